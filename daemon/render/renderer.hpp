@@ -1,0 +1,63 @@
+// Renders the two worlds of a scene and composites them with the plate, progressively.
+#pragma once
+
+#include <functional>
+#include <glm/mat4x4.hpp>
+#include <memory>
+#include <string>
+
+#include "daemon/lighting/environment.hpp"
+#include "daemon/render/layers.hpp"
+#include "daemon/scene/scene.hpp"
+#include "daemon/set/set.hpp"
+#include "drivers/calibration.hpp"
+#include "drivers/frame.hpp"
+
+namespace previz::render {
+
+// A Vulkan 1.3 device with a compute queue. Errors say what is missing and what was found.
+struct DeviceOptions {
+  bool validation = false;  // Khronos validation layer; its messages go to the log and are counted
+  std::string name;         // substring of the device's name; empty: the first discrete, else any
+};
+
+class Device;  // daemon/render/device.hpp
+std::shared_ptr<Device> open_device(const DeviceOptions& options = {});
+std::string device_name(const Device& device);
+std::uint64_t validation_messages(const Device& device);
+
+// One observer frame as the renderer wants it.
+struct FrameInput {
+  Plate plate;                            // samples as captured; empty: composite over black
+  double exposure = 1.0;                  // absolute, of this frame
+  glm::dmat4 world_from_camera{1.0};      // OpenCV camera axes
+};
+
+class Renderer {
+ public:
+  Renderer(std::shared_ptr<Device> device, const set::Estimation& estimation,
+           const ObserverCalibration& calibration);
+  ~Renderer();
+
+  // Uploads; may be called between any two frames (P13). Nothing is precomputed beyond BVHs.
+  void set_scene(const scene::Scene& scene);
+  void set_environment(const lighting::EnvironmentMap& environment, set::LightSampling sampling);
+
+  // Starts a frame: clears what was accumulated.
+  void begin(const FrameInput& frame);
+  // Adds samples to every pixel of the frame begun. The i-th sample of a pixel is the same however
+  // the calls split them (P8). `cancelled` is asked between batches.
+  void render(int samples, const std::function<bool()>& cancelled = {});
+  // Layers of the samples so far.
+  Layers layers() const;
+  // The composite through exposure and response, as the display shows it: the plate's own bits
+  // where nothing virtual touches it.
+  Plate picture() const;
+  Counters counters() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace previz::render

@@ -1,0 +1,150 @@
+// A set: everything one TOML file says about a stage, as typed values. Plain data.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/calibration.hpp"
+
+namespace previz::set {
+
+enum class Driver { none, replay, v4l2, aravis, libcamera };
+
+struct Observer {
+  Driver driver = Driver::replay;
+  std::string device;  // replay: session directory; otherwise the device's stable name
+  // Calibration given here overrides the session's.
+  std::optional<ObserverCalibration> calibration;
+  std::optional<double> exposure;  // absolute; overrides the frames' own
+};
+
+struct LightCamera {
+  Driver driver = Driver::replay;
+  std::string device;
+  std::optional<LightCameraCalibration> calibration;
+  std::optional<double> exposure;
+};
+
+// One AprilTag: outer edge of the black border, metres. Corners in the tag's frame: x right, y up,
+// z out of the paper.
+struct Tag {
+  int id = 0;
+  double size_m = 0;
+  glm::dmat4 world_from_tag{1.0};
+};
+
+enum class Presence { phantom, virtual_object, removed };  // in (mixed, real): (1,1) (1,0) (0,1)
+
+// A glTF file (all its nodes) put into the world. glTF is Y up, the world Z up; world_from_file
+// applies after that conversion.
+struct Object {
+  std::string name;
+  std::filesystem::path file;  // resolved; absolute or relative to the working directory
+  std::string file_as_written;
+  Presence presence = Presence::virtual_object;
+  glm::dmat4 world_from_file{1.0};
+  std::vector<std::string> nodes;  // glTF node names to take; empty: all
+};
+
+enum class LightType { point, spot, directional, rectangle, sphere };
+
+// A lamp of the set. Gains scale its emission in the mixed and in the real world: an added light is
+// (1,0), a real light that stays is (1,1), a dimmed one (g,1).
+struct Light {
+  std::string name;
+  LightType type = LightType::point;
+  glm::dvec3 position{0};           // metres (point, spot, rectangle centre, sphere centre)
+  glm::dvec3 direction{0, 0, -1};   // unit, the way the light travels (spot, directional, rectangle)
+  glm::dvec3 up{0, 1, 0};           // rectangle: direction of its height
+  // point, spot: radiant intensity (W/sr); directional: irradiance on a facing plane (W/m^2);
+  // rectangle, sphere: radiance (W/sr/m^2). Linear Rec. 709.
+  glm::dvec3 emission{1};
+  double width_m = 1, height_m = 1;  // rectangle
+  double radius_m = 0;               // sphere (> 0)
+  double angular_radius_rad = 0;     // directional: 0 is a delta light
+  double inner_cone_rad = 0, outer_cone_rad = 0.785398;  // spot, half angles
+  double gain_mixed = 1, gain_real = 0;
+};
+
+enum class UnseenRule { constant, horizon, mirror };
+enum class LightMode { image };  // sources and hybrid follow
+enum class LightSampling { importance, bsdf };
+
+struct Lighting {
+  LightMode mode = LightMode::image;
+  LightSampling sampling = LightSampling::importance;
+  std::optional<std::filesystem::path> environment;  // EXR, latitude-longitude; instead of a fisheye
+  std::string environment_as_written;
+  double environment_rotation_rad = 0;   // about world Z, counter-clockwise from above
+  double environment_gain = 1;
+  int resolution = 0;                    // octahedral map, texels a side; 0: from the source
+  UnseenRule unseen = UnseenRule::horizon;
+  glm::dvec3 unseen_radiance{0};         // UnseenRule::constant
+  int frame = -1;  // light frame to use; -1: every bracket up to the newest before the observer frame
+};
+
+enum class Estimator { paired };       // difference follows
+enum class Composite { additive };     // ratio and hybrid follow
+
+struct Estimation {
+  Estimator estimator = Estimator::paired;
+  Composite composite = Composite::additive;
+  int max_depth = 16;              // path vertices after the camera, 1..64
+  int roulette_depth = 4;          // Russian roulette from this vertex on
+  std::uint32_t seed = 1;
+  double specular_roughness = 1e-3;  // alpha at or below which a lobe is a Dirac delta
+};
+
+struct Quality {
+  int samples = 16;       // per pixel and frame, 1..1'000'000
+  double scale = 1.0;     // of the observer's resolution, preview only
+};
+
+struct Output {
+  std::filesystem::path directory = "out";
+  bool exr = true;
+  bool png = true;
+  bool video = true;
+};
+
+struct Tracking {
+  bool enabled = true;            // false: poses of the session's track.jsonl are used
+  std::string family = "tag36h11";
+  double decimate = 1.0;
+  double min_margin = 20.0;       // decision margin of a detection
+  int max_hamming = 1;
+  double ambiguity_ratio = 0.2;   // best/second reprojection error above which one tag is ambiguous
+  std::vector<Tag> tags;
+};
+
+struct Set {
+  std::string name;
+  std::filesystem::path file;  // where it was read from, for messages
+  Observer observer;
+  LightCamera light_camera;
+  Tracking tracking;
+  std::vector<Object> objects;
+  std::vector<Light> lights;
+  Lighting lighting;
+  Estimation estimation;
+  Quality quality;
+  Output output;
+};
+
+// Parses TOML text. `file` names it in errors and is what relative paths are relative to;
+// `assets` maps paths as written to other paths (a session's assets). Throws previz::Error whose
+// message holds every problem found, one a line: file:line: key: what is wrong and what is allowed.
+Set parse_set(const std::string& text, const std::filesystem::path& file,
+              const std::vector<std::pair<std::string, std::filesystem::path>>& assets = {});
+Set load_set(const std::filesystem::path& file);
+
+// config/reference.toml: every key with its unit, default and range, from the parser's own table.
+std::string reference_toml();
+
+}  // namespace previz::set

@@ -1,0 +1,42 @@
+// Where the camera is: the one interface a tracking system stands behind (P12).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/frame.hpp"
+
+namespace previz::tracking {
+
+struct Pose {
+  glm::dmat4 world_from_camera{1.0};  // OpenCV camera axes, metres
+  // Row-major 6x6, rotation (rad) then translation (m), perturbation in the camera frame.
+  std::array<double, 36> covariance{};
+  double reprojection_rms_px = 0;
+  std::vector<int> tags;  // ids used
+};
+
+enum class TrackStatus { tracked, ambiguous, lost };
+
+struct Track {
+  TrackStatus status = TrackStatus::lost;
+  std::optional<Pose> pose;          // set only if tracked
+  std::vector<Pose> candidates;      // ambiguous: both poses, better first
+  std::string reason;                // lost or ambiguous: why, in plain words
+  std::vector<int> seen_tags;        // every id detected, of the map or not
+};
+
+class Tracker {
+ public:
+  virtual ~Tracker() = default;
+  // Frames in capture order; a tracker may use the last pose. Never throws for picture content.
+  virtual Track track(const Frame& frame) = 0;
+  // Forgets the last pose (a cut, a seek).
+  virtual void reset() = 0;
+};
+
+}  // namespace previz::tracking

@@ -1,0 +1,62 @@
+// What is known about a camera: lens, pose and response. Plain data, written in sessions and sets.
+#pragma once
+
+#include <array>
+#include <glm/mat4x4.hpp>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace previz {
+
+// Pinhole with Brown-Conrady distortion in OpenCV's order. Pixels; (0,0) is the centre of the
+// top-left pixel.
+struct PinholeIntrinsics {
+  int width = 0, height = 0;
+  double fx = 0, fy = 0, cx = 0, cy = 0;
+  double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
+};
+
+// Kannala-Brandt (OpenCV fisheye): r = t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9, t the angle off axis,
+// u = cx + fx r cos(psi), v = cy + fy r sin(psi). Invalid beyond max_angle_rad.
+struct FisheyeIntrinsics {
+  int width = 0, height = 0;
+  double fx = 0, fy = 0, cx = 0, cy = 0;
+  std::array<double, 4> k{};
+  double max_angle_rad = std::numbers::pi / 2;
+};
+
+// Thin lens with a circular uniform aperture of diameter focal_length_m / f_number; the intrinsics
+// are those of the sharp image. Distances along the optical axis.
+struct ThinLens {
+  double focal_length_m = 0;
+  double f_number = 0;
+  double focus_distance_m = 0;
+};
+
+// The camera's response: value in [0,1] = forward(exposure * radiance), clipped at 1.
+struct ResponseCurve {
+  enum class Kind { srgb, linear, gamma, table };
+  Kind kind = Kind::srgb;
+  double gamma = 2.2;  // Kind::gamma only: value = signal^(1/gamma)
+  // Kind::table only: signal at value i/(n-1), i = 0..n-1; strictly increasing from 0 to 1.
+  std::vector<double> inverse_table;
+};
+
+struct ObserverCalibration {
+  PinholeIntrinsics intrinsics;
+  std::optional<ThinLens> lens;  // absent: pinhole
+  ResponseCurve response;
+  double responsivity = 1.0;  // exposure = exposure_s * gain * responsivity
+};
+
+struct LightCameraCalibration {
+  FisheyeIntrinsics intrinsics;
+  ResponseCurve response;
+  double responsivity = 1.0;
+  // Rigid; OpenCV camera axes (x right, y down, z forward); metres; world Z up.
+  glm::dmat4 world_from_camera{1.0};
+};
+
+}  // namespace previz

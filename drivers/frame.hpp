@@ -1,0 +1,59 @@
+// A picture as a device delivered it: native samples, where it came from, when, and how exposed.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace previz {
+
+// Sample layouts a driver may deliver. 16-bit samples are little-endian, full range 0..65535.
+enum class PixelFormat {
+  rgb8,       // interleaved R,G,B, 8 bit
+  rgb16,      // interleaved R,G,B, 16 bit
+  gray8,      // one plane, 8 bit
+  gray16,     // one plane, 16 bit (also raw Bayer)
+  yuv422p8,   // planar Y, Cb, Cr; chroma half width; BT.709 limited range
+};
+
+// Immutable once published; stages share it by FramePtr.
+struct Frame {
+  std::string source;          // device role: "observer" or "light"
+  std::uint64_t sequence = 0;  // the device's own counter; a gap is a dropped frame
+  std::int64_t timestamp_ns = 0;  // capture time, session clock
+  std::int64_t arrival_ns = 0;    // when the host received it, same clock
+  double exposure_s = 0.0;        // shutter time; 0 where unknown
+  double gain = 1.0;              // linear sensor gain
+  // Absolute exposure: radiance = inverse_response(value) / exposure. Always > 0.
+  double exposure = 1.0;
+  PixelFormat format = PixelFormat::rgb8;
+  int width = 0;   // pixels
+  int height = 0;  // pixels
+  // Rows packed without padding; planes one after the other.
+  std::vector<std::uint8_t> bytes;
+};
+
+using FramePtr = std::shared_ptr<const Frame>;
+
+// Bytes of one frame of this format and size (without padding).
+std::size_t frame_bytes(PixelFormat format, int width, int height);
+
+// The format's name as written in session.toml: "rgb8", "gray16", ...
+const char* to_string(PixelFormat format);
+// Inverse of to_string; throws std::invalid_argument naming the unknown format.
+PixelFormat pixel_format_from_string(const std::string& name);
+
+// The converted RGB plate: interleaved RGB, 8 or 16 bits a sample. "Bit for bit" refers to this.
+struct Plate {
+  int width = 0;
+  int height = 0;
+  int bits = 8;                         // 8 or 16 significant bits a sample
+  std::vector<std::uint16_t> samples;   // 3*width*height, row-major, 0..2^bits-1
+};
+
+// Converts a frame to its RGB plate. gray repeats the sample; yuv422p8 is BT.709 limited range.
+Plate to_plate(const Frame& frame);
+
+}  // namespace previz

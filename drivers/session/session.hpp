@@ -1,0 +1,100 @@
+// The session format: what the devices of a take said, on disk. See docs at the top of session.cpp
+// for the directory layout; the .jsonl files are the truth for time, the .mkv for samples.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <glm/mat4x4.hpp>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/calibration.hpp"
+#include "drivers/frame.hpp"
+
+namespace previz::session {
+
+inline constexpr int format_version = 1;
+
+// session.toml. `set_text` is the set file verbatim; `set_name` the file name to use in errors.
+struct SessionInfo {
+  std::string name;
+  std::string clock = "monotonic";  // what timestamp_ns counts
+  std::string set_name = "set.toml";
+  std::string set_text;
+  std::optional<ObserverCalibration> observer;
+  std::optional<LightCameraCalibration> light;
+  // Paths as the set file writes them -> paths below the session ("assets/<sha256>.glb").
+  std::map<std::string, std::string> assets;
+};
+
+// A line of track.jsonl.
+struct TrackRecord {
+  std::uint64_t frame = 0;  // index of the observer frame
+  std::int64_t timestamp_ns = 0;
+  bool tracked = false;                 // false: lost; the pose is then not valid
+  glm::dmat4 world_from_camera{1.0};    // OpenCV camera axes, metres
+  // Row-major 6x6: rotation (rad) then translation (m), in the camera frame.
+  std::array<double, 36> covariance{};
+  std::vector<int> tags;                // ids used
+};
+
+// A frame of a stream as recorded; `frame` is its position in the .mkv, from 0.
+struct FrameRecord {
+  std::uint64_t frame = 0;
+  std::uint64_t sequence = 0;
+  std::int64_t timestamp_ns = 0;
+  std::int64_t arrival_ns = 0;
+  double exposure_s = 0, gain = 1, exposure = 1;
+};
+
+// Reads one stream (observer or light) in order or by index. Frames come as they were recorded,
+// sample for sample. Not thread-safe.
+class StreamReader {
+ public:
+  virtual ~StreamReader() = default;
+  virtual const std::vector<FrameRecord>& records() const = 0;  // whole frames only
+  // Frame `index`; seeks where it must. Throws previz::Error naming file and frame if unreadable.
+  virtual FramePtr read(std::size_t index) = 0;
+};
+
+// An opened session. Opening a truncated or damaged session succeeds up to its last whole frame;
+// `missing` says in plain words what is not there.
+struct Session {
+  std::filesystem::path directory;
+  SessionInfo info;
+  std::vector<TrackRecord> track;     // empty where nothing was tracked
+  std::vector<std::string> missing;
+};
+
+// Throws previz::Error naming the file (and line) if session.toml cannot be understood.
+Session open_session(const std::filesystem::path& directory);
+// `source` is "observer" or "light"; null where the session has no such stream. What is missing of
+// the stream is appended to session.missing.
+std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& source);
+
+// Writes a session directory; every call leaves a readable session behind. FFV1 in Matroska,
+// lossless; streams open at their first frame. Throws previz::Error naming the file on failure.
+class SessionWriter {
+ public:
+  // The directory must not exist or be empty.
+  SessionWriter(const std::filesystem::path& directory, const SessionInfo& info);
+  ~SessionWriter();
+  SessionWriter(const SessionWriter&) = delete;
+  SessionWriter& operator=(const SessionWriter&) = delete;
+
+  void write(const Frame& frame);  // goes to the stream that frame.source names
+  void write(const TrackRecord& record);
+  // Copies a file into assets/ under its content hash and maps `as_written` to it.
+  void add_asset(const std::string& as_written, const std::filesystem::path& file);
+  void close();  // flushes and finishes the files; the destructor does it too, without throwing
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace previz::session
