@@ -1,0 +1,1 @@
+#include "drivers/frame.hpp"

@@ -1,0 +1,1 @@
+#include "drivers/replay/replay_camera.hpp"
