@@ -1,0 +1,1 @@
+#include "daemon/tracking/apriltag_tracker.hpp"
