@@ -1,0 +1,151 @@
+#include "daemon/output/exr.hpp"
+
+#include <ImathMatrix.h>
+#include <ImfChannelList.h>
+#include <ImfChromaticitiesAttribute.h>
+#include <ImfDoubleAttribute.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
+#include <ImfIntAttribute.h>
+#include <ImfMatrixAttribute.h>
+#include <ImfOutputFile.h>
+#include <ImfStandardAttributes.h>
+#include <ImfStringAttribute.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "daemon/output/file.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::output {
+namespace {
+
+// A layer of three channels and one of a single channel, by the names they have in the file.
+struct ColorLayer {
+  std::array<const char*, 3> channels;
+  std::vector<glm::vec3> render::Layers::*values;
+};
+struct ScalarLayer {
+  const char* channel;
+  std::vector<float> render::Layers::*values;
+};
+
+constexpr std::array color_layers{
+    ColorLayer{{"composite.R", "composite.G", "composite.B"}, &render::Layers::composite},
+    ColorLayer{{"mixed.R", "mixed.G", "mixed.B"}, &render::Layers::mixed},
+    ColorLayer{{"real.R", "real.G", "real.B"}, &render::Layers::real},
+    ColorLayer{{"diff.R", "diff.G", "diff.B"}, &render::Layers::diff},
+    ColorLayer{{"normal.X", "normal.Y", "normal.Z"}, &render::Layers::normal},
+    ColorLayer{{"variance.R", "variance.G", "variance.B"}, &render::Layers::variance},
+};
+constexpr std::array scalar_layers{
+    ScalarLayer{"mask.Y", &render::Layers::mask},
+    ScalarLayer{"depth.Z", &render::Layers::depth},
+};
+
+// OpenEXR's slices take a mutable pointer for reading and writing alike.
+Imf::Slice slice(const float* first, std::size_t floats_a_pixel, int width) {
+  const std::size_t stride = floats_a_pixel * sizeof(float);
+  return Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(first)), stride,
+                    stride * static_cast<std::size_t>(width));
+}
+
+Imf::FrameBuffer frame_buffer(const render::Layers& layers) {
+  Imf::FrameBuffer buffer;
+  for (const ColorLayer& layer : color_layers)
+    for (int i = 0; i < 3; ++i)
+      buffer.insert(layer.channels[i], slice(&(layers.*layer.values)[0][i], 3, layers.width));
+  for (const ScalarLayer& layer : scalar_layers)
+    buffer.insert(layer.channel, slice((layers.*layer.values).data(), 1, layers.width));
+  return buffer;
+}
+
+Imf::Header header(const render::Layers& layers, const ExrMetadata& metadata) {
+  Imf::Header header(layers.width, layers.height);
+  header.compression() = Imf::ZIP_COMPRESSION;
+  for (const ColorLayer& layer : color_layers)
+    for (const char* channel : layer.channels)
+      header.channels().insert(channel, Imf::Channel(Imf::FLOAT));
+  for (const ScalarLayer& layer : scalar_layers)
+    header.channels().insert(layer.channel, Imf::Channel(Imf::FLOAT));
+
+  // The defaults of Imf::Chromaticities are Rec. 709 with D65.
+  Imf::addChromaticities(header, Imf::Chromaticities());
+  header.insert("software", Imf::StringAttribute("previzd " PREVIZ_VERSION));
+  header.insert("previz.set", Imf::StringAttribute(metadata.set_name));
+  header.insert("previz.pose", Imf::StringAttribute(metadata.pose));
+  header.insert("previz.exposure", Imf::DoubleAttribute(metadata.exposure));
+  header.insert("previz.timestamp_ns", Imf::StringAttribute(std::to_string(metadata.timestamp_ns)));
+  header.insert("previz.samples", Imf::IntAttribute(static_cast<int>(std::min<std::int64_t>(
+                                      layers.samples, std::numeric_limits<int>::max()))));
+  if (metadata.pose == "tracked") {
+    Imath::M44d matrix;
+    for (int row = 0; row < 4; ++row)
+      for (int column = 0; column < 4; ++column)
+        matrix[row][column] = metadata.world_from_camera[column][row];
+    header.insert("previz.world_from_camera", Imf::M44dAttribute(matrix));
+  }
+  return header;
+}
+
+void require_whole(const std::filesystem::path& path, const render::Layers& layers) {
+  const std::size_t pixels = std::size_t(layers.width) * std::size_t(layers.height);
+  for (const ColorLayer& layer : color_layers)
+    if (pixels == 0 || (layers.*layer.values).size() != pixels)
+      throw Error(path.string() + ": layer " + layer.channels[0] + " does not fill the picture");
+  for (const ScalarLayer& layer : scalar_layers)
+    if ((layers.*layer.values).size() != pixels)
+      throw Error(path.string() + ": layer " + layer.channel + " does not fill the picture");
+}
+
+}  // namespace
+
+void write_exr(const std::filesystem::path& path, const render::Layers& layers,
+               const ExrMetadata& metadata) {
+  require_whole(path, layers);
+  render::Layers written = layers;
+  for (std::size_t i = 0; i < written.diff.size(); ++i) written.diff[i] *= 1.0f - written.mask[i];
+  try {
+    write_whole(path, [&](const std::filesystem::path& unfinished) {
+      Imf::OutputFile file(unfinished.c_str(), header(written, metadata));
+      file.setFrameBuffer(frame_buffer(written));
+      file.writePixels(written.height);
+    });
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw Error(path.string() + ": cannot be written: " + error.what());
+  }
+}
+
+render::Layers read_exr(const std::filesystem::path& path) {
+  try {
+    Imf::InputFile file(path.c_str());
+    const Imath::Box2i window = file.header().dataWindow();
+    render::Layers layers;
+    layers.width = window.max.x - window.min.x + 1;
+    layers.height = window.max.y - window.min.y + 1;
+    const std::size_t pixels = std::size_t(layers.width) * std::size_t(layers.height);
+    for (const ColorLayer& layer : color_layers) (layers.*layer.values).resize(pixels);
+    for (const ScalarLayer& layer : scalar_layers) (layers.*layer.values).resize(pixels);
+
+    const Imf::FrameBuffer buffer = frame_buffer(layers);
+    for (auto channel = buffer.begin(); channel != buffer.end(); ++channel)
+      if (!file.header().channels().findChannel(channel.name()))
+        throw Error(path.string() + ": has no channel " + channel.name());
+    if (const auto* samples = file.header().findTypedAttribute<Imf::IntAttribute>("previz.samples"))
+      layers.samples = samples->value();
+    file.setFrameBuffer(buffer);
+    file.readPixels(window.min.y, window.max.y);
+    return layers;
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& error) {
+    throw Error(path.string() + ": cannot be read: " + error.what());
+  }
+}
+
+}  // namespace previz::output

@@ -1,0 +1,39 @@
+// One frame as one multi-layer OpenEXR file: every layer of the render, linear, 32-bit float.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <glm/mat4x4.hpp>
+#include <string>
+
+#include "daemon/render/layers.hpp"
+
+namespace previz::output {
+
+// What stands in the file's header beside the picture. Attribute names:
+//   software (string), chromaticities (Rec. 709, D65),
+//   previz.samples (int), previz.exposure (double), previz.timestamp_ns (string; EXR has no 64-bit
+//   integers), previz.set (string), previz.pose (string: "tracked", "lost" or "ambiguous"),
+//   previz.world_from_camera (m44d; element [row][column] as the matrix is written, it multiplies
+//   column vectors; OpenCV camera axes, metres; absent unless the pose is tracked).
+struct ExrMetadata {
+  double exposure = 1;
+  std::int64_t timestamp_ns = 0;
+  std::string set_name;
+  std::string pose = "tracked";
+  glm::dmat4 world_from_camera{1.0};
+};
+
+// Channels, 32-bit float, ZIP compressed: composite.R/.G/.B, mixed.R/.G/.B, real.R/.G/.B,
+// diff.R/.G/.B, mask.Y, depth.Z, normal.X/.Y/.Z, variance.R/.G/.B.
+// diff is what virtual things do to real pixels: (1 - mask) * (Lm - Lr), which is Lm - Lr where the
+// mask is 0 and 0 where it is 1. The file appears whole or not at all; throws previz::Error naming
+// it on failure.
+void write_exr(const std::filesystem::path& path, const render::Layers& layers,
+               const ExrMetadata& metadata);
+
+// Reads the layers of a file that write_exr wrote (diff comes back as written, so multiplied by
+// 1 - mask). Throws previz::Error naming the file and the channel that is missing.
+render::Layers read_exr(const std::filesystem::path& path);
+
+}  // namespace previz::output

@@ -1,0 +1,53 @@
+#include "daemon/output/file.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <system_error>
+
+#include "drivers/error.hpp"
+
+namespace previz::output {
+
+std::filesystem::path unfinished_name(const std::filesystem::path& path) {
+  return std::filesystem::path(path) += ".part";
+}
+
+void finish(const std::filesystem::path& unfinished, const std::filesystem::path& path) {
+  const int descriptor = ::open(unfinished.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool synced = descriptor >= 0 && ::fsync(descriptor) == 0;
+  const int error = errno;
+  if (descriptor >= 0) ::close(descriptor);
+  if (!synced)
+    throw Error(unfinished.string() + ": cannot be written to disk: " + std::strerror(error));
+  std::error_code code;
+  std::filesystem::rename(unfinished, path, code);
+  if (code) throw Error(path.string() + ": cannot be put in place: " + code.message());
+}
+
+void write_whole(const std::filesystem::path& path,
+                 const std::function<void(const std::filesystem::path&)>& write) {
+  const std::filesystem::path unfinished = unfinished_name(path);
+  try {
+    write(unfinished);
+    finish(unfinished, path);
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove(unfinished, ignored);
+    throw;
+  }
+}
+
+void write_text(const std::filesystem::path& path, std::string_view text) {
+  write_whole(path, [&](const std::filesystem::path& unfinished) {
+    std::ofstream file(unfinished, std::ios::binary);
+    file.write(text.data(), static_cast<std::streamsize>(text.size()));
+    file.close();
+    if (!file) throw Error(path.string() + ": cannot be written: " + std::strerror(errno));
+  });
+}
+
+}  // namespace previz::output

@@ -1,0 +1,25 @@
+// Files that are whole or not there: written beside their place, synced, then renamed into it.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string_view>
+
+namespace previz::output {
+
+// The name `write_whole` and the video writer use until a file is finished: "<path>.part".
+std::filesystem::path unfinished_name(const std::filesystem::path& path);
+
+// Calls `write` with the unfinished name, then syncs that file to disk and renames it to `path`.
+// If `write` throws, the unfinished file is removed and the exception passes on. Throws
+// previz::Error naming the file if it cannot be synced or renamed.
+void write_whole(const std::filesystem::path& path,
+                 const std::function<void(const std::filesystem::path& unfinished)>& write);
+
+// The same for a file whose content is already in memory.
+void write_text(const std::filesystem::path& path, std::string_view text);
+
+// Syncs and renames an unfinished file somebody else wrote.
+void finish(const std::filesystem::path& unfinished, const std::filesystem::path& path);
+
+}  // namespace previz::output

@@ -1,0 +1,17 @@
+// Pictures as the display shows them: PNG, RGB, 8 or 16 bits a sample as the plate has them.
+#pragma once
+
+#include <filesystem>
+
+#include "drivers/frame.hpp"
+
+namespace previz::output {
+
+// Lossless; the file appears whole or not at all. Throws previz::Error naming the file.
+void write_png(const std::filesystem::path& path, const Plate& picture);
+
+// Reads an RGB, RGBA or gray PNG of 8 or 16 bits; alpha is dropped, gray is repeated. Throws
+// previz::Error naming the file and what is wrong with it.
+Plate read_png(const std::filesystem::path& path);
+
+}  // namespace previz::output

@@ -1,0 +1,151 @@
+// The EXR that carries every layer: exact names, exact values, honest header.
+#include "daemon/output/exr.hpp"
+
+#include <ImfChannelList.h>
+#include <ImfChromaticitiesAttribute.h>
+#include <ImfDoubleAttribute.h>
+#include <ImfInputFile.h>
+#include <ImfIntAttribute.h>
+#include <ImfMatrixAttribute.h>
+#include <ImfStandardAttributes.h>
+#include <ImfStringAttribute.h>
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "daemon/output/file.hpp"
+#include "drivers/error.hpp"
+#include "tests/unit/temporary_directory.hpp"
+
+namespace previz::output {
+namespace {
+
+using test::TemporaryDirectory;
+
+// Every value different, with negative, tiny and huge ones, so that swapped channels cannot hide.
+render::Layers sample_layers(int width, int height) {
+  render::Layers layers;
+  layers.width = width;
+  layers.height = height;
+  layers.samples = 256;
+  float next = 0.001f;
+  const auto value = [&] { return next = next * -1.01f - 0.37f; };
+  for (int i = 0; i < width * height; ++i) {
+    for (auto* layer : {&layers.composite, &layers.mixed, &layers.real, &layers.diff,
+                        &layers.normal, &layers.variance})
+      layer->emplace_back(value(), 1e-20f * value(), 1e20f * value());
+    layers.mask.push_back(i % 3 == 0 ? 0.0f : i % 3 == 1 ? 0.25f : 1.0f);
+    layers.depth.push_back(value());
+  }
+  return layers;
+}
+
+TEST(Exr, ChannelsAreExactlyTheNamedOnesIn32BitFloat) {
+  const TemporaryDirectory directory;
+  write_exr(directory / "frame.exr", sample_layers(5, 3), {});
+  const Imf::InputFile file((directory / "frame.exr").c_str());
+  std::set<std::string> names;
+  const Imf::ChannelList& channels = file.header().channels();
+  for (auto channel = channels.begin(); channel != channels.end(); ++channel) {
+    names.insert(channel.name());
+    EXPECT_EQ(channel.channel().type, Imf::FLOAT) << channel.name();
+  }
+  const std::set<std::string> expected{"composite.R", "composite.G", "composite.B", "mixed.R",
+                                       "mixed.G",     "mixed.B",     "real.R",      "real.G",
+                                       "real.B",      "diff.R",      "diff.G",      "diff.B",
+                                       "mask.Y",      "depth.Z",     "normal.X",    "normal.Y",
+                                       "normal.Z",    "variance.R",  "variance.G",  "variance.B"};
+  EXPECT_EQ(names, expected);
+  EXPECT_EQ(file.header().compression(), Imf::ZIP_COMPRESSION);
+}
+
+TEST(Exr, EveryValueComesBackBitForBit) {
+  const TemporaryDirectory directory;
+  const render::Layers written = sample_layers(7, 4);
+  write_exr(directory / "frame.exr", written, {});
+  const render::Layers read = read_exr(directory / "frame.exr");
+  EXPECT_EQ(read.width, 7);
+  EXPECT_EQ(read.height, 4);
+  EXPECT_EQ(read.samples, 256);
+  EXPECT_EQ(read.composite, written.composite);
+  EXPECT_EQ(read.mixed, written.mixed);
+  EXPECT_EQ(read.real, written.real);
+  EXPECT_EQ(read.normal, written.normal);
+  EXPECT_EQ(read.variance, written.variance);
+  EXPECT_EQ(read.mask, written.mask);
+  EXPECT_EQ(read.depth, written.depth);
+}
+
+TEST(Exr, DifferenceIsThatOfTheUncoveredPart) {
+  const TemporaryDirectory directory;
+  const render::Layers written = sample_layers(6, 2);
+  write_exr(directory / "frame.exr", written, {});
+  const render::Layers read = read_exr(directory / "frame.exr");
+  for (std::size_t i = 0; i < written.diff.size(); ++i)
+    EXPECT_EQ(read.diff[i], written.diff[i] * (1.0f - written.mask[i])) << i;
+}
+
+TEST(Exr, HeaderSaysWhatThePictureIs) {
+  const TemporaryDirectory directory;
+  ExrMetadata metadata{1.25, 1'700'000'000'567'008'006, "glass", "tracked", glm::dmat4(1.0)};
+  metadata.world_from_camera[3] = {0.5, -0.25, 2.0, 1.0};  // glm: the fourth column
+  write_exr(directory / "frame.exr", sample_layers(2, 2), metadata);
+  const Imf::InputFile file((directory / "frame.exr").c_str());
+  const Imf::Header& header = file.header();
+  EXPECT_EQ(header.typedAttribute<Imf::IntAttribute>("previz.samples").value(), 256);
+  EXPECT_EQ(header.typedAttribute<Imf::DoubleAttribute>("previz.exposure").value(), 1.25);
+  EXPECT_EQ(header.typedAttribute<Imf::StringAttribute>("previz.timestamp_ns").value(),
+            "1700000000567008006");
+  EXPECT_EQ(header.typedAttribute<Imf::StringAttribute>("previz.set").value(), "glass");
+  EXPECT_EQ(header.typedAttribute<Imf::StringAttribute>("previz.pose").value(), "tracked");
+  const Imath::M44d& pose =
+      header.typedAttribute<Imf::M44dAttribute>("previz.world_from_camera").value();
+  EXPECT_EQ(pose[0][3], 0.5);
+  EXPECT_EQ(pose[1][3], -0.25);
+  EXPECT_EQ(pose[2][3], 2.0);
+  EXPECT_EQ(pose[3][0], 0.0);
+  ASSERT_TRUE(Imf::hasChromaticities(header));
+  EXPECT_FLOAT_EQ(Imf::chromaticities(header).red.x, 0.64f);
+  EXPECT_FLOAT_EQ(Imf::chromaticities(header).white.x, 0.3127f);
+}
+
+TEST(Exr, LostPoseIsNotWritten) {
+  const TemporaryDirectory directory;
+  write_exr(directory / "frame.exr", sample_layers(2, 2), {1, 0, "glass", "lost", glm::dmat4(1)});
+  const Imf::InputFile file((directory / "frame.exr").c_str());
+  EXPECT_EQ(file.header().findTypedAttribute<Imf::M44dAttribute>("previz.world_from_camera"),
+            nullptr);
+}
+
+TEST(Exr, IncompleteLayersAreRefusedAndLeaveNoFile) {
+  const TemporaryDirectory directory;
+  render::Layers layers = sample_layers(4, 4);
+  layers.depth.pop_back();
+  EXPECT_THROW(write_exr(directory / "frame.exr", layers, {}), Error);
+  EXPECT_FALSE(std::filesystem::exists(directory / "frame.exr"));
+}
+
+TEST(Exr, UnwritablePlaceIsNamed) {
+  try {
+    write_exr("/nowhere/at/all/frame.exr", sample_layers(1, 1), {});
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("/nowhere/at/all/frame.exr"), std::string::npos);
+  }
+}
+
+TEST(WriteWhole, LeavesNothingWhenTheWriterThrows) {
+  const TemporaryDirectory directory;
+  write_text(directory / "a.txt", "old");
+  EXPECT_THROW(write_whole(directory / "a.txt",
+                           [](const std::filesystem::path& unfinished) {
+                             write_text(unfinished, "half");
+                             throw Error("power cut");
+                           }),
+               Error);
+  EXPECT_EQ(std::filesystem::file_size(directory / "a.txt"), 3u);  // still "old"
+  EXPECT_FALSE(std::filesystem::exists(unfinished_name(directory / "a.txt")));
+}
+
+}  // namespace
+}  // namespace previz::output
