@@ -1,0 +1,202 @@
+#include "tests/truth/cpu_bsdf.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+namespace previz::truth {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+double mean(const glm::dvec3& c) {
+  return (c.x + c.y + c.z) / 3;
+}
+
+glm::dvec3 schlick(const glm::dvec3& f0, double cosine) {
+  return f0 + (1.0 - f0) * std::pow(1 - std::clamp(cosine, 0.0, 1.0), 5);
+}
+
+// Orthonormal frame around n (Duff et al. 2017).
+struct Frame {
+  glm::dvec3 x, y, z;
+  explicit Frame(const glm::dvec3& n) : z(n) {
+    const double sign = std::copysign(1.0, n.z);
+    const double a = -1 / (sign + n.z);
+    const double b = n.x * n.y * a;
+    x = {1 + sign * n.x * n.x * a, sign * b, -sign * n.x};
+    y = {b, sign + n.y * n.y * a, -n.y};
+  }
+  glm::dvec3 local(const glm::dvec3& v) const {
+    return {glm::dot(v, x), glm::dot(v, y), glm::dot(v, z)};
+  }
+  glm::dvec3 world(const glm::dvec3& v) const { return v.x * x + v.y * y + v.z * z; }
+};
+
+// GGX (Walter et al. 2007) with the height-correlated Smith term (Heitz 2014).
+double ggx_distribution(double nh, double alpha) {
+  const double a2 = alpha * alpha;
+  const double d = nh * nh * (a2 - 1) + 1;
+  return a2 / (pi * d * d);
+}
+double smith_lambda_root(double cosine, double alpha) {
+  const double a2 = alpha * alpha;
+  return std::sqrt(a2 + (1 - a2) * cosine * cosine);
+}
+// D G2 / (4 nl nv)
+double ggx_brdf(double nl, double nv, double nh, double alpha) {
+  return ggx_distribution(nh, alpha) * 0.5 /
+         (nl * smith_lambda_root(nv, alpha) + nv * smith_lambda_root(nl, alpha));
+}
+// Density of wi when the half vector is drawn from the visible normals (Heitz 2018).
+double ggx_pdf(double nv, double nh, double alpha) {
+  return ggx_distribution(nh, alpha) * 0.5 / (nv + smith_lambda_root(nv, alpha));
+}
+glm::dvec3 sample_visible_normal(const glm::dvec3& v, double alpha, glm::dvec2 random) {
+  const glm::dvec3 stretched = glm::normalize(glm::dvec3(alpha * v.x, alpha * v.y, v.z));
+  const Frame frame(stretched);
+  const double r = std::sqrt(random.x);
+  const double phi = 2 * pi * random.y;
+  const double t1 = r * std::cos(phi);
+  const double s = 0.5 * (1 + stretched.z);
+  // The frame's axes must be those of the projected hemisphere: x horizontal.
+  const glm::dvec3 horizontal =
+      stretched.z < 0.9999999 ? glm::normalize(glm::dvec3(-stretched.y, stretched.x, 0)) : frame.x;
+  const glm::dvec3 vertical = glm::cross(stretched, horizontal);
+  const double t2 = (1 - s) * std::sqrt(1 - t1 * t1) + s * r * std::sin(phi);
+  const glm::dvec3 n =
+      t1 * horizontal + t2 * vertical + std::sqrt(std::max(0.0, 1 - t1 * t1 - t2 * t2)) * stretched;
+  return glm::normalize(glm::dvec3(alpha * n.x, alpha * n.y, std::max(0.0, n.z)));
+}
+
+// What each lobe reflects, and how likely sample() takes it.
+struct Lobes {
+  double nv = 0;
+  double plastic_fresnel = 0;                   // s Fr(N.V)
+  double diffuse = 0, specular = 0, glass = 0;  // probabilities, sum 1 unless nothing reflects
+};
+
+Lobes lobes_of(const Bsdf& bsdf, const ShadingPoint& point) {
+  Lobes lobes;
+  lobes.nv = glm::dot(point.shading_normal, point.wo);
+  lobes.plastic_fresnel =
+      bsdf.specular * fresnel_dielectric(std::clamp(lobes.nv, 0.0, 1.0), bsdf.ior);
+  const double opaque = (1 - bsdf.metallic) * (1 - bsdf.transmission);
+  lobes.diffuse = opaque * (1 - lobes.plastic_fresnel) * mean(bsdf.base_color);
+  lobes.glass = (1 - bsdf.metallic) * bsdf.transmission;
+  if (lobes.nv > 0) {
+    lobes.specular =
+        opaque * lobes.plastic_fresnel + bsdf.metallic * mean(schlick(bsdf.base_color, lobes.nv));
+  }
+  const double sum = lobes.diffuse + lobes.specular + lobes.glass;
+  if (sum > 0) {
+    lobes.diffuse /= sum;
+    lobes.specular /= sum;
+    lobes.glass /= sum;
+  }
+  return lobes;
+}
+
+std::optional<BsdfSample> sample_glass(const Bsdf& bsdf, const ShadingPoint& point, double nv,
+                                       double probability, Random& random) {
+  if (nv <= 0) return std::nullopt;
+  const glm::dvec3& n = point.shading_normal;
+  const double eta = bsdf.thin_walled || point.outside ? bsdf.ior : 1 / bsdf.ior;
+  double reflectance = fresnel_dielectric(nv, eta);
+  if (bsdf.thin_walled) reflectance = 2 * reflectance / (1 + reflectance);
+  const glm::dvec3 weight((1 - bsdf.metallic) * bsdf.transmission / probability);
+  if (random.uniform() < reflectance) {
+    const glm::dvec3 wi = 2 * nv * n - point.wo;
+    if (glm::dot(wi, point.geometric_normal) <= 0) return std::nullopt;
+    return BsdfSample{wi, weight, 0, true};
+  }
+  glm::dvec3 wi = -point.wo;
+  if (!bsdf.thin_walled) {
+    const double cos_behind = std::sqrt(std::max(0.0, 1 - (1 - nv * nv) / (eta * eta)));
+    wi = glm::normalize((nv / eta - cos_behind) * n - point.wo / eta);
+  }
+  if (glm::dot(wi, point.geometric_normal) >= 0) return std::nullopt;
+  const bool tinted = bsdf.thin_walled || point.outside;
+  return BsdfSample{wi, tinted ? weight * bsdf.base_color : weight, 0, true};
+}
+
+}  // namespace
+
+double fresnel_dielectric(double cos_incident, double eta) {
+  const double sin2_behind = (1 - cos_incident * cos_incident) / (eta * eta);
+  if (sin2_behind >= 1) return 1;
+  const double cos_behind = std::sqrt(1 - sin2_behind);
+  const double parallel = (eta * cos_incident - cos_behind) / (eta * cos_incident + cos_behind);
+  const double perpendicular =
+      (cos_incident - eta * cos_behind) / (cos_incident + eta * cos_behind);
+  return 0.5 * (parallel * parallel + perpendicular * perpendicular);
+}
+
+bool only_dirac(const Bsdf& bsdf) {
+  const bool diffuse = bsdf.metallic < 1 && bsdf.transmission < 1;
+  const bool rough = !bsdf.smooth && (diffuse || bsdf.metallic > 0);
+  return !diffuse && !rough;
+}
+
+glm::dvec3 evaluate(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& wi) {
+  const double nl = glm::dot(point.shading_normal, wi);
+  if (nl <= 0 || glm::dot(point.geometric_normal, wi) <= 0) return glm::dvec3(0);
+  const Lobes lobes = lobes_of(bsdf, point);
+  const double opaque = (1 - bsdf.metallic) * (1 - bsdf.transmission);
+  glm::dvec3 f = opaque * (1 - lobes.plastic_fresnel) / pi * bsdf.base_color;
+  if (!bsdf.smooth && lobes.nv > 0) {
+    const glm::dvec3 h = glm::normalize(point.wo + wi);
+    const double brdf = ggx_brdf(nl, lobes.nv, glm::dot(point.shading_normal, h), bsdf.alpha);
+    f += brdf * (opaque * lobes.plastic_fresnel +
+                 bsdf.metallic * schlick(bsdf.base_color, glm::dot(point.wo, h)));
+  }
+  return f * nl;
+}
+
+double pdf(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& wi) {
+  const double nl = glm::dot(point.shading_normal, wi);
+  if (nl <= 0 || glm::dot(point.geometric_normal, wi) <= 0) return 0;
+  const Lobes lobes = lobes_of(bsdf, point);
+  double sum = lobes.diffuse * nl / pi;
+  if (!bsdf.smooth && lobes.specular > 0) {
+    const glm::dvec3 h = glm::normalize(point.wo + wi);
+    sum += lobes.specular * ggx_pdf(lobes.nv, glm::dot(point.shading_normal, h), bsdf.alpha);
+  }
+  return sum;
+}
+
+std::optional<BsdfSample> sample(const Bsdf& bsdf, const ShadingPoint& point, Random& random) {
+  const Lobes lobes = lobes_of(bsdf, point);
+  double choice = random.uniform();
+  if ((choice -= lobes.glass) < 0) {
+    return sample_glass(bsdf, point, lobes.nv, lobes.glass, random);
+  }
+  const glm::dvec3& n = point.shading_normal;
+  const Frame frame(n);
+  glm::dvec3 wi;
+  if ((choice -= lobes.specular) < 0) {
+    if (bsdf.smooth) {
+      wi = 2 * lobes.nv * n - point.wo;
+      if (glm::dot(wi, point.geometric_normal) <= 0) return std::nullopt;
+      const double opaque = (1 - bsdf.metallic) * (1 - bsdf.transmission);
+      const glm::dvec3 weight =
+          opaque * lobes.plastic_fresnel + bsdf.metallic * schlick(bsdf.base_color, lobes.nv);
+      return BsdfSample{wi, weight / lobes.specular, 0, true};
+    }
+    const glm::dvec3 wo = frame.local(point.wo);
+    const glm::dvec3 h = sample_visible_normal(wo, bsdf.alpha, random.uniform2());
+    wi = frame.world(2 * glm::dot(wo, h) * h - wo);
+  } else if (lobes.diffuse > 0) {
+    const glm::dvec2 u = random.uniform2();
+    const double r = std::sqrt(u.x);
+    wi = frame.world({r * std::cos(2 * pi * u.y), r * std::sin(2 * pi * u.y), std::sqrt(1 - u.x)});
+  } else {
+    return std::nullopt;
+  }
+  const double density = pdf(bsdf, point, wi);
+  if (!(density > 0)) return std::nullopt;
+  return BsdfSample{wi, evaluate(bsdf, point, wi) / density, density, false};
+}
+
+}  // namespace previz::truth

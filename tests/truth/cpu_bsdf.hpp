@@ -1,0 +1,51 @@
+// The material model of the reference tracer, in double precision. README.md states every choice.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <optional>
+
+#include "tests/truth/cpu_random.hpp"
+
+namespace previz::truth {
+
+// A scene::Material at one point, textures applied.
+struct Bsdf {
+  glm::dvec3 base_color{1};
+  double metallic = 0;
+  double alpha = 1;     // GGX width, roughness^2
+  bool smooth = false;  // alpha at or below the threshold: the specular lobe is a Dirac delta
+  double specular = 1;
+  double ior = 1.5;
+  double transmission = 0;
+  bool thin_walled = true;
+};
+
+// Unit vectors; both normals are on the viewer's side of the surface, wo points to the viewer.
+struct ShadingPoint {
+  glm::dvec3 geometric_normal{0, 0, 1};
+  glm::dvec3 shading_normal{0, 0, 1};
+  glm::dvec3 wo{0, 0, 1};
+  bool outside = true;  // the viewer is on the side the triangle's winding faces
+};
+
+struct BsdfSample {
+  glm::dvec3 wi{0, 0, 1};
+  glm::dvec3 weight{0};  // f |cos| / pdf; for a Dirac lobe its weight over the lobe's probability
+  double pdf = 0;        // per steradian; 0 for a Dirac lobe
+  bool dirac = false;
+};
+
+// Exact unpolarised reflectance of a smooth dielectric; eta = ior behind / ior in front,
+// cos_incident in [0, 1]. 1 at total internal reflection.
+double fresnel_dielectric(double cos_incident, double eta);
+
+// f * cos of the lobes that are not Dirac deltas.
+glm::dvec3 evaluate(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& wi);
+// Density of sample() over directions that come from the lobes that are not Dirac deltas.
+double pdf(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& wi);
+// Nothing where the path is absorbed.
+std::optional<BsdfSample> sample(const Bsdf& bsdf, const ShadingPoint& point, Random& random);
+// True where evaluate() is zero everywhere.
+bool only_dirac(const Bsdf& bsdf);
+
+}  // namespace previz::truth

@@ -1,0 +1,68 @@
+#include "tests/truth/cpu_material.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/vec4.hpp>
+
+namespace previz::truth {
+namespace {
+
+std::size_t wrapped(double index, int size, scene::Wrap wrap) {
+  const auto i = static_cast<std::int64_t>(index);
+  const std::int64_t n = size;
+  switch (wrap) {
+    case scene::Wrap::repeat:
+      return static_cast<std::size_t>(((i % n) + n) % n);
+    case scene::Wrap::clamp:
+      return static_cast<std::size_t>(std::clamp<std::int64_t>(i, 0, n - 1));
+    case scene::Wrap::mirror:
+      break;
+  }
+  const std::int64_t folded = ((i % (2 * n)) + 2 * n) % (2 * n);
+  return static_cast<std::size_t>(folded < n ? folded : 2 * n - 1 - folded);
+}
+
+// Texel (i, j) covers [i, i + 1) x [j, j + 1) of (u width, v height); v = 0 is the first row.
+glm::dvec4 look_up(const scene::Scene& scene, std::uint32_t index, const glm::dvec2& uv) {
+  if (index == scene::no_texture) return glm::dvec4(1);
+  const scene::Texture& texture = scene.textures[index];
+  const auto texel = [&](double i, double j) {
+    return glm::dvec4(texture.texels[wrapped(j, texture.height, texture.wrap_v) *
+                                         static_cast<std::size_t>(texture.width) +
+                                     wrapped(i, texture.width, texture.wrap_u)]);
+  };
+  const glm::dvec2 p = uv * glm::dvec2(texture.width, texture.height);
+  if (texture.nearest) return texel(std::floor(p.x), std::floor(p.y));
+  const glm::dvec2 low = glm::floor(p - 0.5);
+  const glm::dvec2 f = p - 0.5 - low;
+  return (1 - f.y) * ((1 - f.x) * texel(low.x, low.y) + f.x * texel(low.x + 1, low.y)) +
+         f.y * ((1 - f.x) * texel(low.x, low.y + 1) + f.x * texel(low.x + 1, low.y + 1));
+}
+
+}  // namespace
+
+Bsdf bsdf_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2& uv,
+             double specular_roughness) {
+  const scene::Material& m = scene.materials[scene.instances[instance].material];
+  const glm::dvec4 metallic_roughness = look_up(scene, m.metallic_roughness_texture, uv);
+  const double roughness = m.roughness * metallic_roughness.y;
+  Bsdf b;
+  b.base_color = glm::dvec3(m.base_color) * glm::dvec3(look_up(scene, m.base_color_texture, uv));
+  b.metallic = m.metallic * metallic_roughness.z;
+  b.alpha = roughness * roughness;
+  b.smooth = b.alpha <= specular_roughness;
+  b.specular = m.specular;
+  b.ior = m.ior;
+  b.transmission = m.transmission;
+  b.thin_walled = m.thin_walled;
+  return b;
+}
+
+glm::dvec3 emission_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2& uv) {
+  const scene::Material& m = scene.materials[scene.instances[instance].material];
+  if (m.emission == glm::vec3(0)) return glm::dvec3(0);
+  return glm::dvec3(m.emission) * glm::dvec3(look_up(scene, m.emission_texture, uv));
+}
+
+}  // namespace previz::truth

@@ -1,0 +1,287 @@
+#include "tests/truth/cpu_tracer.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <future>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <limits>
+
+#include "drivers/error.hpp"
+#include "tests/truth/cpu_camera.hpp"
+#include "tests/truth/cpu_environment.hpp"
+#include "tests/truth/cpu_geometry.hpp"
+#include "tests/truth/cpu_lights.hpp"
+#include "tests/truth/cpu_material.hpp"
+
+namespace previz::truth {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr int roulette_depth = 4;
+
+double power_heuristic(double taken, double other) {
+  return taken * taken / (taken * taken + other * other);
+}
+
+double largest(const glm::dvec3& c) {
+  return std::max({c.x, c.y, c.z});
+}
+
+// One world seen from one camera position: all that the integrator needs.
+struct World {
+  const scene::Scene& scene;
+  const Environment& environment;
+  const Geometry& geometry;
+  const TraceOptions& options;
+  std::uint32_t bit;
+  std::vector<set::Light> lamps;  // relative to the camera, gain applied
+  EmissiveMeshes emissive;
+};
+
+std::vector<set::Light> placed_lamps(const scene::Scene& scene, const glm::dvec3& origin,
+                                     std::uint32_t world) {
+  std::vector<set::Light> lamps = scene.lights;
+  for (set::Light& lamp : lamps) {
+    lamp.position -= origin;
+    lamp.emission *= world == scene::world_mixed ? lamp.gain_mixed : lamp.gain_real;
+  }
+  std::erase_if(lamps, [](const set::Light& lamp) { return lamp.emission == glm::dvec3(0); });
+  return lamps;
+}
+
+// A surface point of the path, ready for shading.
+struct Vertex {
+  const Hit& hit;
+  Bsdf bsdf;
+  ShadingPoint point;
+  // Where a ray leaving on the viewer's side, or the other one, starts.
+  glm::dvec3 start(const glm::dvec3& direction) const {
+    const double side = glm::dot(direction, point.geometric_normal) < 0 ? -1 : 1;
+    return hit.position + side * hit.offset * point.geometric_normal;
+  }
+};
+
+Vertex vertex_at(const World& world, const Hit& hit, const glm::dvec3& wo) {
+  const double side = glm::dot(hit.geometric_normal, wo) < 0 ? -1 : 1;
+  return {hit,
+          bsdf_at(world.scene, hit.instance, hit.uv, world.options.specular_roughness),
+          {side * hit.geometric_normal, side * hit.shading_normal, wo, side > 0}};
+}
+
+// What a ray meets that shines: every lamp it crosses, then the surface or the environment behind
+// them. `bsdf_pdf` 0: no light sample competes.
+glm::dvec3 emitted(const World& world, const Ray& ray, const std::optional<Hit>& hit,
+                   double bsdf_pdf) {
+  const auto weight = [&](double light_pdf) {
+    return bsdf_pdf > 0 ? power_heuristic(bsdf_pdf, light_pdf) : 1.0;
+  };
+  glm::dvec3 sum(0);
+  for (const set::Light& lamp : world.lamps) {
+    const auto met = meet_lamp(lamp, ray);
+    if (met && (!hit || met->distance < hit->distance)) sum += weight(met->pdf) * met->radiance;
+  }
+  if (!hit) {
+    return sum +
+           weight(world.environment.pdf(ray.direction)) * world.environment.radiance(ray.direction);
+  }
+  const glm::dvec3 emission = emission_at(world.scene, hit->instance, hit->uv);
+  if (emission == glm::dvec3(0)) return sum;
+  const double cosine = std::abs(glm::dot(hit->geometric_normal, ray.direction));
+  const double pdf = world.emissive.area_pdf(hit->instance, hit->triangle) * hit->distance *
+                     hit->distance / cosine;
+  return sum + weight(pdf) * emission;
+}
+
+// f cos / pdf, weighted against finding the same direction by the BSDF; `light_pdf` 0: a light no
+// other technique finds.
+glm::dvec3 reflected(const Vertex& vertex, const glm::dvec3& wi, double light_pdf) {
+  const double mis =
+      light_pdf > 0 ? power_heuristic(light_pdf, pdf(vertex.bsdf, vertex.point, wi)) : 1;
+  return mis * evaluate(vertex.bsdf, vertex.point, wi);
+}
+
+glm::dvec3 light_from_meshes(const World& world, const Vertex& vertex, Random& random) {
+  const EmissiveMeshes::Sample s = world.emissive.sample(random);
+  if (s.area_pdf <= 0) return glm::dvec3(0);
+  const glm::dvec3 start = vertex.start(vertex.point.geometric_normal);
+  const glm::dvec3 to_light = s.position - start;
+  const double distance = glm::length(to_light);
+  const glm::dvec3 wi = to_light / distance;
+  const double cosine = std::abs(glm::dot(s.normal, wi));
+  if (cosine <= 0) return glm::dvec3(0);
+  const double light_pdf = s.area_pdf * distance * distance / cosine;
+  const glm::dvec3 f = reflected(vertex, wi, light_pdf);
+  const double margin = 0x1p-18 * std::max(glm::length(s.position), distance) / cosine;
+  if (f == glm::dvec3(0) || world.geometry.blocked({start, wi}, distance - margin, world.bit)) {
+    return glm::dvec3(0);
+  }
+  return f * emission_at(world.scene, s.instance, s.uv) / light_pdf;
+}
+
+// Next-event estimation: one sample of the environment, of every lamp and of the emissive meshes.
+glm::dvec3 direct_light(const World& world, const Vertex& vertex, Random& random) {
+  const glm::dvec3 start = vertex.start(vertex.point.geometric_normal);
+  glm::dvec3 sum(0);
+  const auto add = [&](const glm::dvec3& wi, double distance, double light_pdf,
+                       const glm::dvec3& value) {
+    const glm::dvec3 f = reflected(vertex, wi, light_pdf) * value;
+    if (f == glm::dvec3(0)) return;
+    if (!world.geometry.blocked({start, wi}, distance, world.bit)) sum += f;
+  };
+  if (!world.environment.black()) {
+    const DirectionSample s = world.environment.sample(random.uniform2());
+    add(s.direction, infinity, s.pdf, world.environment.radiance(s.direction) / s.pdf);
+  }
+  for (const set::Light& lamp : world.lamps) {
+    const LightSample s = sample_lamp(lamp, start, random);
+    add(s.direction, s.distance, s.pdf, s.value);
+  }
+  if (!world.emissive.empty()) sum += light_from_meshes(world, vertex, random);
+  return sum;
+}
+
+glm::dvec3 radiance(const World& world, Ray ray, Random& random, double& first_distance) {
+  glm::dvec3 sum(0);
+  glm::dvec3 throughput(1);
+  double bsdf_pdf = 0;
+  bool last_dirac = false;
+  bool has_rough_vertex = false;
+  for (int depth = 0;; ++depth) {
+    const auto hit = world.geometry.closest(ray, world.bit);
+    if (depth == 0) first_distance = hit ? hit->distance : 0;
+    const bool caustic = has_rough_vertex && last_dirac;
+    if (world.options.caustics || !caustic) {
+      sum += throughput * emitted(world, ray, hit, bsdf_pdf);
+    }
+    if (!hit || depth == world.options.max_depth) return sum;
+
+    const Vertex vertex = vertex_at(world, *hit, -ray.direction);
+    if (!only_dirac(vertex.bsdf)) sum += throughput * direct_light(world, vertex, random);
+
+    const auto next = sample(vertex.bsdf, vertex.point, random);
+    if (!next) return sum;
+    throughput *= next->weight;
+    bsdf_pdf = next->pdf;
+    last_dirac = next->dirac;
+    has_rough_vertex = has_rough_vertex || !next->dirac;
+    if (depth + 1 >= roulette_depth) {
+      const double survival = std::min(1.0, largest(throughput));
+      if (random.uniform() >= survival) return sum;
+      throughput /= survival;
+    }
+    ray = {vertex.start(next->wi), next->wi};
+  }
+}
+
+struct PixelSums {
+  glm::dvec3 sum{0}, squares{0};
+  double mask = 0, depth = 0;
+  int hits = 0;
+};
+
+void require_supported(const scene::Scene& scene) {
+  for (const scene::Material& material : scene.materials) {
+    if (material.alpha < 1) {
+      throw Error("reference tracer: material '" + material.name +
+                  "' has alpha below 1, which is not traced");
+    }
+  }
+}
+
+}  // namespace
+
+struct CpuTracer::Impl {
+  const scene::Scene& scene;
+  Environment environment;
+  TraceOptions options;
+  Geometry geometry;
+};
+
+CpuTracer::CpuTracer(const scene::Scene& scene, const lighting::EnvironmentMap& environment,
+                     const TraceOptions& options) {
+  require_supported(scene);
+  impl_.reset(new Impl{scene, Environment(environment), options, Geometry(scene)});
+}
+
+CpuTracer::~CpuTracer() = default;
+
+TracedPicture CpuTracer::trace(const ObserverCalibration& calibration,
+                               const glm::dmat4& world_from_camera, std::uint32_t world_bit,
+                               int samples, std::uint64_t seed,
+                               const std::optional<Region>& region) {
+  const Region r =
+      region.value_or(Region{0, 0, calibration.intrinsics.width, calibration.intrinsics.height});
+  const glm::dvec3 eye(world_from_camera[3]);
+  const glm::dmat3 rotation(world_from_camera);
+  impl_->geometry.place(eye);
+  const World world{impl_->scene,
+                    impl_->environment,
+                    impl_->geometry,
+                    impl_->options,
+                    world_bit,
+                    placed_lamps(impl_->scene, eye, world_bit),
+                    EmissiveMeshes(impl_->scene, impl_->geometry, world_bit)};
+
+  const auto pixel = [&](int x, int y) {
+    Random random(seed, (static_cast<std::uint64_t>(y) << 32) | static_cast<std::uint32_t>(x));
+    PixelSums sums;
+    for (int s = 0; s < samples; ++s) {
+      const glm::dvec2 jitter = random.uniform2() - 0.5;
+      const Ray in_camera = camera_ray(calibration, x + jitter.x, y + jitter.y, random);
+      const Ray ray{rotation * in_camera.origin, glm::normalize(rotation * in_camera.direction)};
+      double distance = 0;
+      const glm::dvec3 value = radiance(world, ray, random, distance);
+      if (!std::isfinite(value.x + value.y + value.z)) {
+        throw Error("reference tracer: radiance is not finite at pixel (" + std::to_string(x) +
+                    ", " + std::to_string(y) + ")");
+      }
+      sums.sum += value;
+      sums.squares += value * value;
+      if (distance > 0) {
+        sums.depth += distance * in_camera.direction.z;
+        ++sums.hits;
+      }
+      const auto either = impl_->geometry.closest(ray, scene::world_both);
+      if (either && impl_->scene.instances[either->instance].presence != scene::world_both) {
+        ++sums.mask;
+      }
+    }
+    return sums;
+  };
+
+  TracedPicture out;
+  out.width = r.width;
+  out.height = r.height;
+  out.samples = samples;
+  const auto pixels = static_cast<std::size_t>(r.width) * static_cast<std::size_t>(r.height);
+  out.mean.resize(pixels);
+  out.standard_error.resize(pixels);
+  out.mask.resize(pixels);
+  out.depth.resize(pixels);
+  std::atomic<int> next_row{0};
+  const auto work = [&] {
+    for (int row = next_row++; row < r.height; row = next_row++) {
+      for (int column = 0; column < r.width; ++column) {
+        const PixelSums p = pixel(r.x0 + column, r.y0 + row);
+        const auto i = static_cast<std::size_t>(row) * static_cast<std::size_t>(r.width) +
+                       static_cast<std::size_t>(column);
+        const double n = samples;
+        out.mean[i] = p.sum / n;
+        const glm::dvec3 variance =
+            glm::max(p.squares / n - out.mean[i] * out.mean[i], glm::dvec3(0));
+        out.standard_error[i] = glm::sqrt(variance / std::max(n - 1, 1.0));
+        out.mask[i] = p.mask / n;
+        out.depth[i] = p.hits > 0 ? p.depth / p.hits : 0;
+      }
+    }
+  };
+  auto second = std::async(std::launch::async, work);
+  work();
+  second.get();
+  return out;
+}
+
+}  // namespace previz::truth

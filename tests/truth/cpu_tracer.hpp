@@ -1,0 +1,60 @@
+// The reference path tracer the renderer is tested against: one world at a time, on the CPU, the
+// simplest possible code. It shares no code with the renderer; README.md states the model.
+#pragma once
+
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "daemon/lighting/environment.hpp"
+#include "daemon/scene/scene.hpp"
+#include "drivers/calibration.hpp"
+
+namespace previz::truth {
+
+struct TraceOptions {
+  int max_depth = 16;                // surface vertices after the camera
+  double specular_roughness = 1e-3;  // alpha at or below which a lobe is a Dirac delta
+  // false: drop light that reaches a diffuse or rough vertex only by way of Dirac lobes (what
+  // photons would deliver).
+  bool caustics = true;
+};
+
+// Pixels [x0, x0 + width) x [y0, y0 + height) of the picture.
+struct Region {
+  int x0 = 0, y0 = 0, width = 0, height = 0;
+};
+
+// Row-major, region.width * region.height. Linear Rec. 709 radiance.
+struct TracedPicture {
+  int width = 0, height = 0;
+  int samples = 0;  // per pixel, independent
+  std::vector<glm::dvec3> mean;
+  std::vector<glm::dvec3> standard_error;  // of the mean, from the samples' own variance
+  std::vector<double> mask;   // share of samples whose first hit of either world is not in both
+  std::vector<double> depth;  // along the optical axis, mean over hits in this world; 0: no hit
+};
+
+class CpuTracer {
+ public:
+  // The scene and the map must outlive the tracer. Throws previz::Error naming the material if the
+  // scene needs what this tracer does not do (alpha below 1).
+  CpuTracer(const scene::Scene& scene, const lighting::EnvironmentMap& environment,
+            const TraceOptions& options = {});
+  ~CpuTracer();
+
+  // `world` is scene::world_mixed or scene::world_real. Two threads; the result depends only on
+  // the arguments. `region` absent: the whole picture.
+  TracedPicture trace(const ObserverCalibration& calibration, const glm::dmat4& world_from_camera,
+                      std::uint32_t world, int samples, std::uint64_t seed,
+                      const std::optional<Region>& region = {});
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace previz::truth
