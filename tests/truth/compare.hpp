@@ -1,0 +1,74 @@
+// The measures of a rendered frame against truth (docs: README.md, "Measures").
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/calibration.hpp"
+#include "drivers/frame.hpp"
+
+namespace previz::truth {
+
+// All pictures are row-major, width * height, linear Rec. 709 radiance, not yet clipped.
+struct TruthFrame {
+  int width = 0, height = 0;
+  double exposure = 1;  // absolute; the sensor's white is 1 / exposure
+  ResponseCurve response;
+  std::vector<glm::vec3> plate;  // Lc, from the observer frame's 8-bit samples
+  std::vector<glm::vec3> real;   // Lr
+  std::vector<glm::vec3> mixed;  // Lm
+  std::vector<float> mask;       // M
+  // The truth's own noise as its set.json states it, absent where it does not:
+  std::optional<double> diff_rmse;           // of a pixel of mixed - real, radiance
+  std::optional<double> mixed_rmse_of_mean;  // of a pixel of mixed (clipped), over the picture mean
+};
+
+struct EstimatedFrame {
+  std::vector<glm::vec3> composite, mixed, real, diff;
+  std::vector<float> mask;
+  Plate picture;  // 8 bit
+};
+
+struct Measures {
+  double e_diff = 0, e_virtual = 0, e_mask = 0, e_mask_edge = 0, e_edge = 0;
+  double psnr = 0;  // dB; identical_psnr where the pictures are the same
+  double ssim = 0;
+  std::optional<double> noise_diff, noise_virtual;
+  // Not in accuracy.md: the real solution alone, and signed errors of the means, relative.
+  double e_real = 0;
+  double bias_diff = 0, bias_virtual = 0, bias_real = 0;
+  // Blocks each rms was taken over; a measure over none is 0.
+  int diff_blocks = 0, virtual_blocks = 0, edge_blocks = 0;
+};
+
+inline constexpr double identical_psnr = 120;
+
+// Throws previz::Error if the sizes differ or the picture is smaller than 11x11 (ssim's window).
+Measures compare(const TruthFrame& truth, const EstimatedFrame& estimate);
+
+// M Lm + (1 - M)(Lc + D), everything clipped at the sensor's white.
+std::vector<glm::vec3> ideal_composite(const TruthFrame& truth);
+// A picture as the display would show it, 8 bit.
+Plate displayed(const std::vector<glm::vec3>& radiance, int width, int height, double exposure,
+                const ResponseCurve& response);
+
+double psnr(const Plate& a, const Plate& b);
+// Wang et al. 2004: 11x11 Gaussian of sigma 1.5, K1 = 0.01, K2 = 0.03, windows wholly inside the
+// picture; the mean over R, G and B.
+double ssim(const Plate& a, const Plate& b);
+
+// A row of accuracy.md's table of bounds.
+struct Bounds {
+  std::string name;
+  double e_diff, e_virtual, e_mask, psnr, ssim;
+  bool true_pose;  // e_mask_edge at most 0.03
+};
+// "paired", "full" or "captured"; throws previz::Error naming what is allowed.
+Bounds bounds_named(const std::string& name);
+// One line a violated bound, with the figure and what is allowed (sqrt(bound^2 + noise^2)); empty
+// where all hold.
+std::vector<std::string> violations(const Measures& measures, const Bounds& bounds);
+
+}  // namespace previz::truth
