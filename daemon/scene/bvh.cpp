@@ -1,6 +1,186 @@
 #include "daemon/scene/bvh.hpp"
 
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+#include "daemon/scene/bvh_pairs.hpp"
+#include "daemon/scene/bvh_wide.hpp"
+#include "drivers/error.hpp"
+#include "shaders/lib/shared.h"
+
 namespace previz::scene {
+namespace {
+
+constexpr std::uint32_t records_per_block = 8;
+constexpr float largest_coordinate = 1e20f;
+
+struct Triangles {
+  std::vector<std::array<glm::vec3, 3>> corners;
+  std::vector<std::uint32_t> primitives;
+};
+
+bool usable(const std::array<glm::vec3, 3>& corners) {
+  for (const glm::vec3& p : corners)
+    for (int axis = 0; axis < 3; ++axis)
+      if (!(std::abs(p[axis]) <= largest_coordinate)) return false;
+  const glm::dvec3 a(corners[0]);
+  return glm::cross(glm::dvec3(corners[1]) - a, glm::dvec3(corners[2]) - a) != glm::dvec3(0);
+}
+
+Triangles usable_triangles(const Mesh& mesh) {
+  Triangles result;
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    const glm::uvec3& t = mesh.triangles[i];
+    if (std::max({t.x, t.y, t.z}) >= mesh.positions.size()) continue;
+    const std::array<glm::vec3, 3> corners{mesh.positions[t.x], mesh.positions[t.y],
+                                           mesh.positions[t.z]};
+    if (!usable(corners)) continue;
+    result.corners.push_back(corners);
+    result.primitives.push_back(i);
+  }
+  return result;
+}
+
+Aabb bounds_of(const Triangles& triangles) {
+  Aabb bounds;
+  for (const auto& corners : triangles.corners)
+    for (const glm::vec3& p : corners) bounds = merged(bounds, {p, p});
+  return bounds;
+}
+
+double extent_of(const Aabb& bounds) {
+  const glm::vec3 extent = glm::max(glm::abs(bounds.low), glm::abs(bounds.high));
+  return std::max({extent.x, extent.y, extent.z});
+}
+
+Record pair_record(const TrianglePair& pair) {
+  Record record{pair.primitives[0] << 2 | pair.rotations[0],
+                pair.primitives[1] << 2 | pair.rotations[1], gpu::RECORD_PAIR, 0};
+  for (std::size_t v = 0; v < 4; ++v)
+    for (int axis = 0; axis < 3; ++axis)
+      record[4 + 3 * v + static_cast<std::size_t>(axis)] =
+          std::bit_cast<std::uint32_t>(pair.vertices[v][axis]);
+  return record;
+}
+
+Record space_record(const glm::dmat4& grid_from_world, std::uint32_t first_record,
+                    std::uint32_t presence, std::uint32_t index) {
+  Record record{first_record, presence, gpu::RECORD_SPACE, index};
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column)
+      record[4 + static_cast<std::size_t>(4 * row + column)] =
+          std::bit_cast<std::uint32_t>(static_cast<float>(grid_from_world[column][row]));
+  return record;
+}
+
+// The wide tree of the chosen quality; the balanced one should that be too deep for the stack.
+WideTree make_tree(std::span<const Aabb> boxes, BvhQuality quality, const SplitPrimitive& split,
+                   const std::function<Record(std::uint32_t)>& leaf, std::uint32_t most_levels) {
+  WideTree tree = make_wide_tree(build_binary_tree(boxes, quality, split), leaf);
+  if (tree.depth > most_levels) tree = make_wide_tree(build_balanced_tree(boxes), leaf);
+  if (tree.depth > most_levels)
+    throw Error("scene: a BVH over " + std::to_string(boxes.size()) + " boxes needs " +
+                std::to_string(tree.depth) + " levels; at most " + std::to_string(most_levels) +
+                " are allowed");
+  return tree;
+}
+
+glm::dmat4 uniform_scale(double scale) {
+  glm::dmat4 result(scale);
+  result[3][3] = 1;
+  return result;
+}
+
+bool is_finite(const glm::dmat4& m) {
+  for (int column = 0; column < 4; ++column)
+    for (int row = 0; row < 4; ++row)
+      if (!std::isfinite(m[column][row])) return false;
+  return true;
+}
+
+// Rounding of the ray on its way into an instance, as a share of the coordinates, may take a hit
+// this far out of the box.
+Aabb padded(const Aabb& box) {
+  const auto margin = static_cast<float>(extent_of(box) * std::ldexp(1.0, -20));
+  return {box.low - margin, box.high + margin};
+}
+
+}  // namespace
+
+MeshBvh build_mesh_bvh(const Mesh& mesh, BvhQuality quality) {
+  MeshBvh bvh;
+  Triangles triangles = usable_triangles(mesh);
+  bvh.dropped_triangles =
+      static_cast<std::uint32_t>(mesh.triangles.size() - triangles.primitives.size());
+  if (triangles.primitives.empty()) return bvh;
+  bvh.bounds = bounds_of(triangles);
+  bvh.grid_exponent = grid_exponent(extent_of(bvh.bounds));
+
+  const float scale = std::ldexp(1.0f, bvh.grid_exponent);
+  for (auto& corners : triangles.corners)
+    for (glm::vec3& p : corners) p *= scale;  // exact
+  const std::vector<TrianglePair> pairs = make_pairs(triangles.corners, triangles.primitives);
+  std::vector<Aabb> boxes;
+  boxes.reserve(pairs.size());
+  for (const TrianglePair& pair : pairs) boxes.push_back(bounds_of(pair));
+
+  const WideTree tree = make_tree(
+      boxes, quality,
+      [&](std::uint32_t primitive, const Aabb& bounds, int axis, float position, Aabb& left,
+          Aabb& right) { split_pair(pairs[primitive], bounds, axis, position, left, right); },
+      [&](std::uint32_t primitive) { return pair_record(pairs[primitive]); }, gpu::MESH_BVH_DEPTH);
+  append_texels(bvh.texels, tree.records);
+  bvh.sah_cost = tree.sah_cost;
+  bvh.depth = tree.depth;
+  bvh.leaves = tree.leaves;
+  return bvh;
+}
+
+// One block for the record where rays start, one for the root, one for each node's children.
+std::size_t top_bvh_texels(std::size_t instance_count) {
+  return (instance_count + 2) * records_per_block * texels_per_record;
+}
+
+TopBvh build_top_bvh(std::span<const TopInstance> instances) {
+  TopBvh top;
+  std::vector<Record> spaces;
+  std::vector<Aabb> boxes;
+  double extent = 0;
+  for (std::uint32_t i = 0; i < instances.size(); ++i) {
+    const TopInstance& instance = instances[i];
+    if (instance.mesh == nullptr || instance.mesh->texels.empty()) continue;
+    const glm::dmat4 grid_from_world =
+        uniform_scale(std::ldexp(1.0, instance.mesh->grid_exponent)) *
+        glm::inverse(instance.world_from_object);
+    if (!is_finite(instance.world_from_object) || !is_finite(grid_from_world)) {
+      ++top.dropped_instances;
+      continue;
+    }
+    spaces.push_back(space_record(grid_from_world, instance.first_record, instance.presence, i));
+    boxes.push_back(padded(transform_bounds(instance.mesh->bounds, instance.world_from_object)));
+    extent = std::max(extent, extent_of(boxes.back()));
+  }
+
+  std::vector<Record> records(records_per_block);
+  if (spaces.size() == 1) {
+    records[0] = spaces[0];
+  } else if (!spaces.empty()) {
+    const int exponent = grid_exponent(extent);
+    for (Aabb& box : boxes)
+      box = {box.low * std::ldexp(1.0f, exponent), box.high * std::ldexp(1.0f, exponent)};
+    const WideTree tree = make_tree(
+        boxes, BvhQuality::medium, {}, [&](std::uint32_t i) { return spaces[i]; },
+        gpu::TOP_BVH_DEPTH);
+    records[0] =
+        space_record(uniform_scale(std::ldexp(1.0, exponent)), records_per_block, world_both, 0);
+    records.insert(records.end(), tree.records.begin(), tree.records.end());
+  }
+  records.resize(top_bvh_texels(instances.size()) / texels_per_record);
+  append_texels(top.texels, records);
+  return top;
+}
 
 Aabb transform_bounds(const Aabb& object_bounds, const glm::dmat4& world_from_object) {
   Aabb bounds;

@@ -1,43 +1,69 @@
-// Two-level bounding volume hierarchy: Embree builds, we encode 8-wide quantised nodes for the GPU
-// (CWBVH: Ylitie, Karras, Laine 2017). Objects move by rebuilding the small top level only.
+// Two-level bounding volume hierarchy for shaders/lib/trace.glsl: Embree builds, we collapse to
+// eight-wide quantised nodes after Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on
+// GPUs Through Compressed Wide BVHs" (HPG 2017). Objects move by rebuilding the small top level.
+//
+// Everything is a record of 64 bytes, four RGBA32UI texels (shaders/lib/shared.h): a node, a leaf
+// of up to two triangles that share an edge, or an instance. The one buffer that the shader reads
+// is the top level followed by the meshes:
+//
+//   std::vector<glm::uvec4> texels(top_bvh_texels(instance_count));    // reserved for the top
+//   level for each mesh: first_record = texels.size() / texels_per_record; append its
+//   MeshBvh::texels overwrite the front with build_top_bvh(...).texels, now and whenever an
+//   instance has moved
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "daemon/scene/scene.hpp"
 
 namespace previz::scene {
 
+inline constexpr std::uint32_t texels_per_record = 4;
+
 struct Aabb {
   glm::vec3 low{1e30f};
   glm::vec3 high{-1e30f};
 };
 
-// The bottom level of one mesh, position independent: child indices are relative to `nodes`.
+// The bottom level of one mesh. Position independent: indices inside are relative to its start.
 struct MeshBvh {
-  std::vector<glm::uvec4> nodes;        // 5 texels a node (80 bytes)
-  std::vector<glm::vec4> triangles;     // 3 texels a triangle in leaf order; primitive in v0.w's bits
-  Aabb bounds;                          // object space
-  double sah_cost = 0;                  // relative to the root's area; guards against bad builds
-  std::uint32_t dropped_triangles = 0;  // NaN or zero area: reported, never traced
+  std::vector<glm::uvec4> texels;       // whole records, in blocks of eight
+  Aabb bounds;                          // object space; empty where the mesh has no triangle
+  int grid_exponent = 0;                // the tree is in grid space = object space * 2^exponent
+  double sah_cost = 0;                  // expected records visited by a ray that meets the bounds
+  std::uint32_t depth = 0;              // levels of nodes, at most gpu::MESH_BVH_DEPTH
+  std::uint32_t leaves = 0;             // pairs and single triangles, split references counted
+  std::uint32_t dropped_triangles = 0;  // not finite, zero area or bad index: reported, not traced
 };
 
+// Embree's Morton, binned SAH, and binned SAH with spatial splits.
 enum class BvhQuality { low, medium, high };
 
+// Same input, same bytes. Throws previz::Error if Embree fails.
 MeshBvh build_mesh_bvh(const Mesh& mesh, BvhQuality quality = BvhQuality::medium);
 
-// The top level over instances.
-struct TopBvh {
-  std::vector<glm::uvec4> nodes;          // same encoding; a leaf names instances
-  std::vector<std::uint32_t> instances;   // leaf order -> index of Scene::instances
+// One instance for the top level; the hit names it by its place in the span given.
+struct TopInstance {
+  const MeshBvh* mesh = nullptr;
+  std::uint32_t first_record = 0;       // where the mesh's records start in the whole buffer
+  std::uint32_t presence = world_both;  // world_* bits; 0 is never hit
+  glm::dmat4 world_from_object{1.0};    // any invertible affine transform
 };
 
-TopBvh build_top_bvh(std::span<const Aabb> instance_world_bounds);
+struct TopBvh {
+  std::vector<glm::uvec4> texels;       // always top_bvh_texels(number of instances)
+  std::uint32_t dropped_instances = 0;  // not invertible or not finite; empty meshes do not count
+};
+
+// Texels that the top level over so many instances takes, whatever their places.
+std::size_t top_bvh_texels(std::size_t instance_count);
+TopBvh build_top_bvh(std::span<const TopInstance> instances);
 
 // World bounds of an instance (conservative for any affine transform).
 Aabb transform_bounds(const Aabb& object_bounds, const glm::dmat4& world_from_object);

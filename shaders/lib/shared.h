@@ -25,22 +25,34 @@ PREVIZ_CONST uint WORLD_MIXED = 1u;
 PREVIZ_CONST uint WORLD_REAL = 2u;
 PREVIZ_CONST uint WORLD_BOTH = 3u;
 
-// Scene buffers of set 0, read by lib/trace.glsl. All are texel buffers: on lavapipe they are 1.4
-// to 1.7 times as fast as storage buffers.
-//   BINDING_BVH_NODES      RGBA32UI, 5 texels a node; the top level first (its root at texel 0),
-//                          then every mesh's nodes
-//   BINDING_BVH_TRIANGLES  RGBA32F, 3 texels a triangle in leaf order: v0, v1 - v0, v2 - v0;
-//                          v0.w holds the bits of the primitive's index in its mesh
-//   BINDING_BVH_INSTANCES  RGBA32F, 4 texels an instance in top-level leaf order: the three rows of
-//                          object_from_world (3x4), then the bits of (first node texel of the mesh,
-//                          first triangle texel of the mesh, presence, index of the instance)
-PREVIZ_CONST uint BINDING_BVH_NODES = 0u;
-PREVIZ_CONST uint BINDING_BVH_TRIANGLES = 1u;
-PREVIZ_CONST uint BINDING_BVH_INSTANCES = 2u;
+// The scene as lib/trace.glsl reads it: set 0, one texel buffer (on lavapipe 1.4 to 1.7 times as
+// fast as a storage buffer) of RGBA32UI, made by daemon/scene/bvh.hpp. It consists of records of
+// four texels, one cache line, in blocks of eight; a node's children are one block. Record 0 is the
+// space in which a ray starts: the top level's, or the only instance's.
+//
+//   any      Texel 0: z, bits 0..7: the kind, RECORD_*.
+//   nothing  All zero: an empty slot. Meeting it has no effect.
+//   node     Texel 0: x, y, z: origin << 8 | biased exponent, the quantisation of each axis (the
+//            origin is a signed integer in grid space); w: the children's block, counted from the
+//            start of the tree. Texels 1, 2, 3 for x, y, z: low planes of children 0..3, of 4..7,
+//            high planes of 0..3, of 4..7, a byte each from the low byte up;
+//            plane = origin + byte * 2^exponent. Bits 0, 1, 2 of a child's slot say that it lies
+//            towards +x, +y, +z. An empty slot has an inverted box.
+//   pair     Texel 0: x, y: primitive << 2 | rotation, of two triangles. Texels 1..3: floats v0,
+//            v1, v2, v3 in grid space. The triangles are (v0, v1, v2) and (v0, v2, v3), each its
+//            primitive's corners turned left `rotation` times. v3 = v2: only the first.
+//   space    Texel 0: x: the record where its tree starts (its root is slot 0 of block 0);
+//            y: presence; w: index of the instance. Texels 1..3: the rows of grid_from_world.
+PREVIZ_CONST uint BINDING_BVH = 0u;
 
-PREVIZ_CONST uint TEXELS_PER_NODE = 5u;
-PREVIZ_CONST uint TEXELS_PER_TRIANGLE = 3u;
-PREVIZ_CONST uint TEXELS_PER_TRACE_INSTANCE = 4u;
+PREVIZ_CONST uint RECORD_NOTHING = 0u;
+PREVIZ_CONST uint RECORD_PAIR = 1u;
+PREVIZ_CONST uint RECORD_SPACE = 2u;
+PREVIZ_CONST uint RECORD_NODE = 127u;  // and above: the biased exponent of a node's z cell
+
+// Levels of nodes that the builders guarantee; the sum bounds the traversal's stack.
+PREVIZ_CONST uint TOP_BVH_DEPTH = 8u;
+PREVIZ_CONST uint MESH_BVH_DEPTH = 16u;
 
 #ifdef __cplusplus
 }  // namespace previz::gpu

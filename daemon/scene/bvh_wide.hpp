@@ -1,0 +1,34 @@
+// Collapses a binary tree to the eight-wide one of least cost and encodes it. Internal to the scene
+// room.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "daemon/scene/bvh_binary.hpp"
+
+namespace previz::scene {
+
+// Four texels as sixteen words; the layout is in shaders/lib/shared.h.
+using Record = std::array<std::uint32_t, 16>;
+
+struct WideTree {
+  std::vector<Record> records;  // blocks of eight, the root first
+  double sah_cost = 0;          // expected records visited by a ray that meets the root
+  std::uint32_t depth = 0;      // levels of nodes
+  std::uint32_t leaves = 0;
+};
+
+// `leaf` gives a primitive's record. The binary tree is in grid space: integers of at most 2^23.
+WideTree make_wide_tree(std::span<const BinaryNode> binary,
+                        const std::function<Record(std::uint32_t primitive)>& leaf);
+
+// Exponent e such that coordinates of at most `extent`, times 2^e, stay below 2^23.
+int grid_exponent(double extent);
+
+void append_texels(std::vector<glm::uvec4>& texels, std::span<const Record> records);
+
+}  // namespace previz::scene
