@@ -5,7 +5,6 @@
 
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <system_error>
 
 #include "drivers/error.hpp"
@@ -39,15 +38,6 @@ void write_whole(const std::filesystem::path& path,
     std::filesystem::remove(unfinished, ignored);
     throw;
   }
-}
-
-void write_text(const std::filesystem::path& path, std::string_view text) {
-  write_whole(path, [&](const std::filesystem::path& unfinished) {
-    std::ofstream file(unfinished, std::ios::binary);
-    file.write(text.data(), static_cast<std::streamsize>(text.size()));
-    file.close();
-    if (!file) throw Error(path.string() + ": cannot be written: " + std::strerror(errno));
-  });
 }
 
 }  // namespace previz::output

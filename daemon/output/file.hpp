@@ -1,9 +1,9 @@
 // Files that are whole or not there: written beside their place, synced, then renamed into it.
+// (For text that is in memory already: session::replace_file.)
 #pragma once
 
 #include <filesystem>
 #include <functional>
-#include <string_view>
 
 namespace previz::output {
 
@@ -15,9 +15,6 @@ std::filesystem::path unfinished_name(const std::filesystem::path& path);
 // previz::Error naming the file if it cannot be synced or renamed.
 void write_whole(const std::filesystem::path& path,
                  const std::function<void(const std::filesystem::path& unfinished)>& write);
-
-// The same for a file whose content is already in memory.
-void write_text(const std::filesystem::path& path, std::string_view text);
 
 // Syncs and renames an unfinished file somebody else wrote.
 void finish(const std::filesystem::path& unfinished, const std::filesystem::path& path);

@@ -11,6 +11,7 @@
 #include <ImfStringAttribute.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <set>
 
 #include "daemon/output/file.hpp"
@@ -136,10 +137,10 @@ TEST(Exr, UnwritablePlaceIsNamed) {
 
 TEST(WriteWhole, LeavesNothingWhenTheWriterThrows) {
   const TemporaryDirectory directory;
-  write_text(directory / "a.txt", "old");
+  std::ofstream(directory / "a.txt") << "old";
   EXPECT_THROW(write_whole(directory / "a.txt",
                            [](const std::filesystem::path& unfinished) {
-                             write_text(unfinished, "half");
+                             std::ofstream(unfinished) << "half of it";
                              throw Error("power cut");
                            }),
                Error);

@@ -1,0 +1,146 @@
+// What stands between two stages: a mailbox (newest value only) or a bounded queue (never drops).
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+namespace previz::pipeline {
+
+// One writer side, one reader side; any thread may close. What passes is moved; share big values by
+// std::shared_ptr<const T>.
+template <class T>
+class Channel {
+ public:
+  virtual ~Channel() = default;
+
+  // False if the channel is closed: the value is gone and the writer should end.
+  virtual bool push(T value) = 0;
+  // Waits for a value; empty once the channel is closed and drained: the reader should end.
+  virtual std::optional<T> pop() = 0;
+  // What is there now, without waiting.
+  virtual std::optional<T> try_pop() = 0;
+  // No more pushes; wakes everybody. What is inside can still be popped.
+  virtual void close() = 0;
+  // Closes and throws away what is inside (another stage failed; the backlog is of no use).
+  virtual void abandon() = 0;
+  // Values that were pushed and never popped because a newer one took their place.
+  virtual std::uint64_t dropped() const = 0;
+};
+
+// Live: a push replaces what was not taken yet, and counts it as dropped. Never blocks the writer.
+template <class T>
+class Mailbox final : public Channel<T> {
+ public:
+  bool push(T value) override {
+    {
+      const std::lock_guard lock(mutex_);
+      if (closed_) return false;
+      if (value_) ++dropped_;
+      value_ = std::move(value);
+    }
+    filled_.notify_one();
+    return true;
+  }
+
+  std::optional<T> pop() override {
+    std::unique_lock lock(mutex_);
+    filled_.wait(lock, [this] { return value_ || closed_; });
+    return std::exchange(value_, std::nullopt);
+  }
+
+  std::optional<T> try_pop() override {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(value_, std::nullopt);
+  }
+
+  void close() override { close(false); }
+  void abandon() override { close(true); }
+
+  std::uint64_t dropped() const override {
+    const std::lock_guard lock(mutex_);
+    return dropped_;
+  }
+
+ private:
+  void close(bool empty) {
+    {
+      const std::lock_guard lock(mutex_);
+      closed_ = true;
+      if (empty) value_.reset();
+    }
+    filled_.notify_all();
+  }
+
+  mutable std::mutex mutex_;
+  std::condition_variable filled_;
+  std::optional<T> value_;
+  std::uint64_t dropped_ = 0;
+  bool closed_ = false;
+};
+
+// Recording and offline: at most `capacity` (>= 1) values wait, in order; a push waits for room.
+template <class T>
+class BoundedQueue final : public Channel<T> {
+ public:
+  explicit BoundedQueue(std::size_t capacity) : capacity_(capacity) {}
+
+  bool push(T value) override {
+    {
+      std::unique_lock lock(mutex_);
+      room_.wait(lock, [this] { return values_.size() < capacity_ || closed_; });
+      if (closed_) return false;
+      values_.push_back(std::move(value));
+    }
+    filled_.notify_one();
+    return true;
+  }
+
+  std::optional<T> pop() override {
+    std::unique_lock lock(mutex_);
+    filled_.wait(lock, [this] { return !values_.empty() || closed_; });
+    return take(lock);
+  }
+
+  std::optional<T> try_pop() override {
+    std::unique_lock lock(mutex_);
+    return take(lock);
+  }
+
+  void close() override { close(false); }
+  void abandon() override { close(true); }
+
+  std::uint64_t dropped() const override { return 0; }
+
+ private:
+  std::optional<T> take(std::unique_lock<std::mutex>& lock) {
+    if (values_.empty()) return std::nullopt;
+    std::optional<T> value = std::move(values_.front());
+    values_.pop_front();
+    lock.unlock();
+    room_.notify_one();
+    return value;
+  }
+
+  void close(bool empty) {
+    {
+      const std::lock_guard lock(mutex_);
+      closed_ = true;
+      if (empty) values_.clear();
+    }
+    filled_.notify_all();
+    room_.notify_all();
+  }
+
+  const std::size_t capacity_;
+  mutable std::mutex mutex_;
+  std::condition_variable filled_, room_;
+  std::deque<T> values_;
+  bool closed_ = false;
+};
+
+}  // namespace previz::pipeline

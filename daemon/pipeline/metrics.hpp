@@ -1,0 +1,56 @@
+// What the pipeline did: frames and time per stage, every drop with its cause, latency to display.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace previz::pipeline {
+
+struct StageMetrics {
+  std::uint64_t frames = 0;
+  double busy_s = 0;                             // spent working, not waiting
+  std::map<std::string, std::uint64_t> dropped;  // cause -> frames
+};
+
+struct MetricsSnapshot {
+  double seconds = 0;  // since the start
+  std::map<std::string, StageMetrics> stages;
+  std::map<std::string, std::uint64_t> counts;  // events that are no drops: "pose lost"
+  double latency_p50_s = 0;  // capture to display, over the last frames; 0 where none was shown
+  double latency_p99_s = 0;
+};
+
+// Safe to use from every stage's thread.
+class Metrics {
+ public:
+  void worked(const std::string& stage, double seconds);
+  void dropped(const std::string& stage, const std::string& cause, std::uint64_t frames = 1);
+  void count(const std::string& event, std::uint64_t times = 1);
+  void shown(double latency_s);
+
+  // `seconds` since the start, by the caller's clock.
+  MetricsSnapshot snapshot(double seconds) const;
+
+ private:
+  static constexpr std::size_t latency_window = 4096;  // frames
+
+  mutable std::mutex mutex_;
+  std::map<std::string, StageMetrics> stages_;
+  std::map<std::string, std::uint64_t> counts_;
+  std::vector<double> latencies_s_;  // a ring once full
+  std::size_t next_latency_ = 0;
+};
+
+// {"seconds": ..., "stages": {"render": {"frames": ..., "frames_per_second": ...,
+//  "busy_fraction": ..., "dropped": {"newer frame": ...}}}, "counts": {...},
+//  "latency_s": {"p50": ..., "p99": ...}}
+std::string to_json(const MetricsSnapshot& snapshot);
+
+// The smallest value that at least `fraction` (0..1) of the values do not exceed; 0 of none.
+double quantile(std::vector<double> values, double fraction);
+
+}  // namespace previz::pipeline

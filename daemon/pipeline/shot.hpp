@@ -1,0 +1,43 @@
+// One observer frame on its way: what is known of it so far. Owned by one stage at a time.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/lighting/environment.hpp"
+#include "daemon/render/layers.hpp"
+#include "daemon/tracking/tracker.hpp"
+#include "drivers/frame.hpp"
+
+namespace previz::pipeline {
+
+// A finished light estimate and the light frames (by sequence number) it was made from.
+struct Light {
+  lighting::Lighting lighting;
+  std::vector<std::uint64_t> sequences;  // empty: an environment given as a file
+};
+using LightPtr = std::shared_ptr<const Light>;
+
+struct Shot {
+  // From the observer.
+  std::uint64_t index = 0;  // in the stream, from 0
+  FramePtr frame;
+  std::chrono::steady_clock::time_point arrived;  // when the daemon got it
+
+  // From tracking and lighting.
+  tracking::Track track;
+  LightPtr light;  // null: no light frame was seen yet
+
+  // From rendering. `untouched` says why the plate passes through as it is; empty: it was rendered.
+  std::string untouched;
+  Plate picture;
+  render::Layers layers;  // empty where the pipeline shows pictures only
+  render::Counters counters;
+  bool whole = false;  // false: interrupted before its last sample
+  double render_s = 0;
+};
+
+}  // namespace previz::pipeline

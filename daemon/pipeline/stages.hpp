@@ -1,0 +1,133 @@
+// A stage is a thread with one input and one output; StageThreads runs them and ends them together.
+#pragma once
+
+#include <chrono>
+#include <exception>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "daemon/pipeline/channel.hpp"
+#include "daemon/pipeline/metrics.hpp"
+
+namespace previz::pipeline {
+
+// Every stage ends when its input ends (and then ends its output), so a stream's end runs through
+// the whole line in order, and what was begun is finished. A stop ends the sources. An exception in
+// any stage abandons every channel at once. Channels must outlive this object.
+class StageThreads {
+ public:
+  StageThreads(Metrics& metrics, std::stop_token stop)
+      : metrics_(metrics), stop_(std::move(stop)) {}
+  ~StageThreads() {
+    abandon();
+    join();
+  }
+  StageThreads(const StageThreads&) = delete;
+  StageThreads& operator=(const StageThreads&) = delete;
+
+  // `produce`: () -> std::optional<Out>; empty ends the stream. Its waiting is not counted as work.
+  template <class Out, class Produce>
+  void source(std::string name, Channel<Out>& output, Produce produce) {
+    know(output);
+    start([this, name = std::move(name), &output, produce = std::move(produce)]() mutable {
+      while (!stop_.stop_requested()) {
+        std::optional<Out> value = produce();
+        if (!value) break;
+        metrics_.worked(name, 0);
+        if (!output.push(std::move(*value))) break;
+      }
+      output.close();
+    });
+  }
+
+  // `work`: (In) -> Out.
+  template <class In, class Out, class Work>
+  void stage(std::string name, Channel<In>& input, Channel<Out>& output, Work work) {
+    know(input);
+    know(output);
+    start([this, name = std::move(name), &input, &output, work = std::move(work)]() mutable {
+      while (std::optional<In> value = input.pop()) {
+        const auto begin = std::chrono::steady_clock::now();
+        Out result = work(std::move(*value));
+        metrics_.worked(name, seconds_since(begin));
+        if (!output.push(std::move(result))) break;
+      }
+      metrics_.dropped(name, "newer frame", input.dropped());
+      output.close();
+    });
+  }
+
+  // `consume`: (In) -> void.
+  template <class In, class Consume>
+  void sink(std::string name, Channel<In>& input, Consume consume) {
+    know(input);
+    start([this, name = std::move(name), &input, consume = std::move(consume)]() mutable {
+      while (std::optional<In> value = input.pop()) {
+        const auto begin = std::chrono::steady_clock::now();
+        consume(std::move(*value));
+        metrics_.worked(name, seconds_since(begin));
+      }
+      metrics_.dropped(name, "newer frame", input.dropped());
+    });
+  }
+
+  // Waits for the end of every stage; throws what the first failing stage threw.
+  void wait() {
+    join();
+    if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+  }
+
+ private:
+  static double seconds_since(std::chrono::steady_clock::time_point begin) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  }
+
+  template <class T>
+  void know(Channel<T>& channel) {
+    const std::lock_guard lock(mutex_);
+    abandon_channel_.push_back([&channel] { channel.abandon(); });
+    if (abandoned_) channel.abandon();
+  }
+
+  template <class Body>
+  void start(Body body) {
+    threads_.emplace_back([this, body = std::move(body)]() mutable {
+      try {
+        body();
+      } catch (...) {
+        {
+          const std::lock_guard lock(mutex_);
+          if (!failure_) failure_ = std::current_exception();
+        }
+        abandon();
+      }
+    });
+  }
+
+  void abandon() {
+    const std::lock_guard lock(mutex_);
+    abandoned_ = true;
+    for (const auto& abandon_one : abandon_channel_) abandon_one();
+  }
+
+  void join() {
+    for (std::thread& thread : threads_) thread.join();
+    threads_.clear();
+  }
+
+  Metrics& metrics_;
+  const std::stop_token stop_;
+  std::mutex mutex_;
+  std::vector<std::function<void()>> abandon_channel_;
+  bool abandoned_ = false;
+  std::exception_ptr failure_;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace previz::pipeline

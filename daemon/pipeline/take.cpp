@@ -1,0 +1,48 @@
+#include "daemon/pipeline/take.hpp"
+
+#include <utility>
+#include <vector>
+
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+
+namespace previz::pipeline {
+ObserverCalibration observer_calibration(const set::Set& set, const session::SessionInfo& session) {
+  if (set.observer.calibration) return *set.observer.calibration;
+  if (session.observer) return *session.observer;
+  throw Error(set.file.string() +
+              ": observer: neither the set nor the session has the observer's calibration");
+}
+
+std::optional<LightCameraCalibration> light_calibration(const set::Set& set,
+                                                        const session::SessionInfo& session) {
+  return set.light_camera.calibration ? set.light_camera.calibration : session.light;
+}
+
+Take open_take(const std::filesystem::path& session_directory,
+               const std::optional<std::filesystem::path>& set_file) {
+  Take take;
+  take.session = session::open_session(session_directory);
+  std::vector<std::pair<std::string, std::filesystem::path>> assets;
+  for (const auto& [as_written, stored] : take.session.info.assets)
+    if (!set_file || !std::filesystem::exists(set_file->parent_path() / as_written))
+      assets.emplace_back(as_written, session_directory / stored);
+
+  const std::filesystem::path name =
+      set_file.value_or(session_directory / take.session.info.set_name);
+  take.set_text = set_file ? session::read_file(*set_file) : take.session.info.set_text;
+  if (take.set_text.empty())
+    throw Error(session_directory.string() +
+                ": the session carries no set file; name one with --set FILE");
+  take.set = set::parse_set(take.set_text, name, assets);
+
+  take.observer = observer_calibration(take.set, take.session.info);
+  take.light = light_calibration(take.set, take.session.info);
+  take.observer_stream = session::open_stream(take.session, "observer");
+  take.light_stream = session::open_stream(take.session, "light");
+  if (!take.observer_stream || take.observer_stream->records().empty())
+    throw Error(session_directory.string() + ": the session has no observer frames");
+  return take;
+}
+
+}  // namespace previz::pipeline

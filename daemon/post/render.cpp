@@ -1,0 +1,258 @@
+#include "daemon/post/render.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <ostream>
+#include <set>
+#include <utility>
+#include <variant>
+
+#include "daemon/pipeline/light_stage.hpp"
+#include "daemon/pipeline/render_stage.hpp"
+#include "daemon/pipeline/stages.hpp"
+#include "daemon/pipeline/take.hpp"
+#include "daemon/pipeline/track_stage.hpp"
+#include "daemon/post/progress.hpp"
+#include "daemon/post/render_directory.hpp"
+#include "daemon/scene/scene.hpp"
+#include "drivers/error.hpp"
+#include "drivers/replay/replay_camera.hpp"
+#include "drivers/session/files.hpp"
+
+namespace previz::post {
+namespace {
+
+using pipeline::Shot;
+
+double now_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+void override_set(set::Set& set, const RenderOptions& options) {
+  if (options.samples) set.quality.samples = *options.samples;
+  if (options.seed) set.estimation.seed = *options.seed;
+  if (options.estimator) set.estimation.estimator = *options.estimator;
+  if (options.directory) set.output.directory = *options.directory;
+  if (options.exr) set.output.exr = *options.exr;
+  if (options.png) set.output.png = *options.png;
+  if (options.video) set.output.video = *options.video;
+}
+
+// Everything that decides what the pictures look like, as RenderDirectory compares it.
+std::string settings_of(const pipeline::Take& take, const set::Set& set) {
+  nlohmann::ordered_json json;
+  json["software"] = "previzd " PREVIZ_VERSION;
+  json["session"] = take.session.info.name;
+  json["session_start_ns"] = take.observer_stream->records().front().timestamp_ns;
+  json["samples"] = set.quality.samples;
+  json["seed"] = set.estimation.seed;
+  json["set"] = take.set_text;
+  for (const set::Object& object : set.objects)
+    json["file " + object.file_as_written] = session::sha256_of(object.file);
+  if (set.lighting.environment)
+    json["file " + set.lighting.environment_as_written] =
+        session::sha256_of(*set.lighting.environment);
+  return json.dump(2) + "\n";
+}
+
+FrameRange range_of(const RenderOptions& options, const pipeline::Take& take) {
+  const std::uint64_t last = take.observer_stream->records().size() - 1;
+  FrameRange range = options.frames.value_or(FrameRange{0, last});
+  if (range.first > last)
+    throw Error(options.session.string() + ": --frames starts at " + std::to_string(range.first) +
+                ", but the last observer frame is " + std::to_string(last));
+  range.last = std::min(range.last, last);
+  return range;
+}
+
+// Shots of the frames that are still to do (not empty), straight from the replay driver.
+class ObserverSource {
+ public:
+  ObserverSource(pipeline::Take& take, std::set<std::uint64_t> to_do, Progress& progress,
+                 pipeline::Metrics& metrics)
+      : next_(*to_do.begin()), to_do_(std::move(to_do)), progress_(progress), metrics_(metrics) {
+    ReplayOptions options;
+    options.speed = 0;
+    options.first = *to_do_.begin();
+    options.last = *to_do_.rbegin();
+    camera_ = replay(std::move(take.observer_stream), "observer", options);
+  }
+
+  std::optional<Shot> operator()() {
+    for (;;) {
+      CameraEvent event = camera_->next(std::chrono::milliseconds(100));
+      if (std::holds_alternative<EndOfStream>(event)) return std::nullopt;
+      if (std::holds_alternative<NoFrame>(event)) continue;
+      const std::uint64_t index = next_++;
+      if (const auto* trouble = std::get_if<DeviceTrouble>(&event)) {
+        progress_.note(trouble->device + ": " + trouble->what);
+        metrics_.dropped("observer", "device trouble");
+      } else if (to_do_.contains(index)) {
+        Shot shot;
+        shot.index = index;
+        shot.frame = std::get<FramePtr>(std::move(event));
+        shot.arrived = std::chrono::steady_clock::now();
+        return shot;
+      }
+    }
+  }
+
+ private:
+  std::unique_ptr<Camera> camera_;
+  std::uint64_t next_;
+  const std::set<std::uint64_t> to_do_;
+  Progress& progress_;
+  pipeline::Metrics& metrics_;
+};
+
+// Gives each shot the light of the newest light frames before it.
+class LightSource {
+ public:
+  LightSource(pipeline::Take& take, Progress& progress)
+      : stage_(take.set, take.light), stream_(std::move(take.light_stream)), progress_(progress) {
+    if (stage_.needs_frames() && !stream_)
+      throw Error(take.session.directory.string() +
+                  ": the session has no light frames, and the set gives no lighting.environment");
+  }
+
+  void operator()(Shot& shot) {
+    while (stage_.needs_frames() && next_ < stream_->records().size() &&
+           stream_->records()[next_].timestamp_ns <= shot.frame->timestamp_ns) {
+      stage_.see(stream_->read(next_), next_);
+      ++next_;
+    }
+    shot.light = stage_.light();
+    if (!shot.light) return;
+    for (const std::string& note : shot.light->lighting.report.notes)
+      if (noted_.insert(note).second) progress_.note("light: " + note);
+  }
+
+ private:
+  pipeline::LightStage stage_;
+  std::unique_ptr<session::StreamReader> stream_;
+  std::size_t next_ = 0;
+  std::set<std::string> noted_;
+  Progress& progress_;
+};
+
+std::string done_text(const Shot& shot) {
+  const std::string frame = "frame " + std::to_string(shot.index) + ": ";
+  if (!shot.untouched.empty()) return frame + "plate untouched, " + shot.untouched;
+  return frame + std::to_string(shot.layers.samples) + " samples in " +
+         duration_words(shot.render_s);
+}
+
+// NaN, negative and overflowed samples are left out of the means; nobody may miss that.
+std::string dropped_text(const render::Counters& counters) {
+  std::string text;
+  const auto add = [&](std::uint64_t count, const char* what) {
+    if (count > 0) text += (text.empty() ? "" : ", ") + std::to_string(count) + what;
+  };
+  add(counters.dropped_not_finite, " samples not finite");
+  add(counters.dropped_negative, " samples negative");
+  add(counters.queue_overflow, " paths lost to full queues");
+  return text;
+}
+
+}  // namespace
+
+FrameRange parse_frame_range(const std::string& text) {
+  const Error error("--frames " + text +
+                    ": write one frame (7), a range (3-9) or an open one (3-)");
+  const auto number = [&](std::string_view digits) {
+    std::uint64_t value = 0;
+    const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (code != std::errc() || end != digits.data() + digits.size()) throw error;
+    return value;
+  };
+  const std::string_view view = text;
+  const std::size_t dash = view.find('-');
+  FrameRange range;
+  range.first = number(view.substr(0, dash));
+  range.last = range.first;
+  if (dash != std::string_view::npos) {
+    const std::string_view last = view.substr(dash + 1);
+    range.last = last.empty() ? std::numeric_limits<std::uint64_t>::max() : number(last);
+  }
+  if (range.last < range.first) throw error;
+  return range;
+}
+
+RenderReport render_session(const RenderOptions& options, std::ostream& out) {
+  pipeline::Take take = pipeline::open_take(options.session, options.set_file);
+  override_set(take.set, options);
+  const set::Set& set = take.set;
+  const FrameRange range = range_of(options, take);
+  RenderDirectory directory(set.output, settings_of(take, set), options.force);
+
+  RenderReport report;
+  report.directory = directory.path();
+  std::set<std::uint64_t> to_do;
+  for (std::uint64_t frame = range.first; frame <= range.last; ++frame)
+    if (!directory.finished(frame)) to_do.insert(frame);
+  report.found_finished = range.last - range.first + 1 - to_do.size();
+
+  for (const std::string& what : take.session.missing) out << "session: " << what << std::endl;
+  if (report.found_finished > 0)
+    out << directory.path().string() << ": " << report.found_finished
+        << " frames are finished already" << std::endl;
+
+  pipeline::Metrics metrics;
+  const double start = now_s();
+  if (!to_do.empty()) {
+    const scene::Scene scene = scene::load_scene(set);
+    for (const std::string& note : scene.notes) out << "scene: " << note << std::endl;
+    const std::shared_ptr<render::Device> device = render::open_device(options.device);
+    out << take.session.info.name << ": " << to_do.size() << " frames of "
+        << take.observer.intrinsics.width << "x" << take.observer.intrinsics.height << ", "
+        << set.quality.samples << " samples, on " << render::device_name(*device) << std::endl;
+
+    Progress progress(out, options.terminal, to_do.size(), now_s());
+    ObserverSource observer(take, to_do, progress, metrics);
+    pipeline::TrackStage track(set, take.observer, take.session.track);
+    LightSource light(take, progress);
+    pipeline::RenderStageOptions render_options;
+    render_options.layers = true;
+    render_options.cancelled = [&] { return options.stop.stop_requested(); };
+    render_options.progress = [&](const Shot& shot, int samples) {
+      progress.sample(shot.index, samples, set.quality.samples, now_s());
+    };
+    pipeline::RenderStage render(device, set, take.observer, scene, render_options);
+
+    // A frame ahead per stage is all that keeps them busy; whole layers wait in the last queue.
+    pipeline::BoundedQueue<Shot> seen(1), tracked(1), lit(1), rendered(1);
+    pipeline::StageThreads stages(metrics, options.stop);
+    const auto step = [](auto& stage) {
+      return [&stage](Shot shot) {
+        stage(shot);
+        return shot;
+      };
+    };
+    stages.source("observer", seen, [&] { return observer(); });
+    stages.stage("tracking", seen, tracked, step(track));
+    stages.stage("lighting", tracked, lit, step(light));
+    stages.stage("render", lit, rendered, step(render));
+    stages.sink("output", rendered, [&](Shot shot) {
+      if (!shot.whole) return;
+      directory.write(shot, set);
+      if (const std::string dropped = dropped_text(shot.counters); !dropped.empty())
+        progress.note("frame " + std::to_string(shot.index) + ": left out " + dropped);
+      progress.frame_done(done_text(shot), now_s());
+      if (options.on_frame) options.on_frame(shot);
+    });
+    stages.wait();
+  }
+
+  for (std::uint64_t frame = range.first; frame <= range.last; ++frame)
+    if (const FrameRecord* record = directory.finished(frame)) report.frames.push_back(*record);
+  report.interrupted = options.stop.stop_requested();
+  if (set.output.video && !report.interrupted && !report.frames.empty())
+    report.video = directory.write_video(report.frames, out);
+  report.seconds = now_s() - start;
+  report.metrics = metrics.snapshot(report.seconds);
+  return report;
+}
+
+}  // namespace previz::post

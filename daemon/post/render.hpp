@@ -1,0 +1,82 @@
+// `previzd render`: the daemon's pipeline over a recorded session, without a clock and without
+// drops.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <iosfwd>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "daemon/pipeline/metrics.hpp"
+#include "daemon/pipeline/shot.hpp"
+#include "daemon/render/renderer.hpp"
+#include "daemon/set/set.hpp"
+
+namespace previz::post {
+
+// Observer frames by index in the stream, both ends included.
+struct FrameRange {
+  std::uint64_t first = 0;
+  std::uint64_t last = 0;
+};
+
+// "7", "3-9", "3-" (to the end); throws previz::Error saying what is allowed.
+FrameRange parse_frame_range(const std::string& text);
+
+// What is given here overrides the set file.
+struct RenderOptions {
+  std::filesystem::path session;
+  std::optional<std::filesystem::path> set_file;  // instead of the one in the session
+  std::optional<FrameRange> frames;               // all
+  std::optional<int> samples;                     // quality.samples
+  std::optional<std::uint32_t> seed;              // estimation.seed
+  std::optional<set::Estimator> estimator;
+  std::optional<std::filesystem::path> directory;  // output.directory
+  std::optional<bool> exr, png, video;
+  bool force = false;  // render again what is there with other settings, or with these
+  render::DeviceOptions device;
+  bool terminal = false;  // the report goes to a terminal: one line that is rewritten
+  std::stop_token stop;   // ends cleanly, with what is finished on disk
+  // Called after a frame's files are written, from the output stage's thread, in frame order; not
+  // for frames that were finished before. The shot has its layers.
+  std::function<void(const pipeline::Shot&)> on_frame;
+};
+
+enum class FrameStatus { rendered, untouched };
+
+// A line of DIR/frames.jsonl.
+struct FrameRecord {
+  std::uint64_t frame = 0;
+  std::int64_t timestamp_ns = 0;
+  FrameStatus status = FrameStatus::rendered;
+  std::string reason;  // untouched: why the plate passed through as it is
+  std::int64_t samples = 0;
+  double render_s = 0;
+  std::optional<tracking::Pose> pose;
+  std::vector<std::uint64_t> light_frames;  // sequence numbers; empty: environment file
+  render::Counters counters;
+};
+
+struct RenderReport {
+  std::filesystem::path directory;
+  std::vector<FrameRecord> frames;  // every finished frame of the range, in order
+  std::size_t found_finished = 0;   // of those, the ones an earlier run had finished
+  bool interrupted = false;
+  double seconds = 0;           // wall clock, without opening the session, scene and device
+  std::filesystem::path video;  // empty: none was made
+  pipeline::MetricsSnapshot metrics;
+};
+
+// For every frame one NNNN.exr and NNNN.png, then review.mp4 over all pictures of the range, and
+//   DIR/render.json   the settings; a run with other settings refuses to mix its frames with these
+//   DIR/frames.jsonl  a line a finished frame (FrameRecord)
+// Frames that are finished are skipped. A frame whose pose is lost, or that no light frame
+// precedes, passes through untouched and is reported so. Progress and notes go to `out`. Throws
+// previz::Error on anything that keeps the job from being done.
+RenderReport render_session(const RenderOptions& options, std::ostream& out);
+
+}  // namespace previz::post

@@ -1,0 +1,52 @@
+// The directory a render leaves behind: pictures, a line per finished frame, and the settings all
+// of them were made with. Knows what is finished, so that a run can go on where another ended.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+
+#include "daemon/pipeline/shot.hpp"
+#include "daemon/post/render.hpp"
+#include "daemon/set/set.hpp"
+
+namespace previz::post {
+
+class RenderDirectory {
+ public:
+  // Makes the directory. `settings` is JSON: an object whose values decide what the pictures look
+  // like. Throws previz::Error, naming what differs, if frames made with other settings are there;
+  // with `force` those frames count as not finished.
+  RenderDirectory(const set::Output& output, const std::string& settings, bool force);
+
+  // Null: still to be rendered. A frame is finished if its line and all the files the set asks for
+  // are there.
+  const FrameRecord* finished(std::uint64_t frame) const;
+
+  // Writes the shot's files, then its line.
+  void write(const pipeline::Shot& shot, const set::Set& set);
+
+  // Encodes the pictures of these frames to review.mp4 (or .mkv) and says with what on `out`.
+  std::filesystem::path write_video(const std::vector<FrameRecord>& frames,
+                                    std::ostream& out) const;
+
+  const std::filesystem::path& path() const { return output_.directory; }
+
+ private:
+  std::filesystem::path file(std::uint64_t frame, const char* extension) const;
+  bool wants_png() const { return output_.png || output_.video; }  // the video is made of them
+  void check_settings(const std::string& settings) const;
+  void read_finished();
+
+  const set::Output output_;
+  std::map<std::uint64_t, FrameRecord> finished_;
+};
+
+// A line of frames.jsonl and back; from_json throws nlohmann::json::exception on a broken line.
+std::string to_json(const FrameRecord& record);
+FrameRecord from_json(const std::string& line);
+
+// What is recorded of a shot.
+FrameRecord record_of(const pipeline::Shot& shot);
+
+}  // namespace previz::post

@@ -1,0 +1,62 @@
+#include "daemon/rig/cameras.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "drivers/error.hpp"
+#include "drivers/replay/replay_camera.hpp"
+
+namespace previz::rig {
+namespace {
+
+// Threads and device start before the first frame is due.
+constexpr std::chrono::milliseconds replay_delay{200};
+
+void require_replay(const set::Set& set, const std::string& key, set::Driver driver) {
+  if (driver != set::Driver::replay)
+    throw Error(set.file.string() + ": " + key +
+                ".driver: this build drives no such camera; \"replay\" is allowed");
+}
+
+std::unique_ptr<Camera> start(std::unique_ptr<session::StreamReader> stream,
+                              const std::string& name, const ReplayOptions::Origin& origin,
+                              const std::vector<std::string>& trouble) {
+  ReplayOptions options;
+  options.origin = origin;
+  return replay(std::move(stream), name, options, {}, trouble);
+}
+
+}  // namespace
+
+Cameras open_cameras(const set::Set& set) {
+  require_replay(set, "observer", set.observer.driver);
+  Cameras cameras;
+  cameras.recorded = session::open_session(set.observer.device);
+  auto observer = session::open_stream(cameras.recorded, "observer");
+  if (!observer || observer->records().empty())
+    throw Error(set.observer.device + ": the session has no observer frames");
+  ReplayOptions::Origin origin{std::chrono::steady_clock::now() + replay_delay,
+                               observer->records().front().timestamp_ns};
+
+  std::unique_ptr<session::StreamReader> light;
+  ReplayOptions::Origin light_origin = origin;
+  if (!set.lighting.environment && set.light_camera.driver != set::Driver::none) {
+    require_replay(set, "light_camera", set.light_camera.driver);
+    session::Session session = session::open_session(set.light_camera.device);
+    light = session::open_stream(session, "light");
+    if (!light || light->records().empty())
+      throw Error(set.light_camera.device + ": the session has no light frames");
+    light_origin.timestamp_ns = light->records().front().timestamp_ns;
+    if (session.directory == cameras.recorded.directory) {
+      origin.timestamp_ns = std::min(origin.timestamp_ns, light_origin.timestamp_ns);
+      light_origin = origin;
+    }
+    if (!cameras.recorded.info.light) cameras.recorded.info.light = session.info.light;
+    cameras.light = start(std::move(light), "light", light_origin, session.missing);
+  }
+  cameras.observer = start(std::move(observer), "observer", origin, cameras.recorded.missing);
+  return cameras;
+}
+
+}  // namespace previz::rig

@@ -1,0 +1,22 @@
+// The one registry of camera drivers: from what a set file names to an open camera.
+#pragma once
+
+#include <memory>
+
+#include "daemon/set/set.hpp"
+#include "drivers/camera.hpp"
+#include "drivers/session/session.hpp"
+
+namespace previz::rig {
+
+// The rig's cameras as the set names them. Replayed streams of one session keep their common time.
+struct Cameras {
+  std::unique_ptr<Camera> observer;
+  std::unique_ptr<Camera> light;  // null: the set has none, or gives an environment file
+  session::Session recorded;      // of the replayed observer: calibration and track
+};
+
+// Throws previz::Error naming the key whose driver this build has not, or the device that fails.
+Cameras open_cameras(const set::Set& set);
+
+}  // namespace previz::rig
