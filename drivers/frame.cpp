@@ -1,1 +1,142 @@
 #include "drivers/frame.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+
+#include "drivers/error.hpp"
+
+namespace previz {
+namespace {
+
+// 16-bit samples are copied as the host holds them.
+static_assert(std::endian::native == std::endian::little);
+
+struct FormatName {
+  PixelFormat format;
+  const char* name;
+};
+
+constexpr FormatName format_names[] = {
+    {PixelFormat::rgb8, "rgb8"},         {PixelFormat::rgb16, "rgb16"},
+    {PixelFormat::gray8, "gray8"},       {PixelFormat::gray16, "gray16"},
+    {PixelFormat::yuv422p8, "yuv422p8"},
+};
+
+std::vector<std::uint16_t> widen(const std::vector<std::uint8_t>& bytes) {
+  return {bytes.begin(), bytes.end()};
+}
+
+std::vector<std::uint16_t> samples_of_16_bit(const std::vector<std::uint8_t>& bytes) {
+  std::vector<std::uint16_t> samples(bytes.size() / 2);
+  std::memcpy(samples.data(), bytes.data(), samples.size() * 2);
+  return samples;
+}
+
+std::vector<std::uint16_t> repeat_three_times(const std::vector<std::uint16_t>& gray) {
+  std::vector<std::uint16_t> rgb(gray.size() * 3);
+  for (std::size_t i = 0; i < gray.size(); ++i)
+    rgb[3 * i] = rgb[3 * i + 1] = rgb[3 * i + 2] = gray[i];
+  return rgb;
+}
+
+std::uint16_t quantize_8_bit(double value) {
+  return static_cast<std::uint16_t>(std::floor(255.0 * std::clamp(value, 0.0, 1.0) + 0.5));
+}
+
+// Recommendation ITU-R BT.709-6, items 3.2 to 3.4 inverted: luma 16..235, chroma 16..240 around
+// 128.
+void bt709_to_rgb(double luma, double cb, double cr, std::uint16_t* rgb) {
+  constexpr double kr = 0.2126, kb = 0.0722, kg = 1.0 - kr - kb;
+  const double y = (luma - 16.0) / 219.0;
+  const double red = y + 2.0 * (1.0 - kr) * (cr - 128.0) / 224.0;
+  const double blue = y + 2.0 * (1.0 - kb) * (cb - 128.0) / 224.0;
+  const double green = (y - kr * red - kb * blue) / kg;
+  rgb[0] = quantize_8_bit(red);
+  rgb[1] = quantize_8_bit(green);
+  rgb[2] = quantize_8_bit(blue);
+}
+
+std::vector<std::uint16_t> yuv422_to_rgb(const Frame& frame) {
+  const std::size_t width = frame.width, height = frame.height, chroma_width = (width + 1) / 2;
+  const std::uint8_t* luma = frame.bytes.data();
+  const std::uint8_t* cb = luma + width * height;
+  const std::uint8_t* cr = cb + chroma_width * height;
+  std::vector<std::uint16_t> rgb(3 * width * height);
+  for (std::size_t y = 0; y < height; ++y) {
+    for (std::size_t x = 0; x < width; ++x) {
+      const std::size_t left = y * chroma_width + x / 2;
+      const std::size_t right = y * chroma_width + std::min(x / 2 + x % 2, chroma_width - 1);
+      bt709_to_rgb(luma[y * width + x], 0.5 * (cb[left] + cb[right]), 0.5 * (cr[left] + cr[right]),
+                   &rgb[3 * (y * width + x)]);
+    }
+  }
+  return rgb;
+}
+
+}  // namespace
+
+std::size_t frame_bytes(PixelFormat format, int width, int height) {
+  if (width < 0 || height < 0)
+    throw std::invalid_argument("a frame cannot have a negative width or height");
+  const std::size_t w = width, h = height;
+  switch (format) {
+    case PixelFormat::rgb8:
+      return 3 * w * h;
+    case PixelFormat::rgb16:
+      return 6 * w * h;
+    case PixelFormat::gray8:
+      return w * h;
+    case PixelFormat::gray16:
+      return 2 * w * h;
+    case PixelFormat::yuv422p8:
+      return (w + 2 * ((w + 1) / 2)) * h;
+  }
+  throw std::invalid_argument("unknown pixel format");
+}
+
+const char* to_string(PixelFormat format) {
+  for (const FormatName& known : format_names)
+    if (known.format == format) return known.name;
+  throw std::invalid_argument("unknown pixel format");
+}
+
+PixelFormat pixel_format_from_string(const std::string& name) {
+  for (const FormatName& known : format_names)
+    if (name == known.name) return known.format;
+  throw std::invalid_argument("unknown pixel format \"" + name +
+                              "\"; allowed: rgb8, rgb16, gray8, gray16, yuv422p8");
+}
+
+Plate to_plate(const Frame& frame) {
+  if (frame.bytes.size() != frame_bytes(frame.format, frame.width, frame.height))
+    throw Error("frame " + std::to_string(frame.sequence) + " of " + frame.source + " holds " +
+                std::to_string(frame.bytes.size()) + " bytes; " + to_string(frame.format) + " of " +
+                std::to_string(frame.width) + "x" + std::to_string(frame.height) + " needs " +
+                std::to_string(frame_bytes(frame.format, frame.width, frame.height)));
+  Plate plate{frame.width, frame.height, 8, {}};
+  switch (frame.format) {
+    case PixelFormat::rgb8:
+      plate.samples = widen(frame.bytes);
+      break;
+    case PixelFormat::gray8:
+      plate.samples = repeat_three_times(widen(frame.bytes));
+      break;
+    case PixelFormat::yuv422p8:
+      plate.samples = yuv422_to_rgb(frame);
+      break;
+    case PixelFormat::rgb16:
+      plate.bits = 16;
+      plate.samples = samples_of_16_bit(frame.bytes);
+      break;
+    case PixelFormat::gray16:
+      plate.bits = 16;
+      plate.samples = repeat_three_times(samples_of_16_bit(frame.bytes));
+      break;
+  }
+  return plate;
+}
+
+}  // namespace previz

@@ -37,7 +37,8 @@ struct Frame {
 
 using FramePtr = std::shared_ptr<const Frame>;
 
-// Bytes of one frame of this format and size (without padding).
+// Bytes of one frame of this format and size, without padding; yuv422p8 of odd width has
+// (width + 1) / 2 chroma columns.
 std::size_t frame_bytes(PixelFormat format, int width, int height);
 
 // The format's name as written in session.toml: "rgb8", "gray16", ...
@@ -53,7 +54,9 @@ struct Plate {
   std::vector<std::uint16_t> samples;   // 3*width*height, row-major, 0..2^bits-1
 };
 
-// Converts a frame to its RGB plate. gray repeats the sample; yuv422p8 is BT.709 limited range.
+// Converts a frame to its RGB plate. gray repeats the sample; yuv422p8 is BT.709 limited range
+// (ITU-R BT.709-6), chroma sited on the even columns and linear between them, rounded to nearest,
+// clipped to 0..255. Throws previz::Error if `bytes` has not the length of its format and size.
 Plate to_plate(const Frame& frame);
 
 }  // namespace previz

@@ -1,1 +1,65 @@
+// A session on disk:
+//
+//   SESSION/
+//     session.toml    format version, name, clock; per stream its pixel format, size and, once the
+//                     session is closed, its number of frames; calibrations; the asset map; the set
+//                     file verbatim. Replaced as a whole, never edited in place.
+//     observer.mkv    FFV1 level 3, every frame a key frame, slice checksums, one Matroska cluster
+//     a
+//                     frame: RGB (8 or 16 bit), gray (8 or 16 bit) or 4:2:2 Y'CbCr. Matroska times
+//                     are milliseconds from the first frame, strictly increasing.
+//     observer.jsonl  a line a frame: frame, sequence, timestamp_ns, arrival_ns, exposure_s, gain,
+//                     exposure; video_ms and crc32 name the packet of observer.mkv that holds its
+//                     picture, so that the two files can lose parts and still be joined rightly.
+//     light.mkv, light.jsonl   likewise; a bracket is consecutive frames
+//     track.jsonl     a line a frame: frame, timestamp_ns, tracked, tags; if tracked also
+//                     world_from_camera (16 numbers, row-major) and covariance (36 numbers)
+//     assets/         files of the set, named by the SHA-256 of their content
 #include "drivers/session/session.hpp"
+
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "drivers/session/json_lines.hpp"
+#include "drivers/session/missing.hpp"
+#include "drivers/session/session_toml.hpp"
+
+namespace previz::session {
+namespace {
+
+void check_assets(Session& session) {
+  for (const auto& [as_written, path] : session.info.assets) {
+    const std::filesystem::path file = session.directory / path;
+    const std::string named = path + " (" + as_written + ")";
+    if (!std::filesystem::is_regular_file(file))
+      session.missing.push_back(named + ": the file is missing");
+    else if (sha256_of(file) != file.stem())
+      session.missing.push_back(named + ": the file was changed since it was recorded");
+  }
+}
+
+void read_track(Session& session) {
+  Lines<TrackRecord> lines = read_track_lines(session.directory / "track.jsonl");
+  session.track = std::move(lines.records);
+  if (!lines.bad_lines.empty())
+    session.missing.push_back("track.jsonl: " + list_of("line", lines.bad_lines) +
+                              " cannot be understood and are left out");
+}
+
+}  // namespace
+
+Session open_session(const std::filesystem::path& directory) {
+  const std::filesystem::path toml = directory / "session.toml";
+  if (!std::filesystem::exists(toml))
+    throw Error(directory.string() + ": is not a session; it holds no session.toml");
+  const SessionFile file = parse_session_toml(read_file(toml), toml);
+  Session session{directory, file.info, {}, {}};
+  if (!file.closed)
+    session.missing.push_back(
+        "session.toml: the recording was not closed (power cut, crash, or still recording); what "
+        "came after the last whole frame, at most about a second, is lost");
+  check_assets(session);
+  read_track(session);
+  return session;
+}
+
+}  // namespace previz::session

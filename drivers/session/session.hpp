@@ -35,11 +35,11 @@ struct SessionInfo {
 struct TrackRecord {
   std::uint64_t frame = 0;  // index of the observer frame
   std::int64_t timestamp_ns = 0;
-  bool tracked = false;                 // false: lost; the pose is then not valid
-  glm::dmat4 world_from_camera{1.0};    // OpenCV camera axes, metres
+  bool tracked = false;               // false: lost; the pose is then not valid
+  glm::dmat4 world_from_camera{1.0};  // OpenCV camera axes, metres
   // Row-major 6x6: rotation (rad) then translation (m), in the camera frame.
   std::array<double, 36> covariance{};
-  std::vector<int> tags;                // ids used
+  std::vector<int> tags;  // ids used
 };
 
 // A frame of a stream as recorded; `frame` is its position in the .mkv, from 0.
@@ -66,18 +66,24 @@ class StreamReader {
 struct Session {
   std::filesystem::path directory;
   SessionInfo info;
-  std::vector<TrackRecord> track;     // empty where nothing was tracked
+  std::vector<TrackRecord> track;  // empty where nothing was tracked
   std::vector<std::string> missing;
 };
 
-// Throws previz::Error naming the file (and line) if session.toml cannot be understood.
+// Throws previz::Error naming the file (and line) if session.toml cannot be understood. Checks the
+// assets' content hashes, and with them reads the assets once.
 Session open_session(const std::filesystem::path& directory);
 // `source` is "observer" or "light"; null where the session has no such stream. What is missing of
-// the stream is appended to session.missing.
+// the stream is appended to session.missing. Reads the video once from end to end, so that a
+// damaged picture is known here (packet checksums) and never shown.
 std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& source);
 
 // Writes a session directory; every call leaves a readable session behind. FFV1 in Matroska,
 // lossless; streams open at their first frame. Throws previz::Error naming the file on failure.
+// A frame is the kernel's when write() returns: a process killed at any time loses at most the
+// frame it was writing. About once a second write() also waits until all is on the disk
+// (fdatasync): a power cut loses about the last second. Call it from a thread that may wait. Not
+// thread-safe.
 class SessionWriter {
  public:
   // The directory must not exist or be empty.

@@ -1,0 +1,48 @@
+// Owning handles and error text for libav. Not for use outside drivers/.
+#pragma once
+
+extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavformat/avformat.h>
+#include <libavutil/crc.h>
+}
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "drivers/error.hpp"
+
+namespace previz::av {
+
+struct Closer {
+  void operator()(AVCodecContext* context) const { avcodec_free_context(&context); }
+  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
+  void operator()(AVPacket* packet) const { av_packet_free(&packet); }
+};
+
+using Codec = std::unique_ptr<AVCodecContext, Closer>;
+using Picture = std::unique_ptr<AVFrame, Closer>;
+using Packet = std::unique_ptr<AVPacket, Closer>;
+
+inline std::string error_text(int code) {
+  std::array<char, AV_ERROR_MAX_STRING_SIZE> text{};
+  av_strerror(code, text.data(), text.size());
+  return text.data();
+}
+
+// Throws previz::Error "<file>: <what>: <libav's reason>" if `code` says failure.
+inline int check(int code, const std::filesystem::path& file, const std::string& what) {
+  if (code < 0) throw Error(file.string() + ": " + what + ": " + error_text(code));
+  return code;
+}
+
+// IEEE 802.3 (zlib's) CRC-32.
+inline std::uint32_t crc32(const AVPacket& packet) {
+  return ~av_crc(av_crc_get_table(AV_CRC_32_IEEE_LE), ~0u, packet.data,
+                 static_cast<std::size_t>(packet.size));
+}
+
+}  // namespace previz::av

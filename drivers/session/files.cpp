@@ -1,0 +1,102 @@
+#include "drivers/session/files.hpp"
+
+#include <fcntl.h>
+#include <openssl/evp.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include "drivers/error.hpp"
+
+namespace previz::session {
+namespace {
+
+[[noreturn]] void fail(const std::filesystem::path& file, const char* what) {
+  throw Error(file.string() + ": " + what + ": " + std::strerror(errno));
+}
+
+void write_all(int descriptor, std::string_view content, const std::filesystem::path& file) {
+  while (!content.empty()) {
+    const ssize_t written = ::write(descriptor, content.data(), content.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) fail(file, "cannot be written");
+    content.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+}  // namespace
+
+Descriptor::Descriptor(const std::filesystem::path& file, int flags)
+    : file_(file), descriptor_(::open(file.c_str(), flags | O_CLOEXEC, 0666)) {
+  if (descriptor_ < 0) fail(file, "cannot be opened");
+}
+
+Descriptor::~Descriptor() {
+  ::close(descriptor_);
+}
+
+void Descriptor::sync() const {
+  if (::fdatasync(descriptor_) != 0) fail(file_, "cannot be brought to the disk");
+}
+
+LineFile::LineFile(const std::filesystem::path& file)
+    : file_(file), descriptor_(file, O_WRONLY | O_CREAT | O_EXCL | O_APPEND) {}
+
+void LineFile::append(std::string line) {
+  line += '\n';
+  write_all(descriptor_.get(), line, file_);
+}
+
+void replace_file(const std::filesystem::path& file, const std::string& content) {
+  const std::filesystem::path draft = file.string() + ".part";
+  {
+    const Descriptor descriptor(draft, O_WRONLY | O_CREAT | O_TRUNC);
+    write_all(descriptor.get(), content, draft);
+    descriptor.sync();
+  }
+  if (std::rename(draft.c_str(), file.c_str()) != 0) fail(file, "cannot be replaced");
+  const Descriptor directory(file.parent_path(), O_RDONLY | O_DIRECTORY);
+  ::fsync(directory.get());  // the rename itself; not every file system can, and then need not
+}
+
+std::string read_file(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) fail(file, "cannot be opened");
+  std::string content{std::istreambuf_iterator<char>(stream), {}};
+  if (stream.bad()) fail(file, "cannot be read");
+  return content;
+}
+
+std::string sha256_of(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) fail(file, "cannot be opened");
+  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(),
+                                                                        EVP_MD_CTX_free);
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
+  unsigned int size = 0;
+  bool good = context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1;
+  std::vector<char> block(1 << 20);
+  while (good && stream) {
+    stream.read(block.data(), static_cast<std::streamsize>(block.size()));
+    good = EVP_DigestUpdate(context.get(), block.data(), stream.gcount()) == 1;
+  }
+  if (stream.bad()) fail(file, "cannot be read");
+  if (!good || EVP_DigestFinal_ex(context.get(), digest.data(), &size) != 1)
+    throw Error(file.string() + ": libcrypto cannot compute its SHA-256");
+  std::string text;
+  for (unsigned int i = 0; i < size; ++i) {
+    constexpr char digits[] = "0123456789abcdef";
+    text += digits[digest[i] >> 4];
+    text += digits[digest[i] & 15];
+  }
+  return text;
+}
+
+}  // namespace previz::session

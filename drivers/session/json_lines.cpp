@@ -1,0 +1,179 @@
+#include "drivers/session/json_lines.hpp"
+
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "drivers/error.hpp"
+
+namespace previz::session {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double finite(double value, const char* key) {
+  if (!std::isfinite(value))
+    throw Error(std::string("a frame's ") + key + " must be a finite number to be recorded");
+  return value;
+}
+
+std::string hex(std::uint32_t value) {
+  std::array<char, 8> digits;
+  digits.fill('0');
+  std::array<char, 8> text{};
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value, 16).ptr;
+  std::copy(text.data(), end, digits.end() - (end - text.data()));
+  return {digits.begin(), digits.end()};
+}
+
+std::uint32_t from_hex(const std::string& text) {
+  std::uint32_t value = 0;
+  const char* end = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), end, value, 16);
+  if (text.size() != 8 || result.ec != std::errc{} || result.ptr != end)
+    throw std::invalid_argument("not eight hexadecimal digits");
+  return value;
+}
+
+// Strict, unlike get_to: a number of the wrong kind is damage, and converting it may overflow.
+void get(const Json& json, std::uint64_t& value) {
+  if (!json.is_number_unsigned()) throw std::invalid_argument("not a count");
+  json.get_to(value);
+}
+
+void get(const Json& json, std::int64_t& value) {
+  if (!json.is_number_integer() ||
+      (json.is_number_unsigned() && json.get<std::uint64_t>() > INT64_MAX))
+    throw std::invalid_argument("not an integer");
+  json.get_to(value);
+}
+
+void get(const Json& json, int& value) {
+  std::int64_t wide = 0;
+  get(json, wide);
+  if (!std::in_range<int>(wide)) throw std::invalid_argument("too large");
+  value = static_cast<int>(wide);
+}
+
+void get(const Json& json, double& value) {
+  if (!json.is_number()) throw std::invalid_argument("not a number");
+  json.get_to(value);
+}
+
+void get(const Json& json, bool& value) {
+  json.get_to(value);
+}
+
+template <std::size_t N>
+void get(const Json& json, std::array<double, N>& values) {
+  if (!json.is_array() || json.size() != N) throw std::invalid_argument("wrong length");
+  for (std::size_t i = 0; i < N; ++i) get(json[i], values[i]);
+}
+
+void get(const Json& json, std::vector<int>& values) {
+  if (!json.is_array()) throw std::invalid_argument("not a list");
+  for (const Json& item : json) get(item, values.emplace_back());
+}
+
+FrameLine parse_frame_line(const Json& json) {
+  FrameLine line;
+  get(json.at("frame"), line.record.frame);
+  get(json.at("sequence"), line.record.sequence);
+  get(json.at("timestamp_ns"), line.record.timestamp_ns);
+  get(json.at("arrival_ns"), line.record.arrival_ns);
+  get(json.at("exposure_s"), line.record.exposure_s);
+  get(json.at("gain"), line.record.gain);
+  get(json.at("exposure"), line.record.exposure);
+  get(json.at("video_ms"), line.video_ms);
+  line.crc32 = from_hex(json.at("crc32").get<std::string>());
+  return line;
+}
+
+TrackRecord parse_track_line(const Json& json) {
+  TrackRecord record;
+  get(json.at("frame"), record.frame);
+  get(json.at("timestamp_ns"), record.timestamp_ns);
+  get(json.at("tracked"), record.tracked);
+  get(json.at("tags"), record.tags);
+  if (!record.tracked) return record;
+  std::array<double, 16> rows{};
+  get(json.at("world_from_camera"), rows);
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column)
+      record.world_from_camera[column][row] = rows[4 * row + column];
+  get(json.at("covariance"), record.covariance);
+  return record;
+}
+
+std::uint64_t frame_of(const FrameLine& line) {
+  return line.record.frame;
+}
+std::uint64_t frame_of(const TrackRecord& record) {
+  return record.frame;
+}
+
+template <typename Record>
+Lines<Record> read_lines(const std::filesystem::path& file, Record (*parse)(const Json&)) {
+  Lines<Record> lines;
+  std::ifstream stream(file, std::ios::binary);
+  std::string text;
+  for (std::uint64_t number = 1; std::getline(stream, text); ++number) {
+    try {
+      Record record = parse(Json::parse(text));
+      if (!lines.records.empty() && frame_of(record) <= frame_of(lines.records.back()))
+        throw std::invalid_argument("frames go backwards");
+      lines.records.push_back(std::move(record));
+    } catch (const std::exception&) {
+      lines.bad_lines.push_back(number);
+    }
+  }
+  return lines;
+}
+
+}  // namespace
+
+std::string to_line(const FrameLine& line) {
+  const FrameRecord& record = line.record;
+  return Json{{"frame", record.frame},
+              {"sequence", record.sequence},
+              {"timestamp_ns", record.timestamp_ns},
+              {"arrival_ns", record.arrival_ns},
+              {"exposure_s", finite(record.exposure_s, "exposure_s")},
+              {"gain", finite(record.gain, "gain")},
+              {"exposure", finite(record.exposure, "exposure")},
+              {"video_ms", line.video_ms},
+              {"crc32", hex(line.crc32)}}
+      .dump();
+}
+
+std::string to_line(const TrackRecord& record) {
+  Json json{{"frame", record.frame},
+            {"timestamp_ns", record.timestamp_ns},
+            {"tracked", record.tracked},
+            {"tags", record.tags}};
+  if (record.tracked) {
+    std::array<double, 16> rows{};
+    for (int row = 0; row < 4; ++row)
+      for (int column = 0; column < 4; ++column)
+        rows[4 * row + column] = finite(record.world_from_camera[column][row], "world_from_camera");
+    for (const double value : record.covariance) finite(value, "covariance");
+    json["world_from_camera"] = rows;
+    json["covariance"] = record.covariance;
+  }
+  return json.dump();
+}
+
+Lines<FrameLine> read_frame_lines(const std::filesystem::path& file) {
+  return read_lines<FrameLine>(file, parse_frame_line);
+}
+
+Lines<TrackRecord> read_track_lines(const std::filesystem::path& file) {
+  return read_lines<TrackRecord>(file, parse_track_line);
+}
+
+}  // namespace previz::session

@@ -1,0 +1,35 @@
+// The .jsonl files: one record a line, so that a torn line costs that line only. Numbers are
+// written so that every double comes back bit for bit. Not for use outside drivers/.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "drivers/session/session.hpp"
+
+namespace previz::session {
+
+// A line of observer.jsonl or light.jsonl: the frame, and which packet of the .mkv is its picture.
+struct FrameLine {
+  FrameRecord record;
+  std::int64_t video_ms = 0;  // Matroska time of the packet; unique in the file
+  std::uint32_t crc32 = 0;    // of the packet's bytes (IEEE 802.3, as zlib's)
+};
+
+// Without the newline. Throw previz::Error if a number is not finite.
+std::string to_line(const FrameLine& line);
+std::string to_line(const TrackRecord& record);
+
+template <typename Record>
+struct Lines {
+  std::vector<Record> records;           // whole lines, frames strictly increasing
+  std::vector<std::uint64_t> bad_lines;  // numbers, from 1, of lines that cannot be understood
+};
+
+// Read what can be read; a file that is not there has no lines.
+Lines<FrameLine> read_frame_lines(const std::filesystem::path& file);
+Lines<TrackRecord> read_track_lines(const std::filesystem::path& file);
+
+}  // namespace previz::session

@@ -1,0 +1,32 @@
+// session.toml: what a session says about itself, as text and back. Not for use outside drivers/.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "drivers/session/session.hpp"
+
+namespace previz::session {
+
+// What session.toml says about a stream's pictures, so that a damaged video header is noticed.
+struct StreamFormat {
+  PixelFormat format = PixelFormat::rgb8;
+  int width = 0, height = 0;            // pixels
+  std::optional<std::uint64_t> frames;  // known once the session was closed
+};
+
+struct SessionFile {
+  SessionInfo info;
+  std::map<std::string, StreamFormat> streams;  // by source
+  bool closed = false;                          // the recording came to an orderly end
+};
+
+// Throws previz::Error if a name or path is not UTF-8. The set's text may be any bytes.
+std::string to_toml(const SessionFile& file);
+// `path` names the text in errors. Throws previz::Error naming line and key.
+SessionFile parse_session_toml(const std::string& text, const std::filesystem::path& path);
+
+}  // namespace previz::session

@@ -1,0 +1,185 @@
+#include <fcntl.h>
+
+#include <chrono>
+#include <cmath>
+#include <map>
+
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "drivers/session/json_lines.hpp"
+#include "drivers/session/session.hpp"
+#include "drivers/session/session_toml.hpp"
+#include "drivers/session/video_writer.hpp"
+
+namespace previz::session {
+namespace {
+
+constexpr std::chrono::seconds sync_interval{1};
+
+struct StreamWriter {
+  VideoWriter video;
+  LineFile lines;
+  std::uint64_t frames = 0;
+
+  StreamWriter(const std::filesystem::path& directory, const std::string& source,
+               const StreamFormat& format)
+      : video(directory / (source + ".mkv"), format), lines(directory / (source + ".jsonl")) {}
+
+  // Picture first: a line always has its picture.
+  void write(const Frame& frame) {
+    const VideoWriter::Stamp stamp = video.write(frame);
+    lines.append(to_line(FrameLine{{frames++, frame.sequence, frame.timestamp_ns, frame.arrival_ns,
+                                    frame.exposure_s, frame.gain, frame.exposure},
+                                   stamp.video_ms,
+                                   stamp.crc32}));
+  }
+
+  void sync() const {
+    video.sync();
+    lines.sync();
+  }
+};
+
+void check(const Frame& frame) {
+  const auto fail = [&](const std::string& what) {
+    throw Error("frame " + std::to_string(frame.sequence) + " of \"" + frame.source + "\" " + what +
+                " and cannot be recorded");
+  };
+  if (frame.source != "observer" && frame.source != "light")
+    fail("comes from neither \"observer\" nor \"light\"");
+  if (frame.width < 1 || frame.height < 1 || frame.width > 65535 || frame.height > 65535)
+    fail("has a width or height outside 1 to 65535 pixels");
+  if (frame.bytes.size() != frame_bytes(frame.format, frame.width, frame.height))
+    fail("does not hold the bytes of its format and size");
+  if (!std::isfinite(frame.exposure) || frame.exposure <= 0)
+    fail("has an exposure that is not positive");
+  if (!std::isfinite(frame.exposure_s) || !std::isfinite(frame.gain))
+    fail("has a shutter time or gain that is not a finite number");
+}
+
+std::string text(const StreamFormat& format) {
+  return std::string(to_string(format.format)) + " " + std::to_string(format.width) + "x" +
+         std::to_string(format.height);
+}
+
+void make_empty_directory(const std::filesystem::path& directory) {
+  std::error_code failure;
+  std::filesystem::create_directories(directory, failure);
+  if (failure)
+    throw Error(directory.string() + ": cannot be made a directory: " + failure.message());
+  if (!std::filesystem::is_empty(directory))
+    throw Error(directory.string() + ": is not empty; a session needs a directory of its own");
+}
+
+}  // namespace
+
+struct SessionWriter::Impl {
+  std::filesystem::path directory;
+  SessionFile file;
+  std::map<std::string, StreamWriter> streams;
+  std::unique_ptr<LineFile> track;
+  std::chrono::steady_clock::time_point synced = std::chrono::steady_clock::now();
+  bool closed = false;
+
+  void check_open() const {
+    if (closed) throw Error(directory.string() + ": the session is closed; nothing can be added");
+  }
+
+  void write_toml() const { replace_file(directory / "session.toml", to_toml(file)); }
+
+  // session.toml announces a stream before its files are there, so that their loss is noticed.
+  StreamWriter& open(const Frame& frame) {
+    const StreamFormat format{frame.format, frame.width, frame.height, {}};
+    file.streams[frame.source] = format;
+    write_toml();
+    return streams.try_emplace(frame.source, directory, frame.source, format).first->second;
+  }
+
+  void sync() {
+    for (auto& [source, stream] : streams) stream.sync();
+    if (track) track->sync();
+    synced = std::chrono::steady_clock::now();
+  }
+
+  void sync_when_due() {
+    if (std::chrono::steady_clock::now() - synced >= sync_interval) sync();
+  }
+
+  void close() {
+    if (closed) return;
+    closed = true;
+    for (auto& [source, stream] : streams) {
+      stream.video.finish();
+      file.streams[source].frames = stream.frames;
+    }
+    sync();
+    file.closed = true;
+    write_toml();
+  }
+};
+
+SessionWriter::SessionWriter(const std::filesystem::path& directory, const SessionInfo& info)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->directory = directory;
+  impl_->file.info = info;
+  make_empty_directory(directory);
+  impl_->write_toml();
+}
+
+SessionWriter::~SessionWriter() {
+  try {
+    impl_->close();
+  } catch (const std::exception&) {
+    // session.toml then says that the session was not closed; close() tells who wants to know.
+  }
+}
+
+void SessionWriter::write(const Frame& frame) {
+  impl_->check_open();
+  check(frame);
+  const auto found = impl_->streams.find(frame.source);
+  StreamWriter& stream = found == impl_->streams.end() ? impl_->open(frame) : found->second;
+  const StreamFormat& format = impl_->file.streams.at(frame.source);
+  if (frame.format != format.format || frame.width != format.width || frame.height != format.height)
+    throw Error((impl_->directory / (frame.source + ".mkv")).string() + ": frame " +
+                std::to_string(frame.sequence) + " is " +
+                text(StreamFormat{frame.format, frame.width, frame.height, {}}) +
+                "; the stream is " + text(format) + " from its first frame on");
+  stream.write(frame);
+  impl_->sync_when_due();
+}
+
+void SessionWriter::write(const TrackRecord& record) {
+  impl_->check_open();
+  const std::string line = to_line(record);
+  if (!impl_->track) impl_->track = std::make_unique<LineFile>(impl_->directory / "track.jsonl");
+  impl_->track->append(line);
+  impl_->sync_when_due();
+}
+
+void SessionWriter::add_asset(const std::string& as_written, const std::filesystem::path& file) {
+  impl_->check_open();
+  const std::string path = "assets/" + sha256_of(file) + file.extension().string();
+  const std::filesystem::path target = impl_->directory / path;
+  try {
+    std::filesystem::create_directories(target.parent_path());
+    if (!std::filesystem::exists(target)) {
+      const std::filesystem::path draft = target.string() + ".part";
+      std::filesystem::copy_file(file, draft, std::filesystem::copy_options::overwrite_existing);
+      std::filesystem::permissions(draft, std::filesystem::perms::owner_write,
+                                   std::filesystem::perm_options::add);
+      Descriptor(draft, O_RDONLY).sync();
+      std::filesystem::rename(draft, target);
+    }
+  } catch (const std::filesystem::filesystem_error& error) {
+    throw Error(file.string() + ": cannot be copied into the session: " + error.code().message());
+  }
+  impl_->file.info.assets[as_written] = path;
+  impl_->write_toml();
+}
+
+void SessionWriter::close() {
+  impl_->close();
+}
+
+}  // namespace previz::session

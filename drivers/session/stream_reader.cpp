@@ -1,0 +1,155 @@
+// open_stream(): joins a stream's lines with the packets of its video.
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "drivers/session/json_lines.hpp"
+#include "drivers/session/missing.hpp"
+#include "drivers/session/session.hpp"
+#include "drivers/session/session_toml.hpp"
+#include "drivers/session/video_reader.hpp"
+
+namespace previz::session {
+namespace {
+
+class RecordedStream final : public StreamReader {
+ public:
+  RecordedStream(std::string source, StreamFormat format, std::unique_ptr<VideoReader> video)
+      : source_(std::move(source)), format_(format), video_(std::move(video)) {}
+
+  void add(const FrameLine& line) {
+    records_.push_back(line.record);
+    packets_.push_back({line.video_ms, line.crc32});
+  }
+
+  const std::vector<FrameRecord>& records() const override { return records_; }
+
+  FramePtr read(std::size_t index) override {
+    if (index >= records_.size())
+      throw Error(source_ + " frame " + std::to_string(index) + " was asked for; there are " +
+                  std::to_string(records_.size()));
+    const FrameRecord& record = records_[index];
+    auto frame = std::make_shared<Frame>();
+    frame->source = source_;
+    frame->sequence = record.sequence;
+    frame->timestamp_ns = record.timestamp_ns;
+    frame->arrival_ns = record.arrival_ns;
+    frame->exposure_s = record.exposure_s;
+    frame->gain = record.gain;
+    frame->exposure = record.exposure;
+    frame->format = format_.format;
+    frame->width = format_.width;
+    frame->height = format_.height;
+    try {
+      frame->bytes = video_->read(packets_[index]);
+    } catch (const Error& error) {
+      throw Error(source_ + " frame " + std::to_string(record.frame) + ": " + error.what());
+    }
+    return frame;
+  }
+
+ private:
+  std::string source_;
+  StreamFormat format_;
+  std::unique_ptr<VideoReader> video_;
+  std::vector<FrameRecord> records_;
+  std::vector<VideoReader::PacketInfo> packets_;
+};
+
+// What joining lines with packets leaves over.
+struct Leftovers {
+  std::vector<std::uint64_t> without_picture;  // frames
+  std::vector<std::uint64_t> damaged;          // frames
+  std::uint64_t without_line = 0;              // pictures
+};
+
+Leftovers join(const std::vector<FrameLine>& lines,
+               const std::vector<VideoReader::PacketInfo>& packets, RecordedStream& stream) {
+  std::multimap<std::int64_t, std::uint32_t> unclaimed;
+  for (const VideoReader::PacketInfo& packet : packets)
+    unclaimed.emplace(packet.video_ms, packet.crc32);
+  Leftovers left;
+  for (const FrameLine& line : lines) {
+    const auto [first, last] = unclaimed.equal_range(line.video_ms);
+    const auto whole =
+        std::find_if(first, last, [&](const auto& packet) { return packet.second == line.crc32; });
+    if (whole != last) {
+      stream.add(line);
+      unclaimed.erase(whole);
+    } else if (first != last) {
+      left.damaged.push_back(line.record.frame);
+      unclaimed.erase(first);
+    } else {
+      left.without_picture.push_back(line.record.frame);
+    }
+  }
+  left.without_line = unclaimed.size();
+  return left;
+}
+
+void tell(const Leftovers& left, const std::string& source, std::vector<std::string>& missing) {
+  const std::string video = source + ".mkv", lines = source + ".jsonl";
+  if (!left.damaged.empty())
+    missing.push_back(video + ": the pictures of " + list_of("frame", left.damaged) +
+                      " are damaged and left out");
+  if (!left.without_picture.empty())
+    missing.push_back(video + ": the pictures of " + list_of("frame", left.without_picture) +
+                      " are missing");
+  if (left.without_line > 0)
+    missing.push_back(lines + ": " + count_of("picture", left.without_line) + " of " + video +
+                      " have no line that says when they were taken, and are left out");
+}
+
+std::unique_ptr<VideoReader> open_video(const std::filesystem::path& file,
+                                        const StreamFormat& format,
+                                        std::vector<std::string>& missing) {
+  if (!std::filesystem::exists(file)) {
+    missing.push_back(file.filename().string() + ": the file is missing");
+    return nullptr;
+  }
+  try {
+    return std::make_unique<VideoReader>(file, format);
+  } catch (const Error& error) {
+    missing.push_back(std::string("no picture can be read: ") + error.what());
+    return nullptr;
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& source) {
+  const std::filesystem::path toml = session.directory / "session.toml";
+  const SessionFile file = parse_session_toml(read_file(toml), toml);
+  const std::filesystem::path video_file = session.directory / (source + ".mkv");
+  const std::filesystem::path line_file = session.directory / (source + ".jsonl");
+  const auto declared = file.streams.find(source);
+  if (declared == file.streams.end()) {
+    if (std::filesystem::exists(video_file))
+      session.missing.push_back("session.toml: does not say what is in " + source +
+                                ".mkv, which is left out");
+    return nullptr;
+  }
+  std::unique_ptr<VideoReader> video = open_video(video_file, declared->second, session.missing);
+  std::vector<VideoReader::PacketInfo> packets;
+  if (video) packets = video->scan();
+
+  if (!std::filesystem::exists(line_file))
+    session.missing.push_back(source + ".jsonl: the file is missing");
+  const Lines<FrameLine> lines = read_frame_lines(line_file);
+  if (!lines.bad_lines.empty())
+    session.missing.push_back(source + ".jsonl: " + list_of("line", lines.bad_lines) +
+                              " cannot be understood and are left out");
+
+  auto stream = std::make_unique<RecordedStream>(source, declared->second, std::move(video));
+  tell(join(lines.records, packets, *stream), source, session.missing);
+  const std::uint64_t whole = stream->records().size();
+  if (const auto recorded = declared->second.frames; recorded && whole < *recorded)
+    session.missing.push_back(source + ": " + std::to_string(whole) + " of " +
+                              count_of("recorded frame", *recorded) + " are whole");
+  return stream;
+}
+
+}  // namespace previz::session

@@ -1,0 +1,136 @@
+#include "drivers/session/video_reader.hpp"
+
+#include <algorithm>
+#include <thread>
+
+#include "drivers/session/av.hpp"
+#include "drivers/session/samples.hpp"
+
+namespace previz::session {
+namespace {
+
+struct CloseDemuxer {
+  void operator()(AVFormatContext* context) const { avformat_close_input(&context); }
+};
+using Demuxer = std::unique_ptr<AVFormatContext, CloseDemuxer>;
+
+Demuxer open_demuxer(const std::filesystem::path& file) {
+  AVFormatContext* context = nullptr;
+  const AVInputFormat* matroska = av_find_input_format("matroska");
+  av::check(avformat_open_input(&context, file.c_str(), matroska, nullptr), file,
+            "cannot be read as Matroska");
+  // Packets as they are in the file: no parser, no invented times.
+  context->flags |= AVFMT_FLAG_NOPARSE | AVFMT_FLAG_NOFILLIN;
+  return Demuxer(context);
+}
+
+int find_track(const AVFormatContext& demuxer, const std::filesystem::path& file) {
+  for (unsigned int i = 0; i < demuxer.nb_streams; ++i)
+    if (demuxer.streams[i]->codecpar->codec_id == AV_CODEC_ID_FFV1) return static_cast<int>(i);
+  throw Error(file.string() + ": holds no FFV1 track");
+}
+
+av::Codec open_decoder(const AVCodecParameters& parameters, const std::filesystem::path& file) {
+  const AVCodec* codec = avcodec_find_decoder(AV_CODEC_ID_FFV1);
+  if (!codec) throw Error(file.string() + ": this libavcodec has no FFV1 decoder");
+  av::Codec decoder(avcodec_alloc_context3(codec));
+  av::check(avcodec_parameters_to_context(decoder.get(), &parameters), file,
+            "its video header is damaged");
+  // Slices are independent within a picture; threads over frames would hold pictures back.
+  decoder->thread_type = FF_THREAD_SLICE;
+  decoder->thread_count = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 16);
+  av::check(avcodec_open2(decoder.get(), codec, nullptr), file, "its video header is damaged");
+  return decoder;
+}
+
+}  // namespace
+
+struct VideoReader::Impl {
+  std::filesystem::path file;
+  StreamFormat format;
+  Demuxer demuxer;
+  int track;
+  av::Codec decoder;
+  av::Packet packet{av_packet_alloc()};
+  av::Picture picture{av_frame_alloc()};
+
+  Impl(const std::filesystem::path& path, const StreamFormat& stream_format)
+      : file(path),
+        format(stream_format),
+        demuxer(open_demuxer(file)),
+        track(find_track(*demuxer, file)),
+        decoder(open_decoder(*demuxer->streams[track]->codecpar, file)) {
+    if (decoder->width != format.width || decoder->height != format.height)
+      throw Error(file.string() + ": its video header says " + std::to_string(decoder->width) +
+                  "x" + std::to_string(decoder->height) + ", session.toml " +
+                  std::to_string(format.width) + "x" + std::to_string(format.height));
+  }
+
+  void rewind() { demuxer = open_demuxer(file); }
+
+  // False at the end of what can be read.
+  bool next_packet() {
+    do {
+      av_packet_unref(packet.get());
+      if (av_read_frame(demuxer.get(), packet.get()) < 0) return false;
+    } while (packet->stream_index != track || time_ms() == AV_NOPTS_VALUE);
+    return true;
+  }
+
+  // libav writes FFV1 as V_MS/VFW/FOURCC, whose block times it reads back as decoding times.
+  std::int64_t time_ms() const { return packet->pts != AV_NOPTS_VALUE ? packet->pts : packet->dts; }
+
+  bool holds(const PacketInfo& wanted) const {
+    return time_ms() == wanted.video_ms && av::crc32(*packet) == wanted.crc32;
+  }
+
+  // Goes forward to the packet; a file's times increase, unless they are damaged.
+  bool find_forward(const PacketInfo& wanted) {
+    while (next_packet())
+      if (holds(wanted)) return true;
+    return false;
+  }
+
+  bool find(const PacketInfo& wanted) {
+    if (next_packet() && holds(wanted)) return true;
+    if (av_seek_frame(demuxer.get(), track, wanted.video_ms, AVSEEK_FLAG_BACKWARD) >= 0 &&
+        find_forward(wanted))
+      return true;
+    rewind();
+    return find_forward(wanted);
+  }
+
+  std::string failure(const PacketInfo& wanted, const std::string& why) const {
+    return file.string() + ": the picture at " + std::to_string(wanted.video_ms) + " ms " + why;
+  }
+};
+
+VideoReader::VideoReader(const std::filesystem::path& file, const StreamFormat& format)
+    : impl_(std::make_unique<Impl>(file, format)) {}
+
+VideoReader::~VideoReader() = default;
+
+std::vector<VideoReader::PacketInfo> VideoReader::scan() {
+  std::vector<PacketInfo> packets;
+  while (impl_->next_packet()) packets.push_back({impl_->time_ms(), av::crc32(*impl_->packet)});
+  impl_->rewind();
+  return packets;
+}
+
+std::vector<std::uint8_t> VideoReader::read(const PacketInfo& wanted) {
+  Impl& s = *impl_;
+  if (!s.find(wanted)) throw Error(s.failure(wanted, "is no longer in the file"));
+  int code = avcodec_send_packet(s.decoder.get(), s.packet.get());
+  if (code >= 0) code = avcodec_receive_frame(s.decoder.get(), s.picture.get());
+  if (code < 0) {
+    avcodec_flush_buffers(s.decoder.get());
+    throw Error(s.failure(wanted, "cannot be decoded: " + av::error_text(code)));
+  }
+  const auto format = session_format(AVPixelFormat(s.picture->format));
+  if (format != s.format.format || s.picture->width != s.format.width ||
+      s.picture->height != s.format.height)
+    throw Error(s.failure(wanted, "has not the format and size that session.toml says"));
+  return unpack(*s.picture);
+}
+
+}  // namespace previz::session

@@ -1,0 +1,36 @@
+// Packets and pictures of a stream's Matroska file, as far as it is whole. Not for use outside
+// drivers/.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "drivers/session/session_toml.hpp"
+
+namespace previz::session {
+
+class VideoReader {
+ public:
+  struct PacketInfo {
+    std::int64_t video_ms = 0;  // Matroska time
+    std::uint32_t crc32 = 0;    // of the packet as it now is
+  };
+
+  // Throws previz::Error naming the file if it holds no FFV1 track that can be read.
+  VideoReader(const std::filesystem::path& file, const StreamFormat& format);
+  ~VideoReader();
+
+  // Every packet that can be found, in file order. Reads the file once from end to end.
+  std::vector<PacketInfo> scan();
+  // Frame::bytes of the packet; in order without seeking. Throws previz::Error naming the file and
+  // the time if the packet, or a whole picture in it, is not there.
+  std::vector<std::uint8_t> read(const PacketInfo& packet);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace previz::session

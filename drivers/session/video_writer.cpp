@@ -1,0 +1,159 @@
+#include "drivers/session/video_writer.hpp"
+
+#include <fcntl.h>
+
+#include <algorithm>
+#include <thread>
+
+extern "C" {
+#include <libavutil/opt.h>
+}
+
+#include "drivers/session/av.hpp"
+#include "drivers/session/files.hpp"
+#include "drivers/session/samples.hpp"
+
+namespace previz::session {
+namespace {
+
+struct CloseMuxer {
+  void operator()(AVFormatContext* context) const {
+    avio_closep(&context->pb);
+    avformat_free_context(context);
+  }
+};
+using Muxer = std::unique_ptr<AVFormatContext, CloseMuxer>;
+
+// FFV1 codes a picture in independent slices, each on one thread. libav's encoder knows only some
+// counts: 1 up to 352x288 pixels, 4 and 16 always.
+int slice_count(const StreamFormat& format) {
+  if (format.width <= 352 && format.height <= 288)
+    return format.width * format.height < 128 * 128 ? 1 : 4;
+  return std::min(format.width, format.height) < 480 ? 4 : 16;
+}
+
+av::Codec open_encoder(const StreamFormat& format, const std::filesystem::path& file) {
+  const AVCodec* codec = avcodec_find_encoder(AV_CODEC_ID_FFV1);
+  if (!codec) throw Error(file.string() + ": this libavcodec has no FFV1 encoder");
+  av::Codec encoder(avcodec_alloc_context3(codec));
+  const int slices = slice_count(format);
+  encoder->width = format.width;
+  encoder->height = format.height;
+  encoder->pix_fmt = encoder_format(format.format);
+  encoder->time_base = {1, 1000};
+  encoder->gop_size = 1;
+  encoder->level = 3;
+  encoder->slices = slices;
+  encoder->thread_type = FF_THREAD_SLICE;
+  encoder->thread_count =
+      std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, slices);
+  encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
+  if (format.format == PixelFormat::yuv422p8) {
+    encoder->colorspace = AVCOL_SPC_BT709;
+    encoder->color_range = AVCOL_RANGE_MPEG;
+    encoder->chroma_sample_location = AVCHROMA_LOC_LEFT;
+  }
+  av_opt_set_int(encoder->priv_data, "slicecrc", 1, 0);
+  const bool deep = format.format == PixelFormat::rgb16 || format.format == PixelFormat::gray16;
+  if (deep) av_opt_set(encoder->priv_data, "coder", "range_tab", 0);  // all it has for 16 bits
+  av::check(avcodec_open2(encoder.get(), codec, nullptr), file, "FFV1 cannot be started");
+  return encoder;
+}
+
+Muxer open_muxer(const AVCodecContext& encoder, const std::filesystem::path& file) {
+  AVFormatContext* context = nullptr;
+  av::check(avformat_alloc_output_context2(&context, nullptr, "matroska", file.c_str()), file,
+            "Matroska cannot be started");
+  Muxer muxer(context);
+  AVStream* stream = avformat_new_stream(context, nullptr);
+  if (!stream) throw Error(file.string() + ": no memory for a video track");
+  av::check(avcodec_parameters_from_context(stream->codecpar, &encoder), file, "cannot be set up");
+  stream->time_base = encoder.time_base;
+  context->flags |= AVFMT_FLAG_BITEXACT;  // the same frames make the same file
+  av::check(avio_open(&context->pb, file.c_str(), AVIO_FLAG_WRITE), file, "cannot be created");
+  av::check(avformat_write_header(context, nullptr), file, "its header cannot be written");
+  return muxer;
+}
+
+}  // namespace
+
+struct VideoWriter::Impl {
+  std::filesystem::path file;
+  StreamFormat format;
+  av::Codec encoder;
+  Muxer muxer;
+  Descriptor descriptor;  // the same file once more: libav does not hand out its own for sync
+  av::Picture picture;
+  av::Packet packet;
+  std::int64_t first_ns = 0;
+  std::int64_t last_ms = -1;
+
+  Impl(const std::filesystem::path& path, const StreamFormat& stream_format)
+      : file(path),
+        format(stream_format),
+        encoder(open_encoder(format, file)),
+        muxer(open_muxer(*encoder, file)),
+        descriptor(file, O_RDONLY),
+        picture(av_frame_alloc()),
+        packet(av_packet_alloc()) {
+    picture->width = format.width;
+    picture->height = format.height;
+    picture->format = encoder->pix_fmt;
+    av::check(av_frame_get_buffer(picture.get(), 0), file, "no memory for a picture");
+  }
+
+  // Matroska counts milliseconds from the first frame. Frames that come closer, or whose device
+  // clock jumped back, are put a millisecond after the frame before.
+  std::int64_t next_ms(std::int64_t timestamp_ns) {
+    if (last_ms < 0) first_ns = timestamp_ns;
+    const double elapsed_ms =
+        (static_cast<double>(timestamp_ns) - static_cast<double>(first_ns)) * 1e-6;
+    constexpr double one_year_ms = 366.0 * 86'400'000.0;
+    const auto wanted = static_cast<std::int64_t>(std::clamp(elapsed_ms, 0.0, one_year_ms));
+    return last_ms = std::max(last_ms + 1, wanted);
+  }
+
+  // Writes out what the muxer holds back, so that the kernel has the whole frame.
+  void flush() {
+    av::check(av_write_frame(muxer.get(), nullptr), file, "cannot be written");
+    avio_flush(muxer->pb);
+    av::check(muxer->pb->error, file, "cannot be written");
+  }
+};
+
+VideoWriter::VideoWriter(const std::filesystem::path& file, const StreamFormat& format)
+    : impl_(std::make_unique<Impl>(file, format)) {
+  impl_->flush();
+}
+
+VideoWriter::~VideoWriter() = default;
+
+VideoWriter::Stamp VideoWriter::write(const Frame& frame) {
+  Impl& s = *impl_;
+  av::check(av_frame_make_writable(s.picture.get()), s.file, "no memory for a picture");
+  pack(frame.bytes, frame.format, *s.picture);
+  s.picture->pts = s.next_ms(frame.timestamp_ns);
+  av::check(avcodec_send_frame(s.encoder.get(), s.picture.get()), s.file, "FFV1 failed");
+  av::check(avcodec_receive_packet(s.encoder.get(), s.packet.get()), s.file, "FFV1 failed");
+  const Stamp stamp{s.picture->pts, av::crc32(*s.packet)};
+  s.packet->stream_index = 0;
+  av_packet_rescale_ts(s.packet.get(), s.encoder->time_base, s.muxer->streams[0]->time_base);
+  const int written = av_write_frame(s.muxer.get(), s.packet.get());
+  av_packet_unref(s.packet.get());
+  av::check(written, s.file, "cannot be written");
+  s.flush();
+  return stamp;
+}
+
+void VideoWriter::sync() const {
+  impl_->descriptor.sync();
+}
+
+void VideoWriter::finish() {
+  av::check(av_write_trailer(impl_->muxer.get()), impl_->file, "its index cannot be written");
+  avio_flush(impl_->muxer->pb);
+  av::check(impl_->muxer->pb->error, impl_->file, "cannot be written");
+  sync();
+}
+
+}  // namespace previz::session

@@ -1,0 +1,180 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "drivers/error.hpp"
+#include "drivers/replay/replay_camera.hpp"
+#include "tests/unit/session_fixture.hpp"
+
+namespace previz {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::nanoseconds;
+
+// Time that passes only when somebody sleeps.
+struct HeldTime {
+  ReplayClock::Time now{};
+  ReplayClock clock() {
+    return {[this] { return now; }, [this](ReplayClock::Time time) { now = std::max(now, time); }};
+  }
+};
+
+class Replay : public testing::Test {
+ protected:
+  void SetUp() override { session::write_small_session(take(), 5); }
+  std::filesystem::path take() const { return directory_.path() / "take"; }
+  std::unique_ptr<Camera> open(const ReplayOptions& options) {
+    return open_replay(take(), "observer", options, time_.clock());
+  }
+  nanoseconds elapsed() const { return time_.now - ReplayClock::Time{}; }
+
+  session::TemporaryDirectory directory_;
+  HeldTime time_;
+};
+
+constexpr std::int64_t interval_ns = 40'000'003;  // of session::noise_frame
+
+TEST_F(Replay, DeliversEveryFrameInOrderAtItsTime) {
+  const auto camera = open({});
+  for (int i = 0; i < 5; ++i) {
+    const CameraEvent event = camera->next(milliseconds(100));
+    ASSERT_TRUE(std::holds_alternative<FramePtr>(event));
+    EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(event), i));
+    EXPECT_EQ(elapsed(), nanoseconds(i * interval_ns));
+  }
+  EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera->next(milliseconds(100))));
+  EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera->next(milliseconds(100))));
+  EXPECT_FALSE(camera->set_exposure(0.01, 1));
+  EXPECT_EQ(camera->name(), (take() / "observer").string());
+}
+
+TEST_F(Replay, SpeedScalesTime) {
+  ReplayOptions options;
+  options.speed = 4;
+  const auto camera = open(options);
+  for (int i = 0; i < 5; ++i) camera->next(milliseconds(100));
+  EXPECT_EQ(elapsed(), nanoseconds(interval_ns));
+}
+
+TEST_F(Replay, SpeedZeroNeverWaits) {
+  ReplayOptions options;
+  options.speed = 0;
+  const auto camera = open(options);
+  for (int i = 0; i < 5; ++i)
+    EXPECT_TRUE(std::holds_alternative<FramePtr>(camera->next(milliseconds(0))));
+  EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera->next(milliseconds(0))));
+  EXPECT_EQ(elapsed(), nanoseconds(0));
+}
+
+TEST_F(Replay, AShortWaitEndsWithoutAFrame) {
+  const auto camera = open({});
+  camera->next(milliseconds(0));
+  for (int i = 1; i <= 4; ++i) {
+    EXPECT_TRUE(std::holds_alternative<NoFrame>(camera->next(milliseconds(10))));
+    EXPECT_EQ(elapsed(), milliseconds(10 * i));
+  }
+  const CameraEvent event = camera->next(milliseconds(10));
+  ASSERT_TRUE(std::holds_alternative<FramePtr>(event));
+  EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(event), 1));
+  EXPECT_EQ(elapsed(), nanoseconds(interval_ns));
+}
+
+TEST_F(Replay, ALateReaderGetsEveryFrameAtOnce) {
+  const auto camera = open({});
+  camera->next(milliseconds(0));
+  time_.now += std::chrono::seconds(9);
+  for (int i = 1; i < 5; ++i) {
+    const CameraEvent event = camera->next(milliseconds(0));
+    ASSERT_TRUE(std::holds_alternative<FramePtr>(event));
+    EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(event), i));
+  }
+  EXPECT_EQ(elapsed(), std::chrono::seconds(9));
+}
+
+TEST_F(Replay, ARangeOfFrames) {
+  ReplayOptions options;
+  options.first = 1;
+  options.last = 3;
+  const auto camera = open(options);
+  for (int i = 1; i <= 3; ++i)
+    EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(camera->next(milliseconds(100))), i));
+  EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera->next(milliseconds(100))));
+  EXPECT_EQ(elapsed(), nanoseconds(2 * interval_ns));
+}
+
+// A lap is the span of its frames and one interval, so the rhythm goes on over the seam.
+TEST_F(Replay, LoopsWithoutATimeJump) {
+  ReplayOptions options;
+  options.loop = true;
+  options.first = 2;
+  const auto camera = open(options);
+  std::int64_t first_ns = 0;
+  for (int i = 0; i < 10; ++i) {
+    const FramePtr frame = std::get<FramePtr>(camera->next(milliseconds(100)));
+    if (i == 0) first_ns = frame->timestamp_ns;
+    EXPECT_EQ(frame->bytes, session::noise_frame("", 2 + i % 3, frame->format, 24, 18).bytes);
+    EXPECT_EQ(frame->timestamp_ns, first_ns + i * interval_ns);
+    EXPECT_EQ(frame->sequence, 102u + i);
+    EXPECT_EQ(elapsed(), nanoseconds(i * interval_ns));
+  }
+}
+
+TEST_F(Replay, StreamsShareAnOrigin) {
+  ReplayOptions options;
+  options.origin = {time_.now + milliseconds(500),
+                    session::noise_frame("", 0, PixelFormat::rgb8, 1, 1).timestamp_ns};
+  const auto camera = open(options);
+  EXPECT_TRUE(std::holds_alternative<NoFrame>(camera->next(milliseconds(499))));
+  EXPECT_TRUE(std::holds_alternative<FramePtr>(camera->next(milliseconds(499))));
+  EXPECT_EQ(elapsed(), milliseconds(500));
+}
+
+TEST_F(Replay, WhatTheSessionLacksIsToldFirst) {
+  const std::string video = session::content_of(take() / "observer.mkv");
+  session::write_content(take() / "observer.mkv", video.substr(0, video.size() / 2));
+  const auto camera = open({});
+  int troubles = 0, frames = 0;
+  for (;;) {
+    const CameraEvent event = camera->next(milliseconds(100));
+    if (std::holds_alternative<EndOfStream>(event)) break;
+    if (std::holds_alternative<DeviceTrouble>(event)) {
+      EXPECT_EQ(frames, 0);
+      EXPECT_EQ(std::get<DeviceTrouble>(event).device, camera->name());
+      ++troubles;
+    } else {
+      EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(event), frames++));
+    }
+  }
+  EXPECT_EQ(troubles, 2);  // pictures missing; how many of how many are whole
+  EXPECT_EQ(frames, 2);
+}
+
+// The file changes under the reader: that frame is trouble in its place, the rest goes on.
+TEST_F(Replay, AnUnreadableFrameIsTroubleInItsPlace) {
+  ReplayOptions options;
+  options.speed = 0;
+  const auto camera = open(options);
+  std::string video = session::content_of(take() / "observer.mkv");
+  video[video.size() / 2] ^= 1;
+  session::write_content(take() / "observer.mkv", video);
+  std::string seen;
+  for (int i = 0; i < 5; ++i)
+    seen += std::holds_alternative<FramePtr>(camera->next(milliseconds(0))) ? 'f' : 't';
+  EXPECT_EQ(std::count(seen.begin(), seen.end(), 't'), 1) << seen;
+  EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera->next(milliseconds(0))));
+}
+
+TEST_F(Replay, WrongOptionsAreErrors) {
+  ReplayOptions options;
+  options.speed = -1;
+  EXPECT_THROW(open(options), Error);
+  options.speed = 1;
+  options.first = 5;
+  EXPECT_THROW(open(options), Error);
+  EXPECT_THROW(open_replay(take(), "light"), Error);
+  EXPECT_THROW(open_replay(directory_.path() / "nowhere", "observer"), Error);
+}
+
+}  // namespace
+}  // namespace previz

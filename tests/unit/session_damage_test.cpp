@@ -1,0 +1,227 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "drivers/error.hpp"
+#include "drivers/session/session.hpp"
+#include "tests/unit/session_fixture.hpp"
+
+namespace previz::session {
+namespace {
+
+constexpr int frame_count = 6;
+
+// A whole small session, and copies of it in which one file is not as it was.
+class Damage : public testing::Test {
+ protected:
+  void SetUp() override {
+    write_small_session(whole(), frame_count);
+    std::filesystem::copy(whole(), copy());
+  }
+  std::filesystem::path whole() const { return directory_.path() / "whole"; }
+  std::filesystem::path copy() const { return directory_.path() / "copy"; }
+
+  struct Opened {
+    std::vector<std::uint64_t> frames;  // that came back, each bit for bit
+    std::vector<std::string> missing;
+  };
+
+  // Opens the copy and reads every frame that it offers; any that is offered must be right.
+  Opened open_copy() const {
+    Session session = open_session(copy());
+    const auto stream = open_stream(session, "observer");
+    Opened opened;
+    for (std::size_t i = 0; stream && i < stream->records().size(); ++i) {
+      const FramePtr frame = stream->read(i);
+      const std::uint64_t index = stream->records()[i].frame;
+      EXPECT_EQ(frame->bytes, noise_frame("observer", index, PixelFormat::rgb8, 24, 18).bytes);
+      opened.frames.push_back(index);
+    }
+    opened.missing = session.missing;
+    return opened;
+  }
+
+  static bool is_prefix(const std::vector<std::uint64_t>& frames) {
+    for (std::size_t i = 0; i < frames.size(); ++i)
+      if (frames[i] != i) return false;
+    return true;
+  }
+
+ private:
+  TemporaryDirectory directory_;
+};
+
+TEST_F(Damage, AWholeSessionMissesNothing) {
+  const Opened opened = open_copy();
+  EXPECT_EQ(opened.frames.size(), std::size_t{frame_count});
+  EXPECT_TRUE(opened.missing.empty());
+}
+
+TEST_F(Damage, AVideoCutAnywhereGivesAPrefix) {
+  const std::string video = content_of(whole() / "observer.mkv");
+  std::size_t before = 0;
+  for (std::size_t length = 0; length < video.size(); length += 1 + length % 13) {
+    write_content(copy() / "observer.mkv", video.substr(0, length));
+    const Opened opened = open_copy();
+    EXPECT_TRUE(is_prefix(opened.frames)) << "cut at " << length;
+    EXPECT_GE(opened.frames.size(), before) << "cut at " << length;
+    if (opened.frames.size() < frame_count) {
+      EXPECT_FALSE(opened.missing.empty()) << "cut at " << length;
+    }
+    before = opened.frames.size();
+  }
+  EXPECT_EQ(before, std::size_t{frame_count});  // what is cut off last is only the index
+}
+
+TEST_F(Damage, LinesCutAnywhereGiveAPrefix) {
+  const std::string lines = content_of(whole() / "observer.jsonl");
+  for (std::size_t length = 0; length + 1 < lines.size(); ++length) {
+    write_content(copy() / "observer.jsonl", lines.substr(0, length));
+    const Opened opened = open_copy();
+    EXPECT_TRUE(is_prefix(opened.frames)) << "cut at " << length;
+    EXPECT_LE(opened.frames.size(), std::size_t{frame_count});
+    const auto whole_lines = std::count(lines.begin(), lines.begin() + length, '\n');
+    EXPECT_GE(opened.frames.size(), static_cast<std::size_t>(whole_lines));
+    if (opened.frames.size() < frame_count) {
+      EXPECT_TRUE(mentions(opened.missing, "have no line") &&
+                  mentions(opened.missing, " of 6 recorded frames are whole"))
+          << "cut at " << length;
+    }
+  }
+}
+
+// Every byte of the video in turn is changed; a frame that is still offered is the right one.
+TEST_F(Damage, AChangedByteOfTheVideoIsNeverShown) {
+  const std::string video = content_of(whole() / "observer.mkv");
+  std::mt19937 random(2);
+  std::size_t noticed = 0, tries = 0;
+  for (std::size_t at = 0; at < video.size(); at += 1 + random() % 17) {
+    std::string damaged = video;
+    damaged[at] = static_cast<char>(damaged[at] ^ (1 + random() % 255));
+    write_content(copy() / "observer.mkv", damaged);
+    const Opened opened = open_copy();
+    ++tries;
+    if (opened.frames.size() < frame_count) {
+      ++noticed;
+      EXPECT_FALSE(opened.missing.empty()) << "byte " << at;
+    }
+  }
+  // Nearly all of the file is pictures; the rest is headers and index.
+  EXPECT_GT(noticed, tries / 2);
+}
+
+TEST_F(Damage, OneDamagedPictureCostsThatFrameOnly) {
+  const std::string video = content_of(whole() / "observer.mkv");
+  std::string damaged = video;
+  damaged[video.size() / 2] ^= 0x10;
+  write_content(copy() / "observer.mkv", damaged);
+  const Opened opened = open_copy();
+  EXPECT_EQ(opened.frames.size(), std::size_t{frame_count} - 1);
+  EXPECT_TRUE(mentions(opened.missing, "observer.mkv: the pictures of frame ")) << "sentence";
+  EXPECT_TRUE(mentions(opened.missing, "5 of 6 recorded frames are whole"));
+}
+
+TEST_F(Damage, AHoleInTheVideoDoesNotShiftTheRest) {
+  std::string video = content_of(whole() / "observer.mkv");
+  std::fill(video.begin() + video.size() * 3 / 10, video.begin() + video.size() * 5 / 10, '\0');
+  write_content(copy() / "observer.mkv", video);
+  const Opened opened = open_copy();
+  EXPECT_GE(opened.frames.size(), 3u);
+  EXPECT_LT(opened.frames.size(), std::size_t{frame_count});
+  EXPECT_EQ(opened.frames.back(), std::uint64_t{frame_count} - 1);
+}
+
+TEST_F(Damage, ChangedLinesAreLeftOut) {
+  std::string lines = content_of(whole() / "observer.jsonl");
+  std::mt19937 random(3);
+  for (int round = 0; round < 400; ++round) {
+    std::string damaged = lines;
+    damaged[random() % damaged.size()] = static_cast<char>(random());
+    write_content(copy() / "observer.jsonl", damaged);
+    EXPECT_GE(open_copy().frames.size(), std::size_t{frame_count} - 2) << "round " << round;
+  }
+  const auto third = lines.find('\n', lines.find('\n') + 1) + 1;
+  lines.replace(third, 5, "#####");
+  write_content(copy() / "observer.jsonl", lines);
+  const Opened opened = open_copy();
+  EXPECT_EQ(opened.frames, (std::vector<std::uint64_t>{0, 1, 3, 4, 5}));
+  EXPECT_TRUE(mentions(opened.missing, "observer.jsonl: line 3 cannot be understood"));
+  EXPECT_TRUE(mentions(opened.missing, "1 picture of observer.mkv"));
+}
+
+TEST_F(Damage, NumbersOfTheWrongKindAreDamage) {
+  const std::string lines = content_of(whole() / "observer.jsonl");
+  for (
+      const char* line :
+      {"{}", "[]", "null", "7", "{\"frame\":1e300}",
+       R"({"frame":-1,"sequence":1,"timestamp_ns":1,"arrival_ns":1,"exposure_s":1,"gain":1,"exposure":1,"video_ms":1,"crc32":"00000000"})",
+       R"({"frame":9,"sequence":1,"timestamp_ns":1e40,"arrival_ns":1,"exposure_s":1,"gain":1,"exposure":1,"video_ms":1,"crc32":"00000000"})",
+       R"({"frame":9,"sequence":1,"timestamp_ns":18446744073709551615,"arrival_ns":1,"exposure_s":1,"gain":1,"exposure":1,"video_ms":1,"crc32":"00000000"})",
+       R"({"frame":9,"sequence":1,"timestamp_ns":1,"arrival_ns":1,"exposure_s":1,"gain":1,"exposure":1,"video_ms":1,"crc32":"xyz"})"}) {
+    write_content(copy() / "observer.jsonl", lines + line + "\n");
+    const Opened opened = open_copy();
+    EXPECT_EQ(opened.frames.size(), std::size_t{frame_count});
+    EXPECT_TRUE(mentions(opened.missing, "line 7 cannot be understood")) << line;
+  }
+}
+
+TEST_F(Damage, MoreLinesThanPictures) {
+  write_content(copy() / "observer.jsonl",
+                content_of(whole() / "observer.jsonl") +
+                    R"({"frame":6,"sequence":1,"timestamp_ns":1,"arrival_ns":1,"exposure_s":1,)"
+                    R"("gain":1,"exposure":1,"video_ms":99999,"crc32":"00000000"})"
+                    "\n");
+  const Opened opened = open_copy();
+  EXPECT_EQ(opened.frames.size(), std::size_t{frame_count});
+  EXPECT_TRUE(mentions(opened.missing, "observer.mkv: the pictures of frame 6 are missing"));
+}
+
+TEST_F(Damage, FilesThatAreEmptyOrGone) {
+  for (const char* file : {"observer.mkv", "observer.jsonl"}) {
+    write_content(copy() / file, "");
+    EXPECT_TRUE(open_copy().frames.empty());
+    EXPECT_FALSE(open_copy().missing.empty());
+    std::filesystem::remove(copy() / file);
+    EXPECT_TRUE(open_copy().frames.empty());
+    EXPECT_TRUE(mentions(open_copy().missing, std::string(file) + ": the file is missing"));
+    std::filesystem::copy(whole() / file, copy() / file,
+                          std::filesystem::copy_options::overwrite_existing);
+  }
+  std::filesystem::remove(copy() / "session.toml");
+  EXPECT_THROW(open_copy(), Error);
+  write_content(copy() / "session.toml", "\x01\x02 garbage");
+  EXPECT_THROW(open_copy(), Error);
+}
+
+TEST_F(Damage, AnotherSessionsVideoIsNotShown) {
+  write_small_session(whole().parent_path() / "other", frame_count, 30, 20);
+  std::filesystem::copy(whole().parent_path() / "other" / "observer.mkv", copy() / "observer.mkv",
+                        std::filesystem::copy_options::overwrite_existing);
+  const Opened opened = open_copy();
+  EXPECT_TRUE(opened.frames.empty());
+  EXPECT_TRUE(mentions(opened.missing, "30x20"));
+}
+
+TEST_F(Damage, TrackLinesCutAnywhere) {
+  const TemporaryDirectory directory;
+  {
+    SessionWriter writer(directory.path(), {});
+    for (int i = 0; i < 3; ++i) {
+      TrackRecord record;
+      record.frame = i;
+      record.tracked = i != 1;
+      writer.write(record);
+    }
+  }
+  const std::string lines = content_of(directory.path() / "track.jsonl");
+  for (std::size_t length = 0; length < lines.size(); ++length) {
+    write_content(directory.path() / "track.jsonl", lines.substr(0, length));
+    const Session session = open_session(directory.path());
+    EXPECT_LE(session.track.size(), 3u);
+    for (std::size_t i = 0; i < session.track.size(); ++i) EXPECT_EQ(session.track[i].frame, i);
+  }
+}
+
+}  // namespace
+}  // namespace previz::session

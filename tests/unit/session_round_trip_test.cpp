@@ -1,0 +1,197 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "drivers/error.hpp"
+#include "drivers/session/session.hpp"
+#include "tests/unit/session_fixture.hpp"
+
+namespace previz::session {
+namespace {
+
+struct Picture {
+  PixelFormat format;
+  int width, height;
+};
+
+class RoundTrip : public testing::TestWithParam<Picture> {};
+
+TEST_P(RoundTrip, EveryFrameComesBackBitForBit) {
+  const auto [format, width, height] = GetParam();
+  const TemporaryDirectory directory;
+  {
+    SessionWriter writer(directory.path(), {});
+    for (int i = 0; i < 5; ++i) writer.write(noise_frame("observer", i, format, width, height));
+    writer.close();
+  }
+  Session session = open_session(directory.path());
+  const auto stream = open_stream(session, "observer");
+  ASSERT_TRUE(stream);
+  EXPECT_TRUE(session.missing.empty()) << session.missing.front();
+  ASSERT_EQ(stream->records().size(), 5u);
+  for (const int i : {0, 1, 2, 3, 4, 2, 4, 0, 3, 1, 1}) {
+    const FramePtr frame = stream->read(i);
+    EXPECT_EQ(frame->format, format);
+    EXPECT_EQ(frame->width, width);
+    EXPECT_EQ(frame->height, height);
+    EXPECT_TRUE(is_frame(*frame, i)) << "frame " << i;
+  }
+  EXPECT_THROW(stream->read(5), Error);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Formats, RoundTrip,
+    testing::Values(Picture{PixelFormat::rgb8, 160, 120}, Picture{PixelFormat::rgb16, 160, 120},
+                    Picture{PixelFormat::gray8, 160, 120}, Picture{PixelFormat::gray16, 160, 120},
+                    Picture{PixelFormat::yuv422p8, 160, 120}, Picture{PixelFormat::rgb8, 1, 1},
+                    Picture{PixelFormat::rgb16, 1, 1}, Picture{PixelFormat::gray16, 3, 1},
+                    Picture{PixelFormat::yuv422p8, 1, 1}, Picture{PixelFormat::yuv422p8, 35, 7},
+                    Picture{PixelFormat::rgb8, 2000, 9}, Picture{PixelFormat::rgb16, 9, 2000},
+                    Picture{PixelFormat::gray8, 37, 21}, Picture{PixelFormat::rgb8, 1283, 721},
+                    Picture{PixelFormat::gray16, 1283, 721}));
+
+TEST(Session, TwoStreamsAndTrackInOneSession) {
+  const TemporaryDirectory directory;
+  TrackRecord tracked;
+  tracked.frame = 0;
+  tracked.timestamp_ns = 17;
+  tracked.tracked = true;
+  for (int i = 0; i < 16; ++i) tracked.world_from_camera[i % 4][i / 4] = 1.0 / (3.0 + i);
+  for (int i = 0; i < 36; ++i) tracked.covariance[i] = 1e-300 * i / 7.0;
+  tracked.tags = {0, 2, 17};
+  TrackRecord lost;
+  lost.frame = 1;
+  lost.timestamp_ns = std::numeric_limits<std::int64_t>::max();
+  {
+    SessionWriter writer(directory.path(), {});
+    writer.write(noise_frame("light", 0, PixelFormat::gray16, 32, 32));
+    writer.write(noise_frame("observer", 0, PixelFormat::rgb8, 40, 30));
+    writer.write(tracked);
+    writer.write(noise_frame("light", 1, PixelFormat::gray16, 32, 32));
+    writer.write(lost);
+  }
+  Session session = open_session(directory.path());
+  EXPECT_TRUE(session.missing.empty());
+  ASSERT_EQ(session.track.size(), 2u);
+  EXPECT_EQ(session.track[0].world_from_camera, tracked.world_from_camera);
+  EXPECT_EQ(session.track[0].covariance, tracked.covariance);
+  EXPECT_EQ(session.track[0].tags, tracked.tags);
+  EXPECT_EQ(session.track[1].timestamp_ns, lost.timestamp_ns);
+  EXPECT_FALSE(session.track[1].tracked);
+  EXPECT_TRUE(is_frame(*open_stream(session, "light")->read(1), 1));
+  EXPECT_TRUE(is_frame(*open_stream(session, "observer")->read(0), 0));
+  EXPECT_TRUE(session.missing.empty());
+}
+
+TEST(Session, AStreamThatIsNotThereIsNull) {
+  const TemporaryDirectory directory;
+  write_small_session(directory.path() / "take", 1);
+  Session session = open_session(directory.path() / "take");
+  EXPECT_EQ(open_stream(session, "light"), nullptr);
+  EXPECT_TRUE(session.missing.empty());
+}
+
+// Two frames in a millisecond, and a device clock that jumps back: Matroska time must not collide.
+TEST(Session, TimestampsMayBeCloseOrJump) {
+  const TemporaryDirectory directory;
+  const std::int64_t times[] = {5'000'000'000,
+                                5'000'000'001,
+                                5'000'000'002,
+                                4'000'000'000,
+                                std::numeric_limits<std::int64_t>::max(),
+                                0};
+  {
+    SessionWriter writer(directory.path(), {});
+    for (std::size_t i = 0; i < std::size(times); ++i) {
+      Frame frame = noise_frame("observer", i, PixelFormat::gray8, 8, 8);
+      frame.timestamp_ns = times[i];
+      writer.write(frame);
+    }
+  }
+  Session session = open_session(directory.path());
+  const auto stream = open_stream(session, "observer");
+  EXPECT_TRUE(session.missing.empty());
+  ASSERT_EQ(stream->records().size(), std::size(times));
+  for (std::size_t i = 0; i < std::size(times); ++i) {
+    EXPECT_EQ(stream->read(i)->timestamp_ns, times[i]);
+    EXPECT_EQ(stream->read(i)->bytes, noise_frame("", i, PixelFormat::gray8, 8, 8).bytes);
+  }
+}
+
+TEST(Session, WhatWasWrittenIsReadableBeforeClose) {
+  const TemporaryDirectory directory;
+  SessionWriter writer(directory.path(), {});
+  for (int i = 0; i < 4; ++i) {
+    writer.write(noise_frame("observer", i, PixelFormat::rgb8, 40, 30));
+    Session session = open_session(directory.path());
+    EXPECT_TRUE(mentions(session.missing, "not closed"));
+    const auto stream = open_stream(session, "observer");
+    EXPECT_EQ(session.missing.size(), 1u);
+    ASSERT_EQ(stream->records().size(), static_cast<std::size_t>(i) + 1);
+    EXPECT_TRUE(is_frame(*stream->read(i), i));
+  }
+}
+
+TEST(Session, AssetsAreKeptByContent) {
+  const TemporaryDirectory directory;
+  write_content(directory.path() / "ball.glb", "glTF-like");
+  const std::filesystem::path take = directory.path() / "take";
+  {
+    SessionWriter writer(take, {});
+    writer.add_asset("models/ball.glb", directory.path() / "ball.glb");
+    writer.add_asset("the same \"ball\".glb", directory.path() / "ball.glb");
+    EXPECT_THROW(writer.add_asset("x", directory.path() / "absent.glb"), Error);
+  }
+  const Session session = open_session(take);
+  EXPECT_TRUE(session.missing.empty());
+  // Reference: printf 'glTF-like' | sha256sum
+  const std::string path =
+      "assets/373e953a74bded1677eb56b6088c62e68bad6de08da97af804fea097553c60f5.glb";
+  EXPECT_EQ(session.info.assets.at("models/ball.glb"), path);
+  EXPECT_EQ(session.info.assets.at("the same \"ball\".glb"), path);
+  EXPECT_EQ(content_of(take / path), "glTF-like");
+
+  write_content(take / path, "glTF-lick");
+  EXPECT_TRUE(mentions(open_session(take).missing, "was changed"));
+  std::filesystem::remove(take / path);
+  EXPECT_TRUE(mentions(open_session(take).missing, "missing"));
+}
+
+TEST(Session, WhatCannotBeRecordedIsRefused) {
+  const TemporaryDirectory directory;
+  SessionWriter writer(directory.path(), {});
+  const Frame good = noise_frame("observer", 0, PixelFormat::rgb8, 8, 8);
+  const auto refuses = [&](auto change) {
+    Frame frame = good;
+    change(frame);
+    EXPECT_THROW(writer.write(frame), Error);
+  };
+  refuses([](Frame& f) { f.source = "../escape"; });
+  refuses([](Frame& f) { f.bytes.pop_back(); });
+  refuses([](Frame& f) { f.width = 0; });
+  refuses([](Frame& f) { f.exposure = 0; });
+  refuses([](Frame& f) { f.exposure = std::numeric_limits<double>::quiet_NaN(); });
+  refuses([](Frame& f) { f.exposure_s = std::numeric_limits<double>::infinity(); });
+  writer.write(good);
+  EXPECT_THROW(writer.write(noise_frame("observer", 1, PixelFormat::rgb8, 8, 9)), Error);
+  EXPECT_THROW(writer.write(noise_frame("observer", 1, PixelFormat::gray8, 8, 8)), Error);
+  TrackRecord record;
+  record.tracked = true;
+  record.covariance[3] = std::numeric_limits<double>::infinity();
+  EXPECT_THROW(writer.write(record), Error);
+  writer.close();
+  EXPECT_THROW(writer.write(good), Error);
+  EXPECT_THROW(SessionWriter(directory.path(), {}), Error);  // not empty
+}
+
+TEST(Session, TheSameFramesMakeTheSameFiles) {
+  const TemporaryDirectory directory;
+  write_small_session(directory.path() / "a", 3);
+  write_small_session(directory.path() / "b", 3);
+  for (const char* file : {"session.toml", "observer.mkv", "observer.jsonl"})
+    EXPECT_EQ(content_of(directory.path() / "a" / file), content_of(directory.path() / "b" / file));
+}
+
+}  // namespace
+}  // namespace previz::session

@@ -1,0 +1,167 @@
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+#include "drivers/error.hpp"
+#include "drivers/session/session_toml.hpp"
+
+namespace previz::session {
+namespace {
+
+SessionFile through_toml(const SessionFile& file) {
+  return parse_session_toml(to_toml(file), "session.toml");
+}
+
+std::string error_of(const std::string& text) {
+  try {
+    parse_session_toml(text, "take/session.toml");
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+class AnyText : public testing::TestWithParam<std::string> {};
+
+TEST_P(AnyText, ComesBackVerbatimAsTheSet) {
+  SessionFile file;
+  file.info.set_text = GetParam();
+  EXPECT_EQ(through_toml(file).info.set_text, GetParam());
+}
+
+using namespace std::string_literals;
+INSTANTIATE_TEST_SUITE_P(Texts, AnyText,
+                         testing::Values("", "\n", "\n\n", "a", "[set]\nname = \"x\" # comment\n",
+                                         "no newline at the end", "text = '''\nnested\n'''\n",
+                                         "ends with a quote'", "ends with two''", "'''", "''''''",
+                                         "\"\"\"\n", "\\ back\\slash \\n \\u0041\n",
+                                         "windows\r\nlines\r\n", "old mac\rlines\r",
+                                         "tab\tbell\a escape\x1b del\x7f\n", "nul\0inside"s, "\0"s,
+                                         "h\xc3\xa9llo \xe2\x82\xac "
+                                         "\xf0\x9f\x8e\xac\n",
+                                         "\xef\xbb\xbf"
+                                         "byte order mark\n",
+                                         "a\n\xef\xbb\xbf"
+                                         "b",
+                                         "latin1 \xe9\xff\n", "\xc3", "\xed\xa0\x80 surrogate",
+                                         "\xc0\x80 overlong",
+                                         "\xc2\x85 next line \xe2\x80\xa8 line separator\n",
+                                         std::string(300'000, 'x') + "\n"));
+
+TEST(SessionToml, RandomBytesComeBackAsTheSet) {
+  std::mt19937 random(1);
+  for (int round = 0; round < 300; ++round) {
+    SessionFile file;
+    const auto length = random() % 40;
+    // Half of the rounds over a small alphabet of what is special in TOML.
+    const std::string special = "'\"\\\n\r\t#[]= \0a"s;
+    for (std::size_t i = 0; i < length; ++i)
+      file.info.set_text +=
+          round % 2 ? static_cast<char>(random()) : special[random() % special.size()];
+    EXPECT_EQ(through_toml(file).info.set_text, file.info.set_text) << "round " << round;
+  }
+}
+
+TEST(SessionToml, AnOrdinarySetStaysReadable) {
+  SessionFile file;
+  file.info.set_text = "[observer]\ndriver = \"replay\"\n";
+  EXPECT_NE(to_toml(file).find("'''\n[observer]\ndriver = \"replay\"\n'''"), std::string::npos);
+}
+
+TEST(SessionToml, EveryNumberComesBackBitForBit) {
+  SessionFile file;
+  file.info.name = "take \"7\"\n";
+  file.info.clock = "ptp";
+  file.closed = true;
+  file.streams["observer"] = {PixelFormat::yuv422p8, 1920, 1080, 1234567};
+  file.streams["light"] = {PixelFormat::gray16, 512, 512, {}};
+  ObserverCalibration observer;
+  observer.intrinsics = {1920,
+                         1080,
+                         612.1,
+                         613.3,
+                         1.0 / 3.0,
+                         236.4,
+                         -0.118,
+                         0.041,
+                         9e-4,
+                         -7e-4,
+                         std::numeric_limits<double>::denorm_min()};
+  observer.lens = ThinLens{0.0235, 2.0, 0.78};
+  observer.response.kind = ResponseCurve::Kind::gamma;
+  observer.response.gamma = 1.0 / 0.45;
+  observer.responsivity = 1e22;
+  file.info.observer = observer;
+  LightCameraCalibration light;
+  light.intrinsics = {512,   512,   145.5312799632291,      145.5,
+                      255.5, 255.5, {0.1, -0.2, 0.3, -0.0}, 1.7453292519943295};
+  light.response.kind = ResponseCurve::Kind::table;
+  light.response.inverse_table = {0, 0.1, 0.30000000000000004, 1};
+  for (int i = 0; i < 16; ++i) light.world_from_camera[i % 4][i / 4] = std::sqrt(i) / 3;
+  file.info.light = light;
+  file.info.assets = {{"a.glb", "assets/1.glb"}, {"dir \"q\"/b.glb", "assets/2.glb"}};
+
+  const SessionFile back = through_toml(file);
+  EXPECT_EQ(back.info.name, file.info.name);
+  EXPECT_EQ(back.info.clock, "ptp");
+  EXPECT_TRUE(back.closed);
+  EXPECT_EQ(back.info.assets, file.info.assets);
+  EXPECT_EQ(back.streams.at("observer").format, PixelFormat::yuv422p8);
+  EXPECT_EQ(back.streams.at("observer").frames, 1234567u);
+  EXPECT_EQ(back.streams.at("light").width, 512);
+  EXPECT_FALSE(back.streams.at("light").frames);
+  const PinholeIntrinsics &in = observer.intrinsics, &out = back.info.observer->intrinsics;
+  for (const auto member : {&PinholeIntrinsics::fx, &PinholeIntrinsics::fy, &PinholeIntrinsics::cx,
+                            &PinholeIntrinsics::cy, &PinholeIntrinsics::k1, &PinholeIntrinsics::k2,
+                            &PinholeIntrinsics::p1, &PinholeIntrinsics::p2, &PinholeIntrinsics::k3})
+    EXPECT_EQ(out.*member, in.*member);
+  EXPECT_EQ(out.width, 1920);
+  EXPECT_EQ(back.info.observer->lens->focal_length_m, 0.0235);
+  EXPECT_EQ(back.info.observer->lens->f_number, 2.0);
+  EXPECT_EQ(back.info.observer->lens->focus_distance_m, 0.78);
+  EXPECT_EQ(back.info.observer->response.gamma, 1.0 / 0.45);
+  EXPECT_EQ(back.info.observer->responsivity, 1e22);
+  EXPECT_EQ(back.info.light->intrinsics.k, light.intrinsics.k);
+  EXPECT_EQ(back.info.light->intrinsics.max_angle_rad, light.intrinsics.max_angle_rad);
+  EXPECT_EQ(back.info.light->world_from_camera, light.world_from_camera);
+  EXPECT_EQ(back.info.light->response.inverse_table, light.response.inverse_table);
+}
+
+TEST(SessionToml, ErrorsNameFileLineAndKey) {
+  SessionFile file;
+  file.streams["observer"] = {PixelFormat::rgb8, 640, 480, {}};
+  file.info.observer = ObserverCalibration{};
+  file.info.observer->intrinsics.width = file.info.observer->intrinsics.height = 9;
+  const std::string good = to_toml(file);
+  EXPECT_EQ(error_of(good), "");
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    text.replace(text.find(from), from.size(), to);
+    return error_of(text);
+  };
+  EXPECT_NE(with("format_version = 1", "format_version = 2").find("session.toml:2: format_version"),
+            std::string::npos);
+  EXPECT_NE(with("format = \"rgb8\"", "format = \"nv12\"").find("observer.video.format"),
+            std::string::npos);
+  EXPECT_NE(with("fx = 0.0", "fx = \"wide\"").find("observer.calibration.fx must be a number"),
+            std::string::npos);
+  EXPECT_NE(with("fx = 0.0\n", "").find("observer.calibration.fx is missing"), std::string::npos);
+  EXPECT_NE(with("width = 640", "width = -640").find("observer.video.width"), std::string::npos);
+  EXPECT_NE(with("kind = \"srgb\"", "kind = \"log\"").find("observer.calibration.response.kind"),
+            std::string::npos);
+  EXPECT_NE(with("[set]", "[[set]]").find("set must be a table"), std::string::npos);
+  EXPECT_NE(error_of("garbage").find("take/session.toml:1:"), std::string::npos);
+  EXPECT_NE(error_of("").find("format_version is missing"), std::string::npos);
+  for (std::size_t length = 0; length + 1 < good.size(); ++length)  // never anything but an Error
+    static_cast<void>(error_of(good.substr(0, length)));
+}
+
+TEST(SessionToml, NamesMustBeText) {
+  SessionFile file;
+  file.info.name = "\xff";
+  EXPECT_THROW(to_toml(file), Error);
+}
+
+}  // namespace
+}  // namespace previz::session
