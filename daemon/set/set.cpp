@@ -1,6 +1,164 @@
-// The set file's parser: TOML in, typed values or every problem of the file out.
+// The set file's parser: TOML in, by the table of keys; typed values or every problem of it out.
 #include "daemon/set/set.hpp"
 
+#include <toml++/toml.h>
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+
+#include "daemon/set/resolve.hpp"
+#include "daemon/set/table.hpp"
 #include "drivers/error.hpp"
 
-namespace previz::set {}
+namespace previz::set {
+namespace {
+
+Position position(const toml::source_region& region) {
+  return {std::max(region.begin.line, toml::source_index{1}),
+          std::max(region.begin.column, toml::source_index{1})};
+}
+
+Value value_of(const toml::node& node) {
+  Value out{position(node.source()), std::monostate{}};
+  if (const auto* flag = node.as_boolean())
+    out.data = flag->get();
+  else if (const auto* whole = node.as_integer())
+    out.data = whole->get();
+  else if (const auto* real = node.as_floating_point())
+    out.data = real->get();
+  else if (const auto* text = node.as_string())
+    out.data = text->get();
+  else if (const auto* array = node.as_array()) {
+    std::vector<Value> entries;
+    for (const auto& entry : *array) entries.push_back(value_of(entry));
+    out.data = std::move(entries);
+  }
+  return out;
+}
+
+class Reader {
+ public:
+  Reader(Draft& draft, Problems& problems) : sections_(sections(draft)), problems_(problems) {}
+
+  // `path` is the table's name; "" is the file itself.
+  void read(const toml::table& table, const std::string& path) {
+    const auto* section = find(path);
+    auto opened = section ? section->open() : Section::Opened{nullptr, {}};
+    if (opened.given) opened.given->at = position(table.source());
+
+    for (const auto& [name, node] : table) {
+      const std::string key(name.str());
+      const auto full = path.empty() ? key : path + '.' + key;
+      const auto row = std::ranges::find(opened.keys, key, &Key::name);
+      if (row != opened.keys.end())
+        read_key(*row, *opened.given, position(name.source()), value_of(node));
+      else if (const auto* child = find(full))
+        read_child(*child, position(name.source()), node);
+      else
+        unknown(full, key, path, position(name.source()), node.is_table(), opened.keys);
+    }
+    for (const auto& row : opened.keys)
+      if (row.need.kind == Need::Kind::required && !opened.given->has(row.name))
+        problems_.add(*opened.given->at, path + '.' + row.name,
+                      "is missing; allowed: " + row.allowed + ", like " + row.need.example);
+  }
+
+ private:
+  const Section* find(const std::string& path) const {
+    const auto found = std::ranges::find(sections_, path, &Section::path);
+    return found == sections_.end() ? nullptr : &*found;
+  }
+
+  void read_key(const Key& key, Given& given, Position at, const Value& value) {
+    given.keys[key.name] = {at, false};
+    try {
+      key.read(value);
+      given.keys[key.name].good = true;
+    } catch (const Misread& misread) {
+      problems_.add(misread.at, given.path + '.' + key.name, misread.what);
+    }
+  }
+
+  void read_child(const Section& child, Position at, const toml::node& node) {
+    const bool repeated = child.kind == Section::Kind::repeated;
+    const auto header = repeated ? "[[" + child.path + "]]" : '[' + child.path + ']';
+    if (const auto* table = node.as_table(); table && !repeated) return read(*table, child.path);
+    if (const auto* array = node.as_array(); array && repeated) {
+      for (const auto& entry : *array) {
+        if (const auto* table = entry.as_table())
+          read(*table, child.path);
+        else
+          problems_.add(position(entry.source()), child.path,
+                        "an entry is not a table; allowed: tables, each under " + header);
+      }
+      return;
+    }
+    problems_.add(at, child.path,
+                  (repeated ? "is not a list of tables" : "is not a table") +
+                      std::string("; allowed: keys under ") + header);
+  }
+
+  void unknown(const std::string& full, const std::string& key, const std::string& path,
+               Position at, bool is_table, const std::vector<Key>& keys) {
+    std::vector<std::string> near;
+    for (const auto& row : keys) near.push_back(row.name);
+    const auto dot = path.empty() ? 0 : path.size() + 1;
+    for (const auto& section : sections_)
+      if (section.path.starts_with(path) && section.path.size() > dot &&
+          section.path.find('.', dot) == std::string::npos &&
+          (dot == 0 || section.path[dot - 1] == '.'))
+        near.push_back(section.path.substr(dot));
+    std::string hint;
+    if (const auto meant = nearest(key, near); !meant.empty()) {
+      hint = "did you mean " + meant + "?";
+    } else if (const auto home = home_of(key); !home.empty()) {
+      hint = "did you mean it under " + home + "?";
+    } else {
+      hint = "allowed: ";
+      for (const auto& word : near) hint += (&word == near.data() ? "" : ", ") + word;
+    }
+    problems_.add(at, full, std::string(is_table ? "unknown table; " : "unknown key; ") + hint);
+  }
+
+  // The table that has such a key, or such a table inside it.
+  static std::string home_of(const std::string& key) {
+    Draft scratch;
+    for (const auto& section : sections(scratch))
+      for (const auto& row : section.open().keys)
+        if (row.name == key)
+          return section.kind == Section::Kind::repeated ? "[[" + section.path + "]]"
+                                                         : '[' + section.path + ']';
+    return "";
+  }
+
+  std::vector<Section> sections_;
+  Problems& problems_;
+};
+
+}  // namespace
+
+Set parse_set(const std::string& text, const std::filesystem::path& file, const Assets& assets) {
+  Problems problems(file.string());
+  Draft draft;
+  try {
+    const toml::table root = toml::parse(text, file.string());
+    Reader(draft, problems).read(root, "");
+  } catch (const toml::parse_error& error) {
+    problems.add(position(error.source()), "",
+                 "not valid TOML: " + std::string(error.description()));
+    problems.throw_if_any();
+  }
+  auto set = resolve(std::move(draft), file, assets, problems);
+  problems.throw_if_any();
+  return set;
+}
+
+Set load_set(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  if (!stream || !(text << stream.rdbuf()))
+    throw Error(file.string() + ": cannot be read; allowed: a set file (TOML)");
+  return parse_set(text.str(), file);
+}
+
+}  // namespace previz::set

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <vector>
@@ -59,16 +60,16 @@ enum class LightType { point, spot, directional, rectangle, sphere };
 struct Light {
   std::string name;
   LightType type = LightType::point;
-  glm::dvec3 position{0};           // metres (point, spot, rectangle centre, sphere centre)
-  glm::dvec3 direction{0, 0, -1};   // unit, the way the light travels (spot, directional, rectangle)
-  glm::dvec3 up{0, 1, 0};           // rectangle: direction of its height
+  glm::dvec3 position{0};          // metres (point, spot, rectangle centre, sphere centre)
+  glm::dvec3 direction{0, 0, -1};  // unit, the way the light travels (spot, directional, rectangle)
+  glm::dvec3 up{0, 1, 0};          // rectangle: direction of its height
   // point, spot: radiant intensity (W/sr); directional: irradiance on a facing plane (W/m^2);
   // rectangle, sphere: radiance (W/sr/m^2). Linear Rec. 709.
   glm::dvec3 emission{1};
   double width_m = 1, height_m = 1;  // rectangle
   double radius_m = 0;               // sphere (> 0)
   double angular_radius_rad = 0;     // directional: 0 is a delta light
-  double inner_cone_rad = 0, outer_cone_rad = 0.785398;  // spot, half angles
+  double inner_cone_rad = 0, outer_cone_rad = std::numbers::pi / 4;  // spot, half angles
   double gain_mixed = 1, gain_real = 0;
 };
 
@@ -79,31 +80,33 @@ enum class LightSampling { importance, bsdf };
 struct Lighting {
   LightMode mode = LightMode::image;
   LightSampling sampling = LightSampling::importance;
-  std::optional<std::filesystem::path> environment;  // EXR, latitude-longitude; instead of a fisheye
+  // EXR, latitude-longitude; instead of a fisheye.
+  std::optional<std::filesystem::path> environment;
   std::string environment_as_written;
-  double environment_rotation_rad = 0;   // about world Z, counter-clockwise from above
+  double environment_rotation_rad = 0;  // about world Z, counter-clockwise from above
   double environment_gain = 1;
-  int resolution = 0;                    // octahedral map, texels a side; 0: from the source
+  int resolution = 0;  // octahedral map, texels a side; 0: from the source
   UnseenRule unseen = UnseenRule::horizon;
-  glm::dvec3 unseen_radiance{0};         // UnseenRule::constant
-  int frame = -1;  // light frame to use; -1: every bracket up to the newest before the observer frame
+  glm::dvec3 unseen_radiance{0};  // UnseenRule::constant
+  // Light frame to use; -1: every bracket up to the newest before the observer frame.
+  int frame = -1;
 };
 
-enum class Estimator { paired };       // difference follows
-enum class Composite { additive };     // ratio and hybrid follow
+enum class Estimator { paired };    // difference follows
+enum class Composite { additive };  // ratio and hybrid follow
 
 struct Estimation {
   Estimator estimator = Estimator::paired;
   Composite composite = Composite::additive;
-  int max_depth = 16;              // path vertices after the camera, 1..64
-  int roulette_depth = 4;          // Russian roulette from this vertex on
+  int max_depth = 16;      // path vertices after the camera, 1..64
+  int roulette_depth = 4;  // Russian roulette from this vertex on
   std::uint32_t seed = 1;
   double specular_roughness = 1e-3;  // alpha at or below which a lobe is a Dirac delta
 };
 
 struct Quality {
-  int samples = 16;       // per pixel and frame, 1..1'000'000
-  double scale = 1.0;     // of the observer's resolution, preview only
+  int samples = 16;    // per pixel and frame, 1..1'000'000
+  double scale = 1.0;  // of the observer's resolution, preview only
 };
 
 struct Output {
@@ -114,12 +117,12 @@ struct Output {
 };
 
 struct Tracking {
-  bool enabled = true;            // false: poses of the session's track.jsonl are used
+  bool enabled = true;  // false: poses of the session's track.jsonl are used
   std::string family = "tag36h11";
   double decimate = 1.0;
-  double min_margin = 20.0;       // decision margin of a detection
+  double min_margin = 20.0;  // decision margin of a detection
   int max_hamming = 1;
-  double ambiguity_ratio = 0.2;   // best/second reprojection error above which one tag is ambiguous
+  double ambiguity_ratio = 0.2;  // best/second reprojection error above which one tag is ambiguous
   std::vector<Tag> tags;
 };
 
@@ -137,11 +140,16 @@ struct Set {
   Output output;
 };
 
-// Parses TOML text. `file` names it in errors and is what relative paths are relative to;
-// `assets` maps paths as written to other paths (a session's assets). Throws previz::Error whose
-// message holds every problem found, one a line: file:line: key: what is wrong and what is allowed.
+// Parses TOML text. `file` names it in errors, and its folder is what relative paths are relative
+// to; `assets` maps paths as the set writes them to paths that stand in for them (a session's assets,
+// relative to that folder too). The files of objects and the environment must exist; a replay
+// device's session and the output directory need not. Tag and camera poses come out exactly rigid.
+// Throws previz::Error whose message holds every problem found, one a line, in the order of the
+// file's lines: file:line:column: key: what is wrong; what is allowed. Where the text is no TOML at
+// all, that is the one problem, without a key.
 Set parse_set(const std::string& text, const std::filesystem::path& file,
               const std::vector<std::pair<std::string, std::filesystem::path>>& assets = {});
+// The same from a file; throws previz::Error naming it if it cannot be read.
 Set load_set(const std::filesystem::path& file);
 
 // config/reference.toml: every key with its unit, default and range, from the parser's own table.

@@ -1,0 +1,63 @@
+// How the set file spells every enumeration; the one place where a new spelling is added.
+#pragma once
+
+#include <array>
+#include <utility>
+
+#include "daemon/set/set.hpp"
+
+namespace previz::set {
+
+template <class E>
+using Name = std::pair<const char*, E>;
+
+// A driver is listed once it exists.
+constexpr auto names(Driver) {
+  return std::to_array<Name<Driver>>({{"replay", Driver::replay}, {"none", Driver::none}});
+}
+constexpr auto names(Presence) {
+  return std::to_array<Name<Presence>>({{"phantom", Presence::phantom},
+                                        {"virtual", Presence::virtual_object},
+                                        {"removed", Presence::removed}});
+}
+constexpr auto names(LightType) {
+  return std::to_array<Name<LightType>>({{"point", LightType::point},
+                                         {"spot", LightType::spot},
+                                         {"directional", LightType::directional},
+                                         {"rectangle", LightType::rectangle},
+                                         {"sphere", LightType::sphere}});
+}
+constexpr auto names(UnseenRule) {
+  return std::to_array<Name<UnseenRule>>({{"horizon", UnseenRule::horizon},
+                                          {"mirror", UnseenRule::mirror},
+                                          {"constant", UnseenRule::constant}});
+}
+constexpr auto names(LightMode) {
+  return std::to_array<Name<LightMode>>({{"image", LightMode::image}});
+}
+constexpr auto names(LightSampling) {
+  return std::to_array<Name<LightSampling>>(
+      {{"importance", LightSampling::importance}, {"bsdf", LightSampling::bsdf}});
+}
+constexpr auto names(Estimator) {
+  return std::to_array<Name<Estimator>>({{"paired", Estimator::paired}});
+}
+constexpr auto names(Composite) {
+  return std::to_array<Name<Composite>>({{"additive", Composite::additive}});
+}
+constexpr auto names(ResponseCurve::Kind) {
+  return std::to_array<Name<ResponseCurve::Kind>>({{"srgb", ResponseCurve::Kind::srgb},
+                                                   {"linear", ResponseCurve::Kind::linear},
+                                                   {"gamma", ResponseCurve::Kind::gamma},
+                                                   {"table", ResponseCurve::Kind::table}});
+}
+
+// The value as a set file writes it.
+template <class E>
+constexpr const char* name_of(E value) {
+  for (const auto& [name, known] : names(value))
+    if (known == value) return name;
+  return "(no name)";
+}
+
+}  // namespace previz::set

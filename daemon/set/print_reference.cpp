@@ -1,0 +1,8 @@
+// Prints config/reference.toml; `ninja reference` writes it.
+#include <iostream>
+
+#include "daemon/set/set.hpp"
+
+int main() {
+  std::cout << previz::set::reference_toml();
+}

@@ -1,0 +1,83 @@
+#include "daemon/set/problems.hpp"
+
+#include <algorithm>
+#include <numeric>
+#include <tuple>
+
+#include "drivers/error.hpp"
+
+namespace previz::set {
+
+void Problems::add(Position at, const std::string& key, const std::string& what) {
+  problems_.push_back({at, key, what});
+}
+
+void Problems::throw_if_any() const {
+  if (problems_.empty()) return;
+  auto sorted = problems_;
+  std::ranges::stable_sort(sorted, {}, [](const Problem& p) { return p.at; });
+  std::string message;
+  for (const auto& [at, key, what] : sorted) {
+    if (!message.empty()) message += '\n';
+    message += printable(file_) + ':' + std::to_string(at.line) + ':' + std::to_string(at.column) +
+               ": " + (key.empty() ? "" : printable(key) + ": ") + printable(what);
+  }
+  throw Error(message);
+}
+
+namespace {
+
+// Optimal string alignment: insertions, deletions, substitutions and swaps of neighbours cost 1.
+std::size_t edit_distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> before, last(b.size() + 1), row(b.size() + 1);
+  std::iota(last.begin(), last.end(), 0);
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    row[0] = i;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + (a[i - 1] != b[j - 1])});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        row[j] = std::min(row[j], before[j - 2] + 1);
+    }
+    before = last;
+    last = row;
+  }
+  return last.back();
+}
+
+}  // namespace
+
+std::string nearest(const std::string& word, const std::vector<std::string>& known) {
+  constexpr std::size_t longest_word = 64;  // longer ones are no slip of the hand
+  if (word.size() > longest_word) return "";
+  std::string best;
+  std::size_t best_distance = std::max<std::size_t>(2, word.size() / 3) + 1;
+  for (const auto& candidate : known) {
+    // "focal_length" means "focal_length_mm": a forgotten unit is the likeliest slip of all.
+    const bool unit_forgotten = word.size() > 2 && candidate.starts_with(word + "_");
+    const auto distance = unit_forgotten ? 0 : edit_distance(word, candidate);
+    if (distance < best_distance && distance < candidate.size()) {
+      best = candidate;
+      best_distance = distance;
+    }
+  }
+  return best;
+}
+
+std::string printable(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '\n')
+      out += "\\n";
+    else if (c == '\t')
+      out += "\\t";
+    else if (byte < 0x20 || byte == 0x7f) {
+      constexpr const char* hex = "0123456789abcdef";
+      out += std::string("\\u00") + hex[byte >> 4] + hex[byte & 15];
+    } else
+      out += c;
+  }
+  return out;
+}
+
+}  // namespace previz::set

@@ -1,0 +1,45 @@
+// Every problem of one file, gathered while reading and told together in the order of its lines.
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace previz::set {
+
+// From 1, as editors count; columns in code points.
+struct Position {
+  std::uint32_t line = 1;
+  std::uint32_t column = 1;
+  auto operator<=>(const Position&) const = default;
+};
+
+class Problems {
+ public:
+  explicit Problems(std::string file) : file_(std::move(file)) {}
+
+  // `key` is the full path of the key or table at fault, "observer.lens.f_number"; `what` says what
+  // is wrong and what is allowed.
+  void add(Position at, const std::string& key, const std::string& what);
+
+  // Throws previz::Error, one problem a line, "file:line:column: key: what"; returns if there are
+  // none. No line of a file can break a message in two: control characters are escaped.
+  void throw_if_any() const;
+
+ private:
+  struct Problem {
+    Position at;
+    std::string key, what;
+  };
+  std::string file_;
+  std::vector<Problem> problems_;
+};
+
+// The word of `known` that `word` was most likely meant to be, or "" where none is near.
+std::string nearest(const std::string& word, const std::vector<std::string>& known);
+
+// `text` with control characters as \n, \t or \u00XX.
+std::string printable(const std::string& text);
+
+}  // namespace previz::set

@@ -1,0 +1,361 @@
+#include "daemon/set/resolve.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+#include <numbers>
+
+#include "daemon/set/pose.hpp"
+
+namespace previz::set {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string bracket(const std::string& table) {
+  return '[' + table + ']';
+}
+
+class Resolver {
+ public:
+  Resolver(Draft& draft, const fs::path& file, const Assets& assets, Problems& problems)
+      : draft_(draft),
+        set_(draft.set),
+        folder_(file.parent_path()),
+        assets_(assets),
+        problems_(problems) {
+    set_.file = file;
+  }
+
+  void run() {
+    if (set_.name.empty()) set_.name = set_.file.stem().string();
+    observer();
+    light_camera();
+    tags();
+    objects();
+    lights();
+    lighting();
+    if (!given("output").has("directory") || given("output").good("directory"))
+      set_.output.directory = located(set_.output.directory);
+  }
+
+ private:
+  const Given& given(const std::string& table) { return draft_.given[table]; }
+
+  void problem(const Given& table, const std::string& key, const std::string& what) {
+    problems_.add(table.where(key), table.path + '.' + key, what);
+  }
+
+  fs::path located(const fs::path& as_written) const {
+    return (folder_ / as_written).lexically_normal();
+  }
+
+  // A file that must be there. Assets stand in for what the file names.
+  fs::path existing(const Given& table, const std::string& key, const fs::path& as_written) {
+    if (!table.good(key)) return {};
+    auto path = located(as_written);
+    for (const auto& [name, stand_in] : assets_)
+      if (name == as_written.string()) path = located(stand_in);
+    std::error_code error;
+    if (!fs::is_regular_file(path, error))
+      problem(table, key,
+              "there is no file " + path.string() +
+                  "; allowed: a file that exists, its path relative to the folder of this file");
+    return path;
+  }
+
+  // Says so for every key of `keys` that is written although `reason` excludes it.
+  void exclude(const Given& table, std::initializer_list<const char*> keys,
+               const std::string& reason) {
+    for (const auto* key : keys)
+      if (table.has(key)) problem(table, key, reason);
+  }
+
+  // The table stands without the one it belongs to.
+  void needs_intrinsics(const std::string& camera, const std::string& part) {
+    const auto& table = given(camera + '.' + part);
+    if (table.at && !given(camera + ".intrinsics").at)
+      problems_.add(*table.at, table.path,
+                    bracket(camera + ".intrinsics") +
+                        " is missing; a calibration given here replaces the session's as a whole");
+  }
+
+  void device(const std::string& table, Driver driver, std::string& device) {
+    if (driver == Driver::none)
+      exclude(given(table), {"device"}, "driver \"none\" has no device; leave one of the two out");
+    if (driver == Driver::replay && !device.empty()) device = located(device).string();
+  }
+
+  void response(const std::string& path, const ResponseCurve& curve) {
+    using Kind = ResponseCurve::Kind;
+    const auto& table = given(path);
+    if (table.has("kind") && !table.good("kind")) return;
+    const std::string kind = name_of(curve.kind);
+    if (curve.kind != Kind::gamma)
+      exclude(table, {"gamma"}, "does not go with kind \"" + kind + "\"; allowed with \"gamma\"");
+    if (curve.kind != Kind::table) {
+      exclude(table, {"table"}, "does not go with kind \"" + kind + "\"; allowed with \"table\"");
+      return;
+    }
+    constexpr auto wanted = "allowed: at least 2 numbers, strictly increasing from 0 to 1";
+    const auto& t = curve.inverse_table;
+    if (!table.has("table"))
+      problem(table, "table", std::string("is missing with kind \"table\"; ") + wanted);
+    if (!table.good("table")) return;
+    if (t.size() < 2 || t.front() != 0 || t.back() != 1)
+      problem(table, "table", std::string("does not run from 0 to 1; ") + wanted);
+    for (std::size_t i = 1; i < t.size(); ++i)
+      if (!(t[i] > t[i - 1])) {
+        problem(table, "table",
+                "number " + std::to_string(i + 1) + " is not above the one before it; " + wanted);
+        return;
+      }
+  }
+
+  void observer() {
+    device("observer", set_.observer.driver, set_.observer.device);
+    needs_intrinsics("observer", "lens");
+    needs_intrinsics("observer", "response");
+    response("observer.response", draft_.observer.response);
+    const auto& lens = given("observer.lens");
+    if (lens.good("focus_distance_m") && lens.good("focal_length_mm") &&
+        draft_.lens.focus_distance_m <= draft_.lens.focal_length_m)
+      problem(lens, "focus_distance_m",
+              "the focus is not beyond the focal length; allowed: above " +
+                  codec::print_number(draft_.lens.focal_length_m) + " m");
+    if (lens.at) draft_.observer.lens = draft_.lens;
+    if (given("observer.intrinsics").at) set_.observer.calibration = draft_.observer;
+  }
+
+  void light_camera() {
+    device("light_camera", set_.light_camera.driver, set_.light_camera.device);
+    needs_intrinsics("light_camera", "response");
+    needs_intrinsics("light_camera", "pose");
+    response("light_camera.response", draft_.light.response);
+    const auto& intrinsics = given("light_camera.intrinsics");
+    if (!intrinsics.at) return;
+
+    if (intrinsics.good("max_angle_deg") && intrinsics.good("k") == intrinsics.has("k"))
+      if (const auto fold = fold_angle(draft_.light.intrinsics))
+        problem(intrinsics, "k",
+                "the picture folds back at " +
+                    codec::print_number(std::floor(*fold * 1800 / std::numbers::pi) / 10) +
+                    " degrees off axis; allowed: a radius that grows up to max_angle_deg");
+    const auto& pose = given("light_camera.pose");
+    if (!pose.at)
+      problems_.add(*intrinsics.at, "light_camera.pose",
+                    "is missing; a calibrated light camera needs to say where it stands: "
+                    "[light_camera.pose] with position_m, rotation_deg or world_from_camera");
+    else
+      draft_.light.world_from_camera = rigid(pose, draft_.light_pose, "world_from_camera");
+    set_.light_camera.calibration = draft_.light;
+  }
+
+  // A pose that must be given in one of the two forms every pose has.
+  glm::dmat4 rigid(const Given& table, const PoseDraft& draft, const std::string& matrix_key) {
+    if (table.has(matrix_key)) {
+      exclude(table, {"position_m", "rotation_deg"},
+              "contradicts " + matrix_key + "; allowed: one of the two forms");
+      if (!table.good(matrix_key)) return glm::dmat4{1};
+      const double error = rigidity_error(*draft.matrix);
+      if (error <= rigid_tolerance) return nearest_rigid(*draft.matrix);
+      problem(table, matrix_key,
+              std::isinf(error)
+                  ? "is a mirroring or singular transform; allowed: a rotation and a shift"
+                  : "is not rigid, its axes are off by " + codec::print_number(error) +
+                        "; allowed: unit axes at right angles to within 1e-4");
+      return glm::dmat4{1};
+    }
+    if (!table.has("position_m"))
+      problem(table, "position_m",
+              "is missing; allowed: position_m (with rotation_deg), or " + matrix_key);
+    return pose(draft.position.value_or(glm::dvec3{0}), draft.rotation.value_or(glm::dvec3{0}));
+  }
+
+  void tags() {
+    std::map<int, Position> first;
+    for (const auto& draft : draft_.tags) {
+      const auto& table = draft.given;
+      if (table.good("id")) {
+        const auto [other, fresh] = first.emplace(draft.id, table.where("id"));
+        if (!fresh)
+          problem(table, "id",
+                  "tag " + std::to_string(draft.id) + " is already in line " +
+                      std::to_string(other->second.line) + "; allowed: each id once");
+      }
+      Tag tag{.id = draft.id, .size_m = draft.size.value_or(0)};
+      if (table.has("corners_m")) {
+        measured(draft, tag);
+      } else {
+        if (!table.has("size_m"))
+          problem(table, "size_m",
+                  "is missing; allowed: the outer edge of the black border in m, or corners_m");
+        tag.world_from_tag = rigid(table, draft.pose, "world_from_tag");
+      }
+      set_.tracking.tags.push_back(tag);
+    }
+  }
+
+  // A tag given by its four corners.
+  void measured(const TagDraft& draft, Tag& tag) {
+    const auto& table = draft.given;
+    exclude(table, {"position_m", "rotation_deg", "world_from_tag"},
+            "contradicts corners_m; allowed: one form of the pose");
+    if (!table.good("corners_m")) return;
+    const auto fit = fit_square(*draft.corners);
+    const auto percent = [](double part) {
+      return codec::print_number(std::round(part * 1000) / 10) + " %";
+    };
+    if (!fit || fit->error > square_tolerance) {
+      problem(table, "corners_m",
+              fit ? "is no square, a corner is off by " + percent(fit->error) +
+                        " of the side; allowed: at most " + percent(square_tolerance) +
+                        ", in the order lower left, lower right, upper right, upper left"
+                  : "has no area; allowed: lower left, lower right, upper right, upper left");
+      return;
+    }
+    tag.world_from_tag = fit->world_from_tag;
+    if (!table.good("size_m")) {
+      tag.size_m = fit->size;
+    } else if (std::abs(tag.size_m / fit->size - 1) > square_tolerance) {
+      problem(table, "size_m",
+              "contradicts corners_m, whose side is " + codec::print_number(fit->size) +
+                  " m; allowed: that to within " + percent(square_tolerance) + ", or leave it out");
+    }
+  }
+
+  void objects() {
+    std::map<std::string, Position> first;
+    for (auto& draft : draft_.objects) {
+      const auto& table = draft.given;
+      auto& object = draft.object;
+      if (table.good("name")) {
+        if (object.name.empty()) problem(table, "name", "is empty; allowed: text");
+        const auto [other, fresh] = first.emplace(object.name, table.where("name"));
+        if (!fresh)
+          problem(table, "name",
+                  codec::quote(object.name) + " is already in line " +
+                      std::to_string(other->second.line) + "; allowed: each name once");
+      }
+      object.file_as_written = draft.file.string();
+      object.file = existing(table, "file", draft.file);
+      object.world_from_file = placed(draft);
+      set_.objects.push_back(object);
+    }
+  }
+
+  glm::dmat4 placed(const ObjectDraft& draft) {
+    const auto& table = draft.given;
+    if (!table.has("world_from_file"))
+      return glm::scale(pose(draft.pose.position.value_or(glm::dvec3{0}),
+                             draft.pose.rotation.value_or(glm::dvec3{0})),
+                        glm::dvec3{draft.scale});
+    exclude(table, {"position_m", "rotation_deg", "scale"},
+            "contradicts world_from_file; allowed: one of the two forms");
+    if (!table.good("world_from_file")) return glm::dmat4{1};
+    constexpr double flat = 1e-6;
+    if (regularity(*draft.pose.matrix) < flat)
+      problem(table, "world_from_file",
+              "cannot be inverted, it flattens the object; allowed: any invertible transform");
+    return *draft.pose.matrix;
+  }
+
+  void lights() {
+    int number = 0;
+    for (auto& draft : draft_.lights) {
+      ++number;
+      if (draft.light.name.empty()) draft.light.name = "light " + std::to_string(number);
+      if (draft.given.good("type")) light(draft.given, draft.light);
+      set_.lights.push_back(draft.light);
+    }
+  }
+
+  void light(const Given& table, Light& light) {
+    using enum LightType;
+    struct Use {
+      const char* key;
+      std::vector<LightType> required, allowed;
+    };
+    static const Use uses[] = {
+        {"position_m", {point, spot, rectangle, sphere}, {}},
+        {"direction", {spot, directional, rectangle}, {}},
+        {"up", {}, {rectangle}},
+        {"width_m", {rectangle}, {}},
+        {"height_m", {rectangle}, {}},
+        {"radius_m", {sphere}, {}},
+        {"angular_radius_deg", {}, {directional}},
+        {"inner_cone_deg", {}, {spot}},
+        {"outer_cone_deg", {}, {spot}},
+    };
+    const std::string type = std::string("a ") + name_of(light.type) + " light";
+    for (const auto& [key, required, allowed] : uses) {
+      const bool is_required = std::ranges::find(required, light.type) != required.end();
+      const bool is_allowed = std::ranges::find(allowed, light.type) != allowed.end();
+      if (is_required && !table.has(key)) problem(table, key, "is missing; " + type + " needs it");
+      if (!is_required && !is_allowed)
+        exclude(table, {key}, type + " has no such thing; leave it out");
+    }
+    if (table.good("direction")) {
+      if (glm::length(light.direction) > 0)
+        light.direction = glm::normalize(light.direction);
+      else
+        problem(table, "direction", "has no length; allowed: any other vector");
+    }
+    if (light.type == rectangle && table.good("direction")) upright(table, light);
+    if (light.type == spot && light.inner_cone_rad > light.outer_cone_rad)
+      problem(table, "inner_cone_deg",
+              "is wider than outer_cone_deg; allowed: at most that, " +
+                  codec::print_number(light.outer_cone_rad * 180 / std::numbers::pi));
+  }
+
+  // Makes `up` a unit vector at right angles to the direction.
+  void upright(const Given& table, Light& light) {
+    if (!table.has("up") && std::abs(light.direction.y) > 0.99) light.up = {0, 0, 1};
+    const auto across = light.up - glm::dot(light.up, light.direction) * light.direction;
+    if (glm::length(across) > 1e-6 * glm::length(light.up))
+      light.up = glm::normalize(across);
+    else
+      problem(table, "up", "has no part across the light's direction; allowed: any that has");
+  }
+
+  void lighting() {
+    const auto& table = given("lighting");
+    auto& lighting = set_.lighting;
+    if (draft_.environment) {
+      lighting.environment_as_written = draft_.environment->string();
+      lighting.environment = existing(table, "environment", *draft_.environment);
+    }
+    if (table.good("resolution") && lighting.resolution != 0 &&
+        !std::has_single_bit(static_cast<unsigned>(lighting.resolution)))
+      problem(table, "resolution",
+              std::to_string(lighting.resolution) +
+                  " is no power of two; allowed: 0 or 1, 2, 4 ... 4096");
+    if (table.has("unseen") && !table.good("unseen")) return;
+    if (lighting.unseen == UnseenRule::constant) {
+      if (!table.has("unseen_radiance"))
+        problem(table, "unseen_radiance",
+                "is missing with unseen = \"constant\"; allowed: 3 numbers, at least 0");
+      lighting.unseen_radiance = draft_.unseen_radiance.value_or(glm::dvec3{0});
+    } else {
+      exclude(table, {"unseen_radiance"},
+              "goes with unseen = \"constant\" only; leave one of the two out");
+    }
+  }
+
+  Draft& draft_;
+  Set& set_;
+  fs::path folder_;
+  const Assets& assets_;
+  Problems& problems_;
+};
+
+}  // namespace
+
+Set resolve(Draft draft, const fs::path& file, const Assets& assets, Problems& problems) {
+  Resolver(draft, file, assets, problems).run();
+  return std::move(draft.set);
+}
+
+}  // namespace previz::set

@@ -1,0 +1,242 @@
+#include "daemon/set/table.hpp"
+
+#include <numbers>
+
+namespace previz::set {
+namespace {
+
+// Units of the file; struct units are metres, radians and pixels.
+constexpr Unit plain{"", 1}, px{"px", 1}, m{"m", 1}, mm{"mm", 1e-3},
+    deg{"degrees", std::numbers::pi / 180};
+
+constexpr int max_picture_side_px = 16384;
+// A distance beyond which a lens cannot tell the difference, and a float still can.
+constexpr double far_m = 1e6;
+
+Need required(const char* example) {
+  return {Need::Kind::required, example};
+}
+Need optional(const char* example) {
+  return {Need::Kind::optional, example};
+}
+
+using Keys = std::vector<Key>;
+
+// One row, one line: name, where its value goes, unit and range, what it means, what if left out.
+// clang-format off
+
+Keys set_keys(Set& s) {
+  return {
+      {"name", &s.name, plain, "What the crew calls this set; left out: the file's name.", optional("\"desk\"")},
+  };
+}
+
+Keys observer_keys(Observer& o) {
+  return {
+      {"driver", &o.driver, plain, "How the film camera is reached."},
+      {"device", &o.device, plain, "The camera's stable name; for replay the session's folder, relative to this file. Left out: the session named on the command line.", optional("\"sessions/take1\"")},
+      {"exposure", &o.exposure, plain.above(0), "Absolute exposure, in place of what the frames say: picture signal = exposure * radiance.", optional("1.0")},
+  };
+}
+
+Keys pinhole_keys(PinholeIntrinsics& i) {
+  return {
+      {"width", &i.width, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1920")},
+      {"height", &i.height, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1080")},
+      {"fx", &i.fx, px.above(0), "Focal length along the rows.", required("1850.0")},
+      {"fy", &i.fy, px.above(0), "Focal length along the columns.", required("1850.0")},
+      {"cx", &i.cx, px, "Principal point; 0 is the centre of the leftmost pixels.", required("959.5")},
+      {"cy", &i.cy, px, "Principal point; 0 is the centre of the topmost pixels.", required("539.5")},
+      {"k1", &i.k1, plain, "Radial distortion (Brown-Conrady, OpenCV's order)."},
+      {"k2", &i.k2, plain, "Radial distortion."},
+      {"p1", &i.p1, plain, "Tangential distortion."},
+      {"p2", &i.p2, plain, "Tangential distortion."},
+      {"k3", &i.k3, plain, "Radial distortion."},
+  };
+}
+
+Keys lens_keys(ThinLens& l) {
+  return {
+      {"focal_length_mm", &l.focal_length_m, mm.above(0, 1e4), "Focal length as engraved on the lens.", required("35.0")},
+      {"f_number", &l.f_number, plain.within(0.5, 1e6), "The f-stop; no lens in air is faster than 0.5.", required("2.8")},
+      {"focus_distance_m", &l.focus_distance_m, m.above(0, far_m), "What is sharp, measured along the optical axis; beyond the focal length. 1e6 for infinity.", required("1.2")},
+  };
+}
+
+Keys response_keys(ResponseCurve& r, double& responsivity) {
+  return {
+      {"kind", &r.kind, plain, "Curve from signal (exposure * radiance) to picture value."},
+      {"gamma", &r.gamma, plain.within(0.1, 10), "With kind \"gamma\" only: value = signal^(1/gamma).", optional("2.2")},
+      {"table", &r.inverse_table, plain.within(0, 1), "With kind \"table\" only: signal at value i/(n-1), strictly increasing from 0 to 1.", optional("[0.0, 0.05, 0.22, 0.52, 1.0]")},
+      {"responsivity", &responsivity, plain.above(0), "exposure = shutter time in s * gain * responsivity."},
+  };
+}
+
+Keys light_camera_keys(LightCamera& c) {
+  return {
+      {"driver", &c.driver, plain, "How the light camera (the fisheye that looks at the lamps) is reached."},
+      {"device", &c.device, plain, "As in [observer].", optional("\"sessions/take1\"")},
+      {"exposure", &c.exposure, plain.above(0), "Absolute exposure, in place of what the frames say.", optional("0.35")},
+  };
+}
+
+Keys fisheye_keys(FisheyeIntrinsics& i) {
+  return {
+      {"width", &i.width, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1024")},
+      {"height", &i.height, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1024")},
+      {"fx", &i.fx, px.above(0), "Focal length along the rows (Kannala-Brandt, OpenCV's fisheye).", required("290.0")},
+      {"fy", &i.fy, px.above(0), "Focal length along the columns.", required("290.0")},
+      {"cx", &i.cx, px, "Principal point; 0 is the centre of the leftmost pixels.", required("511.5")},
+      {"cy", &i.cy, px, "Principal point; 0 is the centre of the topmost pixels.", required("511.5")},
+      {"k", &i.k, plain, "k1 to k4 of r = t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9, t the angle off axis."},
+      {"max_angle_deg", &i.max_angle_rad, deg.above(0, 180), "Angle off axis up to which the calibration holds; nothing is read beyond it.", required("100.0")},
+  };
+}
+
+Keys light_pose_keys(PoseDraft& p) {
+  return {
+      {"position_m", &p.position, m, "Where it stands in the world (Z up). Required unless world_from_camera is given.", optional("[0.5, 0.0, 1.6]")},
+      {"rotation_deg", &p.rotation, deg, "Turns about world X, then Y, then Z. Unturned it looks straight up, picture right = X, picture down = Y.", optional("[0.0, 0.0, 0.0]")},
+      {"world_from_camera", &p.matrix, plain, "In place of both: the rigid transform, OpenCV axes (right, down, forward).", optional("[[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, 1.6], [0, 0, 0, 1]]")},
+  };
+}
+
+Keys tracking_keys(Tracking& t) {
+  return {
+      {"enabled", &t.enabled, plain, "Find the film camera by the tags in its picture; false: take the poses the session recorded."},
+      {"family", &t.family, plain, "AprilTag family of the printed tags."},
+      {"decimate", &t.decimate, plain.within(1, 8), "Tags are looked for in a picture smaller by this factor: faster, and small tags get lost."},
+      {"min_margin", &t.min_margin, plain.within(0, 255), "Decision margin below which a detection is dropped."},
+      {"max_hamming", &t.max_hamming, plain.within(0, 3), "Bits of a tag's code that may be corrected."},
+      {"ambiguity_ratio", &t.ambiguity_ratio, plain.within(0, 1), "Error of the best over the second pose above which a single tag is called ambiguous."},
+  };
+}
+
+Keys tag_keys(TagDraft& t) {
+  return {
+      {"id", &t.id, plain.within(0, 65535), "The number that the tag encodes; each at most once.", required("0")},
+      {"size_m", &t.size, m.above(0, 100), "Outer edge of the black border. Required unless corners_m is given.", optional("0.08")},
+      {"position_m", &t.pose.position, m, "Where the middle of the tag is in the world (Z up).", optional("[0.0, 0.0, 0.0]")},
+      {"rotation_deg", &t.pose.rotation, deg, "Turns about world X, then Y, then Z. Unturned it lies face up, its right = X; [90, 0, 0] hangs it on a wall facing -Y.", optional("[0.0, 0.0, 0.0]")},
+      {"corners_m", &t.corners, m, "In place of position and rotation: lower left, lower right, upper right, upper left of the black border, as printed.", optional("[[-0.04, -0.04, 0], [0.04, -0.04, 0], [0.04, 0.04, 0], [-0.04, 0.04, 0]]")},
+      {"world_from_tag", &t.pose.matrix, plain, "In place of position and rotation: the rigid transform; tag axes right, up, out of the paper.", optional("[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]")},
+  };
+}
+
+Keys object_keys(ObjectDraft& o) {
+  return {
+      {"name", &o.object.name, plain, "What messages call it; each at most once.", required("\"vase\"")},
+      {"file", &o.file, plain, "glTF 2.0 (.glb or .gltf); its Y-up is turned to the world's Z-up.", required("\"vase.glb\"")},
+      {"presence", &o.object.presence, plain, "\"phantom\" stands for something real, \"virtual\" is added, \"removed\" is real and taken away.", required("\"virtual\"")},
+      {"nodes", &o.object.nodes, plain, "Names of the glTF nodes to take; empty: all of the file."},
+      {"position_m", &o.pose.position, m, "Where the file's origin goes in the world.", optional("[0.2, 0.1, 0.0]")},
+      {"rotation_deg", &o.pose.rotation, deg, "Turns about world X, then Y, then Z, before it is moved.", optional("[0.0, 0.0, 45.0]")},
+      {"scale", &o.scale, plain.above(0, 1e6), "Size factor, before it is turned."},
+      {"world_from_file", &o.pose.matrix, plain, "In place of the three: any invertible transform.", optional("[[1, 0, 0, 0.2], [0, 1, 0, 0.1], [0, 0, 1, 0], [0, 0, 0, 1]]")},
+  };
+}
+
+Keys light_keys(Light& l) {
+  return {
+      {"name", &l.name, plain, "What messages call it.", optional("\"key light\"")},
+      {"type", &l.type, plain, "Shape of the lamp.", required("\"spot\"")},
+      {"position_m", &l.position, m, "Where it is (its centre); not for a directional light.", optional("[0.0, -1.0, 2.0]")},
+      {"direction", &l.direction, plain, "The way the light travels: spot, directional, rectangle.", optional("[0.0, 0.5, -1.0]")},
+      {"up", &l.up, plain, "Direction of a rectangle's height; what is along the light's direction is ignored.", optional("[0.0, 1.0, 0.0]")},
+      {"emission", &l.emission, plain.at_least(0), "Linear Rec. 709. Point, spot: intensity in W/sr; directional: W/m^2 on a facing plane; rectangle, sphere: radiance in W/sr/m^2.", required("[10.0, 9.5, 8.0]")},
+      {"width_m", &l.width_m, m.above(0), "Rectangle.", optional("1.0")},
+      {"height_m", &l.height_m, m.above(0), "Rectangle.", optional("0.5")},
+      {"radius_m", &l.radius_m, m.above(0), "Sphere.", optional("0.05")},
+      {"angular_radius_deg", &l.angular_radius_rad, deg.within(0, 90), "Directional: half the angle it is seen under; 0: a sharp shadow. The sun: 0.265.", optional("0.265")},
+      {"inner_cone_deg", &l.inner_cone_rad, deg.within(0, 90), "Spot: half angle of full intensity; left out: 0.", optional("20.0")},
+      {"outer_cone_deg", &l.outer_cone_rad, deg.above(0, 90), "Spot: half angle where its light ends; left out: 45.", optional("35.0")},
+      {"gain_mixed", &l.gain_mixed, plain.at_least(0), "Brightness in the picture that is made: 1 as it is, 0 off, 0.3 dimmed."},
+      {"gain_real", &l.gain_real, plain.at_least(0), "Brightness in the real scene: 0 for a lamp that is added, 1 for one that is there."},
+  };
+}
+
+Keys lighting_keys(Draft& d) {
+  auto& l = d.set.lighting;
+  return {
+      {"mode", &l.mode, plain, "The whole fisheye picture lights the scene."},
+      {"sampling", &l.sampling, plain, "How directions towards the light are chosen; \"bsdf\" is noisier, for comparison."},
+      {"environment", &d.environment, plain, "Latitude-longitude EXR in place of the light camera; Z up, the picture's middle is +X.", optional("\"env.exr\"")},
+      {"environment_rotation_deg", &l.environment_rotation_rad, deg, "Turns that picture about world Z, counter-clockwise seen from above."},
+      {"environment_gain", &l.environment_gain, plain.at_least(0), "Scales that picture."},
+      {"resolution", &l.resolution, plain.within(0, 4096), "Side of the light map in texels, a power of two; 0: as fine as the source."},
+      {"unseen", &l.unseen, plain, "What stands where the light camera cannot see: the colour of its horizon, its picture mirrored at its edge, or a constant."},
+      {"unseen_radiance", &d.unseen_radiance, plain.at_least(0), "With unseen = \"constant\" only: linear Rec. 709 radiance.", optional("[0.1, 0.1, 0.1]")},
+      {"frame", &l.frame, plain.within(-1, 1'000'000), "Light frame to use for the whole take; -1: the newest bracket before each picture."},
+  };
+}
+
+Keys estimator_keys(Estimation& e) {
+  return {
+      {"kind", &e.estimator, plain, "\"paired\": both worlds are traced in full, with the same random numbers."},
+      {"composite", &e.composite, plain, "How the difference of the worlds is put onto the camera picture."},
+      {"max_depth", &e.max_depth, plain.within(1, 64), "Bounces of a path: vertices after the camera."},
+      {"roulette_depth", &e.roulette_depth, plain.within(1, 64), "Russian roulette ends paths from this vertex on."},
+      {"seed", &e.seed, plain, "The same seed gives the same noise."},
+      {"specular_roughness", &e.specular_roughness, plain.within(0, 0.1), "GGX alpha at or below which a surface is a perfect mirror."},
+  };
+}
+
+Keys quality_keys(Quality& q) {
+  return {
+      {"samples", &q.samples, plain.within(1, 1'000'000), "Samples per pixel and frame."},
+      {"scale", &q.scale, plain.within(0.01, 1), "Size of the preview over the camera's picture; offline rendering is always full size."},
+  };
+}
+
+Keys output_keys(Output& o) {
+  return {
+      {"directory", &o.directory, plain, "Where rendered frames go."},
+      {"exr", &o.exr, plain, "A multi-layer EXR a frame: composite, mixed, real, diff, mask, depth, normal, variance."},
+      {"png", &o.png, plain, "A PNG a frame, as the display shows it."},
+      {"video", &o.video, plain, "A review video of the take."},
+  };
+}
+
+// clang-format on
+}  // namespace
+
+std::vector<Section> sections(Draft& d) {
+  const auto once = [&d](const char* path, Section::Kind kind, const char* about, auto keys) {
+    return Section{path, kind, about, [&d, path, keys] {
+                     auto& given = d.given[path];
+                     given.path = path;
+                     return Section::Opened{&given, keys()};
+                   }};
+  };
+  const auto many = [](const char* path, const char* about, auto& drafts, auto keys) {
+    return Section{path, Section::Kind::repeated, about, [path, &drafts, keys] {
+                     auto& draft = drafts.emplace_back();
+                     draft.given.path = path;
+                     return Section::Opened{&draft.given, keys(draft)};
+                   }};
+  };
+  using enum Section::Kind;
+  // clang-format off
+  return {
+      once("set", always, "The set as a whole.", [&d] { return set_keys(d.set); }),
+      once("observer", always, "The film camera.", [&d] { return observer_keys(d.set.observer); }),
+      once("observer.intrinsics", optional, "Its lens as calibrated. A calibration given here replaces the session's as a whole.", [&d] { return pinhole_keys(d.observer.intrinsics); }),
+      once("observer.lens", optional, "Depth of field; left out: everything is sharp.", [&d] { return lens_keys(d.lens); }),
+      once("observer.response", optional, "How its sensor turns light into picture values.", [&d] { return response_keys(d.observer.response, d.observer.responsivity); }),
+      once("light_camera", always, "The light camera.", [&d] { return light_camera_keys(d.set.light_camera); }),
+      once("light_camera.intrinsics", optional, "Its fisheye as calibrated.", [&d] { return fisheye_keys(d.light.intrinsics); }),
+      once("light_camera.response", optional, "How its sensor turns light into picture values.", [&d] { return response_keys(d.light.response, d.light.responsivity); }),
+      once("light_camera.pose", optional, "Where it stands.", [&d] { return light_pose_keys(d.light_pose); }),
+      once("tracking", always, "Where the film camera is, found by printed AprilTags.", [&d] { return tracking_keys(d.set.tracking); }),
+      many("tag", "A printed tag; one table each. Give its pose in one of three forms.", d.tags, tag_keys),
+      many("object", "A piece of geometry, real or virtual; one table each.", d.objects, object_keys),
+      many("light", "A lamp that is added or whose brightness is changed; one table each.", d.lights, [](LightDraft& l) { return light_keys(l.light); }),
+      once("lighting", always, "The light around the set.", [&d] { return lighting_keys(d); }),
+      once("estimator", always, "How light is simulated.", [&d] { return estimator_keys(d.set.estimation); }),
+      once("quality", always, "What a frame may cost.", [&d] { return quality_keys(d.set.quality); }),
+      once("output", always, "What is written.", [&d] { return output_keys(d.set.output); }),
+  };
+  // clang-format on
+}
+
+}  // namespace previz::set
