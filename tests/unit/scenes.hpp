@@ -1,0 +1,81 @@
+// Scenes made by code for tests of the renderer and of the CPU tracer: simple shapes, closed
+// furnaces, a Cornell-like box and whole random sets. World space, Z up, metres.
+#pragma once
+
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include "daemon/lighting/environment.hpp"
+#include "daemon/scene/scene.hpp"
+#include "drivers/calibration.hpp"
+
+namespace previz::testing {
+
+// Shapes around the origin, with uvs; counter-clockwise seen from outside (rectangle: from +Z).
+scene::Mesh rectangle_mesh(const glm::dvec2& size);
+scene::Mesh box_mesh(const glm::dvec3& size);                        // flat normals
+scene::Mesh uv_sphere_mesh(double radius, int segments, int rings);  // smooth normals
+// 20 * 4^subdivisions triangles, smooth normals, no uvs.
+scene::Mesh icosphere_mesh(double radius, int subdivisions);
+// The same surface seen from the other side: winding and normals turned around.
+scene::Mesh inside_out(scene::Mesh mesh);
+
+scene::Material diffuse(const glm::vec3& albedo);  // Lambert: no specular at all
+scene::Material plastic(const glm::vec3& base_color, float roughness, float ior = 1.5f);
+scene::Material metal(const glm::vec3& f0, float roughness);
+scene::Material glass(float ior);                    // smooth, solid
+scene::Material emitter(const glm::vec3& radiance);  // reflects nothing
+
+std::uint32_t add_mesh(scene::Scene& scene, scene::Mesh mesh);
+std::uint32_t add_material(scene::Scene& scene, scene::Material material);
+std::uint32_t add_texture(scene::Scene& scene, scene::Texture texture);
+// Returns the instance's index; Instance::object counts instances.
+std::uint32_t add_instance(scene::Scene& scene, std::uint32_t mesh, std::uint32_t material,
+                           const glm::dmat4& world_from_object = glm::dmat4(1.0),
+                           std::uint32_t presence = scene::world_both);
+
+// Squares of the given side at z = 0 (facing up) and z = gap (facing down).
+scene::Scene facing_planes(double side_m, double gap_m, const scene::Material& lower,
+                           const scene::Material& upper);
+// Closed surfaces that face inwards; the sphere is an icosphere, so its radius is between
+// 0.99 and 1 times the one given at 3 subdivisions.
+scene::Scene furnace_box(const glm::dvec3& size, const scene::Material& wall);
+scene::Scene furnace_sphere(double radius_m, int subdivisions, const scene::Material& wall);
+// The unit box [-0.5, 0.5]^2 x [0, 1], open towards -Y: white floor, ceiling and back, red wall at
+// -X, green wall at +X, a square emitter of side 0.4 just below the ceiling, two white boxes.
+scene::Scene cornell_box();
+
+// All that a renderer is given for one picture.
+struct View {
+  scene::Scene scene;
+  lighting::EnvironmentMap environment;
+  ObserverCalibration calibration;
+  glm::dmat4 world_from_camera{1.0};  // OpenCV axes
+};
+
+// World pose of a camera at `eye` that looks at `target`, picture up towards world Z (towards Y
+// when it looks along Z).
+glm::dmat4 look_at(const glm::dvec3& eye, const glm::dvec3& target);
+// Square pixels, centred principal point, no distortion.
+ObserverCalibration pinhole(int width, int height, double horizontal_fov_rad);
+
+struct RandomScene {
+  int width = 160, height = 120;
+  int real_objects = 4, virtual_objects = 4;  // together at most 12
+  int removed_objects = 0;                    // further objects, in the real world only
+  int lights = 0;                             // further set lights, of random types and gains
+  bool lens = false;                          // thin lens focused on the table's centre
+  int environment_size = 64;
+};
+
+// A table with real boxes and spheres (diffuse, textured, plastic), virtual objects that are
+// diffuse, textured, plastic (roughness 0.1 to 0.6), rough metal, smooth metal or emissive, under a
+// smooth environment with one to three lamp discs of 20 to 60 times the mean, seen by a camera that
+// looks at the table from 25 to 55 degrees above it. Objects sink 2 mm into the table and do not
+// touch each other. The same seed gives the same view on every machine; virtual object 0 of six
+// consecutive seeds takes each of the six materials in turn.
+View random_scene(std::uint32_t seed, const RandomScene& options = {});
+
+}  // namespace previz::testing
