@@ -9,6 +9,14 @@
 
 namespace previz::tracking {
 
+// Frames must have the lens's size; `response` is the camera's, undone before corners are measured.
+// Throws previz::Error naming the key where the family is unknown, a tag's size is not positive, an
+// id is used twice, or the lens has no size or focal length.
+//
+// A pose that two views explain about equally well (one tag seen face on, a small flat map) is
+// ambiguous unless a pose tracked at most 0.5 s before lies within reach (3 rad/s) of one of them
+// only. A frame that follows a tracked one is searched at `settings.decimate`, and once more at
+// full resolution if that finds no pose; every other frame at full resolution.
 std::unique_ptr<Tracker> make_apriltag_tracker(const set::Tracking& settings,
                                                const PinholeIntrinsics& intrinsics,
                                                const ResponseCurve& response = {});

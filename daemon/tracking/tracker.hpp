@@ -24,10 +24,11 @@ enum class TrackStatus { tracked, ambiguous, lost };
 
 struct Track {
   TrackStatus status = TrackStatus::lost;
-  std::optional<Pose> pose;          // set only if tracked
-  std::vector<Pose> candidates;      // ambiguous: both poses, better first
-  std::string reason;                // lost or ambiguous: why, in plain words
-  std::vector<int> seen_tags;        // every id detected, of the map or not
+  std::optional<Pose> pose;      // set only if tracked
+  std::vector<Pose> candidates;  // ambiguous: both poses, better first
+  // Lost or ambiguous: why, in plain words. Tracked: which tags were left out and why, if any.
+  std::string reason;
+  std::vector<int> seen_tags;  // every id detected, of the map or not
 };
 
 class Tracker {

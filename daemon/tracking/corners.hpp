@@ -1,0 +1,32 @@
+// The four corners of a tag from its four border edges, at full resolution.
+#pragma once
+
+#include <array>
+#include <glm/vec2.hpp>
+#include <string>
+
+#include "daemon/tracking/edge.hpp"
+#include "drivers/calibration.hpp"
+
+namespace previz::tracking {
+
+// Lower left, lower right, upper right, upper left of the printed tag (libapriltag's order), at the
+// border's edge; pixels, (0,0) the centre of the top-left pixel.
+using CornerPixels = std::array<glm::dvec2, 4>;
+
+struct RefinedCorners {
+  CornerPixels pixel;
+  // Row-major 8x8 of (x0,y0,..,x3,y3), px^2, from the picture's own noise.
+  std::array<double, 64> covariance{};
+  std::string trouble;  // not empty: no corners, and why
+};
+
+// `cells` is the border's outer width in cells; `white_inside` of families with reversed borders.
+// `guess` within about 2 px.
+RefinedCorners refine_corners(const Luminance& luminance, const PinholeIntrinsics& lens,
+                              const CornerPixels& guess, int cells, bool white_inside);
+
+// The narrowest cell beside the border, px: below about 2 px the edges cannot be told apart.
+double narrowest_cell_px(const CornerPixels& corners, int cells);
+
+}  // namespace previz::tracking

@@ -1,0 +1,332 @@
+#include "daemon/tracking/edge.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/mat2x2.hpp>
+#include <glm/matrix.hpp>
+#include <numbers>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "daemon/tracking/lens.hpp"
+#include "daemon/tracking/photometry.hpp"
+
+namespace previz::tracking {
+namespace {
+
+constexpr double kSearchPx = 2.0;      // how far off the guess may be
+constexpr double kMinContrast = 0.05;  // sRGB-encoded, 13 of 255
+constexpr double kMaxBlurPx = 4.0;
+constexpr double kMinNoise = 0.0015;  // quantisation of 8 bits is 0.0011
+constexpr int kMaxColumns = 200;      // pixel columns used of a long edge
+
+// A pixel near the edge. Its distance to the line is (offset - shift of the line) * scale.
+struct Sample {
+  double along;   // 0 at a, 1 at b
+  double offset;  // undistorted px, positive on the bright side
+  double scale;   // picture px per undistorted px across the line
+  double nx, ny;  // unit normal in the picture
+  double value;   // sRGB-encoded
+  double weight = 1;
+};
+
+constexpr int kEndA = 0, kEndB = 1, kBlack = 2, kWhite = 3, kBlur = 4, kShadeAlong = 5,
+              kShadeAcross = 6, kParameters = 7;
+using Vector = cv::Vec<double, kParameters>;
+using Matrix = cv::Matx<double, kParameters, kParameters>;
+
+// The usual deviation of what is not measured well: shading relative to white, per edge length and
+// per pixel. Keeps short edges solvable, leaves long ones free.
+constexpr double kShadeAlongPrior = 0.3, kShadeAcrossPrior = 0.01, kBlurPrior = 1.0;
+
+struct Line {
+  glm::dvec2 a, b, normal;
+  double length;
+};
+
+Line make_line(glm::dvec2 a, glm::dvec2 b, glm::dvec2 bright_side) {
+  const double length = glm::distance(a, b);
+  glm::dvec2 normal(-(b - a).y / length, (b - a).x / length);
+  if (glm::dot(normal, bright_side - a) < 0) normal = -normal;
+  return {a, b, normal, length};
+}
+
+// The pixels within [-dark, bright] px of the line and between its ends less `margin_px`.
+std::vector<Sample> gather(const Luminance& luminance, const PinholeIntrinsics& lens,
+                           const Line& line, double dark, double bright, double margin_px) {
+  std::vector<Sample> samples;
+  const glm::dvec2 focal(lens.fx, lens.fy), centre(lens.cx, lens.cy);
+  const glm::dvec2 pa = distort(lens, (line.a - centre) / focal);
+  const glm::dvec2 pb = distort(lens, (line.b - centre) / focal);
+  const glm::dvec2 d = pb - pa;
+  const int major = std::abs(d.x) >= std::abs(d.y) ? 0 : 1;
+  const int minor = 1 - major;
+  const int size[2] = {lens.width, lens.height};
+  const double margin = margin_px / line.length;
+  // 2 px more than a straight edge needs: the lens may bend it.
+  const double reach = (std::max(dark, bright) + 2) * glm::length(d) / std::abs(d[major]);
+
+  const int first = std::max(0, int(std::ceil(std::min(pa[major], pb[major]))));
+  const int last = std::min(size[major] - 1, int(std::floor(std::max(pa[major], pb[major]))));
+  const int stride = std::max(1, (last - first + 1) / kMaxColumns);
+  for (int i = first; i <= last; i += stride) {
+    const double at = pa[minor] + (i - pa[major]) * d[minor] / d[major];
+    const int low = std::max(0, int(std::ceil(at - reach)));
+    const int high = std::min(size[minor] - 1, int(std::floor(at + reach)));
+    for (int j = low; j <= high; ++j) {
+      const int x = major == 0 ? i : j, y = major == 0 ? j : i;
+      const auto ray = undistort(lens, {x, y});
+      if (!ray) continue;
+      const glm::dvec2 u = *ray * focal + centre;
+      Sample s;
+      s.along = glm::dot(u - line.a, line.b - line.a) / (line.length * line.length);
+      if (s.along < margin || s.along > 1 - margin) continue;
+      s.offset = glm::dot(u - line.a, line.normal);
+      glm::dmat2 pixel_by_ray;
+      distort(lens, *ray, &pixel_by_ray);
+      // d(offset)/d(pixel), whose length is undistorted px per picture px
+      const glm::dvec2 gradient =
+          glm::transpose(glm::inverse(pixel_by_ray)) * (line.normal * focal);
+      const double steepness = glm::length(gradient);
+      s.scale = 1 / steepness;
+      s.nx = gradient.x / steepness;
+      s.ny = gradient.y / steepness;
+      const double distance = s.offset * s.scale;
+      if (distance < -dark || distance > bright) continue;
+      s.value = srgb_encode(luminance(x, y));
+      samples.push_back(s);
+    }
+  }
+  return samples;
+}
+
+double predict(const Vector& p, const Sample& s, Vector* gradient) {
+  const double distance = (s.offset - p[kEndA] * (1 - s.along) - p[kEndB] * s.along) * s.scale;
+  double by_s, by_blur;
+  const double c = edge_coverage(distance, s.nx, s.ny, p[kBlur], &by_s, &by_blur);
+  const double plain = p[kBlack] + (p[kWhite] - p[kBlack]) * c;
+  const double shade = 1 + p[kShadeAlong] * (s.along - 0.5) + p[kShadeAcross] * distance;
+  double slope;
+  const double value = srgb_encode(plain * shade, &slope);
+  if (gradient) {
+    const double step = (p[kWhite] - p[kBlack]) * shade;
+    const double by_distance = slope * (step * by_s + plain * p[kShadeAcross]);
+    (*gradient)[kEndA] = -by_distance * (1 - s.along) * s.scale;
+    (*gradient)[kEndB] = -by_distance * s.along * s.scale;
+    (*gradient)[kBlack] = slope * shade * (1 - c);
+    (*gradient)[kWhite] = slope * shade * c;
+    (*gradient)[kBlur] = slope * step * by_blur;
+    (*gradient)[kShadeAlong] = slope * plain * (s.along - 0.5);
+    (*gradient)[kShadeAcross] = slope * plain * distance;
+  }
+  return value;
+}
+
+double tukey_loss(double r, double cutoff) {
+  const double q = std::min(1.0, r * r / (cutoff * cutoff));
+  return cutoff * cutoff / 6 * (1 - (1 - q) * (1 - q) * (1 - q));
+}
+
+double tukey_weight(double r, double cutoff) {
+  const double q = r * r / (cutoff * cutoff);
+  return q < 1 ? (1 - q) * (1 - q) : 0;
+}
+
+const Vector& prior_information() {
+  static const Vector v = [] {
+    Vector p = Vector::all(0);
+    p[kBlur] = 1 / (kBlurPrior * kBlurPrior);
+    p[kShadeAlong] = 1 / (kShadeAlongPrior * kShadeAlongPrior);
+    p[kShadeAcross] = 1 / (kShadeAcrossPrior * kShadeAcrossPrior);
+    return p;
+  }();
+  return v;
+}
+
+double cost(const std::vector<Sample>& samples, const Vector& p, double cutoff, double noise) {
+  double sum = 0;
+  for (const Sample& s : samples) sum += tukey_loss(s.value - predict(p, s, nullptr), cutoff);
+  for (int i = 0; i < kParameters; ++i)
+    sum += 0.5 * noise * noise * prior_information()[i] * p[i] * p[i];
+  return sum;
+}
+
+Matrix normal_equations(std::vector<Sample>& samples, const Vector& p, double cutoff, double noise,
+                        Vector* rhs) {
+  Matrix h = Matrix::zeros();
+  *rhs = Vector::all(0);
+  for (Sample& s : samples) {
+    Vector g;
+    const double r = s.value - predict(p, s, &g);
+    s.weight = tukey_weight(r, cutoff);
+    for (int i = 0; i < kParameters; ++i) {
+      (*rhs)[i] += s.weight * r * g[i];
+      for (int j = 0; j <= i; ++j) h(i, j) += s.weight * g[i] * g[j];
+    }
+  }
+  for (int i = 0; i < kParameters; ++i) {
+    const double prior = noise * noise * prior_information()[i];
+    h(i, i) += prior;
+    (*rhs)[i] -= prior * p[i];
+    for (int j = 0; j < i; ++j) h(j, i) = h(i, j);
+  }
+  return h;
+}
+
+// Levenberg-Marquardt; false where it came to nothing finite.
+bool minimise(std::vector<Sample>& samples, double cutoff, double noise, int iterations,
+              Vector* p) {
+  double damping = 1e-3;
+  double current = cost(samples, *p, cutoff, noise);
+  for (int i = 0; i < iterations && damping < 1e6; ++i) {
+    Vector rhs;
+    Matrix h = normal_equations(samples, *p, cutoff, noise, &rhs);
+    for (int k = 0; k < kParameters; ++k) h(k, k) = h(k, k) * (1 + damping) + 1e-12;
+    const cv::Matx<double, kParameters, 1> step = h.solve(rhs, cv::DECOMP_CHOLESKY);
+    Vector next = *p + Vector(step.val);
+    next[kBlur] = std::clamp(std::abs(next[kBlur]), 1e-3, kMaxBlurPx);
+    next[kBlack] = std::max(next[kBlack], 0.0);
+    const double then = cost(samples, next, cutoff, noise);
+    if (!std::isfinite(then)) return false;
+    if (then > current) {
+      damping *= 10;
+      continue;
+    }
+    const bool settled = std::abs(step(kEndA)) + std::abs(step(kEndB)) < 1e-4;
+    *p = next;
+    current = then;
+    damping = std::max(1e-9, damping * 0.1);
+    if (settled) break;
+  }
+  return true;
+}
+
+double percentile(std::vector<double> values, double q) {
+  const auto nth = values.begin() + std::ptrdiff_t(q * double(values.size() - 1));
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
+double median_residual(const std::vector<Sample>& samples, const Vector& p) {
+  std::vector<double> r;
+  r.reserve(samples.size());
+  for (const Sample& s : samples) r.push_back(std::abs(s.value - predict(p, s, nullptr)));
+  return percentile(std::move(r), 0.5);
+}
+
+double srgb_decode(double v) {
+  return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
+}
+
+// The plain areas' values and the whole-picture offset that fits best, on a half-pixel grid.
+Vector coarse_start(const std::vector<Sample>& samples) {
+  std::vector<double> values;
+  for (const Sample& s : samples) values.push_back(s.value);
+  Vector start = Vector::all(0);
+  start[kBlack] = srgb_decode(percentile(values, 0.1));
+  start[kWhite] = srgb_decode(percentile(values, 0.9));
+  start[kBlur] = 0.5;
+  Vector best = start;
+  double least = HUGE_VAL;
+  for (double shift = -kSearchPx; shift <= kSearchPx; shift += 0.5) {
+    Vector p = start;
+    p[kEndA] = p[kEndB] = shift;
+    const double c = cost(samples, p, 1.0, 0);
+    if (c < least) least = c, best = p;
+  }
+  return best;
+}
+
+// Phi and the integrals E[max(x + z,0)], E[max(x + z,0)^2]/2 of a Gaussian z.
+struct Ramp {
+  double step, ramp, parabola;
+};
+Ramp gaussian_ramp(double x, double sigma) {
+  if (x > 6 * sigma) return {1, x, (x * x + sigma * sigma) / 2};
+  if (x < -6 * sigma) return {0, 0, 0};
+  const double z = x / sigma;
+  const double density = std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi);
+  const double phi = 0.5 * std::erfc(-z / std::numbers::sqrt2);
+  return {phi, x * phi + sigma * density,
+          0.5 * ((x * x + sigma * sigma) * phi + x * sigma * density)};
+}
+
+}  // namespace
+
+// A half plane seen through the pixel's box is its indicator smoothed by two boxes, of widths |nx|
+// and |ny|, along the normal: second differences of the twice-integrated (Gaussian) step.
+double edge_coverage(double s, double nx, double ny, double blur_px, double* by_s,
+                     double* by_blur) {
+  const double a = std::max(std::abs(nx), 1e-4), b = std::max(std::abs(ny), 1e-4);
+  const double sigma = std::max(blur_px, 1e-6);
+  const Ramp r[4] = {gaussian_ramp(s + (a + b) / 2, sigma), gaussian_ramp(s + (a - b) / 2, sigma),
+                     gaussian_ramp(s - (a - b) / 2, sigma), gaussian_ramp(s - (a + b) / 2, sigma)};
+  const double area = a * b;
+  if (by_s) *by_s = (r[0].ramp - r[1].ramp - r[2].ramp + r[3].ramp) / area;
+  if (by_blur) *by_blur = sigma * (r[0].step - r[1].step - r[2].step + r[3].step) / area;
+  return (r[0].parabola - r[1].parabola - r[2].parabola + r[3].parabola) / area;
+}
+
+std::optional<EdgeFit> fit_edge(const Luminance& luminance, const PinholeIntrinsics& lens,
+                                const EdgeGuess& guess, const char** why) {
+  Line line = make_line(guess.a, guess.b, guess.bright_side);
+  if (!(line.length > 4)) return *why = "too short", std::nullopt;
+
+  double dark = std::clamp(0.8 * guess.dark_depth_px, 1.2, 4.0);
+  double bright = std::clamp(0.8 * guess.bright_depth_px, 1.2, 4.0);
+  double margin = std::min(0.2 * line.length, 5.0);
+  Vector p = Vector::all(0);
+  double noise = 0, total_shift = 0;
+  std::vector<Sample> samples;
+  for (int round = 0; round < 3; ++round) {
+    samples = gather(luminance, lens, line, dark, bright, margin);
+    if (samples.size() < 12) return *why = "cut by the picture's border", std::nullopt;
+    if (round == 0) p = coarse_start(samples);
+    const double contrast = srgb_encode(p[kWhite]) - srgb_encode(p[kBlack]);
+    if (!(contrast > kMinContrast)) return *why = "without contrast", std::nullopt;
+    // Wide at first, so that a shifted start is not taken for outliers.
+    const double cutoff = round == 0 ? 1.0 : std::max(6 * noise, 0.15 * contrast);
+    if (!minimise(samples, cutoff, std::max(noise, kMinNoise), round == 0 ? 15 : 8, &p))
+      return *why = "without a fit", std::nullopt;
+    noise = std::max(kMinNoise, 1.4826 * median_residual(samples, p));
+
+    line = make_line(line.a + line.normal * p[kEndA], line.b + line.normal * p[kEndB],
+                     line.a + line.normal * 1e3);
+    total_shift += std::max(std::abs(p[kEndA]), std::abs(p[kEndB]));
+    if (round < 2) p[kEndA] = p[kEndB] = 0;
+    if (total_shift > 1.5 * kSearchPx) return *why = "not where the detector saw it", std::nullopt;
+    // Stay clear of the next printed cell and of the corners, by what the blur carries over.
+    const double spill = 0.5 + 2 * p[kBlur];
+    dark = std::clamp(guess.dark_depth_px - spill, 1.2, 1.5 + 3 * p[kBlur]);
+    bright = std::clamp(guess.bright_depth_px - spill, 1.2, 1.5 + 3 * p[kBlur]);
+    margin = std::min(0.25 * line.length, 1 + 2.5 * p[kBlur]);
+  }
+
+  Vector rhs;
+  const double contrast = srgb_encode(p[kWhite]) - srgb_encode(p[kBlack]);
+  const Matrix h = normal_equations(samples, p, std::max(6 * noise, 0.15 * contrast), noise, &rhs);
+  double weight = 0, squares = 0;
+  for (const Sample& s : samples) {
+    const double r = s.value - predict(p, s, nullptr);
+    weight += s.weight;
+    squares += s.weight * r * r;
+  }
+  if (!(contrast > kMinContrast)) return *why = "without contrast", std::nullopt;
+  if (weight < 0.6 * double(samples.size())) return *why = "covered", std::nullopt;
+  const double rms = std::max(kMinNoise, std::sqrt(squares / std::max(1.0, weight - kParameters)));
+  if (rms > 0.2 * contrast) return *why = "unclear", std::nullopt;
+  const Matrix covariance = h.inv(cv::DECOMP_CHOLESKY) * (rms * rms);
+  EdgeFit fit{line.a,
+              line.b,
+              covariance(kEndA, kEndA),
+              covariance(kEndA, kEndB),
+              covariance(kEndB, kEndB),
+              p[kBlur],
+              contrast,
+              rms};
+  if (!(fit.var_a > 0 && fit.var_b > 0)) return *why = "without a fit", std::nullopt;
+  return fit;
+}
+
+}  // namespace previz::tracking

@@ -1,0 +1,329 @@
+#include "daemon/tracking/joint_pose.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <opencv2/core.hpp>
+
+#include "daemon/tracking/lens.hpp"
+#include "daemon/tracking/pose_starts.hpp"
+
+namespace previz::tracking {
+namespace {
+
+// What the picture's noise does not say: lens model, print, map. Added to every corner coordinate.
+constexpr double kCornerFloorPx = 0.03;
+// The residuals' own variance is trusted by its degrees of freedom against this many of the stated.
+constexpr double kPriorDegrees = 8;
+
+using Vector6 = cv::Matx<double, 6, 1>;
+using Matrix6 = cv::Matx<double, 6, 6>;
+using Whitening = cv::Matx<double, 8, 8>;  // lower triangular; whitened = W * residual
+
+glm::dvec3 corner_in_world(const TagObservation& tag, std::size_t i) {
+  return glm::dvec3(tag.world_from_tag * glm::dvec4(tag_corner(tag.size_m, i), 1));
+}
+
+Whitening whitening(const TagObservation& tag) {
+  Whitening c(tag.covariance.data());
+  for (int i = 0; i < 8; ++i) c(i, i) += kCornerFloorPx * kCornerFloorPx;
+  Whitening l = Whitening::zeros();  // Cholesky
+  for (int i = 0; i < 8; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      double sum = c(i, j);
+      for (int k = 0; k < j; ++k) sum -= l(i, k) * l(j, k);
+      l(i, j) = i == j ? std::sqrt(std::max(sum, 1e-12)) : sum / l(j, j);
+    }
+  }
+  Whitening inverse = Whitening::zeros();
+  for (int i = 0; i < 8; ++i) {
+    inverse(i, i) = 1 / l(i, i);
+    for (int j = 0; j < i; ++j) {
+      double sum = 0;
+      for (int k = j; k < i; ++k) sum += l(i, k) * inverse(k, j);
+      inverse(i, j) = -sum / l(i, i);
+    }
+  }
+  return inverse;
+}
+
+// A tag made ready: world corners and the whitening of its residuals.
+struct Prepared {
+  std::array<glm::dvec3, 4> world;
+  CornerPixels corners;
+  Whitening whiten;
+};
+
+// measured - projected (x0,y0,..) and, where asked for, its derivative by the camera's small
+// motion.
+bool residual(const Prepared& tag, const PinholeIntrinsics& lens, const CameraFromWorld& pose,
+              cv::Matx<double, 8, 1>* r, cv::Matx<double, 8, 6>* jacobian) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec3 x = pose.rotation * tag.world[i] + pose.translation;
+    if (!(x.z > 1e-9)) return false;
+    glm::dmat2 by_ray;
+    const glm::dvec2 pixel = distort(lens, {x.x / x.z, x.y / x.z}, jacobian ? &by_ray : nullptr);
+    const int row = int(2 * i);
+    (*r)(row) = tag.corners[i].x - pixel.x;
+    (*r)(row + 1) = tag.corners[i].y - pixel.y;
+    if (!jacobian) continue;
+    const glm::dvec2 by_x = by_ray[0] / x.z, by_y = by_ray[1] / x.z;
+    const glm::dvec2 by_z = -(by_ray[0] * x.x + by_ray[1] * x.y) / (x.z * x.z);
+    for (int k = 0; k < 2; ++k) {
+      // The point moves by x cross w for a rotation w of the camera, by -v for a translation v.
+      const glm::dvec3 g(by_x[k], by_y[k], by_z[k]);
+      const glm::dvec3 by_rotation = glm::cross(g, x);
+      for (int c = 0; c < 3; ++c) {
+        (*jacobian)(row + k, c) = by_rotation[c];
+        (*jacobian)(row + k, 3 + c) = -g[c];
+      }
+    }
+  }
+  return true;
+}
+
+CameraFromWorld moved(const CameraFromWorld& pose, const Vector6& step) {
+  const glm::dvec3 w(step(0), step(1), step(2)), v(step(3), step(4), step(5));
+  const double angle = glm::length(w);
+  const glm::dmat3 back =
+      angle > 0 ? glm::mat3_cast(glm::angleAxis(-angle, w / angle)) : glm::dmat3(1.0);
+  CameraFromWorld next{back * pose.rotation, back * (pose.translation - v)};
+  next.rotation = glm::mat3_cast(glm::normalize(glm::quat_cast(next.rotation)));
+  return next;
+}
+
+// What is minimised: whitened squares, or a redescending loss of each tag's distance in px (Geman
+// and McClure), which lets tags at odds with the rest go as `scale_px` shrinks.
+struct Loss {
+  bool robust = false;
+  double scale_px = 0;
+};
+
+struct Accumulated {
+  double cost = HUGE_VAL;
+  Matrix6 information = Matrix6::zeros();
+  Vector6 rhs = Vector6::zeros();
+};
+
+class Problem {
+ public:
+  Problem(const std::vector<TagObservation>& tags, const PinholeIntrinsics& lens) : lens_(lens) {
+    for (const TagObservation& tag : tags) {
+      Prepared p{{}, tag.corners, whitening(tag)};
+      for (std::size_t i = 0; i < 4; ++i) p.world[i] = corner_in_world(tag, i);
+      tags_.push_back(p);
+    }
+  }
+
+  Accumulated accumulate(const std::vector<std::size_t>& used, const CameraFromWorld& pose,
+                         Loss loss, bool derivatives) const {
+    Accumulated sum;
+    double cost = 0;
+    for (std::size_t index : used) {
+      const Prepared& tag = tags_[index];
+      cv::Matx<double, 8, 1> r;
+      cv::Matx<double, 8, 6> j;
+      if (!residual(tag, lens_, pose, &r, derivatives ? &j : nullptr)) return {};
+      double weight = 1;
+      if (loss.robust) {
+        const double e2 = r.dot(r) / 4, c2 = loss.scale_px * loss.scale_px;
+        weight = c2 / (c2 + e2) * (c2 / (c2 + e2));
+        cost += 4 * e2 * c2 / (c2 + e2);
+      } else {
+        r = tag.whiten * r;
+        if (derivatives) j = tag.whiten * j;
+        cost += r.dot(r);
+      }
+      if (!derivatives) continue;
+      sum.information += weight * (j.t() * j);
+      sum.rhs += weight * (j.t() * r);
+    }
+    if (std::isfinite(cost)) sum.cost = cost;
+    return sum;
+  }
+
+  // Levenberg-Marquardt to a standstill. Nothing where the start is behind the camera.
+  std::optional<CameraFromWorld> minimise(const std::vector<std::size_t>& used,
+                                          CameraFromWorld pose, Loss loss, int iterations) const {
+    double damping = 1e-4;
+    Accumulated now = accumulate(used, pose, loss, true);
+    if (!std::isfinite(now.cost)) return std::nullopt;
+    for (int i = 0; i < iterations && damping < 1e10; ++i) {
+      Matrix6 h = now.information;
+      for (int k = 0; k < 6; ++k) h(k, k) += damping * h(k, k) + 1e-300;
+      const Vector6 step = h.solve(now.rhs, cv::DECOMP_CHOLESKY);
+      const CameraFromWorld next = moved(pose, step);
+      const Accumulated then = accumulate(used, next, loss, true);
+      if (!(then.cost <= now.cost)) {
+        damping *= 10;
+        continue;
+      }
+      const bool settled = now.cost - then.cost <= 1e-12 * now.cost;
+      pose = next;
+      now = then;
+      damping = std::max(1e-12, damping / 10);
+      if (settled) break;
+    }
+    return pose;
+  }
+
+ private:
+  const PinholeIntrinsics& lens_;
+  std::vector<Prepared> tags_;
+};
+
+// Inverse of a positive definite matrix whose rows have different units.
+Matrix6 inverse_scaled(const Matrix6& m) {
+  Vector6 scale;
+  Matrix6 n = m;
+  for (int i = 0; i < 6; ++i) scale(i) = 1 / std::sqrt(std::max(m(i, i), 1e-300));
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) n(i, j) *= scale(i) * scale(j);
+  n = n.inv(cv::DECOMP_SVD);
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) n(i, j) *= scale(i) * scale(j);
+  return n;
+}
+
+FittedPose describe(const Problem& problem, const std::vector<TagObservation>& tags,
+                    const PinholeIntrinsics& lens, const CameraFromWorld& pose,
+                    const std::vector<std::size_t>& used) {
+  FittedPose fit;
+  fit.pose = pose;
+  fit.used = used;
+  const Accumulated sum = problem.accumulate(used, pose, {}, true);
+  fit.chi_square = sum.cost;
+  fit.degrees_of_freedom = int(8 * used.size()) - 6;
+  double squares = 0;
+  for (std::size_t i : used) {
+    const double e = tag_error_px(tags[i], pose, lens);
+    squares += e * e;
+  }
+  fit.rms_px = std::sqrt(squares / double(used.size()));
+  const double variance =
+      std::max(1.0, (fit.chi_square + kPriorDegrees) / (fit.degrees_of_freedom + kPriorDegrees));
+  const Matrix6 covariance = variance * inverse_scaled(sum.information);
+  std::copy(covariance.val, covariance.val + 36, fit.covariance.begin());
+  return fit;
+}
+
+bool same_pose(const CameraFromWorld& a, const CameraFromWorld& b) {
+  return rotation_between(a, b) < 1e-4 &&
+         glm::distance(a.translation, b.translation) < 1e-4 * glm::length(a.translation);
+}
+
+// The distinct minima over exactly these tags, better first, each seeing every tag from its front.
+std::vector<FittedPose> minima(const Problem& problem, const std::vector<TagObservation>& tags,
+                               const PinholeIntrinsics& lens, const std::vector<std::size_t>& used,
+                               const std::vector<CameraFromWorld>& starts) {
+  std::vector<FittedPose> found;
+  for (const CameraFromWorld& start : starts) {
+    const auto pose = problem.minimise(used, start, {}, 50);
+    if (!pose) continue;
+    FittedPose fit = describe(problem, tags, lens, *pose, used);
+    if (!std::isfinite(fit.rms_px)) continue;
+    if (std::none_of(found.begin(), found.end(),
+                     [&](const FittedPose& f) { return same_pose(f.pose, fit.pose); }))
+      found.push_back(std::move(fit));
+  }
+  std::sort(found.begin(), found.end(),
+            [](const FittedPose& a, const FittedPose& b) { return a.chi_square < b.chi_square; });
+  return found;
+}
+
+std::vector<std::size_t> explained(const std::vector<TagObservation>& tags,
+                                   const PinholeIntrinsics& lens, const CameraFromWorld& pose,
+                                   double gate_px) {
+  std::vector<std::size_t> used;
+  for (std::size_t i = 0; i < tags.size(); ++i)
+    if (tag_error_px(tags[i], pose, lens) <= gate_px) used.push_back(i);
+  return used;
+}
+
+}  // namespace
+
+glm::dmat4 world_from_camera(const CameraFromWorld& pose) {
+  const glm::dmat3 r = glm::transpose(pose.rotation);
+  glm::dmat4 m(r);
+  m[3] = glm::dvec4(-(r * pose.translation), 1);
+  return m;
+}
+
+CameraFromWorld camera_from_world(const glm::dmat4& world_from_camera) {
+  const glm::dmat3 r = glm::transpose(glm::dmat3(world_from_camera));
+  return {r, -(r * glm::dvec3(world_from_camera[3]))};
+}
+
+double rotation_between(const CameraFromWorld& a, const CameraFromWorld& b) {
+  // From the difference's Frobenius norm: exact for small angles, where acos of the trace is not.
+  const glm::dmat3 d = a.rotation - b.rotation;
+  const double norm2 = glm::dot(d[0], d[0]) + glm::dot(d[1], d[1]) + glm::dot(d[2], d[2]);
+  return 2 * std::asin(std::min(1.0, std::sqrt(norm2 / 8)));
+}
+
+double tag_error_px(const TagObservation& tag, const CameraFromWorld& pose,
+                    const PinholeIntrinsics& lens) {
+  const glm::dvec3 centre = pose.rotation * glm::dvec3(tag.world_from_tag[3]) + pose.translation;
+  const glm::dvec3 normal = pose.rotation * glm::dvec3(tag.world_from_tag[2]);
+  if (!(glm::dot(normal, centre) < 0)) return HUGE_VAL;
+  double squares = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec3 x = pose.rotation * corner_in_world(tag, i) + pose.translation;
+    if (!(x.z > 1e-9)) return HUGE_VAL;
+    const glm::dvec2 d = tag.corners[i] - distort(lens, {x.x / x.z, x.y / x.z});
+    squares += glm::dot(d, d);
+  }
+  return std::isfinite(squares) ? std::sqrt(squares / 4) : HUGE_VAL;
+}
+
+double consistency_gate_px(const PinholeIntrinsics& lens) {
+  return 2 * std::max(1.0, lens.width / 1280.0);
+}
+
+JointPose solve_joint_pose(const std::vector<TagObservation>& tags, const PinholeIntrinsics& lens,
+                           const std::optional<CameraFromWorld>& seed) {
+  JointPose result;
+  if (tags.empty()) return result;
+  const Problem problem(tags, lens);
+  std::vector<std::size_t> all(tags.size());
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
+  std::vector<CameraFromWorld> starts = pose_starts(tags, lens);
+  if (seed) starts.insert(starts.begin(), *seed);
+
+  const double gate_px = consistency_gate_px(lens);
+  struct Consensus {
+    std::vector<std::size_t> used;
+    CameraFromWorld pose;
+  };
+  std::vector<Consensus> largest;
+  if (tags.size() == 1) {
+    largest.push_back({all, starts.empty() ? CameraFromWorld{} : starts.front()});
+  } else {
+    for (const CameraFromWorld& start : starts) {
+      std::optional<CameraFromWorld> pose = start;
+      for (double scale : {100.0, 30.0, 10.0, 3.0, 1.0})
+        if (pose) pose = problem.minimise(all, *pose, {true, scale * gate_px}, 6);
+      if (!pose) continue;
+      Consensus c{explained(tags, lens, *pose, gate_px), *pose};
+      if (c.used.empty()) continue;
+      if (!largest.empty() && c.used.size() > largest.front().used.size()) largest.clear();
+      const bool known = std::any_of(largest.begin(), largest.end(),
+                                     [&](const Consensus& l) { return l.used == c.used; });
+      if (!known && (largest.empty() || c.used.size() == largest.front().used.size()))
+        largest.push_back(std::move(c));
+      if (largest.front().used.size() == tags.size()) break;
+    }
+  }
+
+  result.contradiction = largest.size() > 1;
+  for (const Consensus& c : largest) {
+    std::vector<CameraFromWorld> from = starts;
+    from.insert(from.begin(), c.pose);
+    for (FittedPose& fit : minima(problem, tags, lens, c.used, from))
+      result.poses.push_back(std::move(fit));
+  }
+  return result;
+}
+
+}  // namespace previz::tracking

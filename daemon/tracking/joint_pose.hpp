@@ -1,0 +1,66 @@
+// One camera pose from the corners of many tags: robust, with every pose that explains them.
+#pragma once
+
+#include <array>
+#include <glm/mat3x3.hpp>
+#include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <vector>
+
+#include "daemon/tracking/corners.hpp"
+#include "drivers/calibration.hpp"
+
+namespace previz::tracking {
+
+// x_camera = rotation * x_world + translation (m)
+struct CameraFromWorld {
+  glm::dmat3 rotation{1.0};
+  glm::dvec3 translation{0};
+};
+
+glm::dmat4 world_from_camera(const CameraFromWorld& pose);
+CameraFromWorld camera_from_world(const glm::dmat4& world_from_camera);
+// The angle of the rotation between two poses, rad.
+double rotation_between(const CameraFromWorld& a, const CameraFromWorld& b);
+
+struct TagObservation {
+  int id = 0;
+  double size_m = 0;
+  glm::dmat4 world_from_tag{1.0};
+  CornerPixels corners{};
+  std::array<double, 64> covariance{};  // px^2, from the picture
+};
+
+struct FittedPose {
+  CameraFromWorld pose;
+  // Row-major, rotation (rad) then translation (m): the true world_from_camera is the estimate
+  // times the small motion (rotation, translation), both along the camera's axes.
+  std::array<double, 36> covariance{};
+  double rms_px = 0;      // of the used corners, per coordinate pair
+  double chi_square = 0;  // of the used corners against their stated covariance
+  int degrees_of_freedom = 0;
+  std::vector<std::size_t> used;  // indices of the observations it explains
+};
+
+struct JointPose {
+  // Local minima that explain the largest number of tags, better first; empty: none does.
+  std::vector<FittedPose> poses;
+  bool contradiction = false;  // several sets of tags, equally large, say different things
+};
+
+// How far off a tag's corners may be (rms) and still be explained: 2 px, more on wide pictures.
+double consistency_gate_px(const PinholeIntrinsics& lens);
+
+// `seed` is a further start beside those of pose_starts. Levenberg-Marquardt from each, over all
+// tags with a loss that lets go of tags at odds with the rest (a moved tag); then over the tags
+// that remain, with their stated covariance.
+JointPose solve_joint_pose(const std::vector<TagObservation>& tags, const PinholeIntrinsics& lens,
+                           const std::optional<CameraFromWorld>& seed);
+
+// Rms distance in px between a tag's corners and their projection; infinite where it cannot be seen
+// (behind the camera or from behind).
+double tag_error_px(const TagObservation& tag, const CameraFromWorld& pose,
+                    const PinholeIntrinsics& lens);
+
+}  // namespace previz::tracking

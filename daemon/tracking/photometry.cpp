@@ -1,0 +1,127 @@
+#include "daemon/tracking/photometry.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace previz::tracking {
+namespace {
+
+constexpr double kRed = 0.2126, kGreen = 0.7152, kBlue = 0.0722;  // Rec. 709
+
+double srgb_decode(double value) {
+  return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
+}
+
+// value in [0,1] to the linear signal in [0,1]
+double inverse_response(const ResponseCurve& curve, double value) {
+  value = std::clamp(value, 0.0, 1.0);
+  switch (curve.kind) {
+    case ResponseCurve::Kind::srgb:
+      return srgb_decode(value);
+    case ResponseCurve::Kind::linear:
+      return value;
+    case ResponseCurve::Kind::gamma:
+      return std::pow(value, curve.gamma);
+    case ResponseCurve::Kind::table:
+      break;
+  }
+  const std::vector<double>& table = curve.inverse_table;
+  if (table.size() < 2) return value;
+  const double at = value * double(table.size() - 1);
+  const std::size_t i = std::min(std::size_t(at), table.size() - 2);
+  return table[i] + (at - double(i)) * (table[i + 1] - table[i]);
+}
+
+std::vector<std::uint8_t> encode(const std::vector<double>& signal) {
+  std::vector<std::uint8_t> code(signal.size());
+  std::transform(signal.begin(), signal.end(), code.begin(),
+                 [](double s) { return std::uint8_t(std::lround(255 * srgb_encode(s))); });
+  return code;
+}
+
+std::uint16_t sample16(const Frame& frame, std::size_t index) {
+  return std::uint16_t(frame.bytes[2 * index] | frame.bytes[2 * index + 1] << 8);
+}
+
+std::uint8_t luma8(std::uint8_t r, std::uint8_t g, std::uint8_t b) {
+  return std::uint8_t((54 * r + 183 * g + 19 * b + 128) >> 8);
+}
+
+}  // namespace
+
+double srgb_encode(double signal, double* slope) {
+  if (slope) *slope = 0;
+  if (!(signal > 0)) return 0;
+  if (signal >= 1) return 1;
+  if (signal <= 0.0031308) {
+    if (slope) *slope = 12.92;
+    return 12.92 * signal;
+  }
+  const double root = std::pow(signal, 1 / 2.4);
+  if (slope) *slope = 1.055 / 2.4 * root / signal;
+  return 1.055 * root - 0.055;
+}
+
+Photometry::Photometry(const ResponseCurve& response)
+    : signal8_(256), signal_luma_(256), signal16_(65536) {
+  for (int i = 0; i < 256; ++i) {
+    signal8_[std::size_t(i)] = inverse_response(response, i / 255.0);
+    signal_luma_[std::size_t(i)] = inverse_response(response, (i - 16) / 219.0);
+  }
+  for (int i = 0; i < 65536; ++i)
+    signal16_[std::size_t(i)] = inverse_response(response, i / 65535.0);
+  code8_ = encode(signal8_);
+  code_luma_ = encode(signal_luma_);
+  code16_ = encode(signal16_);
+}
+
+std::vector<std::uint8_t> Photometry::gray8(const Frame& frame) const {
+  const std::size_t pixels = std::size_t(frame.width) * std::size_t(frame.height);
+  std::vector<std::uint8_t> gray(pixels);
+  const std::uint8_t* bytes = frame.bytes.data();
+  switch (frame.format) {
+    case PixelFormat::rgb8:
+      for (std::size_t i = 0; i < pixels; ++i, bytes += 3)
+        gray[i] = luma8(code8_[bytes[0]], code8_[bytes[1]], code8_[bytes[2]]);
+      break;
+    case PixelFormat::rgb16:
+      for (std::size_t i = 0; i < pixels; ++i)
+        gray[i] = luma8(code16_[sample16(frame, 3 * i)], code16_[sample16(frame, 3 * i + 1)],
+                        code16_[sample16(frame, 3 * i + 2)]);
+      break;
+    case PixelFormat::gray8:
+      for (std::size_t i = 0; i < pixels; ++i) gray[i] = code8_[bytes[i]];
+      break;
+    case PixelFormat::gray16:
+      for (std::size_t i = 0; i < pixels; ++i) gray[i] = code16_[sample16(frame, i)];
+      break;
+    case PixelFormat::yuv422p8:
+      for (std::size_t i = 0; i < pixels; ++i) gray[i] = code_luma_[bytes[i]];
+      break;
+  }
+  return gray;
+}
+
+double Photometry::luminance(const Frame& frame, int x, int y) const {
+  const std::size_t i = std::size_t(y) * std::size_t(frame.width) + std::size_t(x);
+  switch (frame.format) {
+    case PixelFormat::rgb8: {
+      const std::uint8_t* p = &frame.bytes[3 * i];
+      return kRed * signal8_[p[0]] + kGreen * signal8_[p[1]] + kBlue * signal8_[p[2]];
+    }
+    case PixelFormat::rgb16:
+      return kRed * signal16_[sample16(frame, 3 * i)] +
+             kGreen * signal16_[sample16(frame, 3 * i + 1)] +
+             kBlue * signal16_[sample16(frame, 3 * i + 2)];
+    case PixelFormat::gray8:
+      return signal8_[frame.bytes[i]];
+    case PixelFormat::gray16:
+      return signal16_[sample16(frame, i)];
+    case PixelFormat::yuv422p8:
+      return signal_luma_[frame.bytes[i]];
+  }
+  return 0;
+}
+
+}  // namespace previz::tracking

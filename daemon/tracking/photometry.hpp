@@ -1,0 +1,35 @@
+// Frames of any format as grey: 8 bits to find tags in, exact luminance to measure them with.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "drivers/calibration.hpp"
+#include "drivers/frame.hpp"
+
+namespace previz::tracking {
+
+// The sRGB transfer curve; `signal` is clipped to [0,1]. `slope`, where given, becomes its
+// derivative (0 where clipped).
+double srgb_encode(double signal, double* slope = nullptr);
+
+// The camera's response undone. Holds no frame.
+class Photometry {
+ public:
+  explicit Photometry(const ResponseCurve& response);
+
+  // The whole picture, sRGB-encoded luma of the linear signal, row-major, width*height.
+  std::vector<std::uint8_t> gray8(const Frame& frame) const;
+
+  // Linear luminance (Rec. 709, white = 1) of one pixel. Of yuv422p8 the luma sample alone is
+  // read: chroma has half the resolution.
+  double luminance(const Frame& frame, int x, int y) const;
+
+ private:
+  std::vector<double> signal8_;                           // by 8-bit sample
+  std::vector<double> signal_luma_;                       // by 8-bit limited-range luma
+  std::vector<double> signal16_;                          // by 16-bit sample
+  std::vector<std::uint8_t> code8_, code_luma_, code16_;  // the same, sRGB-encoded
+};
+
+}  // namespace previz::tracking

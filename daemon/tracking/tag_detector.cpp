@@ -1,0 +1,160 @@
+#include "daemon/tracking/tag_detector.hpp"
+
+#include <apriltag/apriltag.h>
+#include <apriltag/tag16h5.h>
+#include <apriltag/tag25h9.h>
+#include <apriltag/tag36h10.h>
+#include <apriltag/tag36h11.h>
+#include <apriltag/tagCircle21h7.h>
+#include <apriltag/tagCircle49h12.h>
+#include <apriltag/tagCustom48h12.h>
+#include <apriltag/tagStandard41h12.h>
+#include <apriltag/tagStandard52h13.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "drivers/error.hpp"
+
+namespace previz::tracking {
+namespace {
+
+struct Family {
+  const char* name;
+  apriltag_family_t* (*create)();
+  void (*destroy)(apriltag_family_t*);
+};
+
+constexpr Family kFamilies[] = {
+    {"tag36h11", tag36h11_create, tag36h11_destroy},
+    {"tag25h9", tag25h9_create, tag25h9_destroy},
+    {"tag16h5", tag16h5_create, tag16h5_destroy},
+    {"tag36h10", tag36h10_create, tag36h10_destroy},
+    {"tagStandard41h12", tagStandard41h12_create, tagStandard41h12_destroy},
+    {"tagStandard52h13", tagStandard52h13_create, tagStandard52h13_destroy},
+    {"tagCircle21h7", tagCircle21h7_create, tagCircle21h7_destroy},
+    {"tagCircle49h12", tagCircle49h12_create, tagCircle49h12_destroy},
+    {"tagCustom48h12", tagCustom48h12_create, tagCustom48h12_destroy},
+};
+
+const Family& family_by_name(const std::string& name) {
+  std::string known;
+  for (const Family& family : kFamilies) {
+    if (name == family.name) return family;
+    known += (known.empty() ? "" : ", ") + std::string(family.name);
+  }
+  throw Error("tracking.family: \"" + name + "\" is not a tag family; known are " + known);
+}
+
+constexpr int kMinPictureSide =
+    16;                             // libapriltag thresholds in tiles and reads beyond smaller ones
+constexpr double kMinSidePx = 8;    // of a tag; below, a code is read from less than a pixel a cell
+constexpr double kMinCellPx = 1.7;  // for the refinement: an edge and a plain pixel on either side
+constexpr double kUnrefinedSigmaPx = 0.5;  // libapriltag's corners, decimated or of tiny tags
+
+// A tag cut by the picture's border is seen with a false corner on that border.
+bool near_border(const CornerPixels& corners, const Frame& frame, double margin) {
+  return std::any_of(corners.begin(), corners.end(), [&](glm::dvec2 p) {
+    return !(p.x >= margin && p.y >= margin && p.x <= frame.width - 1 - margin &&
+             p.y <= frame.height - 1 - margin);
+  });
+}
+
+double shortest_side(const CornerPixels& c) {
+  double least = HUGE_VAL;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec2 d = c[(i + 1) % 4] - c[i];
+    least = std::min(least, std::hypot(d.x, d.y));
+  }
+  return least;
+}
+
+double area(const CornerPixels& c) {
+  double twice = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec2 &a = c[i], &b = c[(i + 1) % 4];
+    twice += a.x * b.y - b.x * a.y;
+  }
+  return std::abs(twice) / 2;
+}
+
+}  // namespace
+
+struct TagDetector::Library {
+  const Family& functions;
+  apriltag_family_t* family;
+  apriltag_detector_t* detector;
+
+  explicit Library(const Family& f)
+      : functions(f), family(f.create()), detector(apriltag_detector_create()) {
+    apriltag_detector_add_family(detector, family);
+  }
+  ~Library() {
+    apriltag_detector_destroy(detector);
+    functions.destroy(family);
+  }
+  Library(const Library&) = delete;
+  Library& operator=(const Library&) = delete;
+};
+
+TagDetector::TagDetector(const DetectorSettings& settings, const PinholeIntrinsics& lens,
+                         const ResponseCurve& response)
+    : settings_(settings),
+      lens_(lens),
+      photometry_(response),
+      library_(std::make_unique<Library>(family_by_name(settings.family))) {}
+
+TagDetector::~TagDetector() = default;
+
+std::vector<TagDetection> TagDetector::detect(const Frame& frame, double decimate) {
+  std::vector<TagDetection> tags;
+  if (frame.width < kMinPictureSide * decimate || frame.height < kMinPictureSide * decimate)
+    return tags;
+
+  std::vector<std::uint8_t> gray = photometry_.gray8(frame);
+  image_u8_t picture{frame.width, frame.height, frame.width, gray.data()};
+  library_->detector->quad_decimate = float(decimate);
+  zarray_t* found = apriltag_detector_detect(library_->detector, &picture);
+  for (int i = 0; i < zarray_size(found); ++i) {
+    apriltag_detection_t* d = nullptr;
+    zarray_get(found, i, &d);
+    if (d->hamming > settings_.max_hamming || d->decision_margin < settings_.min_margin) continue;
+    TagDetection tag;
+    tag.id = d->id;
+    tag.hamming = d->hamming;
+    tag.margin = d->decision_margin;
+    // (0,0) is a pixel's corner there, its centre here.
+    for (std::size_t k = 0; k < 4; ++k) tag.corners[k] = {d->p[k][0] - 0.5, d->p[k][1] - 0.5};
+    if (area(tag.corners) >= kMinSidePx * kMinSidePx) tags.push_back(tag);
+  }
+  apriltag_detections_destroy(found);
+
+  const Luminance luminance = [&](int x, int y) { return photometry_.luminance(frame, x, y); };
+  const int cells = library_->family->width_at_border;
+  for (TagDetection& tag : tags) {
+    if (near_border(tag.corners, frame, 1 + decimate)) {
+      tag.trouble = "cut by the picture's border";
+    } else if (shortest_side(tag.corners) > 4 &&
+               narrowest_cell_px(tag.corners, cells) >= kMinCellPx) {
+      const RefinedCorners refined =
+          refine_corners(luminance, lens_, tag.corners, cells, library_->family->reversed_border);
+      tag.trouble = refined.trouble;
+      if (refined.trouble.empty()) {
+        tag.corners = refined.pixel;
+        tag.covariance = refined.covariance;
+        tag.refined = true;
+      }
+    } else {
+      for (std::size_t k = 0; k < 8; ++k)
+        tag.covariance[9 * k] = kUnrefinedSigmaPx * kUnrefinedSigmaPx;
+    }
+  }
+  std::sort(tags.begin(), tags.end(), [](const TagDetection& a, const TagDetection& b) {
+    return std::tuple(a.id, a.corners[0].x, a.corners[0].y) <
+           std::tuple(b.id, b.corners[0].x, b.corners[0].y);
+  });
+  return tags;
+}
+
+}  // namespace previz::tracking

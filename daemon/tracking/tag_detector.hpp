@@ -1,0 +1,53 @@
+// AprilTags in one picture: ids by libapriltag, corners by our own refinement.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/tracking/corners.hpp"
+#include "daemon/tracking/photometry.hpp"
+#include "drivers/calibration.hpp"
+#include "drivers/frame.hpp"
+
+namespace previz::tracking {
+
+struct TagDetection {
+  int id = 0;
+  int hamming = 0;    // bits corrected
+  double margin = 0;  // libapriltag's decision margin
+  CornerPixels corners{};
+  std::array<double, 64> covariance{};  // row-major 8x8 of the corners, px^2
+  bool refined = false;  // false: libapriltag's corners, for cells too small to measure
+  std::string trouble;   // not empty: the id stands, the corners must not be used
+};
+
+struct DetectorSettings {
+  std::string family = "tag36h11";
+  double min_margin = 20;
+  int max_hamming = 1;
+};
+
+// Families of libapriltag by name: tag36h11, tag25h9, tag16h5, tagStandard41h12, ...; throws
+// previz::Error naming them all where `settings.family` is none of them.
+class TagDetector {
+ public:
+  TagDetector(const DetectorSettings& settings, const PinholeIntrinsics& lens,
+              const ResponseCurve& response);
+  ~TagDetector();
+
+  // Every tag that passes the gates, by id, then from left to right. `decimate` >= 1 shrinks the
+  // picture in which they are looked for; corners are always measured at full resolution. Frames
+  // below 16 px a side show no tag.
+  std::vector<TagDetection> detect(const Frame& frame, double decimate);
+
+ private:
+  struct Library;
+  DetectorSettings settings_;
+  PinholeIntrinsics lens_;
+  Photometry photometry_;
+  std::unique_ptr<Library> library_;
+};
+
+}  // namespace previz::tracking
