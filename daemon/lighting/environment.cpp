@@ -1,1 +1,67 @@
-#include "daemon/lighting/lighting.hpp"
+#include "daemon/lighting/environment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+#include "drivers/error.hpp"
+#include "shaders/lib/octahedral.h"
+
+namespace previz::lighting {
+
+int resolution_for(double pixel_sr) {
+  int size = min_resolution;
+  while (size < max_resolution && texel_sr(size) > pixel_sr) size *= 2;
+  return size;
+}
+
+int chosen_resolution(int setting, double pixel_sr) {
+  if (setting == 0) return resolution_for(pixel_sr);
+  const bool power_of_two = setting > 0 && (setting & (setting - 1)) == 0;
+  if (!power_of_two || setting < min_resolution || setting > max_resolution)
+    throw Error("lighting.resolution is " + std::to_string(setting) +
+                "; allowed are 0 (from the source) and powers of two from " +
+                std::to_string(min_resolution) + " to " + std::to_string(max_resolution));
+  return setting;
+}
+
+double texel_sr(int size) {
+  return 4 * std::numbers::pi / (static_cast<double>(size) * size);
+}
+
+glm::vec3 texel_direction(int size, int i, int j) {
+  const float texel = 2.0f / static_cast<float>(size);
+  return octahedral_direction(glm::vec2((static_cast<float>(i) + 0.5f) * texel - 1,
+                                        (static_cast<float>(j) + 0.5f) * texel - 1));
+}
+
+std::size_t texel_index(int size, const glm::vec3& direction) {
+  const glm::vec2 point = octahedral_point(direction);
+  const auto texel = [size](float p) {
+    return std::clamp(static_cast<int>((p + 1) * 0.5f * static_cast<float>(size)), 0, size - 1);
+  };
+  return static_cast<std::size_t>(texel(point.y)) * static_cast<std::size_t>(size) +
+         static_cast<std::size_t>(texel(point.x));
+}
+
+glm::dvec3 total_flux(const EnvironmentMap& map) {
+  glm::dvec3 sum(0);
+  for (const glm::vec3& radiance : map.radiance) sum += glm::dvec3(radiance);
+  return sum * texel_sr(map.size);
+}
+
+glm::dvec3 irradiance(const EnvironmentMap& map, const glm::dvec3& normal) {
+  glm::dvec3 sum(0);
+  for (int j = 0; j < map.size; ++j) {
+    for (int i = 0; i < map.size; ++i) {
+      const glm::dvec3 direction(texel_direction(map.size, i, j));
+      const double cosine = glm::dot(direction, normal);
+      if (cosine > 0)
+        sum += cosine * glm::dvec3(map.radiance[static_cast<std::size_t>(j * map.size + i)]);
+    }
+  }
+  return sum * texel_sr(map.size);
+}
+
+}  // namespace previz::lighting

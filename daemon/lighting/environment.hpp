@@ -2,6 +2,7 @@
 // octahedral map.
 #pragma once
 
+#include <cstddef>
 #include <glm/vec3.hpp>
 #include <string>
 #include <vector>
@@ -18,10 +19,10 @@ struct EnvironmentMap {
 
 // How the map came to be; printed, and recorded with the frame.
 struct EnvironmentReport {
-  double seen_sr = 0;         // solid angle measured by the camera
-  double filled_sr = 0;       // filled by the unseen rule
-  double overexposed_sr = 0;  // clipped in every exposure; radiance there is a lower bound
-  double underexposed_sr = 0; // black in every exposure
+  double seen_sr = 0;          // solid angle measured by the camera
+  double filled_sr = 0;        // filled by the unseen rule
+  double overexposed_sr = 0;   // clipped in every exposure; radiance there is a lower bound
+  double underexposed_sr = 0;  // black in every exposure
   std::vector<std::string> notes;
 };
 
@@ -29,5 +30,25 @@ struct Lighting {
   EnvironmentMap environment;
   EnvironmentReport report;
 };
+
+inline constexpr int min_resolution = 16;
+inline constexpr int max_resolution = 2048;
+
+// Texels a side of the smallest map whose texels are not larger than `pixel_sr`, within the limits.
+int resolution_for(double pixel_sr);
+// The set's lighting.resolution, where 0 stands for resolution_for(pixel_sr). Throws previz::Error
+// if it is not a power of two within the limits.
+int chosen_resolution(int setting, double pixel_sr);
+
+double texel_sr(int size);
+// Unit direction of a texel's centre.
+glm::vec3 texel_direction(int size, int i, int j);
+// Index into `radiance` of the texel that a unit direction lies in.
+std::size_t texel_index(int size, const glm::vec3& direction);
+
+// Integral of radiance over all directions, per channel.
+glm::dvec3 total_flux(const EnvironmentMap& map);
+// Irradiance on a plane of this unit normal, per channel.
+glm::dvec3 irradiance(const EnvironmentMap& map, const glm::dvec3& normal);
 
 }  // namespace previz::lighting

@@ -1,1 +1,104 @@
 #include "daemon/lighting/response.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "drivers/error.hpp"
+
+namespace previz::lighting {
+namespace {
+
+constexpr double srgb_linear_end = 0.0031308;
+
+double srgb_value(double signal) {
+  return signal <= srgb_linear_end ? 12.92 * signal : 1.055 * std::pow(signal, 1 / 2.4) - 0.055;
+}
+
+double srgb_signal(double value) {
+  return value <= 12.92 * srgb_linear_end ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
+}
+
+double table_value(const std::vector<double>& table, double signal) {
+  const auto above = std::upper_bound(table.begin() + 1, table.end() - 1, signal);
+  const auto below = above - 1;
+  const double position = static_cast<double>(below - table.begin());
+  return (position + (signal - *below) / (*above - *below)) / static_cast<double>(table.size() - 1);
+}
+
+double table_signal(const std::vector<double>& table, double value) {
+  const double position = value * static_cast<double>(table.size() - 1);
+  const auto below = std::min(static_cast<std::size_t>(position), table.size() - 2);
+  const double t = position - static_cast<double>(below);
+  return (1 - t) * table[below] + t * table[below + 1];
+}
+
+double curve_value(const ResponseCurve& curve, double signal) {
+  switch (curve.kind) {
+    case ResponseCurve::Kind::srgb:
+      return srgb_value(signal);
+    case ResponseCurve::Kind::linear:
+      return signal;
+    case ResponseCurve::Kind::gamma:
+      return std::pow(signal, 1 / curve.gamma);
+    case ResponseCurve::Kind::table:
+      return table_value(curve.inverse_table, signal);
+  }
+  return signal;
+}
+
+double curve_signal(const ResponseCurve& curve, double value) {
+  switch (curve.kind) {
+    case ResponseCurve::Kind::srgb:
+      return srgb_signal(value);
+    case ResponseCurve::Kind::linear:
+      return value;
+    case ResponseCurve::Kind::gamma:
+      return std::pow(value, curve.gamma);
+    case ResponseCurve::Kind::table:
+      return table_signal(curve.inverse_table, value);
+  }
+  return value;
+}
+
+void check(const ResponseCurve& curve, int bits) {
+  if (bits < 1 || bits > 16)
+    throw Error("response: samples of " + std::to_string(bits) + " bits; 1 to 16 are allowed");
+  if (curve.kind == ResponseCurve::Kind::gamma && !(curve.gamma > 0 && std::isfinite(curve.gamma)))
+    throw Error("response: gamma is " + std::to_string(curve.gamma) + "; it must be above 0");
+  if (curve.kind != ResponseCurve::Kind::table) return;
+  const auto& table = curve.inverse_table;
+  if (table.size() < 2 || table.front() != 0 || table.back() != 1)
+    throw Error("response: an inverse table has at least 2 entries, the first 0 and the last 1");
+  for (std::size_t i = 1; i < table.size(); ++i) {
+    if (!(table[i] > table[i - 1]))
+      throw Error("response: entry " + std::to_string(i) +
+                  " of the inverse table is not above the one before; the table must increase");
+  }
+}
+
+}  // namespace
+
+Response::Response(const ResponseCurve& curve, int bits) : curve_(curve), bits_(bits) {
+  check(curve, bits);
+  const int max = (1 << bits) - 1;
+  inverse_.resize(static_cast<std::size_t>(max) + 1);
+  for (int code = 0; code <= max; ++code)
+    inverse_[static_cast<std::size_t>(code)] = curve_signal(curve, static_cast<double>(code) / max);
+  inverse_.front() = 0;
+  inverse_.back() = 1;
+  for (int code = 0; code <= max; ++code) {
+    if (forward(inverse_[static_cast<std::size_t>(code)]) != code)
+      throw Error("response: the curve is too steep or too flat for " + std::to_string(bits) +
+                  "-bit samples: code " + std::to_string(code) + " does not come back as itself");
+  }
+}
+
+std::uint16_t Response::forward(double signal) const {
+  if (!(signal > 0)) return 0;
+  const double max = static_cast<double>((1 << bits_) - 1);
+  return static_cast<std::uint16_t>(
+      std::floor(max * curve_value(curve_, std::min(signal, 1.0)) + 0.5));
+}
+
+}  // namespace previz::lighting

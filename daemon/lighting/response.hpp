@@ -9,9 +9,13 @@
 namespace previz::lighting {
 
 // inverse: for a `bits`-bit sample, the linear signal (exposure * radiance) it stands for;
-// 2^bits entries, inverse[0] = 0 and inverse[max] = 1. forward(inverse[v]) == v for every v.
+// 2^bits entries, inverse[0] = 0 and inverse[max] = 1. forward(inverse[v]) == v for every v: the
+// constructor checks it and throws previz::Error saying which code the curve cannot return.
+// Kind::srgb is IEC 61966-2-1 with the linear part up to a signal of 0.0031308; a table is linear
+// between its entries.
 class Response {
  public:
+  // `bits`: 1 to 16.
   Response(const ResponseCurve& curve, int bits);
   int bits() const { return bits_; }
   const std::vector<double>& inverse() const { return inverse_; }

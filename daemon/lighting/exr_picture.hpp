@@ -1,0 +1,25 @@
+// Linear RGB pictures in OpenEXR files: environments, and what the lighting stage dumps.
+#pragma once
+
+#include <filesystem>
+#include <glm/vec3.hpp>
+#include <string>
+#include <vector>
+
+namespace previz::lighting {
+
+struct LinearPicture {
+  int width = 0;
+  int height = 0;
+  std::vector<glm::vec3> radiance;  // row-major, linear Rec. 709
+};
+
+// Reads R, G and B, or Y, of half, float or integer samples; other channels are ignored. What is
+// odd but usable about the file is appended to `notes`. Throws previz::Error naming the file, and
+// the channels found where those are missing.
+LinearPicture read_exr_picture(const std::filesystem::path& path, std::vector<std::string>& notes);
+
+// 32-bit float RGB. Throws previz::Error naming the file.
+void write_exr_picture(const std::filesystem::path& path, const LinearPicture& picture);
+
+}  // namespace previz::lighting

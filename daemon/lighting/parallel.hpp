@@ -1,0 +1,28 @@
+// Rows of a map split over the few threads that lighting may use beside the renderer.
+#pragma once
+
+#include <algorithm>
+#include <future>
+#include <thread>
+#include <vector>
+
+namespace previz::lighting {
+
+inline constexpr int max_threads = 2;
+
+// Calls body(begin, end) on contiguous blocks that together are [0, count), concurrently. The
+// result must not depend on where the blocks part. An exception of a block is thrown on.
+template <typename Body>
+void parallel_blocks(int count, const Body& body) {
+  const int threads =
+      std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, max_threads);
+  std::vector<std::future<void>> others;
+  for (int t = 1; t < threads; ++t)
+    others.push_back(std::async(std::launch::async, [&body, count, threads, t] {
+      body(count * t / threads, count * (t + 1) / threads);
+    }));
+  body(0, count / threads);
+  for (auto& other : others) other.get();
+}
+
+}  // namespace previz::lighting

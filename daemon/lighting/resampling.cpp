@@ -1,0 +1,194 @@
+#include "daemon/lighting/resampling.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <mutex>
+
+#include "daemon/lighting/environment.hpp"
+#include "daemon/lighting/parallel.hpp"
+#include "shaders/lib/octahedral.h"
+
+namespace previz::lighting {
+namespace {
+
+constexpr int samples_a_side = 4;  // of a cell
+
+// Where a direction lands in the picture.
+struct Landing {
+  glm::dvec2 pixel{0};
+  bool seen = false;
+};
+
+class Gatherer {
+ public:
+  Gatherer(const Fisheye& lens, const glm::dmat3& world_from_camera, int size)
+      : lens_(lens),
+        camera_from_world_(glm::transpose(world_from_camera)),
+        size_(size),
+        cells_(std::max(size, resolution_for(lens.axis_pixel_sr()))) {}
+
+  // Entries of texel rows begin..end-1; `counts` has one number a texel.
+  void gather(int begin, int end, std::vector<std::uint32_t>& counts,
+              std::vector<std::uint32_t>& pixels, std::vector<float>& weights) const {
+    const int cells_a_side = cells_ / size_;
+    const float sample_weight =
+        1.0f / static_cast<float>(cells_a_side * cells_a_side * samples_a_side * samples_a_side);
+    std::vector<std::vector<Landing>> rows(static_cast<std::size_t>(cells_a_side) + 1);
+    rows.back() = corner_row(begin * cells_a_side);
+    std::vector<std::uint32_t> hits;
+    for (int j = begin; j < end; ++j) {
+      std::swap(rows.front(), rows.back());
+      for (int c = 1; c <= cells_a_side; ++c)
+        rows[static_cast<std::size_t>(c)] = corner_row(j * cells_a_side + c);
+      for (int i = 0; i < size_; ++i) {
+        hits.clear();
+        for (int cj = 0; cj < cells_a_side; ++cj)
+          for (int ci = 0; ci < cells_a_side; ++ci)
+            sample_cell(i * cells_a_side + ci, j * cells_a_side + cj,
+                        rows[static_cast<std::size_t>(cj)], rows[static_cast<std::size_t>(cj) + 1],
+                        hits);
+        counts.push_back(add_entries(hits, sample_weight, pixels, weights));
+      }
+    }
+  }
+
+ private:
+  // Position in the square, in cells.
+  Landing land(double i, double j) const {
+    const glm::vec2 point(static_cast<float>(2 * i / cells_ - 1),
+                          static_cast<float>(2 * j / cells_ - 1));
+    const auto pixel = lens_.project(camera_from_world_ * glm::dvec3(octahedral_direction(point)));
+    if (!pixel || !lens_.in_picture(*pixel)) return {};
+    return {*pixel, true};
+  }
+
+  std::vector<Landing> corner_row(int j) const {
+    std::vector<Landing> row(static_cast<std::size_t>(cells_) + 1);
+    for (int i = 0; i <= cells_; ++i) row[static_cast<std::size_t>(i)] = land(i, j);
+    return row;
+  }
+
+  // Whether the map is smooth inside a cell: not where it is folded along |u| + |v| = 1, nor at the
+  // poles.
+  bool smooth(int i, int j) const {
+    const int u = std::abs(2 * i + 1 - cells_), v = std::abs(2 * j + 1 - cells_);
+    return u + v != cells_ && u + v != 2 && u + v != 2 * cells_ - 2;
+  }
+
+  std::uint32_t pixel_index(const glm::dvec2& pixel) const {
+    const int width = lens_.intrinsics().width, height = lens_.intrinsics().height;
+    const int x = std::clamp(static_cast<int>(pixel.x + 0.5), 0, width - 1);
+    const int y = std::clamp(static_cast<int>(pixel.y + 0.5), 0, height - 1);
+    return static_cast<std::uint32_t>(y * width + x);
+  }
+
+  // Appends the pixels of a cell's directions. Inside the picture the corners are interpolated;
+  // where an edge crosses the cell every direction is projected by itself.
+  void sample_cell(int i, int j, const std::vector<Landing>& above,
+                   const std::vector<Landing>& below, std::vector<std::uint32_t>& hits) const {
+    const auto left = static_cast<std::size_t>(i);
+    const std::array<Landing, 4> corners{above[left], above[left + 1], below[left],
+                                         below[left + 1]};
+    const auto seen = std::count_if(corners.begin(), corners.end(),
+                                    [](const Landing& corner) { return corner.seen; });
+    if (seen == 0) return;
+    const bool interpolate = seen == 4 && smooth(i, j);
+    for (int b = 0; b < samples_a_side; ++b) {
+      const double t = (b + 0.5) / samples_a_side;
+      const glm::dvec2 start = corners[0].pixel * (1 - t) + corners[2].pixel * t;
+      const glm::dvec2 stop = corners[1].pixel * (1 - t) + corners[3].pixel * t;
+      for (int a = 0; a < samples_a_side; ++a) {
+        const double s = (a + 0.5) / samples_a_side;
+        if (interpolate) {
+          hits.push_back(pixel_index(start * (1 - s) + stop * s));
+        } else if (const Landing landing = land(i + s, j + t); landing.seen) {
+          hits.push_back(pixel_index(landing.pixel));
+        }
+      }
+    }
+  }
+
+  static std::uint32_t add_entries(std::vector<std::uint32_t>& hits, float sample_weight,
+                                   std::vector<std::uint32_t>& pixels,
+                                   std::vector<float>& weights) {
+    std::sort(hits.begin(), hits.end());
+    const std::size_t before = pixels.size();
+    for (std::size_t h = 0; h < hits.size();) {
+      std::size_t next = h;
+      while (next < hits.size() && hits[next] == hits[h]) ++next;
+      pixels.push_back(hits[h]);
+      weights.push_back(static_cast<float>(next - h) * sample_weight);
+      h = next;
+    }
+    return static_cast<std::uint32_t>(pixels.size() - before);
+  }
+
+  const Fisheye& lens_;
+  glm::dmat3 camera_from_world_;
+  int size_;
+  int cells_;
+};
+
+}  // namespace
+
+Resampling make_resampling(const Fisheye& lens, const glm::dmat3& world_from_camera, int size) {
+  struct Block {
+    int begin = 0;
+    std::vector<std::uint32_t> counts, pixels;
+    std::vector<float> weights;
+  };
+  const Gatherer gatherer(lens, world_from_camera, size);
+  std::vector<Block> blocks;
+  std::mutex mutex;
+  parallel_blocks(size, [&](int begin, int end) {
+    Block block;
+    block.begin = begin;
+    gatherer.gather(begin, end, block.counts, block.pixels, block.weights);
+    const std::lock_guard lock(mutex);
+    blocks.push_back(std::move(block));
+  });
+  std::sort(blocks.begin(), blocks.end(),
+            [](const Block& a, const Block& b) { return a.begin < b.begin; });
+
+  Resampling result;
+  result.size = size;
+  result.first.push_back(0);
+  for (const Block& block : blocks) {
+    for (const std::uint32_t count : block.counts)
+      result.first.push_back(result.first.back() + count);
+    result.pixels.insert(result.pixels.end(), block.pixels.begin(), block.pixels.end());
+    result.weights.insert(result.weights.end(), block.weights.begin(), block.weights.end());
+  }
+  return result;
+}
+
+Resampled resample(const Resampling& resampling, const HdrPicture& picture) {
+  const std::size_t texels = resampling.first.size() - 1;
+  Resampled result;
+  result.size = resampling.size;
+  result.radiance.resize(texels);
+  result.seen.resize(texels);
+  double over = 0, under = 0;
+  for (std::size_t t = 0; t < texels; ++t) {
+    glm::vec3 radiance(0);
+    float seen = 0;
+    for (std::uint32_t e = resampling.first[t]; e < resampling.first[t + 1]; ++e) {
+      const std::uint32_t pixel = resampling.pixels[e];
+      const float weight = resampling.weights[e];
+      radiance += weight * picture.radiance[pixel];
+      seen += weight;
+      if (picture.flags[pixel] & overexposed) over += weight;
+      if (picture.flags[pixel] & underexposed) under += weight;
+    }
+    result.radiance[t] = radiance;
+    result.seen[t] = seen;
+  }
+  result.overexposed_sr = over * texel_sr(resampling.size);
+  result.underexposed_sr = under * texel_sr(resampling.size);
+  return result;
+}
+
+}  // namespace previz::lighting

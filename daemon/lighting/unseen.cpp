@@ -1,0 +1,175 @@
+#include "daemon/lighting/unseen.hpp"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <numbers>
+
+#include "daemon/lighting/environment.hpp"
+
+namespace previz::lighting {
+namespace {
+
+using std::numbers::pi;
+
+constexpr int sectors = 72;
+constexpr double sector_rad = 2 * pi / sectors;
+constexpr double band_rad = 10 * pi / 180;
+constexpr double outlier = 8;  // times the band's median luminance
+
+double luminance(const glm::vec3& c) {
+  return 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b;
+}
+
+// Camera axes; psi from x to y around the optical axis.
+glm::dvec3 camera_direction(double off_axis, double psi) {
+  return {std::sin(off_axis) * std::cos(psi), std::sin(off_axis) * std::sin(psi),
+          std::cos(off_axis)};
+}
+
+struct Edge {
+  std::array<double, sectors> limit_rad{};  // angle off axis at which the picture ends
+  std::array<glm::vec3, sectors> radiance{};
+  glm::vec3 mean{0};
+  double left_out = 0;  // part of the band's solid angle
+};
+
+double limit_rad(const Fisheye& lens, double psi) {
+  double seen = 0, unseen = lens.max_angle_rad();
+  const auto sees = [&](double angle) {
+    const auto pixel = lens.project(camera_direction(angle, psi));
+    return pixel && lens.in_picture(*pixel);
+  };
+  if (sees(unseen * (1 - 1e-9))) return unseen;
+  for (int i = 0; i < 40; ++i) {
+    const double middle = 0.5 * (seen + unseen);
+    (sees(middle) ? seen : unseen) = middle;
+  }
+  return seen;
+}
+
+Edge edge_of(const HdrPicture& picture, const Fisheye& lens) {
+  struct Sample {
+    int sector;
+    double weight;
+    glm::vec3 radiance;
+  };
+  constexpr int steps_out = 20, steps_around = 10;
+  Edge edge;
+  std::vector<Sample> samples;
+  for (int s = 0; s < sectors; ++s) {
+    const double limit = limit_rad(lens, (s + 0.5) * sector_rad);
+    edge.limit_rad[static_cast<std::size_t>(s)] = limit;
+    const double start = std::max(0.0, limit - band_rad);
+    for (int k = 0; k < steps_out * steps_around; ++k) {
+      const double psi = (s + (k % steps_around + 0.5) / steps_around) * sector_rad;
+      const double angle = start + (k / steps_around + 0.5) / steps_out * (limit - start);
+      const auto pixel = lens.project(camera_direction(angle, psi));
+      if (!pixel || !lens.in_picture(*pixel)) continue;
+      const auto x = static_cast<std::size_t>(pixel->x + 0.5);
+      const auto y = static_cast<std::size_t>(pixel->y + 0.5);
+      samples.push_back(
+          {s, std::sin(angle), picture.radiance[y * static_cast<std::size_t>(picture.width) + x]});
+    }
+  }
+  if (samples.empty()) return edge;
+
+  std::vector<double> luminances;
+  for (const Sample& sample : samples) luminances.push_back(luminance(sample.radiance));
+  const auto middle = luminances.begin() + static_cast<std::ptrdiff_t>(luminances.size() / 2);
+  std::nth_element(luminances.begin(), middle, luminances.end());
+  const double brightest = outlier * *middle;
+
+  std::array<double, sectors> weights{};
+  double weight = 0, left_out = 0;
+  for (const Sample& sample : samples) {
+    if (luminance(sample.radiance) > brightest) {
+      left_out += sample.weight;
+      continue;
+    }
+    const auto s = static_cast<std::size_t>(sample.sector);
+    edge.radiance[s] += static_cast<float>(sample.weight) * sample.radiance;
+    edge.mean += static_cast<float>(sample.weight) * sample.radiance;
+    weights[s] += sample.weight;
+    weight += sample.weight;
+  }
+  edge.mean /= static_cast<float>(weight);
+  edge.left_out = left_out / (weight + left_out);
+  for (std::size_t s = 0; s < sectors; ++s)
+    edge.radiance[s] =
+        weights[s] > 0 ? edge.radiance[s] / static_cast<float>(weights[s]) : edge.mean;
+  return edge;
+}
+
+glm::vec3 continued(const Edge& edge, const glm::dvec3& direction) {
+  const double psi = std::atan2(direction.y, direction.x);
+  const double position = psi / sector_rad - 0.5 + sectors;
+  const auto first = static_cast<std::size_t>(position) % sectors;
+  const auto second = (first + 1) % sectors;
+  const double between = position - std::floor(position);
+  const double limit = glm::mix(edge.limit_rad[first], edge.limit_rad[second], between);
+  const double angle = std::acos(std::clamp(direction.z, -1.0, 1.0));
+  const double t = std::clamp((angle - limit) / std::max(pi - limit, 1e-9), 0.0, 1.0);
+  const glm::vec3 here =
+      glm::mix(edge.radiance[first], edge.radiance[second], static_cast<float>(between));
+  return glm::mix(here, edge.mean, static_cast<float>(t * t * (3 - 2 * t)));
+}
+
+// Adds fill(world direction of the texel's centre) to the unseen part of every texel.
+template <typename Fill>
+void fill_each(Resampled& map, const Fill& fill) {
+  for (int j = 0; j < map.size; ++j) {
+    for (int i = 0; i < map.size; ++i) {
+      const auto t = static_cast<std::size_t>(j * map.size + i);
+      if (map.seen[t] < 1)
+        map.radiance[t] += (1 - map.seen[t]) * fill(t, texel_direction(map.size, i, j));
+    }
+  }
+}
+
+}  // namespace
+
+void fill_unseen(const HdrPicture& picture, const Fisheye& lens,
+                 const glm::dmat3& world_from_camera, const set::Lighting& settings, Resampled& map,
+                 std::vector<std::string>& notes) {
+  if (settings.unseen == set::UnseenRule::constant) {
+    const glm::vec3 radiance(settings.unseen_radiance);
+    fill_each(map, [&](std::size_t, const glm::vec3&) { return radiance; });
+    return;
+  }
+
+  const Edge edge = edge_of(picture, lens);
+  const glm::dmat3 camera_from_world = glm::transpose(world_from_camera);
+  const auto horizon = [&](const glm::vec3& direction) {
+    return continued(edge, camera_from_world * glm::dvec3(direction));
+  };
+  if (edge.left_out > 0)
+    notes.push_back(fmt::format(
+        "{:.1f} % of the band at the picture's edge is brighter than {} times its median and was "
+        "not continued into the unseen part",
+        100 * edge.left_out, outlier));
+  if (settings.unseen == set::UnseenRule::horizon) {
+    fill_each(map, [&](std::size_t, const glm::vec3& direction) { return horizon(direction); });
+    return;
+  }
+
+  const glm::dmat3 mirror(1, 0, 0, 0, 1, 0, 0, 0, -1);
+  const Resampled mirrored =
+      resample(make_resampling(lens, world_from_camera * mirror, map.size), picture);
+  double unseen_twice = 0;
+  fill_each(map, [&](std::size_t t, const glm::vec3& direction) {
+    if (mirrored.seen[t] < 1) unseen_twice += (1 - map.seen[t]) * (1 - mirrored.seen[t]);
+    if (mirrored.seen[t] == 0) return horizon(direction);
+    return mirrored.radiance[t] / mirrored.seen[t];
+  });
+  if (unseen_twice > 0)
+    notes.push_back(
+        fmt::format("{:.3f} sr are unseen in the mirror too and continue the picture's edge",
+                    unseen_twice * texel_sr(map.size)));
+}
+
+}  // namespace previz::lighting
