@@ -7,6 +7,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -20,7 +21,8 @@ inline constexpr std::uint32_t world_mixed = 1;
 inline constexpr std::uint32_t world_real = 2;
 inline constexpr std::uint32_t world_both = world_mixed | world_real;
 
-// Object space. All three arrays have one entry a vertex; `uvs` is empty where there are none.
+// Object space. All three arrays have one entry a vertex; `uvs` is empty where there are none (a
+// texture is then read at (0, 0)). Every vertex is finite and used; no triangle has zero area.
 // Normals are unit and on the side of counter-clockwise winding.
 struct Mesh {
   std::string name;
@@ -30,6 +32,10 @@ struct Mesh {
   std::vector<glm::uvec3> triangles;  // vertex indices
 };
 
+// world_from_object is finite and invertible. Where its determinant is negative it turns
+// orientation around and the front stays where it was in object space (glTF 2.0, 3.7.4): normals,
+// shading and geometric, go through the inverse transpose; a geometric normal made as a cross
+// product of world space edges must be multiplied by the determinant's sign.
 struct Instance {
   std::string name;
   std::uint32_t mesh = 0;
@@ -41,22 +47,33 @@ struct Instance {
 
 inline constexpr std::uint32_t no_texture = 0xffffffffu;
 
-// glTF 2.0 metallic-roughness with the extensions the shaders implement.
+// `mask`: a hit counts where alpha >= alpha_cutoff; `blend`: with probability alpha.
+enum class AlphaMode : std::uint32_t { opaque, mask, blend };
+
+// glTF 2.0 metallic-roughness with the extensions the shaders implement. A texture multiplies its
+// factor.
 struct Material {
   std::string name;
-  glm::vec3 base_color{1};       // linear Rec. 709
-  float alpha = 1;
-  float metallic = 0;            // 0..1
-  float roughness = 1;           // perceptual, 0..1; alpha = roughness^2
-  float specular = 1;            // KHR_materials_specular.specularFactor, 0..1
-  float ior = 1.5f;              // KHR_materials_ior, >= 1
-  float transmission = 0;        // KHR_materials_transmission, 0..1
-  bool thin_walled = true;       // false where KHR_materials_volume gives a thickness > 0
+  glm::vec3 base_color{1};  // linear Rec. 709
+  float alpha = 1;          // times the base colour texture's; no meaning where opaque
+  float metallic = 0;       // 0..1
+  float roughness = 1;      // perceptual, 0..1; alpha = roughness^2
+  float specular = 1;       // KHR_materials_specular.specularFactor, 0..1
+  float ior = 1.5f;         // KHR_materials_ior, >= 1
+  float transmission = 0;   // KHR_materials_transmission, 0..1
+  bool thin_walled = true;  // false where KHR_materials_volume gives a thickness > 0
   bool double_sided = false;
-  glm::vec3 emission{0};         // radiance: emissiveFactor * emissive_strength
+  glm::vec3 emission{0};  // radiance: emissiveFactor * emissive_strength
   std::uint32_t base_color_texture = no_texture;
   std::uint32_t metallic_roughness_texture = no_texture;  // G roughness, B metallic
   std::uint32_t emission_texture = no_texture;
+  AlphaMode alpha_mode = AlphaMode::opaque;
+  float alpha_cutoff = 0.5f;
+  // KHR_materials_volume: white light is attenuation_color after this far inside (Beer-Lambert).
+  glm::vec3 attenuation_color{1};
+  float attenuation_distance_m = std::numeric_limits<float>::infinity();
+  std::uint32_t normal_texture = no_texture;  // tangent space, +Y up; not shaded yet
+  float normal_scale = 1;
 };
 
 enum class Wrap : std::uint32_t { repeat, clamp, mirror };
@@ -76,7 +93,9 @@ struct Scene {
   std::vector<Material> materials;
   std::vector<Texture> textures;
   // Of the set and of KHR_lights_punctual, in world space. Emissive meshes are not here: the
-  // renderer finds them.
+  // renderer finds them. glTF's photometric numbers are taken as radiometric ones, per channel of
+  // linear Rec. 709: candela as W/sr, lux as W/m^2. Gains follow the object's presence: virtual
+  // (1, 0), phantom (1, 1), removed (0, 1).
   std::vector<set::Light> lights;
   // What was dropped or not understood while loading, in plain words (counted, never silent).
   std::vector<std::string> notes;
@@ -85,24 +104,34 @@ struct Scene {
 // What the scene needs of the renderer; what it does not need is left out of the pipelines.
 struct Requirements {
   bool transmission = false;
-  bool metals = false;            // any conductor
-  bool rough_specular = false;    // any GGX lobe above the specular threshold
+  bool metals = false;          // any conductor
+  bool rough_specular = false;  // any GGX lobe above the specular threshold
   bool textures = false;
-  bool alpha = false;
+  bool alpha = false;  // any surface that can let rays through by alpha
   bool emissive_meshes = false;
-  bool lights = false;
-  bool differing_objects = false; // any instance present in one world only
+  bool lights = false;             // any light that shines in one of the worlds
+  bool differing_objects = false;  // any instance present in one world only
   bool removed_objects = false;
   bool thin_lens = false;
   std::uint64_t triangles = 0;            // unique
   std::uint64_t instanced_triangles = 0;  // as seen by rays
 };
 
-// Loads every object of the set. Throws previz::Error naming the file and what is wrong in it;
-// what can be left out (zero-area and NaN triangles, unknown extensions) goes into Scene::notes.
+// At most this much is loaded; anything larger is refused before it is allocated.
+inline constexpr std::uint64_t max_triangles = 1ull << 26;  // unique, and vertices
+inline constexpr std::uint64_t max_instances = 1ull << 20;
+inline constexpr std::uint64_t max_texels = 1ull << 27;  // of all textures together
+inline constexpr int max_texture_side = 16384;
+inline constexpr std::uint64_t max_file_bytes = 0xffffffffull;  // glTF binary's own limit
+
+// Loads every object of the set. Geometry that nodes share (the same accessors) becomes one mesh
+// with several instances, also where objects name the same file. Throws previz::Error naming the
+// file and what is wrong in it; what can be left out (zero-area and NaN triangles, extensions that
+// are used but not required) goes into Scene::notes.
 Scene load_scene(const set::Set& set);
 
-// What the scene, with this lens, needs.
+// What the scene, with the set's lens and specular threshold, needs: only materials and textures
+// of instances count.
 Requirements requirements(const Scene& scene, const set::Set& set);
 
 }  // namespace previz::scene
