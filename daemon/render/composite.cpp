@@ -1,0 +1,97 @@
+#include "daemon/render/composite.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace previz::render {
+namespace {
+
+// What one pixel's sums say, in double precision.
+struct Means {
+  glm::dvec3 mixed, diff, mixed_square, diff_square;
+  double mask, depth_sum, hits;
+};
+
+Means means(const gpu::GpuPixel& p, double samples) {
+  const auto sum = [](const glm::vec4& high, const glm::vec4& low) {
+    return glm::dvec4(high) + glm::dvec4(low);
+  };
+  const glm::dvec4 mixed = sum(p.mixed_high, p.mixed_low);
+  const glm::dvec4 diff = sum(p.diff_high, p.diff_low);
+  return {glm::dvec3(mixed) / samples,
+          glm::dvec3(diff) / samples,
+          glm::dvec3(sum(p.square_mixed_high, p.square_mixed_low)) / samples,
+          glm::dvec3(sum(p.square_diff_high, p.square_diff_low)) / samples,
+          mixed.w / samples,
+          diff.w,
+          p.normal.w};
+}
+
+// Variance of a mean of n samples from the means of values and squares.
+glm::dvec3 variance_of_mean(const glm::dvec3& mean, const glm::dvec3& square, double n) {
+  if (n < 2) return glm::dvec3(0);
+  return glm::max(square - mean * mean, glm::dvec3(0)) / (n - 1);
+}
+
+}  // namespace
+
+std::vector<double> plate_radiance(const Plate& plate, const lighting::Response& response,
+                                   double exposure) {
+  std::vector<double> result(plate.samples.size());
+  std::transform(plate.samples.begin(), plate.samples.end(), result.begin(),
+                 [&](std::uint16_t value) { return response.inverse()[value] / exposure; });
+  return result;
+}
+
+Layers make_layers(std::span<const gpu::GpuPixel> pixels, int width, int height,
+                   std::int64_t samples, std::span<const double> plate) {
+  Layers layers;
+  layers.width = width;
+  layers.height = height;
+  layers.samples = samples;
+  for (auto* layer : {&layers.composite, &layers.mixed, &layers.real, &layers.diff, &layers.normal,
+                      &layers.variance})
+    layer->resize(pixels.size());
+  layers.mask.resize(pixels.size());
+  layers.depth.resize(pixels.size());
+  const auto n = static_cast<double>(samples);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const Means m = means(pixels[i], n);
+    const glm::dvec3 camera =
+        plate.empty() ? glm::dvec3(0) : glm::dvec3(plate[3 * i], plate[3 * i + 1], plate[3 * i + 2]);
+    const double uncovered = 1 - m.mask;
+    layers.composite[i] = glm::vec3(m.mask * m.mixed + uncovered * (camera + m.diff));
+    layers.mixed[i] = glm::vec3(m.mixed);
+    layers.real[i] = glm::vec3(m.mixed - m.diff);
+    layers.diff[i] = glm::vec3(m.diff);
+    layers.variance[i] =
+        glm::vec3(m.mask * m.mask * variance_of_mean(m.mixed, m.mixed_square, n) +
+                  uncovered * uncovered * variance_of_mean(m.diff, m.diff_square, n));
+    layers.mask[i] = static_cast<float>(m.mask);
+    layers.depth[i] = static_cast<float>(m.hits > 0 ? m.depth_sum / m.hits : 0);
+    const glm::dvec3 normal(pixels[i].normal.x, pixels[i].normal.y, pixels[i].normal.z);
+    layers.normal[i] = glm::vec3(m.hits > 0 ? normal / m.hits : glm::dvec3(0));
+  }
+  return layers;
+}
+
+Plate make_picture(const Layers& layers, const Plate& plate, const lighting::Response& response,
+                   double exposure) {
+  Plate picture;
+  picture.width = layers.width;
+  picture.height = layers.height;
+  picture.bits = response.bits();
+  picture.samples.resize(3 * layers.composite.size());
+  for (std::size_t i = 0; i < layers.composite.size(); ++i) {
+    const bool untouched = !plate.samples.empty() && layers.mask[i] == 0 &&
+                           layers.diff[i] == glm::vec3(0);
+    for (int c = 0; c < 3; ++c)
+      picture.samples[3 * i + c] =
+          untouched ? plate.samples[3 * i + c]
+                    : response.forward(exposure * static_cast<double>(layers.composite[i][c]));
+  }
+  return picture;
+}
+
+}  // namespace previz::render

@@ -1,0 +1,316 @@
+#include "daemon/render/device.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+
+#include "drivers/error.hpp"
+
+namespace previz::render {
+namespace {
+
+constexpr std::uint64_t gpu_timeout_ns = 600'000'000'000;  // a batch on a slow CPU device is seconds
+
+VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT severity,
+                                          VkDebugUtilsMessageTypeFlagsEXT,
+                                          const VkDebugUtilsMessengerCallbackDataEXT* data,
+                                          void* user) {
+  if (severity >= VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT) {
+    static_cast<std::atomic<std::uint64_t>*>(user)->fetch_add(1);
+    spdlog::error("vulkan validation: {}", data->pMessage);
+  }
+  return VK_FALSE;
+}
+
+bool has_layer(const vk::raii::Context& context, const char* name) {
+  const auto layers = context.enumerateInstanceLayerProperties();
+  return std::any_of(layers.begin(), layers.end(), [&](const vk::LayerProperties& layer) {
+    return std::strcmp(layer.layerName, name) == 0;
+  });
+}
+
+// Lower is better.
+int rank(vk::PhysicalDeviceType type) {
+  switch (type) {
+    case vk::PhysicalDeviceType::eDiscreteGpu: return 0;
+    case vk::PhysicalDeviceType::eIntegratedGpu: return 1;
+    case vk::PhysicalDeviceType::eVirtualGpu: return 2;
+    default: return 3;
+  }
+}
+
+// Empty if the device can run us, otherwise what it lacks.
+std::string lacks(const vk::raii::PhysicalDevice& physical) {
+  if (physical.getProperties().apiVersion < VK_API_VERSION_1_3) return "no Vulkan 1.3";
+  const auto features = physical.getFeatures2<vk::PhysicalDeviceFeatures2,
+                                              vk::PhysicalDeviceVulkan12Features,
+                                              vk::PhysicalDeviceVulkan13Features>();
+  if (!features.get<vk::PhysicalDeviceVulkan12Features>().scalarBlockLayout)
+    return "no scalarBlockLayout";
+  if (!features.get<vk::PhysicalDeviceVulkan13Features>().synchronization2)
+    return "no synchronization2";
+  const auto subgroup =
+      physical.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceVulkan11Properties>()
+          .get<vk::PhysicalDeviceVulkan11Properties>();
+  if (!(subgroup.subgroupSupportedOperations & vk::SubgroupFeatureFlagBits::eBallot))
+    return "no subgroup ballot";
+  return {};
+}
+
+}  // namespace
+
+Device::Device(const DeviceOptions& options) {
+  try {
+    create_instance(options.validation);
+    pick_physical_device(options.name);
+    create_device();
+  } catch (const vk::SystemError& error) {
+    throw Error(std::string("Vulkan: ") + error.what());
+  }
+}
+
+void Device::create_instance(bool validation) {
+  static constexpr const char* layer = "VK_LAYER_KHRONOS_validation";
+  if (context_.enumerateInstanceVersion() < VK_API_VERSION_1_3)
+    throw Error("Vulkan: the loader is older than 1.3");
+  std::vector<const char*> layers;
+  std::vector<const char*> extensions;
+  if (validation) {
+    if (!has_layer(context_, layer))
+      throw Error("Vulkan: validation was asked for, but the layer " + std::string(layer) +
+                  " is not installed (package vulkan-validationlayers)");
+    layers.push_back(layer);
+    extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
+  }
+  const vk::ApplicationInfo application("previzd", 1, "previzd", 1, VK_API_VERSION_1_3);
+  instance_ = vk::raii::Instance(context_, {{}, &application, layers, extensions});
+  if (!validation) return;
+  using Severity = vk::DebugUtilsMessageSeverityFlagBitsEXT;
+  using Type = vk::DebugUtilsMessageTypeFlagBitsEXT;
+  vk::DebugUtilsMessengerCreateInfoEXT info({}, Severity::eWarning | Severity::eError,
+                                            Type::eGeneral | Type::eValidation, &on_message,
+                                            &validation_messages_);
+  messenger_ = vk::raii::DebugUtilsMessengerEXT(instance_, info);
+}
+
+void Device::pick_physical_device(const std::string& wanted_name) {
+  std::string found;
+  int best = 1000;
+  for (auto& physical : vk::raii::PhysicalDevices(instance_)) {
+    const auto properties = physical.getProperties();
+    const std::string name = properties.deviceName;
+    const std::string lack = lacks(physical);
+    found += "\n  " + name + (lack.empty() ? "" : " (" + lack + ")");
+    if (!lack.empty() || name.find(wanted_name) == std::string::npos) continue;
+    if (rank(properties.deviceType) >= best) continue;
+    best = rank(properties.deviceType);
+    physical_ = std::move(physical);
+    name_ = name;
+    limits_ = properties.limits;
+    is_cpu_ = properties.deviceType == vk::PhysicalDeviceType::eCpu;
+  }
+  if (best == 1000)
+    throw Error("Vulkan: no usable device" +
+                (wanted_name.empty() ? "" : " named \"" + wanted_name + "\"") + "; found:" +
+                (found.empty() ? " none" : found));
+}
+
+void Device::create_device() {
+  const auto families = physical_.getQueueFamilyProperties();
+  const auto family = std::find_if(families.begin(), families.end(), [](const auto& properties) {
+    return static_cast<bool>(properties.queueFlags & vk::QueueFlagBits::eCompute);
+  });
+  if (family == families.end()) throw Error("Vulkan: " + name_ + " has no compute queue");
+  queue_family_ = static_cast<std::uint32_t>(family - families.begin());
+
+  const float priority = 1.0f;
+  const vk::DeviceQueueCreateInfo queue({}, queue_family_, 1, &priority);
+  vk::PhysicalDeviceVulkan13Features features13;
+  features13.synchronization2 = VK_TRUE;
+  vk::PhysicalDeviceVulkan12Features features12;
+  features12.scalarBlockLayout = VK_TRUE;
+  features12.pNext = &features13;
+  vk::DeviceCreateInfo info({}, queue);
+  info.pNext = &features12;
+  device_ = vk::raii::Device(physical_, info);
+  queue_ = vk::raii::Queue(device_, queue_family_, 0);
+  pool_ = vk::raii::CommandPool(
+      device_, {vk::CommandPoolCreateFlagBits::eResetCommandBuffer, queue_family_});
+  commands_ = std::move(
+      vk::raii::CommandBuffers(device_, {*pool_, vk::CommandBufferLevel::ePrimary, 1}).front());
+  fence_ = vk::raii::Fence(device_, vk::FenceCreateInfo{});
+}
+
+std::uint32_t Device::memory_type(std::uint32_t allowed_bits, vk::MemoryPropertyFlags wanted,
+                                  vk::MemoryPropertyFlags preferred) const {
+  const auto properties = physical_.getMemoryProperties();
+  for (const auto flags : {wanted | preferred, wanted}) {
+    for (std::uint32_t i = 0; i < properties.memoryTypeCount; ++i) {
+      const bool has_flags = (properties.memoryTypes[i].propertyFlags & flags) == flags;
+      if ((allowed_bits & (1u << i)) != 0 && has_flags) return i;
+    }
+  }
+  throw Error("Vulkan: " + name_ + " has no suitable memory type");
+}
+
+void Device::submit(const std::function<void(const vk::raii::CommandBuffer&)>& record) {
+  try {
+    commands_.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
+    record(commands_);
+    commands_.end();
+    const vk::CommandBuffer raw = *commands_;
+    queue_.submit(vk::SubmitInfo({}, {}, raw), *fence_);
+    if (device_.waitForFences(*fence_, VK_TRUE, gpu_timeout_ns) != vk::Result::eSuccess)
+      throw Error("Vulkan: " + name_ + " did not finish within ten minutes");
+    device_.resetFences(*fence_);
+  } catch (const vk::SystemError& error) {
+    throw Error("Vulkan: " + name_ + ": " + error.what());
+  }
+}
+
+namespace {
+
+Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags usage,
+                     vk::MemoryPropertyFlags wanted, vk::MemoryPropertyFlags preferred) {
+  using Usage = vk::BufferUsageFlagBits;
+  Buffer result;
+  result.size = std::max<vk::DeviceSize>((size + 15) / 16 * 16, 16);
+  usage |= Usage::eTransferSrc | Usage::eTransferDst;
+  result.buffer = vk::raii::Buffer(device.vk(), {{}, result.size, usage});
+  const auto requirements = result.buffer.getMemoryRequirements();
+  const auto type = device.memory_type(requirements.memoryTypeBits, wanted, preferred);
+  result.memory = vk::raii::DeviceMemory(device.vk(), {requirements.size, type});
+  result.buffer.bindMemory(*result.memory, 0);
+  return result;
+}
+
+using Memory = vk::MemoryPropertyFlagBits;
+
+// Where device memory is host-visible anyway (a CPU device), it is mapped and no staging is needed.
+Buffer create_device_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags usage) {
+  const vk::MemoryPropertyFlags host = Memory::eHostVisible | Memory::eHostCoherent;
+  if (!device.is_cpu()) return create_buffer(device, size, usage, Memory::eDeviceLocal, {});
+  Buffer result = create_buffer(device, size, usage, host, Memory::eDeviceLocal);
+  result.mapped = result.memory.mapMemory(0, VK_WHOLE_SIZE);
+  return result;
+}
+
+Buffer create_staging_buffer(Device& device, vk::DeviceSize size) {
+  Buffer result = create_buffer(device, size, {}, Memory::eHostVisible | Memory::eHostCoherent,
+                                Memory::eHostCached);
+  result.mapped = result.memory.mapMemory(0, VK_WHOLE_SIZE);
+  return result;
+}
+
+}  // namespace
+
+Buffer create_storage_buffer(Device& device, vk::DeviceSize size) {
+  if (size > device.limits().maxStorageBufferRange)
+    throw Error("Vulkan: a storage buffer of " + std::to_string(size) + " bytes is past the " +
+                std::to_string(device.limits().maxStorageBufferRange) + " that " + device.name() +
+                " allows");
+  return create_device_buffer(device, size, vk::BufferUsageFlagBits::eStorageBuffer);
+}
+
+Buffer create_indirect_buffer(Device& device, vk::DeviceSize size) {
+  return create_device_buffer(
+      device, size,
+      vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eIndirectBuffer);
+}
+
+namespace {
+
+vk::DeviceSize texel_bytes_of(vk::Format format) {
+  switch (format) {
+    case vk::Format::eR32G32Sfloat:
+    case vk::Format::eR32G32Uint: return 8;
+    case vk::Format::eR32G32B32A32Sfloat:
+    case vk::Format::eR32G32B32A32Uint: return 16;
+    default: throw Error("Vulkan: no texel buffer of format " + vk::to_string(format));
+  }
+}
+
+}  // namespace
+
+Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format) {
+  Buffer result =
+      create_device_buffer(device, size, vk::BufferUsageFlagBits::eUniformTexelBuffer);
+  const vk::DeviceSize texel_bytes = texel_bytes_of(format);
+  if (result.size / texel_bytes > device.limits().maxTexelBufferElements)
+    throw Error("Vulkan: the scene needs a texel buffer of " +
+                std::to_string(result.size / texel_bytes) + " texels, but " + device.name() +
+                " allows " + std::to_string(device.limits().maxTexelBufferElements));
+  result.view = vk::raii::BufferView(device.vk(), {{}, *result.buffer, format, 0, VK_WHOLE_SIZE});
+  return result;
+}
+
+void upload_bytes(Device& device, Buffer& buffer, std::span<const std::byte> bytes,
+                  vk::DeviceSize offset) {
+  if (bytes.empty()) return;
+  if (offset + bytes.size() > buffer.size) throw Error("Vulkan: upload past a buffer's end");
+  if (buffer.mapped) {
+    std::memcpy(static_cast<std::byte*>(buffer.mapped) + offset, bytes.data(), bytes.size());
+    return;
+  }
+  Buffer staging = create_staging_buffer(device, bytes.size());
+  std::memcpy(staging.mapped, bytes.data(), bytes.size());
+  device.submit([&](const vk::raii::CommandBuffer& commands) {
+    commands.copyBuffer(*staging.buffer, *buffer.buffer, vk::BufferCopy(0, offset, bytes.size()));
+    barrier(commands);
+  });
+}
+
+void download_bytes(Device& device, const Buffer& buffer, std::span<std::byte> bytes) {
+  if (bytes.empty()) return;
+  if (buffer.mapped) {
+    std::memcpy(bytes.data(), buffer.mapped, bytes.size());
+    return;
+  }
+  Buffer staging = create_staging_buffer(device, bytes.size());
+  device.submit([&](const vk::raii::CommandBuffer& commands) {
+    barrier(commands);
+    commands.copyBuffer(*buffer.buffer, *staging.buffer, vk::BufferCopy(0, 0, bytes.size()));
+    vk::MemoryBarrier2 to_host(
+        vk::PipelineStageFlagBits2::eCopy, vk::AccessFlagBits2::eTransferWrite,
+        vk::PipelineStageFlagBits2::eHost, vk::AccessFlagBits2::eHostRead);
+    commands.pipelineBarrier2(vk::DependencyInfo({}, to_host));
+  });
+  std::memcpy(bytes.data(), staging.mapped, bytes.size());
+}
+
+Pipeline create_pipeline(Device& device, std::span<const std::uint32_t> spirv,
+                         const vk::raii::PipelineLayout& layout,
+                         std::span<const std::uint32_t> constants) {
+  const vk::raii::ShaderModule module(device.vk(), {{}, spirv.size_bytes(), spirv.data()});
+  std::vector<vk::SpecializationMapEntry> entries;
+  for (std::uint32_t i = 0; i < constants.size(); ++i) entries.emplace_back(i, 4 * i, 4);
+  const vk::SpecializationInfo specialization(static_cast<std::uint32_t>(entries.size()),
+                                              entries.data(), constants.size_bytes(),
+                                              constants.data());
+  const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module,
+                                                "main", &specialization);
+  const vk::ComputePipelineCreateInfo info({}, stage, *layout);
+  return {vk::raii::Pipeline(device.vk(), nullptr, info)};
+}
+
+void barrier(const vk::raii::CommandBuffer& commands) {
+  using Stage = vk::PipelineStageFlagBits2;
+  using Access = vk::AccessFlagBits2;
+  const vk::MemoryBarrier2 everything(
+      Stage::eComputeShader | Stage::eCopy | Stage::eClear,
+      Access::eShaderWrite | Access::eTransferWrite,
+      Stage::eComputeShader | Stage::eDrawIndirect | Stage::eCopy | Stage::eClear,
+      Access::eShaderRead | Access::eShaderWrite | Access::eIndirectCommandRead |
+          Access::eTransferRead | Access::eTransferWrite);
+  commands.pipelineBarrier2(vk::DependencyInfo({}, everything));
+}
+
+std::shared_ptr<Device> open_device(const DeviceOptions& options) {
+  return std::make_shared<Device>(options);
+}
+std::string device_name(const Device& device) { return device.name(); }
+std::uint64_t validation_messages(const Device& device) { return device.validation_messages(); }
+
+}  // namespace previz::render

@@ -1,0 +1,24 @@
+// The environment map in the layout the shaders read.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec4.hpp>
+#include <vector>
+
+#include "daemon/lighting/environment.hpp"
+
+namespace previz::render {
+
+struct EncodedEnvironment {
+  std::uint32_t size = 1;
+  std::uint32_t levels = 0;           // log2(size)
+  std::vector<glm::vec4> radiance;    // (size + 2)^2, border wrapped by the octahedral rule
+  std::vector<glm::vec4> importance;  // densities, level by level; see render_shared.h
+  double mean = 0;                    // mean of (r + g + b) / 3 over the sphere
+};
+
+// Throws previz::Error if the size is not a power of two up to 4096 or a texel is negative or not
+// finite (the lighting room never makes such a map).
+EncodedEnvironment encode_environment(const lighting::EnvironmentMap& map);
+
+}  // namespace previz::render

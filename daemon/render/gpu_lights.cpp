@@ -1,0 +1,128 @@
+#include "daemon/render/gpu_lights.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+namespace previz::render {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+std::uint32_t gpu_type(set::LightType type) {
+  switch (type) {
+    case set::LightType::point: return gpu::LIGHT_POINT;
+    case set::LightType::spot: return gpu::LIGHT_SPOT;
+    case set::LightType::directional: return gpu::LIGHT_DIRECTIONAL;
+    case set::LightType::rectangle: return gpu::LIGHT_RECTANGLE;
+    case set::LightType::sphere: return gpu::LIGHT_SPHERE;
+  }
+  return gpu::LIGHT_POINT;
+}
+
+double power(const gpu::GpuLight& light, double scene_radius) {
+  const double emission = (light.emission.r + light.emission.g + light.emission.b) / 3.0;
+  const double gain = std::max(light.gain.x, light.gain.y);
+  const double area = glm::length(glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v)));
+  const double disc = pi * scene_radius * scene_radius;
+  switch (light.type) {
+    case gpu::LIGHT_POINT: return gain * emission * 4 * pi;
+    case gpu::LIGHT_SPOT: return gain * emission * 2 * pi * (1 - light.cos_outer);
+    case gpu::LIGHT_DIRECTIONAL:
+      return gain * emission * disc * (light.cone_sr > 0 ? light.cone_sr : 1);
+    case gpu::LIGHT_RECTANGLE: return gain * emission * pi * area;
+    case gpu::LIGHT_SPHERE:
+      return gain * emission * pi * 4 * pi * light.radius * light.radius;
+    default: return gain * emission * pi * area;  // triangle: half the area, both sides
+  }
+}
+
+}  // namespace
+
+bool can_be_seen(const set::Light& light) {
+  return light.type == set::LightType::rectangle || light.type == set::LightType::sphere ||
+         (light.type == set::LightType::directional && light.angular_radius_rad > 0);
+}
+
+gpu::GpuLight encode_light(const set::Light& light, const glm::dvec3& camera_position) {
+  gpu::GpuLight result{};
+  result.type = gpu_type(light.type);
+  result.position = glm::vec3(light.position - camera_position);
+  result.direction = glm::vec3(glm::normalize(light.direction));
+  result.emission = glm::vec3(light.emission);
+  result.gain = glm::vec2(light.gain_mixed, light.gain_real);
+  result.radius = static_cast<float>(light.radius_m);
+  result.emission_texture = gpu::NO_INDEX;
+  if (light.type == set::LightType::spot) {
+    result.cos_inner = static_cast<float>(std::cos(light.inner_cone_rad));
+    result.cos_outer = static_cast<float>(std::cos(light.outer_cone_rad));
+  }
+  if (light.type == set::LightType::rectangle) {
+    const glm::dvec3 normal = glm::normalize(light.direction);
+    const glm::dvec3 up = glm::normalize(light.up - glm::dot(light.up, normal) * normal);
+    result.edge_u = glm::vec3(glm::cross(up, normal) * light.width_m);
+    result.edge_v = glm::vec3(up * light.height_m);
+  }
+  if (light.type == set::LightType::directional && light.angular_radius_rad > 0) {
+    const double sine = std::sin(light.angular_radius_rad);
+    const double half = std::sin(light.angular_radius_rad / 2);
+    result.cos_inner = static_cast<float>(std::cos(light.angular_radius_rad));
+    result.cone_sr = static_cast<float>(4 * pi * half * half);
+    // The disc's radiance that gives the stated irradiance on a plane facing it.
+    result.emission = glm::vec3(light.emission / (pi * sine * sine));
+  }
+  return result;
+}
+
+std::vector<gpu::GpuLight> encode_emitter(const scene::Instance& instance, const scene::Mesh& mesh,
+                                          const scene::Material& material,
+                                          const glm::dvec3& camera_position) {
+  std::vector<gpu::GpuLight> result;
+  result.reserve(mesh.triangles.size());
+  const auto world = [&](std::uint32_t vertex) {
+    const glm::dvec4 p(glm::dvec3(mesh.positions[vertex]), 1.0);
+    return glm::dvec3(instance.world_from_object * p) - camera_position;
+  };
+  for (const glm::uvec3& triangle : mesh.triangles) {
+    gpu::GpuLight light{};
+    light.type = gpu::LIGHT_TRIANGLE;
+    const glm::dvec3 v0 = world(triangle.x);
+    const glm::dvec3 u = world(triangle.y) - v0;
+    const glm::dvec3 v = world(triangle.z) - v0;
+    const glm::dvec3 normal = glm::cross(u, v);
+    const double doubled_area = glm::length(normal);
+    light.position = glm::vec3(v0);
+    light.edge_u = glm::vec3(u);
+    light.edge_v = glm::vec3(v);
+    light.direction =
+        doubled_area > 0 ? glm::vec3(normal / doubled_area) : glm::vec3(0.0f, 0.0f, 1.0f);
+    light.emission = material.emission;
+    light.gain = glm::vec2((instance.presence & scene::world_mixed) != 0 ? 1 : 0,
+                           (instance.presence & scene::world_real) != 0 ? 1 : 0);
+    light.emission_texture = material.emission_texture;
+    if (!mesh.uvs.empty()) {
+      light.uv0 = mesh.uvs[triangle.x];
+      light.uv1 = mesh.uvs[triangle.y];
+      light.uv2 = mesh.uvs[triangle.z];
+    }
+    result.push_back(light);
+  }
+  return result;
+}
+
+double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius) {
+  double total = 0;
+  for (const gpu::GpuLight& light : lights) total += power(light, scene_radius);
+  double sum = 0;
+  for (gpu::GpuLight& light : lights) {
+    const double share = total > 0 ? power(light, scene_radius) / total : 1.0 / lights.size();
+    sum += share;
+    light.selection = static_cast<float>(share);
+    light.cdf = static_cast<float>(sum);
+  }
+  if (!lights.empty()) lights.back().cdf = 1.0f;
+  return total;
+}
+
+}  // namespace previz::render

@@ -1,0 +1,29 @@
+// Lights in the layout the shaders sample: positions relative to the camera, powers, and the odds of
+// picking each.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "daemon/scene/scene.hpp"
+#include "daemon/set/set.hpp"
+#include "shaders/lib/render_shared.h"
+
+namespace previz::render {
+
+// True for lights that have an extent, so that rays can meet them: rectangle, sphere, and a
+// directional light with an angular radius.
+bool can_be_seen(const set::Light& light);
+
+gpu::GpuLight encode_light(const set::Light& light, const glm::dvec3& camera_position);
+
+// One light a triangle of the mesh, in the mesh's order.
+std::vector<gpu::GpuLight> encode_emitter(const scene::Instance& instance, const scene::Mesh& mesh,
+                                          const scene::Material& material,
+                                          const glm::dvec3& camera_position);
+
+// Fills selection and cdf in proportion to the power a light brings to a scene of this radius
+// (metres); returns the sum of the powers (W per channel, mean of the channels).
+double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius);
+
+}  // namespace previz::render

@@ -1,0 +1,231 @@
+#include "daemon/render/gpu_scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/packing.hpp>
+#include <numbers>
+#include <utility>
+
+#include "daemon/render/gpu_lights.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::render {
+namespace {
+
+// Three rows of an affine transform.
+void set_rows(glm::vec4 (&rows)[3], const glm::dmat4& m) {
+  for (int r = 0; r < 3; ++r) rows[r] = glm::vec4(m[0][r], m[1][r], m[2][r], m[3][r]);
+}
+
+glm::dmat4 relative_to(const glm::dmat4& world_from_object, const glm::dvec3& camera_position) {
+  glm::dmat4 result = world_from_object;
+  result[3] -= glm::dvec4(camera_position, 0.0);
+  return result;
+}
+
+bool emits(const scene::Material& material) {
+  return material.emission.r > 0 || material.emission.g > 0 || material.emission.b > 0;
+}
+
+template <typename T>
+void append(std::vector<T>& to, const std::vector<T>& from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
+
+}  // namespace
+
+void GpuScene::set_scene(const scene::Scene& scene) {
+  scene_ = scene;
+  upload_meshes();
+  upload_materials();
+  upload_textures();
+  find_emitters();
+}
+
+void GpuScene::upload_meshes() {
+  std::vector<glm::uvec4> bvh(scene::top_bvh_texels(scene_.instances.size()));
+  std::vector<glm::vec4> vertices;
+  std::vector<glm::uvec4> triangles;
+  places_.clear();
+  for (const scene::Mesh& mesh : scene_.meshes) {
+    MeshPlace place;
+    place.bvh = scene::build_mesh_bvh(mesh);
+    place.first_record = static_cast<std::uint32_t>(bvh.size() / scene::texels_per_record);
+    place.first_triangle = static_cast<std::uint32_t>(triangles.size());
+    append(bvh, std::exchange(place.bvh.texels, {}));
+    places_.push_back(std::move(place));
+    const auto first = static_cast<std::uint32_t>(vertices.size() / 2);
+    for (const glm::uvec3& t : mesh.triangles)
+      triangles.emplace_back(first + t.x, first + t.y, first + t.z, 0u);
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+      const glm::vec2 uv = mesh.uvs.empty() ? glm::vec2(0) : mesh.uvs[i];
+      vertices.emplace_back(mesh.positions[i], uv.x);
+      vertices.emplace_back(mesh.normals[i], uv.y);
+    }
+  }
+  upload_texels(device_, bvh_, bvh, vk::Format::eR32G32B32A32Uint);
+  upload_texels(device_, vertices_, vertices, vk::Format::eR32G32B32A32Sfloat);
+  upload_texels(device_, triangles_, triangles, vk::Format::eR32G32B32A32Uint);
+}
+
+void GpuScene::upload_materials() {
+  std::vector<gpu::GpuMaterial> materials;
+  for (const scene::Material& m : scene_.materials)
+    materials.push_back({m.base_color, m.metallic, m.emission, m.roughness, m.specular, m.ior,
+                         m.transmission, m.thin_walled ? 1u : 0u, m.base_color_texture,
+                         m.metallic_roughness_texture, m.emission_texture});
+  upload_storage(device_, materials_, materials);
+}
+
+void GpuScene::upload_textures() {
+  std::vector<gpu::GpuTexture> textures;
+  std::vector<glm::uvec2> texels;
+  for (const scene::Texture& t : scene_.textures) {
+    textures.push_back({static_cast<std::uint32_t>(texels.size()),
+                        static_cast<std::uint32_t>(t.width), static_cast<std::uint32_t>(t.height),
+                        static_cast<std::uint32_t>(t.wrap_u), static_cast<std::uint32_t>(t.wrap_v),
+                        t.nearest ? 1u : 0u});
+    for (const glm::vec4& texel : t.texels)
+      texels.emplace_back(glm::packHalf2x16(glm::vec2(texel.x, texel.y)),
+                          glm::packHalf2x16(glm::vec2(texel.z, texel.w)));
+  }
+  upload_storage(device_, textures_, textures);
+  upload_texels(device_, texels_, texels, vk::Format::eR32G32Uint);
+}
+
+void GpuScene::find_emitters() {
+  emitters_.clear();
+  first_light_.assign(scene_.instances.size(), gpu::NO_INDEX);
+  for (std::uint32_t i = 0; i < scene_.instances.size(); ++i)
+    if (emits(scene_.materials[scene_.instances[i].material])) emitters_.push_back(i);
+}
+
+void GpuScene::set_environment(const lighting::EnvironmentMap& map, set::LightSampling sampling) {
+  const EncodedEnvironment encoded = encode_environment(map);
+  environment_size_ = encoded.size;
+  environment_levels_ = encoded.levels;
+  environment_mean_ = encoded.mean;
+  sampling_ = sampling;
+  upload_texels(device_, environment_, encoded.radiance, vk::Format::eR32G32B32A32Sfloat);
+  upload_texels(device_, importance_, encoded.importance, vk::Format::eR32G32B32A32Sfloat);
+}
+
+void GpuScene::place(const glm::dvec3& camera_position) {
+  upload_lights(camera_position);
+  upload_instances(camera_position);
+}
+
+void GpuScene::upload_instances(const glm::dvec3& camera_position) {
+  std::vector<scene::TopInstance> top;
+  std::vector<gpu::GpuInstance> instances;
+  scene::Aabb all;
+  for (std::uint32_t i = 0; i < scene_.instances.size(); ++i) {
+    const scene::Instance& instance = scene_.instances[i];
+    const MeshPlace& place = places_[instance.mesh];
+    const glm::dmat4 world = relative_to(instance.world_from_object, camera_position);
+    gpu::GpuInstance record{};
+    set_rows(record.world_from_object, world);
+    set_rows(record.object_from_world, glm::inverse(world));
+    record.material = instance.material;
+    record.first_triangle = place.first_triangle;
+    record.first_light = first_light_[i];
+    record.presence = instance.presence;
+    record.mirrored = glm::determinant(glm::dmat3(world)) < 0 ? -1.0f : 1.0f;
+    instances.push_back(record);
+    top.push_back({&place.bvh, place.first_record, instance.presence, world});
+    const scene::Aabb bounds = scene::transform_bounds(place.bvh.bounds, world);
+    all.low = glm::min(all.low, bounds.low);
+    all.high = glm::max(all.high, bounds.high);
+  }
+  if (all.low.x <= all.high.x) scene_radius_ = 0.5 * glm::length(glm::dvec3(all.high - all.low));
+  const scene::TopBvh top_bvh = scene::build_top_bvh(top);
+  upload_bytes(device_, bvh_, std::as_bytes(std::span(top_bvh.texels)));
+  upload_storage(device_, instances_, instances);
+}
+
+std::vector<gpu::GpuLight> GpuScene::placed_lights(const glm::dvec3& camera_position) const {
+  std::vector<gpu::GpuLight> lights;
+  for (const set::Light& light : scene_.lights)
+    if (can_be_seen(light)) lights.push_back(encode_light(light, camera_position));
+  for (const set::Light& light : scene_.lights)
+    if (!can_be_seen(light)) lights.push_back(encode_light(light, camera_position));
+  for (const std::uint32_t i : emitters_) {
+    const scene::Instance& instance = scene_.instances[i];
+    append(lights, encode_emitter(instance, scene_.meshes[instance.mesh],
+                                  scene_.materials[instance.material], camera_position));
+  }
+  return lights;
+}
+
+void GpuScene::upload_lights(const glm::dvec3& camera_position) {
+  std::vector<gpu::GpuLight> lights = placed_lights(camera_position);
+  visible_light_count_ = static_cast<std::uint32_t>(
+      std::count_if(scene_.lights.begin(), scene_.lights.end(), can_be_seen));
+  light_count_ = static_cast<std::uint32_t>(lights.size());
+  light_power_ = select_by_power(lights, scene_radius_);
+  auto next = static_cast<std::uint32_t>(scene_.lights.size());
+  for (const std::uint32_t i : emitters_) {
+    first_light_[i] = next;
+    next += static_cast<std::uint32_t>(scene_.meshes[scene_.instances[i].mesh].triangles.size());
+  }
+  upload_storage(device_, lights_, lights);
+}
+
+std::uint32_t GpuScene::features() const {
+  std::uint32_t result = 0;
+  const auto any_material = [&](auto predicate) {
+    return std::any_of(scene_.instances.begin(), scene_.instances.end(), [&](const auto& instance) {
+      return predicate(scene_.materials[instance.material]);
+    });
+  };
+  if (any_material([](const scene::Material& m) {
+        const bool opaque_part = m.metallic < 1 && m.transmission < 1;
+        return m.metallic > 0 || (opaque_part && m.specular > 0 && m.ior > 1);
+      }))
+    result |= gpu::FEATURE_GLOSSY;
+  if (any_material([](const scene::Material& m) { return m.transmission > 0 && m.metallic < 1; }))
+    result |= gpu::FEATURE_TRANSMISSION;
+  if (!scene_.textures.empty()) result |= gpu::FEATURE_TEXTURES;
+  if (!scene_.lights.empty() || !emitters_.empty()) result |= gpu::FEATURE_LIGHTS;
+  if (std::any_of(scene_.lights.begin(), scene_.lights.end(), can_be_seen))
+    result |= gpu::FEATURE_VISIBLE_LIGHTS;
+  if (std::any_of(scene_.instances.begin(), scene_.instances.end(), [](const auto& instance) {
+        return instance.presence != scene::world_both;
+      }))
+    result |= gpu::FEATURE_FORKS;
+  if (sampling_ == set::LightSampling::importance && environment_mean_ > 0)
+    result |= gpu::FEATURE_ENVIRONMENT_SAMPLING;
+  return result;
+}
+
+void GpuScene::describe(gpu::GpuFrame& frame) const {
+  frame.environment_size = environment_size_;
+  frame.environment_levels = environment_levels_;
+  frame.light_count = light_count_;
+  frame.visible_light_count = visible_light_count_;
+  // Light samples are shared out by power; the environment's is what crosses the scene's disc.
+  const double environment_power = environment_mean_ * std::numbers::pi * std::numbers::pi *
+                                   scene_radius_ * scene_radius_;
+  const bool sampled = (features() & gpu::FEATURE_ENVIRONMENT_SAMPLING) != 0;
+  double share = sampled ? 1.0 : 0.0;
+  if (sampled && light_power_ > 0)
+    share = std::clamp(environment_power / (environment_power + light_power_), 0.1, 0.9);
+  frame.environment_selection = static_cast<float>(share);
+}
+
+std::vector<const Buffer*> GpuScene::bindings() const {
+  std::vector<const Buffer*> result(gpu::SCENE_BINDINGS, nullptr);
+  result[gpu::BINDING_BVH] = &bvh_;
+  result[gpu::BINDING_VERTICES] = &vertices_;
+  result[gpu::BINDING_TRIANGLES] = &triangles_;
+  result[gpu::BINDING_TEXELS] = &texels_;
+  result[gpu::BINDING_ENVIRONMENT] = &environment_;
+  result[gpu::BINDING_IMPORTANCE] = &importance_;
+  result[gpu::BINDING_INSTANCES] = &instances_;
+  result[gpu::BINDING_MATERIALS] = &materials_;
+  result[gpu::BINDING_TEXTURES] = &textures_;
+  result[gpu::BINDING_LIGHTS] = &lights_;
+  return result;
+}
+
+}  // namespace previz::render

@@ -1,0 +1,64 @@
+// The scene in GPU memory: what stays while a scene stays, and what is placed anew for each camera
+// position, because GPU space is relative to the camera (subtracted in double precision).
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "daemon/render/device.hpp"
+#include "daemon/render/gpu_environment.hpp"
+#include "daemon/scene/bvh.hpp"
+#include "daemon/scene/scene.hpp"
+#include "shaders/lib/render_shared.h"
+
+namespace previz::render {
+
+class GpuScene {
+ public:
+  explicit GpuScene(Device& device) : device_(device) {}
+
+  // Builds the meshes' BVHs and uploads everything that does not depend on the camera.
+  void set_scene(const scene::Scene& scene);
+  void set_environment(const lighting::EnvironmentMap& map, set::LightSampling sampling);
+  // Uploads instances, top level and lights relative to `camera_position` (world, metres).
+  void place(const glm::dvec3& camera_position);
+
+  std::uint32_t features() const;  // FEATURE_* that the scene and the environment require
+  // Fills the fields of the frame that describe environment and lights.
+  void describe(gpu::GpuFrame& frame) const;
+  // Buffers of set 0 by binding, without RAYS and FRAME, which are the renderer's (null there).
+  std::vector<const Buffer*> bindings() const;
+
+ private:
+  struct MeshPlace {  // where a mesh lies in the shared buffers
+    scene::MeshBvh bvh;            // its texels moved into the shared buffer
+    std::uint32_t first_record = 0;
+    std::uint32_t first_triangle = 0;
+  };
+
+  void upload_meshes();
+  void upload_materials();
+  void upload_textures();
+  void find_emitters();
+  std::vector<gpu::GpuLight> placed_lights(const glm::dvec3& camera_position) const;
+  void upload_lights(const glm::dvec3& camera_position);
+  void upload_instances(const glm::dvec3& camera_position);
+
+  Device& device_;
+  scene::Scene scene_;
+  std::vector<MeshPlace> places_;
+  std::vector<std::uint32_t> first_light_;  // by instance; NO_INDEX: not an emitter
+  std::vector<std::uint32_t> emitters_;     // instances that emit, in the order of their lights
+  double scene_radius_ = 1;                 // of the instances' bounds
+  std::uint32_t environment_size_ = 1, environment_levels_ = 0;
+  double environment_mean_ = 0;
+  set::LightSampling sampling_ = set::LightSampling::importance;
+  std::uint32_t light_count_ = 0, visible_light_count_ = 0;
+  double light_power_ = 0;
+
+  Buffer bvh_, vertices_, triangles_, texels_, environment_,
+      importance_, instances_, materials_, textures_, lights_;
+};
+
+}  // namespace previz::render

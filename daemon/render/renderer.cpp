@@ -1,0 +1,142 @@
+#include "daemon/render/renderer.hpp"
+
+#include <algorithm>
+#include <optional>
+
+#include "daemon/lighting/response.hpp"
+#include "daemon/render/composite.hpp"
+#include "daemon/render/gpu_scene.hpp"
+#include "daemon/render/view.hpp"
+#include "daemon/render/wavefront.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::render {
+
+struct Renderer::Impl {
+  Impl(std::shared_ptr<Device> the_device, const set::Estimation& the_estimation,
+       const ObserverCalibration& the_calibration)
+      : device(std::move(the_device)),
+        estimation(the_estimation),
+        calibration(the_calibration),
+        scene(*device),
+        wavefront(*device, calibration.intrinsics.width, calibration.intrinsics.height) {
+    upload_texels(*device, rays, corner_rays(calibration.intrinsics), vk::Format::eR32G32Sfloat);
+  }
+
+  void upload_frame();
+
+  std::shared_ptr<Device> device;
+  set::Estimation estimation;
+  ObserverCalibration calibration;
+  GpuScene scene;
+  Wavefront wavefront;
+  Buffer rays, frame_buffer;
+  bool has_scene = false, has_environment = false;
+  FrameInput frame;
+  std::optional<lighting::Response> response;
+  std::int64_t samples = 0;
+};
+
+void Renderer::Impl::upload_frame() {
+  gpu::GpuFrame gpu_frame{};
+  for (int r = 0; r < 3; ++r) {
+    const glm::dmat4& m = frame.world_from_camera;
+    gpu_frame.world_from_camera[r] = glm::vec4(m[0][r], m[1][r], m[2][r], 0.0);
+  }
+  gpu_frame.width = static_cast<std::uint32_t>(calibration.intrinsics.width);
+  gpu_frame.height = static_cast<std::uint32_t>(calibration.intrinsics.height);
+  if (calibration.lens) {
+    const ThinLens& lens = *calibration.lens;
+    gpu_frame.lens_radius = static_cast<float>(lens.focal_length_m / (2 * lens.f_number));
+    gpu_frame.focus_distance = static_cast<float>(lens.focus_distance_m);
+  }
+  gpu_frame.seed = estimation.seed;
+  gpu_frame.max_depth = static_cast<std::uint32_t>(estimation.max_depth);
+  gpu_frame.roulette_depth = static_cast<std::uint32_t>(estimation.roulette_depth);
+  gpu_frame.specular_alpha = static_cast<float>(estimation.specular_roughness);
+  scene.describe(gpu_frame);
+  upload_storage(*device, frame_buffer, std::vector{gpu_frame});
+}
+
+Renderer::Renderer(std::shared_ptr<Device> device, const set::Estimation& estimation,
+                   const ObserverCalibration& calibration)
+    : impl_(std::make_unique<Impl>(std::move(device), estimation, calibration)) {}
+Renderer::~Renderer() = default;
+
+void Renderer::set_scene(const scene::Scene& scene) {
+  impl_->scene.set_scene(scene);
+  impl_->has_scene = true;
+}
+
+void Renderer::set_environment(const lighting::EnvironmentMap& environment,
+                               set::LightSampling sampling) {
+  impl_->scene.set_environment(environment, sampling);
+  impl_->has_environment = true;
+}
+
+void Renderer::begin(const FrameInput& frame) {
+  Impl& r = *impl_;
+  if (!r.has_scene || !r.has_environment)
+    throw Error("renderer: a frame was begun before the scene and the environment were set");
+  const PinholeIntrinsics& lens = r.calibration.intrinsics;
+  if (!frame.plate.samples.empty() &&
+      (frame.plate.width != lens.width || frame.plate.height != lens.height))
+    throw Error("observer: a frame of " + std::to_string(frame.plate.width) + "x" +
+                std::to_string(frame.plate.height) + " does not fit the calibration's " +
+                std::to_string(lens.width) + "x" + std::to_string(lens.height));
+  r.frame = frame;
+  if (!r.response || r.response->bits() != frame.plate.bits)
+    r.response.emplace(r.calibration.response, frame.plate.bits);
+  r.samples = 0;
+  r.scene.place(glm::dvec3(frame.world_from_camera[3]));
+  r.upload_frame();
+
+  std::vector<const Buffer*> bindings = r.scene.bindings();
+  bindings[gpu::BINDING_RAYS] = &r.rays;
+  bindings[gpu::BINDING_FRAME] = &r.frame_buffer;
+  const bool thin_lens = r.calibration.lens && r.calibration.lens->focal_length_m > 0;
+  r.wavefront.bind(bindings, r.scene.features() | (thin_lens ? gpu::FEATURE_LENS : 0u));
+  r.wavefront.clear();
+}
+
+void Renderer::render(int samples, const std::function<bool()>& cancelled) {
+  Impl& r = *impl_;
+  const bool whole = r.wavefront.render(static_cast<std::uint32_t>(r.samples),
+                                        static_cast<std::uint32_t>(std::max(samples, 0)),
+                                        static_cast<std::uint32_t>(r.estimation.max_depth),
+                                        cancelled);
+  if (whole) {
+    r.samples += samples;
+  } else {
+    r.wavefront.clear();
+    r.samples = 0;
+  }
+}
+
+Layers Renderer::layers() const {
+  const Impl& r = *impl_;
+  const PinholeIntrinsics& lens = r.calibration.intrinsics;
+  const auto plate = plate_radiance(r.frame.plate, *r.response, r.frame.exposure);
+  return make_layers(r.wavefront.pixels(), lens.width, lens.height, std::max<std::int64_t>(r.samples, 1),
+                     plate);
+}
+
+Plate Renderer::picture() const {
+  const Impl& r = *impl_;
+  return make_picture(layers(), r.frame.plate, *r.response, r.frame.exposure);
+}
+
+Counters Renderer::counters() const {
+  const gpu::GpuControl control = impl_->wavefront.control();
+  const auto wide = [](std::uint32_t high, std::uint32_t low) {
+    return static_cast<std::uint64_t>(high) << 32 | low;
+  };
+  Counters counters;
+  counters.rays = wide(control.rays_high, control.rays_low);
+  counters.shadow_rays = wide(control.shadow_rays_high, control.shadow_rays_low);
+  counters.dropped_not_finite = control.dropped_not_finite;
+  counters.dropped_negative = control.dropped_negative;
+  return counters;
+}
+
+}  // namespace previz::render

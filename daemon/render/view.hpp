@@ -1,0 +1,17 @@
+// The observer's lens as the shaders want it: undistorted rays at pixel corners. The camera picture
+// itself is never resampled.
+#pragma once
+
+#include <glm/vec2.hpp>
+#include <vector>
+
+#include "drivers/calibration.hpp"
+
+namespace previz::render {
+
+// (width + 1) * (height + 1) entries, row-major: (x/z, y/z) of the ray through the corner (i, j),
+// which is OpenCV pixel position (i - 0.5, j - 0.5). Camera axes x right, y down, z forward.
+// Throws previz::Error naming the pixel where the distortion cannot be inverted to 0.01 px.
+std::vector<glm::vec2> corner_rays(const PinholeIntrinsics& intrinsics);
+
+}  // namespace previz::render

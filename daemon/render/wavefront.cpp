@@ -1,0 +1,247 @@
+#include "daemon/render/wavefront.hpp"
+
+#include <algorithm>
+
+#include "shaders/accumulate.spv.h"
+#include "shaders/advance.spv.h"
+#include "shaders/extend.spv.h"
+#include "shaders/generate.spv.h"
+#include "shaders/prepare_shadow.spv.h"
+#include "shaders/shade.spv.h"
+#include "shaders/shadow.spv.h"
+
+namespace previz::render {
+namespace {
+
+// Blocks of pixels in shaders/lib/path.glsl.
+constexpr std::uint32_t block_width = 8;
+constexpr std::uint32_t block_height = 4;
+
+// Slots in flight: what stays near a CPU's caches; enough to fill a GPU.
+constexpr std::uint32_t cpu_slots = 1u << 17;
+constexpr std::uint32_t gpu_slots = 1u << 20;
+
+std::uint32_t round_up(std::uint32_t value, std::uint32_t to) { return (value + to - 1) / to * to; }
+
+std::uint32_t slots_of(const gpu::GpuBatch& tile) {
+  return round_up(tile.width, block_width) * round_up(tile.height, block_height);
+}
+
+std::uint32_t groups(std::uint32_t invocations) {
+  return (invocations + gpu::WORKGROUP_SIZE - 1) / gpu::WORKGROUP_SIZE;
+}
+
+bool is_texel_buffer(std::uint32_t binding) {
+  return binding < gpu::BINDING_INSTANCES;
+}
+
+vk::raii::DescriptorSetLayout create_set_layout(
+    Device& device, std::uint32_t bindings,
+    const std::function<vk::DescriptorType(std::uint32_t)>& type) {
+  std::vector<vk::DescriptorSetLayoutBinding> entries;
+  for (std::uint32_t i = 0; i < bindings; ++i)
+    entries.emplace_back(i, type(i), 1, vk::ShaderStageFlagBits::eCompute);
+  return {device.vk(), vk::DescriptorSetLayoutCreateInfo({}, entries)};
+}
+
+}  // namespace
+
+Wavefront::Wavefront(Device& device, int width, int height)
+    : device_(device),
+      max_slots_(device.is_cpu() ? cpu_slots : gpu_slots),
+      width_(width),
+      height_(height) {
+  create_layouts();
+  create_tiles(width, height);
+  create_paths();
+  for (const Tile& tile : tiles_) write_path_set(tile);
+}
+
+void Wavefront::create_layouts() {
+  using Type = vk::DescriptorType;
+  scene_layout_ = create_set_layout(device_, gpu::SCENE_BINDINGS, [](std::uint32_t binding) {
+    return is_texel_buffer(binding) ? Type::eUniformTexelBuffer : Type::eStorageBuffer;
+  });
+  path_layout_ = create_set_layout(device_, gpu::PATH_BINDINGS,
+                                   [](std::uint32_t) { return Type::eStorageBuffer; });
+  const vk::DescriptorSetLayout layouts[] = {*scene_layout_, *path_layout_};
+  const vk::PushConstantRange batch(vk::ShaderStageFlagBits::eCompute, 0, sizeof(gpu::GpuBatch));
+  layout_ = vk::raii::PipelineLayout(device_.vk(), {{}, layouts, batch});
+}
+
+void Wavefront::create_tiles(int width, int height) {
+  const auto columns = static_cast<std::uint32_t>(width);
+  const auto rows = static_cast<std::uint32_t>(height);
+  const std::uint32_t row_slots = round_up(columns, block_width) * block_height;
+  const std::uint32_t most_rows =
+      std::max(max_slots_ / row_slots * block_height, block_height);
+  // Bands of equal height, so that none is left with a few rows.
+  const std::uint32_t bands = (rows + most_rows - 1) / most_rows;
+  const std::uint32_t band_rows = round_up((rows + bands - 1) / bands, block_height);
+  for (std::uint32_t y = 0; y < rows; y += band_rows) {
+    Tile tile;
+    tile.batch = {0, y, columns, std::min(band_rows, rows - y), 0, 0};
+    tile.pixels = create_storage_buffer(
+        device_, sizeof(gpu::GpuPixel) * tile.batch.width * tile.batch.height);
+    tiles_.push_back(std::move(tile));
+  }
+  const auto sets = static_cast<std::uint32_t>(tiles_.size());
+  const vk::DescriptorPoolSize sizes[] = {
+      {vk::DescriptorType::eUniformTexelBuffer, gpu::SCENE_BINDINGS},
+      {vk::DescriptorType::eStorageBuffer, gpu::SCENE_BINDINGS + sets * gpu::PATH_BINDINGS}};
+  descriptors_ = vk::raii::DescriptorPool(
+      device_.vk(), {vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet, sets + 1, sizes});
+  const auto allocate = [&](const vk::raii::DescriptorSetLayout& layout) {
+    const vk::DescriptorSetLayout raw = *layout;
+    return std::move(vk::raii::DescriptorSets(device_.vk(), {*descriptors_, raw}).front());
+  };
+  scene_set_ = allocate(scene_layout_);
+  for (Tile& tile : tiles_) tile.set = allocate(path_layout_);
+}
+
+void Wavefront::create_paths() {
+  for (const Tile& tile : tiles_) slots_ = std::max(slots_, slots_of(tile.batch));
+  slots_ = std::max(slots_, max_slots_ / slots_ * slots_);
+  const vk::DeviceSize paths = 2 * static_cast<vk::DeviceSize>(slots_);
+  ray_origin_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
+  ray_direction_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
+  throughput_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
+  hits_ = create_storage_buffer(device_, paths * sizeof(gpu::GpuHit));
+  queue_ = create_storage_buffer(device_, 2 * paths * sizeof(std::uint32_t));
+  shadow_rays_ = create_storage_buffer(device_, paths * sizeof(gpu::GpuShadowRay));
+  sample_mixed_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
+  sample_real_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
+  sample_aov_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
+  control_ = create_indirect_buffer(device_, sizeof(gpu::GpuControl));
+}
+
+void Wavefront::write_path_set(const Tile& tile) {
+  std::vector<const Buffer*> buffers(gpu::PATH_BINDINGS);
+  buffers[gpu::BINDING_RAY_ORIGIN] = &ray_origin_;
+  buffers[gpu::BINDING_RAY_DIRECTION] = &ray_direction_;
+  buffers[gpu::BINDING_THROUGHPUT] = &throughput_;
+  buffers[gpu::BINDING_HIT] = &hits_;
+  buffers[gpu::BINDING_QUEUE] = &queue_;
+  buffers[gpu::BINDING_SHADOW] = &shadow_rays_;
+  buffers[gpu::BINDING_SAMPLE_MIXED] = &sample_mixed_;
+  buffers[gpu::BINDING_SAMPLE_REAL] = &sample_real_;
+  buffers[gpu::BINDING_SAMPLE_AOV] = &sample_aov_;
+  buffers[gpu::BINDING_CONTROL] = &control_;
+  buffers[gpu::BINDING_PIXELS] = &tile.pixels;
+  for (std::uint32_t i = 0; i < gpu::PATH_BINDINGS; ++i) {
+    const vk::DescriptorBufferInfo info(*buffers[i]->buffer, 0, buffers[i]->size);
+    const vk::WriteDescriptorSet write(*tile.set, i, 0, vk::DescriptorType::eStorageBuffer, {},
+                                       info);
+    device_.vk().updateDescriptorSets(write, {});
+  }
+}
+
+void Wavefront::bind(const std::vector<const Buffer*>& scene, std::uint32_t features) {
+  for (std::uint32_t i = 0; i < gpu::SCENE_BINDINGS; ++i) {
+    const Buffer& buffer = *scene[i];
+    if (is_texel_buffer(i)) {
+      const vk::BufferView view = *buffer.view;
+      const vk::WriteDescriptorSet write(*scene_set_, i, 0, vk::DescriptorType::eUniformTexelBuffer,
+                                         {}, {}, view);
+      device_.vk().updateDescriptorSets(write, {});
+    } else {
+      const vk::DescriptorBufferInfo info(*buffer.buffer, 0, buffer.size);
+      const vk::WriteDescriptorSet write(*scene_set_, i, 0, vk::DescriptorType::eStorageBuffer, {},
+                                         info);
+      device_.vk().updateDescriptorSets(write, {});
+    }
+  }
+  if (!*generate_.pipeline || features != features_) create_pipelines(features);
+}
+
+void Wavefront::create_pipelines(std::uint32_t features) {
+  const std::uint32_t constants[] = {features};
+  generate_ = create_pipeline(device_, generate_spv, layout_, constants);
+  advance_ = create_pipeline(device_, advance_spv, layout_, constants);
+  extend_ = create_pipeline(device_, extend_spv, layout_, constants);
+  shade_ = create_pipeline(device_, shade_spv, layout_, constants);
+  prepare_shadow_ = create_pipeline(device_, prepare_shadow_spv, layout_, constants);
+  shadow_ = create_pipeline(device_, shadow_spv, layout_, constants);
+  accumulate_ = create_pipeline(device_, accumulate_spv, layout_, constants);
+  features_ = features;
+}
+
+void Wavefront::clear() {
+  gpu::GpuControl control{};
+  control.extend_groups[1] = control.extend_groups[2] = 1;
+  control.shadow_groups[1] = control.shadow_groups[2] = 1;
+  upload_bytes(device_, control_, std::as_bytes(std::span(&control, 1)));
+  device_.submit([&](const vk::raii::CommandBuffer& commands) {
+    for (const Tile& tile : tiles_) commands.fillBuffer(*tile.pixels.buffer, 0, VK_WHOLE_SIZE, 0);
+    barrier(commands);
+  });
+}
+
+void Wavefront::record_batch(const vk::raii::CommandBuffer& commands, const Tile& tile,
+                             const gpu::GpuBatch& batch, std::uint32_t max_depth) const {
+  const auto use = [&](const Pipeline& pipeline) {
+    commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipeline.pipeline);
+  };
+  const vk::DescriptorSet sets[] = {*scene_set_, *tile.set};
+  commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *layout_, 0, sets, {});
+  commands.pushConstants<gpu::GpuBatch>(*layout_, vk::ShaderStageFlagBits::eCompute, 0, batch);
+  use(generate_);
+  commands.dispatch(groups(slots_of(batch) * batch.samples), 1, 1);
+  barrier(commands);
+  // One segment a vertex, one more to meet light after the last vertex, and one because a fork
+  // goes on a round later than the path it parted from.
+  for (std::uint32_t segment = 0; segment < max_depth + 2; ++segment) {
+    use(advance_);
+    commands.dispatch(1, 1, 1);
+    barrier(commands);
+    use(extend_);
+    commands.dispatchIndirect(*control_.buffer, offsetof(gpu::GpuControl, extend_groups));
+    barrier(commands);
+    use(shade_);
+    commands.dispatchIndirect(*control_.buffer, offsetof(gpu::GpuControl, extend_groups));
+    barrier(commands);
+    use(prepare_shadow_);
+    commands.dispatch(1, 1, 1);
+    barrier(commands);
+    use(shadow_);
+    commands.dispatchIndirect(*control_.buffer, offsetof(gpu::GpuControl, shadow_groups));
+    barrier(commands);
+  }
+  use(accumulate_);
+  commands.dispatch(groups(batch.width * batch.height), 1, 1);
+  barrier(commands);
+}
+
+bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::uint32_t max_depth,
+                       const std::function<bool()>& cancelled) {
+  for (const Tile& tile : tiles_) {
+    const std::uint32_t at_once = std::max(slots_ / slots_of(tile.batch), 1u);
+    for (std::uint32_t done = 0; done < samples; done += at_once) {
+      if (cancelled && cancelled()) return false;
+      gpu::GpuBatch batch = tile.batch;
+      batch.first_sample = first_sample + done;
+      batch.samples = std::min(at_once, samples - done);
+      device_.submit([&](const vk::raii::CommandBuffer& commands) {
+        record_batch(commands, tile, batch, max_depth);
+      });
+    }
+  }
+  return true;
+}
+
+std::vector<gpu::GpuPixel> Wavefront::pixels() const {
+  std::vector<gpu::GpuPixel> result;
+  result.reserve(static_cast<std::size_t>(width_) * height_);
+  for (const Tile& tile : tiles_) {
+    const auto part = download<gpu::GpuPixel>(
+        device_, tile.pixels, static_cast<std::size_t>(tile.batch.width) * tile.batch.height);
+    result.insert(result.end(), part.begin(), part.end());
+  }
+  return result;
+}
+
+gpu::GpuControl Wavefront::control() const {
+  return download<gpu::GpuControl>(device_, control_, 1).front();
+}
+
+}  // namespace previz::render

@@ -1,0 +1,61 @@
+// The path tracer's passes: generate, then extend, shade and shadow once a segment, then accumulate.
+// Paths are kept in compacted queues; a picture is worked on in tiles of whole rows.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "daemon/render/device.hpp"
+#include "shaders/lib/render_shared.h"
+
+namespace previz::render {
+
+class Wavefront {
+ public:
+  Wavefront(Device& device, int width, int height);
+
+  // Binds the scene's buffers (set 0, by binding) and makes sure that the pipelines are those for
+  // `features`. Must be called whenever a buffer was recreated.
+  void bind(const std::vector<const Buffer*>& scene, std::uint32_t features);
+  // Forgets all samples.
+  void clear();
+  // Adds samples first_sample .. first_sample + samples - 1 to every pixel. Returns false where
+  // `cancelled` stopped it between two batches: the sums are then uneven and must be cleared.
+  bool render(std::uint32_t first_sample, std::uint32_t samples, std::uint32_t max_depth,
+              const std::function<bool()>& cancelled);
+
+  std::vector<gpu::GpuPixel> pixels() const;  // row-major
+  gpu::GpuControl control() const;            // counters since the last clear
+
+ private:
+  struct Tile {
+    gpu::GpuBatch batch;  // its rectangle
+    Buffer pixels;
+    vk::raii::DescriptorSet set{nullptr};
+  };
+
+  void create_layouts();
+  void create_tiles(int width, int height);
+  void create_paths();
+  void create_pipelines(std::uint32_t features);
+  void write_path_set(const Tile& tile);
+  void record_batch(const vk::raii::CommandBuffer& commands, const Tile& tile,
+                    const gpu::GpuBatch& batch, std::uint32_t max_depth) const;
+
+  Device& device_;
+  std::uint32_t max_slots_;
+  std::uint32_t slots_ = 0;  // allocated
+  int width_, height_;
+  vk::raii::DescriptorSetLayout scene_layout_{nullptr}, path_layout_{nullptr};
+  vk::raii::PipelineLayout layout_{nullptr};
+  vk::raii::DescriptorPool descriptors_{nullptr};
+  vk::raii::DescriptorSet scene_set_{nullptr};
+  std::vector<Tile> tiles_;
+  std::uint32_t features_ = 0;
+  Pipeline generate_, advance_, extend_, shade_, prepare_shadow_, shadow_, accumulate_;
+  Buffer ray_origin_, ray_direction_, throughput_, hits_, queue_, shadow_rays_, sample_mixed_,
+      sample_real_, sample_aov_, control_;
+};
+
+}  // namespace previz::render

@@ -1,0 +1,54 @@
+// Adds the batch's samples to their pixels, in the order of the samples, as two-float sums (P4).
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shaders/lib/path.glsl"
+
+// high + low += x, exactly up to the rounding of low (Knuth's TwoSum, then renormalised).
+// precise: no reassociation may touch it.
+void add_exactly(inout vec4 high, inout vec4 low, vec4 x) {
+  precise const vec4 sum = high + x;
+  precise const vec4 part = sum - high;
+  precise const vec4 error = (high - (sum - part)) + (x - part);
+  precise const vec4 rest = low + error;
+  precise const vec4 new_high = sum + rest;
+  precise const vec4 new_low = rest - (new_high - sum);
+  high = new_high;
+  low = new_low;
+}
+
+bool is_finite(vec3 v) {
+  return !any(isnan(v)) && !any(isinf(v));
+}
+
+// What cannot be is counted, and the sample is then black in both worlds.
+void reject_impossible(inout vec4 mixed, inout vec4 real) {
+  const bool finite = is_finite(mixed.rgb) && is_finite(real.rgb);
+  const bool negative = any(lessThan(mixed.rgb, vec3(0.0))) || any(lessThan(real.rgb, vec3(0.0)));
+  if (finite && !negative) return;
+  if (!finite) atomicAdd(control.dropped_not_finite, 1u);
+  else atomicAdd(control.dropped_negative, 1u);
+  mixed.rgb = vec3(0.0);
+  real.rgb = vec3(0.0);
+}
+
+void main() {
+  if (gl_GlobalInvocationID.x >= batch.width * batch.height) return;
+  const uvec2 in_tile = uvec2(gl_GlobalInvocationID.x % batch.width, gl_GlobalInvocationID.x / batch.width);
+  GpuPixel sums = pixels[gl_GlobalInvocationID.x];
+  for (uint s = 0u; s < batch.samples; ++s) {
+    const uint slot = s * tile_slots() + pixel_slot(in_tile);
+    vec4 mixed = sample_mixed[slot];
+    vec4 real = sample_real[slot];
+    const vec4 aov = sample_aov[slot];
+    reject_impossible(mixed, real);
+    const vec3 diff = mixed.rgb - real.rgb;
+    add_exactly(sums.mixed_high, sums.mixed_low, mixed);
+    add_exactly(sums.diff_high, sums.diff_low, vec4(diff, aov.w));
+    sums.normal += vec4(aov.xyz, aov.w > 0.0 ? 1.0 : 0.0);
+    add_exactly(sums.square_mixed_high, sums.square_mixed_low, vec4(mixed.rgb * mixed.rgb, 0.0));
+    add_exactly(sums.square_diff_high, sums.square_diff_low, vec4(diff * diff, 0.0));
+  }
+  pixels[gl_GlobalInvocationID.x] = sums;
+}

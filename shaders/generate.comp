@@ -1,0 +1,45 @@
+// Camera rays: one path a slot, through a sub-pixel point and a point of the lens.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shaders/lib/append.glsl"
+#include "shaders/lib/bsdf.glsl"
+#include "shaders/lib/sampler.glsl"
+
+layout(set = 0, binding = BINDING_RAYS) uniform textureBuffer corner_rays;
+
+// x/z and y/z of the undistorted ray through a point of the picture; pixel (0, 0) covers [0, 1]^2.
+vec2 calibrated_ray(uvec2 pixel, vec2 inside) {
+  const int stride = int(frame.width) + 1;
+  const int corner = int(pixel.y) * stride + int(pixel.x);
+  const vec2 top = mix(texelFetch(corner_rays, corner).xy, texelFetch(corner_rays, corner + 1).xy, inside.x);
+  const vec2 bottom = mix(texelFetch(corner_rays, corner + stride).xy,
+                          texelFetch(corner_rays, corner + stride + 1).xy, inside.x);
+  return mix(top, bottom, inside.y);
+}
+
+void main() {
+  const uint slot = gl_GlobalInvocationID.x;
+  const uvec2 in_tile = slot_pixel(slot);
+  const bool valid = slot < tile_slots() * batch.samples &&
+                     all(lessThan(in_tile, uvec2(batch.width, batch.height)));
+  if (valid) {
+    const uvec2 pixel = uvec2(batch.x, batch.y) + in_tile;
+    const Sampler random = make_sampler(frame.seed, pixel, slot_sample(slot));
+    vec3 target = vec3(calibrated_ray(pixel, sample_2d(random, PAIR_PIXEL)), 1.0);
+    vec3 origin = vec3(0.0);
+    if (has_feature(FEATURE_LENS)) {
+      origin.xy = frame.lens_radius * sample_disc(sample_2d(random, PAIR_LENS));
+      target = target * frame.focus_distance - origin;
+    }
+    const uint path = 2u * slot;
+    ray_origin[path] = vec4(transform_vector(frame.world_from_camera, origin), 0.0);
+    ray_direction[path] = vec4(normalize(transform_vector(frame.world_from_camera, target)), 0.0);
+    path_throughput[path] = vec4(1.0, 1.0, 1.0, uintBitsToFloat(WORLD_BOTH));
+    sample_mixed[slot] = vec4(0.0);
+    sample_real[slot] = vec4(0.0);
+    sample_aov[slot] = vec4(0.0);
+  }
+  append_next(valid, 2u * slot);
+}

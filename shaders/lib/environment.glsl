@@ -1,0 +1,65 @@
+// The environment: radiance from a direction, and directions by importance (hierarchical warping
+// down the quadtree of densities; Clarberg et al. 2005, "Wavelet Importance Sampling").
+#ifndef PREVIZ_ENVIRONMENT_GLSL
+#define PREVIZ_ENVIRONMENT_GLSL
+
+#include "shaders/lib/octahedral.h"
+#include "shaders/lib/scene.glsl"
+
+layout(set = 0, binding = BINDING_ENVIRONMENT) uniform textureBuffer environment;
+layout(set = 0, binding = BINDING_IMPORTANCE) uniform textureBuffer importance;
+
+// Bilinear between texel centres; the border carries the wrap.
+vec3 environment_radiance(vec3 direction) {
+  const int size = int(frame.environment_size);
+  const int stride = size + 2;
+  const vec2 at = (octahedral_point(direction) * 0.5 + 0.5) * float(size) + 0.5;
+  const vec2 low = clamp(floor(at), vec2(0.0), vec2(float(size)));
+  const vec2 f = at - low;
+  const int first = int(low.y) * stride + int(low.x);
+  const vec3 top = mix(texelFetch(environment, first).rgb, texelFetch(environment, first + 1).rgb, f.x);
+  const vec3 bottom = mix(texelFetch(environment, first + stride).rgb,
+                          texelFetch(environment, first + stride + 1).rgb, f.x);
+  return mix(top, bottom, f.y);
+}
+
+int importance_texel(uint level, uvec2 at) {
+  // (4^level - 1) / 3 texels stand before this level.
+  return int(((1u << (2u * level)) - 1u) / 3u + (at.y << level) + at.x);
+}
+
+// Density of environment_sample at a direction, per steradian.
+float environment_pdf(vec3 direction) {
+  if (frame.environment_levels == 0u) return 1.0 / (4.0 * PI);
+  const float size = float(frame.environment_size);
+  const vec2 at = (octahedral_point(direction) * 0.5 + 0.5) * size;
+  const uvec2 texel = uvec2(clamp(at, vec2(0.0), vec2(size - 1.0)));
+  const vec4 densities =
+      texelFetch(importance, importance_texel(frame.environment_levels - 1u, texel >> 1));
+  return densities[(texel.x & 1u) + 2u * (texel.y & 1u)] / (4.0 * PI);
+}
+
+// Picks the lower (false) or upper (true) half with the given weights and makes u fresh again.
+bool pick_half(float lower, float upper, inout float u) {
+  const float p = lower / (lower + upper);
+  const bool second = u >= p;
+  u = second ? (u - p) / (1.0 - p) : u / p;
+  u = min(u, 0.99999994);
+  return second;
+}
+
+vec3 environment_sample(vec2 u, out float pdf) {
+  uvec2 texel = uvec2(0u);
+  float density = 1.0;
+  for (uint level = 0u; level < frame.environment_levels; ++level) {
+    const vec4 c = texelFetch(importance, importance_texel(level, texel));
+    const bool right = pick_half(c.x + c.z, c.y + c.w, u.x);
+    const bool down = pick_half(right ? c.y : c.x, right ? c.w : c.z, u.y);
+    texel = texel * 2u + uvec2(right, down);
+    density = c[uint(right) + 2u * uint(down)];
+  }
+  pdf = density / (4.0 * PI);
+  return octahedral_direction((vec2(texel) + u) / float(frame.environment_size) * 2.0 - 1.0);
+}
+
+#endif

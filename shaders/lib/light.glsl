@@ -1,0 +1,163 @@
+// Lights with a place or a direction of their own: set lights and emissive triangles.
+#ifndef PREVIZ_LIGHT_GLSL
+#define PREVIZ_LIGHT_GLSL
+
+#include "shaders/lib/bsdf.glsl"
+
+layout(scalar, set = 0, binding = BINDING_LIGHTS) readonly buffer Lights { GpuLight lights[]; };
+
+struct LightSample {
+  vec3 direction;  // unit, from the point towards the light
+  float t_max;     // a blocker must be nearer than this
+  vec3 radiance;   // Le, or for a delta light the irradiance it brings on a facing plane
+  float pdf;       // per steradian; 0: a delta light
+  vec2 gain;
+};
+
+// Keeps the end of a shadow ray clear of the light's own surface.
+const float SHADOW_END = 0.9999;
+
+uint pick_light(float u) {
+  uint low = 0u;
+  uint high = frame.light_count - 1u;
+  while (low < high) {
+    const uint middle = (low + high) >> 1;
+    if (u < lights[middle].cdf) high = middle;
+    else low = middle + 1u;
+  }
+  return low;
+}
+
+// 1 - cos of the half angle under which a sphere is seen, without cancellation.
+float sphere_cap(float radius, float distance_squared) {
+  const float sin2 = radius * radius / distance_squared;
+  return sin2 / (1.0 + sqrt(max(0.0, 1.0 - sin2)));
+}
+
+vec3 sample_cone(vec3 axis, float cap, vec2 u) {
+  const float z = 1.0 - u.x * cap;
+  const float sin_theta = sqrt(max(0.0, (1.0 - z) * (1.0 + z)));
+  const float phi = 2.0 * PI * u.y;
+  return make_frame(axis) * vec3(sin_theta * cos(phi), sin_theta * sin(phi), z);
+}
+
+// Nearest crossing of a unit ray with a sphere from outside; < 0: none.
+float intersect_sphere(vec3 origin, vec3 direction, vec3 center, float radius) {
+  const vec3 to_center = center - origin;
+  const float along = dot(to_center, direction);
+  const vec3 off = to_center - along * direction;
+  const float under = radius * radius - dot(off, off);
+  if (under < 0.0 || dot(to_center, to_center) < radius * radius) return -1.0;
+  return along - sqrt(under);
+}
+
+float spot_falloff(GpuLight light, float cos_angle) {
+  if (light.type != LIGHT_SPOT) return 1.0;
+  const float x = clamp((cos_angle - light.cos_outer) / max(light.cos_inner - light.cos_outer, 1e-6),
+                        0.0, 1.0);
+  return x * x * (3.0 - 2.0 * x);
+}
+
+vec3 triangle_emission(GpuLight light, vec2 b) {
+  if (!has_feature(FEATURE_TEXTURES) || light.emission_texture == NO_INDEX) return light.emission;
+  const vec2 uv = light.uv0 * (1.0 - b.x - b.y) + light.uv1 * b.x + light.uv2 * b.y;
+  return light.emission * sample_texture(light.emission_texture, uv).rgb;
+}
+
+bool sample_area(GpuLight light, vec3 point, vec3 on_light, vec3 normal, float area,
+                 bool two_sided, inout LightSample result) {
+  const vec3 to_light = on_light - point;
+  const float distance_squared = dot(to_light, to_light);
+  if (distance_squared <= 0.0) return false;
+  const float distance = sqrt(distance_squared);
+  result.direction = to_light / distance;
+  result.t_max = distance * SHADOW_END;
+  float cos_light = -dot(result.direction, normal);
+  if (two_sided) cos_light = abs(cos_light);
+  if (cos_light <= 0.0 || area <= 0.0) return false;
+  result.pdf = distance_squared / (area * cos_light);
+  return true;
+}
+
+bool sample_light(GpuLight light, vec3 point, vec2 u, out LightSample result) {
+  result = LightSample(vec3(0.0), 3.4e38, light.emission, 0.0, light.gain);
+  switch (light.type) {
+    case LIGHT_POINT:
+    case LIGHT_SPOT: {
+      const vec3 to_light = light.position - point;
+      const float distance_squared = dot(to_light, to_light);
+      if (distance_squared <= 0.0) return false;
+      result.t_max = sqrt(distance_squared) * SHADOW_END;
+      result.direction = to_light / sqrt(distance_squared);
+      result.radiance *= spot_falloff(light, -dot(result.direction, light.direction)) / distance_squared;
+      return true;
+    }
+    case LIGHT_DIRECTIONAL:
+      result.direction = -light.direction;
+      if (light.cone_sr > 0.0) {
+        result.direction = sample_cone(-light.direction, light.cone_sr / (2.0 * PI), u);
+        result.pdf = 1.0 / light.cone_sr;
+      }
+      return true;
+    case LIGHT_SPHERE: {
+      const vec3 to_center = light.position - point;
+      const float distance_squared = dot(to_center, to_center);
+      if (distance_squared <= light.radius * light.radius) return false;  // it emits outwards
+      const float cap = sphere_cap(light.radius, distance_squared);
+      result.direction = sample_cone(to_center / sqrt(distance_squared), cap, u);
+      const float t = intersect_sphere(point, result.direction, light.position, light.radius);
+      // A grazing sample may miss by rounding; it then ends where the tangent touches.
+      result.t_max = (t > 0.0 ? t : sqrt(distance_squared - light.radius * light.radius)) * SHADOW_END;
+      result.pdf = 1.0 / (2.0 * PI * cap);
+      return cap > 0.0;
+    }
+    case LIGHT_RECTANGLE:
+      return sample_area(light, point,
+                         light.position + (u.x - 0.5) * light.edge_u + (u.y - 0.5) * light.edge_v,
+                         light.direction, length(light.edge_u) * length(light.edge_v), false, result);
+    default: {  // LIGHT_TRIANGLE
+      const float root = sqrt(u.x);
+      const vec2 b = vec2(1.0 - root, u.y * root);
+      result.radiance = triangle_emission(light, b);
+      return sample_area(light, point, light.position + b.x * light.edge_u + b.y * light.edge_v,
+                         light.direction, 0.5 * length(cross(light.edge_u, light.edge_v)), true, result);
+    }
+  }
+}
+
+// Density with which sample_light finds this point of an emissive triangle, per steradian.
+float triangle_pdf(GpuLight light, vec3 direction, float t) {
+  const float area = 0.5 * length(cross(light.edge_u, light.edge_v));
+  return t * t / max(area * abs(dot(direction, light.direction)), 1e-30);
+}
+
+// A ray meets a light that is not a mesh: t of the crossing (< 0: none) and the density with which
+// sample_light would have chosen the direction. Directional discs are met at infinity.
+float meet_light(GpuLight light, vec3 origin, vec3 direction, out float pdf) {
+  pdf = 0.0;
+  if (light.type == LIGHT_DIRECTIONAL) {
+    if (light.cone_sr <= 0.0 || dot(-direction, light.direction) < light.cos_inner) return -1.0;
+    pdf = 1.0 / light.cone_sr;
+    return 3.3e38;
+  }
+  if (light.type == LIGHT_SPHERE) {
+    const float t = intersect_sphere(origin, direction, light.position, light.radius);
+    if (t <= 0.0) return -1.0;
+    const vec3 to_center = light.position - origin;
+    pdf = 1.0 / (2.0 * PI * sphere_cap(light.radius, dot(to_center, to_center)));
+    return t;
+  }
+  const float cos_light = -dot(direction, light.direction);  // LIGHT_RECTANGLE
+  if (cos_light <= 0.0) return -1.0;
+  const vec3 to_plane = light.position - origin;
+  const float t = -dot(to_plane, light.direction) / cos_light;
+  if (t <= 0.0) return -1.0;
+  const vec3 off = t * direction - to_plane;
+  const float a = dot(off, light.edge_u) / dot(light.edge_u, light.edge_u);
+  const float b = dot(off, light.edge_v) / dot(light.edge_v, light.edge_v);
+  if (abs(a) > 0.5 || abs(b) > 0.5) return -1.0;
+  pdf = t * t / (length(light.edge_u) * length(light.edge_v) * cos_light);
+  return t;
+}
+
+#endif

@@ -1,0 +1,207 @@
+// Structures of the renderer that cross between C++ and the shaders, with their layout (scalar).
+// What tracing needs is in shared.h.
+#ifndef PREVIZ_RENDER_SHARED_H
+#define PREVIZ_RENDER_SHARED_H
+
+#include "shaders/lib/shared.h"
+
+#ifdef __cplusplus
+#include <cstddef>
+namespace previz::gpu {
+#endif
+
+// Set 0, the scene. Texel buffers come first; BINDING_BVH (0) is shared.h's.
+//   VERTICES    RGBA32F, 2 texels a vertex: position, u; normal, v (object space)
+//   TRIANGLES   RGBA32UI, 1 texel a triangle: three indices into VERTICES
+//   TEXELS      RG32UI, all textures one after the other: four halves a texel, linear
+//   ENVIRONMENT RGBA32F, (size + 2)^2: the map with a border wrapped by the octahedral rule
+//   IMPORTANCE  RGBA32F, quadtree of sampling density: level l has 4^l texels, each the density
+//               of its four children; mean density 1 on every level
+PREVIZ_CONST uint BINDING_VERTICES = 1u;
+PREVIZ_CONST uint BINDING_TRIANGLES = 2u;
+PREVIZ_CONST uint BINDING_TEXELS = 3u;
+PREVIZ_CONST uint BINDING_ENVIRONMENT = 4u;
+PREVIZ_CONST uint BINDING_IMPORTANCE = 5u;
+PREVIZ_CONST uint BINDING_RAYS = 6u;        // RG32F, (width + 1)(height + 1): x/z, y/z of pixel corners
+PREVIZ_CONST uint BINDING_INSTANCES = 7u;   // GpuInstance[]
+PREVIZ_CONST uint BINDING_MATERIALS = 8u;  // GpuMaterial[]
+PREVIZ_CONST uint BINDING_TEXTURES = 9u;   // GpuTexture[]
+PREVIZ_CONST uint BINDING_LIGHTS = 10u;     // GpuLight[]
+PREVIZ_CONST uint BINDING_FRAME = 11u;      // GpuFrame
+PREVIZ_CONST uint SCENE_BINDINGS = 12u;
+
+// Set 1, paths in flight and what they bring back. A slot is one sample of one pixel; it has two
+// paths, because it can fork once: path 2 slot, and path 2 slot + 1 for the world that parted.
+PREVIZ_CONST uint BINDING_RAY_ORIGIN = 0u;     // vec4[path]: origin, t_min
+PREVIZ_CONST uint BINDING_RAY_DIRECTION = 1u;  // vec4[path]: unit direction, pdf (0: no MIS)
+PREVIZ_CONST uint BINDING_THROUGHPUT = 2u;     // vec4[path]: throughput, bits of PATH_*
+PREVIZ_CONST uint BINDING_HIT = 3u;            // GpuHit[path]
+PREVIZ_CONST uint BINDING_QUEUE = 4u;          // uint[2][paths]: paths to extend, ping-pong
+PREVIZ_CONST uint BINDING_SHADOW = 5u;         // GpuShadowRay[paths]
+PREVIZ_CONST uint BINDING_SAMPLE_MIXED = 6u;   // vec4[slot]: Lm, M
+PREVIZ_CONST uint BINDING_SAMPLE_REAL = 7u;    // vec4[slot]: Lr, unused
+PREVIZ_CONST uint BINDING_SAMPLE_AOV = 8u;     // vec4[slot]: normal, depth (0: no hit)
+PREVIZ_CONST uint BINDING_CONTROL = 9u;        // GpuControl
+PREVIZ_CONST uint BINDING_PIXELS = 10u;        // GpuPixel[width * height]
+PREVIZ_CONST uint PATH_BINDINGS = 11u;
+
+PREVIZ_CONST uint WORKGROUP_SIZE = 64u;
+PREVIZ_CONST uint NO_INDEX = 0xffffffffu;
+PREVIZ_CONST uint MAX_DEPTH = 64u;
+
+// What the scene requires; specialisation constant 0. A feature left out changes no pixel.
+PREVIZ_CONST uint FEATURE_GLOSSY = 1u;        // any specular reflection of opaque surfaces
+PREVIZ_CONST uint FEATURE_TRANSMISSION = 2u;
+PREVIZ_CONST uint FEATURE_TEXTURES = 4u;
+PREVIZ_CONST uint FEATURE_LIGHTS = 8u;        // set lights or emissive triangles
+PREVIZ_CONST uint FEATURE_VISIBLE_LIGHTS = 16u;  // lights with an extent that rays can see
+PREVIZ_CONST uint FEATURE_LENS = 32u;
+PREVIZ_CONST uint FEATURE_FORKS = 64u;        // any object present in one world only
+PREVIZ_CONST uint FEATURE_ENVIRONMENT_SAMPLING = 128u;  // next-event estimation of the environment
+
+// Bits of a path's state.
+PREVIZ_CONST uint PATH_WORLDS_MASK = 3u;      // WORLD_*
+PREVIZ_CONST uint PATH_DEPTH_SHIFT = 8u;      // number of surface vertices so far
+PREVIZ_CONST uint PATH_RESUMED = 4u;          // a fork that goes on along the ray that parted
+
+struct GpuHit {
+  float t;  // < 0: nothing hit
+  vec2 barycentrics;
+  uint instance;
+  uint primitive;
+};
+
+struct GpuShadowRay {
+  vec3 origin;
+  float t_max;
+  vec3 direction;
+  uint slot_and_worlds;  // slot << 2 | WORLD_*
+  vec3 contribution;     // throughput * f * cos * Le / pdf * MIS weight
+  vec2 gain;             // emission gain in the (mixed, real) world
+};
+
+// What one pixel has gathered: two-float sums (value = high + low), so that 1e7 samples stay exact.
+struct GpuPixel {
+  vec4 mixed_high;  // Lm, M
+  vec4 mixed_low;
+  vec4 diff_high;   // Lm - Lr, depth
+  vec4 diff_low;
+  vec4 normal;      // sum of normals, number of samples that hit something
+  vec4 square_mixed_high;  // sums of squares, for the variance; w unused
+  vec4 square_mixed_low;
+  vec4 square_diff_high;
+  vec4 square_diff_low;
+};
+
+struct GpuControl {
+  uint extend_groups[4];  // indirect dispatch arguments (x, y, z), padding
+  uint shadow_groups[4];
+  uint active_count;      // paths in the queue being worked on
+  uint next_count;        // paths appended for the next segment
+  uint shadow_count;
+  uint queue_side;        // which half of QUEUE is active
+  uint rays_low, rays_high;
+  uint shadow_rays_low, shadow_rays_high;
+  uint dropped_not_finite;
+  uint dropped_negative;
+};
+
+struct GpuInstance {
+  vec4 world_from_object[3];  // rows; camera-relative world
+  vec4 object_from_world[3];
+  uint material;
+  uint first_triangle;  // in TRIANGLES
+  uint first_light;     // of its emissive triangles; NO_INDEX: emits nothing
+  uint presence;
+  float mirrored;       // -1 where the transform turns orientation around, else 1
+};
+
+struct GpuMaterial {
+  vec3 base_color;
+  float metallic;
+  vec3 emission;
+  float roughness;
+  float specular;
+  float ior;
+  float transmission;
+  uint thin_walled;
+  uint base_color_texture;  // NO_INDEX: none
+  uint metallic_roughness_texture;
+  uint emission_texture;
+};
+
+PREVIZ_CONST uint TEXTURE_REPEAT = 0u;
+PREVIZ_CONST uint TEXTURE_CLAMP = 1u;
+PREVIZ_CONST uint TEXTURE_MIRROR = 2u;
+
+struct GpuTexture {
+  uint first_texel;
+  uint width, height;
+  uint wrap_u, wrap_v;
+  uint nearest;
+};
+
+PREVIZ_CONST uint LIGHT_POINT = 0u;
+PREVIZ_CONST uint LIGHT_SPOT = 1u;
+PREVIZ_CONST uint LIGHT_DIRECTIONAL = 2u;
+PREVIZ_CONST uint LIGHT_RECTANGLE = 3u;
+PREVIZ_CONST uint LIGHT_SPHERE = 4u;
+PREVIZ_CONST uint LIGHT_TRIANGLE = 5u;
+
+// Camera-relative world space.
+struct GpuLight {
+  vec3 position;   // point, spot, sphere centre, rectangle centre, triangle's first vertex
+  uint type;
+  vec3 direction;  // the way light travels; triangle: unit normal
+  float radius;    // sphere
+  vec3 edge_u;     // rectangle: whole width; triangle: v1 - v0
+  float cos_inner; // spot; directional: cosine of the angular radius
+  vec3 edge_v;     // rectangle: whole height; triangle: v2 - v0
+  float cos_outer; // spot
+  vec3 emission;   // intensity, irradiance (directional delta) or radiance
+  float cone_sr;   // directional: solid angle of its disc, 0 for a delta light
+  vec2 gain;       // (mixed, real)
+  float selection; // probability that a light sample picks this light
+  float cdf;       // sum of selection up to and including this light
+  vec2 uv0, uv1, uv2;  // triangle: texture coordinates
+  uint emission_texture;
+};
+
+struct GpuFrame {
+  vec4 world_from_camera[3];  // rows of the rotation; the camera is the origin
+  uint width, height;
+  float lens_radius;          // metres; 0: pinhole
+  float focus_distance;       // metres along the axis
+  uint seed;
+  uint max_depth;
+  uint roulette_depth;
+  float specular_alpha;       // alpha at or below which a lobe is a Dirac delta
+  uint environment_size;
+  uint environment_levels;    // of IMPORTANCE
+  float environment_selection;  // probability that a light sample picks the environment
+  uint light_count;
+  uint visible_light_count;   // the first lights, those with an extent that are not triangles
+};
+
+// Push constants: the part of the picture and the samples of this batch.
+struct GpuBatch {
+  uint x, y, width, height;   // tile
+  uint first_sample, samples;
+};
+
+#ifdef __cplusplus
+static_assert(sizeof(GpuHit) == 20);
+static_assert(sizeof(GpuShadowRay) == 52);
+static_assert(sizeof(GpuPixel) == 144);
+static_assert(sizeof(GpuControl) == 72);
+static_assert(sizeof(GpuInstance) == 116);
+static_assert(sizeof(GpuMaterial) == 60);
+static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
+static_assert(sizeof(GpuTexture) == 24);
+static_assert(sizeof(GpuLight) == 124);
+static_assert(offsetof(GpuLight, uv0) == 96);
+static_assert(sizeof(GpuFrame) == 100);
+static_assert(sizeof(GpuBatch) == 24);
+}  // namespace previz::gpu
+#endif
+#endif

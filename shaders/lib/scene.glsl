@@ -1,0 +1,173 @@
+// The scene as the shaders see it: set 0's buffers, and a hit made into a surface.
+#ifndef PREVIZ_SCENE_GLSL
+#define PREVIZ_SCENE_GLSL
+
+#include "shaders/lib/render_shared.h"
+
+layout(constant_id = 0) const uint FEATURES = 0xffffffffu;
+bool has_feature(uint feature) { return (FEATURES & feature) != 0u; }
+
+layout(set = 0, binding = BINDING_VERTICES) uniform textureBuffer vertices;
+layout(set = 0, binding = BINDING_TRIANGLES) uniform utextureBuffer triangles;
+layout(set = 0, binding = BINDING_TEXELS) uniform utextureBuffer texels;
+layout(scalar, set = 0, binding = BINDING_INSTANCES) readonly buffer Instances {
+  GpuInstance instances[];
+};
+layout(scalar, set = 0, binding = BINDING_MATERIALS) readonly buffer Materials {
+  GpuMaterial materials[];
+};
+layout(scalar, set = 0, binding = BINDING_TEXTURES) readonly buffer Textures {
+  GpuTexture textures[];
+};
+layout(scalar, set = 0, binding = BINDING_FRAME) readonly buffer Frame { GpuFrame frame; };
+
+const float PI = 3.14159265358979;
+
+// A point of a surface, seen from `wo`. Normals are turned towards the viewer's side.
+struct Surface {
+  vec3 position;
+  float error;            // bound on the position's error along the geometric normal, metres
+  vec3 geometric_normal;  // unit, dot(geometric_normal, wo) >= 0
+  vec3 normal;            // unit, interpolated, on the geometric normal's side
+  vec3 wo;                // unit, towards where the ray came from
+  bool entering;          // the ray came from outside (the side of counter-clockwise winding)
+  vec3 base_color;
+  float metallic;
+  float alpha;            // GGX width, roughness^2
+  float specular;
+  float ior;
+  float transmission;
+  bool thin_walled;
+  vec3 emission;
+};
+
+vec4 fetch_texel(GpuTexture t, ivec2 at) {
+  const uvec2 bits = texelFetch(texels, int(t.first_texel) + at.y * int(t.width) + at.x).xy;
+  return vec4(unpackHalf2x16(bits.x), unpackHalf2x16(bits.y));
+}
+
+int wrap_texel(int i, int size, uint mode) {
+  if (mode == TEXTURE_CLAMP) return clamp(i, 0, size - 1);
+  const int period = mode == TEXTURE_MIRROR ? 2 * size : size;
+  i = i - period * int(floor(float(i) / float(period)));
+  i = clamp(i, 0, period - 1);  // float division may be one off far out
+  return i < size ? i : period - 1 - i;
+}
+
+vec4 sample_texture(uint index, vec2 uv) {
+  const GpuTexture t = textures[index];
+  const ivec2 size = ivec2(t.width, t.height);
+  // Beyond this a float no longer tells texels apart; it also keeps NaN out of the addressing.
+  uv = clamp(uv, vec2(-65536.0), vec2(65536.0));
+  const vec2 at = uv * vec2(size);
+  if (t.nearest != 0u) {
+    const ivec2 i = ivec2(floor(at));
+    return fetch_texel(t, ivec2(wrap_texel(i.x, size.x, t.wrap_u), wrap_texel(i.y, size.y, t.wrap_v)));
+  }
+  const vec2 low = floor(at - 0.5);
+  const vec2 f = at - 0.5 - low;
+  const int x0 = wrap_texel(int(low.x), size.x, t.wrap_u);
+  const int x1 = wrap_texel(int(low.x) + 1, size.x, t.wrap_u);
+  const int y0 = wrap_texel(int(low.y), size.y, t.wrap_v);
+  const int y1 = wrap_texel(int(low.y) + 1, size.y, t.wrap_v);
+  return mix(mix(fetch_texel(t, ivec2(x0, y0)), fetch_texel(t, ivec2(x1, y0)), f.x),
+             mix(fetch_texel(t, ivec2(x0, y1)), fetch_texel(t, ivec2(x1, y1)), f.x), f.y);
+}
+
+vec3 transform_point(vec4 rows[3], vec3 p) {
+  return vec3(dot(rows[0].xyz, p) + rows[0].w, dot(rows[1].xyz, p) + rows[1].w,
+              dot(rows[2].xyz, p) + rows[2].w);
+}
+vec3 transform_vector(vec4 rows[3], vec3 v) {
+  return vec3(dot(rows[0].xyz, v), dot(rows[1].xyz, v), dot(rows[2].xyz, v));
+}
+// |rows| applied to non-negative v: a bound on transform_vector's summands.
+vec3 transform_bound(vec4 rows[3], vec3 v) {
+  return vec3(dot(abs(rows[0].xyz), v), dot(abs(rows[1].xyz), v), dot(abs(rows[2].xyz), v));
+}
+vec3 transform_translation(vec4 rows[3]) { return vec3(rows[0].w, rows[1].w, rows[2].w); }
+
+// Normals transform by the transposed inverse.
+vec3 transform_normal(vec4 inverse_rows[3], vec3 n) {
+  return inverse_rows[0].xyz * n.x + inverse_rows[1].xyz * n.y + inverse_rows[2].xyz * n.z;
+}
+
+// Bound on the error of a hit point, in world space, per axis: rounding of the interpolation and of
+// the transform (Pharr, Jakob, Humphreys, "Managing Rounding Error"), and of the ray that was taken
+// into object space to be tested.
+vec3 position_error(GpuInstance instance, vec3 object_bound, vec3 position) {
+  const float gamma = 8.0 * 5.9604645e-8;
+  const vec3 ray_bound = transform_bound(instance.object_from_world, abs(position)) +
+                         abs(transform_translation(instance.object_from_world));
+  return gamma * (transform_bound(instance.world_from_object, object_bound + ray_bound) +
+                  abs(transform_translation(instance.world_from_object)));
+}
+
+vec2 triangle_uv(vec4 p0, vec4 n0, vec4 p1, vec4 n1, vec4 p2, vec4 n2, vec3 b) {
+  return vec2(p0.w, n0.w) * b.x + vec2(p1.w, n1.w) * b.y + vec2(p2.w, n2.w) * b.z;
+}
+
+void apply_material(inout Surface s, uint material, vec2 uv) {
+  const GpuMaterial m = materials[material];
+  s.base_color = m.base_color;
+  s.metallic = m.metallic;
+  float roughness = m.roughness;
+  s.specular = m.specular;
+  s.ior = m.ior;
+  s.transmission = m.transmission;
+  s.thin_walled = m.thin_walled != 0u;
+  s.emission = m.emission;
+  if (has_feature(FEATURE_TEXTURES)) {
+    if (m.base_color_texture != NO_INDEX)
+      s.base_color *= sample_texture(m.base_color_texture, uv).rgb;
+    if (m.metallic_roughness_texture != NO_INDEX) {
+      const vec4 t = sample_texture(m.metallic_roughness_texture, uv);
+      roughness *= t.g;
+      s.metallic *= t.b;
+    }
+    if (m.emission_texture != NO_INDEX) s.emission *= sample_texture(m.emission_texture, uv).rgb;
+  }
+  s.alpha = roughness * roughness;
+}
+
+// `direction` is the ray's; the barycentrics weigh the triangle's second and third vertex.
+Surface make_surface(GpuHit hit, vec3 direction) {
+  const GpuInstance instance = instances[hit.instance];
+  const uvec3 index = texelFetch(triangles, int(instance.first_triangle + hit.primitive)).xyz;
+  const vec4 p0 = texelFetch(vertices, int(2u * index.x));
+  const vec4 p1 = texelFetch(vertices, int(2u * index.y));
+  const vec4 p2 = texelFetch(vertices, int(2u * index.z));
+  const vec4 n0 = texelFetch(vertices, int(2u * index.x) + 1);
+  const vec4 n1 = texelFetch(vertices, int(2u * index.y) + 1);
+  const vec4 n2 = texelFetch(vertices, int(2u * index.z) + 1);
+  const vec3 b = vec3(1.0 - hit.barycentrics.x - hit.barycentrics.y, hit.barycentrics);
+
+  Surface s;
+  s.wo = -direction;
+  const vec3 object_position = p0.xyz * b.x + p1.xyz * b.y + p2.xyz * b.z;
+  const vec3 object_bound = abs(p0.xyz) * b.x + abs(p1.xyz) * b.y + abs(p2.xyz) * b.z;
+  s.position = transform_point(instance.world_from_object, object_position);
+  const vec3 face = cross(p1.xyz - p0.xyz, p2.xyz - p0.xyz) * instance.mirrored;
+  // The face is scaled first: its length is an area and underflows for small triangles.
+  const float face_scale = max(max(abs(face.x), abs(face.y)), abs(face.z));
+  const vec3 outward = normalize(transform_normal(instance.object_from_world, face / face_scale));
+  s.entering = dot(outward, s.wo) >= 0.0;
+  s.geometric_normal = s.entering ? outward : -outward;
+  const vec3 bound = position_error(instance, object_bound, s.position);
+  s.error = 2.0 * dot(abs(s.geometric_normal), bound);
+  const vec3 smooth_normal = transform_normal(instance.object_from_world,
+                                              n0.xyz * b.x + n1.xyz * b.y + n2.xyz * b.z);
+  const float length_squared = dot(smooth_normal, smooth_normal);
+  s.normal = length_squared > 0.0 ? smooth_normal * inversesqrt(length_squared) : outward;
+  if (dot(s.normal, s.geometric_normal) < 0.0) s.normal = -s.normal;
+  apply_material(s, instance.material, triangle_uv(p0, n0, p1, n1, p2, n2, b));
+  return s;
+}
+
+// Where a ray that leaves the surface towards `direction` starts, clear of the surface itself.
+vec3 offset_origin(Surface s, vec3 direction) {
+  const float side = dot(direction, s.geometric_normal) >= 0.0 ? s.error : -s.error;
+  return s.position + s.geometric_normal * side;
+}
+
+#endif

@@ -1,0 +1,182 @@
+// A path arrives: forks where the worlds part, takes emission, samples a light, scatters on.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shaders/lib/append.glsl"
+#include "shaders/lib/environment.glsl"
+#include "shaders/lib/light.glsl"
+#include "shaders/lib/sampler.glsl"
+
+struct Path {
+  uint index;
+  uint slot;
+  vec3 origin;
+  float t_min;
+  vec3 direction;
+  float pdf;  // density of the direction where a light sample could have found it too; 0: none could
+  vec3 throughput;
+  uint worlds;
+  uint depth;
+};
+
+Path load_path(uint index) {
+  const vec4 origin = ray_origin[index];
+  const vec4 direction = ray_direction[index];
+  const vec4 throughput = path_throughput[index];
+  const uint bits = floatBitsToUint(throughput.w);
+  return Path(index, index >> 1, origin.xyz, origin.w, direction.xyz, direction.w, throughput.rgb,
+              path_worlds(bits), path_depth(bits));
+}
+
+void store_path(Path p, uint index) {
+  ray_origin[index] = vec4(p.origin, p.t_min);
+  ray_direction[index] = vec4(p.direction, p.pdf);
+  path_throughput[index] =
+      vec4(p.throughput, uintBitsToFloat(p.worlds | (p.depth << PATH_DEPTH_SHIFT)));
+}
+
+// Power heuristic; pdf = 0 stands for a Dirac direction, which a light sample cannot find.
+float mis_weight(float pdf, float other) {
+  if (pdf <= 0.0) return 1.0;
+  const float ratio = other / pdf;
+  return 1.0 / (1.0 + ratio * ratio);
+}
+
+// Lights without a surface of their own, met before the hit. They block nothing.
+void meet_lights(Path p, float t_hit) {
+  for (uint i = 0u; i < frame.visible_light_count; ++i) {
+    float pdf;
+    const float t = meet_light(lights[i], p.origin, p.direction, pdf);
+    if (t < 0.0 || t <= p.t_min || t > t_hit) continue;
+    const float other = (1.0 - frame.environment_selection) * lights[i].selection * pdf;
+    add_radiance(p.slot, p.worlds, p.throughput * lights[i].emission * mis_weight(p.pdf, other),
+                 lights[i].gain);
+  }
+}
+
+void meet_environment(Path p) {
+  float weight = 1.0;
+  if (has_feature(FEATURE_ENVIRONMENT_SAMPLING) && p.pdf > 0.0)
+    weight = mis_weight(p.pdf, frame.environment_selection * environment_pdf(p.direction));
+  add_radiance(p.slot, p.worlds, p.throughput * environment_radiance(p.direction) * weight, vec2(1.0));
+}
+
+void meet_emission(Path p, Surface s, GpuHit hit) {
+  if (all(equal(s.emission, vec3(0.0)))) return;
+  float weight = 1.0;
+  const uint first = instances[hit.instance].first_light;
+  if (has_feature(FEATURE_LIGHTS) && p.pdf > 0.0 && first != NO_INDEX) {
+    const GpuLight light = lights[first + hit.primitive];
+    const float pdf = triangle_pdf(light, p.direction, hit.t);
+    weight = mis_weight(p.pdf, (1.0 - frame.environment_selection) * light.selection * pdf);
+  }
+  add_radiance(p.slot, p.worlds, p.throughput * s.emission * weight, vec2(1.0));
+}
+
+// One light sample: the pair of what it would bring to each world, to be tested for blockers.
+bool light_ray(Path p, Surface s, Lobes l, Sampler random, float choice, out GpuShadowRay ray) {
+  const bool has_lights = has_feature(FEATURE_LIGHTS);
+  const vec2 u = sample_2d(random, vertex_pair(PAIR_LIGHT, p.depth));
+  LightSample light = LightSample(vec3(0.0), 3.4e38, vec3(0.0), 0.0, vec2(1.0));
+  float selection = frame.environment_selection;
+  if (has_lights && choice >= selection) {
+    if (frame.light_count == 0u) return false;
+    const uint index = pick_light(min((choice - selection) / (1.0 - selection), 0.99999994));
+    if (!sample_light(lights[index], s.position, u, light)) return false;
+    selection = (1.0 - selection) * lights[index].selection;
+  } else {
+    if (!has_feature(FEATURE_ENVIRONMENT_SAMPLING)) return false;
+    light.direction = environment_sample(u, light.pdf);
+    light.radiance = environment_radiance(light.direction);
+  }
+  float bsdf_pdf;
+  const vec3 value = bsdf_evaluate(s, l, light.direction, bsdf_pdf);
+  const bool delta = light.pdf <= 0.0;
+  const float pdf = selection * (delta ? 1.0 : light.pdf);
+  if (!(pdf > 0.0)) return false;
+  const float weight = delta ? 1.0 : mis_weight(pdf, bsdf_pdf);
+  ray.origin = offset_origin(s, light.direction);
+  ray.direction = light.direction;
+  ray.t_max = light.t_max;
+  ray.slot_and_worlds = (p.slot << 2) | p.worlds;
+  ray.contribution = p.throughput * value * light.radiance * (weight / pdf);
+  ray.gain = light.gain;
+  return any(greaterThan(ray.contribution, vec3(0.0)));
+}
+
+// The next direction; false where the path ends.
+bool scatter(inout Path p, Surface s, Lobes l, Sampler random, float choice) {
+  vec3 direction;
+  vec3 weight;
+  float pdf;
+  const vec2 u = sample_2d(random, vertex_pair(PAIR_SCATTER, p.depth));
+  if (!bsdf_sample(s, l, choice, u, direction, weight, pdf)) return false;
+  p.throughput *= weight;
+  const float strongest = max(max(p.throughput.r, p.throughput.g), p.throughput.b);
+  if (!(strongest > 0.0)) return false;
+  if (p.depth + 1u >= frame.roulette_depth && strongest < 1.0) {
+    if (sample_2d(random, vertex_pair(PAIR_ROULETTE, p.depth)).x >= strongest) return false;
+    p.throughput /= strongest;
+  }
+  p.origin = offset_origin(s, direction);
+  p.t_min = 0.0;
+  p.direction = direction;
+  p.pdf = pdf;
+  return true;
+}
+
+// The world that does not contain the hit goes on along the same ray, as a path of its own.
+void fork(Path p, uint other_worlds, float t_hit, out uint forked) {
+  forked = p.index ^ 1u;
+  p.worlds = other_worlds;
+  p.t_min = t_hit;
+  store_path(p, forked);
+}
+
+void write_aov(Path p, Surface s, float t) {
+  const vec3 axis = vec3(frame.world_from_camera[0].z, frame.world_from_camera[1].z,
+                         frame.world_from_camera[2].z);
+  const vec3 position = p.origin + t * p.direction;
+  sample_aov[p.slot] = vec4(s.normal, dot(position, axis));
+}
+
+void main() {
+  const bool active_path = gl_GlobalInvocationID.x < control.active_count;
+  uint forked = NO_INDEX;
+  bool scattered = false;
+  bool lit = false;
+  GpuShadowRay ray;
+  Path p;
+  if (active_path) {
+    p = load_path(queue[active_queue_index(gl_GlobalInvocationID.x)]);
+    const GpuHit hit = hits[p.index];
+    if (has_feature(FEATURE_VISIBLE_LIGHTS)) meet_lights(p, hit.t < 0.0 ? 3.4e38 : hit.t);
+    if (hit.t < 0.0) {
+      meet_environment(p);
+    } else {
+      const uint presence = instances[hit.instance].presence & p.worlds;
+      if (has_feature(FEATURE_FORKS) && presence != p.worlds) {
+        if (p.depth == 0u) sample_mixed[p.slot].w = 1.0;
+        fork(p, p.worlds & ~presence, hit.t, forked);
+        p.worlds = presence;
+      }
+      const Surface s = make_surface(hit, p.direction);
+      if (p.depth == 0u && (p.worlds & WORLD_MIXED) != 0u) write_aov(p, s, hit.t);
+      meet_emission(p, s, hit);
+      if (p.depth < frame.max_depth) {
+        const uvec2 pixel = uvec2(batch.x, batch.y) + slot_pixel(p.slot);
+        const Sampler random = make_sampler(frame.seed, pixel, slot_sample(p.slot));
+        const vec2 choice = sample_2d(random, vertex_pair(PAIR_CHOICE, p.depth));
+        const Lobes l = make_lobes(s);
+        lit = light_ray(p, s, l, random, choice.x, ray);
+        scattered = scatter(p, s, l, random, choice.y);
+        p.depth += 1u;
+        if (scattered) store_path(p, p.index);
+      }
+    }
+  }
+  append_shadow(lit, ray);
+  append_next(forked != NO_INDEX, forked);
+  append_next(scattered, p.index);
+}
