@@ -1,0 +1,102 @@
+// tracking_report SETDIR...: the tracker's figures on ground truth sets, a line a frame and a
+// total.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <glm/geometric.hpp>
+
+#include "drivers/error.hpp"
+#include "tests/truth/tracking_measure.hpp"
+
+namespace {
+
+using namespace previz;
+
+const char* to_string(tracking::TrackStatus status) {
+  switch (status) {
+    case tracking::TrackStatus::tracked:
+      return "tracked";
+    case tracking::TrackStatus::ambiguous:
+      return "ambiguous";
+    case tracking::TrackStatus::lost:
+      return "lost";
+  }
+  return "?";
+}
+
+struct Mean {
+  double sum = 0, most = 0;
+  int count = 0;
+  void add(double v) { sum += v, most = std::max(most, v), ++count; }
+  double mean() const { return count ? sum / count : 0; }
+};
+
+void report(const truth::TruthSet& set, const set::Tracking& settings) {
+  std::printf("%s (%dx%d, %zu frames, decimate %g)\n", set.name.c_str(),
+              set.observer.intrinsics.width, set.observer.intrinsics.height, set.frames.size(),
+              settings.decimate);
+  std::printf("%5s %-9s %-9s %9s %8s %8s %8s %9s %9s %7s %6s  %s\n", "frame", "status", "tags",
+              "corner_px", "reproj", "vertex", "max", "rot_mrad", "trans_mm", "nees", "ms", "why");
+  Mean corner, reprojection, vertex, nees, corner_chi, margin, milliseconds;
+  glm::dvec2 bias(0);
+  double least_margin = HUGE_VAL;
+  for (const truth::TrackedFrame& row : measure_tracking(set, settings)) {
+    Mean here;
+    for (const truth::CornerError& tag : row.corners) {
+      least_margin = std::min(least_margin, tag.margin);
+      if (!tag.trouble.empty() || tag.error_px.size() < 4) continue;
+      for (const glm::dvec2& e : tag.error_px) {
+        here.add(glm::length(e));
+        corner.add(glm::length(e));
+        bias += e;
+      }
+      corner_chi.add(tag.chi_square / 8);
+    }
+    std::string tags;
+    if (row.track.pose)
+      for (int id : row.track.pose->tags) tags += (tags.empty() ? "" : ",") + std::to_string(id);
+    std::printf("%5d %-9s %-9s %9.3f %8.3f %8.3f %8.3f %9.3f %9.3f %7.2f %6.1f  %s\n", row.index,
+                to_string(row.track.status), tags.c_str(), here.mean(), row.reprojection_px,
+                row.vertex_px, row.vertex_max_px, 1e3 * row.rotation_rad, 1e3 * row.translation_m,
+                row.error_squared, row.milliseconds, row.track.reason.c_str());
+    milliseconds.add(row.milliseconds);
+    if (!row.track.pose) continue;
+    reprojection.add(row.reprojection_px);
+    vertex.add(row.vertex_px);
+    nees.add(row.error_squared);
+  }
+  std::printf(
+      "  tracked %d of %zu; mean (max) px: corner %.3f (%.3f), reprojection %.3f (%.3f), vertices "
+      "%.3f (%.3f)\n  corner bias %+.3f %+.3f px, corner chi2/8 %.2f, pose nees/6 %.2f, least "
+      "margin "
+      "%.0f, %.1f ms a frame\n\n",
+      vertex.count, set.frames.size(), corner.mean(), corner.most, reprojection.mean(),
+      reprojection.most, vertex.mean(), vertex.most, bias.x / std::max(1, corner.count),
+      bias.y / std::max(1, corner.count), corner_chi.mean(), nees.mean() / 6, least_margin,
+      milliseconds.mean());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("The tracker's figures on ground truth sets (directories with a set.json)");
+  std::vector<std::string> sets;
+  double decimate = 1;
+  app.add_option("SETDIR", sets)->required()->check(CLI::ExistingDirectory);
+  app.add_option("--decimate", decimate, "shrink the picture in which tags are looked for")
+      ->check(CLI::Range(1.0, 8.0));
+  CLI11_PARSE(app, argc, argv);
+  try {
+    for (const std::string& directory : sets) {
+      const truth::TruthSet set = truth::load_truth_set(directory);
+      set::Tracking settings = truth::tracking_settings(set);
+      settings.decimate = decimate;
+      report(set, settings);
+    }
+  } catch (const Error& error) {
+    std::fprintf(stderr, "tracking_report: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

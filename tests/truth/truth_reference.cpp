@@ -1,0 +1,119 @@
+// Renders truth frames with the reference CPU tracer and compares: whether the truth and our
+// material models are the same, without the renderer under test.
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+
+#include "daemon/lighting/lighting.hpp"
+#include "drivers/error.hpp"
+#include "tests/truth/compare.hpp"
+#include "tests/truth/cpu_camera.hpp"
+#include "tests/truth/cpu_tracer.hpp"
+#include "tests/truth/truth_set.hpp"
+#include "tests/truth/truth_take.hpp"
+
+namespace previz::truth {
+namespace {
+
+// Each pixel of the small picture repeated, so that 8x8 block means stay what they are. (Clipping
+// then acts on the small pixel's mean: mirror images of lamps need --scale 1.)
+template <class T, class From>
+std::vector<T> enlarged(const std::vector<From>& small, int width, int height, int times) {
+  std::vector<T> out;
+  out.reserve(small.size() * static_cast<std::size_t>(times * times));
+  for (int y = 0; y < height * times; ++y) {
+    for (int x = 0; x < width * times; ++x) {
+      out.emplace_back(small[static_cast<std::size_t>(y / times * width + x / times)]);
+    }
+  }
+  return out;
+}
+
+double mean_standard_error(const TracedPicture& p) {
+  double squares = 0;
+  for (const glm::dvec3& e : p.standard_error) squares += (e.x * e.x + e.y * e.y + e.z * e.z) / 3;
+  return std::sqrt(squares / static_cast<double>(p.standard_error.size()));
+}
+
+void run(const std::filesystem::path& directory, int frame, int reduction, int samples) {
+  const TruthSet truth_set = load_truth_set(directory);
+  const TruthFrame truth = load_truth_frame(truth_set, frame);
+  if (truth.width % reduction || truth.height % reduction) {
+    throw Error("the picture's size is not a multiple of " + std::to_string(reduction));
+  }
+  set::Set set;
+  const auto object = [](const char* name, const std::filesystem::path& file, set::Presence p) {
+    set::Object o;
+    o.name = name;
+    o.file = file;
+    o.file_as_written = file.string();
+    o.presence = p;
+    return o;
+  };
+  set.objects = {object("phantom", truth_set.phantom, set::Presence::phantom),
+                 object("virtual", truth_set.virtual_objects, set::Presence::virtual_object)};
+  set.lighting.environment = truth_set.environment;
+  set.lighting.environment_as_written = truth_set.environment.string();
+  const scene::Scene scene = scene::load_scene(set);
+  for (const std::string& note : scene.notes) std::cerr << "scene: " << note << std::endl;
+  const lighting::Lighting lighting = lighting::load_environment(set.lighting);
+  std::cerr << "environment: " << lighting.environment.size << " texels a side" << std::endl;
+
+  const auto begin = std::chrono::steady_clock::now();
+  CpuTracer tracer(scene, lighting.environment);
+  const ObserverCalibration camera = resized(truth_set.observer, 1.0 / reduction);
+  const glm::dmat4 pose = observer_frame(truth_set, frame).world_from_camera;
+  const TracedPicture mixed = tracer.trace(camera, pose, scene::world_mixed, samples, 1);
+  const TracedPicture real = tracer.trace(camera, pose, scene::world_real, samples, 2);
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+
+  std::vector<glm::dvec3> diff(mixed.mean.size());
+  for (std::size_t i = 0; i < diff.size(); ++i) diff[i] = mixed.mean[i] - real.mean[i];
+  EstimatedFrame estimate;
+  estimate.mixed = enlarged<glm::vec3>(mixed.mean, mixed.width, mixed.height, reduction);
+  estimate.real = enlarged<glm::vec3>(real.mean, mixed.width, mixed.height, reduction);
+  estimate.diff = enlarged<glm::vec3>(diff, mixed.width, mixed.height, reduction);
+  estimate.mask = enlarged<float>(mixed.mask, mixed.width, mixed.height, reduction);
+  for (std::size_t i = 0; i < estimate.mask.size(); ++i) {
+    const float m = estimate.mask[i];
+    estimate.composite.push_back(m * estimate.mixed[i] +
+                                 (1 - m) * (truth.plate[i] + estimate.diff[i]));
+  }
+  estimate.picture =
+      displayed(estimate.composite, truth.width, truth.height, truth.exposure, truth.response);
+  const Measures m = compare(truth, estimate);
+  std::printf("%s frame %s, 1/%d, %d samples, %.0f s\n", truth_set.name.c_str(),
+              frame_name(frame).c_str(), reduction, samples, seconds);
+  std::printf("  real     e %.4f  bias %+.5f  (rms standard error a pixel %.4f)\n", m.e_real,
+              m.bias_real, mean_standard_error(real));
+  std::printf("  virtual  e %.4f  bias %+.5f  (truth's noise %.4f, standard error %.4f)\n",
+              m.e_virtual, m.bias_virtual, m.noise_virtual.value_or(0), mean_standard_error(mixed));
+  std::printf("  diff     e %.4f  bias %+.5f  (truth's noise %.4f)\n", m.e_diff, m.bias_diff,
+              m.noise_diff.value_or(0));
+  std::printf("  mask     e %.5f  edge %.5f\n", m.e_mask, m.e_mask_edge);
+}
+
+}  // namespace
+}  // namespace previz::truth
+
+int main(int argc, char** argv) {
+  CLI::App app("The reference CPU tracer against ground truth sets.");
+  std::filesystem::path directory;
+  int frame = 0, reduction = 4, samples = 256;
+  app.add_option("SETDIR", directory)->required();
+  app.add_option("--frame", frame, "truth frame [0]");
+  app.add_option("--reduction", reduction, "trace a picture smaller by this factor [4]")
+      ->check(CLI::IsMember({1, 2, 4, 8}));
+  app.add_option("--spp", samples, "samples per (reduced) pixel [256]");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    previz::truth::run(directory, frame, reduction, samples);
+    return 0;
+  } catch (const std::exception& e) {
+    std::cerr << "truth reference: " << e.what() << std::endl;
+    return 2;
+  }
+}

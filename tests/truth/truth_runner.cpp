@@ -1,0 +1,230 @@
+// Renders the truth frames of ground truth sets as `previzd render` would and says how far off they
+// are. tests/truth/run builds and calls it.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <glm/geometric.hpp>
+#include <iostream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "daemon/output/exr.hpp"
+#include "daemon/output/png.hpp"
+#include "daemon/post/render.hpp"
+#include "drivers/error.hpp"
+#include "tests/truth/compare.hpp"
+#include "tests/truth/comparison_sheet.hpp"
+#include "tests/truth/truth_set.hpp"
+#include "tests/truth/truth_take.hpp"
+
+namespace previz::truth {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+struct Arguments {
+  std::vector<fs::path> sets;
+  TakeOptions take;
+  int samples = 256;
+  fs::path out;
+  std::optional<std::string> bounds;
+  std::vector<int> frames;  // empty: every truth frame
+  std::string device;
+};
+
+struct JudgedFrame {
+  Measures measures;
+  post::FrameRecord record;
+  std::vector<std::string> violations;
+};
+
+// Leaves DIR/NNNN.exr and NNNN.png, whatever the frame's place in the session.
+post::FrameRecord render_frame(const TruthSet& set, int frame, const Arguments& arguments,
+                               const fs::path& directory) {
+  const std::uint64_t index = session_index(set, frame);
+  post::RenderOptions options;
+  options.session = directory / "session";
+  options.frames = post::FrameRange{index, index};
+  options.samples = arguments.samples;
+  options.directory = directory / "render";
+  options.exr = options.png = true;
+  options.video = false;
+  options.force = true;
+  options.device.name = arguments.device;
+  const post::RenderReport report = post::render_session(options, std::cerr);
+  if (report.frames.empty()) {
+    throw Error(set.name + ": frame " + std::to_string(frame) + " was not rendered");
+  }
+  for (const char* extension : {".exr", ".png"}) {
+    fs::rename(directory / "render" / (frame_name(static_cast<int>(index)) + extension),
+               directory / (frame_name(frame) + extension));
+  }
+  return report.frames.front();
+}
+
+JudgedFrame judge_frame(const TruthSet& set, int frame, const Arguments& arguments,
+                        const fs::path& directory) {
+  JudgedFrame out;
+  out.record = render_frame(set, frame, arguments, directory);
+  render::Layers layers = output::read_exr(directory / (frame_name(frame) + ".exr"));
+  EstimatedFrame estimate;
+  estimate.picture = output::read_png(directory / (frame_name(frame) + ".png"));
+  estimate.composite = std::move(layers.composite);
+  estimate.mixed = std::move(layers.mixed);
+  estimate.real = std::move(layers.real);
+  estimate.diff = std::move(layers.diff);
+  estimate.mask = std::move(layers.mask);
+
+  const TruthFrame truth = load_truth_frame(set, frame);
+  out.measures = compare(truth, estimate);
+  output::write_png(directory / (frame_name(frame) + "_compare.png"),
+                    comparison_sheet(truth, estimate));
+  if (arguments.bounds) out.violations = violations(out.measures, bounds_named(*arguments.bounds));
+  return out;
+}
+
+ordered_json to_json(const TruthSet& set, int frame, const JudgedFrame& judged) {
+  const Measures& m = judged.measures;
+  const auto optional = [](const std::optional<double>& value) {
+    return value ? ordered_json(*value) : ordered_json(nullptr);
+  };
+  ordered_json json;
+  json["e_diff"] = m.e_diff;
+  json["e_virtual"] = m.e_virtual;
+  json["e_mask"] = m.e_mask;
+  json["psnr"] = m.psnr;
+  json["ssim"] = m.ssim;
+  json["noise_diff"] = optional(m.noise_diff);
+  json["noise_virtual"] = optional(m.noise_virtual);
+  json["e_mask_edge"] = m.e_mask_edge;
+  json["e_edge"] = m.e_edge;
+  json["e_real"] = m.e_real;
+  json["bias_diff"] = m.bias_diff;
+  json["bias_virtual"] = m.bias_virtual;
+  json["bias_real"] = m.bias_real;
+  json["diff_blocks"] = m.diff_blocks;
+  json["virtual_blocks"] = m.virtual_blocks;
+  json["edge_blocks"] = m.edge_blocks;
+  json["samples"] = judged.record.samples;
+  json["seconds"] = judged.record.render_s;
+  json["dropped_samples"] = judged.record.counters.dropped_not_finite +
+                            judged.record.counters.dropped_negative +
+                            judged.record.counters.queue_overflow;
+  if (judged.record.status == post::FrameStatus::untouched)
+    json["untouched"] = judged.record.reason;
+  if (judged.record.pose) {
+    const glm::dmat4& pose = judged.record.pose->world_from_camera;
+    const glm::dmat4& truth = observer_frame(set, frame).world_from_camera;
+    const glm::dmat3 turned = glm::transpose(glm::dmat3(truth)) * glm::dmat3(pose);
+    const glm::dvec3 axis(turned[1][2] - turned[2][1], turned[2][0] - turned[0][2],
+                          turned[0][1] - turned[1][0]);
+    json["pose_error_m"] = glm::length(glm::dvec3(pose[3] - truth[3]));
+    json["pose_error_rad"] = std::asin(std::min(1.0, glm::length(axis) / 2));
+  }
+  if (!judged.violations.empty()) json["violations"] = judged.violations;
+  return json;
+}
+
+void print_header() {
+  std::printf("%-12s %5s  %7s %7s %7s %7s %8s %8s %6s %7s  %7s %7s %7s\n", "set", "frame", "e_diff",
+              "noise", "e_virt", "noise", "e_mask", "m_edge", "psnr", "ssim", "e_edge", "e_real",
+              "seconds");
+}
+
+void print_row(const std::string& set, int frame, const JudgedFrame& judged) {
+  const Measures& m = judged.measures;
+  std::printf("%-12s %5s  %7.4f %7.4f %7.4f %7.4f %8.5f %8.5f %6.2f %7.4f  %7.4f %7.4f %7.1f\n",
+              set.c_str(), frame_name(frame).c_str(), m.e_diff, m.noise_diff.value_or(0),
+              m.e_virtual, m.noise_virtual.value_or(0), m.e_mask, m.e_mask_edge, m.psnr, m.ssim,
+              m.e_edge, m.e_real, judged.record.render_s);
+  if (!judged.record.reason.empty()) std::printf("    %s\n", judged.record.reason.c_str());
+  for (const std::string& line : judged.violations) std::printf("    BOUND %s\n", line.c_str());
+  std::fflush(stdout);
+}
+
+// True where every bound holds.
+bool run_set(const fs::path& path, const Arguments& arguments) {
+  const TruthSet set = load_truth_set(path);
+  for (const std::string& note : set.notes) std::cerr << "note: " << note << std::endl;
+  std::vector<int> frames = arguments.frames.empty() ? set.truth_frames : arguments.frames;
+  for (const int frame : frames) {
+    if (std::find(set.truth_frames.begin(), set.truth_frames.end(), frame) ==
+        set.truth_frames.end()) {
+      throw Error(path.string() + ": has no truth of frame " + std::to_string(frame));
+    }
+  }
+  const fs::path directory = arguments.out / set.name;
+  fs::remove_all(directory / "session");
+  fs::remove_all(directory / "render");
+  fs::create_directories(directory);
+  write_take(set, arguments.take, directory / "session");
+
+  ordered_json metrics;
+  metrics["frames"] = ordered_json::object();
+  double seconds = 0;
+  bool held = true;
+  for (const int frame : frames) {
+    const JudgedFrame judged = judge_frame(set, frame, arguments, directory);
+    print_row(set.name, frame, judged);
+    metrics["frames"][frame_name(frame)] = to_json(set, frame, judged);
+    seconds += judged.record.render_s;
+    held = held && judged.violations.empty();
+  }
+  metrics["seconds"] = seconds;
+  metrics["samples"] = arguments.samples;
+  metrics["light"] = arguments.take.light == LightFrom::truth ? "truth" : "captured";
+  metrics["pose"] = arguments.take.pose == PoseFrom::truth ? "truth" : "tracked";
+  std::ofstream file(directory / "metrics.json");
+  file << metrics.dump(2) << std::endl;
+  if (!file) throw Error((directory / "metrics.json").string() + ": cannot be written");
+  return held;
+}
+
+}  // namespace
+}  // namespace previz::truth
+
+int main(int argc, char** argv) {
+  using namespace previz::truth;
+  Arguments arguments;
+  CLI::App app(
+      "Renders the truth frames of ground truth sets and compares. Exit status: 0 it ran "
+      "(and every bound held, with --bounds), 1 a bound did not hold, 2 it could not run.");
+  app.name("tests/truth/run");
+  app.add_option("SETDIR", arguments.sets, "directories in the format of README.md")->required();
+  const std::map<std::string, LightFrom> lights{{"truth", LightFrom::truth},
+                                                {"captured", LightFrom::captured}};
+  const std::map<std::string, PoseFrom> poses{{"truth", PoseFrom::truth},
+                                              {"tracked", PoseFrom::tracked}};
+  app.add_option("--light", arguments.take.light, "truth: env.exr; captured: the fisheye frames")
+      ->transform(CLI::Transformer(lights, CLI::ignore_case))
+      ->type_name("truth|captured");
+  app.add_option("--pose", arguments.take.pose, "truth: the set's poses; tracked: by its tags")
+      ->transform(CLI::Transformer(poses, CLI::ignore_case))
+      ->type_name("truth|tracked");
+  app.add_option("--spp", arguments.samples, "samples per pixel [256]")
+      ->check(CLI::Range(1, 1000000));
+  app.add_option("--out", arguments.out, "directory for the pictures and figures")->required();
+  app.add_option("--bounds", arguments.bounds, "judge by this row of bounds")
+      ->check(CLI::IsMember({"paired", "full", "captured"}));
+  app.add_option("--frames", arguments.frames, "only these truth frames, as 0,12 [all]")
+      ->delimiter(',');
+  app.add_option("--device", arguments.device, "Vulkan device by a part of its name");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  try {
+    print_header();
+    bool held = true;
+    for (const auto& set : arguments.sets) held = run_set(set, arguments) && held;
+    return held ? 0 : 1;
+  } catch (const std::exception& e) {
+    std::cerr << "truth runner: " << e.what() << std::endl;
+    return 2;
+  }
+}

@@ -1,0 +1,61 @@
+// A ground truth set on disk (README.md, "Format of a set"): set.json and the files it names.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/set/set.hpp"
+#include "drivers/calibration.hpp"
+#include "tests/truth/compare.hpp"
+
+namespace previz::truth {
+
+struct ObserverFrame {
+  int index = 0;  // the set's own number; truth frames are named by it
+  std::filesystem::path file;
+  std::int64_t timestamp_ns = 0;
+  glm::dmat4 world_from_camera{1.0};
+};
+
+struct LightFrame {
+  std::filesystem::path file;
+  std::int64_t timestamp_ns = 0;
+  double exposure = 1;  // absolute
+};
+
+struct TruthStatistics {
+  std::optional<double> diff_rmse, mixed_rmse_of_mean;
+};
+
+struct TruthSet {
+  std::string name;
+  std::filesystem::path directory;
+  ObserverCalibration observer;
+  double exposure = 1;                // absolute, of every observer frame
+  std::vector<ObserverFrame> frames;  // those whose picture is there, in order
+  std::string tag_family;
+  std::vector<set::Tag> tags;
+  std::optional<LightCameraCalibration> light_camera;
+  std::vector<LightFrame> light_frames;  // auto and brackets, by time; no sequence with other light
+  std::filesystem::path environment, phantom, virtual_objects;
+  std::vector<int> truth_frames;  // those whose truth and observer picture are there
+  std::map<int, TruthStatistics> statistics;
+  std::vector<std::string> notes;  // what was left out and why, in plain words
+};
+
+// Throws previz::Error naming file and key, and what is allowed there.
+TruthSet load_truth_set(const std::filesystem::path& directory);
+
+// Reads the truth pictures and the plate of one frame. Throws previz::Error naming the file.
+TruthFrame load_truth_frame(const TruthSet& set, int frame);
+
+const ObserverFrame& observer_frame(const TruthSet& set, int frame);
+
+// "0012"
+std::string frame_name(int frame);
+
+}  // namespace previz::truth

@@ -1,0 +1,194 @@
+// Ground truth sets: read from disk, refused where they are wrong, turned into sessions.
+#include "tests/truth/truth_set.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "daemon/set/set.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/session.hpp"
+#include "tests/truth/truth_take.hpp"
+
+namespace previz::truth {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+const fs::path glass = fs::path(PREVIZ_SOURCE_DIR) / "tests/truth/data/glass";
+
+// A copy of the bundled set whose set.json a test may change.
+class ChangedSet : public testing::Test {
+ protected:
+  void SetUp() override {
+    directory_ =
+        fs::path(testing::TempDir()) /
+        ("truth_set_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    fs::remove_all(directory_);
+    fs::copy(glass, directory_, fs::copy_options::recursive);
+    std::ifstream(directory_ / "set.json") >> json_;
+  }
+  void TearDown() override { fs::remove_all(directory_); }
+
+  TruthSet load() {
+    std::ofstream(directory_ / "set.json") << json_;
+    return load_truth_set(directory_);
+  }
+  std::string refusal() {
+    try {
+      load();
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "accepted";
+  }
+
+  fs::path directory_;
+  json json_;
+};
+
+TEST(TruthSet, ReadsTheBundledSet) {
+  const TruthSet set = load_truth_set(glass);
+  EXPECT_EQ(set.name, "glass");
+  EXPECT_EQ(set.observer.intrinsics.width, 640);
+  EXPECT_DOUBLE_EQ(set.observer.intrinsics.cx, 316.2);
+  ASSERT_TRUE(set.observer.lens);
+  EXPECT_DOUBLE_EQ(set.observer.lens->focal_length_m, 0.0235);
+  EXPECT_DOUBLE_EQ(set.observer.lens->focus_distance_m, 0.78);
+  EXPECT_DOUBLE_EQ(set.exposure, 1.1);
+  EXPECT_EQ(set.frames.size(), 2u);
+  EXPECT_EQ(set.truth_frames, (std::vector<int>{0, 12}));
+  EXPECT_EQ(set.notes.size(), 1u) << "frame 23 is not bundled";
+  EXPECT_EQ(set.light_frames.size(), 7u);
+  EXPECT_TRUE(
+      std::is_sorted(set.light_frames.begin(), set.light_frames.end(),
+                     [](const auto& a, const auto& b) { return a.timestamp_ns < b.timestamp_ns; }));
+  ASSERT_TRUE(set.light_camera);
+  EXPECT_NEAR(set.light_camera->intrinsics.max_angle_rad, 100 * std::numbers::pi / 180, 1e-12);
+  ASSERT_EQ(set.tags.size(), 3u);
+  // Corner 2 (upper right) of a tag is half its size along its axes.
+  const glm::dvec3 corner = set.tags[1].world_from_tag * glm::dvec4(0.04, 0.04, 0, 1);
+  EXPECT_NEAR(corner.x, 0.32311506, 1e-7);
+  EXPECT_NEAR(corner.y, -0.05065242, 1e-7);
+}
+
+TEST(TruthSet, ReadsTruthPicturesAndThePlate) {
+  const TruthSet set = load_truth_set(glass);
+  const TruthFrame truth = load_truth_frame(set, 12);
+  double real = 0, mask = 0, plate = 0;
+  for (std::size_t i = 0; i < truth.mask.size(); ++i) {
+    real += static_cast<double>(truth.real[i].x) / static_cast<double>(truth.mask.size());
+    plate += static_cast<double>(truth.plate[i].x) / static_cast<double>(truth.mask.size());
+    mask += static_cast<double>(truth.mask[i]) / static_cast<double>(truth.mask.size());
+  }
+  // set.json's own means.
+  EXPECT_NEAR(real, 0.24324, 1e-4);
+  EXPECT_NEAR(mask, 0.05825, 2e-3);
+  EXPECT_NEAR(plate / real, 1, 5e-3);  // 8-bit rounding and sensor noise average out
+  EXPECT_NEAR(truth.diff_rmse.value(), 0.0021994, 1e-6);
+  EXPECT_NEAR(truth.mixed_rmse_of_mean.value(), 0.036561, 1e-5);
+}
+
+TEST_F(ChangedSet, WithoutLensOrDistortionIsAPinhole) {
+  json_["observer"]["lens"] = nullptr;
+  json_["observer"].erase("distortion");
+  const TruthSet set = load();
+  EXPECT_FALSE(set.observer.lens);
+  EXPECT_EQ(set.observer.intrinsics.k1, 0);
+}
+
+TEST_F(ChangedSet, UnderstandsOtherResponses) {
+  json_["observer"]["response"] = "value = floor(255*clip(signal)^(1/2.4)+0.5)";
+  TruthSet set = load();
+  EXPECT_EQ(set.observer.response.kind, ResponseCurve::Kind::gamma);
+  EXPECT_DOUBLE_EQ(set.observer.response.gamma, 2.4);
+  EXPECT_EQ(set.light_camera->response.kind, ResponseCurve::Kind::gamma) << "as observer";
+  json_["observer"]["response"] = "linear";
+  EXPECT_EQ(load().observer.response.kind, ResponseCurve::Kind::linear);
+  json_["observer"]["response"] = "S-Log3";
+  EXPECT_NE(refusal().find("set.observer.response: 'S-Log3' is not understood"), std::string::npos);
+}
+
+TEST_F(ChangedSet, WithoutLightCameraTagsOrStatisticsStillLoads) {
+  json_.erase("light_camera");
+  json_.erase("tags");
+  json_["truth"].erase("statistics");
+  const TruthSet set = load();
+  EXPECT_FALSE(set.light_camera);
+  EXPECT_FALSE(load_truth_frame(set, 0).diff_rmse);
+  const fs::path session = directory_ / "session";
+  write_take(set, {}, session);
+  EXPECT_THROW(write_take(set, {LightFrom::captured, PoseFrom::truth}, directory_ / "a"), Error);
+  EXPECT_THROW(write_take(set, {LightFrom::truth, PoseFrom::tracked}, directory_ / "b"), Error);
+}
+
+TEST_F(ChangedSet, RefusalsNameFileAndKey) {
+  json_["observer"]["exposure"] = 0;
+  EXPECT_NE(refusal().find("set.json: set.observer.exposure: must be above 0"), std::string::npos);
+  json_["observer"]["exposure"] = 1.1;
+  json_["observer"]["lens"].erase("focus_distance_m");
+  EXPECT_NE(refusal().find("set.observer.lens: has no 'focus_distance_m'"), std::string::npos);
+  json_["observer"]["lens"]["focus_distance_m"] = 1;
+  json_["observer"]["vignetting"] = "cos4";
+  EXPECT_NE(refusal().find("set.observer.vignetting: vignetting is not supported"),
+            std::string::npos);
+  json_["observer"]["vignetting"] = nullptr;
+  json_["truth"]["frames"] = {23};
+  EXPECT_NE(refusal().find("no frame has both truth and picture"), std::string::npos);
+}
+
+TEST_F(ChangedSet, BecomesASession) {
+  const TruthSet set = load();
+  const fs::path directory = directory_ / "session";
+  write_take(set, {}, directory);
+  session::Session session = session::open_session(directory);
+  EXPECT_TRUE(session.missing.empty());
+  ASSERT_EQ(session.track.size(), 2u);
+  EXPECT_TRUE(session.track[1].tracked);
+  EXPECT_EQ(session.track[1].world_from_camera, set.frames[1].world_from_camera);
+  ASSERT_TRUE(session.info.observer && session.info.observer->lens);
+  EXPECT_DOUBLE_EQ(session.info.observer->lens->f_number, 2.0);
+  const auto observer = session::open_stream(session, "observer");
+  ASSERT_EQ(observer->records().size(), 2u);
+  EXPECT_EQ(observer->records()[1].timestamp_ns, 1700000001045871617);
+  EXPECT_DOUBLE_EQ(observer->records()[1].exposure, 1.1);
+  const auto light = session::open_stream(session, "light");
+  ASSERT_EQ(light->records().size(), 7u);
+  EXPECT_DOUBLE_EQ(light->records()[0].exposure, 0.0001953125);
+  // The very samples of the picture.
+  const FramePtr frame = observer->read(1);
+  const TruthFrame truth = load_truth_frame(set, 12);
+  const Plate plate = to_plate(*frame);
+  EXPECT_EQ(
+      plate.samples,
+      displayed(truth.plate, truth.width, truth.height, truth.exposure, truth.response).samples);
+}
+
+TEST_F(ChangedSet, ItsSetFileIsOneTheParserTakes) {
+  const TruthSet truth = load();
+  for (const LightFrom light : {LightFrom::truth, LightFrom::captured}) {
+    for (const PoseFrom pose : {PoseFrom::truth, PoseFrom::tracked}) {
+      const set::Set set =
+          set::parse_set(set_file_text(truth, {light, pose}), directory_ / "set.toml");
+      EXPECT_EQ(set.name, "glass");
+      ASSERT_EQ(set.objects.size(), 2u);
+      EXPECT_EQ(set.objects[1].presence, set::Presence::virtual_object);
+      EXPECT_EQ(set.lighting.environment.has_value(), light == LightFrom::truth);
+      EXPECT_EQ(set.tracking.enabled, pose == PoseFrom::tracked);
+      ASSERT_EQ(set.tracking.tags.size(), 3u);
+      for (int c = 0; c < 4; ++c) {
+        EXPECT_LT(
+            glm::length(set.tracking.tags[2].world_from_tag[c] - truth.tags[2].world_from_tag[c]),
+            1e-12);
+      }
+      EXPECT_EQ(set.estimation.max_depth, 16);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace previz::truth
