@@ -150,7 +150,7 @@ TopBvh build_top_bvh(std::span<const TopInstance> instances) {
   double extent = 0;
   for (std::uint32_t i = 0; i < instances.size(); ++i) {
     const TopInstance& instance = instances[i];
-    if (instance.mesh == nullptr || instance.mesh->texels.empty()) continue;
+    if (instance.mesh == nullptr || instance.mesh->leaves == 0) continue;
     const glm::dmat4 grid_from_world =
         uniform_scale(std::ldexp(1.0, instance.mesh->grid_exponent)) *
         glm::inverse(instance.world_from_object);
