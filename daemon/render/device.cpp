@@ -49,6 +49,8 @@ std::string lacks(const vk::raii::PhysicalDevice& physical) {
                                               vk::PhysicalDeviceVulkan13Features>();
   if (!features.get<vk::PhysicalDeviceVulkan12Features>().scalarBlockLayout)
     return "no scalarBlockLayout";
+  if (!features.get<vk::PhysicalDeviceVulkan13Features>().maintenance4)
+    return "no maintenance4";
   if (!features.get<vk::PhysicalDeviceVulkan13Features>().synchronization2)
     return "no synchronization2";
   const auto subgroup =
@@ -129,6 +131,7 @@ void Device::create_device() {
   const vk::DeviceQueueCreateInfo queue({}, queue_family_, 1, &priority);
   vk::PhysicalDeviceVulkan13Features features13;
   features13.synchronization2 = VK_TRUE;
+  features13.maintenance4 = VK_TRUE;  // LocalSizeId, which glslang writes for 1.3
   vk::PhysicalDeviceVulkan12Features features12;
   features12.scalarBlockLayout = VK_TRUE;
   features12.pNext = &features13;

@@ -1,0 +1,62 @@
+// What the renderer's tests share: one device with the validation layer on, and pictures of a view.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "daemon/render/renderer.hpp"
+#include "tests/unit/scenes.hpp"
+
+namespace previz::testing {
+
+// One device a test program; every test ends by asking it for validation messages.
+inline const std::shared_ptr<render::Device>& shared_device() {
+  static const auto device = render::open_device({.validation = true, .name = ""});
+  return device;
+}
+
+inline lighting::EnvironmentMap uniform_environment(const glm::vec3& radiance, int size = 4) {
+  return {size, std::vector<glm::vec3>(static_cast<std::size_t>(size) * size, radiance)};
+}
+
+struct Rendered {
+  render::Layers layers;
+  render::Counters counters;
+};
+
+inline Rendered render_view(const View& view, int samples, const set::Estimation& estimation = {},
+                            set::LightSampling sampling = set::LightSampling::importance) {
+  render::Renderer renderer(shared_device(), estimation, view.calibration);
+  renderer.set_scene(view.scene);
+  renderer.set_environment(view.environment, sampling);
+  render::FrameInput frame;
+  frame.world_from_camera = view.world_from_camera;
+  renderer.begin(frame);
+  renderer.render(samples);
+  return {renderer.layers(), renderer.counters()};
+}
+
+// Mean of a layer over the picture, per channel, in double precision.
+inline glm::dvec3 mean(const std::vector<glm::vec3>& layer) {
+  glm::dvec3 sum(0);
+  for (const glm::vec3& value : layer) sum += glm::dvec3(value);
+  return sum / static_cast<double>(layer.size());
+}
+
+// Standard error of that mean, from the renderer's own variance of each pixel's mean (an
+// over-estimate, because it ignores that the samples are stratified). For mask = 0 the variance is
+// the difference's, so this is for pictures whose mask is 1.
+inline glm::dvec3 standard_error(const render::Layers& layers) {
+  const auto n = static_cast<double>(layers.variance.size());
+  return glm::sqrt(mean(layers.variance) / n);
+}
+
+inline void expect_clean(const render::Counters& counters) {
+  EXPECT_EQ(counters.dropped_not_finite, 0u);
+  EXPECT_EQ(counters.dropped_negative, 0u);
+  EXPECT_EQ(counters.queue_overflow, 0u);
+  EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
+}
+
+}  // namespace previz::testing
