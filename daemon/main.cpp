@@ -1,9 +1,129 @@
 // previzd: the subcommands; nothing else.
+//
+// Exit status: 0 done; 1 an error, one line on standard error says which; 2 the command line cannot
+// be understood; 128 + N stopped by signal N (what was finished is on disk, and a render goes on
+// there when it is called again).
+#include <spdlog/pattern_formatter.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <iostream>
+
+#include "daemon/post/render.hpp"
+#include "daemon/rig/live.hpp"
+#include "daemon/rig/signals.hpp"
+#include "drivers/error.hpp"
+
+namespace {
+
+using namespace previz;
+
+// Under systemd the journal adds the time and reads the level from the <N> prefix (sd-daemon(3)).
+void start_log(const std::string& level) {
+  auto log = spdlog::stderr_color_mt("previzd");
+  log->set_level(spdlog::level::from_str(level));
+  if (std::getenv("JOURNAL_STREAM")) {
+    class Priority final : public spdlog::custom_flag_formatter {
+      void format(const spdlog::details::log_msg& message, const std::tm&,
+                  spdlog::memory_buf_t& out) override {
+        constexpr std::string_view of_level[] = {"<7>", "<7>", "<6>", "<4>", "<3>", "<2>", "<6>"};
+        const std::string_view text = of_level[message.level];
+        out.append(text.data(), text.data() + text.size());
+      }
+      std::unique_ptr<custom_flag_formatter> clone() const override {
+        return std::make_unique<Priority>();
+      }
+    };
+    auto formatter = std::make_unique<spdlog::pattern_formatter>();
+    formatter->add_flag<Priority>('*').set_pattern("%*%v");
+    log->set_formatter(std::move(formatter));
+  } else {
+    log->set_pattern("%H:%M:%S.%e %^%l%$ %v");
+  }
+  spdlog::set_default_logger(std::move(log));
+}
+
+void add_device_options(CLI::App& command, render::DeviceOptions& device) {
+  command.add_option("--device", device.name, "Vulkan device whose name contains this");
+  command.add_flag("--validation", device.validation, "Vulkan's validation layer, into the log");
+}
+
+void add_render(CLI::App& app, post::RenderOptions& options) {
+  CLI::App& command = *app.add_subcommand("render", "Composite every frame of a recorded session");
+  command.add_option("session", options.session, "Session directory")->required();
+  command.add_option("--set", options.set_file, "Set file, instead of the session's own");
+  command.add_option_function<std::string>(
+      "--frames", [&](const std::string& text) { options.frames = post::parse_frame_range(text); },
+      "Observer frames: 7, 3-9 or 3- (default: all)");
+  command.add_option("--spp", options.samples, "Samples per pixel (default: quality.samples)")
+      ->check(CLI::Range(1, 1'000'000));
+  command.add_option("--seed", options.seed, "Seed of the random numbers (default: the set's)");
+  command.add_option("--estimator", options.estimator, "Estimator (default: the set's)")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, set::Estimator>{{"paired", set::Estimator::paired}}));
+  command.add_option("--out", options.directory, "Directory for the pictures");
+  command.add_flag_callback(
+      "--no-exr", [&] { options.exr = false; }, "No EXR files");
+  command.add_flag_callback(
+      "--no-png", [&] { options.png = false; }, "No PNG files (the video still needs them)");
+  command.add_flag_callback(
+      "--no-video", [&] { options.video = false; }, "No review video");
+  command.add_flag("--force", options.force, "Render frames again that are there already");
+  add_device_options(command, options.device);
+}
+
+void add_run(CLI::App& app, rig::LiveOptions& options) {
+  CLI::App& command = *app.add_subcommand("run", "Composite live, until the cameras end or Ctrl-C");
+  command.add_option("set", options.set_file, "Set file")->required();
+  command.add_option("--spp", options.samples, "Samples per pixel (default: quality.samples)")
+      ->check(CLI::Range(1, 1'000'000));
+  command.add_option("--out", options.directory, "Directory for picture.png and metrics.json");
+  add_device_options(command, options.device);
+}
+
+int do_render(post::RenderOptions& options, const rig::StopOnSignal& stop) {
+  options.stop = stop.token();
+  options.terminal = isatty(STDOUT_FILENO) != 0;
+  const post::RenderReport report = post::render_session(options, std::cout);
+  std::cout << report.directory.string() << ": " << report.frames.size() << " frames"
+            << (report.interrupted ? "; stopped, the same command goes on from here" : "")
+            << std::endl;
+  return report.interrupted ? 128 + stop.received() : 0;
+}
+
+int do_run(rig::LiveOptions& options, const rig::StopOnSignal& stop) {
+  options.stop = stop.token();
+  std::cout << to_json(rig::run_live(options, std::cout));
+  return stop.received() ? 128 + stop.received() : 0;
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app{"previzd: path-traced previsualization for a camera rig"};
+  app.set_version_flag("--version", "previzd " PREVIZ_VERSION);
   app.require_subcommand(1);
-  CLI11_PARSE(app, argc, argv);
-  return 0;
+  std::string level = "info";
+  app.add_option("--log-level", level, "What goes to the log")
+      ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}))
+      ->capture_default_str();
+  post::RenderOptions render_options;
+  rig::LiveOptions live_options;
+  try {
+    add_render(app, render_options);
+    add_run(app, live_options);
+    app.parse(argc, argv);
+    start_log(level);
+    const rig::StopOnSignal stop;
+    if (app.got_subcommand("render")) return do_render(render_options, stop);
+    return do_run(live_options, stop);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const std::exception& error) {
+    std::cerr << "previzd: " << error.what() << std::endl;
+    return 1;
+  }
 }

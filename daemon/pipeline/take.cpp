@@ -26,7 +26,7 @@ Take open_take(const std::filesystem::path& session_directory,
   std::vector<std::pair<std::string, std::filesystem::path>> assets;
   for (const auto& [as_written, stored] : take.session.info.assets)
     if (!set_file || !std::filesystem::exists(set_file->parent_path() / as_written))
-      assets.emplace_back(as_written, session_directory / stored);
+      assets.emplace_back(as_written, std::filesystem::absolute(session_directory / stored));
 
   const std::filesystem::path name =
       set_file.value_or(session_directory / take.session.info.set_name);
