@@ -109,7 +109,7 @@ std::string quote(const std::string& text) {
 
 std::string range(const Rule& rule) {
   const bool low = std::isfinite(rule.low), high = std::isfinite(rule.high);
-  std::string text = *rule.unit ? std::string(", ") + rule.unit : "";
+  std::string text = *rule.unit ? std::string(" in ") + rule.unit : "";
   if (low && high && !rule.low_excluded)
     return text + ", " + plain(rule.low) + " to " + plain(rule.high);
   if (low) text += (rule.low_excluded ? ", above " : ", at least ") + plain(rule.low);

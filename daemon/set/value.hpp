@@ -72,7 +72,7 @@ std::vector<double> numbers(const Value& value, std::size_t count, const Rule& r
 std::string print_number(double file_value);  // shortest form of 12 digits, always a TOML float
 std::string print_numbers(const double* values, std::size_t count, const Rule& rule);
 std::string quote(const std::string& text);
-std::string range(const Rule& rule);  // ", px, above 0"
+std::string range(const Rule& rule);  // " in px, above 0"
 [[noreturn]] void misread(const Value& value, const std::string& wanted);
 }  // namespace codec
 
@@ -191,7 +191,7 @@ template <>
 struct Codec<glm::dmat4> {
   static glm::dmat4 read(const Value& value, const Rule& rule);
   static std::string describe(const Rule&) {
-    return "4 rows of 4 numbers, metres, the last row 0 0 0 1";
+    return "4 rows of 4 numbers (metres), the last row 0 0 0 1";
   }
 };
 

@@ -1,0 +1,96 @@
+// config/reference.toml and the example: generated, complete, and true.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "daemon/set/set.hpp"
+#include "daemon/set/table.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::set {
+namespace {
+
+const std::filesystem::path config = std::filesystem::path(PREVIZ_SOURCE_DIR) / "config";
+
+std::string contents(const std::filesystem::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+TEST(SetReference, IsTheCommittedFile) {
+  EXPECT_EQ(contents(config / "reference.toml"), reference_toml())
+      << "config/reference.toml is stale: write it anew with `ninja reference`";
+}
+
+// Prints every key's value in the set, in the file's form: equal prints are equal sets.
+std::string printed(Draft& draft) {
+  std::string all;
+  for (const auto& section : sections(draft))
+    if (section.kind == Section::Kind::always)
+      for (const auto& key : section.open().keys) all += key.name + " = " + key.initial + '\n';
+  return all;
+}
+
+TEST(SetReference, ParsesToTheDefaults) {
+  Draft parsed, defaults;
+  parsed.set = parse_set(reference_toml(), "config/reference.toml");
+  EXPECT_EQ(parsed.set.name, "reference");
+  EXPECT_EQ(parsed.set.output.directory, "config/out");
+  parsed.set.output.directory = defaults.set.output.directory;
+  EXPECT_EQ(printed(parsed), printed(defaults));
+  EXPECT_FALSE(parsed.set.observer.calibration);
+  EXPECT_FALSE(parsed.set.light_camera.calibration);
+  EXPECT_FALSE(parsed.set.observer.exposure);
+  EXPECT_FALSE(parsed.set.lighting.environment);
+  EXPECT_TRUE(parsed.set.tracking.tags.empty());
+  EXPECT_TRUE(parsed.set.objects.empty());
+  EXPECT_TRUE(parsed.set.lights.empty());
+}
+
+// A left-out table means what its commented defaults say.
+TEST(SetReference, CommentedDefaultsAreTheStructs) {
+  Draft draft;
+  for (const auto& section : sections(draft))
+    for (const auto& key : section.open().keys)
+      EXPECT_EQ(key.need.kind == Need::Kind::defaulted, !key.initial.empty())
+          << section.path << '.' << key.name;
+}
+
+// Take the "#" from every key: each value must be one that its key takes. What contradicts another
+// form, or names a file that is not here, is another matter.
+TEST(SetReference, ExamplesAreOfTheRightKind) {
+  std::istringstream lines(reference_toml());
+  std::string text;
+  for (std::string line; std::getline(lines, line); text += line + '\n')
+    if (line.size() > 1 && line[0] == '#' && line[1] != ' ') line.erase(0, 1);
+  try {
+    parse_set(text, "reference.toml");
+    FAIL() << "contradicting forms were taken";
+  } catch (const Error& error) {
+    std::istringstream problems(error.what());
+    for (std::string line; std::getline(problems, line);) {
+      EXPECT_EQ(line.find("is not allowed"), std::string::npos) << line;
+      EXPECT_EQ(line.find("unknown"), std::string::npos) << line;
+      EXPECT_EQ(line.find("not valid TOML"), std::string::npos) << line;
+    }
+  }
+}
+
+// The example's files are the crew's own; any file stands in for them here.
+TEST(SetExample, Parses) {
+  const auto file = config / "set.example.toml";
+  const auto set =
+      parse_set(contents(file), file,
+                {{"stage/set.glb", file}, {"stage/creature.glb", file}, {"stage/lamp.glb", file}});
+  EXPECT_EQ(set.tracking.tags.size(), 3u);
+  EXPECT_EQ(set.objects.size(), 3u);
+  EXPECT_EQ(set.lights.size(), 2u);
+  ASSERT_TRUE(set.observer.calibration && set.observer.calibration->lens);
+  EXPECT_TRUE(set.light_camera.calibration);
+}
+
+}  // namespace
+}  // namespace previz::set

@@ -1,0 +1,228 @@
+// What a correct set file means: units, poses, corners, paths.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <numbers>
+
+#include "daemon/set/pose.hpp"
+#include "daemon/set/set.hpp"
+#include "tests/unit/temporary_directory.hpp"
+
+namespace previz::set {
+namespace {
+
+// Products of a few double operations on values of order 1.
+constexpr double rounding = 1e-14;
+
+void expect_near(const glm::dvec4& actual, const glm::dvec4& expected, double tolerance) {
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(actual[i], expected[i], tolerance) << "component " << i;
+}
+
+Set parse(const std::string& text) {
+  return parse_set(text, "folder/stage.toml");
+}
+
+TEST(SetValues, EmptyFileIsTheDefaults) {
+  const auto set = parse("");
+  EXPECT_EQ(set.name, "stage");
+  EXPECT_EQ(set.file, "folder/stage.toml");
+  EXPECT_EQ(set.quality.samples, Quality{}.samples);
+  EXPECT_EQ(set.output.directory, "folder/out");
+}
+
+TEST(SetValues, AreInUnitsOfTheStructs) {
+  const auto set = parse(R"(
+[observer]
+exposure = 2
+[observer.intrinsics]
+width = 640
+height = 480
+fx = 612
+fy = 613.5
+cx = 319.5
+cy = 239.5
+k1 = -0.1
+[observer.lens]
+focal_length_mm = 35
+f_number = 2.8
+focus_distance_m = 1.25
+[observer.response]
+kind = "table"
+table = [0, 0.25, 1]
+responsivity = 3.5
+[light_camera.intrinsics]
+width = 512
+height = 512
+fx = 145.5
+fy = 145.5
+cx = 255.5
+cy = 255.5
+k = [0.01, 0, 0, 0]
+max_angle_deg = 100
+[light_camera.response]
+kind = "gamma"
+gamma = 2.4
+[light_camera.pose]
+position_m = [1, 2, 3]
+[lighting]
+environment_rotation_deg = -90
+unseen = "constant"
+unseen_radiance = [0.1, 0.2, 0.3]
+[[light]]
+type = "spot"
+position_m = [0, 0, 2]
+direction = [0, 3, -4]
+emission = [1, 2, 3]
+outer_cone_deg = 30
+gain_real = 1
+)");
+  EXPECT_EQ(set.observer.exposure, 2.0);
+  const auto& observer = set.observer.calibration.value();
+  EXPECT_EQ(observer.intrinsics.fy, 613.5);
+  EXPECT_EQ(observer.intrinsics.k1, -0.1);
+  EXPECT_DOUBLE_EQ(observer.lens.value().focal_length_m, 0.035);
+  EXPECT_EQ(observer.lens->focus_distance_m, 1.25);
+  EXPECT_EQ(observer.response.kind, ResponseCurve::Kind::table);
+  EXPECT_EQ(observer.response.inverse_table, (std::vector{0.0, 0.25, 1.0}));
+  EXPECT_EQ(observer.responsivity, 3.5);
+  const auto& light = set.light_camera.calibration.value();
+  EXPECT_DOUBLE_EQ(light.intrinsics.max_angle_rad, 100 * std::numbers::pi / 180);
+  EXPECT_EQ(light.intrinsics.k[0], 0.01);
+  EXPECT_EQ(light.response.gamma, 2.4);
+  expect_near(light.world_from_camera[3], {1, 2, 3, 1}, 0);
+  EXPECT_DOUBLE_EQ(set.lighting.environment_rotation_rad, -std::numbers::pi / 2);
+  EXPECT_EQ(set.lighting.unseen_radiance.z, 0.3);
+  ASSERT_EQ(set.lights.size(), 1u);
+  EXPECT_EQ(set.lights[0].name, "light 1");
+  EXPECT_NEAR(set.lights[0].direction.y, 0.6, rounding);
+  EXPECT_NEAR(set.lights[0].direction.z, -0.8, rounding);
+  EXPECT_DOUBLE_EQ(set.lights[0].outer_cone_rad, std::numbers::pi / 6);
+  EXPECT_EQ(set.lights[0].gain_mixed, 1);
+  EXPECT_EQ(set.lights[0].gain_real, 1);
+}
+
+TEST(SetValues, LookTheSameInline) {
+  const auto set = parse(
+      "quality = {samples = 3}\n"
+      "tag = [{id = 2, size_m = 0.1, position_m = [0, 0, 0]}]\n"
+      "observer.driver = 'none'\n");
+  EXPECT_EQ(set.quality.samples, 3);
+  ASSERT_EQ(set.tracking.tags.size(), 1u);
+  EXPECT_EQ(set.tracking.tags[0].id, 2);
+  EXPECT_EQ(set.observer.driver, Driver::none);
+}
+
+TEST(SetValues, RotationTurnsAboutWorldXThenYThenZ) {
+  const auto set =
+      parse("[[tag]]\nid = 1\nsize_m = 0.1\nposition_m = [1, 2, 3]\nrotation_deg = [90, 0, 90]\n");
+  const auto& m = set.tracking.tags.at(0).world_from_tag;
+  // X turns nothing of the tag's right; Z then turns it to +Y. Up goes to +Z and stays there. Out
+  // of the paper goes to -Y and on to +X.
+  expect_near(m[0], {0, 1, 0, 0}, rounding);
+  expect_near(m[1], {0, 0, 1, 0}, rounding);
+  expect_near(m[2], {1, 0, 0, 0}, rounding);
+  expect_near(m[3], {1, 2, 3, 1}, rounding);
+}
+
+TEST(SetValues, WallTagFacesMinusY) {
+  const auto set =
+      parse("[[tag]]\nid = 1\nsize_m = 0.1\nposition_m = [0, 0, 1]\nrotation_deg = [90, 0, 0]\n");
+  expect_near(set.tracking.tags.at(0).world_from_tag[2], {0, -1, 0, 0}, rounding);
+}
+
+TEST(SetValues, MatricesAreRowMajor) {
+  const auto set = parse(
+      "[[tag]]\nid = 1\nsize_m = 0.1\n"
+      "world_from_tag = [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]\n"
+      "[[tag]]\nid = 2\nsize_m = 0.1\n"
+      "world_from_tag = [0, -1, 0, 1,  1, 0, 0, 2,  0, 0, 1, 3,  0, 0, 0, 1]\n");
+  for (const auto& tag : set.tracking.tags) {
+    expect_near(tag.world_from_tag[0], {0, 1, 0, 0}, 0);
+    expect_near(tag.world_from_tag[3], {1, 2, 3, 1}, 0);
+  }
+}
+
+// A pose typed with 4 digits is off by up to 5e-5 an entry: taken, and made exactly rigid, moving
+// no entry by more than the error that was tolerated.
+TEST(SetValues, RoundedPosesBecomeExactlyRigid) {
+  const auto set = parse(
+      "[[tag]]\nid = 1\nsize_m = 0.1\n"
+      "world_from_tag = [[0.8660, -0.5, 0, 0], [0.5, 0.8660, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
+  const auto& m = set.tracking.tags.at(0).world_from_tag;
+  EXPECT_LT(rigidity_error(m), rounding);
+  EXPECT_NEAR(m[0][0], 0.8660, rigid_tolerance);
+  EXPECT_NEAR(m[0][1], 0.5, rigid_tolerance);
+}
+
+TEST(SetValues, CornersGiveSizeAndPose) {
+  const auto set = parse(
+      "[[tag]]\nid = 1\n"
+      "corners_m = [[1, 0, 2.0], [1, 0.1, 2.0], [1, 0.1, 2.1], [1, 0, 2.1]]\n");
+  const auto& tag = set.tracking.tags.at(0);
+  EXPECT_NEAR(tag.size_m, 0.1, rounding);
+  expect_near(tag.world_from_tag[0], {0, 1, 0, 0}, rounding);
+  expect_near(tag.world_from_tag[1], {0, 0, 1, 0}, rounding);
+  expect_near(tag.world_from_tag[2], {1, 0, 0, 0}, rounding);
+  expect_near(tag.world_from_tag[3], {1, 0.05, 2.05, 1}, rounding);
+}
+
+// Corners measured with a tape, each off by at most e: the fitted middle is their mean and at most
+// e off; the fitted side is a mean of four differences, at most 2e off.
+TEST(SetValues, MeasuredCornersAreFitted) {
+  constexpr double e = 0.001;
+  const auto set = parse(
+      "[[tag]]\nid = 1\nsize_m = 0.1\n"
+      "corners_m = [[0.001, 0, 0], [0.1, 0.001, 0], [0.1, 0.1, 0.001], [0, 0.099, 0]]\n");
+  const auto& tag = set.tracking.tags.at(0);
+  EXPECT_EQ(tag.size_m, 0.1);  // what was measured along the edge wins
+  EXPECT_LT(rigidity_error(tag.world_from_tag), rounding);
+  expect_near(tag.world_from_tag[3], {0.05, 0.05, 0, 1}, e);
+}
+
+TEST(SetValues, FilesAreRelativeToTheSetAndAssetsStandIn) {
+  test::TemporaryDirectory directory;
+  std::filesystem::create_directories(directory.path() / "assets");
+  std::ofstream(directory.path() / "vase.glb") << "glTF";
+  std::ofstream(directory.path() / "assets" / "abc.glb") << "glTF";
+  const auto file = directory.path() / "stage.toml";
+  const std::string text =
+      "[observer]\ndevice = 'takes/1'\n"
+      "[[object]]\nname = 'vase'\nfile = 'vase.glb'\npresence = 'removed'\n"
+      "position_m = [1, 0, 0]\nrotation_deg = [0, 0, 90]\nscale = 2\n";
+  const auto set = parse_set(text, file);
+  EXPECT_EQ(set.objects.at(0).file, directory.path() / "vase.glb");
+  EXPECT_EQ(set.objects[0].file_as_written, "vase.glb");
+  EXPECT_EQ(set.objects[0].presence, Presence::removed);
+  expect_near(set.objects[0].world_from_file[0], {0, 2, 0, 0}, rounding);
+  expect_near(set.objects[0].world_from_file[3], {1, 0, 0, 1}, rounding);
+  EXPECT_EQ(set.observer.device, (directory.path() / "takes/1").string());
+
+  const auto replayed = parse_set(text, file, {{"vase.glb", "assets/abc.glb"}});
+  EXPECT_EQ(replayed.objects.at(0).file, directory.path() / "assets" / "abc.glb");
+  EXPECT_EQ(replayed.objects[0].file_as_written, "vase.glb");
+}
+
+TEST(SetValues, RectangleGetsAnUpAcrossItsDirection) {
+  const auto set = parse(
+      "[[light]]\ntype = 'rectangle'\nposition_m = [0, 0, 0]\ndirection = [0, 1, 0]\n"
+      "width_m = 1\nheight_m = 2\nemission = [1, 1, 1]\n"
+      "[[light]]\ntype = 'rectangle'\nposition_m = [0, 0, 0]\ndirection = [0, 0, -2]\n"
+      "up = [3, 0, 1]\nwidth_m = 1\nheight_m = 2\nemission = [1, 1, 1]\n");
+  EXPECT_EQ(set.lights.at(0).up, glm::dvec3(0, 0, 1));
+  EXPECT_EQ(set.lights.at(1).up, glm::dvec3(1, 0, 0));
+}
+
+TEST(SetPose, FoldAngleIsWhereTheRadiusStopsGrowing) {
+  FisheyeIntrinsics fisheye;
+  fisheye.max_angle_rad = std::numbers::pi;
+  EXPECT_FALSE(fold_angle(fisheye));
+  // r = t - t^5 / 20: slope 1 - t^4 / 4, zero at sqrt(2). Bisected to the last bits.
+  fisheye.k = {0, -0.05, 0, 0};
+  EXPECT_NEAR(fold_angle(fisheye).value(), std::numbers::sqrt2, rounding);
+  fisheye.max_angle_rad = 1.41;
+  EXPECT_FALSE(fold_angle(fisheye));
+}
+
+}  // namespace
+}  // namespace previz::set
