@@ -1,0 +1,137 @@
+// A line of stages ends in order at the stream's end, cleanly at a stop, and at once at an error.
+#include "daemon/pipeline/stages.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "daemon/pipeline/metrics.hpp"
+
+namespace previz::pipeline {
+namespace {
+
+// Counts up to `total`; with a move-only value, as shots are moved and never copied.
+auto count_to(int total) {
+  return [next = 0, total]() mutable -> std::optional<std::unique_ptr<int>> {
+    if (next == total) return std::nullopt;
+    return std::make_unique<int>(next++);
+  };
+}
+
+TEST(StageThreads, EndOfStreamRunsThroughTheWholeLine) {
+  Metrics metrics;
+  BoundedQueue<std::unique_ptr<int>> first(1), second(1);
+  std::vector<int> results;
+  StageThreads stages(metrics, {});
+  stages.source("camera", first, count_to(100));
+  stages.stage("double", first, second, [](std::unique_ptr<int> value) {
+    *value *= 2;
+    return value;
+  });
+  stages.sink("display", second, [&](std::unique_ptr<int> value) { results.push_back(*value); });
+  stages.wait();
+  ASSERT_EQ(results.size(), 100u);
+  EXPECT_EQ(results.front(), 0);
+  EXPECT_EQ(results.back(), 198);
+  const MetricsSnapshot snapshot = metrics.snapshot(1);
+  EXPECT_EQ(snapshot.stages.at("camera").frames, 100u);
+  EXPECT_EQ(snapshot.stages.at("double").frames, 100u);
+  EXPECT_EQ(snapshot.stages.at("display").frames, 100u);
+}
+
+TEST(StageThreads, MailboxDropsAreCountedByStageAndCause) {
+  Metrics metrics;
+  Mailbox<std::unique_ptr<int>> mailbox;
+  std::atomic<int> shown = 0;
+  StageThreads stages(metrics, {});
+  stages.source("camera", mailbox, count_to(5000));
+  stages.sink("display", mailbox, [&](std::unique_ptr<int>) { ++shown; });
+  stages.wait();
+  const auto& dropped = metrics.snapshot(1).stages.at("display").dropped;
+  const std::uint64_t count = dropped.contains("newer frame") ? dropped.at("newer frame") : 0;
+  EXPECT_EQ(shown + count, 5000u);
+}
+
+TEST(StageThreads, StopEndsTheSourceAndFinishesWhatWasBegun) {
+  Metrics metrics;
+  std::stop_source stop;
+  BoundedQueue<int> queue(2);
+  int produced = 0, shown = 0;
+  StageThreads stages(metrics, stop.get_token());
+  stages.source("camera", queue, [&]() -> std::optional<int> { return produced++; });
+  stages.sink("display", queue, [&](int value) {
+    if (value == 50) stop.request_stop();
+    ++shown;
+  });
+  stages.wait();
+  EXPECT_EQ(shown, produced);
+  EXPECT_GE(shown, 51);
+  EXPECT_LE(shown, 51 + 4);  // 2 in the queue, 1 in the source's hands, 1 it may have begun
+}
+
+TEST(StageThreads, AnErrorEndsEveryStageAndIsThrown) {
+  Metrics metrics;
+  BoundedQueue<std::unique_ptr<int>> first(1), second(1);
+  StageThreads stages(metrics, {});
+  stages.source("camera", first, count_to(1'000'000'000));  // would never end by itself
+  stages.stage("faulty", first, second, [](std::unique_ptr<int> value) {
+    if (*value == 10) throw std::runtime_error("lamp fell down");
+    return value;
+  });
+  stages.sink("display", second, [](std::unique_ptr<int>) {});
+  try {
+    stages.wait();
+    FAIL() << "no error";
+  } catch (const std::runtime_error& error) {
+    EXPECT_STREQ(error.what(), "lamp fell down");
+  }
+}
+
+TEST(StageThreads, LeavingTheScopeEndsThem) {
+  Metrics metrics;
+  Mailbox<std::unique_ptr<int>> mailbox;
+  StageThreads stages(metrics, {});
+  stages.source("camera", mailbox, count_to(1'000'000'000));
+  stages.sink("display", mailbox, [](std::unique_ptr<int>) {});
+}
+
+TEST(Metrics, QuantilesAreNearestRank) {
+  EXPECT_EQ(quantile({}, 0.5), 0);
+  EXPECT_EQ(quantile({3}, 0.99), 3);
+  EXPECT_EQ(quantile({4, 1, 3, 2}, 0.5), 2);
+  std::vector<double> hundred;
+  for (int i = 100; i >= 1; --i) hundred.push_back(i);
+  EXPECT_EQ(quantile(hundred, 0.99), 99);
+  EXPECT_EQ(quantile(hundred, 1.0), 100);
+}
+
+TEST(Metrics, JsonHasRatesDropsAndLatency) {
+  Metrics metrics;
+  for (int i = 0; i < 50; ++i) metrics.worked("render", 0.03);
+  metrics.dropped("render", "newer frame", 7);
+  metrics.dropped("render", "newer frame", 0);
+  metrics.count("plate untouched: pose lost", 2);
+  for (int i = 1; i <= 100; ++i) metrics.shown(0.001 * i);
+  const auto json = nlohmann::json::parse(to_json(metrics.snapshot(2.0)));
+  EXPECT_EQ(json["stages"]["render"]["frames"], 50);
+  EXPECT_DOUBLE_EQ(json["stages"]["render"]["frames_per_second"], 25);
+  EXPECT_NEAR(json["stages"]["render"]["busy_fraction"], 0.75, 1e-12);
+  EXPECT_EQ(json["stages"]["render"]["dropped"]["newer frame"], 7);
+  EXPECT_EQ(json["counts"]["plate untouched: pose lost"], 2);
+  EXPECT_DOUBLE_EQ(json["latency_s"]["p50"], 0.050);
+  EXPECT_DOUBLE_EQ(json["latency_s"]["p99"], 0.099);
+}
+
+// The window holds the last 4096 frames: older latencies leave the figures.
+TEST(Metrics, OldLatenciesLeaveTheWindow) {
+  Metrics metrics;
+  for (int i = 0; i < 4096; ++i) metrics.shown(9.0);
+  for (int i = 0; i < 4096; ++i) metrics.shown(0.5);
+  EXPECT_EQ(metrics.snapshot(1).latency_p99_s, 0.5);
+}
+
+}  // namespace
+}  // namespace previz::pipeline

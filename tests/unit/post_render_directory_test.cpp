@@ -1,0 +1,157 @@
+// What a render leaves behind, and how the next one goes on from it.
+#include "daemon/post/render_directory.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "daemon/output/exr.hpp"
+#include "daemon/output/png.hpp"
+#include "drivers/error.hpp"
+#include "tests/unit/temporary_directory.hpp"
+
+namespace previz::post {
+namespace {
+
+constexpr const char* settings = R"({"samples": 16, "set": "a long text"})";
+
+pipeline::Shot sample_shot(std::uint64_t index) {
+  constexpr int width = 8, height = 6;
+  pipeline::Shot shot;
+  shot.index = index;
+  auto frame = std::make_shared<Frame>();
+  frame->timestamp_ns = 1'000'000'000 + 40'000'000 * static_cast<std::int64_t>(index);
+  frame->exposure = 1.1;
+  shot.frame = frame;
+  shot.track.status = tracking::TrackStatus::tracked;
+  shot.track.pose.emplace();
+  shot.track.pose->world_from_camera[3] = {0.1, -0.2, 0.3, 1.0};
+  shot.track.pose->covariance[7] = 1e-6;
+  shot.track.pose->tags = {0, 3};
+  shot.light = std::make_shared<pipeline::Light>(pipeline::Light{{}, {4, 5}});
+  shot.picture = {width, height, 8, std::vector<std::uint16_t>(3 * width * height, 99)};
+  render::Layers& layers = shot.layers;
+  layers.width = width;
+  layers.height = height;
+  layers.samples = 16;
+  for (auto* layer : {&layers.composite, &layers.mixed, &layers.real, &layers.diff, &layers.normal,
+                      &layers.variance})
+    layer->resize(width * height, glm::vec3(0.5f));
+  layers.mask.resize(width * height);
+  layers.depth.resize(width * height);
+  shot.counters.rays = 1234;
+  shot.whole = true;
+  return shot;
+}
+
+class RenderDirectoryTest : public testing::Test {
+ protected:
+  RenderDirectory open(const char* text = settings, bool force = false) const {
+    return RenderDirectory(output_, text, force);
+  }
+  test::TemporaryDirectory directory_;
+  set::Output output_{directory_ / "out", true, true, true};
+  set::Set set_;
+};
+
+TEST_F(RenderDirectoryTest, WritesNumberedFilesAndALineAFrame) {
+  RenderDirectory directory = open();
+  EXPECT_EQ(directory.finished(7), nullptr);
+  directory.write(sample_shot(7), set_);
+  EXPECT_NE(directory.finished(7), nullptr);
+  EXPECT_EQ(output::read_exr(directory_ / "out/0007.exr").width, 8);
+  EXPECT_EQ(output::read_png(directory_ / "out/0007.png").samples.front(), 99);
+
+  const RenderDirectory again = open();
+  const FrameRecord* record = again.finished(7);
+  ASSERT_NE(record, nullptr);
+  EXPECT_EQ(record->timestamp_ns, 1'280'000'000);
+  EXPECT_EQ(record->samples, 16);
+  EXPECT_EQ(record->status, FrameStatus::rendered);
+  ASSERT_TRUE(record->pose);
+  EXPECT_EQ(record->pose->world_from_camera[3][2], 0.3);
+  EXPECT_EQ(record->pose->covariance[7], 1e-6);
+  EXPECT_EQ(record->pose->tags, (std::vector<int>{0, 3}));
+  EXPECT_EQ(record->light_frames, (std::vector<std::uint64_t>{4, 5}));
+  EXPECT_EQ(record->counters.rays, 1234u);
+}
+
+TEST_F(RenderDirectoryTest, UntouchedFrameSaysWhyAndHasNoPose) {
+  pipeline::Shot shot = sample_shot(0);
+  shot.track = {};
+  shot.track.reason = "no tag of the map is seen";
+  shot.untouched = "pose lost: no tag of the map is seen";
+  open().write(shot, set_);
+  const RenderDirectory again = open();
+  ASSERT_NE(again.finished(0), nullptr);
+  EXPECT_EQ(again.finished(0)->status, FrameStatus::untouched);
+  EXPECT_EQ(again.finished(0)->reason, shot.untouched);
+  EXPECT_FALSE(again.finished(0)->pose);
+}
+
+TEST_F(RenderDirectoryTest, AMissingFileOrAHalfLineMeansTheFrameIsDoneAgain) {
+  {
+    RenderDirectory directory = open();
+    for (const std::uint64_t frame : {0, 1, 2}) directory.write(sample_shot(frame), set_);
+  }
+  std::filesystem::remove(directory_ / "out/0001.exr");
+  std::ofstream(directory_ / "out/frames.jsonl", std::ios::app) << R"({"frame":3,"timesta)";
+  {
+    RenderDirectory directory = open();
+    EXPECT_NE(directory.finished(0), nullptr);
+    EXPECT_EQ(directory.finished(1), nullptr);
+    EXPECT_NE(directory.finished(2), nullptr);
+    EXPECT_EQ(directory.finished(3), nullptr);
+    directory.write(sample_shot(3), set_);  // its line must not run into the half one
+  }
+  EXPECT_NE(open().finished(3), nullptr);
+}
+
+TEST_F(RenderDirectoryTest, OtherSettingsAreRefusedByNameUnlessForced) {
+  open().write(sample_shot(0), set_);
+  constexpr const char* other = R"({"samples": 64, "set": "another text"})";
+  try {
+    open(other);
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    const std::string message = error.what();
+    EXPECT_NE(message.find("render.json"), std::string::npos) << message;
+    EXPECT_NE(message.find("samples is 16 there and 64 now"), std::string::npos) << message;
+    EXPECT_NE(message.find("set differs"), std::string::npos) << message;
+    EXPECT_NE(message.find("--force"), std::string::npos) << message;
+  }
+  EXPECT_EQ(open(other, true).finished(0), nullptr);
+  EXPECT_NO_THROW(open(other));
+}
+
+TEST_F(RenderDirectoryTest, WithoutFinishedFramesOtherSettingsAreNoMatter) {
+  open();
+  EXPECT_NO_THROW(open(R"({"samples": 64})"));
+}
+
+TEST_F(RenderDirectoryTest, VideoIsMadeOfThePicturesInOrder) {
+  RenderDirectory directory = open();
+  std::vector<FrameRecord> frames;
+  for (const std::uint64_t frame : {0, 1, 2}) {
+    directory.write(sample_shot(frame), set_);
+    frames.push_back(*directory.finished(frame));
+  }
+  std::ostringstream out;
+  const std::filesystem::path video = directory.write_video(frames, out);
+  EXPECT_GT(std::filesystem::file_size(video), 0u);
+  EXPECT_NE(out.str().find("3 pictures"), std::string::npos);
+}
+
+TEST(FrameRange, ReadsWhatTheHelpSays) {
+  EXPECT_EQ(parse_frame_range("7").first, 7u);
+  EXPECT_EQ(parse_frame_range("7").last, 7u);
+  EXPECT_EQ(parse_frame_range("3-9").first, 3u);
+  EXPECT_EQ(parse_frame_range("3-9").last, 9u);
+  EXPECT_GT(parse_frame_range("3-").last, 1'000'000'000u);
+  for (const char* wrong : {"", "-", "a", "3-b", "9-3", "3--9", "-3", " 3", "3 - 9"})
+    EXPECT_THROW(parse_frame_range(wrong), Error) << wrong;
+}
+
+}  // namespace
+}  // namespace previz::post
