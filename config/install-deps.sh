@@ -1,0 +1,43 @@
+#!/usr/bin/env bash
+# Installs what building, testing and running previzd needs on Debian 12, and only what is missing.
+# As root, or through sudo; asks no questions.
+set -euo pipefail
+
+packages=(
+  # tools
+  cmake ninja-build g++ ccache pkg-config git glslang-tools clang-format clang-tidy
+  # Vulkan: loader, Mesa's drivers (with a CPU one) and the validation layer the tests switch on
+  libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers
+  # pictures and video
+  libopencv-dev libopenexr-dev libimath-dev libpng-dev
+  libavformat-dev libavcodec-dev libavutil-dev libswscale-dev
+  # markers, geometry, scenes
+  libapriltag-dev libembree-dev libtinygltf-dev libstb-dev libglm-dev
+  # files, command line, log, hashes
+  libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libspdlog-dev libfmt-dev libssl-dev
+  # tests
+  libgtest-dev libbenchmark-dev
+)
+
+missing=()
+for package in "${packages[@]}"; do
+  state=$(dpkg-query --show --showformat='${db:Status-Status}' "$package" 2>/dev/null || true)
+  [[ $state == installed ]] || missing+=("$package")
+done
+if [[ ${#missing[@]} -eq 0 ]]; then
+  echo "install-deps: everything is installed"
+  exit 0
+fi
+
+as_root=()
+if [[ $EUID -ne 0 ]]; then
+  if ! command -v sudo >/dev/null; then
+    echo "install-deps: run this as root, or install sudo; missing: ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+echo "install-deps: installing ${missing[*]}"
+"${as_root[@]}" apt-get update --quiet
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+  apt-get install --quiet --yes --no-install-recommends "${missing[@]}"
