@@ -1,1 +1,218 @@
-#include "daemon/scene/scene.hpp"
+#include "daemon/scene/gltf.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <map>
+#include <numbers>
+#include <optional>
+
+#include "daemon/scene/gltf_material.hpp"
+#include "daemon/scene/gltf_mesh.hpp"
+#include "daemon/scene/gltf_nodes.hpp"
+#include "daemon/scene/gltf_read.hpp"
+#include "daemon/scene/gltf_value.hpp"
+#include "daemon/set/problems.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::scene {
+namespace {
+
+std::uint32_t presence_bits(set::Presence presence) {
+  switch (presence) {
+    case set::Presence::phantom:
+      return world_both;
+    case set::Presence::virtual_object:
+      return world_mixed;
+    case set::Presence::removed:
+      return world_real;
+  }
+  return world_both;
+}
+
+bool is_finite(const glm::dmat4& transform) {
+  for (int column = 0; column < 4; ++column)
+    for (int row = 0; row < 4; ++row)
+      if (!std::isfinite(transform[column][row])) return false;
+  return true;
+}
+
+bool is_invertible(const glm::dmat4& transform) {
+  const glm::dmat3 linear(transform);
+  const double size = glm::length(linear[0]) * glm::length(linear[1]) * glm::length(linear[2]);
+  return is_finite(transform) && std::isfinite(size) && size > 0 &&
+         std::abs(glm::determinant(linear)) > 1e-12 * size;
+}
+
+}  // namespace
+
+struct GltfFile::Loader {
+  Loader(const std::filesystem::path& path, Scene& target, Budget& limits)
+      : file(path.string()),
+        scene(target),
+        budget(limits),
+        notes(file),
+        model(read_gltf(path, notes)),
+        materials(model, file, scene, notes, budget) {
+    const auto ignored = [&](std::size_t count, const char* what) {
+      if (count > 0) notes.add("has " + std::to_string(count) + " " + what + "; ignored");
+    };
+    ignored(model.animations.size(), "animations");
+    ignored(model.skins.size(), "skins");
+    ignored(model.cameras.size(), "cameras");
+  }
+
+  void add(const set::Object& object, std::uint32_t object_index);
+  void add_mesh(const PlacedNode& placed, const Instance& instance_of_node);
+  void add_light(const PlacedNode& placed, const glm::dmat4& world_from_node,
+                 std::uint32_t presence);
+  std::optional<std::uint32_t> use_mesh(const tinygltf::Primitive& primitive,
+                                        const UsedMaterial& material, const std::string& name,
+                                        const std::string& what);
+
+  std::string file;
+  Scene& scene;
+  Budget& budget;
+  Notes notes;
+  tinygltf::Model model;
+  GltfMaterials materials;
+  std::map<MeshSource, std::optional<std::uint32_t>> meshes;  // nothing: empty
+};
+
+void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index) {
+  const std::size_t before = scene.instances.size() + scene.lights.size();
+  for (const PlacedNode& placed : place_nodes(model, object.nodes, file, notes)) {
+    const tinygltf::Node& node = model.nodes[static_cast<std::size_t>(placed.node)];
+    Instance instance;
+    instance.name = node.name;
+    instance.presence = presence_bits(object.presence);
+    instance.object = object_index;
+    instance.world_from_object = object.world_from_file * z_up_from_y_up * placed.file_from_node;
+    if (node.mesh >= 0) add_mesh(placed, instance);
+    add_light(placed, instance.world_from_object, instance.presence);
+  }
+  if (scene.instances.size() + scene.lights.size() == before)
+    notes.add("object \"" + set::printable(object.name) + "\" has nothing to see in it");
+}
+
+void GltfFile::Loader::add_mesh(const PlacedNode& placed, const Instance& instance_of_node) {
+  const std::string node = node_name(model, placed.node);
+  const int index = model.nodes[static_cast<std::size_t>(placed.node)].mesh;
+  if (static_cast<std::size_t>(index) >= model.meshes.size())
+    throw Error(file + ": " + node + ": there is no mesh " + std::to_string(index));
+  const tinygltf::Mesh& mesh = model.meshes[static_cast<std::size_t>(index)];
+  if (!is_invertible(instance_of_node.world_from_object)) {
+    notes.add(node + ": its transform is singular or not finite; skipped");
+    return;
+  }
+  if (mesh.primitives.empty())
+    notes.add("mesh " + std::to_string(index) + ": has no primitives; skipped");
+  for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
+    const tinygltf::Primitive& primitive = mesh.primitives[i];
+    const std::string what = "mesh " + std::to_string(index) + " \"" + set::printable(mesh.name) +
+                             "\", primitive " + std::to_string(i);
+    if (primitive.mode >= 0 && primitive.mode < TINYGLTF_MODE_TRIANGLES) {
+      notes.add(what + ": points and lines are not supported; skipped");
+      continue;
+    }
+    if (primitive.mode > TINYGLTF_MODE_TRIANGLE_FAN)
+      throw Error(file + ": " + what + ": mode " + std::to_string(primitive.mode) +
+                  " is not one of glTF's");
+    const UsedMaterial material = materials.use(primitive.material);
+    std::string suffix;
+    if (mesh.primitives.size() > 1) suffix.append(".").append(std::to_string(i));
+    const auto used = use_mesh(primitive, material, mesh.name + suffix, what);
+    if (!used) continue;
+    budget.add_instance(file);
+    Instance instance = instance_of_node;
+    instance.name += suffix;
+    instance.mesh = *used;
+    instance.material = material.index;
+    scene.instances.push_back(std::move(instance));
+  }
+}
+
+std::optional<std::uint32_t> GltfFile::Loader::use_mesh(const tinygltf::Primitive& primitive,
+                                                        const UsedMaterial& material,
+                                                        const std::string& name,
+                                                        const std::string& what) {
+  const MeshSource source = mesh_source(primitive, material.mapping);
+  if (material.is_textured && source.uvs < 0)
+    notes.add(what + ": has no TEXCOORD_" + std::to_string(material.mapping.set) +
+              " for its textures; they are read at (0, 0)");
+  const auto [at, is_new] = meshes.try_emplace(source);
+  if (!is_new) return at->second;
+  if (!primitive.targets.empty()) notes.add(what + ": its morph targets are ignored");
+  if (primitive.attributes.contains("COLOR_0"))
+    notes.add(what + ": its vertex colours are ignored");
+  std::optional<Mesh> mesh = read_mesh(model, source, file + ": " + what, what, notes, budget);
+  if (!mesh) return {};
+  mesh->name = name;
+  at->second = static_cast<std::uint32_t>(scene.meshes.size());
+  scene.meshes.push_back(std::move(*mesh));
+  return at->second;
+}
+
+// KHR_lights_punctual: a light shines along its node's -Z; scale does not change it.
+void GltfFile::Loader::add_light(const PlacedNode& placed, const glm::dmat4& world_from_node,
+                                 std::uint32_t presence) {
+  const tinygltf::Node& node = model.nodes[static_cast<std::size_t>(placed.node)];
+  const double index = number(extension(node.extensions, "KHR_lights_punctual"), "light", -1);
+  if (index < 0) return;
+  const std::string where = node_name(model, placed.node);
+  if (index >= static_cast<double>(model.lights.size()))
+    throw Error(file + ": " + where + ": there is no light " +
+                std::to_string(static_cast<std::int64_t>(std::min(index, 1e15))));
+  const tinygltf::Light& given = model.lights[static_cast<std::size_t>(index)];
+  const std::string what = where + ": its light";
+
+  set::Light light;
+  light.name = given.name.empty() ? node.name : given.name;
+  light.position = glm::dvec3(world_from_node[3]);
+  light.direction = -glm::dvec3(world_from_node[2]);
+  const double length = glm::length(light.direction);
+  if (!is_finite(world_from_node) || !(length > 0) || !std::isfinite(length)) {
+    notes.add(what + " has a transform that is singular or not finite; left out");
+    return;
+  }
+  light.direction /= length;
+  if (given.type == "point") {
+    light.type = set::LightType::point;
+  } else if (given.type == "directional") {
+    light.type = set::LightType::directional;
+  } else if (given.type == "spot") {
+    light.type = set::LightType::spot;
+    const double widest = std::numbers::pi / 2;
+    light.outer_cone_rad =
+        within(given.spot.outerConeAngle, 1e-4, widest, what + "'s outer cone", notes);
+    light.inner_cone_rad =
+        within(given.spot.innerConeAngle, 0, light.outer_cone_rad, what + "'s inner cone", notes);
+  } else {
+    notes.add(what + " is of the unknown type \"" + set::printable(given.type) + "\"; left out");
+    return;
+  }
+  const std::vector<double> color =
+      given.color.size() == 3 ? given.color : std::vector<double>{1, 1, 1};
+  for (int i = 0; i < 3; ++i)
+    light.emission[i] = within(color[static_cast<std::size_t>(i)] * given.intensity, 0, 1e30,
+                               what + "'s colour or intensity", notes);
+  if (given.range > 0) notes.add(what + "'s range is ignored: light falls off with the square");
+  light.gain_mixed = (presence & world_mixed) != 0 ? 1 : 0;
+  light.gain_real = (presence & world_real) != 0 ? 1 : 0;
+  scene.lights.push_back(std::move(light));
+}
+
+GltfFile::GltfFile(const std::filesystem::path& file, Scene& scene, Budget& budget)
+    : loader_(std::make_unique<Loader>(file, scene, budget)) {}
+GltfFile::~GltfFile() = default;
+
+void GltfFile::add(const set::Object& object, std::uint32_t index) {
+  loader_->add(object, index);
+}
+
+std::vector<std::string> GltfFile::notes() const {
+  return loader_->notes.lines();
+}
+
+}  // namespace previz::scene

@@ -1,1 +1,96 @@
 #include "daemon/scene/scene.hpp"
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <system_error>
+#include <vector>
+
+#include "daemon/scene/gltf.hpp"
+
+namespace previz::scene {
+namespace {
+
+float largest(const glm::vec3& color) {
+  return std::max({color.r, color.g, color.b});
+}
+
+// What one material, somewhere in the scene, asks of the renderer.
+void require(const Material& material, const Scene& scene, double specular_alpha,
+             Requirements& required) {
+  const auto has_texture = [](std::uint32_t texture) { return texture != no_texture; };
+  const bool is_metal = material.metallic > 0;
+  const bool is_dielectric =
+      material.metallic < 1 || has_texture(material.metallic_roughness_texture);
+  const bool transmits = is_dielectric && material.transmission > 0;
+  const bool reflects = is_metal || transmits || (material.specular > 0 && material.ior > 1);
+  // A texture can only lower the roughness.
+  const double alpha = static_cast<double>(material.roughness) * material.roughness;
+  required.metals |= is_metal;
+  required.transmission |= transmits;
+  required.rough_specular |= reflects && alpha > specular_alpha;
+  required.textures |= has_texture(material.base_color_texture) ||
+                       has_texture(material.metallic_roughness_texture) ||
+                       has_texture(material.emission_texture);
+  required.emissive_meshes |= largest(material.emission) > 0;
+
+  if (material.alpha_mode == AlphaMode::opaque) return;
+  float least_alpha = material.alpha;
+  if (has_texture(material.base_color_texture)) {
+    const Texture& texture = scene.textures[material.base_color_texture];
+    float least = 1;
+    for (const glm::vec4& texel : texture.texels) least = std::min(least, texel.a);
+    least_alpha *= least;
+  }
+  required.alpha |= material.alpha_mode == AlphaMode::mask ? least_alpha < material.alpha_cutoff
+                                                           : least_alpha < 1;
+}
+
+}  // namespace
+
+Scene load_scene(const set::Set& set) {
+  Scene scene;
+  Budget budget;
+  std::map<std::filesystem::path, std::unique_ptr<GltfFile>> files;
+  std::vector<const GltfFile*> in_order;
+  for (std::size_t i = 0; i < set.objects.size(); ++i) {
+    const set::Object& object = set.objects[i];
+    std::error_code not_there;
+    const auto canonical = std::filesystem::weakly_canonical(object.file, not_there);
+    auto& file = files[not_there ? object.file : canonical];
+    if (!file) {
+      file = std::make_unique<GltfFile>(object.file, scene, budget);
+      in_order.push_back(file.get());
+    }
+    file->add(object, static_cast<std::uint32_t>(i));
+  }
+  scene.lights.insert(scene.lights.end(), set.lights.begin(), set.lights.end());
+  for (const GltfFile* file : in_order)
+    for (std::string& note : file->notes()) scene.notes.push_back(std::move(note));
+  return scene;
+}
+
+Requirements requirements(const Scene& scene, const set::Set& set) {
+  Requirements required;
+  std::vector<bool> mesh_counted(scene.meshes.size()), material_seen(scene.materials.size());
+  for (const Instance& instance : scene.instances) {
+    if (instance.presence == 0) continue;
+    const std::uint64_t triangles = scene.meshes[instance.mesh].triangles.size();
+    if (!mesh_counted[instance.mesh]) required.triangles += triangles;
+    mesh_counted[instance.mesh] = true;
+    required.instanced_triangles += triangles;
+    required.differing_objects |= instance.presence != world_both;
+    required.removed_objects |= instance.presence == world_real;
+    if (material_seen[instance.material]) continue;
+    material_seen[instance.material] = true;
+    require(scene.materials[instance.material], scene, set.estimation.specular_roughness, required);
+  }
+  for (const set::Light& light : scene.lights) {
+    const bool shines = light.gain_mixed > 0 || light.gain_real > 0;
+    required.lights |= shines && largest(glm::vec3(light.emission)) > 0;
+  }
+  required.thin_lens = set.observer.calibration && set.observer.calibration->lens;
+  return required;
+}
+
+}  // namespace previz::scene

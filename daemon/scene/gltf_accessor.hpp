@@ -1,0 +1,30 @@
+// The numbers of a glTF accessor: every component type, normalised integers, strides and sparse
+// accessors (glTF 2.0, 3.6.2; KHR_mesh_quantization). Everything is checked against the buffers
+// before it is read; `where` begins the message of the previz::Error thrown.
+#pragma once
+
+#include <tiny_gltf.h>
+
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace previz::scene {
+
+std::vector<glm::vec2> read_vec2s(const tinygltf::Model& model, int accessor,
+                                  const std::string& where);
+std::vector<glm::vec3> read_vec3s(const tinygltf::Model& model, int accessor,
+                                  const std::string& where);
+std::vector<std::uint32_t> read_indices(const tinygltf::Model& model, int accessor,
+                                        const std::string& where);
+
+// Number of elements, without reading them.
+std::uint64_t element_count(const tinygltf::Model& model, int accessor, const std::string& where);
+
+std::span<const unsigned char> view_bytes(const tinygltf::Model& model, int buffer_view,
+                                          const std::string& where);
+
+}  // namespace previz::scene

@@ -1,0 +1,256 @@
+#include "daemon/scene/gltf_mesh.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numeric>
+#include <utility>
+
+#include "daemon/scene/gltf_accessor.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::scene {
+namespace {
+
+// Squares and products of coordinates stay finite in single precision.
+constexpr float max_coordinate = 1e15f;
+constexpr std::uint32_t unused = 0xffffffffu;
+
+std::string count_of(std::uint64_t count, const std::string& one, const std::string& many) {
+  return std::to_string(count) + " " + (count == 1 ? one : many);
+}
+
+// Triangles of a list, strip or fan in the order and winding of glTF 2.0, 3.7.2.1.
+std::vector<glm::uvec3> triangulate(const std::vector<std::uint32_t>& indices, int mode) {
+  std::vector<glm::uvec3> triangles;
+  if (indices.size() < 3) return triangles;
+  if (mode == TINYGLTF_MODE_TRIANGLES) {
+    triangles.reserve(indices.size() / 3);
+    for (std::size_t i = 0; i + 2 < indices.size(); i += 3)
+      triangles.emplace_back(indices[i], indices[i + 1], indices[i + 2]);
+    return triangles;
+  }
+  triangles.reserve(indices.size() - 2);
+  for (std::size_t i = 0; i + 2 < indices.size(); ++i) {
+    const std::size_t odd = i % 2;
+    if (mode == TINYGLTF_MODE_TRIANGLE_STRIP)
+      triangles.emplace_back(indices[i], indices[i + 1 + odd], indices[i + 2 - odd]);
+    else
+      triangles.emplace_back(indices[i + 1], indices[i + 2], indices[0]);
+  }
+  return triangles;
+}
+
+std::vector<glm::uvec3> read_triangles(const tinygltf::Model& model, const MeshSource& source,
+                                       std::uint64_t vertices, const std::string& where,
+                                       const std::string& what, Notes& notes, Budget& budget) {
+  const std::uint64_t count =
+      source.indices < 0 ? vertices : element_count(model, source.indices, where + ", indices");
+  budget.add_triangles(source.mode == TINYGLTF_MODE_TRIANGLES ? count / 3 : count, where);
+  std::vector<std::uint32_t> indices;
+  if (source.indices < 0) {
+    indices.resize(vertices);
+    std::iota(indices.begin(), indices.end(), 0u);
+  } else {
+    indices = read_indices(model, source.indices, where + ", indices");
+  }
+  for (const std::uint32_t index : indices)
+    if (index >= vertices)
+      throw Error(where + ": index " + std::to_string(index) + " is outside its " +
+                  count_of(vertices, "vertex", "vertices"));
+  if (source.mode == TINYGLTF_MODE_TRIANGLES && count % 3 != 0)
+    notes.add(what + ": the last triangle is incomplete; dropped");
+  return triangulate(indices, source.mode);
+}
+
+// Twice the area, on the side of counter-clockwise winding.
+glm::dvec3 area_normal(const std::vector<glm::vec3>& positions, const glm::uvec3& triangle) {
+  const glm::dvec3 a = positions[triangle.x];
+  return glm::cross(glm::dvec3(positions[triangle.y]) - a, glm::dvec3(positions[triangle.z]) - a);
+}
+
+void drop_bad_triangles(Mesh& mesh, const std::string& what, Notes& notes) {
+  const auto is_finite = [&](std::uint32_t vertex) {
+    const glm::vec3& p = mesh.positions[vertex];
+    // Comparisons with NaN are false.
+    return std::abs(p.x) <= max_coordinate && std::abs(p.y) <= max_coordinate &&
+           std::abs(p.z) <= max_coordinate;
+  };
+  std::uint64_t not_finite = 0, no_area = 0;
+  std::erase_if(mesh.triangles, [&](const glm::uvec3& triangle) {
+    if (!is_finite(triangle.x) || !is_finite(triangle.y) || !is_finite(triangle.z))
+      return ++not_finite, true;
+    if (area_normal(mesh.positions, triangle) == glm::dvec3(0)) return ++no_area, true;
+    return false;
+  });
+  if (not_finite > 0)
+    notes.add(what + ": " +
+              count_of(not_finite, "triangle has a position that is",
+                       "triangles have positions that are") +
+              " not a number or beyond 1e15; dropped");
+  if (no_area > 0)
+    notes.add(what + ": " + count_of(no_area, "triangle has", "triangles have") +
+              " no area; dropped");
+}
+
+// Every corner its own vertex.
+void split_corners(Mesh& mesh) {
+  std::vector<glm::vec3> positions;
+  std::vector<glm::vec2> uvs;
+  positions.reserve(3 * mesh.triangles.size());
+  uvs.reserve(mesh.uvs.empty() ? 0 : 3 * mesh.triangles.size());
+  for (glm::uvec3& triangle : mesh.triangles) {
+    for (int i = 0; i < 3; ++i) {
+      const std::uint32_t vertex = triangle[i];
+      triangle[i] = static_cast<std::uint32_t>(positions.size());
+      positions.push_back(mesh.positions[vertex]);
+      if (!mesh.uvs.empty()) uvs.push_back(mesh.uvs[vertex]);
+    }
+  }
+  mesh.positions = std::move(positions);
+  mesh.uvs = std::move(uvs);
+}
+
+// Keeps the vertices that a triangle uses, in their order.
+void drop_unused_vertices(Mesh& mesh) {
+  std::vector<std::uint32_t> place(mesh.positions.size(), unused);
+  for (const glm::uvec3& triangle : mesh.triangles)
+    for (int i = 0; i < 3; ++i) place[triangle[i]] = 0;
+  std::uint32_t count = 0;
+  for (std::uint32_t vertex = 0; vertex < place.size(); ++vertex) {
+    if (place[vertex] == unused) continue;
+    place[vertex] = count;
+    mesh.positions[count] = mesh.positions[vertex];
+    if (!mesh.normals.empty()) mesh.normals[count] = mesh.normals[vertex];
+    if (!mesh.uvs.empty()) mesh.uvs[count] = mesh.uvs[vertex];
+    ++count;
+  }
+  mesh.positions.resize(count);
+  if (!mesh.normals.empty()) mesh.normals.resize(count);
+  if (!mesh.uvs.empty()) mesh.uvs.resize(count);
+  for (glm::uvec3& triangle : mesh.triangles)
+    triangle = {place[triangle.x], place[triangle.y], place[triangle.z]};
+}
+
+void set_flat_normals(Mesh& mesh) {
+  split_corners(mesh);
+  mesh.normals.resize(mesh.positions.size());
+  for (const glm::uvec3& triangle : mesh.triangles) {
+    const glm::vec3 normal = glm::normalize(area_normal(mesh.positions, triangle));
+    for (int i = 0; i < 3; ++i) mesh.normals[triangle[i]] = normal;
+  }
+}
+
+// Makes normals unit, and puts right those that are no direction or that point away from all the
+// triangles around: the winding says which side is the front.
+void repair_normals(Mesh& mesh, const std::string& what, Notes& notes) {
+  struct Around {
+    glm::dvec3 sum{0}, any{0};
+    double area = 0;
+  };
+  std::vector<Around> around(mesh.positions.size());
+  for (const glm::uvec3& triangle : mesh.triangles) {
+    const glm::dvec3 normal = area_normal(mesh.positions, triangle);
+    for (int i = 0; i < 3; ++i) {
+      Around& vertex = around[triangle[i]];
+      vertex.sum += normal;
+      vertex.any = normal;
+      vertex.area += glm::length(normal);
+    }
+  }
+  std::uint64_t replaced = 0, turned = 0;
+  for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
+    const auto& [sum, any, area] = around[i];
+    const glm::dvec3 given = mesh.normals[i];
+    const double length = glm::length(given);
+    glm::dvec3 normal = given / length;
+    if (!(length > 1e-12) || !std::isfinite(length)) {
+      normal = glm::normalize(glm::length(sum) > 1e-6 * area ? sum : any);
+      ++replaced;
+    } else if (glm::dot(normal, sum) < -1e-3 * area) {
+      normal = -normal;
+      ++turned;
+    }
+    mesh.normals[i] = glm::vec3(normal);
+  }
+  if (replaced > 0)
+    notes.add(what + ": " + count_of(replaced, "normal is", "normals are") +
+              " no direction; made from the triangles around");
+  if (turned > 0)
+    notes.add(what + ": " + count_of(turned, "normal points", "normals point") +
+              " to the back of the triangles around; turned round");
+}
+
+void read_uvs(const tinygltf::Model& model, const MeshSource& source, const std::string& where,
+              const std::string& what, Notes& notes, Mesh& mesh) {
+  const auto& [a, b, c, d, e, f] = source.mapping.affine;
+  mesh.uvs = read_vec2s(model, source.uvs, where + ", texture coordinates");
+  std::uint64_t not_finite = 0;
+  for (glm::vec2& uv : mesh.uvs) {
+    if (source.mapping.affine != UvMapping{}.affine) {
+      const glm::dvec2 p = uv;
+      uv = {static_cast<float>(a * p.x + b * p.y + c), static_cast<float>(d * p.x + e * p.y + f)};
+    }
+    if (std::abs(uv.x) <= max_coordinate && std::abs(uv.y) <= max_coordinate) continue;
+    uv = glm::vec2(0);
+    ++not_finite;
+  }
+  if (not_finite > 0)
+    notes.add(what + ": " +
+              count_of(not_finite, "texture coordinate is", "texture coordinates are") +
+              " not a number or beyond 1e15; set to 0");
+}
+
+int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
+  const auto at = primitive.attributes.find(name);
+  return at == primitive.attributes.end() ? -1 : at->second;
+}
+
+}  // namespace
+
+MeshSource mesh_source(const tinygltf::Primitive& primitive, const UvMapping& mapping) {
+  MeshSource source;
+  source.positions = attribute(primitive, "POSITION");
+  source.normals = attribute(primitive, "NORMAL");
+  source.uvs = attribute(primitive, "TEXCOORD_" + std::to_string(mapping.set));
+  source.indices = primitive.indices;
+  if (primitive.mode >= 0) source.mode = primitive.mode;
+  source.mapping = mapping;
+  return source;
+}
+
+std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& source,
+                              const std::string& where, const std::string& what, Notes& notes,
+                              Budget& budget) {
+  if (source.positions < 0) {
+    notes.add(what + ": has no positions; skipped");
+    return {};
+  }
+  Mesh mesh;
+  const std::uint64_t count = element_count(model, source.positions, where + ", positions");
+  budget.add_vertices(count, where);
+  mesh.positions = read_vec3s(model, source.positions, where + ", positions");
+  mesh.triangles = read_triangles(model, source, count, where, what, notes, budget);
+  if (source.normals >= 0) mesh.normals = read_vec3s(model, source.normals, where + ", normals");
+  if (source.uvs >= 0) read_uvs(model, source, where, what, notes, mesh);
+  if ((source.normals >= 0 && mesh.normals.size() != count) ||
+      (source.uvs >= 0 && mesh.uvs.size() != count))
+    throw Error(where + ": its attributes have different numbers of elements");
+
+  drop_bad_triangles(mesh, what, notes);
+  if (mesh.triangles.empty()) {
+    notes.add(what + ": is empty; skipped");
+    return {};
+  }
+  if (source.normals >= 0) {
+    drop_unused_vertices(mesh);
+    repair_normals(mesh, what, notes);
+  } else {
+    if (3 * mesh.triangles.size() > count)
+      budget.add_vertices(3 * mesh.triangles.size() - count, where);
+    set_flat_normals(mesh);
+  }
+  return mesh;
+}
+
+}  // namespace previz::scene

@@ -1,0 +1,116 @@
+#include "daemon/scene/gltf_nodes.hpp"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/gtc/type_ptr.hpp>
+#include <numeric>
+#include <set>
+
+#include "daemon/set/problems.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::scene {
+namespace {
+
+// A matrix, or translation * rotation * scale.
+glm::dmat4 parent_from_node(const tinygltf::Node& node, const std::string& where) {
+  const auto has = [&](const std::vector<double>& values, std::size_t count) {
+    if (values.empty()) return false;
+    if (values.size() != count)
+      throw Error(where + ": its transform has " + std::to_string(values.size()) +
+                  " numbers where it must have " + std::to_string(count));
+    return true;
+  };
+  if (has(node.matrix, 16)) return glm::make_mat4(node.matrix.data());
+  glm::dmat4 transform(1.0);
+  if (has(node.translation, 3))
+    transform = glm::translate(transform, glm::make_vec3(node.translation.data()));
+  if (has(node.rotation, 4)) {
+    const std::vector<double>& q = node.rotation;  // x, y, z, w
+    const glm::dquat rotation(q[3], q[0], q[1], q[2]);
+    if (!(glm::length(rotation) > 1e-12))
+      throw Error(where + ": its rotation is not a quaternion of length 1");
+    transform *= glm::mat4_cast(glm::normalize(rotation));
+  }
+  if (has(node.scale, 3)) transform = glm::scale(transform, glm::make_vec3(node.scale.data()));
+  return transform;
+}
+
+std::vector<int> root_nodes(const tinygltf::Model& model, const std::string& file, Notes& notes) {
+  if (!model.scenes.empty()) {
+    const int scene = model.defaultScene < 0 ? 0 : model.defaultScene;
+    if (static_cast<std::size_t>(scene) >= model.scenes.size())
+      throw Error(file + ": its default scene " + std::to_string(scene) + " is not there");
+    if (model.scenes.size() > 1)
+      notes.add("has " + std::to_string(model.scenes.size()) + " scenes; only scene " +
+                std::to_string(scene) + " is used");
+    return model.scenes[static_cast<std::size_t>(scene)].nodes;
+  }
+  std::vector<bool> is_child(model.nodes.size());
+  for (const tinygltf::Node& node : model.nodes)
+    for (const int child : node.children)
+      if (child >= 0 && static_cast<std::size_t>(child) < is_child.size())
+        is_child[static_cast<std::size_t>(child)] = true;
+  std::vector<int> roots;
+  for (std::size_t i = 0; i < is_child.size(); ++i)
+    if (!is_child[i]) roots.push_back(static_cast<int>(i));
+  return roots;
+}
+
+}  // namespace
+
+std::string node_name(const tinygltf::Model& model, int node) {
+  const std::string& name = model.nodes[static_cast<std::size_t>(node)].name;
+  return "node " + std::to_string(node) +
+         (name.empty() ? std::string() : " \"" + set::printable(name) + "\"");
+}
+
+std::vector<PlacedNode> place_nodes(const tinygltf::Model& model,
+                                    const std::vector<std::string>& names, const std::string& file,
+                                    Notes& notes) {
+  struct Visit {
+    PlacedNode placed;  // its matrix is the parent's until it is visited
+    bool is_wanted;
+  };
+  std::vector<Visit> to_visit;
+  const auto push = [&](const std::vector<int>& nodes, const glm::dmat4& parent, bool is_wanted) {
+    for (auto node = nodes.rbegin(); node != nodes.rend(); ++node)
+      to_visit.push_back({{*node, parent}, is_wanted});
+  };
+
+  std::vector<PlacedNode> placed;
+  std::vector<bool> visited(model.nodes.size());
+  std::set<std::string> known;
+  push(root_nodes(model, file, notes), glm::dmat4(1.0), names.empty());
+  while (!to_visit.empty()) {
+    Visit visit = to_visit.back();
+    to_visit.pop_back();
+    const int index = visit.placed.node;
+    if (index < 0 || static_cast<std::size_t>(index) >= model.nodes.size())
+      throw Error(file + ": there is no node " + std::to_string(index));
+    if (visited[static_cast<std::size_t>(index)])
+      throw Error(file + ": " + node_name(model, index) +
+                  " has two parents or is its own ancestor");
+    visited[static_cast<std::size_t>(index)] = true;
+    const tinygltf::Node& node = model.nodes[static_cast<std::size_t>(index)];
+    visit.placed.file_from_node *= parent_from_node(node, file + ": " + node_name(model, index));
+    if (!node.name.empty()) known.insert(node.name);
+    const bool is_wanted =
+        visit.is_wanted || std::find(names.begin(), names.end(), node.name) != names.end();
+    if (is_wanted) placed.push_back(visit.placed);
+    push(node.children, visit.placed.file_from_node, is_wanted);
+  }
+
+  for (const std::string& name : names) {
+    if (known.contains(name)) continue;
+    const std::string near = set::nearest(name, {known.begin(), known.end()});
+    throw Error(
+        file + ": has no node \"" + set::printable(name) + "\"" +
+        (near.empty() ? std::string() : "; did you mean \"" + set::printable(near) + "\"?"));
+  }
+  return placed;
+}
+
+}  // namespace previz::scene

@@ -1,0 +1,51 @@
+#include "daemon/scene/load_log.hpp"
+
+#include "daemon/scene/scene.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::scene {
+namespace {
+
+void add(std::uint64_t& total, std::uint64_t count, std::uint64_t limit, const char* of_what,
+         const std::string& where) {
+  if (count > limit - total)
+    throw Error(where + ": with its " + std::to_string(count) + " the scene would have " +
+                "more than " + std::to_string(limit) + " " + of_what);
+  total += count;
+}
+
+}  // namespace
+
+void Notes::add(const std::string& what) {
+  const auto [at, is_new] = place_.try_emplace(what, notes_.size());
+  if (is_new)
+    notes_.emplace_back(what, 1);
+  else
+    ++notes_[at->second].second;
+}
+
+std::vector<std::string> Notes::lines() const {
+  std::vector<std::string> lines;
+  for (const auto& [what, times] : notes_)
+    lines.push_back(file_ + ": " + what +
+                    (times > 1 ? " (" + std::to_string(times) + " times)" : ""));
+  return lines;
+}
+
+void Budget::add_vertices(std::uint64_t count, const std::string& where) {
+  scene::add(vertices_, count, max_triangles, "vertices", where);
+}
+
+void Budget::add_triangles(std::uint64_t count, const std::string& where) {
+  scene::add(triangles_, count, max_triangles, "triangles", where);
+}
+
+void Budget::add_instance(const std::string& where) {
+  scene::add(instances_, 1, max_instances, "instances", where);
+}
+
+void Budget::add_texels(std::uint64_t count, const std::string& where) {
+  scene::add(texels_, count, max_texels, "texels", where);
+}
+
+}  // namespace previz::scene

@@ -1,0 +1,39 @@
+// What loading keeps count of: notes about what was left out, and how much has been loaded.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+namespace previz::scene {
+
+// Notes of one file. The same note again is counted, not repeated.
+class Notes {
+ public:
+  explicit Notes(std::string file) : file_(std::move(file)) {}
+  void add(const std::string& what);
+  // "file: what" or "file: what (3 times)", in the order of first mention.
+  std::vector<std::string> lines() const;
+
+ private:
+  std::string file_;
+  std::vector<std::pair<std::string, std::uint64_t>> notes_;
+  std::unordered_map<std::string, std::size_t> place_;
+};
+
+// Counts against scene.hpp's limits. `where` begins the message of the previz::Error that says
+// which limit would be passed; call before allocating.
+class Budget {
+ public:
+  void add_vertices(std::uint64_t count, const std::string& where);
+  void add_triangles(std::uint64_t count, const std::string& where);
+  void add_instance(const std::string& where);
+  void add_texels(std::uint64_t count, const std::string& where);
+
+ private:
+  std::uint64_t vertices_ = 0, triangles_ = 0, instances_ = 0, texels_ = 0;
+};
+
+}  // namespace previz::scene
