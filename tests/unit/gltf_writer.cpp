@@ -1,0 +1,117 @@
+#include "tests/unit/gltf_writer.hpp"
+
+#include <stb_image_write.h>
+
+#include <fstream>
+#include <stdexcept>
+
+namespace previz::testing {
+namespace {
+
+void append_u32(std::string& bytes, std::size_t value) {
+  for (int shift = 0; shift < 32; shift += 8)
+    bytes.push_back(static_cast<char>(value >> shift & 0xff));
+}
+
+void append_chunk(std::string& file, const char* type, std::string data, char padding) {
+  while (data.size() % 4 != 0) data.push_back(padding);
+  append_u32(file, data.size());
+  file.append(type, 4).append(data);
+}
+
+}  // namespace
+
+int GltfWriter::add(const char* what, Json value) {
+  json[what].push_back(std::move(value));
+  return static_cast<int>(json[what].size()) - 1;
+}
+
+int GltfWriter::view(const std::vector<unsigned char>& bytes, int stride) {
+  while (buffer_.size() % 4 != 0) buffer_.push_back(0);
+  Json view = {{"buffer", 0}, {"byteOffset", buffer_.size()}, {"byteLength", bytes.size()}};
+  if (stride > 0) view["byteStride"] = stride;
+  buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+  return add("bufferViews", std::move(view));
+}
+
+int GltfWriter::accessor(int view, int component_type, const char* type, std::size_t count,
+                         bool normalized, std::size_t offset) {
+  Json accessor = {{"componentType", component_type}, {"type", type}, {"count", count}};
+  if (view >= 0) accessor["bufferView"] = view;
+  if (normalized) accessor["normalized"] = true;
+  if (offset > 0) accessor["byteOffset"] = offset;
+  return add("accessors", std::move(accessor));
+}
+
+int GltfWriter::triangle_mesh(int material) {
+  Json primitive = {{"attributes", {{"POSITION", positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}})}}}};
+  if (material >= 0) primitive["material"] = material;
+  return mesh(std::move(primitive), "triangle");
+}
+
+int GltfWriter::root(const char* name, int mesh, Json more) {
+  more["name"] = name;
+  if (mesh >= 0) more["mesh"] = mesh;
+  const int node = add("nodes", std::move(more));
+  json["scenes"][0]["nodes"].push_back(node);
+  return node;
+}
+
+int GltfWriter::texture(int width, int height, const std::vector<unsigned char>& rgba,
+                        Json sampler) {
+  const int image =
+      add("images", {{"bufferView", view(png(width, height, rgba))}, {"mimeType", "image/png"}});
+  return add("textures", {{"source", image}, {"sampler", add("samplers", std::move(sampler))}});
+}
+
+void GltfWriter::save(const std::filesystem::path& path) const {
+  Json saved = json;
+  const bool is_binary = path.extension() == ".glb";
+  if (!buffer_.empty()) {
+    saved["buffers"] = Json::array({{{"byteLength", buffer_.size()}}});
+    if (!is_binary)
+      saved["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64(buffer_);
+  }
+  std::string bytes = saved.dump();
+  if (is_binary) {
+    std::string chunks;
+    append_chunk(chunks, "JSON", bytes, ' ');
+    if (!buffer_.empty())
+      append_chunk(chunks, "BIN\0", std::string(buffer_.begin(), buffer_.end()), '\0');
+    bytes = "glTF";
+    append_u32(bytes, 2);
+    append_u32(bytes, 12 + chunks.size());
+    bytes += chunks;
+  }
+  std::ofstream stream(path, std::ios::binary);
+  stream << bytes;
+  if (!stream.flush()) throw std::runtime_error("cannot write " + path.string());
+}
+
+std::string base64(const std::vector<unsigned char>& bytes) {
+  const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t group = 0;
+    for (std::size_t j = 0; j < 3; ++j)
+      group = group << 8 | (i + j < bytes.size() ? bytes[i + j] : 0u);
+    for (std::size_t j = 0; j < 4; ++j)
+      text.push_back(i + j <= bytes.size() ? digits[group >> (18 - 6 * j) & 63] : '=');
+  }
+  return text;
+}
+
+std::vector<unsigned char> png(int width, int height, const std::vector<unsigned char>& rgba) {
+  std::vector<unsigned char> bytes;
+  const auto append = [](void* to, void* data, int size) {
+    const auto* begin = static_cast<unsigned char*>(data);
+    static_cast<std::vector<unsigned char>*>(to)->insert(
+        static_cast<std::vector<unsigned char>*>(to)->end(), begin, begin + size);
+  };
+  if (rgba.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 4 ||
+      !stbi_write_png_to_func(append, &bytes, width, height, 4, rgba.data(), 4 * width))
+    throw std::runtime_error("cannot encode a PNG");
+  return bytes;
+}
+
+}  // namespace previz::testing
