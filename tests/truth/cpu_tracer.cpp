@@ -183,10 +183,11 @@ struct PixelSums {
 };
 
 void require_supported(const scene::Scene& scene) {
-  for (const scene::Material& material : scene.materials) {
-    if (material.alpha < 1) {
-      throw Error("reference tracer: material '" + material.name +
-                  "' has alpha below 1, which is not traced");
+  for (const scene::Material& m : scene.materials) {
+    const std::string what = "reference tracer: material '" + m.name + "' has ";
+    if (m.alpha_mode != scene::AlphaMode::opaque) throw Error(what + "alpha, which is not traced");
+    if (m.attenuation_color != glm::vec3(1)) {
+      throw Error(what + "an attenuating volume, which is not traced");
     }
   }
 }

@@ -41,7 +41,7 @@ struct TracedPicture {
 class CpuTracer {
  public:
   // The scene and the map must outlive the tracer. Throws previz::Error naming the material if the
-  // scene needs what this tracer does not do (alpha below 1).
+  // scene needs what this tracer does not do (alpha, attenuating volumes).
   CpuTracer(const scene::Scene& scene, const lighting::EnvironmentMap& environment,
             const TraceOptions& options = {});
   ~CpuTracer();

@@ -12,13 +12,52 @@
 #include "tests/truth/cpu_bsdf.hpp"
 #include "tests/truth/cpu_camera.hpp"
 #include "tests/truth/cpu_environment.hpp"
-#include "tests/truth/small_scenes.hpp"
+#include "tests/unit/scenes.hpp"
 
 namespace previz::truth {
 namespace {
 
+using testing::diffuse;
+using testing::emitter;
+using testing::glass;
+using testing::look_at;
+using testing::metal;
+using testing::plastic;
+
 constexpr double pi = std::numbers::pi;
 const glm::dvec3 eye(0.3, -1.0, 1.5);
+
+std::uint32_t add(scene::Scene& scene, scene::Mesh mesh, const scene::Material& material) {
+  const std::uint32_t mesh_index = testing::add_mesh(scene, std::move(mesh));
+  return testing::add_instance(scene, mesh_index, testing::add_material(scene, material));
+}
+
+// A parallelogram around `centre` that faces cross(half_u, half_v).
+std::uint32_t add_quad(scene::Scene& scene, const glm::vec3& centre, const glm::vec3& half_u,
+                       const glm::vec3& half_v, const scene::Material& material) {
+  scene::Mesh mesh = testing::rectangle_mesh({2, 2});
+  for (glm::vec3& p : mesh.positions) p = centre + p.x * half_u + p.y * half_v;
+  mesh.normals.assign(4, glm::normalize(glm::cross(half_u, half_v)));
+  return add(scene, std::move(mesh), material);
+}
+
+// A sphere around the origin of 2 n segments and n rings.
+std::uint32_t add_sphere(scene::Scene& scene, double radius, int n,
+                         const scene::Material& material) {
+  return add(scene, testing::uv_sphere_mesh(radius, 2 * n, n), material);
+}
+
+lighting::EnvironmentMap constant_environment(const glm::vec3& radiance, int size = 4) {
+  return {size, std::vector<glm::vec3>(static_cast<std::size_t>(size * size), radiance)};
+}
+
+ObserverCalibration pinhole(int width, int height, double focal_px) {
+  return testing::pinhole(width, height, 2 * std::atan(0.5 * width / focal_px));
+}
+
+ObserverCalibration one_pixel() {
+  return pinhole(1, 1, 1e4);
+}  // 1e-4 rad wide
 
 struct Estimate {
   glm::dvec3 mean, standard_error;
@@ -138,7 +177,7 @@ TEST(CpuCamera, EveryLensRayMeetsTheFocusPoint) {
 TEST(CpuTracer, DiffuseFurnace) {
   for (const float albedo : {0.0F, 0.5F, 1.0F}) {
     scene::Scene scene;
-    add_sphere(scene, {0, 0, 0}, 0.5F, 32, lambert(glm::vec3(albedo)));
+    add_sphere(scene, 0.5, 32, diffuse(glm::vec3(albedo)));
     CpuTracer tracer(scene, constant_environment({1, 2, 3}));
     // The sphere fills the picture.
     const TracedPicture p =
@@ -155,7 +194,7 @@ TEST(CpuTracer, DiffuseFurnace) {
 TEST(CpuTracer, GlassFurnaceLosesNothing) {
   for (const float ior : {1.0F, 1.0001F, 1.5F, 2.5F}) {
     scene::Scene scene;
-    add_sphere(scene, {0, 0, 0}, 0.5F, 256, glass(ior));
+    add_sphere(scene, 0.5, 256, glass(ior));
     TraceOptions options;
     options.max_depth = 64;
     CpuTracer tracer(scene, constant_environment({1, 1, 1}), options);
@@ -249,7 +288,7 @@ TEST(CpuTracer, ThinPaneSumsItsInnerReflections) {
 }
 
 TEST(CpuTracer, PointAndSpotLight) {
-  auto scene = floor_of(lambert({0.5F, 0.5F, 0.5F}));
+  auto scene = floor_of(diffuse({0.5F, 0.5F, 0.5F}));
   scene.lights = {lamp(set::LightType::point)};
   const glm::dvec3 to_light = scene.lights[0].position;
   const double d2 = glm::dot(to_light, to_light);
@@ -268,7 +307,7 @@ TEST(CpuTracer, PointAndSpotLight) {
 }
 
 TEST(CpuTracer, DirectionalLightOfAnySize) {
-  auto scene = floor_of(lambert({0.5F, 0.5F, 0.5F}));
+  auto scene = floor_of(diffuse({0.5F, 0.5F, 0.5F}));
   set::Light light = lamp(set::LightType::directional);
   light.direction = glm::normalize(glm::dvec3(0.3, 0.4, -1));
   const glm::dvec3 expected = 0.5 / pi * glm::dvec3(3, 2, 1) * -light.direction.z;
@@ -281,7 +320,7 @@ TEST(CpuTracer, DirectionalLightOfAnySize) {
 }
 
 TEST(CpuTracer, SphereLight) {
-  auto scene = floor_of(lambert({0.5F, 0.5F, 0.5F}));
+  auto scene = floor_of(diffuse({0.5F, 0.5F, 0.5F}));
   scene.lights = {lamp(set::LightType::sphere)};
   for (const double radius : {1e-4, 0.3, 1.1}) {
     scene.lights[0].radius_m = radius;
@@ -303,7 +342,7 @@ double rectangle_irradiance(double half_a, double half_b, double height) {
 
 TEST(CpuTracer, RectangleLightAndEmissiveQuad) {
   const glm::dvec3 expected = 0.5 / pi * rectangle_irradiance(0.4, 0.25, 0.6) * glm::dvec3(3, 2, 1);
-  auto scene = floor_of(lambert({0.5F, 0.5F, 0.5F}));
+  auto scene = floor_of(diffuse({0.5F, 0.5F, 0.5F}));
   set::Light light = lamp(set::LightType::rectangle);
   light.position = {0, 0, 0.6};
   light.direction = {0, 0, -1};
@@ -316,7 +355,7 @@ TEST(CpuTracer, RectangleLightAndEmissiveQuad) {
   scene.lights[0].direction = {0, 0, 1};
   expect_radiance(radiance_of_origin(scene, no_environment, 64), glm::dvec3(0));
 
-  auto with_mesh = floor_of(lambert({0.5F, 0.5F, 0.5F}));
+  auto with_mesh = floor_of(diffuse({0.5F, 0.5F, 0.5F}));
   add_quad(with_mesh, {0, 0, 0.6F}, {0.4F, 0, 0}, {0, 0.25F, 0}, emitter({3, 2, 1}));
   expect_radiance(radiance_of_origin(with_mesh, no_environment, 20000), expected, 1e-5);
 }
@@ -339,8 +378,8 @@ TEST(CpuTracer, TwoPlanesExchangeLightAsTheSeriesSays) {
   const double a = 0.7F, b = 0.6F;
   for (const int depth : {1, 2, 3, 7, 16}) {
     scene::Scene scene;
-    add_quad(scene, {0, 0, 0}, {1000, 0, 0}, {0, 1000, 0}, lambert(glm::vec3(0.7F)));
-    scene::Material ceiling = lambert(glm::vec3(0.6F));
+    add_quad(scene, {0, 0, 0}, {1000, 0, 0}, {0, 1000, 0}, diffuse(glm::vec3(0.7F)));
+    scene::Material ceiling = diffuse(glm::vec3(0.6F));
     ceiling.emission = {1, 1, 1};
     add_quad(scene, {0, 0, 0.1F}, {1000, 0, 0}, {0, -1000, 0}, ceiling);
     double expected = 0;
@@ -353,9 +392,9 @@ TEST(CpuTracer, TwoPlanesExchangeLightAsTheSeriesSays) {
 }
 
 TEST(CpuTracer, WorldsSeeWhatIsPresentInThem) {
-  auto scene = floor_of(lambert({0.5F, 0.5F, 0.5F}));
-  const std::size_t quad =
-      add_quad(scene, {0, 0, 0.1F}, {0.2F, 0, 0}, {0, 0.2F, 0}, lambert({0.1F, 0.2F, 0.3F}));
+  auto scene = floor_of(diffuse({0.5F, 0.5F, 0.5F}));
+  const std::uint32_t quad =
+      add_quad(scene, {0, 0, 0.1F}, {0.2F, 0, 0}, {0, 0.2F, 0}, diffuse({0.1F, 0.2F, 0.3F}));
   const lighting::EnvironmentMap environment = constant_environment({1, 1, 1});
   for (const std::uint32_t presence : {scene::world_mixed, scene::world_real}) {
     scene.instances[quad].presence = presence;
@@ -378,8 +417,9 @@ TEST(CpuTracer, ScaleAndPlaceChangeNothing) {
   for (const auto& [scale, offset] :
        {std::pair(1.0, 0.0), {1e-3, 0.0}, {1e3, 0.0}, {1.0, 1000.0}}) {
     scene::Scene scene;
-    add_quad(scene, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, lambert(glm::vec3(0.5F)));
-    add_sphere(scene, {0, 0, 0.25F}, 0.25F, 32, plastic({0.8F, 0.2F, 0.1F}, 0.3F));
+    add_quad(scene, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, diffuse(glm::vec3(0.5F)));
+    const std::uint32_t sphere = add_sphere(scene, 0.25, 32, plastic({0.8F, 0.2F, 0.1F}, 0.3F));
+    scene.instances[sphere].world_from_object[3].z = 0.25;
     glm::dmat4 world(1);
     for (int i = 0; i < 3; ++i) world[i] *= scale;
     world[3] = {offset, offset, offset, 1};
