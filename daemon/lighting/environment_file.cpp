@@ -146,7 +146,7 @@ Lighting load_environment(const set::Lighting& settings) {
   const double pixel_rad = 2 * pi / picture.width;
   const int size = chosen_resolution(settings.resolution, pixel_rad * pixel_rad);
   const int samples_a_side =
-      std::max(4, static_cast<int>(std::ceil(2 * std::sqrt(texel_sr(size)) / pixel_rad)));
+      std::max(4, static_cast<int>(std::ceil(4 * std::sqrt(texel_sr(size)) / pixel_rad)));
   const Source source(picture);
   const TexelMeans means(source, size, samples_a_side, settings.environment_rotation_rad);
   const auto gain = static_cast<float>(settings.environment_gain);

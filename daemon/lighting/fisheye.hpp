@@ -1,6 +1,8 @@
 // Kannala-Brandt fisheye projection both ways, exact beyond 90 degrees off axis.
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
@@ -26,8 +28,9 @@ class Fisheye {
   std::optional<glm::dvec2> project(const glm::dvec3& direction) const;
   // Unit direction of a pixel position; nothing beyond max_angle_rad().
   std::optional<glm::dvec3> unproject(const glm::dvec2& pixel) const;
-  // Whether a position lies on a pixel of the picture.
-  bool in_picture(const glm::dvec2& pixel) const;
+  // Index (y * width + x) of the pixel that a position lies on; nothing outside the picture and on
+  // pixels that are not wholly within max_angle_rad(): those are darkened by the lens's edge.
+  std::optional<std::uint32_t> pixel_at(const glm::dvec2& position) const;
   // Solid angle of a pixel on the optical axis, sr.
   double axis_pixel_sr() const { return 1 / (intrinsics_.fx * intrinsics_.fy); }
 

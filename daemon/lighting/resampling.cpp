@@ -1,11 +1,11 @@
 #include "daemon/lighting/resampling.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <glm/geometric.hpp>
+#include <glm/common.hpp>
 #include <glm/matrix.hpp>
 #include <mutex>
+#include <optional>
 
 #include "daemon/lighting/environment.hpp"
 #include "daemon/lighting/parallel.hpp"
@@ -16,11 +16,8 @@ namespace {
 
 constexpr int samples_a_side = 4;  // of a cell
 
-// Where a direction lands in the picture.
-struct Landing {
-  glm::dvec2 pixel{0};
-  bool seen = false;
-};
+// Where a direction lands in the picture; nothing beyond the lens's angle.
+using Landing = std::optional<glm::dvec2>;
 
 class Gatherer {
  public:
@@ -60,9 +57,7 @@ class Gatherer {
   Landing land(double i, double j) const {
     const glm::vec2 point(static_cast<float>(2 * i / cells_ - 1),
                           static_cast<float>(2 * j / cells_ - 1));
-    const auto pixel = lens_.project(camera_from_world_ * glm::dvec3(octahedral_direction(point)));
-    if (!pixel || !lens_.in_picture(*pixel)) return {};
-    return {*pixel, true};
+    return lens_.project(camera_from_world_ * glm::dvec3(octahedral_direction(point)));
   }
 
   std::vector<Landing> corner_row(int j) const {
@@ -78,35 +73,23 @@ class Gatherer {
     return u + v != cells_ && u + v != 2 && u + v != 2 * cells_ - 2;
   }
 
-  std::uint32_t pixel_index(const glm::dvec2& pixel) const {
-    const int width = lens_.intrinsics().width, height = lens_.intrinsics().height;
-    const int x = std::clamp(static_cast<int>(pixel.x + 0.5), 0, width - 1);
-    const int y = std::clamp(static_cast<int>(pixel.y + 0.5), 0, height - 1);
-    return static_cast<std::uint32_t>(y * width + x);
-  }
-
   // Appends the pixels of a cell's directions. Inside the picture the corners are interpolated;
   // where an edge crosses the cell every direction is projected by itself.
   void sample_cell(int i, int j, const std::vector<Landing>& above,
                    const std::vector<Landing>& below, std::vector<std::uint32_t>& hits) const {
-    const auto left = static_cast<std::size_t>(i);
-    const std::array<Landing, 4> corners{above[left], above[left + 1], below[left],
-                                         below[left + 1]};
-    const auto seen = std::count_if(corners.begin(), corners.end(),
-                                    [](const Landing& corner) { return corner.seen; });
-    if (seen == 0) return;
-    const bool interpolate = seen == 4 && smooth(i, j);
+    const auto left = static_cast<std::size_t>(i), right = left + 1;
+    if (!above[left] && !above[right] && !below[left] && !below[right]) return;
+    const bool all = above[left] && above[right] && below[left] && below[right];
+    const bool interpolate = all && smooth(i, j);
     for (int b = 0; b < samples_a_side; ++b) {
       const double t = (b + 0.5) / samples_a_side;
-      const glm::dvec2 start = corners[0].pixel * (1 - t) + corners[2].pixel * t;
-      const glm::dvec2 stop = corners[1].pixel * (1 - t) + corners[3].pixel * t;
       for (int a = 0; a < samples_a_side; ++a) {
         const double s = (a + 0.5) / samples_a_side;
-        if (interpolate) {
-          hits.push_back(pixel_index(start * (1 - s) + stop * s));
-        } else if (const Landing landing = land(i + s, j + t); landing.seen) {
-          hits.push_back(pixel_index(landing.pixel));
-        }
+        const Landing landing = interpolate ? glm::mix(glm::mix(*above[left], *above[right], s),
+                                                       glm::mix(*below[left], *below[right], s), t)
+                                            : land(i + s, j + t);
+        if (!landing) continue;
+        if (const auto pixel = lens_.pixel_at(*landing)) hits.push_back(*pixel);
       }
     }
   }

@@ -42,9 +42,8 @@ double limit_rad(const Fisheye& lens, double psi) {
   double seen = 0, unseen = lens.max_angle_rad();
   const auto sees = [&](double angle) {
     const auto pixel = lens.project(camera_direction(angle, psi));
-    return pixel && lens.in_picture(*pixel);
+    return pixel && lens.pixel_at(*pixel);
   };
-  if (sees(unseen * (1 - 1e-9))) return unseen;
   for (int i = 0; i < 40; ++i) {
     const double middle = 0.5 * (seen + unseen);
     (sees(middle) ? seen : unseen) = middle;
@@ -69,11 +68,8 @@ Edge edge_of(const HdrPicture& picture, const Fisheye& lens) {
       const double psi = (s + (k % steps_around + 0.5) / steps_around) * sector_rad;
       const double angle = start + (k / steps_around + 0.5) / steps_out * (limit - start);
       const auto pixel = lens.project(camera_direction(angle, psi));
-      if (!pixel || !lens.in_picture(*pixel)) continue;
-      const auto x = static_cast<std::size_t>(pixel->x + 0.5);
-      const auto y = static_cast<std::size_t>(pixel->y + 0.5);
-      samples.push_back(
-          {s, std::sin(angle), picture.radiance[y * static_cast<std::size_t>(picture.width) + x]});
+      const auto index = pixel ? lens.pixel_at(*pixel) : std::nullopt;
+      if (index) samples.push_back({s, std::sin(angle), picture.radiance[*index]});
     }
   }
   if (samples.empty()) return edge;

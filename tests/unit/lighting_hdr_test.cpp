@@ -1,0 +1,164 @@
+#include "daemon/lighting/hdr.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <string>
+
+#include "daemon/lighting/response.hpp"
+#include "drivers/error.hpp"
+#include "tests/unit/lighting_pictures.hpp"
+
+namespace previz::lighting {
+namespace {
+
+using test::make_frame;
+
+const ResponseCurve linear{.kind = ResponseCurve::Kind::linear, .inverse_table = {}};
+
+FramePtr frame_of(double exposure, const std::vector<glm::dvec3>& radiances) {
+  std::vector<glm::dvec3> signals;
+  for (const glm::dvec3& radiance : radiances) signals.push_back(exposure * radiance);
+  return make_frame(static_cast<int>(radiances.size()), 1, exposure, signals);
+}
+
+FramePtr srgb8_frame(int width, double exposure, std::vector<std::uint8_t> codes) {
+  Frame frame;
+  frame.source = "light";
+  frame.sequence = 12;
+  frame.exposure = exposure;
+  frame.width = width;
+  frame.height = static_cast<int>(codes.size()) / 3 / width;
+  frame.bytes = std::move(codes);
+  return std::make_shared<Frame>(std::move(frame));
+}
+
+TEST(MergeExposures, OneExposureIsTheInverseResponse) {
+  std::vector<std::uint8_t> codes;
+  for (int code = 0; code < 255; ++code) codes.insert(codes.end(), 3, static_cast<uint8_t>(code));
+  const FramePtr frame = srgb8_frame(255, 0.5, codes);
+  const HdrPicture picture = merge_exposures({&frame, 1}, {});
+  const Response response({}, 8);
+  for (std::size_t code = 0; code < 255; ++code) {
+    EXPECT_FLOAT_EQ(picture.radiance[code].g, static_cast<float>(response.inverse()[code] / 0.5));
+    EXPECT_EQ(picture.flags[code], code == 0 ? underexposed : 0);
+  }
+}
+
+TEST(MergeExposures, KeepsExactRadianceOverSevenDecades) {
+  const std::vector<glm::dvec3> radiances{
+      {1e-3, 1e-2, 0.1}, {1, 10, 100}, {1000, 5, 0.02}, {3, 3, 3000}};
+  std::vector<FramePtr> frames;
+  for (double exposure : {1e-4, 1e-2, 1.0, 100.0}) frames.push_back(frame_of(exposure, radiances));
+  std::mt19937 random(1);
+  for (int order = 0; order < 5; ++order) {
+    std::shuffle(frames.begin(), frames.end(), random);
+    const HdrPicture picture = merge_exposures(frames, linear);
+    for (std::size_t p = 0; p < radiances.size(); ++p) {
+      EXPECT_EQ(picture.flags[p], 0);
+      // Every radiance lies above 1 % of white in some exposure; half a code there is 0.08 %, and
+      // no exposure counts that is much worse.
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(picture.radiance[p][c] / radiances[p][c], 1, 1e-3) << "pixel " << p;
+    }
+  }
+}
+
+TEST(MergeExposures, FlagsWhatNoExposureSaw) {
+  const std::vector<glm::dvec3> radiances{{0, 0, 0}, {50, 1, 1}, {0, 0, 1}, {50, 50, 50}};
+  const std::vector<FramePtr> frames{frame_of(1, radiances), frame_of(0.1, radiances)};
+  const HdrPicture picture = merge_exposures(frames, linear);
+  EXPECT_EQ(picture.flags, (std::vector<std::uint8_t>{underexposed, overexposed, 0, overexposed}));
+  EXPECT_EQ(picture.radiance[0], glm::vec3(0));
+  EXPECT_FLOAT_EQ(picture.radiance[1].r, 10);  // white of the shortest exposure
+  EXPECT_NEAR(picture.radiance[1].g, 1, 1e-3);
+  EXPECT_EQ(picture.radiance[2].r, 0);
+  EXPECT_FLOAT_EQ(picture.radiance[3].b, 10);
+}
+
+TEST(MergeExposures, AClippedChannelLeavesTheOthers) {
+  const std::vector<glm::dvec3> radiances{{5, 0.5, 0.25}};
+  const std::vector<FramePtr> frames{frame_of(1, radiances), frame_of(0.01, radiances)};
+  const HdrPicture picture = merge_exposures(frames, linear);
+  EXPECT_EQ(picture.flags[0], 0);
+  EXPECT_NEAR(picture.radiance[0].r, 5, 5e-3);    // half a code of 0.05
+  EXPECT_NEAR(picture.radiance[0].g, 0.5, 2e-5);  // the long exposure rules
+  EXPECT_NEAR(picture.radiance[0].b, 0.25, 2e-5);
+}
+
+TEST(MergeExposures, EqualExposuresAverage) {
+  const std::vector<FramePtr> frames{make_frame(1, 1, 2, {{0.2, 0.4, 0.6}}),
+                                     make_frame(1, 1, 2, {{0.3, 0.4, 0.5}})};
+  const HdrPicture picture = merge_exposures(frames, linear);
+  EXPECT_NEAR(picture.radiance[0].r, 0.125, 1e-5);
+  EXPECT_NEAR(picture.radiance[0].g, 0.2, 1e-5);
+  EXPECT_NEAR(picture.radiance[0].b, 0.275, 1e-5);
+}
+
+// The truth sets' light camera: 8-bit sRGB, 60000 electrons, 8 electrons read noise.
+TEST(MergeExposures, IsUnbiasedAndNearTheBestUnderSensorNoise) {
+  constexpr int pixels = 20000;
+  const std::vector<double> exposures{0.8 / 4096, 0.8 / 256, 0.8 / 16, 0.2, 0.8, 3.2};
+  const Response response({}, 8);
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  for (double radiance = 2e-3; radiance < 4000; radiance *= 1.7) {
+    std::vector<FramePtr> frames;
+    double best = 0;  // information of all exposures that are neither black nor clipped
+    for (double exposure : exposures) {
+      const double signal = radiance * exposure;
+      const double sigma = std::sqrt(signal / 60000 + std::pow(8.0 / 60000, 2));
+      std::vector<std::uint8_t> codes;
+      for (int i = 0; i < pixels; ++i)
+        codes.insert(codes.end(), 3,
+                     static_cast<std::uint8_t>(response.forward(signal + sigma * normal(random))));
+      frames.push_back(srgb8_frame(pixels, exposure, codes));
+      const int code = response.forward(signal);
+      if (code > 1 && code < 250) {
+        const double step = response.inverse()[static_cast<std::size_t>(code + 1)] -
+                            response.inverse()[static_cast<std::size_t>(code)];
+        best += exposure * exposure / (sigma * sigma + step * step / 12);
+      }
+    }
+    const HdrPicture picture = merge_exposures(frames, {});
+    double sum = 0, squares = 0;
+    for (const glm::vec3& r : picture.radiance) {
+      sum += r.g;
+      squares += std::pow(r.g - radiance, 2);
+    }
+    const double bias = sum / pixels / radiance - 1;
+    const double rms = std::sqrt(squares / pixels) / radiance;
+    RecordProperty("radiance", std::to_string(radiance));
+    // Noise of the mean is below rms / 140. Where one exposure alone counts and its noise is
+    // smaller than its steps, rounding is not averaged out: half a step is the bound.
+    const double half_step = 0.5 * std::sqrt(12 / best) / radiance;
+    EXPECT_LT(std::abs(bias), std::max(0.002, half_step)) << "radiance " << radiance;
+    EXPECT_LT(rms, 2 * std::sqrt(1 / best) / radiance) << "radiance " << radiance;
+    EXPECT_EQ(picture.flags[0], 0) << "radiance " << radiance;
+  }
+}
+
+std::string message_of(const std::vector<FramePtr>& frames) {
+  try {
+    merge_exposures(frames, {});
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(MergeExposures, RefusesWhatCannotBeUsed) {
+  EXPECT_NE(message_of({}).find("at least one"), std::string::npos);
+  EXPECT_NE(message_of({srgb8_frame(1, 0, {1, 2, 3})}).find("light frame 12: exposure"),
+            std::string::npos);
+  EXPECT_NE(message_of({srgb8_frame(1, std::nan(""), {1, 2, 3})}).find("exposure"),
+            std::string::npos);
+  EXPECT_NE(
+      message_of({srgb8_frame(1, 1, {1, 2, 3}), srgb8_frame(2, 1, {1, 2, 3, 1, 2, 3})}).find("2x1"),
+      std::string::npos);
+}
+
+}  // namespace
+}  // namespace previz::lighting

@@ -1,0 +1,36 @@
+// Pictures and light made by code, for the tests of the lighting room.
+#pragma once
+
+#include <functional>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "daemon/lighting/environment.hpp"
+#include "drivers/calibration.hpp"
+#include "drivers/frame.hpp"
+
+namespace previz::lighting::test {
+
+// Radiance from a unit world direction.
+using Sky = std::function<glm::dvec3(const glm::dvec3&)>;
+
+// A linear rgb16 frame; signals are row-major, clipped at 1.
+FramePtr make_frame(int width, int height, double exposure, const std::vector<glm::dvec3>& signals);
+
+// A fisheye of 200 degrees and 512x512 pixels with the truth sets' kind of polynomial and a linear
+// response, looking up.
+LightCameraCalibration fisheye_camera();
+// Rotation of the camera: its axis at this azimuth and elevation, turned by `roll` about itself.
+glm::dmat4 looking(double azimuth_deg, double elevation_deg, double roll_deg = 0);
+glm::dvec3 towards(double azimuth_deg, double elevation_deg);
+
+// What the camera records: the mean over a pixel of 2x2 directions, or of 8x8 where those differ
+// and `fine` is asked for; black beyond the calibrated angle.
+enum class Detail { smooth, fine };
+FramePtr photograph(const LightCameraCalibration& camera, const Sky& sky, double exposure,
+                    Detail detail = Detail::smooth);
+
+// 64 unit vectors spread evenly over the upper hemisphere (a spherical Fibonacci lattice).
+std::vector<glm::dvec3> upper_normals();
+
+}  // namespace previz::lighting::test
