@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "drivers/av.hpp"
 #include "drivers/frame.hpp"
-#include "drivers/session/av.hpp"
 
 namespace previz::session {
 

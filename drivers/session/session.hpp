@@ -92,7 +92,9 @@ class SessionWriter {
   SessionWriter(const SessionWriter&) = delete;
   SessionWriter& operator=(const SessionWriter&) = delete;
 
-  void write(const Frame& frame);  // goes to the stream that frame.source names
+  // Goes to the stream that frame.source names. Frames of a stream have one format and size, at
+  // least 8x8 pixels.
+  void write(const Frame& frame);
   void write(const TrackRecord& record);
   // Copies a file into assets/ under its content hash and maps `as_written` to it.
   void add_asset(const std::string& as_written, const std::filesystem::path& file);

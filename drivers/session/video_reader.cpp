@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <thread>
 
-#include "drivers/session/av.hpp"
+#include "drivers/av.hpp"
 #include "drivers/session/samples.hpp"
 
 namespace previz::session {

@@ -9,7 +9,7 @@ extern "C" {
 #include <libavutil/opt.h>
 }
 
-#include "drivers/session/av.hpp"
+#include "drivers/av.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/samples.hpp"
 

@@ -152,6 +152,8 @@ TEST_F(Replay, WhatTheSessionLacksIsToldFirst) {
 
 // The file changes under the reader: that frame is trouble in its place, the rest goes on.
 TEST_F(Replay, AnUnreadableFrameIsTroubleInItsPlace) {
+  std::filesystem::remove_all(take());
+  session::write_small_session(take(), 5, 200, 150);  // larger than what a reader reads ahead
   ReplayOptions options;
   options.speed = 0;
   const auto camera = open(options);

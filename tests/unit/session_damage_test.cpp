@@ -1,4 +1,11 @@
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+extern "C" {
+#include <libavutil/log.h>
+}
 
 #include <algorithm>
 #include <random>
@@ -15,6 +22,7 @@ constexpr int frame_count = 6;
 // A whole small session, and copies of it in which one file is not as it was.
 class Damage : public testing::Test {
  protected:
+  static void SetUpTestSuite() { av_log_set_level(AV_LOG_QUIET); }
   void SetUp() override {
     write_small_session(whole(), frame_count);
     std::filesystem::copy(whole(), copy());
@@ -61,7 +69,7 @@ TEST_F(Damage, AWholeSessionMissesNothing) {
 TEST_F(Damage, AVideoCutAnywhereGivesAPrefix) {
   const std::string video = content_of(whole() / "observer.mkv");
   std::size_t before = 0;
-  for (std::size_t length = 0; length < video.size(); length += 1 + length % 13) {
+  for (std::size_t length = 0; length < video.size(); length += 1 + length % 37) {
     write_content(copy() / "observer.mkv", video.substr(0, length));
     const Opened opened = open_copy();
     EXPECT_TRUE(is_prefix(opened.frames)) << "cut at " << length;
@@ -76,7 +84,7 @@ TEST_F(Damage, AVideoCutAnywhereGivesAPrefix) {
 
 TEST_F(Damage, LinesCutAnywhereGiveAPrefix) {
   const std::string lines = content_of(whole() / "observer.jsonl");
-  for (std::size_t length = 0; length + 1 < lines.size(); ++length) {
+  for (std::size_t length = 0; length + 1 < lines.size(); length += 1 + length % 5) {
     write_content(copy() / "observer.jsonl", lines.substr(0, length));
     const Opened opened = open_copy();
     EXPECT_TRUE(is_prefix(opened.frames)) << "cut at " << length;
@@ -96,7 +104,7 @@ TEST_F(Damage, AChangedByteOfTheVideoIsNeverShown) {
   const std::string video = content_of(whole() / "observer.mkv");
   std::mt19937 random(2);
   std::size_t noticed = 0, tries = 0;
-  for (std::size_t at = 0; at < video.size(); at += 1 + random() % 17) {
+  for (std::size_t at = 0; at < video.size(); at += 1 + random() % 47) {
     std::string damaged = video;
     damaged[at] = static_cast<char>(damaged[at] ^ (1 + random() % 255));
     write_content(copy() / "observer.mkv", damaged);
@@ -135,7 +143,7 @@ TEST_F(Damage, AHoleInTheVideoDoesNotShiftTheRest) {
 TEST_F(Damage, ChangedLinesAreLeftOut) {
   std::string lines = content_of(whole() / "observer.jsonl");
   std::mt19937 random(3);
-  for (int round = 0; round < 400; ++round) {
+  for (int round = 0; round < 150; ++round) {
     std::string damaged = lines;
     damaged[random() % damaged.size()] = static_cast<char>(random());
     write_content(copy() / "observer.jsonl", damaged);
@@ -192,6 +200,37 @@ TEST_F(Damage, FilesThatAreEmptyOrGone) {
   EXPECT_THROW(open_copy(), Error);
   write_content(copy() / "session.toml", "\x01\x02 garbage");
   EXPECT_THROW(open_copy(), Error);
+}
+
+// The child says so after each frame it has written; then it is killed in the middle of its work.
+TEST_F(Damage, AKilledRecordingKeepsEveryWrittenFrame) {
+  const std::filesystem::path take = whole().parent_path() / "killed";
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    SessionWriter writer(take, {});
+    for (std::uint64_t i = 0;; ++i) {
+      writer.write(noise_frame("observer", i, PixelFormat::rgb8, 64, 48));
+      if (::write(ends[1], "f", 1) != 1) ::_exit(1);
+    }
+  }
+  char report = 0;
+  std::uint64_t written = 0;
+  while (written < 20 && ::read(ends[0], &report, 1) == 1) ++written;
+  ::kill(child, SIGKILL);
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ::close(ends[0]);
+  ::close(ends[1]);
+  ASSERT_EQ(written, 20u);
+
+  Session session = open_session(take);
+  EXPECT_TRUE(mentions(session.missing, "was not closed"));
+  const auto stream = open_stream(session, "observer");
+  ASSERT_GE(stream->records().size(), written);
+  for (std::size_t i = 0; i < stream->records().size(); ++i)
+    EXPECT_TRUE(is_frame(*stream->read(i), i)) << "frame " << i;
 }
 
 TEST_F(Damage, AnotherSessionsVideoIsNotShown) {

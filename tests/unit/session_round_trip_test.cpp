@@ -44,12 +44,13 @@ INSTANTIATE_TEST_SUITE_P(
     Formats, RoundTrip,
     testing::Values(Picture{PixelFormat::rgb8, 160, 120}, Picture{PixelFormat::rgb16, 160, 120},
                     Picture{PixelFormat::gray8, 160, 120}, Picture{PixelFormat::gray16, 160, 120},
-                    Picture{PixelFormat::yuv422p8, 160, 120}, Picture{PixelFormat::rgb8, 1, 1},
-                    Picture{PixelFormat::rgb16, 1, 1}, Picture{PixelFormat::gray16, 3, 1},
-                    Picture{PixelFormat::yuv422p8, 1, 1}, Picture{PixelFormat::yuv422p8, 35, 7},
-                    Picture{PixelFormat::rgb8, 2000, 9}, Picture{PixelFormat::rgb16, 9, 2000},
-                    Picture{PixelFormat::gray8, 37, 21}, Picture{PixelFormat::rgb8, 1283, 721},
-                    Picture{PixelFormat::gray16, 1283, 721}));
+                    Picture{PixelFormat::yuv422p8, 160, 120}, Picture{PixelFormat::rgb8, 8, 8},
+                    Picture{PixelFormat::rgb16, 8, 9}, Picture{PixelFormat::gray8, 9, 8},
+                    Picture{PixelFormat::gray16, 8, 8}, Picture{PixelFormat::yuv422p8, 9, 9},
+                    Picture{PixelFormat::yuv422p8, 35, 8}, Picture{PixelFormat::rgb8, 2000, 8},
+                    Picture{PixelFormat::yuv422p8, 8, 2000}, Picture{PixelFormat::rgb16, 8, 2000},
+                    Picture{PixelFormat::gray8, 37, 21}, Picture{PixelFormat::rgb8, 643, 481},
+                    Picture{PixelFormat::gray16, 643, 481}));
 
 TEST(Session, TwoStreamsAndTrackInOneSession) {
   const TemporaryDirectory directory;
@@ -170,6 +171,10 @@ TEST(Session, WhatCannotBeRecordedIsRefused) {
   refuses([](Frame& f) { f.source = "../escape"; });
   refuses([](Frame& f) { f.bytes.pop_back(); });
   refuses([](Frame& f) { f.width = 0; });
+  refuses([](Frame& f) {
+    f.width = 7;
+    f.bytes.resize(7 * 8 * 3);
+  });
   refuses([](Frame& f) { f.exposure = 0; });
   refuses([](Frame& f) { f.exposure = std::numeric_limits<double>::quiet_NaN(); });
   refuses([](Frame& f) { f.exposure_s = std::numeric_limits<double>::infinity(); });

@@ -1,4 +1,4 @@
-// Owning handles and error text for libav. Not for use outside drivers/.
+// Owning handles and error text for libav; who includes it links libav.
 #pragma once
 
 extern "C" {

@@ -1,0 +1,294 @@
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <opencv2/core.hpp>
+
+#include "drivers/error.hpp"
+#include "drivers/session/session.hpp"
+#include "tests/unit/import_fixture.hpp"
+
+namespace previz::post {
+namespace {
+
+// The smallest glTF file: a .glb with one JSON chunk.
+std::string glb(std::string json) {
+  while (json.size() % 4) json += ' ';
+  const auto word = [](std::size_t value) {
+    std::string text;
+    for (int i = 0; i < 4; ++i) text += static_cast<char>(value >> 8 * i & 255);
+    return text;
+  };
+  return "glTF" + word(2) + word(20 + json.size()) + word(json.size()) + "JSON" + json;
+}
+
+const char* const desk_set = R"([set]
+name = "desk"
+
+[[object]]
+name = "table"
+file = "models/table.glb"
+presence = "phantom"
+
+[[object]]
+name = "the table again"
+file = "models/table.glb"
+presence = "virtual"
+)";
+
+void write_set(const Shoot& shoot, const std::string& text = desk_set) {
+  session::write_content(shoot.folder() / "desk.toml", text);
+  session::write_content(shoot.folder() / "models" / "table.glb",
+                         glb(R"({"asset":{"version":"2.0"}})"));
+}
+
+TEST(ImportDescription, TheSetComesAlongVerbatimWithItsFiles) {
+  Shoot shoot;
+  write_set(shoot);
+  shoot.json["set"] = "desk.toml";
+  EXPECT_EQ(shoot.import().assets, 1u);
+  const session::Session opened = session::open_session(shoot.session());
+  EXPECT_TRUE(opened.missing.empty());
+  EXPECT_EQ(opened.info.name, "take");
+  EXPECT_EQ(opened.info.set_name, "desk.toml");
+  EXPECT_EQ(opened.info.set_text, desk_set);
+  ASSERT_EQ(opened.info.assets.size(), 1u);
+  EXPECT_EQ(session::content_of(shoot.session() / opened.info.assets.at("models/table.glb")),
+            session::content_of(shoot.folder() / "models" / "table.glb"));
+}
+
+TEST(ImportDescription, ASetThatIsWrongIsTheSetsError) {
+  Shoot shoot;
+  write_set(shoot, "[set]\nnmae = \"x\"\n");
+  shoot.json["set"] = "desk.toml";
+  EXPECT_NE(shoot.error().find("desk.toml:2"), std::string::npos);
+  shoot.json["set"] = "absent.toml";
+  EXPECT_NE(shoot.error().find("absent.toml"), std::string::npos);
+}
+
+TEST(ImportDescription, AGltfThatNeedsOtherFilesIsAnError) {
+  Shoot shoot;
+  write_set(shoot);
+  shoot.json["set"] = "desk.toml";
+  session::write_content(
+      shoot.folder() / "models" / "table.glb",
+      glb(R"({"images":[{"uri":"data:image/png;base64,"},{"uri":"wood.png"}]})"));
+  EXPECT_NE(shoot.error().find("table.glb: needs wood.png beside it"), std::string::npos);
+  session::write_content(shoot.folder() / "models" / "table.glb",
+                         "glTF\2\0\0\0\1\0\0\0\xff\xff\xff\xffJSON");
+  EXPECT_NE(shoot.error().find("table.glb"), std::string::npos);
+}
+
+TEST(ImportDescription, PosesBecomeTheTrack) {
+  Shoot shoot;
+  const Json turned = {{0, -1, 0, 1.5}, {1, 0, 0, 2.5}, {0, 0, 1, 3.5}, {0, 0, 0, 1}};
+  shoot.json["track"] = {{{"frame", 1}, {"world_from_camera", turned}, {"tags", {4, 7}}}};
+  EXPECT_EQ(shoot.import().poses, 1u);
+  const auto track = session::open_session(shoot.session()).track;
+  ASSERT_EQ(track.size(), 3u);
+  EXPECT_FALSE(track[0].tracked);
+  EXPECT_TRUE(track[1].tracked);
+  EXPECT_FALSE(track[2].tracked);
+  EXPECT_EQ(track[1].timestamp_ns, 40'000'000);
+  EXPECT_EQ(track[1].tags, (std::vector<int>{4, 7}));
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column)
+      EXPECT_NEAR(track[1].world_from_camera[column][row], turned[row][column].get<double>(),
+                  1e-15);
+}
+
+// config/frames.example.json as it is shipped, with footage made to fit it.
+TEST(ImportDescription, TheExampleIsValidAndMeansWhatItSays) {
+  const session::TemporaryDirectory folder;
+  const std::filesystem::path config = std::filesystem::path(PREVIZ_SOURCE_DIR) / "config";
+  std::filesystem::copy(config / "frames.example.json", folder.path() / "FRAMES.json");
+  session::write_content(folder.path() / "desk.toml", "[set]\nname = \"desk\"\n");
+  for (const char* name : {"0000.png", "0001.png"})
+    write_picture(folder.path() / "observer" / name, noise_picture(1, CV_8UC3, 64, 48));
+  session::write_content(folder.path() / "light" / "light.csv",
+                         "file,timestamp_ns,exposure\nb.png,200,0.5\na.png,100,0.25\n");
+  for (const char* name : {"a.png", "b.png"})
+    write_picture(folder.path() / "light" / name, noise_picture(2, CV_8UC3, 64, 64));
+
+  const ImportReport report =
+      import_session({folder.path() / "FRAMES.json", folder.path() / "takes" / "3"});
+  EXPECT_EQ(report.observer_frames, 2u);
+  EXPECT_EQ(report.light_frames, 2u);
+  EXPECT_GT(report.bytes, 0u);
+  session::Session opened = session::open_session(folder.path() / "takes" / "3");
+  EXPECT_EQ(opened.info.name, "desk take 3");
+  EXPECT_EQ(opened.info.clock, "utc");
+  const ObserverCalibration& observer = opened.info.observer.value();
+  EXPECT_EQ(observer.intrinsics.k1, -0.118);
+  EXPECT_EQ(observer.intrinsics.p2, -0.0007);
+  EXPECT_DOUBLE_EQ(observer.lens.value().focal_length_m, 0.0235);
+  EXPECT_EQ(observer.responsivity, 28.3);
+  const LightCameraCalibration& light = opened.info.light.value();
+  EXPECT_EQ(light.intrinsics.k, (std::array{-0.02, 0.002, -0.0003, 0.0}));
+  EXPECT_DOUBLE_EQ(light.intrinsics.max_angle_rad, 100 * std::numbers::pi / 180);
+  EXPECT_EQ(light.response.kind, ResponseCurve::Kind::gamma);
+  // Turned by 90 degrees about Z: the picture's right is world Y.
+  EXPECT_NEAR(light.world_from_camera[0][1], 1, 1e-15);
+  EXPECT_EQ(light.world_from_camera[3], glm::dvec4(-0.45, -0.05, 0.05, 1));
+  const auto stream = session::open_stream(opened, "observer");
+  EXPECT_EQ(stream->records()[1].timestamp_ns, 1'700'000'000'040'000'000);
+  EXPECT_DOUBLE_EQ(stream->records()[1].exposure, 0.02 * 1.5 * 28.3);
+  EXPECT_EQ(session::open_stream(opened, "light")->records()[0].exposure, 0.25);
+  EXPECT_TRUE(opened.missing.empty());
+}
+
+struct Mistake {
+  const char* pointer;  // RFC 6901 into the JSON of good()
+  const char* value;    // what is written there; "" removes it
+  const char* message;
+};
+
+Json good_calibrated(const Shoot& shoot) {
+  Json json = shoot.json;
+  json["observer"]["intrinsics"] = {{"width", 32}, {"height", 24}, {"fx", 30},
+                                    {"fy", 30},    {"cx", 16},     {"cy", 12}};
+  json["observer"]["lens"] = {{"focal_length_mm", 20}, {"f_number", 2}, {"focus_distance_m", 1}};
+  json["light"] = {{"pictures", {"light.png"}},
+                   {"timestamps_ns", {5}},
+                   {"exposure", 1},
+                   {"intrinsics",
+                    {{"width", 16},
+                     {"height", 16},
+                     {"fx", 5},
+                     {"fy", 5},
+                     {"cx", 8},
+                     {"cy", 8},
+                     {"max_angle_deg", 100}}},
+                   {"pose", {{"position_m", {0, 0, 1}}}}};
+  return json;
+}
+
+class Mistakes : public testing::TestWithParam<Mistake> {};
+
+TEST_P(Mistakes, AreToldWithTheirPathBeforeAnythingIsWritten) {
+  const auto [pointer, value, message] = GetParam();
+  Shoot shoot;
+  write_picture(shoot.folder() / "light.png", noise_picture(1, CV_8UC3, 16, 16));
+  shoot.json = good_calibrated(shoot);
+  const Json::json_pointer at(pointer);
+  if (*value)
+    shoot.json[at] = Json::parse(value);
+  else
+    shoot.json[at.parent_pointer()].erase(at.back());
+  const std::string error = shoot.error();
+  EXPECT_NE(error.find(message), std::string::npos) << error;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, Mistakes,
+    testing::Values(
+        Mistake{"/observer", "", "FRAMES.json: observer is missing"},
+        Mistake{"/observer", "[]", "FRAMES.json: observer must be an object"},
+        Mistake{"/obsrever", "{}", "obsrever is not known; did you mean observer?"},
+        Mistake{"/observer/exposre", "1", "observer.exposre is not known; did you mean exposure?"},
+        Mistake{"/observer/zzzzzzzz", "1", "observer.zzzzzzzz is not known; allowed: "},
+        Mistake{"/observer/pictures", "", "observer.pictures is missing; allowed: "},
+        Mistake{"/observer/pictures", "\"observer/%d.jpg\"", "%d.jpg: there is no such file"},
+        Mistake{"/observer/pictures", "[\"absent.png\"]", "absent.png: is not a file"},
+        Mistake{"/observer/pictures", "[]", "observer.pictures is empty"},
+        Mistake{"/observer/pictures", "7", "observer.pictures must be a list"},
+        Mistake{"/observer/video", "\"a.mkv\"", "observer.video contradicts pictures"},
+        Mistake{"/observer/fps", "", "observer.timestamps_ns must be given in exactly one way"},
+        Mistake{"/observer/timestamps_ns", "[1]",
+                "observer.timestamps_ns must be given in exactly"},
+        Mistake{"/observer/fps", "0", "observer.fps must be a number above 0"},
+        Mistake{"/observer/fps", "\"25\"", "observer.fps must be a number above 0"},
+        Mistake{"/observer/start_ns", "-1", "observer.start_ns must be a whole number from 0"},
+        Mistake{"/observer/start_ns", "1.5", "observer.start_ns must be a whole number from 0"},
+        Mistake{"/observer/sort_by_time", "1", "observer.sort_by_time must be true or false"},
+        Mistake{"/observer/csv", "\"absent.csv\"", "absent.csv: cannot be opened"},
+        Mistake{"/observer/exposure", "", "observer.exposure is missing; allowed: exposure, or"},
+        Mistake{"/observer/exposure", "0", "observer.exposure must be a number above 0"},
+        Mistake{"/observer/exposure", "[1, 2]", "observer.exposure has 2 entries; there are 3"},
+        Mistake{"/observer/exposure", "[1, \"x\", 2]", "observer.exposure[1] must be a number"},
+        Mistake{"/observer/intrinsics/fx", "", "observer.intrinsics.fx is missing"},
+        Mistake{"/observer/intrinsics/fx", "-3", "observer.intrinsics.fx must be a number above 0"},
+        Mistake{"/observer/intrinsics/width", "33", "observer.intrinsics is for 33x24"},
+        Mistake{"/observer/intrinsics/k4", "0", "observer.intrinsics.k4 is not known"},
+        Mistake{"/observer/intrinsics", "", "observer.lens needs intrinsics beside it"},
+        Mistake{"/observer/lens/focus_distance_m", "0.01", "must be more than the focal length"},
+        Mistake{"/observer/lens/focal_length", "3", "did you mean focal_length_mm?"},
+        Mistake{"/observer/response", "{\"kind\":\"log\"}", "observer.response.kind must be"},
+        Mistake{"/observer/response", "{\"gamma\":2}", "belongs to kind \"gamma\" only"},
+        Mistake{"/observer/response", "{\"kind\":\"table\",\"table\":[0,0.5,0.5,1]}",
+                "observer.response.table must increase strictly from 0 to 1"},
+        Mistake{"/light/timestamps_ns", "[1, 2]", "light.timestamps_ns has 2 entries; there are 1"},
+        Mistake{"/light/timestamps_ns", "\"container\"", "light.timestamps_ns must be a list, or"},
+        Mistake{"/light/lens", "{}", "light.lens is not known"},
+        Mistake{"/light/intrinsics/k", "[1, 2]",
+                "light.intrinsics.k has 2 entries; it must have 4"},
+        Mistake{"/light/intrinsics/max_angle_deg", "181", "light.intrinsics.max_angle_deg must be"},
+        Mistake{"/light/pose", "", "light.pose is missing"},
+        Mistake{"/light/pose/world_from_camera", "1", "contradicts position_m"},
+        Mistake{"/light/pose", "{\"world_from_camera\": [[2,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}",
+                "light.pose.world_from_camera must be rigid"},
+        Mistake{"/light/pose", "{\"world_from_camera\": [[1,0,0],[0,1,0],[0,0,1]]}",
+                "light.pose.world_from_camera must be 4 rows of 4 numbers"},
+        Mistake{"/track", "[{\"frame\": 0}]", "track[0].world_from_camera is missing"},
+        Mistake{"/track",
+                "[{\"frame\": 3, \"world_from_camera\": "
+                "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]",
+                "track has a pose for frame 3; observer has frames 0 to 2"}));
+
+TEST(ImportDescription, PicturesOfDifferentSizesAreAnError) {
+  Shoot shoot;
+  write_picture(shoot.folder() / "observer" / "0002.png", noise_picture(1, CV_8UC3, 32, 25));
+  EXPECT_NE(shoot.error().find("0002.png: is rgb8 32x25; all pictures of observer must be rgb8 "
+                               "32x24 like the first"),
+            std::string::npos);
+}
+
+TEST(ImportDescription, TablesNameFileAndLine) {
+  Shoot shoot;
+  shoot.json["observer"].erase("fps");
+  shoot.json["observer"]["csv"] = "t.csv";
+  const auto error_with = [&](const std::string& table) {
+    session::write_content(shoot.folder() / "t.csv", table);
+    return shoot.error();
+  };
+  EXPECT_NE(error_with("").find("t.csv: holds no rows"), std::string::npos);
+  EXPECT_NE(error_with("timestamp_ns,kind\n1\n").find("t.csv:2: has 1 cells"), std::string::npos);
+  EXPECT_NE(error_with("timestamp_ns\n\"1\"\n").find("t.csv:2: quotes"), std::string::npos);
+  EXPECT_NE(error_with("timestamp_ns\n1\n2\n3.5\n").find("column timestamp_ns, row 3: \"3.5\""),
+            std::string::npos);
+  EXPECT_NE(error_with("timestamp_ns,exposure\n1,1\n2,2\n3,3\n")
+                .find("observer.exposure is also a column of"),
+            std::string::npos);
+  EXPECT_NE(error_with("timestamp_ns\n1\n2\n").find("has 2 entries; there are 3 pictures"),
+            std::string::npos);
+  EXPECT_EQ(error_with("\xef\xbb\xbftimestamp_ns,note\r\n1,\r\n2,b\r\n\r\n3,c"), "");
+}
+
+TEST(ImportDescription, NothingIsOverwritten) {
+  Shoot shoot;
+  EXPECT_EQ(shoot.error(), "");
+  EXPECT_THROW(shoot.import(), Error);
+  std::filesystem::remove_all(shoot.session());
+  std::filesystem::create_directory(shoot.session());
+  EXPECT_NO_THROW(shoot.import());  // an empty folder is taken
+}
+
+TEST(ImportDescription, WhatIsNotJsonIsAnError) {
+  const session::TemporaryDirectory folder;
+  const auto error_of = [&](const std::string& text) -> std::string {
+    session::write_content(folder.path() / "F.json", text);
+    try {
+      import_session({folder.path() / "F.json", folder.path() / "take"});
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_NE(error_of("{\n\"name\": }").find("F.json: is not JSON: "), std::string::npos);
+  EXPECT_NE(error_of("{\n\"name\": }").find("line 2"), std::string::npos);
+  EXPECT_NE(error_of("[]").find("F.json: the document must be an object"), std::string::npos);
+  EXPECT_NE(error_of("").find("F.json: is not JSON"), std::string::npos);
+  EXPECT_THROW(import_session({folder.path() / "absent.json", folder.path() / "take"}), Error);
+}
+
+}  // namespace
+}  // namespace previz::post

@@ -1,0 +1,46 @@
+// Footage made on the spot: pictures of noise in every kind of file, and a video.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "daemon/post/import.hpp"
+#include "tests/unit/session_fixture.hpp"
+
+namespace previz::post {
+
+using Json = nlohmann::json;
+
+// BGR or grey noise as OpenCV holds it; `type` is CV_8UC3 and so on.
+cv::Mat noise_picture(int seed, int type, int width, int height);
+// The bytes that previz::Frame should hold for that picture: RGB order, packed.
+std::vector<std::uint8_t> frame_bytes_of(const cv::Mat& picture);
+void write_picture(const std::filesystem::path& file, const cv::Mat& picture);
+
+// Rows packed, planes one after the other, in the order of `pixel_format`, one string a frame;
+// FFV1 or whatever the container's name wants. Marked BT.709 limited range if `bt709`.
+void write_video(const std::filesystem::path& file, const std::string& pixel_format,
+                 const std::vector<std::vector<std::uint8_t>>& frames, int width, int height,
+                 int fps, bool bt709);
+
+// A folder with observer/0000.png ... and FRAMES.json; every test changes one thing.
+class Shoot {
+ public:
+  Shoot();
+  const std::filesystem::path& folder() const { return directory_.path(); }
+  std::filesystem::path session() const { return folder() / "take"; }
+
+  Json json;  // FRAMES.json: three pictures of 32x24, 25 frames per second, exposure 0.5
+
+  ImportReport import() const;
+  // The message, or "" if the import succeeded; checks that a failure leaves nothing.
+  std::string error() const;
+
+ private:
+  session::TemporaryDirectory directory_;
+};
+
+}  // namespace previz::post

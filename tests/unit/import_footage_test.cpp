@@ -1,0 +1,269 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numeric>
+
+#include "drivers/error.hpp"
+#include "drivers/session/session.hpp"
+#include "tests/unit/import_fixture.hpp"
+
+namespace previz::post {
+namespace {
+
+std::unique_ptr<session::StreamReader> open(const Shoot& shoot, const std::string& source) {
+  session::Session opened = session::open_session(shoot.session());
+  auto stream = session::open_stream(opened, source);
+  EXPECT_TRUE(opened.missing.empty());
+  return stream;
+}
+
+TEST(Import, NumberedPicturesComeInBitForBit) {
+  const Shoot shoot;
+  const ImportReport report = shoot.import();
+  EXPECT_EQ(report.observer_frames, 3u);
+  EXPECT_EQ(report.light_frames, 0u);
+  const auto stream = open(shoot, "observer");
+  ASSERT_EQ(stream->records().size(), 3u);
+  for (int i = 0; i < 3; ++i) {
+    const FramePtr frame = stream->read(i);
+    EXPECT_EQ(frame->format, PixelFormat::rgb8);
+    EXPECT_EQ(frame->bytes, frame_bytes_of(noise_picture(i, CV_8UC3, 32, 24)));
+    EXPECT_EQ(frame->timestamp_ns, i * 40'000'000);
+    EXPECT_EQ(frame->sequence, static_cast<std::uint64_t>(i));
+    EXPECT_EQ(frame->exposure, 0.5);
+  }
+}
+
+struct Kind {
+  const char* extension;
+  int type;
+  PixelFormat format;
+};
+
+class ImportKinds : public testing::TestWithParam<Kind> {};
+
+TEST_P(ImportKinds, KeepTheirBits) {
+  const auto [extension, type, format] = GetParam();
+  Shoot shoot;
+  write_picture(shoot.folder() / (std::string("deep.") + extension),
+                noise_picture(7, type, 20, 10));
+  shoot.json["observer"]["pictures"] = {std::string("deep.") + extension};
+  ASSERT_EQ(shoot.error(), "");
+  const FramePtr frame = open(shoot, "observer")->read(0);
+  EXPECT_EQ(frame->format, format);
+  EXPECT_EQ(frame->bytes, frame_bytes_of(noise_picture(7, type, 20, 10)));
+}
+
+INSTANTIATE_TEST_SUITE_P(Files, ImportKinds,
+                         testing::Values(Kind{"png", CV_8UC1, PixelFormat::gray8},
+                                         Kind{"png", CV_8UC3, PixelFormat::rgb8},
+                                         Kind{"png", CV_16UC1, PixelFormat::gray16},
+                                         Kind{"png", CV_16UC3, PixelFormat::rgb16},
+                                         Kind{"tiff", CV_8UC3, PixelFormat::rgb8},
+                                         Kind{"tiff", CV_16UC1, PixelFormat::gray16},
+                                         Kind{"tiff", CV_16UC3, PixelFormat::rgb16}));
+
+TEST(Import, JpegIsWhatItsDecoderSays) {
+  Shoot shoot;
+  write_picture(shoot.folder() / "a.jpg", cv::Mat(16, 24, CV_8UC3, cv::Scalar(30, 90, 200)));
+  shoot.json["observer"]["pictures"] = {"a.jpg"};
+  ASSERT_EQ(shoot.error(), "");
+  const FramePtr frame = open(shoot, "observer")->read(0);
+  // One flat block: only its mean is coded, to a step of at most 2 at OpenCV's quality 95, and
+  // Y'CbCr to RGB multiplies a chroma step by at most 1.8.
+  EXPECT_NEAR(frame->bytes[0], 200, 6);
+  EXPECT_NEAR(frame->bytes[1], 90, 6);
+  EXPECT_NEAR(frame->bytes[2], 30, 6);
+}
+
+TEST(Import, ATableOfTimesAndExposuresInAnyOrder) {
+  Shoot shoot;
+  for (int i = 0; i < 3; ++i)
+    write_picture(shoot.folder() / "light" / ("b" + std::to_string(i) + ".png"),
+                  noise_picture(10 + i, CV_8UC3, 16, 16));
+  session::write_content(shoot.folder() / "light" / "light.csv",
+                         "file,timestamp_ns,exposure,kind\r\n"
+                         "b0.png,1700000000684751644,0.35,auto\r\n"
+                         "b1.png,1700000000304751644,8.54492187e-05,bracket\r\n"
+                         "b2.png,1700000000344751644,0.0013671875,bracket\r\n");
+  shoot.json["light"] = {{"csv", "light/light.csv"}};
+  EXPECT_NE(shoot.error().find("light.timestamps_ns must increase; entry 2"), std::string::npos);
+  shoot.json["light"]["sort_by_time"] = true;
+  EXPECT_EQ(shoot.import().light_frames, 3u);
+  const auto stream = open(shoot, "light");
+  const int order[] = {1, 2, 0};
+  const double exposure[] = {8.54492187e-05, 0.0013671875, 0.35};
+  for (int i = 0; i < 3; ++i) {
+    const FramePtr frame = stream->read(i);
+    EXPECT_EQ(frame->bytes, frame_bytes_of(noise_picture(10 + order[i], CV_8UC3, 16, 16)));
+    EXPECT_EQ(frame->exposure, exposure[i]);
+    EXPECT_EQ(frame->sequence, static_cast<std::uint64_t>(i));
+  }
+  EXPECT_EQ(stream->records()[0].timestamp_ns, 1700000000304751644);
+}
+
+TEST(Import, ExposureOfShutterGainAndResponsivity) {
+  Shoot shoot;
+  Json& observer = shoot.json["observer"];
+  observer.erase("exposure");
+  observer["exposure_s"] = {0.01, 0.02, 0.04};
+  observer["gain"] = 2;
+  observer["intrinsics"] = {{"width", 32}, {"height", 24}, {"fx", 30},
+                            {"fy", 30},    {"cx", 16},     {"cy", 12}};
+  observer["response"] = {{"responsivity", 3}};
+  ASSERT_EQ(shoot.error(), "");
+  const auto stream = open(shoot, "observer");
+  for (int i = 0; i < 3; ++i) {
+    const session::FrameRecord& record = stream->records()[i];
+    EXPECT_EQ(record.exposure_s, 0.01 * (1 << i));
+    EXPECT_EQ(record.gain, 2);
+    EXPECT_EQ(record.exposure, 0.01 * (1 << i) * 2 * 3);
+  }
+}
+
+TEST(Import, WildcardsSortByNumber) {
+  Shoot shoot;
+  for (const int i : {2, 10, 1})
+    write_picture(shoot.folder() / "shots" / ("img" + std::to_string(i) + ".png"),
+                  noise_picture(i, CV_8UC3, 16, 12));
+  session::write_content(shoot.folder() / "shots" / "readme.txt", "no picture");
+  for (const char* pattern : {"shots/img*.png", "shots/*.png"}) {
+    shoot.json["observer"]["pictures"] = pattern;
+    std::filesystem::remove_all(shoot.session());
+    ASSERT_EQ(shoot.error(), "");
+    const auto stream = open(shoot, "observer");
+    ASSERT_EQ(stream->records().size(), 3u);
+    for (const int i : {0, 1, 2})
+      EXPECT_EQ(stream->read(i)->bytes,
+                frame_bytes_of(noise_picture(i == 2 ? 10 : i + 1, CV_8UC3, 16, 12)));
+  }
+  shoot.json["observer"]["pictures"] = "shots/img%d.png";
+  std::filesystem::remove_all(shoot.session());
+  EXPECT_NE(shoot.error().find("number 3 is missing"), std::string::npos);
+}
+
+std::vector<std::uint8_t> noise_bytes(std::size_t count, int seed) {
+  cv::Mat noise = noise_picture(seed, CV_8UC1, static_cast<int>(count), 1);
+  return {noise.datastart, noise.dataend};
+}
+
+TEST(Import, AVideoOfBt709KeepsItsSamples) {
+  Shoot shoot;
+  std::vector<std::vector<std::uint8_t>> frames;
+  for (int i = 0; i < 4; ++i) frames.push_back(noise_bytes(2 * 64 * 48, i));
+  write_video(shoot.folder() / "take.mkv", "yuv422p", frames, 64, 48, 50, true);
+  shoot.json["observer"] = {
+      {"video", "take.mkv"}, {"timestamps_ns", "container"}, {"start_ns", 1000}, {"exposure", 1}};
+  const ImportReport report = shoot.import();
+  ASSERT_EQ(report.notes.size(), 1u);
+  EXPECT_NE(report.notes[0].find("kept as it is"), std::string::npos) << report.notes[0];
+  const auto stream = open(shoot, "observer");
+  ASSERT_EQ(stream->records().size(), 4u);
+  for (int i = 0; i < 4; ++i) {
+    const FramePtr frame = stream->read(i);
+    EXPECT_EQ(frame->format, PixelFormat::yuv422p8);
+    EXPECT_EQ(frame->bytes, frames[i]);
+    EXPECT_EQ(frame->timestamp_ns, 1000 + i * 20'000'000);
+  }
+}
+
+TEST(Import, AVideoOfRgbKeepsItsSamples) {
+  Shoot shoot;
+  const std::vector<std::uint8_t> rgb = noise_bytes(3 * 32 * 16, 1);
+  std::vector<std::uint8_t> bgr0;
+  for (std::size_t i = 0; i < rgb.size(); i += 3)
+    bgr0.insert(bgr0.end(), {rgb[i + 2], rgb[i + 1], rgb[i], 0});
+  write_video(shoot.folder() / "take.mkv", "bgr0", {bgr0}, 32, 16, 25, false);
+  shoot.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
+  ASSERT_EQ(shoot.error(), "");
+  const FramePtr frame = open(shoot, "observer")->read(0);
+  EXPECT_EQ(frame->format, PixelFormat::rgb8);
+  EXPECT_EQ(frame->bytes, rgb);
+}
+
+// Flat colours, so that chroma interpolation plays no part. BT.601 unless marked, as players do:
+// R = 255 (y' + 1.402 pr), G = 255 (y' - 0.344136 pb - 0.714136 pr), B = 255 (y' + 1.772 pb) with
+// y' = (Y - 16)/219 and p = (C - 128)/224; BT.709 likewise with 1.5748, 0.187324, 0.468124, 1.8556.
+// swscale's tables are fixed point: one code of rounding on top of the half.
+TEST(Import, AnyOtherVideoBecomesRgb) {
+  struct Case {
+    bool bt709;
+    double red, green, blue;
+  };
+  const double y = (120 - 16) / 219.0, pb = (100 - 128) / 224.0, pr = (180 - 128) / 224.0;
+  for (const Case& matrix :
+       {Case{false, y + 1.402 * pr, y - 0.344136 * pb - 0.714136 * pr, y + 1.772 * pb},
+        Case{true, y + 1.5748 * pr, y - 0.187324 * pb - 0.468124 * pr, y + 1.8556 * pb}}) {
+    Shoot shoot;
+    std::vector<std::uint8_t> frame(64 * 48, 120);
+    frame.insert(frame.end(), 32 * 24, 100);
+    frame.insert(frame.end(), 32 * 24, 180);
+    write_video(shoot.folder() / "take.mkv", "yuv420p", {frame}, 64, 48, 25, matrix.bt709);
+    shoot.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
+    const ImportReport report = shoot.import();
+    EXPECT_NE(report.notes.at(0).find("converted to rgb8"), std::string::npos);
+    EXPECT_EQ(report.notes.at(0).find("(assumed)") == std::string::npos, matrix.bt709);
+    const FramePtr rgb = open(shoot, "observer")->read(0);
+    ASSERT_EQ(rgb->format, PixelFormat::rgb8);
+    for (std::size_t i = 0; i < rgb->bytes.size(); i += 3) {
+      ASSERT_NEAR(rgb->bytes[i], 255 * matrix.red, 1.5);
+      ASSERT_NEAR(rgb->bytes[i + 1], 255 * matrix.green, 1.5);
+      ASSERT_NEAR(rgb->bytes[i + 2], 255 * matrix.blue, 1.5);
+    }
+  }
+}
+
+TEST(Import, AVideoDeeperThan8BitsKeepsItsDepth) {
+  Shoot shoot;
+  const std::vector<std::uint8_t> samples = noise_bytes(2 * 3 * 32 * 16, 5);
+  write_video(shoot.folder() / "take.mkv", "gbrp16le", {samples}, 32, 16, 25, false);
+  shoot.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
+  ASSERT_EQ(shoot.error(), "");
+  const FramePtr frame = open(shoot, "observer")->read(0);
+  ASSERT_EQ(frame->format, PixelFormat::rgb16);
+  for (std::size_t pixel = 0; pixel < 32 * 16; ++pixel)
+    for (int channel = 0; channel < 3; ++channel) {
+      const std::size_t plane = (channel + 2) % 3;  // planes G, B, R
+      for (int byte = 0; byte < 2; ++byte)
+        ASSERT_EQ(frame->bytes[6 * pixel + 2 * channel + byte],
+                  samples[2 * (plane * 32 * 16 + pixel) + byte]);
+    }
+}
+
+TEST(Import, AVideoWithMoreOrFewerFramesThanTimes) {
+  Shoot shoot;
+  write_video(shoot.folder() / "take.mkv", "gray", {noise_bytes(512, 1), noise_bytes(512, 2)}, 32,
+              16, 25, false);
+  shoot.json["observer"] = {{"video", "take.mkv"}, {"timestamps_ns", {1}}, {"exposure", 1}};
+  EXPECT_NE(shoot.error().find("frame 1: is one more than the 1 frames"), std::string::npos);
+  shoot.json["observer"]["timestamps_ns"] = {1, 2, 3};
+  EXPECT_NE(shoot.error().find("observer has 2 frames; 3 are described"), std::string::npos);
+  shoot.json["observer"]["timestamps_ns"] = {1, 2};
+  EXPECT_EQ(shoot.error(), "");
+}
+
+TEST(Import, DamagedFootageIsAnError) {
+  Shoot shoot;
+  session::write_content(shoot.folder() / "observer" / "0001.png", "no PNG");
+  EXPECT_NE(shoot.error().find("0001.png: cannot be read as a picture"), std::string::npos);
+  session::write_content(shoot.folder() / "a.mp4", "no video");
+  shoot.json["observer"] = {{"video", "a.mp4"}, {"fps", 25}, {"exposure", 1}};
+  EXPECT_NE(shoot.error().find("a.mp4: cannot be read as a video"), std::string::npos);
+}
+
+TEST(Import, TransparencyIsAnErrorUnlessThereIsNone) {
+  Shoot shoot;
+  cv::Mat picture = noise_picture(1, CV_8UC4, 16, 16);
+  shoot.json["observer"]["pictures"] = {"a.png"};
+  write_picture(shoot.folder() / "a.png", picture);
+  EXPECT_NE(shoot.error().find("is transparent in places"), std::string::npos);
+  std::vector<cv::Mat> channels;
+  cv::split(picture, channels);
+  channels[3].setTo(255);
+  cv::merge(channels, picture);
+  write_picture(shoot.folder() / "a.png", picture);
+  EXPECT_EQ(shoot.error(), "");
+}
+
+}  // namespace
+}  // namespace previz::post
