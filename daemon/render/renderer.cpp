@@ -50,7 +50,7 @@ void Renderer::Impl::upload_frame() {
     gpu_frame.lens_radius = static_cast<float>(lens.focal_length_m / (2 * lens.f_number));
     gpu_frame.focus_distance = static_cast<float>(lens.focus_distance_m);
   }
-  gpu_frame.seed = estimation.seed;
+  gpu_frame.seed = frame.seed.value_or(estimation.seed);
   gpu_frame.max_depth = static_cast<std::uint32_t>(estimation.max_depth);
   gpu_frame.roulette_depth = static_cast<std::uint32_t>(estimation.roulette_depth);
   gpu_frame.specular_alpha = static_cast<float>(estimation.specular_roughness);

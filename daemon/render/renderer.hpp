@@ -4,6 +4,7 @@
 #include <functional>
 #include <glm/mat4x4.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "daemon/lighting/environment.hpp"
@@ -31,6 +32,7 @@ struct FrameInput {
   Plate plate;                            // samples as captured; empty: composite over black
   double exposure = 1.0;                  // absolute, of this frame
   glm::dmat4 world_from_camera{1.0};      // OpenCV camera axes
+  std::optional<std::uint32_t> seed;      // absent: the set's, the same in every frame (P8)
 };
 
 class Renderer {
