@@ -141,12 +141,12 @@ struct Set {
 };
 
 // Parses TOML text. `file` names it in errors, and its folder is what relative paths are relative
-// to; `assets` maps paths as the set writes them to paths that stand in for them (a session's assets,
-// relative to that folder too). The files of objects and the environment must exist; a replay
-// device's session and the output directory need not. Tag and camera poses come out exactly rigid.
-// Throws previz::Error whose message holds every problem found, one a line, in the order of the
-// file's lines: file:line:column: key: what is wrong; what is allowed. Where the text is no TOML at
-// all, that is the one problem, without a key.
+// to; `assets` maps paths as the set writes them to paths that stand in for them (a session's
+// assets, relative to that folder too). The files of objects and the environment must exist; a
+// replay device's session and the output directory need not. Tag and camera poses come out exactly
+// rigid. Throws previz::Error whose message holds every problem found, one a line, in the order of
+// the file's lines: file:line:column: key: what is wrong; what is allowed. Where the text is no
+// TOML at all, that is the one problem, without a key.
 Set parse_set(const std::string& text, const std::filesystem::path& file,
               const std::vector<std::pair<std::string, std::filesystem::path>>& assets = {});
 // The same from a file; throws previz::Error naming it if it cannot be read.

@@ -13,6 +13,10 @@ constexpr int max_picture_side_px = 16384;
 // A distance beyond which a lens cannot tell the difference, and a float still can.
 constexpr double far_m = 1e6;
 
+constexpr const char* tag_families[] = {"tag36h11",      "tag25h9",          "tag16h5",
+                                        "tag36h10",      "tagStandard41h12", "tagStandard52h13",
+                                        "tagCircle21h7", "tagCircle49h12",   "tagCustom48h12"};
+
 Need required(const char* example) {
   return {Need::Kind::required, example};
 }
@@ -104,7 +108,7 @@ Keys light_pose_keys(PoseDraft& p) {
 Keys tracking_keys(Tracking& t) {
   return {
       {"enabled", &t.enabled, plain, "Find the film camera by the tags in its picture; false: take the poses the session recorded."},
-      {"family", &t.family, plain, "AprilTag family of the printed tags."},
+      {"family", &t.family, Rule{.words = tag_families}, "AprilTag family of the printed tags."},
       {"decimate", &t.decimate, plain.within(1, 8), "Tags are looked for in a picture smaller by this factor: faster, and small tags get lost."},
       {"min_margin", &t.min_margin, plain.within(0, 255), "Decision margin below which a detection is dropped."},
       {"max_hamming", &t.max_hamming, plain.within(0, 3), "Bits of a tag's code that may be corrected."},

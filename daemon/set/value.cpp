@@ -119,6 +119,19 @@ std::string range(const Rule& rule) {
 
 }  // namespace codec
 
+std::string Codec<std::string>::read(const Value& value, const Rule& rule) {
+  const auto& text = codec::text(value);
+  if (!rule.words.empty() && std::ranges::find(rule.words, text) == rule.words.end())
+    codec::misread(value, describe(rule));
+  return text;
+}
+
+std::string Codec<std::string>::describe(const Rule& rule) {
+  std::string words;
+  for (const auto* word : rule.words) words += (words.empty() ? "" : " | ") + codec::quote(word);
+  return words.empty() ? "text" : words;
+}
+
 std::filesystem::path Codec<std::filesystem::path>::read(const Value& value, const Rule& rule) {
   const auto& text = codec::text(value);
   if (text.empty() || text.find('\0') != std::string::npos) codec::misread(value, describe(rule));

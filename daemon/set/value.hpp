@@ -11,6 +11,7 @@
 #include <glm/vec3.hpp>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <variant>
@@ -40,6 +41,7 @@ struct Rule {
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
   bool low_excluded = false;
+  std::span<const char* const> words{};  // of a text; empty: any text
 };
 
 // The units of the table; a unit alone allows every finite number.
@@ -113,9 +115,9 @@ struct Codec<double> {
 
 template <>
 struct Codec<std::string> {
-  static std::string read(const Value& value, const Rule&) { return codec::text(value); }
+  static std::string read(const Value& value, const Rule& rule);
   static std::string print(const std::string& text, const Rule&) { return codec::quote(text); }
-  static std::string describe(const Rule&) { return "text"; }
+  static std::string describe(const Rule& rule);
 };
 
 template <>

@@ -96,6 +96,8 @@ const Mistake types[] = {
     {"tag = [4]\n", "1:8: tag: an entry is not a table", "[[tag]]"},
     {"[observer]\ndriver = \"gopro\"\n", "2:10: observer.driver: \"gopro\"",
      "\"replay\" | \"none\""},
+    {"[tracking]\nfamily = \"tag36h12\"\n", "2:10: tracking.family: \"tag36h12\"",
+     "\"tag36h11\" | "},
     {"[[tag]]\nid=1\nsize_m=0.1\nposition_m=[0,0]\n", "4:12: tag.position_m: a list of 2 entries",
      "3 numbers"},
     {"[[tag]]\nid=1\nsize_m=0.1\nposition_m=[0,0,\n  \"up\"]\n", "5:3: tag.position_m: \"up\"",

@@ -1,0 +1,314 @@
+#include "daemon/post/check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <optional>
+#include <ostream>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "daemon/lighting/lighting.hpp"
+#include "daemon/pipeline/take.hpp"
+#include "daemon/scene/scene.hpp"
+#include "daemon/set/names.hpp"
+#include "daemon/set/set.hpp"
+#include "daemon/tracking/apriltag_tracker.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/session.hpp"
+
+namespace previz::post {
+namespace {
+
+namespace fs = std::filesystem;
+using Lines = std::vector<std::string>;
+
+// The set, with the calibrations in force put into it, and what is known besides.
+struct Checked {
+  set::Set set;
+  bool has_track = false;  // the session has poses
+  Lines remarks;           // allowed, and worth a look
+};
+
+// Digits in groups of three: 1 234 567.
+std::string grouped(std::uint64_t number) {
+  auto digits = std::to_string(number);
+  for (auto at = static_cast<std::ptrdiff_t>(digits.size()) - 3; at > 0; at -= 3)
+    digits.insert(static_cast<std::size_t>(at), 1, ' ');
+  return digits;
+}
+
+std::string plural(std::uint64_t number, const std::string& noun) {
+  return grouped(number) + ' ' + noun + (number == 1 ? "" : "s");
+}
+
+template <class... Parts>
+std::string words(const Parts&... parts) {
+  std::ostringstream text;
+  text.precision(6);
+  (text << ... << parts);
+  return text.str();
+}
+
+Checked open(const fs::path& set_or_session) {
+  Checked checked;
+  if (fs::is_directory(set_or_session)) {
+    auto take = pipeline::open_take(set_or_session, std::nullopt);
+    checked.set = std::move(take.set);
+    checked.set.observer.calibration = take.observer;
+    checked.set.light_camera.calibration = take.light;
+    checked.has_track = !take.session.track.empty();
+    checked.remarks = take.session.missing;
+    if (!take.light_stream) checked.set.light_camera.driver = set::Driver::none;
+    return checked;
+  }
+  checked.set = set::load_set(set_or_session);
+  auto& observer = checked.set.observer;
+  auto& light = checked.set.light_camera;
+  const auto replayed = [&](const std::string& camera, set::Driver driver, const fs::path& device) {
+    if (driver != set::Driver::replay || device.empty()) return session::SessionInfo{};
+    if (!fs::exists(device)) {
+      checked.remarks.push_back(camera + ".device: there is no session " + device.string());
+      return session::SessionInfo{};
+    }
+    const auto session = session::open_session(device);
+    if (camera == "observer") checked.has_track = !session.track.empty();
+    return session.info;
+  };
+  const auto observer_session = replayed("observer", observer.driver, observer.device);
+  const auto light_session = replayed("light_camera", light.driver, light.device);
+  if (!observer.calibration) observer.calibration = observer_session.observer;
+  if (!light.calibration) light.calibration = light_session.light;
+  return checked;
+}
+
+// Runs `work`; what it throws is appended to `problems`.
+void attempt(Lines& problems, const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const Error& error) {
+    problems.push_back(error.what());
+  }
+}
+
+// The scene, or what is wrong with each object's file.
+std::optional<scene::Scene> load_scene(const set::Set& set, Lines& problems) {
+  try {
+    return scene::load_scene(set);
+  } catch (const Error& whole) {
+    const auto before = problems.size();
+    for (const auto& object : set.objects) {
+      auto alone = set;
+      alone.objects = {object};
+      attempt(problems, [&] { scene::load_scene(alone); });
+    }
+    if (problems.size() == before) problems.push_back(whole.what());  // only all together too much
+    return std::nullopt;
+  }
+}
+
+void check_environment(Checked& checked, Lines& problems) {
+  if (!checked.set.lighting.environment) return;
+  auto coarse = checked.set.lighting;
+  coarse.resolution = 16;  // the file is what is checked
+  attempt(problems, [&] {
+    for (const auto& note : lighting::load_environment(coarse).report.notes)
+      checked.remarks.push_back(note);
+  });
+}
+
+void check_tracking(Checked& checked, Lines& problems) {
+  const auto& tracking = checked.set.tracking;
+  const auto& calibration = checked.set.observer.calibration;
+  if (tracking.enabled && tracking.tags.empty())
+    checked.remarks.push_back("tracking is on and there is no [[tag]]: the camera will be lost");
+  if (!tracking.enabled && !checked.has_track)
+    checked.remarks.push_back("tracking is off: only a session that recorded poses can be used");
+  if (tracking.enabled && calibration)
+    attempt(problems, [&] {
+      tracking::make_apriltag_tracker(tracking, calibration->intrinsics, calibration->response);
+    });
+}
+
+void remark_on_cameras(Checked& checked) {
+  const auto& set = checked.set;
+  if (!set.observer.calibration)
+    checked.remarks.push_back(
+        "the observer has no calibration here: it must come with the session that is rendered");
+  const bool has_light_camera =
+      set.light_camera.driver != set::Driver::none && set.light_camera.calibration;
+  if (!set.lighting.environment && !has_light_camera)
+    checked.remarks.push_back(
+        "no environment and no calibrated light camera here: the light must come with the session");
+}
+
+void remark_on_scene(Checked& checked, const scene::Scene& scene) {
+  for (const auto& note : scene.notes) checked.remarks.push_back(note);
+  const auto has = [&](set::Presence presence) {
+    return std::ranges::find(checked.set.objects, presence, &set::Object::presence) !=
+           checked.set.objects.end();
+  };
+  const bool relit = std::ranges::any_of(
+      scene.lights, [](const set::Light& light) { return light.gain_mixed != light.gain_real; });
+  if (!has(set::Presence::virtual_object) && !has(set::Presence::removed) && !relit)
+    checked.remarks.push_back(
+        "nothing is virtual, removed or relit: the picture will be the camera's own");
+  else if (!has(set::Presence::phantom))
+    checked.remarks.push_back(
+        "no phantom: there is nothing real to catch shadows, and nothing real hides an object");
+}
+
+void print_cameras(const set::Set& set, std::ostream& out) {
+  const auto device = [](set::Driver driver, const std::string& name) {
+    return words(set::name_of(driver), name.empty() ? "" : " of ", name);
+  };
+  out << "\ncameras\n  observer      " << device(set.observer.driver, set.observer.device);
+  if (const auto& c = set.observer.calibration) {
+    out << words(", ", c->intrinsics.width, "x", c->intrinsics.height, ", ");
+    if (c->lens)
+      out << words(c->lens->focal_length_m * 1e3, " mm lens at f/", c->lens->f_number,
+                   ", focus at ", c->lens->focus_distance_m, " m");
+    else
+      out << "everything sharp";
+  }
+  out << "\n  light camera  " << device(set.light_camera.driver, set.light_camera.device);
+  if (const auto& c = set.light_camera.calibration;
+      c && set.light_camera.driver != set::Driver::none)
+    out << words(", ", c->intrinsics.width, "x", c->intrinsics.height, ", calibrated to ",
+                 c->intrinsics.max_angle_rad * 180 / std::numbers::pi, " degrees off axis");
+  out << '\n';
+}
+
+void print_tags(const set::Tracking& tracking, std::ostream& out) {
+  out << "\ntracking\n  ";
+  if (!tracking.enabled) {
+    out << "off: the poses that the session recorded are used\n";
+    return;
+  }
+  out << plural(tracking.tags.size(), "tag") << " of family " << tracking.family;
+  const char* separator = ": ";
+  for (const auto& tag : tracking.tags) {
+    out << separator << words(tag.id, " (", std::round(tag.size_m * 1e4) / 10, " mm)");
+    separator = ", ";
+  }
+  out << '\n';
+}
+
+void print_objects(const set::Set& set, const scene::Scene& scene, std::ostream& out) {
+  if (set.objects.empty()) return;
+  std::vector<std::uint64_t> triangles(set.objects.size()), instances(set.objects.size());
+  for (const auto& instance : scene.instances) {
+    ++instances[instance.object];
+    triangles[instance.object] += scene.meshes[instance.mesh].triangles.size();
+  }
+  out << "\nobjects\n";
+  for (std::size_t i = 0; i < set.objects.size(); ++i) {
+    const auto& object = set.objects[i];
+    out << "  " << object.name << ": " << set::name_of(object.presence) << ", "
+        << plural(triangles[i], "triangle") << " in " << plural(instances[i], "instance")
+        << ", from " << object.file_as_written << '\n';
+  }
+}
+
+void print_lights(const set::Set& set, const scene::Scene& scene, std::ostream& out) {
+  const auto& lighting = set.lighting;
+  out << "\nlight\n  around the set: "
+      << (lighting.environment ? "the picture " + lighting.environment_as_written
+                               : words("what the light camera sees; where it cannot see: ",
+                                       set::name_of(lighting.unseen)))
+      << '\n';
+  for (const auto& light : scene.lights) {
+    const char* change = light.gain_real == 0                  ? "added"
+                         : light.gain_mixed == light.gain_real ? "as it is"
+                         : light.gain_mixed == 0               ? "taken away"
+                         : light.gain_mixed < light.gain_real  ? "dimmed"
+                                                               : "brightened";
+    out << "  " << (light.name.empty() ? "(no name)" : light.name) << ": "
+        << set::name_of(light.type) << ", " << change
+        << words(", gain ", light.gain_mixed, " in the picture, ", light.gain_real,
+                 " in the real scene\n");
+  }
+}
+
+void print_estimator(const set::Set& set, std::ostream& out) {
+  const auto& e = set.estimation;
+  out << "\nestimator\n  " << set::name_of(e.estimator) << ", " << set::name_of(e.composite) << ", "
+      << plural(static_cast<std::uint64_t>(set.quality.samples), "sample")
+      << " per pixel and frame, at most " << e.max_depth << " bounces, seed " << e.seed << '\n';
+}
+
+void print_requirements(const scene::Requirements& required, std::ostream& out) {
+  struct Part {
+    bool scene::Requirements::*needed;
+    const char* with;
+    const char* without;
+  };
+  static constexpr Part parts[] = {
+      {&scene::Requirements::differing_objects,
+       "two worlds: an object is in one of them only, paths fork there",
+       "forks: every object is in both worlds"},
+      {&scene::Requirements::removed_objects, "diminished reality: a real object is taken away",
+       "diminished reality: nothing real is taken away"},
+      {&scene::Requirements::thin_lens, "lens sampling: the aperture blurs what is out of focus",
+       "lens sampling: everything is sharp"},
+      {&scene::Requirements::transmission, "refraction: something lets light through",
+       "refraction: nothing lets light through"},
+      {&scene::Requirements::metals, "conductors: something is of metal",
+       "conductors: nothing is of metal"},
+      {&scene::Requirements::rough_specular, "GGX: something is glossy", "GGX: nothing is glossy"},
+      {&scene::Requirements::textures, "textures: surfaces read pictures",
+       "textures: no surface reads a picture"},
+      {&scene::Requirements::alpha, "alpha: rays pass through parts of a surface",
+       "alpha: every surface is opaque"},
+      {&scene::Requirements::emissive_meshes, "glowing meshes: surfaces that are lights",
+       "glowing meshes: no surface gives light"},
+      {&scene::Requirements::lights, "lamps: the set or a glTF file names some",
+       "lamps: only the light around the set shines"},
+  };
+  out << "\nthe renderer needs\n  rays: " << plural(required.triangles, "triangle") << ", seen as "
+      << grouped(required.instanced_triangles) << '\n';
+  for (const auto& part : parts)
+    if (required.*part.needed) out << "  " << part.with << '\n';
+  out << "\nthe renderer leaves out\n";
+  for (const auto& part : parts)
+    if (!(required.*part.needed)) out << "  " << part.without << '\n';
+}
+
+int refuse(const Lines& problems, std::ostream& out) {
+  std::string all;
+  for (const auto& problem : problems) all += problem + '\n';
+  const auto count = static_cast<std::uint64_t>(std::ranges::count(all, '\n'));
+  out << all << plural(count, "problem") << '\n';
+  return 1;
+}
+
+}  // namespace
+
+int check_set(const fs::path& set_or_session, std::ostream& out) {
+  Lines problems;
+  Checked checked;
+  attempt(problems, [&] { checked = open(set_or_session); });
+  if (!problems.empty()) return refuse(problems, out);
+
+  const auto scene = load_scene(checked.set, problems);
+  check_environment(checked, problems);
+  check_tracking(checked, problems);
+  if (!problems.empty()) return refuse(problems, out);
+
+  remark_on_cameras(checked);
+  remark_on_scene(checked, *scene);
+  out << checked.set.name << " (" << checked.set.file.string() << ") is right\n";
+  print_cameras(checked.set, out);
+  print_tags(checked.set.tracking, out);
+  print_objects(checked.set, *scene, out);
+  print_lights(checked.set, *scene, out);
+  print_estimator(checked.set, out);
+  print_requirements(scene::requirements(*scene, checked.set), out);
+  if (!checked.remarks.empty()) out << "\nworth a look\n";
+  for (const auto& remark : checked.remarks) out << "  " << remark << '\n';
+  return 0;
+}
+
+}  // namespace previz::post

@@ -1,0 +1,152 @@
+// `previzd check`: right sets are described, wrong ones refused with every problem.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "daemon/post/check.hpp"
+#include "daemon/set/table.hpp"
+#include "daemon/tracking/apriltag_tracker.hpp"
+#include "drivers/error.hpp"
+#include "tests/unit/temporary_directory.hpp"
+
+namespace previz::post {
+namespace {
+
+// One triangle (0,0,0) (1,0,0) (0,1,0); `material` is a glTF material's body.
+std::string triangle(const std::string& material) {
+  return R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+ "nodes": [{"mesh": 0}],
+ "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+ "materials": [{)" +
+         material +
+         R"(}],
+ "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+                "min": [0, 0, 0], "max": [1, 1, 0]}],
+ "bufferViews": [{"buffer": 0, "byteLength": 36}],
+ "buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64,)"
+         "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}]}";
+}
+
+class Check : public testing::Test {
+ protected:
+  void write(const std::string& name, const std::string& text) {
+    std::ofstream(directory_ / name) << text;
+  }
+
+  // Exit status; what was printed is in `said_`.
+  int check(const std::string& set) {
+    write("stage.toml", set);
+    std::ostringstream out;
+    const int status = check_set(directory_ / "stage.toml", out);
+    said_ = out.str();
+    return status;
+  }
+
+  void expect_said(const std::string& words) {
+    EXPECT_NE(said_.find(words), std::string::npos) << words << "\nis not in\n" << said_;
+  }
+
+  test::TemporaryDirectory directory_;
+  std::string said_;
+};
+
+TEST_F(Check, DescribesWhatASetAsksFor) {
+  write("table.gltf", triangle(R"("pbrMetallicRoughness": {"metallicFactor": 0})"));
+  write("ring.gltf", triangle(R"("pbrMetallicRoughness": {"metallicFactor": 1})"));
+  ASSERT_EQ(check(R"(
+[set]
+name = "ring on a table"
+[[tag]]
+id = 4
+size_m = 0.0805
+position_m = [0, 0, 0]
+[[object]]
+name = "table"
+file = "table.gltf"
+presence = "phantom"
+[[object]]
+name = "ring"
+file = "ring.gltf"
+presence = "virtual"
+[[light]]
+name = "spot"
+type = "point"
+position_m = [0, 0, 1]
+emission = [1, 1, 1]
+gain_mixed = 0.5
+gain_real = 1
+[quality]
+samples = 1500
+)"),
+            0)
+      << said_;
+  expect_said("ring on a table (");
+  expect_said("1 tag of family tag36h11: 4 (80.5 mm)");
+  expect_said("table: phantom, 1 triangle in 1 instance, from table.gltf");
+  expect_said("ring: virtual, 1 triangle in 1 instance, from ring.gltf");
+  expect_said("spot: point, dimmed, gain 0.5 in the picture, 1 in the real scene");
+  expect_said("1 500 samples per pixel");
+  const auto left_out = said_.find("the renderer leaves out");
+  ASSERT_NE(left_out, std::string::npos);
+  EXPECT_LT(said_.find("conductors: something is of metal"), left_out);
+  EXPECT_LT(said_.find("two worlds: an object is in one of them only"), left_out);
+  EXPECT_LT(said_.find("lamps: the set or a glTF file names some"), left_out);
+  EXPECT_GT(said_.find("refraction: nothing lets light through"), left_out);
+  EXPECT_GT(said_.find("lens sampling: everything is sharp"), left_out);
+  expect_said("the observer has no calibration here");
+}
+
+TEST_F(Check, RefusesWithEveryProblemOfTheSetFile) {
+  EXPECT_EQ(check("[quality]\nsamples = 0\nscala = 1\n"), 1);
+  expect_said("stage.toml:2:11: quality.samples: ");
+  expect_said("stage.toml:3:1: quality.scala: ");
+  expect_said("2 problems\n");
+}
+
+TEST_F(Check, RefusesWithEveryFileThatIsWrong) {
+  write("a.gltf", "no glTF");
+  write("b.gltf", "{}");
+  write("env.exr", "no EXR");
+  EXPECT_EQ(check("[[object]]\nname='a'\nfile='a.gltf'\npresence='phantom'\n"
+                  "[[object]]\nname='b'\nfile='b.gltf'\npresence='virtual'\n"
+                  "[lighting]\nenvironment='env.exr'\n"),
+            1);
+  expect_said("a.gltf");
+  expect_said("b.gltf");
+  expect_said("env.exr");
+  expect_said("3 problems\n");
+}
+
+TEST_F(Check, RefusesWhatIsNotThere) {
+  std::ostringstream out;
+  EXPECT_EQ(check_set(directory_ / "no.toml", out), 1);
+  EXPECT_NE(out.str().find("no.toml"), std::string::npos) << out.str();
+  EXPECT_EQ(check_set(directory_.path(), out), 1);  // a folder that is no session
+}
+
+// The families that the set file's table offers are those that the tracker names. (It is not made
+// for each: the large families take it minutes.)
+TEST_F(Check, TagFamiliesOfTheTableAreTheTrackers) {
+  std::string of_table;
+  set::Draft draft;
+  for (const auto& section : set::sections(draft))
+    if (section.path == "tracking")
+      for (const auto& key : section.open().keys)
+        if (key.name == "family") of_table = key.allowed;
+  std::erase(of_table, '"');
+  for (auto bar = of_table.find(" | "); bar != std::string::npos; bar = of_table.find(" | "))
+    of_table.replace(bar, 3, ", ");
+
+  set::Tracking tracking;
+  tracking.family = "none of them";
+  try {
+    tracking::make_apriltag_tracker(tracking, {.width = 640, .height = 480, .fx = 600, .fy = 600});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_TRUE(std::string(error.what()).ends_with(of_table)) << of_table << '\n' << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace previz::post
