@@ -12,6 +12,8 @@
 #include <cstdlib>
 #include <iostream>
 
+#include "daemon/post/check.hpp"
+#include "daemon/post/import.hpp"
 #include "daemon/post/render.hpp"
 #include "daemon/rig/live.hpp"
 #include "daemon/rig/signals.hpp"
@@ -84,6 +86,27 @@ void add_run(CLI::App& app, rig::LiveOptions& options) {
   add_device_options(command, options.device);
 }
 
+void add_check(CLI::App& app, std::filesystem::path& set_or_session) {
+  CLI::App& command =
+      *app.add_subcommand("check", "Say what is wrong with a set, or what it needs");
+  command.add_option("set", set_or_session, "Set file or session directory")->required();
+}
+
+void add_import(CLI::App& app, post::ImportOptions& options) {
+  CLI::App& command = *app.add_subcommand("import", "Make a session of footage");
+  command.add_option("description", options.description, "FRAMES.json")->required();
+  command.add_option("session", options.session, "Session directory to make")->required();
+}
+
+int do_import(const post::ImportOptions& options) {
+  const post::ImportReport report = post::import_session(options);
+  for (const std::string& note : report.notes) std::cout << note << "\n";
+  std::cout << options.session.string() << ": " << report.observer_frames << " observer frames, "
+            << report.light_frames << " light frames, " << report.poses << " poses, "
+            << report.assets << " assets, " << report.bytes / 1'000'000.0 << " MB" << std::endl;
+  return 0;
+}
+
 int do_render(post::RenderOptions& options, const rig::StopOnSignal& stop) {
   options.stop = stop.token();
   options.terminal = isatty(STDOUT_FILENO) != 0;
@@ -112,12 +135,18 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   post::RenderOptions render_options;
   rig::LiveOptions live_options;
+  std::filesystem::path checked;
+  post::ImportOptions import_options;
   try {
     add_render(app, render_options);
     add_run(app, live_options);
+    add_check(app, checked);
+    add_import(app, import_options);
     app.parse(argc, argv);
     start_log(level);
     const rig::StopOnSignal stop;
+    if (app.got_subcommand("check")) return post::check_set(checked, std::cout);
+    if (app.got_subcommand("import")) return do_import(import_options);
     if (app.got_subcommand("render")) return do_render(render_options, stop);
     return do_run(live_options, stop);
   } catch (const CLI::ParseError& error) {

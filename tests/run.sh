@@ -7,7 +7,7 @@
 #   tests/run.sh              all of it
 #   tests/run.sh release      only the named steps: release asan format lint
 set -uo pipefail
-cd "$(dirname "$0")/.."
+cd "$(dirname "$0")/.." || exit
 jobs=$(nproc)
 steps=("$@")
 [[ ${#steps[@]} -gt 0 ]] || steps=(release asan format lint)

@@ -48,6 +48,7 @@ Owned<AVCodecContext> open_encoder(const VideoCodec& codec, int width, int heigh
   context->width = width;
   context->height = height;
   context->time_base = video_clock;
+  context->framerate = {30, 1};  // a guess for the level in the header; the times are exact
   context->pix_fmt = odd && codec.encoder != "mpeg4" ? AV_PIX_FMT_YUV444P : AV_PIX_FMT_YUV420P;
   context->color_range = AVCOL_RANGE_MPEG;
   context->color_primaries = AVCOL_PRI_BT709;

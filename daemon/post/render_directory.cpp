@@ -52,10 +52,11 @@ std::string differences(const nlohmann::json& there, const nlohmann::json& now) 
   for (const auto& [key, value] : now.items()) {
     if (there.contains(key) && there[key] == value) continue;
     if (!text.empty()) text += "; ";
-    const bool short_values = value.is_primitive() && value.dump().size() < 60;
+    const std::string before = there.contains(key) ? there[key].dump() : "unknown";
+    const std::string after = value.dump();
     text += key;
-    if (short_values && there.contains(key))
-      text += " is " + there[key].dump() + " there and " + value.dump() + " now";
+    if (std::max(before.size(), after.size()) < 60)
+      text += " is " + before + " there and " + after + " now";
     else
       text += " differs";
   }

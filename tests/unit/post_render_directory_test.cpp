@@ -14,7 +14,8 @@
 namespace previz::post {
 namespace {
 
-constexpr const char* settings = R"({"samples": 16, "set": "a long text"})";
+constexpr const char* settings =
+    R"({"samples": 16, "set": "a text that is too long to be repeated in an error message, as sets are"})";
 
 pipeline::Shot sample_shot(std::uint64_t index) {
   constexpr int width = 8, height = 6;
