@@ -312,7 +312,7 @@ void order_by_time(const Members& m, FootageDescription& footage) {
   }
   const auto late = std::ranges::adjacent_find(times, std::greater_equal{});
   if (late == times.end()) return;
-  const std::string where = "must increase; entry " + std::to_string(late - times.begin() + 1) +
+  const std::string where = "must increase; entry " + std::to_string(late - times.begin() + 2) +
                             " is " + std::to_string(late[1]) + " after " + std::to_string(late[0]);
   m.fail("timestamps_ns", sort ? where : where + " (sort_by_time: true puts frames in order)");
 }

@@ -14,6 +14,10 @@ extern "C" {
 
 namespace previz::post {
 
+std::string numbered(const std::string& before, int number, const std::string& after) {
+  return before + std::to_string(number) + after;
+}
+
 cv::Mat noise_picture(int seed, int type, int width, int height) {
   cv::Mat picture(height, width, type);
   cv::RNG(seed + 1).fill(picture, cv::RNG::UNIFORM, 0, picture.depth() == CV_16U ? 65536 : 256);
@@ -81,7 +85,7 @@ void write_video(const std::filesystem::path& file, const std::string& pixel_for
 
 Shoot::Shoot() {
   for (int i = 0; i < 3; ++i)
-    write_picture(folder() / "observer" / ("000" + std::to_string(i) + ".png"),
+    write_picture(folder() / "observer" / numbered("000", i, ".png"),
                   noise_picture(i, CV_8UC3, 32, 24));
   json = {{"observer", {{"pictures", "observer/%04d.png"}, {"fps", 25}, {"exposure", 0.5}}}};
 }

@@ -14,6 +14,8 @@ namespace previz::post {
 
 using Json = nlohmann::json;
 
+// A file name.
+std::string numbered(const std::string& before, int number, const std::string& after);
 // BGR or grey noise as OpenCV holds it; `type` is CV_8UC3 and so on.
 cv::Mat noise_picture(int seed, int type, int width, int height);
 // The bytes that previz::Frame should hold for that picture: RGB order, packed.

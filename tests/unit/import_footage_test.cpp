@@ -45,9 +45,10 @@ class ImportKinds : public testing::TestWithParam<Kind> {};
 TEST_P(ImportKinds, KeepTheirBits) {
   const auto [extension, type, format] = GetParam();
   Shoot shoot;
-  write_picture(shoot.folder() / (std::string("deep.") + extension),
-                noise_picture(7, type, 20, 10));
-  shoot.json["observer"]["pictures"] = {std::string("deep.") + extension};
+  std::string name = "deep.";
+  name += extension;
+  write_picture(shoot.folder() / name, noise_picture(7, type, 20, 10));
+  shoot.json["observer"]["pictures"] = {name};
   ASSERT_EQ(shoot.error(), "");
   const FramePtr frame = open(shoot, "observer")->read(0);
   EXPECT_EQ(frame->format, format);
@@ -79,7 +80,7 @@ TEST(Import, JpegIsWhatItsDecoderSays) {
 TEST(Import, ATableOfTimesAndExposuresInAnyOrder) {
   Shoot shoot;
   for (int i = 0; i < 3; ++i)
-    write_picture(shoot.folder() / "light" / ("b" + std::to_string(i) + ".png"),
+    write_picture(shoot.folder() / "light" / numbered("b", i, ".png"),
                   noise_picture(10 + i, CV_8UC3, 16, 16));
   session::write_content(shoot.folder() / "light" / "light.csv",
                          "file,timestamp_ns,exposure,kind\r\n"
@@ -124,7 +125,7 @@ TEST(Import, ExposureOfShutterGainAndResponsivity) {
 TEST(Import, WildcardsSortByNumber) {
   Shoot shoot;
   for (const int i : {2, 10, 1})
-    write_picture(shoot.folder() / "shots" / ("img" + std::to_string(i) + ".png"),
+    write_picture(shoot.folder() / "shots" / numbered("img", i, ".png"),
                   noise_picture(i, CV_8UC3, 16, 12));
   session::write_content(shoot.folder() / "shots" / "readme.txt", "no picture");
   for (const char* pattern : {"shots/img*.png", "shots/*.png"}) {
