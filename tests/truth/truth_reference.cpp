@@ -2,7 +2,6 @@
 // material models are the same, without the renderer under test.
 #include <CLI/CLI.hpp>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <iostream>
 
@@ -12,7 +11,6 @@
 #include "tests/truth/cpu_camera.hpp"
 #include "tests/truth/cpu_tracer.hpp"
 #include "tests/truth/truth_set.hpp"
-#include "tests/truth/truth_take.hpp"
 
 namespace previz::truth {
 namespace {
@@ -31,10 +29,49 @@ std::vector<T> enlarged(const std::vector<From>& small, int width, int height, i
   return out;
 }
 
-double mean_standard_error(const TracedPicture& p) {
-  double squares = 0;
-  for (const glm::dvec3& e : p.standard_error) squares += (e.x * e.x + e.y * e.y + e.z * e.z) / 3;
-  return std::sqrt(squares / static_cast<double>(p.standard_error.size()));
+EstimatedFrame with_picture(const TruthFrame& truth, EstimatedFrame estimate) {
+  estimate.composite.clear();
+  for (std::size_t i = 0; i < estimate.mask.size(); ++i) {
+    const float m = estimate.mask[i];
+    estimate.composite.push_back(m * estimate.mixed[i] +
+                                 (1 - m) * (truth.plate[i] + estimate.diff[i]));
+  }
+  estimate.picture =
+      displayed(estimate.composite, truth.width, truth.height, truth.exposure, truth.response);
+  return estimate;
+}
+
+EstimatedFrame estimated(const TruthFrame& truth, const TracedPicture& mixed,
+                         const TracedPicture& real, int reduction) {
+  EstimatedFrame out;
+  out.mixed = enlarged<glm::vec3>(mixed.mean, mixed.width, mixed.height, reduction);
+  out.real = enlarged<glm::vec3>(real.mean, mixed.width, mixed.height, reduction);
+  out.mask = enlarged<float>(mixed.mask, mixed.width, mixed.height, reduction);
+  for (std::size_t i = 0; i < out.mixed.size(); ++i) out.diff.push_back(out.mixed[i] - out.real[i]);
+  return with_picture(truth, out);
+}
+
+EstimatedFrame mean_of(const TruthFrame& truth, const EstimatedFrame& a, const EstimatedFrame& b) {
+  EstimatedFrame out = a;
+  for (std::size_t i = 0; i < a.mask.size(); ++i) {
+    out.mixed[i] = 0.5F * (a.mixed[i] + b.mixed[i]);
+    out.real[i] = 0.5F * (a.real[i] + b.real[i]);
+    out.diff[i] = 0.5F * (a.diff[i] + b.diff[i]);
+    out.mask[i] = 0.5F * (a.mask[i] + b.mask[i]);
+  }
+  return with_picture(truth, out);
+}
+
+// Truth with half the difference of the halves added: as far from truth as their mean is by chance.
+EstimatedFrame noise_of(const TruthFrame& truth, const EstimatedFrame& a, const EstimatedFrame& b) {
+  EstimatedFrame out = a;
+  for (std::size_t i = 0; i < a.mask.size(); ++i) {
+    out.mixed[i] = truth.mixed[i] + 0.5F * (a.mixed[i] - b.mixed[i]);
+    out.real[i] = truth.real[i] + 0.5F * (a.real[i] - b.real[i]);
+    out.diff[i] = truth.mixed[i] - truth.real[i] + 0.5F * (a.diff[i] - b.diff[i]);
+    out.mask[i] = truth.mask[i];
+  }
+  return with_picture(truth, out);
 }
 
 void run(const std::filesystem::path& directory, int frame, int reduction, int samples) {
@@ -65,36 +102,31 @@ void run(const std::filesystem::path& directory, int frame, int reduction, int s
   CpuTracer tracer(scene, lighting.environment);
   const ObserverCalibration camera = resized(truth_set.observer, 1.0 / reduction);
   const glm::dmat4 pose = observer_frame(truth_set, frame).world_from_camera;
-  const TracedPicture mixed = tracer.trace(camera, pose, scene::world_mixed, samples, 1);
-  // The same random numbers in both worlds: what the virtual objects do not touch cancels.
-  const TracedPicture real = tracer.trace(camera, pose, scene::world_real, samples, 1);
+  // Two independent halves tell the estimate's own noise. The same random numbers in both worlds:
+  // what the virtual objects do not touch cancels.
+  const auto half = [&](std::uint64_t seed) {
+    return estimated(truth, tracer.trace(camera, pose, scene::world_mixed, samples / 2, seed),
+                     tracer.trace(camera, pose, scene::world_real, samples / 2, seed), reduction);
+  };
+  const EstimatedFrame a = half(1);
+  const EstimatedFrame b = half(2);
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const Measures m = compare(truth, mean_of(truth, a, b));
+  const Measures noise = compare(truth, noise_of(truth, a, b));
 
-  std::vector<glm::dvec3> diff(mixed.mean.size());
-  for (std::size_t i = 0; i < diff.size(); ++i) diff[i] = mixed.mean[i] - real.mean[i];
-  EstimatedFrame estimate;
-  estimate.mixed = enlarged<glm::vec3>(mixed.mean, mixed.width, mixed.height, reduction);
-  estimate.real = enlarged<glm::vec3>(real.mean, mixed.width, mixed.height, reduction);
-  estimate.diff = enlarged<glm::vec3>(diff, mixed.width, mixed.height, reduction);
-  estimate.mask = enlarged<float>(mixed.mask, mixed.width, mixed.height, reduction);
-  for (std::size_t i = 0; i < estimate.mask.size(); ++i) {
-    const float m = estimate.mask[i];
-    estimate.composite.push_back(m * estimate.mixed[i] +
-                                 (1 - m) * (truth.plate[i] + estimate.diff[i]));
-  }
-  estimate.picture =
-      displayed(estimate.composite, truth.width, truth.height, truth.exposure, truth.response);
-  const Measures m = compare(truth, estimate);
   std::printf("%s frame %s, 1/%d, %d samples, %.0f s\n", truth_set.name.c_str(),
               frame_name(frame).c_str(), reduction, samples, seconds);
-  std::printf("  real     e %.4f  bias %+.5f  (rms standard error a pixel %.4f)\n", m.e_real,
-              m.bias_real, mean_standard_error(real));
-  std::printf("  virtual  e %.4f  bias %+.5f  (truth's noise %.4f, standard error %.4f)\n",
-              m.e_virtual, m.bias_virtual, m.noise_virtual.value_or(0), mean_standard_error(mixed));
-  std::printf("  diff     e %.4f  bias %+.5f  (truth's noise %.4f)\n", m.e_diff, m.bias_diff,
-              m.noise_diff.value_or(0));
-  std::printf("  mask     e %.5f  edge %.5f\n", m.e_mask, m.e_mask_edge);
+  const auto print = [](const char* what, double error, double bias, double own,
+                        const std::optional<double>& of_truth) {
+    std::printf("  %-8s error %.4f, of which noise %.4f (truth's %.4f), bias %+.5f\n", what, error,
+                own, of_truth.value_or(0), bias);
+  };
+  print("real", m.e_real, m.bias_real, noise.e_real, {});
+  print("virtual", m.e_virtual, m.bias_virtual, noise.e_virtual, m.noise_virtual);
+  print("diff", m.e_diff, m.bias_diff, noise.e_diff, m.noise_diff);
+  std::printf("  mask     error %.5f, near edges %.5f\n", m.e_mask, m.e_mask_edge);
+  std::fflush(stdout);
 }
 
 }  // namespace
@@ -108,7 +140,8 @@ int main(int argc, char** argv) {
   app.add_option("--frame", frame, "truth frame [0]");
   app.add_option("--reduction", reduction, "trace a picture smaller by this factor [4]")
       ->check(CLI::IsMember({1, 2, 4, 8}));
-  app.add_option("--spp", samples, "samples per (reduced) pixel [256]");
+  app.add_option("--spp", samples, "samples per (reduced) pixel, in two halves [256]")
+      ->check(CLI::Range(2, 1000000));
   CLI11_PARSE(app, argc, argv);
   try {
     previz::truth::run(directory, frame, reduction, samples);
