@@ -15,6 +15,7 @@ namespace {
 
 constexpr std::uint32_t records_per_block = 8;
 constexpr float largest_coordinate = 1e20f;
+constexpr std::size_t most_triangles = 1u << 24;  // a hit's primitive has 24 bits
 
 struct Triangles {
   std::vector<std::array<glm::vec3, 3>> corners;
@@ -55,9 +56,13 @@ double extent_of(const Aabb& bounds) {
   return std::max({extent.x, extent.y, extent.z});
 }
 
+std::uint32_t with_fill(std::uint32_t value, std::uint32_t rotation = 0) {
+  return value << 8 | (gpu::RECORD_FILL + rotation);
+}
+
 Record pair_record(const TrianglePair& pair) {
-  Record record{pair.primitives[0] << 2 | pair.rotations[0],
-                pair.primitives[1] << 2 | pair.rotations[1], gpu::RECORD_PAIR, 0};
+  Record record{with_fill(pair.primitives[0], pair.rotations[0]),
+                with_fill(pair.primitives[1], pair.rotations[1]), gpu::RECORD_PAIR, 0};
   for (std::size_t v = 0; v < 4; ++v)
     for (int axis = 0; axis < 3; ++axis)
       record[4 + 3 * v + static_cast<std::size_t>(axis)] =
@@ -67,7 +72,8 @@ Record pair_record(const TrianglePair& pair) {
 
 Record space_record(const glm::dmat4& grid_from_world, std::uint32_t first_record,
                     std::uint32_t presence, std::uint32_t index) {
-  Record record{first_record, presence, gpu::RECORD_SPACE, index};
+  Record record{with_fill(first_record / records_per_block), with_fill(presence), gpu::RECORD_SPACE,
+                index};
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 4; ++column)
       record[4 + static_cast<std::size_t>(4 * row + column)] =
@@ -110,6 +116,9 @@ Aabb padded(const Aabb& box) {
 }  // namespace
 
 MeshBvh build_mesh_bvh(const Mesh& mesh, BvhQuality quality) {
+  if (mesh.triangles.size() > most_triangles)
+    throw Error("scene: mesh \"" + mesh.name + "\" has " + std::to_string(mesh.triangles.size()) +
+                " triangles; at most " + std::to_string(most_triangles) + " are allowed");
   MeshBvh bvh;
   Triangles triangles = usable_triangles(mesh);
   bvh.dropped_triangles =

@@ -33,19 +33,20 @@ struct Aabb {
 
 // The bottom level of one mesh. Position independent: indices inside are relative to its start.
 struct MeshBvh {
-  std::vector<glm::uvec4> texels;       // whole records, in blocks of eight
-  Aabb bounds;                          // object space; empty where the mesh has no triangle
-  int grid_exponent = 0;                // the tree is in grid space = object space * 2^exponent
-  double sah_cost = 0;                  // expected records visited by a ray that meets the bounds
-  std::uint32_t depth = 0;              // levels of nodes, at most gpu::MESH_BVH_DEPTH
-  std::uint32_t leaves = 0;             // pairs and single triangles, split references counted
-  std::uint32_t dropped_triangles = 0;  // not finite, zero area or bad index: reported, not traced
+  std::vector<glm::uvec4> texels;  // whole records, in blocks of eight
+  Aabb bounds;                     // object space; empty where the mesh has no triangle
+  int grid_exponent = 0;           // the tree is in grid space = object space * 2^exponent
+  double sah_cost = 0;             // expected records visited by a ray that meets the bounds
+  std::uint32_t depth = 0;         // levels of nodes, at most gpu::MESH_BVH_DEPTH
+  std::uint32_t leaves = 0;        // pairs and single triangles, split references counted
+  // Zero area, a bad index, or a coordinate that is not finite or past 1e20: never traced.
+  std::uint32_t dropped_triangles = 0;
 };
 
 // Embree's Morton, binned SAH, and binned SAH with spatial splits.
 enum class BvhQuality { low, medium, high };
 
-// Same input, same bytes. Throws previz::Error if Embree fails.
+// Same input, same bytes. Throws previz::Error past 2^24 triangles.
 MeshBvh build_mesh_bvh(const Mesh& mesh, BvhQuality quality = BvhQuality::medium);
 
 // One instance for the top level; the hit names it by its place in the span given.

@@ -1,0 +1,294 @@
+// Closest hit and shadow rays through the two-level tree of daemon/scene/bvh.hpp, in compute.
+//
+// The loop visits one record a turn, whatever its kind, and a subgroup's lanes all fetch, test eight
+// boxes and test two triangles side by side: on a CPU device there are no branches to save, and on
+// a GPU the same two tests diverge only where the rays do. Needs GL_GOOGLE_include_directive.
+#ifndef PREVIZ_TRACE_GLSL
+#define PREVIZ_TRACE_GLSL
+#extension GL_EXT_samplerless_texture_functions : require
+
+#include "shaders/lib/shared.h"
+
+layout(set = 0, binding = BINDING_BVH) uniform utextureBuffer bvh;
+
+struct Hit {
+  float t;            // in units of the ray's direction, as given
+  vec2 barycentrics;  // weights of the primitive's second and third corner
+  uint instance;      // index of Scene::instances
+  uint primitive;     // index of Mesh::triangles
+  uint presence;      // WORLD_* bits of the instance
+};
+
+// Every level of nodes leaves at most one group of children behind, and entering an instance one.
+const uint TRACE_STACK_SIZE = TOP_BVH_DEPTH + MESH_BVH_DEPTH;
+
+// How far rounding may move a ray sideways, as a share of the largest coordinate: 16 half ulps,
+// where the projection of a vertex takes 5 and the planes of a box take 4.
+const float TRACE_SLACK = 9.5367432e-7;  // 2^-20
+
+// Hits of two instances closer than this share of the distances involved are at the same place:
+// the lower instance wins, so that faces laid upon each other do not speckle.
+const float TRACE_TIE = 9.5367432e-7;
+
+// The ray in the space of a tree.
+struct TraceSpace {
+  vec3 origin;
+  vec3 x, y, z;      // rows: x and y across the ray, z along it, so that dot(p - origin, z) is t
+  vec3 inverse;      // of the direction, finite
+  vec3 near, far;    // origin moved back and forth by the slack, for near and far planes
+  uint octant;       // bit i: the direction's component i is negative
+  uint first_texel;  // of the tree
+  uint presence, instance;
+};
+
+TraceSpace trace_enter(uint record, vec3 world_origin, vec3 world_direction) {
+  const int texel = int(record * 4u);
+  const uvec4 head = texelFetch(bvh, texel);
+  const vec4 row0 = uintBitsToFloat(texelFetch(bvh, texel + 1));
+  const vec4 row1 = uintBitsToFloat(texelFetch(bvh, texel + 2));
+  const vec4 row2 = uintBitsToFloat(texelFetch(bvh, texel + 3));
+  TraceSpace s;
+  s.first_texel = (head.x >> 8) << 5;
+  s.presence = head.y >> 8;
+  s.instance = head.w;
+  s.origin = vec3(dot(row0.xyz, world_origin) + row0.w, dot(row1.xyz, world_origin) + row1.w,
+                  dot(row2.xyz, world_origin) + row2.w);
+  const vec3 d = vec3(dot(row0.xyz, world_direction), dot(row1.xyz, world_direction),
+                      dot(row2.xyz, world_direction));
+  // Axes across the ray after Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection" (JCGT
+  // 2013), but as rows, without permuting every vertex.
+  const vec3 size = abs(d);
+  const float largest = max(size.x, max(size.y, size.z));
+  const bool along_z = size.z == largest;
+  const bool along_y = !along_z && size.y == largest;
+  const vec3 slope = d / (along_z ? d.z : along_y ? d.y : d.x);
+  s.x = along_z   ? vec3(1.0, 0.0, -slope.x)
+        : along_y ? vec3(1.0, -slope.x, 0.0)
+                  : vec3(-slope.y, 1.0, 0.0);
+  s.y = along_z   ? vec3(0.0, 1.0, -slope.y)
+        : along_y ? vec3(0.0, -slope.z, 1.0)
+                  : vec3(-slope.z, 0.0, 1.0);
+  s.z = d / dot(d, d);
+  // A ray along an axis: so small a slope moves it by less than the slack.
+  const float least = largest * 1e-12;
+  const vec3 steep = mix(d, vec3(least), lessThan(size, vec3(least)));
+  s.inverse = 1.0 / steep;
+  const vec3 reach = abs(s.origin);
+  const float slack = TRACE_SLACK * (max(reach.x, max(reach.y, reach.z)) + 8388608.0);
+  const vec3 towards = mix(vec3(slack), vec3(-slack), lessThan(steep, vec3(0.0)));
+  s.near = s.origin + towards;
+  s.far = s.origin - towards;
+  s.octant = (steep.x < 0.0 ? 1u : 0u) | (steep.y < 0.0 ? 2u : 0u) | (steep.z < 0.0 ? 4u : 0u);
+  return s;
+}
+
+// Bit `bit` if the ray is in the box between the distances. Compared as integers, which for floats
+// gives the right answer wherever t_min >= 0, and has no case for NaN.
+uint trace_box(vec3 near, vec3 far, int t_min, int t_max, uint bit) {
+  const ivec3 n = floatBitsToInt(near);
+  const ivec3 f = floatBitsToInt(far);
+  return max(max(n.x, n.y), max(n.z, t_min)) <= min(min(f.x, f.y), min(f.z, t_max)) ? bit : 0u;
+}
+
+// Bytes 0 and 3 come at their value, 1 and 2 times 2^8 and 2^16; the scales make up for it.
+vec3 trace_byte0(uvec3 planes) { return vec3(ivec3(planes & 0xffu)); }
+vec3 trace_byte1(uvec3 planes) { return vec3(ivec3(planes & 0xff00u)); }
+vec3 trace_byte2(uvec3 planes) { return vec3(ivec3(planes & 0xff0000u)); }
+vec3 trace_byte3(uvec3 planes) { return vec3(ivec3(planes >> 24)); }
+
+struct TraceTriangle {
+  float t;
+  vec3 weights;  // of its vertices
+  bool hit;
+};
+
+// a, b, c: the vertices across and along the ray. Both sides of an edge compute the same two
+// products, so no ray passes between two triangles.
+TraceTriangle trace_triangle(vec3 a, vec3 b, vec3 c, float t_min, float t_max) {
+  TraceTriangle r;
+  precise const float u = c.x * b.y - c.y * b.x;
+  precise const float v = a.x * c.y - a.y * c.x;
+  precise const float w = b.x * a.y - b.y * a.x;
+  const float sum = u + v + w;
+  const float inverse = 1.0 / sum;
+  r.weights = vec3(u, v, w) * inverse;
+  r.t = (u * a.z + v * b.z + w * c.z) * inverse;
+  const bool inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
+  r.hit = inside && sum != 0.0 && r.t > t_min && r.t < t_max;
+  return r;
+}
+
+vec3 trace_project(vec3 vertex, const TraceSpace s) {
+  precise const vec3 p = vertex - s.origin;
+  precise const float x = p.x * s.x.x + p.y * s.x.y + p.z * s.x.z;
+  precise const float y = p.x * s.y.x + p.y * s.y.y + p.z * s.y.z;
+  return vec3(x, y, dot(p, s.z));
+}
+
+// One traversal for both kinds of ray. `shadow`, a constant, asks only which of `worlds` are
+// blocked, and returns them; otherwise `hit` is the closest and the result is 0 or 1.
+uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, float t_max,
+                uint worlds, inout Hit hit) {
+  uint stack[TRACE_STACK_SIZE];  // groups: block of children << 8 | those still to visit
+  uint top = 0u;
+  uint bottom = 0u;  // of the stack that belongs to the tree being traversed
+  uint record = 0u;
+  bool fresh = true;
+  uint blocked = 0u;
+  uint found = 0u;
+  const int t_min_bits = floatBitsToInt(t_min);
+  float t_cull = t_max;
+  const vec3 reach = abs(origin);
+  const vec3 pace = abs(direction);
+  const float tie = TRACE_TIE * max(reach.x, max(reach.y, reach.z)) /
+                    max(pace.x, max(pace.y, pace.z));
+
+  for (;;) {  // a tree a turn: the top level, an instance, back to the top level
+    const TraceSpace s = trace_enter(record, origin, direction);
+    const uint b0 = 1u << s.octant;
+    const uint b1 = 1u << (s.octant ^ 1u);
+    const uint b2 = 1u << (s.octant ^ 2u);
+    const uint b3 = 1u << (s.octant ^ 3u);
+    const uint b4 = 1u << (s.octant ^ 4u);
+    const uint b5 = 1u << (s.octant ^ 5u);
+    const uint b6 = 1u << (s.octant ^ 6u);
+    const uint b7 = 1u << (s.octant ^ 7u);
+    const bvec3 backwards = lessThan(s.inverse, vec3(0.0));
+    uint group = fresh && (s.presence & worlds & ~blocked) != 0u ? b0 : 0u;
+    uint entered = 0u;
+
+    for (;;) {  // a record a turn
+      if ((group & 0xffu) == 0u) {
+        if (top == bottom) break;
+        top--;
+        group = stack[top];
+      }
+      // The lowest bit is the nearest child: bit i is slot i ^ octant.
+      const uint bit = group & (~group + 1u);
+      group ^= bit;
+      const uint slot = ((floatBitsToUint(float(int(bit))) >> 23) - 127u) ^ s.octant;
+      const uint texel = s.first_texel + ((group >> 8) << 5) + (slot << 2);
+      const uvec4 head = texelFetch(bvh, int(texel));
+      const uvec4 w1 = texelFetch(bvh, int(texel) + 1);
+      const uvec4 w2 = texelFetch(bvh, int(texel) + 2);
+      const uvec4 w3 = texelFetch(bvh, int(texel) + 3);
+      const uint kind = head.z & 0xffu;
+
+      // As a node.
+      {
+        const vec3 corner = vec3(ivec3(head.xyz) >> 8);
+        const vec3 scale = uintBitsToFloat((head.xyz << 23) & 0x7f800000u) * s.inverse;
+        const vec3 scale1 = scale * 0.00390625;
+        const vec3 scale2 = scale * 1.52587890625e-5;
+        const vec3 near = (corner - s.near) * s.inverse;
+        const vec3 far = (corner - s.far) * s.inverse;
+        const uvec3 low0 = uvec3(w1.x, w2.x, w3.x);
+        const uvec3 low1 = uvec3(w1.y, w2.y, w3.y);
+        const uvec3 high0 = uvec3(w1.z, w2.z, w3.z);
+        const uvec3 high1 = uvec3(w1.w, w2.w, w3.w);
+        const uvec3 n0 = mix(low0, high0, backwards);
+        const uvec3 n1 = mix(low1, high1, backwards);
+        const uvec3 f0 = mix(high0, low0, backwards);
+        const uvec3 f1 = mix(high1, low1, backwards);
+        const int cull = floatBitsToInt(t_cull);
+        uint hits = trace_box(trace_byte0(n0) * scale + near, trace_byte0(f0) * scale + far, t_min_bits, cull, b0);
+        hits |= trace_box(trace_byte1(n0) * scale1 + near, trace_byte1(f0) * scale1 + far, t_min_bits, cull, b1);
+        hits |= trace_box(trace_byte2(n0) * scale2 + near, trace_byte2(f0) * scale2 + far, t_min_bits, cull, b2);
+        hits |= trace_box(trace_byte3(n0) * scale + near, trace_byte3(f0) * scale + far, t_min_bits, cull, b3);
+        hits |= trace_box(trace_byte0(n1) * scale + near, trace_byte0(f1) * scale + far, t_min_bits, cull, b4);
+        hits |= trace_box(trace_byte1(n1) * scale1 + near, trace_byte1(f1) * scale1 + far, t_min_bits, cull, b5);
+        hits |= trace_box(trace_byte2(n1) * scale2 + near, trace_byte2(f1) * scale2 + far, t_min_bits, cull, b6);
+        hits |= trace_box(trace_byte3(n1) * scale + near, trace_byte3(f1) * scale + far, t_min_bits, cull, b7);
+        if (kind >= RECORD_NODE && hits != 0u) {
+          if ((group & 0xffu) != 0u) {
+            stack[top] = group;
+            top++;
+          }
+          group = head.w << 8 | hits;
+        }
+      }
+
+      // As a pair of triangles.
+      {
+        const vec3 p0 = trace_project(uintBitsToFloat(w1.xyz), s);
+        const vec3 p1 = trace_project(uintBitsToFloat(uvec3(w1.w, w2.xy)), s);
+        const vec3 p2 = trace_project(uintBitsToFloat(uvec3(w2.zw, w3.x)), s);
+        const vec3 p3 = trace_project(uintBitsToFloat(w3.yzw), s);
+        const TraceTriangle first = trace_triangle(p0, p1, p2, t_min, t_max);
+        const TraceTriangle second = trace_triangle(p0, p2, p3, t_min, t_max);
+        const bool is_pair = kind == RECORD_PAIR;
+        if (shadow) {
+          if (is_pair && (first.hit || second.hit)) {
+            blocked |= s.presence & worlds;
+            group = 0u;
+            top = bottom;
+          }
+        } else {
+          const bool take_second = second.hit && (!first.hit || second.t < first.t || (second.t == first.t && head.y < head.x));
+          const float t = take_second ? second.t : first.t;
+          const vec3 weights = take_second ? second.weights : first.weights;
+          const uint primitive = take_second ? head.y : head.x;
+          const bool same = found == 0u || s.instance == hit.instance;
+          const float gap = t - hit.t;
+          const bool tied = abs(gap) <= (same ? 0.0 : tie + TRACE_TIE * t);
+          const bool wins = found == 0u || (tied ? (same ? primitive < hit.primitive : s.instance < hit.instance) : gap < 0.0);
+          if (is_pair && (first.hit || second.hit) && wins) {
+            found = 1u;
+            hit.t = t;
+            hit.barycentrics = weights.yz;
+            hit.instance = s.instance;
+            hit.primitive = primitive;
+            hit.presence = s.presence;
+            t_cull = min(t_max, t + (tie + TRACE_TIE * t));
+          }
+        }
+      }
+
+      if (kind == RECORD_SPACE && ((head.y >> 8) & worlds & ~blocked) != 0u) {
+        entered = texel >> 2;
+        break;
+      }
+    }
+
+    if (entered != 0u) {
+      if ((group & 0xffu) != 0u) {
+        stack[top] = group;
+        top++;
+      }
+      bottom = top;
+      record = entered;
+      fresh = true;
+    } else {
+      if (record == 0u || top == 0u || blocked == worlds) break;
+      bottom = 0u;
+      record = 0u;
+      fresh = false;
+    }
+  }
+  return shadow ? blocked : found;
+}
+
+// The closest hit with t_min < t < t_max, t_min >= 0, among the instances present in any of
+// `worlds`. `direction` has any length but zero; t counts in its units. Where two instances' surfaces
+// coincide, the lower instance is hit, where two triangles of one do, the lower primitive.
+bool trace_closest(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds,
+                   out Hit hit) {
+  hit = Hit(t_max, vec2(0.0), 0xffffffffu, 0xffffffffu, 0u);
+  const bool found =
+      trace_rays(false, origin, direction, t_min, t_max, worlds, hit) != 0u;
+  // The stored vertices are the primitive's turned left: turn the weights back.
+  const uint rotation = hit.primitive & 3u;
+  const vec3 stored = vec3(1.0 - hit.barycentrics.x - hit.barycentrics.y, hit.barycentrics);
+  hit.barycentrics = rotation == 0u ? stored.yz : rotation == 1u ? stored.xy : stored.zx;
+  hit.primitive >>= 8;
+  return found;
+}
+
+// The subset of `worlds` in which something lies between t_min and t_max; stops as soon as that is
+// all of them.
+uint trace_blocked(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds) {
+  Hit unused;
+  return trace_rays(true, origin, direction, t_min, t_max, worlds, unused);
+}
+
+#endif
