@@ -99,8 +99,8 @@ class AprilTagTracker final : public Tracker {
  private:
   Track locate(const std::vector<TagDetection>& detections, std::int64_t time_ns) const;
   bool within_reach(const FittedPose& fit, std::int64_t time_ns) const;
-  void choose(const JointPose& joint, const std::vector<TagObservation>& tags, std::int64_t time_ns,
-              Track* track) const;
+  void choose(const std::vector<FittedPose>& poses, const std::vector<TagObservation>& tags,
+              std::int64_t time_ns, Track* track) const;
 
   set::Tracking settings_;
   PinholeIntrinsics lens_;
@@ -161,27 +161,28 @@ bool AprilTagTracker::within_reach(const FittedPose& fit, std::int64_t time_ns) 
   return last_ && rotation_between(*last_, fit.pose) <= kReachRad + kReachRadPerS * seconds;
 }
 
-void AprilTagTracker::choose(const JointPose& joint, const std::vector<TagObservation>& tags,
-                             std::int64_t time_ns, Track* track) const {
+void AprilTagTracker::choose(const std::vector<FittedPose>& poses,
+                             const std::vector<TagObservation>& tags, std::int64_t time_ns,
+                             Track* track) const {
   std::vector<int> ids;
   for (const TagObservation& tag : tags) ids.push_back(tag.id);
   const double gate_px = consistency_gate_px(lens_);
-  if (joint.poses.empty() || !(joint.poses.front().rms_px <= gate_px)) {
+  if (poses.empty() || !(poses.front().rms_px <= gate_px)) {
     track->reason = "no pose explains " + join(ids);
     return;
   }
 
   // The poses that cannot be ruled out, better first.
-  const FittedPose& best = joint.poses.front();
+  const FittedPose& best = poses.front();
   const double variance = std::max(1.0, best.chi_square / std::max(1, best.degrees_of_freedom));
+  bool contradiction = false;
   std::vector<const FittedPose*> plausible{&best};
-  for (std::size_t i = 1; i < joint.poses.size(); ++i) {
-    const FittedPose& rival = joint.poses[i];
-    if (rival.used == best.used) {
-      const bool worse = best.rms_px <= settings_.ambiguity_ratio * rival.rms_px &&
-                         rival.chi_square - best.chi_square > kDecisiveChiSquare * variance;
-      if (worse || within_noise(best, rival)) continue;
-    }
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    const FittedPose& rival = poses[i];
+    const bool worse = best.rms_px <= settings_.ambiguity_ratio * rival.rms_px &&
+                       rival.chi_square - best.chi_square > kDecisiveChiSquare * variance;
+    if (worse || (rival.used == best.used && within_noise(best, rival))) continue;
+    contradiction = contradiction || rival.used != best.used;
     plausible.push_back(&rival);
   }
 
@@ -197,7 +198,7 @@ void AprilTagTracker::choose(const JointPose& joint, const std::vector<TagObserv
     track->pose = to_pose(*chosen, tags);
     return;
   }
-  if (joint.contradiction) {
+  if (contradiction) {
     track->reason = join(ids) + " contradict each other in this map";
     return;
   }

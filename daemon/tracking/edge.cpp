@@ -18,8 +18,10 @@ namespace {
 constexpr double kSearchPx = 2.0;      // how far off the guess may be
 constexpr double kMinContrast = 0.05;  // sRGB-encoded, 13 of 255
 constexpr double kMaxBlurPx = 4.0;
-constexpr double kMinNoise = 0.0015;  // quantisation of 8 bits is 0.0011
-constexpr int kMaxColumns = 200;      // pixel columns used of a long edge
+constexpr double kMinNoise = 0.003;  // of the contrast; 8-bit rounding of white is about that
+constexpr double kClipped = 0.99;    // linear; where a sensor's white begins
+constexpr double kClippedVariance = 0.15 * 0.15;  // px^2
+constexpr int kMaxColumns = 200;                  // pixel columns used of a long edge
 
 // A pixel near the edge. Its distance to the line is (offset - shift of the line) * scale.
 struct Sample {
@@ -27,18 +29,18 @@ struct Sample {
   double offset;  // undistorted px, positive on the bright side
   double scale;   // picture px per undistorted px across the line
   double nx, ny;  // unit normal in the picture
-  double value;   // sRGB-encoded
+  double value;   // linear
   double weight = 1;
 };
 
-constexpr int kEndA = 0, kEndB = 1, kBlack = 2, kWhite = 3, kBlur = 4, kShadeAlong = 5,
-              kShadeAcross = 6, kParameters = 7;
+// Shading across the edge is left out on purpose: it moves the line by thousandths, but as a
+// parameter it would take up one side of a blur that is not Gaussian, and that moves it by tenths.
+constexpr int kEndA = 0, kEndB = 1, kBlack = 2, kWhite = 3, kBlur = 4, kShade = 5, kParameters = 6;
 using Vector = cv::Vec<double, kParameters>;
 using Matrix = cv::Matx<double, kParameters, kParameters>;
 
-// The usual deviation of what is not measured well: shading relative to white, per edge length and
-// per pixel. Keeps short edges solvable, leaves long ones free.
-constexpr double kShadeAlongPrior = 0.3, kShadeAcrossPrior = 0.01, kBlurPrior = 1.0;
+// The usual deviation of what short edges do not show: relative shading over the edge's length, px.
+constexpr double kShadePrior = 0.3, kBlurPrior = 1.0;
 
 struct Line {
   glm::dvec2 a, b, normal;
@@ -94,7 +96,7 @@ std::vector<Sample> gather(const Luminance& luminance, const PinholeIntrinsics& 
       s.ny = gradient.y / steepness;
       const double distance = s.offset * s.scale;
       if (distance < -dark || distance > bright) continue;
-      s.value = srgb_encode(luminance(x, y));
+      s.value = luminance(x, y);
       samples.push_back(s);
     }
   }
@@ -106,21 +108,20 @@ double predict(const Vector& p, const Sample& s, Vector* gradient) {
   double by_s, by_blur;
   const double c = edge_coverage(distance, s.nx, s.ny, p[kBlur], &by_s, &by_blur);
   const double plain = p[kBlack] + (p[kWhite] - p[kBlack]) * c;
-  const double shade = 1 + p[kShadeAlong] * (s.along - 0.5) + p[kShadeAcross] * distance;
-  double slope;
-  const double value = srgb_encode(plain * shade, &slope);
+  const double shade = 1 + p[kShade] * (s.along - 0.5);
+  const double light = plain * shade;
+  const double slope = light < 1 ? 1 : 0;  // the sensor clips
   if (gradient) {
     const double step = (p[kWhite] - p[kBlack]) * shade;
-    const double by_distance = slope * (step * by_s + plain * p[kShadeAcross]);
+    const double by_distance = slope * step * by_s;
     (*gradient)[kEndA] = -by_distance * (1 - s.along) * s.scale;
     (*gradient)[kEndB] = -by_distance * s.along * s.scale;
     (*gradient)[kBlack] = slope * shade * (1 - c);
     (*gradient)[kWhite] = slope * shade * c;
     (*gradient)[kBlur] = slope * step * by_blur;
-    (*gradient)[kShadeAlong] = slope * plain * (s.along - 0.5);
-    (*gradient)[kShadeAcross] = slope * plain * distance;
+    (*gradient)[kShade] = slope * plain * (s.along - 0.5);
   }
-  return value;
+  return std::min(light, 1.0);
 }
 
 double tukey_loss(double r, double cutoff) {
@@ -137,67 +138,62 @@ const Vector& prior_information() {
   static const Vector v = [] {
     Vector p = Vector::all(0);
     p[kBlur] = 1 / (kBlurPrior * kBlurPrior);
-    p[kShadeAlong] = 1 / (kShadeAlongPrior * kShadeAlongPrior);
-    p[kShadeAcross] = 1 / (kShadeAcrossPrior * kShadeAcrossPrior);
+    p[kShade] = 1 / (kShadePrior * kShadePrior);
     return p;
   }();
   return v;
 }
 
-double cost(const std::vector<Sample>& samples, const Vector& p, double cutoff, double noise) {
-  double sum = 0;
-  for (const Sample& s : samples) sum += tukey_loss(s.value - predict(p, s, nullptr), cutoff);
-  for (int i = 0; i < kParameters; ++i)
-    sum += 0.5 * noise * noise * prior_information()[i] * p[i] * p[i];
-  return sum;
-}
+struct System {
+  double cost = 0;
+  Matrix information = Matrix::zeros();
+  Vector rhs = Vector::all(0);
+};
 
-Matrix normal_equations(std::vector<Sample>& samples, const Vector& p, double cutoff, double noise,
-                        Vector* rhs) {
-  Matrix h = Matrix::zeros();
-  *rhs = Vector::all(0);
+System linearise(std::vector<Sample>& samples, const Vector& p, double cutoff, double noise) {
+  System sum;
   for (Sample& s : samples) {
     Vector g;
     const double r = s.value - predict(p, s, &g);
     s.weight = tukey_weight(r, cutoff);
+    sum.cost += tukey_loss(r, cutoff);
     for (int i = 0; i < kParameters; ++i) {
-      (*rhs)[i] += s.weight * r * g[i];
-      for (int j = 0; j <= i; ++j) h(i, j) += s.weight * g[i] * g[j];
+      sum.rhs[i] += s.weight * r * g[i];
+      for (int j = 0; j <= i; ++j) sum.information(i, j) += s.weight * g[i] * g[j];
     }
   }
   for (int i = 0; i < kParameters; ++i) {
     const double prior = noise * noise * prior_information()[i];
-    h(i, i) += prior;
-    (*rhs)[i] -= prior * p[i];
-    for (int j = 0; j < i; ++j) h(j, i) = h(i, j);
+    sum.cost += 0.5 * prior * p[i] * p[i];
+    sum.information(i, i) += prior;
+    sum.rhs[i] -= prior * p[i];
+    for (int j = 0; j < i; ++j) sum.information(j, i) = sum.information(i, j);
   }
-  return h;
+  return sum;
 }
 
 // Levenberg-Marquardt; false where it came to nothing finite.
 bool minimise(std::vector<Sample>& samples, double cutoff, double noise, int iterations,
               Vector* p) {
   double damping = 1e-3;
-  double current = cost(samples, *p, cutoff, noise);
+  System now = linearise(samples, *p, cutoff, noise);
   for (int i = 0; i < iterations && damping < 1e6; ++i) {
-    Vector rhs;
-    Matrix h = normal_equations(samples, *p, cutoff, noise, &rhs);
-    for (int k = 0; k < kParameters; ++k) h(k, k) = h(k, k) * (1 + damping) + 1e-12;
-    const cv::Matx<double, kParameters, 1> step = h.solve(rhs, cv::DECOMP_CHOLESKY);
+    Matrix h = now.information;
+    for (int k = 0; k < kParameters; ++k) h(k, k) = h(k, k) * (1 + damping) + 1e-15;
+    const cv::Matx<double, kParameters, 1> step = h.solve(now.rhs, cv::DECOMP_CHOLESKY);
     Vector next = *p + Vector(step.val);
     next[kBlur] = std::clamp(std::abs(next[kBlur]), 1e-3, kMaxBlurPx);
     next[kBlack] = std::max(next[kBlack], 0.0);
-    const double then = cost(samples, next, cutoff, noise);
-    if (!std::isfinite(then)) return false;
-    if (then > current) {
+    const System then = linearise(samples, next, cutoff, noise);
+    if (!std::isfinite(then.cost)) return false;
+    if (then.cost > now.cost) {
       damping *= 10;
       continue;
     }
-    const bool settled = std::abs(step(kEndA)) + std::abs(step(kEndB)) < 1e-4;
     *p = next;
-    current = then;
+    now = then;
     damping = std::max(1e-9, damping * 0.1);
-    if (settled) break;
+    if (std::abs(step(kEndA)) + std::abs(step(kEndB)) < 1e-4) break;
   }
   return true;
 }
@@ -215,27 +211,36 @@ double median_residual(const std::vector<Sample>& samples, const Vector& p) {
   return percentile(std::move(r), 0.5);
 }
 
-double srgb_decode(double v) {
-  return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
-}
-
-// The plain areas' values and the whole-picture offset that fits best, on a half-pixel grid.
+// The plain areas' values, and the shift and blur that fit best on a coarse grid. A clipped white
+// may be anything above 1.
 Vector coarse_start(const std::vector<Sample>& samples) {
   std::vector<double> values;
   for (const Sample& s : samples) values.push_back(s.value);
-  Vector start = Vector::all(0);
-  start[kBlack] = srgb_decode(percentile(values, 0.1));
-  start[kWhite] = srgb_decode(percentile(values, 0.9));
-  start[kBlur] = 0.5;
-  Vector best = start;
+  const double white = percentile(values, 0.9);
+  const std::vector<double> whites =
+      white < kClipped ? std::vector<double>{white} : std::vector<double>{1, 1.4, 2, 3};
+  Vector best;
   double least = HUGE_VAL;
-  for (double shift = -kSearchPx; shift <= kSearchPx; shift += 0.5) {
-    Vector p = start;
-    p[kEndA] = p[kEndB] = shift;
-    const double c = cost(samples, p, 1.0, 0);
-    if (c < least) least = c, best = p;
+  for (double bright : whites) {
+    for (double shift = -kSearchPx; shift <= kSearchPx; shift += 0.5) {
+      Vector p = Vector::all(0);
+      p[kBlack] = percentile(values, 0.1);
+      p[kWhite] = bright;
+      p[kBlur] = 0.5;
+      p[kEndA] = p[kEndB] = shift;
+      double squares = 0;
+      for (const Sample& s : samples) {
+        const double r = s.value - predict(p, s, nullptr);
+        squares += r * r;
+      }
+      if (squares < least) least = squares, best = p;
+    }
   }
   return best;
+}
+
+bool visible(const Vector& p) {
+  return srgb_encode(p[kWhite]) - srgb_encode(p[kBlack]) > kMinContrast;
 }
 
 // Phi and the integrals E[max(x + z,0)], E[max(x + z,0)^2]/2 of a Gaussian z.
@@ -283,48 +288,54 @@ std::optional<EdgeFit> fit_edge(const Luminance& luminance, const PinholeIntrins
     samples = gather(luminance, lens, line, dark, bright, margin);
     if (samples.size() < 12) return *why = "cut by the picture's border", std::nullopt;
     if (round == 0) p = coarse_start(samples);
-    const double contrast = srgb_encode(p[kWhite]) - srgb_encode(p[kBlack]);
-    if (!(contrast > kMinContrast)) return *why = "without contrast", std::nullopt;
+    if (!visible(p)) return *why = "without contrast", std::nullopt;
+    const double contrast = p[kWhite] - p[kBlack];
+    const double least_noise = kMinNoise * contrast;
     // Wide at first, so that a shifted start is not taken for outliers.
-    const double cutoff = round == 0 ? 1.0 : std::max(6 * noise, 0.15 * contrast);
-    if (!minimise(samples, cutoff, std::max(noise, kMinNoise), round == 0 ? 15 : 8, &p))
+    const double cutoff = round == 0 ? 10 * contrast : std::max(6 * noise, 0.15 * contrast);
+    if (!minimise(samples, cutoff, std::max(noise, least_noise), round == 0 ? 15 : 8, &p))
       return *why = "without a fit", std::nullopt;
-    noise = std::max(kMinNoise, 1.4826 * median_residual(samples, p));
+    noise = std::max(least_noise, 1.4826 * median_residual(samples, p));
 
     line = make_line(line.a + line.normal * p[kEndA], line.b + line.normal * p[kEndB],
                      line.a + line.normal * 1e3);
     total_shift += std::max(std::abs(p[kEndA]), std::abs(p[kEndB]));
     if (round < 2) p[kEndA] = p[kEndB] = 0;
     if (total_shift > 1.5 * kSearchPx) return *why = "not where the detector saw it", std::nullopt;
-    // Stay clear of the next printed cell and of the corners, by what the blur carries over.
-    const double spill = 0.5 + 2 * p[kBlur];
-    dark = std::clamp(guess.dark_depth_px - spill, 1.2, 1.5 + 3 * p[kBlur]);
-    bright = std::clamp(guess.bright_depth_px - spill, 1.2, 1.5 + 3 * p[kBlur]);
+    // Stay clear of the next printed cell and of the corners by what the blur carries over; as far
+    // to one side as to the other, so that a blur that is not Gaussian cannot shift the line.
+    const double free = std::min(guess.dark_depth_px, guess.bright_depth_px) - 0.5 - 2 * p[kBlur];
+    dark = bright = std::clamp(free, 1.2, 1.5 + 3 * p[kBlur]);
     margin = std::min(0.25 * line.length, 1 + 2.5 * p[kBlur]);
   }
 
-  Vector rhs;
-  const double contrast = srgb_encode(p[kWhite]) - srgb_encode(p[kBlack]);
-  const Matrix h = normal_equations(samples, p, std::max(6 * noise, 0.15 * contrast), noise, &rhs);
+  if (!visible(p)) return *why = "without contrast", std::nullopt;
+  const double contrast = p[kWhite] - p[kBlack];
+  const System system = linearise(samples, p, std::max(6 * noise, 0.15 * contrast), noise);
   double weight = 0, squares = 0;
   for (const Sample& s : samples) {
     const double r = s.value - predict(p, s, nullptr);
     weight += s.weight;
     squares += s.weight * r * r;
   }
-  if (!(contrast > kMinContrast)) return *why = "without contrast", std::nullopt;
   if (weight < 0.6 * double(samples.size())) return *why = "covered", std::nullopt;
-  const double rms = std::max(kMinNoise, std::sqrt(squares / std::max(1.0, weight - kParameters)));
+  const double rms =
+      std::max(kMinNoise * contrast, std::sqrt(squares / std::max(1.0, weight - kParameters)));
   if (rms > 0.2 * contrast) return *why = "unclear", std::nullopt;
-  const Matrix covariance = h.inv(cv::DECOMP_CHOLESKY) * (rms * rms);
-  EdgeFit fit{line.a,
-              line.b,
-              covariance(kEndA, kEndA),
-              covariance(kEndA, kEndB),
-              covariance(kEndB, kEndB),
-              p[kBlur],
-              contrast,
-              rms};
+  const Matrix covariance = system.information.inv(cv::DECOMP_CHOLESKY) * (rms * rms);
+  // How far a clipped white really goes, and with it where half of it is, is then only a guess.
+  const auto whites = std::count_if(samples.begin(), samples.end(),
+                                    [](const Sample& x) { return x.value >= kClipped; });
+  const double clipped = 10 * whites > std::ptrdiff_t(samples.size()) ? kClippedVariance : 0;
+  EdgeFit fit;
+  fit.a = line.a;
+  fit.b = line.b;
+  fit.var_a = covariance(kEndA, kEndA) + clipped;
+  fit.cov_ab = covariance(kEndA, kEndB) + clipped / 2;
+  fit.var_b = covariance(kEndB, kEndB) + clipped;
+  fit.blur_px = p[kBlur];
+  fit.contrast = contrast;
+  fit.noise = rms;
   if (!(fit.var_a > 0 && fit.var_b > 0)) return *why = "without a fit", std::nullopt;
   return fit;
 }

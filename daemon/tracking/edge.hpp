@@ -24,8 +24,8 @@ struct EdgeFit {
   glm::dvec2 a, b;                          // the ends, moved onto the line
   double var_a = 0, cov_ab = 0, var_b = 0;  // of their offsets across the line, px^2
   double blur_px = 0;                       // standard deviation beyond the pixel's own box
-  double contrast = 0;                      // white - black, sRGB-encoded
-  double noise = 0;                         // rms residual, sRGB-encoded
+  double contrast = 0;                      // white - black, linear
+  double noise = 0;                         // rms residual, linear
 };
 
 // Fraction of a pixel on the bright side of a straight edge at signed distance `s` px (positive:
@@ -35,8 +35,9 @@ double edge_coverage(double s, double nx, double ny, double blur_px, double* by_
                      double* by_blur = nullptr);
 
 // Fits line, blur, black, white and shading to the pixels beside the guess: robust least squares in
-// sRGB-encoded values of a linear model, so neither the curve nor a clipped white shifts the edge.
-// Nothing, and `why`, if there is no such edge within about 2 px (or it is covered or cut).
+// linear light, where every symmetric blur leaves the edge in its place, with the sensor's
+// clipping. Nothing, and `why`, if there is no such edge within about 2 px (or it is covered or
+// cut).
 std::optional<EdgeFit> fit_edge(const Luminance& luminance, const PinholeIntrinsics& lens,
                                 const EdgeGuess& guess, const char** why);
 

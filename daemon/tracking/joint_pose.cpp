@@ -213,6 +213,10 @@ bool same_pose(const CameraFromWorld& a, const CameraFromWorld& b) {
          glm::distance(a.translation, b.translation) < 1e-4 * glm::length(a.translation);
 }
 
+bool better(const FittedPose& a, const FittedPose& b) {
+  return a.chi_square < b.chi_square;
+}
+
 // The distinct minima over exactly these tags, better first, each seeing every tag from its front.
 std::vector<FittedPose> minima(const Problem& problem, const std::vector<TagObservation>& tags,
                                const PinholeIntrinsics& lens, const std::vector<std::size_t>& used,
@@ -227,18 +231,42 @@ std::vector<FittedPose> minima(const Problem& problem, const std::vector<TagObse
                      [&](const FittedPose& f) { return same_pose(f.pose, fit.pose); }))
       found.push_back(std::move(fit));
   }
-  std::sort(found.begin(), found.end(),
-            [](const FittedPose& a, const FittedPose& b) { return a.chi_square < b.chi_square; });
+  std::sort(found.begin(), found.end(), better);
   return found;
 }
 
 std::vector<std::size_t> explained(const std::vector<TagObservation>& tags,
-                                   const PinholeIntrinsics& lens, const CameraFromWorld& pose,
-                                   double gate_px) {
+                                   const PinholeIntrinsics& lens, const CameraFromWorld& pose) {
+  const double gate_px = consistency_gate_px(lens);
   std::vector<std::size_t> used;
   for (std::size_t i = 0; i < tags.size(); ++i)
     if (tag_error_px(tags[i], pose, lens) <= gate_px) used.push_back(i);
   return used;
+}
+
+// From a pose that fits some tags to one that fits as many as agree: the loss first spans the
+// better half of the tags as they are, then closes to the gate.
+std::optional<CameraFromWorld> agree(const Problem& problem,
+                                     const std::vector<TagObservation>& tags,
+                                     const PinholeIntrinsics& lens, const CameraFromWorld& start) {
+  std::vector<std::size_t> all;
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < tags.size(); ++i) {
+    all.push_back(i);
+    errors.push_back(tag_error_px(tags[i], start, lens));
+  }
+  std::nth_element(errors.begin(), errors.begin() + std::ptrdiff_t(errors.size() / 2),
+                   errors.end());
+  const double gate_px = consistency_gate_px(lens);
+  const double widest = 0.5 * (lens.width + lens.height);
+  double scale = std::clamp(2 * errors[errors.size() / 2], gate_px, std::max(gate_px, widest));
+  std::optional<CameraFromWorld> pose = start;
+  while (pose) {
+    pose = problem.minimise(all, *pose, {true, scale}, 6);
+    if (scale <= 0.5 * gate_px) break;
+    scale = std::max(0.5 * gate_px, scale / 2.5);
+  }
+  return pose;
 }
 
 }  // namespace
@@ -281,49 +309,47 @@ double consistency_gate_px(const PinholeIntrinsics& lens) {
   return 2 * std::max(1.0, lens.width / 1280.0);
 }
 
-JointPose solve_joint_pose(const std::vector<TagObservation>& tags, const PinholeIntrinsics& lens,
-                           const std::optional<CameraFromWorld>& seed) {
-  JointPose result;
-  if (tags.empty()) return result;
+std::vector<FittedPose> solve_joint_pose(const std::vector<TagObservation>& tags,
+                                         const PinholeIntrinsics& lens,
+                                         const std::optional<CameraFromWorld>& seed) {
+  if (tags.empty()) return {};
   const Problem problem(tags, lens);
-  std::vector<std::size_t> all(tags.size());
-  for (std::size_t i = 0; i < all.size(); ++i) all[i] = i;
   std::vector<CameraFromWorld> starts = pose_starts(tags, lens);
   if (seed) starts.insert(starts.begin(), *seed);
 
-  const double gate_px = consistency_gate_px(lens);
   struct Consensus {
     std::vector<std::size_t> used;
     CameraFromWorld pose;
   };
   std::vector<Consensus> largest;
-  if (tags.size() == 1) {
-    largest.push_back({all, starts.empty() ? CameraFromWorld{} : starts.front()});
-  } else {
-    for (const CameraFromWorld& start : starts) {
-      std::optional<CameraFromWorld> pose = start;
-      for (double scale : {100.0, 30.0, 10.0, 3.0, 1.0})
-        if (pose) pose = problem.minimise(all, *pose, {true, scale * gate_px}, 6);
-      if (!pose) continue;
-      Consensus c{explained(tags, lens, *pose, gate_px), *pose};
-      if (c.used.empty()) continue;
-      if (!largest.empty() && c.used.size() > largest.front().used.size()) largest.clear();
-      const bool known = std::any_of(largest.begin(), largest.end(),
-                                     [&](const Consensus& l) { return l.used == c.used; });
-      if (!known && (largest.empty() || c.used.size() == largest.front().used.size()))
-        largest.push_back(std::move(c));
-      if (largest.front().used.size() == tags.size()) break;
+  const auto offer = [&](const CameraFromWorld& pose) {
+    Consensus c{explained(tags, lens, pose), pose};
+    if (c.used.empty()) return;
+    if (!largest.empty() && c.used.size() > largest.front().used.size()) largest.clear();
+    if (!largest.empty() && c.used.size() < largest.front().used.size()) return;
+    if (std::none_of(largest.begin(), largest.end(),
+                     [&](const Consensus& l) { return l.used == c.used; }))
+      largest.push_back(std::move(c));
+  };
+  for (const CameraFromWorld& start : starts) {
+    if (tags.size() == 1) {
+      largest.push_back({{0}, start});
+      break;
     }
+    offer(start);
+    if (const auto pose = agree(problem, tags, lens, start)) offer(*pose);
+    if (!largest.empty() && largest.front().used.size() == tags.size()) break;
   }
 
-  result.contradiction = largest.size() > 1;
+  std::vector<FittedPose> poses;
   for (const Consensus& c : largest) {
     std::vector<CameraFromWorld> from = starts;
     from.insert(from.begin(), c.pose);
     for (FittedPose& fit : minima(problem, tags, lens, c.used, from))
-      result.poses.push_back(std::move(fit));
+      poses.push_back(std::move(fit));
   }
-  return result;
+  std::sort(poses.begin(), poses.end(), better);
+  return poses;
 }
 
 }  // namespace previz::tracking

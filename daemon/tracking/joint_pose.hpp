@@ -43,20 +43,17 @@ struct FittedPose {
   std::vector<std::size_t> used;  // indices of the observations it explains
 };
 
-struct JointPose {
-  // Local minima that explain the largest number of tags, better first; empty: none does.
-  std::vector<FittedPose> poses;
-  bool contradiction = false;  // several sets of tags, equally large, say different things
-};
-
 // How far off a tag's corners may be (rms) and still be explained: 2 px, more on wide pictures.
 double consistency_gate_px(const PinholeIntrinsics& lens);
 
-// `seed` is a further start beside those of pose_starts. Levenberg-Marquardt from each, over all
-// tags with a loss that lets go of tags at odds with the rest (a moved tag); then over the tags
-// that remain, with their stated covariance.
-JointPose solve_joint_pose(const std::vector<TagObservation>& tags, const PinholeIntrinsics& lens,
-                           const std::optional<CameraFromWorld>& seed);
+// Every local minimum that explains the largest number of tags, better (by chi-square) first. Those
+// with different `used` are tags at odds, equally many on either side. `seed` is a further start
+// beside those of pose_starts. Levenberg-Marquardt from each, over all tags with a loss that lets
+// go of tags at odds with the rest (a moved tag); then over the tags that remain, with their stated
+// covariance. Empty where no pose explains a tag.
+std::vector<FittedPose> solve_joint_pose(const std::vector<TagObservation>& tags,
+                                         const PinholeIntrinsics& lens,
+                                         const std::optional<CameraFromWorld>& seed);
 
 // Rms distance in px between a tag's corners and their projection; infinite where it cannot be seen
 // (behind the camera or from behind).

@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/matrix.hpp>
@@ -53,7 +54,8 @@ Layout layout(const std::string& name, int id) {
   Layout l{family->total_width, family->width_at_border, {}};
   for (int y = 0; y < l.total; ++y)
     for (int x = 0; x < l.total; ++x) l.cells.push_back(image->buf[y * image->stride + x]);
-  image_u8_destroy(image);
+  std::free(image->buf);  // the packaged library does not export image_u8_destroy
+  std::free(image);
   entry.destroy(family);
   return l;
 }
