@@ -16,6 +16,7 @@ namespace {
 constexpr double kCornerFloorPx = 0.03;
 // The residuals' own variance is trusted by its degrees of freedom against this many of the stated.
 constexpr double kPriorDegrees = 8;
+constexpr double kDecisiveDrop = 4;
 
 using Vector6 = cv::Matx<double, 6, 1>;
 using Matrix6 = cv::Matx<double, 6, 6>;
@@ -186,6 +187,16 @@ Matrix6 inverse_scaled(const Matrix6& m) {
   return n;
 }
 
+double rms_px(const std::vector<TagObservation>& tags, const PinholeIntrinsics& lens,
+              const CameraFromWorld& pose, const std::vector<std::size_t>& used) {
+  double squares = 0;
+  for (std::size_t i : used) {
+    const double e = tag_error_px(tags[i], pose, lens);
+    squares += e * e;
+  }
+  return std::sqrt(squares / double(used.size()));
+}
+
 FittedPose describe(const Problem& problem, const std::vector<TagObservation>& tags,
                     const PinholeIntrinsics& lens, const CameraFromWorld& pose,
                     const std::vector<std::size_t>& used) {
@@ -195,12 +206,7 @@ FittedPose describe(const Problem& problem, const std::vector<TagObservation>& t
   const Accumulated sum = problem.accumulate(used, pose, {}, true);
   fit.chi_square = sum.cost;
   fit.degrees_of_freedom = int(8 * used.size()) - 6;
-  double squares = 0;
-  for (std::size_t i : used) {
-    const double e = tag_error_px(tags[i], pose, lens);
-    squares += e * e;
-  }
-  fit.rms_px = std::sqrt(squares / double(used.size()));
+  fit.rms_px = rms_px(tags, lens, pose, used);
   const double variance =
       std::max(1.0, (fit.chi_square + kPriorDegrees) / (fit.degrees_of_freedom + kPriorDegrees));
   const Matrix6 covariance = variance * inverse_scaled(sum.information);
@@ -269,6 +275,38 @@ std::optional<CameraFromWorld> agree(const Problem& problem,
   return pose;
 }
 
+struct Consensus {
+  std::vector<std::size_t> used;
+  CameraFromWorld pose;
+};
+
+// A tag moved by little is taken in by bending the pose. It is let go where the others (two at
+// least) agree kDecisiveDrop times better without it.
+void let_go(const Problem& problem, const std::vector<TagObservation>& tags,
+            const PinholeIntrinsics& lens, Consensus* consensus) {
+  while (consensus->used.size() >= 3) {
+    const auto joint = problem.minimise(consensus->used, consensus->pose, {}, 30);
+    if (!joint) return;
+    const double limit = rms_px(tags, lens, *joint, consensus->used) / kDecisiveDrop;
+    if (limit < kCornerFloorPx) return;
+    Consensus least;
+    double least_rms = limit;
+    for (std::size_t i = 0; i < consensus->used.size(); ++i) {
+      Consensus without{consensus->used, *joint};
+      without.used.erase(without.used.begin() + std::ptrdiff_t(i));
+      const auto pose = problem.minimise(without.used, *joint, {}, 30);
+      if (!pose) continue;
+      const double rms = rms_px(tags, lens, *pose, without.used);
+      if (rms >= least_rms) continue;
+      least_rms = rms;
+      without.pose = *pose;
+      least = without;
+    }
+    if (least.used.empty()) return;
+    *consensus = least;
+  }
+}
+
 }  // namespace
 
 glm::dmat4 world_from_camera(const CameraFromWorld& pose) {
@@ -317,10 +355,6 @@ std::vector<FittedPose> solve_joint_pose(const std::vector<TagObservation>& tags
   std::vector<CameraFromWorld> starts = pose_starts(tags, lens);
   if (seed) starts.insert(starts.begin(), *seed);
 
-  struct Consensus {
-    std::vector<std::size_t> used;
-    CameraFromWorld pose;
-  };
   std::vector<Consensus> largest;
   const auto offer = [&](const CameraFromWorld& pose) {
     Consensus c{explained(tags, lens, pose), pose};
@@ -342,7 +376,8 @@ std::vector<FittedPose> solve_joint_pose(const std::vector<TagObservation>& tags
   }
 
   std::vector<FittedPose> poses;
-  for (const Consensus& c : largest) {
+  for (Consensus& c : largest) {
+    let_go(problem, tags, lens, &c);
     std::vector<CameraFromWorld> from = starts;
     from.insert(from.begin(), c.pose);
     for (FittedPose& fit : minima(problem, tags, lens, c.used, from))
