@@ -63,9 +63,11 @@ void add_render(CLI::App& app, post::RenderOptions& options) {
   command.add_option("--spp", options.samples, "Samples per pixel (default: quality.samples)")
       ->check(CLI::Range(1, 1'000'000));
   command.add_option("--seed", options.seed, "Seed of the random numbers (default: the set's)");
-  command.add_option("--estimator", options.estimator, "Estimator (default: the set's)")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, set::Estimator>{{"paired", set::Estimator::paired}}));
+  command
+      .add_option_function<std::string>(
+          "--estimator", [&](const std::string&) { options.estimator = set::Estimator::paired; },
+          "Estimator (default: the set's)")
+      ->check(CLI::IsMember({"paired"}));
   command.add_option("--out", options.directory, "Directory for the pictures");
   command.add_flag_callback(
       "--no-exr", [&] { options.exr = false; }, "No EXR files");
@@ -83,6 +85,7 @@ void add_run(CLI::App& app, rig::LiveOptions& options) {
   command.add_option("--spp", options.samples, "Samples per pixel (default: quality.samples)")
       ->check(CLI::Range(1, 1'000'000));
   command.add_option("--out", options.directory, "Directory for picture.png and metrics.json");
+  command.add_flag("--loop", options.loop, "Replayed cameras start again at their end, for ever");
   add_device_options(command, options.device);
 }
 

@@ -21,16 +21,19 @@ void require_replay(const set::Set& set, const std::string& key, set::Driver dri
 
 std::unique_ptr<Camera> start(std::unique_ptr<session::StreamReader> stream,
                               const std::string& name, const ReplayOptions::Origin& origin,
-                              const std::vector<std::string>& trouble) {
+                              bool loop, const std::vector<std::string>& trouble) {
   ReplayOptions options;
   options.origin = origin;
+  options.loop = loop;
   return replay(std::move(stream), name, options, {}, trouble);
 }
 
 }  // namespace
 
-Cameras open_cameras(const set::Set& set) {
+Cameras open_cameras(const set::Set& set, bool loop) {
   require_replay(set, "observer", set.observer.driver);
+  if (set.observer.device.empty())
+    throw Error(set.file.string() + ": observer.device: names no session; a folder is needed here");
   Cameras cameras;
   cameras.recorded = session::open_session(set.observer.device);
   auto observer = session::open_stream(cameras.recorded, "observer");
@@ -43,19 +46,21 @@ Cameras open_cameras(const set::Set& set) {
   ReplayOptions::Origin light_origin = origin;
   if (!set.lighting.environment && set.light_camera.driver != set::Driver::none) {
     require_replay(set, "light_camera", set.light_camera.driver);
-    session::Session session = session::open_session(set.light_camera.device);
+    const std::string& device =
+        set.light_camera.device.empty() ? set.observer.device : set.light_camera.device;
+    session::Session session = session::open_session(device);
     light = session::open_stream(session, "light");
     if (!light || light->records().empty())
-      throw Error(set.light_camera.device + ": the session has no light frames");
+      throw Error(device + ": the session has no light frames");
     light_origin.timestamp_ns = light->records().front().timestamp_ns;
     if (session.directory == cameras.recorded.directory) {
       origin.timestamp_ns = std::min(origin.timestamp_ns, light_origin.timestamp_ns);
       light_origin = origin;
     }
     if (!cameras.recorded.info.light) cameras.recorded.info.light = session.info.light;
-    cameras.light = start(std::move(light), "light", light_origin, session.missing);
+    cameras.light = start(std::move(light), "light", light_origin, loop, session.missing);
   }
-  cameras.observer = start(std::move(observer), "observer", origin, cameras.recorded.missing);
+  cameras.observer = start(std::move(observer), "observer", origin, loop, cameras.recorded.missing);
   return cameras;
 }
 

@@ -16,7 +16,8 @@ struct Cameras {
   session::Session recorded;      // of the replayed observer: calibration and track
 };
 
-// Throws previz::Error naming the key whose driver this build has not, or the device that fails.
-Cameras open_cameras(const set::Set& set);
+// `loop`: replayed streams start again at their end. Throws previz::Error naming the key whose
+// driver this build has not, or the device that fails.
+Cameras open_cameras(const set::Set& set, bool loop = false);
 
 }  // namespace previz::rig

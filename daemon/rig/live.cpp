@@ -98,7 +98,7 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out
   const std::shared_ptr<render::Device> device = render::open_device(options.device);
   HeadlessDisplay display(set.output.directory, metrics);
 
-  Cameras cameras = open_cameras(set);
+  Cameras cameras = open_cameras(set, options.loop);
   const ObserverCalibration calibration =
       pipeline::observer_calibration(set, cameras.recorded.info);
   pipeline::TrackStage track(set, calibration, cameras.recorded.track);

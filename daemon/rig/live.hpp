@@ -15,6 +15,7 @@ struct LiveOptions {
   std::filesystem::path set_file;
   std::optional<int> samples;                      // quality.samples
   std::optional<std::filesystem::path> directory;  // output.directory
+  bool loop = false;                               // replayed cameras start again at their end
   render::DeviceOptions device;
   std::stop_token stop;
 };

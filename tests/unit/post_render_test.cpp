@@ -1,0 +1,190 @@
+// `previzd render` and `previzd run` from end to end on a small take, on whatever Vulkan device
+// there is (Mesa's CPU driver where there is no GPU).
+#include "daemon/post/render.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
+
+#include "daemon/output/exr.hpp"
+#include "daemon/output/png.hpp"
+#include "daemon/rig/live.hpp"
+#include "drivers/error.hpp"
+#include "tests/unit/small_take.hpp"
+#include "tests/unit/temporary_directory.hpp"
+
+namespace previz::post {
+namespace {
+
+using test::small_take_frame;
+using test::small_take_frames;
+using test::small_take_lost;
+using test::small_take_unlit;
+
+class RenderSession : public testing::Test {
+ protected:
+  RenderReport render(RenderOptions options) {
+    options.session = directory_ / "session";
+    if (!options.directory) options.directory = directory_ / "out";
+    out_.str("");
+    return render_session(options, out_);
+  }
+  static bool is_plate(const std::filesystem::path& png, int frame) {
+    return output::read_png(png).samples == to_plate(small_take_frame(frame)).samples;
+  }
+  test::TemporaryDirectory directory_;
+  std::ostringstream out_;
+};
+
+TEST_F(RenderSession, EveryFrameHasItsFilesAndItsRecord) {
+  test::write_small_take(directory_.path());
+  const RenderReport report = render({});
+  ASSERT_EQ(report.frames.size(), std::size_t{small_take_frames});
+  EXPECT_FALSE(report.interrupted);
+  EXPECT_TRUE(std::filesystem::exists(report.video));
+  for (int i = 0; i < small_take_frames; ++i) {
+    const FrameRecord& record = report.frames[i];
+    const std::string number = "000" + std::to_string(i);
+    const render::Layers layers = output::read_exr(directory_ / ("out/" + number + ".exr"));
+    EXPECT_EQ(layers.width, 48);
+    EXPECT_EQ(record.timestamp_ns, small_take_frame(i).timestamp_ns);
+    const bool untouched = i == small_take_lost || i == small_take_unlit;
+    EXPECT_EQ(record.status == FrameStatus::untouched, untouched) << record.reason;
+    EXPECT_EQ(layers.samples, untouched ? 0 : 2);
+    EXPECT_EQ(is_plate(directory_ / ("out/" + number + ".png"), i), untouched);
+    EXPECT_EQ(record.counters.dropped_not_finite, 0u);
+    EXPECT_EQ(record.counters.dropped_negative, 0u);
+    EXPECT_EQ(record.counters.queue_overflow, 0u);
+  }
+  EXPECT_NE(report.frames[small_take_lost].reason.find("pose lost"), std::string::npos);
+  EXPECT_NE(report.frames[small_take_unlit].reason.find("light"), std::string::npos);
+  EXPECT_NE(out_.str().find("plate untouched"), std::string::npos);
+  EXPECT_EQ(report.frames.back().light_frames.size(), 3u);  // one of each exposure
+}
+
+// 0.3 m at 0.9 m and f = 40 px is 13 px wide: the card covers the middle of the picture.
+TEST_F(RenderSession, TheVirtualCardCoversThePlateAndTheRestShowsIt) {
+  test::write_small_take(directory_.path());
+  RenderOptions options;
+  options.frames = FrameRange{1, 1};
+  render::Layers seen;
+  options.on_frame = [&](const pipeline::Shot& shot) { seen = shot.layers; };
+  render(options);
+  const std::size_t middle = 18 * 48 + 24;
+  EXPECT_EQ(seen.mask[middle], 1.0f);
+  EXPECT_NEAR(seen.depth[middle], 0.9f, 1e-3f);
+  EXPECT_GT(seen.composite[middle].g, 0.0f);
+  EXPECT_EQ(seen.mask[0], 0.0f);
+  EXPECT_EQ(seen.composite[middle], seen.mixed[middle]);
+}
+
+TEST_F(RenderSession, WithNothingVirtualEveryPictureIsThePlateBitForBit) {
+  test::write_small_take(directory_.path(), false);
+  render({});
+  for (int i = 0; i < small_take_frames; ++i)
+    EXPECT_TRUE(is_plate(directory_ / ("out/000" + std::to_string(i) + ".png"), i)) << i;
+}
+
+TEST_F(RenderSession, ASecondRunSkipsWhatIsFinishedAndOtherSamplesAreRefused) {
+  test::write_small_take(directory_.path());
+  RenderOptions options;
+  options.frames = FrameRange{0, 2};
+  EXPECT_EQ(render(options).found_finished, 0u);
+  int rendered = 0;
+  options.frames.reset();
+  options.on_frame = [&](const pipeline::Shot&) { ++rendered; };
+  const RenderReport second = render(options);
+  EXPECT_EQ(second.found_finished, 3u);
+  EXPECT_EQ(rendered, small_take_frames - 3);
+  EXPECT_EQ(second.frames.size(), std::size_t{small_take_frames});
+  options.samples = 4;
+  EXPECT_THROW(render(options), Error);
+  options.force = true;
+  EXPECT_EQ(render(options).found_finished, 0u);
+}
+
+// What a run leaves must not depend on where it was interrupted.
+TEST_F(RenderSession, AStopLeavesWholeFramesAndTheNextRunEndsInTheSamePictures) {
+  test::write_small_take(directory_.path());
+  RenderOptions whole;
+  whole.directory = directory_ / "whole";
+  render(whole);
+
+  std::stop_source stop;
+  RenderOptions options;
+  options.stop = stop.get_token();
+  options.on_frame = [&](const pipeline::Shot& shot) {
+    if (shot.index == 1) stop.request_stop();
+  };
+  const RenderReport stopped = render(options);
+  EXPECT_TRUE(stopped.interrupted);
+  EXPECT_TRUE(stopped.video.empty());
+  EXPECT_LT(stopped.frames.size(), std::size_t{small_take_frames});
+  EXPECT_GE(stopped.frames.size(), 2u);
+
+  const RenderReport resumed = render({});
+  EXPECT_EQ(resumed.found_finished, stopped.frames.size());
+  ASSERT_EQ(resumed.frames.size(), std::size_t{small_take_frames});
+  for (int i = 0; i < small_take_frames; ++i) {
+    const std::string name = "000" + std::to_string(i) + ".png";
+    EXPECT_EQ(output::read_png(directory_ / ("out/" + name)).samples,
+              output::read_png(directory_ / ("whole/" + name)).samples);
+  }
+}
+
+TEST_F(RenderSession, AnotherSetFileTakesTheSessionsAssetsWhereItHasNoOwn) {
+  test::write_small_take(directory_.path());
+  std::filesystem::create_directory(directory_ / "elsewhere");
+  std::filesystem::rename(directory_ / "set.toml", directory_ / "elsewhere/tweaked.toml");
+  RenderOptions options;
+  options.set_file = directory_ / "elsewhere/tweaked.toml";
+  options.frames = FrameRange{1, 1};
+  EXPECT_EQ(render(options).frames.size(), 1u);
+}
+
+TEST_F(RenderSession, ARangeBehindTheEndIsRefused) {
+  test::write_small_take(directory_.path());
+  RenderOptions options;
+  options.frames = FrameRange{80, 90};
+  EXPECT_THROW(render(options), Error);
+}
+
+// Live: nothing vanishes. Every frame of the camera was shown or is counted as dropped, with cause.
+TEST_F(RenderSession, LiveAccountsForEveryFrame) {
+  test::write_small_take(directory_.path());
+  rig::LiveOptions options;
+  options.set_file = directory_ / "set.toml";
+  options.directory = directory_ / "live";
+  const pipeline::MetricsSnapshot snapshot = rig::run_live(options, out_);
+  std::uint64_t accounted = snapshot.stages.at("display").frames;
+  for (const auto& [name, stage] : snapshot.stages)
+    for (const auto& [cause, frames] : stage.dropped) accounted += frames;
+  EXPECT_EQ(accounted, std::uint64_t{small_take_frames});
+  EXPECT_GT(snapshot.latency_p50_s, 0.003);  // at least the device's own 3 ms
+  EXPECT_GE(snapshot.latency_p99_s, snapshot.latency_p50_s);
+  EXPECT_EQ(output::read_png(directory_ / "live/picture.png").width, 48);
+  std::ifstream metrics(directory_ / "live/metrics.json");
+  EXPECT_EQ(nlohmann::json::parse(metrics)["stages"]["observer"]["frames"], small_take_frames);
+}
+
+TEST_F(RenderSession, LiveStopsWhenAsked) {
+  test::write_small_take(directory_.path());
+  std::stop_source stop;
+  rig::LiveOptions options;
+  options.set_file = directory_ / "set.toml";
+  options.directory = directory_ / "live";
+  options.loop = true;  // would never end by itself
+  options.stop = stop.get_token();
+  std::jthread later([&] {
+    while (!std::filesystem::exists(directory_ / "live/picture.png"))
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));  // until something was shown
+    stop.request_stop();
+  });
+  EXPECT_GT(rig::run_live(options, out_).stages.at("display").frames, 0u);
+}
+
+}  // namespace
+}  // namespace previz::post
