@@ -37,12 +37,15 @@ class Resolver {
     objects();
     lights();
     lighting();
-    if (!given("output").has("directory") || given("output").good("directory"))
-      set_.output.directory = located(set_.output.directory);
+    set_.output.directory = located(set_.output.directory);
   }
 
  private:
-  const Given& given(const std::string& table) { return draft_.given[table]; }
+  const Given& given(const std::string& table) {
+    auto& given = draft_.given[table];
+    given.path = table;
+    return given;
+  }
 
   void problem(const Given& table, const std::string& key, const std::string& what) {
     problems_.add(table.where(key), table.path + '.' + key, what);

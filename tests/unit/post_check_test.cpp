@@ -8,6 +8,7 @@
 #include "daemon/set/table.hpp"
 #include "daemon/tracking/apriltag_tracker.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/session.hpp"
 #include "tests/unit/temporary_directory.hpp"
 
 namespace previz::post {
@@ -95,6 +96,30 @@ samples = 1500
   EXPECT_GT(said_.find("refraction: nothing lets light through"), left_out);
   EXPECT_GT(said_.find("lens sampling: everything is sharp"), left_out);
   expect_said("the observer has no calibration here");
+}
+
+TEST_F(Check, TakesSetAndCalibrationOfASession) {
+  session::SessionInfo info;
+  info.set_text = "[set]\nname = 'recorded'\n[tracking]\nenabled = false\n";
+  info.observer.emplace();
+  info.observer->intrinsics = {.width = 16, .height = 8, .fx = 20, .fy = 20, .cx = 7.5, .cy = 3.5};
+  info.observer->lens = {.focal_length_m = 0.035, .f_number = 2.8, .focus_distance_m = 1.5};
+  session::SessionWriter writer(directory_ / "take", info);
+  Frame frame;
+  frame.source = "observer";
+  frame.width = 16;
+  frame.height = 8;
+  frame.bytes.resize(frame_bytes(frame.format, frame.width, frame.height));
+  writer.write(frame);
+  writer.close();
+
+  std::ostringstream out;
+  ASSERT_EQ(check_set(directory_ / "take", out), 0) << out.str();
+  said_ = out.str();
+  expect_said("recorded (");
+  expect_said("16x8, 35 mm lens at f/2.8, focus at 1.5 m");
+  expect_said("lens sampling: the aperture blurs what is out of focus");
+  expect_said("tracking is off: only a session that recorded poses can be used");
 }
 
 TEST_F(Check, RefusesWithEveryProblemOfTheSetFile) {
