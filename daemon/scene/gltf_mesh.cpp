@@ -141,12 +141,13 @@ void set_flat_normals(Mesh& mesh) {
   }
 }
 
-// Makes normals unit, and puts right those that are no direction or that point away from all the
-// triangles around: the winding says which side is the front.
+// Makes normals unit, and puts right those that are no direction or that point to the back of every
+// triangle around: the winding says which side is the front.
 void repair_normals(Mesh& mesh, const std::string& what, Notes& notes) {
   struct Around {
     glm::dvec3 sum{0}, any{0};
     double area = 0;
+    bool faces_one = false;
   };
   std::vector<Around> around(mesh.positions.size());
   for (const glm::uvec3& triangle : mesh.triangles) {
@@ -156,18 +157,19 @@ void repair_normals(Mesh& mesh, const std::string& what, Notes& notes) {
       vertex.sum += normal;
       vertex.any = normal;
       vertex.area += glm::length(normal);
+      vertex.faces_one |= glm::dot(glm::dvec3(mesh.normals[triangle[i]]), normal) >= 0;
     }
   }
   std::uint64_t replaced = 0, turned = 0;
   for (std::size_t i = 0; i < mesh.normals.size(); ++i) {
-    const auto& [sum, any, area] = around[i];
+    const auto& [sum, any, area, faces_one] = around[i];
     const glm::dvec3 given = mesh.normals[i];
     const double length = glm::length(given);
     glm::dvec3 normal = given / length;
     if (!(length > 1e-12) || !std::isfinite(length)) {
       normal = glm::normalize(glm::length(sum) > 1e-6 * area ? sum : any);
       ++replaced;
-    } else if (glm::dot(normal, sum) < -1e-3 * area) {
+    } else if (!faces_one) {
       normal = -normal;
       ++turned;
     }
@@ -178,7 +180,7 @@ void repair_normals(Mesh& mesh, const std::string& what, Notes& notes) {
               " no direction; made from the triangles around");
   if (turned > 0)
     notes.add(what + ": " + count_of(turned, "normal points", "normals point") +
-              " to the back of the triangles around; turned round");
+              " to the back of every triangle around; turned round");
 }
 
 void read_uvs(const tinygltf::Model& model, const MeshSource& source, const std::string& where,

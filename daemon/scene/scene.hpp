@@ -23,7 +23,7 @@ inline constexpr std::uint32_t world_both = world_mixed | world_real;
 
 // Object space. All three arrays have one entry a vertex; `uvs` is empty where there are none (a
 // texture is then read at (0, 0)). Every vertex is finite and used; no triangle has zero area.
-// Normals are unit and on the side of counter-clockwise winding.
+// Normals are unit and, for at least one triangle around, on the side of counter-clockwise winding.
 struct Mesh {
   std::string name;
   std::vector<glm::vec3> positions;

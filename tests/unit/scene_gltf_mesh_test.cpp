@@ -122,7 +122,7 @@ TEST_F(GltfMesh, ReadsQuantisedAttributesAndStrides) {
       {"NORMAL", gltf.accessor(view, 5120, "VEC3", 3, true, offsetof(Vertex, normal))},
       {"TEXCOORD_0",
        gltf.values<std::uint16_t>(5123, "VEC2", {0, 65535, 32768, 0, 65535, 65535}, true)}};
-  gltf.json["accessors"][2]["count"] = 3;
+  gltf.json["accessors"][2]["count"] = 3;  // six numbers, three pairs
   gltf.root("a", gltf.mesh({{"attributes", attributes}}));
   gltf.json["extensionsRequired"] = {"KHR_mesh_quantization"};
   const scene::Scene scene = load();

@@ -1,0 +1,281 @@
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <numbers>
+
+#include "tests/unit/gltf_test.hpp"
+
+namespace previz::testing {
+namespace {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using Json = GltfWriter::Json;
+
+class GltfMaterials : public GltfTest {
+ protected:
+  // A triangle with two sets of texture coordinates and the material given.
+  void use(Json material) {
+    const int index = gltf.add("materials", std::move(material));
+    const Json attributes = {{"POSITION", gltf.positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}})},
+                             {"TEXCOORD_0", gltf.uvs({{0, 0}, {1, 0}, {0, 1}})},
+                             {"TEXCOORD_1", gltf.uvs({{0.5f, 0.5f}, {0.75f, 0}, {0, 0.75f}})}};
+    gltf.root("a", gltf.mesh({{"attributes", attributes}, {"material", index}}));
+  }
+  scene::Material loaded(Json material) {
+    use(std::move(material));
+    return load().materials.at(0);
+  }
+};
+
+const std::vector<unsigned char> two_texels = {0, 51, 255, 255, 10, 11, 128, 64};
+
+TEST_F(GltfMaterials, DefaultsAreGltfs) {
+  gltf.root("a", gltf.triangle_mesh());
+  for (const scene::Material& m : {load().materials.at(0), loaded({{"name", "empty"}})}) {
+    EXPECT_EQ(m.base_color, glm::vec3(1));
+    EXPECT_EQ(m.metallic, 1);
+    EXPECT_EQ(m.roughness, 1);
+    EXPECT_EQ(m.specular, 1);
+    EXPECT_EQ(m.ior, 1.5f);
+    EXPECT_EQ(m.transmission, 0);
+    EXPECT_TRUE(m.thin_walled);
+    EXPECT_FALSE(m.double_sided);
+    EXPECT_EQ(m.emission, glm::vec3(0));
+    EXPECT_EQ(m.alpha_mode, scene::AlphaMode::opaque);
+    EXPECT_EQ(m.attenuation_distance_m, std::numeric_limits<float>::infinity());
+    EXPECT_EQ(m.base_color_texture, scene::no_texture);
+  }
+}
+
+TEST_F(GltfMaterials, ReadsEveryFactor) {
+  const scene::Material m =
+      loaded({{"name", "all"},
+              {"pbrMetallicRoughness",
+               {{"baseColorFactor", {0.1, 0.2, 0.3, 0.4}},
+                {"metallicFactor", 0.5},
+                {"roughnessFactor", 0.6}}},
+              {"emissiveFactor", {0.25, 0.5, 1}},
+              {"alphaMode", "MASK"},
+              {"alphaCutoff", 0.3},
+              {"doubleSided", true},
+              {"extensions",
+               {{"KHR_materials_emissive_strength", {{"emissiveStrength", 8}}},
+                {"KHR_materials_transmission", {{"transmissionFactor", 0.9}}},
+                {"KHR_materials_ior", {{"ior", 1.33}}},
+                {"KHR_materials_specular", {{"specularFactor", 0.7}}},
+                {"KHR_materials_volume",
+                 {{"thicknessFactor", 0.01},
+                  {"attenuationColor", {0.8, 0.9, 1}},
+                  {"attenuationDistance", 0.5}}}}}});
+  EXPECT_EQ(m.name, "all");
+  EXPECT_EQ(m.base_color, glm::vec3(0.1f, 0.2f, 0.3f));
+  EXPECT_EQ(m.alpha, 0.4f);
+  EXPECT_EQ(m.alpha_mode, scene::AlphaMode::mask);
+  EXPECT_EQ(m.alpha_cutoff, 0.3f);
+  EXPECT_EQ(m.metallic, 0.5f);
+  EXPECT_EQ(m.roughness, 0.6f);
+  EXPECT_EQ(m.emission, glm::vec3(2, 4, 8));
+  EXPECT_TRUE(m.double_sided);
+  EXPECT_EQ(m.transmission, 0.9f);
+  EXPECT_EQ(m.ior, 1.33f);
+  EXPECT_EQ(m.specular, 0.7f);
+  EXPECT_FALSE(m.thin_walled);
+  EXPECT_EQ(m.attenuation_color, glm::vec3(0.8f, 0.9f, 1));
+  EXPECT_EQ(m.attenuation_distance_m, 0.5f);
+}
+
+TEST_F(GltfMaterials, OpaqueMeansAlphaOneAndThicknessZeroMeansThin) {
+  const scene::Material m =
+      loaded({{"pbrMetallicRoughness", {{"baseColorFactor", {1, 1, 1, 0.4}}}},
+              {"extensions", {{"KHR_materials_volume", {{"attenuationDistance", 1}}}}}});
+  EXPECT_EQ(m.alpha, 1);
+  EXPECT_TRUE(m.thin_walled);
+}
+
+TEST_F(GltfMaterials, BringsNumbersIntoRangeWithANote) {
+  use({{"name", "odd"},
+       {"pbrMetallicRoughness",
+        {{"baseColorFactor", {2, 0.5, -1, 1}}, {"metallicFactor", 7}, {"roughnessFactor", -1}}},
+       {"extensions", {{"KHR_materials_ior", {{"ior", 0}}}}}});
+  const scene::Scene scene = load();
+  const scene::Material& m = scene.materials.at(0);
+  EXPECT_EQ(m.base_color, glm::vec3(1, 0.5f, 0));
+  EXPECT_EQ(m.metallic, 1);
+  EXPECT_EQ(m.roughness, 0);
+  EXPECT_EQ(m.ior, 1);
+  EXPECT_THAT(scene.notes,
+              Contains(HasSubstr("material 0 \"odd\": its base colour is out of range; brought to "
+                                 "the nearest allowed (2 times)")));
+  EXPECT_EQ(scene.notes.size(), 4u);
+}
+
+TEST_F(GltfMaterials, DecodesColoursBySrgbAndDataAsTheyAre) {
+  const int texture = gltf.texture(2, 1, two_texels);
+  use({{"pbrMetallicRoughness",
+        {{"baseColorTexture", {{"index", texture}}},
+         {"metallicRoughnessTexture", {{"index", texture}}}}},
+       {"emissiveTexture", {{"index", texture}}},
+       {"normalTexture", {{"index", texture}, {"scale", 0.5}}}});
+  const scene::Scene scene = load();
+  const scene::Material& m = scene.materials.at(0);
+  ASSERT_EQ(scene.textures.size(), 2u);  // one image, as colour and as data
+  EXPECT_EQ(m.emission_texture, m.base_color_texture);
+  EXPECT_EQ(m.normal_texture, m.metallic_roughness_texture);
+  EXPECT_EQ(m.normal_scale, 0.5f);
+  EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("its normal texture is not used yet")));
+  const scene::Texture& color = scene.textures[m.base_color_texture];
+  EXPECT_EQ(color.width, 2);
+  EXPECT_EQ(color.height, 1);
+  // IEC 61966-2-1: ((0.2 + 0.055) / 1.055)^2.4, and value / 12.92 up to 0.04045 (10 of 255).
+  const auto srgb = [](double v) { return static_cast<float>(std::pow((v + 0.055) / 1.055, 2.4)); };
+  EXPECT_EQ(color.texels[0], glm::vec4(0, srgb(0.2), 1, 1));
+  EXPECT_EQ(color.texels[1], glm::vec4(static_cast<float>(10 / 255.0 / 12.92), srgb(11 / 255.0),
+                                       srgb(128 / 255.0), static_cast<float>(64 / 255.0)));
+  const scene::Texture& data = scene.textures[m.metallic_roughness_texture];
+  EXPECT_EQ(data.texels[0], glm::vec4(0, 0.2f, 1, 1));
+}
+
+TEST_F(GltfMaterials, ReadsSamplers) {
+  const auto sampled = [&](const Json& sampler) {
+    const int texture = gltf.texture(2, 1, two_texels, sampler);
+    return Json{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}};
+  };
+  use(sampled(Json::object()));
+  use(sampled({{"magFilter", 9728}, {"wrapS", 33071}, {"wrapT", 33648}}));
+  const scene::Scene scene = load();
+  const scene::Texture& first = scene.textures.at(0);
+  EXPECT_EQ(first.wrap_u, scene::Wrap::repeat);
+  EXPECT_FALSE(first.nearest);
+  const scene::Texture& second = scene.textures.at(1);
+  EXPECT_EQ(second.wrap_u, scene::Wrap::clamp);
+  EXPECT_EQ(second.wrap_v, scene::Wrap::mirror);
+  EXPECT_TRUE(second.nearest);
+}
+
+TEST_F(GltfMaterials, MakesTextureCoordinatesOfTheSetAndTransformAsked) {
+  const int texture = gltf.texture(2, 1, two_texels);
+  const auto colored = [&](Json more) {
+    more["index"] = texture;
+    return Json{{"pbrMetallicRoughness", {{"baseColorTexture", more}}}};
+  };
+  const auto transformed = [](Json transform) {
+    return Json{{"extensions", {{"KHR_texture_transform", std::move(transform)}}}};
+  };
+  use(colored({{"texCoord", 1}}));
+  use(colored(transformed({{"offset", {0.5, 0.25}}, {"scale", {2, 3}}})));
+  // The extension's own example: the lower left quadrant, turned.
+  use(colored(transformed(
+      {{"offset", {0, 1}}, {"rotation", std::numbers::pi / 2}, {"scale", {0.5, 0.5}}})));
+  use(colored(transformed({{"texCoord", 1}})));
+  const scene::Scene scene = load();
+  ASSERT_EQ(scene.meshes.size(), 4u);
+  EXPECT_THAT(scene.meshes[0].uvs,
+              ElementsAre(glm::vec2(0.5f, 0.5f), glm::vec2(0.75f, 0), glm::vec2(0, 0.75f)));
+  EXPECT_THAT(scene.meshes[1].uvs,
+              ElementsAre(glm::vec2(0.5f, 0.25f), glm::vec2(2.5f, 0.25f), glm::vec2(0.5f, 3.25f)));
+  const auto expect_uv = [](const glm::vec2& uv, float u, float v) {
+    EXPECT_NEAR(uv.x, u, 1e-7);  // half a last place of single precision at 1
+    EXPECT_NEAR(uv.y, v, 1e-7);
+  };
+  expect_uv(scene.meshes[2].uvs[0], 0, 1);
+  expect_uv(scene.meshes[2].uvs[1], 0, 0.5f);
+  expect_uv(scene.meshes[2].uvs[2], 0.5f, 1);
+  EXPECT_EQ(scene.meshes[3].uvs, scene.meshes[0].uvs);
+  EXPECT_THAT(scene.notes, IsEmpty());
+}
+
+TEST_F(GltfMaterials, LeavesOutTexturesThatAreMappedOtherwise) {
+  const int texture = gltf.texture(2, 1, two_texels);
+  use({{"name", "two sets"},
+       {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}, {"texCoord", 1}}}}},
+       {"emissiveTexture", {{"index", texture}}}});
+  const scene::Scene scene = load();
+  EXPECT_EQ(scene.materials.at(0).base_color_texture, 0u);
+  EXPECT_EQ(scene.materials.at(0).emission_texture, scene::no_texture);
+  EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("\"two sets\": its emission texture is mapped "
+                                                 "otherwise")));
+}
+
+TEST_F(GltfMaterials, NotesTexturedMeshesWithoutCoordinates) {
+  const int texture = gltf.texture(2, 1, two_texels);
+  const int material = gltf.add(
+      "materials", {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}});
+  gltf.root("a", gltf.triangle_mesh(material));
+  const scene::Scene scene = load();
+  EXPECT_THAT(scene.meshes.at(0).uvs, IsEmpty());
+  EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("has no TEXCOORD_0 for its textures")));
+}
+
+TEST_F(GltfMaterials, ReadsImagesOfDataUrisAndOfFilesBeside) {
+  const std::vector<unsigned char> bytes = png(2, 1, two_texels);
+  std::ofstream(directory / "my wood.png", std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<long>(bytes.size()));
+  gltf.add("images", {{"uri", "data:image/png;base64," + base64(bytes)}});
+  gltf.add("images", {{"uri", "my%20wood.png"}});
+  for (int i = 0; i < 2; ++i)
+    use({{"pbrMetallicRoughness",
+          {{"baseColorTexture", {{"index", gltf.add("textures", {{"source", i}})}}}}}});
+  const scene::Scene scene = load();
+  ASSERT_EQ(scene.textures.size(), 2u);
+  EXPECT_EQ(scene.textures[0].texels, scene.textures[1].texels);
+}
+
+TEST_F(GltfMaterials, Reads16BitPng) {
+  // One grey texel of 0x8001: 1 x 1, 16 bit, colour type 0.
+  const std::string encoded =
+      "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABEAAAAABq7kcWAAAAC0lEQVR4nGNo"
+      "YAQAAQQAgjmbwLoAAAAASUVORK5CYII=";
+  gltf.add("images", {{"uri", "data:image/png;base64," + encoded}});
+  gltf.add("textures", {{"source", 0}});
+  use({{"pbrMetallicRoughness", {{"metallicRoughnessTexture", {{"index", 0}}}}}});
+  const scene::Scene scene = load();
+  const float grey = static_cast<float>(0x8001 / 65535.0);
+  EXPECT_THAT(scene.textures.at(0).texels, ElementsAre(glm::vec4(grey, grey, grey, 1)));
+}
+
+TEST_F(GltfMaterials, NamesImagesThatCannotBeRead) {
+  const int image = gltf.add("images", {{"uri", "lost.png"}});
+  use({{"pbrMetallicRoughness",
+        {{"baseColorTexture", {{"index", gltf.add("textures", {{"source", image}})}}}}}});
+  const std::string file = (directory / "test.gltf").string();
+  const auto message_of = [&](const Json& given) {
+    gltf.json["images"][0] = given;
+    return error();
+  };
+  EXPECT_EQ(message_of({{"uri", "lost.png"}}),
+            file + ": image 0 \"lost.png\": there is no such file, or it is empty");
+  EXPECT_EQ(message_of({{"name", "text"},
+                        {"uri", "data:text/plain;base64," + base64({'n', 'o', '!', '!'})}}),
+            file + ": image 0 \"text\": is neither PNG nor JPEG");
+  std::vector<unsigned char> broken = png(2, 1, two_texels);
+  broken.resize(40);
+  EXPECT_THAT(message_of({{"uri", "data:image/png;base64," + base64(broken)}}),
+              HasSubstr("image 0: cannot be decoded"));
+  // Width in the PNG's header, big-endian at byte 16: larger than allowed, and more than its bytes.
+  std::vector<unsigned char> huge = png(2, 1, two_texels);
+  huge[16] = 0x01;
+  EXPECT_THAT(message_of({{"uri", "data:image/png;base64," + base64(huge)}}), HasSubstr("image 0"));
+  huge[16] = 0x00;
+  huge[18] = 0x20;
+  huge[22] = 0x20;
+  EXPECT_THAT(message_of({{"uri", "data:image/png;base64," + base64(huge)}}),
+              HasSubstr("is cut short"));
+  EXPECT_THAT(message_of({{"bufferView", 99}, {"mimeType", "image/png"}}), HasSubstr("image[0]"));
+}
+
+TEST_F(GltfMaterials, LeavesOutTexturesInFormatsOfExtensions) {
+  gltf.json["extensionsUsed"] = {"EXT_texture_webp"};
+  const int texture =
+      gltf.add("textures", {{"extensions", {{"EXT_texture_webp", {{"source", 0}}}}}});
+  use({{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}});
+  const scene::Scene scene = load();
+  EXPECT_EQ(scene.materials.at(0).base_color_texture, scene::no_texture);
+  EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("\"EXT_texture_webp\" is not supported; ignored"),
+                                       HasSubstr("texture 0: has no PNG or JPEG image; left out")));
+}
+
+}  // namespace
+}  // namespace previz::testing
