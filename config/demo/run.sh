@@ -1,0 +1,19 @@
+#!/usr/bin/env bash
+# The main job on the bundled take: installs what is missing, builds, and renders the path-traced
+# composite of every frame to out/demo. Needs no GPU. Options of `previzd render` may be given:
+#   config/demo/run.sh --spp 256 --frames 0
+# Called again it goes on where it was stopped; after a change of options or of the set, add --force.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+out=out/demo
+
+config/install-deps.sh
+cmake --preset release --log-level=WARNING
+cmake --build --preset release --parallel "$(nproc)" --target previzd
+build/release/daemon/previzd render config/demo/session --set config/demo/demo.toml \
+  --out "$out" "$@"
+
+echo
+echo "The pictures, as a display would show them:  $PWD/$out/0000.png ..."
+echo "All layers, linear 32-bit float (OpenEXR):   $PWD/$out/0000.exr ..."
+echo "The review video:                            $PWD/$out/review.mp4"
