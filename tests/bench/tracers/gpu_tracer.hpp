@@ -1,0 +1,62 @@
+// Runs shaders/lib/trace.glsl on arrays of rays, for tests and benchmarks.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "daemon/render/device.hpp"
+#include "daemon/scene/bvh.hpp"
+#include "daemon/scene/scene.hpp"
+
+namespace previz::bench {
+
+struct Ray {
+  glm::vec3 origin{0};
+  float t_min = 0;
+  glm::vec3 direction{0, 0, 1};
+  float t_max = 1e30f;
+};
+
+struct TracedHit {
+  float t;  // < 0: nothing hit
+  glm::vec2 barycentrics;
+  std::uint32_t instance, primitive, presence;
+};
+
+// The texels that the shader reads: top level and meshes, as the renderer lays them out.
+std::vector<glm::uvec4> scene_texels(const scene::Scene& scene, scene::BvhQuality quality);
+std::vector<glm::uvec4> scene_texels(const scene::Scene& scene,
+                                     std::span<const scene::MeshBvh> meshes);
+
+class GpuTracer {
+ public:
+  GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texels);
+
+  std::vector<TracedHit> closest(std::span<const Ray> rays, std::uint32_t worlds);
+  std::vector<std::uint32_t> blocked(std::span<const Ray> rays, std::uint32_t worlds);
+
+  // For benchmarks: the rays stay, a dispatch is timed by its caller.
+  void set_rays(std::span<const Ray> rays);
+  void dispatch_distances(std::uint32_t worlds);
+  void dispatch_blocked(std::uint32_t worlds);
+  std::vector<float> distances();               // of the last dispatch_distances; < 0: nothing hit
+  std::vector<std::uint32_t> blocked_worlds();  // of the last dispatch_blocked
+
+ private:
+  void bind();
+  void dispatch(const render::Pipeline& pipeline, std::uint32_t worlds);
+
+  render::Device& device_;
+  vk::raii::DescriptorSetLayout set_layout_{nullptr};
+  vk::raii::PipelineLayout layout_{nullptr};
+  vk::raii::DescriptorPool pool_{nullptr};
+  vk::raii::DescriptorSet set_{nullptr};
+  render::Pipeline hits_pipeline_, distances_pipeline_, blocked_pipeline_;
+  render::Buffer bvh_, rays_, results_;
+  std::uint32_t count_ = 0;
+};
+
+}  // namespace previz::bench

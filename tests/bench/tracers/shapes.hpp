@@ -1,0 +1,22 @@
+// Procedural meshes for tests and benchmarks.
+#pragma once
+
+#include <cstddef>
+
+#include "daemon/scene/scene.hpp"
+
+namespace previz::bench {
+
+// A sphere of 20 * 4^levels triangles around the origin, closed and indexed, whose radius varies by
+// up to `bumps` of itself.
+scene::Mesh bumpy_sphere(int levels, double radius, double bumps, std::uint32_t seed);
+
+// A field of bumpy spheres of various sizes on a ground, of about so many triangles: one mesh.
+scene::Mesh sphere_field(std::size_t triangles);
+
+// Triangles with random corners in a cube of edge 2 `extent` and edges of about `size`.
+scene::Mesh random_triangles(std::size_t count, float extent, float size, std::uint32_t seed);
+
+scene::Scene scene_of(scene::Mesh mesh);
+
+}  // namespace previz::bench
