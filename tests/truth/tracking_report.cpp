@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <glm/geometric.hpp>
+#include <utility>
 
 #include "drivers/error.hpp"
 #include "tests/truth/tracking_measure.hpp"
+#include "tests/truth/tracking_photographs.hpp"
 
 namespace {
 
@@ -77,15 +80,52 @@ void report(const truth::TruthSet& set, const set::Tracking& settings) {
       milliseconds.mean());
 }
 
+void report_photographs(const std::filesystem::path& directory, double decimate) {
+  const truth::RoomResult room = truth::measure_room(directory / "apriltag", decimate);
+  std::printf(
+      "room (%d photographs, decimate %g)\n  %d of %d listed tags (%.1f %%), %d false, least "
+      "margin "
+      "%.1f, corners refined %d, refused %d\n  tracked %d, ambiguous %d, lost %d; rms %.3f px, "
+      "worst photograph %.3f; %d with several tags: rms %.3f px\n",
+      room.photographs, decimate, room.found, room.listed, 100.0 * room.found / room.listed,
+      room.false_ids, room.least_margin, room.refined, room.refused, room.tracked, room.ambiguous,
+      room.lost, room.rms_px, room.worst_px, room.poses_of_several, room.several_rms_px);
+  for (const std::string& s : room.missed) std::printf("  missed %s\n", s.c_str());
+  for (const std::string& s : room.not_tracked) std::printf("  not tracked %s\n", s.c_str());
+  for (const std::string& s : room.left_out) std::printf("  tracked without %s\n", s.c_str());
+
+  const std::filesystem::path misc = directory / "apriltag" / "misc";
+  for (const auto& [name, family] : {std::pair("36h11_stress_test.png", "tag36h11"),
+                                     std::pair("phone_tag1_640_480.jpg", "tag36h11"),
+                                     std::pair("negative_16h5_field2023.png", "tag36h11"),
+                                     std::pair("negative_16h5_field2023.png", "tag16h5")}) {
+    for (double margin : {0.0, 20.0}) {
+      const truth::CountResult count = truth::count_tags(misc / name, family, margin);
+      std::printf("%s as %s, margin >= %g: %d tags, margins %.1f to %.1f, refined %d\n", name,
+                  family, margin, count.tags, count.least_margin, count.most_margin, count.refined);
+    }
+  }
+  const truth::VideoResult video =
+      truth::measure_video(directory / "video" / "wall_tags3and4_1080p.mp4", decimate);
+  std::printf(
+      "video: both tags in %d of %d frames, tracked %d, ambiguous %d, rms %.3f px, jitter %.2f mm, "
+      "%.0f ms a frame\n",
+      video.with_both, video.frames, video.tracked, video.ambiguous, video.rms_px,
+      1e3 * video.jitter_m, video.milliseconds);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app("The tracker's figures on ground truth sets (directories with a set.json)");
   std::vector<std::string> sets;
   double decimate = 1;
-  app.add_option("SETDIR", sets)->required()->check(CLI::ExistingDirectory);
+  app.add_option("SETDIR", sets)->check(CLI::ExistingDirectory);
   app.add_option("--decimate", decimate, "shrink the picture in which tags are looked for")
       ->check(CLI::Range(1.0, 8.0));
+  std::string photographs;
+  app.add_option("--photographs", photographs, "folder with apriltag/ and video/")
+      ->check(CLI::ExistingDirectory);
   CLI11_PARSE(app, argc, argv);
   try {
     for (const std::string& directory : sets) {
@@ -94,6 +134,7 @@ int main(int argc, char** argv) {
       settings.decimate = decimate;
       report(set, settings);
     }
+    if (!photographs.empty()) report_photographs(photographs, decimate);
   } catch (const Error& error) {
     std::fprintf(stderr, "tracking_report: %s\n", error.what());
     return 1;
