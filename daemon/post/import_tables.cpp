@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstdint>
 #include <fstream>
 #include <optional>
-#include <regex>
 #include <sstream>
 
 #include "drivers/error.hpp"
@@ -34,40 +34,57 @@ std::vector<std::string> file_names(const std::filesystem::path& folder) {
   return names;
 }
 
+// A file name with one number in it: "%d", or "%0Nd" of at least N digits.
+struct NumberPattern {
+  std::string before;
+  std::size_t digits = 1;
+  std::string after;
+};
+
+std::optional<NumberPattern> number_pattern(const std::string& name) {
+  for (auto at = name.find('%'); at != std::string::npos; at = name.find('%', at + 1)) {
+    NumberPattern pattern{name.substr(0, at), 1, {}};
+    std::size_t end = at + 1;
+    if (end + 1 < name.size() && name[end] == '0' && name[end + 1] >= '1' && name[end + 1] <= '9') {
+      pattern.digits = static_cast<std::size_t>(name[end + 1] - '0');
+      end += 2;
+    }
+    if (end >= name.size() || name[end] != 'd') continue;
+    pattern.after = name.substr(end + 1);
+    return pattern;
+  }
+  return std::nullopt;
+}
+
 struct Numbered {
   std::uint64_t number;
   std::string name;
 };
 
-// The number of `name` if it is `before`, a number of at least `digits` digits, `after`.
-std::optional<Numbered> numbered(const std::string& name, const std::string& before,
-                                 std::size_t digits, const std::string& after) {
-  if (name.size() <= before.size() + after.size() || !name.starts_with(before) ||
+std::optional<Numbered> match(const NumberPattern& pattern, const std::string& name) {
+  const auto& [before, digits, after] = pattern;
+  if (name.size() < before.size() + digits + after.size() || !name.starts_with(before) ||
       !name.ends_with(after))
     return std::nullopt;
-  const std::string middle = name.substr(before.size(), name.size() - before.size() - after.size());
+  const char* first = name.data() + before.size();
+  const char* last = name.data() + name.size() - after.size();
   std::uint64_t number = 0;
-  const char* end = middle.data() + middle.size();
-  const auto result = std::from_chars(middle.data(), end, number);
-  const bool padded_more = middle.size() > std::max<std::size_t>(digits, 1) && middle[0] == '0';
-  if (result.ec != std::errc{} || result.ptr != end || middle.size() < digits || padded_more)
-    return std::nullopt;
+  const auto result = std::from_chars(first, last, number);
+  const bool padded_further = static_cast<std::size_t>(last - first) > digits && *first == '0';
+  if (result.ec != std::errc{} || result.ptr != last || padded_further) return std::nullopt;
   return Numbered{number, name};
 }
 
-std::vector<std::string> numbered_files(const std::filesystem::path& pattern,
-                                        const std::smatch& match) {
-  const std::string digits = match[1].str();
+std::vector<std::string> numbered_files(const std::filesystem::path& path,
+                                        const NumberPattern& pattern) {
   std::vector<Numbered> found;
-  for (const std::string& name : file_names(pattern.parent_path()))
-    if (auto file = numbered(name, match.prefix().str(), digits.empty() ? 0 : std::stoul(digits),
-                             match.suffix().str()))
-      found.push_back(std::move(*file));
+  for (const std::string& name : file_names(path.parent_path()))
+    if (auto file = match(pattern, name)) found.push_back(std::move(*file));
   std::ranges::sort(found, {}, &Numbered::number);
   std::vector<std::string> names;
   for (std::size_t i = 0; i < found.size(); ++i) {
     if (i > 0 && found[i].number != found[i - 1].number + 1)
-      throw Error(pattern.string() + ": number " + std::to_string(found[i - 1].number + 1) +
+      throw Error(path.string() + ": number " + std::to_string(found[i - 1].number + 1) +
                   " is missing; there are numbers up to " + std::to_string(found.back().number));
     names.push_back(found[i].name);
   }
@@ -122,11 +139,9 @@ Table read_csv(const std::filesystem::path& file) {
 
 std::vector<std::filesystem::path> matching_files(const std::filesystem::path& pattern) {
   const std::string name = pattern.filename().string();
-  static const std::regex number("%0?([0-9]{0,2})d");
-  std::smatch match;
   std::vector<std::string> names;
-  if (std::regex_search(name, match, number))
-    names = numbered_files(pattern, match);
+  if (const auto numbers = number_pattern(name))
+    names = numbered_files(pattern, *numbers);
   else if (name.find_first_of("*?") != std::string::npos)
     names = wildcard_files(pattern);
   else

@@ -30,10 +30,23 @@ AVColorSpace matrix_of(const AVFrame& frame) {
   return frame.height >= 720 ? AVCOL_SPC_BT709 : AVCOL_SPC_SMPTE170M;
 }
 
+// Older formats that say "full range" in their name, which swscale takes as a setting.
+AVPixelFormat without_range(AVPixelFormat format) {
+  switch (format) {
+    case AV_PIX_FMT_YUVJ420P:
+      return AV_PIX_FMT_YUV420P;
+    case AV_PIX_FMT_YUVJ422P:
+      return AV_PIX_FMT_YUV422P;
+    case AV_PIX_FMT_YUVJ444P:
+      return AV_PIX_FMT_YUV444P;
+    default:
+      return format;
+  }
+}
+
 bool is_full_range(const AVFrame& frame) {
   const auto format = AVPixelFormat(frame.format);
-  return frame.color_range == AVCOL_RANGE_JPEG || format == AV_PIX_FMT_YUVJ420P ||
-         format == AV_PIX_FMT_YUVJ422P || format == AV_PIX_FMT_YUVJ444P;
+  return frame.color_range == AVCOL_RANGE_JPEG || format != without_range(format);
 }
 
 Target target_of(const AVFrame& frame) {
@@ -145,8 +158,8 @@ class VideoFile final : public Footage {
 
   void convert(AVPixelFormat format, Picture& picture) {
     scaler_.reset(sws_getCachedContext(
-        scaler_.release(), picture.width, picture.height, AVPixelFormat(frame_->format),
-        picture.width, picture.height, format,
+        scaler_.release(), picture.width, picture.height,
+        without_range(AVPixelFormat(frame_->format)), picture.width, picture.height, format,
         SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP | SWS_BITEXACT,
         nullptr, nullptr, nullptr));
     if (!scaler_)

@@ -143,6 +143,20 @@ TEST(Import, WildcardsSortByNumber) {
   EXPECT_NE(shoot.error().find("number 3 is missing"), std::string::npos);
 }
 
+// "%03d" takes three digits or more, "%d" any without padding; what only looks alike is left alone.
+TEST(Import, NumbersMayGrowPastTheirPadding) {
+  Shoot shoot;
+  for (const char* name : {"s998.png", "s999.png", "s1000.png"})
+    write_picture(shoot.folder() / name, noise_picture(1, CV_8UC3, 16, 12));
+  for (const char* name : {"s01.png", "s0997.png", "s.png", "s1001.png.bak", "s-5.png", "s1x.png"})
+    session::write_content(shoot.folder() / name, "no picture");
+  for (const char* pattern : {"s%03d.png", "s%d.png"}) {
+    shoot.json["observer"]["pictures"] = pattern;
+    std::filesystem::remove_all(shoot.session());
+    EXPECT_EQ(shoot.import().observer_frames, 3u) << pattern;
+  }
+}
+
 std::vector<std::uint8_t> noise_bytes(std::size_t count, int seed) {
   cv::Mat noise = noise_picture(seed, CV_8UC1, static_cast<int>(count), 1);
   return {noise.datastart, noise.dataend};
