@@ -168,7 +168,7 @@ Keys lighting_keys(Draft& d) {
       {"environment_rotation_deg", &l.environment_rotation_rad, deg, "Turns that picture about world Z, counter-clockwise seen from above."},
       {"environment_gain", &l.environment_gain, plain.at_least(0), "Scales that picture."},
       {"resolution", &l.resolution, plain.within(0, 4096), "Side of the light map in texels, a power of two; 0: as fine as the source."},
-      {"unseen", &l.unseen, plain, "What stands where the light camera cannot see: the colour of its horizon, its picture mirrored at its edge, or a constant."},
+      {"unseen", &l.unseen, plain, "What stands where the light camera cannot see: the edge of its picture continued, its picture mirrored about the plane it stands in, or a constant."},
       {"unseen_radiance", &d.unseen_radiance, plain.at_least(0), "With unseen = \"constant\" only: linear Rec. 709 radiance.", optional("[0.1, 0.1, 0.1]")},
       {"frame", &l.frame, plain.within(-1, 1'000'000), "Light frame to use for the whole take; -1: the newest bracket before each picture."},
   };
