@@ -127,6 +127,24 @@ void fill_each(Resampled& map, const Fill& fill) {
   }
 }
 
+// Across the plane perpendicular to the optical axis, camera axes.
+const glm::dmat3 mirror(1, 0, 0, 0, 1, 0, 0, 0, -1);
+
+template <typename Fallback>
+void fill_mirrored(const Resampled& mirrored, const Fallback& fallback, Resampled& map,
+                   std::vector<std::string>& notes) {
+  double unseen_twice = 0;
+  fill_each(map, [&](std::size_t t, const glm::vec3& direction) {
+    unseen_twice += (1 - map.seen[t]) * (1 - mirrored.seen[t]);
+    if (mirrored.seen[t] == 0) return fallback(direction);
+    return mirrored.radiance[t] / mirrored.seen[t];
+  });
+  if (unseen_twice > 0)
+    notes.push_back(
+        fmt::format("{:.3f} sr are unseen in the mirror too and continue the picture's edge",
+                    unseen_twice * texel_sr(map.size)));
+}
+
 }  // namespace
 
 void fill_unseen(const HdrPicture& picture, const Fisheye& lens,
@@ -140,32 +158,21 @@ void fill_unseen(const HdrPicture& picture, const Fisheye& lens,
 
   const Edge edge = edge_of(picture, lens);
   const glm::dmat3 camera_from_world = glm::transpose(world_from_camera);
+  bool edge_used = false;
   const auto horizon = [&](const glm::vec3& direction) {
+    edge_used = true;
     return continued(edge, camera_from_world * glm::dvec3(direction));
   };
-  if (edge.left_out > 0)
+  if (settings.unseen == set::UnseenRule::horizon)
+    fill_each(map, [&](std::size_t, const glm::vec3& direction) { return horizon(direction); });
+  else
+    fill_mirrored(resample(make_resampling(lens, world_from_camera * mirror, map.size), picture),
+                  horizon, map, notes);
+  if (edge_used && edge.left_out > 0)
     notes.push_back(fmt::format(
         "{:.1f} % of the band at the picture's edge is brighter than {} times its median and was "
         "not continued into the unseen part",
         100 * edge.left_out, outlier));
-  if (settings.unseen == set::UnseenRule::horizon) {
-    fill_each(map, [&](std::size_t, const glm::vec3& direction) { return horizon(direction); });
-    return;
-  }
-
-  const glm::dmat3 mirror(1, 0, 0, 0, 1, 0, 0, 0, -1);
-  const Resampled mirrored =
-      resample(make_resampling(lens, world_from_camera * mirror, map.size), picture);
-  double unseen_twice = 0;
-  fill_each(map, [&](std::size_t t, const glm::vec3& direction) {
-    if (mirrored.seen[t] < 1) unseen_twice += (1 - map.seen[t]) * (1 - mirrored.seen[t]);
-    if (mirrored.seen[t] == 0) return horizon(direction);
-    return mirrored.radiance[t] / mirrored.seen[t];
-  });
-  if (unseen_twice > 0)
-    notes.push_back(
-        fmt::format("{:.3f} sr are unseen in the mirror too and continue the picture's edge",
-                    unseen_twice * texel_sr(map.size)));
 }
 
 }  // namespace previz::lighting

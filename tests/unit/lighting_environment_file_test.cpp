@@ -97,8 +97,10 @@ TEST(LoadEnvironment, KeepsFluxAndIrradiance) {
     settings.resolution = resolution;
     const EnvironmentMap map = load_environment(settings).environment;
     EXPECT_EQ(map.size, resolution == 0 ? 256 : resolution);
-    // The sun's pixel falls onto a grid of directions at least 4 times as fine in both axes.
-    EXPECT_LT(largest_relative_error(total_flux(map), flux), 1e-3) << resolution;
+    // The suns hold nearly all of the flux. Each is a tent two pixels wide that is summed over a
+    // grid of h pixels; where its kink falls between two directions the sum is off by up to h^2 / 6
+    // along that axis, with either sign: h is 1/4.4 at 64 texels and 1/7 at 256.
+    EXPECT_LT(largest_relative_error(total_flux(map), flux), map.size >= 256 ? 1e-3 : 5e-3);
     double worst = 0;
     for (std::size_t n = 0; n < normals.size(); ++n)
       worst = std::max(worst, largest_relative_error(irradiance(map, normals[n]), expected[n]));
