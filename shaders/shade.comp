@@ -79,11 +79,14 @@ bool light_ray(Path p, Surface s, Lobes l, Sampler random, float choice, out Gpu
   const bool has_lights = has_feature(FEATURE_LIGHTS);
   const vec2 u = sample_2d(random, vertex_pair(PAIR_LIGHT, p.depth));
   LightSample light = LightSample(vec3(0.0), 3.4e38, vec3(0.0), 0.0, vec2(1.0));
+  // Light is gathered on the viewer's side only. The sample is made for the very point from which
+  // the shadow ray starts, or the ray would end behind the light.
+  ray.origin = offset_origin(s, s.geometric_normal);
   float selection = frame.environment_selection;
   if (has_lights && choice >= selection) {
     if (frame.light_count == 0u) return false;
     const uint index = pick_light(min((choice - selection) / (1.0 - selection), 0.99999994));
-    if (!sample_light(lights[index], s.position, u, light)) return false;
+    if (!sample_light(lights[index], ray.origin, u, light)) return false;
     selection = (1.0 - selection) * lights[index].selection;
   } else {
     if (!has_feature(FEATURE_ENVIRONMENT_SAMPLING)) return false;
@@ -96,7 +99,6 @@ bool light_ray(Path p, Surface s, Lobes l, Sampler random, float choice, out Gpu
   const float pdf = selection * (delta ? 1.0 : light.pdf);
   if (!(pdf > 0.0)) return false;
   const float weight = delta ? 1.0 : mis_weight(pdf, bsdf_pdf);
-  ray.origin = offset_origin(s, light.direction);
   ray.direction = light.direction;
   ray.t_max = light.t_max;
   ray.slot_and_worlds = (p.slot << 2) | p.worlds;

@@ -58,8 +58,9 @@ Layers make_layers(std::span<const gpu::GpuPixel> pixels, int width, int height,
   const auto n = static_cast<double>(samples);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const Means m = means(pixels[i], n);
-    const glm::dvec3 camera =
-        plate.empty() ? glm::dvec3(0) : glm::dvec3(plate[3 * i], plate[3 * i + 1], plate[3 * i + 2]);
+    const glm::dvec3 camera = plate.empty()
+                                  ? glm::dvec3(0)
+                                  : glm::dvec3(plate[3 * i], plate[3 * i + 1], plate[3 * i + 2]);
     const double uncovered = 1 - m.mask;
     layers.composite[i] = glm::vec3(m.mask * m.mixed + uncovered * (camera + m.diff));
     layers.mixed[i] = glm::vec3(m.mixed);
@@ -84,8 +85,8 @@ Plate make_picture(const Layers& layers, const Plate& plate, const lighting::Res
   picture.bits = response.bits();
   picture.samples.resize(3 * layers.composite.size());
   for (std::size_t i = 0; i < layers.composite.size(); ++i) {
-    const bool untouched = !plate.samples.empty() && layers.mask[i] == 0 &&
-                           layers.diff[i] == glm::vec3(0);
+    const bool untouched =
+        !plate.samples.empty() && layers.mask[i] == 0 && layers.diff[i] == glm::vec3(0);
     for (int c = 0; c < 3; ++c)
       picture.samples[3 * i + c] =
           untouched ? plate.samples[3 * i + c]

@@ -15,9 +15,9 @@ namespace previz::render {
 std::vector<double> plate_radiance(const Plate& plate, const lighting::Response& response,
                                    double exposure);
 
-// All layers from per-pixel sums of `samples` samples (> 0) and the plate's radiance (empty: black).
-// composite = mean(M) mean(Lm) + (1 - mean(M)) (Lc + mean(Lm - Lr)), which is estimator.md's
-// mean(Lm) + (1 - mean(M)) (Lc - mean(Lr)) without subtracting two large sums.
+// All layers from per-pixel sums of `samples` samples (> 0) and the plate's radiance (empty:
+// black). composite = mean(M) mean(Lm) + (1 - mean(M)) (Lc + mean(Lm - Lr)), which is
+// estimator.md's mean(Lm) + (1 - mean(M)) (Lc - mean(Lr)) without subtracting two large sums.
 Layers make_layers(std::span<const gpu::GpuPixel> pixels, int width, int height,
                    std::int64_t samples, std::span<const double> plate);
 

@@ -11,7 +11,8 @@
 namespace previz::render {
 namespace {
 
-constexpr std::uint64_t gpu_timeout_ns = 600'000'000'000;  // a batch on a slow CPU device is seconds
+constexpr std::uint64_t gpu_timeout_ns =
+    600'000'000'000;  // a batch on a slow CPU device is seconds
 
 VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT severity,
                                           VkDebugUtilsMessageTypeFlagsEXT,
@@ -34,23 +35,26 @@ bool has_layer(const vk::raii::Context& context, const char* name) {
 // Lower is better.
 int rank(vk::PhysicalDeviceType type) {
   switch (type) {
-    case vk::PhysicalDeviceType::eDiscreteGpu: return 0;
-    case vk::PhysicalDeviceType::eIntegratedGpu: return 1;
-    case vk::PhysicalDeviceType::eVirtualGpu: return 2;
-    default: return 3;
+    case vk::PhysicalDeviceType::eDiscreteGpu:
+      return 0;
+    case vk::PhysicalDeviceType::eIntegratedGpu:
+      return 1;
+    case vk::PhysicalDeviceType::eVirtualGpu:
+      return 2;
+    default:
+      return 3;
   }
 }
 
 // Empty if the device can run us, otherwise what it lacks.
 std::string lacks(const vk::raii::PhysicalDevice& physical) {
   if (physical.getProperties().apiVersion < VK_API_VERSION_1_3) return "no Vulkan 1.3";
-  const auto features = physical.getFeatures2<vk::PhysicalDeviceFeatures2,
-                                              vk::PhysicalDeviceVulkan12Features,
-                                              vk::PhysicalDeviceVulkan13Features>();
+  const auto features =
+      physical.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceVulkan12Features,
+                            vk::PhysicalDeviceVulkan13Features>();
   if (!features.get<vk::PhysicalDeviceVulkan12Features>().scalarBlockLayout)
     return "no scalarBlockLayout";
-  if (!features.get<vk::PhysicalDeviceVulkan13Features>().maintenance4)
-    return "no maintenance4";
+  if (!features.get<vk::PhysicalDeviceVulkan13Features>().maintenance4) return "no maintenance4";
   if (!features.get<vk::PhysicalDeviceVulkan13Features>().synchronization2)
     return "no synchronization2";
   const auto subgroup =
@@ -115,8 +119,8 @@ void Device::pick_physical_device(const std::string& wanted_name) {
   }
   if (best == 1000)
     throw Error("Vulkan: no usable device" +
-                (wanted_name.empty() ? "" : " named \"" + wanted_name + "\"") + "; found:" +
-                (found.empty() ? " none" : found));
+                (wanted_name.empty() ? "" : " named \"" + wanted_name + "\"") +
+                "; found:" + (found.empty() ? " none" : found));
 }
 
 void Device::create_device() {
@@ -228,18 +232,20 @@ namespace {
 vk::DeviceSize texel_bytes_of(vk::Format format) {
   switch (format) {
     case vk::Format::eR32G32Sfloat:
-    case vk::Format::eR32G32Uint: return 8;
+    case vk::Format::eR32G32Uint:
+      return 8;
     case vk::Format::eR32G32B32A32Sfloat:
-    case vk::Format::eR32G32B32A32Uint: return 16;
-    default: throw Error("Vulkan: no texel buffer of format " + vk::to_string(format));
+    case vk::Format::eR32G32B32A32Uint:
+      return 16;
+    default:
+      throw Error("Vulkan: no texel buffer of format " + vk::to_string(format));
   }
 }
 
 }  // namespace
 
 Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format) {
-  Buffer result =
-      create_device_buffer(device, size, vk::BufferUsageFlagBits::eUniformTexelBuffer);
+  Buffer result = create_device_buffer(device, size, vk::BufferUsageFlagBits::eUniformTexelBuffer);
   const vk::DeviceSize texel_bytes = texel_bytes_of(format);
   if (result.size / texel_bytes > device.limits().maxTexelBufferElements)
     throw Error("Vulkan: the scene needs a texel buffer of " +
@@ -275,9 +281,9 @@ void download_bytes(Device& device, const Buffer& buffer, std::span<std::byte> b
   device.submit([&](const vk::raii::CommandBuffer& commands) {
     barrier(commands);
     commands.copyBuffer(*buffer.buffer, *staging.buffer, vk::BufferCopy(0, 0, bytes.size()));
-    vk::MemoryBarrier2 to_host(
-        vk::PipelineStageFlagBits2::eCopy, vk::AccessFlagBits2::eTransferWrite,
-        vk::PipelineStageFlagBits2::eHost, vk::AccessFlagBits2::eHostRead);
+    vk::MemoryBarrier2 to_host(vk::PipelineStageFlagBits2::eCopy,
+                               vk::AccessFlagBits2::eTransferWrite,
+                               vk::PipelineStageFlagBits2::eHost, vk::AccessFlagBits2::eHostRead);
     commands.pipelineBarrier2(vk::DependencyInfo({}, to_host));
   });
   std::memcpy(bytes.data(), staging.mapped, bytes.size());
@@ -313,7 +319,11 @@ void barrier(const vk::raii::CommandBuffer& commands) {
 std::shared_ptr<Device> open_device(const DeviceOptions& options) {
   return std::make_shared<Device>(options);
 }
-std::string device_name(const Device& device) { return device.name(); }
-std::uint64_t validation_messages(const Device& device) { return device.validation_messages(); }
+std::string device_name(const Device& device) {
+  return device.name();
+}
+std::uint64_t validation_messages(const Device& device) {
+  return device.validation_messages();
+}
 
 }  // namespace previz::render

@@ -12,11 +12,16 @@ constexpr double pi = std::numbers::pi;
 
 std::uint32_t gpu_type(set::LightType type) {
   switch (type) {
-    case set::LightType::point: return gpu::LIGHT_POINT;
-    case set::LightType::spot: return gpu::LIGHT_SPOT;
-    case set::LightType::directional: return gpu::LIGHT_DIRECTIONAL;
-    case set::LightType::rectangle: return gpu::LIGHT_RECTANGLE;
-    case set::LightType::sphere: return gpu::LIGHT_SPHERE;
+    case set::LightType::point:
+      return gpu::LIGHT_POINT;
+    case set::LightType::spot:
+      return gpu::LIGHT_SPOT;
+    case set::LightType::directional:
+      return gpu::LIGHT_DIRECTIONAL;
+    case set::LightType::rectangle:
+      return gpu::LIGHT_RECTANGLE;
+    case set::LightType::sphere:
+      return gpu::LIGHT_SPHERE;
   }
   return gpu::LIGHT_POINT;
 }
@@ -27,14 +32,18 @@ double power(const gpu::GpuLight& light, double scene_radius) {
   const double area = glm::length(glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v)));
   const double disc = pi * scene_radius * scene_radius;
   switch (light.type) {
-    case gpu::LIGHT_POINT: return gain * emission * 4 * pi;
-    case gpu::LIGHT_SPOT: return gain * emission * 2 * pi * (1 - light.cos_outer);
+    case gpu::LIGHT_POINT:
+      return gain * emission * 4 * pi;
+    case gpu::LIGHT_SPOT:
+      return gain * emission * 2 * pi * (1 - light.cos_outer);
     case gpu::LIGHT_DIRECTIONAL:
       return gain * emission * disc * (light.cone_sr > 0 ? light.cone_sr : 1);
-    case gpu::LIGHT_RECTANGLE: return gain * emission * pi * area;
+    case gpu::LIGHT_RECTANGLE:
+      return gain * emission * pi * area;
     case gpu::LIGHT_SPHERE:
       return gain * emission * pi * 4 * pi * light.radius * light.radius;
-    default: return gain * emission * pi * area;  // triangle: half the area, both sides
+    default:
+      return gain * emission * pi * area;  // triangle: half the area, both sides
   }
 }
 

@@ -1,5 +1,5 @@
-// Lights in the layout the shaders sample: positions relative to the camera, powers, and the odds of
-// picking each.
+// Lights in the layout the shaders sample: positions relative to the camera, powers, and the odds
+// of picking each.
 #pragma once
 
 #include <glm/vec3.hpp>

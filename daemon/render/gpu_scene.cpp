@@ -189,9 +189,8 @@ std::uint32_t GpuScene::features() const {
   if (!scene_.lights.empty() || !emitters_.empty()) result |= gpu::FEATURE_LIGHTS;
   if (std::any_of(scene_.lights.begin(), scene_.lights.end(), can_be_seen))
     result |= gpu::FEATURE_VISIBLE_LIGHTS;
-  if (std::any_of(scene_.instances.begin(), scene_.instances.end(), [](const auto& instance) {
-        return instance.presence != scene::world_both;
-      }))
+  if (std::any_of(scene_.instances.begin(), scene_.instances.end(),
+                  [](const auto& instance) { return instance.presence != scene::world_both; }))
     result |= gpu::FEATURE_FORKS;
   if (sampling_ == set::LightSampling::importance && environment_mean_ > 0)
     result |= gpu::FEATURE_ENVIRONMENT_SAMPLING;
@@ -204,8 +203,8 @@ void GpuScene::describe(gpu::GpuFrame& frame) const {
   frame.light_count = light_count_;
   frame.visible_light_count = visible_light_count_;
   // Light samples are shared out by power; the environment's is what crosses the scene's disc.
-  const double environment_power = environment_mean_ * std::numbers::pi * std::numbers::pi *
-                                   scene_radius_ * scene_radius_;
+  const double environment_power =
+      environment_mean_ * std::numbers::pi * std::numbers::pi * scene_radius_ * scene_radius_;
   const bool sampled = (features() & gpu::FEATURE_ENVIRONMENT_SAMPLING) != 0;
   double share = sampled ? 1.0 : 0.0;
   if (sampled && light_power_ > 0)

@@ -31,8 +31,8 @@ class GpuScene {
   std::vector<const Buffer*> bindings() const;
 
  private:
-  struct MeshPlace {  // where a mesh lies in the shared buffers
-    scene::MeshBvh bvh;            // its texels moved into the shared buffer
+  struct MeshPlace {     // where a mesh lies in the shared buffers
+    scene::MeshBvh bvh;  // its texels moved into the shared buffer
     std::uint32_t first_record = 0;
     std::uint32_t first_triangle = 0;
   };
@@ -57,8 +57,8 @@ class GpuScene {
   std::uint32_t light_count_ = 0, visible_light_count_ = 0;
   double light_power_ = 0;
 
-  Buffer bvh_, vertices_, triangles_, texels_, environment_,
-      importance_, instances_, materials_, textures_, lights_;
+  Buffer bvh_, vertices_, triangles_, texels_, environment_, importance_, instances_, materials_,
+      textures_, lights_;
 };
 
 }  // namespace previz::render

@@ -11,20 +11,20 @@ namespace previz::render {
 struct Layers {
   int width = 0;
   int height = 0;
-  std::int64_t samples = 0;           // per pixel
-  std::vector<glm::vec3> composite;   // mean(M) mean(Lm) + (1 - mean(M)) (Lc + mean(Lm - Lr))
-  std::vector<glm::vec3> mixed;       // mean(Lm)
-  std::vector<glm::vec3> real;        // mean(Lr)
-  std::vector<glm::vec3> diff;        // mean(Lm - Lr), accumulated as a difference
-  std::vector<glm::vec3> normal;      // mean world normal of the mixed world's first hit
-  std::vector<glm::vec3> variance;    // of the composite's mean
-  std::vector<float> mask;            // mean(M), 0..1
-  std::vector<float> depth;           // metres along the optical axis, mean over hits; 0: no hit
+  std::int64_t samples = 0;          // per pixel
+  std::vector<glm::vec3> composite;  // mean(M) mean(Lm) + (1 - mean(M)) (Lc + mean(Lm - Lr))
+  std::vector<glm::vec3> mixed;      // mean(Lm)
+  std::vector<glm::vec3> real;       // mean(Lr)
+  std::vector<glm::vec3> diff;       // mean(Lm - Lr), accumulated as a difference
+  std::vector<glm::vec3> normal;     // mean world normal of the mixed world's first hit
+  std::vector<glm::vec3> variance;   // of the composite's mean
+  std::vector<float> mask;           // mean(M), 0..1
+  std::vector<float> depth;          // metres along the optical axis, mean over hits; 0: no hit
 };
 
 // Counted on the GPU, never silently discarded. The tests demand zeros.
 struct Counters {
-  std::uint64_t rays = 0;              // path segments traced
+  std::uint64_t rays = 0;  // path segments traced
   std::uint64_t shadow_rays = 0;
   std::uint64_t dropped_not_finite = 0;  // NaN or Inf samples
   std::uint64_t dropped_negative = 0;

@@ -101,10 +101,9 @@ void Renderer::begin(const FrameInput& frame) {
 
 void Renderer::render(int samples, const std::function<bool()>& cancelled) {
   Impl& r = *impl_;
-  const bool whole = r.wavefront.render(static_cast<std::uint32_t>(r.samples),
-                                        static_cast<std::uint32_t>(std::max(samples, 0)),
-                                        static_cast<std::uint32_t>(r.estimation.max_depth),
-                                        cancelled);
+  const bool whole = r.wavefront.render(
+      static_cast<std::uint32_t>(r.samples), static_cast<std::uint32_t>(std::max(samples, 0)),
+      static_cast<std::uint32_t>(r.estimation.max_depth), cancelled);
   if (whole) {
     r.samples += samples;
   } else {
@@ -117,8 +116,8 @@ Layers Renderer::layers() const {
   const Impl& r = *impl_;
   const PinholeIntrinsics& lens = r.calibration.intrinsics;
   const auto plate = plate_radiance(r.frame.plate, *r.response, r.frame.exposure);
-  return make_layers(r.wavefront.pixels(), lens.width, lens.height, std::max<std::int64_t>(r.samples, 1),
-                     plate);
+  return make_layers(r.wavefront.pixels(), lens.width, lens.height,
+                     std::max<std::int64_t>(r.samples, 1), plate);
 }
 
 Plate Renderer::picture() const {

@@ -21,7 +21,9 @@ constexpr std::uint32_t block_height = 4;
 constexpr std::uint32_t cpu_slots = 1u << 17;
 constexpr std::uint32_t gpu_slots = 1u << 20;
 
-std::uint32_t round_up(std::uint32_t value, std::uint32_t to) { return (value + to - 1) / to * to; }
+std::uint32_t round_up(std::uint32_t value, std::uint32_t to) {
+  return (value + to - 1) / to * to;
+}
 
 std::uint32_t slots_of(const gpu::GpuBatch& tile) {
   return round_up(tile.width, block_width) * round_up(tile.height, block_height);
@@ -73,8 +75,7 @@ void Wavefront::create_tiles(int width, int height) {
   const auto columns = static_cast<std::uint32_t>(width);
   const auto rows = static_cast<std::uint32_t>(height);
   const std::uint32_t row_slots = round_up(columns, block_width) * block_height;
-  const std::uint32_t most_rows =
-      std::max(max_slots_ / row_slots * block_height, block_height);
+  const std::uint32_t most_rows = std::max(max_slots_ / row_slots * block_height, block_height);
   // Bands of equal height, so that none is left with a few rows.
   const std::uint32_t bands = (rows + most_rows - 1) / most_rows;
   const std::uint32_t band_rows = round_up((rows + bands - 1) / bands, block_height);

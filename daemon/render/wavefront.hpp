@@ -1,5 +1,5 @@
-// The path tracer's passes: generate, then extend, shade and shadow once a segment, then accumulate.
-// Paths are kept in compacted queues; a picture is worked on in tiles of whole rows.
+// The path tracer's passes: generate, then extend, shade and shadow once a segment, then
+// accumulate. Paths are kept in compacted queues; a picture is worked on in tiles of whole rows.
 #pragma once
 
 #include <cstdint>

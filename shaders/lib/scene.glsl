@@ -103,6 +103,17 @@ vec3 position_error(GpuInstance instance, vec3 object_bound, vec3 position) {
                   abs(transform_translation(instance.world_from_object)));
 }
 
+// Bound on how far off its triangle's plane rounding in lib/trace.glsl may see a ray's origin: its
+// distances are combined from the corners', so the error grows with the triangle's size, and for
+// slivers with their aspect, because that is how the weights' own error grows (kept below 256).
+float plane_error(GpuInstance instance, vec3 edge1, vec3 edge2) {
+  const vec3 e1 = transform_vector(instance.world_from_object, edge1);
+  const vec3 e2 = transform_vector(instance.world_from_object, edge2);
+  const float size = max(length(e1), length(e2));
+  const float doubled_area = length(cross(e1 / size, e2 / size));  // over size^2
+  return 8.0 * 5.9604645e-8 * size * clamp(1.0 / doubled_area, 1.0, 256.0);
+}
+
 vec2 triangle_uv(vec4 p0, vec4 n0, vec4 p1, vec4 n1, vec4 p2, vec4 n2, vec3 b) {
   return vec2(p0.w, n0.w) * b.x + vec2(p1.w, n1.w) * b.y + vec2(p2.w, n2.w) * b.z;
 }
@@ -154,7 +165,8 @@ Surface make_surface(GpuHit hit, vec3 direction) {
   s.entering = dot(outward, s.wo) >= 0.0;
   s.geometric_normal = s.entering ? outward : -outward;
   const vec3 bound = position_error(instance, object_bound, s.position);
-  s.error = 2.0 * dot(abs(s.geometric_normal), bound);
+  s.error = 2.0 * dot(abs(s.geometric_normal), bound) +
+            plane_error(instance, p1.xyz - p0.xyz, p2.xyz - p0.xyz);
   const vec3 smooth_normal = transform_normal(instance.object_from_world,
                                               n0.xyz * b.x + n1.xyz * b.y + n2.xyz * b.z);
   const float length_squared = dot(smooth_normal, smooth_normal);

@@ -1,0 +1,148 @@
+// The composite: untouched plates bit for bit, samples independent of how they are asked for, and
+// the equation itself.
+#include <random>
+
+#include "daemon/render/composite.hpp"
+#include "tests/unit/render_fixture.hpp"
+
+namespace previz::testing {
+namespace {
+
+Plate random_plate(int width, int height, int bits) {
+  Plate plate{width, height, bits, {}};
+  std::mt19937 random(7);
+  for (int i = 0; i < 3 * width * height; ++i)
+    plate.samples.push_back(static_cast<std::uint16_t>(random() & ((1u << bits) - 1)));
+  return plate;
+}
+
+Plate show(const View& view, const Plate& plate, int samples) {
+  render::Renderer renderer(shared_device(), {}, view.calibration);
+  renderer.set_scene(view.scene);
+  renderer.set_environment(view.environment, set::LightSampling::importance);
+  renderer.begin({plate, 0.85, view.world_from_camera});
+  renderer.render(samples);
+  expect_clean(renderer.counters());
+  return renderer.picture();
+}
+
+View real_set() {
+  RandomScene options;
+  options.width = 70;
+  options.height = 50;
+  options.virtual_objects = 0;
+  return random_scene(3, options);
+}
+
+TEST(Composite, without_a_virtual_object_the_plate_comes_back_bit_for_bit) {
+  View view = real_set();
+  for (const int bits : {8, 16}) {
+    const Plate plate = random_plate(70, 50, bits);
+    EXPECT_EQ(show(view, plate, 2).samples, plate.samples) << bits << " bits, pinhole";
+  }
+  PinholeIntrinsics& lens = view.calibration.intrinsics;
+  lens.k1 = -0.118;
+  lens.k2 = 0.041;
+  lens.p1 = 0.0009;
+  lens.p2 = -0.0007;
+  lens.k3 = -0.006;
+  const Plate plate = random_plate(70, 50, 8);
+  EXPECT_EQ(show(view, plate, 2).samples, plate.samples) << "distorted";
+  view.calibration.lens = ThinLens{0.05, 1.4, 0.8};
+  EXPECT_EQ(show(view, plate, 2).samples, plate.samples) << "defocused";
+}
+
+TEST(Composite, samples_do_not_depend_on_how_they_are_asked_for) {
+  RandomScene options;
+  options.width = 45;
+  options.height = 31;
+  const View view = random_scene(2, options);
+  render::Renderer renderer(shared_device(), {}, view.calibration);
+  renderer.set_scene(view.scene);
+  renderer.set_environment(view.environment, set::LightSampling::importance);
+  renderer.begin({{}, 1.0, view.world_from_camera});
+  renderer.render(7);
+  const render::Layers whole = renderer.layers();
+  renderer.begin({{}, 1.0, view.world_from_camera});
+  for (const int part : {1, 4, 2}) renderer.render(part);
+  const render::Layers parts = renderer.layers();
+  EXPECT_EQ(parts.samples, 7);
+  EXPECT_EQ(whole.mixed, parts.mixed);
+  EXPECT_EQ(whole.diff, parts.diff);
+  EXPECT_EQ(whole.variance, parts.variance);
+}
+
+// estimator.md: a virtual object over the white half of a black-and-white pixel gives a quarter.
+TEST(Composite, covered_pixels_use_means_not_samples) {
+  gpu::GpuPixel pixel{};
+  // Two samples: one covered (Lm = 0.5, Lr = 1), one not (Lm = Lr = 0).
+  pixel.mixed_high = gpu::vec4(0.5f, 0.5f, 0.5f, 1.0f);
+  pixel.diff_high = gpu::vec4(-0.5f, -0.5f, -0.5f, 0.0f);
+  const std::vector<double> plate(3, 0.5);
+  const render::Layers layers = render::make_layers(std::span(&pixel, 1), 1, 1, 2, plate);
+  // 0.25 + (1 - 0.5) (0.5 - 0.5)
+  EXPECT_FLOAT_EQ(layers.composite[0].g, 0.25f);
+  EXPECT_FLOAT_EQ(layers.real[0].g, 0.5f);
+  EXPECT_FLOAT_EQ(layers.mask[0], 0.5f);
+}
+
+TEST(Composite, two_float_sums_keep_what_one_float_loses) {
+  gpu::GpuPixel pixel{};
+  pixel.mixed_high = gpu::vec4(16777216.0f, 0, 0, 0);
+  pixel.mixed_low = gpu::vec4(0.5f, 0, 0, 0);
+  const render::Layers layers = render::make_layers(std::span(&pixel, 1), 1, 1, 1, {});
+  EXPECT_FLOAT_EQ(layers.mixed[0].r, static_cast<float>(16777216.5));
+  EXPECT_EQ(layers.composite[0].r, 0.0f);  // nothing covered, a black plate, no difference
+}
+
+TEST(Composite, a_frame_of_another_size_is_refused) {
+  const View view = real_set();
+  render::Renderer renderer(shared_device(), {}, view.calibration);
+  renderer.set_scene(view.scene);
+  renderer.set_environment(view.environment, set::LightSampling::importance);
+  EXPECT_THROW(renderer.begin({random_plate(32, 32, 8), 1.0, view.world_from_camera}),
+               std::exception);
+}
+
+// An out-of-focus point becomes a uniform disc of radius fx R |1/z - 1/focus|, whose variance along
+// one axis is radius^2 / 4; the pixel's box adds 1/12 and the emitter its own width^2 / 12.
+TEST(Lens, defocus_is_the_circle_of_confusion) {
+  View view;
+  const double depth = 2.0, width = 0.02;
+  const auto mesh = add_mesh(view.scene, rectangle_mesh({width, width}));
+  glm::dmat4 place(1.0);
+  place[3] = glm::dvec4(0, 0, -depth, 1);
+  add_instance(view.scene, mesh, add_material(view.scene, emitter(glm::vec3(1))), place);
+  view.environment = uniform_environment(glm::vec3(0));
+  view.calibration = pinhole(64, 64, 0.4);
+  view.calibration.lens = ThinLens{0.05, 1.0, 1.0};
+  // Looking down -Z from the origin.
+  view.world_from_camera = look_at({0, 0, 0}, {0, 0, -1});
+  const int samples = 512;
+  const Rendered result = render_view(view, samples);
+  double sum = 0, first = 0, second = 0;
+  for (int y = 0; y < 64; ++y)
+    for (int x = 0; x < 64; ++x) {
+      const double value = result.layers.mixed[64 * y + x].g;
+      sum += value;
+      first += value * x;
+      second += value * x * x;
+    }
+  const double fx = view.calibration.intrinsics.fx;
+  const double radius = fx * 0.025 * std::abs(1 / depth - 1 / 1.0);
+  const double pixels = fx * width / depth;  // the emitter's width
+  const double expected = radius * radius / 4 + 1.0 / 12 + pixels * pixels / 12;
+  const double centre = first / sum;
+  // Every sample that sees the emitter counts 1, so there are sum * samples of them; a mean of n
+  // has the error sqrt(variance / n), a variance the relative error sqrt(2 / n) at most (a normal
+  // distribution's; a disc's tails are shorter).
+  const double contributing = sum * samples;
+  EXPECT_NEAR(centre, 31.5, 4 * std::sqrt(expected / contributing));
+  EXPECT_NEAR((second / sum - centre * centre) / expected, 1, 4 * std::sqrt(2 / contributing));
+  // No light is lost: the same flux as in focus, the emitter's own area in pixels.
+  EXPECT_NEAR(sum / (pixels * pixels), 1, 4 / std::sqrt(contributing));
+  expect_clean(result.counters);
+}
+
+}  // namespace
+}  // namespace previz::testing

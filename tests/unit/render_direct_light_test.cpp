@@ -1,0 +1,142 @@
+// Direct light of every kind of lamp on a Lambert plane, against closed forms.
+#include <numbers>
+
+#include "tests/unit/render_fixture.hpp"
+
+namespace previz::testing {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+constexpr double albedo = 0.6;
+
+// The plane z = 0, seen at the origin from the side by so narrow a picture that the whole of it
+// shows one point.
+View lit_point() {
+  View view;
+  const auto mesh = add_mesh(view.scene, rectangle_mesh({20, 20}));
+  add_instance(view.scene, mesh, add_material(view.scene, diffuse(glm::vec3(albedo))));
+  view.environment = uniform_environment(glm::vec3(0));
+  view.calibration = pinhole(32, 32, 1e-3);
+  view.world_from_camera = look_at({0, -1, 0.5}, {0, 0, 0});
+  return view;
+}
+
+set::Light lamp(set::LightType type) {
+  set::Light light;
+  light.name = "lamp";
+  light.type = type;
+  light.emission = glm::dvec3(2, 3, 5);
+  light.gain_real = 1;
+  return light;
+}
+
+// Mean of the picture against emission * factor, within four standard errors plus `bias`, the share
+// by which the picture's 1 mm extent and single precision may move it.
+void expect_radiance(const View& view, const glm::dvec3& expected, double bias = 2e-4) {
+  set::Estimation estimation;
+  estimation.max_depth = 1;
+  const Rendered result = render_view(view, 64, estimation);
+  const glm::dvec3 measured = mean(result.layers.mixed);
+  double square = 0;
+  for (const glm::vec3& pixel : result.layers.mixed)
+    square += (pixel.g - measured.g) * (pixel.g - measured.g);
+  const auto n = static_cast<double>(result.layers.mixed.size());
+  const double relative_error = std::sqrt(square / (n * (n - 1))) / measured.g;
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(measured[c] / expected[c], 1, 4 * relative_error + bias) << "channel " << c;
+  EXPECT_EQ(mean(result.layers.diff), glm::dvec3(0));  // the same light in both worlds
+  expect_clean(result.counters);
+}
+
+TEST(DirectLight, point) {
+  View view = lit_point();
+  set::Light light = lamp(set::LightType::point);
+  light.position = {1, 1, 2};
+  view.scene.lights.push_back(light);
+  const double d2 = 6;
+  expect_radiance(view, albedo / pi * light.emission * (2 / std::sqrt(d2)) / d2, 1e-3);
+}
+
+TEST(DirectLight, spot_inside_and_between_its_cones) {
+  View view = lit_point();
+  set::Light light = lamp(set::LightType::spot);
+  light.position = {0, 0, 2};
+  const double off_axis = 0.4;
+  light.direction = {std::sin(off_axis), 0, -std::cos(off_axis)};
+  light.inner_cone_rad = 0.2;
+  light.outer_cone_rad = 0.6;
+  view.scene.lights.push_back(light);
+  const double x = (std::cos(off_axis) - std::cos(0.6)) / (std::cos(0.2) - std::cos(0.6));
+  const double falloff = x * x * (3 - 2 * x);
+  expect_radiance(view, albedo / pi * light.emission * falloff / 4.0, 2e-3);
+}
+
+TEST(DirectLight, directional_as_a_point_and_as_a_disc) {
+  for (const double radius : {0.0, 0.00465, 0.2}) {
+    View view = lit_point();
+    set::Light light = lamp(set::LightType::directional);
+    light.direction = glm::normalize(glm::dvec3(0.5, 0.2, -1));
+    light.angular_radius_rad = radius;
+    view.scene.lights.push_back(light);
+    // A uniform disc around the direction brings E cos(theta), whatever its size, while all of it
+    // is above the plane.
+    expect_radiance(view, albedo / pi * light.emission * -light.direction.z);
+  }
+}
+
+TEST(DirectLight, sphere) {
+  View view = lit_point();
+  set::Light light = lamp(set::LightType::sphere);
+  light.position = {1, 0.5, 2};
+  light.radius_m = 0.7;
+  view.scene.lights.push_back(light);
+  // Irradiance pi L (r/d)^2 cos(theta) of a sphere wholly above the horizon.
+  const double d2 = 5.25;
+  expect_radiance(view, albedo * light.emission * 0.49 / d2 * (2 / std::sqrt(d2)), 1e-3);
+}
+
+// Form factor of a rectangle a x b to an element below its corner, parallel, at distance c.
+double corner_form_factor(double a, double b, double c) {
+  const double x = a / c, y = b / c;
+  const double p = std::sqrt(1 + x * x), q = std::sqrt(1 + y * y);
+  return (x / p * std::atan(y / p) + y / q * std::atan(x / q)) / (2 * pi);
+}
+
+TEST(DirectLight, rectangle) {
+  View view = lit_point();
+  set::Light light = lamp(set::LightType::rectangle);
+  light.position = {0, 0, 1.5};
+  light.direction = {0, 0, -1};
+  light.up = {0, 1, 0};
+  light.width_m = 1.2;
+  light.height_m = 0.8;
+  view.scene.lights.push_back(light);
+  expect_radiance(view, albedo * light.emission * 4.0 * corner_form_factor(0.6, 0.4, 1.5), 1e-3);
+}
+
+TEST(DirectLight, emissive_mesh_is_the_same_as_a_rectangle) {
+  View view = lit_point();
+  const auto mesh = add_mesh(view.scene, rectangle_mesh({1.2, 0.8}));
+  glm::dmat4 above(1.0);
+  above[3] = glm::dvec4(0, 0, 1.5, 1);
+  add_instance(view.scene, mesh, add_material(view.scene, emitter(glm::vec3(2, 3, 5))), above);
+  expect_radiance(view, albedo * glm::dvec3(2, 3, 5) * 4.0 * corner_form_factor(0.6, 0.4, 1.5),
+                  1e-3);
+}
+
+TEST(DirectLight, a_gain_scales_its_world_only) {
+  View view = lit_point();
+  set::Light light = lamp(set::LightType::point);
+  light.position = {0, 0, 2};
+  light.gain_mixed = 0.25;
+  light.gain_real = 1;
+  view.scene.lights.push_back(light);
+  const Rendered result = render_view(view, 4);
+  const double full = albedo / pi * 3 / 4;
+  EXPECT_NEAR(mean(result.layers.mixed).g / full, 0.25, 1e-3);
+  EXPECT_NEAR(mean(result.layers.real).g / full, 1, 1e-3);
+  expect_clean(result.counters);
+}
+
+}  // namespace
+}  // namespace previz::testing
