@@ -56,7 +56,9 @@ void fill_normals(scene::Mesh& mesh) {
   }
 }
 
-scene::Mesh ground(float edge, int cells) {
+}  // namespace
+
+scene::Mesh grid(float edge, int cells) {
   scene::Mesh mesh;
   for (int y = 0; y <= cells; ++y)
     for (int x = 0; x <= cells; ++x)
@@ -71,10 +73,9 @@ scene::Mesh ground(float edge, int cells) {
       mesh.triangles.emplace_back(i, i + row + 1, i + row);
     }
   }
+  fill_normals(mesh);
   return mesh;
 }
-
-}  // namespace
 
 scene::Mesh bumpy_sphere(int levels, double radius, double bumps, std::uint32_t seed) {
   scene::Mesh mesh = icosahedron();
@@ -100,7 +101,7 @@ scene::Mesh sphere_field(std::size_t triangles) {
   const int side = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(spheres))));
   std::mt19937 random(7);
   std::uniform_real_distribution<double> radius(0.25, 0.6);
-  scene::Mesh mesh = ground(static_cast<float>(side) + 2.0f, 8);
+  scene::Mesh mesh = grid(static_cast<float>(side) + 2.0f, 8);
   for (std::size_t i = 0; i < spheres; ++i) {
     const double r = radius(random);
     const auto x = static_cast<float>(i % static_cast<std::size_t>(side));

@@ -11,6 +11,9 @@ namespace previz::bench {
 // up to `bumps` of itself.
 scene::Mesh bumpy_sphere(int levels, double radius, double bumps, std::uint32_t seed);
 
+// A square in the plane z = 0 around the origin, of cells * cells squares of two triangles.
+scene::Mesh grid(float edge, int cells);
+
 // A field of bumpy spheres of various sizes on a ground, of about so many triangles: one mesh.
 scene::Mesh sphere_field(std::size_t triangles);
 
