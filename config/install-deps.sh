@@ -16,7 +16,7 @@ packages=(
   # files, command line, log, hashes
   libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libspdlog-dev libfmt-dev libssl-dev
   # tests
-  libgtest-dev libbenchmark-dev
+  libgtest-dev libgmock-dev libbenchmark-dev
 )
 
 missing=()
