@@ -50,7 +50,8 @@ TEST(StageThreads, MailboxDropsAreCountedByStageAndCause) {
   stages.source("camera", mailbox, count_to(5000));
   stages.sink("display", mailbox, [&](std::unique_ptr<int>) { ++shown; });
   stages.wait();
-  const auto& dropped = metrics.snapshot(1).stages.at("display").dropped;
+  const MetricsSnapshot snapshot = metrics.snapshot(1);
+  const auto& dropped = snapshot.stages.at("display").dropped;
   const std::uint64_t count = dropped.contains("newer frame") ? dropped.at("newer frame") : 0;
   EXPECT_EQ(shown + count, 5000u);
 }
