@@ -11,18 +11,18 @@
 namespace previz::lighting {
 
 int resolution_for(double pixel_sr) {
-  int size = min_resolution;
-  while (size < max_resolution && texel_sr(size) > pixel_sr) size *= 2;
+  int size = 1;
+  while (size < max_chosen_resolution && texel_sr(size) > pixel_sr) size *= 2;
   return size;
 }
 
 int chosen_resolution(int setting, double pixel_sr) {
   if (setting == 0) return resolution_for(pixel_sr);
   const bool power_of_two = setting > 0 && (setting & (setting - 1)) == 0;
-  if (!power_of_two || setting < min_resolution || setting > max_resolution)
+  if (!power_of_two || setting > max_resolution)
     throw Error("lighting.resolution is " + std::to_string(setting) +
-                "; allowed are 0 (from the source) and powers of two from " +
-                std::to_string(min_resolution) + " to " + std::to_string(max_resolution));
+                "; allowed are 0 (from the source) and powers of two up to " +
+                std::to_string(max_resolution));
   return setting;
 }
 

@@ -31,13 +31,14 @@ struct Lighting {
   EnvironmentReport report;
 };
 
-inline constexpr int min_resolution = 16;
-inline constexpr int max_resolution = 2048;
+inline constexpr int max_resolution = 4096;
+inline constexpr int max_chosen_resolution = 2048;  // where the set leaves it to the source
 
-// Texels a side of the smallest map whose texels are not larger than `pixel_sr`, within the limits.
+// Texels a side of the smallest map whose texels are not larger than `pixel_sr`, at most
+// max_chosen_resolution.
 int resolution_for(double pixel_sr);
 // The set's lighting.resolution, where 0 stands for resolution_for(pixel_sr). Throws previz::Error
-// if it is not a power of two within the limits.
+// if it is not a power of two up to max_resolution.
 int chosen_resolution(int setting, double pixel_sr);
 
 double texel_sr(int size);

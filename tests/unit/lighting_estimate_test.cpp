@@ -83,6 +83,18 @@ TEST(Estimate, UniformSkyIsUniformWhereSeen) {
   }
 }
 
+TEST(Estimate, OneTexelHoldsTheWholeSphere) {
+  const LightCameraCalibration camera = fisheye_camera();
+  const FramePtr frame = photograph(camera, uniform, 0.25);
+  set::Lighting settings = constant_fill(9);
+  settings.resolution = 1;
+  const Lighting lighting = estimate({&frame, 1}, camera, settings);
+  ASSERT_EQ(lighting.environment.radiance.size(), 1u);
+  const double seen = lighting.report.seen_sr / (4 * pi);
+  EXPECT_NEAR(seen, 0.5 * (1 - std::cos(100 * degree)), 0.01);
+  EXPECT_NEAR(lighting.environment.radiance[0].g, 2 * seen + 9 * (1 - seen), 1e-3);
+}
+
 // Discs of 2 degrees radius: flux within 1 % and direction within a tenth of a degree, wherever
 // they stand, on the map's folds and poles too, at any resolution.
 TEST(Estimate, LampsKeepFluxAndDirection) {
@@ -287,7 +299,8 @@ TEST(Estimate, ResolutionFollowsTheSourceOrTheSet) {
   EXPECT_EQ(chosen_resolution(0, 4 * pi / (512.0 * 512.0) * 0.999), 1024);
   EXPECT_EQ(chosen_resolution(0, 1e-12), 2048);
   EXPECT_EQ(chosen_resolution(64, 1e-12), 64);
-  for (int refused : {-1, 8, 100, 4096}) EXPECT_THROW(chosen_resolution(refused, 1), Error);
+  EXPECT_EQ(chosen_resolution(4096, 1), 4096);
+  for (int refused : {-1, 100, 8192}) EXPECT_THROW(chosen_resolution(refused, 1), Error);
 }
 
 TEST(Estimate, RefusesFramesAndPosesThatDoNotFit) {
