@@ -18,6 +18,7 @@ struct Path {
   vec3 throughput;
   uint worlds;
   uint depth;
+  bool rough;  // some vertex so far scattered by a lobe that is not Dirac
 };
 
 Path load_path(uint index) {
@@ -26,15 +27,18 @@ Path load_path(uint index) {
   const vec4 throughput = path_throughput[index];
   const uint bits = floatBitsToUint(throughput.w);
   return Path(index, index >> 1, origin.xyz, origin.w, direction.xyz, direction.w, throughput.rgb,
-              path_worlds(bits), path_depth(bits));
+              path_worlds(bits), path_depth(bits), (bits & PATH_ROUGH) != 0u);
 }
 
 void store_path(Path p, uint index) {
   ray_origin[index] = vec4(p.origin, p.t_min);
   ray_direction[index] = vec4(p.direction, p.pdf);
-  path_throughput[index] =
-      vec4(p.throughput, uintBitsToFloat(p.worlds | (p.depth << PATH_DEPTH_SHIFT)));
+  const uint bits = p.worlds | (p.rough ? PATH_ROUGH : 0u) | (p.depth << PATH_DEPTH_SHIFT);
+  path_throughput[index] = vec4(p.throughput, uintBitsToFloat(bits));
 }
+
+// The light at the end of this path is a caustic's: rough, then Dirac lobes only.
+bool is_caustic(Path p) { return p.rough && p.pdf <= 0.0; }
 
 // Power heuristic; pdf = 0 stands for a Dirac direction, which a light sample cannot find.
 float mis_weight(float pdf, float other) {
@@ -125,6 +129,7 @@ bool scatter(inout Path p, Surface s, Lobes l, Sampler random, float choice) {
   p.t_min = 0.0;
   p.direction = direction;
   p.pdf = pdf;
+  p.rough = p.rough || pdf > 0.0;
   return true;
 }
 
@@ -153,9 +158,11 @@ void main() {
   if (active_path) {
     p = load_path(queue[active_queue_index(gl_GlobalInvocationID.x)]);
     const GpuHit hit = hits[p.index];
-    if (has_feature(FEATURE_VISIBLE_LIGHTS)) meet_lights(p, hit.t < 0.0 ? 3.4e38 : hit.t);
+    const bool takes_light = has_feature(FEATURE_CAUSTICS) || !is_caustic(p);
+    if (has_feature(FEATURE_VISIBLE_LIGHTS) && takes_light)
+      meet_lights(p, hit.t < 0.0 ? 3.4e38 : hit.t);
     if (hit.t < 0.0) {
-      meet_environment(p);
+      if (takes_light) meet_environment(p);
     } else {
       const uint presence = instances[hit.instance].presence & p.worlds;
       if (has_feature(FEATURE_FORKS) && presence != p.worlds) {
@@ -165,7 +172,7 @@ void main() {
       }
       const Surface s = make_surface(hit, p.direction);
       if (p.depth == 0u && (p.worlds & WORLD_MIXED) != 0u) write_aov(p, s, hit.t);
-      meet_emission(p, s, hit);
+      if (takes_light) meet_emission(p, s, hit);
       if (p.depth < frame.max_depth) {
         const uvec2 pixel = uvec2(batch.x, batch.y) + slot_pixel(p.slot);
         const Sampler random = make_sampler(frame.seed, pixel, slot_sample(p.slot));

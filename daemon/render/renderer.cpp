@@ -94,8 +94,10 @@ void Renderer::begin(const FrameInput& frame) {
   std::vector<const Buffer*> bindings = r.scene.bindings();
   bindings[gpu::BINDING_RAYS] = &r.rays;
   bindings[gpu::BINDING_FRAME] = &r.frame_buffer;
-  const bool thin_lens = r.calibration.lens && r.calibration.lens->focal_length_m > 0;
-  r.wavefront.bind(bindings, r.scene.features() | (thin_lens ? gpu::FEATURE_LENS : 0u));
+  std::uint32_t features = r.scene.features();
+  if (r.calibration.lens) features |= gpu::FEATURE_LENS;
+  if (r.estimation.caustics) features |= gpu::FEATURE_CAUSTICS;
+  r.wavefront.bind(bindings, features);
   r.wavefront.clear();
 }
 

@@ -102,6 +102,7 @@ struct Estimation {
   int roulette_depth = 4;  // Russian roulette from this vertex on
   std::uint32_t seed = 1;
   double specular_roughness = 1e-3;  // alpha at or below which a lobe is a Dirac delta
+  bool caustics = true;              // light that reaches a rough surface by mirrors and glass only
 };
 
 struct Quality {

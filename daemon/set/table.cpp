@@ -182,6 +182,7 @@ Keys estimator_keys(Estimation& e) {
       {"roulette_depth", &e.roulette_depth, plain.within(1, 64), "Russian roulette ends paths from this vertex on."},
       {"seed", &e.seed, plain, "The same seed gives the same noise."},
       {"specular_roughness", &e.specular_roughness, plain.within(0, 0.1), "GGX alpha at or below which a surface is a perfect mirror."},
+      {"caustics", &e.caustics, plain, "Light that mirrors and glass throw onto rough surfaces; false leaves it out, with its noise."},
   };
 }
 

@@ -58,11 +58,12 @@ PREVIZ_CONST uint FEATURE_VISIBLE_LIGHTS = 16u;  // lights with an extent that r
 PREVIZ_CONST uint FEATURE_LENS = 32u;
 PREVIZ_CONST uint FEATURE_FORKS = 64u;        // any object present in one world only
 PREVIZ_CONST uint FEATURE_ENVIRONMENT_SAMPLING = 128u;  // next-event estimation of the environment
+PREVIZ_CONST uint FEATURE_CAUSTICS = 256u;  // light that reaches a rough vertex by Dirac lobes only
 
 // Bits of a path's state.
 PREVIZ_CONST uint PATH_WORLDS_MASK = 3u;      // WORLD_*
 PREVIZ_CONST uint PATH_DEPTH_SHIFT = 8u;      // number of surface vertices so far
-PREVIZ_CONST uint PATH_RESUMED = 4u;          // a fork that goes on along the ray that parted
+PREVIZ_CONST uint PATH_ROUGH = 4u;            // some vertex so far scattered by a non-Dirac lobe
 
 struct GpuHit {
   float t;  // < 0: nothing hit
