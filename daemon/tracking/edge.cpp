@@ -301,7 +301,8 @@ std::optional<EdgeFit> fit_edge(const Luminance& luminance, const PinholeIntrins
                      line.a + line.normal * 1e3);
     total_shift += std::max(std::abs(p[kEndA]), std::abs(p[kEndB]));
     if (round < 2) p[kEndA] = p[kEndB] = 0;
-    if (total_shift > 1.5 * kSearchPx) return *why = "not where the detector saw it", std::nullopt;
+    if (total_shift > 1.5 * kSearchPx + 2 * p[kBlur])
+      return *why = "not where the detector saw it", std::nullopt;
     // Stay clear of the next printed cell and of the corners by what the blur carries over; as far
     // to one side as to the other, so that a blur that is not Gaussian cannot shift the line.
     const double free = std::min(guess.dark_depth_px, guess.bright_depth_px) - 0.5 - 2 * p[kBlur];

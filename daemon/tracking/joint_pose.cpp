@@ -12,10 +12,9 @@
 namespace previz::tracking {
 namespace {
 
-// What the picture's noise does not say: lens model, print, map. Added to every corner coordinate.
+// What the picture's noise does not say (lens model, response, print, map) is a further deviation
+// of every corner coordinate: at least this, more where the residuals ask for it.
 constexpr double kCornerFloorPx = 0.03;
-// The residuals' own variance is trusted by its degrees of freedom against this many of the stated.
-constexpr double kPriorDegrees = 8;
 constexpr double kDecisiveDrop = 4;
 
 using Vector6 = cv::Matx<double, 6, 1>;
@@ -26,9 +25,9 @@ glm::dvec3 corner_in_world(const TagObservation& tag, std::size_t i) {
   return glm::dvec3(tag.world_from_tag * glm::dvec4(tag_corner(tag.size_m, i), 1));
 }
 
-Whitening whitening(const TagObservation& tag) {
+Whitening whitening(const TagObservation& tag, double model_error_px) {
   Whitening c(tag.covariance.data());
-  for (int i = 0; i < 8; ++i) c(i, i) += kCornerFloorPx * kCornerFloorPx;
+  for (int i = 0; i < 8; ++i) c(i, i) += model_error_px * model_error_px;
   Whitening l = Whitening::zeros();  // Cholesky
   for (int i = 0; i < 8; ++i) {
     for (int j = 0; j <= i; ++j) {
@@ -109,12 +108,19 @@ struct Accumulated {
 
 class Problem {
  public:
-  Problem(const std::vector<TagObservation>& tags, const PinholeIntrinsics& lens) : lens_(lens) {
+  Problem(const std::vector<TagObservation>& tags, const PinholeIntrinsics& lens)
+      : lens_(lens), observations_(tags) {
     for (const TagObservation& tag : tags) {
-      Prepared p{{}, tag.corners, whitening(tag)};
+      Prepared p{{}, tag.corners, {}};
       for (std::size_t i = 0; i < 4; ++i) p.world[i] = corner_in_world(tag, i);
       tags_.push_back(p);
     }
+    set_model_error(kCornerFloorPx);
+  }
+
+  void set_model_error(double px) {
+    for (std::size_t i = 0; i < tags_.size(); ++i)
+      tags_[i].whiten = whitening(observations_[i], px);
   }
 
   Accumulated accumulate(const std::vector<std::size_t>& used, const CameraFromWorld& pose,
@@ -171,6 +177,7 @@ class Problem {
 
  private:
   const PinholeIntrinsics& lens_;
+  const std::vector<TagObservation>& observations_;
   std::vector<Prepared> tags_;
 };
 
@@ -207,9 +214,7 @@ FittedPose describe(const Problem& problem, const std::vector<TagObservation>& t
   fit.chi_square = sum.cost;
   fit.degrees_of_freedom = int(8 * used.size()) - 6;
   fit.rms_px = rms_px(tags, lens, pose, used);
-  const double variance =
-      std::max(1.0, (fit.chi_square + kPriorDegrees) / (fit.degrees_of_freedom + kPriorDegrees));
-  const Matrix6 covariance = variance * inverse_scaled(sum.information);
+  const Matrix6 covariance = inverse_scaled(sum.information);
   std::copy(covariance.val, covariance.val + 36, fit.covariance.begin());
   return fit;
 }
@@ -307,6 +312,22 @@ void let_go(const Problem& problem, const std::vector<TagObservation>& tags,
   }
 }
 
+// The least model error with which the residuals are no larger than their degrees of freedom let
+// expect, one standard deviation allowed: few tags say little about it.
+double model_error_px(Problem& problem, const PinholeIntrinsics& lens, const Consensus& consensus) {
+  const double degrees = 8.0 * double(consensus.used.size()) - 6;
+  const double expected = degrees + std::sqrt(2 * degrees);
+  double error = kCornerFloorPx;
+  CameraFromWorld pose = consensus.pose;
+  while (error < consistency_gate_px(lens)) {
+    problem.set_model_error(error);
+    pose = problem.minimise(consensus.used, pose, {}, 20).value_or(pose);
+    if (problem.accumulate(consensus.used, pose, {}, false).cost <= expected) break;
+    error *= 1.2;
+  }
+  return error;
+}
+
 }  // namespace
 
 glm::dmat4 world_from_camera(const CameraFromWorld& pose) {
@@ -351,7 +372,7 @@ std::vector<FittedPose> solve_joint_pose(const std::vector<TagObservation>& tags
                                          const PinholeIntrinsics& lens,
                                          const std::optional<CameraFromWorld>& seed) {
   if (tags.empty()) return {};
-  const Problem problem(tags, lens);
+  Problem problem(tags, lens);
   std::vector<CameraFromWorld> starts = pose_starts(tags, lens);
   if (seed) starts.insert(starts.begin(), *seed);
 
@@ -375,9 +396,15 @@ std::vector<FittedPose> solve_joint_pose(const std::vector<TagObservation>& tags
     if (!largest.empty() && largest.front().used.size() == tags.size()) break;
   }
 
-  std::vector<FittedPose> poses;
+  double error = HUGE_VAL;
   for (Consensus& c : largest) {
+    problem.set_model_error(kCornerFloorPx);
     let_go(problem, tags, lens, &c);
+    error = std::min(error, model_error_px(problem, lens, c));
+  }
+  problem.set_model_error(error);
+  std::vector<FittedPose> poses;
+  for (const Consensus& c : largest) {
     std::vector<CameraFromWorld> from = starts;
     from.insert(from.begin(), c.pose);
     for (FittedPose& fit : minima(problem, tags, lens, c.used, from))

@@ -38,7 +38,7 @@ struct FittedPose {
   // times the small motion (rotation, translation), both along the camera's axes.
   std::array<double, 36> covariance{};
   double rms_px = 0;      // of the used corners, per coordinate pair
-  double chi_square = 0;  // of the used corners against their stated covariance
+  double chi_square = 0;  // of the used corners against the covariance they were given
   int degrees_of_freedom = 0;
   std::vector<std::size_t> used;  // indices of the observations it explains
 };
@@ -49,8 +49,9 @@ double consistency_gate_px(const PinholeIntrinsics& lens);
 // Every local minimum that explains the largest number of tags, better (by chi-square) first. Those
 // with different `used` are tags at odds, equally many on either side. `seed` is a further start
 // beside those of pose_starts. Levenberg-Marquardt from each, over all tags with a loss that lets
-// go of tags at odds with the rest (a moved tag); then over the tags that remain, with their stated
-// covariance. Empty where no pose explains a tag.
+// go of tags at odds with the rest (a moved tag); then over the tags that remain, with their
+// covariance and a model error of at least 0.03 px, as large as their residuals ask for. Empty
+// where no pose explains a tag.
 std::vector<FittedPose> solve_joint_pose(const std::vector<TagObservation>& tags,
                                          const PinholeIntrinsics& lens,
                                          const std::optional<CameraFromWorld>& seed);

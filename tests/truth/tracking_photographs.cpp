@@ -14,6 +14,7 @@
 #include <sstream>
 
 #include "daemon/tracking/apriltag_tracker.hpp"
+#include "daemon/tracking/joint_pose.hpp"
 #include "daemon/tracking/tag_detector.hpp"
 #include "drivers/error.hpp"
 #include "tests/truth/tracking_measure.hpp"
@@ -39,6 +40,29 @@ std::map<std::string, std::set<int>> read_listed_ids(const std::filesystem::path
     for (int id; words >> id;) listed[name].insert(id);
   }
   return listed;
+}
+
+// Corners as libapriltag itself has them (one detection an id), in OpenCV's pixels.
+std::map<std::string, std::map<int, tracking::CornerPixels>> read_baseline(
+    const std::filesystem::path& file) {
+  std::ifstream in(file);
+  if (!in) throw Error(file.string() + ": cannot be opened");
+  std::map<std::string, std::map<int, tracking::CornerPixels>> corners;
+  std::string line;
+  std::getline(in, line);  // the heading
+  while (std::getline(in, line)) {
+    std::replace(line.begin(), line.end(), ',', ' ');
+    std::istringstream words(line);
+    std::string name;
+    int id, hamming;
+    double margin;
+    tracking::CornerPixels c;
+    words >> name >> id >> hamming >> margin;
+    for (glm::dvec2& p : c) words >> p.x >> p.y;
+    for (glm::dvec2& p : c) p -= 0.5;
+    if (words) corners[name][id] = c;
+  }
+  return corners;
 }
 
 struct RoomMap {
@@ -72,18 +96,20 @@ RoomMap read_room_map(const std::filesystem::path& file, int width, int height) 
 
 }  // namespace
 
-RoomResult measure_room(const std::filesystem::path& apriltag, double decimate) {
+RoomResult measure_room(const std::filesystem::path& apriltag, double decimate,
+                        const ResponseCurve& response) {
   RoomResult result;
   result.least_margin = HUGE_VAL;
-  double squares = 0, several_squares = 0;
-  int corners = 0, several_corners = 0;
+  double squares = 0, several_squares = 0, library_squares = 0;
+  int corners = 0, several_corners = 0, library_corners = 0;
+  const auto library = read_baseline(apriltag / "room" / "baseline_libapriltag_3.3.0.csv");
   for (const auto& [name, ids] : read_listed_ids(apriltag / "room" / "groundtruth_ids.txt")) {
     const std::filesystem::path file = apriltag / "room" / name;
     if (!std::filesystem::exists(file)) continue;
     const Frame frame = read_frame(file);
     const RoomMap map =
         read_room_map(apriltag / "room" / "tag_map_derived.json", frame.width, frame.height);
-    tracking::TagDetector detector({}, map.lens, {});
+    tracking::TagDetector detector({}, map.lens, response);
     ++result.photographs;
     result.listed += int(ids.size());
     std::set<int> seen;
@@ -103,7 +129,8 @@ RoomResult measure_room(const std::filesystem::path& apriltag, double decimate) 
 
     set::Tracking settings = map.settings;
     settings.decimate = decimate;
-    const tracking::Track track = tracking::make_apriltag_tracker(settings, map.lens)->track(frame);
+    const tracking::Track track =
+        tracking::make_apriltag_tracker(settings, map.lens, response)->track(frame);
     if (track.status != tracking::TrackStatus::tracked) {
       ++(track.status == tracking::TrackStatus::lost ? result.lost : result.ambiguous);
       result.not_tracked.push_back(name + ": " + track.reason);
@@ -113,6 +140,18 @@ RoomResult measure_room(const std::filesystem::path& apriltag, double decimate) 
     if (!track.reason.empty()) result.left_out.push_back(name + ": " + track.reason);
     const double rms = track.pose->reprojection_rms_px;
     const int n = int(4 * track.pose->tags.size());
+    for (const set::Tag& tag : map.settings.tags) {
+      const auto photograph = library.find(name);
+      if (photograph == library.end() || !photograph->second.contains(tag.id)) continue;
+      tracking::TagObservation seen_by_library;
+      seen_by_library.size_m = tag.size_m;
+      seen_by_library.world_from_tag = tag.world_from_tag;
+      seen_by_library.corners = photograph->second.at(tag.id);
+      const double e = tracking::tag_error_px(
+          seen_by_library, tracking::camera_from_world(track.pose->world_from_camera), map.lens);
+      library_squares += 4 * e * e;
+      library_corners += 4;
+    }
     squares += n * rms * rms;
     corners += n;
     result.worst_px = std::max(result.worst_px, rms);
@@ -122,6 +161,7 @@ RoomResult measure_room(const std::filesystem::path& apriltag, double decimate) 
     several_corners += n;
   }
   result.rms_px = std::sqrt(squares / std::max(1, corners));
+  result.library_rms_px = std::sqrt(library_squares / std::max(1, library_corners));
   result.several_rms_px = std::sqrt(several_squares / std::max(1, several_corners));
   return result;
 }

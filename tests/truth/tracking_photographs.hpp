@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "drivers/calibration.hpp"
+
 namespace previz::truth {
 
 struct RoomResult {
@@ -17,12 +19,14 @@ struct RoomResult {
   std::vector<std::string> not_tracked;  // file and reason
   std::vector<std::string> left_out;     // file and reason, of tracked ones
   double rms_px = 0, worst_px = 0;       // corners of the used tags, in the given map
+  double library_rms_px = 0;             // libapriltag's own corners under these poses
   int poses_of_several = 0;
   double several_rms_px = 0;  // the same, of photographs with two tags or more
 };
 
 // `apriltag/room` against the authors' list and the given map, without tag 13, which moved.
-RoomResult measure_room(const std::filesystem::path& apriltag, double decimate);
+RoomResult measure_room(const std::filesystem::path& apriltag, double decimate,
+                        const ResponseCurve& response = {});
 
 struct CountResult {
   int tags = 0, refined = 0;
