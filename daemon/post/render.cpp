@@ -234,7 +234,7 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
     stages.stage("tracking", seen, tracked, step(track));
     stages.stage("lighting", tracked, lit, step(light));
     stages.stage("render", lit, rendered, step(render));
-    stages.sink("output", rendered, [&](Shot shot) {
+    stages.sink("output", rendered, [&](const Shot& shot) {
       if (!shot.whole) return;
       directory.write(shot, set);
       if (const std::string dropped = dropped_text(shot.counters); !dropped.empty())
