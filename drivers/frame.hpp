@@ -11,17 +11,17 @@ namespace previz {
 
 // Sample layouts a driver may deliver. 16-bit samples are little-endian, full range 0..65535.
 enum class PixelFormat {
-  rgb8,       // interleaved R,G,B, 8 bit
-  rgb16,      // interleaved R,G,B, 16 bit
-  gray8,      // one plane, 8 bit
-  gray16,     // one plane, 16 bit (also raw Bayer)
-  yuv422p8,   // planar Y, Cb, Cr; chroma half width; BT.709 limited range
+  rgb8,      // interleaved R,G,B, 8 bit
+  rgb16,     // interleaved R,G,B, 16 bit
+  gray8,     // one plane, 8 bit
+  gray16,    // one plane, 16 bit (also raw Bayer)
+  yuv422p8,  // planar Y, Cb, Cr; chroma half width; BT.709 limited range
 };
 
 // Immutable once published; stages share it by FramePtr.
 struct Frame {
-  std::string source;          // device role: "observer" or "light"
-  std::uint64_t sequence = 0;  // the device's own counter; a gap is a dropped frame
+  std::string source;             // device role: "observer" or "light"
+  std::uint64_t sequence = 0;     // the device's own counter; a gap is a dropped frame
   std::int64_t timestamp_ns = 0;  // capture time, session clock
   std::int64_t arrival_ns = 0;    // when the host received it, same clock
   double exposure_s = 0.0;        // shutter time; 0 where unknown
@@ -50,8 +50,8 @@ PixelFormat pixel_format_from_string(const std::string& name);
 struct Plate {
   int width = 0;
   int height = 0;
-  int bits = 8;                         // 8 or 16 significant bits a sample
-  std::vector<std::uint16_t> samples;   // 3*width*height, row-major, 0..2^bits-1
+  int bits = 8;                        // 8 or 16 significant bits a sample
+  std::vector<std::uint16_t> samples;  // 3*width*height, row-major, 0..2^bits-1
 };
 
 // Converts a frame to its RGB plate. gray repeats the sample; yuv422p8 is BT.709 limited range

@@ -16,7 +16,8 @@ struct Table {
   std::vector<std::string> column(const std::string& name) const;
 };
 
-// Comma-separated, a header line and at least one row, no quotes. Throws previz::Error naming file and line.
+// Comma-separated, a header line and at least one row, no quotes. Throws previz::Error naming file
+// and line.
 Table read_csv(const std::filesystem::path& file);
 
 // One number "%d" or "%0Nd" in the file name: all such files, by number, without a gap. Wildcards *

@@ -13,6 +13,17 @@ namespace {
 
 using std::chrono::nanoseconds;
 
+// Recorded times can be anything; arithmetic on them wraps rather than overflows.
+std::int64_t sum(std::int64_t a, std::int64_t b) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
+}
+std::int64_t difference(std::int64_t a, std::int64_t b) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
+}
+std::int64_t product(std::int64_t a, std::int64_t b) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) * static_cast<std::uint64_t>(b));
+}
+
 class ReplayCamera final : public Camera {
  public:
   ReplayCamera(std::unique_ptr<session::StreamReader> stream, std::string name,
@@ -59,24 +70,28 @@ class ReplayCamera final : public Camera {
   }
 
  private:
+  // How much later this lap is than the recording.
+  std::int64_t shift_ns() const { return product(lap_, lap_ns()); }
+
   std::int64_t timestamp_ns(std::size_t index) const {
-    return stream_->records()[index].timestamp_ns + lap_ * lap_ns();
+    return sum(stream_->records()[index].timestamp_ns, shift_ns());
   }
 
   ReplayClock::Time due_time() const {
+    constexpr double one_year_ns = 366.0 * 86'400e9;
     const auto elapsed_ns =
-        static_cast<double>(timestamp_ns(index_) - options_.origin->timestamp_ns);
-    return options_.origin->due +
-           nanoseconds(static_cast<std::int64_t>(elapsed_ns / options_.speed));
+        static_cast<double>(difference(timestamp_ns(index_), options_.origin->timestamp_ns));
+    const double wait_ns = std::clamp(elapsed_ns / options_.speed, -one_year_ns, one_year_ns);
+    return options_.origin->due + nanoseconds(static_cast<std::int64_t>(wait_ns));
   }
 
   // From a frame to the same frame a lap later: the frames' span and one mean interval.
   std::int64_t lap_ns() const {
     const auto& records = stream_->records();
     const std::int64_t span =
-        records[options_.last].timestamp_ns - records[options_.first].timestamp_ns;
+        difference(records[options_.last].timestamp_ns, records[options_.first].timestamp_ns);
     const auto intervals = static_cast<std::int64_t>(options_.last - options_.first);
-    return intervals > 0 ? span + span / intervals : 1'000'000'000;
+    return intervals > 0 ? sum(span, span / intervals) : 1'000'000'000;
   }
 
   std::uint64_t lap_sequence() const {
@@ -102,8 +117,8 @@ class ReplayCamera final : public Camera {
   FramePtr on_this_lap(FramePtr recorded) const {
     if (lap_ == 0) return recorded;
     auto frame = std::make_shared<Frame>(*recorded);
-    frame->timestamp_ns += lap_ * lap_ns();
-    frame->arrival_ns += lap_ * lap_ns();
+    frame->timestamp_ns = sum(frame->timestamp_ns, shift_ns());
+    frame->arrival_ns = sum(frame->arrival_ns, shift_ns());
     frame->sequence += static_cast<std::uint64_t>(lap_) * lap_sequence();
     return frame;
   }

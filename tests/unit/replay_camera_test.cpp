@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "drivers/error.hpp"
 #include "drivers/replay/replay_camera.hpp"
@@ -128,6 +129,26 @@ TEST_F(Replay, StreamsShareAnOrigin) {
   EXPECT_TRUE(std::holds_alternative<NoFrame>(camera->next(milliseconds(499))));
   EXPECT_TRUE(std::holds_alternative<FramePtr>(camera->next(milliseconds(499))));
   EXPECT_EQ(elapsed(), milliseconds(500));
+}
+
+TEST_F(Replay, AbsurdTimesDoNoHarm) {
+  const std::filesystem::path odd = directory_.path() / "odd";
+  {
+    session::SessionWriter writer(odd, {});
+    for (const std::int64_t time : {std::numeric_limits<std::int64_t>::max(), std::int64_t{0},
+                                    std::numeric_limits<std::int64_t>::min()}) {
+      Frame frame = session::noise_frame("observer", 0, PixelFormat::gray8, 16, 16);
+      frame.timestamp_ns = frame.arrival_ns = time;
+      writer.write(frame);
+    }
+  }
+  for (const double speed : {1.0, 1e-300, 1e300}) {
+    ReplayOptions options;
+    options.speed = speed;
+    options.loop = true;
+    const auto camera = open_replay(odd, "observer", options, time_.clock());
+    for (int i = 0; i < 9; ++i) camera->next(milliseconds(1));
+  }
 }
 
 TEST_F(Replay, WhatTheSessionLacksIsToldFirst) {

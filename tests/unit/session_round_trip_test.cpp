@@ -22,22 +22,22 @@ TEST_P(RoundTrip, EveryFrameComesBackBitForBit) {
   const TemporaryDirectory directory;
   {
     SessionWriter writer(directory.path(), {});
-    for (int i = 0; i < 5; ++i) writer.write(noise_frame("observer", i, format, width, height));
+    for (int i = 0; i < 3; ++i) writer.write(noise_frame("observer", i, format, width, height));
     writer.close();
   }
   Session session = open_session(directory.path());
   const auto stream = open_stream(session, "observer");
   ASSERT_TRUE(stream);
   EXPECT_TRUE(session.missing.empty()) << session.missing.front();
-  ASSERT_EQ(stream->records().size(), 5u);
-  for (const int i : {0, 1, 2, 3, 4, 2, 4, 0, 3, 1, 1}) {
+  ASSERT_EQ(stream->records().size(), 3u);
+  for (const int i : {0, 1, 2, 1, 0, 2, 2}) {
     const FramePtr frame = stream->read(i);
     EXPECT_EQ(frame->format, format);
     EXPECT_EQ(frame->width, width);
     EXPECT_EQ(frame->height, height);
     EXPECT_TRUE(is_frame(*frame, i)) << "frame " << i;
   }
-  EXPECT_THROW(stream->read(5), Error);
+  EXPECT_THROW(stream->read(3), Error);
 }
 
 INSTANTIATE_TEST_SUITE_P(
