@@ -4,8 +4,8 @@
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shaders/lib/append.glsl"
+#include "shaders/lib/difference_bounds.glsl"
 #include "shaders/lib/environment.glsl"
-#include "shaders/lib/light.glsl"
 #include "shaders/lib/sampler.glsl"
 
 struct Path {
@@ -78,8 +78,49 @@ void meet_emission(Path p, Surface s, GpuHit hit) {
   add_radiance(p.slot, p.worlds, p.throughput * s.emission * weight, vec2(1.0));
 }
 
+// How directions are sampled at a vertex: by the BSDF, and for `share` of them towards the objects
+// that differ. Depends on shared data alone, so it is the same in both worlds.
+struct Technique {
+  float share;
+  float total;
+};
+
+Technique make_technique(Path p, Surface s, Lobes l) {
+  const bool rough = l.p_diffuse > 0.0 || (l.p_reflection > 0.0 && !l.smooth_reflection);
+  if (!has_feature(FEATURE_FORKS) || p.worlds != WORLD_BOTH || !rough) return Technique(0.0, 0.0);
+  const float total = bounds_total(s.position);
+  return Technique(total > 0.0 ? frame.bound_share : 0.0, total);
+}
+
+// Density over both techniques of a direction that the BSDF alone has with bsdf_pdf.
+float combined_pdf(Technique t, Surface s, vec3 direction, float bsdf_pdf) {
+  if (t.share <= 0.0) return bsdf_pdf;
+  return mix(bsdf_pdf, bounds_pdf(s.position, t.total, direction), t.share);
+}
+
+// A direction by either technique; see bsdf_sample for what comes back.
+bool sample_direction(Technique t, Surface s, Lobes l, float choice, float technique, vec2 u,
+                      out vec3 direction, out vec3 weight, out float pdf) {
+  if (technique >= t.share) {
+    if (!bsdf_sample(s, l, choice, u, direction, weight, pdf)) return false;
+    if (t.share <= 0.0) return true;
+    const float all = pdf > 0.0 ? combined_pdf(t, s, direction, pdf) : 1.0 - t.share;
+    weight *= (pdf > 0.0 ? pdf : 1.0) / all;
+    if (pdf > 0.0) pdf = all;
+    return true;
+  }
+  direction = bounds_sample(s.position, t.total, technique / t.share, u);
+  float bsdf_pdf;
+  const vec3 value = bsdf_evaluate(s, l, direction, bsdf_pdf);
+  if (bsdf_pdf <= 0.0) return false;
+  pdf = combined_pdf(t, s, direction, bsdf_pdf);
+  weight = value / pdf;
+  return true;
+}
+
 // One light sample: the pair of what it would bring to each world, to be tested for blockers.
-bool light_ray(Path p, Surface s, Lobes l, Sampler random, float choice, out GpuShadowRay ray) {
+bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, float choice,
+               out GpuShadowRay ray) {
   const bool has_lights = has_feature(FEATURE_LIGHTS);
   const vec2 u = sample_2d(random, vertex_pair(PAIR_LIGHT, p.depth));
   LightSample light = LightSample(vec3(0.0), 3.4e38, vec3(0.0), 0.0, vec2(1.0));
@@ -102,7 +143,8 @@ bool light_ray(Path p, Surface s, Lobes l, Sampler random, float choice, out Gpu
   const bool delta = light.pdf <= 0.0;
   const float pdf = selection * (delta ? 1.0 : light.pdf);
   if (!(pdf > 0.0)) return false;
-  const float weight = delta ? 1.0 : mis_weight(pdf, bsdf_pdf);
+  const float weight =
+      delta ? 1.0 : mis_weight(pdf, combined_pdf(t, s, light.direction, bsdf_pdf));
   ray.direction = light.direction;
   ray.t_max = light.t_max;
   ray.slot_and_worlds = (p.slot << 2) | p.worlds;
@@ -112,17 +154,18 @@ bool light_ray(Path p, Surface s, Lobes l, Sampler random, float choice, out Gpu
 }
 
 // The next direction; false where the path ends.
-bool scatter(inout Path p, Surface s, Lobes l, Sampler random, float choice) {
+bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, float choice) {
   vec3 direction;
   vec3 weight;
   float pdf;
   const vec2 u = sample_2d(random, vertex_pair(PAIR_SCATTER, p.depth));
-  if (!bsdf_sample(s, l, choice, u, direction, weight, pdf)) return false;
+  const vec2 chance = sample_2d(random, vertex_pair(PAIR_ROULETTE, p.depth));
+  if (!sample_direction(t, s, l, choice, chance.y, u, direction, weight, pdf)) return false;
   p.throughput *= weight;
   const float strongest = max(max(p.throughput.r, p.throughput.g), p.throughput.b);
   if (!(strongest > 0.0)) return false;
   if (p.depth + 1u >= frame.roulette_depth && strongest < 1.0) {
-    if (sample_2d(random, vertex_pair(PAIR_ROULETTE, p.depth)).x >= strongest) return false;
+    if (chance.x >= strongest) return false;
     p.throughput /= strongest;
   }
   p.origin = offset_origin(s, direction);
@@ -178,8 +221,9 @@ void main() {
         const Sampler random = make_sampler(frame.seed, pixel, slot_sample(p.slot));
         const vec2 choice = sample_2d(random, vertex_pair(PAIR_CHOICE, p.depth));
         const Lobes l = make_lobes(s);
-        lit = light_ray(p, s, l, random, choice.x, ray);
-        scattered = scatter(p, s, l, random, choice.y);
+        const Technique t = make_technique(p, s, l);
+        lit = light_ray(p, s, l, t, random, choice.x, ray);
+        scattered = scatter(p, s, l, t, random, choice.y);
         p.depth += 1u;
         if (scattered) store_path(p, p.index);
       }

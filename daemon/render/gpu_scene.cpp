@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/packing.hpp>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -27,6 +28,33 @@ bool emits(const scene::Material& material) {
   return material.emission.r > 0 || material.emission.g > 0 || material.emission.b > 0;
 }
 
+// Around the centre of the vertices' box: exact for a sphere, at most sqrt(3) times too wide.
+glm::dvec4 bounding_sphere(const scene::Mesh& mesh, const glm::dmat4& world_from_object) {
+  glm::dvec3 low(std::numeric_limits<double>::max());
+  glm::dvec3 high(std::numeric_limits<double>::lowest());
+  const auto world = [&](const glm::vec3& p) {
+    return glm::dvec3(world_from_object * glm::dvec4(glm::dvec3(p), 1.0));
+  };
+  for (const glm::vec3& p : mesh.positions) {
+    low = glm::min(low, world(p));
+    high = glm::max(high, world(p));
+  }
+  const glm::dvec3 centre = 0.5 * (low + high);
+  double radius = 0;
+  for (const glm::vec3& p : mesh.positions)
+    radius = std::max(radius, glm::length(world(p) - centre));
+  return {centre, radius};
+}
+
+glm::dvec4 merged_spheres(const glm::dvec4& a, const glm::dvec4& b) {
+  const glm::dvec3 between = glm::dvec3(b) - glm::dvec3(a);
+  const double distance = glm::length(between);
+  if (distance + b.w <= a.w) return a;
+  if (distance + a.w <= b.w) return b;
+  const double radius = 0.5 * (distance + a.w + b.w);
+  return {glm::dvec3(a) + between * ((radius - a.w) / distance), radius};
+}
+
 template <typename T>
 void append(std::vector<T>& to, const std::vector<T>& from) {
   to.insert(to.end(), from.begin(), from.end());
@@ -40,6 +68,7 @@ void GpuScene::set_scene(const scene::Scene& scene) {
   upload_materials();
   upload_textures();
   find_emitters();
+  find_bounds();
 }
 
 void GpuScene::upload_meshes() {
@@ -113,6 +142,29 @@ void GpuScene::set_environment(const lighting::EnvironmentMap& map, set::LightSa
 void GpuScene::place(const glm::dvec3& camera_position) {
   upload_lights(camera_position);
   upload_instances(camera_position);
+  upload_bounds(camera_position);
+}
+
+// Every shared vertex looks at every bound, so past the first few the rest become one.
+void GpuScene::find_bounds() {
+  static constexpr std::size_t most_bounds = 16;
+  bounds_.clear();
+  for (const scene::Instance& instance : scene_.instances) {
+    const scene::Mesh& mesh = scene_.meshes[instance.mesh];
+    if (instance.presence == scene::world_both || mesh.triangles.empty()) continue;
+    const glm::dvec4 sphere = bounding_sphere(mesh, instance.world_from_object);
+    if (bounds_.size() < most_bounds)
+      bounds_.push_back(sphere);
+    else
+      bounds_.back() = merged_spheres(bounds_.back(), sphere);
+  }
+}
+
+void GpuScene::upload_bounds(const glm::dvec3& camera_position) {
+  std::vector<glm::vec4> bounds;
+  for (const glm::dvec4& bound : bounds_)
+    bounds.emplace_back(glm::dvec3(bound) - camera_position, bound.w);
+  upload_storage(device_, bounds_buffer_, bounds);
 }
 
 void GpuScene::upload_instances(const glm::dvec3& camera_position) {
@@ -202,6 +254,7 @@ void GpuScene::describe(gpu::GpuFrame& frame) const {
   frame.environment_levels = environment_levels_;
   frame.light_count = light_count_;
   frame.visible_light_count = visible_light_count_;
+  frame.bound_count = static_cast<std::uint32_t>(bounds_.size());
   // Light samples are shared out by power; the environment's is what crosses the scene's disc.
   const double environment_power =
       environment_mean_ * std::numbers::pi * std::numbers::pi * scene_radius_ * scene_radius_;
@@ -224,6 +277,7 @@ std::vector<const Buffer*> GpuScene::bindings() const {
   result[gpu::BINDING_MATERIALS] = &materials_;
   result[gpu::BINDING_TEXTURES] = &textures_;
   result[gpu::BINDING_LIGHTS] = &lights_;
+  result[gpu::BINDING_BOUNDS] = &bounds_buffer_;
   return result;
 }
 

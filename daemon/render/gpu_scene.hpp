@@ -44,12 +44,15 @@ class GpuScene {
   std::vector<gpu::GpuLight> placed_lights(const glm::dvec3& camera_position) const;
   void upload_lights(const glm::dvec3& camera_position);
   void upload_instances(const glm::dvec3& camera_position);
+  void find_bounds();
+  void upload_bounds(const glm::dvec3& camera_position);
 
   Device& device_;
   scene::Scene scene_;
   std::vector<MeshPlace> places_;
   std::vector<std::uint32_t> first_light_;  // by instance; NO_INDEX: not an emitter
   std::vector<std::uint32_t> emitters_;     // instances that emit, in the order of their lights
+  std::vector<glm::dvec4> bounds_;          // world centre and radius of each differing object
   double scene_radius_ = 1;                 // of the instances' bounds
   std::uint32_t environment_size_ = 1, environment_levels_ = 0;
   double environment_mean_ = 0;
@@ -58,7 +61,7 @@ class GpuScene {
   double light_power_ = 0;
 
   Buffer bvh_, vertices_, triangles_, texels_, environment_, importance_, instances_, materials_,
-      textures_, lights_;
+      textures_, lights_, bounds_buffer_;
 };
 
 }  // namespace previz::render

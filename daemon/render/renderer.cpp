@@ -54,6 +54,7 @@ void Renderer::Impl::upload_frame() {
   gpu_frame.max_depth = static_cast<std::uint32_t>(estimation.max_depth);
   gpu_frame.roulette_depth = static_cast<std::uint32_t>(estimation.roulette_depth);
   gpu_frame.specular_alpha = static_cast<float>(estimation.specular_roughness);
+  gpu_frame.bound_share = static_cast<float>(estimation.difference_sampling);
   scene.describe(gpu_frame);
   upload_storage(*device, frame_buffer, std::vector{gpu_frame});
 }

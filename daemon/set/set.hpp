@@ -102,6 +102,9 @@ struct Estimation {
   int roulette_depth = 4;  // Russian roulette from this vertex on
   std::uint32_t seed = 1;
   double specular_roughness = 1e-3;  // alpha at or below which a lobe is a Dirac delta
+  // Share of a shared path's directions that are sampled towards objects of one world only; 0 is
+  // the paper's algorithm. At most 0.8: the BSDF keeps the rest.
+  double difference_sampling = 0.5;
   bool caustics = true;              // light that reaches a rough surface by mirrors and glass only
 };
 

@@ -182,6 +182,7 @@ Keys estimator_keys(Estimation& e) {
       {"roulette_depth", &e.roulette_depth, plain.within(1, 64), "Russian roulette ends paths from this vertex on."},
       {"seed", &e.seed, plain, "The same seed gives the same noise."},
       {"specular_roughness", &e.specular_roughness, plain.within(0, 0.1), "GGX alpha at or below which a surface is a perfect mirror."},
+      {"difference_sampling", &e.difference_sampling, plain.within(0, 0.8), "Share of directions sampled towards objects of one world only, where the worlds can differ; 0: none, as in the paper."},
       {"caustics", &e.caustics, plain, "Light that mirrors and glass throw onto rough surfaces; false leaves it out, with its noise."},
   };
 }

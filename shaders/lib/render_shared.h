@@ -28,7 +28,8 @@ PREVIZ_CONST uint BINDING_MATERIALS = 8u;  // GpuMaterial[]
 PREVIZ_CONST uint BINDING_TEXTURES = 9u;   // GpuTexture[]
 PREVIZ_CONST uint BINDING_LIGHTS = 10u;     // GpuLight[]
 PREVIZ_CONST uint BINDING_FRAME = 11u;      // GpuFrame
-PREVIZ_CONST uint SCENE_BINDINGS = 12u;
+PREVIZ_CONST uint BINDING_BOUNDS = 12u;     // vec4[]: centre and radius of each differing object
+PREVIZ_CONST uint SCENE_BINDINGS = 13u;
 
 // Set 1, paths in flight and what they bring back. A slot is one sample of one pixel; it has two
 // paths, because it can fork once: path 2 slot, and path 2 slot + 1 for the world that parted.
@@ -182,6 +183,8 @@ struct GpuFrame {
   float environment_selection;  // probability that a light sample picks the environment
   uint light_count;
   uint visible_light_count;   // the first lights, those with an extent that are not triangles
+  uint bound_count;
+  float bound_share;          // of a shared path's directions that go towards BOUNDS
 };
 
 // Push constants: the part of the picture and the samples of this batch.
@@ -201,7 +204,7 @@ static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
 static_assert(sizeof(GpuLight) == 124);
 static_assert(offsetof(GpuLight, uv0) == 96);
-static_assert(sizeof(GpuFrame) == 100);
+static_assert(sizeof(GpuFrame) == 108);
 static_assert(sizeof(GpuBatch) == 24);
 }  // namespace previz::gpu
 #endif

@@ -67,7 +67,7 @@ const uint PAIR_LENS = 1u;
 const uint PAIR_CHOICE = 2u;    // x: which light, y: which lobe
 const uint PAIR_LIGHT = 3u;
 const uint PAIR_SCATTER = 4u;
-const uint PAIR_ROULETTE = 5u;  // x only
+const uint PAIR_ROULETTE = 5u;  // x: roulette, y: BSDF or difference bounds
 const uint PAIRS_PER_VERTEX = 4u;
 
 uint vertex_pair(uint pair, uint depth) { return pair + PAIRS_PER_VERTEX * depth; }

@@ -129,7 +129,7 @@ vec3 trace_project(vec3 vertex, const TraceSpace s) {
 // blocked, and returns them; otherwise `hit` is the closest and the result is 0 or 1.
 uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, float t_max,
                 uint worlds, inout Hit hit) {
-  uint stack[TRACE_STACK_SIZE];  // groups: block of children << 8 | those still to visit
+  uint stack[TRACE_STACK_SIZE + 1u];  // groups: block of children << 8 | those still to visit
   uint top = 0u;
   uint bottom = 0u;  // of the stack that belongs to the tree being traversed
   uint record = 0u;
@@ -199,13 +199,10 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
         hits |= trace_box(trace_byte1(n1) * scale1 + near, trace_byte1(f1) * scale1 + far, t_min_bits, cull, b5);
         hits |= trace_box(trace_byte2(n1) * scale2 + near, trace_byte2(f1) * scale2 + far, t_min_bits, cull, b6);
         hits |= trace_box(trace_byte3(n1) * scale + near, trace_byte3(f1) * scale + far, t_min_bits, cull, b7);
-        if (kind >= RECORD_NODE && hits != 0u) {
-          if ((group & 0xffu) != 0u) {
-            stack[top] = group;
-            top++;
-          }
-          group = head.w << 8 | hits;
-        }
+        stack[top] = group;
+        const bool descend = kind >= RECORD_NODE && hits != 0u;
+        top += descend && (group & 0xffu) != 0u ? 1u : 0u;
+        group = descend ? head.w << 8 | hits : group;
       }
 
       // As a pair of triangles.

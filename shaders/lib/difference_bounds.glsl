@@ -1,0 +1,57 @@
+// Directions towards the objects that are not in both worlds: only there can the two differ, so a
+// shared path spends a share of its directions on them (estimator.md, "difference bounds"). Each
+// object stands for its bounding sphere, a cone from any point outside; a sphere that contains the
+// point takes no part, since the BSDF meets it often enough.
+#ifndef PREVIZ_DIFFERENCE_BOUNDS_GLSL
+#define PREVIZ_DIFFERENCE_BOUNDS_GLSL
+
+#include "shaders/lib/light.glsl"
+
+layout(scalar, set = 0, binding = BINDING_BOUNDS) readonly buffer Bounds { vec4 bounds[]; };
+
+// 1 - cos of the cone's half angle; 0 from inside.
+float bound_cap(vec4 bound, vec3 point) {
+  const vec3 to_center = bound.xyz - point;
+  const float distance_squared = dot(to_center, to_center);
+  return distance_squared > bound.w * bound.w ? sphere_cap(bound.w, distance_squared) : 0.0;
+}
+
+// Sum of all caps: the cones are chosen by their solid angle.
+float bounds_total(vec3 point) {
+  float total = 0.0;
+  for (uint i = 0u; i < frame.bound_count; ++i) total += bound_cap(bounds[i], point);
+  return total;
+}
+
+vec3 bounds_sample(vec3 point, float total, float choice, vec2 u) {
+  float rest = choice * total;
+  uint chosen = 0u;
+  float cap = 0.0;
+  for (uint i = 0u; i < frame.bound_count; ++i) {
+    const float next = bound_cap(bounds[i], point);
+    if (next <= 0.0) continue;
+    chosen = i;
+    cap = next;
+    rest -= next;
+    if (rest < 0.0) break;
+  }
+  return sample_cone(normalize(bounds[chosen].xyz - point), cap, u);
+}
+
+// Density of bounds_sample, per steradian: every cone that holds the direction adds cap / total
+// times 1 / (2 pi cap).
+float bounds_pdf(vec3 point, float total, vec3 direction) {
+  if (total <= 0.0) return 0.0;
+  float cones = 0.0;
+  for (uint i = 0u; i < frame.bound_count; ++i) {
+    const vec3 to_center = bounds[i].xyz - point;
+    const float along = dot(to_center, direction);
+    const vec3 off = to_center - along * direction;
+    const float radius_squared = bounds[i].w * bounds[i].w;
+    if (dot(to_center, to_center) > radius_squared && along > 0.0 && dot(off, off) <= radius_squared)
+      cones += 1.0;
+  }
+  return cones / (2.0 * PI * total);
+}
+
+#endif
