@@ -8,7 +8,8 @@ namespace previz::pipeline {
 TrackStage::TrackStage(const set::Set& set, const ObserverCalibration& calibration,
                        const std::vector<session::TrackRecord>& recorded) {
   if (set.tracking.enabled) {
-    tracker_ = tracking::make_apriltag_tracker(set.tracking, calibration.intrinsics, calibration.response);
+    tracker_ =
+        tracking::make_apriltag_tracker(set.tracking, calibration.intrinsics, calibration.response);
     return;
   }
   if (recorded.empty())

@@ -105,7 +105,7 @@ struct Estimation {
   // Share of a shared path's directions that are sampled towards objects of one world only; 0 is
   // the paper's algorithm. At most 0.8: the BSDF keeps the rest.
   double difference_sampling = 0.5;
-  bool caustics = true;              // light that reaches a rough surface by mirrors and glass only
+  bool caustics = true;  // light that reaches a rough surface by mirrors and glass only
 };
 
 struct Quality {
