@@ -314,12 +314,14 @@ std::optional<EdgeFit> fit_edge(const Luminance& luminance, const PinholeIntrins
   const double contrast = p[kWhite] - p[kBlack];
   const System system = linearise(samples, p, std::max(6 * noise, 0.15 * contrast), noise);
   double weight = 0, squares = 0;
+  std::size_t outliers = 0;
   for (const Sample& s : samples) {
     const double r = s.value - predict(p, s, nullptr);
     weight += s.weight;
     squares += s.weight * r * r;
+    outliers += s.weight < 0.1;
   }
-  if (weight < 0.6 * double(samples.size())) return *why = "covered", std::nullopt;
+  if (3 * outliers > samples.size()) return *why = "covered", std::nullopt;
   const double rms =
       std::max(kMinNoise * contrast, std::sqrt(squares / std::max(1.0, weight - kParameters)));
   if (rms > 0.2 * contrast) return *why = "unclear", std::nullopt;

@@ -86,9 +86,11 @@ struct TagDetector::Library {
   apriltag_family_t* family;
   apriltag_detector_t* detector;
 
-  explicit Library(const Family& f)
+  // The table of codes grows with the power of `corrected_bits`: gigabytes for the large families
+  // at the library's limit of 2.
+  Library(const Family& f, int corrected_bits)
       : functions(f), family(f.create()), detector(apriltag_detector_create()) {
-    apriltag_detector_add_family(detector, family);
+    apriltag_detector_add_family_bits(detector, family, std::clamp(corrected_bits, 0, 2));
   }
   ~Library() {
     apriltag_detector_destroy(detector);
@@ -103,7 +105,7 @@ TagDetector::TagDetector(const DetectorSettings& settings, const PinholeIntrinsi
     : settings_(settings),
       lens_(lens),
       photometry_(response),
-      library_(std::make_unique<Library>(family_by_name(settings.family))) {}
+      library_(std::make_unique<Library>(family_by_name(settings.family), settings.max_hamming)) {}
 
 TagDetector::~TagDetector() = default;
 
