@@ -45,17 +45,19 @@ glm::ivec2 tiled_pixel(int i, int width) {
   return p + tile * glm::ivec2(which % tiles, which / tiles);
 }
 
-glm::vec3 geometric_normal(const scene::Mesh& mesh, std::uint32_t primitive) {
-  const glm::uvec3& t = mesh.triangles[primitive];
+// Of instances that are moved and scaled, not turned.
+glm::vec3 geometric_normal(const scene::Scene& scene, const TracedHit& hit) {
+  const scene::Mesh& mesh = scene.meshes[scene.instances[hit.instance].mesh];
+  const glm::uvec3& t = mesh.triangles[hit.primitive];
   const glm::vec3& a = mesh.positions[t.x];
   return glm::normalize(glm::cross(mesh.positions[t.y] - a, mesh.positions[t.z] - a));
 }
 
 // Primary rays of a camera that looks over the field; from each hit a cosine-distributed bounce and
 // a ray to a point of a light above.
-RaySets make_rays(const scene::Mesh& mesh, const EmbreeTracer& embree, int size) {
+RaySets make_rays(const scene::Scene& scene, const EmbreeTracer& embree, int size) {
   float edge = 0;
-  for (const glm::vec3& p : mesh.positions) edge = std::max(edge, p.x);
+  for (const glm::vec3& p : scene.meshes[0].positions) edge = std::max(edge, p.x);
   const glm::vec3 eye(-0.55f * edge, -0.75f * edge, 0.45f * edge);
   const glm::vec3 forward = glm::normalize(-eye);
   const glm::vec3 right = glm::normalize(glm::cross(forward, glm::vec3(0, 0, 1)));
@@ -69,7 +71,7 @@ RaySets make_rays(const scene::Mesh& mesh, const EmbreeTracer& embree, int size)
     sets.primary.push_back(ray);
     const TracedHit hit = embree.closest(ray, scene::world_both);
     if (hit.t < 0) continue;
-    glm::vec3 n = geometric_normal(mesh, hit.primitive);
+    glm::vec3 n = geometric_normal(scene, hit);
     if (glm::dot(n, ray.direction) > 0) n = -n;
     const glm::vec3 at = ray.origin + hit.t * ray.direction + 1e-4f * n;
     const float z = 1 - 2 * uniform(random);
@@ -132,21 +134,30 @@ struct Options {
   std::string quality = "high";
   int size = 512;
   int rounds = 7;
+  bool instanced = false;
 };
 
 void run(render::Device& device, std::size_t triangles, const Options& options) {
-  const scene::Scene scene = scene_of(sphere_field(triangles));
+  const scene::Scene scene =
+      options.instanced ? instanced_field(triangles) : scene_of(sphere_field(triangles));
   const bool high = options.quality == "high";
   const EmbreeTracer embree(scene, high ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM, false);
+  std::vector<scene::MeshBvh> meshes;
   const double start = cpu_seconds();
-  const scene::MeshBvh mesh = scene::build_mesh_bvh(
-      scene.meshes[0], high ? scene::BvhQuality::high : scene::BvhQuality::medium);
+  for (const scene::Mesh& mesh : scene.meshes)
+    meshes.push_back(
+        build_mesh_bvh(mesh, high ? scene::BvhQuality::high : scene::BvhQuality::medium));
   const double built = cpu_seconds() - start;
-  GpuTracer ours(device, scene_texels(scene, std::vector{mesh}));
-  const RaySets sets = make_rays(scene.meshes[0], embree, options.size);
-  std::printf("\n%zu triangles, %u leaves, %u levels, SAH cost %.1f, built in %.0f ms (CPU)\n\n",
-              scene.meshes[0].triangles.size(), mesh.leaves, mesh.depth, mesh.sah_cost,
-              1e3 * built);
+  GpuTracer ours(device, scene_texels(scene, meshes));
+  const RaySets sets = make_rays(scene, embree, options.size);
+  std::size_t seen = 0;
+  for (const scene::Instance& instance : scene.instances)
+    seen += scene.meshes[instance.mesh].triangles.size();
+  std::printf(
+      "\n%zu triangles in %zu instances; the last mesh: %u leaves, %u levels, SAH cost %.1f; "
+      "built in %.0f ms (CPU)\n\n",
+      seen, scene.instances.size(), meshes.back().leaves, meshes.back().depth,
+      meshes.back().sah_cost, 1e3 * built);
   std::printf("| rays | ours, Mrays/s | Embree, Mrays/s | ratio | spread | wrong |\n");
   std::printf("| --- | --- | --- | --- | --- | --- |\n");
 
@@ -188,6 +199,7 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"medium", "high"}));
   app.add_option("--size", options.size, "Primary rays in x and y, a multiple of 16");
   app.add_option("--rounds", options.rounds, "Rounds in turns");
+  app.add_flag("--instanced", options.instanced, "One instance a sphere instead of one mesh");
   CLI11_PARSE(app, argc, argv);
   try {
     previz::render::Device device({});

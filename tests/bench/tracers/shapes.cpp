@@ -56,6 +56,37 @@ void fill_normals(scene::Mesh& mesh) {
   }
 }
 
+// Where the spheres of a field of about so many triangles are.
+struct Field {
+  struct Sphere {
+    glm::dvec3 centre;
+    double radius;
+  };
+
+  explicit Field(std::size_t triangles)
+      : levels(triangles < 50'000    ? 3
+               : triangles < 300'000 ? 4
+                                     : 5) {
+    const std::size_t each = std::size_t{20} << (2 * levels);
+    const std::size_t count = std::max<std::size_t>(1, triangles / each);
+    side = static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(count))));
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> radius(0.25, 0.6);
+    const double middle = 0.5 * static_cast<double>(side - 1);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double r = radius(random);
+      spheres.push_back(
+          {{static_cast<double>(i % side) - middle, static_cast<double>(i / side) - middle, r}, r});
+    }
+  }
+
+  float edge() const { return static_cast<float>(side) + 2.0f; }
+
+  int levels;
+  std::size_t side = 0;
+  std::vector<Sphere> spheres;
+};
+
 }  // namespace
 
 scene::Mesh grid(float edge, int cells) {
@@ -95,23 +126,31 @@ scene::Mesh bumpy_sphere(int levels, double radius, double bumps, std::uint32_t 
 }
 
 scene::Mesh sphere_field(std::size_t triangles) {
-  const int levels = triangles < 50'000 ? 3 : triangles < 300'000 ? 4 : 5;
-  const std::size_t each = std::size_t{20} << (2 * levels);
-  const std::size_t spheres = std::max<std::size_t>(1, triangles / each);
-  const int side = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(spheres))));
-  std::mt19937 random(7);
-  std::uniform_real_distribution<double> radius(0.25, 0.6);
-  scene::Mesh mesh = grid(static_cast<float>(side) + 2.0f, 8);
-  for (std::size_t i = 0; i < spheres; ++i) {
-    const double r = radius(random);
-    const auto x = static_cast<float>(i % static_cast<std::size_t>(side));
-    const auto y = static_cast<float>(i / static_cast<std::size_t>(side));
-    const float middle = 0.5f * static_cast<float>(side - 1);
-    append(mesh, bumpy_sphere(levels, r, 0.2, static_cast<std::uint32_t>(i)),
-           {x - middle, y - middle, static_cast<float>(r)});
+  const Field field(triangles);
+  scene::Mesh mesh = grid(field.edge(), 8);
+  for (std::size_t i = 0; i < field.spheres.size(); ++i) {
+    const Field::Sphere& sphere = field.spheres[i];
+    append(mesh, bumpy_sphere(field.levels, sphere.radius, 0.2, static_cast<std::uint32_t>(i)),
+           glm::vec3(sphere.centre));
   }
   fill_normals(mesh);
   return mesh;
+}
+
+scene::Scene instanced_field(std::size_t triangles) {
+  const Field field(triangles);
+  scene::Scene scene = scene_of(grid(field.edge(), 8));
+  for (std::uint32_t shape = 0; shape < 4; ++shape)
+    scene.meshes.push_back(bumpy_sphere(field.levels, 1.0, 0.2, shape));
+  for (std::size_t i = 0; i < field.spheres.size(); ++i) {
+    const Field::Sphere& sphere = field.spheres[i];
+    scene::Instance instance;
+    instance.mesh = 1 + static_cast<std::uint32_t>(i % 4);
+    instance.world_from_object = glm::dmat4(sphere.radius);
+    instance.world_from_object[3] = glm::dvec4(sphere.centre, 1.0);
+    scene.instances.push_back(instance);
+  }
+  return scene;
 }
 
 scene::Mesh random_triangles(std::size_t count, float extent, float size, std::uint32_t seed) {

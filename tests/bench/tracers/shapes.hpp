@@ -22,4 +22,7 @@ scene::Mesh random_triangles(std::size_t count, float extent, float size, std::u
 
 scene::Scene scene_of(scene::Mesh mesh);
 
+// The same field as instances, one a sphere, of four meshes and the ground.
+scene::Scene instanced_field(std::size_t triangles);
+
 }  // namespace previz::bench
