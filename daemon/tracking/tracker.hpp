@@ -25,7 +25,7 @@ enum class TrackStatus { tracked, ambiguous, lost };
 struct Track {
   TrackStatus status = TrackStatus::lost;
   std::optional<Pose> pose;      // set only if tracked
-  std::vector<Pose> candidates;  // ambiguous: both poses, better first
+  std::vector<Pose> candidates;  // ambiguous: both poses, likelier first
   // Lost or ambiguous: why, in plain words. Tracked: which tags were left out and why, if any.
   std::string reason;
   std::vector<int> seen_tags;  // every id detected, of the map or not
