@@ -1,4 +1,4 @@
-// Files that survive a crash, and their content hash. Not for use outside drivers/.
+// Files that survive a crash, and their content hash.
 #pragma once
 
 #include <filesystem>
