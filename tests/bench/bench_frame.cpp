@@ -1,184 +1,176 @@
-// Milliseconds a frame over resolution and triangles, one sample a pixel, three bounces: the
-// paper's figure 4 for this renderer. Prints a table and writes CSV and SVG. Wall time, so on a CPU
-// device quote it only from an idle machine.
+// Time of a frame of one sample a pixel over resolution, for several numbers of triangles: the
+// paper's figure 4. Writes a table (CSV) and a chart (SVG).
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <fstream>
-#include <numbers>
+#include <glm/gtc/matrix_transform.hpp>
 #include <string>
 #include <vector>
 
 #include "daemon/render/renderer.hpp"
+#include "drivers/error.hpp"
+#include "tests/bench/cpu_time.hpp"
+#include "tests/bench/plot.hpp"
 #include "tests/bench/tracers/shapes.hpp"
 
 namespace previz::bench {
 namespace {
 
+struct Options {
+  std::vector<std::size_t> triangles{4'000, 98'000, 582'000, 1'000'000};
+  int rounds = 3;
+  int depth = 4;
+  std::string clock = "wall";
+  std::string out = ".";
+};
+
 struct Resolution {
   int width, height;
 };
+constexpr Resolution resolutions[] = {{320, 240},  {640, 480},  {800, 600},
+                                      {1024, 768}, {1280, 720}, {1920, 1080}};
 
-struct Curve {
-  std::size_t triangles;
-  std::vector<double> megapixels, milliseconds;
+struct Times {
+  double wall_ms = 0, cpu_ms = 0;
 };
 
-const std::vector<Resolution> resolutions = {
-    {320, 240}, {640, 480}, {800, 600}, {1280, 720}, {1920, 1080}};
+std::string name_of(std::size_t triangles) {
+  return triangles < 1'000'000 ? std::to_string((triangles + 500) / 1000) + " K triangles"
+                               : std::to_string((triangles + 500'000) / 1'000'000) + " M triangles";
+}
 
-// A real ground under a virtual field of spheres, lit by a sky with a brighter side.
-scene::Scene mixed_field(std::size_t triangles) {
-  scene::Scene scene;
-  scene.meshes = {grid(40, 2), sphere_field(triangles)};
-  scene::Material ground, field;
-  ground.specular = field.specular = 0;
-  ground.base_color = glm::vec3(0.5f);
-  field.base_color = glm::vec3(0.6f, 0.5f, 0.4f);
-  scene.materials = {ground, field};
-  scene::Instance below;
-  below.world_from_object[3] = glm::dvec4(0, 0, -0.01, 1);
-  scene::Instance above;
-  above.mesh = above.material = 1;
-  above.presence = scene::world_mixed;
-  scene.instances = {below, above};
+// The field is real, and among it stands one virtual sphere.
+scene::Scene make_scene(std::size_t triangles) {
+  scene::Scene scene = scene_of(sphere_field(triangles));
+  scene.meshes.push_back(bumpy_sphere(3, 0.5, 0.2, 99));
+  scene::Instance sphere;
+  sphere.name = "virtual";
+  sphere.mesh = 1;
+  sphere.presence = scene::world_mixed;
+  sphere.world_from_object = glm::translate(glm::dmat4(1), glm::dvec3(0, 0, 1.4));
+  scene.instances.push_back(sphere);
   return scene;
 }
 
 lighting::EnvironmentMap sky() {
-  lighting::EnvironmentMap map{64, {}};
-  for (int j = 0; j < 64; ++j)
-    for (int i = 0; i < 64; ++i)
-      map.radiance.emplace_back(glm::vec3(0.3f) + glm::vec3(0.02f, 0.015f, 0.01f) * float(i));
+  lighting::EnvironmentMap map{32, {}};
+  map.radiance.resize(std::size_t{32} * 32);
+  for (int j = 0; j < map.size; ++j) {
+    for (int i = 0; i < map.size; ++i) {
+      const glm::vec3 d = lighting::texel_direction(map.size, i, j);
+      map.radiance[static_cast<std::size_t>(j * map.size + i)] =
+          d.z > 0 ? glm::vec3(0.4f, 0.6f, 1.0f) * (0.5f + d.z) : glm::vec3(0.1f);
+    }
+  }
   return map;
 }
 
-// From beyond the field's corner, looking at its middle.
-glm::dmat4 camera_pose(const scene::Mesh& field) {
-  float edge = 0;
-  for (const glm::vec3& p : field.positions) edge = std::max({edge, p.x, p.y});
-  const glm::dvec3 eye(0, -1.4 * edge, 0.8 * edge);
-  const glm::dvec3 z = glm::normalize(-eye);
-  const glm::dvec3 x(1, 0, 0);
-  glm::dmat4 pose(1.0);
-  pose[0] = glm::dvec4(x, 0);
-  pose[1] = glm::dvec4(glm::cross(z, x), 0);
-  pose[2] = glm::dvec4(z, 0);
-  pose[3] = glm::dvec4(eye, 1);
+glm::dmat4 world_from_camera(const scene::Scene& scene) {
+  double edge = 0;
+  for (const glm::vec3& p : scene.meshes[0].positions)
+    edge = std::max(edge, static_cast<double>(p.x));
+  const glm::dvec3 eye(-0.55 * edge, -0.75 * edge, 0.45 * edge);
+  glm::dmat4 pose = glm::inverse(glm::lookAt(eye, glm::dvec3(0), glm::dvec3(0, 0, 1)));
+  pose[1] = -pose[1];  // OpenGL's axes to OpenCV's
+  pose[2] = -pose[2];
   return pose;
 }
 
-double median_frame_ms(render::Renderer& renderer, const glm::dmat4& pose, int frames) {
-  std::vector<double> times;
-  for (int i = 0; i <= frames; ++i) {  // the first one compiles the kernels and does not count
-    const auto begin = std::chrono::steady_clock::now();
-    renderer.begin({{}, 1.0, pose});
+ObserverCalibration calibration_of(const Resolution& r) {
+  ObserverCalibration calibration;
+  calibration.intrinsics.width = r.width;
+  calibration.intrinsics.height = r.height;
+  calibration.intrinsics.fx = calibration.intrinsics.fy = r.height;
+  calibration.intrinsics.cx = 0.5 * (r.width - 1);
+  calibration.intrinsics.cy = 0.5 * (r.height - 1);
+  return calibration;
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+Times measure(render::Renderer& renderer, const render::FrameInput& frame, int rounds) {
+  std::vector<double> wall, cpu;
+  for (int round = -1; round < rounds; ++round) {
+    const auto wall_start = std::chrono::steady_clock::now();
+    const double cpu_start = cpu_seconds();
+    renderer.begin(frame);
     renderer.render(1);
-    const std::chrono::duration<double, std::milli> taken =
-        std::chrono::steady_clock::now() - begin;
-    if (i > 0) times.push_back(taken.count());
+    const std::chrono::duration<double, std::milli> elapsed =
+        std::chrono::steady_clock::now() - wall_start;
+    if (round < 0) continue;  // compiles the pipelines
+    wall.push_back(elapsed.count());
+    cpu.push_back(1e3 * (cpu_seconds() - cpu_start));
   }
-  std::sort(times.begin(), times.end());
-  return times[times.size() / 2];
+  return {median(wall), median(cpu)};
 }
 
-Curve measure(const std::shared_ptr<render::Device>& device, std::size_t triangles, int frames) {
-  const scene::Scene scene = mixed_field(triangles);
-  Curve curve{scene.meshes[1].triangles.size(), {}, {}};
+void run(const Options& options) {
+  const auto device = render::open_device();
+  const std::string device_name = render::device_name(*device);
+  std::printf("%s, %d bounces, 1 sample a pixel\n\n", device_name.c_str(), options.depth);
+  std::printf(
+      "| triangles | resolution | ms a frame | CPU ms a frame |\n| --- | --- | --- | --- |\n");
+  std::ofstream csv(options.out + "/frame.csv");
+  csv << "triangles,width,height,wall_ms,cpu_ms\n";
+  Chart chart{"1 sample a pixel, " + device_name,
+              "resolution",
+              options.clock == "cpu" ? "CPU ms a frame (sum over cores)" : "ms a frame",
+              {},
+              {}};
+  for (const Resolution& r : resolutions)
+    chart.x_ticks.emplace_back(1e-6 * r.width * r.height,
+                               std::to_string(r.width) + "x" + std::to_string(r.height));
   set::Estimation estimation;
-  estimation.max_depth = 3;
-  for (const Resolution& size : resolutions) {
-    ObserverCalibration calibration;
-    const double f = size.width / (2 * std::tan(0.4));
-    calibration.intrinsics = {
-        size.width, size.height, f, f, size.width / 2.0 - 0.5, size.height / 2.0 - 0.5};
-    render::Renderer renderer(device, estimation, calibration);
-    renderer.set_scene(scene);
-    renderer.set_environment(sky(), set::LightSampling::importance);
-    const double ms = median_frame_ms(renderer, camera_pose(scene.meshes[1]), frames);
-    std::printf("%8zu triangles  %4dx%-4d  %9.2f ms\n", curve.triangles, size.width, size.height,
-                ms);
-    std::fflush(stdout);
-    curve.megapixels.push_back(1e-6 * size.width * size.height);
-    curve.milliseconds.push_back(ms);
+  estimation.max_depth = options.depth;
+  for (const std::size_t triangles : options.triangles) {
+    const scene::Scene scene = make_scene(triangles);
+    const std::size_t count = scene.meshes[0].triangles.size() + scene.meshes[1].triangles.size();
+    Curve& curve = chart.curves.emplace_back();
+    curve.name = name_of(count);
+    for (const Resolution& r : resolutions) {
+      render::Renderer renderer(device, estimation, calibration_of(r));
+      renderer.set_scene(scene);
+      renderer.set_environment(sky(), set::LightSampling::importance);
+      render::FrameInput frame;
+      frame.plate = {r.width, r.height, 8,
+                     std::vector<std::uint16_t>(std::size_t{3} * r.width * r.height, 128)};
+      frame.world_from_camera = world_from_camera(scene);
+      const Times times = measure(renderer, frame, options.rounds);
+      std::printf("| %zu | %dx%d | %.0f | %.0f |\n", count, r.width, r.height, times.wall_ms,
+                  times.cpu_ms);
+      std::fflush(stdout);
+      csv << count << ',' << r.width << ',' << r.height << ',' << times.wall_ms << ','
+          << times.cpu_ms << '\n';
+      curve.points.emplace_back(1e-6 * r.width * r.height,
+                                options.clock == "cpu" ? times.cpu_ms : times.wall_ms);
+    }
   }
-  return curve;
-}
-
-void write_csv(const std::vector<Curve>& curves, const std::filesystem::path& file) {
-  std::ofstream out(file);
-  out << "triangles,width,height,ms\n";
-  for (const Curve& curve : curves)
-    for (std::size_t i = 0; i < resolutions.size(); ++i)
-      out << curve.triangles << ',' << resolutions[i].width << ',' << resolutions[i].height << ','
-          << curve.milliseconds[i] << '\n';
-}
-
-void write_svg(const std::vector<Curve>& curves, const std::string& device,
-               const std::filesystem::path& file) {
-  constexpr double left = 70, bottom = 340, width = 520, height = 300;
-  static constexpr const char* colours[] = {"#1b6ca8", "#2e8b57", "#c9820a", "#b03a48"};
-  double slowest = 0, largest = 0;
-  for (const Curve& c : curves) {
-    slowest = std::max(slowest, *std::max_element(c.milliseconds.begin(), c.milliseconds.end()));
-    largest = std::max(largest, c.megapixels.back());
-  }
-  const auto x = [&](double megapixels) { return left + width * megapixels / largest; };
-  const auto y = [&](double ms) { return bottom - height * ms / slowest; };
-  std::ofstream out(file);
-  out << "<svg xmlns='http://www.w3.org/2000/svg' width='720' height='400' "
-         "font-family='sans-serif' "
-         "font-size='12'>\n<rect width='720' height='400' fill='white'/>\n<text x='70' y='20'>ms a "
-         "frame over resolution, 1 sample a pixel, 3 bounces; "
-      << device << "</text>\n";
-  for (int i = 0; i <= 4; ++i) {
-    const double ms = slowest * i / 4;
-    out << "<path d='M" << left << ' ' << y(ms) << " h" << width << "' stroke='#ddd'/><text x='"
-        << left - 6 << "' y='" << y(ms) + 4 << "' text-anchor='end'>" << std::lround(ms * 10) / 10.0
-        << "</text>\n";
-  }
-  for (std::size_t i = 0; i < resolutions.size(); ++i)
-    out << "<text x='" << x(curves[0].megapixels[i]) << "' y='" << bottom + 18
-        << "' text-anchor='end' transform='rotate(-25 " << x(curves[0].megapixels[i]) << ' '
-        << bottom + 18 << ")'>" << resolutions[i].width << "x" << resolutions[i].height
-        << "</text>\n";
-  for (std::size_t k = 0; k < curves.size(); ++k) {
-    out << "<polyline fill='none' stroke-width='2' stroke='" << colours[k % 4] << "' points='";
-    for (std::size_t i = 0; i < resolutions.size(); ++i)
-      out << x(curves[k].megapixels[i]) << ',' << y(curves[k].milliseconds[i]) << ' ';
-    out << "'/>\n<text x='" << left + width + 8 << "' y='" << y(curves[k].milliseconds.back()) + 4
-        << "' fill='" << colours[k % 4] << "'>" << curves[k].triangles << "</text>\n";
-  }
-  out << "</svg>\n";
+  csv.close();
+  if (!csv) throw Error("bench: " + options.out + "/frame.csv cannot be written");
+  write_svg(chart, options.out + "/frame.svg");
 }
 
 }  // namespace
 }  // namespace previz::bench
 
 int main(int argc, char** argv) {
-  CLI::App app("Milliseconds a frame over resolution and triangles.");
-  std::string device_name;
-  std::filesystem::path out = "out/bench";
-  int frames = 3;
-  std::vector<std::size_t> triangles = {4000, 98000, 582000, 1000000};
-  app.add_option("--device", device_name, "Vulkan device whose name contains this");
-  app.add_option("--out", out, "directory for frame.csv and frame.svg [out/bench]");
-  app.add_option("--frames", frames, "frames timed each; the median counts [3]")
-      ->check(CLI::Range(1, 1000));
-  app.add_option("--triangles", triangles, "about how many [4000 98000 582000 1000000]");
+  previz::bench::Options options;
+  CLI::App app("Milliseconds a frame over resolution and triangles");
+  app.add_option("--triangles", options.triangles, "Triangles of the real scene, about");
+  app.add_option("--rounds", options.rounds, "Frames measured; the median counts");
+  app.add_option("--depth", options.depth, "Path vertices after the camera");
+  app.add_option("--clock", options.clock, "What the chart shows; the table has both")
+      ->check(CLI::IsMember({"wall", "cpu"}));
+  app.add_option("--out", options.out, "Folder for frame.csv and frame.svg")
+      ->check(CLI::ExistingDirectory);
   CLI11_PARSE(app, argc, argv);
   try {
-    const auto device = previz::render::open_device({.validation = false, .name = device_name});
-    std::vector<previz::bench::Curve> curves;
-    for (const std::size_t count : triangles)
-      curves.push_back(previz::bench::measure(device, count, frames));
-    std::filesystem::create_directories(out);
-    previz::bench::write_csv(curves, out / "frame.csv");
-    previz::bench::write_svg(curves, previz::render::device_name(*device), out / "frame.svg");
-    return 0;
+    previz::bench::run(options);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "bench_frame: %s\n", error.what());
     return 1;

@@ -1,7 +1,5 @@
 // Rays per second of our traversal beside Embree's single-ray calls: same mesh, same rays, in turns
 // in one run, in CPU time of all threads, so that "a core" means a core whatever else runs here.
-#include <sys/resource.h>
-
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -11,21 +9,13 @@
 #include <string>
 #include <vector>
 
+#include "tests/bench/cpu_time.hpp"
 #include "tests/bench/tracers/embree_tracer.hpp"
 #include "tests/bench/tracers/gpu_tracer.hpp"
 #include "tests/bench/tracers/shapes.hpp"
 
 namespace previz::bench {
 namespace {
-
-double cpu_seconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  const auto seconds = [](const timeval& t) {
-    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
-  };
-  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
 
 struct RaySets {
   std::vector<Ray> primary, diffuse, shadow;

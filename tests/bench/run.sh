@@ -1,0 +1,16 @@
+#!/bin/sh
+# All benchmarks of a build: run.sh BUILD_DIR OUT_DIR. Writes rays.md, instances.md, frame.md,
+# frame.csv and frame.svg. CLOCK=cpu (default where the device is lavapipe: wall elsewhere) or wall.
+set -eu
+if [ $# -ne 2 ]; then
+  echo "usage: $0 BUILD_DIR OUT_DIR" >&2
+  exit 2
+fi
+bench="$1/tests/bench"
+out="$2"
+mkdir -p "$out"
+
+"$bench/bench_rays" | tee "$out/rays.md"
+"$bench/bench_rays" --instanced --triangles 98000 1000000 | tee "$out/instances.md"
+if head -n 1 "$out/rays.md" | grep -q llvmpipe; then default=cpu; else default=wall; fi
+"$bench/bench_frame" --clock "${CLOCK:-$default}" --out "$out" | tee "$out/frame.md"
