@@ -112,8 +112,8 @@ std::optional<std::uint32_t> Fisheye::pixel_at(const glm::dvec2& position) const
   if (!(position.x >= -0.5 && position.y >= -0.5 && position.x < intrinsics_.width - 0.5 &&
         position.y < intrinsics_.height - 0.5))
     return std::nullopt;
-  const auto x = static_cast<std::uint32_t>(position.x + 0.5);
-  const auto y = static_cast<std::uint32_t>(position.y + 0.5);
+  const auto x = static_cast<std::uint32_t>(std::floor(position.x + 0.5));
+  const auto y = static_cast<std::uint32_t>(std::floor(position.y + 0.5));
   const double far_x = (std::abs(x - intrinsics_.cx) + 0.5) / intrinsics_.fx;
   const double far_y = (std::abs(y - intrinsics_.cy) + 0.5) / intrinsics_.fy;
   if (far_x * far_x + far_y * far_y > max_radius_ * max_radius_) return std::nullopt;

@@ -3,18 +3,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "daemon/lighting/luminance.hpp"
 #include "daemon/lighting/response.hpp"
 
 namespace previz::lighting {
-namespace {
 
 using std::numbers::pi;
-
-double luminance(const glm::vec3& c) {
-  return 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b;
-}
-
-}  // namespace
 
 LinearPicture to_latitude_longitude(const EnvironmentMap& map, int width) {
   constexpr int samples = 4;
@@ -25,8 +19,9 @@ LinearPicture to_latitude_longitude(const EnvironmentMap& map, int width) {
     for (int column = 0; column < width; ++column) {
       glm::vec3 sum(0);
       for (int s = 0; s < samples * samples; ++s) {
-        const double x = column + (s % samples + 0.5) / samples;
-        const double y = row + (s / samples + 0.5) / samples;
+        const int across = s % samples, down = s / samples;
+        const double x = column + (across + 0.5) / samples;
+        const double y = row + (down + 0.5) / samples;
         const double azimuth = 2 * pi * (0.5 - x / width);
         const double elevation = pi * (0.5 - y / picture.height);
         sum += map.radiance[texel_index(

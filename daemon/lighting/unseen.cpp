@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "daemon/lighting/environment.hpp"
+#include "daemon/lighting/luminance.hpp"
 
 namespace previz::lighting {
 namespace {
@@ -20,10 +21,6 @@ constexpr int sectors = 72;
 constexpr double sector_rad = 2 * pi / sectors;
 constexpr double band_rad = 10 * pi / 180;
 constexpr double outlier = 8;  // times the band's median luminance
-
-double luminance(const glm::vec3& c) {
-  return 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b;
-}
 
 // Camera axes; psi from x to y around the optical axis.
 glm::dvec3 camera_direction(double off_axis, double psi) {
@@ -65,8 +62,9 @@ Edge edge_of(const HdrPicture& picture, const Fisheye& lens) {
     edge.limit_rad[static_cast<std::size_t>(s)] = limit;
     const double start = std::max(0.0, limit - band_rad);
     for (int k = 0; k < steps_out * steps_around; ++k) {
-      const double psi = (s + (k % steps_around + 0.5) / steps_around) * sector_rad;
-      const double angle = start + (k / steps_around + 0.5) / steps_out * (limit - start);
+      const int around = k % steps_around, out = k / steps_around;
+      const double psi = (s + (around + 0.5) / steps_around) * sector_rad;
+      const double angle = start + (out + 0.5) / steps_out * (limit - start);
       const auto pixel = lens.project(camera_direction(angle, psi));
       const auto index = pixel ? lens.pixel_at(*pixel) : std::nullopt;
       if (index) samples.push_back({s, std::sin(angle), picture.radiance[*index]});
