@@ -7,6 +7,7 @@
 
 #include "daemon/scene/bvh_pairs.hpp"
 #include "daemon/scene/bvh_wide.hpp"
+#include "daemon/scene/transform.hpp"
 #include "drivers/error.hpp"
 #include "shaders/lib/shared.h"
 
@@ -97,13 +98,6 @@ glm::dmat4 uniform_scale(double scale) {
   glm::dmat4 result(scale);
   result[3][3] = 1;
   return result;
-}
-
-bool is_finite(const glm::dmat4& m) {
-  for (int column = 0; column < 4; ++column)
-    for (int row = 0; row < 4; ++row)
-      if (!std::isfinite(m[column][row])) return false;
-  return true;
 }
 
 // Rounding of the ray on its way into an instance, as a share of the coordinates, may take a hit

@@ -9,13 +9,13 @@
 namespace previz::scene {
 namespace {
 
-constexpr int width = 8;
+constexpr int branches = 8;
 
 // Least cost of covering a binary subtree by at most k wide subtrees, k = 1..8 (Ylitie et al.,
 // section 3.1). A node and a leaf both cost one visit, times the chance of meeting their box.
 struct Cover {
-  std::array<float, width + 1> cost{};
-  std::array<std::uint8_t, width + 1> left{};  // subtrees given to the left child; 0: one node
+  std::array<float, branches + 1> cost{};
+  std::array<std::uint8_t, branches + 1> left{};  // subtrees given to the left child; 0: one node
 };
 
 float cheapest_split(const Cover& left, const Cover& right, int k, std::uint8_t& left_count) {
@@ -39,13 +39,13 @@ std::vector<Cover> cover(std::span<const BinaryNode> binary) {
       c.cost.fill(area);
       continue;
     }
-    std::array<std::uint8_t, width + 1> split{};
-    std::array<float, width + 1> divided{};
-    for (int k = 2; k <= width; ++k)
+    std::array<std::uint8_t, branches + 1> split{};
+    std::array<float, branches + 1> divided{};
+    for (int k = 2; k <= branches; ++k)
       divided[k] = cheapest_split(covers[node.left], covers[node.right], k, split[k]);
-    c.cost[1] = area + divided[width];
-    c.left[1] = split[width];  // how its own children are divided, should it be a wide node
-    for (int k = 2; k <= width; ++k) {
+    c.cost[1] = area + divided[branches];
+    c.left[1] = split[branches];  // how its own children are divided, should it be a wide node
+    for (int k = 2; k <= branches; ++k) {
       c.cost[k] = std::min(divided[k], c.cost[1]);
       c.left[k] = divided[k] < c.cost[1] ? split[k] : std::uint8_t{0};
     }
@@ -59,11 +59,11 @@ class Collapse {
       : binary_(binary), leaf_(leaf), covers_(cover(binary)) {}
 
   WideTree run() {
-    tree_.records.resize(width);
+    tree_.records.resize(branches);
     root_area_ = half_area(binary_[0].bounds);
     if (binary_[0].left == 0) {
       // A lone leaf still gets a node above it.
-      tree_.records.resize(2 * width);
+      tree_.records.resize(2 * branches);
       const std::array<std::uint32_t, 1> children{0};
       encode(0, children, 1);
       add_cost(0);
@@ -92,14 +92,14 @@ class Collapse {
     std::vector<std::uint32_t> children;
     const int left = covers_[node].left[1];
     gather(binary_[node].left, left, children);
-    gather(binary_[node].right, width - left, children);
+    gather(binary_[node].right, branches - left, children);
 
-    const std::size_t block = tree_.records.size() / width;
-    tree_.records.resize(tree_.records.size() + width);
+    const std::size_t block = tree_.records.size() / branches;
+    tree_.records.resize(tree_.records.size() + branches);
     const auto slots = encode(record, children, block);
-    for (int slot = 0; slot < width; ++slot) {
+    for (int slot = 0; slot < branches; ++slot) {
       if (slots[slot] == none || binary_[slots[slot]].left == 0) continue;
-      emit(slots[slot], block * width + static_cast<std::size_t>(slot), level + 1);
+      emit(slots[slot], block * branches + static_cast<std::size_t>(slot), level + 1);
     }
   }
 
@@ -109,25 +109,25 @@ class Collapse {
 
   // Which child goes into which slot: of all pairs, the one that lies most towards the slot's
   // octant first (greedy form of the paper's assignment).
-  std::array<std::uint32_t, width> assign_slots(std::span<const std::uint32_t> children,
-                                                const Aabb& bounds) const {
+  std::array<std::uint32_t, branches> assign_slots(std::span<const std::uint32_t> children,
+                                                   const Aabb& bounds) const {
     const glm::vec3 middle = bounds.low + bounds.high;
-    std::array<std::array<float, width>, width> gain;  // child, slot
+    std::array<std::array<float, branches>, branches> gain;  // child, slot
     for (std::size_t c = 0; c < children.size(); ++c) {
       const Aabb& box = binary_[children[c]].bounds;
       const glm::vec3 offset = box.low + box.high - middle;
-      for (int slot = 0; slot < width; ++slot)
+      for (int slot = 0; slot < branches; ++slot)
         gain[c][slot] = (slot & 1 ? offset.x : -offset.x) + (slot & 2 ? offset.y : -offset.y) +
                         (slot & 4 ? offset.z : -offset.z);
     }
-    std::array<std::uint32_t, width> slots;
+    std::array<std::uint32_t, branches> slots;
     slots.fill(none);
-    std::array<bool, width> placed{};
+    std::array<bool, branches> placed{};
     for (std::size_t round = 0; round < children.size(); ++round) {
       float best = -std::numeric_limits<float>::infinity();
       std::size_t best_child = 0, best_slot = 0;
       for (std::size_t c = 0; c < children.size(); ++c) {
-        for (std::size_t slot = 0; slot < width; ++slot) {
+        for (std::size_t slot = 0; slot < branches; ++slot) {
           if (placed[c] || slots[slot] != none || gain[c][slot] <= best) continue;
           best = gain[c][slot];
           best_child = c;
@@ -141,9 +141,9 @@ class Collapse {
   }
 
   // Writes a node's record and its leaves' records in the children's block.
-  std::array<std::uint32_t, width> encode(std::size_t record,
-                                          std::span<const std::uint32_t> children,
-                                          std::size_t block) {
+  std::array<std::uint32_t, branches> encode(std::size_t record,
+                                             std::span<const std::uint32_t> children,
+                                             std::size_t block) {
     Aabb bounds;
     for (const std::uint32_t child : children) bounds = merged(bounds, binary_[child].bounds);
     const auto slots = assign_slots(children, bounds);
@@ -151,24 +151,24 @@ class Collapse {
     words[3] = static_cast<std::uint32_t>(block);
     for (int axis = 0; axis < 3; ++axis) encode_axis(words, axis, bounds, slots);
     tree_.records[record] = words;
-    for (std::size_t slot = 0; slot < width; ++slot) {
+    for (std::size_t slot = 0; slot < branches; ++slot) {
       if (slots[slot] == none || binary_[slots[slot]].left != 0) continue;
       add_cost(slots[slot]);
       ++tree_.leaves;
-      tree_.records[block * width + slot] = leaf_(binary_[slots[slot]].primitive);
+      tree_.records[block * branches + slot] = leaf_(binary_[slots[slot]].primitive);
     }
     return slots;
   }
 
   void encode_axis(Record& words, int axis, const Aabb& bounds,
-                   const std::array<std::uint32_t, width>& slots) const {
+                   const std::array<std::uint32_t, branches>& slots) const {
     const double origin = std::floor(bounds.low[axis]);
     int exponent = 0;
     while (std::ceil(std::ldexp(bounds.high[axis] - origin, -exponent)) > 255) ++exponent;
     words[axis] = static_cast<std::uint32_t>(static_cast<std::int32_t>(origin)) << 8 |
                   (gpu::RECORD_NODE + static_cast<std::uint32_t>(exponent));
     const std::size_t first = 4 + 4 * static_cast<std::size_t>(axis);
-    for (std::size_t slot = 0; slot < width; ++slot) {
+    for (std::size_t slot = 0; slot < branches; ++slot) {
       std::uint32_t low = 255, high = 0;
       if (slots[slot] != none) {
         const Aabb& box = binary_[slots[slot]].bounds;

@@ -13,6 +13,7 @@
 #include "daemon/scene/gltf_nodes.hpp"
 #include "daemon/scene/gltf_read.hpp"
 #include "daemon/scene/gltf_value.hpp"
+#include "daemon/scene/transform.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
 
@@ -29,13 +30,6 @@ std::uint32_t presence_bits(set::Presence presence) {
       return world_real;
   }
   return world_both;
-}
-
-bool is_finite(const glm::dmat4& transform) {
-  for (int column = 0; column < 4; ++column)
-    for (int row = 0; row < 4; ++row)
-      if (!std::isfinite(transform[column][row])) return false;
-  return true;
 }
 
 bool is_invertible(const glm::dmat4& transform) {
