@@ -15,8 +15,10 @@
 namespace previz::tracking {
 namespace {
 
-constexpr double kSearchPx = 2.0;      // how far off the guess may be
-constexpr double kMinContrast = 0.05;  // sRGB-encoded, 13 of 255
+constexpr double kSearchStepPx = 0.5;
+constexpr int kSearchSteps = 4;                             // either way
+constexpr double kSearchPx = kSearchSteps * kSearchStepPx;  // how far off the guess may be
+constexpr double kMinContrast = 0.05;                       // sRGB-encoded, 13 of 255
 constexpr double kMaxBlurPx = 4.0;
 constexpr double kMinNoise = 0.003;  // of the contrast; 8-bit rounding of white is about that
 constexpr double kClipped = 0.99;    // linear; where a sensor's white begins
@@ -222,7 +224,8 @@ Vector coarse_start(const std::vector<Sample>& samples) {
   Vector best;
   double least = HUGE_VAL;
   for (double bright : whites) {
-    for (double shift = -kSearchPx; shift <= kSearchPx; shift += 0.5) {
+    for (int step = -kSearchSteps; step <= kSearchSteps; ++step) {
+      const double shift = step * kSearchStepPx;
       Vector p = Vector::all(0);
       p[kBlack] = percentile(values, 0.1);
       p[kWhite] = bright;
