@@ -80,9 +80,9 @@ bool reads_back(const std::string& assignment, const std::string& text) {
 
 // A set's text as a reader likes it best among the forms that bring it back byte for byte.
 std::string text_assignment(const std::string& text) {
-  const std::string literal = "text = '''\n" + text + "'''\n";
+  std::string literal = "text = '''\n" + text + "'''\n";
   if (reads_back(literal, text)) return literal;
-  const std::string escaped = "text = " + quote(text) + "\n";
+  std::string escaped = "text = " + quote(text) + "\n";
   if (reads_back(escaped, text)) return escaped;
   return "text_base64 = \"" + base64(text) + "\"  # the set file is not UTF-8\n";
 }
