@@ -198,7 +198,7 @@ std::filesystem::path RenderDirectory::write_video(const std::vector<FrameRecord
     if (!video) video.emplace(path() / "review", picture.width, picture.height, codecs.front());
     video->write(picture, frame.timestamp_ns);
   }
-  const std::filesystem::path written = video->close();
+  std::filesystem::path written = video->close();
   out << written.string() << ": " << frames.size() << " pictures, " << codecs.front().description
       << std::endl;
   return written;
