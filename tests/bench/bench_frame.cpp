@@ -11,7 +11,7 @@
 
 #include "daemon/render/renderer.hpp"
 #include "drivers/error.hpp"
-#include "tests/bench/cpu_time.hpp"
+#include "tests/bench/measure.hpp"
 #include "tests/bench/plot.hpp"
 #include "tests/bench/tracers/shapes.hpp"
 
@@ -86,11 +86,6 @@ ObserverCalibration calibration_of(const Resolution& r) {
   calibration.intrinsics.cx = 0.5 * (r.width - 1);
   calibration.intrinsics.cy = 0.5 * (r.height - 1);
   return calibration;
-}
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
 }
 
 Times measure(render::Renderer& renderer, const render::FrameInput& frame, int rounds) {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/bench/cpu_time.hpp"
+#include "tests/bench/measure.hpp"
 #include "tests/bench/tracers/embree_tracer.hpp"
 #include "tests/bench/tracers/gpu_tracer.hpp"
 #include "tests/bench/tracers/shapes.hpp"
@@ -79,11 +79,6 @@ struct Measured {
   double ours = 0, embree = 0;          // median Mrays/s a core
   double ratio = 0, low = 0, high = 0;  // median and extremes over the rounds
 };
-
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
-}
 
 template <typename Ours, typename Theirs>
 Measured measure(std::size_t rays, int rounds, const Ours& ours, const Theirs& theirs) {
