@@ -6,6 +6,7 @@
 #include "shaders/lib/append.glsl"
 #include "shaders/lib/difference_bounds.glsl"
 #include "shaders/lib/environment.glsl"
+#include "shaders/lib/gather.glsl"
 #include "shaders/lib/sampler.glsl"
 
 struct Path {
@@ -153,6 +154,15 @@ bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, float ch
   return any(greaterThan(ray.contribution, vec3(0.0)));
 }
 
+// Light that comes by mirrors and glass only (P16), by photons. Each world sums the same photons in
+// the same order, so that the two are equal where the photons are.
+void meet_photons(Path p, Surface s, Lobes l) {
+  if (l.p_diffuse <= 0.0 && (l.p_reflection <= 0.0 || l.smooth_reflection)) return;
+  const GatheredPair gathered = gather_photons(s, l, frame.max_depth - p.depth - 1u);
+  if ((p.worlds & WORLD_MIXED) != 0u) sample_mixed[p.slot].rgb += p.throughput * gathered.mixed;
+  if ((p.worlds & WORLD_REAL) != 0u) sample_real[p.slot].rgb += p.throughput * gathered.real;
+}
+
 // The next direction; false where the path ends.
 bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, float choice) {
   vec3 direction;
@@ -222,6 +232,7 @@ void main() {
         const vec2 choice = sample_2d(random, vertex_pair(PAIR_CHOICE, p.depth));
         const Lobes l = make_lobes(s);
         const Technique t = make_technique(p, s, l);
+        if (has_feature(FEATURE_PHOTONS)) meet_photons(p, s, l);
         lit = light_ray(p, s, l, t, random, choice.x, ray);
         scattered = scatter(p, s, l, t, random, choice.y);
         p.depth += 1u;

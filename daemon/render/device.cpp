@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "drivers/error.hpp"
+#include "shaders/lib/render_shared.h"
 
 namespace previz::render {
 namespace {
@@ -302,6 +303,19 @@ Pipeline create_pipeline(Device& device, std::span<const std::uint32_t> spirv,
                                                 "main", &specialization);
   const vk::ComputePipelineCreateInfo info({}, stage, *layout);
   return {vk::raii::Pipeline(device.vk(), nullptr, info)};
+}
+
+vk::raii::DescriptorSetLayout create_set_layout(
+    Device& device, std::uint32_t bindings,
+    const std::function<vk::DescriptorType(std::uint32_t)>& type) {
+  std::vector<vk::DescriptorSetLayoutBinding> entries;
+  for (std::uint32_t i = 0; i < bindings; ++i)
+    entries.emplace_back(i, type(i), 1, vk::ShaderStageFlagBits::eCompute);
+  return {device.vk(), vk::DescriptorSetLayoutCreateInfo({}, entries)};
+}
+
+std::uint32_t work_groups(std::uint32_t invocations) {
+  return (invocations + gpu::WORKGROUP_SIZE - 1) / gpu::WORKGROUP_SIZE;
 }
 
 void barrier(const vk::raii::CommandBuffer& commands) {

@@ -105,6 +105,14 @@ Pipeline create_pipeline(Device& device, std::span<const std::uint32_t> spirv,
                          const vk::raii::PipelineLayout& layout,
                          std::span<const std::uint32_t> constants);
 
+// Bindings 0 .. count - 1, each of the type that `type` says, for compute shaders.
+vk::raii::DescriptorSetLayout create_set_layout(
+    Device& device, std::uint32_t bindings,
+    const std::function<vk::DescriptorType(std::uint32_t)>& type);
+
+// Work groups of WORKGROUP_SIZE that hold so many invocations.
+std::uint32_t work_groups(std::uint32_t invocations);
+
 // Makes what earlier dispatches and transfers wrote visible to later dispatches (and their indirect
 // arguments) and transfers.
 void barrier(const vk::raii::CommandBuffer& commands);

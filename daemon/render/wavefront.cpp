@@ -29,21 +29,8 @@ std::uint32_t slots_of(const gpu::GpuBatch& tile) {
   return round_up(tile.width, block_width) * round_up(tile.height, block_height);
 }
 
-std::uint32_t groups(std::uint32_t invocations) {
-  return (invocations + gpu::WORKGROUP_SIZE - 1) / gpu::WORKGROUP_SIZE;
-}
-
 bool is_texel_buffer(std::uint32_t binding) {
   return binding < gpu::BINDING_INSTANCES;
-}
-
-vk::raii::DescriptorSetLayout create_set_layout(
-    Device& device, std::uint32_t bindings,
-    const std::function<vk::DescriptorType(std::uint32_t)>& type) {
-  std::vector<vk::DescriptorSetLayoutBinding> entries;
-  for (std::uint32_t i = 0; i < bindings; ++i)
-    entries.emplace_back(i, type(i), 1, vk::ShaderStageFlagBits::eCompute);
-  return {device.vk(), vk::DescriptorSetLayoutCreateInfo({}, entries)};
 }
 
 }  // namespace
@@ -52,7 +39,8 @@ Wavefront::Wavefront(Device& device, int width, int height)
     : device_(device),
       max_slots_(device.is_cpu() ? cpu_slots : gpu_slots),
       width_(width),
-      height_(height) {
+      height_(height),
+      photons_(device) {
   create_layouts();
   create_tiles(width, height);
   create_paths();
@@ -66,7 +54,8 @@ void Wavefront::create_layouts() {
   });
   path_layout_ = create_set_layout(device_, gpu::PATH_BINDINGS,
                                    [](std::uint32_t) { return Type::eStorageBuffer; });
-  const vk::DescriptorSetLayout layouts[] = {*scene_layout_, *path_layout_};
+  const vk::DescriptorSetLayout layouts[] = {*scene_layout_, *path_layout_,
+                                             *photons_.set_layout()};
   const vk::PushConstantRange batch(vk::ShaderStageFlagBits::eCompute, 0, sizeof(gpu::GpuBatch));
   layout_ = vk::raii::PipelineLayout(device_.vk(), {{}, layouts, batch});
 }
@@ -81,7 +70,7 @@ void Wavefront::create_tiles(int width, int height) {
   const std::uint32_t band_rows = round_up((rows + bands - 1) / bands, block_height);
   for (std::uint32_t y = 0; y < rows; y += band_rows) {
     Tile tile;
-    tile.batch = {0, y, columns, std::min(band_rows, rows - y), 0, 0};
+    tile.batch = {0, y, columns, std::min(band_rows, rows - y), 0, 0, 0};
     tile.pixels = create_storage_buffer(
         device_, sizeof(gpu::GpuPixel) * tile.batch.width * tile.batch.height);
     tiles_.push_back(std::move(tile));
@@ -164,6 +153,7 @@ void Wavefront::create_pipelines(std::uint32_t features) {
   prepare_shadow_ = create_pipeline(device_, prepare_shadow_spv, layout_, constants);
   shadow_ = create_pipeline(device_, shadow_spv, layout_, constants);
   accumulate_ = create_pipeline(device_, accumulate_spv, layout_, constants);
+  if ((features & gpu::FEATURE_PHOTONS) != 0) photons_.create_pipelines(layout_, features);
   features_ = features;
 }
 
@@ -178,16 +168,21 @@ void Wavefront::clear() {
   });
 }
 
+void Wavefront::bind_sets(const vk::raii::CommandBuffer& commands, const Tile& tile,
+                          const gpu::GpuBatch& batch) const {
+  const vk::DescriptorSet sets[] = {*scene_set_, *tile.set, photons_.set()};
+  commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *layout_, 0, sets, {});
+  commands.pushConstants<gpu::GpuBatch>(*layout_, vk::ShaderStageFlagBits::eCompute, 0, batch);
+}
+
 void Wavefront::record_batch(const vk::raii::CommandBuffer& commands, const Tile& tile,
                              const gpu::GpuBatch& batch, std::uint32_t max_depth) const {
   const auto use = [&](const Pipeline& pipeline) {
     commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipeline.pipeline);
   };
-  const vk::DescriptorSet sets[] = {*scene_set_, *tile.set};
-  commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *layout_, 0, sets, {});
-  commands.pushConstants<gpu::GpuBatch>(*layout_, vk::ShaderStageFlagBits::eCompute, 0, batch);
+  bind_sets(commands, tile, batch);
   use(generate_);
-  commands.dispatch(groups(slots_of(batch) * batch.samples), 1, 1);
+  commands.dispatch(work_groups(slots_of(batch) * batch.samples), 1, 1);
   barrier(commands);
   // One segment a vertex, one more to meet light after the last vertex, and one because a fork
   // goes on a round later than the path it parted from.
@@ -209,12 +204,14 @@ void Wavefront::record_batch(const vk::raii::CommandBuffer& commands, const Tile
     barrier(commands);
   }
   use(accumulate_);
-  commands.dispatch(groups(batch.width * batch.height), 1, 1);
+  commands.dispatch(work_groups(batch.width * batch.height), 1, 1);
   barrier(commands);
 }
 
 bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::uint32_t max_depth,
                        const std::function<bool()>& cancelled) {
+  if ((features_ & gpu::FEATURE_PHOTONS) != 0)
+    return render_with_photons(first_sample, samples, max_depth, cancelled);
   for (const Tile& tile : tiles_) {
     const std::uint32_t at_once = std::max(slots_ / slots_of(tile.batch), 1u);
     for (std::uint32_t done = 0; done < samples; done += at_once) {
@@ -228,6 +225,35 @@ bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::u
     }
   }
   return true;
+}
+
+// Sample by sample: each has photons of its own, which all tiles share.
+bool Wavefront::render_with_photons(std::uint32_t first_sample, std::uint32_t samples,
+                                    std::uint32_t max_depth,
+                                    const std::function<bool()>& cancelled) {
+  for (std::uint32_t sample = first_sample; sample < first_sample + samples; ++sample) {
+    const double radius = photon_radius_ * photon_radius_factor(sample);
+    for (const Tile& tile : tiles_) {
+      if (cancelled && cancelled()) return false;
+      gpu::GpuBatch batch = tile.batch;
+      batch.first_sample = sample;
+      batch.samples = 1;
+      batch.photon_radius = static_cast<float>(radius);
+      device_.submit([&](const vk::raii::CommandBuffer& commands) {
+        if (&tile == &tiles_.front()) {
+          bind_sets(commands, tile, batch);
+          photons_.record(commands);
+        }
+        record_batch(commands, tile, batch, max_depth);
+      });
+    }
+  }
+  return true;
+}
+
+void Wavefront::use_photons(std::uint32_t count, double radius) {
+  photons_.resize(count);
+  photon_radius_ = radius;
 }
 
 std::vector<gpu::GpuPixel> Wavefront::pixels() const {

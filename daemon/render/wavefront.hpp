@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "daemon/render/device.hpp"
+#include "daemon/render/photon_map.hpp"
 #include "shaders/lib/render_shared.h"
 
 namespace previz::render {
@@ -18,6 +19,8 @@ class Wavefront {
   // Binds the scene's buffers (set 0, by binding) and makes sure that the pipelines are those for
   // `features`. Must be called whenever a buffer was recreated.
   void bind(const std::vector<const Buffer*>& scene, std::uint32_t features);
+  // Photons a pass and the radius (metres) of the first, where `features` has FEATURE_PHOTONS.
+  void use_photons(std::uint32_t count, double radius);
   // Forgets all samples.
   void clear();
   // Adds samples first_sample .. first_sample + samples - 1 to every pixel. Returns false where
@@ -40,6 +43,10 @@ class Wavefront {
   void create_paths();
   void create_pipelines(std::uint32_t features);
   void write_path_set(const Tile& tile);
+  void bind_sets(const vk::raii::CommandBuffer& commands, const Tile& tile,
+                 const gpu::GpuBatch& batch) const;
+  bool render_with_photons(std::uint32_t first_sample, std::uint32_t samples,
+                           std::uint32_t max_depth, const std::function<bool()>& cancelled);
   void record_batch(const vk::raii::CommandBuffer& commands, const Tile& tile,
                     const gpu::GpuBatch& batch, std::uint32_t max_depth) const;
 
@@ -47,6 +54,8 @@ class Wavefront {
   std::uint32_t max_slots_;
   std::uint32_t slots_ = 0;  // allocated
   int width_, height_;
+  PhotonMap photons_;
+  double photon_radius_ = 0;
   vk::raii::DescriptorSetLayout scene_layout_{nullptr}, path_layout_{nullptr};
   vk::raii::PipelineLayout layout_{nullptr};
   vk::raii::DescriptorPool descriptors_{nullptr};

@@ -45,6 +45,11 @@ constexpr auto names(Estimator) {
 constexpr auto names(Composite) {
   return std::to_array<Name<Composite>>({{"additive", Composite::additive}});
 }
+constexpr auto names(Caustics) {
+  return std::to_array<Name<Caustics>>({{"photons", Caustics::photons},
+                                        {"traced", Caustics::traced},
+                                        {"none", Caustics::none}});
+}
 constexpr auto names(ResponseCurve::Kind) {
   return std::to_array<Name<ResponseCurve::Kind>>({{"srgb", ResponseCurve::Kind::srgb},
                                                    {"linear", ResponseCurve::Kind::linear},

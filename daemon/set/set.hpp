@@ -94,6 +94,7 @@ struct Lighting {
 
 enum class Estimator { paired };    // difference follows
 enum class Composite { additive };  // ratio and hybrid follow
+enum class Caustics { photons, traced, none };
 
 struct Estimation {
   Estimator estimator = Estimator::paired;
@@ -105,7 +106,9 @@ struct Estimation {
   // Share of a shared path's directions that are sampled towards objects of one world only; 0 is
   // the paper's algorithm. At most 0.8: the BSDF keeps the rest.
   double difference_sampling = 0.5;
-  bool caustics = true;  // light that reaches a rough surface by mirrors and glass only
+  Caustics caustics = Caustics::photons;  // how light comes to rough surfaces by mirrors and glass
+  double photons = 0.1;                   // a pass (sample), per pixel of the picture
+  double photon_radius_px = 4;  // of the first pass, at the distance of the nearest such object
 };
 
 struct Quality {

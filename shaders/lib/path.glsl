@@ -2,11 +2,8 @@
 #ifndef PREVIZ_PATH_GLSL
 #define PREVIZ_PATH_GLSL
 
+#include "shaders/lib/batch.glsl"
 #include "shaders/lib/scene.glsl"
-
-layout(local_size_x = WORKGROUP_SIZE) in;
-
-layout(scalar, push_constant) uniform Batch { GpuBatch batch; };
 
 layout(scalar, set = 1, binding = BINDING_RAY_ORIGIN) buffer RayOrigin { vec4 ray_origin[]; };
 layout(scalar, set = 1, binding = BINDING_RAY_DIRECTION) buffer RayDirection { vec4 ray_direction[]; };

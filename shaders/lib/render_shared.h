@@ -28,7 +28,8 @@ PREVIZ_CONST uint BINDING_MATERIALS = 8u;  // GpuMaterial[]
 PREVIZ_CONST uint BINDING_TEXTURES = 9u;   // GpuTexture[]
 PREVIZ_CONST uint BINDING_LIGHTS = 10u;     // GpuLight[]
 PREVIZ_CONST uint BINDING_FRAME = 11u;      // GpuFrame
-PREVIZ_CONST uint BINDING_BOUNDS = 12u;     // vec4[]: centre and radius of each differing object
+PREVIZ_CONST uint BINDING_BOUNDS = 12u;     // vec4[]: centre and radius of each differing object,
+                                            // then of each object that can reflect without blur
 PREVIZ_CONST uint SCENE_BINDINGS = 13u;
 
 // Set 1, paths in flight and what they bring back. A slot is one sample of one pixel; it has two
@@ -46,6 +47,13 @@ PREVIZ_CONST uint BINDING_CONTROL = 9u;        // GpuControl
 PREVIZ_CONST uint BINDING_PIXELS = 10u;        // GpuPixel[width * height]
 PREVIZ_CONST uint PATH_BINDINGS = 11u;
 
+// Set 2, the photons of one pass, in a hash grid of cells twice as wide as the radius.
+PREVIZ_CONST uint BINDING_PHOTONS = 0u;        // GpuPhoton[2 * photon_count]; two, for a fork
+PREVIZ_CONST uint BINDING_PHOTON_ORDER = 1u;   // uint[]: photons, those of a bucket together
+PREVIZ_CONST uint BINDING_PHOTON_BUCKETS = 2u; // GpuPhotonBucket[], a power of two
+PREVIZ_CONST uint BINDING_PHOTON_CONTROL = 3u; // GpuPhotonControl
+PREVIZ_CONST uint PHOTON_BINDINGS = 4u;
+
 PREVIZ_CONST uint WORKGROUP_SIZE = 64u;
 PREVIZ_CONST uint NO_INDEX = 0xffffffffu;
 PREVIZ_CONST uint MAX_DEPTH = 64u;
@@ -59,7 +67,8 @@ PREVIZ_CONST uint FEATURE_VISIBLE_LIGHTS = 16u;  // lights with an extent that r
 PREVIZ_CONST uint FEATURE_LENS = 32u;
 PREVIZ_CONST uint FEATURE_FORKS = 64u;        // any object present in one world only
 PREVIZ_CONST uint FEATURE_ENVIRONMENT_SAMPLING = 128u;  // next-event estimation of the environment
-PREVIZ_CONST uint FEATURE_CAUSTICS = 256u;  // light that reaches a rough vertex by Dirac lobes only
+PREVIZ_CONST uint FEATURE_CAUSTICS = 256u;  // paths bring light to rough vertices by Dirac lobes only
+PREVIZ_CONST uint FEATURE_PHOTONS = 512u;   // photons bring it
 
 // Bits of a path's state.
 PREVIZ_CONST uint PATH_WORLDS_MASK = 3u;      // WORLD_*
@@ -80,6 +89,26 @@ struct GpuShadowRay {
   uint slot_and_worlds;  // slot << 2 | WORLD_*
   vec3 contribution;     // throughput * f * cos * Le / pdf * MIS weight
   vec2 gain;             // emission gain in the (mixed, real) world
+};
+
+// Light that arrived at a surface with a non-Dirac lobe by way of Dirac lobes only.
+struct GpuPhoton {
+  vec3 position;
+  uint vertices;   // Dirac vertices on its way
+  vec3 direction;  // in which it travelled, unit
+  vec3 normal;     // geometric, on the side on which it arrived
+  vec3 flux;       // watts; divided by the number of photons of the pass
+  vec2 gain;       // in the (mixed, real) world; both 0: no photon
+};
+
+struct GpuPhotonBucket {
+  uint first;   // in ORDER
+  uint count;
+  uint filled;  // while ORDER is made
+};
+
+struct GpuPhotonControl {
+  uint stored;
 };
 
 // What one pixel has gathered: two-float sums (value = high + low), so that 1e7 samples stay exact.
@@ -184,13 +213,19 @@ struct GpuFrame {
   uint light_count;
   uint visible_light_count;   // the first lights, those with an extent that are not triangles
   uint bound_count;
-  float bound_share;          // of a shared path's directions that go towards BOUNDS
+  float bound_share;          // of a shared path's directions that go towards those BOUNDS
+  uint specular_bound_count;  // the BOUNDS after them
+  uint photon_count;          // emitted a pass
+  float photon_environment;   // probability that a photon starts from the environment
+  vec3 scene_center;
+  float scene_radius;         // of a sphere that holds everything
 };
 
 // Push constants: the part of the picture and the samples of this batch.
 struct GpuBatch {
   uint x, y, width, height;   // tile
   uint first_sample, samples;
+  float photon_radius;        // metres; photons of a pass serve the sample of the same index
 };
 
 #ifdef __cplusplus
@@ -204,8 +239,9 @@ static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
 static_assert(sizeof(GpuLight) == 124);
 static_assert(offsetof(GpuLight, uv0) == 96);
-static_assert(sizeof(GpuFrame) == 108);
-static_assert(sizeof(GpuBatch) == 24);
+static_assert(sizeof(GpuFrame) == 136);
+static_assert(sizeof(GpuBatch) == 28);
+static_assert(sizeof(GpuPhoton) == 60);
 }  // namespace previz::gpu
 #endif
 #endif

@@ -28,7 +28,7 @@ std::vector<glm::dvec3> widen(const std::vector<glm::vec3>& layer) {
 Worlds gpu_scrambles(const View& view, int samples, bool caustics) {
   Worlds worlds;
   set::Estimation estimation;
-  estimation.caustics = caustics;
+  estimation.caustics = caustics ? set::Caustics::traced : set::Caustics::none;
   render::Renderer renderer(shared_device(), estimation, view.calibration);
   renderer.set_scene(view.scene);
   renderer.set_environment(view.environment, set::LightSampling::importance);

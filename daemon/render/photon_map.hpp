@@ -1,0 +1,41 @@
+// Photons for caustics: progressive photon mapping in both worlds (P16). One pass of photons serves
+// the sample of the same index; the radius shrinks from pass to pass (Knaus and Zwicker 2011).
+#pragma once
+
+#include <cstdint>
+
+#include "daemon/render/device.hpp"
+
+namespace previz::render {
+
+// Radius of a pass (0, 1, ...) over that of pass 0: r^2 shrinks by (n + 2/3) / (n + 1) after pass n.
+double photon_radius_factor(std::uint64_t pass);
+
+// Photons of one pass, from what the set asks for a pixel; at least 1024, at most 2^17.
+std::uint32_t photon_count(double photons_per_pixel, int width, int height);
+
+class PhotonMap {
+ public:
+  // Pipeline layouts of the passes have this at set 2.
+  explicit PhotonMap(Device& device);
+  const vk::raii::DescriptorSetLayout& set_layout() const { return set_layout_; }
+  vk::DescriptorSet set() const { return *set_; }
+
+  // (Re)creates the buffers where `photons` a pass differs. At least 1, also where none are used.
+  void resize(std::uint32_t photons);
+  void create_pipelines(const vk::raii::PipelineLayout& layout, std::uint32_t features);
+  // Empties the map and fills it with the photons of one pass. Sets 0 and 2 and the push constants
+  // (GpuBatch: first_sample is the pass, photon_radius) must be bound.
+  void record(const vk::raii::CommandBuffer& commands) const;
+
+ private:
+  Device& device_;
+  vk::raii::DescriptorSetLayout set_layout_{nullptr};
+  vk::raii::DescriptorPool descriptors_{nullptr};
+  vk::raii::DescriptorSet set_{nullptr};
+  Pipeline trace_, buckets_pass_, scatter_, sort_;
+  std::uint32_t photons_ = 0, bucket_count_ = 0;
+  Buffer photon_buffer_, order_, buckets_, control_;
+};
+
+}  // namespace previz::render
