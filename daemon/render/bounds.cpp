@@ -80,9 +80,8 @@ Bounds specular_bounds(const scene::Scene& scene, double specular_alpha) {
   std::vector<bool> dirac;
   for (const scene::Material& material : scene.materials)
     dirac.push_back(can_be_dirac(scene, material, specular_alpha));
-  return bounds_where(scene, [&](const scene::Instance& instance) -> bool {
-    return dirac[instance.material];
-  });
+  return bounds_where(
+      scene, [&](const scene::Instance& instance) -> bool { return dirac[instance.material]; });
 }
 
 }  // namespace previz::render

@@ -243,8 +243,8 @@ void GpuScene::describe(gpu::GpuFrame& frame) const {
 double GpuScene::nearest_specular_distance(const glm::dvec3& camera_position) const {
   double nearest = std::numeric_limits<double>::infinity();
   for (const glm::dvec4& bound : specular_bounds_)
-    nearest = std::min(nearest,
-                       std::max(glm::length(glm::dvec3(bound) - camera_position), bound.w));
+    nearest =
+        std::min(nearest, std::max(glm::length(glm::dvec3(bound) - camera_position), bound.w));
   return nearest;
 }
 

@@ -6,6 +6,7 @@
 #include "daemon/lighting/response.hpp"
 #include "daemon/render/composite.hpp"
 #include "daemon/render/gpu_scene.hpp"
+#include "daemon/render/photon_schedule.hpp"
 #include "daemon/render/view.hpp"
 #include "daemon/render/wavefront.hpp"
 #include "drivers/error.hpp"

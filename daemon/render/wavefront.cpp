@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "daemon/render/photon_schedule.hpp"
 #include "shaders/accumulate.spv.h"
 #include "shaders/advance.spv.h"
 #include "shaders/extend.spv.h"
@@ -54,8 +55,7 @@ void Wavefront::create_layouts() {
   });
   path_layout_ = create_set_layout(device_, gpu::PATH_BINDINGS,
                                    [](std::uint32_t) { return Type::eStorageBuffer; });
-  const vk::DescriptorSetLayout layouts[] = {*scene_layout_, *path_layout_,
-                                             *photons_.set_layout()};
+  const vk::DescriptorSetLayout layouts[] = {*scene_layout_, *path_layout_, *photons_.set_layout()};
   const vk::PushConstantRange batch(vk::ShaderStageFlagBits::eCompute, 0, sizeof(gpu::GpuBatch));
   layout_ = vk::raii::PipelineLayout(device_.vk(), {{}, layouts, batch});
 }
