@@ -7,7 +7,7 @@
 
 void main() {
   const uint bucket = gl_GlobalInvocationID.x;
-  if (bucket >= buckets.length()) return;
+  if (bucket >= photon_bucket_count()) return;
   const uint count = buckets[bucket].count;
   if (count > 0u) buckets[bucket].first = atomicAdd(photon_control.stored, count);
 }

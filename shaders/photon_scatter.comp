@@ -7,7 +7,7 @@
 
 void main() {
   const uint photon = gl_GlobalInvocationID.x;
-  if (photon >= photons.length() || !photon_stored(photons[photon])) return;
+  if (photon >= 2u * frame.photon_count || photons[photon].vertices == 0u) return;
   const uint bucket = photon_bucket(photon_cell(photons[photon].position));
-  photon_order[buckets[bucket].first + atomicAdd(buckets[bucket].filled, 1u)] = photon;
+  photon_order[buckets[bucket].first + atomicAdd(filled[bucket], 1u)] = photon;
 }

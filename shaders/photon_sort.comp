@@ -1,4 +1,5 @@
-// Sorts the photons of each bucket by index: sums over them then round the same in every run.
+// Sorts the photons of each bucket by index, so that sums over them round the same in every run, and
+// lays them out as they are gathered.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -17,11 +18,7 @@ void sift_down(uint first, uint root, uint count) {
   photon_order[first + root] = value;
 }
 
-void main() {
-  if (gl_GlobalInvocationID.x >= buckets.length()) return;
-  const uint first = buckets[gl_GlobalInvocationID.x].first;
-  const uint count = buckets[gl_GlobalInvocationID.x].count;
-  if (count < 2u) return;
+void sort_bucket(uint first, uint count) {
   const uint steps = count / 2u + count - 1u;
   for (uint chunk = 0u; chunk < steps; chunk += LOOP_CHUNK) {
     for (uint step = chunk; step < min(chunk + LOOP_CHUNK, steps); ++step) {
@@ -36,4 +33,21 @@ void main() {
       }
     }
   }
+}
+
+void write_sorted(uint place) {
+  const GpuPhoton p = photons[photon_order[place]];
+  sorted_photons[TEXELS_PER_PHOTON * place] = vec4(p.position, float(p.vertices));
+  sorted_photons[TEXELS_PER_PHOTON * place + 1u] = vec4(p.direction, p.gain.x);
+  sorted_photons[TEXELS_PER_PHOTON * place + 2u] = vec4(p.normal, p.gain.y);
+  sorted_photons[TEXELS_PER_PHOTON * place + 3u] = vec4(p.flux, 0.0);
+}
+
+void main() {
+  if (gl_GlobalInvocationID.x >= photon_bucket_count()) return;
+  const GpuPhotonBucket bucket = buckets[gl_GlobalInvocationID.x];
+  if (bucket.count > 1u) sort_bucket(bucket.first, bucket.count);
+  const uint end = bucket.first + bucket.count;
+  for (uint chunk = bucket.first; chunk < end; chunk += LOOP_CHUNK)
+    for (uint place = chunk; place < min(chunk + LOOP_CHUNK, end); ++place) write_sorted(place);
 }

@@ -246,7 +246,9 @@ vk::DeviceSize texel_bytes_of(vk::Format format) {
 }  // namespace
 
 Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format) {
-  Buffer result = create_device_buffer(device, size, vk::BufferUsageFlagBits::eUniformTexelBuffer);
+  using Usage = vk::BufferUsageFlagBits;
+  Buffer result =
+      create_device_buffer(device, size, Usage::eUniformTexelBuffer | Usage::eStorageBuffer);
   const vk::DeviceSize texel_bytes = texel_bytes_of(format);
   if (result.size / texel_bytes > device.limits().maxTexelBufferElements)
     throw Error("Vulkan: the scene needs a texel buffer of " +
@@ -312,6 +314,18 @@ vk::raii::DescriptorSetLayout create_set_layout(
   for (std::uint32_t i = 0; i < bindings; ++i)
     entries.emplace_back(i, type(i), 1, vk::ShaderStageFlagBits::eCompute);
   return {device.vk(), vk::DescriptorSetLayoutCreateInfo({}, entries)};
+}
+
+void write_descriptor(Device& device, const vk::raii::DescriptorSet& set, std::uint32_t binding,
+                      const Buffer& buffer, bool as_texels) {
+  const vk::BufferView view = *buffer.view;
+  const vk::DescriptorBufferInfo info(*buffer.buffer, 0, buffer.size);
+  vk::WriteDescriptorSet write(*set, binding, 0, 1, vk::DescriptorType::eStorageBuffer);
+  if (as_texels)
+    write.setDescriptorType(vk::DescriptorType::eUniformTexelBuffer).setTexelBufferView(view);
+  else
+    write.setBufferInfo(info);
+  device.vk().updateDescriptorSets(write, {});
 }
 
 std::uint32_t work_groups(std::uint32_t invocations) {

@@ -13,9 +13,9 @@ double photon_radius_factor(std::uint64_t pass) {
   return std::exp(0.5 * log_squared);
 }
 
-std::uint32_t photon_count(double photons_per_pixel, int width, int height) {
-  const double wanted = photons_per_pixel * width * height;
-  return static_cast<std::uint32_t>(std::clamp(wanted, 1024.0, 131072.0));
+std::uint32_t photon_count(double photons_per_pixel, int width, int height, std::uint32_t most) {
+  const double wanted = std::max(photons_per_pixel * width * height, 1024.0);
+  return static_cast<std::uint32_t>(std::min(wanted, static_cast<double>(most)));
 }
 
 }  // namespace previz::render

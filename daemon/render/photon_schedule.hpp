@@ -9,7 +9,7 @@ namespace previz::render {
 // n.
 double photon_radius_factor(std::uint64_t pass);
 
-// Photons of one pass, from what the set asks for a pixel; at least 1024, at most 2^17.
-std::uint32_t photon_count(double photons_per_pixel, int width, int height);
+// Photons of one pass, from what the set asks for a pixel: at least 1024, at most `most`.
+std::uint32_t photon_count(double photons_per_pixel, int width, int height, std::uint32_t most);
 
 }  // namespace previz::render

@@ -65,7 +65,7 @@ void Renderer::Impl::upload_frame() {
 
 std::uint32_t Renderer::Impl::photons() const {
   return photon_count(estimation.photons, calibration.intrinsics.width,
-                      calibration.intrinsics.height);
+                      calibration.intrinsics.height, wavefront.most_photons());
 }
 
 // FEATURE_* of this frame: what the scene requires and the set asks for.

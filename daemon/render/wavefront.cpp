@@ -118,29 +118,13 @@ void Wavefront::write_path_set(const Tile& tile) {
   buffers[gpu::BINDING_SAMPLE_AOV] = &sample_aov_;
   buffers[gpu::BINDING_CONTROL] = &control_;
   buffers[gpu::BINDING_PIXELS] = &tile.pixels;
-  for (std::uint32_t i = 0; i < gpu::PATH_BINDINGS; ++i) {
-    const vk::DescriptorBufferInfo info(*buffers[i]->buffer, 0, buffers[i]->size);
-    const vk::WriteDescriptorSet write(*tile.set, i, 0, vk::DescriptorType::eStorageBuffer, {},
-                                       info);
-    device_.vk().updateDescriptorSets(write, {});
-  }
+  for (std::uint32_t i = 0; i < gpu::PATH_BINDINGS; ++i)
+    write_descriptor(device_, tile.set, i, *buffers[i], false);
 }
 
 void Wavefront::bind(const std::vector<const Buffer*>& scene, std::uint32_t features) {
-  for (std::uint32_t i = 0; i < gpu::SCENE_BINDINGS; ++i) {
-    const Buffer& buffer = *scene[i];
-    if (is_texel_buffer(i)) {
-      const vk::BufferView view = *buffer.view;
-      const vk::WriteDescriptorSet write(*scene_set_, i, 0, vk::DescriptorType::eUniformTexelBuffer,
-                                         {}, {}, view);
-      device_.vk().updateDescriptorSets(write, {});
-    } else {
-      const vk::DescriptorBufferInfo info(*buffer.buffer, 0, buffer.size);
-      const vk::WriteDescriptorSet write(*scene_set_, i, 0, vk::DescriptorType::eStorageBuffer, {},
-                                         info);
-      device_.vk().updateDescriptorSets(write, {});
-    }
-  }
+  for (std::uint32_t i = 0; i < gpu::SCENE_BINDINGS; ++i)
+    write_descriptor(device_, scene_set_, i, *scene[i], is_texel_buffer(i));
   if (!*generate_.pipeline || features != features_) create_pipelines(features);
 }
 
@@ -175,6 +159,16 @@ void Wavefront::bind_sets(const vk::raii::CommandBuffer& commands, const Tile& t
   commands.pushConstants<gpu::GpuBatch>(*layout_, vk::ShaderStageFlagBits::eCompute, 0, batch);
 }
 
+// The queue that was filled becomes the active one, and each of its paths finds its next hit.
+void Wavefront::record_extension(const vk::raii::CommandBuffer& commands) const {
+  commands.bindPipeline(vk::PipelineBindPoint::eCompute, *advance_.pipeline);
+  commands.dispatch(1, 1, 1);
+  barrier(commands);
+  commands.bindPipeline(vk::PipelineBindPoint::eCompute, *extend_.pipeline);
+  commands.dispatchIndirect(*control_.buffer, offsetof(gpu::GpuControl, extend_groups));
+  barrier(commands);
+}
+
 void Wavefront::record_batch(const vk::raii::CommandBuffer& commands, const Tile& tile,
                              const gpu::GpuBatch& batch, std::uint32_t max_depth) const {
   const auto use = [&](const Pipeline& pipeline) {
@@ -187,12 +181,7 @@ void Wavefront::record_batch(const vk::raii::CommandBuffer& commands, const Tile
   // One segment a vertex, one more to meet light after the last vertex, and one because a fork
   // goes on a round later than the path it parted from.
   for (std::uint32_t segment = 0; segment < max_depth + 2; ++segment) {
-    use(advance_);
-    commands.dispatch(1, 1, 1);
-    barrier(commands);
-    use(extend_);
-    commands.dispatchIndirect(*control_.buffer, offsetof(gpu::GpuControl, extend_groups));
-    barrier(commands);
+    record_extension(commands);
     use(shade_);
     commands.dispatchIndirect(*control_.buffer, offsetof(gpu::GpuControl, extend_groups));
     barrier(commands);
@@ -206,6 +195,19 @@ void Wavefront::record_batch(const vk::raii::CommandBuffer& commands, const Tile
   use(accumulate_);
   commands.dispatch(work_groups(batch.width * batch.height), 1, 1);
   barrier(commands);
+}
+
+// Photons are paths of their own, before those of the sample. A fork goes on a round later.
+void Wavefront::record_photons(const vk::raii::CommandBuffer& commands,
+                               std::uint32_t max_depth) const {
+  photons_.record_emission(commands);
+  for (std::uint32_t segment = 0; segment < max_depth + 1; ++segment) {
+    record_extension(commands);
+    photons_.bind_bounce(commands);
+    commands.dispatchIndirect(*control_.buffer, offsetof(gpu::GpuControl, extend_groups));
+    barrier(commands);
+  }
+  photons_.record_sorting(commands);
 }
 
 bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::uint32_t max_depth,
@@ -242,7 +244,7 @@ bool Wavefront::render_with_photons(std::uint32_t first_sample, std::uint32_t sa
       device_.submit([&](const vk::raii::CommandBuffer& commands) {
         if (&tile == &tiles_.front()) {
           bind_sets(commands, tile, batch);
-          photons_.record(commands);
+          record_photons(commands, max_depth);
         }
         record_batch(commands, tile, batch, max_depth);
       });

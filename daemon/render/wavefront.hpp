@@ -21,6 +21,7 @@ class Wavefront {
   void bind(const std::vector<const Buffer*>& scene, std::uint32_t features);
   // Photons a pass and the radius (metres) of the first, where `features` has FEATURE_PHOTONS.
   void use_photons(std::uint32_t count, double radius);
+  std::uint32_t most_photons() const { return slots_; }
   // Forgets all samples.
   void clear();
   // Adds samples first_sample .. first_sample + samples - 1 to every pixel. Returns false where
@@ -47,6 +48,8 @@ class Wavefront {
                  const gpu::GpuBatch& batch) const;
   bool render_with_photons(std::uint32_t first_sample, std::uint32_t samples,
                            std::uint32_t max_depth, const std::function<bool()>& cancelled);
+  void record_extension(const vk::raii::CommandBuffer& commands) const;
+  void record_photons(const vk::raii::CommandBuffer& commands, std::uint32_t max_depth) const;
   void record_batch(const vk::raii::CommandBuffer& commands, const Tile& tile,
                     const gpu::GpuBatch& batch, std::uint32_t max_depth) const;
 

@@ -1,30 +1,31 @@
-// The photons of a pass, and the hash grid in which they are found. A cell is twice as wide as the
-// radius, so that a disc of photons touches at most two cells an axis.
+// The photons of a pass while they are made and sorted.
 #ifndef PREVIZ_PHOTON_GLSL
 #define PREVIZ_PHOTON_GLSL
 
-#include "shaders/lib/batch.glsl"
-#include "shaders/lib/sampler.glsl"
+#include "shaders/lib/photon_grid.glsl"
 
 layout(scalar, set = 2, binding = BINDING_PHOTONS) buffer Photons { GpuPhoton photons[]; };
 layout(scalar, set = 2, binding = BINDING_PHOTON_ORDER) buffer Order { uint photon_order[]; };
-layout(scalar, set = 2, binding = BINDING_PHOTON_BUCKETS) buffer Buckets {
-  GpuPhotonBucket buckets[];
-};
+layout(scalar, set = 2, binding = BINDING_PHOTON_FILLED) buffer Filled { uint filled[]; };
 layout(scalar, set = 2, binding = BINDING_PHOTON_CONTROL) buffer PhotonControl {
   GpuPhotonControl photon_control;
 };
+layout(scalar, set = 2, binding = BINDING_PHOTON_SORTED) buffer Sorted { vec4 sorted_photons[]; };
+layout(scalar, set = 2, binding = BINDING_PHOTON_BUCKETS) buffer Buckets {
+  GpuPhotonBucket buckets[];
+};
 
-// Lavapipe of Mesa 22.3 silently ends a loop after 65535 rounds; longer ones are cut into these.
-const uint LOOP_CHUNK = 32768u;
-
-ivec3 photon_cell(vec3 position) { return ivec3(floor(position / (2.0 * batch.photon_radius))); }
-
-uint photon_bucket(ivec3 cell) {
-  const uvec3 c = uvec3(cell);
-  return hash_pair(hash_pair(c.x, c.y), c.z) & (buckets.length() - 1u);
+// All photons of many passes are one sequence; both worlds' parts of a photon share its numbers.
+Sampler photon_sampler(uint photon) {
+  const uint passes = 4096u;
+  return make_sampler(frame.seed, uvec2(NO_INDEX, batch.first_sample / passes),
+                      (batch.first_sample % passes) * frame.photon_count + photon);
 }
 
-bool photon_stored(GpuPhoton p) { return p.gain.x > 0.0 || p.gain.y > 0.0; }
+// Dimension pairs of a photon.
+const uint PAIR_EMITTER = 0u;  // x: which light, y: which bound
+const uint PAIR_ON_LIGHT = 1u;
+const uint PAIR_AIM = 2u;
+const uint PAIR_BOUNCE = 3u;   // plus the vertex; x: stay or go on, and how; y: roulette
 
 #endif

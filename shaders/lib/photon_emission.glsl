@@ -5,7 +5,7 @@
 
 #include "shaders/lib/environment.glsl"
 #include "shaders/lib/light.glsl"
-#include "shaders/lib/sampler.glsl"
+#include "shaders/lib/photon.glsl"
 
 layout(scalar, set = 0, binding = BINDING_BOUNDS) readonly buffer Bounds { vec4 bounds[]; };
 
@@ -15,12 +15,6 @@ struct Emission {
   vec3 flux;  // radiance, intensity or irradiance over the density of the sample; watts
   vec2 gain;
 };
-
-// Dimension pairs of a photon.
-const uint PAIR_EMITTER = 0u;  // x: which light, y: which bound
-const uint PAIR_ON_LIGHT = 1u;
-const uint PAIR_AIM = 2u;
-const uint PAIR_BOUNCE = 3u;   // plus the vertex: x: stay or go on, then which lobe; y: roulette
 
 vec4 specular_bound(uint i) { return bounds[frame.bound_count + i]; }
 

@@ -47,12 +47,21 @@ PREVIZ_CONST uint BINDING_CONTROL = 9u;        // GpuControl
 PREVIZ_CONST uint BINDING_PIXELS = 10u;        // GpuPixel[width * height]
 PREVIZ_CONST uint PATH_BINDINGS = 11u;
 
-// Set 2, the photons of one pass, in a hash grid of cells twice as wide as the radius.
-PREVIZ_CONST uint BINDING_PHOTONS = 0u;        // GpuPhoton[2 * photon_count]; two, for a fork
-PREVIZ_CONST uint BINDING_PHOTON_ORDER = 1u;   // uint[]: photons, those of a bucket together
-PREVIZ_CONST uint BINDING_PHOTON_BUCKETS = 2u; // GpuPhotonBucket[], a power of two
-PREVIZ_CONST uint BINDING_PHOTON_CONTROL = 3u; // GpuPhotonControl
-PREVIZ_CONST uint PHOTON_BINDINGS = 4u;
+// Set 2, the photons of one pass, in a hash grid of cells twice as wide as the radius. What is
+// gathered from comes as texel buffers, faster on lavapipe, which are views of the last two.
+//   FOUND_PHOTONS RGBA32F, 4 texels a photon, those of a bucket together: position, Dirac vertices;
+//                 direction, gain in the mixed world; normal, gain in the real world; flux
+//   FOUND_BUCKETS RG32UI: first photon, number of photons
+PREVIZ_CONST uint BINDING_FOUND_PHOTONS = 0u;
+PREVIZ_CONST uint BINDING_FOUND_BUCKETS = 1u;
+PREVIZ_CONST uint BINDING_PHOTONS = 2u;         // GpuPhoton[2 * photon_count]; two, for a fork
+PREVIZ_CONST uint BINDING_PHOTON_ORDER = 3u;    // uint[]: photons, those of a bucket together
+PREVIZ_CONST uint BINDING_PHOTON_FILLED = 4u;   // uint[]: of a bucket, while ORDER is made
+PREVIZ_CONST uint BINDING_PHOTON_CONTROL = 5u;  // GpuPhotonControl
+PREVIZ_CONST uint BINDING_PHOTON_SORTED = 6u;   // vec4[]: FOUND_PHOTONS, to write
+PREVIZ_CONST uint BINDING_PHOTON_BUCKETS = 7u;  // GpuPhotonBucket[], a power of two; FOUND_BUCKETS
+PREVIZ_CONST uint PHOTON_BINDINGS = 8u;
+PREVIZ_CONST uint TEXELS_PER_PHOTON = 4u;
 
 PREVIZ_CONST uint WORKGROUP_SIZE = 64u;
 PREVIZ_CONST uint NO_INDEX = 0xffffffffu;
@@ -94,17 +103,16 @@ struct GpuShadowRay {
 // Light that arrived at a surface with a non-Dirac lobe by way of Dirac lobes only.
 struct GpuPhoton {
   vec3 position;
-  uint vertices;   // Dirac vertices on its way
+  uint vertices;   // Dirac vertices on its way; 0: it did not stay anywhere
   vec3 direction;  // in which it travelled, unit
   vec3 normal;     // geometric, on the side on which it arrived
   vec3 flux;       // watts; divided by the number of photons of the pass
-  vec2 gain;       // in the (mixed, real) world; both 0: no photon
+  vec2 gain;       // in the (mixed, real) world
 };
 
 struct GpuPhotonBucket {
-  uint first;   // in ORDER
+  uint first;  // in ORDER
   uint count;
-  uint filled;  // while ORDER is made
 };
 
 struct GpuPhotonControl {
@@ -242,6 +250,7 @@ static_assert(offsetof(GpuLight, uv0) == 96);
 static_assert(sizeof(GpuFrame) == 136);
 static_assert(sizeof(GpuBatch) == 28);
 static_assert(sizeof(GpuPhoton) == 60);
+static_assert(sizeof(GpuPhotonBucket) == 8);
 }  // namespace previz::gpu
 #endif
 #endif

@@ -319,9 +319,9 @@ TEST(PhotonRadius, shrinks_by_the_rule_of_progressive_photon_mapping) {
 }
 
 TEST(PhotonCount, is_kept_within_what_a_pass_can_hold) {
-  EXPECT_EQ(render::photon_count(0.1, 640, 480), 30720u);
-  EXPECT_EQ(render::photon_count(0.001, 16, 16), 1024u);
-  EXPECT_EQ(render::photon_count(10, 8192, 4320), 131072u);
+  EXPECT_EQ(render::photon_count(0.1, 640, 480, 131072), 30720u);
+  EXPECT_EQ(render::photon_count(0.001, 16, 16, 131072), 1024u);
+  EXPECT_EQ(render::photon_count(10, 8192, 4320, 131072), 131072u);
 }
 
 }  // namespace
