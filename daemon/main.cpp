@@ -65,9 +65,13 @@ void add_render(CLI::App& app, post::RenderOptions& options) {
   command.add_option("--seed", options.seed, "Seed of the random numbers (default: the set's)");
   command
       .add_option_function<std::string>(
-          "--estimator", [&](const std::string&) { options.estimator = set::Estimator::paired; },
+          "--estimator",
+          [&](const std::string& name) {
+            options.estimator =
+                name == "paired" ? set::Estimator::paired : set::Estimator::difference;
+          },
           "Estimator (default: the set's)")
-      ->check(CLI::IsMember({"paired"}));
+      ->check(CLI::IsMember({"paired", "difference"}));
   command.add_option("--out", options.directory, "Directory for the pictures");
   command.add_flag_callback(
       "--no-exr", [&] { options.exr = false; }, "No EXR files");

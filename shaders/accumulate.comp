@@ -47,7 +47,7 @@ void main() {
     add_exactly(sums.mixed_high, sums.mixed_low, mixed);
     add_exactly(sums.diff_high, sums.diff_low, vec4(diff, aov.w));
     sums.normal += vec4(aov.xyz, aov.w > 0.0 ? 1.0 : 0.0);
-    add_exactly(sums.square_mixed_high, sums.square_mixed_low, vec4(mixed.rgb * mixed.rgb, 0.0));
+    add_exactly(sums.square_mixed_high, sums.square_mixed_low, vec4(mixed.rgb * mixed.rgb, real.w));
     add_exactly(sums.square_diff_high, sums.square_diff_low, vec4(diff * diff, 0.0));
   }
   pixels[gl_GlobalInvocationID.x] = sums;

@@ -4,7 +4,7 @@
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shaders/lib/append.glsl"
-#include "shaders/lib/bsdf.glsl"
+#include "shaders/lib/difference_bounds.glsl"
 #include "shaders/lib/sampler.glsl"
 
 layout(set = 0, binding = BINDING_RAYS) uniform textureBuffer corner_rays;
@@ -17,6 +17,24 @@ vec2 calibrated_ray(uvec2 pixel, vec2 inside) {
   const vec2 bottom = mix(texelFetch(corner_rays, corner + stride).xy,
                           texelFetch(corner_rays, corner + stride + 1).xy, inside.x);
   return mix(top, bottom, inside.y);
+}
+
+// Whether a differing object may cover a part of the pixel: its bound, widened by the pixel's own
+// extent and by the lens, meets the ray through the pixel's centre.
+bool may_be_covered(uvec2 pixel) {
+  const vec3 corner = vec3(calibrated_ray(pixel, vec2(0.0)), 1.0);
+  const vec3 ray = vec3(calibrated_ray(pixel, vec2(0.5)), 1.0);
+  const float pixel_angle = 1.5 * length(corner - ray);  // of half the diagonal, and some more
+  const vec3 direction = normalize(transform_vector(frame.world_from_camera, ray));
+  for (uint i = 0u; i < frame.bound_count; ++i) {
+    const float far = length(bounds[i].xyz) + bounds[i].w;
+    float radius = bounds[i].w + pixel_angle * far;
+    if (has_feature(FEATURE_LENS)) radius += frame.lens_radius * (1.0 + far / frame.focus_distance);
+    const float along = max(dot(bounds[i].xyz, direction), 0.0);
+    const vec3 off = bounds[i].xyz - along * direction;
+    if (dot(off, off) <= radius * radius) return true;
+  }
+  return false;
 }
 
 void main() {
@@ -36,9 +54,11 @@ void main() {
     const uint path = 2u * slot;
     ray_origin[path] = vec4(transform_vector(frame.world_from_camera, origin), 0.0);
     ray_direction[path] = vec4(normalize(transform_vector(frame.world_from_camera, target)), 0.0);
-    path_throughput[path] = vec4(1.0, 1.0, 1.0, uintBitsToFloat(WORLD_BOTH));
+    const bool difference = has_feature(FEATURE_DIFFERENCE) && !may_be_covered(pixel);
+    const uint bits = WORLD_BOTH | (difference ? PATH_DIFFERENCE : 0u);
+    path_throughput[path] = vec4(1.0, 1.0, 1.0, uintBitsToFloat(bits));
     sample_mixed[slot] = vec4(0.0);
-    sample_real[slot] = vec4(0.0);
+    sample_real[slot] = vec4(0.0, 0.0, 0.0, difference ? 1.0 : 0.0);
     sample_aov[slot] = vec4(0.0);
   }
   append_next(valid, 2u * slot);

@@ -10,7 +10,7 @@ namespace {
 // What one pixel's sums say, in double precision.
 struct Means {
   glm::dvec3 mixed, diff, mixed_square, diff_square;
-  double mask, depth_sum, hits;
+  double mask, depth_sum, hits, difference_only;
 };
 
 Means means(const gpu::GpuPixel& p, double samples) {
@@ -19,13 +19,15 @@ Means means(const gpu::GpuPixel& p, double samples) {
   };
   const glm::dvec4 mixed = sum(p.mixed_high, p.mixed_low);
   const glm::dvec4 diff = sum(p.diff_high, p.diff_low);
+  const glm::dvec4 mixed_square = sum(p.square_mixed_high, p.square_mixed_low);
   return {glm::dvec3(mixed) / samples,
           glm::dvec3(diff) / samples,
-          glm::dvec3(sum(p.square_mixed_high, p.square_mixed_low)) / samples,
+          glm::dvec3(mixed_square) / samples,
           glm::dvec3(sum(p.square_diff_high, p.square_diff_low)) / samples,
           mixed.w / samples,
           diff.w,
-          p.normal.w};
+          p.normal.w,
+          mixed_square.w / samples};
 }
 
 // Variance of a mean of n samples from the means of values and squares.
@@ -57,10 +59,12 @@ Layers make_layers(std::span<const gpu::GpuPixel> pixels, int width, int height,
   layers.depth.resize(pixels.size());
   const auto n = static_cast<double>(samples);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    const Means m = means(pixels[i], n);
+    Means m = means(pixels[i], n);
     const glm::dvec3 camera = plate.empty()
                                   ? glm::dvec3(0)
                                   : glm::dvec3(plate[3 * i], plate[3 * i + 1], plate[3 * i + 2]);
+    // Where only the difference was traced, the camera has measured the real world.
+    if (m.difference_only > 0) m.mixed = camera + m.diff;
     const double uncovered = 1 - m.mask;
     layers.composite[i] = glm::vec3(m.mask * m.mixed + uncovered * (camera + m.diff));
     layers.mixed[i] = glm::vec3(m.mixed);

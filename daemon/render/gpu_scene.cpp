@@ -185,6 +185,8 @@ void GpuScene::upload_lights(const glm::dvec3& camera_position) {
       std::count_if(scene_.lights.begin(), scene_.lights.end(), can_be_seen));
   light_count_ = static_cast<std::uint32_t>(lights.size());
   light_power_ = select_by_power(lights, scene_radius_);
+  lights_differ_ = std::any_of(lights.begin(), lights.end(),
+                               [](const auto& light) { return light.gain.x != light.gain.y; });
   auto next = static_cast<std::uint32_t>(scene_.lights.size());
   for (const std::uint32_t i : emitters_) {
     first_light_[i] = next;
@@ -227,6 +229,8 @@ void GpuScene::describe(gpu::GpuFrame& frame) const {
   frame.light_count = light_count_;
   frame.visible_light_count = visible_light_count_;
   frame.bound_count = static_cast<std::uint32_t>(difference_bounds_.size());
+  // Lamps that differ bring a difference everywhere, near objects or not.
+  frame.difference_roulette = lights_differ_ ? 0.0f : 2.0f;
   frame.specular_bound_count = static_cast<std::uint32_t>(specular_bounds_.size());
   frame.scene_center = scene_center_;
   // Wider, so that rounding leaves no surface outside.

@@ -66,6 +66,7 @@ class GpuScene {
   set::LightSampling sampling_ = set::LightSampling::importance;
   std::uint32_t light_count_ = 0, visible_light_count_ = 0;
   double light_power_ = 0;
+  bool lights_differ_ = false;  // between the worlds
 
   Buffer bvh_, vertices_, triangles_, texels_, environment_, importance_, instances_, materials_,
       textures_, lights_, bounds_buffer_;

@@ -14,7 +14,7 @@ struct Layers {
   std::int64_t samples = 0;          // per pixel
   std::vector<glm::vec3> composite;  // mean(M) mean(Lm) + (1 - mean(M)) (Lc + mean(Lm - Lr))
   std::vector<glm::vec3> mixed;      // mean(Lm)
-  std::vector<glm::vec3> real;       // mean(Lr)
+  std::vector<glm::vec3> real;       // mean(Lr); Lc where only the difference was traced
   std::vector<glm::vec3> diff;       // mean(Lm - Lr), accumulated as a difference
   std::vector<glm::vec3> normal;     // mean world normal of the mixed world's first hit
   std::vector<glm::vec3> variance;   // of the composite's mean

@@ -72,6 +72,7 @@ std::uint32_t Renderer::Impl::photons() const {
 std::uint32_t Renderer::Impl::features() const {
   std::uint32_t result = scene.features();
   if (calibration.lens) result |= gpu::FEATURE_LENS;
+  if (estimation.estimator == set::Estimator::difference) result |= gpu::FEATURE_DIFFERENCE;
   if (estimation.caustics == set::Caustics::traced) result |= gpu::FEATURE_CAUSTICS;
   if (estimation.caustics != set::Caustics::photons) result &= ~gpu::FEATURE_PHOTONS;
   return result;

@@ -92,7 +92,7 @@ struct Lighting {
   int frame = -1;
 };
 
-enum class Estimator { paired };    // difference follows
+enum class Estimator { paired, difference };
 enum class Composite { additive };  // ratio and hybrid follow
 enum class Caustics { photons, traced, none };
 
@@ -108,7 +108,7 @@ struct Estimation {
   double difference_sampling = 0.5;
   Caustics caustics = Caustics::photons;  // how light comes to rough surfaces by mirrors and glass
   double photons = 0.1;                   // a pass (sample), per pixel of the picture
-  double photon_radius_px = 4;  // of the first pass, at the distance of the nearest such object
+  double photon_radius_px = 2;  // of the first pass, at the distance of the nearest such object
 };
 
 struct Quality {

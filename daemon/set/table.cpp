@@ -176,7 +176,7 @@ Keys lighting_keys(Draft& d) {
 
 Keys estimator_keys(Estimation& e) {
   return {
-      {"kind", &e.estimator, plain, "\"paired\": both worlds are traced in full, with the same random numbers."},
+      {"kind", &e.estimator, plain, "\"paired\": both worlds are traced in full, with the same random numbers. \"difference\": where no virtual object covers the picture, only what differs between the worlds is traced."},
       {"composite", &e.composite, plain, "How the difference of the worlds is put onto the camera picture."},
       {"max_depth", &e.max_depth, plain.within(1, 64), "Bounces of a path: vertices after the camera."},
       {"roulette_depth", &e.roulette_depth, plain.within(1, 64), "Russian roulette ends paths from this vertex on."},

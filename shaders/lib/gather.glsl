@@ -21,7 +21,7 @@ struct GatheredPair {
 
 // f / cos times the flux of one photon, weighed by its distance. Texel 0 is `position`.
 void gather_photon(uint photon, vec4 position, Surface s, Lobes l, uint most_vertices,
-                   inout GatheredPair sum) {
+                   bool differing, inout GatheredPair sum) {
   const vec3 off = position.xyz - s.position;
   const float closeness = 1.0 - dot(off, off) / (batch.photon_radius * batch.photon_radius);
   if (closeness <= 0.0 || uint(position.w) > most_vertices) return;
@@ -30,6 +30,7 @@ void gather_photon(uint photon, vec4 position, Surface s, Lobes l, uint most_ver
   const vec4 normal = texelFetch(found_photons, first + 2);
   if (dot(normal.xyz, s.geometric_normal) < SAME_SURFACE_COS) return;
   const vec4 direction = texelFetch(found_photons, first + 1);
+  if (differing && direction.w == normal.w) return;
   const float cos_geometric = -dot(direction.xyz, normal.xyz);
   float pdf;
   const vec3 value = bsdf_evaluate(s, l, -direction.xyz, pdf);
@@ -51,8 +52,9 @@ bool reaches_cell(Surface s, ivec3 cell) {
 }
 
 // Radiance of both worlds towards the viewer, by the lobes that are not Dirac. Photons that met more
-// than `most_vertices` Dirac vertices are left out: their paths would be longer than allowed.
-GatheredPair gather_photons(Surface s, Lobes l, uint most_vertices) {
+// than `most_vertices` Dirac vertices are left out: their paths would be longer than allowed. So are,
+// if only `differing` ones are wanted, those that are the same in both worlds.
+GatheredPair gather_photons(Surface s, Lobes l, uint most_vertices, bool differing) {
   GatheredPair sum = GatheredPair(vec3(0.0), vec3(0.0));
   const ivec3 first_cell = photon_cell(s.position - batch.photon_radius);
   for (uint corner = 0u; corner < 8u; ++corner) {
@@ -65,7 +67,7 @@ GatheredPair gather_photons(Surface s, Lobes l, uint most_vertices) {
         const vec4 position = texelFetch(found_photons, int(i * TEXELS_PER_PHOTON));
         // Other cells share the bucket; two of the eight may, too.
         if (photon_cell(position.xyz) != cell) continue;
-        gather_photon(i, position, s, l, most_vertices, sum);
+        gather_photon(i, position, s, l, most_vertices, differing, sum);
       }
     }
   }

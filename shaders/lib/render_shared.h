@@ -41,7 +41,7 @@ PREVIZ_CONST uint BINDING_HIT = 3u;            // GpuHit[path]
 PREVIZ_CONST uint BINDING_QUEUE = 4u;          // uint[2][paths]: paths to extend, ping-pong
 PREVIZ_CONST uint BINDING_SHADOW = 5u;         // GpuShadowRay[paths]
 PREVIZ_CONST uint BINDING_SAMPLE_MIXED = 6u;   // vec4[slot]: Lm, M
-PREVIZ_CONST uint BINDING_SAMPLE_REAL = 7u;    // vec4[slot]: Lr, unused
+PREVIZ_CONST uint BINDING_SAMPLE_REAL = 7u;    // vec4[slot]: Lr, 1 where only the difference is traced
 PREVIZ_CONST uint BINDING_SAMPLE_AOV = 8u;     // vec4[slot]: normal, depth (0: no hit)
 PREVIZ_CONST uint BINDING_CONTROL = 9u;        // GpuControl
 PREVIZ_CONST uint BINDING_PIXELS = 10u;        // GpuPixel[width * height]
@@ -78,11 +78,13 @@ PREVIZ_CONST uint FEATURE_FORKS = 64u;        // any object present in one world
 PREVIZ_CONST uint FEATURE_ENVIRONMENT_SAMPLING = 128u;  // next-event estimation of the environment
 PREVIZ_CONST uint FEATURE_CAUSTICS = 256u;  // paths bring light to rough vertices by Dirac lobes only
 PREVIZ_CONST uint FEATURE_PHOTONS = 512u;   // photons bring it
+PREVIZ_CONST uint FEATURE_DIFFERENCE = 1024u;  // only what differs is traced, where that is enough
 
 // Bits of a path's state.
 PREVIZ_CONST uint PATH_WORLDS_MASK = 3u;      // WORLD_*
 PREVIZ_CONST uint PATH_DEPTH_SHIFT = 8u;      // number of surface vertices so far
 PREVIZ_CONST uint PATH_ROUGH = 4u;            // some vertex so far scattered by a non-Dirac lobe
+PREVIZ_CONST uint PATH_DIFFERENCE = 8u;       // while in both worlds, only what differs counts
 
 struct GpuHit {
   float t;  // < 0: nothing hit
@@ -126,7 +128,7 @@ struct GpuPixel {
   vec4 diff_high;   // Lm - Lr, depth
   vec4 diff_low;
   vec4 normal;      // sum of normals, number of samples that hit something
-  vec4 square_mixed_high;  // sums of squares, for the variance; w unused
+  vec4 square_mixed_high;  // sums of squares, for the variance; w: samples of the difference only
   vec4 square_mixed_low;
   vec4 square_diff_high;
   vec4 square_diff_low;
@@ -222,6 +224,7 @@ struct GpuFrame {
   uint visible_light_count;   // the first lights, those with an extent that are not triangles
   uint bound_count;
   float bound_share;          // of a shared path's directions that go towards those BOUNDS
+  float difference_roulette;  // survival of a path of the difference over the bounds' solid angle
   uint specular_bound_count;  // the BOUNDS after them
   uint photon_count;          // emitted a pass
   float photon_environment;   // probability that a photon starts from the environment
@@ -247,7 +250,7 @@ static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
 static_assert(sizeof(GpuLight) == 124);
 static_assert(offsetof(GpuLight, uv0) == 96);
-static_assert(sizeof(GpuFrame) == 136);
+static_assert(sizeof(GpuFrame) == 140);
 static_assert(sizeof(GpuBatch) == 28);
 static_assert(sizeof(GpuPhoton) == 60);
 static_assert(sizeof(GpuPhotonBucket) == 8);
