@@ -12,7 +12,7 @@ struct Layers {
   int width = 0;
   int height = 0;
   std::int64_t samples = 0;          // per pixel
-  std::vector<glm::vec3> composite;  // mean(M) mean(Lm) + (1 - mean(M)) (Lc + mean(Lm - Lr))
+  std::vector<glm::vec3> composite;  // by the set's rule: daemon/render/composite.hpp
   std::vector<glm::vec3> mixed;      // mean(Lm)
   std::vector<glm::vec3> real;       // mean(Lr); Lc where only the difference was traced
   std::vector<glm::vec3> diff;       // mean(Lm - Lr), accumulated as a difference

@@ -72,7 +72,10 @@ std::uint32_t Renderer::Impl::photons() const {
 std::uint32_t Renderer::Impl::features() const {
   std::uint32_t result = scene.features();
   if (calibration.lens) result |= gpu::FEATURE_LENS;
-  if (estimation.estimator == set::Estimator::difference) result |= gpu::FEATURE_DIFFERENCE;
+  // The other composites need the real world's own radiance in every pixel.
+  if (estimation.estimator == set::Estimator::difference &&
+      estimation.composite == set::Composite::additive)
+    result |= gpu::FEATURE_DIFFERENCE;
   if (estimation.caustics == set::Caustics::traced) result |= gpu::FEATURE_CAUSTICS;
   if (estimation.caustics != set::Caustics::photons) result &= ~gpu::FEATURE_PHOTONS;
   return result;
@@ -142,7 +145,8 @@ Layers Renderer::layers() const {
   const PinholeIntrinsics& lens = r.calibration.intrinsics;
   const auto plate = plate_radiance(r.frame.plate, *r.response, r.frame.exposure);
   return make_layers(r.wavefront.pixels(), lens.width, lens.height,
-                     std::max<std::int64_t>(r.samples, 1), plate);
+                     std::max<std::int64_t>(r.samples, 1), plate,
+                     {r.estimation.composite, r.estimation.composite_floor / r.frame.exposure});
 }
 
 Plate Renderer::picture() const {

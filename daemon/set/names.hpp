@@ -44,7 +44,9 @@ constexpr auto names(Estimator) {
       {{"paired", Estimator::paired}, {"difference", Estimator::difference}});
 }
 constexpr auto names(Composite) {
-  return std::to_array<Name<Composite>>({{"additive", Composite::additive}});
+  return std::to_array<Name<Composite>>({{"additive", Composite::additive},
+                                         {"ratio", Composite::ratio},
+                                         {"hybrid", Composite::hybrid}});
 }
 constexpr auto names(Caustics) {
   return std::to_array<Name<Caustics>>(

@@ -93,12 +93,13 @@ struct Lighting {
 };
 
 enum class Estimator { paired, difference };
-enum class Composite { additive };  // ratio and hybrid follow
+enum class Composite { additive, ratio, hybrid };
 enum class Caustics { photons, traced, none };
 
 struct Estimation {
   Estimator estimator = Estimator::paired;
   Composite composite = Composite::additive;
+  double composite_floor = 0.02;  // radiance over the sensor's white, below which hybrid adds
   int max_depth = 16;      // path vertices after the camera, 1..64
   int roulette_depth = 4;  // Russian roulette from this vertex on
   std::uint32_t seed = 1;

@@ -176,8 +176,9 @@ Keys lighting_keys(Draft& d) {
 
 Keys estimator_keys(Estimation& e) {
   return {
-      {"kind", &e.estimator, plain, "\"paired\": both worlds are traced in full, with the same random numbers. \"difference\": where no virtual object covers the picture, only what differs between the worlds is traced."},
-      {"composite", &e.composite, plain, "How the difference of the worlds is put onto the camera picture."},
+      {"kind", &e.estimator, plain, "\"paired\": both worlds are traced in full, with the same random numbers. \"difference\": where no virtual object covers the picture, only what differs between the worlds is traced (with composite = \"additive\"; the others need both in full)."},
+      {"composite", &e.composite, plain, "How the difference of the worlds is put onto the camera picture: added; as the ratio of the worlds, which forgives a wrong albedo of the phantom but lights no black surface; or the ratio on bright surfaces and the sum on dark ones."},
+      {"composite_floor", &e.composite_floor, plain.within(0.0001, 1), "With composite = \"hybrid\": radiance below which a real surface counts as dark, as a share of the sensor's white."},
       {"max_depth", &e.max_depth, plain.within(1, 64), "Bounces of a path: vertices after the camera."},
       {"roulette_depth", &e.roulette_depth, plain.within(1, 64), "Russian roulette ends paths from this vertex on."},
       {"seed", &e.seed, plain, "The same seed gives the same noise."},
