@@ -5,6 +5,7 @@ extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
 #include <libavutil/crc.h>
+#include <libswscale/swscale.h>
 }
 
 #include <array>
@@ -21,11 +22,24 @@ struct Closer {
   void operator()(AVCodecContext* context) const { avcodec_free_context(&context); }
   void operator()(AVFrame* frame) const { av_frame_free(&frame); }
   void operator()(AVPacket* packet) const { av_packet_free(&packet); }
+  void operator()(SwsContext* context) const { sws_freeContext(context); }
+};
+struct InputCloser {
+  void operator()(AVFormatContext* context) const { avformat_close_input(&context); }
+};
+struct OutputCloser {
+  void operator()(AVFormatContext* context) const {
+    avio_closep(&context->pb);
+    avformat_free_context(context);
+  }
 };
 
 using Codec = std::unique_ptr<AVCodecContext, Closer>;
 using Picture = std::unique_ptr<AVFrame, Closer>;
 using Packet = std::unique_ptr<AVPacket, Closer>;
+using Scaler = std::unique_ptr<SwsContext, Closer>;
+using Demuxer = std::unique_ptr<AVFormatContext, InputCloser>;
+using Muxer = std::unique_ptr<AVFormatContext, OutputCloser>;
 
 inline std::string error_text(int code) {
   std::array<char, AV_ERROR_MAX_STRING_SIZE> text{};

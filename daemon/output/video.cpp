@@ -5,13 +5,10 @@
 #include <optional>
 
 #include "daemon/output/file.hpp"
-#include "drivers/error.hpp"
+#include "drivers/av.hpp"
 
 extern "C" {
-#include <libavcodec/avcodec.h>
-#include <libavformat/avformat.h>
 #include <libavutil/opt.h>
-#include <libswscale/swscale.h>
 }
 
 namespace previz::output {
@@ -20,30 +17,11 @@ namespace {
 // Fine enough for jittered capture times, and below MPEG-4's limit of 65535 ticks a second.
 constexpr AVRational video_clock{1, 60000};
 
-struct Free {
-  void operator()(AVCodecContext* context) const { avcodec_free_context(&context); }
-  void operator()(AVFrame* frame) const { av_frame_free(&frame); }
-  void operator()(AVPacket* packet) const { av_packet_free(&packet); }
-  void operator()(SwsContext* context) const { sws_freeContext(context); }
-  void operator()(AVFormatContext* context) const {
-    if (context->pb) avio_closep(&context->pb);
-    avformat_free_context(context);
-  }
-};
-template <class T>
-using Owned = std::unique_ptr<T, Free>;
-
-std::string words(int error) {
-  std::array<char, AV_ERROR_MAX_STRING_SIZE> buffer{};
-  av_strerror(error, buffer.data(), buffer.size());
-  return buffer.data();
-}
-
 // An encoder opened for pictures of this size, or null where libav cannot.
-Owned<AVCodecContext> open_encoder(const VideoCodec& codec, int width, int height) {
+av::Codec open_encoder(const VideoCodec& codec, int width, int height) {
   const AVCodec* found = avcodec_find_encoder_by_name(codec.encoder.c_str());
   if (!found) return nullptr;
-  Owned<AVCodecContext> context(avcodec_alloc_context3(found));
+  av::Codec context(avcodec_alloc_context3(found));
   const bool odd = width % 2 != 0 || height % 2 != 0;
   context->width = width;
   context->height = height;
@@ -92,19 +70,17 @@ std::vector<VideoCodec> review_codecs() {
 struct VideoWriter::Impl {
   std::filesystem::path path;
   std::filesystem::path unfinished;
-  Owned<AVCodecContext> encoder;
-  Owned<AVFormatContext> file;
-  Owned<SwsContext> converter;
-  Owned<AVFrame> frame{av_frame_alloc()};
-  Owned<AVPacket> packet{av_packet_alloc()};
+  av::Codec encoder;
+  av::Muxer file;
+  av::Scaler converter;
+  av::Picture frame{av_frame_alloc()};
+  av::Packet packet{av_packet_alloc()};
   AVStream* stream = nullptr;  // of `file`
   std::optional<std::int64_t> first_timestamp_ns;
   std::int64_t last_tick = -1;
   std::int64_t last_interval = video_clock.den / 25;  // of a single picture
 
-  void check(int result, const char* what) const {
-    if (result < 0) throw Error(path.string() + ": " + what + ": " + words(result));
-  }
+  void check(int result, const char* what) const { av::check(result, path, what); }
 
   // Null: no more pictures.
   void encode(const AVFrame* picture) {

@@ -1,7 +1,6 @@
 extern "C" {
 #include <libavutil/imgutils.h>
 #include <libavutil/pixdesc.h>
-#include <libswscale/swscale.h>
 }
 
 #include <array>
@@ -11,13 +10,6 @@ extern "C" {
 
 namespace previz::post {
 namespace {
-
-struct CloseDemuxer {
-  void operator()(AVFormatContext* context) const { avformat_close_input(&context); }
-};
-struct FreeScaler {
-  void operator()(SwsContext* context) const { sws_freeContext(context); }
-};
 
 // The picture as the session will hold it, and libav's name for that.
 struct Target {
@@ -177,12 +169,12 @@ class VideoFile final : public Footage {
   }
 
   std::filesystem::path file_;
-  std::unique_ptr<AVFormatContext, CloseDemuxer> demuxer_;
+  av::Demuxer demuxer_;
   int track_ = 0;
   av::Codec decoder_;
   av::Packet packet_{av_packet_alloc()};
   av::Picture frame_{av_frame_alloc()};
-  std::unique_ptr<SwsContext, FreeScaler> scaler_;
+  av::Scaler scaler_;
   std::uint64_t index_ = 0;
   std::optional<std::int64_t> first_pts_;
   std::vector<std::string> notes_;

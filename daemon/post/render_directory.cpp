@@ -20,18 +20,6 @@ namespace {
 constexpr const char* settings_name = "render.json";
 constexpr const char* lines_name = "frames.jsonl";
 
-const char* to_string(tracking::TrackStatus status) {
-  switch (status) {
-    case tracking::TrackStatus::tracked:
-      return "tracked";
-    case tracking::TrackStatus::ambiguous:
-      return "ambiguous";
-    case tracking::TrackStatus::lost:
-      break;
-  }
-  return "lost";
-}
-
 nlohmann::ordered_json rows(const glm::dmat4& matrix) {
   nlohmann::ordered_json result;
   for (int row = 0; row < 4; ++row)

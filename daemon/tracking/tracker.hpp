@@ -21,6 +21,7 @@ struct Pose {
 };
 
 enum class TrackStatus { tracked, ambiguous, lost };
+const char* to_string(TrackStatus status);  // "tracked" and so on
 
 struct Track {
   TrackStatus status = TrackStatus::lost;

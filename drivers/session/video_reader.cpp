@@ -9,19 +9,14 @@
 namespace previz::session {
 namespace {
 
-struct CloseDemuxer {
-  void operator()(AVFormatContext* context) const { avformat_close_input(&context); }
-};
-using Demuxer = std::unique_ptr<AVFormatContext, CloseDemuxer>;
-
-Demuxer open_demuxer(const std::filesystem::path& file) {
+av::Demuxer open_demuxer(const std::filesystem::path& file) {
   AVFormatContext* context = nullptr;
   const AVInputFormat* matroska = av_find_input_format("matroska");
   av::check(avformat_open_input(&context, file.c_str(), matroska, nullptr), file,
             "cannot be read as Matroska");
   // Packets as they are in the file: no parser, no invented times.
   context->flags |= AVFMT_FLAG_NOPARSE | AVFMT_FLAG_NOFILLIN;
-  return Demuxer(context);
+  return av::Demuxer(context);
 }
 
 int find_track(const AVFormatContext& demuxer, const std::filesystem::path& file) {
@@ -48,7 +43,7 @@ av::Codec open_decoder(const AVCodecParameters& parameters, const std::filesyste
 struct VideoReader::Impl {
   std::filesystem::path file;
   StreamFormat format;
-  Demuxer demuxer;
+  av::Demuxer demuxer;
   int track;
   av::Codec decoder;
   av::Packet packet{av_packet_alloc()};

@@ -16,14 +16,6 @@ extern "C" {
 namespace previz::session {
 namespace {
 
-struct CloseMuxer {
-  void operator()(AVFormatContext* context) const {
-    avio_closep(&context->pb);
-    avformat_free_context(context);
-  }
-};
-using Muxer = std::unique_ptr<AVFormatContext, CloseMuxer>;
-
 // FFV1 codes a picture in independent slices, each on one thread. libav's encoder knows only some
 // counts: 1 up to 352x288 pixels, 4 and 16 always.
 int slice_count(const StreamFormat& format) {
@@ -60,11 +52,11 @@ av::Codec open_encoder(const StreamFormat& format, const std::filesystem::path& 
   return encoder;
 }
 
-Muxer open_muxer(const AVCodecContext& encoder, const std::filesystem::path& file) {
+av::Muxer open_muxer(const AVCodecContext& encoder, const std::filesystem::path& file) {
   AVFormatContext* context = nullptr;
   av::check(avformat_alloc_output_context2(&context, nullptr, "matroska", file.c_str()), file,
             "Matroska cannot be started");
-  Muxer muxer(context);
+  av::Muxer muxer(context);
   AVStream* stream = avformat_new_stream(context, nullptr);
   if (!stream) throw Error(file.string() + ": no memory for a video track");
   av::check(avcodec_parameters_from_context(stream->codecpar, &encoder), file, "cannot be set up");
@@ -81,7 +73,7 @@ struct VideoWriter::Impl {
   std::filesystem::path file;
   StreamFormat format;
   av::Codec encoder;
-  Muxer muxer;
+  av::Muxer muxer;
   Descriptor descriptor;  // the same file once more: libav does not hand out its own for sync
   av::Picture picture;
   av::Packet packet;

@@ -16,18 +16,6 @@ namespace {
 
 using namespace previz;
 
-const char* to_string(tracking::TrackStatus status) {
-  switch (status) {
-    case tracking::TrackStatus::tracked:
-      return "tracked";
-    case tracking::TrackStatus::ambiguous:
-      return "ambiguous";
-    case tracking::TrackStatus::lost:
-      return "lost";
-  }
-  return "?";
-}
-
 struct Mean {
   double sum = 0, most = 0;
   int count = 0;

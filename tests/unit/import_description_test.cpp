@@ -98,7 +98,7 @@ TEST(ImportDescription, PosesBecomeTheTrack) {
 
 // config/frames.example.json as it is shipped, with footage made to fit it.
 TEST(ImportDescription, TheExampleIsValidAndMeansWhatItSays) {
-  const session::TemporaryDirectory folder;
+  const test::TemporaryDirectory folder;
   const std::filesystem::path config = std::filesystem::path(PREVIZ_SOURCE_DIR) / "config";
   std::filesystem::copy(config / "frames.example.json", folder.path() / "FRAMES.json");
   session::write_content(folder.path() / "desk.toml", "[set]\nname = \"desk\"\n");
@@ -273,7 +273,7 @@ TEST(ImportDescription, NothingIsOverwritten) {
 }
 
 TEST(ImportDescription, WhatIsNotJsonIsAnError) {
-  const session::TemporaryDirectory folder;
+  const test::TemporaryDirectory folder;
   const auto error_of = [&](const std::string& text) -> std::string {
     session::write_content(folder.path() / "F.json", text);
     try {

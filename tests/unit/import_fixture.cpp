@@ -38,8 +38,9 @@ void write_picture(const std::filesystem::path& file, const cv::Mat& picture) {
 void write_video(const std::filesystem::path& file, const std::string& pixel_format,
                  const std::vector<std::vector<std::uint8_t>>& frames, int width, int height,
                  int fps, bool bt709) {
-  AVFormatContext* muxer = nullptr;
-  avformat_alloc_output_context2(&muxer, nullptr, nullptr, file.c_str());
+  AVFormatContext* context = nullptr;
+  ASSERT_GE(avformat_alloc_output_context2(&context, nullptr, nullptr, file.c_str()), 0);
+  const av::Muxer muxer(context);
   const AVCodec* codec = avcodec_find_encoder(AV_CODEC_ID_FFV1);
   const av::Codec encoder(avcodec_alloc_context3(codec));
   encoder->width = width;
@@ -53,11 +54,11 @@ void write_video(const std::filesystem::path& file, const std::string& pixel_for
     encoder->color_range = AVCOL_RANGE_MPEG;
   }
   ASSERT_EQ(avcodec_open2(encoder.get(), codec, nullptr), 0);
-  AVStream* stream = avformat_new_stream(muxer, nullptr);
+  AVStream* stream = avformat_new_stream(context, nullptr);
   avcodec_parameters_from_context(stream->codecpar, encoder.get());
   stream->time_base = encoder->time_base;
   ASSERT_GE(avio_open(&muxer->pb, file.c_str(), AVIO_FLAG_WRITE), 0);
-  ASSERT_GE(avformat_write_header(muxer, nullptr), 0);
+  ASSERT_GE(avformat_write_header(context, nullptr), 0);
   const av::Packet packet(av_packet_alloc());
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const av::Picture picture(av_frame_alloc());
@@ -75,12 +76,10 @@ void write_video(const std::filesystem::path& file, const std::string& pixel_for
     ASSERT_EQ(avcodec_send_frame(encoder.get(), picture.get()), 0);
     ASSERT_EQ(avcodec_receive_packet(encoder.get(), packet.get()), 0);
     av_packet_rescale_ts(packet.get(), encoder->time_base, stream->time_base);
-    ASSERT_GE(av_write_frame(muxer, packet.get()), 0);
+    ASSERT_GE(av_write_frame(context, packet.get()), 0);
     av_packet_unref(packet.get());
   }
-  av_write_trailer(muxer);
-  avio_closep(&muxer->pb);
-  avformat_free_context(muxer);
+  ASSERT_EQ(av_write_trailer(context), 0);
 }
 
 Shoot::Shoot() {

@@ -42,7 +42,7 @@ class Shoot {
   std::string error() const;
 
  private:
-  session::TemporaryDirectory directory_;
+  test::TemporaryDirectory directory_;
 };
 
 }  // namespace previz::post

@@ -6,13 +6,9 @@
 
 #include "daemon/output/png.hpp"
 #include "daemon/output/video.hpp"
+#include "drivers/av.hpp"
 #include "drivers/error.hpp"
 #include "tests/unit/temporary_directory.hpp"
-
-extern "C" {
-#include <libavcodec/avcodec.h>
-#include <libavformat/avformat.h>
-}
 
 namespace previz::output {
 namespace {
@@ -74,17 +70,18 @@ struct Decoded {
 
 Decoded decode(const std::filesystem::path& path) {
   Decoded decoded;
-  AVFormatContext* file = nullptr;
-  EXPECT_EQ(avformat_open_input(&file, path.c_str(), nullptr, nullptr), 0);
-  EXPECT_GE(avformat_find_stream_info(file, nullptr), 0);
+  AVFormatContext* context = nullptr;
+  av::check(avformat_open_input(&context, path.c_str(), nullptr, nullptr), path, "cannot be read");
+  const av::Demuxer file(context);
+  EXPECT_GE(avformat_find_stream_info(context, nullptr), 0);
   const AVStream* stream = file->streams[0];
-  AVCodecContext* codec = avcodec_alloc_context3(avcodec_find_decoder(stream->codecpar->codec_id));
-  avcodec_parameters_to_context(codec, stream->codecpar);
-  EXPECT_EQ(avcodec_open2(codec, nullptr, nullptr), 0);
-  AVPacket* packet = av_packet_alloc();
-  AVFrame* frame = av_frame_alloc();
+  const av::Codec codec(avcodec_alloc_context3(avcodec_find_decoder(stream->codecpar->codec_id)));
+  avcodec_parameters_to_context(codec.get(), stream->codecpar);
+  EXPECT_EQ(avcodec_open2(codec.get(), nullptr, nullptr), 0);
+  const av::Packet packet(av_packet_alloc());
+  const av::Picture frame(av_frame_alloc());
   const auto receive = [&] {
-    while (avcodec_receive_frame(codec, frame) == 0) {
+    while (avcodec_receive_frame(codec.get(), frame.get()) == 0) {
       decoded.times_s.push_back(static_cast<double>(frame->pts) * av_q2d(stream->time_base));
       decoded.width = frame->width;
       decoded.height = frame->height;
@@ -94,17 +91,13 @@ Decoded decode(const std::filesystem::path& path) {
       decoded.mean_luma = sum / (frame->width * frame->height);
     }
   };
-  while (av_read_frame(file, packet) == 0) {
-    avcodec_send_packet(codec, packet);
+  while (av_read_frame(file.get(), packet.get()) == 0) {
+    avcodec_send_packet(codec.get(), packet.get());
     receive();
-    av_packet_unref(packet);
+    av_packet_unref(packet.get());
   }
-  avcodec_send_packet(codec, nullptr);
+  avcodec_send_packet(codec.get(), nullptr);
   receive();
-  av_frame_free(&frame);
-  av_packet_free(&packet);
-  avcodec_free_context(&codec);
-  avformat_close_input(&file);
   return decoded;
 }
 

@@ -30,7 +30,7 @@ class Replay : public testing::Test {
   }
   nanoseconds elapsed() const { return time_.now - ReplayClock::Time{}; }
 
-  session::TemporaryDirectory directory_;
+  test::TemporaryDirectory directory_;
   HeldTime time_;
 };
 
