@@ -62,6 +62,14 @@ void add_render(CLI::App& app, post::RenderOptions& options) {
       "Observer frames: 7, 3-9 or 3- (default: all)");
   command.add_option("--spp", options.samples, "Samples per pixel (default: quality.samples)")
       ->check(CLI::Range(1, 1'000'000));
+  command
+      .add_option("--error", options.error,
+                  "Go on to this error, over the picture's mean radiance (default: quality.error)")
+      ->check(CLI::Range(0.0, 1.0));
+  command
+      .add_option("--seconds", options.seconds,
+                  "Go on for so long a frame (default: quality.seconds)")
+      ->check(CLI::Range(0.0, 86400.0));
   command.add_option("--seed", options.seed, "Seed of the random numbers (default: the set's)");
   command
       .add_option_function<std::string>(

@@ -10,24 +10,27 @@ namespace {
 // What one pixel's sums say, in double precision.
 struct Means {
   glm::dvec3 mixed, diff, mixed_square, diff_square;
-  double mask, depth_sum, hits, difference_only;
+  double mask, depth_sum, hits, difference_only, samples;
 };
 
-Means means(const gpu::GpuPixel& p, double samples) {
+Means means(const gpu::GpuPixel& p) {
   const auto sum = [](const glm::vec4& high, const glm::vec4& low) {
     return glm::dvec4(high) + glm::dvec4(low);
   };
   const glm::dvec4 mixed = sum(p.mixed_high, p.mixed_low);
   const glm::dvec4 diff = sum(p.diff_high, p.diff_low);
   const glm::dvec4 mixed_square = sum(p.square_mixed_high, p.square_mixed_low);
+  const glm::dvec4 diff_square = sum(p.square_diff_high, p.square_diff_low);
+  const double samples = std::max(diff_square.w, 1.0);
   return {glm::dvec3(mixed) / samples,
           glm::dvec3(diff) / samples,
           glm::dvec3(mixed_square) / samples,
-          glm::dvec3(sum(p.square_diff_high, p.square_diff_low)) / samples,
+          glm::dvec3(diff_square) / samples,
           mixed.w / samples,
           diff.w,
           p.normal.w,
-          mixed_square.w / samples};
+          mixed_square.w / samples,
+          samples};
 }
 
 // Variance of a mean of n samples from the means of values and squares.
@@ -86,9 +89,8 @@ Layers make_layers(std::span<const gpu::GpuPixel> pixels, int width, int height,
     layer->resize(pixels.size());
   layers.mask.resize(pixels.size());
   layers.depth.resize(pixels.size());
-  const auto n = static_cast<double>(samples);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    Means m = means(pixels[i], n);
+    Means m = means(pixels[i]);
     const glm::dvec3 camera = pixel_of(plate.value, i);
     const glm::dvec3 plate_variance = pixel_of(plate.variance, i);
     // Where only the difference was traced, the camera has measured the real world.
@@ -101,9 +103,9 @@ Layers make_layers(std::span<const gpu::GpuPixel> pixels, int width, int height,
     layers.mixed[i] = glm::vec3(m.mixed);
     layers.real[i] = glm::vec3(real);
     layers.diff[i] = glm::vec3(m.diff);
-    layers.variance[i] = glm::vec3(m.mask * m.mask * variance_of_mean(m.mixed, m.mixed_square, n) +
-                                   uncovered * uncovered * gains * gains *
-                                       variance_of_mean(m.diff, m.diff_square, n));
+    layers.variance[i] = glm::vec3(
+        m.mask * m.mask * variance_of_mean(m.mixed, m.mixed_square, m.samples) +
+        uncovered * uncovered * gains * gains * variance_of_mean(m.diff, m.diff_square, m.samples));
     layers.mask[i] = static_cast<float>(m.mask);
     layers.depth[i] = static_cast<float>(m.hits > 0 ? m.depth_sum / m.hits : 0);
     const glm::dvec3 normal(pixels[i].normal.x, pixels[i].normal.y, pixels[i].normal.z);

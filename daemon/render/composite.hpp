@@ -30,7 +30,7 @@ struct CompositeRule {
   double floor = 0;  // radiance, of hybrid
 };
 
-// All layers from per-pixel sums of `samples` samples (> 0) and the plate (empty: black).
+// All layers from per-pixel sums and the plate (empty: black). `samples`: the most a pixel has.
 // composite = mean(M) mean(Lm) + (1 - mean(M)) U with U by `rule`; with additive that is
 // estimator.md's mean(Lm) + (1 - mean(M)) (Lc - mean(Lr)) without subtracting two large sums.
 Layers make_layers(std::span<const gpu::GpuPixel> pixels, int width, int height,

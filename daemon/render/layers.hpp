@@ -11,7 +11,7 @@ namespace previz::render {
 struct Layers {
   int width = 0;
   int height = 0;
-  std::int64_t samples = 0;          // per pixel
+  std::int64_t samples = 0;          // per pixel; the most, where some were left out
   std::vector<glm::vec3> composite;  // by the set's rule: daemon/render/composite.hpp
   std::vector<glm::vec3> mixed;      // mean(Lm)
   std::vector<glm::vec3> real;       // mean(Lr); Lc where only the difference was traced

@@ -140,6 +140,10 @@ void Renderer::render(int samples, const std::function<bool()>& cancelled) {
   }
 }
 
+void Renderer::sample_only(const std::vector<std::uint32_t>& blocks) {
+  impl_->wavefront.sample_only(blocks);
+}
+
 Layers Renderer::layers() const {
   const Impl& r = *impl_;
   const PinholeIntrinsics& lens = r.calibration.intrinsics;

@@ -30,6 +30,10 @@ std::uint32_t slots_of(const gpu::GpuBatch& tile) {
   return round_up(tile.width, block_width) * round_up(tile.height, block_height);
 }
 
+std::uint32_t sampled_blocks(int pixels) {
+  return (static_cast<std::uint32_t>(pixels) + gpu::SAMPLED_BLOCK - 1) / gpu::SAMPLED_BLOCK;
+}
+
 bool is_texel_buffer(std::uint32_t binding) {
   return binding < gpu::BINDING_INSTANCES;
 }
@@ -102,6 +106,8 @@ void Wavefront::create_paths() {
   sample_mixed_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
   sample_real_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
   sample_aov_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
+  sampled_ = create_storage_buffer(
+      device_, sizeof(std::uint32_t) * sampled_blocks(width_) * sampled_blocks(height_));
   control_ = create_indirect_buffer(device_, sizeof(gpu::GpuControl));
 }
 
@@ -118,6 +124,7 @@ void Wavefront::write_path_set(const Tile& tile) {
   buffers[gpu::BINDING_SAMPLE_AOV] = &sample_aov_;
   buffers[gpu::BINDING_CONTROL] = &control_;
   buffers[gpu::BINDING_PIXELS] = &tile.pixels;
+  buffers[gpu::BINDING_SAMPLED] = &sampled_;
   for (std::uint32_t i = 0; i < gpu::PATH_BINDINGS; ++i)
     write_descriptor(device_, tile.set, i, *buffers[i], false);
 }
@@ -141,7 +148,21 @@ void Wavefront::create_pipelines(std::uint32_t features) {
   features_ = features;
 }
 
+void Wavefront::sample_only(const std::vector<std::uint32_t>& blocks) {
+  upload_bytes(device_, sampled_, std::as_bytes(std::span(blocks)));
+  const std::size_t columns = sampled_blocks(width_);
+  for (Tile& tile : tiles_) {
+    const std::size_t first = tile.batch.y / gpu::SAMPLED_BLOCK;
+    const std::size_t last = (tile.batch.y + tile.batch.height - 1) / gpu::SAMPLED_BLOCK;
+    tile.sampled = std::any_of(blocks.begin() + static_cast<std::ptrdiff_t>(first * columns),
+                               blocks.begin() + static_cast<std::ptrdiff_t>((last + 1) * columns),
+                               [](std::uint32_t block) { return block != 0; });
+  }
+}
+
 void Wavefront::clear() {
+  sample_only(
+      std::vector<std::uint32_t>(std::size_t{sampled_blocks(width_)} * sampled_blocks(height_), 1));
   gpu::GpuControl control{};
   control.extend_groups[1] = control.extend_groups[2] = 1;
   control.shadow_groups[1] = control.shadow_groups[2] = 1;
@@ -215,6 +236,7 @@ bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::u
   if ((features_ & gpu::FEATURE_PHOTONS) != 0)
     return render_with_photons(first_sample, samples, max_depth, cancelled);
   for (const Tile& tile : tiles_) {
+    if (!tile.sampled) continue;
     const std::uint32_t at_once = std::max(slots_ / slots_of(tile.batch), 1u);
     for (std::uint32_t done = 0; done < samples; done += at_once) {
       if (cancelled && cancelled()) return false;
@@ -235,19 +257,22 @@ bool Wavefront::render_with_photons(std::uint32_t first_sample, std::uint32_t sa
                                     const std::function<bool()>& cancelled) {
   for (std::uint32_t sample = first_sample; sample < first_sample + samples; ++sample) {
     const double radius = photon_radius_ * photon_radius_factor(sample);
+    bool has_photons = false;
     for (const Tile& tile : tiles_) {
+      if (!tile.sampled) continue;
       if (cancelled && cancelled()) return false;
       gpu::GpuBatch batch = tile.batch;
       batch.first_sample = sample;
       batch.samples = 1;
       batch.photon_radius = static_cast<float>(radius);
       device_.submit([&](const vk::raii::CommandBuffer& commands) {
-        if (&tile == &tiles_.front()) {
+        if (!has_photons) {
           bind_sets(commands, tile, batch);
           record_photons(commands, max_depth);
         }
         record_batch(commands, tile, batch, max_depth);
       });
+      has_photons = true;
     }
   }
   return true;

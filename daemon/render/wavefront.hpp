@@ -22,7 +22,9 @@ class Wavefront {
   // Photons a pass and the radius (metres) of the first, where `features` has FEATURE_PHOTONS.
   void use_photons(std::uint32_t count, double radius);
   std::uint32_t most_photons() const { return slots_; }
-  // Forgets all samples.
+  // Which blocks of SAMPLED_BLOCK^2 pixels are sampled from now on, row-major; 0: not.
+  void sample_only(const std::vector<std::uint32_t>& blocks);
+  // Forgets all samples; every pixel is sampled again.
   void clear();
   // Adds samples first_sample .. first_sample + samples - 1 to every pixel. Returns false where
   // `cancelled` stopped it between two batches: the sums are then uneven and must be cleared.
@@ -35,6 +37,7 @@ class Wavefront {
  private:
   struct Tile {
     gpu::GpuBatch batch;  // its rectangle
+    bool sampled = true;  // any of its pixels
     Buffer pixels;
     vk::raii::DescriptorSet set{nullptr};
   };
@@ -67,7 +70,7 @@ class Wavefront {
   std::uint32_t features_ = 0;
   Pipeline generate_, advance_, extend_, shade_, prepare_shadow_, shadow_, accumulate_;
   Buffer ray_origin_, ray_direction_, throughput_, hits_, queue_, shadow_rays_, sample_mixed_,
-      sample_real_, sample_aov_, control_;
+      sample_real_, sample_aov_, sampled_, control_;
 };
 
 }  // namespace previz::render

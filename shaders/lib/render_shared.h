@@ -41,11 +41,13 @@ PREVIZ_CONST uint BINDING_HIT = 3u;            // GpuHit[path]
 PREVIZ_CONST uint BINDING_QUEUE = 4u;          // uint[2][paths]: paths to extend, ping-pong
 PREVIZ_CONST uint BINDING_SHADOW = 5u;         // GpuShadowRay[paths]
 PREVIZ_CONST uint BINDING_SAMPLE_MIXED = 6u;   // vec4[slot]: Lm, M
-PREVIZ_CONST uint BINDING_SAMPLE_REAL = 7u;    // vec4[slot]: Lr, 1 where only the difference is traced
+PREVIZ_CONST uint BINDING_SAMPLE_REAL = 7u;    // vec4[slot]: Lr, one of SAMPLE_*
 PREVIZ_CONST uint BINDING_SAMPLE_AOV = 8u;     // vec4[slot]: normal, depth (0: no hit)
 PREVIZ_CONST uint BINDING_CONTROL = 9u;        // GpuControl
 PREVIZ_CONST uint BINDING_PIXELS = 10u;        // GpuPixel[width * height]
-PREVIZ_CONST uint PATH_BINDINGS = 11u;
+PREVIZ_CONST uint BINDING_SAMPLED = 11u;       // uint[]: of each block of the picture, row-major,
+                                               // whether its pixels are sampled
+PREVIZ_CONST uint PATH_BINDINGS = 12u;
 
 // Set 2, the photons of one pass, in a hash grid of cells twice as wide as the radius. What is
 // gathered from comes as texel buffers, faster on lavapipe, which are views of the last two.
@@ -62,6 +64,14 @@ PREVIZ_CONST uint BINDING_PHOTON_SORTED = 6u;   // vec4[]: FOUND_PHOTONS, to wri
 PREVIZ_CONST uint BINDING_PHOTON_BUCKETS = 7u;  // GpuPhotonBucket[], a power of two; FOUND_BUCKETS
 PREVIZ_CONST uint PHOTON_BINDINGS = 8u;
 PREVIZ_CONST uint TEXELS_PER_PHOTON = 4u;
+
+// What a slot holds, in the fourth component of its SAMPLE_REAL.
+PREVIZ_CONST float SAMPLE_FULL = 0.0f;        // both radiances
+PREVIZ_CONST float SAMPLE_DIFFERENCE = 1.0f;  // only what differs between them
+PREVIZ_CONST float SAMPLE_NONE = 2.0f;        // nothing: its pixel is not sampled any more
+
+// Sides of the blocks of pixels that are sampled or not.
+PREVIZ_CONST uint SAMPLED_BLOCK = 8u;
 
 PREVIZ_CONST uint WORKGROUP_SIZE = 64u;
 PREVIZ_CONST uint NO_INDEX = 0xffffffffu;
@@ -130,7 +140,7 @@ struct GpuPixel {
   vec4 normal;      // sum of normals, number of samples that hit something
   vec4 square_mixed_high;  // sums of squares, for the variance; w: samples of the difference only
   vec4 square_mixed_low;
-  vec4 square_diff_high;
+  vec4 square_diff_high;   // w: number of samples
   vec4 square_diff_low;
 };
 

@@ -78,6 +78,7 @@ TEST(Composite, covered_pixels_use_means_not_samples) {
   // Two samples: one covered (Lm = 0.5, Lr = 1), one not (Lm = Lr = 0).
   pixel.mixed_high = gpu::vec4(0.5f, 0.5f, 0.5f, 1.0f);
   pixel.diff_high = gpu::vec4(-0.5f, -0.5f, -0.5f, 0.0f);
+  pixel.square_diff_high.w = 2;
   const render::PlateRadiance plate{std::vector<double>(3, 0.5), std::vector<double>(3, 0.0)};
   const render::Layers layers = render::make_layers(std::span(&pixel, 1), 1, 1, 2, plate);
   // 0.25 + (1 - 0.5) (0.5 - 0.5)
