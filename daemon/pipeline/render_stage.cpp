@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "daemon/pipeline/preview_size.hpp"
 #include "daemon/pipeline/refinement.hpp"
 #include "drivers/error.hpp"
 
@@ -10,8 +11,9 @@ namespace previz::pipeline {
 namespace {
 
 // What a plate looks like with nothing in front of it and nothing known behind it.
-render::Layers plate_layers(const Plate& plate, double exposure, const ResponseCurve& curve) {
-  const std::vector<double> signal = lighting::Response(curve, plate.bits).inverse();
+render::Layers plate_layers(const Plate& plate, double exposure,
+                            const lighting::Response& response) {
+  const std::vector<double>& signal = response.inverse();
   render::Layers layers;
   layers.width = plate.width;
   layers.height = plate.height;
@@ -30,9 +32,8 @@ render::Layers plate_layers(const Plate& plate, double exposure, const ResponseC
 }
 
 std::string why_no_pose(const tracking::Track& track) {
-  const char* what =
-      track.status == tracking::TrackStatus::ambiguous ? "pose ambiguous" : "pose lost";
-  return track.reason.empty() ? what : std::string(what) + ": " + track.reason;
+  const std::string what = std::string("pose ") + to_string(track.status);
+  return track.reason.empty() ? what : what + ": " + track.reason;
 }
 
 }  // namespace
@@ -41,16 +42,16 @@ RenderStage::RenderStage(std::shared_ptr<render::Device> device, const set::Set&
                          const ObserverCalibration& calibration, const scene::Scene& scene,
                          RenderStageOptions options)
     : set_(set),
-      response_(calibration.response),
+      calibration_(calibration),
       options_(std::move(options)),
-      renderer_(std::move(device), set.estimation, calibration) {
+      renderer_(std::move(device), set.estimation, scaled(calibration, options_.scale)) {
   renderer_.set_scene(scene);
 }
 
 void RenderStage::operator()(Shot& shot) {
   const auto begin = std::chrono::steady_clock::now();
   const double exposure = set_.observer.exposure.value_or(shot.frame->exposure);
-  Plate plate = to_plate(*shot.frame);
+  Plate plate = plate_of(*shot.frame);
   if (!shot.track.pose) return pass_through(shot, std::move(plate), why_no_pose(shot.track));
   if (!shot.light) return pass_through(shot, std::move(plate), "no light frame was seen yet");
 
@@ -72,9 +73,22 @@ void RenderStage::operator()(Shot& shot) {
   shot.render_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
+Plate RenderStage::plate_of(const Frame& frame) {
+  Plate plate = to_plate(frame);
+  if (!response_ || response_->bits() != plate.bits)
+    response_.emplace(calibration_.response, plate.bits);
+  if (options_.scale == 1) return plate;
+  const PinholeIntrinsics& lens = calibration_.intrinsics;
+  if (plate.width != lens.width || plate.height != lens.height)
+    throw Error("observer: a frame of " + std::to_string(plate.width) + "x" +
+                std::to_string(plate.height) + " does not fit the calibration's " +
+                std::to_string(lens.width) + "x" + std::to_string(lens.height));
+  return scaled(plate, options_.scale, *response_);
+}
+
 void RenderStage::pass_through(Shot& shot, Plate plate, std::string reason) const {
   const double exposure = set_.observer.exposure.value_or(shot.frame->exposure);
-  if (options_.layers) shot.layers = plate_layers(plate, exposure, response_);
+  if (options_.layers) shot.layers = plate_layers(plate, exposure, *response_);
   shot.untouched = std::move(reason);
   shot.picture = std::move(plate);
   shot.whole = true;

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "daemon/lighting/response.hpp"
 #include "daemon/pipeline/shot.hpp"
@@ -14,6 +15,7 @@ namespace previz::pipeline {
 
 struct RenderStageOptions {
   bool layers = false;  // fill shot.layers (they cost a download)
+  double scale = 1;     // of everything a shot gets, over the observer's size (preview_size.hpp)
   std::function<bool()> cancelled;
   std::function<void(const Shot&, int samples_done)> progress;  // a few times per frame
 };
@@ -28,10 +30,12 @@ class RenderStage {
   void operator()(Shot& shot);
 
  private:
+  Plate plate_of(const Frame& frame);
   void pass_through(Shot& shot, Plate plate, std::string reason) const;
 
   const set::Set set_;
-  const ResponseCurve response_;
+  const ObserverCalibration calibration_;       // at the observer's size
+  std::optional<lighting::Response> response_;  // of the last plate's bits
   const RenderStageOptions options_;
   render::Renderer renderer_;
   LightPtr light_;  // the one the renderer holds

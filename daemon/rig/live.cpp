@@ -87,9 +87,6 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out
   set::Set set = set::load_set(options.set_file);
   if (options.samples) set.quality.samples = *options.samples;
   if (options.directory) set.output.directory = *options.directory;
-  if (set.quality.scale != 1.0)
-    throw Error(set.file.string() +
-                ": quality.scale: this build shows the observer's own resolution; 1 is allowed");
 
   Notes note(out);
   pipeline::Metrics metrics;
@@ -108,6 +105,7 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out
                 ": lighting: the set has neither a light camera nor lighting.environment");
   pipeline::RenderStageOptions render_options;
   render_options.cancelled = [&] { return options.stop.stop_requested(); };
+  render_options.scale = set.quality.scale;
   pipeline::RenderStage render(device, set, calibration, scene, std::move(render_options));
   out << "live on " << render::device_name(*device) << ", " << set.quality.samples
       << " samples a frame" << std::endl;

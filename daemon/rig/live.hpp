@@ -21,10 +21,10 @@ struct LiveOptions {
 };
 
 // Runs until the observer's stream ends or a stop is requested. About once a second, and at the
-// end, writes what a display would show to DIR/picture.png and what the pipeline did to
-// DIR/metrics.json. A frame whose pose is lost, or that comes before the first light, shows its
-// plate untouched. Notes go to `out`. Throws previz::Error on anything that keeps the rig from
-// running.
+// end, writes what a display would show, at the set's quality.scale, to DIR/picture.png and what
+// the pipeline did to DIR/metrics.json. A frame whose pose is lost, or that comes before the first
+// light, shows its plate untouched. Notes go to `out`. Throws previz::Error on anything that keeps
+// the rig from running.
 pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out);
 
 }  // namespace previz::rig

@@ -11,6 +11,7 @@
 
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
+#include "daemon/pipeline/preview_size.hpp"
 #include "daemon/rig/live.hpp"
 #include "drivers/error.hpp"
 #include "tests/unit/small_take.hpp"
@@ -31,6 +32,12 @@ class RenderSession : public testing::Test {
     if (!options.directory) options.directory = directory_ / "out";
     out_.str("");
     return render_session(options, out_);
+  }
+  rig::LiveOptions live_options() const {
+    rig::LiveOptions options;
+    options.set_file = directory_ / "set.toml";
+    options.directory = directory_ / "live";
+    return options;
   }
   static bool is_plate(const std::filesystem::path& png, int frame) {
     return output::read_png(png).samples == to_plate(small_take_frame(frame)).samples;
@@ -155,10 +162,7 @@ TEST_F(RenderSession, ARangeBehindTheEndIsRefused) {
 // Live: nothing vanishes. Every frame of the camera was shown or is counted as dropped, with cause.
 TEST_F(RenderSession, LiveAccountsForEveryFrame) {
   test::write_small_take(directory_.path());
-  rig::LiveOptions options;
-  options.set_file = directory_ / "set.toml";
-  options.directory = directory_ / "live";
-  const pipeline::MetricsSnapshot snapshot = rig::run_live(options, out_);
+  const pipeline::MetricsSnapshot snapshot = rig::run_live(live_options(), out_);
   std::uint64_t accounted = snapshot.stages.at("display").frames;
   for (const auto& [name, stage] : snapshot.stages)
     for (const auto& [cause, frames] : stage.dropped) accounted += frames;
@@ -170,12 +174,26 @@ TEST_F(RenderSession, LiveAccountsForEveryFrame) {
   EXPECT_EQ(nlohmann::json::parse(metrics)["stages"]["observer"]["frames"], small_take_frames);
 }
 
+// quality.scale is of the preview only.
+TEST_F(RenderSession, LiveShowsThePreviewAtTheSetsScaleAndOfflineIsFullSize) {
+  test::write_small_take(directory_.path(), false, "scale = 0.5\n");
+  rig::run_live(live_options(), out_);
+  const Plate last = to_plate(small_take_frame(small_take_frames - 1));
+  const Plate half = pipeline::scaled(last, 0.5, lighting::Response(ResponseCurve{}, 8));
+  const Plate shown = output::read_png(directory_ / "live/picture.png");
+  EXPECT_EQ(shown.width, 24);
+  EXPECT_EQ(shown.samples, half.samples);  // nothing is virtual: the plate, bit for bit
+
+  RenderOptions offline;
+  offline.frames = FrameRange{1, 1};
+  render(offline);
+  EXPECT_TRUE(is_plate(directory_ / "out/0001.png", 1));
+}
+
 TEST_F(RenderSession, LiveStopsWhenAsked) {
   test::write_small_take(directory_.path());
   std::stop_source stop;
-  rig::LiveOptions options;
-  options.set_file = directory_ / "set.toml";
-  options.directory = directory_ / "live";
+  rig::LiveOptions options = live_options();
   options.loop = true;  // would never end by itself
   options.stop = stop.get_token();
   std::jthread later([&] {

@@ -59,7 +59,7 @@ TEST(Adaptive, the_estimate_is_the_true_error_or_above) {
 TEST(Adaptive, reaches_the_error_with_fewer_samples_than_even_sampling) {
   const View view = small_set();
   SetRenderer renderer(view);
-  const double target = 0.05;
+  const double target = 0.2;
   renderer.begin({{}, 1.0, view.world_from_camera});
   const auto refined = pipeline::refine(renderer, quality(8, target), {}, {});
   EXPECT_TRUE(refined.whole);
