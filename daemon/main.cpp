@@ -62,12 +62,24 @@ void add_render(CLI::App& app, post::RenderOptions& options) {
       "Observer frames: 7, 3-9 or 3- (default: all)");
   command.add_option("--spp", options.samples, "Samples per pixel (default: quality.samples)")
       ->check(CLI::Range(1, 1'000'000));
+  command
+      .add_option("--error", options.error,
+                  "Go on to this error, over the picture's mean radiance (default: quality.error)")
+      ->check(CLI::Range(0.0, 1.0));
+  command
+      .add_option("--seconds", options.seconds,
+                  "Go on for so long a frame (default: quality.seconds)")
+      ->check(CLI::Range(0.0, 86400.0));
   command.add_option("--seed", options.seed, "Seed of the random numbers (default: the set's)");
   command
       .add_option_function<std::string>(
-          "--estimator", [&](const std::string&) { options.estimator = set::Estimator::paired; },
+          "--estimator",
+          [&](const std::string& name) {
+            options.estimator =
+                name == "paired" ? set::Estimator::paired : set::Estimator::difference;
+          },
           "Estimator (default: the set's)")
-      ->check(CLI::IsMember({"paired"}));
+      ->check(CLI::IsMember({"paired", "difference"}));
   command.add_option("--out", options.directory, "Directory for the pictures");
   command.add_flag_callback(
       "--no-exr", [&] { options.exr = false; }, "No EXR files");

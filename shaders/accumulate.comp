@@ -41,14 +41,15 @@ void main() {
     const uint slot = s * tile_slots() + pixel_slot(in_tile);
     vec4 mixed = sample_mixed[slot];
     vec4 real = sample_real[slot];
+    if (real.w == SAMPLE_NONE) continue;
     const vec4 aov = sample_aov[slot];
     reject_impossible(mixed, real);
     const vec3 diff = mixed.rgb - real.rgb;
     add_exactly(sums.mixed_high, sums.mixed_low, mixed);
     add_exactly(sums.diff_high, sums.diff_low, vec4(diff, aov.w));
     sums.normal += vec4(aov.xyz, aov.w > 0.0 ? 1.0 : 0.0);
-    add_exactly(sums.square_mixed_high, sums.square_mixed_low, vec4(mixed.rgb * mixed.rgb, 0.0));
-    add_exactly(sums.square_diff_high, sums.square_diff_low, vec4(diff * diff, 0.0));
+    add_exactly(sums.square_mixed_high, sums.square_mixed_low, vec4(mixed.rgb * mixed.rgb, real.w));
+    add_exactly(sums.square_diff_high, sums.square_diff_low, vec4(diff * diff, 1.0));
   }
   pixels[gl_GlobalInvocationID.x] = sums;
 }

@@ -4,7 +4,7 @@
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shaders/lib/append.glsl"
-#include "shaders/lib/bsdf.glsl"
+#include "shaders/lib/difference_bounds.glsl"
 #include "shaders/lib/sampler.glsl"
 
 layout(set = 0, binding = BINDING_RAYS) uniform textureBuffer corner_rays;
@@ -19,13 +19,38 @@ vec2 calibrated_ray(uvec2 pixel, vec2 inside) {
   return mix(top, bottom, inside.y);
 }
 
+// Whether a differing object may cover a part of the pixel: its bound, widened by the pixel's own
+// extent and by the lens, meets the ray through the pixel's centre.
+bool may_be_covered(uvec2 pixel) {
+  const vec3 corner = vec3(calibrated_ray(pixel, vec2(0.0)), 1.0);
+  const vec3 ray = vec3(calibrated_ray(pixel, vec2(0.5)), 1.0);
+  const float pixel_angle = 1.5 * length(corner - ray);  // of half the diagonal, and some more
+  const vec3 direction = normalize(transform_vector(frame.world_from_camera, ray));
+  for (uint i = 0u; i < frame.bound_count; ++i) {
+    const float far = length(bounds[i].xyz) + bounds[i].w;
+    float radius = bounds[i].w + pixel_angle * far;
+    if (has_feature(FEATURE_LENS)) radius += frame.lens_radius * (1.0 + far / frame.focus_distance);
+    const float along = max(dot(bounds[i].xyz, direction), 0.0);
+    const vec3 off = bounds[i].xyz - along * direction;
+    if (dot(off, off) <= radius * radius) return true;
+  }
+  return false;
+}
+
+bool is_sampled(uvec2 pixel) {
+  const uint blocks_x = (frame.width + SAMPLED_BLOCK - 1u) / SAMPLED_BLOCK;
+  return sampled[pixel.y / SAMPLED_BLOCK * blocks_x + pixel.x / SAMPLED_BLOCK] != 0u;
+}
+
 void main() {
   const uint slot = gl_GlobalInvocationID.x;
   const uvec2 in_tile = slot_pixel(slot);
   const bool valid = slot < tile_slots() * batch.samples &&
                      all(lessThan(in_tile, uvec2(batch.width, batch.height)));
-  if (valid) {
-    const uvec2 pixel = uvec2(batch.x, batch.y) + in_tile;
+  const uvec2 pixel = uvec2(batch.x, batch.y) + in_tile;
+  const bool wanted = valid && is_sampled(pixel);
+  if (valid && !wanted) sample_real[slot] = vec4(0.0, 0.0, 0.0, SAMPLE_NONE);
+  if (wanted) {
     const Sampler random = make_sampler(frame.seed, pixel, slot_sample(slot));
     vec3 target = vec3(calibrated_ray(pixel, sample_2d(random, PAIR_PIXEL)), 1.0);
     vec3 origin = vec3(0.0);
@@ -36,10 +61,12 @@ void main() {
     const uint path = 2u * slot;
     ray_origin[path] = vec4(transform_vector(frame.world_from_camera, origin), 0.0);
     ray_direction[path] = vec4(normalize(transform_vector(frame.world_from_camera, target)), 0.0);
-    path_throughput[path] = vec4(1.0, 1.0, 1.0, uintBitsToFloat(WORLD_BOTH));
+    const bool difference = has_feature(FEATURE_DIFFERENCE) && !may_be_covered(pixel);
+    const uint bits = WORLD_BOTH | (difference ? PATH_DIFFERENCE : 0u);
+    path_throughput[path] = vec4(1.0, 1.0, 1.0, uintBitsToFloat(bits));
     sample_mixed[slot] = vec4(0.0);
-    sample_real[slot] = vec4(0.0);
+    sample_real[slot] = vec4(0.0, 0.0, 0.0, difference ? SAMPLE_DIFFERENCE : SAMPLE_FULL);
     sample_aov[slot] = vec4(0.0);
   }
-  append_next(valid, 2u * slot);
+  append_next(wanted, 2u * slot);
 }

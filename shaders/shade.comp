@@ -6,7 +6,11 @@
 #include "shaders/lib/append.glsl"
 #include "shaders/lib/difference_bounds.glsl"
 #include "shaders/lib/environment.glsl"
+#include "shaders/lib/gather.glsl"
 #include "shaders/lib/sampler.glsl"
+
+// Of a path of the difference, at one vertex: bounds its weight.
+const float LEAST_SURVIVAL = 0.1;
 
 struct Path {
   uint index;
@@ -19,6 +23,7 @@ struct Path {
   uint worlds;
   uint depth;
   bool rough;  // some vertex so far scattered by a lobe that is not Dirac
+  bool difference;  // what is the same in both worlds need not be traced
 };
 
 Path load_path(uint index) {
@@ -27,18 +32,25 @@ Path load_path(uint index) {
   const vec4 throughput = path_throughput[index];
   const uint bits = floatBitsToUint(throughput.w);
   return Path(index, index >> 1, origin.xyz, origin.w, direction.xyz, direction.w, throughput.rgb,
-              path_worlds(bits), path_depth(bits), (bits & PATH_ROUGH) != 0u);
+              path_worlds(bits), path_depth(bits), (bits & PATH_ROUGH) != 0u,
+              has_feature(FEATURE_DIFFERENCE) && (bits & PATH_DIFFERENCE) != 0u);
 }
 
 void store_path(Path p, uint index) {
   ray_origin[index] = vec4(p.origin, p.t_min);
   ray_direction[index] = vec4(p.direction, p.pdf);
-  const uint bits = p.worlds | (p.rough ? PATH_ROUGH : 0u) | (p.depth << PATH_DEPTH_SHIFT);
+  const uint bits = p.worlds | (p.rough ? PATH_ROUGH : 0u) |
+                    (p.difference ? PATH_DIFFERENCE : 0u) | (p.depth << PATH_DEPTH_SHIFT);
   path_throughput[index] = vec4(p.throughput, uintBitsToFloat(bits));
 }
 
 // The light at the end of this path is a caustic's: rough, then Dirac lobes only.
 bool is_caustic(Path p) { return p.rough && p.pdf <= 0.0; }
+
+// Whether light with this gain is the same in all worlds of the path, and cancels.
+bool cancels(Path p, vec2 gain) {
+  return p.difference && p.worlds == WORLD_BOTH && gain.x == gain.y;
+}
 
 // Power heuristic; pdf = 0 stands for a Dirac direction, which a light sample cannot find.
 float mis_weight(float pdf, float other) {
@@ -50,6 +62,7 @@ float mis_weight(float pdf, float other) {
 // Lights without a surface of their own, met before the hit. They block nothing.
 void meet_lights(Path p, float t_hit) {
   for (uint i = 0u; i < frame.visible_light_count; ++i) {
+    if (cancels(p, lights[i].gain)) continue;
     float pdf;
     const float t = meet_light(lights[i], p.origin, p.direction, pdf);
     if (t < 0.0 || t <= p.t_min || t > t_hit) continue;
@@ -60,6 +73,7 @@ void meet_lights(Path p, float t_hit) {
 }
 
 void meet_environment(Path p) {
+  if (cancels(p, vec2(1.0))) return;
   float weight = 1.0;
   if (has_feature(FEATURE_ENVIRONMENT_SAMPLING) && p.pdf > 0.0)
     weight = mis_weight(p.pdf, frame.environment_selection * environment_pdf(p.direction));
@@ -67,7 +81,7 @@ void meet_environment(Path p) {
 }
 
 void meet_emission(Path p, Surface s, GpuHit hit) {
-  if (all(equal(s.emission, vec3(0.0)))) return;
+  if (all(equal(s.emission, vec3(0.0))) || cancels(p, vec2(1.0))) return;
   float weight = 1.0;
   const uint first = instances[hit.instance].first_light;
   if (has_feature(FEATURE_LIGHTS) && p.pdf > 0.0 && first != NO_INDEX) {
@@ -150,16 +164,39 @@ bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, float ch
   ray.slot_and_worlds = (p.slot << 2) | p.worlds;
   ray.contribution = p.throughput * value * light.radiance * (weight / pdf);
   ray.gain = light.gain;
+  if (cancels(p, light.gain) && !meets_bounds(ray.origin, ray.direction, ray.t_max)) return false;
   return any(greaterThan(ray.contribution, vec3(0.0)));
 }
 
+// Light that comes by mirrors and glass only (P16), by photons. Each world sums the same photons in
+// the same order, so that the two are equal where the photons are.
+void meet_photons(Path p, Surface s, Lobes l) {
+  if (l.p_diffuse <= 0.0 && (l.p_reflection <= 0.0 || l.smooth_reflection)) return;
+  const bool differing = cancels(p, vec2(1.0));
+  const GatheredPair gathered = gather_photons(s, l, frame.max_depth - p.depth - 1u, differing);
+  if ((p.worlds & WORLD_MIXED) != 0u) sample_mixed[p.slot].rgb += p.throughput * gathered.mixed;
+  if ((p.worlds & WORLD_REAL) != 0u) sample_real[p.slot].rgb += p.throughput * gathered.real;
+}
+
+// Ends a path of the difference that is far from all that differs: what can still come is little.
+bool ends_far_off(inout Path p, Surface s, inout float chance) {
+  if (!p.difference || p.worlds != WORLD_BOTH || p.depth == 0u || frame.difference_roulette <= 0.0)
+    return false;
+  const float survival = clamp(frame.difference_roulette * bounds_reach(s.position),
+                               LEAST_SURVIVAL, 1.0);
+  if (chance >= survival) return true;
+  chance /= survival;
+  p.throughput /= survival;
+  return false;
+}
+
 // The next direction; false where the path ends.
-bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, float choice) {
+bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, float choice,
+             vec2 chance) {
   vec3 direction;
   vec3 weight;
   float pdf;
   const vec2 u = sample_2d(random, vertex_pair(PAIR_SCATTER, p.depth));
-  const vec2 chance = sample_2d(random, vertex_pair(PAIR_ROULETTE, p.depth));
   if (!sample_direction(t, s, l, choice, chance.y, u, direction, weight, pdf)) return false;
   p.throughput *= weight;
   const float strongest = max(max(p.throughput.r, p.throughput.g), p.throughput.b);
@@ -191,6 +228,24 @@ void write_aov(Path p, Surface s, float t) {
   sample_aov[p.slot] = vec4(s.normal, dot(position, axis));
 }
 
+// At a vertex: light by photons and by a light sample, for which a ray comes back where `lit`, then
+// the next direction, for which the path is made ready where `scattered`.
+void shade_vertex(inout Path p, Surface s, out GpuShadowRay ray, out bool lit, out bool scattered) {
+  lit = false;
+  scattered = false;
+  const uvec2 pixel = uvec2(batch.x, batch.y) + slot_pixel(p.slot);
+  const Sampler random = make_sampler(frame.seed, pixel, slot_sample(p.slot));
+  vec2 chance = sample_2d(random, vertex_pair(PAIR_ROULETTE, p.depth));
+  if (ends_far_off(p, s, chance.x)) return;
+  const vec2 choice = sample_2d(random, vertex_pair(PAIR_CHOICE, p.depth));
+  const Lobes l = make_lobes(s);
+  const Technique t = make_technique(p, s, l);
+  if (has_feature(FEATURE_PHOTONS)) meet_photons(p, s, l);
+  lit = light_ray(p, s, l, t, random, choice.x, ray);
+  scattered = scatter(p, s, l, t, random, choice.y, chance);
+  p.depth += 1u;
+}
+
 void main() {
   const bool active_path = gl_GlobalInvocationID.x < control.active_count;
   uint forked = NO_INDEX;
@@ -217,14 +272,7 @@ void main() {
       if (p.depth == 0u && (p.worlds & WORLD_MIXED) != 0u) write_aov(p, s, hit.t);
       if (takes_light) meet_emission(p, s, hit);
       if (p.depth < frame.max_depth) {
-        const uvec2 pixel = uvec2(batch.x, batch.y) + slot_pixel(p.slot);
-        const Sampler random = make_sampler(frame.seed, pixel, slot_sample(p.slot));
-        const vec2 choice = sample_2d(random, vertex_pair(PAIR_CHOICE, p.depth));
-        const Lobes l = make_lobes(s);
-        const Technique t = make_technique(p, s, l);
-        lit = light_ray(p, s, l, t, random, choice.x, ray);
-        scattered = scatter(p, s, l, t, random, choice.y);
-        p.depth += 1u;
+        shade_vertex(p, s, ray, lit, scattered);
         if (scattered) store_path(p, p.index);
       }
     }

@@ -4,13 +4,11 @@
 #include <utility>
 
 #include "daemon/pipeline/preview_size.hpp"
+#include "daemon/pipeline/refinement.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::pipeline {
 namespace {
-
-// Often enough for a progress line, seldom enough to cost nothing.
-constexpr int batches_a_frame = 32;
 
 // What a plate looks like with nothing in front of it and nothing known behind it.
 render::Layers plate_layers(const Plate& plate, double exposure,
@@ -63,15 +61,11 @@ void RenderStage::operator()(Shot& shot) {
   }
   renderer_.begin({std::move(plate), exposure, shot.track.pose->world_from_camera});
   const auto cancelled = [&] { return options_.cancelled && options_.cancelled(); };
-  const int total = set_.quality.samples;
-  const int batch = std::max(1, total / batches_a_frame);
-  for (int done = 0; done < total && !cancelled();) {
-    const int samples = std::min(batch, total - done);
-    renderer_.render(samples, cancelled);
-    done += samples;
-    if (options_.progress) options_.progress(shot, done);
-  }
-  shot.whole = !cancelled();
+  const Refined refined = refine(renderer_, set_.quality, cancelled, [&](int samples) {
+    if (options_.progress) options_.progress(shot, samples);
+  });
+  shot.whole = refined.whole;
+  shot.error = refined.error;
   if (!shot.whole) return;
   shot.picture = renderer_.picture();
   shot.counters = renderer_.counters();

@@ -38,6 +38,7 @@ struct Shot {
   render::Counters counters;
   bool whole = false;  // false: interrupted before its last sample
   double render_s = 0;
+  double error = 0;  // Refined::error
 };
 
 }  // namespace previz::pipeline

@@ -1,8 +1,10 @@
 #include "daemon/post/render.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <chrono>
+#include <cstdio>
 #include <nlohmann/json.hpp>
 #include <ostream>
 #include <set>
@@ -17,6 +19,7 @@
 #include "daemon/post/progress.hpp"
 #include "daemon/post/render_directory.hpp"
 #include "daemon/scene/scene.hpp"
+#include "daemon/set/names.hpp"
 #include "drivers/error.hpp"
 #include "drivers/replay/replay_camera.hpp"
 #include "drivers/session/files.hpp"
@@ -32,6 +35,8 @@ double now_s() {
 
 void override_set(set::Set& set, const RenderOptions& options) {
   if (options.samples) set.quality.samples = *options.samples;
+  if (options.error) set.quality.error = *options.error;
+  if (options.seconds) set.quality.seconds = *options.seconds;
   if (options.seed) set.estimation.seed = *options.seed;
   if (options.estimator) set.estimation.estimator = *options.estimator;
   if (options.directory) set.output.directory = *options.directory;
@@ -47,7 +52,10 @@ std::string settings_of(const pipeline::Take& take, const set::Set& set) {
   json["session"] = take.session.info.name;
   json["session_start_ns"] = take.observer_stream->records().front().timestamp_ns;
   json["samples"] = set.quality.samples;
+  json["error"] = set.quality.error;
+  json["seconds"] = set.quality.seconds;
   json["seed"] = set.estimation.seed;
+  json["estimator"] = set::name_of(set.estimation.estimator);
   json["set"] = take.set_text;
   for (const set::Object& object : set.objects)
     json["file " + object.file_as_written] = session::sha256_of(object.file);
@@ -137,11 +145,27 @@ class LightSource {
   Progress& progress_;
 };
 
+std::string percent_words(double share) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.2g %%", 100 * share);
+  return text.data();
+}
+
 std::string done_text(const Shot& shot) {
   const std::string frame = "frame " + std::to_string(shot.index) + ": ";
   if (!shot.untouched.empty()) return frame + "plate untouched, " + shot.untouched;
-  return frame + std::to_string(shot.layers.samples) + " samples in " +
-         duration_words(shot.render_s);
+  std::string text =
+      frame + std::to_string(shot.layers.samples) + " samples in " + duration_words(shot.render_s);
+  if (shot.error > 0) text += ", error " + percent_words(shot.error);
+  return text;
+}
+
+std::string quality_words(const set::Quality& quality) {
+  std::string text = std::to_string(quality.samples) + " samples";
+  if (quality.error > 0) text += ", then to an error of " + percent_words(quality.error);
+  if (quality.seconds > 0)
+    text += ", then for " + duration_words(quality.seconds) + " a frame at most";
+  return text;
 }
 
 // NaN, negative and overflowed samples are left out of the means; nobody may miss that.
@@ -207,7 +231,7 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
     const std::shared_ptr<render::Device> device = render::open_device(options.device);
     out << take.session.info.name << ": " << to_do.size() << " frames of "
         << take.observer.intrinsics.width << "x" << take.observer.intrinsics.height << ", "
-        << set.quality.samples << " samples, on " << render::device_name(*device) << std::endl;
+        << quality_words(set.quality) << ", on " << render::device_name(*device) << std::endl;
 
     Progress progress(out, options.terminal, to_do.size(), now_s());
     ObserverSource observer(take, to_do, progress, metrics);

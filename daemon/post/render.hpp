@@ -33,6 +33,8 @@ struct RenderOptions {
   std::optional<std::filesystem::path> set_file;  // instead of the one in the session
   std::optional<FrameRange> frames;               // all
   std::optional<int> samples;                     // quality.samples
+  std::optional<double> error;                    // quality.error
+  std::optional<double> seconds;                  // quality.seconds
   std::optional<std::uint32_t> seed;              // estimation.seed
   std::optional<set::Estimator> estimator;
   std::optional<std::filesystem::path> directory;  // output.directory
@@ -56,6 +58,7 @@ struct FrameRecord {
   std::string reason;  // untouched: why the plate passed through as it is
   std::int64_t samples = 0;
   double render_s = 0;
+  double error = 0;  // estimated, where quality.error or .seconds was asked for
   std::optional<tracking::Pose> pose;
   std::vector<std::uint64_t> light_frames;  // sequence numbers; empty: environment file
   render::Counters counters;

@@ -61,6 +61,7 @@ FrameRecord record_of(const pipeline::Shot& shot) {
   record.reason = shot.untouched;
   record.samples = shot.layers.samples;
   record.render_s = shot.render_s;
+  record.error = shot.error;
   record.pose = shot.track.pose;
   if (shot.light) record.light_frames = shot.light->sequences;
   record.counters = shot.counters;
@@ -75,6 +76,7 @@ std::string to_json(const FrameRecord& record) {
   if (!record.reason.empty()) json["reason"] = record.reason;
   json["samples"] = record.samples;
   json["render_s"] = record.render_s;
+  if (record.error > 0) json["error"] = record.error;
   if (record.pose) {
     json["world_from_camera"] = rows(record.pose->world_from_camera);
     json["covariance"] = record.pose->covariance;
@@ -99,6 +101,7 @@ FrameRecord from_json(const std::string& line) {
   record.reason = json.value("reason", "");
   record.samples = json.at("samples");
   record.render_s = json.at("render_s");
+  record.error = json.value("error", 0.0);
   if (json.contains("world_from_camera")) {
     record.pose.emplace();
     record.pose->world_from_camera = matrix_of(json["world_from_camera"]);

@@ -10,22 +10,27 @@ namespace {
 // What one pixel's sums say, in double precision.
 struct Means {
   glm::dvec3 mixed, diff, mixed_square, diff_square;
-  double mask, depth_sum, hits;
+  double mask, depth_sum, hits, difference_only, samples;
 };
 
-Means means(const gpu::GpuPixel& p, double samples) {
+Means means(const gpu::GpuPixel& p) {
   const auto sum = [](const glm::vec4& high, const glm::vec4& low) {
     return glm::dvec4(high) + glm::dvec4(low);
   };
   const glm::dvec4 mixed = sum(p.mixed_high, p.mixed_low);
   const glm::dvec4 diff = sum(p.diff_high, p.diff_low);
+  const glm::dvec4 mixed_square = sum(p.square_mixed_high, p.square_mixed_low);
+  const glm::dvec4 diff_square = sum(p.square_diff_high, p.square_diff_low);
+  const double samples = std::max(diff_square.w, 1.0);
   return {glm::dvec3(mixed) / samples,
           glm::dvec3(diff) / samples,
-          glm::dvec3(sum(p.square_mixed_high, p.square_mixed_low)) / samples,
-          glm::dvec3(sum(p.square_diff_high, p.square_diff_low)) / samples,
+          glm::dvec3(mixed_square) / samples,
+          glm::dvec3(diff_square) / samples,
           mixed.w / samples,
           diff.w,
-          p.normal.w};
+          p.normal.w,
+          mixed_square.w / samples,
+          samples};
 }
 
 // Variance of a mean of n samples from the means of values and squares.
@@ -34,18 +39,47 @@ glm::dvec3 variance_of_mean(const glm::dvec3& mean, const glm::dvec3& square, do
   return glm::max(square - mean * mean, glm::dvec3(0)) / (n - 1);
 }
 
+// Interleaved RGB; black where there is no plate.
+glm::dvec3 pixel_of(const std::vector<double>& rgb, std::size_t i) {
+  return rgb.empty() ? glm::dvec3(0) : glm::dvec3(rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2]);
+}
+
+// By how much a difference of one is added to the camera's radiance.
+double gain(const CompositeRule& rule, double camera, double real, double plate_variance) {
+  switch (rule.kind) {
+    case set::Composite::additive:
+      return 1;
+    case set::Composite::ratio:
+      return real > 0 ? camera / real : 0;
+    case set::Composite::hybrid: {
+      const double s2 = plate_variance + rule.floor * rule.floor;
+      const double denominator = real * real + s2;
+      return denominator > 0 ? (real * camera + s2) / denominator : 1;
+    }
+  }
+  return 1;
+}
+
 }  // namespace
 
-std::vector<double> plate_radiance(const Plate& plate, const lighting::Response& response,
-                                   double exposure) {
-  std::vector<double> result(plate.samples.size());
-  std::transform(plate.samples.begin(), plate.samples.end(), result.begin(),
-                 [&](std::uint16_t value) { return response.inverse()[value] / exposure; });
+PlateRadiance plate_radiance(const Plate& plate, const lighting::Response& response,
+                             double exposure) {
+  const std::vector<double>& inverse = response.inverse();
+  PlateRadiance result;
+  result.value.reserve(plate.samples.size());
+  result.variance.reserve(plate.samples.size());
+  for (const std::uint16_t sample : plate.samples) {
+    const std::size_t low = sample > 0 ? sample - 1u : 0u;
+    const std::size_t high = std::min<std::size_t>(sample + 1u, inverse.size() - 1);
+    const double step = (inverse[high] - inverse[low]) / static_cast<double>(high - low) / exposure;
+    result.value.push_back(inverse[sample] / exposure);
+    result.variance.push_back(step * step / 12);
+  }
   return result;
 }
 
 Layers make_layers(std::span<const gpu::GpuPixel> pixels, int width, int height,
-                   std::int64_t samples, std::span<const double> plate) {
+                   std::int64_t samples, const PlateRadiance& plate, const CompositeRule& rule) {
   Layers layers;
   layers.width = width;
   layers.height = height;
@@ -55,20 +89,23 @@ Layers make_layers(std::span<const gpu::GpuPixel> pixels, int width, int height,
     layer->resize(pixels.size());
   layers.mask.resize(pixels.size());
   layers.depth.resize(pixels.size());
-  const auto n = static_cast<double>(samples);
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    const Means m = means(pixels[i], n);
-    const glm::dvec3 camera = plate.empty()
-                                  ? glm::dvec3(0)
-                                  : glm::dvec3(plate[3 * i], plate[3 * i + 1], plate[3 * i + 2]);
+    Means m = means(pixels[i]);
+    const glm::dvec3 camera = pixel_of(plate.value, i);
+    const glm::dvec3 plate_variance = pixel_of(plate.variance, i);
+    // Where only the difference was traced, the camera has measured the real world.
+    if (m.difference_only > 0) m.mixed = camera + m.diff;
     const double uncovered = 1 - m.mask;
-    layers.composite[i] = glm::vec3(m.mask * m.mixed + uncovered * (camera + m.diff));
+    const glm::dvec3 real = m.mixed - m.diff;
+    glm::dvec3 gains;
+    for (int c = 0; c < 3; ++c) gains[c] = gain(rule, camera[c], real[c], plate_variance[c]);
+    layers.composite[i] = glm::vec3(m.mask * m.mixed + uncovered * (camera + gains * m.diff));
     layers.mixed[i] = glm::vec3(m.mixed);
-    layers.real[i] = glm::vec3(m.mixed - m.diff);
+    layers.real[i] = glm::vec3(real);
     layers.diff[i] = glm::vec3(m.diff);
-    layers.variance[i] =
-        glm::vec3(m.mask * m.mask * variance_of_mean(m.mixed, m.mixed_square, n) +
-                  uncovered * uncovered * variance_of_mean(m.diff, m.diff_square, n));
+    layers.variance[i] = glm::vec3(
+        m.mask * m.mask * variance_of_mean(m.mixed, m.mixed_square, m.samples) +
+        uncovered * uncovered * gains * gains * variance_of_mean(m.diff, m.diff_square, m.samples));
     layers.mask[i] = static_cast<float>(m.mask);
     layers.depth[i] = static_cast<float>(m.hits > 0 ? m.depth_sum / m.hits : 0);
     const glm::dvec3 normal(pixels[i].normal.x, pixels[i].normal.y, pixels[i].normal.z);

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "drivers/error.hpp"
+#include "shaders/lib/render_shared.h"
 
 namespace previz::render {
 namespace {
@@ -245,7 +246,9 @@ vk::DeviceSize texel_bytes_of(vk::Format format) {
 }  // namespace
 
 Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format) {
-  Buffer result = create_device_buffer(device, size, vk::BufferUsageFlagBits::eUniformTexelBuffer);
+  using Usage = vk::BufferUsageFlagBits;
+  Buffer result =
+      create_device_buffer(device, size, Usage::eUniformTexelBuffer | Usage::eStorageBuffer);
   const vk::DeviceSize texel_bytes = texel_bytes_of(format);
   if (result.size / texel_bytes > device.limits().maxTexelBufferElements)
     throw Error("Vulkan: the scene needs a texel buffer of " +
@@ -302,6 +305,31 @@ Pipeline create_pipeline(Device& device, std::span<const std::uint32_t> spirv,
                                                 "main", &specialization);
   const vk::ComputePipelineCreateInfo info({}, stage, *layout);
   return {vk::raii::Pipeline(device.vk(), nullptr, info)};
+}
+
+vk::raii::DescriptorSetLayout create_set_layout(
+    Device& device, std::uint32_t bindings,
+    const std::function<vk::DescriptorType(std::uint32_t)>& type) {
+  std::vector<vk::DescriptorSetLayoutBinding> entries;
+  for (std::uint32_t i = 0; i < bindings; ++i)
+    entries.emplace_back(i, type(i), 1, vk::ShaderStageFlagBits::eCompute);
+  return {device.vk(), vk::DescriptorSetLayoutCreateInfo({}, entries)};
+}
+
+void write_descriptor(Device& device, const vk::raii::DescriptorSet& set, std::uint32_t binding,
+                      const Buffer& buffer, bool as_texels) {
+  const vk::BufferView view = *buffer.view;
+  const vk::DescriptorBufferInfo info(*buffer.buffer, 0, buffer.size);
+  vk::WriteDescriptorSet write(*set, binding, 0, 1, vk::DescriptorType::eStorageBuffer);
+  if (as_texels)
+    write.setDescriptorType(vk::DescriptorType::eUniformTexelBuffer).setTexelBufferView(view);
+  else
+    write.setBufferInfo(info);
+  device.vk().updateDescriptorSets(write, {});
+}
+
+std::uint32_t work_groups(std::uint32_t invocations) {
+  return (invocations + gpu::WORKGROUP_SIZE - 1) / gpu::WORKGROUP_SIZE;
 }
 
 void barrier(const vk::raii::CommandBuffer& commands) {

@@ -65,6 +65,7 @@ struct Buffer {
 
 Buffer create_storage_buffer(Device& device, vk::DeviceSize size);
 Buffer create_indirect_buffer(Device& device, vk::DeviceSize size);
+// Read as texels, written by uploads or as a storage buffer.
 Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format);
 
 // `offset` in bytes. Throws previz::Error where it would not fit.
@@ -104,6 +105,18 @@ struct Pipeline {
 Pipeline create_pipeline(Device& device, std::span<const std::uint32_t> spirv,
                          const vk::raii::PipelineLayout& layout,
                          std::span<const std::uint32_t> constants);
+
+// Bindings 0 .. count - 1, each of the type that `type` says, for compute shaders.
+vk::raii::DescriptorSetLayout create_set_layout(
+    Device& device, std::uint32_t bindings,
+    const std::function<vk::DescriptorType(std::uint32_t)>& type);
+
+// Binds a buffer, as texels or as a storage buffer.
+void write_descriptor(Device& device, const vk::raii::DescriptorSet& set, std::uint32_t binding,
+                      const Buffer& buffer, bool as_texels);
+
+// Work groups of WORKGROUP_SIZE that hold so many invocations.
+std::uint32_t work_groups(std::uint32_t invocations);
 
 // Makes what earlier dispatches and transfers wrote visible to later dispatches (and their indirect
 // arguments) and transfers.

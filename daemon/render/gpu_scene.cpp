@@ -28,31 +28,11 @@ bool emits(const scene::Material& material) {
   return material.emission.r > 0 || material.emission.g > 0 || material.emission.b > 0;
 }
 
-// Around the centre of the vertices' box: exact for a sphere, at most sqrt(3) times too wide.
-glm::dvec4 bounding_sphere(const scene::Mesh& mesh, const glm::dmat4& world_from_object) {
-  glm::dvec3 low(std::numeric_limits<double>::max());
-  glm::dvec3 high(std::numeric_limits<double>::lowest());
-  const auto world = [&](const glm::vec3& p) {
-    return glm::dvec3(world_from_object * glm::dvec4(glm::dvec3(p), 1.0));
-  };
-  for (const glm::vec3& p : mesh.positions) {
-    low = glm::min(low, world(p));
-    high = glm::max(high, world(p));
-  }
-  const glm::dvec3 centre = 0.5 * (low + high);
-  double radius = 0;
-  for (const glm::vec3& p : mesh.positions)
-    radius = std::max(radius, glm::length(world(p) - centre));
-  return {centre, radius};
-}
-
-glm::dvec4 merged_spheres(const glm::dvec4& a, const glm::dvec4& b) {
-  const glm::dvec3 between = glm::dvec3(b) - glm::dvec3(a);
-  const double distance = glm::length(between);
-  if (distance + b.w <= a.w) return a;
-  if (distance + a.w <= b.w) return b;
-  const double radius = 0.5 * (distance + a.w + b.w);
-  return {glm::dvec3(a) + between * ((radius - a.w) / distance), radius};
+// Probability of the environment where either may be sampled: by power, but neither is forgotten.
+double environment_share(double environment_power, double light_power) {
+  if (!(light_power > 0)) return 1;
+  if (!(environment_power > 0)) return 0;
+  return std::clamp(environment_power / (environment_power + light_power), 0.1, 0.9);
 }
 
 template <typename T>
@@ -62,13 +42,14 @@ void append(std::vector<T>& to, const std::vector<T>& from) {
 
 }  // namespace
 
-void GpuScene::set_scene(const scene::Scene& scene) {
+void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha) {
   scene_ = scene;
   upload_meshes();
   upload_materials();
   upload_textures();
   find_emitters();
-  find_bounds();
+  difference_bounds_ = difference_bounds(scene_);
+  specular_bounds_ = specular_bounds(scene_, specular_alpha);
 }
 
 void GpuScene::upload_meshes() {
@@ -145,25 +126,11 @@ void GpuScene::place(const glm::dvec3& camera_position) {
   upload_bounds(camera_position);
 }
 
-// Every shared vertex looks at every bound, so past the first few the rest become one.
-void GpuScene::find_bounds() {
-  static constexpr std::size_t most_bounds = 16;
-  bounds_.clear();
-  for (const scene::Instance& instance : scene_.instances) {
-    const scene::Mesh& mesh = scene_.meshes[instance.mesh];
-    if (instance.presence == scene::world_both || mesh.triangles.empty()) continue;
-    const glm::dvec4 sphere = bounding_sphere(mesh, instance.world_from_object);
-    if (bounds_.size() < most_bounds)
-      bounds_.push_back(sphere);
-    else
-      bounds_.back() = merged_spheres(bounds_.back(), sphere);
-  }
-}
-
 void GpuScene::upload_bounds(const glm::dvec3& camera_position) {
   std::vector<glm::vec4> bounds;
-  for (const glm::dvec4& bound : bounds_)
-    bounds.emplace_back(glm::dvec3(bound) - camera_position, bound.w);
+  for (const Bounds& part : {difference_bounds_, specular_bounds_})
+    for (const glm::dvec4& bound : part)
+      bounds.emplace_back(glm::dvec3(bound) - camera_position, bound.w);
   upload_storage(device_, bounds_buffer_, bounds);
 }
 
@@ -189,7 +156,10 @@ void GpuScene::upload_instances(const glm::dvec3& camera_position) {
     all.low = glm::min(all.low, bounds.low);
     all.high = glm::max(all.high, bounds.high);
   }
-  if (all.low.x <= all.high.x) scene_radius_ = 0.5 * glm::length(glm::dvec3(all.high - all.low));
+  if (all.low.x <= all.high.x) {
+    scene_radius_ = 0.5 * glm::length(glm::dvec3(all.high - all.low));
+    scene_center_ = 0.5f * (all.low + all.high);
+  }
   const scene::TopBvh top_bvh = scene::build_top_bvh(top);
   upload_bytes(device_, bvh_, std::as_bytes(std::span(top_bvh.texels)));
   upload_storage(device_, instances_, instances);
@@ -215,6 +185,8 @@ void GpuScene::upload_lights(const glm::dvec3& camera_position) {
       std::count_if(scene_.lights.begin(), scene_.lights.end(), can_be_seen));
   light_count_ = static_cast<std::uint32_t>(lights.size());
   light_power_ = select_by_power(lights, scene_radius_);
+  lights_differ_ = std::any_of(lights.begin(), lights.end(),
+                               [](const auto& light) { return light.gain.x != light.gain.y; });
   auto next = static_cast<std::uint32_t>(scene_.lights.size());
   for (const std::uint32_t i : emitters_) {
     first_light_[i] = next;
@@ -244,6 +216,8 @@ std::uint32_t GpuScene::features() const {
   if (std::any_of(scene_.instances.begin(), scene_.instances.end(),
                   [](const auto& instance) { return instance.presence != scene::world_both; }))
     result |= gpu::FEATURE_FORKS;
+  if (!specular_bounds_.empty() && (environment_mean_ > 0 || light_power_ > 0))
+    result |= gpu::FEATURE_PHOTONS;
   if (sampling_ == set::LightSampling::importance && environment_mean_ > 0)
     result |= gpu::FEATURE_ENVIRONMENT_SAMPLING;
   return result;
@@ -254,15 +228,28 @@ void GpuScene::describe(gpu::GpuFrame& frame) const {
   frame.environment_levels = environment_levels_;
   frame.light_count = light_count_;
   frame.visible_light_count = visible_light_count_;
-  frame.bound_count = static_cast<std::uint32_t>(bounds_.size());
+  frame.bound_count = static_cast<std::uint32_t>(difference_bounds_.size());
+  // Lamps that differ bring a difference everywhere, near objects or not.
+  frame.difference_roulette = lights_differ_ ? 0.0f : 2.0f;
+  frame.specular_bound_count = static_cast<std::uint32_t>(specular_bounds_.size());
+  frame.scene_center = scene_center_;
+  // Wider, so that rounding leaves no surface outside.
+  frame.scene_radius = static_cast<float>(scene_radius_ * 1.001);
   // Light samples are shared out by power; the environment's is what crosses the scene's disc.
   const double environment_power =
       environment_mean_ * std::numbers::pi * std::numbers::pi * scene_radius_ * scene_radius_;
   const bool sampled = (features() & gpu::FEATURE_ENVIRONMENT_SAMPLING) != 0;
-  double share = sampled ? 1.0 : 0.0;
-  if (sampled && light_power_ > 0)
-    share = std::clamp(environment_power / (environment_power + light_power_), 0.1, 0.9);
-  frame.environment_selection = static_cast<float>(share);
+  const double share = environment_share(environment_power, light_power_);
+  frame.environment_selection = sampled ? static_cast<float>(share) : 0.0f;
+  frame.photon_environment = static_cast<float>(share);
+}
+
+double GpuScene::nearest_specular_distance(const glm::dvec3& camera_position) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const glm::dvec4& bound : specular_bounds_)
+    nearest =
+        std::min(nearest, std::max(glm::length(glm::dvec3(bound) - camera_position), bound.w));
+  return nearest;
 }
 
 std::vector<const Buffer*> GpuScene::bindings() const {

@@ -6,6 +6,7 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
+#include "daemon/render/bounds.hpp"
 #include "daemon/render/device.hpp"
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/scene/bvh.hpp"
@@ -19,12 +20,18 @@ class GpuScene {
   explicit GpuScene(Device& device) : device_(device) {}
 
   // Builds the meshes' BVHs and uploads everything that does not depend on the camera.
-  void set_scene(const scene::Scene& scene);
+  // Surfaces are perfect mirrors where their GGX alpha is at most `specular_alpha`.
+  void set_scene(const scene::Scene& scene, double specular_alpha);
   void set_environment(const lighting::EnvironmentMap& map, set::LightSampling sampling);
   // Uploads instances, top level and lights relative to `camera_position` (world, metres).
   void place(const glm::dvec3& camera_position);
 
-  std::uint32_t features() const;  // FEATURE_* that the scene and the environment require
+  // FEATURE_* that the scene and the environment require, once placed. FEATURE_PHOTONS: where they
+  // are wanted.
+  std::uint32_t features() const;
+  // From the camera to the centre of the nearest object that can throw a caustic, but at least its
+  // radius, metres; infinite where there is none.
+  double nearest_specular_distance(const glm::dvec3& camera_position) const;
   // Fills the fields of the frame that describe environment and lights.
   void describe(gpu::GpuFrame& frame) const;
   // Buffers of set 0 by binding, without RAYS and FRAME, which are the renderer's (null there).
@@ -44,7 +51,6 @@ class GpuScene {
   std::vector<gpu::GpuLight> placed_lights(const glm::dvec3& camera_position) const;
   void upload_lights(const glm::dvec3& camera_position);
   void upload_instances(const glm::dvec3& camera_position);
-  void find_bounds();
   void upload_bounds(const glm::dvec3& camera_position);
 
   Device& device_;
@@ -52,13 +58,15 @@ class GpuScene {
   std::vector<MeshPlace> places_;
   std::vector<std::uint32_t> first_light_;  // by instance; NO_INDEX: not an emitter
   std::vector<std::uint32_t> emitters_;     // instances that emit, in the order of their lights
-  std::vector<glm::dvec4> bounds_;          // world centre and radius of each differing object
-  double scene_radius_ = 1;                 // of the instances' bounds
+  Bounds difference_bounds_, specular_bounds_;
+  glm::vec3 scene_center_{0.0f};  // of the instances' bounds, relative to the camera
+  double scene_radius_ = 1;
   std::uint32_t environment_size_ = 1, environment_levels_ = 0;
   double environment_mean_ = 0;
   set::LightSampling sampling_ = set::LightSampling::importance;
   std::uint32_t light_count_ = 0, visible_light_count_ = 0;
   double light_power_ = 0;
+  bool lights_differ_ = false;  // between the worlds
 
   Buffer bvh_, vertices_, triangles_, texels_, environment_, importance_, instances_, materials_,
       textures_, lights_, bounds_buffer_;

@@ -11,10 +11,10 @@ namespace previz::render {
 struct Layers {
   int width = 0;
   int height = 0;
-  std::int64_t samples = 0;          // per pixel
-  std::vector<glm::vec3> composite;  // mean(M) mean(Lm) + (1 - mean(M)) (Lc + mean(Lm - Lr))
+  std::int64_t samples = 0;          // per pixel; the most, where some were left out
+  std::vector<glm::vec3> composite;  // by the set's rule: daemon/render/composite.hpp
   std::vector<glm::vec3> mixed;      // mean(Lm)
-  std::vector<glm::vec3> real;       // mean(Lr)
+  std::vector<glm::vec3> real;       // mean(Lr); Lc where only the difference was traced
   std::vector<glm::vec3> diff;       // mean(Lm - Lr), accumulated as a difference
   std::vector<glm::vec3> normal;     // mean world normal of the mixed world's first hit
   std::vector<glm::vec3> variance;   // of the composite's mean

@@ -6,6 +6,7 @@
 #include "daemon/lighting/response.hpp"
 #include "daemon/render/composite.hpp"
 #include "daemon/render/gpu_scene.hpp"
+#include "daemon/render/photon_schedule.hpp"
 #include "daemon/render/view.hpp"
 #include "daemon/render/wavefront.hpp"
 #include "drivers/error.hpp"
@@ -24,6 +25,8 @@ struct Renderer::Impl {
   }
 
   void upload_frame();
+  std::uint32_t photons() const;  // a pass
+  std::uint32_t features() const;
 
   std::shared_ptr<Device> device;
   set::Estimation estimation;
@@ -55,8 +58,27 @@ void Renderer::Impl::upload_frame() {
   gpu_frame.roulette_depth = static_cast<std::uint32_t>(estimation.roulette_depth);
   gpu_frame.specular_alpha = static_cast<float>(estimation.specular_roughness);
   gpu_frame.bound_share = static_cast<float>(estimation.difference_sampling);
+  gpu_frame.photon_count = photons();
   scene.describe(gpu_frame);
   upload_storage(*device, frame_buffer, std::vector{gpu_frame});
+}
+
+std::uint32_t Renderer::Impl::photons() const {
+  return photon_count(estimation.photons, calibration.intrinsics.width,
+                      calibration.intrinsics.height, wavefront.most_photons());
+}
+
+// FEATURE_* of this frame: what the scene requires and the set asks for.
+std::uint32_t Renderer::Impl::features() const {
+  std::uint32_t result = scene.features();
+  if (calibration.lens) result |= gpu::FEATURE_LENS;
+  // The other composites need the real world's own radiance in every pixel.
+  if (estimation.estimator == set::Estimator::difference &&
+      estimation.composite == set::Composite::additive)
+    result |= gpu::FEATURE_DIFFERENCE;
+  if (estimation.caustics == set::Caustics::traced) result |= gpu::FEATURE_CAUSTICS;
+  if (estimation.caustics != set::Caustics::photons) result &= ~gpu::FEATURE_PHOTONS;
+  return result;
 }
 
 Renderer::Renderer(std::shared_ptr<Device> device, const set::Estimation& estimation,
@@ -65,7 +87,7 @@ Renderer::Renderer(std::shared_ptr<Device> device, const set::Estimation& estima
 Renderer::~Renderer() = default;
 
 void Renderer::set_scene(const scene::Scene& scene) {
-  impl_->scene.set_scene(scene);
+  impl_->scene.set_scene(scene, impl_->estimation.specular_roughness);
   impl_->has_scene = true;
 }
 
@@ -95,9 +117,12 @@ void Renderer::begin(const FrameInput& frame) {
   std::vector<const Buffer*> bindings = r.scene.bindings();
   bindings[gpu::BINDING_RAYS] = &r.rays;
   bindings[gpu::BINDING_FRAME] = &r.frame_buffer;
-  std::uint32_t features = r.scene.features();
-  if (r.calibration.lens) features |= gpu::FEATURE_LENS;
-  if (r.estimation.caustics) features |= gpu::FEATURE_CAUSTICS;
+  const std::uint32_t features = r.features();
+  if ((features & gpu::FEATURE_PHOTONS) != 0) {
+    const double distance =
+        r.scene.nearest_specular_distance(glm::dvec3(frame.world_from_camera[3]));
+    r.wavefront.use_photons(r.photons(), r.estimation.photon_radius_px * distance / lens.fx);
+  }
   r.wavefront.bind(bindings, features);
   r.wavefront.clear();
 }
@@ -115,12 +140,17 @@ void Renderer::render(int samples, const std::function<bool()>& cancelled) {
   }
 }
 
+void Renderer::sample_only(const std::vector<std::uint32_t>& blocks) {
+  impl_->wavefront.sample_only(blocks);
+}
+
 Layers Renderer::layers() const {
   const Impl& r = *impl_;
   const PinholeIntrinsics& lens = r.calibration.intrinsics;
   const auto plate = plate_radiance(r.frame.plate, *r.response, r.frame.exposure);
   return make_layers(r.wavefront.pixels(), lens.width, lens.height,
-                     std::max<std::int64_t>(r.samples, 1), plate);
+                     std::max<std::int64_t>(r.samples, 1), plate,
+                     {r.estimation.composite, r.estimation.composite_floor / r.frame.exposure});
 }
 
 Plate Renderer::picture() const {

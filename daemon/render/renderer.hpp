@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "daemon/lighting/environment.hpp"
 #include "daemon/render/layers.hpp"
@@ -50,6 +51,9 @@ class Renderer {
   // Adds samples to every pixel of the frame begun. The i-th sample of a pixel is the same however
   // the calls split them (P8). `cancelled` is asked between batches.
   void render(int samples, const std::function<bool()>& cancelled = {});
+  // From now on only these blocks of SAMPLED_BLOCK^2 pixels are given samples (row-major; 0: not):
+  // adaptive sampling, daemon/render/error_estimate.hpp. begin() samples all again.
+  void sample_only(const std::vector<std::uint32_t>& blocks);
   // Layers of the samples so far.
   Layers layers() const;
   // The composite through exposure and response, as the display shows it: the plate's own bits

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "daemon/render/photon_schedule.hpp"
 #include "shaders/accumulate.spv.h"
 #include "shaders/advance.spv.h"
 #include "shaders/extend.spv.h"
@@ -29,21 +30,12 @@ std::uint32_t slots_of(const gpu::GpuBatch& tile) {
   return round_up(tile.width, block_width) * round_up(tile.height, block_height);
 }
 
-std::uint32_t groups(std::uint32_t invocations) {
-  return (invocations + gpu::WORKGROUP_SIZE - 1) / gpu::WORKGROUP_SIZE;
+std::uint32_t sampled_blocks(int pixels) {
+  return (static_cast<std::uint32_t>(pixels) + gpu::SAMPLED_BLOCK - 1) / gpu::SAMPLED_BLOCK;
 }
 
 bool is_texel_buffer(std::uint32_t binding) {
   return binding < gpu::BINDING_INSTANCES;
-}
-
-vk::raii::DescriptorSetLayout create_set_layout(
-    Device& device, std::uint32_t bindings,
-    const std::function<vk::DescriptorType(std::uint32_t)>& type) {
-  std::vector<vk::DescriptorSetLayoutBinding> entries;
-  for (std::uint32_t i = 0; i < bindings; ++i)
-    entries.emplace_back(i, type(i), 1, vk::ShaderStageFlagBits::eCompute);
-  return {device.vk(), vk::DescriptorSetLayoutCreateInfo({}, entries)};
 }
 
 }  // namespace
@@ -52,7 +44,8 @@ Wavefront::Wavefront(Device& device, int width, int height)
     : device_(device),
       max_slots_(device.is_cpu() ? cpu_slots : gpu_slots),
       width_(width),
-      height_(height) {
+      height_(height),
+      photons_(device) {
   create_layouts();
   create_tiles(width, height);
   create_paths();
@@ -66,7 +59,7 @@ void Wavefront::create_layouts() {
   });
   path_layout_ = create_set_layout(device_, gpu::PATH_BINDINGS,
                                    [](std::uint32_t) { return Type::eStorageBuffer; });
-  const vk::DescriptorSetLayout layouts[] = {*scene_layout_, *path_layout_};
+  const vk::DescriptorSetLayout layouts[] = {*scene_layout_, *path_layout_, *photons_.set_layout()};
   const vk::PushConstantRange batch(vk::ShaderStageFlagBits::eCompute, 0, sizeof(gpu::GpuBatch));
   layout_ = vk::raii::PipelineLayout(device_.vk(), {{}, layouts, batch});
 }
@@ -81,7 +74,7 @@ void Wavefront::create_tiles(int width, int height) {
   const std::uint32_t band_rows = round_up((rows + bands - 1) / bands, block_height);
   for (std::uint32_t y = 0; y < rows; y += band_rows) {
     Tile tile;
-    tile.batch = {0, y, columns, std::min(band_rows, rows - y), 0, 0};
+    tile.batch = {0, y, columns, std::min(band_rows, rows - y), 0, 0, 0};
     tile.pixels = create_storage_buffer(
         device_, sizeof(gpu::GpuPixel) * tile.batch.width * tile.batch.height);
     tiles_.push_back(std::move(tile));
@@ -113,6 +106,8 @@ void Wavefront::create_paths() {
   sample_mixed_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
   sample_real_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
   sample_aov_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
+  sampled_ = create_storage_buffer(
+      device_, sizeof(std::uint32_t) * sampled_blocks(width_) * sampled_blocks(height_));
   control_ = create_indirect_buffer(device_, sizeof(gpu::GpuControl));
 }
 
@@ -129,29 +124,14 @@ void Wavefront::write_path_set(const Tile& tile) {
   buffers[gpu::BINDING_SAMPLE_AOV] = &sample_aov_;
   buffers[gpu::BINDING_CONTROL] = &control_;
   buffers[gpu::BINDING_PIXELS] = &tile.pixels;
-  for (std::uint32_t i = 0; i < gpu::PATH_BINDINGS; ++i) {
-    const vk::DescriptorBufferInfo info(*buffers[i]->buffer, 0, buffers[i]->size);
-    const vk::WriteDescriptorSet write(*tile.set, i, 0, vk::DescriptorType::eStorageBuffer, {},
-                                       info);
-    device_.vk().updateDescriptorSets(write, {});
-  }
+  buffers[gpu::BINDING_SAMPLED] = &sampled_;
+  for (std::uint32_t i = 0; i < gpu::PATH_BINDINGS; ++i)
+    write_descriptor(device_, tile.set, i, *buffers[i], false);
 }
 
 void Wavefront::bind(const std::vector<const Buffer*>& scene, std::uint32_t features) {
-  for (std::uint32_t i = 0; i < gpu::SCENE_BINDINGS; ++i) {
-    const Buffer& buffer = *scene[i];
-    if (is_texel_buffer(i)) {
-      const vk::BufferView view = *buffer.view;
-      const vk::WriteDescriptorSet write(*scene_set_, i, 0, vk::DescriptorType::eUniformTexelBuffer,
-                                         {}, {}, view);
-      device_.vk().updateDescriptorSets(write, {});
-    } else {
-      const vk::DescriptorBufferInfo info(*buffer.buffer, 0, buffer.size);
-      const vk::WriteDescriptorSet write(*scene_set_, i, 0, vk::DescriptorType::eStorageBuffer, {},
-                                         info);
-      device_.vk().updateDescriptorSets(write, {});
-    }
-  }
+  for (std::uint32_t i = 0; i < gpu::SCENE_BINDINGS; ++i)
+    write_descriptor(device_, scene_set_, i, *scene[i], is_texel_buffer(i));
   if (!*generate_.pipeline || features != features_) create_pipelines(features);
 }
 
@@ -164,10 +144,25 @@ void Wavefront::create_pipelines(std::uint32_t features) {
   prepare_shadow_ = create_pipeline(device_, prepare_shadow_spv, layout_, constants);
   shadow_ = create_pipeline(device_, shadow_spv, layout_, constants);
   accumulate_ = create_pipeline(device_, accumulate_spv, layout_, constants);
+  if ((features & gpu::FEATURE_PHOTONS) != 0) photons_.create_pipelines(layout_, features);
   features_ = features;
 }
 
+void Wavefront::sample_only(const std::vector<std::uint32_t>& blocks) {
+  upload_bytes(device_, sampled_, std::as_bytes(std::span(blocks)));
+  const std::size_t columns = sampled_blocks(width_);
+  for (Tile& tile : tiles_) {
+    const std::size_t first = tile.batch.y / gpu::SAMPLED_BLOCK;
+    const std::size_t last = (tile.batch.y + tile.batch.height - 1) / gpu::SAMPLED_BLOCK;
+    tile.sampled = std::any_of(blocks.begin() + static_cast<std::ptrdiff_t>(first * columns),
+                               blocks.begin() + static_cast<std::ptrdiff_t>((last + 1) * columns),
+                               [](std::uint32_t block) { return block != 0; });
+  }
+}
+
 void Wavefront::clear() {
+  sample_only(
+      std::vector<std::uint32_t>(std::size_t{sampled_blocks(width_)} * sampled_blocks(height_), 1));
   gpu::GpuControl control{};
   control.extend_groups[1] = control.extend_groups[2] = 1;
   control.shadow_groups[1] = control.shadow_groups[2] = 1;
@@ -178,26 +173,36 @@ void Wavefront::clear() {
   });
 }
 
+void Wavefront::bind_sets(const vk::raii::CommandBuffer& commands, const Tile& tile,
+                          const gpu::GpuBatch& batch) const {
+  const vk::DescriptorSet sets[] = {*scene_set_, *tile.set, photons_.set()};
+  commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *layout_, 0, sets, {});
+  commands.pushConstants<gpu::GpuBatch>(*layout_, vk::ShaderStageFlagBits::eCompute, 0, batch);
+}
+
+// The queue that was filled becomes the active one, and each of its paths finds its next hit.
+void Wavefront::record_extension(const vk::raii::CommandBuffer& commands) const {
+  commands.bindPipeline(vk::PipelineBindPoint::eCompute, *advance_.pipeline);
+  commands.dispatch(1, 1, 1);
+  barrier(commands);
+  commands.bindPipeline(vk::PipelineBindPoint::eCompute, *extend_.pipeline);
+  commands.dispatchIndirect(*control_.buffer, offsetof(gpu::GpuControl, extend_groups));
+  barrier(commands);
+}
+
 void Wavefront::record_batch(const vk::raii::CommandBuffer& commands, const Tile& tile,
                              const gpu::GpuBatch& batch, std::uint32_t max_depth) const {
   const auto use = [&](const Pipeline& pipeline) {
     commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipeline.pipeline);
   };
-  const vk::DescriptorSet sets[] = {*scene_set_, *tile.set};
-  commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *layout_, 0, sets, {});
-  commands.pushConstants<gpu::GpuBatch>(*layout_, vk::ShaderStageFlagBits::eCompute, 0, batch);
+  bind_sets(commands, tile, batch);
   use(generate_);
-  commands.dispatch(groups(slots_of(batch) * batch.samples), 1, 1);
+  commands.dispatch(work_groups(slots_of(batch) * batch.samples), 1, 1);
   barrier(commands);
   // One segment a vertex, one more to meet light after the last vertex, and one because a fork
   // goes on a round later than the path it parted from.
   for (std::uint32_t segment = 0; segment < max_depth + 2; ++segment) {
-    use(advance_);
-    commands.dispatch(1, 1, 1);
-    barrier(commands);
-    use(extend_);
-    commands.dispatchIndirect(*control_.buffer, offsetof(gpu::GpuControl, extend_groups));
-    barrier(commands);
+    record_extension(commands);
     use(shade_);
     commands.dispatchIndirect(*control_.buffer, offsetof(gpu::GpuControl, extend_groups));
     barrier(commands);
@@ -209,13 +214,29 @@ void Wavefront::record_batch(const vk::raii::CommandBuffer& commands, const Tile
     barrier(commands);
   }
   use(accumulate_);
-  commands.dispatch(groups(batch.width * batch.height), 1, 1);
+  commands.dispatch(work_groups(batch.width * batch.height), 1, 1);
   barrier(commands);
+}
+
+// Photons are paths of their own, before those of the sample. A fork goes on a round later.
+void Wavefront::record_photons(const vk::raii::CommandBuffer& commands,
+                               std::uint32_t max_depth) const {
+  photons_.record_emission(commands);
+  for (std::uint32_t segment = 0; segment < max_depth + 1; ++segment) {
+    record_extension(commands);
+    photons_.bind_bounce(commands);
+    commands.dispatchIndirect(*control_.buffer, offsetof(gpu::GpuControl, extend_groups));
+    barrier(commands);
+  }
+  photons_.record_sorting(commands);
 }
 
 bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::uint32_t max_depth,
                        const std::function<bool()>& cancelled) {
+  if ((features_ & gpu::FEATURE_PHOTONS) != 0)
+    return render_with_photons(first_sample, samples, max_depth, cancelled);
   for (const Tile& tile : tiles_) {
+    if (!tile.sampled) continue;
     const std::uint32_t at_once = std::max(slots_ / slots_of(tile.batch), 1u);
     for (std::uint32_t done = 0; done < samples; done += at_once) {
       if (cancelled && cancelled()) return false;
@@ -228,6 +249,38 @@ bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::u
     }
   }
   return true;
+}
+
+// Sample by sample: each has photons of its own, which all tiles share.
+bool Wavefront::render_with_photons(std::uint32_t first_sample, std::uint32_t samples,
+                                    std::uint32_t max_depth,
+                                    const std::function<bool()>& cancelled) {
+  for (std::uint32_t sample = first_sample; sample < first_sample + samples; ++sample) {
+    const double radius = photon_radius_ * photon_radius_factor(sample);
+    bool has_photons = false;
+    for (const Tile& tile : tiles_) {
+      if (!tile.sampled) continue;
+      if (cancelled && cancelled()) return false;
+      gpu::GpuBatch batch = tile.batch;
+      batch.first_sample = sample;
+      batch.samples = 1;
+      batch.photon_radius = static_cast<float>(radius);
+      device_.submit([&](const vk::raii::CommandBuffer& commands) {
+        if (!has_photons) {
+          bind_sets(commands, tile, batch);
+          record_photons(commands, max_depth);
+        }
+        record_batch(commands, tile, batch, max_depth);
+      });
+      has_photons = true;
+    }
+  }
+  return true;
+}
+
+void Wavefront::use_photons(std::uint32_t count, double radius) {
+  photons_.resize(count);
+  photon_radius_ = radius;
 }
 
 std::vector<gpu::GpuPixel> Wavefront::pixels() const {

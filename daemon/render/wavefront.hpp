@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "daemon/render/device.hpp"
+#include "daemon/render/photon_map.hpp"
 #include "shaders/lib/render_shared.h"
 
 namespace previz::render {
@@ -18,7 +19,12 @@ class Wavefront {
   // Binds the scene's buffers (set 0, by binding) and makes sure that the pipelines are those for
   // `features`. Must be called whenever a buffer was recreated.
   void bind(const std::vector<const Buffer*>& scene, std::uint32_t features);
-  // Forgets all samples.
+  // Photons a pass and the radius (metres) of the first, where `features` has FEATURE_PHOTONS.
+  void use_photons(std::uint32_t count, double radius);
+  std::uint32_t most_photons() const { return slots_; }
+  // Which blocks of SAMPLED_BLOCK^2 pixels are sampled from now on, row-major; 0: not.
+  void sample_only(const std::vector<std::uint32_t>& blocks);
+  // Forgets all samples; every pixel is sampled again.
   void clear();
   // Adds samples first_sample .. first_sample + samples - 1 to every pixel. Returns false where
   // `cancelled` stopped it between two batches: the sums are then uneven and must be cleared.
@@ -31,6 +37,7 @@ class Wavefront {
  private:
   struct Tile {
     gpu::GpuBatch batch;  // its rectangle
+    bool sampled = true;  // any of its pixels
     Buffer pixels;
     vk::raii::DescriptorSet set{nullptr};
   };
@@ -40,6 +47,12 @@ class Wavefront {
   void create_paths();
   void create_pipelines(std::uint32_t features);
   void write_path_set(const Tile& tile);
+  void bind_sets(const vk::raii::CommandBuffer& commands, const Tile& tile,
+                 const gpu::GpuBatch& batch) const;
+  bool render_with_photons(std::uint32_t first_sample, std::uint32_t samples,
+                           std::uint32_t max_depth, const std::function<bool()>& cancelled);
+  void record_extension(const vk::raii::CommandBuffer& commands) const;
+  void record_photons(const vk::raii::CommandBuffer& commands, std::uint32_t max_depth) const;
   void record_batch(const vk::raii::CommandBuffer& commands, const Tile& tile,
                     const gpu::GpuBatch& batch, std::uint32_t max_depth) const;
 
@@ -47,6 +60,8 @@ class Wavefront {
   std::uint32_t max_slots_;
   std::uint32_t slots_ = 0;  // allocated
   int width_, height_;
+  PhotonMap photons_;
+  double photon_radius_ = 0;
   vk::raii::DescriptorSetLayout scene_layout_{nullptr}, path_layout_{nullptr};
   vk::raii::PipelineLayout layout_{nullptr};
   vk::raii::DescriptorPool descriptors_{nullptr};
@@ -55,7 +70,7 @@ class Wavefront {
   std::uint32_t features_ = 0;
   Pipeline generate_, advance_, extend_, shade_, prepare_shadow_, shadow_, accumulate_;
   Buffer ray_origin_, ray_direction_, throughput_, hits_, queue_, shadow_rays_, sample_mixed_,
-      sample_real_, sample_aov_, control_;
+      sample_real_, sample_aov_, sampled_, control_;
 };
 
 }  // namespace previz::render

@@ -40,10 +40,17 @@ constexpr auto names(LightSampling) {
       {{"importance", LightSampling::importance}, {"bsdf", LightSampling::bsdf}});
 }
 constexpr auto names(Estimator) {
-  return std::to_array<Name<Estimator>>({{"paired", Estimator::paired}});
+  return std::to_array<Name<Estimator>>(
+      {{"paired", Estimator::paired}, {"difference", Estimator::difference}});
 }
 constexpr auto names(Composite) {
-  return std::to_array<Name<Composite>>({{"additive", Composite::additive}});
+  return std::to_array<Name<Composite>>({{"additive", Composite::additive},
+                                         {"ratio", Composite::ratio},
+                                         {"hybrid", Composite::hybrid}});
+}
+constexpr auto names(Caustics) {
+  return std::to_array<Name<Caustics>>(
+      {{"photons", Caustics::photons}, {"traced", Caustics::traced}, {"none", Caustics::none}});
 }
 constexpr auto names(ResponseCurve::Kind) {
   return std::to_array<Name<ResponseCurve::Kind>>({{"srgb", ResponseCurve::Kind::srgb},

@@ -92,24 +92,30 @@ struct Lighting {
   int frame = -1;
 };
 
-enum class Estimator { paired };    // difference follows
-enum class Composite { additive };  // ratio and hybrid follow
+enum class Estimator { paired, difference };
+enum class Composite { additive, ratio, hybrid };
+enum class Caustics { photons, traced, none };
 
 struct Estimation {
   Estimator estimator = Estimator::paired;
   Composite composite = Composite::additive;
-  int max_depth = 16;      // path vertices after the camera, 1..64
-  int roulette_depth = 4;  // Russian roulette from this vertex on
+  double composite_floor = 0.02;  // radiance over the sensor's white, below which hybrid adds
+  int max_depth = 16;             // path vertices after the camera, 1..64
+  int roulette_depth = 4;         // Russian roulette from this vertex on
   std::uint32_t seed = 1;
   double specular_roughness = 1e-3;  // alpha at or below which a lobe is a Dirac delta
   // Share of a shared path's directions that are sampled towards objects of one world only; 0 is
   // the paper's algorithm. At most 0.8: the BSDF keeps the rest.
   double difference_sampling = 0.5;
-  bool caustics = true;  // light that reaches a rough surface by mirrors and glass only
+  Caustics caustics = Caustics::photons;  // how light comes to rough surfaces by mirrors and glass
+  double photons = 0.1;                   // a pass (sample), per pixel of the picture
+  double photon_radius_px = 2;  // of the first pass, at the distance of the nearest such object
 };
 
 struct Quality {
   int samples = 16;    // per pixel and frame, 1..1'000'000
+  double error = 0;    // rms error over the picture's rms to go on to; 0: samples decide
+  double seconds = 0;  // a frame may take; 0: samples decide
   double scale = 1.0;  // of the observer's resolution, preview only
 };
 

@@ -176,20 +176,25 @@ Keys lighting_keys(Draft& d) {
 
 Keys estimator_keys(Estimation& e) {
   return {
-      {"kind", &e.estimator, plain, "\"paired\": both worlds are traced in full, with the same random numbers."},
-      {"composite", &e.composite, plain, "How the difference of the worlds is put onto the camera picture."},
+      {"kind", &e.estimator, plain, "\"paired\": both worlds are traced in full, with the same random numbers. \"difference\": where no virtual object covers the picture, only what differs between the worlds is traced (with composite = \"additive\"; the others need both in full)."},
+      {"composite", &e.composite, plain, "How the difference of the worlds is put onto the camera picture: added; as the ratio of the worlds, which forgives a wrong albedo of the phantom but lights no black surface; or the ratio on bright surfaces and the sum on dark ones."},
+      {"composite_floor", &e.composite_floor, plain.within(0.0001, 1), "With composite = \"hybrid\": radiance below which a real surface counts as dark, as a share of the sensor's white."},
       {"max_depth", &e.max_depth, plain.within(1, 64), "Bounces of a path: vertices after the camera."},
       {"roulette_depth", &e.roulette_depth, plain.within(1, 64), "Russian roulette ends paths from this vertex on."},
       {"seed", &e.seed, plain, "The same seed gives the same noise."},
       {"specular_roughness", &e.specular_roughness, plain.within(0, 0.1), "GGX alpha at or below which a surface is a perfect mirror."},
       {"difference_sampling", &e.difference_sampling, plain.within(0, 0.8), "Share of directions sampled towards objects of one world only, where the worlds can differ; 0: none, as in the paper."},
-      {"caustics", &e.caustics, plain, "Light that mirrors and glass throw onto rough surfaces; false leaves it out, with its noise."},
+      {"caustics", &e.caustics, plain, "How light comes to rough surfaces by way of mirrors and glass: by photons (soft at first, then sharper), by paths that happen to find it (noisy), or not at all."},
+      {"photons", &e.photons, plain.within(0.001, 10), "With caustics = \"photons\": photons of a sample, for each pixel of the picture; at least 1024 in all."},
+      {"photon_radius_px", &e.photon_radius_px, plain.within(0.1, 100), "Radius over which photons of the first sample are gathered, in pixels at the distance of the nearest mirror or glass; later ones take less."},
   };
 }
 
 Keys quality_keys(Quality& q) {
   return {
-      {"samples", &q.samples, plain.within(1, 1'000'000), "Samples per pixel and frame."},
+      {"samples", &q.samples, plain.within(1, 1'000'000), "Samples per pixel and frame; with error or seconds: the first round, in every pixel."},
+      {"error", &q.error, plain.within(0, 1), "Goes on where the picture's estimated error is above this share of its mean radiance; 0: samples alone decide."},
+      {"seconds", &q.seconds, plain.within(0, 86'400), "Goes on for so long, where the picture needs it most; 0: samples alone decide."},
       {"scale", &q.scale, plain.within(0.01, 1), "Size of the preview over the camera's picture; offline rendering is always full size."},
   };
 }

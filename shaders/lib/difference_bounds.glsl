@@ -16,6 +16,27 @@ float bound_cap(vec4 bound, vec3 point) {
   return distance_squared > bound.w * bound.w ? sphere_cap(bound.w, distance_squared) : 0.0;
 }
 
+// Whether a segment from a point can meet a bound.
+bool meets_bounds(vec3 point, vec3 direction, float t_max) {
+  for (uint i = 0u; i < frame.bound_count; ++i) {
+    const vec3 to_center = bounds[i].xyz - point;
+    const float nearest = clamp(dot(to_center, direction), 0.0, t_max);
+    const vec3 off = to_center - nearest * direction;
+    if (dot(off, off) <= bounds[i].w * bounds[i].w) return true;
+  }
+  return false;
+}
+
+// Solid angle of the bounds over 2 pi, all around from inside one: how much can differ at a point.
+float bounds_reach(vec3 point) {
+  float total = 0.0;
+  for (uint i = 0u; i < frame.bound_count; ++i) {
+    const float cap = bound_cap(bounds[i], point);
+    total += cap > 0.0 ? cap : 2.0;
+  }
+  return total;
+}
+
 // Sum of all caps: the cones are chosen by their solid angle.
 float bounds_total(vec3 point) {
   float total = 0.0;

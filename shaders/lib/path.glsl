@@ -2,11 +2,8 @@
 #ifndef PREVIZ_PATH_GLSL
 #define PREVIZ_PATH_GLSL
 
+#include "shaders/lib/batch.glsl"
 #include "shaders/lib/scene.glsl"
-
-layout(local_size_x = WORKGROUP_SIZE) in;
-
-layout(scalar, push_constant) uniform Batch { GpuBatch batch; };
 
 layout(scalar, set = 1, binding = BINDING_RAY_ORIGIN) buffer RayOrigin { vec4 ray_origin[]; };
 layout(scalar, set = 1, binding = BINDING_RAY_DIRECTION) buffer RayDirection { vec4 ray_direction[]; };
@@ -18,6 +15,7 @@ layout(scalar, set = 1, binding = BINDING_SAMPLE_MIXED) buffer Mixed { vec4 samp
 layout(scalar, set = 1, binding = BINDING_SAMPLE_REAL) buffer Real { vec4 sample_real[]; };
 layout(scalar, set = 1, binding = BINDING_SAMPLE_AOV) buffer Aov { vec4 sample_aov[]; };
 layout(scalar, set = 1, binding = BINDING_CONTROL) buffer Control { GpuControl control; };
+layout(scalar, set = 1, binding = BINDING_SAMPLED) readonly buffer Sampled { uint sampled[]; };
 layout(scalar, set = 1, binding = BINDING_PIXELS) buffer Pixels { GpuPixel pixels[]; };
 
 // Slots of a tile: pixels in blocks of 8x4 for coherent rays, rounded up; then sample by sample.

@@ -28,7 +28,8 @@ PREVIZ_CONST uint BINDING_MATERIALS = 8u;  // GpuMaterial[]
 PREVIZ_CONST uint BINDING_TEXTURES = 9u;   // GpuTexture[]
 PREVIZ_CONST uint BINDING_LIGHTS = 10u;     // GpuLight[]
 PREVIZ_CONST uint BINDING_FRAME = 11u;      // GpuFrame
-PREVIZ_CONST uint BINDING_BOUNDS = 12u;     // vec4[]: centre and radius of each differing object
+PREVIZ_CONST uint BINDING_BOUNDS = 12u;     // vec4[]: centre and radius of each differing object,
+                                            // then of each object that can reflect without blur
 PREVIZ_CONST uint SCENE_BINDINGS = 13u;
 
 // Set 1, paths in flight and what they bring back. A slot is one sample of one pixel; it has two
@@ -40,11 +41,37 @@ PREVIZ_CONST uint BINDING_HIT = 3u;            // GpuHit[path]
 PREVIZ_CONST uint BINDING_QUEUE = 4u;          // uint[2][paths]: paths to extend, ping-pong
 PREVIZ_CONST uint BINDING_SHADOW = 5u;         // GpuShadowRay[paths]
 PREVIZ_CONST uint BINDING_SAMPLE_MIXED = 6u;   // vec4[slot]: Lm, M
-PREVIZ_CONST uint BINDING_SAMPLE_REAL = 7u;    // vec4[slot]: Lr, unused
+PREVIZ_CONST uint BINDING_SAMPLE_REAL = 7u;    // vec4[slot]: Lr, one of SAMPLE_*
 PREVIZ_CONST uint BINDING_SAMPLE_AOV = 8u;     // vec4[slot]: normal, depth (0: no hit)
 PREVIZ_CONST uint BINDING_CONTROL = 9u;        // GpuControl
 PREVIZ_CONST uint BINDING_PIXELS = 10u;        // GpuPixel[width * height]
-PREVIZ_CONST uint PATH_BINDINGS = 11u;
+PREVIZ_CONST uint BINDING_SAMPLED = 11u;       // uint[]: of each block of the picture, row-major,
+                                               // whether its pixels are sampled
+PREVIZ_CONST uint PATH_BINDINGS = 12u;
+
+// Set 2, the photons of one pass, in a hash grid of cells twice as wide as the radius. What is
+// gathered from comes as texel buffers, faster on lavapipe, which are views of the last two.
+//   FOUND_PHOTONS RGBA32F, 4 texels a photon, those of a bucket together: position, Dirac vertices;
+//                 direction, gain in the mixed world; normal, gain in the real world; flux
+//   FOUND_BUCKETS RG32UI: first photon, number of photons
+PREVIZ_CONST uint BINDING_FOUND_PHOTONS = 0u;
+PREVIZ_CONST uint BINDING_FOUND_BUCKETS = 1u;
+PREVIZ_CONST uint BINDING_PHOTONS = 2u;         // GpuPhoton[2 * photon_count]; two, for a fork
+PREVIZ_CONST uint BINDING_PHOTON_ORDER = 3u;    // uint[]: photons, those of a bucket together
+PREVIZ_CONST uint BINDING_PHOTON_FILLED = 4u;   // uint[]: of a bucket, while ORDER is made
+PREVIZ_CONST uint BINDING_PHOTON_CONTROL = 5u;  // GpuPhotonControl
+PREVIZ_CONST uint BINDING_PHOTON_SORTED = 6u;   // vec4[]: FOUND_PHOTONS, to write
+PREVIZ_CONST uint BINDING_PHOTON_BUCKETS = 7u;  // GpuPhotonBucket[], a power of two; FOUND_BUCKETS
+PREVIZ_CONST uint PHOTON_BINDINGS = 8u;
+PREVIZ_CONST uint TEXELS_PER_PHOTON = 4u;
+
+// What a slot holds, in the fourth component of its SAMPLE_REAL.
+PREVIZ_CONST float SAMPLE_FULL = 0.0f;        // both radiances
+PREVIZ_CONST float SAMPLE_DIFFERENCE = 1.0f;  // only what differs between them
+PREVIZ_CONST float SAMPLE_NONE = 2.0f;        // nothing: its pixel is not sampled any more
+
+// Sides of the blocks of pixels that are sampled or not.
+PREVIZ_CONST uint SAMPLED_BLOCK = 8u;
 
 PREVIZ_CONST uint WORKGROUP_SIZE = 64u;
 PREVIZ_CONST uint NO_INDEX = 0xffffffffu;
@@ -59,12 +86,15 @@ PREVIZ_CONST uint FEATURE_VISIBLE_LIGHTS = 16u;  // lights with an extent that r
 PREVIZ_CONST uint FEATURE_LENS = 32u;
 PREVIZ_CONST uint FEATURE_FORKS = 64u;        // any object present in one world only
 PREVIZ_CONST uint FEATURE_ENVIRONMENT_SAMPLING = 128u;  // next-event estimation of the environment
-PREVIZ_CONST uint FEATURE_CAUSTICS = 256u;  // light that reaches a rough vertex by Dirac lobes only
+PREVIZ_CONST uint FEATURE_CAUSTICS = 256u;  // paths bring light to rough vertices by Dirac lobes only
+PREVIZ_CONST uint FEATURE_PHOTONS = 512u;   // photons bring it
+PREVIZ_CONST uint FEATURE_DIFFERENCE = 1024u;  // only what differs is traced, where that is enough
 
 // Bits of a path's state.
 PREVIZ_CONST uint PATH_WORLDS_MASK = 3u;      // WORLD_*
 PREVIZ_CONST uint PATH_DEPTH_SHIFT = 8u;      // number of surface vertices so far
 PREVIZ_CONST uint PATH_ROUGH = 4u;            // some vertex so far scattered by a non-Dirac lobe
+PREVIZ_CONST uint PATH_DIFFERENCE = 8u;       // while in both worlds, only what differs counts
 
 struct GpuHit {
   float t;  // < 0: nothing hit
@@ -82,6 +112,25 @@ struct GpuShadowRay {
   vec2 gain;             // emission gain in the (mixed, real) world
 };
 
+// Light that arrived at a surface with a non-Dirac lobe by way of Dirac lobes only.
+struct GpuPhoton {
+  vec3 position;
+  uint vertices;   // Dirac vertices on its way; 0: it did not stay anywhere
+  vec3 direction;  // in which it travelled, unit
+  vec3 normal;     // geometric, on the side on which it arrived
+  vec3 flux;       // watts; divided by the number of photons of the pass
+  vec2 gain;       // in the (mixed, real) world
+};
+
+struct GpuPhotonBucket {
+  uint first;  // in ORDER
+  uint count;
+};
+
+struct GpuPhotonControl {
+  uint stored;
+};
+
 // What one pixel has gathered: two-float sums (value = high + low), so that 1e7 samples stay exact.
 struct GpuPixel {
   vec4 mixed_high;  // Lm, M
@@ -89,9 +138,9 @@ struct GpuPixel {
   vec4 diff_high;   // Lm - Lr, depth
   vec4 diff_low;
   vec4 normal;      // sum of normals, number of samples that hit something
-  vec4 square_mixed_high;  // sums of squares, for the variance; w unused
+  vec4 square_mixed_high;  // sums of squares, for the variance; w: samples of the difference only
   vec4 square_mixed_low;
-  vec4 square_diff_high;
+  vec4 square_diff_high;   // w: number of samples
   vec4 square_diff_low;
 };
 
@@ -184,13 +233,20 @@ struct GpuFrame {
   uint light_count;
   uint visible_light_count;   // the first lights, those with an extent that are not triangles
   uint bound_count;
-  float bound_share;          // of a shared path's directions that go towards BOUNDS
+  float bound_share;          // of a shared path's directions that go towards those BOUNDS
+  float difference_roulette;  // survival of a path of the difference over the bounds' solid angle
+  uint specular_bound_count;  // the BOUNDS after them
+  uint photon_count;          // emitted a pass
+  float photon_environment;   // probability that a photon starts from the environment
+  vec3 scene_center;
+  float scene_radius;         // of a sphere that holds everything
 };
 
 // Push constants: the part of the picture and the samples of this batch.
 struct GpuBatch {
   uint x, y, width, height;   // tile
   uint first_sample, samples;
+  float photon_radius;        // metres; photons of a pass serve the sample of the same index
 };
 
 #ifdef __cplusplus
@@ -204,8 +260,10 @@ static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
 static_assert(sizeof(GpuLight) == 124);
 static_assert(offsetof(GpuLight, uv0) == 96);
-static_assert(sizeof(GpuFrame) == 108);
-static_assert(sizeof(GpuBatch) == 24);
+static_assert(sizeof(GpuFrame) == 140);
+static_assert(sizeof(GpuBatch) == 28);
+static_assert(sizeof(GpuPhoton) == 60);
+static_assert(sizeof(GpuPhotonBucket) == 8);
 }  // namespace previz::gpu
 #endif
 #endif

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "tests/truth/truth_set.hpp"
 
@@ -15,6 +16,7 @@ enum class PoseFrom { truth, tracked };    // the set's poses, or the tags in th
 struct TakeOptions {
   LightFrom light = LightFrom::truth;
   PoseFrom pose = PoseFrom::truth;
+  std::vector<std::string> estimator = {};  // lines for the set file's section, "key = value"
 };
 
 // The set file: calibration is the session's, objects and environment its assets. Truth was

@@ -78,12 +78,47 @@ TEST(Composite, covered_pixels_use_means_not_samples) {
   // Two samples: one covered (Lm = 0.5, Lr = 1), one not (Lm = Lr = 0).
   pixel.mixed_high = gpu::vec4(0.5f, 0.5f, 0.5f, 1.0f);
   pixel.diff_high = gpu::vec4(-0.5f, -0.5f, -0.5f, 0.0f);
-  const std::vector<double> plate(3, 0.5);
+  pixel.square_diff_high.w = 2;
+  const render::PlateRadiance plate{std::vector<double>(3, 0.5), std::vector<double>(3, 0.0)};
   const render::Layers layers = render::make_layers(std::span(&pixel, 1), 1, 1, 2, plate);
   // 0.25 + (1 - 0.5) (0.5 - 0.5)
   EXPECT_FLOAT_EQ(layers.composite[0].g, 0.25f);
   EXPECT_FLOAT_EQ(layers.real[0].g, 0.5f);
   EXPECT_FLOAT_EQ(layers.mask[0], 0.5f);
+}
+
+// One uncovered pixel of one sample, as `rule` composites it.
+double composited(double camera, double mixed, double real, const render::CompositeRule& rule) {
+  gpu::GpuPixel pixel{};
+  pixel.mixed_high = gpu::vec4(static_cast<float>(mixed));
+  pixel.mixed_high.w = 0;
+  pixel.diff_high = gpu::vec4(static_cast<float>(mixed - real));
+  const render::PlateRadiance plate{std::vector<double>(3, camera), std::vector<double>(3, 1e-6)};
+  return render::make_layers(std::span(&pixel, 1), 1, 1, 1, plate, rule).composite[0].g;
+}
+
+// A shadow halves the light on a surface whose albedo the phantom has wrong by a factor of two.
+TEST(Composite, the_ratio_forgives_a_wrong_albedo_and_the_sum_does_not) {
+  using enum set::Composite;
+  const double camera = 0.4, real = 0.8, mixed = 0.4;
+  EXPECT_NEAR(composited(camera, mixed, real, {additive, 0}), 0.0, 1e-7);
+  EXPECT_FLOAT_EQ(composited(camera, mixed, real, {ratio, 0}), 0.2);
+  // Wrong by floor^2 / Lr^2 of the sum's error.
+  EXPECT_NEAR(composited(camera, mixed, real, {hybrid, 0.01}), 0.2, 0.2 * 2e-4);
+}
+
+// A virtual lamp on a real surface that was black.
+TEST(Composite, the_sum_lights_a_black_surface_and_the_ratio_does_not) {
+  using enum set::Composite;
+  EXPECT_FLOAT_EQ(composited(0, 0.3, 0, {additive, 0}), 0.3);
+  EXPECT_FLOAT_EQ(composited(0, 0.3, 0, {ratio, 0}), 0.0);
+  EXPECT_FLOAT_EQ(composited(0, 0.3, 0, {hybrid, 0.01}), 0.3);
+}
+
+TEST(Composite, all_rules_are_one_where_the_model_is_right) {
+  using enum set::Composite;
+  for (const auto kind : {additive, ratio, hybrid})
+    EXPECT_FLOAT_EQ(composited(0.5, 0.2, 0.5, {kind, 0.01}), 0.2);
 }
 
 TEST(Composite, two_float_sums_keep_what_one_float_loses) {

@@ -1,0 +1,87 @@
+#include "daemon/render/bounds.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <glm/mat4x4.hpp>
+#include <limits>
+
+namespace previz::render {
+namespace {
+
+// Around the centre of the vertices' box: exact for a sphere, at most sqrt(3) times too wide.
+glm::dvec4 bounding_sphere(const scene::Mesh& mesh, const glm::dmat4& world_from_object) {
+  glm::dvec3 low(std::numeric_limits<double>::max());
+  glm::dvec3 high(std::numeric_limits<double>::lowest());
+  const auto world = [&](const glm::vec3& p) {
+    return glm::dvec3(world_from_object * glm::dvec4(glm::dvec3(p), 1.0));
+  };
+  for (const glm::vec3& p : mesh.positions) {
+    low = glm::min(low, world(p));
+    high = glm::max(high, world(p));
+  }
+  const glm::dvec3 centre = 0.5 * (low + high);
+  double radius = 0;
+  for (const glm::vec3& p : mesh.positions)
+    radius = std::max(radius, glm::length(world(p) - centre));
+  return {centre, radius};
+}
+
+glm::dvec4 merged_spheres(const glm::dvec4& a, const glm::dvec4& b) {
+  const glm::dvec3 between = glm::dvec3(b) - glm::dvec3(a);
+  const double distance = glm::length(between);
+  if (distance + b.w <= a.w) return a;
+  if (distance + a.w <= b.w) return b;
+  const double radius = 0.5 * (distance + a.w + b.w);
+  return {glm::dvec3(a) + between * ((radius - a.w) / distance), radius};
+}
+
+Bounds bounds_where(const scene::Scene& scene,
+                    const std::function<bool(const scene::Instance&)>& wanted) {
+  static constexpr std::size_t most_bounds = 16;
+  Bounds bounds;
+  for (const scene::Instance& instance : scene.instances) {
+    const scene::Mesh& mesh = scene.meshes[instance.mesh];
+    if (mesh.triangles.empty() || !wanted(instance)) continue;
+    const glm::dvec4 sphere = bounding_sphere(mesh, instance.world_from_object);
+    if (bounds.size() < most_bounds)
+      bounds.push_back(sphere);
+    else
+      bounds.back() = merged_spheres(bounds.back(), sphere);
+  }
+  return bounds;
+}
+
+// The smallest factor that a texture puts on the roughness.
+float least_roughness_factor(const scene::Scene& scene, std::uint32_t texture) {
+  if (texture == scene::no_texture) return 1.0f;
+  float least = 1.0f;
+  for (const glm::vec4& texel : scene.textures[texture].texels) least = std::min(least, texel.g);
+  return least;
+}
+
+bool can_be_dirac(const scene::Scene& scene, const scene::Material& m, double specular_alpha) {
+  if (m.transmission > 0 && m.metallic < 1) return true;
+  if (!(m.metallic > 0) && !(m.specular > 0 && m.ior > 1)) return false;
+  const double roughness =
+      m.roughness * least_roughness_factor(scene, m.metallic_roughness_texture);
+  return roughness * roughness <= specular_alpha * (1 + 1e-5);  // the shader's sum is in floats
+}
+
+}  // namespace
+
+Bounds difference_bounds(const scene::Scene& scene) {
+  return bounds_where(scene, [](const scene::Instance& instance) {
+    return instance.presence != scene::world_both;
+  });
+}
+
+Bounds specular_bounds(const scene::Scene& scene, double specular_alpha) {
+  std::vector<bool> dirac;
+  for (const scene::Material& material : scene.materials)
+    dirac.push_back(can_be_dirac(scene, material, specular_alpha));
+  return bounds_where(
+      scene, [&](const scene::Instance& instance) -> bool { return dirac[instance.material]; });
+}
+
+}  // namespace previz::render

@@ -1,0 +1,133 @@
+// A photon arrives: it forks where the worlds part, goes on by mirrors and glass only, and stays on
+// the first other surface after them.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shaders/lib/append.glsl"
+#include "shaders/lib/bsdf.glsl"
+#include "shaders/lib/photon.glsl"
+
+struct Flight {
+  vec3 origin;
+  float t_min;
+  vec3 direction;
+  float survival;  // product of the Dirac lobes' weights so far, for the roulette
+  vec3 flux;
+  uint worlds;
+  uint vertices;
+};
+
+Flight load_flight(uint path) {
+  const vec4 origin = ray_origin[path];
+  const vec4 direction = ray_direction[path];
+  const vec4 flux = path_throughput[path];
+  const uint bits = floatBitsToUint(flux.w);
+  return Flight(origin.xyz, origin.w, direction.xyz, direction.w, flux.rgb, path_worlds(bits),
+                path_depth(bits));
+}
+
+void store_flight(Flight f, uint path) {
+  ray_origin[path] = vec4(f.origin, f.t_min);
+  ray_direction[path] = vec4(f.direction, f.survival);
+  path_throughput[path] =
+      vec4(f.flux, uintBitsToFloat(f.worlds | (f.vertices << PATH_DEPTH_SHIFT)));
+}
+
+// The Dirac lobes of a surface as light meets them: the reverse of what bsdf_sample does from the
+// camera, so a solid's colour tints on leaving, and flux that enters it is divided by ior^2 as
+// radiance is left unscaled there.
+bool sample_dirac(Surface s, Lobes l, float p_mirror, float choice, out vec3 wi, out vec3 weight) {
+  const float cos_o = dot(s.normal, s.wo);
+  wi = vec3(0.0);
+  weight = vec3(0.0);
+  if (cos_o <= 0.0) return false;
+  if (choice < p_mirror) {
+    wi = 2.0 * cos_o * s.normal - s.wo;
+    weight = reflection_color(l, cos_o) / p_mirror;
+    if (!reflects_to(s, wi)) return false;
+  } else {
+    const float fresh = clamp((choice - p_mirror) / (1.0 - p_mirror), 0.0, 0.99999994);
+    if (!sample_glass(s, fresh, wi, weight)) return false;
+    if (!s.thin_walled && dot(wi, s.geometric_normal) < 0.0)
+      weight = s.entering ? vec3(1.0 / (s.ior * s.ior)) : s.base_color * (s.ior * s.ior);
+    weight *= l.glass / (1.0 - p_mirror);
+  }
+  // Light is spread by the geometric normal, lobes are defined by the interpolated one (Veach 1997,
+  // "Robust Monte Carlo methods", 5.3).
+  weight *= abs(dot(wi, s.geometric_normal)) * cos_o /
+            (dot(s.wo, s.geometric_normal) * abs(dot(wi, s.normal)));
+  return true;
+}
+
+const uint FLIGHT_OVER = 0u;
+const uint FLIGHT_STAYS = 1u;
+const uint FLIGHT_GOES_ON = 2u;
+
+// What a photon does at a surface; its flux pays for the choice.
+uint meet_surface(inout Flight f, Surface s, vec2 random) {
+  const Lobes l = make_lobes(s);
+  const float mirror = l.smooth_reflection ? l.p_reflection : 0.0;
+  const float dirac = mirror + l.p_glass;
+  const float rough = l.p_diffuse + l.p_reflection - mirror;
+  const float p_stay = f.vertices > 0u && rough > 0.0 ? rough / (rough + dirac) : 0.0;
+  if (random.x < p_stay) {
+    f.flux /= p_stay;
+    return FLIGHT_STAYS;
+  }
+  const float fresh = min((random.x - p_stay) / (1.0 - p_stay), 0.99999994);
+  vec3 weight;
+  vec3 wi;
+  if (dirac <= 0.0 || !sample_dirac(s, l, mirror / dirac, fresh, wi, weight)) return FLIGHT_OVER;
+  f.flux *= weight / (1.0 - p_stay);
+  f.vertices += 1u;
+  f.survival *= min(max(max(weight.r, weight.g), weight.b), 1.0);
+  if (f.vertices >= frame.roulette_depth && f.survival < 1.0) {
+    if (random.y >= f.survival) return FLIGHT_OVER;
+    f.flux /= f.survival;
+    f.survival = 1.0;
+  }
+  f.origin = offset_origin(s, wi);
+  f.t_min = 0.0;
+  f.direction = wi;
+  // A photon that stays after the last vertex allowed would never be gathered.
+  return f.vertices < frame.max_depth ? FLIGHT_GOES_ON : FLIGHT_OVER;
+}
+
+void store_photon(uint path, Flight f, Surface s) {
+  photons[path].position = s.position;
+  photons[path].vertices = f.vertices;
+  photons[path].direction = f.direction;
+  photons[path].normal = s.geometric_normal;
+  photons[path].flux = f.flux;
+  photons[path].gain *= vec2((f.worlds & WORLD_MIXED) != 0u, (f.worlds & WORLD_REAL) != 0u);
+  atomicAdd(buckets[photon_bucket(photon_cell(s.position))].count, 1u);
+}
+
+void main() {
+  uint path = NO_INDEX;
+  uint forked = NO_INDEX;
+  uint outcome = FLIGHT_OVER;
+  if (gl_GlobalInvocationID.x < control.active_count) {
+    path = queue[active_queue_index(gl_GlobalInvocationID.x)];
+    const GpuHit hit = hits[path];
+    if (hit.t >= 0.0) {
+      Flight f = load_flight(path);
+      const uint presence = instances[hit.instance].presence & f.worlds;
+      if (presence != f.worlds) {
+        Flight other = f;
+        other.worlds = f.worlds & ~presence;
+        other.t_min = hit.t;
+        forked = path ^ 1u;
+        store_flight(other, forked);
+        f.worlds = presence;
+      }
+      const Surface s = make_surface(hit, f.direction);
+      outcome = meet_surface(f, s, sample_2d(photon_sampler(path >> 1), PAIR_BOUNCE + f.vertices));
+      if (outcome == FLIGHT_STAYS) store_photon(path, f, s);
+      if (outcome == FLIGHT_GOES_ON) store_flight(f, path);
+    }
+  }
+  append_next(forked != NO_INDEX, forked);
+  append_next(outcome == FLIGHT_GOES_ON, path);
+}

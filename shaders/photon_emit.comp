@@ -1,0 +1,27 @@
+// Photons of one pass leave the lights, as paths 2 i; 2 i + 1 is for the world that parts.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shaders/lib/append.glsl"
+#include "shaders/lib/photon.glsl"
+#include "shaders/lib/photon_emission.glsl"
+
+void main() {
+  const uint photon = gl_GlobalInvocationID.x;
+  const uint path = 2u * photon;
+  bool leaves = false;
+  if (photon < frame.photon_count) {
+    const Emission e = emit_photon(photon_sampler(photon));
+    const uint worlds = (e.gain.x > 0.0 ? WORLD_MIXED : 0u) | (e.gain.y > 0.0 ? WORLD_REAL : 0u);
+    leaves = worlds != 0u && any(greaterThan(e.flux, vec3(0.0)));
+    photons[path].vertices = 0u;
+    photons[path].gain = e.gain;
+    photons[path + 1u].vertices = 0u;
+    photons[path + 1u].gain = e.gain;
+    ray_origin[path] = vec4(e.origin, 0.0);
+    ray_direction[path] = vec4(e.direction, 1.0);
+    path_throughput[path] = vec4(e.flux, uintBitsToFloat(worlds));
+  }
+  append_next(leaves, path);
+}

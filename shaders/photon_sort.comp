@@ -1,0 +1,53 @@
+// Sorts the photons of each bucket by index, so that sums over them round the same in every run, and
+// lays them out as they are gathered.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shaders/lib/photon.glsl"
+
+// Heap sort: no memory of its own, and no bad case.
+void sift_down(uint first, uint root, uint count) {
+  const uint value = photon_order[first + root];
+  for (uint child = 2u * root + 1u; child < count; child = 2u * root + 1u) {
+    if (child + 1u < count && photon_order[first + child] < photon_order[first + child + 1u]) ++child;
+    if (photon_order[first + child] <= value) break;
+    photon_order[first + root] = photon_order[first + child];
+    root = child;
+  }
+  photon_order[first + root] = value;
+}
+
+void sort_bucket(uint first, uint count) {
+  const uint steps = count / 2u + count - 1u;
+  for (uint chunk = 0u; chunk < steps; chunk += LOOP_CHUNK) {
+    for (uint step = chunk; step < min(chunk + LOOP_CHUNK, steps); ++step) {
+      if (step < count / 2u) {  // make the heap
+        sift_down(first, count / 2u - 1u - step, count);
+      } else {  // take the largest out, again and again
+        const uint last = count - 1u - (step - count / 2u);
+        const uint largest = photon_order[first];
+        photon_order[first] = photon_order[first + last];
+        photon_order[first + last] = largest;
+        sift_down(first, 0u, last);
+      }
+    }
+  }
+}
+
+void write_sorted(uint place) {
+  const GpuPhoton p = photons[photon_order[place]];
+  sorted_photons[TEXELS_PER_PHOTON * place] = vec4(p.position, float(p.vertices));
+  sorted_photons[TEXELS_PER_PHOTON * place + 1u] = vec4(p.direction, p.gain.x);
+  sorted_photons[TEXELS_PER_PHOTON * place + 2u] = vec4(p.normal, p.gain.y);
+  sorted_photons[TEXELS_PER_PHOTON * place + 3u] = vec4(p.flux, 0.0);
+}
+
+void main() {
+  if (gl_GlobalInvocationID.x >= photon_bucket_count()) return;
+  const GpuPhotonBucket bucket = buckets[gl_GlobalInvocationID.x];
+  if (bucket.count > 1u) sort_bucket(bucket.first, bucket.count);
+  const uint end = bucket.first + bucket.count;
+  for (uint chunk = bucket.first; chunk < end; chunk += LOOP_CHUNK)
+    for (uint place = chunk; place < min(chunk + LOOP_CHUNK, end); ++place) write_sorted(place);
+}
