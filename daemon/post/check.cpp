@@ -236,7 +236,8 @@ void print_estimator(const set::Set& set, std::ostream& out) {
   const auto& e = set.estimation;
   out << "\nestimator\n  " << set::name_of(e.estimator) << ", " << set::name_of(e.composite) << ", "
       << plural(static_cast<std::uint64_t>(set.quality.samples), "sample")
-      << " per pixel and frame, at most " << e.max_depth << " bounces, seed " << e.seed << '\n';
+      << " per pixel and frame, at most " << e.max_depth << " bounces, caustics "
+      << set::name_of(e.caustics) << ", seed " << e.seed << '\n';
 }
 
 void print_requirements(const scene::Requirements& required, std::ostream& out) {

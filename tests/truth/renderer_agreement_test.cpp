@@ -79,16 +79,21 @@ void expect_agreement(const View& view, int samples, bool caustics) {
   EXPECT_TRUE(real.agree) << "real: " << real.report();
 }
 
-class RandomSets : public ::testing::TestWithParam<std::uint32_t> {};
+class RandomSets : public ::testing::TestWithParam<std::uint32_t> {
+ protected:
+  static View view() {
+    RandomScene options;
+    options.width = 64;
+    options.height = 48;
+    options.lights = GetParam() % 2 == 0 ? 2 : 0;
+    options.lens = GetParam() % 3 == 0;
+    options.removed_objects = GetParam() % 2 == 1 ? 1 : 0;
+    return random_scene(GetParam(), options);
+  }
+};
 
 TEST_P(RandomSets, agree_with_the_cpu_tracer) {
-  RandomScene options;
-  options.width = 64;
-  options.height = 48;
-  options.lights = GetParam() % 2 == 0 ? 2 : 0;
-  options.lens = GetParam() % 3 == 0;
-  options.removed_objects = GetParam() % 2 == 1 ? 1 : 0;
-  expect_agreement(random_scene(GetParam(), options), 32, true);
+  expect_agreement(view(), 32, true);
 }
 
 // Six consecutive seeds put each material on the first virtual object.
@@ -98,13 +103,7 @@ INSTANTIATE_TEST_SUITE_P(Seeds, RandomSets, ::testing::Range(1u, 7u));
 // picture, and by the composite over black everywhere. Lamps differ between the worlds in every
 // other set, objects are taken away in the rest.
 TEST_P(RandomSets, have_the_same_difference_by_both_estimators) {
-  RandomScene options;
-  options.width = 64;
-  options.height = 48;
-  options.lights = GetParam() % 2 == 0 ? 2 : 0;
-  options.lens = GetParam() % 3 == 0;
-  options.removed_objects = GetParam() % 2 == 1 ? 1 : 0;
-  const View view = random_scene(GetParam(), options);
+  const View view = RandomSets::view();
   const auto scrambled = [&](set::Estimator estimator, std::uint32_t first_seed) {
     set::Estimation estimation;
     estimation.estimator = estimator;
@@ -112,8 +111,8 @@ TEST_P(RandomSets, have_the_same_difference_by_both_estimators) {
     renderer.set_scene(view.scene);
     renderer.set_environment(view.environment, set::LightSampling::importance);
     truth::Scrambles result;
-    result.width = options.width;
-    result.height = options.height;
+    result.width = view.calibration.intrinsics.width;
+    result.height = view.calibration.intrinsics.height;
     for (std::uint32_t i = 0; i < scrambles; ++i) {
       renderer.begin({{}, 1.0, view.world_from_camera, first_seed + i});
       renderer.render(16);
