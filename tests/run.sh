@@ -5,7 +5,7 @@
 # Ends with one line that sums up, and with status 0 only if all of it passed.
 #
 #   tests/run.sh              all of it
-#   tests/run.sh release      only the named steps: release asan format lint; or lint-all
+#   tests/run.sh release      only the named steps: release asan format lint
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit
 jobs=$(nproc)
@@ -53,29 +53,16 @@ sources() { git ls-files '*.cpp' '*.hpp'; }
 
 format() { sources | xargs clang-format --dry-run -Werror; }
 
-# The .cpp files changed since this branch left origin/main, or by the last commit where it has not.
-changed() {
-  local base
-  base=$(git merge-base HEAD origin/main 2>/dev/null)
-  [[ -n $base && $base != $(git rev-parse HEAD) ]] || base=HEAD~1
-  git diff --name-only --diff-filter=d "$base" -- '*.cpp'
-}
-
-# clang-tidy on the files named on standard input, for at most $1 seconds: it takes half a minute a
-# file, longer than compiling it. What there was no time for is counted.
-tidy() {
-  local late
-  rm -rf build/lint && mkdir -p build/lint
-  export PREVIZ_LINT_END=$(($(date +%s) + $1))
-  # shellcheck disable=SC2016  # expanded by the inner shell
-  xargs -r -P "$jobs" -I{} bash -c '
-    log=build/lint/$(tr / . <<<"{}")
-    if [[ $(date +%s) -ge $PREVIZ_LINT_END ]]; then echo "{}" >"$log.late"; exit 0; fi
-    clang-tidy -quiet -p build/release "{}" >"$log" 2>/dev/null && rm "$log"'
+# clang-tidy on all sources, a target's at once: most of its time goes into the headers of the
+# libraries, which so are read once a target. The longest come first.
+lint() {
+  rm -rf build/lint
+  cmake --preset lint || return
+  cmake --build build/lint --target previz_render_shaders previz_tracer_shaders || return
+  find build/lint -name 'unity_*.cxx' -print0 | xargs -0 ls -S |
+    xargs -P "$jobs" -I{} sh -c 'clang-tidy -quiet -p build/lint "$1" >"$1.log" 2>/dev/null' - {}
   local status=$?
-  cat build/lint/*.cpp 2>/dev/null | grep -E 'error:|warning:' | sort -u
-  late=$(find build/lint -name '*.late' | wc -l)
-  [[ $late -eq 0 ]] || summaries+=("lint: no time for $late files; tests/run.sh lint-all checks them")
+  find build/lint -name 'unity_*.cxx.log' -exec cat {} + | grep -A5 -E 'error:|warning:'
   return "$status"
 }
 
@@ -86,16 +73,9 @@ for name in "${steps[@]}"; do
       check "build $name" build "$name" && check "tests $name" run_tests "$name"
       ;;
     format) check "format" format ;;
-    lint | lint-all)
-      [[ -f build/release/compile_commands.json ]] || cmake --preset release
-      if [[ $name == lint ]]; then
-        check "lint" tidy 480 < <(changed)
-      else
-        check "lint" tidy 86400 < <(git ls-files '*.cpp')
-      fi
-      ;;
+    lint) check "lint" lint ;;
     *)
-      echo "tests/run.sh: no step '$name'; release, asan, format, lint and lint-all are allowed" >&2
+      echo "tests/run.sh: no step '$name'; release, asan, format and lint are allowed" >&2
       exit 2
       ;;
   esac

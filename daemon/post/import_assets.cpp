@@ -3,14 +3,12 @@
 #include <array>
 #include <fstream>
 #include <iterator>
-#include <nlohmann/json.hpp>
 
+#include "daemon/post/json_members.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::post {
 namespace {
-
-using Json = nlohmann::json;
 
 std::uint32_t little_endian(const char* bytes) {
   std::uint32_t value = 0;

@@ -170,7 +170,7 @@ std::vector<Number> parse_column(const Table& table, const std::string& name,
 }
 
 // A camera's members, with its table beside them.
-struct Camera {
+struct CameraMembers {
   const Members& members;
   fs::path folder;  // that paths are relative to
   std::optional<Table> table;
@@ -184,7 +184,7 @@ struct Camera {
   }
 };
 
-void read_pictures(const Camera& camera, FootageDescription& footage) {
+void read_pictures(const CameraMembers& camera, FootageDescription& footage) {
   const Members& m = camera.members;
   if (m.has("pictures") && m.has("video"))
     m.fail("video", "contradicts pictures; one of them is allowed");
@@ -209,7 +209,7 @@ void read_pictures(const Camera& camera, FootageDescription& footage) {
       throw Error(picture.string() + ": is not a file, but " + m.path("pictures") + " lists it");
 }
 
-void read_times(const Camera& camera, FootageDescription& footage) {
+void read_times(const CameraMembers& camera, FootageDescription& footage) {
   const Members& m = camera.members;
   camera.exclude_both("timestamps_ns");
   const bool in_table = camera.in_table("timestamp_ns");
@@ -239,7 +239,7 @@ void read_times(const Camera& camera, FootageDescription& footage) {
                                 std::to_string(pictures) + " pictures");
 }
 
-std::vector<double> read_series(const Camera& camera, const std::string& key) {
+std::vector<double> read_series(const CameraMembers& camera, const std::string& key) {
   camera.exclude_both(key);
   if (camera.in_table(key))
     return parse_column<double>(*camera.table, key, "a number above 0",
@@ -258,8 +258,8 @@ std::size_t frame_count(const FootageDescription& footage) {
   return std::max(footage.pictures.size(), footage.timestamps_ns.size());
 }
 
-void check_length(const Camera& camera, const std::string& key, const std::vector<double>& series,
-                  std::size_t frames) {
+void check_length(const CameraMembers& camera, const std::string& key,
+                  const std::vector<double>& series, std::size_t frames) {
   if (series.size() > 1 && frames > 0 && series.size() != frames)
     camera.members.fail(key, "has " + std::to_string(series.size()) + " entries; there are " +
                                  std::to_string(frames) + " frames");
@@ -269,7 +269,7 @@ double at(const std::vector<double>& series, std::size_t i) {
   return series.size() == 1 ? series[0] : series[i];
 }
 
-void read_exposures(const Camera& camera, double responsivity, FootageDescription& footage) {
+void read_exposures(const CameraMembers& camera, double responsivity, FootageDescription& footage) {
   footage.exposure = read_series(camera, "exposure");
   footage.exposure_s = read_series(camera, "exposure_s");
   footage.gain = read_series(camera, "gain");
@@ -321,7 +321,7 @@ FootageDescription read_footage(const Members& m, const fs::path& folder, const 
                                 double responsivity) {
   FootageDescription footage;
   footage.source = source;
-  Camera camera{m, folder, {}};
+  CameraMembers camera{m, folder, {}};
   if (m.has("csv")) camera.table = read_csv(folder / m.text("csv"));
   read_pictures(camera, footage);
   read_times(camera, footage);

@@ -30,7 +30,7 @@ void HeadlessDisplay::show(pipeline::Shot shot) {
 pipeline::MetricsSnapshot HeadlessDisplay::write() {
   if (!picture_.samples.empty()) output::write_png(directory_ / "picture.png", picture_);
   const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
-  const pipeline::MetricsSnapshot snapshot = metrics_.snapshot(seconds);
+  pipeline::MetricsSnapshot snapshot = metrics_.snapshot(seconds);
   session::replace_file(directory_ / "metrics.json", to_json(snapshot));
   return snapshot;
 }

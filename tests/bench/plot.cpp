@@ -53,7 +53,8 @@ void write_svg(const Chart& chart, const std::filesystem::path& file) {
   if (!(most_x > 0) || !(most_y > 0))
     throw Error("bench: " + file.string() + ": a chart needs points above zero");
   const double step = tick_step(most_y);
-  most_y = std::ceil(most_y / step) * step;
+  const int ticks = static_cast<int>(std::ceil(most_y / step));
+  most_y = ticks * step;
   const auto at_x = [&](double x) { return left + (width - left - right) * x / most_x; };
   const auto at_y = [&](double y) {
     return height - bottom - (height - top - bottom) * y / most_y;
@@ -64,7 +65,8 @@ void write_svg(const Chart& chart, const std::filesystem::path& file) {
       << "\" font-family=\"sans-serif\" font-size=\"12\">\n"
       << "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
       << text((left + width - right) / 2, 24, "middle", chart.title, " font-size=\"15\"");
-  for (double y = 0; y <= most_y * 1.001; y += step) {
+  for (int tick = 0; tick <= ticks; ++tick) {
+    const double y = tick * step;
     out << line(left, at_y(y), width - right, at_y(y), "#dddddd")
         << text(left - 8, at_y(y) + 4, "end", number(y));
   }

@@ -9,7 +9,7 @@
 namespace previz::truth {
 namespace {
 
-constexpr int block_px = 16;
+constexpr int tile_px = 16;
 constexpr double beyond_standard_errors = 4;
 
 struct BlockEstimate {
@@ -18,7 +18,7 @@ struct BlockEstimate {
 };
 
 std::vector<BlockEstimate> block_estimates(const Scrambles& s) {
-  const int columns = s.width / block_px, rows = s.height / block_px;
+  const int columns = s.width / tile_px, rows = s.height / tile_px;
   const auto n = static_cast<double>(s.pictures.size());
   std::vector<BlockEstimate> out;
   for (int by = 0; by < rows; ++by) {
@@ -26,13 +26,13 @@ std::vector<BlockEstimate> block_estimates(const Scrambles& s) {
       std::vector<glm::dvec3> means;
       for (const auto& picture : s.pictures) {
         glm::dvec3 sum(0);
-        for (int y = 0; y < block_px; ++y) {
-          for (int x = 0; x < block_px; ++x) {
-            sum += picture[static_cast<std::size_t>((by * block_px + y) * s.width + bx * block_px +
-                                                    x)];
+        for (int y = 0; y < tile_px; ++y) {
+          for (int x = 0; x < tile_px; ++x) {
+            sum +=
+                picture[static_cast<std::size_t>((by * tile_px + y) * s.width + bx * tile_px + x)];
           }
         }
-        means.push_back(sum / static_cast<double>(block_px * block_px));
+        means.push_back(sum / static_cast<double>(tile_px * tile_px));
       }
       BlockEstimate e;
       for (const glm::dvec3& mean : means) e.mean += mean / n;
@@ -57,7 +57,7 @@ void require_comparable(const Scrambles& a, const Scrambles& b) {
     throw Error("agreement: at least 16 scrambles of each estimator are needed, got " +
                 std::to_string(a.pictures.size()) + " and " + std::to_string(b.pictures.size()));
   }
-  if (a.width < block_px || a.height < block_px) {
+  if (a.width < tile_px || a.height < tile_px) {
     throw Error("agreement: the pictures have no whole block of 16x16 pixels");
   }
 }

@@ -8,7 +8,7 @@
 namespace previz::truth {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 double mean(const glm::dvec3& c) {
   return (c.x + c.y + c.z) / 3;

@@ -5,16 +5,11 @@
 #include <glm/common.hpp>
 #include <numbers>
 
+#include "tests/truth/cpu_luminance.hpp"
+
 namespace previz::truth {
-namespace {
 
-constexpr double pi = std::numbers::pi;
-
-double luminance(const glm::dvec3& c) {
-  return 0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z;
-}
-
-}  // namespace
+using std::numbers::pi;
 
 glm::dvec3 octahedral_direction_fp64(glm::dvec2 point) {
   const double u = std::abs(point.x);
@@ -89,7 +84,8 @@ DirectionSample Environment::sample(glm::dvec2 random) const {
   const double low = index == 0 ? 0 : cumulative_[index - 1];
   const double share = cumulative_[index] - low;
   const auto size = static_cast<std::size_t>(size_);
-  const glm::dvec2 corner(static_cast<double>(index % size), static_cast<double>(index / size));
+  const std::size_t i = index % size, j = index / size;
+  const glm::dvec2 corner(static_cast<double>(i), static_cast<double>(j));
   const glm::dvec2 inside(std::clamp((random.x - low) / share, 0.0, 1.0), random.y);
   const glm::dvec2 point = (corner + inside) * (2.0 / size_) - 1.0;
   return {octahedral_direction_fp64(point), share * size_ * size_ / (4 * pi)};

@@ -3,19 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <limits>
 #include <numbers>
 #include <optional>
+
+#include "tests/truth/cpu_luminance.hpp"
 
 namespace previz::truth {
 namespace {
 
-constexpr double pi = std::numbers::pi;
-constexpr double infinity = std::numeric_limits<double>::infinity();
-
-double luminance(const glm::dvec3& c) {
-  return 0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z;
-}
+using std::numbers::pi;
 
 // Uniform in the cone of half angle with this 1 - cos around the axis; 1 - cos keeps small cones
 // exact.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <glm/vec3.hpp>
+#include <limits>
 #include <vector>
 
 #include "daemon/scene/scene.hpp"
@@ -9,6 +10,8 @@
 #include "tests/truth/cpu_random.hpp"
 
 namespace previz::truth {
+
+inline constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // A point of a light as seen from a receiver.
 struct LightSample {

@@ -7,7 +7,6 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
-#include <limits>
 
 #include "drivers/error.hpp"
 #include "tests/truth/cpu_camera.hpp"
@@ -19,7 +18,6 @@
 namespace previz::truth {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int roulette_depth = 4;
 
 double power_heuristic(double taken, double other) {
@@ -195,6 +193,9 @@ void require_supported(const scene::Scene& scene) {
 }  // namespace
 
 struct CpuTracer::Impl {
+  Impl(const scene::Scene& scene, const lighting::EnvironmentMap& map, const TraceOptions& options)
+      : scene(scene), environment(map), options(options), geometry(scene) {}
+
   const scene::Scene& scene;
   Environment environment;
   TraceOptions options;
@@ -204,7 +205,7 @@ struct CpuTracer::Impl {
 CpuTracer::CpuTracer(const scene::Scene& scene, const lighting::EnvironmentMap& environment,
                      const TraceOptions& options) {
   require_supported(scene);
-  impl_.reset(new Impl{scene, Environment(environment), options, Geometry(scene)});
+  impl_ = std::make_unique<Impl>(scene, environment, options);
 }
 
 CpuTracer::~CpuTracer() = default;

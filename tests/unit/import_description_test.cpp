@@ -10,6 +10,8 @@
 namespace previz::post {
 namespace {
 
+using namespace std::string_literals;
+
 // The smallest glTF file: a .glb with one JSON chunk.
 std::string glb(std::string json) {
   while (json.size() % 4) json += ' ';
@@ -74,8 +76,8 @@ TEST(ImportDescription, AGltfThatNeedsOtherFilesIsAnError) {
       glb(R"({"images":[{"uri":"data:image/png;base64,"},{"uri":"wood.png"}]})"));
   EXPECT_NE(shoot.error().find("table.glb: needs wood.png beside it"), std::string::npos);
   session::write_content(shoot.folder() / "models" / "table.glb",
-                         "glTF\2\0\0\0\1\0\0\0\xff\xff\xff\xffJSON");
-  EXPECT_NE(shoot.error().find("table.glb"), std::string::npos);
+                         "glTF\2\0\0\0\1\0\0\0\xff\xff\xff\xffJSON"s);
+  EXPECT_NE(shoot.error().find("table.glb: its glTF header is damaged"), std::string::npos);
 }
 
 TEST(ImportDescription, PosesBecomeTheTrack) {

@@ -14,6 +14,7 @@ namespace previz::lighting {
 namespace {
 
 using std::numbers::pi;
+using test::degree;
 using test::fisheye_camera;
 using test::looking;
 using test::make_frame;
@@ -21,7 +22,6 @@ using test::photograph;
 using test::Sky;
 using test::towards;
 
-constexpr double degree = pi / 180;
 // A pixel's diagonal on the axis: what is closer than this to an edge may be mixed with it.
 constexpr double pixel_diagonal_rad = 1.5 / 153.3;
 

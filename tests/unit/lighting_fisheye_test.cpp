@@ -7,13 +7,13 @@
 #include <numbers>
 
 #include "drivers/error.hpp"
+#include "tests/unit/lighting_pictures.hpp"
 
 namespace previz::lighting {
 namespace {
 
 using std::numbers::pi;
-
-constexpr double degree = pi / 180;
+using test::degree;
 
 FisheyeIntrinsics wide(std::array<double, 4> k, double max_angle_deg = 130) {
   return {.width = 512,

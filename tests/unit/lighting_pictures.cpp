@@ -8,13 +8,8 @@
 #include "daemon/lighting/fisheye.hpp"
 
 namespace previz::lighting::test {
-namespace {
 
 using std::numbers::pi;
-
-constexpr double degree = pi / 180;
-
-}  // namespace
 
 FramePtr make_frame(int width, int height, double exposure,
                     const std::vector<glm::dvec3>& signals) {
@@ -77,8 +72,9 @@ FramePtr photograph(const LightCameraCalibration& camera, const Sky& sky, double
     Mean mean;
     glm::dvec3 sum(0), first(0);
     for (int s = 0; s < samples * samples; ++s) {
-      const auto ray = lens.unproject(
-          {x - 0.5 + (s % samples + 0.5) / samples, y - 0.5 + (s / samples + 0.5) / samples});
+      const int across = s % samples, down = s / samples;
+      const auto ray =
+          lens.unproject({x - 0.5 + (across + 0.5) / samples, y - 0.5 + (down + 0.5) / samples});
       const glm::dvec3 radiance = ray ? sky(world_from_camera * *ray) : glm::dvec3(0);
       if (s == 0) first = radiance;
       mean.varies = mean.varies || radiance != first;

@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <glm/vec3.hpp>
+#include <numbers>
 #include <vector>
 
 #include "daemon/lighting/environment.hpp"
@@ -10,6 +11,8 @@
 #include "drivers/frame.hpp"
 
 namespace previz::lighting::test {
+
+inline constexpr double degree = std::numbers::pi / 180;
 
 // Radiance from a unit world direction.
 using Sky = std::function<glm::dvec3(const glm::dvec3&)>;

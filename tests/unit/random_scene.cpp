@@ -179,8 +179,8 @@ lighting::EnvironmentMap random_environment(Random& random, int size) {
     for (int i = 0; i < size; ++i) {
       glm::vec3 sum(0);
       for (int step = 0; step < steps * steps; ++step) {
-        const glm::vec2 within((static_cast<float>(step % steps) + 0.5f) / steps,
-                               (static_cast<float>(step / steps) + 0.5f) / steps);
+        const glm::ivec2 cell(step % steps, step / steps);
+        const glm::vec2 within = (glm::vec2(cell) + 0.5f) / static_cast<float>(steps);
         const glm::vec2 point = 2.0f * (glm::vec2(i, j) + within) / static_cast<float>(size) - 1.0f;
         sum += radiance_at(octahedral_direction(point));
       }

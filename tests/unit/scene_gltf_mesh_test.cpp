@@ -248,7 +248,7 @@ TEST_F(GltfMesh, RefusesAbsurdSizesBeforeAllocating) {
   const auto message_of = [&](const char* key, const Json& value) {
     const Json before = gltf.json;
     gltf.json["accessors"][positions][key] = value;
-    const std::string message = error();
+    std::string message = error();
     gltf.json = before;
     return message;
   };

@@ -189,7 +189,7 @@ std::uint32_t add_instance(scene::Scene& scene, std::uint32_t mesh, std::uint32_
   instance.object = static_cast<std::uint32_t>(scene.instances.size());
   instance.world_from_object = world_from_object;
   scene.instances.push_back(std::move(instance));
-  return instance.object;
+  return scene.instances.back().object;
 }
 
 scene::Scene facing_planes(double side_m, double gap_m, const scene::Material& lower,
