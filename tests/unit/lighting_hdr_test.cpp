@@ -104,8 +104,8 @@ TEST(MergeExposures, IsUnbiasedAndNearTheBestUnderSensorNoise) {
   const Response response({}, 8);
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
-  for (int step = 0; step < 28; ++step) {
-    const double radiance = 2e-3 * std::pow(1.7, step);  // to 3300
+  for (int level = 0; level < 28; ++level) {
+    const double radiance = 2e-3 * std::pow(1.7, level);  // to 3300
     std::vector<FramePtr> frames;
     double best = 0;  // information of all exposures that are neither black nor clipped
     for (double exposure : exposures) {

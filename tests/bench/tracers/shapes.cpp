@@ -75,8 +75,9 @@ struct Field {
     const double middle = 0.5 * static_cast<double>(side - 1);
     for (std::size_t i = 0; i < count; ++i) {
       const double r = radius(random);
+      const std::size_t column = i % side, row = i / side;
       spheres.push_back(
-          {{static_cast<double>(i % side) - middle, static_cast<double>(i / side) - middle, r}, r});
+          {{static_cast<double>(column) - middle, static_cast<double>(row) - middle, r}, r});
     }
   }
 
