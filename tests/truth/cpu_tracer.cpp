@@ -193,8 +193,8 @@ void require_supported(const scene::Scene& scene) {
 }  // namespace
 
 struct CpuTracer::Impl {
-  Impl(const scene::Scene& scene, const lighting::EnvironmentMap& map, const TraceOptions& options)
-      : scene(scene), environment(map), options(options), geometry(scene) {}
+  Impl(const scene::Scene& traced, const lighting::EnvironmentMap& map, const TraceOptions& how)
+      : scene(traced), environment(map), options(how), geometry(traced) {}
 
   const scene::Scene& scene;
   Environment environment;
