@@ -7,7 +7,6 @@
 #include "shaders/lib/difference_bounds.glsl"
 #include "shaders/lib/environment.glsl"
 #include "shaders/lib/gather.glsl"
-#include "shaders/lib/sampler.glsl"
 
 // Of a path of the difference, at one vertex: bounds its weight.
 const float LEAST_SURVIVAL = 0.1;
@@ -113,17 +112,17 @@ float combined_pdf(Technique t, Surface s, vec3 direction, float bsdf_pdf) {
 }
 
 // A direction by either technique; see bsdf_sample for what comes back.
-bool sample_direction(Technique t, Surface s, Lobes l, float choice, float technique, vec2 u,
-                      out vec3 direction, out vec3 weight, out float pdf) {
-  if (technique >= t.share) {
-    if (!bsdf_sample(s, l, choice, u, direction, weight, pdf)) return false;
+bool sample_direction(Technique t, Surface s, Lobes l, vec2 u, out vec3 direction, out vec3 weight,
+                      out float pdf) {
+  if (!choose(u.x, t.share)) {
+    if (!bsdf_sample(s, l, u, direction, weight, pdf)) return false;
     if (t.share <= 0.0) return true;
     const float all = pdf > 0.0 ? combined_pdf(t, s, direction, pdf) : 1.0 - t.share;
     weight *= (pdf > 0.0 ? pdf : 1.0) / all;
     if (pdf > 0.0) pdf = all;
     return true;
   }
-  direction = bounds_sample(s.position, t.total, technique / t.share, u);
+  direction = bounds_sample(s.position, t.total, u);
   float bsdf_pdf;
   const vec3 value = bsdf_evaluate(s, l, direction, bsdf_pdf);
   if (bsdf_pdf <= 0.0) return false;
@@ -133,18 +132,17 @@ bool sample_direction(Technique t, Surface s, Lobes l, float choice, float techn
 }
 
 // One light sample: the pair of what it would bring to each world, to be tested for blockers.
-bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, float choice,
-               out GpuShadowRay ray) {
+bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, out GpuShadowRay ray) {
   const bool has_lights = has_feature(FEATURE_LIGHTS);
-  const vec2 u = sample_2d(random, vertex_pair(PAIR_LIGHT, p.depth));
+  vec2 u = sample_2d(random, vertex_pair(PAIR_LIGHT, p.depth));
   LightSample light = LightSample(vec3(0.0), 3.4e38, vec3(0.0), 0.0, vec2(1.0));
   // Light is gathered on the viewer's side only. The sample is made for the very point from which
   // the shadow ray starts, or the ray would end behind the light.
   ray.origin = offset_origin(s, s.geometric_normal);
   float selection = frame.environment_selection;
-  if (has_lights && choice >= selection) {
+  if (has_lights && !choose(u.x, selection)) {
     if (frame.light_count == 0u) return false;
-    const uint index = pick_light(min((choice - selection) / (1.0 - selection), 0.99999994));
+    const uint index = pick_light(u.x);
     if (!sample_light(lights[index], ray.origin, u, light)) return false;
     selection = (1.0 - selection) * lights[index].selection;
   } else {
@@ -191,18 +189,17 @@ bool ends_far_off(inout Path p, Surface s, inout float chance) {
 }
 
 // The next direction; false where the path ends.
-bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, float choice,
-             vec2 chance) {
+bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, float chance) {
   vec3 direction;
   vec3 weight;
   float pdf;
   const vec2 u = sample_2d(random, vertex_pair(PAIR_SCATTER, p.depth));
-  if (!sample_direction(t, s, l, choice, chance.y, u, direction, weight, pdf)) return false;
+  if (!sample_direction(t, s, l, u, direction, weight, pdf)) return false;
   p.throughput *= weight;
   const float strongest = max(max(p.throughput.r, p.throughput.g), p.throughput.b);
   if (!(strongest > 0.0)) return false;
   if (p.depth + 1u >= frame.roulette_depth && strongest < 1.0) {
-    if (chance.x >= strongest) return false;
+    if (chance >= strongest) return false;
     p.throughput /= strongest;
   }
   p.origin = offset_origin(s, direction);
@@ -235,14 +232,13 @@ void shade_vertex(inout Path p, Surface s, out GpuShadowRay ray, out bool lit, o
   scattered = false;
   const uvec2 pixel = uvec2(batch.x, batch.y) + slot_pixel(p.slot);
   const Sampler random = make_sampler(frame.seed, pixel, slot_sample(p.slot));
-  vec2 chance = sample_2d(random, vertex_pair(PAIR_ROULETTE, p.depth));
-  if (ends_far_off(p, s, chance.x)) return;
-  const vec2 choice = sample_2d(random, vertex_pair(PAIR_CHOICE, p.depth));
+  float chance = sample_2d(random, vertex_pair(PAIR_ROULETTE, p.depth)).x;
+  if (ends_far_off(p, s, chance)) return;
   const Lobes l = make_lobes(s);
   const Technique t = make_technique(p, s, l);
   if (has_feature(FEATURE_PHOTONS)) meet_photons(p, s, l);
-  lit = light_ray(p, s, l, t, random, choice.x, ray);
-  scattered = scatter(p, s, l, t, random, choice.y, chance);
+  lit = light_ray(p, s, l, t, random, ray);
+  scattered = scatter(p, s, l, t, random, chance);
   p.depth += 1u;
 }
 

@@ -3,6 +3,7 @@
 #ifndef PREVIZ_BSDF_GLSL
 #define PREVIZ_BSDF_GLSL
 
+#include "shaders/lib/sampler.glsl"
 #include "shaders/lib/scene.glsl"
 
 float luminance(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
@@ -164,17 +165,16 @@ bool sample_glass(Surface s, float choice, out vec3 wi, out vec3 weight) {
 
 // A direction, the throughput it brings (f * cos / pdf over all non-Dirac lobes, or the Dirac
 // lobe's weight), and its density; pdf = 0 says Dirac. False: absorbed.
-bool bsdf_sample(Surface s, Lobes l, float choice, vec2 u, out vec3 wi, out vec3 weight,
+bool bsdf_sample(Surface s, Lobes l, vec2 u, out vec3 wi, out vec3 weight,
                  out float pdf) {
   pdf = 0.0;
   wi = vec3(0.0);
   weight = vec3(0.0);
-  if (choice < l.p_diffuse) {
+  if (choose(u.x, l.p_diffuse)) {
     wi = make_frame(s.normal) * sample_cosine(u);
-  } else if (has_feature(FEATURE_TRANSMISSION) && choice >= l.p_diffuse + l.p_reflection) {
-    if (l.p_glass <= 0.0) return false;
-    const float fresh = clamp((choice - l.p_diffuse - l.p_reflection) / l.p_glass, 0.0, 0.99999994);
-    if (!sample_glass(s, fresh, wi, weight)) return false;
+  } else if (has_feature(FEATURE_TRANSMISSION) && l.p_glass > 0.0 &&
+             choose(u.x, l.p_glass / (l.p_glass + l.p_reflection))) {
+    if (!sample_glass(s, u.x, wi, weight)) return false;
     weight *= l.glass / l.p_glass;
     return true;
   } else if (has_feature(FEATURE_GLOSSY) && l.p_reflection > 0.0) {

@@ -44,8 +44,8 @@ float bounds_total(vec3 point) {
   return total;
 }
 
-vec3 bounds_sample(vec3 point, float total, float choice, vec2 u) {
-  float rest = choice * total;
+vec3 bounds_sample(vec3 point, float total, vec2 u) {
+  float rest = u.x * total;
   uint chosen = 0u;
   float cap = 0.0;
   for (uint i = 0u; i < frame.bound_count; ++i) {
@@ -56,6 +56,7 @@ vec3 bounds_sample(vec3 point, float total, float choice, vec2 u) {
     rest -= next;
     if (rest < 0.0) break;
   }
+  u.x = clamp(1.0 + rest / cap, 0.0, 0.99999994);
   return sample_cone(normalize(bounds[chosen].xyz - point), cap, u);
 }
 

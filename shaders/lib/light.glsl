@@ -17,7 +17,8 @@ struct LightSample {
 // Keeps the end of a shadow ray clear of the light's own surface.
 const float SHADOW_END = 0.9999;
 
-uint pick_light(float u) {
+// Picks a light by its selection probability; what remains of u is stretched to [0, 1).
+uint pick_light(inout float u) {
   uint low = 0u;
   uint high = frame.light_count - 1u;
   while (low < high) {
@@ -25,6 +26,8 @@ uint pick_light(float u) {
     if (u < lights[middle].cdf) high = middle;
     else low = middle + 1u;
   }
+  const float below = low > 0u ? lights[low - 1u].cdf : 0.0;
+  u = clamp((u - below) / max(lights[low].cdf - below, 1e-30), 0.0, 0.99999994);
   return low;
 }
 

@@ -150,11 +150,11 @@ Emission emit_photon(Sampler random) {
   const float environment = frame.photon_environment;
   Emission e;
   float selection;
-  if (choice.x < environment) {
+  if (choose(choice.x, environment)) {
     e = emit_environment(random, choice);
     selection = environment;
   } else {
-    const uint index = pick_light(min((choice.x - environment) / (1.0 - environment), 0.99999994));
+    const uint index = pick_light(choice.x);
     e = emit_light(lights[index], random, choice);
     selection = (1.0 - environment) * lights[index].selection;
   }

@@ -61,14 +61,22 @@ vec2 sample_2d(Sampler s, uint pair) {
   return vec2(unit_float(x), unit_float(y));
 }
 
-// Dimension pairs: two for the camera, then four a vertex.
+// Whether u falls into the first `share` of [0, 1). What remains of u is stretched to [0, 1) again and
+// decides what comes next: so the points of each branch stay as evenly spread as those of the pair,
+// which a choice by a number of its own would thin at random.
+bool choose(inout float u, float share) {
+  const bool first = u < share;
+  u = min(first ? u / share : (u - share) / (1.0 - share), 0.99999994);
+  return first;
+}
+
+// Dimension pairs: two for the camera, then three a vertex.
 const uint PAIR_PIXEL = 0u;
 const uint PAIR_LENS = 1u;
-const uint PAIR_CHOICE = 2u;    // x: which light, y: which lobe
-const uint PAIR_LIGHT = 3u;
-const uint PAIR_SCATTER = 4u;
-const uint PAIR_ROULETTE = 5u;  // x: roulette, y: BSDF or difference bounds
-const uint PAIRS_PER_VERTEX = 4u;
+const uint PAIR_LIGHT = 2u;     // which light, and where on it
+const uint PAIR_SCATTER = 3u;   // which technique and lobe, and the direction
+const uint PAIR_ROULETTE = 4u;  // x
+const uint PAIRS_PER_VERTEX = 3u;
 
 uint vertex_pair(uint pair, uint depth) { return pair + PAIRS_PER_VERTEX * depth; }
 
