@@ -156,7 +156,7 @@ void Wavefront::sample_only(const std::vector<std::uint32_t>& blocks) {
     const std::size_t last = (tile.batch.y + tile.batch.height - 1) / gpu::SAMPLED_BLOCK;
     tile.sampled = std::any_of(blocks.begin() + static_cast<std::ptrdiff_t>(first * columns),
                                blocks.begin() + static_cast<std::ptrdiff_t>((last + 1) * columns),
-                               [](std::uint32_t block) { return block != 0; });
+                               [](std::uint32_t wanted) { return wanted != 0; });
   }
 }
 

@@ -168,14 +168,14 @@ double pdf(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& wi) {
 
 std::optional<BsdfSample> sample(const Bsdf& bsdf, const ShadingPoint& point, Random& random) {
   const Lobes lobes = lobes_of(bsdf, point);
-  double choice = random.uniform();
-  if ((choice -= lobes.glass) < 0) {
+  const double choice = random.uniform();
+  if (choice < lobes.glass) {
     return sample_glass(bsdf, point, lobes.nv, lobes.glass, random);
   }
   const glm::dvec3& n = point.shading_normal;
   const Frame frame(n);
   glm::dvec3 wi;
-  if ((choice -= lobes.specular) < 0) {
+  if (choice < lobes.glass + lobes.specular) {
     if (bsdf.smooth) {
       wi = 2 * lobes.nv * n - point.wo;
       if (glm::dot(wi, point.geometric_normal) <= 0) return std::nullopt;

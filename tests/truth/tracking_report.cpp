@@ -29,7 +29,7 @@ void report(const truth::TruthSet& set, const set::Tracking& settings) {
               settings.decimate);
   std::printf("%5s %-9s %-9s %9s %8s %8s %8s %9s %9s %7s %6s  %s\n", "frame", "status", "tags",
               "corner_px", "reproj", "vertex", "max", "rot_mrad", "trans_mm", "nees", "ms", "why");
-  Mean corner, reprojection, vertex, nees, corner_chi, margin, milliseconds;
+  Mean corner, reprojection, vertex, nees, corner_chi, milliseconds;
   glm::dvec2 bias(0);
   double least_margin = HUGE_VAL;
   for (const truth::TrackedFrame& row : measure_tracking(set, settings)) {

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <cmath>
 
 #include <array>
 #include <stdexcept>
@@ -96,7 +97,7 @@ TEST(Frame, Bt709ReferenceValues) {
 // Chroma sits on the even columns and is linear between them; the last odd column repeats.
 TEST(Frame, ChromaIsInterpolated) {
   const auto red_of = [](double cr) {
-    return static_cast<int>(255.0 * (110.0 / 219.0 + 1.5748 * (cr - 128.0) / 224.0) + 0.5);
+    return static_cast<int>(std::lround(255.0 * (110.0 / 219.0 + 1.5748 * (cr - 128.0) / 224.0)));
   };
   const Plate plate =
       to_plate(frame_of(PixelFormat::yuv422p8, 4, 1, {126, 126, 126, 126, 128, 128, 100, 131}));

@@ -175,9 +175,11 @@ glm::dvec3 rectangle_irradiance(const set::Light& light, const glm::dvec3& p) {
   constexpr int steps = 16;
   double sum = 0;
   for (int i = 0; i < steps * steps; ++i) {
+    const int row = i / steps;
+    const int column = i % steps;
     const glm::dvec3 at = light.position +
-                          glm::dvec3(((i % steps + 0.5) / steps - 0.5) * light.width_m,
-                                     ((i / steps + 0.5) / steps - 0.5) * light.height_m, 0) -
+                          glm::dvec3(((column + 0.5) / steps - 0.5) * light.width_m,
+                                     ((row + 0.5) / steps - 0.5) * light.height_m, 0) -
                           p;
     const double d2 = glm::dot(at, at);
     sum += at.z * at.z / (d2 * d2);
