@@ -68,8 +68,8 @@ const uint FLIGHT_GOES_ON = 2u;
 uint meet_surface(inout Flight f, Surface s, vec2 random) {
   const Lobes l = make_lobes(s);
   const float mirror = l.smooth_reflection ? l.p_reflection : 0.0;
-  const float dirac = mirror + l.p_glass;
-  const float rough = l.p_diffuse + l.p_reflection - mirror;
+  const float dirac = mirror + (l.smooth_glass ? l.p_glass : 0.0);
+  const float rough = is_rough(l) ? 1.0 - dirac : 0.0;
   const float p_stay = f.vertices > 0u && rough > 0.0 ? rough / (rough + dirac) : 0.0;
   if (random.x < p_stay) {
     f.flux /= p_stay;

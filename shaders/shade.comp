@@ -99,8 +99,7 @@ struct Technique {
 };
 
 Technique make_technique(Path p, Surface s, Lobes l) {
-  const bool rough = l.p_diffuse > 0.0 || (l.p_reflection > 0.0 && !l.smooth_reflection);
-  if (!has_feature(FEATURE_FORKS) || p.worlds != WORLD_BOTH || !rough) return Technique(0.0, 0.0);
+  if (!has_feature(FEATURE_FORKS) || p.worlds != WORLD_BOTH || !is_rough(l)) return Technique(0.0, 0.0);
   const float total = bounds_total(s.position);
   return Technique(total > 0.0 ? frame.bound_share : 0.0, total);
 }
@@ -112,10 +111,10 @@ float combined_pdf(Technique t, Surface s, vec3 direction, float bsdf_pdf) {
 }
 
 // A direction by either technique; see bsdf_sample for what comes back.
-bool sample_direction(Technique t, Surface s, Lobes l, vec2 u, out vec3 direction, out vec3 weight,
-                      out float pdf) {
+bool sample_direction(Technique t, Surface s, Lobes l, vec2 u, float choice, out vec3 direction,
+                      out vec3 weight, out float pdf) {
   if (!choose(u.x, t.share)) {
-    if (!bsdf_sample(s, l, u, direction, weight, pdf)) return false;
+    if (!bsdf_sample(s, l, u, choice, direction, weight, pdf)) return false;
     if (t.share <= 0.0) return true;
     const float all = pdf > 0.0 ? combined_pdf(t, s, direction, pdf) : 1.0 - t.share;
     weight *= (pdf > 0.0 ? pdf : 1.0) / all;
@@ -131,24 +130,36 @@ bool sample_direction(Technique t, Surface s, Lobes l, vec2 u, out vec3 directio
   return true;
 }
 
-// One light sample: the pair of what it would bring to each world, to be tested for blockers.
-bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, out GpuShadowRay ray) {
-  const bool has_lights = has_feature(FEATURE_LIGHTS);
-  vec2 u = sample_2d(random, vertex_pair(PAIR_LIGHT, p.depth));
-  LightSample light = LightSample(vec3(0.0), 3.4e38, vec3(0.0), 0.0, vec2(1.0));
-  // Light is gathered on the viewer's side only. The sample is made for the very point from which
-  // the shadow ray starts, or the ray would end behind the light.
-  ray.origin = offset_origin(s, s.geometric_normal);
-  float selection = frame.environment_selection;
-  if (has_lights && !choose(u.x, selection)) {
+// A sample of the environment or of a light, seen from a point; `selection` is the probability of
+// having picked it.
+bool choose_light(vec3 point, vec2 u, out LightSample light, out float selection) {
+  light = LightSample(vec3(0.0), 3.4e38, vec3(0.0), 0.0, vec2(1.0));
+  selection = frame.environment_selection;
+  if (has_feature(FEATURE_LIGHTS) && !choose(u.x, selection)) {
     if (frame.light_count == 0u) return false;
     const uint index = pick_light(u.x);
-    if (!sample_light(lights[index], ray.origin, u, light)) return false;
     selection = (1.0 - selection) * lights[index].selection;
-  } else {
-    if (!has_feature(FEATURE_ENVIRONMENT_SAMPLING)) return false;
-    light.direction = environment_sample(u, light.pdf);
-    light.radiance = environment_radiance(light.direction);
+    return sample_light(lights[index], point, u, light);
+  }
+  if (!has_feature(FEATURE_ENVIRONMENT_SAMPLING)) return false;
+  light.direction = environment_sample(u, light.pdf);
+  light.radiance = environment_radiance(light.direction);
+  return true;
+}
+
+// One light sample: the pair of what it would bring to each world, to be tested for blockers.
+bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, out GpuShadowRay ray) {
+  const vec2 u = sample_2d(random, vertex_pair(PAIR_LIGHT, p.depth));
+  LightSample light;
+  float selection;
+  // The sample is made for the very point from which the shadow ray starts, or the ray would end
+  // behind the light. Only rough glass also gathers on the side away from the viewer.
+  ray.origin = offset_origin(s, s.geometric_normal);
+  if (!choose_light(ray.origin, u, light, selection)) return false;
+  if (has_feature(FEATURE_TRANSMISSION) && has_rough_glass(l) &&
+      dot(light.direction, s.geometric_normal) < 0.0) {
+    ray.origin = offset_origin(s, -s.geometric_normal);
+    if (!choose_light(ray.origin, u, light, selection)) return false;
   }
   float bsdf_pdf;
   const vec3 value = bsdf_evaluate(s, l, light.direction, bsdf_pdf);
@@ -169,7 +180,7 @@ bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, out GpuS
 // Light that comes by mirrors and glass only (P16), by photons. Each world sums the same photons in
 // the same order, so that the two are equal where the photons are.
 void meet_photons(Path p, Surface s, Lobes l) {
-  if (l.p_diffuse <= 0.0 && (l.p_reflection <= 0.0 || l.smooth_reflection)) return;
+  if (!is_rough(l)) return;
   const bool differing = cancels(p, vec2(1.0));
   const GatheredPair gathered = gather_photons(s, l, frame.max_depth - p.depth - 1u, differing);
   if ((p.worlds & WORLD_MIXED) != 0u) sample_mixed[p.slot].rgb += p.throughput * gathered.mixed;
@@ -189,17 +200,17 @@ bool ends_far_off(inout Path p, Surface s, inout float chance) {
 }
 
 // The next direction; false where the path ends.
-bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, float chance) {
+bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, vec2 chance) {
   vec3 direction;
   vec3 weight;
   float pdf;
   const vec2 u = sample_2d(random, vertex_pair(PAIR_SCATTER, p.depth));
-  if (!sample_direction(t, s, l, u, direction, weight, pdf)) return false;
+  if (!sample_direction(t, s, l, u, chance.y, direction, weight, pdf)) return false;
   p.throughput *= weight;
   const float strongest = max(max(p.throughput.r, p.throughput.g), p.throughput.b);
   if (!(strongest > 0.0)) return false;
   if (p.depth + 1u >= frame.roulette_depth && strongest < 1.0) {
-    if (chance >= strongest) return false;
+    if (chance.x >= strongest) return false;
     p.throughput /= strongest;
   }
   p.origin = offset_origin(s, direction);
@@ -232,8 +243,8 @@ void shade_vertex(inout Path p, Surface s, out GpuShadowRay ray, out bool lit, o
   scattered = false;
   const uvec2 pixel = uvec2(batch.x, batch.y) + slot_pixel(p.slot);
   const Sampler random = make_sampler(frame.seed, pixel, slot_sample(p.slot));
-  float chance = sample_2d(random, vertex_pair(PAIR_ROULETTE, p.depth)).x;
-  if (ends_far_off(p, s, chance)) return;
+  vec2 chance = sample_2d(random, vertex_pair(PAIR_CHANCE, p.depth));
+  if (ends_far_off(p, s, chance.x)) return;
   const Lobes l = make_lobes(s);
   const Technique t = make_technique(p, s, l);
   if (has_feature(FEATURE_PHOTONS)) meet_photons(p, s, l);

@@ -6,6 +6,8 @@
 #include <glm/mat4x4.hpp>
 #include <limits>
 
+#include "shaders/lib/render_shared.h"
+
 namespace previz::render {
 namespace {
 
@@ -61,8 +63,9 @@ float least_roughness_factor(const scene::Scene& scene, std::uint32_t texture) {
 }
 
 bool can_be_dirac(const scene::Scene& scene, const scene::Material& m, double specular_alpha) {
-  if (m.transmission > 0 && m.metallic < 1) return true;
-  if (!(m.metallic > 0) && !(m.specular > 0 && m.ior > 1)) return false;
+  const bool glass = m.transmission > 0 && m.metallic < 1;
+  if (glass && m.ior < gpu::LEAST_ROUGH_IOR) return true;
+  if (!glass && !(m.metallic > 0) && !(m.specular > 0 && m.ior > 1)) return false;
   const double roughness =
       m.roughness * least_roughness_factor(scene, m.metallic_roughness_texture);
   return roughness * roughness <= specular_alpha * (1 + 1e-5);  // the shader's sum is in floats

@@ -15,8 +15,8 @@ using Bounds = std::vector<glm::dvec4>;
 // Objects that are in one world only.
 Bounds difference_bounds(const scene::Scene& scene);
 
-// Objects on which light may be reflected or refracted without blur: transmissive ones, and those
-// whose GGX alpha is somewhere at or below `specular_alpha`.
+// Objects on which light may be reflected or refracted without blur: glass, metal and plastic
+// whose GGX alpha is somewhere at or below `specular_alpha`, and glass that hardly refracts.
 Bounds specular_bounds(const scene::Scene& scene, double specular_alpha);
 
 }  // namespace previz::render

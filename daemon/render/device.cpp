@@ -232,6 +232,8 @@ namespace {
 
 vk::DeviceSize texel_bytes_of(vk::Format format) {
   switch (format) {
+    case vk::Format::eR32Sfloat:
+      return 4;
     case vk::Format::eR32G32Sfloat:
     case vk::Format::eR32G32Uint:
       return 8;

@@ -4,9 +4,11 @@
 #include <cmath>
 #include <glm/gtc/packing.hpp>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <utility>
 
+#include "daemon/render/albedo_table.hpp"
 #include "daemon/render/gpu_lights.hpp"
 #include "drivers/error.hpp"
 
@@ -35,6 +37,28 @@ double environment_share(double environment_power, double light_power) {
   return std::clamp(environment_power / (environment_power + light_power), 0.1, 0.9);
 }
 
+// Tables one after the other, with those of glass made where a material needs them.
+struct AlbedoTables {
+  std::vector<float> values = reflection_albedo();
+  std::map<float, std::uint32_t> of_ior;
+
+  std::uint32_t first_of(const scene::Material& m, double specular_alpha) {
+    const double alpha = static_cast<double>(m.roughness) * m.roughness;
+    const bool rough_glass = m.transmission > 0 && m.metallic < 1 && alpha > specular_alpha;
+    if (!rough_glass || m.thin_walled || m.ior < gpu::LEAST_ROUGH_IOR) return 0;
+    constexpr std::size_t table_size = std::size_t{gpu::ALBEDO_SIDE} * gpu::ALBEDO_SIDE;
+    const auto [at, is_new] =
+        of_ior.try_emplace(m.ior, static_cast<std::uint32_t>(values.size() / table_size));
+    if (is_new) {
+      for (const double eta : {1.0 * m.ior, 1.0 / m.ior}) {
+        const AlbedoTable table = refraction_albedo(eta);
+        values.insert(values.end(), table.begin(), table.end());
+      }
+    }
+    return at->second;
+  }
+};
+
 template <typename T>
 void append(std::vector<T>& to, const std::vector<T>& from) {
   to.insert(to.end(), from.begin(), from.end());
@@ -45,7 +69,7 @@ void append(std::vector<T>& to, const std::vector<T>& from) {
 void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha) {
   scene_ = scene;
   upload_meshes();
-  upload_materials();
+  upload_materials(specular_alpha);
   upload_textures();
   find_emitters();
   difference_bounds_ = difference_bounds(scene_);
@@ -78,13 +102,16 @@ void GpuScene::upload_meshes() {
   upload_texels(device_, triangles_, triangles, vk::Format::eR32G32B32A32Uint);
 }
 
-void GpuScene::upload_materials() {
+void GpuScene::upload_materials(double specular_alpha) {
   std::vector<gpu::GpuMaterial> materials;
+  AlbedoTables albedo;
   for (const scene::Material& m : scene_.materials)
     materials.push_back({m.base_color, m.metallic, m.emission, m.roughness, m.specular, m.ior,
                          m.transmission, m.thin_walled ? 1u : 0u, m.base_color_texture,
-                         m.metallic_roughness_texture, m.emission_texture});
+                         m.metallic_roughness_texture, m.emission_texture, m.normal_texture,
+                         m.normal_scale, albedo.first_of(m, specular_alpha)});
   upload_storage(device_, materials_, materials);
+  upload_texels(device_, albedo_, albedo.values, vk::Format::eR32Sfloat);
 }
 
 void GpuScene::upload_textures() {
@@ -149,7 +176,6 @@ void GpuScene::upload_instances(const glm::dvec3& camera_position) {
     record.first_triangle = place.first_triangle;
     record.first_light = first_light_[i];
     record.presence = instance.presence;
-    record.mirrored = glm::determinant(glm::dmat3(world)) < 0 ? -1.0f : 1.0f;
     instances.push_back(record);
     top.push_back({&place.bvh, place.first_record, instance.presence, world});
     const scene::Aabb bounds = scene::transform_bounds(place.bvh.bounds, world);
@@ -210,6 +236,8 @@ std::uint32_t GpuScene::features() const {
   if (any_material([](const scene::Material& m) { return m.transmission > 0 && m.metallic < 1; }))
     result |= gpu::FEATURE_TRANSMISSION;
   if (!scene_.textures.empty()) result |= gpu::FEATURE_TEXTURES;
+  if (any_material([](const scene::Material& m) { return m.normal_texture != scene::no_texture; }))
+    result |= gpu::FEATURE_NORMAL_MAPS;
   if (!scene_.lights.empty() || !emitters_.empty()) result |= gpu::FEATURE_LIGHTS;
   if (std::any_of(scene_.lights.begin(), scene_.lights.end(), can_be_seen))
     result |= gpu::FEATURE_VISIBLE_LIGHTS;
@@ -260,6 +288,7 @@ std::vector<const Buffer*> GpuScene::bindings() const {
   result[gpu::BINDING_TEXELS] = &texels_;
   result[gpu::BINDING_ENVIRONMENT] = &environment_;
   result[gpu::BINDING_IMPORTANCE] = &importance_;
+  result[gpu::BINDING_ALBEDO] = &albedo_;
   result[gpu::BINDING_INSTANCES] = &instances_;
   result[gpu::BINDING_MATERIALS] = &materials_;
   result[gpu::BINDING_TEXTURES] = &textures_;

@@ -45,7 +45,7 @@ class GpuScene {
   };
 
   void upload_meshes();
-  void upload_materials();
+  void upload_materials(double specular_alpha);
   void upload_textures();
   void find_emitters();
   std::vector<gpu::GpuLight> placed_lights(const glm::dvec3& camera_position) const;
@@ -68,8 +68,8 @@ class GpuScene {
   double light_power_ = 0;
   bool lights_differ_ = false;  // between the worlds
 
-  Buffer bvh_, vertices_, triangles_, texels_, environment_, importance_, instances_, materials_,
-      textures_, lights_, bounds_buffer_;
+  Buffer bvh_, vertices_, triangles_, texels_, environment_, importance_, albedo_, instances_,
+      materials_, textures_, lights_, bounds_buffer_;
 };
 
 }  // namespace previz::render

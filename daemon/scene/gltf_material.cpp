@@ -106,8 +106,6 @@ UsedMaterial GltfMaterials::read(const tinygltf::Material& given, const std::str
   material.normal_texture = texture(given.normalTexture, Encoding::linear, "normal texture");
   material.normal_scale =
       within(given.normalTexture.scale, -1e3, 1e3, what + ": its normal texture's scale", notes_);
-  if (material.normal_texture != no_texture)
-    notes_.add(what + ": its normal texture is not used yet");
   // Occlusion textures are not left out: path tracing finds occlusion itself.
 
   const auto index = static_cast<std::uint32_t>(scene_.materials.size());

@@ -31,7 +31,8 @@ void require(const Material& material, const Scene& scene, double specular_alpha
   required.rough_specular |= reflects && alpha > specular_alpha;
   required.textures |= has_texture(material.base_color_texture) ||
                        has_texture(material.metallic_roughness_texture) ||
-                       has_texture(material.emission_texture);
+                       has_texture(material.emission_texture) ||
+                       has_texture(material.normal_texture);
   required.emissive_meshes |= largest(material.emission) > 0;
 
   if (material.alpha_mode == AlphaMode::opaque) return;

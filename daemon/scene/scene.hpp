@@ -72,7 +72,7 @@ struct Material {
   // KHR_materials_volume: white light is attenuation_color after this far inside (Beer-Lambert).
   glm::vec3 attenuation_color{1};
   float attenuation_distance_m = std::numeric_limits<float>::infinity();
-  std::uint32_t normal_texture = no_texture;  // tangent space, +Y up; not shaded yet
+  std::uint32_t normal_texture = no_texture;  // tangent space, +Y up, along the uvs
   float normal_scale = 1;
 };
 

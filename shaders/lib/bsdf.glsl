@@ -1,10 +1,12 @@
-// Scattering at a surface: Lambert, GGX reflection (dielectric coat and conductor), smooth glass.
+// Scattering at a surface: Lambert, GGX reflection (dielectric coat and conductor), glass.
 // Definitions are those of tests/truth/README.md, which an independent CPU tracer follows too.
 #ifndef PREVIZ_BSDF_GLSL
 #define PREVIZ_BSDF_GLSL
 
 #include "shaders/lib/sampler.glsl"
 #include "shaders/lib/scene.glsl"
+
+layout(set = 0, binding = BINDING_ALBEDO) uniform textureBuffer albedo;
 
 float luminance(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
 
@@ -66,16 +68,39 @@ vec3 sample_ggx(vec3 wo, float alpha, vec2 u) {
   return normalize(vec3(cap.xy * alpha, cap.z));
 }
 
+// What single scattering keeps of all light, seen under this cosine; bilinear between the nodes.
+float single_scatter_albedo(uint table, float cos_o, float alpha) {
+  const float last = float(ALBEDO_SIDE - 1u);
+  const vec2 at = sqrt(clamp(vec2(cos_o, alpha), vec2(0.0), vec2(1.0))) * last;
+  const vec2 low = min(floor(at), vec2(last - 1.0));
+  const vec2 f = at - low;
+  const int first = int(table * ALBEDO_SIDE * ALBEDO_SIDE + uint(low.y) * ALBEDO_SIDE + uint(low.x));
+  const int side = int(ALBEDO_SIDE);
+  const float below =
+      mix(texelFetch(albedo, first).r, texelFetch(albedo, first + 1).r, f.x);
+  const float above =
+      mix(texelFetch(albedo, first + side).r, texelFetch(albedo, first + side + 1).r, f.x);
+  return mix(below, above, f.y);
+}
+
 // The lobes of a surface seen from wo: their weights, and the odds of sampling each.
 struct Lobes {
   vec3 diffuse;         // albedo
   float coat;           // weight of the white dielectric reflection
   vec3 conductor;       // reflectance at normal incidence times its weight
   float conductor_weight;
+  vec3 conductor_gain;  // gives back what single scattering loses
   float glass;
+  float glass_gain;
   float p_diffuse, p_reflection, p_glass;
   bool smooth_reflection;  // the reflection is a Dirac delta
+  bool smooth_glass;
 };
+
+bool has_rough_reflection(Lobes l) { return l.p_reflection > 0.0 && !l.smooth_reflection; }
+bool has_rough_glass(Lobes l) { return l.p_glass > 0.0 && !l.smooth_glass; }
+// Whether any lobe is not a Dirac delta.
+bool is_rough(Lobes l) { return l.p_diffuse > 0.0 || has_rough_reflection(l) || has_rough_glass(l); }
 
 Lobes make_lobes(Surface s) {
   Lobes l;
@@ -84,7 +109,10 @@ Lobes make_lobes(Surface s) {
   l.coat = 0.0;
   l.conductor = vec3(0.0);
   l.conductor_weight = 0.0;
+  l.conductor_gain = vec3(1.0);
   l.smooth_reflection = false;
+  l.smooth_glass = true;
+  l.glass_gain = 1.0;
   float reflection = 0.0;
   if (has_feature(FEATURE_GLOSSY)) {
     if (opaque > 0.0 && s.specular > 0.0) l.coat = s.specular * fresnel_dielectric(nv, s.ior);
@@ -92,11 +120,20 @@ Lobes make_lobes(Surface s) {
     l.conductor = s.base_color;
     l.smooth_reflection = s.alpha <= frame.specular_alpha;
     reflection = opaque * l.coat;
-    if (s.metallic > 0.0) reflection += s.metallic * luminance(fresnel_schlick(s.base_color, nv));
+    if (s.metallic > 0.0) {
+      reflection += s.metallic * luminance(fresnel_schlick(s.base_color, nv));
+      if (!l.smooth_reflection)
+        l.conductor_gain += s.base_color * (1.0 / single_scatter_albedo(0u, nv, s.alpha) - 1.0);
+    }
   }
   l.diffuse = opaque * (1.0 - l.coat) * s.base_color;
   l.coat *= opaque;
   l.glass = has_feature(FEATURE_TRANSMISSION) ? (1.0 - s.metallic) * s.transmission : 0.0;
+  if (has_feature(FEATURE_TRANSMISSION) && l.glass > 0.0) {
+    l.smooth_glass = s.alpha <= frame.specular_alpha || s.ior < LEAST_ROUGH_IOR;
+    const uint table = s.thin_walled ? 0u : s.albedo_table + (s.entering ? 0u : 1u);
+    if (!l.smooth_glass) l.glass_gain = 1.0 / single_scatter_albedo(table, nv, s.alpha);
+  }
   const float diffuse = luminance(l.diffuse);
   const float total = diffuse + reflection + l.glass;
   const float scale = total > 0.0 ? 1.0 / total : 0.0;
@@ -107,7 +144,8 @@ Lobes make_lobes(Surface s) {
 }
 
 vec3 reflection_color(Lobes l, float cos_half) {
-  return vec3(l.coat) + l.conductor_weight * fresnel_schlick(l.conductor, cos_half);
+  return vec3(l.coat) +
+         l.conductor_weight * l.conductor_gain * fresnel_schlick(l.conductor, cos_half);
 }
 
 // A reflected direction counts only if it is above both the surface and the shading normal.
@@ -115,57 +153,126 @@ bool reflects_to(Surface s, vec3 wi) {
   return dot(wi, s.geometric_normal) > 0.0 && dot(wi, s.normal) > 0.0;
 }
 
+// Index behind the surface over the index before it.
+float relative_ior(Surface s) { return s.entering || s.thin_walled ? s.ior : 1.0 / s.ior; }
+
+// What glass reflects; the rest goes through. A thin pane reflects between its two sides, too.
+float glass_reflectance(Surface s, float cos_o) {
+  const float once = fresnel_dielectric(cos_o, relative_ior(s));
+  return s.thin_walled ? 2.0 * once / (1.0 + once) : once;
+}
+
+// A solid's colour tints on entering only.
+vec3 glass_tint(Surface s) { return s.thin_walled || s.entering ? s.base_color : vec3(1.0); }
+
+// Rough glass towards a direction i behind the surface, both in the local frame: adds f * cos and
+// the density (Walter et al. 2007). A thin pane sends on what it would reflect, mirrored.
+void add_transmission(Surface s, Lobes l, vec3 o, vec3 i, inout vec3 value, inout float pdf) {
+  const float eta = relative_ior(s);
+  vec3 h = s.thin_walled ? normalize(o + vec3(i.xy, -i.z)) : normalize(o + eta * i);
+  if (h.z < 0.0) h = -h;
+  const float oh = dot(o, h);
+  const float ih = dot(i, h);
+  if (oh <= 0.0 || (!s.thin_walled && ih >= 0.0)) return;
+  // Solid angle of half vectors over that of directions.
+  const float bend = oh + eta * ih;
+  const float spread = s.thin_walled ? 1.0 / (4.0 * oh) : eta * eta * -ih / (bend * bend);
+  const float through = 1.0 - glass_reflectance(s, oh);
+  const float density = ggx_density(h, s.alpha) * oh / o.z * spread * through;
+  const float lambda_o = ggx_lambda(o, s.alpha);
+  value += l.glass * l.glass_gain * glass_tint(s) *
+           (density / (1.0 + lambda_o + ggx_lambda(i, s.alpha)));
+  pdf += l.p_glass * density / (1.0 + lambda_o);
+}
+
+// Reflection of rough coat, conductor and glass alike: adds f * cos and the density.
+void add_reflection(Surface s, Lobes l, vec3 o, vec3 i, inout vec3 value, inout float pdf) {
+  const vec3 h = normalize(o + i);
+  const float oh = dot(o, h);
+  vec3 color = vec3(0.0);
+  float probability = 0.0;
+  if (has_feature(FEATURE_GLOSSY) && has_rough_reflection(l)) {
+    color = reflection_color(l, oh);
+    probability = l.p_reflection;
+  }
+  if (has_feature(FEATURE_TRANSMISSION) && has_rough_glass(l)) {
+    const float reflectance = glass_reflectance(s, oh);
+    color += l.glass * l.glass_gain * reflectance;
+    probability += l.p_glass * reflectance;
+  }
+  const float density = ggx_density(h, s.alpha) / (4.0 * o.z);
+  const float lambda_o = ggx_lambda(o, s.alpha);
+  value += color * (density / (1.0 + lambda_o + ggx_lambda(i, s.alpha)));
+  pdf += probability * density / (1.0 + lambda_o);
+}
+
 // f * cos of the lobes that are not Dirac deltas, and the density bsdf_sample has for wi, 1/sr.
 vec3 bsdf_evaluate(Surface s, Lobes l, vec3 wi, out float pdf) {
   pdf = 0.0;
-  if (!reflects_to(s, wi)) return vec3(0.0);
-  const float cos_i = dot(wi, s.normal);
-  vec3 value = l.diffuse * (cos_i / PI);
-  pdf = l.p_diffuse * (cos_i / PI);
-  if (has_feature(FEATURE_GLOSSY) && l.p_reflection > 0.0 && !l.smooth_reflection) {
-    const mat3 local = make_frame(s.normal);
-    const vec3 o = s.wo * local;
-    if (o.z <= 0.0) return value;
-    const vec3 i = wi * local;
-    const vec3 h = normalize(o + i);
-    const float density = ggx_density(h, s.alpha);
-    const float lambda_o = ggx_lambda(o, s.alpha);
-    const float masking = 1.0 / (1.0 + lambda_o + ggx_lambda(i, s.alpha));
-    value += reflection_color(l, dot(o, h)) * (density * masking / (4.0 * o.z));
-    pdf += l.p_reflection * density / ((1.0 + lambda_o) * 4.0 * o.z);
+  vec3 value = vec3(0.0);
+  const bool reflects = reflects_to(s, wi);
+  if (reflects) {
+    const float cos_i = dot(wi, s.normal);
+    value = l.diffuse * (cos_i / PI);
+    pdf = l.p_diffuse * (cos_i / PI);
   }
+  const bool glass = has_feature(FEATURE_TRANSMISSION) && has_rough_glass(l);
+  if (!glass && !(has_feature(FEATURE_GLOSSY) && has_rough_reflection(l))) return value;
+  const mat3 local = make_frame(s.normal);
+  const vec3 o = s.wo * local;
+  if (o.z <= 0.0) return value;
+  if (reflects)
+    add_reflection(s, l, o, wi * local, value, pdf);
+  else if (glass && dot(wi, s.geometric_normal) < 0.0 && dot(wi, s.normal) < 0.0)
+    add_transmission(s, l, o, wi * local, value, pdf);
   return value;
 }
 
-// Smooth interface, both lobes Dirac: reflects with the Fresnel reflectance, else refracts (solid)
-// or goes straight through (thin-walled). Radiance is not scaled by the squared ratio of indices:
-// light and camera are outside, where the factors of entering and leaving cancel. A solid's colour
-// tints on entering only.
+// Where light from wo goes that meets a facet of glass with normal m: reflected, or refracted
+// (solid) or straight on (thin-walled).
+vec3 glass_direction(Surface s, vec3 wo, vec3 m, bool reflected) {
+  const float cos_o = dot(m, wo);
+  if (reflected) return 2.0 * cos_o * m - wo;
+  if (s.thin_walled) return -wo;
+  const float eta = relative_ior(s);
+  const float cos_t = sqrt(max(0.0, 1.0 - (1.0 - cos_o * cos_o) / (eta * eta)));
+  return normalize(-wo / eta + (cos_o / eta - cos_t) * m);
+}
+
+// Smooth interface, both lobes Dirac: reflects with the Fresnel reflectance, else lets through.
+// Radiance is not scaled by the squared ratio of indices: light and camera are outside, where the
+// factors of entering and leaving cancel.
 bool sample_glass(Surface s, float choice, out vec3 wi, out vec3 weight) {
   const float cos_o = dot(s.normal, s.wo);
   weight = vec3(1.0);
   wi = vec3(0.0);
   if (cos_o <= 0.0) return false;
-  const float eta = s.entering || s.thin_walled ? s.ior : 1.0 / s.ior;
-  float reflectance = fresnel_dielectric(cos_o, eta);
-  if (s.thin_walled) reflectance = 2.0 * reflectance / (1.0 + reflectance);
-  if (choice < reflectance) {
-    wi = 2.0 * cos_o * s.normal - s.wo;
-    return dot(wi, s.geometric_normal) > 0.0;
+  const bool reflected = choice < glass_reflectance(s, cos_o);
+  wi = glass_direction(s, s.wo, s.normal, reflected);
+  if (!reflected) weight = glass_tint(s);
+  return reflected == (dot(wi, s.geometric_normal) > 0.0);
+}
+
+// A direction of rough glass, by a visible facet; `choice` reflects or lets through. False: it ends
+// on the wrong side, in another facet.
+bool sample_rough_glass(Surface s, float choice, vec2 u, out vec3 wi) {
+  const mat3 local = make_frame(s.normal);
+  const vec3 o = s.wo * local;
+  const vec3 h = sample_ggx(o, s.alpha, u);
+  const bool reflected = choice < glass_reflectance(s, max(dot(o, h), 0.0));
+  vec3 i = glass_direction(s, o, h, reflected);
+  if (s.thin_walled && !reflected) {  // scattered as the reflection, mirrored
+    i = 2.0 * dot(o, h) * h - o;
+    i.z = -i.z;
   }
-  if (s.thin_walled || s.entering) weight = s.base_color;
-  if (s.thin_walled) {
-    wi = -s.wo;
-    return true;
-  }
-  const float cos_t = sqrt(max(0.0, 1.0 - (1.0 - cos_o * cos_o) / (eta * eta)));
-  wi = normalize(-s.wo / eta + (cos_o / eta - cos_t) * s.normal);
-  return dot(wi, s.geometric_normal) < 0.0;
+  wi = local * i;
+  return reflected == (i.z > 0.0);
 }
 
 // A direction, the throughput it brings (f * cos / pdf over all non-Dirac lobes, or the Dirac
-// lobe's weight), and its density; pdf = 0 says Dirac. False: absorbed.
-bool bsdf_sample(Surface s, Lobes l, vec2 u, out vec3 wi, out vec3 weight,
+// lobe's weight), and its density; pdf = 0 says Dirac. False: absorbed. `choice` is whether rough
+// glass reflects.
+bool bsdf_sample(Surface s, Lobes l, vec2 u, float choice, out vec3 wi, out vec3 weight,
                  out float pdf) {
   pdf = 0.0;
   wi = vec3(0.0);
@@ -174,9 +281,12 @@ bool bsdf_sample(Surface s, Lobes l, vec2 u, out vec3 wi, out vec3 weight,
     wi = make_frame(s.normal) * sample_cosine(u);
   } else if (has_feature(FEATURE_TRANSMISSION) && l.p_glass > 0.0 &&
              choose(u.x, l.p_glass / (l.p_glass + l.p_reflection))) {
-    if (!sample_glass(s, u.x, wi, weight)) return false;
-    weight *= l.glass / l.p_glass;
-    return true;
+    if (l.smooth_glass) {
+      if (!sample_glass(s, u.x, wi, weight)) return false;
+      weight *= l.glass / l.p_glass;
+      return true;
+    }
+    if (dot(s.normal, s.wo) <= 0.0 || !sample_rough_glass(s, choice, u, wi)) return false;
   } else if (has_feature(FEATURE_GLOSSY) && l.p_reflection > 0.0) {
     const float cos_o = dot(s.normal, s.wo);
     if (cos_o <= 0.0) return false;

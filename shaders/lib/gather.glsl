@@ -28,7 +28,8 @@ void gather_photon(uint photon, vec4 position, Surface s, Lobes l, uint most_ver
   if (abs(dot(off, s.geometric_normal)) > SAME_SURFACE_HEIGHT * batch.photon_radius) return;
   const int first = int(photon * TEXELS_PER_PHOTON);
   const vec4 normal = texelFetch(found_photons, first + 2);
-  if (dot(normal.xyz, s.geometric_normal) < SAME_SURFACE_COS) return;
+  // Which side it came from is the BSDF's concern: rough glass takes both.
+  if (abs(dot(normal.xyz, s.geometric_normal)) < SAME_SURFACE_COS) return;
   const vec4 direction = texelFetch(found_photons, first + 1);
   if (differing && direction.w == normal.w) return;
   const float cos_geometric = -dot(direction.xyz, normal.xyz);

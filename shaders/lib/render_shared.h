@@ -15,6 +15,8 @@ namespace previz::gpu {
 //   TRIANGLES   RGBA32UI, 1 texel a triangle: three indices into VERTICES
 //   TEXELS      RG32UI, all textures one after the other: four halves a texel, linear
 //   ENVIRONMENT RGBA32F, (size + 2)^2: the map with a border wrapped by the octahedral rule
+//   ALBEDO      R32F, tables of ALBEDO_SIDE^2 (daemon/render/albedo_table.hpp): the reflection's,
+//               then for each rough glass one seen from outside and one from inside
 //   IMPORTANCE  RGBA32F, quadtree of sampling density: level l has 4^l texels, each the density
 //               of its four children; mean density 1 on every level
 PREVIZ_CONST uint BINDING_VERTICES = 1u;
@@ -23,14 +25,19 @@ PREVIZ_CONST uint BINDING_TEXELS = 3u;
 PREVIZ_CONST uint BINDING_ENVIRONMENT = 4u;
 PREVIZ_CONST uint BINDING_IMPORTANCE = 5u;
 PREVIZ_CONST uint BINDING_RAYS = 6u;        // RG32F, (width + 1)(height + 1): x/z, y/z of pixel corners
-PREVIZ_CONST uint BINDING_INSTANCES = 7u;   // GpuInstance[]
-PREVIZ_CONST uint BINDING_MATERIALS = 8u;  // GpuMaterial[]
-PREVIZ_CONST uint BINDING_TEXTURES = 9u;   // GpuTexture[]
-PREVIZ_CONST uint BINDING_LIGHTS = 10u;     // GpuLight[]
-PREVIZ_CONST uint BINDING_FRAME = 11u;      // GpuFrame
-PREVIZ_CONST uint BINDING_BOUNDS = 12u;     // vec4[]: centre and radius of each differing object,
+PREVIZ_CONST uint BINDING_ALBEDO = 7u;
+PREVIZ_CONST uint BINDING_INSTANCES = 8u;   // GpuInstance[]
+PREVIZ_CONST uint BINDING_MATERIALS = 9u;  // GpuMaterial[]
+PREVIZ_CONST uint BINDING_TEXTURES = 10u;  // GpuTexture[]
+PREVIZ_CONST uint BINDING_LIGHTS = 11u;     // GpuLight[]
+PREVIZ_CONST uint BINDING_FRAME = 12u;      // GpuFrame
+PREVIZ_CONST uint BINDING_BOUNDS = 13u;     // vec4[]: centre and radius of each differing object,
                                             // then of each object that can reflect without blur
-PREVIZ_CONST uint SCENE_BINDINGS = 13u;
+PREVIZ_CONST uint SCENE_BINDINGS = 14u;
+
+PREVIZ_CONST uint ALBEDO_SIDE = 32u;
+// Glass below this index bends light too little for its roughness to show; it is taken as smooth.
+PREVIZ_CONST float LEAST_ROUGH_IOR = 1.001f;
 
 // Set 1, paths in flight and what they bring back. A slot is one sample of one pixel; it has two
 // paths, because it can fork once: path 2 slot, and path 2 slot + 1 for the world that parted.
@@ -88,6 +95,7 @@ PREVIZ_CONST uint FEATURE_FORKS = 64u;        // any object present in one world
 PREVIZ_CONST uint FEATURE_ENVIRONMENT_SAMPLING = 128u;  // next-event estimation of the environment
 PREVIZ_CONST uint FEATURE_CAUSTICS = 256u;  // paths bring light to rough vertices by Dirac lobes only
 PREVIZ_CONST uint FEATURE_PHOTONS = 512u;   // photons bring it
+PREVIZ_CONST uint FEATURE_NORMAL_MAPS = 2048u;
 PREVIZ_CONST uint FEATURE_DIFFERENCE = 1024u;  // only what differs is traced, where that is enough
 
 // Bits of a path's state.
@@ -164,7 +172,6 @@ struct GpuInstance {
   uint first_triangle;  // in TRIANGLES
   uint first_light;     // of its emissive triangles; NO_INDEX: emits nothing
   uint presence;
-  float mirrored;       // -1 where the transform turns orientation around, else 1
 };
 
 struct GpuMaterial {
@@ -179,6 +186,9 @@ struct GpuMaterial {
   uint base_color_texture;  // NO_INDEX: none
   uint metallic_roughness_texture;
   uint emission_texture;
+  uint normal_texture;
+  float normal_scale;
+  uint albedo_table;  // rough glass: of ALBEDO, seen from outside; the next one is from inside
 };
 
 PREVIZ_CONST uint TEXTURE_REPEAT = 0u;
@@ -254,8 +264,8 @@ static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 52);
 static_assert(sizeof(GpuPixel) == 144);
 static_assert(sizeof(GpuControl) == 72);
-static_assert(sizeof(GpuInstance) == 116);
-static_assert(sizeof(GpuMaterial) == 60);
+static_assert(sizeof(GpuInstance) == 112);
+static_assert(sizeof(GpuMaterial) == 72);
 static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
 static_assert(sizeof(GpuLight) == 124);

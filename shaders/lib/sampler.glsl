@@ -75,7 +75,7 @@ const uint PAIR_PIXEL = 0u;
 const uint PAIR_LENS = 1u;
 const uint PAIR_LIGHT = 2u;     // which light, and where on it
 const uint PAIR_SCATTER = 3u;   // which technique and lobe, and the direction
-const uint PAIR_ROULETTE = 4u;  // x
+const uint PAIR_CHANCE = 4u;    // x: roulette, y: whether rough glass reflects
 const uint PAIRS_PER_VERTEX = 3u;
 
 uint vertex_pair(uint pair, uint depth) { return pair + PAIRS_PER_VERTEX * depth; }

@@ -38,6 +38,7 @@ struct Surface {
   float ior;
   float transmission;
   bool thin_walled;
+  uint albedo_table;      // of ALBEDO, for rough glass
   vec3 emission;
 };
 
@@ -118,6 +119,41 @@ vec2 triangle_uv(vec4 p0, vec4 n0, vec4 p1, vec4 n1, vec4 p2, vec4 n2, vec3 b) {
   return vec2(p0.w, n0.w) * b.x + vec2(p1.w, n1.w) * b.y + vec2(p2.w, n2.w) * b.z;
 }
 
+struct Triangle {
+  vec4 p0, p1, p2;  // position, u
+  vec4 n0, n1, n2;  // normal, v
+};
+
+// Texture coordinates' directions are the triangle's own, as glTF has it where no tangents are given
+// but for their smoothing over a vertex. A normal that dips below the surface is lifted onto it.
+const float LEAST_NORMAL_LIFT = 1e-3;
+
+vec3 map_normal(GpuInstance instance, GpuMaterial m, Triangle t, vec2 uv, vec3 normal, vec3 outward) {
+  const vec2 along1 = vec2(t.p1.w, t.n1.w) - vec2(t.p0.w, t.n0.w);
+  const vec2 along2 = vec2(t.p2.w, t.n2.w) - vec2(t.p0.w, t.n0.w);
+  const vec3 edge1 = transform_vector(instance.world_from_object, t.p1.xyz - t.p0.xyz);
+  const vec3 edge2 = transform_vector(instance.world_from_object, t.p2.xyz - t.p0.xyz);
+  const float area = along1.x * along2.y - along2.x * along1.y;
+  const float side = area < 0.0 ? -1.0 : 1.0;
+  const vec3 along_u = side * (edge1 * along2.y - edge2 * along1.y);
+  const vec3 along_v = side * (edge2 * along1.x - edge1 * along2.x);
+  const vec3 across = along_u - normal * dot(normal, along_u);
+  const float across_squared = dot(across, across);
+  if (area == 0.0 || !(across_squared > 0.0)) return normal;
+  const vec3 tangent = across * inversesqrt(across_squared);
+  const vec3 turned = cross(normal, tangent);
+  // v runs down the picture, +Y up.
+  const vec3 bitangent = dot(turned, along_v) < 0.0 ? turned : -turned;
+  vec3 mapped = sample_texture(m.normal_texture, uv).xyz * 2.0 - 1.0;
+  mapped.xy *= m.normal_scale;
+  mapped = tangent * mapped.x + bitangent * mapped.y + normal * mapped.z;
+  const float mapped_squared = dot(mapped, mapped);
+  if (!(mapped_squared > 0.0)) return normal;
+  mapped *= inversesqrt(mapped_squared);
+  mapped += outward * max(0.0, LEAST_NORMAL_LIFT - dot(mapped, outward));
+  return normalize(mapped);
+}
+
 void apply_material(inout Surface s, uint material, vec2 uv) {
   const GpuMaterial m = materials[material];
   s.base_color = m.base_color;
@@ -127,6 +163,7 @@ void apply_material(inout Surface s, uint material, vec2 uv) {
   s.ior = m.ior;
   s.transmission = m.transmission;
   s.thin_walled = m.thin_walled != 0u;
+  s.albedo_table = m.albedo_table;
   s.emission = m.emission;
   if (has_feature(FEATURE_TEXTURES)) {
     if (m.base_color_texture != NO_INDEX)
@@ -158,7 +195,7 @@ Surface make_surface(GpuHit hit, vec3 direction) {
   const vec3 object_position = p0.xyz * b.x + p1.xyz * b.y + p2.xyz * b.z;
   const vec3 object_bound = abs(p0.xyz) * b.x + abs(p1.xyz) * b.y + abs(p2.xyz) * b.z;
   s.position = transform_point(instance.world_from_object, object_position);
-  const vec3 face = cross(p1.xyz - p0.xyz, p2.xyz - p0.xyz) * instance.mirrored;
+  const vec3 face = cross(p1.xyz - p0.xyz, p2.xyz - p0.xyz);
   // The face is scaled first: its length is an area and underflows for small triangles.
   const float face_scale = max(max(abs(face.x), abs(face.y)), abs(face.z));
   const vec3 outward = normalize(transform_normal(instance.object_from_world, face / face_scale));
@@ -171,8 +208,12 @@ Surface make_surface(GpuHit hit, vec3 direction) {
                                               n0.xyz * b.x + n1.xyz * b.y + n2.xyz * b.z);
   const float length_squared = dot(smooth_normal, smooth_normal);
   s.normal = length_squared > 0.0 ? smooth_normal * inversesqrt(length_squared) : outward;
+  const vec2 uv = triangle_uv(p0, n0, p1, n1, p2, n2, b);
+  if (has_feature(FEATURE_NORMAL_MAPS) && materials[instance.material].normal_texture != NO_INDEX)
+    s.normal = map_normal(instance, materials[instance.material],
+                          Triangle(p0, p1, p2, n0, n1, n2), uv, s.normal, outward);
   if (dot(s.normal, s.geometric_normal) < 0.0) s.normal = -s.normal;
-  apply_material(s, instance.material, triangle_uv(p0, n0, p1, n1, p2, n2, b));
+  apply_material(s, instance.material, uv);
   return s;
 }
 

@@ -5,6 +5,8 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "tests/truth/cpu_albedo.hpp"
+
 namespace previz::truth {
 namespace {
 
@@ -70,6 +72,79 @@ glm::dvec3 sample_visible_normal(const glm::dvec3& v, double alpha, glm::dvec2 r
   return glm::normalize(glm::dvec3(alpha * n.x, alpha * n.y, std::max(0.0, n.z)));
 }
 
+double index_behind(const Bsdf& bsdf, const ShadingPoint& point) {
+  return bsdf.thin_walled || point.outside ? bsdf.ior : 1 / bsdf.ior;
+}
+
+double glass_reflectance(const Bsdf& bsdf, const ShadingPoint& point, double cosine) {
+  const double once = fresnel_dielectric(std::clamp(cosine, 0.0, 1.0), index_behind(bsdf, point));
+  return bsdf.thin_walled ? 2 * once / (1 + once) : once;
+}
+
+// A white conductor gets back all that single scattering loses, a coloured one its share.
+glm::dvec3 conductor_gain(const Bsdf& bsdf, double nv) {
+  if (bsdf.smooth || bsdf.metallic <= 0) return glm::dvec3(1);
+  return 1.0 + bsdf.base_color * (1 / reflected_share(nv, bsdf.alpha) - 1);
+}
+
+double glass_gain(const Bsdf& bsdf, const ShadingPoint& point, double nv) {
+  return 1 / (bsdf.thin_walled ? reflected_share(nv, bsdf.alpha)
+                               : scattered_share(nv, bsdf.alpha, index_behind(bsdf, point)));
+}
+
+// Rough glass: f cos of one white lobe and its density, for a direction on either side.
+struct GlassValue {
+  double value = 0;
+  double pdf = 0;
+};
+
+GlassValue rough_glass(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& wi) {
+  const glm::dvec3& n = point.shading_normal;
+  const double nv = glm::dot(n, point.wo);
+  if (nv <= 0) return {};
+  const double nl = glm::dot(n, wi);
+  const bool through = nl < 0;
+  if ((glm::dot(point.geometric_normal, wi) < 0) != through) return {};
+  // A thin pane's transmitted light is its reflection, mirrored.
+  const bool as_reflection = !through || bsdf.thin_walled;
+  const glm::dvec3 seen = through && bsdf.thin_walled ? wi - 2 * nl * n : wi;
+  const double eta = as_reflection ? 1 : index_behind(bsdf, point);
+  glm::dvec3 h = glm::normalize(point.wo + eta * seen);
+  if (glm::dot(h, n) < 0) h = -h;
+  const double oh = glm::dot(point.wo, h), ih = glm::dot(seen, h);
+  if (oh <= 0 || (!as_reflection && ih >= 0)) return {};
+  const double reflectance = glass_reflectance(bsdf, point, oh);
+  const double jacobian = as_reflection ? 1 / (4 * oh) : -ih * std::pow(eta / (oh + eta * ih), 2);
+  const double d = ggx_distribution(glm::dot(n, h), bsdf.alpha);
+  const double masked_o = smith_lambda_root(nv, bsdf.alpha) / nv;
+  const double masked_i = smith_lambda_root(std::abs(nl), bsdf.alpha) / std::abs(nl);
+  const double share = (through ? 1 - reflectance : reflectance) * d * oh * jacobian / nv;
+  return {share * 2 / (masked_o + masked_i) * glass_gain(bsdf, point, nv),
+          share * 2 / (1 + masked_o)};
+}
+
+glm::dvec3 glass_tint(const Bsdf& bsdf, const ShadingPoint& point, bool through) {
+  const bool tinted = through && (bsdf.thin_walled || point.outside);
+  return tinted ? bsdf.base_color : glm::dvec3(1);
+}
+
+std::optional<glm::dvec3> sample_rough_glass(const Bsdf& bsdf, const ShadingPoint& point,
+                                             Random& random) {
+  const Frame frame(point.shading_normal);
+  const glm::dvec3 wo = frame.local(point.wo);
+  const glm::dvec3 h = sample_visible_normal(wo, bsdf.alpha, random.uniform2());
+  const double oh = glm::dot(wo, h);
+  glm::dvec3 wi = 2 * oh * h - wo;
+  const bool reflected = random.uniform() < glass_reflectance(bsdf, point, oh);
+  if (!reflected) {
+    const double eta = index_behind(bsdf, point);
+    const double behind = std::sqrt(std::max(0.0, 1 - (1 - oh * oh) / (eta * eta)));
+    wi = bsdf.thin_walled ? glm::dvec3(wi.x, wi.y, -wi.z) : (oh / eta - behind) * h - wo / eta;
+  }
+  if (reflected != (wi.z > 0)) return std::nullopt;  // into another facet
+  return glm::normalize(frame.world(wi));
+}
+
 // What each lobe reflects, and how likely sample() takes it.
 struct Lobes {
   double nv = 0;
@@ -102,11 +177,9 @@ std::optional<BsdfSample> sample_glass(const Bsdf& bsdf, const ShadingPoint& poi
                                        double probability, Random& random) {
   if (nv <= 0) return std::nullopt;
   const glm::dvec3& n = point.shading_normal;
-  const double eta = bsdf.thin_walled || point.outside ? bsdf.ior : 1 / bsdf.ior;
-  double reflectance = fresnel_dielectric(nv, eta);
-  if (bsdf.thin_walled) reflectance = 2 * reflectance / (1 + reflectance);
+  const double eta = index_behind(bsdf, point);
   const glm::dvec3 weight((1 - bsdf.metallic) * bsdf.transmission / probability);
-  if (random.uniform() < reflectance) {
+  if (random.uniform() < glass_reflectance(bsdf, point, nv)) {
     const glm::dvec3 wi = 2 * nv * n - point.wo;
     if (glm::dot(wi, point.geometric_normal) <= 0) return std::nullopt;
     return BsdfSample{wi, weight, 0, true};
@@ -117,8 +190,7 @@ std::optional<BsdfSample> sample_glass(const Bsdf& bsdf, const ShadingPoint& poi
     wi = glm::normalize((nv / eta - cos_behind) * n - point.wo / eta);
   }
   if (glm::dot(wi, point.geometric_normal) >= 0) return std::nullopt;
-  const bool tinted = bsdf.thin_walled || point.outside;
-  return BsdfSample{wi, tinted ? weight * bsdf.base_color : weight, 0, true};
+  return BsdfSample{wi, weight * glass_tint(bsdf, point, true), 0, true};
 }
 
 }  // namespace
@@ -136,29 +208,41 @@ double fresnel_dielectric(double cos_incident, double eta) {
 bool only_dirac(const Bsdf& bsdf) {
   const bool diffuse = bsdf.metallic < 1 && bsdf.transmission < 1;
   const bool rough = !bsdf.smooth && (diffuse || bsdf.metallic > 0);
-  return !diffuse && !rough;
+  const bool glass = bsdf.metallic < 1 && bsdf.transmission > 0 && !bsdf.smooth_glass();
+  return !diffuse && !rough && !glass;
+}
+
+bool scatters_behind(const Bsdf& bsdf) {
+  return bsdf.metallic < 1 && bsdf.transmission > 0 && !bsdf.smooth_glass();
 }
 
 glm::dvec3 evaluate(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& wi) {
   const double nl = glm::dot(point.shading_normal, wi);
-  if (nl <= 0 || glm::dot(point.geometric_normal, wi) <= 0) return glm::dvec3(0);
+  glm::dvec3 glass(0);
+  if (scatters_behind(bsdf)) {
+    glass = (1 - bsdf.metallic) * bsdf.transmission * rough_glass(bsdf, point, wi).value *
+            glass_tint(bsdf, point, nl < 0);
+  }
+  if (nl <= 0 || glm::dot(point.geometric_normal, wi) <= 0) return glass;
   const Lobes lobes = lobes_of(bsdf, point);
   const double opaque = (1 - bsdf.metallic) * (1 - bsdf.transmission);
   glm::dvec3 f = opaque * (1 - lobes.plastic_fresnel) / pi * bsdf.base_color;
   if (!bsdf.smooth && lobes.nv > 0) {
     const glm::dvec3 h = glm::normalize(point.wo + wi);
     const double brdf = ggx_brdf(nl, lobes.nv, glm::dot(point.shading_normal, h), bsdf.alpha);
-    f += brdf * (opaque * lobes.plastic_fresnel +
-                 bsdf.metallic * schlick(bsdf.base_color, glm::dot(point.wo, h)));
+    f += brdf *
+         (opaque * lobes.plastic_fresnel + bsdf.metallic * conductor_gain(bsdf, lobes.nv) *
+                                               schlick(bsdf.base_color, glm::dot(point.wo, h)));
   }
-  return f * nl;
+  return f * nl + glass;
 }
 
 double pdf(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& wi) {
   const double nl = glm::dot(point.shading_normal, wi);
-  if (nl <= 0 || glm::dot(point.geometric_normal, wi) <= 0) return 0;
   const Lobes lobes = lobes_of(bsdf, point);
-  double sum = lobes.diffuse * nl / pi;
+  double sum = scatters_behind(bsdf) ? lobes.glass * rough_glass(bsdf, point, wi).pdf : 0;
+  if (nl <= 0 || glm::dot(point.geometric_normal, wi) <= 0) return sum;
+  sum += lobes.diffuse * nl / pi;
   if (!bsdf.smooth && lobes.specular > 0) {
     const glm::dvec3 h = glm::normalize(point.wo + wi);
     sum += lobes.specular * ggx_pdf(lobes.nv, glm::dot(point.shading_normal, h), bsdf.alpha);
@@ -169,13 +253,18 @@ double pdf(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& wi) {
 std::optional<BsdfSample> sample(const Bsdf& bsdf, const ShadingPoint& point, Random& random) {
   const Lobes lobes = lobes_of(bsdf, point);
   const double choice = random.uniform();
-  if (choice < lobes.glass) {
+  if (choice < lobes.glass && bsdf.smooth_glass()) {
     return sample_glass(bsdf, point, lobes.nv, lobes.glass, random);
   }
   const glm::dvec3& n = point.shading_normal;
   const Frame frame(n);
   glm::dvec3 wi;
-  if (choice < lobes.glass + lobes.specular) {
+  if (choice < lobes.glass) {
+    if (lobes.nv <= 0) return std::nullopt;
+    const auto direction = sample_rough_glass(bsdf, point, random);
+    if (!direction) return std::nullopt;
+    wi = *direction;
+  } else if (choice < lobes.glass + lobes.specular) {
     if (bsdf.smooth) {
       wi = 2 * lobes.nv * n - point.wo;
       if (glm::dot(wi, point.geometric_normal) <= 0) return std::nullopt;

@@ -18,6 +18,8 @@ struct Bsdf {
   double ior = 1.5;
   double transmission = 0;
   bool thin_walled = true;
+
+  bool smooth_glass() const { return smooth || ior < 1.001; }  // too little bent to blur
 };
 
 // Unit vectors; both normals are on the viewer's side of the surface, wo points to the viewer.
@@ -45,6 +47,8 @@ glm::dvec3 evaluate(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec
 double pdf(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& wi);
 // Nothing where the path is absorbed.
 std::optional<BsdfSample> sample(const Bsdf& bsdf, const ShadingPoint& point, Random& random);
+// True where light arriving from behind the surface reaches the viewer by lobes that are not Dirac.
+bool scatters_behind(const Bsdf& bsdf);
 // True where evaluate() is zero everywhere.
 bool only_dirac(const Bsdf& bsdf);
 

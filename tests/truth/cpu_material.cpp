@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/mat2x2.hpp>
+#include <glm/matrix.hpp>
 #include <glm/vec4.hpp>
 
 namespace previz::truth {
@@ -57,6 +60,33 @@ Bsdf bsdf_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2
   b.transmission = m.transmission;
   b.thin_walled = m.thin_walled;
   return b;
+}
+
+glm::dvec3 normal_at(const scene::Scene& scene, const Geometry& geometry, const Hit& hit) {
+  const scene::Instance& instance = scene.instances[hit.instance];
+  const scene::Material& m = scene.materials[instance.material];
+  const scene::Mesh& mesh = scene.meshes[instance.mesh];
+  if (m.normal_texture == scene::no_texture || mesh.uvs.empty()) return hit.shading_normal;
+  const glm::uvec3 corner = mesh.triangles[hit.triangle];
+  const glm::dvec2 uv0 = mesh.uvs[corner.x];
+  const glm::dmat2 uv_of_edges(glm::dvec2(mesh.uvs[corner.y]) - uv0,
+                               glm::dvec2(mesh.uvs[corner.z]) - uv0);
+  if (glm::determinant(uv_of_edges) == 0) return hit.shading_normal;
+  const glm::dmat2 edges_of_uv = glm::inverse(uv_of_edges);
+  const Triangle t = geometry.triangle(hit.instance, hit.triangle);
+  const auto along = [&](int axis) {
+    return edges_of_uv[axis].x * (t.v1 - t.v0) + edges_of_uv[axis].y * (t.v2 - t.v0);
+  };
+  const glm::dvec3& n = hit.shading_normal;
+  const glm::dvec3 tangent = glm::normalize(along(0) - n * glm::dot(n, along(0)));
+  glm::dvec3 up = glm::cross(n, tangent);
+  if (glm::dot(up, along(1)) > 0) up = -up;  // v runs down the picture
+  const glm::dvec3 texel = 2.0 * glm::dvec3(look_up(scene, m.normal_texture, hit.uv)) - 1.0;
+  const glm::dvec3 mapped = glm::normalize(
+      static_cast<double>(m.normal_scale) * (texel.x * tangent + texel.y * up) + texel.z * n);
+  // One that dips below the surface is lifted onto it.
+  const double lift = std::max(0.0, 1e-3 - glm::dot(mapped, hit.geometric_normal));
+  return glm::normalize(mapped + lift * hit.geometric_normal);
 }
 
 glm::dvec3 emission_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2& uv) {

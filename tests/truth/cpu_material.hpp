@@ -7,11 +7,14 @@
 
 #include "daemon/scene/scene.hpp"
 #include "tests/truth/cpu_bsdf.hpp"
+#include "tests/truth/cpu_geometry.hpp"
 
 namespace previz::truth {
 
 Bsdf bsdf_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2& uv,
              double specular_roughness);
+// The shading normal after the normal texture, if the material has one; on the side of the winding.
+glm::dvec3 normal_at(const scene::Scene& scene, const Geometry& geometry, const Hit& hit);
 glm::dvec3 emission_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2& uv);
 
 }  // namespace previz::truth

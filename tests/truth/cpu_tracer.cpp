@@ -66,7 +66,8 @@ Vertex vertex_at(const World& world, const Hit& hit, const glm::dvec3& wo) {
   const double side = glm::dot(hit.geometric_normal, wo) < 0 ? -1 : 1;
   return {hit,
           bsdf_at(world.scene, hit.instance, hit.uv, world.options.specular_roughness),
-          {side * hit.geometric_normal, side * hit.shading_normal, wo, side > 0}};
+          {side * hit.geometric_normal, side * normal_at(world.scene, world.geometry, hit), wo,
+           side > 0}};
 }
 
 // What a ray meets that shines: every lamp it crosses, then the surface or the environment behind
@@ -104,7 +105,9 @@ glm::dvec3 reflected(const Vertex& vertex, const glm::dvec3& wi, double light_pd
 glm::dvec3 light_from_meshes(const World& world, const Vertex& vertex, Random& random) {
   const EmissiveMeshes::Sample s = world.emissive.sample(random);
   if (s.area_pdf <= 0) return glm::dvec3(0);
-  const glm::dvec3 start = vertex.start(vertex.point.geometric_normal);
+  const glm::dvec3 towards = s.position - vertex.hit.position;
+  const glm::dvec3 start =
+      vertex.start(scatters_behind(vertex.bsdf) ? towards : vertex.point.geometric_normal);
   const glm::dvec3 to_light = s.position - start;
   const double distance = glm::length(to_light);
   const glm::dvec3 wi = to_light / distance;
@@ -121,20 +124,22 @@ glm::dvec3 light_from_meshes(const World& world, const Vertex& vertex, Random& r
 
 // Next-event estimation: one sample of the environment, of every lamp and of the emissive meshes.
 glm::dvec3 direct_light(const World& world, const Vertex& vertex, Random& random) {
-  const glm::dvec3 start = vertex.start(vertex.point.geometric_normal);
+  const glm::dvec3 above = vertex.start(vertex.point.geometric_normal);
+  const bool behind = scatters_behind(vertex.bsdf);
   glm::dvec3 sum(0);
   const auto add = [&](const glm::dvec3& wi, double distance, double light_pdf,
                        const glm::dvec3& value) {
     const glm::dvec3 f = reflected(vertex, wi, light_pdf) * value;
     if (f == glm::dvec3(0)) return;
-    if (!world.geometry.blocked({start, wi}, distance, world.bit)) sum += f;
+    if (!world.geometry.blocked({behind ? vertex.start(wi) : above, wi}, distance, world.bit))
+      sum += f;
   };
   if (!world.environment.black()) {
     const DirectionSample s = world.environment.sample(random.uniform2());
     add(s.direction, infinity, s.pdf, world.environment.radiance(s.direction) / s.pdf);
   }
   for (const set::Light& lamp : world.lamps) {
-    const LightSample s = sample_lamp(lamp, start, random);
+    const LightSample s = sample_lamp(lamp, behind ? vertex.hit.position : above, random);
     add(s.direction, s.distance, s.pdf, s.value);
   }
   if (!world.emissive.empty()) sum += light_from_meshes(world, vertex, random);

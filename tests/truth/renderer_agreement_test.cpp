@@ -99,6 +99,59 @@ TEST_P(RandomSets, agree_with_the_cpu_tracer) {
 // Six consecutive seeds put each material on the first virtual object.
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomSets, ::testing::Range(1u, 7u));
 
+// Patches of normals up to half a radian off.
+scene::Texture bumps() {
+  scene::Texture texture;
+  texture.width = texture.height = 8;
+  for (int i = 0; i < 64; ++i) {
+    const double angle = 2.4 * i;
+    const glm::dvec3 n =
+        glm::normalize(glm::dvec3(0.5 * glm::dvec2(std::cos(angle), std::sin(angle)), 1));
+    texture.texels.emplace_back(glm::vec3(0.5 * n + 0.5), 1.0f);
+  }
+  return texture;
+}
+
+// Rough glass, solid and as a pane, white rough metal, and normal maps on plastic and metal; on a
+// table in both worlds, under an environment with a bright side.
+View rough_materials() {
+  View view;
+  scene::Scene& scene = view.scene;
+  const auto add = [&](scene::Mesh mesh, const scene::Material& material, const glm::dvec3& at,
+                       std::uint32_t presence) {
+    glm::dmat4 placed(1.0);
+    placed[3] = glm::dvec4(at, 1);
+    add_instance(scene, add_mesh(scene, std::move(mesh)), add_material(scene, material), placed,
+                 presence);
+  };
+  scene::Material ball = glass(1.5f);
+  ball.roughness = 0.4f;
+  ball.base_color = {0.9f, 0.8f, 0.6f};
+  scene::Material pane = ball;
+  pane.thin_walled = true;
+  pane.roughness = 0.25f;
+  scene::Material bumpy = plastic({0.2f, 0.5f, 0.7f}, 0.3f);
+  bumpy.normal_texture = add_texture(scene, bumps());
+  scene::Material hammered = metal({0.9f, 0.7f, 0.4f}, 0.5f);
+  hammered.normal_texture = bumpy.normal_texture;
+  hammered.normal_scale = 0.7f;
+  add(rectangle_mesh({3, 3}), diffuse({0.6f, 0.5f, 0.4f}), {0, 0, 0}, scene::world_both);
+  add(box_mesh({0.3, 0.3, 0.3}), bumpy, {-0.5, 0.2, 0.15}, scene::world_both);
+  add(uv_sphere_mesh(0.25, 48, 24), ball, {-0.1, -0.3, 0.25}, scene::world_mixed);
+  add(uv_sphere_mesh(0.2, 48, 24), metal(glm::vec3(1), 0.8f), {0.4, 0.3, 0.2}, scene::world_mixed);
+  add(box_mesh({0.25, 0.25, 0.25}), hammered, {0.5, -0.3, 0.125}, scene::world_real);
+  add(box_mesh({0.6, 0.004, 0.5}), pane, {0.1, 0.6, 0.3}, scene::world_mixed);
+  view.environment = uniform_environment(glm::vec3(0.3f, 0.4f, 0.5f), 8);
+  for (int i = 0; i < 6; ++i) view.environment.radiance[static_cast<std::size_t>(9 + i)] *= 6.0f;
+  view.calibration = pinhole(64, 48, 0.8);
+  view.world_from_camera = look_at({0.6, -2, 1.2}, {0, 0, 0.15});
+  return view;
+}
+
+TEST(RoughMaterials, agree_with_the_cpu_tracer) {
+  expect_agreement(rough_materials(), 32, true);
+}
+
 // The difference estimator against the paired one: by the difference where nothing covers the
 // picture, and by the composite over black everywhere. Lamps differ between the worlds in every
 // other set, objects are taken away in the rest.

@@ -57,6 +57,43 @@ TEST(DirectLight, point) {
   expect_radiance(view, albedo / pi * light.emission * (2 / std::sqrt(d2)) / d2, 1e-3);
 }
 
+// One texel that turns the normal towards `tangent` (+X along u, +Y up the picture, against v).
+void map_normal(View& view, const glm::dvec3& tangent) {
+  scene::Texture texture;
+  texture.width = texture.height = 1;
+  texture.texels = {glm::vec4(glm::vec3(0.5 * tangent + 0.5), 1)};
+  const std::uint32_t index = add_texture(view.scene, std::move(texture));
+  view.scene.materials[view.scene.instances[0].material].normal_texture = index;
+}
+
+// World direction in which u (0) or v (1) of the plane's mesh grows.
+glm::dvec3 grows(const scene::Mesh& mesh, int coordinate) {
+  glm::dvec3 direction(0);
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i)
+    direction += glm::dvec3(mesh.positions[i]) * (mesh.uvs[i][coordinate] - 0.5);
+  return glm::normalize(direction);
+}
+
+// The cosine at the mapped normal, with the plane facing the camera and turned away from it.
+TEST(DirectLight, on_a_normal_map) {
+  const glm::dvec3 tangent = glm::normalize(glm::dvec3(0.3, 0.5, 0.9));
+  for (const bool mirrored : {false, true}) {
+    View view = lit_point();
+    if (mirrored) view.scene.instances[0].world_from_object[0] *= -1.0;
+    const scene::Mesh& mesh = view.scene.meshes[0];
+    const glm::dvec3 u = (mirrored ? -1.0 : 1.0) * grows(mesh, 0);
+    const glm::dvec3 normal =
+        tangent.x * u - tangent.y * grows(mesh, 1) + tangent.z * glm::dvec3(0, 0, 1);
+    map_normal(view, tangent);
+    SCOPED_TRACE(mirrored ? "mirrored" : "as it is");
+    set::Light light = lamp(set::LightType::directional);
+    light.direction = -glm::normalize(glm::dvec3(0.2, -0.4, 0.7));
+    view.scene.lights.push_back(light);
+    // A half has 11 bits: the texel's error of 2^-11 in each of three components.
+    expect_radiance(view, albedo / pi * light.emission * glm::dot(normal, -light.direction), 2e-3);
+  }
+}
+
 TEST(DirectLight, spot_inside_and_between_its_cones) {
   View view = lit_point();
   set::Light light = lamp(set::LightType::spot);
