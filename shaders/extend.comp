@@ -4,8 +4,8 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
+#include "shaders/lib/alpha.glsl"
 #include "shaders/lib/path.glsl"
-#include "shaders/lib/trace.glsl"
 
 // A resumed ray starts just before where its path parted: what is there is not in its world.
 const float RESUME_BEFORE = 0.9999;
@@ -16,7 +16,7 @@ void main() {
   const vec4 origin = ray_origin[path];
   const uint bits = floatBitsToUint(path_throughput[path].w);
   Hit hit;
-  const bool found = trace_closest(origin.xyz, ray_direction[path].xyz, origin.w * RESUME_BEFORE,
-                                   3.4e38, path_worlds(bits), hit);
+  const bool found = closest_met(origin.xyz, ray_direction[path].xyz, origin.w * RESUME_BEFORE,
+                                 3.4e38, path_worlds(bits), hit);
   hits[path] = GpuHit(found ? hit.t : -1.0, hit.barycentrics, hit.instance, hit.primitive);
 }

@@ -63,6 +63,7 @@ gpu::GpuLight encode_light(const set::Light& light, const glm::dvec3& camera_pos
   result.gain = glm::vec2(light.gain_mixed, light.gain_real);
   result.radius = static_cast<float>(light.radius_m);
   result.emission_texture = gpu::NO_INDEX;
+  result.alpha_material = gpu::NO_INDEX;
   if (light.type == set::LightType::spot) {
     result.cos_inner = static_cast<float>(std::cos(light.inner_cone_rad));
     result.cos_outer = static_cast<float>(std::cos(light.outer_cone_rad));
@@ -110,6 +111,8 @@ std::vector<gpu::GpuLight> encode_emitter(const scene::Instance& instance, const
     light.gain = glm::vec2((instance.presence & scene::world_mixed) != 0 ? 1 : 0,
                            (instance.presence & scene::world_real) != 0 ? 1 : 0);
     light.emission_texture = material.emission_texture;
+    light.alpha_material =
+        material.alpha_mode == scene::AlphaMode::opaque ? gpu::NO_INDEX : instance.material;
     if (!mesh.uvs.empty()) {
       light.uv0 = mesh.uvs[triangle.x];
       light.uv1 = mesh.uvs[triangle.y];

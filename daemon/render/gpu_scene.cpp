@@ -109,7 +109,8 @@ void GpuScene::upload_materials(double specular_alpha) {
     materials.push_back({m.base_color, m.metallic, m.emission, m.roughness, m.specular, m.ior,
                          m.transmission, m.thin_walled ? 1u : 0u, m.base_color_texture,
                          m.metallic_roughness_texture, m.emission_texture, m.normal_texture,
-                         m.normal_scale, albedo.first_of(m, specular_alpha)});
+                         m.normal_scale, static_cast<std::uint32_t>(m.alpha_mode), m.alpha,
+                         m.alpha_cutoff, albedo.first_of(m, specular_alpha)});
   upload_storage(device_, materials_, materials);
   upload_texels(device_, albedo_, albedo.values, vk::Format::eR32Sfloat);
 }
@@ -238,6 +239,9 @@ std::uint32_t GpuScene::features() const {
   if (!scene_.textures.empty()) result |= gpu::FEATURE_TEXTURES;
   if (any_material([](const scene::Material& m) { return m.normal_texture != scene::no_texture; }))
     result |= gpu::FEATURE_NORMAL_MAPS;
+  if (any_material(
+          [](const scene::Material& m) { return m.alpha_mode != scene::AlphaMode::opaque; }))
+    result |= gpu::FEATURE_ALPHA;
   if (!scene_.lights.empty() || !emitters_.empty()) result |= gpu::FEATURE_LIGHTS;
   if (std::any_of(scene_.lights.begin(), scene_.lights.end(), can_be_seen))
     result |= gpu::FEATURE_VISIBLE_LIGHTS;

@@ -62,9 +62,13 @@ float spot_falloff(GpuLight light, float cos_angle) {
 }
 
 vec3 triangle_emission(GpuLight light, vec2 b) {
-  if (!has_feature(FEATURE_TEXTURES) || light.emission_texture == NO_INDEX) return light.emission;
   const vec2 uv = light.uv0 * (1.0 - b.x - b.y) + light.uv1 * b.x + light.uv2 * b.y;
-  return light.emission * sample_texture(light.emission_texture, uv).rgb;
+  vec3 emission = light.emission;
+  if (has_feature(FEATURE_TEXTURES) && light.emission_texture != NO_INDEX)
+    emission *= sample_texture(light.emission_texture, uv).rgb;
+  if (has_feature(FEATURE_ALPHA) && light.alpha_material != NO_INDEX)
+    emission *= coverage(light.alpha_material, uv);
+  return emission;
 }
 
 bool sample_area(GpuLight light, vec3 point, vec3 on_light, vec3 normal, float area,

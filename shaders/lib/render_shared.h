@@ -96,6 +96,7 @@ PREVIZ_CONST uint FEATURE_ENVIRONMENT_SAMPLING = 128u;  // next-event estimation
 PREVIZ_CONST uint FEATURE_CAUSTICS = 256u;  // paths bring light to rough vertices by Dirac lobes only
 PREVIZ_CONST uint FEATURE_PHOTONS = 512u;   // photons bring it
 PREVIZ_CONST uint FEATURE_NORMAL_MAPS = 2048u;
+PREVIZ_CONST uint FEATURE_ALPHA = 4096u;  // any surface that is not there everywhere
 PREVIZ_CONST uint FEATURE_DIFFERENCE = 1024u;  // only what differs is traced, where that is enough
 
 // Bits of a path's state.
@@ -188,8 +189,16 @@ struct GpuMaterial {
   uint emission_texture;
   uint normal_texture;
   float normal_scale;
+  uint alpha_mode;    // ALPHA_*
+  float alpha;
+  float alpha_cutoff;
   uint albedo_table;  // rough glass: of ALBEDO, seen from outside; the next one is from inside
 };
+
+// glTF's alpha modes: all there; there where alpha reaches the cutoff; there by a share of alpha.
+PREVIZ_CONST uint ALPHA_OPAQUE = 0u;
+PREVIZ_CONST uint ALPHA_MASK = 1u;
+PREVIZ_CONST uint ALPHA_BLEND = 2u;
 
 PREVIZ_CONST uint TEXTURE_REPEAT = 0u;
 PREVIZ_CONST uint TEXTURE_CLAMP = 1u;
@@ -226,6 +235,7 @@ struct GpuLight {
   float cdf;       // sum of selection up to and including this light
   vec2 uv0, uv1, uv2;  // triangle: texture coordinates
   uint emission_texture;
+  uint alpha_material;  // triangle: whose alpha weakens it; NO_INDEX: it is all there
 };
 
 struct GpuFrame {
@@ -265,10 +275,10 @@ static_assert(sizeof(GpuShadowRay) == 52);
 static_assert(sizeof(GpuPixel) == 144);
 static_assert(sizeof(GpuControl) == 72);
 static_assert(sizeof(GpuInstance) == 112);
-static_assert(sizeof(GpuMaterial) == 72);
+static_assert(sizeof(GpuMaterial) == 84);
 static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
-static_assert(sizeof(GpuLight) == 124);
+static_assert(sizeof(GpuLight) == 128);
 static_assert(offsetof(GpuLight, uv0) == 96);
 static_assert(sizeof(GpuFrame) == 140);
 static_assert(sizeof(GpuBatch) == 28);

@@ -154,6 +154,26 @@ vec3 map_normal(GpuInstance instance, GpuMaterial m, Triangle t, vec2 uv, vec3 n
   return normalize(mapped);
 }
 
+// How much of a surface is there, by its material's alpha.
+float coverage(uint material, vec2 uv) {
+  const GpuMaterial m = materials[material];
+  if (m.alpha_mode == ALPHA_OPAQUE) return 1.0;
+  float alpha = m.alpha;
+  if (has_feature(FEATURE_TEXTURES) && m.base_color_texture != NO_INDEX)
+    alpha *= sample_texture(m.base_color_texture, uv).a;
+  return m.alpha_mode == ALPHA_MASK ? float(alpha >= m.alpha_cutoff) : clamp(alpha, 0.0, 1.0);
+}
+
+vec2 hit_uv(uint instance, uint primitive, vec2 barycentrics) {
+  const uvec3 index = texelFetch(triangles, int(instances[instance].first_triangle + primitive)).xyz;
+  const vec3 b = vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics);
+  vec2 uv = vec2(0.0);
+  for (int i = 0; i < 3; ++i)
+    uv += b[i] * vec2(texelFetch(vertices, int(2u * index[i])).w,
+                      texelFetch(vertices, int(2u * index[i]) + 1).w);
+  return uv;
+}
+
 void apply_material(inout Surface s, uint material, vec2 uv) {
   const GpuMaterial m = materials[material];
   s.base_color = m.base_color;

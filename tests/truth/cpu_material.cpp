@@ -89,6 +89,14 @@ glm::dvec3 normal_at(const scene::Scene& scene, const Geometry& geometry, const 
   return glm::normalize(mapped + lift * hit.geometric_normal);
 }
 
+double coverage_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2& uv) {
+  const scene::Material& m = scene.materials[scene.instances[instance].material];
+  if (m.alpha_mode == scene::AlphaMode::opaque) return 1;
+  const double alpha = m.alpha * look_up(scene, m.base_color_texture, uv).w;
+  if (m.alpha_mode == scene::AlphaMode::mask) return alpha >= m.alpha_cutoff ? 1 : 0;
+  return std::clamp(alpha, 0.0, 1.0);
+}
+
 glm::dvec3 emission_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2& uv) {
   const scene::Material& m = scene.materials[scene.instances[instance].material];
   if (m.emission == glm::vec3(0)) return glm::dvec3(0);

@@ -37,6 +37,7 @@ struct World {
   std::uint32_t bit;
   std::vector<set::Light> lamps;  // relative to the camera, gain applied
   EmissiveMeshes emissive;
+  bool has_alpha;
 };
 
 std::vector<set::Light> placed_lamps(const scene::Scene& scene, const glm::dvec3& origin,
@@ -48,6 +49,39 @@ std::vector<set::Light> placed_lamps(const scene::Scene& scene, const glm::dvec3
   }
   std::erase_if(lamps, [](const set::Light& lamp) { return lamp.emission == glm::dvec3(0); });
   return lamps;
+}
+
+// The same ray, from just behind what it met.
+Ray resumed(const Ray& ray, const Hit& hit) {
+  return {ray.origin + ray.direction * (hit.distance + 2 * hit.offset), ray.direction};
+}
+
+// The closest surface that is there, each by the odds of its alpha.
+std::optional<Hit> closest_met(const scene::Scene& scene, const Geometry& geometry, const Ray& ray,
+                               std::uint32_t worlds, Random& random) {
+  auto hit = geometry.closest(ray, worlds);
+  while (hit) {
+    const double coverage = coverage_at(scene, hit->instance, hit->uv);
+    if (coverage >= 1 || random.uniform() < coverage) break;
+    const Ray behind = resumed(ray, *hit);
+    hit = geometry.closest(behind, worlds);
+    if (hit) hit->distance += glm::dot(behind.origin - ray.origin, ray.direction);
+  }
+  return hit;
+}
+
+// The share of light that comes this far along the ray.
+double light_through(const World& world, Ray ray, double distance) {
+  if (!world.has_alpha) return world.geometry.blocked(ray, distance, world.bit) ? 0 : 1;
+  double share = 1;
+  while (share > 0) {
+    const auto hit = world.geometry.closest(ray, world.bit);
+    if (!hit || hit->distance >= distance) break;
+    share *= 1 - coverage_at(world.scene, hit->instance, hit->uv);
+    distance -= hit->distance + 2 * hit->offset;
+    ray = resumed(ray, *hit);
+  }
+  return share;
 }
 
 // A surface point of the path, ready for shading.
@@ -116,10 +150,10 @@ glm::dvec3 light_from_meshes(const World& world, const Vertex& vertex, Random& r
   const double light_pdf = s.area_pdf * distance * distance / cosine;
   const glm::dvec3 f = reflected(vertex, wi, light_pdf);
   const double margin = 0x1p-18 * std::max(glm::length(s.position), distance) / cosine;
-  if (f == glm::dvec3(0) || world.geometry.blocked({start, wi}, distance - margin, world.bit)) {
-    return glm::dvec3(0);
-  }
-  return f * emission_at(world.scene, s.instance, s.uv) / light_pdf;
+  if (f == glm::dvec3(0)) return f;
+  const double coverage = coverage_at(world.scene, s.instance, s.uv);
+  return f * coverage * emission_at(world.scene, s.instance, s.uv) / light_pdf *
+         light_through(world, {start, wi}, distance - margin);
 }
 
 // Next-event estimation: one sample of the environment, of every lamp and of the emissive meshes.
@@ -131,8 +165,7 @@ glm::dvec3 direct_light(const World& world, const Vertex& vertex, Random& random
                        const glm::dvec3& value) {
     const glm::dvec3 f = reflected(vertex, wi, light_pdf) * value;
     if (f == glm::dvec3(0)) return;
-    if (!world.geometry.blocked({behind ? vertex.start(wi) : above, wi}, distance, world.bit))
-      sum += f;
+    sum += f * light_through(world, {behind ? vertex.start(wi) : above, wi}, distance);
   };
   if (!world.environment.black()) {
     const DirectionSample s = world.environment.sample(random.uniform2());
@@ -153,7 +186,7 @@ glm::dvec3 radiance(const World& world, Ray ray, Random& random, double& first_d
   bool last_dirac = false;
   bool has_rough_vertex = false;
   for (int depth = 0;; ++depth) {
-    const auto hit = world.geometry.closest(ray, world.bit);
+    const auto hit = closest_met(world.scene, world.geometry, ray, world.bit, random);
     if (depth == 0) first_distance = hit ? hit->distance : 0;
     const bool caustic = has_rough_vertex && last_dirac;
     if (world.options.caustics || !caustic) {
@@ -188,7 +221,6 @@ struct PixelSums {
 void require_supported(const scene::Scene& scene) {
   for (const scene::Material& m : scene.materials) {
     const std::string what = "reference tracer: material '" + m.name + "' has ";
-    if (m.alpha_mode != scene::AlphaMode::opaque) throw Error(what + "alpha, which is not traced");
     if (m.attenuation_color != glm::vec3(1)) {
       throw Error(what + "an attenuating volume, which is not traced");
     }
@@ -224,13 +256,17 @@ TracedPicture CpuTracer::trace(const ObserverCalibration& calibration,
   const glm::dvec3 eye(world_from_camera[3]);
   const glm::dmat3 rotation(world_from_camera);
   impl_->geometry.place(eye);
+  const auto& scene_materials = impl_->scene.materials;
   const World world{impl_->scene,
                     impl_->environment,
                     impl_->geometry,
                     impl_->options,
                     world_bit,
                     placed_lamps(impl_->scene, eye, world_bit),
-                    EmissiveMeshes(impl_->scene, impl_->geometry, world_bit)};
+                    EmissiveMeshes(impl_->scene, impl_->geometry, world_bit),
+                    std::any_of(scene_materials.begin(), scene_materials.end(), [](const auto& m) {
+                      return m.alpha_mode != scene::AlphaMode::opaque;
+                    })};
 
   const auto pixel = [&](int x, int y) {
     Random random(seed, (static_cast<std::uint64_t>(y) << 32) | static_cast<std::uint32_t>(x));
@@ -251,7 +287,8 @@ TracedPicture CpuTracer::trace(const ObserverCalibration& calibration,
         sums.depth += distance * in_camera.direction.z;
         ++sums.hits;
       }
-      const auto either = impl_->geometry.closest(ray, scene::world_both);
+      const auto either =
+          closest_met(impl_->scene, impl_->geometry, ray, scene::world_both, random);
       if (either && impl_->scene.instances[either->instance].presence != scene::world_both) {
         ++sums.mask;
       }

@@ -112,8 +112,17 @@ scene::Texture bumps() {
   return texture;
 }
 
-// Rough glass, solid and as a pane, white rough metal, and normal maps on plastic and metal; on a
-// table in both worlds, under an environment with a bright side.
+scene::Texture holes() {
+  scene::Texture texture;
+  texture.width = texture.height = 4;
+  texture.nearest = true;
+  for (int i = 0; i < 16; ++i)
+    texture.texels.emplace_back(glm::vec3(1), (i + i / 4) % 2 == 0 ? 1.0f : 0.0f);
+  return texture;
+}
+
+// Rough glass, solid and as a pane, white rough metal, normal maps on plastic and metal, a veil and
+// a glowing fence with holes; on a table in both worlds, under an environment with a bright side.
 View rough_materials() {
   View view;
   scene::Scene& scene = view.scene;
@@ -141,6 +150,14 @@ View rough_materials() {
   add(uv_sphere_mesh(0.2, 48, 24), metal(glm::vec3(1), 0.8f), {0.4, 0.3, 0.2}, scene::world_mixed);
   add(box_mesh({0.25, 0.25, 0.25}), hammered, {0.5, -0.3, 0.125}, scene::world_real);
   add(box_mesh({0.6, 0.004, 0.5}), pane, {0.1, 0.6, 0.3}, scene::world_mixed);
+  scene::Material veil = diffuse({0.8f, 0.3f, 0.3f});
+  veil.alpha_mode = scene::AlphaMode::blend;
+  veil.alpha = 0.4f;
+  scene::Material fence = emitter({1.5f, 1.2f, 0.4f});
+  fence.alpha_mode = scene::AlphaMode::mask;
+  fence.base_color_texture = add_texture(scene, holes());
+  add(box_mesh({0.4, 0.002, 0.3}), veil, {0.6, -0.7, 0.2}, scene::world_mixed);
+  add(box_mesh({0.3, 0.002, 0.3}), fence, {-0.7, -0.4, 0.2}, scene::world_both);
   view.environment = uniform_environment(glm::vec3(0.3f, 0.4f, 0.5f), 8);
   for (int i = 0; i < 6; ++i) view.environment.radiance[static_cast<std::size_t>(9 + i)] *= 6.0f;
   view.calibration = pinhole(64, 48, 0.8);

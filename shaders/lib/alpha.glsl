@@ -1,0 +1,62 @@
+// Rays among surfaces that are not there everywhere: a closest hit that is missed where alpha says
+// so, and light that is weakened by what it passes. Without FEATURE_ALPHA they are lib/trace.glsl's.
+#ifndef PREVIZ_ALPHA_GLSL
+#define PREVIZ_ALPHA_GLSL
+
+#include "shaders/lib/sampler.glsl"
+#include "shaders/lib/scene.glsl"
+#include "shaders/lib/trace.glsl"
+
+// Surfaces of a ray that may be transparent; the next one counts as there.
+const uint MAX_LAYERS = 256u;
+
+float hit_coverage(Hit hit) {
+  const uint material = instances[hit.instance].material;
+  if (materials[material].alpha_mode == ALPHA_OPAQUE) return 1.0;
+  return coverage(material, hit_uv(hit.instance, hit.primitive, hit.barycentrics));
+}
+
+// Whether the ray meets the surface, with a probability of its coverage. All worlds of a ray decide
+// alike; rays differ, so a hash of the ray is as good as a random number.
+bool is_met(Hit hit, vec3 origin, vec3 direction) {
+  const float share = hit_coverage(hit);
+  if (share >= 1.0) return true;
+  uint key = hash_pair(hit.instance, hit.primitive);
+  key = hash_pair(key, hash_pair(floatBitsToUint(direction.x), floatBitsToUint(direction.y)));
+  key = hash_pair(key, hash_pair(floatBitsToUint(direction.z), floatBitsToUint(origin.x)));
+  key = hash_pair(key, hash_pair(floatBitsToUint(origin.y), floatBitsToUint(origin.z)));
+  return unit_float(key) < share;
+}
+
+bool closest_met(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds, out Hit hit) {
+  if (!has_feature(FEATURE_ALPHA))
+    return trace_closest(origin, direction, t_min, t_max, worlds, hit);
+  for (uint layer = 0u; layer < MAX_LAYERS; ++layer) {
+    if (!trace_closest(origin, direction, t_min, t_max, worlds, hit)) return false;
+    if (is_met(hit, origin, direction)) return true;
+    t_min = hit.t;
+  }
+  return trace_closest(origin, direction, t_min, t_max, worlds, hit);
+}
+
+// The share of light that comes through, in the (mixed, real) world; 0 in a world not asked for.
+vec2 light_through(vec3 origin, vec3 direction, float t_max, uint worlds) {
+  vec2 share = vec2((worlds & WORLD_MIXED) != 0u, (worlds & WORLD_REAL) != 0u);
+  if (!has_feature(FEATURE_ALPHA)) {
+    const uint blocked = trace_blocked(origin, direction, 0.0, t_max, worlds);
+    return share * vec2((blocked & WORLD_MIXED) == 0u, (blocked & WORLD_REAL) == 0u);
+  }
+  float t_min = 0.0;
+  for (uint layer = 0u; layer <= MAX_LAYERS && worlds != 0u; ++layer) {
+    Hit hit;
+    if (!trace_closest(origin, direction, t_min, t_max, worlds, hit)) return share;
+    const float through = layer < MAX_LAYERS ? 1.0 - hit_coverage(hit) : 0.0;
+    if ((hit.presence & WORLD_MIXED) != 0u) share.x *= through;
+    if ((hit.presence & WORLD_REAL) != 0u) share.y *= through;
+    if (through <= 0.0) worlds &= ~hit.presence;
+    t_min = hit.t;
+  }
+  return share;
+}
+
+#endif
