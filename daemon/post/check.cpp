@@ -18,6 +18,7 @@
 #include "daemon/tracking/apriltag_tracker.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
+#include "shaders/lib/render_shared.h"
 
 namespace previz::post {
 namespace {
@@ -259,6 +260,8 @@ void print_requirements(const scene::Requirements& required, std::ostream& out) 
       {&scene::Requirements::metals, "conductors: something is of metal",
        "conductors: nothing is of metal"},
       {&scene::Requirements::rough_specular, "GGX: something is glossy", "GGX: nothing is glossy"},
+      {&scene::Requirements::caustics, "caustics: mirrors or clear glass throw light on",
+       "caustics: nothing throws light on without blurring it"},
       {&scene::Requirements::textures, "textures: surfaces read pictures",
        "textures: no surface reads a picture"},
       {&scene::Requirements::alpha, "alpha: rays pass through parts of a surface",
@@ -275,6 +278,33 @@ void print_requirements(const scene::Requirements& required, std::ostream& out) 
   out << "\nthe renderer leaves out\n";
   for (const auto& part : parts)
     if (!(required.*part.needed)) out << "  " << part.without << '\n';
+}
+
+// What a frame asks of the GPU, before anything is measured; `previzd trade` measures.
+void print_costs(const set::Set& set, const scene::Requirements& required, std::ostream& out) {
+  // Bytes a vertex, triangle and texel in lib/render_shared.h's buffers; a tree of pairs takes
+  // about one record of 64 bytes a triangle.
+  const double scene_bytes =
+      32.0 * required.vertices + (16.0 + 64.0) * required.triangles + 8.0 * required.texels;
+  constexpr double mebibyte = 1024.0 * 1024.0;
+  out << "\na frame costs\n";
+  out << words("  scene in the GPU's memory: about ", std::ceil(scene_bytes / mebibyte), " MiB\n");
+  if (!set.observer.calibration) return;
+  const auto& intrinsics = set.observer.calibration->intrinsics;
+  const double pixels = static_cast<double>(intrinsics.width) * intrinsics.height;
+  const double samples = pixels * set.quality.samples;
+  out << words("  picture in the GPU's memory: about ",
+               std::ceil(sizeof(gpu::GpuPixel) * pixels / mebibyte), " MiB\n");
+  // A path and a light sample a bounce, and one more segment; twice, where the worlds part.
+  const double most =
+      samples * (2.0 * set.estimation.max_depth + 1) * (required.differing_objects ? 2.0 : 1.0);
+  out << "  rays: " << grouped(static_cast<std::uint64_t>(2 * samples)) << " at least, "
+      << grouped(static_cast<std::uint64_t>(most)) << " at most\n";
+  if (required.caustics && set.estimation.caustics == set::Caustics::photons)
+    out << "  photons: "
+        << grouped(static_cast<std::uint64_t>(std::max(1024.0, set.estimation.photons * pixels)) *
+                   static_cast<std::uint64_t>(set.quality.samples))
+        << '\n';
 }
 
 int refuse(const Lines& problems, std::ostream& out) {
@@ -306,7 +336,9 @@ int check_set(const fs::path& set_or_session, std::ostream& out) {
   print_objects(checked.set, *scene, out);
   print_lights(checked.set, *scene, out);
   print_estimator(checked.set, out);
-  print_requirements(scene::requirements(*scene, checked.set), out);
+  const scene::Requirements required = scene::requirements(*scene, checked.set);
+  print_requirements(required, out);
+  print_costs(checked.set, required, out);
   if (!checked.remarks.empty()) out << "\nworth a look\n";
   for (const auto& remark : checked.remarks) out << "  " << remark << '\n';
   return 0;

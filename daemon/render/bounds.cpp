@@ -6,8 +6,6 @@
 #include <glm/mat4x4.hpp>
 #include <limits>
 
-#include "shaders/lib/render_shared.h"
-
 namespace previz::render {
 namespace {
 
@@ -54,23 +52,6 @@ Bounds bounds_where(const scene::Scene& scene,
   return bounds;
 }
 
-// The smallest factor that a texture puts on the roughness.
-float least_roughness_factor(const scene::Scene& scene, std::uint32_t texture) {
-  if (texture == scene::no_texture) return 1.0f;
-  float least = 1.0f;
-  for (const glm::vec4& texel : scene.textures[texture].texels) least = std::min(least, texel.g);
-  return least;
-}
-
-bool can_be_dirac(const scene::Scene& scene, const scene::Material& m, double specular_alpha) {
-  const bool glass = m.transmission > 0 && m.metallic < 1;
-  if (glass && m.ior < gpu::LEAST_ROUGH_IOR) return true;
-  if (!glass && !(m.metallic > 0) && !(m.specular > 0 && m.ior > 1)) return false;
-  const double roughness =
-      m.roughness * least_roughness_factor(scene, m.metallic_roughness_texture);
-  return roughness * roughness <= specular_alpha * (1 + 1e-5);  // the shader's sum is in floats
-}
-
 }  // namespace
 
 Bounds difference_bounds(const scene::Scene& scene) {
@@ -82,7 +63,7 @@ Bounds difference_bounds(const scene::Scene& scene) {
 Bounds specular_bounds(const scene::Scene& scene, double specular_alpha) {
   std::vector<bool> dirac;
   for (const scene::Material& material : scene.materials)
-    dirac.push_back(can_be_dirac(scene, material, specular_alpha));
+    dirac.push_back(scene::can_be_dirac(scene, material, specular_alpha));
   return bounds_where(
       scene, [&](const scene::Instance& instance) -> bool { return dirac[instance.material]; });
 }

@@ -7,12 +7,21 @@
 #include <vector>
 
 #include "daemon/scene/gltf.hpp"
+#include "shaders/lib/render_shared.h"
 
 namespace previz::scene {
 namespace {
 
 float largest(const glm::vec3& color) {
   return std::max({color.r, color.g, color.b});
+}
+
+// The smallest factor that a texture puts on the roughness.
+float least_roughness_factor(const Scene& scene, std::uint32_t texture) {
+  if (texture == no_texture) return 1.0f;
+  float least = 1.0f;
+  for (const glm::vec4& texel : scene.textures[texture].texels) least = std::min(least, texel.g);
+  return least;
 }
 
 // What one material, somewhere in the scene, asks of the renderer.
@@ -26,6 +35,7 @@ void require(const Material& material, const Scene& scene, double specular_alpha
   const bool reflects = is_metal || transmits || (material.specular > 0 && material.ior > 1);
   // A texture can only lower the roughness.
   const double alpha = static_cast<double>(material.roughness) * material.roughness;
+  required.caustics |= can_be_dirac(scene, material, specular_alpha);
   required.metals |= is_metal;
   required.transmission |= transmits;
   required.rough_specular |= reflects && alpha > specular_alpha;
@@ -71,13 +81,25 @@ Scene load_scene(const set::Set& set) {
   return scene;
 }
 
+bool can_be_dirac(const Scene& scene, const Material& m, double specular_alpha) {
+  const bool glass = m.transmission > 0 && m.metallic < 1;
+  if (glass && m.ior < gpu::LEAST_ROUGH_IOR) return true;
+  if (!glass && !(m.metallic > 0) && !(m.specular > 0 && m.ior > 1)) return false;
+  const double roughness =
+      m.roughness * least_roughness_factor(scene, m.metallic_roughness_texture);
+  return roughness * roughness <= specular_alpha * (1 + 1e-5);  // the shader's sum is in floats
+}
+
 Requirements requirements(const Scene& scene, const set::Set& set) {
   Requirements required;
   std::vector<bool> mesh_counted(scene.meshes.size()), material_seen(scene.materials.size());
   for (const Instance& instance : scene.instances) {
     if (instance.presence == 0) continue;
     const std::uint64_t triangles = scene.meshes[instance.mesh].triangles.size();
-    if (!mesh_counted[instance.mesh]) required.triangles += triangles;
+    if (!mesh_counted[instance.mesh]) {
+      required.triangles += triangles;
+      required.vertices += scene.meshes[instance.mesh].positions.size();
+    }
     mesh_counted[instance.mesh] = true;
     required.instanced_triangles += triangles;
     required.differing_objects |= instance.presence != world_both;
@@ -86,6 +108,7 @@ Requirements requirements(const Scene& scene, const set::Set& set) {
     material_seen[instance.material] = true;
     require(scene.materials[instance.material], scene, set.estimation.specular_roughness, required);
   }
+  for (const Texture& texture : scene.textures) required.texels += texture.texels.size();
   for (const set::Light& light : scene.lights) {
     const bool shines = light.gain_mixed > 0 || light.gain_real > 0;
     required.lights |= shines && largest(glm::vec3(light.emission)) > 0;

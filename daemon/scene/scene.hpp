@@ -107,13 +107,16 @@ struct Requirements {
   bool metals = false;          // any conductor
   bool rough_specular = false;  // any GGX lobe above the specular threshold
   bool textures = false;
-  bool alpha = false;  // any surface that can let rays through by alpha
+  bool caustics = false;  // anything that can throw light on by mirrors or clear glass, and light
+  bool alpha = false;     // any surface that can let rays through by alpha
   bool emissive_meshes = false;
   bool lights = false;             // any light that shines in one of the worlds
   bool differing_objects = false;  // any instance present in one world only
   bool removed_objects = false;
   bool thin_lens = false;
   std::uint64_t triangles = 0;            // unique
+  std::uint64_t vertices = 0;             // unique
+  std::uint64_t texels = 0;               // of all textures
   std::uint64_t instanced_triangles = 0;  // as seen by rays
 };
 
@@ -129,6 +132,10 @@ inline constexpr std::uint64_t max_file_bytes = 0xffffffffull;  // glTF binary's
 // file and what is wrong in it; what can be left out (zero-area and NaN triangles, extensions that
 // are used but not required) goes into Scene::notes.
 Scene load_scene(const set::Set& set);
+
+// Whether light can leave a surface of this material without blur: clear glass, and metal, glass or
+// a coat whose GGX alpha is somewhere at or below `specular_alpha`.
+bool can_be_dirac(const Scene& scene, const Material& material, double specular_alpha);
 
 // What the scene, with the set's lens and specular threshold, needs: only materials and textures
 // of instances count.

@@ -95,6 +95,8 @@ samples = 1500
   EXPECT_LT(said_.find("lamps: the set or a glTF file names some"), left_out);
   EXPECT_GT(said_.find("refraction: nothing lets light through"), left_out);
   EXPECT_GT(said_.find("lens sampling: everything is sharp"), left_out);
+  EXPECT_GT(said_.find("caustics: nothing throws light on"), left_out);
+  expect_said("scene in the GPU's memory: about 1 MiB");
   expect_said("the observer has no calibration here");
 }
 

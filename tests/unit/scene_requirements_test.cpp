@@ -23,8 +23,8 @@ TEST_F(SceneRequirements, ADiffuseRealSceneNeedsNothing) {
   add_mesh(scene, box_mesh({2, 2, 2}));
   const scene::Requirements r = required();
   EXPECT_FALSE(r.transmission || r.metals || r.rough_specular || r.textures || r.alpha ||
-               r.emissive_meshes || r.lights || r.differing_objects || r.removed_objects ||
-               r.thin_lens);
+               r.emissive_meshes || r.lights || r.caustics || r.differing_objects ||
+               r.removed_objects || r.thin_lens);
   EXPECT_EQ(r.triangles, 12u);
   EXPECT_EQ(r.instanced_triangles, 12u);
 }
@@ -54,6 +54,23 @@ TEST_F(SceneRequirements, ALobeIsRoughAboveTheSetsThreshold) {
   EXPECT_TRUE(required().rough_specular);
   set.estimation.specular_roughness = 0.05;
   EXPECT_FALSE(required().rough_specular);
+}
+
+TEST_F(SceneRequirements, CausticsNeedAClearInterface) {
+  scene::Material material = glass(1.5f);
+  material.roughness = 0.3f;
+  add(material);
+  add(metal({1, 1, 1}, 0.2f));
+  EXPECT_FALSE(required().caustics);
+  // Where a texture makes it smooth, a rough metal is a mirror.
+  scene::Texture texture;
+  texture.width = 2;
+  texture.height = 1;
+  texture.texels = {{1, 1, 1, 1}, {1, 0, 1, 1}};
+  scene::Material polished = metal({1, 1, 1}, 0.2f);
+  polished.metallic_roughness_texture = add_texture(scene, texture);
+  add(polished);
+  EXPECT_TRUE(required().caustics);
 }
 
 TEST_F(SceneRequirements, AMetalDoesNotTransmitAndAnIorOfOneDoesNotReflect) {
