@@ -10,6 +10,13 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 
+// A disc narrower than this is one direction: those in floats are 1e-7 apart.
+constexpr double least_disc_rad = 1e-6;
+
+// Of the light samples, the part that is shared out evenly: so none is so faint beside another,
+// wherever it stands, that it is left to luck.
+constexpr double even_share = 0.1;
+
 std::uint32_t gpu_type(set::LightType type) {
   switch (type) {
     case set::LightType::point:
@@ -47,11 +54,15 @@ double power(const gpu::GpuLight& light, double scene_radius) {
   }
 }
 
+bool has_disc(const set::Light& light) {
+  return light.type == set::LightType::directional && light.angular_radius_rad > least_disc_rad;
+}
+
 }  // namespace
 
 bool can_be_seen(const set::Light& light) {
   return light.type == set::LightType::rectangle || light.type == set::LightType::sphere ||
-         (light.type == set::LightType::directional && light.angular_radius_rad > 0);
+         has_disc(light);
 }
 
 gpu::GpuLight encode_light(const set::Light& light, const glm::dvec3& camera_position) {
@@ -74,10 +85,9 @@ gpu::GpuLight encode_light(const set::Light& light, const glm::dvec3& camera_pos
     result.edge_u = glm::vec3(glm::cross(up, normal) * light.width_m);
     result.edge_v = glm::vec3(up * light.height_m);
   }
-  if (light.type == set::LightType::directional && light.angular_radius_rad > 0) {
+  if (has_disc(light)) {
     const double sine = std::sin(light.angular_radius_rad);
     const double half = std::sin(light.angular_radius_rad / 2);
-    result.cos_inner = static_cast<float>(std::cos(light.angular_radius_rad));
     result.cone_sr = static_cast<float>(4 * pi * half * half);
     // The disc's radiance that gives the stated irradiance on a plane facing it.
     result.emission = glm::vec3(light.emission / (pi * sine * sine));
@@ -125,15 +135,23 @@ std::vector<gpu::GpuLight> encode_emitter(const scene::Instance& instance, const
 
 double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius) {
   double total = 0;
-  for (const gpu::GpuLight& light : lights) total += power(light, scene_radius);
-  double sum = 0;
-  for (gpu::GpuLight& light : lights) {
-    const double share = total > 0 ? power(light, scene_radius) / total : 1.0 / lights.size();
-    sum += share;
-    light.selection = static_cast<float>(share);
-    light.cdf = static_cast<float>(sum);
+  std::size_t shining = 0;
+  for (const gpu::GpuLight& light : lights) {
+    const double watts = power(light, scene_radius);
+    total += watts;
+    shining += watts > 0;
   }
-  if (!lights.empty()) lights.back().cdf = 1.0f;
+  double sum = 0;
+  float below = 0;
+  for (gpu::GpuLight& light : lights) {
+    const double watts = power(light, scene_radius);
+    if (total > 0 && watts > 0)
+      sum += (1 - even_share) * watts / total + even_share / static_cast<double>(shining);
+    light.cdf = std::min(static_cast<float>(sum), 1.0f);
+    // What the shader picks by, rounded as it is.
+    light.selection = light.cdf - below;
+    below = light.cdf;
+  }
   return total;
 }
 

@@ -12,7 +12,7 @@
 namespace previz::render {
 
 // True for lights that have an extent, so that rays can meet them: rectangle, sphere, and a
-// directional light with an angular radius.
+// directional light whose disc is wider than single precision can tell from a point.
 bool can_be_seen(const set::Light& light);
 
 gpu::GpuLight encode_light(const set::Light& light, const glm::dvec3& camera_position);
@@ -22,8 +22,9 @@ std::vector<gpu::GpuLight> encode_emitter(const scene::Instance& instance, const
                                           const scene::Material& material,
                                           const glm::dvec3& camera_position);
 
-// Fills selection and cdf in proportion to the power a light brings to a scene of this radius
-// (metres); returns the sum of the powers (W per channel, mean of the channels).
+// Fills selection and cdf: nine tenths by the power a light brings to a scene of this radius
+// (metres), one tenth evenly, nothing for black lights. Returns the sum of the powers (W per
+// channel, mean of the channels).
 double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius);
 
 }  // namespace previz::render

@@ -38,10 +38,10 @@ float sphere_cap(float radius, float distance_squared) {
 }
 
 vec3 sample_cone(vec3 axis, float cap, vec2 u) {
-  const float z = 1.0 - u.x * cap;
-  const float sin_theta = sqrt(max(0.0, (1.0 - z) * (1.0 + z)));
+  const float depth = u.x * cap;  // 1 - cos, which small cones do not survive being taken from 1
+  const float sin_theta = sqrt(depth * (2.0 - depth));
   const float phi = 2.0 * PI * u.y;
-  return make_frame(axis) * vec3(sin_theta * cos(phi), sin_theta * sin(phi), z);
+  return make_frame(axis) * vec3(sin_theta * cos(phi), sin_theta * sin(phi), 1.0 - depth);
 }
 
 // Nearest crossing of a unit ray with a sphere from outside; < 0: none.
@@ -143,7 +143,10 @@ float triangle_pdf(GpuLight light, vec3 direction, float t) {
 float meet_light(GpuLight light, vec3 origin, vec3 direction, out float pdf) {
   pdf = 0.0;
   if (light.type == LIGHT_DIRECTIONAL) {
-    if (light.cone_sr <= 0.0 || dot(-direction, light.direction) < light.cos_inner) return -1.0;
+    // The chord between the directions against the disc's: 2 sin(r / 2), cone = 4 pi sin^2(r / 2). The
+    // cosines of small angles are all the same.
+    const vec3 chord = direction + light.direction;
+    if (light.cone_sr <= 0.0 || dot(chord, chord) > light.cone_sr / PI) return -1.0;
     pdf = 1.0 / light.cone_sr;
     return 3.3e38;
   }
@@ -162,7 +165,7 @@ float meet_light(GpuLight light, vec3 origin, vec3 direction, out float pdf) {
   const vec3 off = t * direction - to_plane;
   const float a = dot(off, light.edge_u) / dot(light.edge_u, light.edge_u);
   const float b = dot(off, light.edge_v) / dot(light.edge_v, light.edge_v);
-  if (abs(a) > 0.5 || abs(b) > 0.5) return -1.0;
+  if (!(abs(a) <= 0.5 && abs(b) <= 0.5)) return -1.0;  // nor is one met whose sides round to nothing
   pdf = t * t / (length(light.edge_u) * length(light.edge_v) * cos_light);
   return t;
 }

@@ -225,7 +225,7 @@ struct GpuLight {
   vec3 direction;  // the way light travels; triangle: unit normal
   float radius;    // sphere
   vec3 edge_u;     // rectangle: whole width; triangle: v1 - v0
-  float cos_inner; // spot; directional: cosine of the angular radius
+  float cos_inner; // spot
   vec3 edge_v;     // rectangle: whole height; triangle: v2 - v0
   float cos_outer; // spot
   vec3 emission;   // intensity, irradiance (directional delta) or radiance

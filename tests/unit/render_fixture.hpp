@@ -52,6 +52,16 @@ inline glm::dvec3 standard_error(const render::Layers& layers) {
   return glm::sqrt(mean(layers.variance) / n);
 }
 
+// Standard error of the mean of the green mixed radiance from the spread of the pixels, for pictures
+// whose pixels all expect the same value: their scrambles are independent.
+inline double standard_error_of_pixels(const render::Layers& layers) {
+  const double centre = mean(layers.mixed).g;
+  double sum = 0;
+  for (const glm::vec3& pixel : layers.mixed) sum += (pixel.g - centre) * (pixel.g - centre);
+  const auto n = static_cast<double>(layers.mixed.size());
+  return std::sqrt(sum / (n * (n - 1)));
+}
+
 inline void expect_clean(const render::Counters& counters) {
   EXPECT_EQ(counters.dropped_not_finite, 0u);
   EXPECT_EQ(counters.dropped_negative, 0u);

@@ -1,0 +1,215 @@
+// Lamps of no size, lamps all around, lamps in an object or on it, and lamps drowned by others.
+#include <numbers>
+
+#include "tests/unit/render_fixture.hpp"
+
+namespace previz::testing {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+constexpr double albedo = 0.5;
+
+// The plane z = 0, so narrowly seen at the origin that the whole picture shows one point.
+View lit_point(double side_m = 20) {
+  View view;
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({side_m, side_m})),
+               add_material(view.scene, diffuse(glm::vec3(albedo))));
+  view.environment = uniform_environment(glm::vec3(0));
+  view.calibration = pinhole(24, 24, 1e-3);
+  view.world_from_camera = look_at({0, -1, 0.5}, {0, 0, 0});
+  return view;
+}
+
+set::Light lamp(set::LightType type) {
+  set::Light light;
+  light.type = type;
+  light.gain_real = 1;
+  return light;
+}
+
+render::Layers show(const View& view, int samples = 32) {
+  set::Estimation estimation;
+  estimation.max_depth = 4;
+  const Rendered result = render_view(view, samples, estimation);
+  expect_clean(result.counters);
+  return result.layers;
+}
+
+// Four standard errors, and `bias`: what the picture's 1 mm and single precision may move.
+void expect_irradiance(const View& view, double irradiance, double bias = 1e-3) {
+  const render::Layers layers = show(view);
+  const double expected = albedo / pi * irradiance;
+  EXPECT_NEAR(mean(layers.mixed).g, expected,
+              4 * standard_error_of_pixels(layers) + bias * expected);
+  EXPECT_LT(standard_error_of_pixels(layers), 0.01 * expected) << "nothing was shown";
+}
+
+// From a disc as wide as the hemisphere down to nothing, at the same irradiance.
+TEST(ExtremeLight, a_disc_brings_its_irradiance_at_any_angle) {
+  for (const double radius : {pi / 2, 0.1, 1e-3, 1e-5, 1e-9, 1e-20, 0.0}) {
+    SCOPED_TRACE(radius);
+    View view = lit_point();
+    set::Light sun = lamp(set::LightType::directional);
+    sun.angular_radius_rad = radius;
+    view.scene.lights.push_back(sun);
+    expect_irradiance(view, 1);
+  }
+}
+
+// What a camera sees of a disc, integrated over the picture, is the irradiance the disc brings: its
+// edge is where it should be, however small it is. A camera ray is right to 1e-7.
+TEST(ExtremeLight, a_disc_looks_as_large_as_it_is) {
+  for (const double radius : {0.2, 4.65e-3, 1e-3, 1e-4}) {
+    View view;
+    view.environment = uniform_environment(glm::vec3(0));
+    set::Light sun = lamp(set::LightType::directional);
+    sun.angular_radius_rad = radius;
+    view.scene.lights.push_back(sun);
+    view.calibration = pinhole(64, 64, 4 * radius);
+    view.world_from_camera = look_at({0, 0, 0}, {0, 0, 1});
+    const render::Layers layers = show(view, 64);
+    const PinholeIntrinsics& k = view.calibration.intrinsics;
+    double flux = 0;
+    for (int y = 0; y < k.height; ++y) {
+      for (int x = 0; x < k.width; ++x) {
+        const double u = (x - k.cx) / k.fx, v = (y - k.cy) / k.fy;
+        // dw cos(theta) of a pixel: 1 / (fx fy) (1 + u^2 + v^2)^-2
+        flux += static_cast<double>(layers.mixed[static_cast<std::size_t>(y) * 64 + x].g) /
+                (k.fx * k.fy * std::pow(1 + u * u + v * v, 2));
+      }
+    }
+    // Pixels that the edge crosses, 100 with 64 stratified samples each, are uncertain by 0.5 / 64
+    // of a pixel at most; the disc covers 800.
+    EXPECT_NEAR(flux, 1, 4 * std::sqrt(100.0) / 128 / 800 + 4e-7 / radius) << radius;
+  }
+}
+
+TEST(ExtremeLight, a_sphere_of_almost_no_size) {
+  for (const double radius : {0.1, 1e-4, 1e-9, 1e-15}) {
+    SCOPED_TRACE(radius);
+    View view = lit_point();
+    set::Light bulb = lamp(set::LightType::sphere);
+    bulb.position = {0.5, 0, 1};
+    bulb.radius_m = radius;
+    bulb.emission = glm::dvec3(1 / (radius * radius));
+    view.scene.lights.push_back(bulb);
+    expect_irradiance(view, pi / 1.25 * (1 / std::sqrt(1.25)));
+  }
+}
+
+TEST(ExtremeLight, a_rectangle_of_almost_no_size) {
+  for (const double side : {1e-2, 1e-6, 1e-12}) {
+    SCOPED_TRACE(side);
+    View view = lit_point();
+    set::Light panel = lamp(set::LightType::rectangle);
+    panel.position = {0, 0, 1};
+    panel.width_m = panel.height_m = side;
+    panel.emission = glm::dvec3(1 / (side * side));
+    view.scene.lights.push_back(panel);
+    expect_irradiance(view, 1);
+  }
+}
+
+// An area that single precision rounds to nothing is no light, and not one that fills the view.
+TEST(ExtremeLight, a_rectangle_of_no_size_is_not_seen) {
+  View view = lit_point();
+  set::Light panel = lamp(set::LightType::rectangle);
+  panel.position = {0, -0.1, 0.05};  // between the camera and what it looks at
+  panel.direction = {0, -1, 0.5};
+  panel.width_m = panel.height_m = 1e-25;
+  panel.emission = glm::dvec3(1e6);
+  view.scene.lights.push_back(panel);
+  EXPECT_EQ(mean(show(view).mixed), glm::dvec3(0));
+}
+
+// A closed lamp all around: every direction brings the same radiance.
+TEST(ExtremeLight, a_lamp_that_fills_the_sphere) {
+  View view = lit_point(1);
+  add_instance(view.scene, add_mesh(view.scene, inside_out(icosphere_mesh(5, 3))),
+               add_material(view.scene, emitter(glm::vec3(2))));
+  expect_irradiance(view, 2 * pi);
+}
+
+// Sphere lamps emit outwards: inside one there is no light, and no division by a negative angle.
+TEST(ExtremeLight, inside_a_sphere_lamp_it_is_dark) {
+  View view = lit_point(1);
+  set::Light bulb = lamp(set::LightType::sphere);
+  bulb.radius_m = 5;
+  view.scene.lights.push_back(bulb);
+  EXPECT_EQ(mean(show(view).mixed), glm::dvec3(0));
+}
+
+// Every kind of lamp in a closed opaque box: nothing comes out. In a glass ball: finite.
+TEST(ExtremeLight, inside_an_object) {
+  for (const auto type : {set::LightType::point, set::LightType::spot, set::LightType::rectangle,
+                          set::LightType::sphere}) {
+    for (const bool opaque : {true, false}) {
+      View view = lit_point();
+      glm::dmat4 pose(1);
+      pose[3] = {0.2, 0, 0.6, 1};
+      const auto shell =
+          add_mesh(view.scene, opaque ? box_mesh({0.3, 0.3, 0.3}) : icosphere_mesh(0.2, 3));
+      const auto material = add_material(view.scene, opaque ? diffuse(glm::vec3(1)) : glass(1.5f));
+      add_instance(view.scene, shell, material, pose, scene::world_mixed);
+      set::Light inside = lamp(type);
+      inside.position = {0.2, 0, 0.6};
+      inside.width_m = inside.height_m = inside.radius_m = 0.05;
+      view.scene.lights.push_back(inside);
+      const render::Layers layers = show(view, 8);
+      EXPECT_GT(mean(layers.real).g, 0);  // where the object is not, the lamp shines
+      if (opaque) {
+        EXPECT_EQ(mean(layers.mixed), glm::dvec3(0));
+      }
+    }
+  }
+}
+
+// Exactly on the surface it would light, and exactly where the camera is.
+TEST(ExtremeLight, on_a_surface_and_in_the_lens) {
+  for (const auto type : {set::LightType::point, set::LightType::spot, set::LightType::rectangle,
+                          set::LightType::sphere}) {
+    for (const glm::dvec3& place : {glm::dvec3(0), glm::dvec3(0, -1, 0.5)}) {
+      View view = lit_point();
+      set::Light light = lamp(type);
+      light.position = place;
+      light.width_m = light.height_m = light.radius_m = 0.01;
+      view.scene.lights.push_back(light);
+      show(view, 8);
+    }
+  }
+}
+
+// A faint lamp close by, in a stage whose sun has 1e11 times its power: half of the light here is
+// the lamp's, and it must not be forgotten when lights are chosen.
+TEST(ExtremeLight, a_candle_is_not_drowned_by_a_sun) {
+  View view = lit_point();
+  glm::dmat4 far(1);
+  for (const double x : {-1e3, 1e3}) {
+    far[3] = {x, 0, 0, 1};
+    add_instance(view.scene, 0, 0, far);
+  }
+  set::Light sun = lamp(set::LightType::directional);
+  view.scene.lights.push_back(sun);
+  set::Light candle = lamp(set::LightType::point);
+  candle.position = {0, 0, 0.01};
+  candle.emission = glm::dvec3(1e-4);
+  view.scene.lights.push_back(candle);
+  view.calibration = pinhole(24, 24, 1e-4);
+  expect_irradiance(view, 2);
+}
+
+TEST(ExtremeLight, black_lamps_light_nothing) {
+  View view = lit_point();
+  for (const auto type : {set::LightType::point, set::LightType::directional,
+                          set::LightType::rectangle, set::LightType::sphere}) {
+    set::Light light = lamp(type);
+    light.position = {0, 0, 1};
+    light.radius_m = 0.1;
+    light.emission = glm::dvec3(0);
+    view.scene.lights.push_back(light);
+  }
+  EXPECT_EQ(mean(show(view, 4).mixed), glm::dvec3(0));
+}
+
+}  // namespace
+}  // namespace previz::testing
