@@ -1,0 +1,192 @@
+// A virtual object that rests exactly on the real table, reaches into it, or contains the camera.
+#include <glm/gtc/matrix_transform.hpp>
+#include <numbers>
+
+#include "tests/unit/render_fixture.hpp"
+
+namespace previz::testing {
+namespace {
+
+constexpr int width = 64, height = 48;
+constexpr double albedo = 0.5;
+// What the sun brings to the table.
+const double lit = albedo / std::numbers::pi * 0.5 / std::sqrt(1.25);
+
+// A real table z = 0 under a point lamp and no other light, seen from the shadows' side.
+View table() {
+  View view;
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({2, 2})),
+               add_material(view.scene, diffuse(glm::vec3(albedo))));
+  view.environment = uniform_environment(glm::vec3(0));
+  set::Light sun;
+  sun.type = set::LightType::directional;
+  sun.direction = glm::normalize(glm::dvec3(0, -1, -0.5));
+  sun.gain_real = 1;
+  view.scene.lights.push_back(sun);
+  view.calibration = pinhole(width, height, 0.6);
+  view.world_from_camera = look_at({0.1, -1.2, 0.9}, {0, -0.1, 0});
+  return view;
+}
+
+std::uint32_t add_virtual(View& view, const scene::Mesh& mesh, const glm::dvec3& at) {
+  return add_instance(view.scene, add_mesh(view.scene, mesh),
+                      add_material(view.scene, diffuse({0.8f, 0.3f, 0.2f})),
+                      glm::translate(glm::dmat4(1), at), scene::world_mixed);
+}
+
+Rendered show(const View& view, set::Estimator estimator = set::Estimator::paired) {
+  set::Estimation estimation;
+  estimation.max_depth = 1;
+  estimation.estimator = estimator;
+  const Rendered result = render_view(view, 4, estimation);
+  expect_clean(result.counters);
+  return result;
+}
+
+// Pixels whose whole area shows the table inside of a rectangle, by their corners.
+template <typename Visit>
+void for_table_pixels(const View& view, const glm::dvec2& low, const glm::dvec2& high,
+                      const Visit& visit) {
+  const PinholeIntrinsics& k = view.calibration.intrinsics;
+  const glm::dvec3 eye(view.world_from_camera[3]);
+  int visited = 0;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      bool inside = true;
+      for (const glm::dvec2& corner : {glm::dvec2(-0.5, -0.5), glm::dvec2(0.5, -0.5),
+                                       glm::dvec2(-0.5, 0.5), glm::dvec2(0.5, 0.5)}) {
+        const glm::dvec3 ray(view.world_from_camera * glm::dvec4((x + corner.x - k.cx) / k.fx,
+                                                                 (y + corner.y - k.cy) / k.fy, 1,
+                                                                 0));
+        const glm::dvec3 at = eye - ray * (eye.z / ray.z);
+        inside = inside && at.x > low.x && at.x < high.x && at.y > low.y && at.y < high.y;
+      }
+      if (!inside) continue;
+      ++visited;
+      visit(static_cast<std::size_t>(y) * width + x);
+    }
+  }
+  EXPECT_GT(visited, 20) << "nothing was looked at";
+}
+
+// The decal lies in the table's plane. Whichever comes first in the scene is seen, everywhere.
+TEST(Contact, of_two_faces_in_one_plane_one_wins_everywhere) {
+  for (const bool table_first : {true, false}) {
+    for (const double turn : {0.0, 0.4}) {
+      View view = table();
+      add_virtual(view, rectangle_mesh({0.6, 0.6}), {0, 0, 0});
+      const glm::dmat4 turned =
+          glm::rotate(glm::dmat4(1), turn, glm::normalize(glm::dvec3(1, 2, 3)));
+      if (!table_first) std::swap(view.scene.instances[0], view.scene.instances[1]);
+      for (scene::Instance& instance : view.scene.instances)
+        instance.world_from_object = turned * instance.world_from_object;
+      view.scene.lights[0].direction = glm::dmat3(turned) * view.scene.lights[0].direction;
+      const View untilted = view;
+      view.world_from_camera = turned * view.world_from_camera;
+      const Rendered result = show(view);
+      for_table_pixels(untilted, glm::dvec2(-0.3), glm::dvec2(0.3), [&](std::size_t i) {
+        ASSERT_EQ(result.layers.mask[i], table_first ? 0.0f : 1.0f) << i;
+        // Neither shadows the other.
+        ASSERT_NEAR(result.layers.mixed[i].g, table_first ? lit : lit * 0.3 / albedo, 1e-5) << i;
+      });
+    }
+  }
+}
+
+// The sun comes from behind the box: all of the table before it, up to its very foot, loses all of
+// its light, to the rounding of a float.
+void expect_dark_before_box(const View& view, double top_m) {
+  for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
+    const Rendered result = show(view, estimator);
+    // The shadow is twice as long as the box is high.
+    for_table_pixels(view, {-0.2, -0.2 - 2 * top_m}, {0.2, -0.2}, [&](std::size_t i) {
+      ASSERT_EQ(result.layers.mask[i], 0.0f) << i;
+      ASSERT_NEAR(result.layers.diff[i].g, -lit, 1e-6) << i;
+    });
+  }
+}
+
+TEST(Contact, a_resting_box_casts_its_shadow_without_a_gap) {
+  for (const double top : {0.4, 0.05}) {
+    View view = table();
+    add_virtual(view, box_mesh({0.4, 0.4, top}), {0, 0, top / 2});
+    expect_dark_before_box(view, top);
+  }
+}
+
+TEST(Contact, an_interpenetrating_box_casts_its_shadow_without_a_gap) {
+  View view = table();
+  add_virtual(view, box_mesh({0.4, 0.4, 0.4}), {0, 0, 0.1});
+  expect_dark_before_box(view, 0.3);
+}
+
+// Two virtual boxes with all their faces in common, and one that reaches through both: the picture
+// is that of the first.
+TEST(Contact, twins_look_like_one) {
+  View one = table();
+  add_virtual(one, box_mesh({0.4, 0.4, 0.4}), {0, 0, 0.2});
+  View twins = one;
+  twins.scene.materials.push_back(diffuse({0.1f, 0.9f, 0.4f}));
+  scene::Instance second = twins.scene.instances.back();
+  second.material = static_cast<std::uint32_t>(twins.scene.materials.size() - 1);
+  second.object = 2;
+  twins.scene.instances.push_back(second);
+  EXPECT_EQ(show(one).layers.mixed, show(twins).layers.mixed);
+}
+
+// The same again and again: nothing depends on the order in which invocations run.
+TEST(Contact, is_deterministic) {
+  View view = table();
+  add_virtual(view, box_mesh({0.4, 0.4, 0.4}), {0, 0, 0.1});
+  add_virtual(view, uv_sphere_mesh(0.2, 24, 12), {0.15, -0.1, 0.1});
+  add_virtual(view, rectangle_mesh({1, 1}), {0, 0, 0});
+  const render::Layers first = show(view).layers;
+  for (int i = 0; i < 2; ++i) {
+    const render::Layers again = show(view).layers;
+    EXPECT_EQ(again.mixed, first.mixed);
+    EXPECT_EQ(again.mask, first.mask);
+  }
+}
+
+// In a closed virtual box that emits 1 and reflects a half, every pixel is covered and shows 2; in
+// the real world the camera sees past it.
+TEST(Contact, a_box_around_the_camera_covers_everything) {
+  for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
+    View view = table();
+    scene::Material wall = diffuse(glm::vec3(0.5f));
+    wall.emission = glm::vec3(1);
+    add_instance(view.scene, add_mesh(view.scene, inside_out(box_mesh({1, 1, 1}))),
+                 add_material(view.scene, wall), glm::translate(glm::dmat4(1), {0.1, -1.2, 0.9}),
+                 scene::world_mixed);
+    set::Estimation estimation;
+    estimation.estimator = estimator;
+    estimation.max_depth = 64;
+    const Rendered result = render_view(view, 8, estimation);
+    for (const float mask : result.layers.mask) ASSERT_EQ(mask, 1.0f);
+    EXPECT_NEAR(mean(result.layers.mixed).g, 2, 4 * standard_error_of_pixels(result.layers) + 1e-5);
+    EXPECT_GT(mean(result.layers.real).g, 0);
+    expect_clean(result.counters);
+  }
+}
+
+// Inside a ball of clear glass in a white environment all directions bring 1.
+TEST(Contact, a_glass_ball_around_the_camera_takes_nothing) {
+  View view;
+  view.world_from_camera = look_at({0.3, -0.2, 0.1}, {0, 1, 0.2});
+  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(1, 4)),
+               add_material(view.scene, glass(1.5f)), glm::dmat4(1), scene::world_mixed);
+  view.environment = uniform_environment(glm::vec3(1));
+  view.calibration = pinhole(width, height, 1.5);
+  set::Estimation estimation;
+  estimation.max_depth = 64;
+  const Rendered result = render_view(view, 4, estimation);
+  // A ray that is reflected inside at every turn never comes out: none may be more than 1, and of
+  // those that start off the centre only few are less.
+  for (const glm::vec3& pixel : result.layers.mixed) EXPECT_LE(pixel.g, 1 + 1e-5f);
+  EXPECT_GT(mean(result.layers.mixed).g, 0.999);
+  for (const float mask : result.layers.mask) ASSERT_EQ(mask, 1.0f);
+  expect_clean(result.counters);
+}
+
+}  // namespace
+}  // namespace previz::testing

@@ -1,0 +1,138 @@
+// White furnaces at the ends of the materials' ranges: what goes in comes out, to 1e-3.
+#include "tests/unit/render_fixture.hpp"
+
+namespace previz::testing {
+namespace {
+
+constexpr double energy = 1e-3;  // estimator.md's bound
+
+set::Estimation deep() {
+  set::Estimation estimation;
+  estimation.max_depth = 64;
+  return estimation;
+}
+
+// A plane seen from three angles in an environment of radiance 1. Where directions are chosen by
+// the BSDF alone, there is little chance in it; with light samples, four standard errors.
+void expect_reflectance(const scene::Material& material, double expected) {
+  scene::Scene scene;
+  add_instance(scene, add_mesh(scene, rectangle_mesh({2, 2})), add_material(scene, material));
+  render::Renderer renderer(shared_device(), {}, pinhole(16, 16, 0.02));
+  renderer.set_scene(scene);
+  for (const auto sampling : {set::LightSampling::bsdf, set::LightSampling::importance}) {
+    renderer.set_environment(uniform_environment(glm::vec3(1)), sampling);
+    for (const double angle : {0.0, 0.8, 1.5}) {
+      render::FrameInput frame;
+      frame.world_from_camera = look_at({0, -std::sin(angle), std::cos(angle)}, {0, 0, 0});
+      renderer.begin(frame);
+      renderer.render(16);
+      const render::Layers layers = renderer.layers();
+      const bool sure = sampling == set::LightSampling::bsdf;
+      EXPECT_NEAR(mean(layers.mixed).g, expected,
+                  sure ? energy : 4 * standard_error_of_pixels(layers) + 1e-5)
+          << "angle " << angle << (sure ? ", by the BSDF" : ", with light samples");
+    }
+  }
+  expect_clean(renderer.counters());
+}
+
+TEST(ExtremeFurnace, lambert_reflects_its_albedo) {
+  for (const float albedo : {0.0f, 0.5f, 1.0f})
+    expect_reflectance(diffuse(glm::vec3(albedo)), albedo);
+}
+
+TEST(ExtremeFurnace, a_white_mirror_takes_nothing) {
+  for (const float roughness : {0.0f, 1e-4f}) {
+    SCOPED_TRACE(roughness);
+    expect_reflectance(metal(glm::vec3(1), roughness), 1);
+  }
+}
+
+// The coat's Fresnel share and the rest for the white base: together 1. At an index of 1 there is
+// no coat, whatever its roughness.
+TEST(ExtremeFurnace, white_plastic_takes_nothing) {
+  for (const float roughness : {0.0f, 1e-4f}) {
+    for (const float ior : {1.0001f, 2.5f}) {
+      SCOPED_TRACE("ior " + std::to_string(ior) + ", roughness " + std::to_string(roughness));
+      expect_reflectance(plastic(glm::vec3(1), roughness, ior), 1);
+    }
+  }
+  expect_reflectance(plastic(glm::vec3(1), 1, 1), 1);
+}
+
+TEST(ExtremeFurnace, black_plastic_reflects_its_coat_alone) {
+  View view;
+  const auto plane = add_mesh(view.scene, rectangle_mesh({2, 2}));
+  add_instance(view.scene, plane, add_material(view.scene, plastic(glm::vec3(0), 0, 2.5f)));
+  view.environment = uniform_environment(glm::vec3(1));
+  view.calibration = pinhole(16, 16, 1e-3);
+  view.world_from_camera = look_at({0, 0, 1}, {0, 0, 0});
+  const Rendered result = render_view(view, 1, deep());
+  const double f0 = std::pow((2.5 - 1) / (2.5 + 1), 2);
+  EXPECT_NEAR(mean(result.layers.mixed).g, f0, 1e-6);  // one path, no chance in it
+  expect_clean(result.counters);
+}
+
+// A slab and a ball, so that rays enter and leave at every angle; of albedo 1 they take nothing but
+// the few rays that graze a triangle of the ball from behind its interpolated normal.
+TEST(ExtremeFurnace, clear_glass_takes_nothing) {
+  for (const float ior : {1.0f, 1.0001f, 1.5f, 2.5f}) {
+    for (const bool thin : {false, true}) {
+      for (const scene::Mesh& mesh : {box_mesh({4, 4, 0.5}), icosphere_mesh(1, 5)}) {
+        View view;
+        scene::Material material = glass(ior);
+        material.thin_walled = thin;
+        add_instance(view.scene, add_mesh(view.scene, mesh), add_material(view.scene, material));
+        view.environment = uniform_environment(glm::vec3(1));
+        view.calibration = pinhole(24, 24, 0.8);
+        view.world_from_camera = look_at({0.3, -0.4, 3}, {0, 0, 0});
+        const Rendered result = render_view(view, 4, deep());
+        EXPECT_NEAR(mean(result.layers.mixed).g, 1, energy)
+            << ior << ' ' << mesh.name << (thin ? " thin" : "");
+        expect_clean(result.counters);
+      }
+    }
+  }
+}
+
+// Opaque to what enters, so what is left is the outer reflection, at normal incidence f0.
+TEST(ExtremeFurnace, black_glass_reflects_its_surface_alone) {
+  for (const float ior : {1.0f, 1.0001f, 2.5f}) {
+    View view;
+    scene::Material material = glass(ior);
+    material.base_color = glm::vec3(0);
+    add_instance(view.scene, add_mesh(view.scene, box_mesh({4, 4, 0.5})),
+                 add_material(view.scene, material));
+    view.environment = uniform_environment(glm::vec3(1));
+    view.calibration = pinhole(16, 16, 1e-3);
+    view.world_from_camera = look_at({0, 0, 3}, {0, 0, 0});
+    const Rendered result = render_view(view, 64, deep());
+    const double f0 = std::pow((ior - 1.0) / (ior + 1.0), 2);
+    // The choice between the lobes is a coin of 16 * 16 * 64 tosses.
+    EXPECT_NEAR(mean(result.layers.mixed).g, f0, 4 * std::sqrt(f0 * (1 - f0) / 16384) + 1e-6);
+    expect_clean(result.counters);
+  }
+}
+
+// Inside a closed surface that reflects all and emits 1, each of 64 bounces and the first hit adds
+// 1; inside one that reflects nothing, only the first does.
+TEST(ExtremeFurnace, sixty_four_bounces_add_up) {
+  for (const float albedo : {0.0f, 1.0f}) {
+    scene::Material wall = diffuse(glm::vec3(albedo));
+    wall.emission = glm::vec3(1);
+    View view;
+    view.scene = furnace_box({2, 2, 2}, wall);
+    view.environment = uniform_environment(glm::vec3(0));
+    view.calibration = pinhole(32, 32, 1.2);
+    view.world_from_camera = look_at({0.1, -0.2, 0.1}, {0.3, 0.9, 0.2});
+    const Rendered result = render_view(view, 32, deep());
+    const double expected = 1 + 64 * albedo;
+    EXPECT_NEAR(mean(result.layers.mixed).g, expected,
+                4 * standard_error_of_pixels(result.layers) + 1e-5 * expected);
+    EXPECT_LT(4 * standard_error_of_pixels(result.layers), energy * expected);
+    expect_clean(result.counters);
+  }
+}
+
+}  // namespace
+}  // namespace previz::testing

@@ -1,0 +1,98 @@
+// Light of any strength: the picture is linear in it, and a sun does not drown its sky.
+#include <numbers>
+
+#include "shaders/lib/octahedral.h"
+#include "tests/unit/render_fixture.hpp"
+
+namespace previz::testing {
+namespace {
+
+View lit_set() {
+  RandomScene options;
+  options.width = 48;
+  options.height = 36;
+  View view = random_scene(6, options);
+  set::Light lamp;
+  lamp.gain_real = 1;
+  lamp.position = {0.3, 0.2, 0.9};
+  lamp.emission = glm::dvec3(0.4, 0.5, 0.6);
+  view.scene.lights.push_back(lamp);
+  return view;
+}
+
+View brightened(View view, float factor) {
+  for (glm::vec3& texel : view.environment.radiance) texel *= factor;
+  for (scene::Material& material : view.scene.materials) material.emission *= factor;
+  for (set::Light& light : view.scene.lights) light.emission *= factor;
+  return view;
+}
+
+render::Layers show(const View& view) {
+  set::Estimation estimation;
+  estimation.max_depth = 6;
+  const Rendered result = render_view(view, 8, estimation);
+  expect_clean(result.counters);
+  return result.layers;
+}
+
+TEST(Radiance, by_a_power_of_two_scales_every_bit) {
+  const View view = lit_set();
+  const render::Layers plain = show(view);
+  for (const float factor : {0x1p-20f, 0x1p20f}) {
+    const render::Layers other = show(brightened(view, factor));
+    for (std::size_t i = 0; i < plain.mixed.size(); ++i) {
+      ASSERT_EQ(other.mixed[i], factor * plain.mixed[i]) << factor;
+      ASSERT_EQ(other.diff[i], factor * plain.diff[i]) << factor;
+    }
+  }
+}
+
+TEST(Radiance, by_a_million_and_a_millionth_scales_the_picture) {
+  const View view = lit_set();
+  const render::Layers plain = show(view);
+  for (const float factor : {1e-6f, 1e6f}) {
+    const render::Layers other = show(brightened(view, factor));
+    for (std::size_t i = 0; i < plain.mixed.size(); ++i)
+      for (int c = 0; c < 3; ++c)
+        ASSERT_NEAR(other.mixed[i][c] / factor, plain.mixed[i][c], 1e-4 * plain.mixed[i][c]);
+  }
+}
+
+constexpr int sun_map = 32;
+constexpr int sun_x = 19, sun_y = 13;
+
+// Integral of cos(theta) dw over the bilinear bump of one texel of radiance 1, by midpoints: what
+// that texel brings to a surface that faces up. The map has equal areas.
+double bump_irradiance() {
+  constexpr int steps = 200;
+  double sum = 0;
+  for (int j = 0; j < 2 * steps; ++j) {
+    for (int i = 0; i < 2 * steps; ++i) {
+      const double x = (i + 0.5) / steps - 1, y = (j + 0.5) / steps - 1;  // in texels
+      const glm::vec2 at((sun_x + 0.5 + x) / sun_map * 2 - 1, (sun_y + 0.5 + y) / sun_map * 2 - 1);
+      sum += (1 - std::abs(x)) * (1 - std::abs(y)) *
+             std::max(0.0, static_cast<double>(octahedral_direction(at).z));
+    }
+  }
+  return sum * 4 * std::numbers::pi / (sun_map * sun_map) / (steps * steps);
+}
+
+TEST(Radiance, of_a_sun_a_million_times_its_sky_is_unbiased_and_so_is_the_sky) {
+  for (const float sun : {1.0f, 1e6f}) {
+    View view;
+    add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({2, 2})),
+                 add_material(view.scene, diffuse(glm::vec3(0.5f))));
+    view.environment = uniform_environment(glm::vec3(1), sun_map);
+    view.environment.radiance[sun_y * sun_map + sun_x] = glm::vec3(sun);
+    view.calibration = pinhole(32, 32, 1e-3);
+    view.world_from_camera = look_at({0, -0.6, 1}, {0, 0, 0});
+    const render::Layers layers = show(view);
+    const double expected = 0.5 * (1 + (sun - 1) * bump_irradiance() / std::numbers::pi);
+    // Four standard errors, and 1e-4 for the quadrature and single precision.
+    EXPECT_NEAR(mean(layers.mixed).g, expected,
+                4 * standard_error_of_pixels(layers) + 1e-4 * expected);
+  }
+}
+
+}  // namespace
+}  // namespace previz::testing

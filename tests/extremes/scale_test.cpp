@@ -1,0 +1,154 @@
+// The same set at another size, and at another place, shows the same picture.
+#include <algorithm>
+#include <glm/gtc/matrix_transform.hpp>
+#include <numbers>
+#include <numeric>
+
+#include "tests/unit/render_fixture.hpp"
+
+namespace previz::testing {
+namespace {
+
+// Every material, a lens, lamps with and without an extent, and glass that casts a caustic.
+View rich_set() {
+  RandomScene options;
+  options.width = 48;
+  options.height = 36;
+  options.lens = true;
+  View view = random_scene(4, options);
+  const auto ball = add_mesh(view.scene, icosphere_mesh(0.05, 3));
+  add_instance(view.scene, ball, add_material(view.scene, glass(1.5f)),
+               glm::translate(glm::dmat4(1), {0.02, -0.12, 0.08}), scene::world_mixed);
+  set::Light lamp;
+  lamp.gain_real = 1;
+  lamp.type = set::LightType::point;
+  lamp.position = {0.3, 0.2, 0.9};
+  lamp.emission = glm::dvec3(0.4, 0.5, 0.6);
+  view.scene.lights.push_back(lamp);
+  lamp.type = set::LightType::rectangle;
+  lamp.position = {-0.3, 0.1, 0.8};
+  lamp.emission = glm::dvec3(2);
+  lamp.width_m = lamp.height_m = 0.1;
+  view.scene.lights.push_back(lamp);
+  return view;
+}
+
+// Everything `factor` times as large and then moved. A point's intensity grows with the square of
+// the distances, so that the radiance stays as it is.
+View resized(View view, double factor, const glm::dvec3& move = {}) {
+  const glm::dmat4 place = glm::scale(glm::translate(glm::dmat4(1), move), glm::dvec3(factor));
+  for (scene::Instance& instance : view.scene.instances)
+    instance.world_from_object = place * instance.world_from_object;
+  for (set::Light& light : view.scene.lights) {
+    light.position = factor * light.position + move;
+    light.width_m *= factor;
+    light.height_m *= factor;
+    if (light.type == set::LightType::point) light.emission *= factor * factor;
+  }
+  view.world_from_camera[3] = glm::dvec4(factor * glm::dvec3(view.world_from_camera[3]) + move, 1);
+  if (view.calibration.lens) {
+    view.calibration.lens->focal_length_m *= factor;
+    view.calibration.lens->focus_distance_m *= factor;
+  }
+  return view;
+}
+
+Rendered show(const View& view) {
+  set::Estimation estimation;
+  estimation.max_depth = 6;
+  const Rendered result = render_view(view, 8, estimation);
+  expect_clean(result.counters);
+  return result;
+}
+
+// Rounding takes a path another way only where it passes an edge, of an object, a lobe or a
+// shadow, by less than about 1e-6 of the set's size. A sample makes up to 6 * 3 such choices, and
+// edges are a few hundred pixels long where a pixel is 1/48 of the set: 8 * 18 * 48e-6 * 10, less
+// than 1 in 10 pixels, and then a sample of 8. Of the rest nothing is left but rounding: 1e-6 in
+// the hit's place, 1e3 times that at the smooth metals' curved reflections.
+void expect_same(const render::Layers& a, const render::Layers& b) {
+  const auto apart = static_cast<std::size_t>(
+      std::inner_product(a.mixed.begin(), a.mixed.end(), b.mixed.begin(), 0, std::plus<>(),
+                         [](const glm::vec3& x, const glm::vec3& y) {
+                           return std::abs(x.g - y.g) > 1e-3f * std::max(x.g, y.g) ? 1 : 0;
+                         }));
+  EXPECT_LE(apart, a.mixed.size() / 10);
+  EXPECT_NEAR(mean(a.mixed).g / mean(b.mixed).g, 1, 1e-2);
+  for (std::size_t i = 0; i < a.mask.size(); ++i) ASSERT_NEAR(a.mask[i], b.mask[i], 0.251f) << i;
+}
+
+// Nothing in the renderer may know how large a metre is: times a power of two, every product and
+// every sum rounds as it did, and no bit changes.
+TEST(Scale, by_a_power_of_two_changes_no_bit) {
+  const View view = rich_set();
+  const render::Layers plain = show(view).layers;
+  for (const double factor : {1.0 / 1024, 1024.0}) {
+    const render::Layers other = show(resized(view, factor)).layers;
+    EXPECT_EQ(other.mixed, plain.mixed) << factor;
+    EXPECT_EQ(other.diff, plain.diff) << factor;
+    EXPECT_EQ(other.mask, plain.mask) << factor;
+    for (std::size_t i = 0; i < plain.depth.size(); ++i)
+      ASSERT_EQ(other.depth[i], static_cast<float>(factor) * plain.depth[i]) << factor;
+  }
+}
+
+TEST(Scale, by_a_thousand_and_a_thousandth_shows_the_same) {
+  const View view = rich_set();
+  const render::Layers plain = show(view).layers;
+  for (const double factor : {1e-3, 1e3}) {
+    SCOPED_TRACE(factor);
+    expect_same(show(resized(view, factor)).layers, plain);
+  }
+}
+
+// GPU space is relative to the camera, subtracted in double precision: 1 km away, what is left of
+// a position is right to 1e-13 m.
+TEST(Scale, a_kilometre_from_the_origin_shows_the_same) {
+  const View view = rich_set();
+  expect_same(show(resized(view, 1, {700, -600, 400})).layers, show(view).layers);
+}
+
+// Inside a closed black-lit box with bright light all around it: what is not black has leaked.
+TEST(Scale, nothing_leaks_into_a_closed_box_of_any_size) {
+  View view;
+  view.scene = furnace_box({2, 1.7, 1.3}, diffuse(glm::vec3(0.9f)));
+  view.environment = uniform_environment(glm::vec3(1e6f));
+  view.calibration = pinhole(48, 48, 1.8);
+  view.world_from_camera = look_at({0.1, -0.2, 0.1}, {0.9, 0.8, 0.6});
+  for (const double factor : {1e-3, 1.0, 1e3}) {
+    for (const glm::dvec3& move : {glm::dvec3(0), glm::dvec3(700, -600, 400)}) {
+      const Rendered result = show(resized(view, factor, move));
+      for (const glm::vec3& pixel : result.layers.mixed) ASSERT_EQ(pixel, glm::vec3(0)) << factor;
+    }
+  }
+}
+
+// A sun two degrees above the horizon: where a surface shadows itself, a pixel is dark.
+TEST(Scale, no_surface_of_any_size_shadows_itself) {
+  View view;
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({40, 40})),
+               add_material(view.scene, diffuse(glm::vec3(0.5f))),
+               glm::rotate(glm::dmat4(1), 0.3, glm::normalize(glm::dvec3(1, 2, 3))));
+  view.environment = uniform_environment(glm::vec3(0));
+  const glm::dmat3 turn(view.scene.instances[0].world_from_object);
+  set::Light sun;
+  sun.type = set::LightType::directional;
+  sun.direction = turn * glm::dvec3(-std::cos(0.035), 0, -std::sin(0.035));
+  sun.gain_real = 1;
+  view.scene.lights.push_back(sun);
+  view.calibration = pinhole(48, 48, 0.9);
+  view.world_from_camera = look_at(turn * glm::dvec3(0.3, -1, 2), {0, 0, 0});
+  const double expected = 0.5 / std::numbers::pi * std::sin(0.035);
+  for (const double factor : {1e-3, 1.0, 1e3}) {
+    for (const glm::dvec3& move : {glm::dvec3(0), glm::dvec3(700, -600, 400)}) {
+      const Rendered result = show(resized(view, factor, move));
+      for (std::size_t i = 0; i < result.layers.mixed.size(); ++i) {
+        // One float rounding of the normal is 1e-7 / 0.035 of the cosine.
+        ASSERT_NEAR(result.layers.mixed[i].g / expected, 1, 2e-5) << factor;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace previz::testing
