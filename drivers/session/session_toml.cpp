@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <stdexcept>
 #include <string_view>
 #include <vector>
@@ -225,6 +226,19 @@ ResponseCurve parse_response(const Place& place) {
   return response;
 }
 
+// What no lens can be would become rays that are no direction.
+ThinLens parse_lens(const Place& place) {
+  const ThinLens lens{place.number("focal_length_m"), place.number("f_number"),
+                      place.number("focus_distance_m")};
+  if (!(lens.focal_length_m > 0 && std::isfinite(lens.focal_length_m)))
+    place.fail("focal_length_m", "must be above 0");
+  if (!(lens.f_number >= 0.5 && std::isfinite(lens.f_number)))
+    place.fail("f_number", "must be at least 0.5");
+  if (!(lens.focus_distance_m > lens.focal_length_m && lens.focus_distance_m <= 1e9))
+    place.fail("focus_distance_m", "must be more than the focal length and at most 1e9");
+  return lens;
+}
+
 ObserverCalibration parse_observer(const Place& place) {
   ObserverCalibration calibration;
   calibration.intrinsics = {place.pixels("width"), place.pixels("height"), place.number("fx"),
@@ -233,11 +247,7 @@ ObserverCalibration parse_observer(const Place& place) {
                             place.number("p2"),    place.number("k3")};
   calibration.responsivity = place.number("responsivity");
   calibration.response = parse_response(place.inner("response"));
-  if (place.find("lens")) {
-    const Place lens = place.inner("lens");
-    calibration.lens = ThinLens{lens.number("focal_length_m"), lens.number("f_number"),
-                                lens.number("focus_distance_m")};
-  }
+  if (place.find("lens")) calibration.lens = parse_lens(place.inner("lens"));
   return calibration;
 }
 

@@ -1,0 +1,159 @@
+// Apertures from nothing to the widest, focus from a centimetre to infinity: continuous with the
+// pinhole, sharp where the focus is; what no lens can be is refused by the key's name.
+#include "daemon/set/set.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/session_toml.hpp"
+#include "tests/unit/render_fixture.hpp"
+
+namespace previz::testing {
+namespace {
+
+// A glowing chequerboard of 8 x 8 fields, `distance` before the camera and as wide as the picture.
+View chequers(double distance) {
+  constexpr double fov = 0.8;
+  View view;
+  scene::Texture texture;
+  texture.width = texture.height = 8;
+  texture.nearest = true;
+  for (int i = 0; i < 64; ++i)
+    texture.texels.emplace_back(glm::vec4(glm::vec3((i / 8 + i) % 2 == 0 ? 0.1f : 0.9f), 1));
+  scene::Material board = emitter(glm::vec3(1));
+  board.emission_texture = add_texture(view.scene, texture);
+  const double side = 4 * distance * std::tan(fov / 2);
+  glm::dmat4 pose(1);  // faces -Z
+  pose[1] = {0, -1, 0, 0};
+  pose[2] = {0, 0, -1, 0};
+  pose[3] = {0, 0, distance, 1};
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({side, side})),
+               add_material(view.scene, board), pose);
+  view.environment = uniform_environment(glm::vec3(0));
+  view.calibration = pinhole(48, 36, fov);
+  return view;  // the camera at the origin, looking along +Z
+}
+
+render::Layers show(const View& view) {
+  set::Estimation estimation;
+  estimation.max_depth = 1;
+  const Rendered result = render_view(view, 16, estimation);
+  expect_clean(result.counters);
+  return result.layers;
+}
+
+// A sample's points on the lens are joined to one point of the focal plane, so there the picture is
+// the pinhole's, sample by sample. Rounding moves that point by 1e-6 of the picture's width at
+// most: over an edge in 36 * 2 * 48 pixel widths by chance 1e-6 * 48 a sample, so in less than one
+// of 100 pixels.
+void expect_sharp(View view, const ThinLens& lens) {
+  const render::Layers plain = show(view);
+  view.calibration.lens = lens;
+  const render::Layers lensed = show(view);
+  std::size_t apart = 0;
+  for (std::size_t i = 0; i < plain.mixed.size(); ++i)
+    apart += std::abs(plain.mixed[i].g - lensed.mixed[i].g) > 1e-5f;
+  EXPECT_LE(apart, plain.mixed.size() / 100)
+      << "f/" << lens.f_number << " at " << lens.focus_distance_m << " m";
+}
+
+TEST(ExtremeLens, is_sharp_at_its_focus_from_a_centimetre_to_infinity) {
+  expect_sharp(chequers(0.01), {0.005, 0.5, 0.01});
+  expect_sharp(chequers(0.01), {0.005, 2, 0.01});
+  expect_sharp(chequers(1), {0.05, 0.5, 1});
+  expect_sharp(chequers(1e6), {0.05, 0.5, 1e6});
+}
+
+TEST(ExtremeLens, closed_down_is_the_pinhole) {
+  for (const double f_number : {1e6, 1e9, 1e30}) expect_sharp(chequers(1), {0.05, f_number, 0.3});
+}
+
+// Half a metre behind the focus of the widest lens, the circle of confusion covers several fields:
+// the board is grey, no darker and no brighter.
+TEST(ExtremeLens, wide_open_blurs_and_keeps_the_light) {
+  View view = chequers(1);
+  view.calibration.lens = ThinLens{0.5, 0.5, 0.6};
+  const render::Layers layers = show(view);
+  // The middle, where the circle does not reach over the board's border.
+  double sum = 0;
+  int count = 0;
+  for (int y = 12; y < 24; ++y)
+    for (int x = 16; x < 32; ++x, ++count)
+      sum += static_cast<double>(layers.mixed[static_cast<std::size_t>(y) * 48 + x].g);
+  // 192 pixels of 16 samples, each 0.1 or 0.9: a standard error of 0.4 / sqrt(3072).
+  EXPECT_NEAR(sum / count, 0.5, 4 * 0.4 / std::sqrt(3072.0));
+}
+
+// The message of a set file with this lens, "" where it is taken.
+std::string refusal_of_set(const std::string& lens) {
+  const std::string text =
+      "[observer.intrinsics]\nwidth=64\nheight=48\nfx=60.0\nfy=60.0\ncx=31.5\ncy=23.5\n"
+      "[observer.lens]\n" +
+      lens;
+  try {
+    set::parse_set(text, "stage.toml");
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(ExtremeLens, impossible_values_are_refused_by_the_keys_name) {
+  const std::string good = "focal_length_mm=35\nf_number=2.8\nfocus_distance_m=1\n";
+  EXPECT_EQ(refusal_of_set(good), "");
+  EXPECT_EQ(refusal_of_set("focal_length_mm=5\nf_number=0.5\nfocus_distance_m=0.01\n"), "");
+  EXPECT_EQ(refusal_of_set("focal_length_mm=35\nf_number=1e6\nfocus_distance_m=1e6\n"), "");
+  for (const char* value : {"0", "-2.8", "0.49", "inf", "nan"}) {
+    const std::string f_number = std::string("f_number=") + value;
+    EXPECT_NE(refusal_of_set("focal_length_mm=35\nfocus_distance_m=1\n" + f_number)
+                  .find("observer.lens.f_number"),
+              std::string::npos)
+        << value;
+  }
+  for (const char* value : {"0", "-1", "0.034", "0.035", "inf", "nan"}) {
+    const std::string focus = std::string("focus_distance_m=") + value;
+    EXPECT_NE(refusal_of_set("focal_length_mm=35\nf_number=2.8\n" + focus)
+                  .find("observer.lens.focus_distance_m"),
+              std::string::npos)
+        << value;
+  }
+  for (const char* value : {"0", "-35", "inf", "nan"}) {
+    const std::string length = std::string("focal_length_mm=") + value;
+    EXPECT_NE(refusal_of_set("f_number=2.8\nfocus_distance_m=1\n" + length)
+                  .find("observer.lens.focal_length_mm"),
+              std::string::npos)
+        << value;
+  }
+}
+
+std::string refusal_of_session(const ThinLens& lens) {
+  session::SessionFile file;
+  file.streams["observer"] = {PixelFormat::rgb8, 64, 48, {}};
+  file.info.observer = ObserverCalibration{};
+  file.info.observer->intrinsics = pinhole(64, 48, 0.9).intrinsics;
+  file.info.observer->lens = lens;
+  try {
+    session::parse_session_toml(session::to_toml(file), "session.toml");
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(ExtremeLens, a_sessions_impossible_lens_is_refused_too) {
+  constexpr double inf = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(refusal_of_session({0.035, 2.8, 1}), "");
+  EXPECT_EQ(refusal_of_session({0.005, 0.5, 0.01}), "");
+  for (const double value : {0.0, -2.8, 0.49, inf, std::nan("")})
+    EXPECT_NE(refusal_of_session({0.035, value, 1}).find("calibration.lens.f_number"),
+              std::string::npos)
+        << value;
+  for (const double value : {0.0, -1.0, 0.035, inf, std::nan("")})
+    EXPECT_NE(refusal_of_session({0.035, 2.8, value}).find("calibration.lens.focus_distance_m"),
+              std::string::npos)
+        << value;
+  for (const double value : {0.0, -1.0, inf, std::nan("")})
+    EXPECT_NE(refusal_of_session({value, 2.8, 1}).find("calibration.lens.focal_length_m"),
+              std::string::npos)
+        << value;
+}
+
+}  // namespace
+}  // namespace previz::testing
