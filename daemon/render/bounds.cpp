@@ -1,6 +1,7 @@
 #include "daemon/render/bounds.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <glm/geometric.hpp>
 #include <glm/mat4x4.hpp>
@@ -9,21 +10,30 @@
 namespace previz::render {
 namespace {
 
-// Around the centre of the vertices' box: exact for a sphere, at most sqrt(3) times too wide.
+// Around the centre of the triangles' box: exact for a sphere, at most sqrt(3) times too wide.
+// Triangles that are not finite are never traced; radius -1 where there is no other.
 glm::dvec4 bounding_sphere(const scene::Mesh& mesh, const glm::dmat4& world_from_object) {
+  const auto for_corners = [&](const auto& visit) {
+    for (const glm::uvec3& triangle : mesh.triangles) {
+      glm::dvec3 corners[3];
+      bool finite = true;
+      for (int i = 0; i < 3; ++i) {
+        corners[i] = world_from_object * glm::dvec4(glm::dvec3(mesh.positions[triangle[i]]), 1.0);
+        finite = finite && std::isfinite(corners[i].x + corners[i].y + corners[i].z);
+      }
+      if (!finite) continue;
+      for (const glm::dvec3& corner : corners) visit(corner);
+    }
+  };
   glm::dvec3 low(std::numeric_limits<double>::max());
   glm::dvec3 high(std::numeric_limits<double>::lowest());
-  const auto world = [&](const glm::vec3& p) {
-    return glm::dvec3(world_from_object * glm::dvec4(glm::dvec3(p), 1.0));
-  };
-  for (const glm::vec3& p : mesh.positions) {
-    low = glm::min(low, world(p));
-    high = glm::max(high, world(p));
-  }
+  for_corners([&](const glm::dvec3& p) {
+    low = glm::min(low, p);
+    high = glm::max(high, p);
+  });
   const glm::dvec3 centre = 0.5 * (low + high);
-  double radius = 0;
-  for (const glm::vec3& p : mesh.positions)
-    radius = std::max(radius, glm::length(world(p) - centre));
+  double radius = -1;
+  for_corners([&](const glm::dvec3& p) { radius = std::max(radius, glm::length(p - centre)); });
   return {centre, radius};
 }
 
@@ -42,8 +52,9 @@ Bounds bounds_where(const scene::Scene& scene,
   Bounds bounds;
   for (const scene::Instance& instance : scene.instances) {
     const scene::Mesh& mesh = scene.meshes[instance.mesh];
-    if (mesh.triangles.empty() || !wanted(instance)) continue;
+    if (!wanted(instance)) continue;
     const glm::dvec4 sphere = bounding_sphere(mesh, instance.world_from_object);
+    if (sphere.w < 0) continue;
     if (bounds.size() < most_bounds)
       bounds.push_back(sphere);
     else

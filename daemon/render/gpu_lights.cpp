@@ -138,14 +138,15 @@ double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius) 
   std::size_t shining = 0;
   for (const gpu::GpuLight& light : lights) {
     const double watts = power(light, scene_radius);
+    if (!(watts > 0)) continue;  // black, or a triangle that is no number
     total += watts;
-    shining += watts > 0;
+    ++shining;
   }
   double sum = 0;
   float below = 0;
   for (gpu::GpuLight& light : lights) {
     const double watts = power(light, scene_radius);
-    if (total > 0 && watts > 0)
+    if (watts > 0)
       sum += (1 - even_share) * watts / total + even_share / static_cast<double>(shining);
     light.cdf = std::min(static_cast<float>(sum), 1.0f);
     // What the shader picks by, rounded as it is.

@@ -22,6 +22,9 @@ constexpr std::uint32_t block_height = 4;
 constexpr std::uint32_t cpu_slots = 1u << 17;
 constexpr std::uint32_t gpu_slots = 1u << 20;
 
+// Metres. Photons are gathered over the square of the radius, which must not round to nothing.
+constexpr double least_photon_radius = 1e-15;
+
 std::uint32_t round_up(std::uint32_t value, std::uint32_t to) {
   return (value + to - 1) / to * to;
 }
@@ -256,7 +259,8 @@ bool Wavefront::render_with_photons(std::uint32_t first_sample, std::uint32_t sa
                                     std::uint32_t max_depth,
                                     const std::function<bool()>& cancelled) {
   for (std::uint32_t sample = first_sample; sample < first_sample + samples; ++sample) {
-    const double radius = photon_radius_ * photon_radius_factor(sample);
+    const double radius =
+        std::max(photon_radius_ * photon_radius_factor(sample), least_photon_radius);
     bool has_photons = false;
     for (const Tile& tile : tiles_) {
       if (!tile.sampled) continue;

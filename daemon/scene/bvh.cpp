@@ -187,6 +187,7 @@ TopBvh build_top_bvh(std::span<const TopInstance> instances) {
 
 Aabb transform_bounds(const Aabb& object_bounds, const glm::dmat4& world_from_object) {
   Aabb bounds;
+  if (object_bounds.low.x > object_bounds.high.x) return bounds;  // nothing is in it
   for (int corner = 0; corner < 8; ++corner) {
     const glm::dvec4 object((corner & 1 ? object_bounds.high : object_bounds.low).x,
                             (corner & 2 ? object_bounds.high : object_bounds.low).y,
