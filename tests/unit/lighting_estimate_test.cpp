@@ -280,20 +280,6 @@ TEST(Estimate, ThePictureMayCutTheCircle) {
   EXPECT_LT(lighting.report.seen_sr, 2 * pi * (1 - std::cos(100 * degree)) * 0.95);
 }
 
-TEST(Estimate, BlackAndBlindFramesStayFinite) {
-  LightCameraCalibration camera = fisheye_camera();
-  camera.world_from_camera = looking(0, 90);
-  for (double signal : {0.0, 1.0}) {
-    const FramePtr frame =
-        make_frame(512, 512, 4, std::vector<glm::dvec3>(512 * 512, glm::dvec3(signal)));
-    const Lighting lighting = estimate({&frame, 1}, camera, {});
-    for (const glm::vec3& radiance : lighting.environment.radiance)
-      ASSERT_LT(glm::length(radiance - glm::vec3(static_cast<float>(signal / 4))), 1e-4f);
-    EXPECT_NEAR(signal > 0 ? lighting.report.overexposed_sr : lighting.report.underexposed_sr,
-                lighting.report.seen_sr, 1e-6);
-  }
-}
-
 TEST(Estimate, ResolutionFollowsTheSourceOrTheSet) {
   EXPECT_EQ(chosen_resolution(0, 4 * pi / (512.0 * 512.0)), 512);
   EXPECT_EQ(chosen_resolution(0, 4 * pi / (512.0 * 512.0) * 0.999), 1024);
