@@ -1,6 +1,7 @@
 #include "daemon/render/device.hpp"
 
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -161,6 +162,19 @@ std::uint32_t Device::memory_type(std::uint32_t allowed_bits, vk::MemoryProperty
     }
   }
   throw Error("Vulkan: " + name_ + " has no suitable memory type");
+}
+
+std::uint64_t Device::memory_bytes() const {
+  // Lavapipe's heap is 2 GiB whatever the computer has.
+  if (is_cpu_)
+    return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) *
+           static_cast<std::uint64_t>(sysconf(_SC_PAGE_SIZE));
+  std::uint64_t most = 0;
+  const auto properties = physical_.getMemoryProperties();
+  for (std::uint32_t i = 0; i < properties.memoryHeapCount; ++i)
+    if (properties.memoryHeaps[i].flags & vk::MemoryHeapFlagBits::eDeviceLocal)
+      most = std::max<std::uint64_t>(most, properties.memoryHeaps[i].size);
+  return most;
 }
 
 void Device::submit(const std::function<void(const vk::raii::CommandBuffer&)>& record) {

@@ -23,6 +23,8 @@ class Device {
   const std::string& name() const { return name_; }
   const vk::PhysicalDeviceLimits& limits() const { return limits_; }
   bool is_cpu() const { return is_cpu_; }
+  // Bytes that all buffers may take: the device's own memory, or the computer's for a CPU device.
+  std::uint64_t memory_bytes() const;
   std::uint64_t validation_messages() const { return validation_messages_; }
 
   // Index of a memory type of `allowed_bits` with all of `wanted`, preferring `preferred` too.

@@ -7,6 +7,7 @@
 #include "daemon/render/composite.hpp"
 #include "daemon/render/gpu_scene.hpp"
 #include "daemon/render/photon_schedule.hpp"
+#include "daemon/render/picture_memory.hpp"
 #include "daemon/render/view.hpp"
 #include "daemon/render/wavefront.hpp"
 #include "drivers/error.hpp"
@@ -82,8 +83,14 @@ std::uint32_t Renderer::Impl::features() const {
 }
 
 Renderer::Renderer(std::shared_ptr<Device> device, const set::Estimation& estimation,
-                   const ObserverCalibration& calibration)
-    : impl_(std::make_unique<Impl>(std::move(device), estimation, calibration)) {}
+                   const ObserverCalibration& calibration) {
+  const PinholeIntrinsics& picture = calibration.intrinsics;
+  refuse_too_large(picture.width, picture.height,
+                   {.bytes = device->memory_bytes(),
+                    .texels = device->limits().maxTexelBufferElements,
+                    .read_back = device->is_cpu()});
+  impl_ = std::make_unique<Impl>(std::move(device), estimation, calibration);
+}
 Renderer::~Renderer() = default;
 
 void Renderer::set_scene(const scene::Scene& scene) {

@@ -1,0 +1,51 @@
+#include "daemon/render/picture_memory.hpp"
+
+#include <cstdio>
+#include <glm/vec2.hpp>
+#include <string>
+
+#include "daemon/render/layers.hpp"
+#include "drivers/error.hpp"
+#include "shaders/lib/render_shared.h"
+
+namespace previz::render {
+namespace {
+
+// A pixel of Layers: six of three floats and two of one; of the plate's radiance and its variance
+// (daemon/render/composite.hpp): three doubles each.
+constexpr std::uint64_t layer_bytes = (6 * 3 + 2) * sizeof(float) + 2 * 3 * sizeof(double);
+
+std::uint64_t rays_of(int width, int height) {
+  return (static_cast<std::uint64_t>(width) + 1) * (static_cast<std::uint64_t>(height) + 1);
+}
+
+std::string gigabytes(std::uint64_t bytes) {
+  char text[32];
+  std::snprintf(text, sizeof(text), "%.1f GB", static_cast<double>(bytes) / 1e9);
+  return text;
+}
+
+}  // namespace
+
+std::uint64_t picture_bytes(int width, int height, bool read_back) {
+  const std::uint64_t pixels =
+      static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
+  const std::uint64_t device =
+      pixels * sizeof(gpu::GpuPixel) + rays_of(width, height) * sizeof(glm::vec2);
+  return read_back ? device + pixels * (sizeof(gpu::GpuPixel) + layer_bytes) : device;
+}
+
+void refuse_too_large(int width, int height, const PictureMemory& memory) {
+  const std::string picture =
+      "a picture of " + std::to_string(width) + "x" + std::to_string(height);
+  if (width < 1 || height < 1) throw Error(picture + " has no pixel");
+  if (rays_of(width, height) > memory.texels)
+    throw Error(picture + " is more than the " + std::to_string(memory.texels) +
+                " pixels that the Vulkan device can address; make it smaller");
+  const std::uint64_t bytes = picture_bytes(width, height, memory.read_back);
+  if (bytes > memory.bytes)
+    throw Error(picture + " takes " + gigabytes(bytes) + " of memory, and there is " +
+                gigabytes(memory.bytes) + "; make it smaller");
+}
+
+}  // namespace previz::render

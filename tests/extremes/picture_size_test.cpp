@@ -1,0 +1,104 @@
+// Pictures from one pixel to the largest there are: they work, or are refused before anything is
+// allocated.
+#include "daemon/render/picture_memory.hpp"
+#include "drivers/error.hpp"
+#include "tests/unit/render_fixture.hpp"
+
+namespace previz::testing {
+namespace {
+
+constexpr std::uint64_t gib = 1ull << 30;
+
+std::string refusal(int width, int height, const render::PictureMemory& memory) {
+  try {
+    render::refuse_too_large(width, height, memory);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+// A white floor and a virtual box on it, in a white environment: whatever the size, the real floor
+// shows 1, the box is there, and where it changes nothing the plate comes back.
+void expect_shown(int width, int height) {
+  SCOPED_TRACE(std::to_string(width) + "x" + std::to_string(height));
+  View view;
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({100, 100})),
+               add_material(view.scene, diffuse(glm::vec3(1))));
+  glm::dmat4 pose(1);
+  pose[3] = {0, 0, 0.05, 1};
+  add_instance(view.scene, add_mesh(view.scene, box_mesh({0.4, 0.4, 0.1})), 0, pose,
+               scene::world_mixed);
+  view.calibration = pinhole(width, height, 0.5);
+  const double focal = 0.5 * std::max(width, height) / std::tan(0.25);
+  view.calibration.intrinsics.fx = view.calibration.intrinsics.fy = focal;
+  view.world_from_camera = look_at({0, -0.3, 1}, {0, 0, 0});
+  Plate plate{width, height, 8, {}};
+  for (int i = 0; i < 3 * width * height; ++i)
+    plate.samples.push_back(static_cast<std::uint16_t>(i % 256));
+
+  set::Estimation estimation;
+  estimation.max_depth = 2;
+  estimation.difference_sampling = 0;  // no chance in what the floor shows
+  render::Renderer renderer(shared_device(), estimation, view.calibration);
+  renderer.set_scene(view.scene);
+  renderer.set_environment(uniform_environment(glm::vec3(1)), set::LightSampling::bsdf);
+  renderer.begin({plate, 1, view.world_from_camera});
+  renderer.render(2);
+  expect_clean(renderer.counters());
+  const render::Layers layers = renderer.layers();
+  ASSERT_EQ(layers.mixed.size(), static_cast<std::size_t>(width) * height);
+  const Plate picture = renderer.picture();
+  ASSERT_EQ(picture.samples.size(), plate.samples.size());
+  std::size_t covered = 0;
+  for (std::size_t i = 0; i < layers.mixed.size(); ++i) {
+    ASSERT_NEAR(layers.real[i].g, 1, 1e-5) << i;
+    covered += layers.mask[i] > 0;
+    if (layers.mask[i] == 0 && layers.diff[i] == glm::vec3(0)) {
+      ASSERT_EQ(picture.samples[3 * i], plate.samples[3 * i]) << i;
+    }
+  }
+  EXPECT_GT(covered, 0u);
+}
+
+TEST(PictureSize, of_one_pixel_and_of_odd_sides) {
+  for (const auto& [width, height] : {std::pair(1, 1), std::pair(1, 17), std::pair(17, 1),
+                                      std::pair(7, 5), std::pair(33, 9), std::pair(101, 67)})
+    expect_shown(width, height);
+}
+
+// Rows as long as the largest camera's, and columns as high: bands of whole rows still fit.
+TEST(PictureSize, of_eight_thousand_by_a_few) {
+  expect_shown(8192, 5);
+  expect_shown(5, 4320);
+}
+
+// 8192x4320 is 35.4 million pixels of 144 bytes and a ray of 8: 5.4 GB.
+TEST(PictureSize, of_8192x4320_fits_or_is_refused) {
+  const std::uint64_t texels = 1u << 27;
+  EXPECT_EQ(refusal(8192, 4320, {.bytes = 8 * gib, .texels = texels}), "");
+  const std::string no_memory = refusal(8192, 4320, {.bytes = 4 * gib, .texels = texels});
+  EXPECT_NE(no_memory.find("8192x4320 takes 5.4 GB"), std::string::npos) << no_memory;
+  EXPECT_NE(no_memory.find("there is 4.3 GB"), std::string::npos) << no_memory;
+  // Read back into the same memory, and made into layers: as much again, and 128 bytes.
+  const std::string shared =
+      refusal(8192, 4320, {.bytes = 8 * gib, .texels = texels, .read_back = true});
+  EXPECT_NE(shared.find("takes 15.0 GB"), std::string::npos) << shared;
+  const std::string no_texels = refusal(8192, 4320, {.bytes = 64 * gib, .texels = 1u << 16});
+  EXPECT_NE(no_texels.find("65536 pixels"), std::string::npos) << no_texels;
+}
+
+// More than any Vulkan device can address: refused at once, though a set file may ask for it.
+TEST(PictureSize, of_more_than_the_device_holds_is_refused_by_the_renderer) {
+  for (const auto& [width, height] : {std::pair(65535, 65535), std::pair(0, 10)}) {
+    try {
+      const render::Renderer renderer(shared_device(), {}, pinhole(width, height, 0.5));
+      FAIL() << "taken";
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(std::to_string(width) + "x"), std::string::npos);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace previz::testing
