@@ -33,6 +33,8 @@ struct ThinLens {
   double focal_length_m = 0;
   double f_number = 0;
   double focus_distance_m = 0;
+
+  friend bool operator==(const ThinLens&, const ThinLens&) = default;
 };
 
 // The camera's response: value in [0,1] = forward(exposure * radiance), clipped at 1.

@@ -13,6 +13,31 @@
 #include "drivers/error.hpp"
 
 namespace previz::render {
+namespace {
+
+struct PartEntry {
+  Part part;
+  const char* name;
+  std::uint32_t feature;
+};
+constexpr std::array part_table = {
+    PartEntry{Part::gloss, "gloss", gpu::FEATURE_GLOSSY},
+    PartEntry{Part::refraction, "refraction", gpu::FEATURE_TRANSMISSION},
+    PartEntry{Part::textures, "textures", gpu::FEATURE_TEXTURES},
+    PartEntry{Part::lamps, "lamps", gpu::FEATURE_LIGHTS},
+    PartEntry{Part::visible_lamps, "lamps in view", gpu::FEATURE_VISIBLE_LIGHTS},
+    PartEntry{Part::lens, "lens", gpu::FEATURE_LENS},
+    PartEntry{Part::forks, "two worlds", gpu::FEATURE_FORKS}};
+
+const PartEntry& entry_of(Part part) {
+  return *std::ranges::find(part_table, part, &PartEntry::part);
+}
+
+}  // namespace
+
+const char* name_of(Part part) {
+  return entry_of(part).name;
+}
 
 struct Renderer::Impl {
   Impl(std::shared_ptr<Device> the_device, const set::Estimation& the_estimation,
@@ -35,6 +60,7 @@ struct Renderer::Impl {
   GpuScene scene;
   Wavefront wavefront;
   Buffer rays, frame_buffer;
+  std::uint32_t carried = 0;  // FEATURE_* bits
   bool has_scene = false, has_environment = false;
   FrameInput frame;
   std::optional<lighting::Response> response;
@@ -54,6 +80,8 @@ void Renderer::Impl::upload_frame() {
     gpu_frame.lens_radius = static_cast<float>(lens.focal_length_m / (2 * lens.f_number));
     gpu_frame.focus_distance = static_cast<float>(lens.focus_distance_m);
   }
+  // A carried lens of a pinhole: every ray starts at its centre, aimed at a distance of one.
+  if (!calibration.lens) gpu_frame.focus_distance = 1;
   gpu_frame.seed = frame.seed.value_or(estimation.seed);
   gpu_frame.max_depth = static_cast<std::uint32_t>(estimation.max_depth);
   gpu_frame.roulette_depth = static_cast<std::uint32_t>(estimation.roulette_depth);
@@ -104,6 +132,14 @@ void Renderer::set_environment(const lighting::EnvironmentMap& environment,
   impl_->has_environment = true;
 }
 
+void Renderer::carry(Part part) {
+  impl_->carried |= entry_of(part).feature;
+}
+
+bool Renderer::needs(Part part) const {
+  return (impl_->features() & entry_of(part).feature) != 0;
+}
+
 void Renderer::begin(const FrameInput& frame) {
   Impl& r = *impl_;
   if (!r.has_scene || !r.has_environment)
@@ -124,7 +160,7 @@ void Renderer::begin(const FrameInput& frame) {
   std::vector<const Buffer*> bindings = r.scene.bindings();
   bindings[gpu::BINDING_RAYS] = &r.rays;
   bindings[gpu::BINDING_FRAME] = &r.frame_buffer;
-  const std::uint32_t features = r.features();
+  const std::uint32_t features = r.features() | r.carried;
   if ((features & gpu::FEATURE_PHOTONS) != 0) {
     const double distance =
         r.scene.nearest_specular_distance(glm::dvec3(frame.world_from_camera[3]));

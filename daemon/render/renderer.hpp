@@ -1,6 +1,7 @@
 // Renders the two worlds of a scene and composites them with the plate, progressively.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <glm/mat4x4.hpp>
 #include <memory>
@@ -36,6 +37,14 @@ struct FrameInput {
   std::optional<std::uint32_t> seed = {};  // absent: the set's, the same in every frame (P8)
 };
 
+// A part of the pipelines that is left out of a frame which has no need of it. No pixel depends on
+// that.
+enum class Part { gloss, refraction, textures, lamps, visible_lamps, lens, forks };
+inline constexpr std::array all_parts = {Part::gloss, Part::refraction,    Part::textures,
+                                         Part::lamps, Part::visible_lamps, Part::lens,
+                                         Part::forks};
+const char* name_of(Part part);
+
 class Renderer {
  public:
   Renderer(std::shared_ptr<Device> device, const set::Estimation& estimation,
@@ -45,6 +54,12 @@ class Renderer {
   // Uploads; may be called between any two frames (P13). Nothing is precomputed beyond BVHs.
   void set_scene(const scene::Scene& scene);
   void set_environment(const lighting::EnvironmentMap& environment, set::LightSampling sampling);
+
+  // From the next begin() on this part is in the pipelines, needed or not: what leaving it out
+  // saves can then be measured.
+  void carry(Part part);
+  // Whether the frame begun, and not only carry(), asks for the part.
+  bool needs(Part part) const;
 
   // Starts a frame: clears what was accumulated.
   void begin(const FrameInput& frame);

@@ -90,6 +90,8 @@ struct Lighting {
   glm::dvec3 unseen_radiance{0};  // UnseenRule::constant
   // Light frame to use; -1: every bracket up to the newest before the observer frame.
   int frame = -1;
+
+  friend bool operator==(const Lighting&, const Lighting&) = default;
 };
 
 enum class Estimator { paired, difference };
@@ -110,6 +112,8 @@ struct Estimation {
   Caustics caustics = Caustics::photons;  // how light comes to rough surfaces by mirrors and glass
   double photons = 0.1;                   // a pass (sample), per pixel of the picture
   double photon_radius_px = 2;  // of the first pass, at the distance of the nearest such object
+
+  friend bool operator==(const Estimation&, const Estimation&) = default;
 };
 
 struct Quality {
