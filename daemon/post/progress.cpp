@@ -70,4 +70,24 @@ void Progress::note(const std::string& text) {
   out_ << text << std::endl;
 }
 
+ShareProgress::ShareProgress(std::ostream& out, bool terminal, double total, double start_s)
+    : out_(out), terminal_(terminal), total_(total), start_s_(start_s) {}
+
+std::string ShareProgress::share_and_rest(double now_s) const {
+  const double share = std::min(done_ / total_, 1.0);
+  std::string text = std::to_string(static_cast<int>(100 * share)) + " %";
+  if (share > 0) text += ", " + duration_words((now_s - start_s_) * (1 / share - 1)) + " left";
+  return text;
+}
+
+void ShareProgress::worked(const std::string& step, double work, double now_s) {
+  done_ += work;
+  if (terminal_) out_ << "\r\x1b[K" << step << " (" << share_and_rest(now_s) << ")" << std::flush;
+}
+
+void ShareProgress::step_done(const std::string& text, double now_s) {
+  out_ << (terminal_ ? "\r\x1b[K" : "") << text << " (" << share_and_rest(now_s) << ")"
+       << std::endl;
+}
+
 }  // namespace previz::post

@@ -36,4 +36,25 @@ class Progress {
   bool line_shown_ = false;
 };
 
+// Progress of a job whose parts take very different times: by the share of the work that is done.
+class ShareProgress {
+ public:
+  // `total`: of any measure of work. Times are in seconds of any one clock.
+  ShareProgress(std::ostream& out, bool terminal, double total, double start_s);
+
+  // Some work of a step is done; shown on a terminal only.
+  void worked(const std::string& step, double work, double now_s);
+  // A step is finished.
+  void step_done(const std::string& text, double now_s);
+
+ private:
+  std::string share_and_rest(double now_s) const;
+
+  std::ostream& out_;
+  const bool terminal_;
+  const double total_;
+  const double start_s_;
+  double done_ = 0;
+};
+
 }  // namespace previz::post

@@ -40,5 +40,17 @@ TEST(Progress, TerminalRewritesOneLine) {
             "frame 7: 16 samples (1 of 2, 5.0 frames/s, 0 s left)\n");
 }
 
+TEST(ShareProgress, TellsTheShareOfTheWorkAndTheTimeLeft) {
+  std::ostringstream plain, terminal;
+  for (std::ostringstream* out : {&plain, &terminal}) {
+    ShareProgress progress(*out, out == &terminal, 200, 100);
+    progress.worked("reference", 50, 110);
+    progress.step_done("reference", 110);
+  }
+  EXPECT_EQ(plain.str(), "reference (25 %, 30 s left)\n");
+  EXPECT_EQ(terminal.str(),
+            "\r\x1b[Kreference (25 %, 30 s left)\r\x1b[Kreference (25 %, 30 s left)\n");
+}
+
 }  // namespace
 }  // namespace previz::post
