@@ -15,6 +15,8 @@
 #include "daemon/post/check.hpp"
 #include "daemon/post/import.hpp"
 #include "daemon/post/render.hpp"
+#include "daemon/post/trade.hpp"
+#include "daemon/post/trade_page.hpp"
 #include "daemon/rig/live.hpp"
 #include "daemon/rig/signals.hpp"
 #include "drivers/error.hpp"
@@ -113,6 +115,24 @@ void add_import(CLI::App& app, post::ImportOptions& options) {
   command.add_option("session", options.session, "Session directory to make")->required();
 }
 
+void add_trade(CLI::App& app, post::TradeOptions& options) {
+  CLI::App& command =
+      *app.add_subcommand("trade", "Measure what time buys on a set: a table and a page");
+  command.add_option("set", options.set_file, "Set file whose cameras are replayed")->required();
+  command.add_option("--frame", options.frame, "Observer frame (default: the first tracked)");
+  command.add_option("--out", options.directory, "Directory for trade.csv and trade.html");
+  command.add_option("--axes", options.axes, "What to vary (default: everything)")->delimiter(',');
+  command.add_option("--scale", options.scale, "Of the observer's size")->capture_default_str();
+  command.add_option("--samples", options.samples, "Samples per pixel to try")
+      ->delimiter(',')
+      ->capture_default_str();
+  command.add_option("--reference-samples", options.reference_samples,
+                     "Of the converged picture (default: 256 times the most of --samples)");
+  command.add_option("--rounds", options.rounds, "How often each is measured")
+      ->capture_default_str();
+  add_device_options(command, options.device);
+}
+
 int do_import(const post::ImportOptions& options) {
   const post::ImportReport report = post::import_session(options);
   for (const std::string& note : report.notes) std::cout << note << "\n";
@@ -130,6 +150,18 @@ int do_render(post::RenderOptions& options, const rig::StopOnSignal& stop) {
             << (report.interrupted ? "; stopped, the same command goes on from here" : "")
             << std::endl;
   return report.interrupted ? 128 + stop.received() : 0;
+}
+
+int do_trade(post::TradeOptions& options, const rig::StopOnSignal& stop) {
+  options.stop = stop.token();
+  options.terminal = isatty(STDOUT_FILENO) != 0;
+  const post::TradeReport report = post::run_trade(options, std::cout);
+  if (report.interrupted) return 128 + stop.received();
+  std::cout << "\n";
+  for (const post::TradeFrontPoint& at : post::told_front_of(report))
+    std::cout << post::front_words(report, at) << "\n";
+  std::cout << "\n" << report.csv.string() << "\n" << report.page.string() << std::endl;
+  return 0;
 }
 
 int do_run(rig::LiveOptions& options, const rig::StopOnSignal& stop) {
@@ -152,17 +184,20 @@ int main(int argc, char** argv) {
   rig::LiveOptions live_options;
   std::filesystem::path checked;
   post::ImportOptions import_options;
+  post::TradeOptions trade_options;
   try {
     add_render(app, render_options);
     add_run(app, live_options);
     add_check(app, checked);
     add_import(app, import_options);
+    add_trade(app, trade_options);
     app.parse(argc, argv);
     start_log(level);
     const rig::StopOnSignal stop;
     if (app.got_subcommand("check")) return post::check_set(checked, std::cout);
     if (app.got_subcommand("import")) return do_import(import_options);
     if (app.got_subcommand("render")) return do_render(render_options, stop);
+    if (app.got_subcommand("trade")) return do_trade(trade_options, stop);
     return do_run(live_options, stop);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;

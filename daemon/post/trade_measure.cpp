@@ -1,0 +1,215 @@
+#include "daemon/post/trade_measure.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+namespace previz::post {
+namespace {
+
+constexpr std::size_t block_px = 8;
+// An error is claimed where the reference's own is at most this part of it.
+constexpr double allowed_noise = 0.1;
+
+// Sums of squares over pixels and channels.
+struct Squares {
+  double error = 0, signal = 0;
+  void add(const glm::vec3& wrong, const glm::vec3& right) {
+    const glm::dvec3 e = glm::dvec3(wrong) - glm::dvec3(right);
+    error += glm::dot(e, e);
+    signal += glm::dot(glm::dvec3(right), glm::dvec3(right));
+  }
+  std::optional<double> relative() const {
+    if (!(signal > 0)) return std::nullopt;
+    return std::sqrt(error / signal);
+  }
+};
+
+std::vector<glm::vec3> middle(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b) {
+  std::vector<glm::vec3> mean(a.size());
+  for (std::size_t i = 0; i < a.size(); ++i) mean[i] = 0.5f * (a[i] + b[i]);
+  return mean;
+}
+
+TradePicture middle(const TradePicture& a, const TradePicture& b) {
+  TradePicture mean{a.width, a.height, middle(a.shown, b.shown), middle(a.added, b.added), a.mask};
+  for (std::size_t i = 0; i < mean.mask.size(); ++i) mean.mask[i] = 0.5f * (a.mask[i] + b.mask[i]);
+  return mean;
+}
+
+std::vector<glm::vec3> enlarged_layer(const std::vector<glm::vec3>& layer, int from_width,
+                                      int from_height, int width, int height) {
+  // OpenCV reads and writes the vectors in place; it leaves `from` alone.
+  const cv::Mat from(from_height, from_width, CV_32FC3, const_cast<glm::vec3*>(layer.data()));
+  std::vector<glm::vec3> result(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  cv::Mat to(height, width, CV_32FC3, result.data());
+  cv::resize(from, to, to.size(), 0, 0, cv::INTER_LINEAR);
+  return result;
+}
+
+glm::dvec3 difference(const glm::vec3& a, const glm::vec3& b) {
+  return glm::dvec3(a) - glm::dvec3(b);
+}
+
+// At one pixel, over its channels: the mean of (x - a)(y - b) over all pairs x, y.
+double common_error(std::span<const TradePicture> alike, std::size_t i, const glm::vec3& a,
+                    const glm::vec3& b) {
+  glm::dvec3 sum_a(0), sum_b(0);
+  double same = 0;
+  for (const TradePicture& picture : alike) {
+    const glm::dvec3 from_a = difference(picture.shown[i], a);
+    const glm::dvec3 from_b = difference(picture.shown[i], b);
+    sum_a += from_a;
+    sum_b += from_b;
+    same += glm::dot(from_a, from_b);
+  }
+  const auto count = static_cast<double>(alike.size());
+  return (glm::dot(sum_a, sum_b) - same) / (count * (count - 1));
+}
+
+// A product of two noises, of which the common error above is a mean: two combinations of the first
+// three pictures in which everything cancels but their noise, each of one picture's variance, and
+// uncorrelated with the other.
+struct NoiseProducts {
+  double of_pictures = 0, with_reference = 0;
+};
+NoiseProducts noise_products(std::span<const TradePicture> alike, std::size_t i, const glm::vec3& a,
+                             const glm::vec3& b) {
+  const glm::dvec3 x(alike[0].shown[i]), y(alike[1].shown[i]), z(alike[2].shown[i]);
+  const glm::dvec3 one = (x - y) / std::sqrt(2.0), other = (x + y - 2.0 * z) / std::sqrt(6.0);
+  return {glm::dot(one, other), glm::dot(one, difference(a, b)) / std::sqrt(2.0)};
+}
+
+}  // namespace
+
+TradePicture trade_picture(const render::Layers& layers, const std::vector<double>& camera,
+                           double white) {
+  TradePicture picture{layers.width, layers.height, {}, {}, layers.mask};
+  picture.shown.reserve(layers.composite.size());
+  picture.added.reserve(layers.composite.size());
+  for (std::size_t i = 0; i < layers.composite.size(); ++i) {
+    const glm::dvec3 seen(camera[3 * i], camera[3 * i + 1], camera[3 * i + 2]);
+    const glm::dvec3 shown = glm::clamp(glm::dvec3(layers.composite[i]), 0.0, white);
+    picture.shown.emplace_back(shown);
+    // Untouched is untouched, whatever rounding made of the camera's value.
+    const bool same = glm::vec3(seen) == layers.composite[i];
+    picture.added.emplace_back(same ? glm::dvec3(0) : shown - seen);
+  }
+  return picture;
+}
+
+TradePicture enlarged(const TradePicture& picture, int width, int height) {
+  if (picture.width == width && picture.height == height) return picture;
+  const auto layer = [&](const std::vector<glm::vec3>& from) {
+    return enlarged_layer(from, picture.width, picture.height, width, height);
+  };
+  // The mask that counts is the reference's.
+  return {width, height, layer(picture.shown), layer(picture.added), {}};
+}
+
+// The mean of the halves is as far from the truth, in expectation, as from either half.
+TradeReference::TradeReference(TradePicture a, TradePicture b)
+    : a_(std::move(a)), b_(std::move(b)), mean_(middle(a_, b_)), noise_(errors(a_)) {}
+
+TradeErrors TradeReference::errors(const TradePicture& picture) const {
+  assert(picture.shown.size() == mean_.shown.size());
+  Squares uncovered, covered, all;
+  for (std::size_t i = 0; i < mean_.shown.size(); ++i) {
+    if (mean_.mask[i] == 0) uncovered.add(picture.added[i], mean_.added[i]);
+    if (mean_.mask[i] == 1) covered.add(picture.shown[i], mean_.shown[i]);
+    all.add(picture.shown[i], mean_.shown[i]);
+  }
+  return {uncovered.relative(), covered.relative(), all.relative()};
+}
+
+TradeReference::Bias TradeReference::bias(std::span<const TradePicture> alike) const {
+  assert(alike.size() >= 3);
+  const auto width = static_cast<std::size_t>(mean_.width);
+  const std::size_t columns = (width + block_px - 1) / block_px;
+  // By block of 8x8 pixels, because pixels that share photons share their noise.
+  std::vector<NoiseProducts> blocks(columns *
+                                    ((mean_.shown.size() / width + block_px - 1) / block_px));
+  double common = 0, signal = 0;
+  for (std::size_t i = 0; i < mean_.shown.size(); ++i) {
+    common += common_error(alike, i, a_.shown[i], b_.shown[i]);
+    signal += glm::dot(glm::dvec3(mean_.shown[i]), glm::dvec3(mean_.shown[i]));
+    const NoiseProducts noise = noise_products(alike, i, a_.shown[i], b_.shown[i]);
+    NoiseProducts& block = blocks[i / width / block_px * columns + i % width / block_px];
+    block.of_pictures += noise.of_pictures;
+    block.with_reference += noise.with_reference;
+  }
+  if (!(signal > 0)) return {};
+  // Each picture's noise meets the others' and that of either half. Three pictures have three
+  // pairs, whose products are uncorrelated.
+  double variance = 0;
+  for (const NoiseProducts& block : blocks)
+    variance +=
+        block.of_pictures * block.of_pictures + 2 * block.with_reference * block.with_reference;
+  const double three_errors = 3 * std::sqrt(variance / 3);
+  Bias bias;
+  bias.least = std::sqrt(three_errors / signal);
+  if (common > three_errors) bias.value = std::sqrt(common / signal);
+  return bias;
+}
+
+TradeErrors rms(std::span<const TradeErrors> errors) {
+  assert(!errors.empty());
+  const auto of = [&](std::optional<double> TradeErrors::*measure) -> std::optional<double> {
+    double sum = 0;
+    for (const TradeErrors& one : errors) {
+      if (!(one.*measure)) return std::nullopt;
+      sum += *(one.*measure) * *(one.*measure);
+    }
+    return std::sqrt(sum / static_cast<double>(errors.size()));
+  };
+  return {of(&TradeErrors::difference), of(&TradeErrors::virtual_part), of(&TradeErrors::picture)};
+}
+
+std::string within_noise(const TradeErrors& errors, const TradeErrors& noise) {
+  std::string names;
+  const auto check = [&](const char* name, std::optional<double> TradeErrors::*measure) {
+    const auto &error = errors.*measure, &own = noise.*measure;
+    if (!error || !own || *own <= allowed_noise * *error) return;
+    if (!names.empty()) names += ' ';
+    names += name;
+  };
+  check("e_diff", &TradeErrors::difference);
+  check("e_virtual", &TradeErrors::virtual_part);
+  check("e_picture", &TradeErrors::picture);
+  return names;
+}
+
+std::vector<bool> pareto_front(std::span<const TradeCost> costs) {
+  std::vector<bool> front;
+  for (const TradeCost& one : costs) {
+    front.push_back(std::ranges::none_of(costs, [&](const TradeCost& other) {
+      return other.seconds <= one.seconds && other.error <= one.error &&
+             (other.seconds < one.seconds || other.error < one.error);
+    }));
+  }
+  return front;
+}
+
+std::size_t knee(std::span<const TradeCost> front) {
+  assert(!front.empty());
+  const auto share = [](double value, double from, double to) {
+    return to > from ? std::log(value / from) / std::log(to / from) : 0;
+  };
+  std::size_t best = 0;
+  double deepest = 0;
+  for (std::size_t i = 0; i < front.size(); ++i) {
+    const double x = share(front[i].seconds, front.front().seconds, front.back().seconds);
+    const double y = share(front[i].error, front.back().error, front.front().error);
+    if (1 - x - y > deepest) {
+      deepest = 1 - x - y;
+      best = i;
+    }
+  }
+  return best;
+}
+
+}  // namespace previz::post

@@ -1,0 +1,54 @@
+#include "daemon/post/trade_method.hpp"
+
+#include <chrono>
+
+#include "daemon/pipeline/preview_size.hpp"
+#include "daemon/render/composite.hpp"
+
+namespace previz::post {
+namespace {
+
+ObserverCalibration method_calibration(const TradeFrame& frame, const TradeSettings& settings,
+                                       double scale) {
+  ObserverCalibration calibration = pipeline::scaled(frame.calibration(), scale);
+  calibration.lens = settings.lens;
+  return calibration;
+}
+
+}  // namespace
+
+MethodRenderer::MethodRenderer(const std::shared_ptr<render::Device>& device, TradeFrame& frame,
+                               const scene::Scene& scene, const TradeSettings& settings,
+                               double sweep_scale)
+    : exposure_(frame.exposure()),
+      world_from_camera_(frame.world_from_camera()),
+      plate_(frame.plate(sweep_scale * settings.scale)),
+      camera_(render::plate_radiance(plate_, frame.response(), exposure_).value),
+      renderer_(device, settings.estimation,
+                method_calibration(frame, settings, sweep_scale * settings.scale)) {
+  renderer_.set_scene(scene);
+  renderer_.set_environment(frame.light(settings.lighting)->lighting.environment,
+                            settings.lighting.sampling);
+  for (const render::Part part : settings.carried) renderer_.carry(part);
+}
+
+void MethodRenderer::warm_up() {
+  begin(0);
+  renderer_.render(1);
+}
+
+void MethodRenderer::begin(std::uint32_t seed) {
+  renderer_.begin({plate_, exposure_, world_from_camera_, seed});
+}
+
+double MethodRenderer::render(int samples) {
+  const auto start = std::chrono::steady_clock::now();
+  renderer_.render(samples);
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+TradePicture MethodRenderer::picture() const {
+  return trade_picture(renderer_.layers(), camera_, 1 / exposure_);
+}
+
+}  // namespace previz::post

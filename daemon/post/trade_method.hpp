@@ -1,0 +1,41 @@
+// One frame rendered with one method of a trade's plan, and timed.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "daemon/post/trade_axes.hpp"
+#include "daemon/post/trade_frame.hpp"
+#include "daemon/post/trade_measure.hpp"
+#include "daemon/render/renderer.hpp"
+#include "daemon/scene/scene.hpp"
+
+namespace previz::post {
+
+class MethodRenderer {
+ public:
+  // `sweep_scale`: of the observer's size; the settings' scale is of that.
+  MethodRenderer(const std::shared_ptr<render::Device>& device, TradeFrame& frame,
+                 const scene::Scene& scene, const TradeSettings& settings, double sweep_scale);
+
+  // A first sample makes the device ready: its pipelines are compiled when they are first used.
+  void warm_up();
+  // Forgets what was rendered.
+  void begin(std::uint32_t seed);
+  // Seconds.
+  double render(int samples);
+
+  bool needs(render::Part part) const { return renderer_.needs(part); }
+  render::Layers layers() const { return renderer_.layers(); }
+  TradePicture picture() const;
+
+ private:
+  const double exposure_;
+  const glm::dmat4 world_from_camera_;
+  const Plate plate_;
+  const std::vector<double> camera_;  // the plate's radiance, interleaved RGB
+  render::Renderer renderer_;
+};
+
+}  // namespace previz::post

@@ -1,0 +1,66 @@
+// What `previzd trade` makes of its table of axes.
+#include "daemon/post/trade_axes.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "drivers/error.hpp"
+
+namespace previz::post {
+namespace {
+
+TradePlan plan_of(const TradeSettings& own, const std::vector<std::string>& wanted = {}) {
+  return plan_trade(own, trade_axes(own, {render::Part::textures}), wanted);
+}
+
+const TradePlan::Axis* axis_named(const TradePlan& plan, const std::string& name) {
+  const auto axis = std::ranges::find(plan.axes, name, &TradePlan::Axis::name);
+  return axis == plan.axes.end() ? nullptr : &*axis;
+}
+
+TEST(TradeAxes, EachHasTheSetsOwnSettingsOnceAndSomethingElse) {
+  const TradePlan plan = plan_of({});
+  EXPECT_EQ(plan.methods.front().settings, TradeSettings());
+  for (const TradePlan::Axis& axis : plan.axes) {
+    EXPECT_EQ(std::ranges::count(axis.entries, 0u, &TradePlan::Entry::method), 1) << axis.name;
+    EXPECT_GT(axis.entries.size(), 1u) << axis.name;
+    EXPECT_FALSE(axis.what.empty()) << axis.name;
+  }
+}
+
+TEST(TradeAxes, NothingIsMeasuredTwice) {
+  const TradePlan plan = plan_of({});
+  for (std::size_t i = 0; i < plan.methods.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      EXPECT_FALSE(plan.methods[i].settings == plan.methods[j].settings)
+          << plan.methods[i].name << " is " << plan.methods[j].name;
+}
+
+TEST(TradeAxes, AnOwnValueOutsideTheListIsNamedByItself) {
+  TradeSettings own;
+  own.estimation.max_depth = 12;
+  EXPECT_EQ(axis_named(plan_of(own), "depth")->entries.front().variant, "12");
+  own.estimation.max_depth = 4;
+  const auto& entries = axis_named(plan_of(own), "depth")->entries;
+  EXPECT_EQ(std::ranges::find(entries, 0u, &TradePlan::Entry::method)->variant, "4");
+  EXPECT_EQ(entries.size(), 4u);
+}
+
+TEST(TradeAxes, WhereThereIsNothingToTradeThereIsNoAxis) {
+  TradeSettings own;
+  EXPECT_FALSE(axis_named(plan_of(own), "lens"));        // a pinhole already
+  EXPECT_FALSE(axis_named(plan_of(own), "light_mode"));  // one is known
+  own.lens = ThinLens{0.05, 2.8, 1.0};
+  EXPECT_TRUE(axis_named(plan_of(own), "lens"));
+}
+
+TEST(TradeAxes, OnlyThoseWantedAreSwept) {
+  const TradePlan plan = plan_of({}, {"estimator"});
+  EXPECT_EQ(plan.axes.size(), 1u);
+  EXPECT_EQ(plan.methods.size(), 2u);
+  EXPECT_THROW(plan_of({}, {"estimators"}), Error);
+}
+
+}  // namespace
+}  // namespace previz::post

@@ -1,0 +1,156 @@
+// `previzd trade` from end to end on a small take, on whatever Vulkan device there is.
+#include "daemon/post/trade.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "tests/unit/small_take.hpp"
+#include "tests/unit/temporary_directory.hpp"
+
+namespace previz::post {
+namespace {
+
+class Trade : public testing::Test {
+ protected:
+  // 32x24, as little as a sweep can be.
+  TradeOptions options() const {
+    TradeOptions options;
+    options.set_file = directory_ / "set.toml";
+    options.directory = directory_ / "out";
+    options.scale = 2.0 / 3;
+    options.axes = {"estimator"};
+    options.samples = {2, 1};
+    options.reference_samples = 16;
+    return options;
+  }
+  void expect_refused(const TradeOptions& refused, const std::string& words) {
+    try {
+      run_trade(refused, out_);
+      ADD_FAILURE() << "not refused: " << words;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+    }
+  }
+  void rewrite_set(const std::string& from, const std::string& to) {
+    std::string text = session::read_file(directory_ / "set.toml");
+    ASSERT_NE(text.find(from), std::string::npos);
+    text.replace(text.find(from), from.size(), to);
+    std::ofstream(directory_ / "set.toml") << text;
+  }
+  test::TemporaryDirectory directory_;
+  std::ostringstream out_;
+};
+
+TEST_F(Trade, SweepsAndWritesTableAndPage) {
+  test::write_small_take(directory_.path());
+  const TradeReport report = run_trade(options(), out_);
+  EXPECT_EQ(report.frame, 1u);  // frame 0 has no light yet
+  EXPECT_EQ(report.width, 32);
+  EXPECT_EQ(report.height, 24);
+  ASSERT_GT(*report.noise.picture, 0.0);
+  std::size_t entries = 0;
+  for (const TradePlan::Axis& axis : report.plan.axes) entries += axis.entries.size();
+  const std::string csv = session::read_file(report.csv);
+  EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(csv, '\n')), 2 + 2 * entries);
+  EXPECT_NE(session::read_file(report.page).find("What time buys on"), std::string::npos);
+  EXPECT_NE(out_.str().find("round 3 of 3, estimator difference ("), std::string::npos);
+
+  for (const TradeMethod& method : report.methods) {
+    ASSERT_EQ(method.points.size(), 2u);
+    EXPECT_EQ(method.points[0].samples, 1);
+    for (const TradePoint& point : method.points) {
+      EXPECT_GT(point.seconds, 0.0);
+      EXPECT_GT(*point.errors.picture, 0.0);
+    }
+    EXPECT_TRUE(method.bias);
+  }
+  ASSERT_FALSE(report.corners.empty());
+  EXPECT_EQ(report.corners.front().at, front_of(report).front());
+  EXPECT_EQ(report.corners.front().difference.width, 32);
+}
+
+// The half-size picture loses the camera's own detail, random in every pixel: no samples bring it
+// back. A plate of independent pixels of standard deviation s, averaged by fours and enlarged, is
+// off by about s itself: far more than any noise of the render.
+TEST_F(Trade, AHalfSizedPictureStaysOff) {
+  test::write_small_take(directory_.path());
+  TradeOptions only = options();
+  only.axes = {"resolution"};
+  const TradeReport report = run_trade(only, out_);
+  ASSERT_EQ(report.plan.methods[1].name, "resolution half");
+  EXPECT_GT(report.methods[1].bias->value, 0.1);
+  EXPECT_LT(report.methods[0].bias->value, 0.1);
+}
+
+TEST_F(Trade, PartsThatNobodyNeedsChangeNoPixel) {
+  test::write_small_take(directory_.path());
+  TradeOptions only = options();
+  only.axes = {"parts"};
+  only.rounds = 1;
+  const TradeReport report = run_trade(only, out_);
+  std::vector<std::string> carried;
+  for (const TradeMethod& method : report.methods) {
+    if (!method.changed_pixels) continue;
+    carried.push_back(method.name);
+    EXPECT_EQ(*method.changed_pixels, 0u) << method.name;
+    EXPECT_FALSE(method.points.back().pareto) << "is no choice";
+  }
+  EXPECT_EQ(carried, (std::vector<std::string>{"parts refraction", "parts textures", "parts lamps",
+                                               "parts lamps in view", "parts lens"}));
+}
+
+TEST_F(Trade, RefusesWhatCannotBeTraded) {
+  test::write_small_take(directory_.path());
+  TradeOptions wrong = options();
+  wrong.frame = test::small_take_lost;
+  expect_refused(wrong, "frame 3: pose lost");
+  wrong.frame = test::small_take_unlit;
+  expect_refused(wrong, "frame 0: no light frame");
+  wrong.frame = 80;
+  expect_refused(wrong, "the last observer frame is 7");
+  for (const double scale : {0.0, 1.5, std::nan("")}) {
+    wrong = options();
+    wrong.scale = scale;
+    expect_refused(wrong, "must be above 0 and at most 1");
+  }
+  wrong = options();
+  wrong.directory = directory_ / "set.toml";
+  expect_refused(wrong, "is not a directory");
+  wrong = options();
+  wrong.axes = {"colour"};
+  expect_refused(wrong, "--axes colour: there is no such axis; estimator, ");
+  wrong = options();
+  wrong.samples = {0};
+  expect_refused(wrong, "--samples 0: must be from 1");
+}
+
+TEST_F(Trade, RefusesASetWithoutAReplayedCamera) {
+  test::write_small_take(directory_.path());
+  rewrite_set("driver = \"replay\"\ndevice = \"session\"", "driver = \"none\"");
+  expect_refused(options(), "observer: a trade needs a take that is replayed");
+}
+
+TEST_F(Trade, RefusesAPictureWithNothingVirtualInIt) {
+  test::write_small_take(directory_.path(), false);
+  TradeOptions none = options();
+  none.reference_samples = 2;
+  expect_refused(none, "nothing virtual");
+}
+
+TEST_F(Trade, AStopLeavesNothing) {
+  test::write_small_take(directory_.path());
+  std::stop_source stop;
+  stop.request_stop();
+  TradeOptions stopped = options();
+  stopped.stop = stop.get_token();
+  EXPECT_TRUE(run_trade(stopped, out_).interrupted);
+  EXPECT_FALSE(std::filesystem::exists(directory_ / "out/trade.csv"));
+}
+
+}  // namespace
+}  // namespace previz::post
