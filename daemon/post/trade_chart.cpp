@@ -52,15 +52,17 @@ struct LogAxis {
   double at(double value) const {
     return from_px + (to_px - from_px) * std::log(value / low) / std::log(high / low);
   }
-  // 1, 2, 5, 10 ... where that is not too many, else powers of ten.
+  // Round numbers, as many as the axis has room for.
   std::vector<double> ticks() const {
-    const bool few = high / low < 300;
+    const std::vector<double> steps = high / low < 8     ? std::vector<double>{1, 1.5, 2, 3, 5, 7}
+                                      : high / low < 300 ? std::vector<double>{1, 2, 5}
+                                                         : std::vector<double>{1};
     std::vector<double> result;
     for (int power = static_cast<int>(std::floor(std::log10(low))); std::pow(10, power) <= high;
          ++power)
-      for (const double step : {1.0, 2.0, 5.0}) {
+      for (const double step : steps) {
         const double tick = step * std::pow(10, power);
-        if (tick >= low && tick <= high && (few || step == 1)) result.push_back(tick);
+        if (tick >= low && tick <= high) result.push_back(tick);
       }
     return result;
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstdio>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -51,6 +52,12 @@ using Measure = std::optional<double> TradeErrors::*;
 std::string plain_words(std::string name) {
   std::ranges::replace(name, '_', ' ');
   return name;
+}
+
+// With a capital letter.
+std::string sentence(std::string words) {
+  words.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(words.front())));
+  return words;
 }
 
 std::string samples_words(int samples) {
@@ -167,7 +174,7 @@ std::string front_section(const TradeReport& report) {
   std::string html =
       "<h2>The front</h2>\n<p>Every dot is one setting at one number of samples. On the line are "
       "those that nothing else beats: whatever is faster is further off, whatever is nearer takes "
-      "longer.</p>\n" +
+      "longer. In the shaded part the reference itself is too noisy to tell.</p>\n" +
       front_chart(report) + "<table>\n" +
       head_row({{"time", true},
                 {"what", false},
@@ -237,9 +244,8 @@ std::string bias_sentence(const TradeReport& report, const TradePlan::Axis& axis
 }
 
 std::string axis_section(const TradeReport& report, const TradePlan::Axis& axis) {
-  std::string title = plain_words(axis.name);
-  title.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(title.front())));
-  return "<h2>" + title + "</h2>\n<p>" + escaped(axis.what) + "</p>\n<div class=\"charts\">\n" +
+  return "<h2>" + sentence(plain_words(axis.name)) + "</h2>\n<p>" + escaped(sentence(axis.what)) +
+         ".</p>\n<div class=\"charts\">\n" +
          axis_chart(report, axis, "The picture", &TradeErrors::picture) +
          axis_chart(report, axis, "Light and shadow on the real scene", &TradeErrors::difference) +
          "</div>\n" + bias_sentence(report, axis);
