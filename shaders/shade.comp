@@ -165,7 +165,7 @@ bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, out GpuS
   const vec3 value = bsdf_evaluate(s, l, light.direction, bsdf_pdf);
   const bool delta = light.pdf <= 0.0;
   const float pdf = selection * (delta ? 1.0 : light.pdf);
-  if (!(pdf > 0.0)) return false;
+  if (pdf <= 0.0) return false;
   const float weight =
       delta ? 1.0 : mis_weight(pdf, combined_pdf(t, s, light.direction, bsdf_pdf));
   ray.direction = light.direction;
@@ -174,7 +174,7 @@ bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, out GpuS
   ray.contribution = p.throughput * value * light.radiance * (weight / pdf);
   ray.gain = light.gain;
   if (cancels(p, light.gain) && !meets_bounds(ray.origin, ray.direction, ray.t_max)) return false;
-  return any(greaterThan(ray.contribution, vec3(0.0)));
+  return any(notEqual(ray.contribution, vec3(0.0)));  // what is no number goes on, to be counted
 }
 
 // Light that comes by mirrors and glass only (P16), by photons. Each world sums the same photons in
@@ -207,8 +207,9 @@ bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, vec2
   const vec2 u = sample_2d(random, vertex_pair(PAIR_SCATTER, p.depth));
   if (!sample_direction(t, s, l, u, chance.y, direction, weight, pdf)) return false;
   p.throughput *= weight;
-  const float strongest = max(max(p.throughput.r, p.throughput.g), p.throughput.b);
-  if (!(strongest > 0.0)) return false;
+  if (all(equal(p.throughput, vec3(0.0)))) return false;
+  const vec3 size = abs(p.throughput);
+  const float strongest = max(max(size.r, size.g), size.b);
   if (p.depth + 1u >= frame.roulette_depth && strongest < 1.0) {
     if (chance.x >= strongest) return false;
     p.throughput /= strongest;

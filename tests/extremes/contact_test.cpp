@@ -38,7 +38,7 @@ Rendered show(const View& view, set::Estimator estimator = set::Estimator::paire
   set::Estimation estimation;
   estimation.max_depth = 1;
   estimation.estimator = estimator;
-  const Rendered result = render_view(view, 4, estimation);
+  Rendered result = render_view(view, 4, estimation);
   expect_clean(result.counters);
   return result;
 }

@@ -76,7 +76,7 @@ TEST(ExtremeFurnace, black_plastic_reflects_its_coat_alone) {
 // A slab and a ball, so that rays enter and leave at every angle; of albedo 1 they take nothing but
 // the few rays that graze a triangle of the ball from behind its interpolated normal.
 TEST(ExtremeFurnace, clear_glass_takes_nothing) {
-  for (const float ior : {1.0f, 1.0001f, 1.5f, 2.5f}) {
+  for (const float ior : {1.0f, 1.0001f, 2.5f}) {
     for (const bool thin : {false, true}) {
       for (const scene::Mesh& mesh : {box_mesh({4, 4, 0.5}), icosphere_mesh(1, 5)}) {
         View view;

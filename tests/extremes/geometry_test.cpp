@@ -41,7 +41,7 @@ View seen_from_above(scene::Mesh mesh, const scene::Material& material) {
 Rendered show(const View& view, int samples = 16) {
   set::Estimation estimation;
   estimation.max_depth = 4;
-  const Rendered result = render_view(view, samples, estimation, set::LightSampling::bsdf);
+  Rendered result = render_view(view, samples, estimation, set::LightSampling::bsdf);
   expect_clean(result.counters);
   return result;
 }

@@ -1,4 +1,5 @@
 // Light of any strength: the picture is linear in it, and a sun does not drown its sky.
+#include <cmath>
 #include <numbers>
 
 #include "shaders/lib/octahedral.h"
@@ -55,6 +56,28 @@ TEST(Radiance, by_a_million_and_a_millionth_scales_the_picture) {
     for (std::size_t i = 0; i < plain.mixed.size(); ++i)
       for (int c = 0; c < 3; ++c)
         ASSERT_NEAR(other.mixed[i][c] / factor, plain.mixed[i][c], 1e-4 * plain.mixed[i][c]);
+  }
+}
+
+// An albedo that is no number, and one below nothing, which no loader lets through: every sample
+// they spoil is counted, none is dropped in silence, and the picture stays finite.
+TEST(Radiance, that_cannot_be_is_counted) {
+  for (const float albedo : {std::nanf(""), -0.5f}) {
+    View view;
+    add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({20, 20})),
+                 add_material(view.scene, diffuse(glm::vec3(albedo))));
+    set::Light lamp;
+    lamp.gain_real = 1;
+    lamp.position = {0.3, 0.2, 0.9};
+    view.scene.lights.push_back(lamp);
+    view.environment = uniform_environment(glm::vec3(0));
+    view.calibration = pinhole(16, 16, 0.5);
+    view.world_from_camera = look_at({0, -0.6, 1}, {0, 0, 0});
+    const Rendered result = render_view(view, 4);
+    const render::Counters& counters = result.counters;
+    constexpr std::uint64_t all = 16 * 16 * 4;
+    EXPECT_EQ(albedo < 0 ? counters.dropped_negative : counters.dropped_not_finite, all) << albedo;
+    for (const glm::vec3& pixel : result.layers.mixed) EXPECT_EQ(pixel, glm::vec3(0));
   }
 }
 

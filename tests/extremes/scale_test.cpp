@@ -56,7 +56,7 @@ View resized(View view, double factor, const glm::dvec3& move = {}) {
 Rendered show(const View& view) {
   set::Estimation estimation;
   estimation.max_depth = 6;
-  const Rendered result = render_view(view, 8, estimation);
+  Rendered result = render_view(view, 8, estimation);
   expect_clean(result.counters);
   return result;
 }
