@@ -25,7 +25,7 @@ void expect_reflectance(const scene::Material& material, double expected) {
       render::FrameInput frame;
       frame.world_from_camera = look_at({0, -std::sin(angle), std::cos(angle)}, {0, 0, 0});
       renderer.begin(frame);
-      renderer.render(16);
+      renderer.render(8);
       const render::Layers layers = renderer.layers();
       const bool sure = sampling == set::LightSampling::bsdf;
       EXPECT_NEAR(mean(layers.mixed).g, expected,
@@ -84,7 +84,7 @@ TEST(ExtremeFurnace, clear_glass_takes_nothing) {
         material.thin_walled = thin;
         add_instance(view.scene, add_mesh(view.scene, mesh), add_material(view.scene, material));
         view.environment = uniform_environment(glm::vec3(1));
-        view.calibration = pinhole(24, 24, 0.8);
+        view.calibration = pinhole(16, 16, 0.8);
         view.world_from_camera = look_at({0.3, -0.4, 3}, {0, 0, 0});
         const Rendered result = render_view(view, 4, deep());
         EXPECT_NEAR(mean(result.layers.mixed).g, 1, energy)
