@@ -52,8 +52,8 @@ inline glm::dvec3 standard_error(const render::Layers& layers) {
   return glm::sqrt(mean(layers.variance) / n);
 }
 
-// Standard error of the mean of the green mixed radiance from the spread of the pixels, for pictures
-// whose pixels all expect the same value: their scrambles are independent.
+// Standard error of the mean of the green mixed radiance from the spread of the pixels, for
+// pictures whose pixels all expect the same value: their scrambles are independent.
 inline double standard_error_of_pixels(const render::Layers& layers) {
   const double centre = mean(layers.mixed).g;
   double sum = 0;
