@@ -130,8 +130,8 @@ TradeReport Sweep::run(std::ostream& out) {
       << " axes, reference of " << report_.reference_samples << " samples, on " << report_.device
       << std::endl;
 
-  TradePicture half = reference_half(0, progress);
-  reference_.emplace(std::move(half), reference_half(1, progress));
+  const TradePicture half = reference_half(0, progress);
+  reference_.emplace(half, reference_half(1, progress));
   report_.noise = reference_->noise();
   report_.reference = displayed(reference_->picture());
   const auto& added = reference_->picture().added;
@@ -213,7 +213,7 @@ void Sweep::conclude() {
       candidates.push_back(&point);
       costs.push_back({point.seconds, point.errors.picture.value_or(0)});
     }
-    if (best_[m].size() >= 3) method.bias = reference_->bias(best_[m]);
+    if (best_[m].size() >= 3) method.bias = reference_->bias(best_[m], best_[0]);
   }
   const std::vector<bool> front = pareto_front(costs);
   for (std::size_t i = 0; i < front.size(); ++i) candidates[i]->pareto = front[i];

@@ -98,7 +98,8 @@ std::string curve_svg(const ChartCurve& curve, const LogAxis& x, const LogAxis& 
          (joined ? "<polyline points=\"" + line + "\"/>\n" : "") + dots + "</g>\n";
 }
 
-// Names at the ends of the curves, moved apart where they would lie on each other.
+// Names beside the ends of the curves, moved apart where they would lie on each other; on the front
+// above their dots.
 std::string labels_svg(const LogChart& chart, const LogAxis& x, const LogAxis& y) {
   struct Label {
     double x, y;
@@ -108,8 +109,8 @@ std::string labels_svg(const LogChart& chart, const LogAxis& x, const LogAxis& y
   for (const ChartCurve& curve : chart.curves) {
     const auto last = std::find_if(curve.points.rbegin(), curve.points.rend(), drawable);
     if (!curve.name.empty() && last != curve.points.rend())
-      labels.push_back(
-          {x.at(last->x) + 9, y.at(last->y) + (curve.style == "front" ? -7 : 4), &curve});
+      labels.push_back(curve.style == "front" ? Label{x.at(last->x) + 9, y.at(last->y) - 7, &curve}
+                                              : Label{x.to_px + 8, y.at(last->y) + 4, &curve});
   }
   std::ranges::sort(labels, {}, &Label::y);
   for (std::size_t i = 1; i < labels.size(); ++i)

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
@@ -51,37 +52,30 @@ std::vector<glm::vec3> enlarged_layer(const std::vector<glm::vec3>& layer, int f
   return result;
 }
 
-glm::dvec3 difference(const glm::vec3& a, const glm::vec3& b) {
-  return glm::dvec3(a) - glm::dvec3(b);
-}
+// What is known of one pixel's differences from the set's own picture, over its channels.
+struct CommonDifference {
+  double common = 0;  // the mean of d e over all pairs of differences
+  // A product of two noises, as d e is where d and e are nothing else: two combinations of the
+  // first three in which everything cancels but noise, each of one's variance and uncorrelated.
+  double noise = 0;
+};
 
-// At one pixel, over its channels: the mean of (x - a)(y - b) over all pairs x, y.
-double common_error(std::span<const TradePicture> alike, std::size_t i, const glm::vec3& a,
-                    const glm::vec3& b) {
-  glm::dvec3 sum_a(0), sum_b(0);
-  double same = 0;
-  for (const TradePicture& picture : alike) {
-    const glm::dvec3 from_a = difference(picture.shown[i], a);
-    const glm::dvec3 from_b = difference(picture.shown[i], b);
-    sum_a += from_a;
-    sum_b += from_b;
-    same += glm::dot(from_a, from_b);
+CommonDifference common_difference(std::span<const TradePicture> alike,
+                                   std::span<const TradePicture> own, std::size_t i) {
+  const auto difference = [&](std::size_t k) {
+    return glm::dvec3(alike[k].shown[i]) - glm::dvec3(own[k].shown[i]);
+  };
+  glm::dvec3 sum(0);
+  double squares = 0;
+  for (std::size_t k = 0; k < alike.size(); ++k) {
+    const glm::dvec3 d = difference(k);
+    sum += d;
+    squares += glm::dot(d, d);
   }
   const auto count = static_cast<double>(alike.size());
-  return (glm::dot(sum_a, sum_b) - same) / (count * (count - 1));
-}
-
-// A product of two noises, of which the common error above is a mean: two combinations of the first
-// three pictures in which everything cancels but their noise, each of one picture's variance, and
-// uncorrelated with the other.
-struct NoiseProducts {
-  double of_pictures = 0, with_reference = 0;
-};
-NoiseProducts noise_products(std::span<const TradePicture> alike, std::size_t i, const glm::vec3& a,
-                             const glm::vec3& b) {
-  const glm::dvec3 x(alike[0].shown[i]), y(alike[1].shown[i]), z(alike[2].shown[i]);
-  const glm::dvec3 one = (x - y) / std::sqrt(2.0), other = (x + y - 2.0 * z) / std::sqrt(6.0);
-  return {glm::dot(one, other), glm::dot(one, difference(a, b)) / std::sqrt(2.0)};
+  const glm::dvec3 x = difference(0), y = difference(1), z = difference(2);
+  return {(glm::dot(sum, sum) - squares) / (count * (count - 1)),
+          glm::dot(x - y, x + y - 2.0 * z) / std::sqrt(12.0)};
 }
 
 }  // namespace
@@ -112,8 +106,8 @@ TradePicture enlarged(const TradePicture& picture, int width, int height) {
 }
 
 // The mean of the halves is as far from the truth, in expectation, as from either half.
-TradeReference::TradeReference(TradePicture a, TradePicture b)
-    : a_(std::move(a)), b_(std::move(b)), mean_(middle(a_, b_)), noise_(errors(a_)) {}
+TradeReference::TradeReference(const TradePicture& a, const TradePicture& b)
+    : mean_(middle(a, b)), noise_(errors(a)) {}
 
 TradeErrors TradeReference::errors(const TradePicture& picture) const {
   assert(picture.shown.size() == mean_.shown.size());
@@ -126,30 +120,26 @@ TradeErrors TradeReference::errors(const TradePicture& picture) const {
   return {uncovered.relative(), covered.relative(), all.relative()};
 }
 
-TradeReference::Bias TradeReference::bias(std::span<const TradePicture> alike) const {
-  assert(alike.size() >= 3);
+TradeReference::Bias TradeReference::bias(std::span<const TradePicture> alike,
+                                          std::span<const TradePicture> own) const {
+  assert(alike.size() >= 3 && own.size() == alike.size());
   const auto width = static_cast<std::size_t>(mean_.width);
+  const auto height = static_cast<std::size_t>(mean_.height);
   const std::size_t columns = (width + block_px - 1) / block_px;
   // By block of 8x8 pixels, because pixels that share photons share their noise.
-  std::vector<NoiseProducts> blocks(columns *
-                                    ((mean_.shown.size() / width + block_px - 1) / block_px));
+  std::vector<double> noise(columns * ((height + block_px - 1) / block_px));
   double common = 0, signal = 0;
   for (std::size_t i = 0; i < mean_.shown.size(); ++i) {
-    common += common_error(alike, i, a_.shown[i], b_.shown[i]);
+    const CommonDifference pixel = common_difference(alike, own, i);
+    common += pixel.common;
+    noise[i / width / block_px * columns + i % width / block_px] += pixel.noise;
     signal += glm::dot(glm::dvec3(mean_.shown[i]), glm::dvec3(mean_.shown[i]));
-    const NoiseProducts noise = noise_products(alike, i, a_.shown[i], b_.shown[i]);
-    NoiseProducts& block = blocks[i / width / block_px * columns + i % width / block_px];
-    block.of_pictures += noise.of_pictures;
-    block.with_reference += noise.with_reference;
   }
   if (!(signal > 0)) return {};
-  // Each picture's noise meets the others' and that of either half. Three pictures have three
-  // pairs, whose products are uncorrelated.
-  double variance = 0;
-  for (const NoiseProducts& block : blocks)
-    variance +=
-        block.of_pictures * block.of_pictures + 2 * block.with_reference * block.with_reference;
-  const double three_errors = 3 * std::sqrt(variance / 3);
+  double variance = 0;  // of one product's sum; those of different pairs are uncorrelated
+  for (const double block : noise) variance += block * block;
+  const auto pairs = static_cast<double>(alike.size() * (alike.size() - 1)) / 2;
+  const double three_errors = 3 * std::sqrt(variance / pairs);
   Bias bias;
   bias.least = std::sqrt(three_errors / signal);
   if (common > three_errors) bias.value = std::sqrt(common / signal);
@@ -200,8 +190,8 @@ std::size_t knee(std::span<const TradeCost> front) {
     return to > from ? std::log(value / from) / std::log(to / from) : 0;
   };
   std::size_t best = 0;
-  double deepest = 0;
-  for (std::size_t i = 0; i < front.size(); ++i) {
+  double deepest = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i + 1 < front.size(); ++i) {
     const double x = share(front[i].seconds, front.front().seconds, front.back().seconds);
     const double y = share(front[i].error, front.back().error, front.front().error);
     if (1 - x - y > deepest) {

@@ -38,7 +38,7 @@ struct TradeErrors {
 // Two independent halves.
 class TradeReference {
  public:
-  TradeReference(TradePicture a, TradePicture b);
+  TradeReference(const TradePicture& a, const TradePicture& b);
 
   const TradePicture& picture() const { return mean_; }
   // Standard error of the halves' mean: half their difference.
@@ -46,18 +46,19 @@ class TradeReference {
   // `picture` has the reference's size.
   TradeErrors errors(const TradePicture& picture) const;
 
-  // What no number of samples removes: rms over the rms of the reference's composite. Of two
-  // pictures made alike, x and y, and the halves a and b, all independent, (x - a)(y - b) is the
-  // square of the bias in expectation, because noise of different pictures does not multiply up;
-  // here its mean over all pairs of at least three pictures.
+  // How far pictures made alike are from the set's `own` with the same samples and random numbers,
+  // beyond noise: rms over the rms of the reference's composite. Of the differences d and e of two
+  // pairs, d e is the square of that in expectation, because independent noise does not multiply
+  // up; here its mean over all pairs of pairs, of which there must be at least three. The
+  // reference itself cannot tell: few samples, clipped, are off from it without being wrong.
   struct Bias {
     double value = 0;  // 0: none is seen
     double least = 0;  // what would have been seen: three standard errors of that mean
   };
-  Bias bias(std::span<const TradePicture> alike) const;
+  Bias bias(std::span<const TradePicture> alike, std::span<const TradePicture> own) const;
 
  private:
-  TradePicture a_, b_, mean_;
+  TradePicture mean_;
   TradeErrors noise_;
 };
 
@@ -77,7 +78,8 @@ struct TradeCost {
 std::vector<bool> pareto_front(std::span<const TradeCost> costs);
 
 // The index of the front's bend: with both axes logarithmic and the ends at (0, 1) and (1, 0), the
-// point furthest below the line between them. `front` is not empty, in order of time; its costs are
+// point between them that is furthest below the line that joins them, or least above it; 0 where
+// there is none between them. `front` is not empty, in order of time; its costs are
 // above 0.
 std::size_t knee(std::span<const TradeCost> front);
 

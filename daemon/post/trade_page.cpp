@@ -230,7 +230,7 @@ std::string axis_chart(const TradeReport& report, const TradePlan::Axis& axis, c
   return to_svg(chart);
 }
 
-// What each variant does not converge to, where that is seen.
+// Which variants do not show what the set's own settings do, where that is seen.
 std::string bias_sentence(const TradeReport& report, const TradePlan::Axis& axis) {
   std::string biased;
   for (const TradePlan::Entry& entry : axis.entries) {
@@ -239,8 +239,10 @@ std::string bias_sentence(const TradeReport& report, const TradePlan::Axis& axis
       biased +=
           (biased.empty() ? "" : "; ") + escaped(entry.variant) + ", " + share_words(bias->value);
   }
-  return biased.empty() ? ""
-                        : "<p class=\"soft\">Stays off however long it runs: " + biased + ".</p>\n";
+  return biased.empty()
+             ? ""
+             : "<p class=\"soft\">Beyond noise, further from the set's own picture by: " + biased +
+                   ".</p>\n";
 }
 
 std::string axis_section(const TradeReport& report, const TradePlan::Axis& axis) {

@@ -50,7 +50,7 @@ TEST(TradeMeasure, BiasIsWhatPicturesMadeAlikeHaveInCommon) {
   const TradeReference reference(truth, truth);
   TradePicture off = truth;
   for (glm::vec3& pixel : off.shown) pixel += 0.125f;
-  const TradeReference::Bias bias = reference.bias(std::vector(3, off));
+  const TradeReference::Bias bias = reference.bias(std::vector(3, off), std::vector(3, truth));
   EXPECT_DOUBLE_EQ(bias.value, 0.25);  // 0.125 of 0.5
   EXPECT_DOUBLE_EQ(bias.least, 0.0);
 }
@@ -74,7 +74,8 @@ std::vector<TradePicture> noisy(float bias) {
 // the mean of the three pairs sqrt(3) less; over a signal of n 0.5^2.
 TEST(TradeMeasure, NoiseThatDiffersIsNoBias) {
   const TradePicture truth = made_up(-0.5f, 0.5f, 32, 32);
-  const TradeReference::Bias bias = TradeReference(truth, truth).bias(noisy(0));
+  const TradeReference::Bias bias =
+      TradeReference(truth, truth).bias(noisy(0), std::vector(3, truth));
   EXPECT_EQ(bias.value, 0.0);
   const double n = 3 * 32 * 32;
   const double expected = std::sqrt(3 * noise_sigma * noise_sigma * std::sqrt(n / 3) / (n * 0.25));
@@ -88,7 +89,8 @@ TEST(TradeMeasure, NoiseThatDiffersIsNoBias) {
 TEST(TradeMeasure, BiasIsSeenThroughNoise) {
   const TradePicture truth = made_up(-0.5f, 0.5f, 32, 32);
   const double expected = 0.25 / 4 / 0.5;
-  EXPECT_NEAR(TradeReference(truth, truth).bias(noisy(0.25f)).value, expected, expected / 12);
+  EXPECT_NEAR(TradeReference(truth, truth).bias(noisy(0.25f), std::vector(3, truth)).value,
+              expected, expected / 12);
 }
 
 TEST(TradeMeasure, EnlargingKeepsAnEvenPictureAndTheSizeAskedFor) {
