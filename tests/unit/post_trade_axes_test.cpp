@@ -14,6 +14,7 @@ TradePlan plan_of(const TradeSettings& own, const std::vector<std::string>& want
   return plan_trade(own, trade_axes(own, {render::Part::textures}), wanted);
 }
 
+// Points into the plan.
 const TradePlan::Axis* axis_named(const TradePlan& plan, const std::string& name) {
   const auto axis = std::ranges::find(plan.axes, name, &TradePlan::Axis::name);
   return axis == plan.axes.end() ? nullptr : &*axis;
@@ -40,19 +41,23 @@ TEST(TradeAxes, NothingIsMeasuredTwice) {
 TEST(TradeAxes, AnOwnValueOutsideTheListIsNamedByItself) {
   TradeSettings own;
   own.estimation.max_depth = 12;
-  EXPECT_EQ(axis_named(plan_of(own), "depth")->entries.front().variant, "12");
+  const TradePlan outside = plan_of(own);
+  EXPECT_EQ(axis_named(outside, "depth")->entries.front().variant, "12");
   own.estimation.max_depth = 4;
-  const auto& entries = axis_named(plan_of(own), "depth")->entries;
+  const TradePlan inside = plan_of(own);
+  const auto& entries = axis_named(inside, "depth")->entries;
   EXPECT_EQ(std::ranges::find(entries, 0u, &TradePlan::Entry::method)->variant, "4");
   EXPECT_EQ(entries.size(), 4u);
 }
 
 TEST(TradeAxes, WhereThereIsNothingToTradeThereIsNoAxis) {
   TradeSettings own;
-  EXPECT_FALSE(axis_named(plan_of(own), "lens"));        // a pinhole already
-  EXPECT_FALSE(axis_named(plan_of(own), "light_mode"));  // one is known
+  const TradePlan pinhole = plan_of(own);
+  EXPECT_FALSE(axis_named(pinhole, "lens"));
+  EXPECT_FALSE(axis_named(pinhole, "light_mode"));  // one is known
   own.lens = ThinLens{0.05, 2.8, 1.0};
-  EXPECT_TRUE(axis_named(plan_of(own), "lens"));
+  const TradePlan with_lens = plan_of(own);
+  EXPECT_TRUE(axis_named(with_lens, "lens"));
 }
 
 TEST(TradeAxes, OnlyThoseWantedAreSwept) {
