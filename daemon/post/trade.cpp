@@ -268,7 +268,8 @@ TradeOptions checked(TradeOptions options) {
     throw Error("--rounds " + std::to_string(options.rounds) + ": must be at least 1");
   if (options.samples.empty()) throw Error("--samples: names no number of samples");
   std::ranges::sort(options.samples);
-  options.samples.erase(std::ranges::unique(options.samples).begin(), options.samples.end());
+  options.samples.erase(std::unique(options.samples.begin(), options.samples.end()),
+                        options.samples.end());
   for (const int samples : options.samples)
     if (samples < 1 || samples > most_samples)
       throw Error("--samples " + std::to_string(samples) + ": must be from 1 to " +
