@@ -71,10 +71,12 @@ AlbedoTable tabulate(const Weight& weight) {
 
 }  // namespace
 
-AlbedoTable reflection_albedo() {
-  return tabulate([](const glm::dvec3& o, const glm::dvec3& h, double alpha) {
-    return direction_weight(o, 2 * glm::dot(o, h) * h - o, 1, alpha);
-  });
+const AlbedoTable& reflection_albedo() {
+  static const AlbedoTable table =
+      tabulate([](const glm::dvec3& o, const glm::dvec3& h, double alpha) {
+        return direction_weight(o, 2 * glm::dot(o, h) * h - o, 1, alpha);
+      });
+  return table;
 }
 
 AlbedoTable refraction_albedo(double eta) {

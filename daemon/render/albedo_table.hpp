@@ -11,8 +11,9 @@ namespace previz::render {
 // of the cosine to the normal from 0 to 1; both ends are nodes. Values are in (0, 1].
 using AlbedoTable = std::vector<float>;
 
-// Of reflection alone, Fresnel term 1; also of a thin pane, whose light goes through mirrored.
-AlbedoTable reflection_albedo();
+// Made once. Of reflection alone, Fresnel term 1; also of a thin pane, whose light goes through
+// mirrored.
+const AlbedoTable& reflection_albedo();
 // Of reflection and refraction together; `eta`, not 1, is the ior behind the surface over the one
 // before it.
 AlbedoTable refraction_albedo(double eta);

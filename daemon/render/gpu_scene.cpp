@@ -37,15 +37,17 @@ double environment_share(double environment_power, double light_power) {
   return std::clamp(environment_power / (environment_power + light_power), 0.1, 0.9);
 }
 
-// Tables one after the other, with those of glass made where a material needs them.
+// Tables one after the other: the reflection's, where anything is rough, and those of glass.
 struct AlbedoTables {
-  std::vector<float> values = reflection_albedo();
+  std::vector<float> values{1};  // read by nobody
   std::map<float, std::uint32_t> of_ior;
 
   std::uint32_t first_of(const scene::Material& m, double specular_alpha) {
     const double alpha = static_cast<double>(m.roughness) * m.roughness;
-    const bool rough_glass = m.transmission > 0 && m.metallic < 1 && alpha > specular_alpha;
-    if (!rough_glass || m.thin_walled || m.ior < gpu::LEAST_ROUGH_IOR) return 0;
+    const bool glass = scene::transmits(m);
+    if (alpha <= specular_alpha || !(glass || m.metallic > 0)) return 0;
+    if (values.size() == 1) values = reflection_albedo();
+    if (!glass || m.thin_walled || m.ior < gpu::LEAST_ROUGH_IOR) return 0;
     constexpr std::size_t table_size = std::size_t{gpu::ALBEDO_SIDE} * gpu::ALBEDO_SIDE;
     const auto [at, is_new] =
         of_ior.try_emplace(m.ior, static_cast<std::uint32_t>(values.size() / table_size));
@@ -234,8 +236,7 @@ std::uint32_t GpuScene::features() const {
         return m.metallic > 0 || (opaque_part && m.specular > 0 && m.ior > 1);
       }))
     result |= gpu::FEATURE_GLOSSY;
-  if (any_material([](const scene::Material& m) { return m.transmission > 0 && m.metallic < 1; }))
-    result |= gpu::FEATURE_TRANSMISSION;
+  if (any_material(scene::transmits)) result |= gpu::FEATURE_TRANSMISSION;
   if (!scene_.textures.empty()) result |= gpu::FEATURE_TEXTURES;
   if (any_material([](const scene::Material& m) { return m.normal_texture != scene::no_texture; }))
     result |= gpu::FEATURE_NORMAL_MAPS;

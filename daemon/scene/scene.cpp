@@ -29,15 +29,13 @@ void require(const Material& material, const Scene& scene, double specular_alpha
              Requirements& required) {
   const auto has_texture = [](std::uint32_t texture) { return texture != no_texture; };
   const bool is_metal = material.metallic > 0;
-  const bool is_dielectric =
-      material.metallic < 1 || has_texture(material.metallic_roughness_texture);
-  const bool transmits = is_dielectric && material.transmission > 0;
-  const bool reflects = is_metal || transmits || (material.specular > 0 && material.ior > 1);
+  const bool is_glass = transmits(material);
+  const bool reflects = is_metal || is_glass || (material.specular > 0 && material.ior > 1);
   // A texture can only lower the roughness.
   const double alpha = static_cast<double>(material.roughness) * material.roughness;
   required.caustics |= can_be_dirac(scene, material, specular_alpha);
   required.metals |= is_metal;
-  required.transmission |= transmits;
+  required.transmission |= is_glass;
   required.rough_specular |= reflects && alpha > specular_alpha;
   required.textures |= has_texture(material.base_color_texture) ||
                        has_texture(material.metallic_roughness_texture) ||
@@ -81,8 +79,12 @@ Scene load_scene(const set::Set& set) {
   return scene;
 }
 
+bool transmits(const Material& m) {
+  return m.transmission > 0 && (m.metallic < 1 || m.metallic_roughness_texture != no_texture);
+}
+
 bool can_be_dirac(const Scene& scene, const Material& m, double specular_alpha) {
-  const bool glass = m.transmission > 0 && m.metallic < 1;
+  const bool glass = transmits(m);
   if (glass && m.ior < gpu::LEAST_ROUGH_IOR) return true;
   if (!glass && !(m.metallic > 0) && !(m.specular > 0 && m.ior > 1)) return false;
   const double roughness =

@@ -133,6 +133,9 @@ inline constexpr std::uint64_t max_file_bytes = 0xffffffffull;  // glTF binary's
 // are used but not required) goes into Scene::notes.
 Scene load_scene(const set::Set& set);
 
+// Whether anything of this material lets light through: a texture can take metal away.
+bool transmits(const Material& material);
+
 // Whether light can leave a surface of this material without blur: clear glass, and metal, glass or
 // a coat whose GGX alpha is somewhere at or below `specular_alpha`.
 bool can_be_dirac(const Scene& scene, const Material& material, double specular_alpha);
