@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <ostream>
@@ -12,13 +13,14 @@
 
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/pipeline/take.hpp"
+#include "daemon/render/photon_schedule.hpp"
+#include "daemon/render/picture_memory.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/names.hpp"
 #include "daemon/set/set.hpp"
 #include "daemon/tracking/apriltag_tracker.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
-#include "shaders/lib/render_shared.h"
 
 namespace previz::post {
 namespace {
@@ -287,6 +289,7 @@ void print_costs(const set::Set& set, const scene::Requirements& required, std::
   const double scene_bytes =
       32.0 * required.vertices + (16.0 + 64.0) * required.triangles + 8.0 * required.texels;
   constexpr double mebibyte = 1024.0 * 1024.0;
+  constexpr auto any_number = std::numeric_limits<std::uint32_t>::max();
   out << "\na frame costs\n";
   out << words("  scene in the GPU's memory: about ", std::ceil(scene_bytes / mebibyte), " MiB\n");
   if (!set.observer.calibration) return;
@@ -294,7 +297,10 @@ void print_costs(const set::Set& set, const scene::Requirements& required, std::
   const double pixels = static_cast<double>(intrinsics.width) * intrinsics.height;
   const double samples = pixels * set.quality.samples;
   out << words("  picture in the GPU's memory: about ",
-               std::ceil(sizeof(gpu::GpuPixel) * pixels / mebibyte), " MiB\n");
+               std::ceil(static_cast<double>(
+                             render::picture_bytes(intrinsics.width, intrinsics.height, false)) /
+                         mebibyte),
+               " MiB\n");
   // A path and a light sample a bounce, and one more segment; twice, where the worlds part.
   const double most =
       samples * (2.0 * set.estimation.max_depth + 1) * (required.differing_objects ? 2.0 : 1.0);
@@ -302,7 +308,8 @@ void print_costs(const set::Set& set, const scene::Requirements& required, std::
       << grouped(static_cast<std::uint64_t>(most)) << " at most\n";
   if (required.caustics && set.estimation.caustics == set::Caustics::photons)
     out << "  photons: "
-        << grouped(static_cast<std::uint64_t>(std::max(1024.0, set.estimation.photons * pixels)) *
+        << grouped(std::uint64_t{render::photon_count(set.estimation.photons, intrinsics.width,
+                                                      intrinsics.height, any_number)} *
                    static_cast<std::uint64_t>(set.quality.samples))
         << '\n';
 }
