@@ -39,10 +39,20 @@ struct FrameInput {
 
 // A part of the pipelines that is left out of a frame which has no need of it. No pixel depends on
 // that.
-enum class Part { gloss, refraction, textures, lamps, visible_lamps, lens, forks };
-inline constexpr std::array all_parts = {Part::gloss, Part::refraction,    Part::textures,
-                                         Part::lamps, Part::visible_lamps, Part::lens,
-                                         Part::forks};
+enum class Part {
+  gloss,
+  refraction,
+  textures,
+  normal_maps,
+  alpha,
+  lamps,
+  visible_lamps,
+  lens,
+  forks
+};
+inline constexpr std::array all_parts = {Part::gloss,         Part::refraction, Part::textures,
+                                         Part::normal_maps,   Part::alpha,      Part::lamps,
+                                         Part::visible_lamps, Part::lens,       Part::forks};
 const char* name_of(Part part);
 
 class Renderer {
