@@ -5,7 +5,6 @@
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shaders/lib/alpha.glsl"
-#include "shaders/lib/path.glsl"
 
 // A resumed ray starts just before where its path parted: what is there is not in its world.
 const float RESUME_BEFORE = 0.9999;

@@ -5,7 +5,6 @@
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shaders/lib/alpha.glsl"
-#include "shaders/lib/path.glsl"
 
 void main() {
   if (gl_GlobalInvocationID.x >= control.shadow_count) return;

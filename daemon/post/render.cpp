@@ -168,7 +168,7 @@ std::string quality_words(const set::Quality& quality) {
   return text;
 }
 
-// NaN, negative and overflowed samples are left out of the means; nobody may miss that.
+// NaN and negative samples are left out of the means; nobody may miss that, nor what was cut short.
 std::string dropped_text(const render::Counters& counters) {
   std::string text;
   const auto add = [&](std::uint64_t count, const char* what) {
@@ -176,7 +176,7 @@ std::string dropped_text(const render::Counters& counters) {
   };
   add(counters.dropped_not_finite, " samples not finite");
   add(counters.dropped_negative, " samples negative");
-  add(counters.queue_overflow, " paths lost to full queues");
+  add(counters.stopped_in_layers, " rays stopped by the last of too many transparent surfaces");
   return text;
 }
 

@@ -88,7 +88,7 @@ std::string to_json(const FrameRecord& record) {
   json["shadow_rays"] = record.counters.shadow_rays;
   json["dropped_not_finite"] = record.counters.dropped_not_finite;
   json["dropped_negative"] = record.counters.dropped_negative;
-  json["queue_overflow"] = record.counters.queue_overflow;
+  json["stopped_in_layers"] = record.counters.stopped_in_layers;
   return json.dump();
 }
 
@@ -114,7 +114,7 @@ FrameRecord from_json(const std::string& line) {
   record.counters.shadow_rays = json.at("shadow_rays");
   record.counters.dropped_not_finite = json.at("dropped_not_finite");
   record.counters.dropped_negative = json.at("dropped_negative");
-  record.counters.queue_overflow = json.at("queue_overflow");
+  record.counters.stopped_in_layers = json.value("stopped_in_layers", std::uint64_t{0});
   return record;
 }
 

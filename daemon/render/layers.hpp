@@ -28,7 +28,7 @@ struct Counters {
   std::uint64_t shadow_rays = 0;
   std::uint64_t dropped_not_finite = 0;  // NaN or Inf samples
   std::uint64_t dropped_negative = 0;
-  std::uint64_t queue_overflow = 0;
+  std::uint64_t stopped_in_layers = 0;  // rays through more transparent surfaces than are followed
 };
 
 }  // namespace previz::render

@@ -24,6 +24,8 @@ constexpr std::array part_table = {
     PartEntry{Part::gloss, "gloss", gpu::FEATURE_GLOSSY},
     PartEntry{Part::refraction, "refraction", gpu::FEATURE_TRANSMISSION},
     PartEntry{Part::textures, "textures", gpu::FEATURE_TEXTURES},
+    PartEntry{Part::normal_maps, "normal maps", gpu::FEATURE_NORMAL_MAPS},
+    PartEntry{Part::alpha, "alpha", gpu::FEATURE_ALPHA},
     PartEntry{Part::lamps, "lamps", gpu::FEATURE_LIGHTS},
     PartEntry{Part::visible_lamps, "lamps in view", gpu::FEATURE_VISIBLE_LIGHTS},
     PartEntry{Part::lens, "lens", gpu::FEATURE_LENS},
@@ -211,6 +213,7 @@ Counters Renderer::counters() const {
   counters.shadow_rays = wide(control.shadow_rays_high, control.shadow_rays_low);
   counters.dropped_not_finite = control.dropped_not_finite;
   counters.dropped_negative = control.dropped_negative;
+  counters.stopped_in_layers = control.stopped_in_layers;
   return counters;
 }
 

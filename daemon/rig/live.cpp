@@ -163,10 +163,11 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out
       note("plate untouched: " + shot.untouched);
     }
     const render::Counters& counters = shot.counters;
-    if (counters.dropped_not_finite + counters.dropped_negative + counters.queue_overflow > 0) {
+    if (counters.dropped_not_finite + counters.dropped_negative + counters.stopped_in_layers > 0) {
       metrics.count("samples not finite", counters.dropped_not_finite);
       metrics.count("samples negative", counters.dropped_negative);
-      metrics.count("paths lost to full queues", counters.queue_overflow);
+      metrics.count("rays stopped by the last of too many transparent surfaces",
+                    counters.stopped_in_layers);
     }
     display.show(std::move(shot));
   });

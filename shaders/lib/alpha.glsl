@@ -3,11 +3,11 @@
 #ifndef PREVIZ_ALPHA_GLSL
 #define PREVIZ_ALPHA_GLSL
 
+#include "shaders/lib/path.glsl"
 #include "shaders/lib/sampler.glsl"
-#include "shaders/lib/scene.glsl"
 #include "shaders/lib/trace.glsl"
 
-// Surfaces of a ray that may be transparent; the next one counts as there.
+// Surfaces of a ray that may be transparent; the next one counts as there, and is counted.
 const uint MAX_LAYERS = 256u;
 
 float hit_coverage(Hit hit) {
@@ -36,6 +36,7 @@ bool closest_met(vec3 origin, vec3 direction, float t_min, float t_max, uint wor
     if (is_met(hit, origin, direction)) return true;
     t_min = hit.t;
   }
+  atomicAdd(control.stopped_in_layers, 1u);
   return trace_closest(origin, direction, t_min, t_max, worlds, hit);
 }
 
@@ -47,10 +48,14 @@ vec2 light_through(vec3 origin, vec3 direction, float t_max, uint worlds) {
     return share * vec2((blocked & WORLD_MIXED) == 0u, (blocked & WORLD_REAL) == 0u);
   }
   float t_min = 0.0;
-  for (uint layer = 0u; layer <= MAX_LAYERS && worlds != 0u; ++layer) {
+  for (uint layer = 0u; worlds != 0u; ++layer) {
+    if (layer == MAX_LAYERS) {
+      atomicAdd(control.stopped_in_layers, 1u);
+      return vec2(0.0);
+    }
     Hit hit;
     if (!trace_closest(origin, direction, t_min, t_max, worlds, hit)) return share;
-    const float through = layer < MAX_LAYERS ? 1.0 - hit_coverage(hit) : 0.0;
+    const float through = 1.0 - hit_coverage(hit);
     if ((hit.presence & WORLD_MIXED) != 0u) share.x *= through;
     if ((hit.presence & WORLD_REAL) != 0u) share.y *= through;
     if (through <= 0.0) worlds &= ~hit.presence;

@@ -164,6 +164,7 @@ struct GpuControl {
   uint shadow_rays_low, shadow_rays_high;
   uint dropped_not_finite;
   uint dropped_negative;
+  uint stopped_in_layers;
 };
 
 struct GpuInstance {
@@ -273,7 +274,7 @@ struct GpuBatch {
 static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 52);
 static_assert(sizeof(GpuPixel) == 144);
-static_assert(sizeof(GpuControl) == 72);
+static_assert(sizeof(GpuControl) == 76);
 static_assert(sizeof(GpuInstance) == 112);
 static_assert(sizeof(GpuMaterial) == 84);
 static_assert(offsetof(GpuMaterial, base_color_texture) == 48);

@@ -231,12 +231,16 @@ void require_supported(const scene::Scene& scene) {
 
 struct CpuTracer::Impl {
   Impl(const scene::Scene& traced, const lighting::EnvironmentMap& map, const TraceOptions& how)
-      : scene(traced), environment(map), options(how), geometry(traced) {}
+      : scene(traced), environment(map), options(how), geometry(traced) {
+    has_alpha = std::any_of(scene.materials.begin(), scene.materials.end(),
+                            [](const auto& m) { return m.alpha_mode != scene::AlphaMode::opaque; });
+  }
 
   const scene::Scene& scene;
   Environment environment;
   TraceOptions options;
   Geometry geometry;
+  bool has_alpha = false;
 };
 
 CpuTracer::CpuTracer(const scene::Scene& scene, const lighting::EnvironmentMap& environment,
@@ -256,7 +260,6 @@ TracedPicture CpuTracer::trace(const ObserverCalibration& calibration,
   const glm::dvec3 eye(world_from_camera[3]);
   const glm::dmat3 rotation(world_from_camera);
   impl_->geometry.place(eye);
-  const auto& scene_materials = impl_->scene.materials;
   const World world{impl_->scene,
                     impl_->environment,
                     impl_->geometry,
@@ -264,9 +267,7 @@ TracedPicture CpuTracer::trace(const ObserverCalibration& calibration,
                     world_bit,
                     placed_lamps(impl_->scene, eye, world_bit),
                     EmissiveMeshes(impl_->scene, impl_->geometry, world_bit),
-                    std::any_of(scene_materials.begin(), scene_materials.end(), [](const auto& m) {
-                      return m.alpha_mode != scene::AlphaMode::opaque;
-                    })};
+                    impl_->has_alpha};
 
   const auto pixel = [&](int x, int y) {
     Random random(seed, (static_cast<std::uint64_t>(y) << 32) | static_cast<std::uint32_t>(x));

@@ -111,9 +111,8 @@ ordered_json to_json(const TruthSet& set, int frame, const JudgedFrame& judged) 
   json["edge_blocks"] = m.edge_blocks;
   json["samples"] = judged.record.samples;
   json["seconds"] = judged.record.render_s;
-  json["dropped_samples"] = judged.record.counters.dropped_not_finite +
-                            judged.record.counters.dropped_negative +
-                            judged.record.counters.queue_overflow;
+  json["dropped_samples"] =
+      judged.record.counters.dropped_not_finite + judged.record.counters.dropped_negative;
   if (judged.record.status == post::FrameStatus::untouched)
     json["untouched"] = judged.record.reason;
   if (judged.record.pose) {

@@ -64,7 +64,7 @@ TEST_F(RenderSession, EveryFrameHasItsFilesAndItsRecord) {
     EXPECT_EQ(is_plate(directory_ / ("out/" + number + ".png"), i), untouched);
     EXPECT_EQ(record.counters.dropped_not_finite, 0u);
     EXPECT_EQ(record.counters.dropped_negative, 0u);
-    EXPECT_EQ(record.counters.queue_overflow, 0u);
+    EXPECT_EQ(record.counters.stopped_in_layers, 0u);
   }
   EXPECT_NE(report.frames[small_take_lost].reason.find("pose lost"), std::string::npos);
   EXPECT_NE(report.frames[small_take_unlit].reason.find("light"), std::string::npos);

@@ -65,7 +65,7 @@ inline double standard_error_of_pixels(const render::Layers& layers) {
 inline void expect_clean(const render::Counters& counters) {
   EXPECT_EQ(counters.dropped_not_finite, 0u);
   EXPECT_EQ(counters.dropped_negative, 0u);
-  EXPECT_EQ(counters.queue_overflow, 0u);
+  EXPECT_EQ(counters.stopped_in_layers, 0u);
   EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
 }
 
