@@ -78,6 +78,12 @@ TEST_F(SceneRequirements, AMetalDoesNotTransmitAndAnIorOfOneDoesNotReflect) {
   material.metallic = 1;
   add(material);
   EXPECT_FALSE(required().transmission);
+  scene::Texture no_metal;
+  no_metal.width = no_metal.height = 1;
+  no_metal.texels = {{1, 1, 0, 1}};
+  material.metallic_roughness_texture = add_texture(scene, no_metal);
+  add(material);
+  EXPECT_TRUE(required().transmission);
   scene.instances.clear();
   add(plastic({1, 1, 1}, 0.5f, 1.0f));
   EXPECT_FALSE(required().rough_specular);
