@@ -48,6 +48,10 @@ constexpr auto names(Composite) {
                                          {"ratio", Composite::ratio},
                                          {"hybrid", Composite::hybrid}});
 }
+constexpr auto names(RealRadiance) {
+  return std::to_array<Name<RealRadiance>>(
+      {{"traced", RealRadiance::traced}, {"camera", RealRadiance::camera}});
+}
 constexpr auto names(Caustics) {
   return std::to_array<Name<Caustics>>(
       {{"photons", Caustics::photons}, {"traced", Caustics::traced}, {"none", Caustics::none}});

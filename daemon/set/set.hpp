@@ -96,11 +96,13 @@ struct Lighting {
 
 enum class Estimator { paired, difference };
 enum class Composite { additive, ratio, hybrid };
+enum class RealRadiance { traced, camera };
 enum class Caustics { photons, traced, none };
 
 struct Estimation {
   Estimator estimator = Estimator::paired;
   Composite composite = Composite::additive;
+  RealRadiance real_radiance = RealRadiance::traced;
   double composite_floor = 0.02;  // radiance over the sensor's white, below which hybrid adds
   int max_depth = 16;             // path vertices after the camera, 1..64
   int roulette_depth = 4;         // Russian roulette from this vertex on

@@ -178,6 +178,7 @@ Keys estimator_keys(Estimation& e) {
   return {
       {"kind", &e.estimator, plain, "\"paired\": both worlds are traced in full, with the same random numbers. \"difference\": where no virtual object covers the picture, only what differs between the worlds is traced (with composite = \"additive\"; the others need both in full)."},
       {"composite", &e.composite, plain, "How the difference of the worlds is put onto the camera picture: added; as the ratio of the worlds, which forgives a wrong albedo of the phantom but lights no black surface; or the ratio on bright surfaces and the sum on dark ones."},
+      {"real_radiance", &e.real_radiance, plain, "Where the radiance of real surfaces comes from that light reaches after a bounce: simulated; or the camera picture's own, where it shows a matt surface (specularFactor 0) in focus and unclipped: reflections then show its true texture, and paths end sooner."},
       {"composite_floor", &e.composite_floor, plain.within(0.0001, 1), "With composite = \"hybrid\": radiance below which a real surface counts as dark, as a share of the sensor's white."},
       {"max_depth", &e.max_depth, plain.within(1, 64), "Bounces of a path: vertices after the camera."},
       {"roulette_depth", &e.roulette_depth, plain.within(1, 64), "Russian roulette ends paths from this vertex on."},
