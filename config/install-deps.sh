@@ -11,6 +11,8 @@ packages=(
   # pictures and video
   libopencv-dev libopenexr-dev libimath-dev libpng-dev
   libavformat-dev libavcodec-dev libavutil-dev libswscale-dev libjpeg62-turbo-dev
+  # cameras, buttons
+  libaravis-dev
   # markers, geometry, scenes
   libapriltag-dev libembree-dev libtinygltf-dev libstb-dev libglm-dev
   # files, command line, log, hashes
