@@ -90,7 +90,10 @@ struct Key {
         need(std::move(its_need)),
         allowed(Codec<T>::describe(rule)),
         read([to, rule](const Value& value) { *to = Codec<T>::read(value, rule); }) {
-    if (need.kind == Need::Kind::defaulted) initial = Codec<T>::print(*to, rule);
+    if constexpr (requires { Codec<T>::print(*to, rule); }) {
+      print = [to, rule] { return Codec<T>::print(*to, rule); };
+      if (need.kind == Need::Kind::defaulted) initial = print();
+    }
   }
 
   std::string name;
@@ -99,6 +102,7 @@ struct Key {
   std::string allowed;                     // type, unit, range
   std::string initial;                     // the default as TOML
   std::function<void(const Value&)> read;  // throws Misread
+  std::function<std::string()> print;      // the value as it is now; "" where there is none
 };
 
 // A table of the file, or an array of tables. `open` makes room for one in the draft.
