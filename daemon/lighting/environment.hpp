@@ -23,6 +23,7 @@ struct EnvironmentReport {
   double filled_sr = 0;        // filled by the unseen rule
   double overexposed_sr = 0;   // clipped in every exposure; radiance there is a lower bound
   double underexposed_sr = 0;  // black in every exposure
+  double moved_sr = 0;         // changed between the exposures; the newest ones count there
   std::vector<std::string> notes;
 };
 

@@ -30,6 +30,7 @@ constexpr auto names(LightType) {
 constexpr auto names(UnseenRule) {
   return std::to_array<Name<UnseenRule>>({{"horizon", UnseenRule::horizon},
                                           {"mirror", UnseenRule::mirror},
+                                          {"observer", UnseenRule::observer},
                                           {"constant", UnseenRule::constant}});
 }
 constexpr auto names(LightMode) {

@@ -73,9 +73,22 @@ struct Light {
   double gain_mixed = 1, gain_real = 0;
 };
 
-enum class UnseenRule { constant, horizon, mirror };
+enum class UnseenRule { constant, horizon, mirror, observer };
 enum class LightMode { image };  // sources and hybrid follow
 enum class LightSampling { importance, bsdf };
+
+// A rough model of what the light comes from: near walls and lamps are then seen in the right
+// direction from where the virtual objects stand, and not from where the light camera stands.
+struct Room {
+  // A box around its own origin; absent: the surfaces of `file`, a glTF.
+  std::optional<glm::dvec3> size_m;
+  std::filesystem::path file;
+  std::string file_as_written;
+  glm::dmat4 world_from_room{1.0};  // rigid
+  glm::dvec3 seen_from{0};          // the place that the light is wanted for
+
+  friend bool operator==(const Room&, const Room&) = default;
+};
 
 struct Lighting {
   LightMode mode = LightMode::image;
@@ -88,6 +101,9 @@ struct Lighting {
   int resolution = 0;  // octahedral map, texels a side; 0: from the source
   UnseenRule unseen = UnseenRule::horizon;
   glm::dvec3 unseen_radiance{0};  // UnseenRule::constant
+  double smoothing_s = 0.25;      // time constant; 0: none
+  double clipped_gain = 1;        // of light that every exposure clips, over white
+  std::optional<Room> room;       // absent: all light comes from far away
   // Light frame to use; -1: every bracket up to the newest before the observer frame.
   int frame = -1;
 

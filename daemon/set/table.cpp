@@ -6,7 +6,7 @@ namespace previz::set {
 namespace {
 
 // Units of the file; struct units are metres, radians and pixels.
-constexpr Unit plain{"", 1}, px{"px", 1}, m{"m", 1}, mm{"mm", 1e-3},
+constexpr Unit plain{"", 1}, px{"px", 1}, m{"m", 1}, mm{"mm", 1e-3}, s{"s", 1},
     deg{"degrees", std::numbers::pi / 180};
 
 constexpr int max_picture_side_px = 16384;
@@ -29,9 +29,9 @@ using Keys = std::vector<Key>;
 // One row, one line: name, where its value goes, unit and range, what it means, what if left out.
 // clang-format off
 
-Keys set_keys(Set& s) {
+Keys set_keys(Set& set) {
   return {
-      {"name", &s.name, plain, "What the crew calls this set; left out: the file's name.", optional("\"desk\"")},
+      {"name", &set.name, plain, "What the crew calls this set; left out: the file's name.", optional("\"desk\"")},
   };
 }
 
@@ -84,7 +84,14 @@ Keys light_camera_keys(LightCamera& c) {
   };
 }
 
-Keys fisheye_keys(FisheyeIntrinsics& i) {
+Keys light_response_keys(LightCameraCalibration& c) {
+  auto keys = response_keys(c.response, c.responsivity);
+  keys.push_back({"dark_level", &c.dark_level, plain.within(0, max_dark_level), "Signal that a covered lens shows, red, green and blue, as a share of white."});
+  return keys;
+}
+
+Keys fisheye_keys(LightCameraCalibration& c) {
+  auto& i = c.intrinsics;
   return {
       {"width", &i.width, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1024")},
       {"height", &i.height, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1024")},
@@ -94,6 +101,7 @@ Keys fisheye_keys(FisheyeIntrinsics& i) {
       {"cy", &i.cy, px, "Principal point; 0 is the centre of the topmost pixels.", required("511.5")},
       {"k", &i.k, plain, "k1 to k4 of r = t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9, t the angle off axis."},
       {"max_angle_deg", &i.max_angle_rad, deg.above(0, 180), "Angle off axis up to which the calibration holds; nothing is read beyond it.", required("100.0")},
+      {"vignetting", &c.vignetting, plain, "v1 to v3 of the light that comes through, 1 + v1 t^2 + v2 t^4 + v3 t^6, t the angle off axis in radians."},
   };
 }
 
@@ -168,9 +176,21 @@ Keys lighting_keys(Draft& d) {
       {"environment_rotation_deg", &l.environment_rotation_rad, deg, "Turns that picture about world Z, counter-clockwise seen from above."},
       {"environment_gain", &l.environment_gain, plain.at_least(0), "Scales that picture."},
       {"resolution", &l.resolution, plain.within(0, 4096), "Side of the light map in texels, a power of two; 0: as fine as the source."},
-      {"unseen", &l.unseen, plain, "What stands where the light camera cannot see: the edge of its picture continued, its picture mirrored about the plane it stands in, or a constant."},
+      {"unseen", &l.unseen, plain, "What stands where the light camera cannot see: the edge of its picture continued, its picture mirrored about the plane it stands in, what the film camera has seen there (elsewhere the edge continued), or a constant."},
       {"unseen_radiance", &d.unseen_radiance, plain.at_least(0), "With unseen = \"constant\" only: linear Rec. 709 radiance.", optional("[0.1, 0.1, 0.1]")},
+      {"smoothing_s", &l.smoothing_s, s.within(0, 60), "Time constant over which light that stays the same is averaged; what changes beyond the sensor's noise passes at once. 0: no averaging."},
+      {"clipped_gain", &l.clipped_gain, plain.within(1, 1e6), "Light that is clipped in every exposure is taken as up to this many times the white it is clipped at; 1: as white, which is its lower bound."},
       {"frame", &l.frame, plain.within(-1, 1'000'000), "Light frame to use for the whole take; -1: the newest bracket before each picture."},
+  };
+}
+
+Keys room_keys(Draft& d) {
+  return {
+      {"size_m", &d.room.size_m, m.above(0, far_m), "A box: its inner size along X, Y and Z, before it is turned. Required unless file is given.", optional("[6.0, 5.0, 2.8]")},
+      {"file", &d.room_file, plain, "In place of size_m: glTF 2.0 of the walls and lamps, as in [[object]].", optional("\"room.glb\"")},
+      {"position_m", &d.room_pose.position, m, "Where the middle of the box, or the file's origin, is in the world.", optional("[0.0, 0.0, 1.4]")},
+      {"rotation_deg", &d.room_pose.rotation, deg, "Turns about world X, then Y, then Z, before it is moved.", optional("[0.0, 0.0, 30.0]")},
+      {"seen_from_m", &d.room.seen_from, m, "The place in the set that the light is wanted for: among the virtual objects."},
   };
 }
 
@@ -236,14 +256,15 @@ std::vector<Section> sections(Draft& d) {
       once("observer.lens", optional, "Depth of field; left out: everything is sharp.", [&d] { return lens_keys(d.lens); }),
       once("observer.response", optional, "How its sensor turns light into picture values.", [&d] { return response_keys(d.observer.response, d.observer.responsivity); }),
       once("light_camera", always, "The light camera.", [&d] { return light_camera_keys(d.set.light_camera); }),
-      once("light_camera.intrinsics", optional, "Its fisheye as calibrated.", [&d] { return fisheye_keys(d.light.intrinsics); }),
-      once("light_camera.response", optional, "How its sensor turns light into picture values.", [&d] { return response_keys(d.light.response, d.light.responsivity); }),
+      once("light_camera.intrinsics", optional, "Its fisheye as calibrated.", [&d] { return fisheye_keys(d.light); }),
+      once("light_camera.response", optional, "How its sensor turns light into picture values.", [&d] { return light_response_keys(d.light); }),
       once("light_camera.pose", optional, "Where it stands.", [&d] { return light_pose_keys(d.light_pose); }),
       once("tracking", always, "Where the film camera is, found by printed AprilTags.", [&d] { return tracking_keys(d.set.tracking); }),
       many("tag", "A printed tag; one table each. Give its pose in one of three forms.", d.tags, tag_keys),
       many("object", "A piece of geometry, real or virtual; one table each.", d.objects, object_keys),
       many("light", "A lamp that is added or whose brightness is changed; one table each.", d.lights, [](LightDraft& l) { return light_keys(l.light); }),
       once("lighting", always, "The light around the set.", [&d] { return lighting_keys(d); }),
+      once("lighting.room", optional, "Where the light comes from, if it is near: the light camera's picture is put on these walls and seen anew from the set. Left out: from far away.", [&d] { return room_keys(d); }),
       once("estimator", always, "How light is simulated.", [&d] { return estimator_keys(d.set.estimation); }),
       once("quality", always, "What a frame may cost.", [&d] { return quality_keys(d.set.quality); }),
       once("output", always, "What is written.", [&d] { return output_keys(d.set.output); }),

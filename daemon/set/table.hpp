@@ -70,6 +70,9 @@ struct Draft {
   PoseDraft light_pose;
   std::optional<std::filesystem::path> environment;
   std::optional<glm::dvec3> unseen_radiance;
+  Room room;
+  std::optional<std::filesystem::path> room_file;
+  PoseDraft room_pose;
   std::vector<TagDraft> tags;
   std::vector<ObjectDraft> objects;
   std::vector<LightDraft> lights;

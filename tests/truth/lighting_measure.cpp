@@ -162,7 +162,9 @@ std::optional<IrradianceError> measure_resampling(const TruthSet& set, const Env
   const LightCameraCalibration& camera = *set.light_camera;
   const lighting::Fisheye lens(camera.intrinsics);
   lighting::Resampled map = lighting::resample(
-      lighting::make_resampling(lens, glm::dmat3(camera.world_from_camera), truth.size), hdr);
+      lighting::make_resampling(
+          lens, lighting::Viewpoint(glm::dmat3(camera.world_from_camera)), truth.size),
+      hdr);
   return compare_irradiance(masked({truth.size, std::move(map.radiance)}, keep), truth);
 }
 
