@@ -74,8 +74,19 @@ struct Light {
 };
 
 enum class UnseenRule { constant, horizon, mirror };
-enum class LightMode { image };  // sources and hybrid follow
+enum class LightMode { image, sources, hybrid };
+enum class Residual { blurred, dropped };
 enum class LightSampling { importance, bsdf };
+
+// What counts as a light source of the image, and what becomes of the rest (LightMode::sources).
+struct LightSources {
+  double contrast = 8;        // over the mean luminance of what is no source
+  double least_share = 0.01;  // of all luminous flux
+  Residual residual = Residual::blurred;
+  std::optional<double> distance_m;  // from the light camera; absent: at infinity
+
+  friend bool operator==(const LightSources&, const LightSources&) = default;
+};
 
 struct Lighting {
   LightMode mode = LightMode::image;
@@ -88,6 +99,7 @@ struct Lighting {
   int resolution = 0;  // octahedral map, texels a side; 0: from the source
   UnseenRule unseen = UnseenRule::horizon;
   glm::dvec3 unseen_radiance{0};  // UnseenRule::constant
+  LightSources sources;           // LightMode::sources and hybrid
   // Light frame to use; -1: every bracket up to the newest before the observer frame.
   int frame = -1;
 

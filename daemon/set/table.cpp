@@ -162,7 +162,7 @@ Keys light_keys(Light& l) {
 Keys lighting_keys(Draft& d) {
   auto& l = d.set.lighting;
   return {
-      {"mode", &l.mode, plain, "The whole fisheye picture lights the scene."},
+      {"mode", &l.mode, plain, "\"image\": the whole fisheye picture lights the scene. \"sources\": its lamps do, as discs or spheres, which takes far fewer samples; what is left of it is blurred or dropped. \"hybrid\": its lamps, and all that is left of it as a picture."},
       {"sampling", &l.sampling, plain, "How directions towards the light are chosen; \"bsdf\" is noisier, for comparison."},
       {"environment", &d.environment, plain, "Latitude-longitude EXR in place of the light camera; Z up, the picture's middle is +X.", optional("\"env.exr\"")},
       {"environment_rotation_deg", &l.environment_rotation_rad, deg, "Turns that picture about world Z, counter-clockwise seen from above."},
@@ -171,6 +171,15 @@ Keys lighting_keys(Draft& d) {
       {"unseen", &l.unseen, plain, "What stands where the light camera cannot see: the edge of its picture continued, its picture mirrored about the plane it stands in, or a constant."},
       {"unseen_radiance", &d.unseen_radiance, plain.at_least(0), "With unseen = \"constant\" only: linear Rec. 709 radiance.", optional("[0.1, 0.1, 0.1]")},
       {"frame", &l.frame, plain.within(-1, 1'000'000), "Light frame to use for the whole take; -1: the newest bracket before each picture."},
+  };
+}
+
+Keys light_sources_keys(LightSources& s) {
+  return {
+      {"contrast", &s.contrast, plain.within(2, 1e6), "How many times brighter than the mean of all that is no lamp a lamp is, at least."},
+      {"least_share", &s.least_share, plain.within(0, 1), "Share of all light that a lamp brings, at least; fainter ones, such as reflections of lamps, stay in the picture."},
+      {"residual", &s.residual, plain, "With mode = \"sources\": the light of everything but the lamps, without its shapes, or none of it (how much that is, is told)."},
+      {"distance_m", &s.distance_m, m.above(0, far_m), "How far from the light camera the lamps are; left out: they are at infinity.", optional("2.5")},
   };
 }
 
@@ -243,6 +252,7 @@ std::vector<Section> sections(Draft& d) {
       many("object", "A piece of geometry, real or virtual; one table each.", d.objects, object_keys),
       many("light", "A lamp that is added or whose brightness is changed; one table each.", d.lights, [](LightDraft& l) { return light_keys(l.light); }),
       once("lighting", always, "The light around the set.", [&d] { return lighting_keys(d); }),
+      once("lighting.sources", always, "The lamps that are found in the light camera's picture, with mode = \"sources\" or \"hybrid\".", [&d] { return light_sources_keys(d.set.lighting.sources); }),
       once("estimator", always, "How light is simulated.", [&d] { return estimator_keys(d.set.estimation); }),
       once("quality", always, "What a frame may cost.", [&d] { return quality_keys(d.set.quality); }),
       once("output", always, "What is written.", [&d] { return output_keys(d.set.output); }),
