@@ -57,6 +57,7 @@ void RenderStage::operator()(Shot& shot) {
 
   if (light_ != shot.light) {
     renderer_.set_environment(shot.light->lighting.environment, set_.lighting.sampling);
+    if (set_.lighting.mode != set::LightMode::image) renderer_.set_sources(shot.light->lamps);
     light_ = shot.light;
   }
   renderer_.begin({std::move(plate), exposure, shot.track.pose->world_from_camera});

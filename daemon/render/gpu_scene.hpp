@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <vector>
 
 #include "daemon/render/bounds.hpp"
@@ -23,6 +24,8 @@ class GpuScene {
   // Surfaces are perfect mirrors where their GGX alpha is at most `specular_alpha`.
   void set_scene(const scene::Scene& scene, double specular_alpha);
   void set_environment(const lighting::EnvironmentMap& map, set::LightSampling sampling);
+  // Lamps beside the scene's own, which may change from frame to frame.
+  void set_sources(std::vector<set::Light> sources);
   // Uploads instances, top level and lights relative to `camera_position` (world, metres).
   void place(const glm::dvec3& camera_position);
 
@@ -48,13 +51,16 @@ class GpuScene {
   void upload_materials(double specular_alpha);
   void upload_textures();
   void find_emitters();
-  std::vector<gpu::GpuLight> placed_lights(const glm::dvec3& camera_position) const;
+  std::vector<set::Light> lamps() const;  // the scene's and the sources, those that rays meet first
+  std::vector<gpu::GpuLight> placed_lights(const std::vector<set::Light>& all_lamps,
+                                           const glm::dvec3& camera_position) const;
   void upload_lights(const glm::dvec3& camera_position);
   void upload_instances(const glm::dvec3& camera_position);
   void upload_bounds(const glm::dvec3& camera_position);
 
   Device& device_;
   scene::Scene scene_;
+  std::optional<std::vector<set::Light>> sources_;  // absent: there never are any
   std::vector<MeshPlace> places_;
   std::vector<std::uint32_t> first_light_;  // by instance; NO_INDEX: not an emitter
   std::vector<std::uint32_t> emitters_;     // instances that emit, in the order of their lights

@@ -158,6 +158,10 @@ void Renderer::set_environment(const lighting::EnvironmentMap& environment,
   impl_->has_environment = true;
 }
 
+void Renderer::set_sources(std::vector<set::Light> sources) {
+  impl_->scene.set_sources(std::move(sources));
+}
+
 void Renderer::carry(Part part) {
   impl_->carried |= entry_of(part).feature;
 }

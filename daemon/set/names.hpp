@@ -34,7 +34,13 @@ constexpr auto names(UnseenRule) {
                                           {"constant", UnseenRule::constant}});
 }
 constexpr auto names(LightMode) {
-  return std::to_array<Name<LightMode>>({{"image", LightMode::image}});
+  return std::to_array<Name<LightMode>>({{"image", LightMode::image},
+                                         {"sources", LightMode::sources},
+                                         {"hybrid", LightMode::hybrid}});
+}
+constexpr auto names(Residual) {
+  return std::to_array<Name<Residual>>(
+      {{"blurred", Residual::blurred}, {"dropped", Residual::dropped}});
 }
 constexpr auto names(LightSampling) {
   return std::to_array<Name<LightSampling>>(

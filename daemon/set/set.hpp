@@ -74,7 +74,8 @@ struct Light {
 };
 
 enum class UnseenRule { constant, horizon, mirror, observer };
-enum class LightMode { image };  // sources and hybrid follow
+enum class LightMode { image, sources, hybrid };
+enum class Residual { blurred, dropped };
 enum class LightSampling { importance, bsdf };
 
 // A rough model of what the light comes from: near walls and lamps are then seen in the right
@@ -88,6 +89,16 @@ struct Room {
   glm::dvec3 seen_from{0};          // the place that the light is wanted for
 
   friend bool operator==(const Room&, const Room&) = default;
+};
+
+// What counts as a light source of the image, and what becomes of the rest (LightMode::sources).
+struct LightSources {
+  double contrast = 8;        // over the mean luminance of what is no source
+  double least_share = 0.01;  // of all luminous flux
+  Residual residual = Residual::blurred;
+  std::optional<double> distance_m;  // from the light camera; absent: at infinity
+
+  friend bool operator==(const LightSources&, const LightSources&) = default;
 };
 
 struct Lighting {
@@ -104,6 +115,7 @@ struct Lighting {
   double smoothing_s = 0.25;      // time constant; 0: none
   double clipped_gain = 1;        // of light that every exposure clips, over white
   std::optional<Room> room;       // absent: all light comes from far away
+  LightSources sources;           // LightMode::sources and hybrid
   // Light frame to use; -1: every bracket up to the newest before the observer frame.
   int frame = -1;
 

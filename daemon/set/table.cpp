@@ -170,7 +170,7 @@ Keys light_keys(Light& l) {
 Keys lighting_keys(Draft& d) {
   auto& l = d.set.lighting;
   return {
-      {"mode", &l.mode, plain, "The whole fisheye picture lights the scene."},
+      {"mode", &l.mode, plain, "\"image\": the whole fisheye picture lights the scene. \"sources\": its lamps do, as discs or spheres, which takes far fewer samples; what is left of it is blurred or dropped. \"hybrid\": its lamps, and all that is left of it as a picture."},
       {"sampling", &l.sampling, plain, "How directions towards the light are chosen; \"bsdf\" is noisier, for comparison."},
       {"environment", &d.environment, plain, "Latitude-longitude EXR in place of the light camera; Z up, the picture's middle is +X.", optional("\"env.exr\"")},
       {"environment_rotation_deg", &l.environment_rotation_rad, deg, "Turns that picture about world Z, counter-clockwise seen from above."},
@@ -191,6 +191,15 @@ Keys room_keys(Draft& d) {
       {"position_m", &d.room_pose.position, m, "Where the middle of the box, or the file's origin, is in the world.", optional("[0.0, 0.0, 1.4]")},
       {"rotation_deg", &d.room_pose.rotation, deg, "Turns about world X, then Y, then Z, before it is moved.", optional("[0.0, 0.0, 30.0]")},
       {"seen_from_m", &d.room.seen_from, m, "The place in the set that the light is wanted for: among the virtual objects."},
+  };
+}
+
+Keys light_sources_keys(LightSources& s) {
+  return {
+      {"contrast", &s.contrast, plain.within(2, 1e6), "How many times brighter than the mean of all that is no lamp a lamp is, at least."},
+      {"least_share", &s.least_share, plain.within(0, 1), "Share of all light that a lamp brings, at least; fainter ones, such as reflections of lamps, stay in the picture."},
+      {"residual", &s.residual, plain, "With mode = \"sources\": the light of everything but the lamps, without its shapes, or none of it (how much that is, is told)."},
+      {"distance_m", &s.distance_m, m.above(0, far_m), "How far from the light camera the lamps are; left out: they are at infinity.", optional("2.5")},
   };
 }
 
@@ -265,6 +274,7 @@ std::vector<Section> sections(Draft& d) {
       many("light", "A lamp that is added or whose brightness is changed; one table each.", d.lights, [](LightDraft& l) { return light_keys(l.light); }),
       once("lighting", always, "The light around the set.", [&d] { return lighting_keys(d); }),
       once("lighting.room", optional, "Where the light comes from, if it is near: the light camera's picture is put on these walls and seen anew from the set. Left out: from far away.", [&d] { return room_keys(d); }),
+      once("lighting.sources", always, "The lamps that are found in the light camera's picture, with mode = \"sources\" or \"hybrid\".", [&d] { return light_sources_keys(d.set.lighting.sources); }),
       once("estimator", always, "How light is simulated.", [&d] { return estimator_keys(d.set.estimation); }),
       once("quality", always, "What a frame may cost.", [&d] { return quality_keys(d.set.quality); }),
       once("output", always, "What is written.", [&d] { return output_keys(d.set.output); }),

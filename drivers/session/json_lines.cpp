@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "drivers/error.hpp"
+#include "drivers/session/light_json.hpp"
 
 namespace previz::session {
 namespace {
@@ -101,6 +102,8 @@ TrackRecord parse_track_line(const Json& json) {
   get(json.at("timestamp_ns"), record.timestamp_ns);
   get(json.at("tracked"), record.tracked);
   get(json.at("tags"), record.tags);
+  if (json.contains("captured_light"))
+    record.captured_light = captured_light_of(json.at("captured_light"));
   if (!record.tracked) return record;
   std::array<double, 16> rows{};
   get(json.at("world_from_camera"), rows);
@@ -181,6 +184,7 @@ std::string to_line(const TrackRecord& record) {
     json["world_from_camera"] = rows;
     json["covariance"] = record.covariance;
   }
+  if (record.captured_light) json["captured_light"] = to_json(*record.captured_light);
   return json.dump();
 }
 

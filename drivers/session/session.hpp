@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
 #include <map>
 #include <memory>
 #include <optional>
@@ -32,6 +33,23 @@ struct SessionInfo {
   std::map<std::string, std::string> assets;
 };
 
+// The light around the set, as it lit the frame: sources, and the rest without its shapes.
+struct CapturedSource {
+  int id = 0;                     // the same from frame to frame
+  glm::dvec3 direction{0, 0, 1};  // unit, world, from the light camera towards it
+  double solid_angle_sr = 0;
+  glm::dvec3 flux{0};  // integral of radiance over solid angle, linear Rec. 709
+
+  friend bool operator==(const CapturedSource&, const CapturedSource&) = default;
+};
+struct CapturedLight {
+  std::vector<CapturedSource> sources;
+  int ambient_size = 0;            // equal-area octahedral map, texels a side, at most 64
+  std::vector<glm::vec3> ambient;  // radiance, row-major
+
+  friend bool operator==(const CapturedLight&, const CapturedLight&) = default;
+};
+
 // A line of track.jsonl.
 struct TrackRecord {
   std::uint64_t frame = 0;  // index of the observer frame
@@ -40,7 +58,8 @@ struct TrackRecord {
   glm::dmat4 world_from_camera{1.0};  // OpenCV camera axes, metres
   // Row-major 6x6: rotation (rad) then translation (m), in the camera frame.
   std::array<double, 36> covariance{};
-  std::vector<int> tags;  // ids used
+  std::vector<int> tags;                        // ids used
+  std::optional<CapturedLight> captured_light;  // absent: none was known, or an older session
 };
 
 // A frame of a stream as recorded; `frame` is its position in the .mkv, from 0.

@@ -136,6 +136,8 @@ TEST_F(SceneRequirements, ReadsLightsAndLens) {
   EXPECT_TRUE(required().lights);
   scene.lights[0].emission = glm::dvec3(0);
   EXPECT_FALSE(required().lights);
+  set.lighting.mode = set::LightMode::hybrid;  // lamps may be found in what the light camera sees
+  EXPECT_TRUE(required().lights);
   set.observer.calibration.emplace();
   EXPECT_FALSE(required().thin_lens);
   set.observer.calibration->lens = ThinLens{0.05, 2, 1};
