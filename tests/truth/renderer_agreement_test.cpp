@@ -25,8 +25,13 @@ std::vector<glm::dvec3> widen(const std::vector<glm::vec3>& layer) {
   return {layer.begin(), layer.end()};
 }
 
-Worlds gpu_scrambles(const View& view, int samples, bool caustics) {
-  Worlds worlds;
+Worlds sized(const View& view) {
+  const PinholeIntrinsics& k = view.calibration.intrinsics;
+  return {{k.width, k.height, {}}, {k.width, k.height, {}}};
+}
+
+Worlds gpu_scrambles(const View& view, int samples, bool caustics, std::uint32_t first_seed) {
+  Worlds worlds = sized(view);
   set::Estimation estimation;
   estimation.caustics = caustics ? set::Caustics::traced : set::Caustics::none;
   render::Renderer renderer(shared_device(), estimation, view.calibration);
@@ -35,7 +40,7 @@ Worlds gpu_scrambles(const View& view, int samples, bool caustics) {
   for (std::uint32_t i = 0; i < scrambles; ++i) {
     render::FrameInput frame;
     frame.world_from_camera = view.world_from_camera;
-    frame.seed = 1000 + i;
+    frame.seed = first_seed + i;
     renderer.begin(frame);
     renderer.render(samples);
     expect_clean(renderer.counters());
@@ -48,7 +53,7 @@ Worlds gpu_scrambles(const View& view, int samples, bool caustics) {
 
 // The CPU tracer traces each world alone, with seeds of its own.
 Worlds cpu_scrambles(const View& view, int samples, bool caustics) {
-  Worlds worlds;
+  Worlds worlds = sized(view);
   truth::TraceOptions options;
   options.caustics = caustics;
   truth::CpuTracer tracer(view.scene, view.environment, options);
@@ -67,12 +72,8 @@ Worlds cpu_scrambles(const View& view, int samples, bool caustics) {
 // Without caustics where mirrors or glass meet small lamps: so rare and bright are the paths that
 // sixteen scrambles do not know their own spread.
 void expect_agreement(const View& view, int samples, bool caustics) {
-  Worlds gpu = gpu_scrambles(view, samples, caustics);
-  Worlds cpu = cpu_scrambles(view, samples, caustics);
-  for (auto* s : {&gpu.mixed, &gpu.real, &cpu.mixed, &cpu.real}) {
-    s->width = view.calibration.intrinsics.width;
-    s->height = view.calibration.intrinsics.height;
-  }
+  const Worlds gpu = gpu_scrambles(view, samples, caustics, 1000);
+  const Worlds cpu = cpu_scrambles(view, samples, caustics);
   const truth::Agreement mixed = truth::agreement(gpu.mixed, cpu.mixed);
   EXPECT_TRUE(mixed.agree) << "mixed: " << mixed.report();
   const truth::Agreement real = truth::agreement(gpu.real, cpu.real);
@@ -98,6 +99,32 @@ TEST_P(RandomSets, agree_with_the_cpu_tracer) {
 
 // Six consecutive seeds put each material on the first virtual object.
 INSTANTIATE_TEST_SUITE_P(Seeds, RandomSets, ::testing::Range(1u, 7u));
+
+// One world as the only one there is.
+View alone(View view, std::uint32_t world) {
+  std::erase_if(view.scene.instances,
+                [world](const auto& instance) { return (instance.presence & world) == 0; });
+  for (scene::Instance& instance : view.scene.instances) instance.presence = scene::world_both;
+  for (set::Light& light : view.scene.lights)
+    light.gain_mixed = light.gain_real =
+        world == scene::world_mixed ? light.gain_mixed : light.gain_real;
+  return view;
+}
+
+// Both worlds from one run of paths, against two renders that know nothing of each other. Lamps
+// that are added, taken away and dimmed, and a removed object.
+class SeparateRenders : public RandomSets {};
+INSTANTIATE_TEST_SUITE_P(Seeds, SeparateRenders, ::testing::Values(2u, 5u));
+
+TEST_P(SeparateRenders, show_what_one_run_shows) {
+  const Worlds pair = gpu_scrambles(view(), 32, true, 1000);
+  const Worlds mixed = gpu_scrambles(alone(view(), scene::world_mixed), 32, true, 2000);
+  const Worlds real = gpu_scrambles(alone(view(), scene::world_real), 32, true, 3000);
+  const truth::Agreement in_mixed = truth::agreement(pair.mixed, mixed.mixed);
+  EXPECT_TRUE(in_mixed.agree) << "mixed: " << in_mixed.report();
+  const truth::Agreement in_real = truth::agreement(pair.real, real.real);
+  EXPECT_TRUE(in_real.agree) << "real: " << in_real.report();
+}
 
 // Patches of normals up to half a radian off.
 scene::Texture bumps() {

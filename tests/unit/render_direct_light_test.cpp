@@ -147,5 +147,25 @@ TEST(DirectLight, a_gain_scales_its_world_only) {
   EXPECT_NEAR(mean(result.layers.real).g / full, 1, 1e-3);
 }
 
+// A real lamp whose colour is changed: it is taken away, and one of the other colour added.
+TEST(DirectLight, a_recoloured_lamp_is_one_taken_away_and_one_added) {
+  View view = lit_point(albedo);
+  set::Light light = lamp(set::LightType::rectangle, colour);
+  light.position = {0, 0, 1.5};
+  light.gain_mixed = 0;
+  view.scene.lights.push_back(light);
+  light.emission = {5, 3, 2};
+  light.gain_mixed = 1;
+  light.gain_real = 0;
+  view.scene.lights.push_back(light);
+  const render::Layers layers = render_clean(view, 64, up_to_depth(1)).layers;
+  const double brought = albedo * 4.0 * corner_form_factor(0.5, 0.5, 1.5);
+  const double error = standard_error_of_pixels(layers) / mean(layers.mixed).g;
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_NEAR(mean(layers.mixed)[c] / (brought * light.emission[c]), 1, 4 * error + 1e-3);
+    EXPECT_NEAR(mean(layers.real)[c] / (brought * colour[c]), 1, 4 * error + 1e-3);
+  }
+}
+
 }  // namespace
 }  // namespace previz::testing
