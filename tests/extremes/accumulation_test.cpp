@@ -29,7 +29,7 @@ class Accumulator {
     pipeline_ = render::create_pipeline(device, accumulate_spv, layout_, features);
 
     const vk::DeviceSize samples = slots * sizeof(gpu::vec4);
-    for (Buffer* buffer : {&mixed_, &real_, &aov_})
+    for (Buffer* buffer : {&mixed_, &real_, &landed_, &aov_})
       *buffer = render::create_storage_buffer(device, samples);
     render::upload_storage(device, pixels_, std::vector<gpu::GpuPixel>(1));
     render::upload_storage(device, control_, std::vector<gpu::GpuControl>(1));
@@ -81,8 +81,10 @@ class Accumulator {
     set_ = std::move(vk::raii::DescriptorSets(device_.vk(), {*pool_, *path_layout_}).front());
     for (const auto& [binding, buffer] :
          {std::pair(gpu::BINDING_SAMPLE_MIXED, &mixed_),
-          std::pair(gpu::BINDING_SAMPLE_REAL, &real_), std::pair(gpu::BINDING_SAMPLE_AOV, &aov_),
-          std::pair(gpu::BINDING_CONTROL, &control_), std::pair(gpu::BINDING_PIXELS, &pixels_)})
+          std::pair(gpu::BINDING_SAMPLE_REAL, &real_),
+          std::pair(gpu::BINDING_SAMPLE_LANDED, &landed_),
+          std::pair(gpu::BINDING_SAMPLE_AOV, &aov_), std::pair(gpu::BINDING_CONTROL, &control_),
+          std::pair(gpu::BINDING_PIXELS, &pixels_)})
       render::write_descriptor(device_, set_, binding, *buffer, false);
   }
 
@@ -90,7 +92,7 @@ class Accumulator {
   vk::raii::DescriptorSetLayout scene_layout_{nullptr}, path_layout_{nullptr};
   vk::raii::PipelineLayout layout_{nullptr};
   render::Pipeline pipeline_;
-  Buffer mixed_, real_, aov_, pixels_, control_;
+  Buffer mixed_, real_, landed_, aov_, pixels_, control_;
   vk::raii::DescriptorPool pool_{nullptr};
   vk::raii::DescriptorSet set_{nullptr};
   std::vector<gpu::vec4> staging_;
