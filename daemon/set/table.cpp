@@ -6,7 +6,7 @@ namespace previz::set {
 namespace {
 
 // Units of the file; struct units are metres, radians and pixels.
-constexpr Unit plain{"", 1}, px{"px", 1}, m{"m", 1}, mm{"mm", 1e-3}, s{"s", 1},
+constexpr Unit plain{"", 1}, px{"px", 1}, m{"m", 1}, mm{"mm", 1e-3}, seconds{"s", 1},
     deg{"degrees", std::numbers::pi / 180};
 
 constexpr int max_picture_side_px = 16384;
@@ -178,7 +178,7 @@ Keys lighting_keys(Draft& d) {
       {"resolution", &l.resolution, plain.within(0, 4096), "Side of the light map in texels, a power of two; 0: as fine as the source."},
       {"unseen", &l.unseen, plain, "What stands where the light camera cannot see: the edge of its picture continued, its picture mirrored about the plane it stands in, what the film camera has seen there (elsewhere the edge continued), or a constant."},
       {"unseen_radiance", &d.unseen_radiance, plain.at_least(0), "With unseen = \"constant\" only: linear Rec. 709 radiance.", optional("[0.1, 0.1, 0.1]")},
-      {"smoothing_s", &l.smoothing_s, s.within(0, 60), "Time constant over which light that stays the same is averaged; what changes beyond the sensor's noise passes at once. 0: no averaging."},
+      {"smoothing_s", &l.smoothing_s, seconds.within(0, 60), "Time constant over which light that stays the same is averaged; what changes beyond the sensor's noise passes at once. 0: no averaging."},
       {"clipped_gain", &l.clipped_gain, plain.within(1, 1e6), "Light that is clipped in every exposure is taken as up to this many times the white it is clipped at; 1: as white, which is its lower bound."},
       {"frame", &l.frame, plain.within(-1, 1'000'000), "Light frame to use for the whole take; -1: the newest bracket before each picture."},
   };
