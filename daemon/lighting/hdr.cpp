@@ -49,20 +49,23 @@ Evidence evidence_of(const Exposure& e, std::size_t sample, std::size_t channel,
           0};
 }
 
+bool beyond(double excess, double variance) {
+  return excess > 0 && excess * excess > confidence * confidence * variance;
+}
+
 bool contradict(const Evidence& a, const Evidence& b, const SensorNoise& noise) {
-  // How far a radiance may lie below another, or below what clips.
+  // Whether a radiance lies below another that clips.
   const auto below = [&](const Evidence& low, double high) {
-    const double blur = (confidence * std::sqrt(low.variance) + low.dark) / low.open;
-    return low.radiance() + blur < high * (1 - noise.calibration_error);
+    const double gap = high * (1 - noise.calibration_error) - low.radiance() - low.dark / low.open;
+    return beyond(gap, low.variance / (low.open * low.open));
   };
-  if (a.open > 0 && below(a, b.at_least)) return true;
-  if (b.open > 0 && below(b, a.at_least)) return true;
+  if (a.open > 0 && b.at_least > 0 && below(a, b.at_least)) return true;
+  if (b.open > 0 && a.at_least > 0 && below(b, a.at_least)) return true;
   if (a.open == 0 || b.open == 0) return false;
   const double high = std::max({a.radiance(), b.radiance(), 0.0});
-  const double noisy =
-      confidence * std::sqrt(a.variance / (a.open * a.open) + b.variance / (b.open * b.open));
-  return std::abs(a.radiance() - b.radiance()) >
-         noisy + a.dark / a.open + b.dark / b.open + noise.calibration_error * high;
+  const double excess = std::abs(a.radiance() - b.radiance()) - a.dark / a.open - b.dark / b.open -
+                        noise.calibration_error * high;
+  return beyond(excess, a.variance / (a.open * a.open) + b.variance / (b.open * b.open));
 }
 
 struct Channel {

@@ -100,10 +100,11 @@ void ObservedLight::see(const Plate& plate, double exposure, const glm::dmat4& w
     glm::dvec3 sum(0);
     int landed = 0;
     for (int k = 0; k < samples_a_side * samples_a_side; ++k) {
-      const double across = (k % samples_a_side + 0.5) / samples_a_side;
-      const double down = (k / samples_a_side + 0.5) / samples_a_side;
-      const auto pixel = pixel_of(direction_in_texel(map_.size, i, j, across, down),
-                                  texel.distance_m, world_from_camera);
+      const int across = k % samples_a_side, down = k / samples_a_side;
+      const auto pixel =
+          pixel_of(direction_in_texel(map_.size, i, j, (across + 0.5) / samples_a_side,
+                                      (down + 0.5) / samples_a_side),
+                   texel.distance_m, world_from_camera);
       if (!pixel) continue;
       sum += glm::dvec3(radiance(3 * *pixel), radiance(3 * *pixel + 1), radiance(3 * *pixel + 2));
       ++landed;

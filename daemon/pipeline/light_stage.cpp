@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "daemon/lighting/light_mode.hpp"
-#include "daemon/lighting/lighting.hpp"
+#include "daemon/pipeline/room_model.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::pipeline {
@@ -14,32 +14,75 @@ namespace {
 // Over which the shapes of sources are averaged.
 constexpr double source_smoothing_s = 0.25;
 
+bool is_exposure(double exposure) {
+  return exposure > 0 && std::isfinite(exposure);
+}
+
 }  // namespace
 
-LightStage::LightStage(const set::Set& set, std::optional<LightCameraCalibration> calibration)
+LightStage::LightStage(const set::Set& set, std::optional<LightCameraCalibration> calibration,
+                       const ObserverCalibration& observer)
     : settings_(set.lighting),
       exposure_(set.light_camera.exposure),
-      calibration_(std::move(calibration)),
+      observer_exposure_(set.observer.exposure),
       given_(set.lighting.environment.has_value()),
       tracker_(source_smoothing_s) {
-  if (given_)
+  if (given_) {
     light_ = finished(lighting::load_environment(settings_), {}, 0);
-  else if (!calibration_)
+    return;
+  }
+  if (!calibration)
     throw Error(set.file.string() +
                 ": lighting: neither lighting.environment nor a light camera with a calibration is "
                 "given; one of them must light the set");
+  intrinsics_ = calibration->intrinsics;
+  const glm::dvec3 camera(calibration->world_from_camera[3]);
+  const auto room = open_room(set, camera);
+  seen_from_ = room ? room->seen_from() : camera;
+  estimator_.emplace(*calibration, settings_, room);
+  if (settings_.unseen == set::UnseenRule::observer)
+    observed_ = std::make_unique<lighting::ObservedLight>(observer, estimator_->resolution(), room);
 }
 
-// The image's sources stand where the set says, seen from the camera; from the world's origin where
-// the image is a file.
+bool LightStage::remembers() const {
+  return needs_frames() &&
+         (settings_.smoothing_s > 0 || needs_observer() || settings_.mode != set::LightMode::image);
+}
+
+bool LightStage::usable(const Frame& frame) {
+  const std::string name = "light frame " + std::to_string(frame.sequence);
+  if (frame.width != intrinsics_.width || frame.height != intrinsics_.height)
+    troubles_.push_back(name + " is left out: it has " + std::to_string(frame.width) + "x" +
+                        std::to_string(frame.height) + " pixels, the calibration " +
+                        std::to_string(intrinsics_.width) + "x" +
+                        std::to_string(intrinsics_.height));
+  else if (!is_exposure(frame.exposure))
+    troubles_.push_back(name + " is left out: its exposure is " + std::to_string(frame.exposure) +
+                        "; it must be above 0");
+  else
+    return true;
+  return false;
+}
+
+void LightStage::drop_oldest() {
+  const auto oldest = std::ranges::min_element(
+      newest_, {}, [](const auto& entry) { return entry.second->timestamp_ns; });
+  troubles_.push_back("light frame " + std::to_string(oldest->second->sequence) +
+                      " is left out: more than " + std::to_string(max_exposures) +
+                      " different exposures were seen since");
+  newest_.erase(oldest);
+}
+
+// The image's sources stand where the set says, seen from where the image is.
 LightPtr LightStage::finished(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
                               std::int64_t timestamp_ns) {
   lighting::apply_mode(lighting, settings_, tracker_, timestamp_ns);
-  const glm::dvec3 viewpoint =
-      given_ ? glm::dvec3(0) : glm::dvec3(calibration_->world_from_camera[3]);
-  std::vector<set::Light> lamps = lighting::lamps_of(lighting.sources, settings_, viewpoint);
-  return std::make_shared<const Light>(
-      Light{std::move(lighting), std::move(lamps), std::move(sequences)});
+  Light light;
+  light.lamps = lighting::lamps_of(lighting.sources, settings_, seen_from_);
+  light.encoded = render::encode_environment(lighting.environment);
+  light.lighting = std::move(lighting);
+  light.sequences = std::move(sequences);
+  return std::make_shared<const Light>(std::move(light));
 }
 
 void LightStage::see(FramePtr frame, std::uint64_t index) {
@@ -50,8 +93,16 @@ void LightStage::see(FramePtr frame, std::uint64_t index) {
     exposed->exposure = *exposure_;
     frame = std::move(exposed);
   }
+  if (!usable(*frame)) return;
   newest_[std::lround(std::log(frame->exposure) / std::log1p(0.01))] = std::move(frame);
+  if (newest_.size() > max_exposures) drop_oldest();
   changed_ = true;
+}
+
+void LightStage::see_observer(const Frame& frame, const glm::dmat4& world_from_camera) {
+  if (!observed_) return;
+  observed_->see(to_plate(frame), observer_exposure_.value_or(frame.exposure), world_from_camera);
+  changed_ = changed_ || !newest_.empty();
 }
 
 LightPtr LightStage::light() {
@@ -64,8 +115,7 @@ LightPtr LightStage::light() {
       sequences.push_back(frame->sequence);
       newest_ns = std::max(newest_ns, frame->timestamp_ns);
     }
-    light_ = finished(lighting::estimate(bracket, *calibration_, settings_), std::move(sequences),
-                      newest_ns);
+    light_ = finished((*estimator_)(bracket, observed_.get()), std::move(sequences), newest_ns);
     changed_ = false;
   }
   return light_;

@@ -2,8 +2,13 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
+#include "daemon/lighting/lighting.hpp"
 #include "daemon/lighting/source_tracker.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/set/set.hpp"
@@ -13,34 +18,56 @@
 namespace previz::pipeline {
 
 // Keeps the newest light frame of every exposure seen so far; together they are the bracket that is
-// merged. (Two exposures within 1 % are the same one: an auto-exposure that wanders does not pile
-// up old frames.) A set that gives an environment file needs no light frames.
+// merged. (Two exposures within 1 % are the same one; of an auto-exposure that wanders, the newest
+// max_exposures stay.) A set that gives an environment file needs no light frames.
 class LightStage {
  public:
-  // Loads the environment if the set gives one. Throws previz::Error if it gives none and the light
-  // camera's calibration is not known.
-  LightStage(const set::Set& set, std::optional<LightCameraCalibration> calibration);
+  static constexpr std::size_t max_exposures = 24;
+
+  // Loads the environment if the set gives one, and the room if it has one. Throws previz::Error
+  // if it gives none and the light camera's calibration is not known.
+  LightStage(const set::Set& set, std::optional<LightCameraCalibration> calibration,
+             const ObserverCalibration& observer);
 
   // True where light() needs frames: no environment is given.
   bool needs_frames() const { return !given_; }
+  // True where the film camera's pictures fill in what the light camera cannot see.
+  bool needs_observer() const { return observed_ != nullptr; }
+  // True where the light depends on more than the newest bracket: who wants the light of a frame in
+  // the middle of a take has to go through all the frames before it.
+  bool remembers() const;
 
   // Frames in capture order. `index` is the frame's place in its stream, from 0; it matters only
-  // where the set names the one to use (lighting.frame).
+  // where the set names the one to use (lighting.frame). A frame that cannot be used (another size
+  // than the calibration's, no exposure) is left out, the light stays as it was, and troubles()
+  // says so.
   void see(FramePtr frame, std::uint64_t index);
+  // The film camera's picture, its pose known.
+  void see_observer(const Frame& frame, const glm::dmat4& world_from_camera);
 
   // The light from what was seen so far, computed only if that changed. Null: nothing usable yet.
   LightPtr light();
 
+  // What was left out since the last call, in plain words.
+  std::vector<std::string> troubles() { return std::exchange(troubles_, {}); }
+
  private:
   LightPtr finished(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
                     std::int64_t timestamp_ns);
+  bool usable(const Frame& frame);
+  void drop_oldest();
 
   const set::Lighting settings_;
-  const std::optional<double> exposure_;  // overrides the frames' own
-  const std::optional<LightCameraCalibration> calibration_;
+  const std::optional<double> exposure_;           // overrides the frames' own
+  const std::optional<double> observer_exposure_;  // likewise
+  const bool given_;
+  std::optional<lighting::Estimator> estimator_;  // where it needs frames
+  FisheyeIntrinsics intrinsics_;                  // of the light camera
+  glm::dvec3 seen_from_{0};                       // where the image is seen from; world, metres
+  std::unique_ptr<lighting::ObservedLight> observed_;
   std::map<long, FramePtr> newest_;  // by exposure, in steps of 1 %
+  std::vector<std::string> troubles_;
   bool changed_ = false;
-  bool given_ = false;
   lighting::SourceTracker tracker_;
   LightPtr light_;
 };

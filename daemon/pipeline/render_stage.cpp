@@ -49,6 +49,7 @@ RenderStage::RenderStage(std::shared_ptr<render::Device> device, const set::Set&
 }
 
 void RenderStage::operator()(Shot& shot) {
+  if (!shot.wanted) return;
   const auto begin = std::chrono::steady_clock::now();
   const double exposure = set_.observer.exposure.value_or(shot.frame->exposure);
   Plate plate = plate_of(*shot.frame);
@@ -56,7 +57,7 @@ void RenderStage::operator()(Shot& shot) {
   if (!shot.light) return pass_through(shot, std::move(plate), "no light frame was seen yet");
 
   if (light_ != shot.light) {
-    renderer_.set_environment(shot.light->lighting.environment, set_.lighting.sampling);
+    renderer_.set_environment(shot.light->encoded, set_.lighting.sampling);
     if (set_.lighting.mode != set::LightMode::image) renderer_.set_sources(shot.light->lamps);
     light_ = shot.light;
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/lighting/environment.hpp"
+#include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/layers.hpp"
 #include "daemon/set/set.hpp"
 #include "daemon/tracking/tracker.hpp"
@@ -18,7 +19,8 @@ namespace previz::pipeline {
 // A finished light estimate and the light frames (by sequence number) it was made from.
 struct Light {
   lighting::Lighting lighting;
-  std::vector<set::Light> lamps;         // of its sources
+  std::vector<set::Light> lamps;       // of its sources
+  render::EncodedEnvironment encoded;  // as the renderer takes it, so that no frame waits for that
   std::vector<std::uint64_t> sequences;  // empty: an environment given as a file
 };
 using LightPtr = std::shared_ptr<const Light>;
@@ -26,6 +28,7 @@ using LightPtr = std::shared_ptr<const Light>;
 struct Shot {
   // From the observer.
   std::uint64_t index = 0;  // in the stream, from 0
+  bool wanted = true;       // false: it is passed through for the light of later ones only
   FramePtr frame;
   std::chrono::steady_clock::time_point arrived;  // when the daemon got it
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "daemon/lighting/lighting.hpp"
+#include "daemon/pipeline/room_model.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/render/photon_schedule.hpp"
 #include "daemon/render/picture_memory.hpp"
@@ -120,6 +121,14 @@ void check_environment(Checked& checked, Lines& problems) {
     for (const auto& note : lighting::load_environment(coarse).report.notes)
       checked.remarks.push_back(note);
   });
+}
+
+void check_room(const set::Set& set, Lines& problems) {
+  if (!set.lighting.room) return;
+  const auto& calibration = set.light_camera.calibration;
+  const glm::dvec3 camera =
+      calibration ? glm::dvec3(calibration->world_from_camera[3]) : set.lighting.room->seen_from;
+  attempt(problems, [&] { pipeline::open_room(set, camera); });
 }
 
 void check_tracking(Checked& checked, Lines& problems) {
@@ -338,6 +347,7 @@ int check_set(const fs::path& set_or_session, std::ostream& out) {
 
   const auto scene = load_scene(checked.set, problems);
   check_environment(checked, problems);
+  check_room(checked.set, problems);
   check_tracking(checked, problems);
   if (!problems.empty()) return refuse(problems, out);
 

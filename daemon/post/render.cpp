@@ -12,6 +12,7 @@
 #include <variant>
 
 #include "daemon/pipeline/light_stage.hpp"
+#include "daemon/pipeline/news.hpp"
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/stages.hpp"
 #include "daemon/pipeline/take.hpp"
@@ -77,15 +78,20 @@ FrameRange range_of(const RenderOptions& options, const pipeline::Take& take) {
   return range;
 }
 
-// Shots of the frames that are still to do (not empty), straight from the replay driver.
+// Shots of the frames that are still to do (not empty), straight from the replay driver. With
+// `from_start` those before them come too, not wanted.
 class ObserverSource {
  public:
-  ObserverSource(pipeline::Take& take, std::set<std::uint64_t> to_do, Progress& progress,
-                 pipeline::Metrics& metrics)
-      : next_(*to_do.begin()), to_do_(std::move(to_do)), progress_(progress), metrics_(metrics) {
+  ObserverSource(pipeline::Take& take, std::set<std::uint64_t> to_do, bool from_start,
+                 Progress& progress, pipeline::Metrics& metrics)
+      : next_(from_start ? 0 : *to_do.begin()),
+        from_start_(from_start),
+        to_do_(std::move(to_do)),
+        progress_(progress),
+        metrics_(metrics) {
     ReplayOptions options;
     options.speed = 0;
-    options.first = *to_do_.begin();
+    options.first = next_;
     options.last = *to_do_.rbegin();
     camera_ = replay(std::move(take.observer_stream), "observer", options);
     camera_->start();
@@ -100,9 +106,10 @@ class ObserverSource {
       if (const auto* trouble = std::get_if<DeviceTrouble>(&event)) {
         progress_.note(trouble->device + ": " + trouble->what);
         metrics_.dropped("observer", "device trouble");
-      } else if (to_do_.contains(index)) {
+      } else if (from_start_ || to_do_.contains(index)) {
         Shot shot;
         shot.index = index;
+        shot.wanted = to_do_.contains(index);
         shot.frame = std::get<FramePtr>(std::move(event));
         shot.arrived = std::chrono::steady_clock::now();
         return shot;
@@ -113,6 +120,7 @@ class ObserverSource {
  private:
   std::unique_ptr<Camera> camera_;
   std::uint64_t next_;
+  const bool from_start_;
   const std::set<std::uint64_t> to_do_;
   Progress& progress_;
   pipeline::Metrics& metrics_;
@@ -121,12 +129,17 @@ class ObserverSource {
 // Gives each shot the light of the newest light frames before it.
 class LightSource {
  public:
-  LightSource(pipeline::Take& take, Progress& progress)
-      : stage_(take.set, take.light), stream_(std::move(take.light_stream)), progress_(progress) {
+  LightSource(pipeline::Take& take, Progress& progress, pipeline::Metrics& metrics)
+      : stage_(take.set, take.light, take.observer),
+        stream_(std::move(take.light_stream)),
+        progress_(progress),
+        metrics_(metrics) {
     if (stage_.needs_frames() && !stream_)
       throw Error(take.session.directory.string() +
                   ": the session has no light frames, and the set gives no lighting.environment");
   }
+
+  bool remembers() const { return stage_.remembers(); }
 
   void operator()(Shot& shot) {
     while (stage_.needs_frames() && next_ < stream_->records().size() &&
@@ -134,18 +147,27 @@ class LightSource {
       stage_.see(stream_->read(next_), next_);
       ++next_;
     }
+    if (shot.track.pose) stage_.see_observer(*shot.frame, shot.track.pose->world_from_camera);
+    for (const std::string& trouble : stage_.troubles()) {
+      note(trouble);
+      metrics_.dropped("lighting", "not usable");
+    }
     shot.light = stage_.light();
     if (!shot.light) return;
-    for (const std::string& note : shot.light->lighting.report.notes)
-      if (noted_.insert(note).second) progress_.note("light: " + note);
+    for (const std::string& what : shot.light->lighting.report.notes) note(what);
   }
 
  private:
+  void note(const std::string& what) {
+    if (news_.is_new(what)) progress_.note("light: " + what);
+  }
+
   pipeline::LightStage stage_;
   std::unique_ptr<session::StreamReader> stream_;
   std::size_t next_ = 0;
-  std::set<std::string> noted_;
+  pipeline::News news_;
   Progress& progress_;
+  pipeline::Metrics& metrics_;
 };
 
 std::string percent_words(double share) {
@@ -237,9 +259,9 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
         << quality_words(set.quality) << ", on " << render::device_name(*device) << std::endl;
 
     Progress progress(out, options.terminal, to_do.size(), now_s());
-    ObserverSource observer(take, to_do, progress, metrics);
+    LightSource light(take, progress, metrics);
+    ObserverSource observer(take, to_do, light.remembers(), progress, metrics);
     pipeline::TrackStage track(set, take.observer, take.session.track);
-    LightSource light(take, progress);
     pipeline::RenderStageOptions render_options;
     render_options.layers = true;
     render_options.cancelled = [&] { return options.stop.stop_requested(); };

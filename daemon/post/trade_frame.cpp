@@ -95,8 +95,9 @@ pipeline::LightPtr TradeFrame::light(const set::Lighting& settings) {
     if (known == settings) return light;
   set::Set set = set_;
   set.lighting = settings;
-  pipeline::LightStage stage(set, light_calibration_);
+  pipeline::LightStage stage(set, light_calibration_, calibration_);
   for (std::size_t i = 0; i < light_frames_.size(); ++i) stage.see(light_frames_[i], i);
+  if (shot_.track.pose) stage.see_observer(*shot_.frame, shot_.track.pose->world_from_camera);
   lights_.emplace_back(settings, stage.light());
   return lights_.back().second;
 }

@@ -140,8 +140,7 @@ void GpuScene::find_emitters() {
     if (emits(scene_.materials[scene_.instances[i].material])) emitters_.push_back(i);
 }
 
-void GpuScene::set_environment(const lighting::EnvironmentMap& map, set::LightSampling sampling) {
-  const EncodedEnvironment encoded = encode_environment(map);
+void GpuScene::set_environment(const EncodedEnvironment& encoded, set::LightSampling sampling) {
   environment_size_ = encoded.size;
   environment_levels_ = encoded.levels;
   environment_mean_ = encoded.mean;

@@ -23,7 +23,7 @@ class GpuScene {
   // Builds the meshes' BVHs and uploads everything that does not depend on the camera.
   // Surfaces are perfect mirrors where their GGX alpha is at most `specular_alpha`.
   void set_scene(const scene::Scene& scene, double specular_alpha);
-  void set_environment(const lighting::EnvironmentMap& map, set::LightSampling sampling);
+  void set_environment(const EncodedEnvironment& encoded, set::LightSampling sampling);
   // Lamps beside the scene's own, which may change from frame to frame.
   void set_sources(std::vector<set::Light> sources);
   // Uploads instances, top level and lights relative to `camera_position` (world, metres).

@@ -154,6 +154,10 @@ void Renderer::set_scene(const scene::Scene& scene) {
 
 void Renderer::set_environment(const lighting::EnvironmentMap& environment,
                                set::LightSampling sampling) {
+  set_environment(encode_environment(environment), sampling);
+}
+
+void Renderer::set_environment(const EncodedEnvironment& environment, set::LightSampling sampling) {
   impl_->scene.set_environment(environment, sampling);
   impl_->has_environment = true;
 }

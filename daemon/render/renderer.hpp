@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "daemon/lighting/environment.hpp"
+#include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/layers.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
@@ -64,6 +65,8 @@ class Renderer {
   // Uploads; may be called between any two frames (P13). Nothing is precomputed beyond BVHs.
   void set_scene(const scene::Scene& scene);
   void set_environment(const lighting::EnvironmentMap& environment, set::LightSampling sampling);
+  // The same, encoded elsewhere: what is left to do is the upload.
+  void set_environment(const EncodedEnvironment& environment, set::LightSampling sampling);
   // Lamps beside those of the scene: the sources that were taken out of the environment. From the
   // first call on the pipelines are made for any number of them, even none, so that lamps come and
   // go between frames without new pipelines.

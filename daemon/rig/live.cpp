@@ -2,12 +2,13 @@
 
 #include <mutex>
 #include <ostream>
-#include <set>
 #include <string>
 #include <utility>
 #include <variant>
 
+#include "daemon/pipeline/light_feed.hpp"
 #include "daemon/pipeline/light_stage.hpp"
+#include "daemon/pipeline/news.hpp"
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/stages.hpp"
 #include "daemon/pipeline/take.hpp"
@@ -23,18 +24,18 @@ namespace {
 using pipeline::LightPtr;
 using pipeline::Shot;
 
-// Each different note once, from any thread.
+// News from any thread.
 class Notes {
  public:
   explicit Notes(std::ostream& out) : out_(out) {}
   void operator()(const std::string& note) {
     const std::lock_guard lock(mutex_);
-    if (told_.insert(note).second) out_ << note << std::endl;
+    if (news_.is_new(note)) out_ << note << std::endl;
   }
 
  private:
   std::mutex mutex_;
-  std::set<std::string> told_;
+  pipeline::News news_;
   std::ostream& out_;
 };
 
@@ -76,9 +77,31 @@ class CameraSource {
   std::optional<std::uint64_t> last_sequence_;
 };
 
-struct LightFrame {
-  FramePtr frame;
-  std::uint64_t index = 0;
+// The estimate of the light from all frames that waited; what it has to say is noted.
+class LightWork {
+ public:
+  LightWork(pipeline::LightStage& stage, Notes& notes, pipeline::Metrics& metrics)
+      : stage_(stage), notes_(notes), metrics_(metrics) {}
+
+  LightPtr operator()(std::vector<pipeline::LightFrame> frames,
+                      const std::optional<pipeline::ObserverView>& view) {
+    if (view) stage_.see_observer(*view->frame, view->world_from_camera);
+    for (pipeline::LightFrame& light_frame : frames)
+      stage_.see(std::move(light_frame.frame), light_frame.index);
+    for (const std::string& trouble : stage_.troubles()) {
+      notes_("light: " + trouble);
+      metrics_.dropped("lighting", "not usable");
+    }
+    LightPtr light = stage_.light();
+    if (light)
+      for (const std::string& what : light->lighting.report.notes) notes_("light: " + what);
+    return light;
+  }
+
+ private:
+  pipeline::LightStage& stage_;
+  Notes& notes_;
+  pipeline::Metrics& metrics_;
 };
 
 }  // namespace
@@ -99,7 +122,8 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out
   const ObserverCalibration calibration =
       pipeline::observer_calibration(set, cameras.recorded.info);
   pipeline::TrackStage track(set, calibration, cameras.recorded.track);
-  pipeline::LightStage lighting(set, pipeline::light_calibration(set, cameras.recorded.info));
+  pipeline::LightStage lighting(set, pipeline::light_calibration(set, cameras.recorded.info),
+                                calibration);
   if (lighting.needs_frames() && !cameras.light)
     throw Error(set.file.string() +
                 ": lighting: the set has neither a light camera nor lighting.environment");
@@ -110,31 +134,20 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out
   out << "live on " << render::device_name(*device) << ", " << set.quality.samples
       << " samples a frame" << std::endl;
 
-  // Every exposure of a bracket counts, so light frames queue; the estimate takes all that wait.
-  pipeline::BoundedQueue<LightFrame> light_frames(16);
-  pipeline::Mailbox<LightPtr> lights;
+  pipeline::LightFeed light(cameras.light ? nullptr : lighting.light());
   pipeline::Mailbox<Shot> seen, tracked, rendered;
   pipeline::StageThreads stages(metrics, options.stop);
 
-  if (cameras.light) {
-    stages.source(
-        "light camera", light_frames,
+  if (cameras.light)
+    light.start(
+        stages,
         [source = CameraSource(*cameras.light, "light camera", options.stop, note, metrics),
-         index = std::uint64_t{0}]() mutable -> std::optional<LightFrame> {
+         index = std::uint64_t{0}]() mutable -> std::optional<pipeline::LightFrame> {
           FramePtr frame = source.next();
           if (!frame) return std::nullopt;
-          return LightFrame{std::move(frame), index++};
-        });
-    stages.stage("lighting", light_frames, lights, [&](LightFrame first) {
-      lighting.see(std::move(first.frame), first.index);
-      while (std::optional<LightFrame> more = light_frames.try_pop())
-        lighting.see(std::move(more->frame), more->index);
-      LightPtr light = lighting.light();
-      if (light)
-        for (const std::string& what : light->lighting.report.notes) note("light: " + what);
-      return light;
-    });
-  }
+          return pipeline::LightFrame{std::move(frame), index++};
+        },
+        LightWork(lighting, note, metrics));
   stages.source("observer", seen,
                 [source = CameraSource(*cameras.observer, "observer", options.stop, note, metrics),
                  index = std::uint64_t{0}]() mutable -> std::optional<Shot> {
@@ -147,15 +160,15 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out
                 });
   stages.stage("tracking", seen, tracked, [&](Shot shot) {
     track(shot);
+    if (lighting.needs_observer() && shot.track.pose)
+      light.see_observer({shot.frame, shot.track.pose->world_from_camera});
     return shot;
   });
-  stages.stage("render", tracked, rendered,
-               [&, light = cameras.light ? nullptr : lighting.light()](Shot shot) mutable {
-                 if (std::optional<LightPtr> newer = lights.try_pop()) light = std::move(*newer);
-                 shot.light = light;
-                 render(shot);
-                 return shot;
-               });
+  stages.stage("render", tracked, rendered, [&](Shot shot) {
+    shot.light = light.newest();
+    render(shot);
+    return shot;
+  });
   stages.sink("display", rendered, [&](Shot shot) {
     if (!shot.whole) return metrics.dropped("display", "stopped while rendering");
     if (!shot.untouched.empty()) {

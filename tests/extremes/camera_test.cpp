@@ -2,13 +2,17 @@
 // exposure.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
 #include <string>
 
 #include "daemon/lighting/hdr.hpp"
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/lighting/response.hpp"
 #include "daemon/render/composite.hpp"
+#include "drivers/error.hpp"
 #include "tests/unit/lighting_pictures.hpp"
 
 namespace previz::lighting {
@@ -84,6 +88,108 @@ TEST(ExtremeCamera, a_clipped_or_black_bracket_is_flagged) {
         report.notes[0].find(signal > 0 ? "clipped in every exposure" : "black in every exposure"),
         std::string::npos)
         << report.notes[0];
+  }
+}
+
+LightCameraCalibration upward_camera() {
+  LightCameraCalibration camera = fisheye_camera(128);
+  camera.world_from_camera = looking(0, 90);
+  return camera;
+}
+
+double cap_sr(double radius_rad) {
+  return 2 * std::numbers::pi * (1 - std::cos(radius_rad));
+}
+
+// The disc of the sun, a million times its sky, which no bracket of a camera reaches: its flux is a
+// lower bound of white over the pixels that it touches, told with the solid angle and the exposure
+// that would be needed, and its direction is right.
+TEST(ExtremeCamera, a_sun_in_frame_is_a_told_lower_bound_in_the_right_direction) {
+  LightCameraCalibration camera = fisheye_camera();
+  camera.world_from_camera = looking(0, 90);
+  set::Lighting settings;
+  settings.resolution = 256;
+  const glm::dvec3 sun = test::towards(40, 55);
+  const double radius = 0.265 * test::degree, white = 256;
+  const test::Sky sky = [&](const glm::dvec3& d) {
+    return glm::dvec3(glm::dot(d, sun) > std::cos(radius) ? 1e6 : 1.0);
+  };
+  std::vector<FramePtr> bracket;
+  for (const double exposure : {0.5, 1 / 16.0, 1 / white})
+    bracket.push_back(test::photograph(camera, sky, exposure, test::Detail::fine));
+  const Lighting lighting = estimate(bracket, camera, settings);
+  const EnvironmentReport& report = lighting.report;
+  const double pixel = 1 / camera.intrinsics.fx;
+  EXPECT_GT(report.overexposed_sr, 0);
+  EXPECT_LT(report.overexposed_sr, cap_sr(radius + std::sqrt(2.0) * pixel));
+  ASSERT_FALSE(report.notes.empty());
+  EXPECT_NE(report.notes[0].find("an exposure below 0.00391 is needed"), std::string::npos)
+      << report.notes[0];
+  glm::dvec3 moment(0);
+  for (int j = 0; j < lighting.environment.size; ++j) {
+    for (int i = 0; i < lighting.environment.size; ++i) {
+      const glm::vec3& r =
+          lighting.environment
+              .radiance[static_cast<std::size_t>(j * lighting.environment.size + i)];
+      ASSERT_TRUE(r.g >= 0 && r.g <= white * (1 + 1e-6)) << r.g;
+      if (r.g > 2)
+        moment += (r.g - 1.0) * glm::dvec3(texel_direction(lighting.environment.size, i, j));
+    }
+  }
+  // A clipped sun is known to the pixels that it clips, no better.
+  EXPECT_LT(std::acos(glm::dot(glm::normalize(moment), sun)), pixel);
+}
+
+// A torch held into the lens, or a hand over it: the map is what can be said, the first note says
+// that the camera is blinded.
+TEST(ExtremeCamera, a_blinded_camera_is_told) {
+  const LightCameraCalibration camera = upward_camera();
+  for (const double radiance : {1e5, 0.0}) {
+    const test::Sky sky = [&](const glm::dvec3& d) {
+      return glm::dvec3(d.z < 0.2 ? 0.5 : radiance);
+    };
+    std::vector<FramePtr> bracket;
+    for (const double exposure : {1.0, 0.01})
+      bracket.push_back(test::photograph(camera, sky, exposure));
+    const Lighting lighting = estimate(bracket, camera, {});
+    ASSERT_FALSE(lighting.report.notes.empty());
+    EXPECT_TRUE(lighting.report.notes[0].starts_with("the light camera is blinded: "))
+        << lighting.report.notes[0];
+    for (const glm::vec3& r : lighting.environment.radiance)
+      ASSERT_TRUE(r.g >= 0 && r.g <= 100 * (1 + 1e-6));
+  }
+}
+
+// Stated two stops off, an exposure contradicts its neighbours all over: the note names both, the
+// newest counts, and the scales are not mixed.
+TEST(ExtremeCamera, an_exposure_stated_two_stops_wrong_is_told) {
+  const LightCameraCalibration camera = upward_camera();
+  const test::Sky sky = [](const glm::dvec3& d) { return glm::dvec3(0.4 + 0.3 * d.z); };
+  std::vector<FramePtr> bracket;
+  for (int i = 0; i < 2; ++i) {
+    const double exposure = i == 0 ? 0.25 : 1.0;
+    Frame frame = *test::photograph(camera, sky, exposure);
+    frame.exposure = i == 0 ? 4 * exposure : exposure;
+    frame.sequence = static_cast<std::uint64_t>(i);
+    bracket.push_back(std::make_shared<Frame>(std::move(frame)));
+  }
+  const Lighting lighting = estimate(bracket, camera, {});
+  const auto told = std::ranges::find_if(lighting.report.notes, [](const std::string& note) {
+    return note.find("disagree by 2.0 stops") != std::string::npos;
+  });
+  ASSERT_NE(told, lighting.report.notes.end());
+  const auto up = texel_index(lighting.environment.size, glm::vec3(0, 0, 1));
+  EXPECT_NEAR(lighting.environment.radiance[up].g, 0.7, 0.005);
+}
+
+TEST(ExtremeCamera, a_frame_of_another_size_is_refused_by_name) {
+  const FramePtr frame = make_frame(3, 5, 1, std::vector<glm::dvec3>(15));
+  try {
+    estimate({&frame, 1}, upward_camera(), {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(),
+                 "light frame 0 has 3x5 pixels, the light camera's calibration 128x128");
   }
 }
 

@@ -15,8 +15,8 @@ namespace previz::lighting {
 namespace {
 
 const ResponseCurve linear_curve{.kind = ResponseCurve::Kind::linear, .inverse_table = {}};
-constexpr double wall = 0.3, lamp = 500;
-constexpr int width = 64, height = 8;
+constexpr double wall_radiance = 0.3, lamp_radiance = 500;
+constexpr int strip_width = 64, strip_height = 8;
 
 // The i-th frame of a bracket, with the sensor's noise. `scene`: radiance by column.
 template <typename Scene>
@@ -24,16 +24,16 @@ FramePtr noisy_frame(int i, double exposure, const Scene& scene, std::mt19937& r
   const SensorNoise noise;
   std::normal_distribution<double> normal;
   std::vector<glm::dvec3> signals;
-  for (int p = 0; p < width * height; ++p) {
+  for (int p = 0; p < strip_width * strip_height; ++p) {
     glm::dvec3 signal(0);
     for (int c = 0; c < 3; ++c) {
-      const double mean = exposure * scene(p % width);
+      const double mean = exposure * scene(p % strip_width);
       signal[c] = mean + normal(random) * std::sqrt(mean * noise.signal_per_electron +
                                                     noise.read_noise * noise.read_noise);
     }
     signals.push_back(signal);
   }
-  Frame frame = *test::make_frame(width, height, exposure, signals);
+  Frame frame = *test::make_frame(strip_width, strip_height, exposure, signals);
   frame.sequence = static_cast<std::uint64_t>(i);
   frame.timestamp_ns = i * 40'000'000;
   return std::make_shared<Frame>(std::move(frame));
@@ -41,7 +41,7 @@ FramePtr noisy_frame(int i, double exposure, const Scene& scene, std::mt19937& r
 
 // A lamp four pixels wide that moves by six a frame.
 double moving_lamp(int frame, int column) {
-  return column >= 6 * frame && column < 6 * frame + 4 ? lamp : wall;
+  return column >= 6 * frame && column < 6 * frame + 4 ? lamp_radiance : wall_radiance;
 }
 
 struct Bracketed {
@@ -75,20 +75,21 @@ TEST(MergeMoving, TheNewestLongExposureShowsTheWallWhereTheLampWas) {
   const SensorNoise noise;
   // The long exposure alone sees the wall well: 5 of its standard deviations.
   const double sigma =
-      std::sqrt(wall * noise.signal_per_electron + noise.read_noise * noise.read_noise);
-  for (int row = 0; row < height; ++row) {
-    for (int column = 0; column < width; ++column) {
-      const bool lit_now = moving_lamp(3, column) == lamp;
+      std::sqrt(wall_radiance * noise.signal_per_electron + noise.read_noise * noise.read_noise);
+  for (int row = 0; row < strip_height; ++row) {
+    for (int column = 0; column < strip_width; ++column) {
+      const bool lit_now = moving_lamp(3, column) == lamp_radiance;
       bool lit_before = false;
-      for (int i = 0; i < 3; ++i) lit_before = lit_before || moving_lamp(i, column) == lamp;
+      for (int i = 0; i < 3; ++i)
+        lit_before = lit_before || moving_lamp(i, column) == lamp_radiance;
       if (lit_now) {
         // Clipped at 1 in the newest, and wall in the others, which the shortest, of a standard
         // deviation of 1.2, cannot tell from 1.
         EXPECT_TRUE(flags_at(picture, column, row) & moved) << column;
         EXPECT_GE(at(picture, column, row).r, 1 - noise.calibration_error);
-        EXPECT_LE(at(picture, column, row).r, wall + 5 * noise.read_noise / exposures[0]);
+        EXPECT_LE(at(picture, column, row).r, wall_radiance + 5 * noise.read_noise / exposures[0]);
       } else {
-        EXPECT_NEAR(at(picture, column, row).g, wall, 5 * sigma) << column;
+        EXPECT_NEAR(at(picture, column, row).g, wall_radiance, 5 * sigma) << column;
         EXPECT_EQ(flags_at(picture, column, row), lit_before ? moved : 0) << column;
       }
     }
@@ -99,14 +100,14 @@ TEST(MergeMoving, TheNewestShortExposureShowsTheLampWhereItIsNowAndNowhereElse) 
   const std::vector<double> exposures{1, 1.0 / 16, 1.0 / 256, 1.0 / 4096};
   const HdrPicture picture = photograph_moving_lamp(exposures).merged;
   const SensorNoise noise;
-  const double signal = lamp * exposures.back();
+  const double signal = lamp_radiance * exposures.back();
   const double sigma =
       std::sqrt(signal * noise.signal_per_electron + noise.read_noise * noise.read_noise) /
       exposures.back();
-  for (int row = 0; row < height; ++row) {
-    for (int column = 0; column < width; ++column) {
-      if (moving_lamp(3, column) == lamp)
-        EXPECT_NEAR(at(picture, column, row).r, lamp, 5 * sigma) << column;
+  for (int row = 0; row < strip_height; ++row) {
+    for (int column = 0; column < strip_width; ++column) {
+      if (moving_lamp(3, column) == lamp_radiance)
+        EXPECT_NEAR(at(picture, column, row).r, lamp_radiance, 5 * sigma) << column;
       else  // at most the white of the long exposure, which no newer one can deny there
         EXPECT_LE(at(picture, column, row).r, 1.0f) << column;
     }
@@ -115,8 +116,8 @@ TEST(MergeMoving, TheNewestShortExposureShowsTheLampWhereItIsNowAndNowhereElse) 
 
 TEST(MergeMoving, ASwitchedOffLampIsGoneWithTheFirstExposureWithoutIt) {
   std::mt19937 random(5);
-  const auto lit = [](int column) { return column < 8 ? lamp : wall; };
-  const auto dark = [](int) { return wall; };
+  const auto lit = [](int column) { return column < 8 ? lamp_radiance : wall_radiance; };
+  const auto dark = [](int) { return wall_radiance; };
   for (const double newest : {1.0, 1.0 / 16, 1.0 / 256, 1.0 / 4096}) {
     std::vector<FramePtr> frames;
     int i = 0;
@@ -129,7 +130,7 @@ TEST(MergeMoving, ASwitchedOffLampIsGoneWithTheFirstExposureWithoutIt) {
     // An exposure that clips at 1 leaves that much where the newest one is too short to deny it,
     // and that one its noise.
     EXPECT_LE(flux, 1 + 5 * SensorNoise{}.read_noise / newest) << newest;
-    EXPECT_NEAR(at(picture, 40, 2).g, wall, 0.05 * wall) << newest;
+    EXPECT_NEAR(at(picture, 40, 2).g, wall_radiance, 0.05 * wall_radiance) << newest;
   }
 }
 

@@ -17,7 +17,7 @@ namespace {
 using std::numbers::pi;
 using test::degree;
 
-const glm::dvec3 size_m(6, 5, 3);
+const glm::dvec3 box_size_m(6, 5, 3);
 
 // Standing on the floor's level, turned about Z.
 glm::dmat4 box_pose() {
@@ -26,7 +26,7 @@ glm::dmat4 box_pose() {
 }
 
 std::shared_ptr<const Room> box_room(const glm::dvec3& seen_from) {
-  return std::make_shared<const Room>(box_triangles(size_m, box_pose()), seen_from);
+  return std::make_shared<const Room>(box_triangles(box_size_m, box_pose()), seen_from);
 }
 
 // Distance to the box's wall from inside, in closed form (Kay and Kajiya's slabs).
@@ -37,7 +37,8 @@ double distance_in_box(const glm::dvec3& origin, const glm::dvec3& direction) {
   double nearest = 1e300;
   for (int axis = 0; axis < 3; ++axis)
     if (d[axis] != 0)
-      nearest = std::min(nearest, (std::copysign(size_m[axis] / 2, d[axis]) - o[axis]) / d[axis]);
+      nearest =
+          std::min(nearest, (std::copysign(box_size_m[axis] / 2, d[axis]) - o[axis]) / d[axis]);
   return nearest;
 }
 
@@ -65,23 +66,23 @@ TEST(Room, WhatStandsBetweenHides) {
   EXPECT_THROW(Room({}, glm::dvec3(0)), Error);
 }
 
-struct Lamp {
+struct WallLamp {
   glm::dvec3 place{0};
   double radius_m = 0;
 };
 
 // A disc on the wall where a ray from `seen_from` meets it, painted by distance along the wall.
-Lamp lamp_on_wall(const glm::dvec3& seen_from, const glm::dvec3& direction, double radius_m) {
+WallLamp lamp_on_wall(const glm::dvec3& seen_from, const glm::dvec3& direction, double radius_m) {
   return {seen_from + distance_in_box(seen_from, direction) * direction, radius_m};
 }
 
-struct Seen {
+struct SeenLamp {
   double flux = 0;
   glm::dvec3 direction{0};
 };
 
-Seen lamp_in(const EnvironmentMap& map, double ambient) {
-  Seen seen;
+SeenLamp lamp_in(const EnvironmentMap& map, double ambient) {
+  SeenLamp seen;
   for (int j = 0; j < map.size; ++j) {
     for (int i = 0; i < map.size; ++i) {
       const double above = map.radiance[static_cast<std::size_t>(j * map.size + i)].g - ambient;
@@ -104,7 +105,7 @@ TEST(Parallax, ALampIsWhereTheSetSeesIt) {
   camera.world_from_camera[3] = glm::dvec4(camera_place, 1);
   for (const glm::dvec3& direction :
        {test::towards(-30, 50), test::towards(160, 40), test::towards(60, 75)}) {
-    const Lamp lamp = lamp_on_wall(seen_from, direction, 0.25);
+    const WallLamp lamp = lamp_on_wall(seen_from, direction, 0.25);
     const auto sky_from = [&](const glm::dvec3& from) {
       return [&lamp, from](const glm::dvec3& d) {
         const glm::dvec3 hit = from + distance_in_box(from, d) * d;
@@ -118,8 +119,8 @@ TEST(Parallax, ALampIsWhereTheSetSeesIt) {
     set::Lighting settings;
     settings.unseen = set::UnseenRule::constant;
     settings.unseen_radiance = glm::dvec3(ambient);
-    const Seen far = lamp_in(estimate(frames, camera, settings).environment, ambient);
-    const Seen near =
+    const SeenLamp far = lamp_in(estimate(frames, camera, settings).environment, ambient);
+    const SeenLamp near =
         lamp_in(estimate(frames, camera, settings, box_room(seen_from)).environment, ambient);
 
     // What a fine grid of rays from the set sees of it.
@@ -128,7 +129,7 @@ TEST(Parallax, ALampIsWhereTheSetSeesIt) {
     for (int t = 0; t < 1024 * 1024; ++t)
       truth.radiance.emplace_back(
           sky(glm::normalize(glm::dvec3(texel_direction(1024, t % 1024, t / 1024)))));
-    const Seen expected = lamp_in(truth, ambient);
+    const SeenLamp expected = lamp_in(truth, ambient);
     EXPECT_GT(std::acos(glm::dot(far.direction, expected.direction)), 10 * degree);
     // A pixel is 0.75 degrees, and a lamp's centre is known to a small part of one.
     EXPECT_LT(std::acos(std::min(1.0, glm::dot(near.direction, expected.direction))),

@@ -8,20 +8,20 @@
 namespace previz::lighting {
 namespace {
 
-constexpr int side = 64, pixels = side * side;
-constexpr float sigma = 0.01f;
+constexpr int picture_side = 64, picture_pixels = picture_side * picture_side;
+constexpr float pixel_sigma = 0.01f;
 constexpr std::int64_t frame_ns = 40'000'000;
 
 // Radiance by pixel, with Gaussian noise; `stated` over the noise that the picture admits.
 template <typename Scene>
 HdrPicture noisy(const Scene& scene, std::mt19937& random, float stated = 1) {
-  std::normal_distribution<float> normal(0, sigma);
-  HdrPicture picture{side, side, {}, std::vector<std::uint8_t>(pixels), {}};
-  for (int p = 0; p < pixels; ++p) {
+  std::normal_distribution<float> normal(0, pixel_sigma);
+  HdrPicture picture{picture_side, picture_side, {}, std::vector<std::uint8_t>(picture_pixels), {}};
+  for (int p = 0; p < picture_pixels; ++p) {
     const float radiance = scene(p);
     picture.radiance.emplace_back(radiance + normal(random), radiance + normal(random),
                                   radiance + normal(random));
-    picture.variance.emplace_back(stated * stated * sigma * sigma);
+    picture.variance.emplace_back(stated * stated * pixel_sigma * pixel_sigma);
   }
   return picture;
 }
@@ -29,7 +29,7 @@ HdrPicture noisy(const Scene& scene, std::mt19937& random, float stated = 1) {
 double deviation(const HdrPicture& picture, double mean) {
   double squares = 0;
   for (const glm::vec3& r : picture.radiance) squares += std::pow(r.g - mean, 2);
-  return std::sqrt(squares / pixels);
+  return std::sqrt(squares / picture_pixels);
 }
 
 double sum_of(const HdrPicture& picture) {
@@ -52,9 +52,10 @@ TEST(Smoothing, AveragesNoise) {
     }
     const double share = 1 - std::exp(-0.1);
     // 4096 pixels know a standard deviation to 1.1 %; five times that.
-    EXPECT_NEAR(deviation(picture, 1) / (sigma * std::sqrt(share / (2 - share))), 1, 0.06);
-    EXPECT_NEAR(picture.variance[0].g / (stated * stated * sigma * sigma * share / (2 - share)), 1,
-                0.01);
+    EXPECT_NEAR(deviation(picture, 1) / (pixel_sigma * std::sqrt(share / (2 - share))), 1, 0.06);
+    EXPECT_NEAR(
+        picture.variance[0].g / (stated * stated * pixel_sigma * pixel_sigma * share / (2 - share)),
+        1, 0.01);
   }
 }
 
@@ -69,11 +70,13 @@ TEST(Smoothing, OfNoSecondsPassesEverything) {
   }
 }
 
-// The lamp is far above the noise in its own pixels; on the wall around it leaves 2 standard
-// deviations, which no single pixel tells from noise.
+// The lamp is far above the noise in its own pixels; on the wall around it leaves 2
+// standard deviations, which no single pixel tells from noise.
 TEST(Smoothing, ASwitchedLightPassesAtOnceAndSoDoesWhatItLeavesOnTheWalls) {
   std::mt19937 random(3);
-  const auto lit = [](int p) { return p % side < 4 && p / side < 4 ? 50.0f : 1 + 2 * sigma; };
+  const auto lit = [](int p) {
+    return p % picture_side < 4 && p / picture_side < 4 ? 50.0f : 1 + 2 * pixel_sigma;
+  };
   for (const bool on : {false, true}) {
     Smoothing smoothing(5);
     HdrPicture picture;
@@ -85,8 +88,8 @@ TEST(Smoothing, ASwitchedLightPassesAtOnceAndSoDoesWhatItLeavesOnTheWalls) {
     const double raw = sum_of(picture);
     smoothing(picture, 40 * frame_ns);
     // The walls' change is this sum; what lags are squares whose own change is within the noise.
-    EXPECT_NEAR(sum_of(picture), raw, 0.05 * 2 * sigma * pixels) << on;
-    for (int p = 0; p < 4; ++p) EXPECT_NEAR(picture.radiance[p].g, on ? 50 : 1, 6 * sigma);
+    EXPECT_NEAR(sum_of(picture), raw, 0.05 * 2 * pixel_sigma * picture_pixels) << on;
+    for (int p = 0; p < 4; ++p) EXPECT_NEAR(picture.radiance[p].g, on ? 50 : 1, 6 * pixel_sigma);
   }
 }
 
@@ -96,16 +99,17 @@ TEST(Smoothing, WhatChangesByItselfLeavesTheRestAveraged) {
   Smoothing smoothing(0.4);
   HdrPicture picture;
   for (int i = 0; i < 60; ++i) {
-    picture = noisy([i](int p) { return p / side < 8 ? static_cast<float>(i % 7) : 1.0f; }, random);
+    picture = noisy([i](int p) { return p / picture_side < 8 ? static_cast<float>(i % 7) : 1.0f; },
+                    random);
     smoothing(picture, i * frame_ns);
   }
   double squares = 0;
   int rest = 0;
-  for (int p = 16 * side; p < pixels; ++p, ++rest)
+  for (int p = 16 * picture_side; p < picture_pixels; ++p, ++rest)
     squares += std::pow(picture.radiance[static_cast<std::size_t>(p)].g - 1, 2);
-  EXPECT_LT(std::sqrt(squares / rest), 0.3 * sigma);  // 0.22 where nothing starts anew
-  for (int p = 0; p < 8 * side; ++p)
-    EXPECT_NEAR(picture.radiance[static_cast<std::size_t>(p)].g, 59 % 7, 6 * sigma);
+  EXPECT_LT(std::sqrt(squares / rest), 0.3 * pixel_sigma);  // 0.22 where nothing starts anew
+  for (int p = 0; p < 8 * picture_side; ++p)
+    EXPECT_NEAR(picture.radiance[static_cast<std::size_t>(p)].g, 59 % 7, 6 * pixel_sigma);
 }
 
 TEST(Smoothing, TotalFluxOfAStaticSceneStandsStill) {
@@ -116,13 +120,13 @@ TEST(Smoothing, TotalFluxOfAStaticSceneStandsStill) {
   for (int i = 0; i < frames; ++i) {
     HdrPicture picture = noisy(grey, random);
     smoothing(picture, i * frame_ns);
-    const double flux = sum_of(picture) / pixels;
+    const double flux = sum_of(picture) / picture_pixels;
     sum += flux;
     squares += flux * flux;
   }
   const double mean = sum / frames;
   EXPECT_LT(std::sqrt(std::max(0.0, squares / frames - mean * mean)) / mean, 0.005);
-  EXPECT_NEAR(mean, 1, 5 * sigma / std::sqrt(static_cast<double>(pixels)));
+  EXPECT_NEAR(mean, 1, 5 * pixel_sigma / std::sqrt(static_cast<double>(picture_pixels)));
 }
 
 TEST(Smoothing, APictureOfAnotherSizeStartsAnew) {

@@ -178,5 +178,19 @@ TEST_F(Check, TagFamiliesOfTheTableAreTheTrackers) {
   }
 }
 
+TEST_F(Check, LoadsTheRoom) {
+  const std::string camera =
+      "[light_camera.intrinsics]\nwidth=64\nheight=64\nfx=20.0\nfy=20.0\ncx=31.5\ncy=31.5\n"
+      "max_angle_deg=90\n[light_camera.pose]\nposition_m=[0,0,5]\n";
+  EXPECT_NE(check(camera + "[lighting.room]\nsize_m=[4,4,3]\n"), 0);
+  expect_said("lighting.room: the light camera is not inside the box");
+  write("empty.gltf", R"({"asset": {"version": "2.0"}})");
+  EXPECT_NE(check(camera + "[lighting.room]\nfile='empty.gltf'\n"), 0);
+  expect_said("holds no surface");
+  EXPECT_EQ(check(camera + "[lighting.room]\nsize_m=[4,4,3]\nposition_m=[0,0,4]\n"
+                           "seen_from_m=[0,0,4]\n"),
+            0);
+}
+
 }  // namespace
 }  // namespace previz::post

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <thread>
@@ -142,6 +143,29 @@ TEST_F(RenderSession, AStopLeavesWholeFramesAndTheNextRunEndsInTheSamePictures) 
   }
 }
 
+// The light is averaged over time and filled with what the film camera saw: a render that starts
+// late, or goes on, has the light of one that did not.
+TEST_F(RenderSession, TheLightOfAFrameIsTheSameWhereverTheRenderStarts) {
+  test::write_small_take(directory_.path(), true,
+                         "[lighting]\nunseen = \"observer\"\nsmoothing_s = 5\n");
+  std::map<std::uint64_t, std::vector<glm::vec3>> whole, late;
+  RenderOptions options;
+  options.on_frame = [&](const pipeline::Shot& shot) {
+    if (shot.light) whole[shot.index] = shot.light->lighting.environment.radiance;
+  };
+  render(options);
+  options.on_frame = [&](const pipeline::Shot& shot) {
+    late[shot.index] = shot.light->lighting.environment.radiance;
+  };
+  options.frames = FrameRange{5, 6};
+  options.directory = directory_ / "late";
+  const RenderReport report = render(options);
+  EXPECT_EQ(report.frames.size(), 2u);
+  ASSERT_EQ(late.size(), 2u);
+  EXPECT_TRUE(late[5] == whole[5] && late[6] == whole[6]);
+  EXPECT_FALSE(whole[5] == whole[6]);  // every picture of the film camera changes the fill
+}
+
 TEST_F(RenderSession, AnotherSetFileTakesTheSessionsAssetsWhereItHasNoOwn) {
   test::write_small_take(directory_.path());
   std::filesystem::create_directory(directory_ / "elsewhere");
@@ -188,6 +212,13 @@ TEST_F(RenderSession, LiveShowsThePreviewAtTheSetsScaleAndOfflineIsFullSize) {
   offline.frames = FrameRange{1, 1};
   render(offline);
   EXPECT_TRUE(is_plate(directory_ / "out/0001.png", 1));
+}
+
+TEST_F(RenderSession, LiveFillsTheLightFromTheFilmCamera) {
+  test::write_small_take(directory_.path(), true, "[lighting]\nunseen = \"observer\"\n");
+  const pipeline::MetricsSnapshot metrics = rig::run_live(live_options(), out_);
+  EXPECT_GT(metrics.stages.at("lighting").frames, 0u);
+  EXPECT_NE(out_.str().find("filled by the rule \"observer\""), std::string::npos) << out_.str();
 }
 
 TEST_F(RenderSession, LiveStopsWhenAsked) {

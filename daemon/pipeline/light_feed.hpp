@@ -1,0 +1,52 @@
+// Light frames in, the newest light out, estimated in a thread of its own: who asks for the light
+// never waits for it (P11).
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "daemon/pipeline/channel.hpp"
+#include "daemon/pipeline/shot.hpp"
+#include "daemon/pipeline/stages.hpp"
+
+namespace previz::pipeline {
+
+struct LightFrame {
+  FramePtr frame;
+  std::uint64_t index = 0;  // in its stream, from 0
+};
+
+// A picture of the film camera whose pose is known.
+struct ObserverView {
+  FramePtr frame;
+  glm::dmat4 world_from_camera{1.0};
+};
+
+class LightFeed {
+ public:
+  using Source = std::function<std::optional<LightFrame>()>;
+  // All light frames that waited, at least one, and the newest view, where there is one.
+  using Estimate =
+      std::function<LightPtr(std::vector<LightFrame>, const std::optional<ObserverView>&)>;
+
+  // `first`: the light until the first estimate; may be null.
+  explicit LightFeed(LightPtr first = nullptr) : newest_(std::move(first)) {}
+
+  // Adds the two stages "light camera" and "lighting". `stages` ends before this object.
+  void start(StageThreads& stages, Source source, Estimate estimate);
+
+  // From any one thread each; neither waits.
+  void see_observer(ObserverView view) { views_.push(std::move(view)); }
+  LightPtr newest();
+
+ private:
+  // Every exposure of a bracket counts, so light frames queue; the estimate takes all that wait.
+  BoundedQueue<LightFrame> frames_{16};
+  Mailbox<ObserverView> views_;
+  Mailbox<LightPtr> lights_;
+  LightPtr newest_;
+};
+
+}  // namespace previz::pipeline
