@@ -21,7 +21,8 @@ struct CameraSettings {
   std::optional<int> width, height;   // pixels; both or neither
   std::optional<double> rate_hz;
   std::optional<double> exposure_s;       // shutter time; the device's automatic is then off
-  std::optional<double> gain;             // linear, 1 or more
+  std::optional<double> gain;             // linear, of a device whose gain is in dB
+  std::optional<double> raw_gain;         // in the device's own units; its factor is then not known
   std::optional<double> white_balance_k;  // colour temperature
   // Absent: the camera runs freely. "software": one frame a call of next(). Otherwise the hardware
   // line in the device's own words ("Line1").
