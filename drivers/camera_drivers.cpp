@@ -6,6 +6,9 @@
 #ifdef PREVIZ_WITH_ARAVIS
 #include "drivers/aravis/aravis_camera.hpp"
 #endif
+#ifdef PREVIZ_WITH_V4L2
+#include "drivers/v4l2/v4l2_camera.hpp"
+#endif
 
 namespace previz {
 namespace {
@@ -13,6 +16,9 @@ namespace {
 constexpr auto drivers = std::to_array<CameraDriver>({
 #ifdef PREVIZ_WITH_ARAVIS
     {"aravis", open_aravis, find_aravis},
+#endif
+#ifdef PREVIZ_WITH_V4L2
+    {"v4l2", open_v4l2, find_v4l2},
 #endif
 });
 

@@ -1,34 +1,16 @@
-// The registry of camera drivers: what a set asks of a camera, and who can drive it.
+// The registry of camera drivers: who can open which camera, and which are there.
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "drivers/camera.hpp"
+#include "drivers/camera_settings.hpp"
 
 namespace previz {
-
-// What is absent is left as the device has it. What the device cannot do is an error that says what
-// it can; nothing is rounded in silence but a rate or an exposure to the device's own steps.
-struct CameraSettings {
-  std::string source = "observer";    // becomes Frame::source
-  std::string device;                 // the stable name, as `previzd devices` prints it
-  std::optional<std::string> format;  // the pixel format in the driver's own words: YUYV, BayerRG12
-  std::optional<int> width, height;   // pixels; both or neither
-  std::optional<double> rate_hz;
-  std::optional<double> exposure_s;       // shutter time; the device's automatic is then off
-  std::optional<double> gain;             // linear, 1 or more
-  std::optional<double> white_balance_k;  // colour temperature
-  // Absent: the camera runs freely. "software": one frame a call of next(). Otherwise the hardware
-  // line in the device's own words ("Line1").
-  std::optional<std::string> trigger;
-  std::optional<int> packet_size;  // bytes, network cameras; absent: the largest that gets through
-  double responsivity = 1;         // exposure = exposure_s * gain * responsivity
-};
 
 // A camera that is there now.
 struct FoundCamera {

@@ -152,7 +152,11 @@ class Configuration {
     if (!agreed_.drives_exposure && settings_.exposure_s)
       refuse("its exposure cannot be set; leave exposure out");
     if (settings_.gain && !agreed_.gain_in_db)
-      refuse("its gain is not in dB, so no factor can be set; leave gain out");
+      refuse("its gain is not in dB, so no factor can be set; raw_gain sets it");
+    if (settings_.raw_gain) {
+      arv_camera_set_gain(&camera_, *settings_.raw_gain, failure_.out());
+      check("raw_gain");
+    }
     if (!agreed_.drives_exposure) return;
     if (settings_.exposure_s && arv_camera_is_exposure_auto_available(&camera_, failure_.out()))
       arv_camera_set_exposure_time_auto(&camera_, ARV_AUTO_OFF, failure_.out());

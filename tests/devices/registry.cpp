@@ -15,6 +15,9 @@ std::span<const RegisteredDevice> registered_devices() {
       {"aravis", true, true, make_aravis},
       {"aravis_losing_a_tenth_of_its_packets", true, false, make_lossy_aravis},
 #endif
+#ifdef PREVIZ_WITH_V4L2
+      {"v4l2", true, false, make_v4l2},
+#endif
   });
   return devices;
 }

@@ -1,0 +1,239 @@
+#include "drivers/gpio/gpio_buttons.hpp"
+
+#include <gpiod.h>
+#include <sys/epoll.h>
+#include <sys/timerfd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cstring>
+#include <ctime>
+#include <deque>
+#include <list>
+#include <optional>
+
+#include "drivers/debouncer.hpp"
+#include "drivers/descriptor.hpp"
+#include "drivers/error.hpp"
+
+namespace previz {
+namespace {
+
+constexpr std::int64_t second_ns = 1'000'000'000;
+constexpr const char* consumer = "previzd";
+
+struct CloseChip {
+  void operator()(gpiod_chip* chip) const { gpiod_chip_close(chip); }  // and releases its lines
+};
+using Chip = std::unique_ptr<gpiod_chip, CloseChip>;
+
+std::int64_t to_ns(const timespec& time) {
+  return std::int64_t{time.tv_sec} * second_ns + time.tv_nsec;
+}
+
+std::int64_t now_ns() {
+  timespec time{};
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return to_ns(time);
+}
+
+// "gpio", "CHIP", "LINE".
+std::vector<std::string> parts_of(const std::string& name) {
+  std::vector<std::string> parts;
+  std::size_t begin = 0;
+  for (std::size_t end = 0; end != std::string::npos; begin = end + 1) {
+    end = name.find(':', begin);
+    parts.push_back(name.substr(begin, end - begin));
+  }
+  if (parts.size() != 3 || parts[1].empty() || parts[2].empty())
+    throw Error("button \"" + name + "\": allowed is gpio:CHIP:LINE, CHIP its label");
+  return parts;
+}
+
+// By label only: the number of a gpiochip changes from boot to boot.
+Chip find_chip(const std::string& label) {
+  Chip chip(gpiod_chip_open_by_label(label.c_str()));
+  if (!chip) throw Error("no GPIO chip has the label \"" + label + "\": " + std::strerror(errno));
+  return chip;
+}
+
+gpiod_line* find_line(gpiod_chip& chip, const std::string& line) {
+  unsigned offset = 0;
+  const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), offset);
+  gpiod_line* found = error == std::errc{} && end == line.data() + line.size()
+                          ? gpiod_chip_get_line(&chip, offset)
+                          : gpiod_chip_find_line(&chip, line.c_str());
+  if (!found) throw Error("the chip has no line \"" + line + "\"");
+  return found;
+}
+
+int request_flags(const ButtonSettings& settings) {
+  using Bias = ButtonSettings::Bias;
+  int flags = settings.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0;
+  if (settings.bias == Bias::none) flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_DISABLE;
+  if (settings.bias == Bias::pull_up) flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP;
+  if (settings.bias == Bias::pull_down) flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_DOWN;
+  return flags;
+}
+
+class GpioButtons final : public Buttons {
+ public:
+  GpioButtons(std::string device, const std::vector<std::string>& names,
+              const ButtonSettings& settings)
+      : device_(std::move(device)),
+        settings_(settings),
+        epoll_(epoll_create1(EPOLL_CLOEXEC)),
+        timer_(timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK)) {
+    if (!epoll_ || !timer_)
+      throw Error(device_ + ": cannot be waited for: " + std::strerror(errno));
+    for (const std::string& name : names)
+      lines_.push_back({name, parts_of(name)[2], nullptr,
+                        Debouncer(static_cast<std::int64_t>(1e9 * settings.debounce_s))});
+    watch(timer_.get());
+    arm();
+  }
+
+  std::string name() const override { return device_; }
+  int fd() const override { return epoll_.get(); }
+
+  std::optional<ButtonsEvent> next() override {
+    if (!chip_ && now_ns() >= retry_ns_) open();
+    for (Line& line : lines_) {
+      if (line.debouncer.settle(now_ns())) tell(line);
+      read(line);
+    }
+    arm();
+    if (events_.empty()) return std::nullopt;
+    ButtonsEvent event = std::move(events_.front());
+    events_.pop_front();
+    return event;
+  }
+
+ private:
+  struct Line {
+    std::string name;   // of the button
+    std::string label;  // name or offset of the line
+    gpiod_line* line;   // the chip's; null while it is not there
+    Debouncer debouncer;
+  };
+
+  void watch(int descriptor) {
+    epoll_event interest{};
+    interest.events = EPOLLIN;
+    epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, descriptor, &interest);
+  }
+
+  void open() {
+    try {
+      Chip chip = find_chip(device_.substr(device_.find(':') + 1));
+      for (Line& line : lines_) request(*chip, line);
+      chip_ = std::move(chip);
+      refusal_.clear();
+    } catch (const Error& error) {
+      for (Line& line : lines_) line.line = nullptr;
+      retry_ns_ = now_ns() + second_ns;
+      if (refusal_ == error.what()) return;
+      refusal_ = error.what();
+      events_.emplace_back(DeviceTrouble{device_, refusal_ + "; tried again until it is there"});
+    }
+  }
+
+  void request(gpiod_chip& chip, Line& line) {
+    line.line = find_line(chip, line.label);
+    if (gpiod_line_request_both_edges_events_flags(line.line, consumer, request_flags(settings_)) !=
+        0)
+      throw Error("line \"" + line.label + "\" cannot be had: " + std::strerror(errno));
+    watch(gpiod_line_event_get_fd(line.line));
+    // Held while the rig starts: pressed from now on.
+    if (gpiod_line_get_value(line.line) == 1 && line.debouncer.edge(true, now_ns())) tell(line);
+  }
+
+  void read(Line& line) {
+    constexpr timespec at_once{0, 0};
+    while (line.line && gpiod_line_event_wait(line.line, &at_once) == 1) {
+      gpiod_line_event edge{};
+      if (gpiod_line_event_read(line.line, &edge) != 0) return lose(std::strerror(errno));
+      if (line.debouncer.edge(edge.event_type == GPIOD_LINE_EVENT_RISING_EDGE, to_ns(edge.ts)))
+        tell(line);
+    }
+  }
+
+  void lose(const std::string& why) {
+    for (Line& line : lines_) {
+      line.line = nullptr;
+      if (line.debouncer.pressed()) events_.emplace_back(ButtonEvent{line.name, false, now_ns()});
+      line.debouncer.reset();
+    }
+    chip_.reset();
+    retry_ns_ = now_ns() + second_ns;
+    events_.emplace_back(DeviceTrouble{device_, "is lost: " + why + "; tried again"});
+  }
+
+  void tell(const Line& line) {
+    events_.emplace_back(
+        ButtonEvent{line.name, line.debouncer.pressed(), line.debouncer.told_ns()});
+  }
+
+  // The timer wakes for what the lines themselves do not: events that wait, a contact that is to
+  // settle, a chip to look for.
+  void arm() {
+    std::optional<std::int64_t> due_ns;
+    const auto at = [&](std::int64_t time_ns) {
+      due_ns = std::min(due_ns.value_or(time_ns), time_ns);
+    };
+    if (!events_.empty()) at(1);
+    if (!chip_) at(std::max<std::int64_t>(1, retry_ns_));
+    for (const Line& line : lines_)
+      if (line.debouncer.settles_ns()) at(*line.debouncer.settles_ns());
+    itimerspec spec{};
+    if (due_ns) spec.it_value = {*due_ns / second_ns, *due_ns % second_ns};
+    timerfd_settime(timer_.get(), TFD_TIMER_ABSTIME, &spec, nullptr);
+  }
+
+  const std::string device_;
+  const ButtonSettings settings_;
+  OwnedDescriptor epoll_, timer_;
+  Chip chip_;
+  std::int64_t retry_ns_ = 0;
+  std::string refusal_;  // as last told
+  std::list<Line> lines_;
+  std::deque<ButtonsEvent> events_;
+};
+
+std::string or_empty(const char* text) {
+  return text ? text : "";
+}
+
+}  // namespace
+
+std::string gpio_device_of(const std::string& name) {
+  return "gpio:" + parts_of(name)[1];
+}
+
+std::unique_ptr<Buttons> open_gpio(const std::string& device, const std::vector<std::string>& names,
+                                   const ButtonSettings& settings) {
+  return std::make_unique<GpioButtons>(device, names, settings);
+}
+
+std::vector<FoundButton> find_gpio() {
+  std::vector<FoundButton> found;
+  gpiod_chip_iter* chips = gpiod_chip_iter_new();
+  if (!chips) return found;
+  while (gpiod_chip* chip = gpiod_chip_iter_next(chips)) {
+    const std::string label = or_empty(gpiod_chip_label(chip));
+    for (unsigned i = 0; i < gpiod_chip_num_lines(chip); ++i) {
+      gpiod_line* line = gpiod_chip_get_line(chip, i);
+      if (!line || gpiod_line_is_used(line)) continue;
+      if (gpiod_line_direction(line) != GPIOD_LINE_DIRECTION_INPUT) continue;
+      const std::string name = or_empty(gpiod_line_name(line));
+      if (!name.empty())
+        found.push_back({"gpio:" + label + ":" + name,
+                         or_empty(gpiod_chip_name(chip)) + " line " + std::to_string(i)});
+    }
+  }
+  gpiod_chip_iter_free(chips);
+  return found;
+}
+
+}  // namespace previz

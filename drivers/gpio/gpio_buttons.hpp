@@ -1,0 +1,22 @@
+// Buttons, pedals and switches on GPIO lines, through libgpiod (1.6; version 2 has another API).
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "drivers/button_drivers.hpp"
+
+namespace previz {
+
+// `device` is "gpio:CHIP". Edges come from the kernel with their time; a chip or line that is not
+// there, or is in use, is trouble told once, and tried again every second.
+std::unique_ptr<Buttons> open_gpio(const std::string& device, const std::vector<std::string>& names,
+                                   const ButtonSettings& settings);
+
+// The named input lines that nobody uses.
+std::vector<FoundButton> find_gpio();
+
+std::string gpio_device_of(const std::string& name);
+
+}  // namespace previz

@@ -1,0 +1,244 @@
+#include "drivers/hid/hid_buttons.hpp"
+
+#include <hidapi.h>
+#include <sys/eventfd.h>
+
+#include <array>
+#include <cerrno>
+#include <charconv>
+#include <condition_variable>
+#include <cstring>
+#include <ctime>
+#include <deque>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "drivers/descriptor.hpp"
+#include "drivers/error.hpp"
+
+namespace previz {
+namespace {
+
+constexpr int poll_ms = 100;  // how late the end may be noticed
+constexpr std::chrono::seconds retry_interval{1};
+
+std::int64_t monotonic_ns() {
+  timespec time{};
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+}
+
+struct Close {
+  void operator()(hid_device* device) const { hid_close(device); }
+};
+using Device = std::unique_ptr<hid_device, Close>;
+
+struct DeviceName {
+  unsigned short vendor = 0, product = 0;
+  std::string serial;  // empty: any
+};
+
+std::vector<std::string> split(const std::string& text) {
+  std::vector<std::string> parts;
+  std::size_t begin = 0;
+  for (std::size_t end = 0; end != std::string::npos; begin = end + 1) {
+    end = text.find(':', begin);
+    parts.push_back(text.substr(begin, end - begin));
+  }
+  return parts;
+}
+
+std::optional<unsigned short> hexadecimal(const std::string& text) {
+  unsigned short value = 0;
+  const char* end = text.data() + text.size();
+  const auto result = std::from_chars(text.data(), end, value, 16);
+  if (text.empty() || result.ec != std::errc{} || result.ptr != end) return std::nullopt;
+  return value;
+}
+
+DeviceName parse_device(const std::string& device) {
+  const std::vector<std::string> parts = split(device);
+  if (parts.size() == 3 || parts.size() == 4) {
+    const auto vendor = hexadecimal(parts[1]), product = hexadecimal(parts[2]);
+    if (vendor && product) return {*vendor, *product, parts.size() == 4 ? parts[3] : ""};
+  }
+  throw Error("\"" + device +
+              "\": allowed is hid:VENDOR:PRODUCT or hid:VENDOR:PRODUCT:SERIAL, "
+              "VENDOR and PRODUCT hexadecimal");
+}
+
+std::string narrow(const wchar_t* text) {
+  std::string narrow;
+  for (; text && *text; ++text) narrow += *text < 0x80 ? static_cast<char>(*text) : '?';
+  return narrow;
+}
+
+Device open_device(const DeviceName& name) {
+  hid_init();
+  const std::wstring serial(name.serial.begin(), name.serial.end());
+  return Device(hid_open(name.vendor, name.product, serial.empty() ? nullptr : serial.c_str()));
+}
+
+// A thread reads, since hidapi has nothing to wait on.
+class HidButtons final : public Buttons {
+ public:
+  HidButtons(std::string device, const std::vector<std::string>& names)
+      : device_(std::move(device)),
+        device_name_(parse_device(device_)),
+        reader_(names),
+        signal_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    if (!signal_) throw Error(device_ + ": cannot be waited for: " + std::strerror(errno));
+    thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+  }
+
+  std::string name() const override { return device_; }
+  int fd() const override { return signal_.get(); }
+
+  std::optional<ButtonsEvent> next() override {
+    const std::lock_guard lock(mutex_);
+    if (events_.empty()) {
+      eventfd_t ignored = 0;
+      eventfd_read(signal_.get(), &ignored);
+      return std::nullopt;
+    }
+    ButtonsEvent event = std::move(events_.front());
+    events_.pop_front();
+    return event;
+  }
+
+ private:
+  void run(const std::stop_token& stop) {
+    bool told = false;
+    while (!stop.stop_requested()) {
+      const Device device = open_device(device_name_);
+      if (device) {
+        told = false;
+        read(*device, stop);
+        if (stop.stop_requested()) return;
+        for (ButtonEvent& event : reader_.release_all(monotonic_ns())) tell(std::move(event));
+      }
+      if (!std::exchange(told, true))
+        tell(DeviceTrouble{device_, device ? "was unplugged; looked for until it is back"
+                                           : "is not there, or may not be opened; looked for until "
+                                             "it is there"});
+      std::unique_lock lock(mutex_);
+      wake_.wait_for(lock, stop, retry_interval, [] { return false; });
+    }
+  }
+
+  void read(hid_device& device, const std::stop_token& stop) {
+    std::array<unsigned char, 4096> report{};
+    while (!stop.stop_requested()) {
+      const int size = hid_read_timeout(&device, report.data(), report.size(), poll_ms);
+      if (size < 0) return;
+      if (size == 0) continue;
+      const std::uint64_t short_before = reader_.reports_cut_short();
+      for (ButtonEvent& event :
+           reader_.read({report.data(), static_cast<std::size_t>(size)}, monotonic_ns()))
+        tell(std::move(event));
+      if (short_before == 0 && reader_.reports_cut_short() > 0)
+        tell(DeviceTrouble{device_, "sends reports of " + std::to_string(size) +
+                                        " bytes, too short for a button of the set"});
+    }
+  }
+
+  void tell(ButtonsEvent event) {
+    const std::lock_guard lock(mutex_);
+    events_.push_back(std::move(event));
+    eventfd_write(signal_.get(), 1);
+  }
+
+  const std::string device_;
+  const DeviceName device_name_;
+  hid::ReportReader reader_;  // the thread's
+  OwnedDescriptor signal_;
+  std::mutex mutex_;
+  std::condition_variable_any wake_;
+  std::deque<ButtonsEvent> events_;
+  std::jthread thread_;
+};
+
+}  // namespace
+
+namespace hid {
+
+ReportReader::ReportReader(const std::vector<std::string>& names) {
+  for (const std::string& name : names)
+    buttons_.push_back({name, parse_selector(name.substr(name.rfind(':') + 1)), false});
+}
+
+std::vector<ButtonEvent> ReportReader::read(std::span<const std::uint8_t> report,
+                                            std::int64_t time_ns) {
+  std::vector<ButtonEvent> events;
+  bool cut_short = false;
+  for (Button& button : buttons_) {
+    cut_short = cut_short || button.selector.too_short(report);
+    if (!button.selector.speaks(report)) continue;
+    const bool pressed = button.selector.pressed(report);
+    if (std::exchange(button.pressed, pressed) != pressed)
+      events.push_back({button.name, pressed, time_ns});
+  }
+  reports_cut_short_ += cut_short ? 1 : 0;
+  return events;
+}
+
+std::vector<ButtonEvent> ReportReader::release_all(std::int64_t time_ns) {
+  std::vector<ButtonEvent> events;
+  for (Button& button : buttons_)
+    if (std::exchange(button.pressed, false)) events.push_back({button.name, false, time_ns});
+  return events;
+}
+
+void learn(const std::string& device, const std::function<bool()>& stop,
+           const std::function<void(const std::string& name)>& pressed) {
+  const Device opened = open_device(parse_device(device));
+  if (!opened) throw Error(device + ": may not be opened");
+  std::array<unsigned char, 4096> report{};
+  // By report number and length; the first of a kind is compared with nothing held.
+  std::map<std::pair<unsigned char, int>, std::vector<std::uint8_t>> before;
+  while (!stop()) {
+    const int size = hid_read_timeout(opened.get(), report.data(), report.size(), poll_ms);
+    if (size < 0) throw Error(device + ": was unplugged");
+    if (size == 0) continue;
+    std::vector<std::uint8_t>& last = before[{size > 1 ? report[0] : 0, size}];
+    last.resize(static_cast<std::size_t>(size));
+    const std::span<const std::uint8_t> now(report.data(), last.size());
+    for (const std::string& selector : pressed_between(last, now)) pressed(device + ":" + selector);
+    last.assign(now.begin(), now.end());
+  }
+}
+
+}  // namespace hid
+
+// hid:VENDOR:PRODUCT[:SERIAL]:SELECTOR without the selector.
+std::string hid_device_of(const std::string& name) {
+  const std::string device = name.substr(0, name.rfind(':'));
+  parse_device(device);
+  hid::parse_selector(name.substr(name.rfind(':') + 1));
+  return device;
+}
+
+std::unique_ptr<Buttons> open_hid(const std::string& device, const std::vector<std::string>& names,
+                                  const ButtonSettings&) {
+  return std::make_unique<HidButtons>(device, names);
+}
+
+std::vector<FoundButton> find_hid() {
+  std::vector<FoundButton> found;
+  hid_init();
+  hid_device_info* all = hid_enumerate(0, 0);
+  for (const hid_device_info* info = all; info; info = info->next) {
+    char ids[16];
+    std::snprintf(ids, sizeof ids, "%04x:%04x", info->vendor_id, info->product_id);
+    const std::string serial = narrow(info->serial_number);
+    found.push_back({std::string("hid:") + ids + (serial.empty() ? "" : ":" + serial),
+                     narrow(info->manufacturer_string) + " " + narrow(info->product_string)});
+  }
+  hid_free_enumeration(all);
+  return found;
+}
+
+}  // namespace previz

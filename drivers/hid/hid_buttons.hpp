@@ -1,0 +1,52 @@
+// Foot pedals, macro pads and game pads, through hidapi.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drivers/button_drivers.hpp"
+#include "drivers/hid/selector.hpp"
+
+namespace previz {
+
+// `device` is "hid:VENDOR:PRODUCT" or "hid:VENDOR:PRODUCT:SERIAL". A device that is not there, or
+// is unplugged, is trouble told once, and looked for every second; its buttons are then released.
+// Reports that are too short for a button are counted and say nothing of it.
+std::unique_ptr<Buttons> open_hid(const std::string& device, const std::vector<std::string>& names,
+                                  const ButtonSettings& settings);
+
+std::vector<FoundButton> find_hid();
+
+std::string hid_device_of(const std::string& name);
+
+namespace hid {
+
+// What reports make of the buttons; without a device, for it and for its tests.
+class ReportReader {
+ public:
+  // Throws previz::Error where a name cannot be understood.
+  explicit ReportReader(const std::vector<std::string>& names);
+
+  std::vector<ButtonEvent> read(std::span<const std::uint8_t> report, std::int64_t time_ns);
+  std::vector<ButtonEvent> release_all(std::int64_t time_ns);
+  std::uint64_t reports_cut_short() const { return reports_cut_short_; }
+
+ private:
+  struct Button {
+    std::string name;
+    Selector selector;
+    bool pressed = false;
+  };
+  std::vector<Button> buttons_;
+  std::uint64_t reports_cut_short_ = 0;
+};
+
+// Reads one device's reports until `stop`; calls back with what went down, as button names.
+void learn(const std::string& device, const std::function<bool()>& stop,
+           const std::function<void(const std::string& name)>& pressed);
+
+}  // namespace hid
+}  // namespace previz

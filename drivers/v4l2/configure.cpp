@@ -1,0 +1,251 @@
+#include "drivers/v4l2/configure.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <vector>
+
+#include "drivers/error.hpp"
+#include "drivers/v4l2/formats.hpp"
+
+namespace previz::v4l2 {
+namespace {
+
+constexpr double exposure_step_s = 100e-6;  // the unit of V4L2_CID_EXPOSURE_ABSOLUTE
+// A driver that never ends its lists must not hold us for ever.
+constexpr std::uint32_t most_entries = 1000;
+
+// Bounds of a control; none where the node has not got it, or not now.
+std::optional<v4l2_queryctrl> query(Node& node, std::uint32_t id) {
+  v4l2_queryctrl control{};
+  control.id = id;
+  if (node.control(VIDIOC_QUERYCTRL, &control) != 0) return std::nullopt;
+  if (control.flags & V4L2_CTRL_FLAG_DISABLED) return std::nullopt;
+  return control;
+}
+
+bool write(Node& node, std::uint32_t id, std::int32_t value) {
+  v4l2_control control{id, value};
+  return node.control(VIDIOC_S_CTRL, &control) == 0;
+}
+
+std::optional<std::int32_t> read(Node& node, std::uint32_t id) {
+  v4l2_control control{id, 0};
+  if (node.control(VIDIOC_G_CTRL, &control) != 0) return std::nullopt;
+  return control.value;
+}
+
+class Configuration {
+ public:
+  Configuration(Node& node, const CameraSettings& settings) : node_(node), settings_(settings) {}
+
+  Agreed agree() {
+    check_capabilities();
+    agree_on_format();
+    agree_on_rate();
+    agree_on_exposure();
+    agree_on_control(V4L2_CID_AUTOGAIN, V4L2_CID_GAIN, "raw_gain", settings_.raw_gain);
+    agree_on_control(V4L2_CID_AUTO_WHITE_BALANCE, V4L2_CID_WHITE_BALANCE_TEMPERATURE,
+                     "white_balance_k", settings_.white_balance_k);
+    return agreed_;
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& what) const {
+    throw Error(settings_.device + ": " + what);
+  }
+  void check(int error, const std::string& what) const {
+    if (error != 0) refuse(what + ": " + std::strerror(error));
+  }
+
+  void check_capabilities() const {
+    v4l2_capability capability{};
+    check(node_.control(VIDIOC_QUERYCAP, &capability), "is no video device");
+    const std::uint32_t can = capability.capabilities & V4L2_CAP_DEVICE_CAPS
+                                  ? capability.device_caps
+                                  : capability.capabilities;
+    if (can & V4L2_CAP_VIDEO_CAPTURE_MPLANE)
+      refuse("is multi-planar; the libcamera driver is for such cameras");
+    if (!(can & V4L2_CAP_VIDEO_CAPTURE)) refuse("captures no video");
+    if (!(can & V4L2_CAP_STREAMING)) refuse("cannot stream");
+    if (settings_.trigger) refuse("V4L2 has no triggers; leave trigger out");
+    if (settings_.packet_size) refuse("is no network camera; leave packet_size out");
+    if (settings_.gain) refuse("its gain has no unit, so no factor can be set; raw_gain sets it");
+  }
+
+  std::vector<std::uint32_t> formats() const {
+    std::vector<std::uint32_t> formats;
+    v4l2_fmtdesc description{};
+    description.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    for (; description.index < most_entries; ++description.index) {
+      if (node_.control(VIDIOC_ENUM_FMT, &description) != 0) break;
+      formats.push_back(description.pixelformat);
+    }
+    return formats;
+  }
+
+  std::string format_names() const {
+    std::string names;
+    for (const std::uint32_t fourcc : formats()) {
+      names += names.empty() ? "" : ", ";
+      names += fourcc_name(fourcc);
+    }
+    return names.empty() ? "none" : names;
+  }
+
+  // What the set asks for; else what the node is set to, if that can be converted; else the first
+  // of its formats that can.
+  std::uint32_t wanted_format(std::uint32_t now) const {
+    const std::vector<std::uint32_t> its = formats();
+    if (settings_.format) {
+      const std::optional<std::uint32_t> wanted = fourcc_of(*settings_.format);
+      if (!wanted)
+        refuse("format \"" + *settings_.format + "\" is not known; known are: " + known_formats());
+      if (std::ranges::find(its, *wanted) == its.end())
+        refuse("has no format " + *settings_.format + "; it has: " + format_names());
+      return *wanted;
+    }
+    if (wire_format(now)) return now;
+    const auto first = std::ranges::find_if(
+        its, [](std::uint32_t fourcc) { return wire_format(fourcc).has_value(); });
+    if (first == its.end())
+      refuse("has no format that can be converted; it has: " + format_names());
+    return *first;
+  }
+
+  void agree_on_format() {
+    v4l2_format format{};
+    format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    check(node_.control(VIDIOC_G_FMT, &format), "does not tell its format");
+    v4l2_pix_format& picture = format.fmt.pix;
+    const std::uint32_t wanted = wanted_format(picture.pixelformat);
+    picture.pixelformat = wanted;
+    picture.field = V4L2_FIELD_NONE;
+    picture.bytesperline = picture.sizeimage = 0;
+    if (settings_.width && settings_.height) {
+      picture.width = static_cast<std::uint32_t>(*settings_.width);
+      picture.height = static_cast<std::uint32_t>(*settings_.height);
+    }
+    check(node_.control(VIDIOC_S_FMT, &format), "does not take the format " + fourcc_name(wanted));
+    const bool as_wanted = picture.pixelformat == wanted &&
+                           (!settings_.width || !settings_.height ||
+                            (picture.width == static_cast<std::uint32_t>(*settings_.width) &&
+                             picture.height == static_cast<std::uint32_t>(*settings_.height)));
+    if (!as_wanted) refuse_size(picture, wanted);
+    if (picture.field != V4L2_FIELD_NONE) refuse("sends interlaced pictures, which are not taken");
+    if (picture.width < 1 || picture.height < 1 || picture.width > 65535 || picture.height > 65535)
+      refuse("says its pictures are " + size_text(picture.width, picture.height) +
+             " pixels, which cannot be");
+    const std::optional<convert::WireFormat> wire = wire_format(picture);
+    if (!wire) refuse("sends " + fourcc_name(picture.pixelformat) + ", which cannot be converted");
+    agreed_.wire = *wire;
+    agreed_.stride = wire->layout == convert::Layout::mjpeg ? 0 : picture.bytesperline;
+    agreed_.format = {convert::delivered_format(*wire), static_cast<int>(picture.width),
+                      static_cast<int>(picture.height), 0};
+  }
+
+  static std::string size_text(std::uint32_t width, std::uint32_t height) {
+    return std::to_string(width) + "x" + std::to_string(height);
+  }
+
+  [[noreturn]] void refuse_size(const v4l2_pix_format& made, std::uint32_t wanted) const {
+    std::string sizes;
+    v4l2_frmsizeenum size{};
+    size.pixel_format = wanted;
+    for (; size.index < most_entries; ++size.index) {
+      if (node_.control(VIDIOC_ENUM_FRAMESIZES, &size) != 0) break;
+      sizes += sizes.empty() ? "" : ", ";
+      if (size.type == V4L2_FRMSIZE_TYPE_DISCRETE) {
+        sizes += size_text(size.discrete.width, size.discrete.height);
+        continue;
+      }
+      sizes += size_text(size.stepwise.min_width, size.stepwise.min_height) + " to " +
+               size_text(size.stepwise.max_width, size.stepwise.max_height) + " in steps of " +
+               size_text(size.stepwise.step_width, size.stepwise.step_height);
+      break;
+    }
+    const std::string asked =
+        fourcc_name(wanted) +
+        (settings_.width && settings_.height
+             ? " " + std::to_string(*settings_.width) + "x" + std::to_string(*settings_.height)
+             : "");
+    refuse("made " + fourcc_name(made.pixelformat) + " " + size_text(made.width, made.height) +
+           " of " + asked + "; possible are: " + (sizes.empty() ? "not told" : sizes));
+  }
+
+  // The nearest the node has; what it made of it is told in format().
+  void agree_on_rate() {
+    v4l2_streamparm parameters{};
+    parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    v4l2_fract& period = parameters.parm.capture.timeperframe;
+    if (settings_.rate_hz) {
+      if (!(*settings_.rate_hz > 0 && *settings_.rate_hz <= 100'000))
+        refuse("a rate of " + std::to_string(*settings_.rate_hz) + " Hz is not possible");
+      period = {1000, static_cast<std::uint32_t>(std::lround(1000 * *settings_.rate_hz))};
+      check(node_.control(VIDIOC_S_PARM, &parameters), "its rate cannot be set");
+    } else if (node_.control(VIDIOC_G_PARM, &parameters) != 0) {
+      return;
+    }
+    if (period.numerator > 0)
+      agreed_.format.rate_hz = double(period.denominator) / period.numerator;
+  }
+
+  void agree_on_exposure() {
+    agreed_.drives_exposure = query(node_, V4L2_CID_EXPOSURE_ABSOLUTE).has_value();
+    if (!agreed_.drives_exposure) {
+      if (settings_.exposure_s) refuse("its exposure cannot be set; leave exposure out");
+      return;
+    }
+    if (settings_.exposure_s) {
+      write(node_, V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL);
+      write(node_, V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0);  // the rate stays, whatever the exposure
+      const std::optional<double> applied = set_exposure(node_, *settings_.exposure_s);
+      if (!applied)
+        refuse("does not take an exposure of " + std::to_string(*settings_.exposure_s) + " s");
+      agreed_.exposure.exposure_s = *applied;
+    } else if (read(node_, V4L2_CID_EXPOSURE_AUTO).value_or(V4L2_EXPOSURE_MANUAL) ==
+               V4L2_EXPOSURE_MANUAL) {
+      const std::optional<std::int32_t> steps = read(node_, V4L2_CID_EXPOSURE_ABSOLUTE);
+      if (steps && *steps > 0) agreed_.exposure.exposure_s = *steps * exposure_step_s;
+    }
+  }
+
+  // A control that has an automatic, which is switched off.
+  void agree_on_control(std::uint32_t automatic, std::uint32_t id, const char* key,
+                        const std::optional<double>& value) const {
+    if (!value) return;
+    const std::string name(key);
+    write(node_, automatic, 0);
+    const std::optional<v4l2_queryctrl> bounds = query(node_, id);
+    if (!bounds) refuse("has no such control; leave " + name + " out");
+    if (*value < bounds->minimum || *value > bounds->maximum)
+      refuse(name + " " + std::to_string(*value) + " is not possible; " +
+             std::to_string(bounds->minimum) + " to " + std::to_string(bounds->maximum) + " is");
+    if (!write(node_, id, static_cast<std::int32_t>(std::lround(*value))))
+      refuse("does not take " + name);
+  }
+
+  Node& node_;
+  const CameraSettings& settings_;
+  Agreed agreed_;
+};
+
+}  // namespace
+
+Agreed configure(Node& node, const CameraSettings& settings) {
+  return Configuration(node, settings).agree();
+}
+
+std::optional<double> set_exposure(Node& node, double exposure_s) {
+  const std::optional<v4l2_queryctrl> bounds = query(node, V4L2_CID_EXPOSURE_ABSOLUTE);
+  if (!bounds || !(exposure_s > 0) || bounds->maximum < 1) return std::nullopt;
+  const double steps = std::clamp(std::round(exposure_s / exposure_step_s),
+                                  static_cast<double>(std::max(1, bounds->minimum)),
+                                  static_cast<double>(std::max(1, bounds->maximum)));
+  if (!write(node, V4L2_CID_EXPOSURE_ABSOLUTE, static_cast<std::int32_t>(steps)))
+    return std::nullopt;
+  const std::optional<std::int32_t> made = read(node, V4L2_CID_EXPOSURE_ABSOLUTE);
+  return made && *made > 0 ? std::optional(*made * exposure_step_s) : std::nullopt;
+}
+
+}  // namespace previz::v4l2

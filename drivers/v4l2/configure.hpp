@@ -1,0 +1,33 @@
+// Agreeing with a video node on format, size, rate and controls. Not for use outside the driver.
+#pragma once
+
+#include <linux/videodev2.h>
+
+#include <optional>
+#include <string>
+
+#include "drivers/camera_drivers.hpp"
+#include "drivers/convert/convert.hpp"
+#include "drivers/exposure_ledger.hpp"
+#include "drivers/v4l2/node.hpp"
+
+namespace previz::v4l2 {
+
+// What the node and we have settled on.
+struct Agreed {
+  CameraFormat format;
+  convert::WireFormat wire;
+  std::size_t stride = 0;  // bytes of a row; 0 for mjpeg
+  Exposure exposure;       // 0 s where the node does not tell it
+  bool drives_exposure = false;
+};
+
+// Writes the settings to the node and reads back what it made of them. Throws previz::Error that
+// names the device, the setting, and what the node can.
+Agreed configure(Node& node, const CameraSettings& settings);
+
+// Writes the shutter time, in the control's steps of 100 us and within its bounds; what the node
+// made of it. None where it refuses.
+std::optional<double> set_exposure(Node& node, double exposure_s);
+
+}  // namespace previz::v4l2

@@ -1,0 +1,101 @@
+#include "drivers/v4l2/find.hpp"
+
+#include <libudev.h>
+
+#include <memory>
+#include <sstream>
+
+#include "drivers/error.hpp"
+
+namespace previz::v4l2 {
+namespace {
+
+struct Unref {
+  void operator()(udev* context) const { udev_unref(context); }
+  void operator()(udev_enumerate* enumeration) const { udev_enumerate_unref(enumeration); }
+  void operator()(udev_device* device) const { udev_device_unref(device); }
+};
+template <typename Type>
+using Owned = std::unique_ptr<Type, Unref>;
+
+const std::string by_id_directory = "/dev/v4l/by-id/", by_path_directory = "/dev/v4l/by-path/";
+
+std::string property(udev_device& device, const char* key) {
+  const char* value = udev_device_get_property_value(&device, key);
+  return value ? value : "";
+}
+
+// What follows `directory` in one of the links; empty where none is there.
+std::string link_below(const std::string& directory, const std::string& links) {
+  std::istringstream words(links);
+  for (std::string link; words >> link;)
+    if (link.starts_with(directory)) return link.substr(directory.size());
+  return {};
+}
+
+FoundNode describe(udev_device& device) {
+  const std::string links = property(device, "DEVLINKS");
+  FoundNode node;
+  const char* file = udev_device_get_devnode(&device);
+  node.node = file ? file : "";
+  node.by_id = link_below(by_id_directory, links);
+  node.by_path = link_below(by_path_directory, links);
+  node.serial = property(device, "ID_SERIAL_SHORT");
+  node.product = property(device, "ID_V4L_PRODUCT");
+  return node;
+}
+
+std::string without(const std::string& directory, const std::string& name) {
+  return name.starts_with(directory) ? name.substr(directory.size()) : name;
+}
+
+}  // namespace
+
+std::vector<FoundNode> find_nodes() {
+  std::vector<FoundNode> found;
+  const Owned<udev> context(udev_new());
+  if (!context) return found;
+  const Owned<udev_enumerate> enumeration(udev_enumerate_new(context.get()));
+  udev_enumerate_add_match_subsystem(enumeration.get(), "video4linux");
+  udev_enumerate_scan_devices(enumeration.get());
+  udev_list_entry* entry = nullptr;
+  udev_list_entry_foreach(entry, udev_enumerate_get_list_entry(enumeration.get())) {
+    const Owned<udev_device> device(
+        udev_device_new_from_syspath(context.get(), udev_list_entry_get_name(entry)));
+    if (!device) continue;
+    // A UVC camera has a second node, for metadata.
+    if (property(*device, "ID_V4L_CAPABILITIES").find(":capture:") == std::string::npos) continue;
+    found.push_back(describe(*device));
+  }
+  return found;
+}
+
+std::string stable_name(const FoundNode& node) {
+  return node.by_id.empty() ? node.by_path : node.by_id;
+}
+
+std::string resolve(const std::string& device, const std::vector<FoundNode>& found) {
+  if (device.empty()) throw Error("a v4l2 camera needs its by-id or by-path name, or its serial");
+  std::string there;
+  const FoundNode* meant = nullptr;
+  for (const FoundNode& node : found) {
+    if (device == node.node)
+      throw Error(device + ": the number of a video node changes; this one is called \"" +
+                  stable_name(node) + "\"");
+    if (without(by_id_directory, device) == node.by_id ||
+        without(by_path_directory, device) == node.by_path || device == node.serial) {
+      if (meant && device == node.serial)
+        throw Error(device + ": two cameras have this serial number; \"" + stable_name(*meant) +
+                    "\" and \"" + stable_name(node) + "\" tell them apart");
+      meant = &node;
+    }
+    there += there.empty() ? "" : ", ";
+    there += stable_name(node);
+  }
+  if (meant) return meant->node;
+  if (device.starts_with("/dev/video"))
+    throw Error(device + ": the number of a video node changes; a by-id or by-path name is needed");
+  throw Error(device + ": is not there; there are: " + (there.empty() ? "no cameras" : there));
+}
+
+}  // namespace previz::v4l2

@@ -1,0 +1,230 @@
+// A kernel's video node as the driver sees it, told what to be and what to send.
+#pragma once
+
+#include <linux/videodev2.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <deque>
+#include <map>
+#include <vector>
+
+#include "drivers/v4l2/node.hpp"
+
+namespace previz::v4l2 {
+
+// Outlives the node that stands on it, so that a test can look at it afterwards.
+struct FakeDevice {
+  // What it can.
+  std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
+  std::vector<std::uint32_t> formats{V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_YUYV};
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> sizes{{32, 24}, {16, 12}};
+  std::uint32_t extra_stride = 0;
+  std::uint32_t field = V4L2_FIELD_NONE;
+  std::map<std::uint32_t, v4l2_queryctrl> controls;
+
+  // What it is set to.
+  v4l2_pix_format picture{};
+  v4l2_fract period{1, 30};
+  std::map<std::uint32_t, std::int32_t> values;
+
+  // Its buffers, and what it has sent.
+  std::vector<std::vector<std::uint8_t>> memory;
+  int mapped = 0;
+  bool streaming = false;
+  std::vector<bool> queued;
+  std::deque<v4l2_buffer> done;
+  std::uint32_t sequence = 0;
+  std::deque<int> dequeue_errors;  // given first
+  bool unplugged = false;
+
+  FakeDevice() {
+    picture.pixelformat = V4L2_PIX_FMT_YUYV;
+    picture.width = 32;
+    picture.height = 24;
+  }
+
+  void add_control(std::uint32_t id, std::int32_t minimum, std::int32_t maximum,
+                   std::int32_t value) {
+    v4l2_queryctrl control{};
+    control.id = id;
+    control.minimum = minimum;
+    control.maximum = maximum;
+    controls[id] = control;
+    values[id] = value;
+  }
+
+  // Fills the next queued buffer as a camera would; changed as `damage` says before it is sent.
+  template <typename Damage>
+  void send(std::int64_t timestamp_ns, std::uint8_t value, Damage damage) {
+    const auto free = std::ranges::find(queued, true);
+    v4l2_buffer buffer{};
+    buffer.sequence = sequence++;
+    if (free == queued.end()) return;  // dropped: nowhere to put it
+    *free = false;
+    buffer.index = static_cast<std::uint32_t>(free - queued.begin());
+    std::ranges::fill(memory[buffer.index], value);
+    buffer.bytesused = picture.sizeimage;
+    buffer.flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
+    buffer.timestamp = {static_cast<time_t>(timestamp_ns / 1'000'000'000),
+                        static_cast<suseconds_t>(timestamp_ns / 1000 % 1'000'000)};
+    damage(buffer);
+    done.push_back(buffer);
+  }
+  void send(std::int64_t timestamp_ns, std::uint8_t value) {
+    send(timestamp_ns, value, [](v4l2_buffer&) {});
+  }
+};
+
+class FakeNode final : public Node {
+ public:
+  explicit FakeNode(FakeDevice& device) : device_(device) {}
+
+  bool wait(std::chrono::milliseconds) override {
+    return device_.unplugged || !device_.done.empty() || !device_.dequeue_errors.empty();
+  }
+
+  std::span<const std::uint8_t> map(std::size_t offset, std::size_t) override {
+    ++device_.mapped;
+    return device_.memory.at(offset);
+  }
+  void unmap(std::span<const std::uint8_t>) override { --device_.mapped; }
+
+  int control(unsigned long request, void* argument) override {
+    if (device_.unplugged) return ENODEV;
+    switch (request) {
+      case VIDIOC_QUERYCAP:
+        static_cast<v4l2_capability*>(argument)->capabilities = device_.capabilities;
+        return 0;
+      case VIDIOC_ENUM_FMT:
+        return entry(*static_cast<v4l2_fmtdesc*>(argument));
+      case VIDIOC_ENUM_FRAMESIZES:
+        return entry(*static_cast<v4l2_frmsizeenum*>(argument));
+      case VIDIOC_G_FMT:
+        static_cast<v4l2_format*>(argument)->fmt.pix = device_.picture;
+        return 0;
+      case VIDIOC_S_FMT:
+        return set(static_cast<v4l2_format*>(argument)->fmt.pix);
+      case VIDIOC_S_PARM:
+        return set(static_cast<v4l2_streamparm*>(argument)->parm.capture.timeperframe);
+      case VIDIOC_G_PARM:
+        static_cast<v4l2_streamparm*>(argument)->parm.capture.timeperframe = device_.period;
+        return 0;
+      case VIDIOC_QUERYCTRL:
+        return query(*static_cast<v4l2_queryctrl*>(argument));
+      case VIDIOC_S_CTRL:
+        return write(*static_cast<v4l2_control*>(argument));
+      case VIDIOC_G_CTRL:
+        return read(*static_cast<v4l2_control*>(argument));
+      default:
+        return stream(request, argument);
+    }
+  }
+
+ private:
+  int entry(v4l2_fmtdesc& description) const {
+    if (description.index >= device_.formats.size()) return EINVAL;
+    description.pixelformat = device_.formats[description.index];
+    return 0;
+  }
+  int entry(v4l2_frmsizeenum& size) const {
+    if (size.index >= device_.sizes.size()) return EINVAL;
+    size.type = V4L2_FRMSIZE_TYPE_DISCRETE;
+    size.discrete = {device_.sizes[size.index].first, device_.sizes[size.index].second};
+    return 0;
+  }
+
+  // As drivers do: what is not possible becomes something that is.
+  int set(v4l2_pix_format& wanted) {
+    if (std::ranges::find(device_.formats, wanted.pixelformat) == device_.formats.end())
+      wanted.pixelformat = device_.formats.front();
+    if (std::ranges::find(device_.sizes, std::pair{wanted.width, wanted.height}) ==
+        device_.sizes.end())
+      std::tie(wanted.width, wanted.height) = device_.sizes.front();
+    wanted.bytesperline = 2 * wanted.width + device_.extra_stride;
+    wanted.sizeimage = wanted.bytesperline * wanted.height;
+    wanted.field = device_.field;
+    device_.picture = wanted;
+    return 0;
+  }
+  int set(v4l2_fract& wanted) {
+    if (wanted.denominator > 60 * wanted.numerator) wanted = {1, 60};
+    device_.period = wanted;
+    return 0;
+  }
+
+  int query(v4l2_queryctrl& control) const {
+    const auto found = device_.controls.find(control.id);
+    if (found == device_.controls.end()) return EINVAL;
+    control = found->second;
+    return 0;
+  }
+  int write(const v4l2_control& control) {
+    const auto found = device_.controls.find(control.id);
+    if (found == device_.controls.end()) return EINVAL;
+    if (control.value < found->second.minimum || control.value > found->second.maximum)
+      return ERANGE;
+    device_.values[control.id] = control.value;
+    return 0;
+  }
+  int read(v4l2_control& control) const {
+    const auto found = device_.values.find(control.id);
+    if (found == device_.values.end()) return EINVAL;
+    control.value = found->second;
+    return 0;
+  }
+
+  int stream(unsigned long request, void* argument) {
+    switch (request) {
+      case VIDIOC_REQBUFS: {
+        const std::uint32_t count = static_cast<v4l2_requestbuffers*>(argument)->count;
+        if (device_.mapped != 0) return EBUSY;
+        device_.memory.assign(count, std::vector<std::uint8_t>(device_.picture.sizeimage));
+        device_.queued.assign(count, false);
+        return 0;
+      }
+      case VIDIOC_QUERYBUF: {
+        auto& buffer = *static_cast<v4l2_buffer*>(argument);
+        buffer.m.offset = buffer.index;
+        buffer.length = device_.picture.sizeimage;
+        return 0;
+      }
+      case VIDIOC_QBUF: {
+        const std::uint32_t index = static_cast<v4l2_buffer*>(argument)->index;
+        if (index >= device_.queued.size() || device_.queued[index]) return EINVAL;
+        device_.queued[index] = true;
+        return 0;
+      }
+      case VIDIOC_STREAMON:
+        device_.streaming = true;
+        device_.sequence = 0;
+        return 0;
+      case VIDIOC_STREAMOFF:
+        device_.streaming = false;
+        device_.done.clear();
+        device_.queued.assign(device_.queued.size(), false);
+        return 0;
+      case VIDIOC_DQBUF:
+        return dequeue(*static_cast<v4l2_buffer*>(argument));
+      default:
+        return ENOTTY;
+    }
+  }
+
+  int dequeue(v4l2_buffer& buffer) {
+    if (!device_.dequeue_errors.empty()) {
+      const int error = device_.dequeue_errors.front();
+      device_.dequeue_errors.pop_front();
+      return error;
+    }
+    if (device_.done.empty()) return EAGAIN;
+    buffer = device_.done.front();
+    device_.done.pop_front();
+    return 0;
+  }
+
+  FakeDevice& device_;
+};
+
+}  // namespace previz::v4l2

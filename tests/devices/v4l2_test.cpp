@@ -1,0 +1,361 @@
+// The V4L2 driver on a stand-in for the kernel: what is agreed, and what malformed buffers do. On
+// real nodes it runs in the compliance suite.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <ctime>
+#include <functional>
+
+#include "drivers/error.hpp"
+#include "drivers/v4l2/find.hpp"
+#include "drivers/v4l2/formats.hpp"
+#include "drivers/v4l2/v4l2_camera.hpp"
+#include "tests/devices/v4l2_fake_node.hpp"
+
+namespace previz::v4l2 {
+namespace {
+
+using std::chrono::milliseconds;
+using testing::HasSubstr;
+
+CameraSettings settings() {
+  CameraSettings settings;
+  settings.device = "usb-cam";
+  return settings;
+}
+
+std::unique_ptr<Camera> open(FakeDevice& device, const CameraSettings& wanted = settings()) {
+  return open_v4l2(std::make_unique<FakeNode>(device), wanted);
+}
+
+std::string error_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+std::string refusal(FakeDevice& device, const CameraSettings& wanted) {
+  return error_of([&] { open(device, wanted); });
+}
+
+std::int64_t now_ns() {
+  timespec time{};
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+}
+
+// ---- names
+
+const std::vector<FoundNode> found{
+    {"/dev/video0", "usb-Acme_Cam_S1-video-index0", "pci-0-usb-0:1:1.0-video-index0", "S1", "Acme"},
+    {"/dev/video2", "", "platform-vivid.0-video-index0", "", "vivid"},
+    {"/dev/video4", "usb-Acme_Cam_S2-video-index0", "pci-0-usb-0:2:1.0-video-index0", "S2", "Acme"},
+    {"/dev/video6", "usb-Other_S2-video-index0", "pci-0-usb-0:3:1.0-video-index0", "S2", "Other"},
+};
+
+TEST(V4l2Find, ByEveryStableName) {
+  for (const char* name : {"S1", "usb-Acme_Cam_S1-video-index0", "pci-0-usb-0:1:1.0-video-index0",
+                           "/dev/v4l/by-id/usb-Acme_Cam_S1-video-index0",
+                           "/dev/v4l/by-path/pci-0-usb-0:1:1.0-video-index0"})
+    EXPECT_EQ(resolve(name, found), "/dev/video0");
+  EXPECT_EQ(resolve("platform-vivid.0-video-index0", found), "/dev/video2");
+  EXPECT_EQ(stable_name(found[0]), "usb-Acme_Cam_S1-video-index0");
+  EXPECT_EQ(stable_name(found[1]), "platform-vivid.0-video-index0");
+}
+
+TEST(V4l2Find, NeverByNumber) {
+  EXPECT_THAT(error_of([] { resolve("/dev/video2", found); }),
+              HasSubstr("this one is called \"platform-vivid.0-video-index0\""));
+  EXPECT_THAT(error_of([] { resolve("/dev/video9", found); }), HasSubstr("number"));
+}
+
+TEST(V4l2Find, WhatIsNotThereOrNotOneIsAnError) {
+  EXPECT_THAT(error_of([] { resolve("missing", found); }),
+              HasSubstr("missing: is not there; there are: usb-Acme_Cam_S1-video-index0"));
+  EXPECT_THAT(error_of([] { resolve("missing", {}); }), HasSubstr("no cameras"));
+  EXPECT_THAT(error_of([] { resolve("", found); }), HasSubstr("by-id"));
+  EXPECT_THAT(error_of([] { resolve("S2", found); }), HasSubstr("two cameras"));
+}
+
+// ---- formats
+
+TEST(V4l2Formats, NamesComeBack) {
+  EXPECT_EQ(fourcc_name(V4L2_PIX_FMT_YUYV), "YUYV");
+  EXPECT_EQ(fourcc_name(V4L2_PIX_FMT_Y16), "Y16");
+  EXPECT_EQ(fourcc_name(V4L2_PIX_FMT_Y16_BE), "Y16-BE");
+  EXPECT_EQ(fourcc_of("Y16"), V4L2_PIX_FMT_Y16);
+  EXPECT_EQ(fourcc_of("Y16-BE"), std::nullopt);
+}
+
+// The kernel's documentation, "Colorspaces": SRGB and JPEG default to BT.601, webcams send them.
+TEST(V4l2Formats, ColourCodingsAreTheDriversOrV4l2sDefaults) {
+  v4l2_pix_format format{};
+  format.pixelformat = V4L2_PIX_FMT_YUYV;
+  format.colorspace = V4L2_COLORSPACE_SRGB;
+  EXPECT_EQ(wire_format(format)->matrix, convert::YuvMatrix::bt601);
+  EXPECT_EQ(wire_format(format)->range, convert::YuvRange::limited);
+  format.colorspace = V4L2_COLORSPACE_JPEG;
+  EXPECT_EQ(wire_format(format)->range, convert::YuvRange::full);
+  format.colorspace = V4L2_COLORSPACE_REC709;
+  EXPECT_EQ(wire_format(format)->matrix, convert::YuvMatrix::bt709);
+  EXPECT_EQ(wire_format(format)->range, convert::YuvRange::limited);
+  format.ycbcr_enc = V4L2_YCBCR_ENC_601;
+  format.quantization = V4L2_QUANTIZATION_FULL_RANGE;
+  EXPECT_EQ(wire_format(format)->matrix, convert::YuvMatrix::bt601);
+  EXPECT_EQ(wire_format(format)->range, convert::YuvRange::full);
+}
+
+// ---- what is agreed
+
+TEST(V4l2Configure, LeavesWhatIsNotAskedForAsItIs) {
+  FakeDevice device;
+  const CameraFormat format = open(device)->format();
+  EXPECT_EQ(format, (CameraFormat{PixelFormat::rgb8, 32, 24, 30}));
+  EXPECT_EQ(device.picture.pixelformat, V4L2_PIX_FMT_YUYV);
+}
+
+TEST(V4l2Configure, TakesTheFirstFormatThatCanBeConverted) {
+  FakeDevice device;
+  device.formats = {V4L2_PIX_FMT_H264, V4L2_PIX_FMT_UYVY};
+  device.picture.pixelformat = V4L2_PIX_FMT_H264;
+  open(device);
+  EXPECT_EQ(device.picture.pixelformat, V4L2_PIX_FMT_UYVY);
+  device.formats = {V4L2_PIX_FMT_H264};
+  device.picture.pixelformat = V4L2_PIX_FMT_H264;
+  EXPECT_EQ(refusal(device, settings()),
+            "usb-cam: has no format that can be converted; it has: H264");
+}
+
+TEST(V4l2Configure, SetsFormatSizeRateAndControls) {
+  FakeDevice device;
+  device.add_control(V4L2_CID_EXPOSURE_AUTO, 0, 3, 3);
+  device.add_control(V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0, 1, 1);
+  device.add_control(V4L2_CID_EXPOSURE_ABSOLUTE, 3, 2047, 250);
+  device.add_control(V4L2_CID_GAIN, 0, 255, 64);
+  device.add_control(V4L2_CID_AUTO_WHITE_BALANCE, 0, 1, 1);
+  device.add_control(V4L2_CID_WHITE_BALANCE_TEMPERATURE, 2800, 6500, 4000);
+  CameraSettings wanted = settings();
+  wanted.format = "MJPG";
+  wanted.width = 16;
+  wanted.height = 12;
+  wanted.rate_hz = 15;
+  wanted.exposure_s = 0.01;
+  wanted.raw_gain = 20;
+  wanted.white_balance_k = 5600;
+  const auto camera = open(device, wanted);
+  EXPECT_EQ(camera->format(), (CameraFormat{PixelFormat::rgb8, 16, 12, 15}));
+  EXPECT_EQ(device.picture.pixelformat, V4L2_PIX_FMT_MJPEG);
+  EXPECT_EQ(device.values[V4L2_CID_EXPOSURE_AUTO], V4L2_EXPOSURE_MANUAL);
+  EXPECT_EQ(device.values[V4L2_CID_EXPOSURE_AUTO_PRIORITY], 0);
+  EXPECT_EQ(device.values[V4L2_CID_EXPOSURE_ABSOLUTE], 100);
+  EXPECT_EQ(device.values[V4L2_CID_GAIN], 20);
+  EXPECT_EQ(device.values[V4L2_CID_AUTO_WHITE_BALANCE], 0);
+  EXPECT_EQ(device.values[V4L2_CID_WHITE_BALANCE_TEMPERATURE], 5600);
+}
+
+TEST(V4l2Configure, TheRateIsWhatTheDeviceMadeOfIt) {
+  FakeDevice device;
+  CameraSettings wanted = settings();
+  wanted.rate_hz = 1000;
+  EXPECT_EQ(open(device, wanted)->format().rate_hz, 60);
+}
+
+TEST(V4l2Configure, WhatCannotBeSaysWhatCan) {
+  FakeDevice device;
+  CameraSettings wanted = settings();
+  wanted.width = 640;
+  wanted.height = 480;
+  EXPECT_EQ(refusal(device, wanted),
+            "usb-cam: made YUYV 32x24 of YUYV 640x480; possible are: 32x24, 16x12");
+  wanted = settings();
+  wanted.format = "NV12";
+  EXPECT_EQ(refusal(device, wanted), "usb-cam: has no format NV12; it has: MJPG, YUYV");
+  wanted.format = "nonsense";
+  EXPECT_THAT(refusal(device, wanted), HasSubstr("known are: GREY"));
+  wanted = settings();
+  wanted.exposure_s = 0.1;
+  EXPECT_THAT(refusal(device, wanted), HasSubstr("exposure cannot be set"));
+  wanted = settings();
+  wanted.white_balance_k = 5600;
+  EXPECT_THAT(refusal(device, wanted), HasSubstr("leave white_balance_k out"));
+  device.add_control(V4L2_CID_WHITE_BALANCE_TEMPERATURE, 2800, 6500, 4000);
+  wanted.white_balance_k = 9000;
+  EXPECT_THAT(refusal(device, wanted), HasSubstr("2800 to 6500 is"));
+  wanted = settings();
+  wanted.gain = 2;
+  EXPECT_THAT(refusal(device, wanted), HasSubstr("raw_gain"));
+  wanted = settings();
+  wanted.trigger = "Line1";
+  EXPECT_THAT(refusal(device, wanted), HasSubstr("trigger"));
+}
+
+TEST(V4l2Configure, WhatIsNoCameraIsRefused) {
+  FakeDevice device;
+  device.capabilities = V4L2_CAP_VIDEO_CAPTURE_MPLANE | V4L2_CAP_STREAMING;
+  EXPECT_THAT(refusal(device, settings()), HasSubstr("libcamera"));
+  device.capabilities = V4L2_CAP_VIDEO_OUTPUT;
+  EXPECT_THAT(refusal(device, settings()), HasSubstr("captures no video"));
+  device.capabilities = V4L2_CAP_VIDEO_CAPTURE;
+  EXPECT_THAT(refusal(device, settings()), HasSubstr("cannot stream"));
+  device.capabilities |= V4L2_CAP_STREAMING;
+  device.field = V4L2_FIELD_INTERLACED;
+  EXPECT_THAT(refusal(device, settings()), HasSubstr("interlaced"));
+  device.unplugged = true;
+  EXPECT_THAT(refusal(device, settings()), HasSubstr("is no video device"));
+}
+
+// ---- streaming
+
+class V4l2Stream : public testing::Test {
+ protected:
+  void start(const CameraSettings& wanted = settings()) {
+    camera_ = open(device_, wanted);
+    camera_->start();
+    ASSERT_TRUE(device_.streaming);
+  }
+
+  FramePtr next() {
+    CameraEvent event = camera_->next(milliseconds(0));
+    auto* frame = std::get_if<FramePtr>(&event);
+    return frame ? std::move(*frame) : nullptr;
+  }
+
+  std::uint64_t counted(const char* what) const {
+    const DeviceCounters counters = camera_->counters();
+    return counters.contains(what) ? counters.at(what) : 0;
+  }
+
+  bool all_buffers_are_queued() const {
+    return std::ranges::all_of(device_.queued, [](bool queued) { return queued; });
+  }
+
+  FakeDevice device_;
+  std::unique_ptr<Camera> camera_;
+};
+
+TEST_F(V4l2Stream, FramesComeWithTheKernelsTimes) {
+  device_.extra_stride = 6;
+  start();
+  const std::int64_t time_ns = now_ns() / 1000 * 1000;
+  device_.send(time_ns, 128);
+  device_.send(time_ns + 1000, 129);
+  const FramePtr first = next(), second = next();
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(first->timestamp_ns, time_ns);
+  EXPECT_GE(first->arrival_ns, first->timestamp_ns);
+  EXPECT_EQ(second->sequence, first->sequence + 1);
+  EXPECT_EQ(first->bytes.size(), 32u * 24 * 3);
+  EXPECT_EQ(first->bytes[0], 130);  // (128 - 16) 255/219 = 130.4
+  EXPECT_TRUE(all_buffers_are_queued());
+  EXPECT_FALSE(next());
+}
+
+TEST_F(V4l2Stream, MalformedBuffersAreCountedAndLeftOut) {
+  start();
+  const std::int64_t time_ns = now_ns() - 1'000'000;
+  device_.send(time_ns, 1, [](v4l2_buffer& buffer) { buffer.bytesused = 100; });
+  device_.send(time_ns, 1, [](v4l2_buffer& buffer) { buffer.bytesused = 0; });
+  device_.send(time_ns, 1, [](v4l2_buffer& buffer) { buffer.bytesused = 1u << 31; });
+  device_.send(time_ns, 1, [](v4l2_buffer& buffer) { buffer.flags |= V4L2_BUF_FLAG_ERROR; });
+  device_.send(time_ns, 7);
+  const FramePtr whole = next();
+  ASSERT_TRUE(whole);
+  EXPECT_EQ(whole->sequence, 5u);  // four are missing before it
+  EXPECT_EQ(counted("frames cut short"), 2u);
+  EXPECT_EQ(counted("frames longer than their buffer"), 1u);
+  EXPECT_EQ(counted("frames the device says are damaged"), 1u);
+  EXPECT_TRUE(all_buffers_are_queued());
+  device_.send(time_ns, 1, [](v4l2_buffer& buffer) { buffer.index = 99; });
+  EXPECT_FALSE(next());
+  EXPECT_EQ(counted("buffers that are none of ours"), 1u);
+}
+
+TEST_F(V4l2Stream, ABrokenClockOrCounterDoesNoHarm) {
+  start();
+  const std::int64_t time_ns = now_ns() - 10'000'000;
+  device_.send(time_ns, 1);
+  device_.send(time_ns, 1, [](v4l2_buffer& buffer) { buffer.sequence = 0; });
+  device_.send(time_ns - 5'000'000, 1);
+  device_.send(time_ns, 1, [](v4l2_buffer& buffer) { buffer.flags = 0; });
+  FramePtr before = next();
+  for (int i = 0; i < 3; ++i) {
+    FramePtr frame = next();
+    ASSERT_TRUE(frame);
+    EXPECT_GT(frame->timestamp_ns, before->timestamp_ns);
+    EXPECT_GT(frame->sequence, before->sequence);
+    before = std::move(frame);
+  }
+  EXPECT_EQ(counted("frames without a time stamp of the kernel"), 1u);
+}
+
+TEST_F(V4l2Stream, NoFrameFromBeforeAStop) {
+  start();
+  device_.send(now_ns(), 1);
+  const std::uint64_t first = next()->sequence;
+  device_.send(now_ns(), 2);
+  camera_->stop();
+  EXPECT_FALSE(device_.streaming);
+  EXPECT_EQ(device_.mapped, 0);
+  EXPECT_TRUE(device_.memory.empty());
+  camera_->start();
+  EXPECT_FALSE(next());
+  device_.send(now_ns(), 3);
+  EXPECT_EQ(next()->sequence, first + 1);
+  camera_.reset();
+  EXPECT_EQ(device_.mapped, 0);
+}
+
+TEST_F(V4l2Stream, AnUnpluggedDeviceIsLostAndLetGo) {
+  start();
+  device_.unplugged = true;
+  for (int i = 0; i < 2; ++i) {
+    const CameraEvent event = camera_->next(milliseconds(0));
+    const auto* trouble = std::get_if<DeviceTrouble>(&event);
+    ASSERT_TRUE(trouble);
+    EXPECT_TRUE(trouble->lost);
+    EXPECT_EQ(trouble->what, "was unplugged");
+  }
+  camera_.reset();
+  EXPECT_EQ(device_.mapped, 0);
+}
+
+TEST_F(V4l2Stream, ErrorsInARowAreALoss) {
+  start();
+  device_.dequeue_errors.assign(9, EIO);
+  device_.send(now_ns(), 1);
+  EXPECT_TRUE(std::holds_alternative<FramePtr>(camera_->next(milliseconds(1000))));
+  EXPECT_EQ(counted("read errors"), 9u);
+  device_.dequeue_errors.assign(10, EIO);
+  const CameraEvent event = camera_->next(milliseconds(1000));
+  ASSERT_TRUE(std::holds_alternative<DeviceTrouble>(event));
+  EXPECT_EQ(std::get<DeviceTrouble>(event).what, "cannot be read: Input/output error");
+}
+
+TEST_F(V4l2Stream, ExposuresAreOnTheFramesThatSurelyHaveThem) {
+  device_.add_control(V4L2_CID_EXPOSURE_ABSOLUTE, 1, 5000, 100);
+  device_.add_control(V4L2_CID_EXPOSURE_AUTO, 0, 3, 1);
+  CameraSettings wanted = settings();
+  wanted.responsivity = 10;
+  start(wanted);
+  device_.send(now_ns(), 1);
+  const FramePtr before = next();
+  EXPECT_DOUBLE_EQ(before->exposure_s, 0.01);
+  EXPECT_DOUBLE_EQ(before->exposure, 0.1);
+  EXPECT_TRUE(camera_->set_exposure(0.02, 1));
+  EXPECT_EQ(device_.values[V4L2_CID_EXPOSURE_ABSOLUTE], 200);
+  for (int i = 0; i < 4; ++i) {
+    device_.send(now_ns() + 1000, 1);
+    EXPECT_FALSE(next());
+  }
+  EXPECT_EQ(counted("frames between two exposures"), 4u);
+  device_.send(now_ns() + 1000, 1);
+  EXPECT_DOUBLE_EQ(next()->exposure_s, 0.02);
+  EXPECT_FALSE(camera_->set_exposure(0.02, 2));  // the gain has no unit
+  EXPECT_FALSE(camera_->set_exposure(-1, 1));
+}
+
+}  // namespace
+}  // namespace previz::v4l2
