@@ -30,7 +30,9 @@ pipeline::Shot sample_shot(std::uint64_t index) {
   shot.track.pose->world_from_camera[3] = {0.1, -0.2, 0.3, 1.0};
   shot.track.pose->covariance[7] = 1e-6;
   shot.track.pose->tags = {0, 3};
-  shot.light = std::make_shared<pipeline::Light>(pipeline::Light{{}, {}, {4, 5}});
+  pipeline::Light light;
+  light.sequences = {4, 5};
+  shot.light = std::make_shared<const pipeline::Light>(std::move(light));
   shot.picture = {width, height, 8, std::vector<std::uint16_t>(3 * width * height, 99)};
   render::Layers& layers = shot.layers;
   layers.width = width;
