@@ -1,10 +1,20 @@
-// The comparison sheet for people to look at.
+// Pictures side by side for people to look at.
 #pragma once
+
+#include <string>
+#include <vector>
 
 #include "drivers/frame.hpp"
 #include "tests/truth/compare.hpp"
 
 namespace previz::truth {
+
+struct Panel {
+  std::string caption;
+  Plate picture;  // 8 bit
+};
+// Rows of panels of one size.
+Plate sheet(const std::vector<std::vector<Panel>>& rows);
 
 // Plate, composite, the ideal composite and five times the difference of the two last (mid-gray:
 // none), side by side with their names, as the display shows them.
