@@ -194,12 +194,12 @@ Keys room_keys(Draft& d) {
   };
 }
 
-Keys light_sources_keys(LightSources& s) {
+Keys light_sources_keys(LightSources& l) {
   return {
-      {"contrast", &s.contrast, plain.within(2, 1e6), "How many times brighter than the mean of all that is no lamp a lamp is, at least."},
-      {"least_share", &s.least_share, plain.within(0, 1), "Share of all light that a lamp brings, at least; fainter ones, such as reflections of lamps, stay in the picture."},
-      {"residual", &s.residual, plain, "With mode = \"sources\": the light of everything but the lamps, without its shapes, or none of it (how much that is, is told)."},
-      {"distance_m", &s.distance_m, m.above(0, far_m), "How far from the light camera the lamps are; left out: they are at infinity.", optional("2.5")},
+      {"contrast", &l.contrast, plain.within(2, 1e6), "How many times brighter than the mean of all that is no lamp a lamp is, at least."},
+      {"least_share", &l.least_share, plain.within(0, 1), "Share of all light that a lamp brings, at least; fainter ones, such as reflections of lamps, stay in the picture."},
+      {"residual", &l.residual, plain, "With mode = \"sources\": the light of everything but the lamps, without its shapes, or none of it (how much that is, is told)."},
+      {"distance_m", &l.distance_m, m.above(0, far_m), "How far from the light camera the lamps are; left out: they are at infinity.", optional("2.5")},
   };
 }
 

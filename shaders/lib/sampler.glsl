@@ -1,13 +1,23 @@
 // Random numbers: padded two-dimensional Owen-scrambled Sobol points, hash-seeded, without tables
 // (Burley 2020, "Practical Hash-based Owen Scrambling"). A sample is a pure function of
 // (seed, pixel, sample index, dimension).
+//
+// The pixels of a tile share a scramble, and each shifts its points, digit by digit, by a point of
+// another net, taken in Morton order. So each pixel has a scrambled Sobol sequence, and each sample
+// of the tile's pixels, of four neighbours as well as of all 64, is a net: errors of neighbours
+// cancel, which the eye and every mean over pixels see (as Ahmed and Wonka 2020, "Screen-Space
+// Blue-Noise Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering of Pixels", but
+// for any number of samples).
 #ifndef PREVIZ_SAMPLER_GLSL
 #define PREVIZ_SAMPLER_GLSL
 
 struct Sampler {
-  uint key;    // of this pixel
+  uint key;    // of this pixel's tile
   uint index;  // of this sample
+  uint place;  // of the pixel in its tile
 };
+
+const uint TILE_BITS = 3u;  // tiles of 8x8 pixels
 
 // Finaliser of a 32-bit hash with low bias (Wellons 2018, lowbias32).
 uint hash_bits(uint x) {
@@ -21,8 +31,16 @@ uint hash_bits(uint x) {
 
 uint hash_pair(uint a, uint b) { return hash_bits(a ^ (hash_bits(b) + 0x9e3779b9u + (a << 6) + (a >> 2))); }
 
+// Bit i goes to bit 2 i.
+uvec2 spread_bits(uvec2 x) {
+  x = (x | (x << 2)) & 0x33u;
+  return (x | (x << 1)) & 0x55u;
+}
+
 Sampler make_sampler(uint seed, uvec2 pixel, uint index) {
-  return Sampler(hash_pair(hash_pair(seed, pixel.x), pixel.y), index);
+  const uvec2 tile = pixel >> TILE_BITS;
+  const uvec2 in_tile = spread_bits(pixel & ((1u << TILE_BITS) - 1u));
+  return Sampler(hash_pair(hash_pair(seed, tile.x), tile.y), index, in_tile.x | (in_tile.y << 1));
 }
 
 // Laine-Karras permutation: an Owen scramble of the reversed bits (constants of Vegdahl 2021).
@@ -49,16 +67,21 @@ uint sobol_second_reversed(uint index) {
 // 24 bits, so that the result is below 1 and exact.
 float unit_float(uint bits) { return float(bits >> 8) * 5.9604644775390625e-8; }
 
+// A scrambled Sobol point, as binary fractions.
+uvec2 sobol_bits(uint index, uint key) {
+  index = bitfieldReverse(scramble_reversed(bitfieldReverse(index), key));
+  // Sobol's first dimension is the reversed index; scrambling wants reversed bits, so the two
+  // reversals cancel.
+  return uvec2(bitfieldReverse(scramble_reversed(index, hash_bits(key ^ 0xa511e9b3u))),
+               bitfieldReverse(scramble_reversed(sobol_second_reversed(index),
+                                                 hash_bits(key ^ 0x63d83595u))));
+}
+
 // Point of dimension pair `pair`, in [0, 1)^2.
 vec2 sample_2d(Sampler s, uint pair) {
   const uint key = hash_pair(s.key, pair);
-  const uint index = bitfieldReverse(scramble_reversed(bitfieldReverse(s.index), key));
-  // Sobol's first dimension is the reversed index; scrambling wants reversed bits, so the two
-  // reversals cancel.
-  const uint x = bitfieldReverse(scramble_reversed(index, hash_bits(key ^ 0xa511e9b3u)));
-  const uint y = bitfieldReverse(
-      scramble_reversed(sobol_second_reversed(index), hash_bits(key ^ 0x63d83595u)));
-  return vec2(unit_float(x), unit_float(y));
+  const uvec2 bits = sobol_bits(s.index, key) ^ sobol_bits(s.place, hash_bits(key + 0x9e3779b9u));
+  return vec2(unit_float(bits.x), unit_float(bits.y));
 }
 
 // Whether u falls into the first `share` of [0, 1). What remains of u is stretched to [0, 1) again and

@@ -1,6 +1,6 @@
-// How much less time the difference estimator needs than other ways to the same error of the
-// difference image (accuracy.md, "Equal-error time"). Methods take turns within a round; rounds
-// have random numbers of their own.
+// How much CPU time forms of the difference estimator, and what lacks one of its techniques, need
+// to the same error of the difference image (accuracy.md, "Equal-error time"). Methods take turns
+// within a round; rounds have random numbers of their own.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "daemon/set/names.hpp"
+#include "drivers/error.hpp"
 #include "tests/bench/equal_error/reference.hpp"
 #include "tests/bench/equal_error/time_to_error.hpp"
 #include "tests/bench/measure.hpp"
@@ -22,97 +24,102 @@ struct Options {
   std::optional<int> frame;
   int width = 160;
   double error = 0.1;
-  int rounds = 5;
-  int reference_samples = 4096;
-  double limit_s = 120;
+  int rounds = 3;
+  int reference_samples = 1024;
+  double limit_s = 60;
   std::vector<std::string> methods;
+  set::LightMode light = set::LightMode::image;
 };
 
-// The first is what the others are compared with. An ablation of it lacks one of its techniques.
+// The first is what the others are compared with.
 std::vector<Method> all_methods() {
-  set::Estimation difference;
-  difference.estimator = set::Estimator::difference;
-  const auto changed = [&](const std::string& name, const auto& change) {
-    Method method{name, difference};
-    change(method);
-    return method;
+  const auto method = [](const std::string& name, set::Estimator estimator, double bounds,
+                         set::Caustics caustics) {
+    Method result{name, {}};
+    result.estimation.estimator = estimator;
+    result.estimation.difference_sampling = bounds;
+    result.estimation.caustics = caustics;
+    return result;
   };
+  constexpr set::Estimator difference = set::Estimator::difference;
   constexpr set::Estimator paired = set::Estimator::paired;
-  return {
-      {"difference", difference},
-      changed("paired", [](Method& m) { m.estimation.estimator = paired; }),
-      changed("paper's paired",
-              [](Method& m) {
-                m.estimation.estimator = paired;
-                m.estimation.difference_sampling = 0;
-              }),
-      changed("two renders", [](Method& m) { m.separate = true; }),
-      changed("difference without bounds", [](Method& m) { m.estimation.difference_sampling = 0; }),
-      changed("difference without photons",
-              [](Method& m) { m.estimation.caustics = set::Caustics::traced; }),
-      changed("paper's paired without photons",
-              [](Method& m) {
-                m.estimation.estimator = paired;
-                m.estimation.difference_sampling = 0;
-                m.estimation.caustics = set::Caustics::traced;
-              }),
+  constexpr set::Caustics photons = set::Caustics::photons;
+  const double bounds = set::Estimation{}.difference_sampling;
+  std::vector<Method> methods = {
+      method("difference", difference, bounds, photons),
+      method("paired", paired, bounds, photons),
+      method("difference, no bounds", difference, 0, photons),
+      method("paper", paired, 0, photons),
+      method("difference, caustics traced", difference, bounds, set::Caustics::traced),
+      method("paper, caustics traced", paired, 0, set::Caustics::traced),
+      method("two renders", paired, 0, photons),
   };
+  methods.back().separate = true;
+  return methods;
 }
 
 std::vector<Method> chosen_methods(const std::vector<std::string>& names) {
-  std::vector<Method> methods = all_methods();
-  if (!names.empty())
-    std::erase_if(methods, [&](const Method& m) { return std::ranges::count(names, m.name) == 0; });
+  const std::vector<Method> all = all_methods();
+  if (names.empty()) return all;
+  std::vector<Method> methods;
+  for (const std::string& name : names) {
+    const auto found = std::ranges::find(all, name, &Method::name);
+    if (found == all.end()) throw Error("there is no method '" + name + "'");
+    methods.push_back(*found);
+  }
   return methods;
 }
 
 struct Result {
-  std::vector<double> seconds;  // to the error, of each round
-  bool extrapolated = false;
-  double rays = 0, shadow_rays = 0;  // a pixel's sample
-  double samples_per_s = 0;          // of all pixels, per second
-  double bias = 0;
-  double samples = 0;
+  std::vector<double> seconds;               // to the error, of each round
+  bool is_beyond = false;                    // some round did not measure there
+  double rays = 0, shadow_rays = 0, ns = 0;  // of a sample of a pixel
+  double samples = 0;                        // of the last round
+  double bias = 0;                           // signed error over the signal, mean over rounds
 };
+
+// Independent noise: what is left of the squared error without the reference's own.
+double without(double error, double noise) {
+  return std::sqrt(std::max(error * error - noise * noise, 1e-12));
+}
 
 void measure(MethodRun& run, std::uint32_t seed, const Reference& reference, const Options& options,
              Result& result) {
   std::vector<Point> points;
+  truth::Measures measures;
   run.begin(seed);
-  for (int samples = 1;; samples *= 2) {
-    run.render(samples - run.samples());
-    const truth::Measures measures = error_of(reference, run.estimate());
-    points.push_back({run.cpu_s(), measures.e_diff});
-    result.bias = measures.bias_diff;
-    if (measures.e_diff <= options.error || run.cpu_s() * 2 > options.limit_s) break;
-  }
+  do {
+    run.render(std::max(run.samples(), 1));
+    measures = error_of(reference, run.estimate());
+    points.push_back({run.cpu_s(), without(measures.e_diff, reference.noise.e_diff)});
+  } while (points.back().error > options.error && 2 * run.cpu_s() < options.limit_s);
   const render::Counters counters = run.counters();
-  const double pixel_samples =
-      static_cast<double>(run.samples()) * reference.frame.width * reference.frame.height;
-  result.rays = static_cast<double>(counters.rays) / pixel_samples;
-  result.shadow_rays = static_cast<double>(counters.shadow_rays) / pixel_samples;
-  result.samples_per_s = run.samples() / run.cpu_s();
+  const double samples = 1.0 * run.samples() * reference.frame.width * reference.frame.height;
+  result.rays = static_cast<double>(counters.rays) / samples;
+  result.shadow_rays = static_cast<double>(counters.shadow_rays) / samples;
+  result.ns = 1e9 * run.cpu_s() / samples;
   result.samples = run.samples();
+  result.bias += measures.bias_diff / options.rounds;
   const TimeToError time = time_to_error(points, options.error);
-  result.extrapolated = result.extrapolated || time.is_beyond;
+  result.is_beyond = result.is_beyond || time.is_beyond;
   result.seconds.push_back(time.cpu_s);
 }
 
-void print(const View& view, const std::vector<Method>& methods,
-           const std::vector<Result>& results) {
+void print(const std::vector<Method>& methods, const std::vector<Result>& results) {
+  std::printf(
+      "| method | CPU s | over the first | spread | rays | shadow rays | ns | samples | bias |\n"
+      "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
   for (std::size_t m = 0; m < methods.size(); ++m) {
+    const Result& r = results[m];
     std::vector<double> ratios;
-    for (std::size_t i = 0; i < results[m].seconds.size(); ++i)
-      ratios.push_back(results[m].seconds[i] / results[0].seconds[i]);
+    for (std::size_t i = 0; i < r.seconds.size(); ++i)
+      ratios.push_back(r.seconds[i] / results[0].seconds[i]);
     const auto [low, high] = std::ranges::minmax(ratios);
-    std::printf("| %s %d | %s | %s%.3g | %.2f | %.2f to %.2f | %.2f | %.2f | %.3g | %.0f | %.3f\n",
-                view.set.c_str(), view.frame, methods[m].name.c_str(),
-                results[m].extrapolated ? "~" : "", median(results[m].seconds), median(ratios), low,
-                high, results[m].rays, results[m].shadow_rays,
-                1e9 / results[m].samples_per_s /
-                    (view.camera.intrinsics.width * view.camera.intrinsics.height),
-                results[m].samples, results[m].bias);
+    std::printf("| %s | %.3g%s | %.2f | %.2f to %.2f | %.2f | %.2f | %.0f | %.0f | %+.3f |\n",
+                methods[m].name.c_str(), median(r.seconds), r.is_beyond ? " *" : "", median(ratios),
+                low, high, r.rays, r.shadow_rays, r.ns, r.samples, r.bias);
   }
+  std::printf("\n");
   std::fflush(stdout);
 }
 
@@ -120,11 +127,16 @@ void run(const Options& options) {
   const auto device = render::open_device();
   const std::vector<Method> methods = chosen_methods(options.methods);
   for (const std::filesystem::path& directory : options.sets) {
-    const View view = load_view(directory, options.frame, options.width);
+    const View view = load_view(directory, options.frame, options.width, options.light);
     const Reference reference =
         make_reference(device, view, all_methods().front(), options.reference_samples);
-    std::printf("reference of %s: e_diff %.4f over %d blocks\n", view.set.c_str(),
-                reference.noise.e_diff, reference.noise.diff_blocks);
+    std::printf(
+        "%s, frame %d, %dx%d, light: %s (%zu lamps). To %.3g %% of the difference over %d "
+        "blocks; the reference's own error, taken off: %.2g %%. * beyond what was measured "
+        "in some round. Rays, ns: of a sample of a pixel.\n\n",
+        view.set.c_str(), view.frame, reference.frame.width, reference.frame.height,
+        set::name_of(options.light), view.lamps.size(), 100 * options.error,
+        reference.noise.diff_blocks, 100 * reference.noise.e_diff);
     std::vector<std::unique_ptr<MethodRun>> runs;
     for (const Method& method : methods)
       runs.push_back(std::make_unique<MethodRun>(device, view, method));
@@ -132,7 +144,7 @@ void run(const Options& options) {
     for (int round = 1; round <= options.rounds; ++round)
       for (std::size_t m = 0; m < methods.size(); ++m)
         measure(*runs[m], static_cast<std::uint32_t>(round), reference, options, results[m]);
-    print(view, methods, results);
+    print(methods, results);
   }
 }
 
@@ -140,21 +152,28 @@ void run(const Options& options) {
 }  // namespace previz::bench
 
 int main(int argc, char** argv) {
+  using previz::set::LightMode;
   previz::bench::Options options;
   CLI::App app("CPU time to an error of the difference image");
-  app.add_option("SETDIR", options.sets)->required();
-  app.add_option("--frame", options.frame);
-  app.add_option("--width", options.width);
-  app.add_option("--error", options.error);
-  app.add_option("--rounds", options.rounds);
-  app.add_option("--reference", options.reference_samples);
-  app.add_option("--limit", options.limit_s);
-  app.add_option("--method", options.methods);
+  app.add_option("SETDIR", options.sets, "Ground truth sets")->required();
+  app.add_option("--frame", options.frame, "Truth frame [the first]");
+  app.add_option("--width", options.width, "Pixels; 800 for the paper's figure");
+  app.add_option("--error", options.error, "A share, as 0.05");
+  app.add_option("--rounds", options.rounds, "With random numbers of their own");
+  app.add_option("--reference", options.reference_samples, "Its samples, in two halves");
+  app.add_option("--limit", options.limit_s, "CPU seconds of a method and round");
+  app.add_option("--method", options.methods, "Only these, compared with the first; repeatable")
+      ->allow_extra_args(false);
+  app.add_option("--light", options.light, "image, sources or hybrid, as lighting.mode")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, LightMode>{{"image", LightMode::image},
+                                                                   {"sources", LightMode::sources},
+                                                                   {"hybrid", LightMode::hybrid}}));
   CLI11_PARSE(app, argc, argv);
   try {
     previz::bench::run(options);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "bench_equal_error: %s\n", error.what());
-    return 1;
+    return 2;
   }
 }

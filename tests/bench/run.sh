@@ -1,16 +1,19 @@
 #!/bin/sh
-# All benchmarks of a build: run.sh BUILD_DIR OUT_DIR. Writes rays.md, instances.md, frame.md,
-# frame.csv and frame.svg. CLOCK=cpu (default where the device is lavapipe: wall elsewhere) or wall.
+# All benchmarks of a build: run.sh BUILD_DIR OUT_DIR [SETDIR...]. Writes rays.md, instances.md,
+# frame.md, frame.csv and frame.svg, and where ground truth sets are given equal_error.md.
+# CLOCK=cpu (default where the device is lavapipe: wall elsewhere) or wall. Beside Cycles: cycles/run.
 set -eu
-if [ $# -ne 2 ]; then
-  echo "usage: $0 BUILD_DIR OUT_DIR" >&2
+if [ $# -lt 2 ]; then
+  echo "usage: $0 BUILD_DIR OUT_DIR [SETDIR...]" >&2
   exit 2
 fi
 bench="$1/tests/bench"
 out="$2"
+shift 2
 mkdir -p "$out"
 
 "$bench/bench_rays" | tee "$out/rays.md"
 "$bench/bench_rays" --instanced --triangles 98000 1000000 | tee "$out/instances.md"
 if head -n 1 "$out/rays.md" | grep -q llvmpipe; then default=cpu; else default=wall; fi
 "$bench/bench_frame" --clock "${CLOCK:-$default}" --out "$out" | tee "$out/frame.md"
+[ $# -eq 0 ] || "$bench/bench_equal_error" "$@" | tee "$out/equal_error.md"

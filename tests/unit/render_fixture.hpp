@@ -74,7 +74,7 @@ inline glm::dvec3 standard_error(const render::Layers& layers) {
 }
 
 // Standard error of the mean of the green mixed radiance from the spread of the pixels, for
-// pictures whose pixels all expect the same value: their scrambles are independent.
+// pictures whose pixels all expect the same value. An over-estimate: neighbours' errors cancel.
 inline double standard_error_of_pixels(const render::Layers& layers) {
   const double centre = mean(layers.mixed).g;
   double sum = 0;

@@ -1,6 +1,5 @@
 #include "tests/bench/equal_error/method.hpp"
 
-#include "daemon/render/device.hpp"
 #include "tests/bench/measure.hpp"
 
 namespace previz::bench {
@@ -14,6 +13,7 @@ MethodRun::MethodRun(const std::shared_ptr<render::Device>& device, const View& 
     renderers_.push_back(std::make_unique<render::Renderer>(device, estimation, view.camera));
     renderers_.back()->set_scene(scene);
     renderers_.back()->set_environment(view.environment, set::LightSampling::importance);
+    if (!view.lamps.empty()) renderers_.back()->set_sources(view.lamps);
   };
   if (method.separate) {
     add(world_alone(view.scene, scene::world_mixed));

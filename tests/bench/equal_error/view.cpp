@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "daemon/lighting/light_mode.hpp"
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
@@ -29,7 +30,8 @@ int chosen_frame(const truth::TruthSet& set, std::optional<int> frame) {
 
 }  // namespace
 
-View load_view(const std::filesystem::path& directory, std::optional<int> frame, int width) {
+View load_view(const std::filesystem::path& directory, std::optional<int> frame, int width,
+               set::LightMode light) {
   const truth::TruthSet truth = truth::load_truth_set(directory);
   View view;
   view.set = truth.name;
@@ -40,7 +42,12 @@ View load_view(const std::filesystem::path& directory, std::optional<int> frame,
   set.lighting.environment = truth.environment;
   set.lighting.environment_as_written = truth.environment.string();
   view.scene = scene::load_scene(set);
-  view.environment = lighting::load_environment(set.lighting).environment;
+  set.lighting.mode = light;
+  lighting::Lighting lighting = lighting::load_environment(set.lighting);
+  lighting::SourceTracker tracker(0);
+  lighting::apply_mode(lighting, set.lighting, tracker, 0);
+  view.lamps = lighting::lamps_of(lighting.sources, set.lighting, glm::dvec3(0));
+  view.environment = std::move(lighting.environment);
   view.camera = truth::resized(truth.observer, 1.0 * width / truth.observer.intrinsics.width);
   view.world_from_camera = truth::observer_frame(truth, view.frame).world_from_camera;
   view.exposure = truth.exposure;

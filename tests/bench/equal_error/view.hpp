@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "daemon/lighting/environment.hpp"
 #include "daemon/scene/scene.hpp"
@@ -15,6 +16,7 @@ struct View {
   int frame = 0;
   scene::Scene scene;
   lighting::EnvironmentMap environment;
+  std::vector<set::Light> lamps;  // taken out of it, by the mode of its light
   ObserverCalibration camera;
   glm::dmat4 world_from_camera{1.0};
   double exposure = 1;
@@ -23,7 +25,8 @@ struct View {
 // The set's objects under its true environment; `frame` absent: the first with truth. The picture
 // is `width` pixels wide and shows what the set's does. Throws previz::Error naming what is
 // missing.
-View load_view(const std::filesystem::path& set, std::optional<int> frame, int width);
+View load_view(const std::filesystem::path& set, std::optional<int> frame, int width,
+               set::LightMode light = set::LightMode::image);
 
 // The same scene as one of the two worlds sees it, without the other: what is not in it is gone,
 // and what is in it is no longer compared with anything.
