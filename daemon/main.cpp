@@ -19,6 +19,7 @@
 #include "daemon/post/render.hpp"
 #include "daemon/post/trade.hpp"
 #include "daemon/post/trade_page.hpp"
+#include "daemon/rig/devices.hpp"
 #include "daemon/rig/live.hpp"
 #include "daemon/rig/signals.hpp"
 #include "drivers/error.hpp"
@@ -111,6 +112,13 @@ void add_check(CLI::App& app, std::filesystem::path& set_or_session) {
   command.add_option("set", set_or_session, "Set file or session directory")->required();
 }
 
+void add_devices(CLI::App& app, bool& learn) {
+  CLI::App& command =
+      *app.add_subcommand("devices", "List cameras and buttons by the names a set file takes");
+  command.add_flag("--learn", learn,
+                   "Print the name of every button that is pressed, until Ctrl-C");
+}
+
 void add_import(CLI::App& app, post::ImportOptions& options) {
   CLI::App& command = *app.add_subcommand("import", "Make a session of footage");
   command.add_option("description", options.description, "FRAMES.json")->required();
@@ -168,6 +176,11 @@ int do_calibrate(const CLI::App& command, const CalibrateOptions& options) {
   return 0;
 }
 
+int do_devices(bool learn, const rig::StopOnSignal& stop) {
+  learn ? rig::learn_buttons(std::cout, stop.token()) : rig::list_devices(std::cout);
+  return stop.received() ? 128 + stop.received() : 0;
+}
+
 int do_import(const post::ImportOptions& options) {
   const post::ImportReport report = post::import_session(options);
   for (const std::string& note : report.notes) std::cout << note << "\n";
@@ -218,6 +231,7 @@ int main(int argc, char** argv) {
   post::RenderOptions render_options;
   rig::LiveOptions live_options;
   std::filesystem::path checked;
+  bool learn = false;
   post::ImportOptions import_options;
   post::TradeOptions trade_options;
   CalibrateOptions calibrate_options;
@@ -225,6 +239,7 @@ int main(int argc, char** argv) {
     add_render(app, render_options);
     add_run(app, live_options);
     add_check(app, checked);
+    add_devices(app, learn);
     add_import(app, import_options);
     add_trade(app, trade_options);
     add_calibrate(app, calibrate_options);
@@ -234,6 +249,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("check")) return post::check_set(checked, std::cout);
     if (app.got_subcommand("calibrate"))
       return do_calibrate(*app.get_subcommand("calibrate"), calibrate_options);
+    if (app.got_subcommand("devices")) return do_devices(learn, stop);
     if (app.got_subcommand("import")) return do_import(import_options);
     if (app.got_subcommand("render")) return do_render(render_options, stop);
     if (app.got_subcommand("trade")) return do_trade(trade_options, stop);

@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "daemon/rig/driven_camera.hpp"
 #include "drivers/error.hpp"
 #include "drivers/replay/replay_camera.hpp"
 
@@ -13,56 +14,86 @@ namespace {
 // Threads and device start before the first frame is due.
 constexpr std::chrono::milliseconds replay_delay{200};
 
-void require_replay(const set::Set& set, const std::string& key, set::Driver driver) {
-  if (driver != set::Driver::replay)
-    throw Error(set.file.string() + ": " + key +
-                ".driver: this build drives no such camera; \"replay\" is allowed");
+CameraOrder observer_order(const set::Set& set) {
+  const double responsivity = set.observer.calibration ? set.observer.calibration->responsivity : 1;
+  return {"observer",          set.observer.driver, set.observer.device,
+          set.observer.camera, set.observer.faults, responsivity};
 }
 
-std::unique_ptr<Camera> start(std::unique_ptr<session::StreamReader> stream,
-                              const std::string& name, const ReplayOptions::Origin& origin,
-                              bool loop, const std::vector<std::string>& trouble) {
-  ReplayOptions options;
-  options.origin = origin;
-  options.loop = loop;
-  std::unique_ptr<Camera> camera = replay(std::move(stream), name, options, {}, trouble);
+CameraOrder light_order(const set::Set& set) {
+  const set::LightCamera& light = set.light_camera;
+  const double responsivity = light.calibration ? light.calibration->responsivity : 1;
+  return {"light", light.driver, light.device, light.camera, light.faults, responsivity};
+}
+
+// A session's stream, replayed in its own time; under the lifeline where faults are rehearsed.
+std::unique_ptr<Camera> start_replay(const set::Set& set, CameraOrder order,
+                                     const session::Session& session,
+                                     std::unique_ptr<session::StreamReader> stream,
+                                     ReplayOptions options) {
+  if (!order.faults.empty()) {
+    options.position = std::make_shared<ReplayPosition>();
+    order.device = (session.directory / order.role).string();
+    return keep_alive(set, order, [directory = session.directory, role = order.role, options] {
+      return open_replay(directory, role, options);
+    });
+  }
+  std::unique_ptr<Camera> camera =
+      replay(std::move(stream), order.role, options, {}, session.missing);
   camera->start();
   return camera;
+}
+
+std::unique_ptr<session::StreamReader> open_frames(session::Session& session,
+                                                   const std::string& source) {
+  auto stream = session::open_stream(session, source);
+  if (!stream || stream->records().empty())
+    throw Error(session.directory.string() + ": the session has no " + source + " frames");
+  return stream;
 }
 
 }  // namespace
 
 Cameras open_cameras(const set::Set& set, bool loop) {
-  require_replay(set, "observer", set.observer.driver);
+  using set::Driver;
+  if (set.observer.driver == Driver::none)
+    throw Error(set.file.string() + ": observer.driver: \"none\" shows nothing live");
   if (set.observer.device.empty())
     throw Error(set.file.string() + ": observer.device: names no session; a folder is needed here");
-  Cameras cameras;
-  cameras.recorded = session::open_session(set.observer.device);
-  auto observer = session::open_stream(cameras.recorded, "observer");
-  if (!observer || observer->records().empty())
-    throw Error(set.observer.device + ": the session has no observer frames");
-  ReplayOptions::Origin origin{std::chrono::steady_clock::now() + replay_delay,
-                               observer->records().front().timestamp_ns};
+  const Driver light_driver = set.lighting.environment ? Driver::none : set.light_camera.driver;
 
-  std::unique_ptr<session::StreamReader> light;
-  ReplayOptions::Origin light_origin = origin;
-  if (!set.lighting.environment && set.light_camera.driver != set::Driver::none) {
-    require_replay(set, "light_camera", set.light_camera.driver);
-    const std::string& device =
-        set.light_camera.device.empty() ? set.observer.device : set.light_camera.device;
-    session::Session session = session::open_session(device);
-    light = session::open_stream(session, "light");
-    if (!light || light->records().empty())
-      throw Error(device + ": the session has no light frames");
-    light_origin.timestamp_ns = light->records().front().timestamp_ns;
+  Cameras cameras;
+  ReplayOptions options;
+  options.loop = loop;
+  options.origin = {std::chrono::steady_clock::now() + replay_delay, 0};
+  std::unique_ptr<session::StreamReader> observer;
+  if (set.observer.driver == Driver::replay) {
+    cameras.recorded = session::open_session(set.observer.device);
+    observer = open_frames(cameras.recorded, "observer");
+    options.origin->timestamp_ns = observer->records().front().timestamp_ns;
+  } else {
+    cameras.observer = drive_camera(set, observer_order(set));
+  }
+
+  if (light_driver == Driver::replay) {
+    session::Session session = session::open_session(
+        set.light_camera.device.empty() ? set.observer.device : set.light_camera.device);
+    auto light = open_frames(session, "light");
+    ReplayOptions light_options = options;
+    light_options.origin->timestamp_ns = light->records().front().timestamp_ns;
     if (session.directory == cameras.recorded.directory) {
-      origin.timestamp_ns = std::min(origin.timestamp_ns, light_origin.timestamp_ns);
-      light_origin = origin;
+      options.origin->timestamp_ns =
+          std::min(options.origin->timestamp_ns, light_options.origin->timestamp_ns);
+      light_options = options;
     }
     if (!cameras.recorded.info.light) cameras.recorded.info.light = session.info.light;
-    cameras.light = start(std::move(light), "light", light_origin, loop, session.missing);
+    cameras.light = start_replay(set, light_order(set), session, std::move(light), light_options);
+  } else if (light_driver != Driver::none) {
+    cameras.light = drive_camera(set, light_order(set));
   }
-  cameras.observer = start(std::move(observer), "observer", origin, loop, cameras.recorded.missing);
+  if (observer)
+    cameras.observer =
+        start_replay(set, observer_order(set), cameras.recorded, std::move(observer), options);
   return cameras;
 }
 

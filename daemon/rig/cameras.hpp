@@ -9,7 +9,8 @@
 
 namespace previz::rig {
 
-// The rig's cameras as the set names them. Replayed streams of one session keep their common time.
+// The rig's cameras as the set names them, started. Replayed streams of one session keep their
+// common time; a real camera need not be there yet, and is picked up when it is.
 struct Cameras {
   std::unique_ptr<Camera> observer;
   std::unique_ptr<Camera> light;  // null: the set has none, or gives an environment file
@@ -17,7 +18,7 @@ struct Cameras {
 };
 
 // `loop`: replayed streams start again at their end. Throws previz::Error naming the key whose
-// driver this build has not, or the device that fails.
+// driver this build has not, or the session that cannot be read.
 Cameras open_cameras(const set::Set& set, bool loop = false);
 
 }  // namespace previz::rig

@@ -13,7 +13,10 @@ using Name = std::pair<const char*, E>;
 
 // A driver is listed once it exists.
 constexpr auto names(Driver) {
-  return std::to_array<Name<Driver>>({{"replay", Driver::replay}, {"none", Driver::none}});
+  return std::to_array<Name<Driver>>({{"replay", Driver::replay},
+                                      {"v4l2", Driver::v4l2},
+                                      {"aravis", Driver::aravis},
+                                      {"none", Driver::none}});
 }
 constexpr auto names(Presence) {
   return std::to_array<Name<Presence>>({{"phantom", Presence::phantom},

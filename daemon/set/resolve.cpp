@@ -90,6 +90,21 @@ class Resolver {
     if (driver == Driver::none)
       exclude(given(table), {"device"}, "driver \"none\" has no device; leave one of the two out");
     if (driver == Driver::replay && !device.empty()) device = located(device).string();
+    const bool recorded = driver == Driver::replay || driver == Driver::none;
+    if (!recorded && device.empty())
+      problem(given(table), "device",
+              std::string("is missing with driver \"") + name_of(driver) +
+                  "\"; allowed: a name that `previzd devices` prints");
+    const Given& camera = given(table + ".camera");
+    if (recorded && camera.at)
+      problems_.add(*camera.at, camera.path,
+                    std::string("does not go with driver \"") + name_of(driver) +
+                        "\", which drives no camera");
+    if (camera.has("width") != camera.has("height"))
+      problem(camera, camera.has("width") ? "height" : "width",
+              "is missing; width and height go together");
+    if (camera.has("exposure_s") && camera.has("bracket_s"))
+      problem(camera, "exposure_s", "does not go with bracket_s; leave one of the two out");
   }
 
   void response(const std::string& path, const ResponseCurve& curve) {

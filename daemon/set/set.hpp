@@ -12,14 +12,25 @@
 #include <vector>
 
 #include "drivers/calibration.hpp"
+#include "drivers/camera_settings.hpp"
 
 namespace previz::set {
 
 enum class Driver { none, replay, v4l2, aravis, libcamera };
 
+// How a camera that is no recording is to be driven.
+struct CameraWish {
+  CameraSettings settings;
+  std::vector<double> bracket_s;  // shutter times in turn, one after every frame; empty: one
+  double start_timeout_s = 5;     // to the first frame, then the device is opened anew
+  double stall_timeout_s = 2;     // from frame to frame
+};
+
 struct Observer {
   Driver driver = Driver::replay;
   std::string device;  // replay: session directory; otherwise the device's stable name
+  CameraWish camera;
+  std::vector<std::string> faults;  // to rehearse: drivers/faults.hpp says how they are written
   // Calibration given here overrides the session's.
   std::optional<ObserverCalibration> calibration;
   std::optional<double> exposure;  // absolute; overrides the frames' own
@@ -28,6 +39,8 @@ struct Observer {
 struct LightCamera {
   Driver driver = Driver::replay;
   std::string device;
+  CameraWish camera;
+  std::vector<std::string> faults;  // to rehearse: drivers/faults.hpp says how they are written
   std::optional<LightCameraCalibration> calibration;
   std::optional<double> exposure;
 };

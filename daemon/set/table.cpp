@@ -39,8 +39,33 @@ Keys observer_keys(Observer& o) {
   return {
       {"driver", &o.driver, plain, "How the film camera is reached."},
       {"device", &o.device, plain, "The camera's stable name; for replay the session's folder, relative to this file. Left out: the session named on the command line.", optional("\"sessions/take1\"")},
+      {"faults", &o.faults, plain, "What is to go wrong, to rehearse it, and at which frame: drop, corrupt, late, stall, disconnect.", optional("[\"stall@250\", \"disconnect@1000+2.5s\"]")},
       {"exposure", &o.exposure, plain.above(0), "Absolute exposure, in place of what the frames say: picture signal = exposure * radiance.", optional("1.0")},
   };
+}
+
+Keys camera_keys(CameraWish& wish) {
+  CameraSettings& c = wish.settings;
+  return {
+      {"pixel_format", &c.format, plain, "In the driver's own words; more bits are worth their bandwidth.", optional("\"BayerRG12\"")},
+      {"width", &c.width, px.within(1, max_picture_side_px), "Size of the pictures; with height.", optional("1920")},
+      {"height", &c.height, px.within(1, max_picture_side_px), "Size of the pictures; with width.", optional("1080")},
+      {"rate_hz", &c.rate_hz, plain.above(0, 1e4), "Frames a second.", optional("25.0")},
+      {"exposure_s", &c.exposure_s, seconds.above(0, 100), "Shutter time; the camera's automatic is then off.", optional("0.01")},
+      {"gain", &c.gain, plain.within(1, 1e4), "Linear; of cameras whose gain is in dB.", optional("2.0")},
+      {"raw_gain", &c.raw_gain, plain, "In the camera's own units; its factor then belongs to the responsivity.", optional("64.0")},
+      {"white_balance_k", &c.white_balance_k, plain.within(1000, 25000), "Colour temperature; the camera's automatic is then off.", optional("5600.0")},
+      {"trigger", &c.trigger, plain, "\"software\", or the camera's line that triggers a frame; left out: it runs freely.", optional("\"Line1\"")},
+      {"packet_size", &c.packet_size, plain.within(576, 16000), "Bytes, of network cameras; left out: the largest that gets through.", optional("9000")},
+      {"start_timeout_s", &wish.start_timeout_s, seconds.above(0, 600), "No frame so long after the start: the camera is opened anew."},
+      {"stall_timeout_s", &wish.stall_timeout_s, seconds.above(0, 600), "No frame so long after the last: the camera is stalled, and soon opened anew."},
+  };
+}
+
+Keys light_camera_driving_keys(CameraWish& wish) {
+  Keys keys = camera_keys(wish);
+  keys.push_back({"bracket_s", &wish.bracket_s, seconds.above(0, 100), "Shutter times that are driven in turn, for light brighter than one exposure holds.", optional("[0.0002, 0.002, 0.02]")});
+  return keys;
 }
 
 Keys pinhole_keys(PinholeIntrinsics& i) {
@@ -80,6 +105,7 @@ Keys light_camera_keys(LightCamera& c) {
   return {
       {"driver", &c.driver, plain, "How the light camera (the fisheye that looks at the lamps) is reached."},
       {"device", &c.device, plain, "As in [observer].", optional("\"sessions/take1\"")},
+      {"faults", &c.faults, plain, "As in [observer].", optional("[\"drop@30+5\"]")},
       {"exposure", &c.exposure, plain.above(0), "Absolute exposure, in place of what the frames say.", optional("0.35")},
   };
 }
@@ -261,10 +287,12 @@ std::vector<Section> sections(Draft& d) {
   return {
       once("set", always, "The set as a whole.", [&d] { return set_keys(d.set); }),
       once("observer", always, "The film camera.", [&d] { return observer_keys(d.set.observer); }),
+      once("observer.camera", optional, "How a camera that is no recording is driven; what is left out stays as the camera has it.", [&d] { return camera_keys(d.set.observer.camera); }),
       once("observer.intrinsics", optional, "Its lens as calibrated. A calibration given here replaces the session's as a whole.", [&d] { return pinhole_keys(d.observer.intrinsics); }),
       once("observer.lens", optional, "Depth of field; left out: everything is sharp.", [&d] { return lens_keys(d.lens); }),
       once("observer.response", optional, "How its sensor turns light into picture values.", [&d] { return response_keys(d.observer.response, d.observer.responsivity); }),
       once("light_camera", always, "The light camera.", [&d] { return light_camera_keys(d.set.light_camera); }),
+      once("light_camera.camera", optional, "As [observer.camera].", [&d] { return light_camera_driving_keys(d.set.light_camera.camera); }),
       once("light_camera.intrinsics", optional, "Its fisheye as calibrated.", [&d] { return fisheye_keys(d.light); }),
       once("light_camera.response", optional, "How its sensor turns light into picture values.", [&d] { return light_response_keys(d.light); }),
       once("light_camera.pose", optional, "Where it stands.", [&d] { return light_pose_keys(d.light_pose); }),

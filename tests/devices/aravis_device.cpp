@@ -24,7 +24,7 @@ constexpr double rate_hz = 40;
 class AravisDevice final : public DeviceUnderTest {
  public:
   // `lost` is the share of the stream's packets that do not arrive.
-  explicit AravisDevice(double lost) : lost_(lost) {
+  explicit AravisDevice(double lost, bool triggered = false) : lost_(lost), triggered_(triggered) {
     for (int i = 0; i < take_frames; ++i)
       take_.push_back(session::noise_frame("observer", i, PixelFormat::gray8, width, height).bytes);
     plug();
@@ -38,6 +38,7 @@ class AravisDevice final : public DeviceUnderTest {
     settings.device = address_;
     settings.rate_hz = rate_hz;
     settings.exposure_s = 0.010;
+    if (triggered_) settings.trigger = "software";
     settings.packet_size = 1500;  // three packets a frame, a leader and a trailer
     return camera_driver("aravis").open(settings);
   }
@@ -95,15 +96,16 @@ class AravisDevice final : public DeviceUnderTest {
 
   const std::string address_ = "127.0.0.1";
   const double lost_;
+  const bool triggered_;
   std::vector<std::vector<std::uint8_t>> take_;
   std::atomic<std::size_t> sent_ = 0;
   ArvGvFakeCamera* camera_ = nullptr;
   ArvFakeCamera* fake_ = nullptr;  // the camera's
 };
 
-std::unique_ptr<DeviceUnderTest> make(double lost, std::string& why_not) {
+std::unique_ptr<DeviceUnderTest> make(double lost, bool triggered, std::string& why_not) {
   enter_private_network();  // the camera's control port is fixed
-  auto device = std::make_unique<AravisDevice>(lost);
+  auto device = std::make_unique<AravisDevice>(lost, triggered);
   if (device->is_running()) return device;
   why_not = "Aravis' fake camera cannot listen on 127.0.0.1";
   return nullptr;
@@ -112,10 +114,13 @@ std::unique_ptr<DeviceUnderTest> make(double lost, std::string& why_not) {
 }  // namespace
 
 std::unique_ptr<DeviceUnderTest> make_aravis(std::string& why_not) {
-  return make(0, why_not);
+  return make(0, false, why_not);
 }
 std::unique_ptr<DeviceUnderTest> make_lossy_aravis(std::string& why_not) {
-  return make(0.1, why_not);
+  return make(0.1, false, why_not);
+}
+std::unique_ptr<DeviceUnderTest> make_triggered_aravis(std::string& why_not) {
+  return make(0, true, why_not);
 }
 
 }  // namespace previz::test

@@ -24,7 +24,7 @@ class DeviceUnderTest {
   virtual void unplug() = 0;
   virtual void plug() = 0;
 
-  // What frames the device may lose while somebody listens (packets on a bad network).
+  // Whether frames may be lost while somebody listens: on a bad network, under load.
   virtual bool may_lose_frames() const { return false; }
 
   // Two exposures the device can take exactly; none where it cannot be driven.

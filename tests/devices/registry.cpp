@@ -13,6 +13,7 @@ std::span<const RegisteredDevice> registered_devices() {
       {"replay_as_fast_as_consumed", false, true, make_unpaced_replay},
 #ifdef PREVIZ_WITH_ARAVIS
       {"aravis", true, true, make_aravis},
+      {"aravis_triggered_by_software", true, false, make_triggered_aravis},
       {"aravis_losing_a_tenth_of_its_packets", true, false, make_lossy_aravis},
 #endif
 #ifdef PREVIZ_WITH_V4L2

@@ -1,0 +1,66 @@
+#include "daemon/rig/driven_camera.hpp"
+
+#include <chrono>
+#include <utility>
+
+#include "daemon/set/names.hpp"
+#include "drivers/bracket.hpp"
+#include "drivers/camera_drivers.hpp"
+#include "drivers/error.hpp"
+#include "drivers/lifeline.hpp"
+
+namespace previz::rig {
+namespace {
+
+std::string table_of(const CameraOrder& order) {
+  return order.role == "light" ? "light_camera" : order.role;
+}
+
+std::vector<Fault> faults_of(const set::Set& set, const CameraOrder& order) {
+  std::vector<Fault> faults;
+  for (const std::string& text : order.faults) {
+    try {
+      faults.push_back(parse_fault(text));
+    } catch (const Error& error) {
+      throw Error(set.file.string() + ": " + table_of(order) + ".faults: " + error.what());
+    }
+  }
+  return faults;
+}
+
+std::chrono::milliseconds milliseconds_of(double seconds) {
+  return std::chrono::round<std::chrono::milliseconds>(std::chrono::duration<double>(seconds));
+}
+
+}  // namespace
+
+std::unique_ptr<Camera> keep_alive(const set::Set& set, const CameraOrder& order,
+                                   CameraOpener open) {
+  if (!order.faults.empty()) open = with_faults(std::move(open), faults_of(set, order));
+  LifelineOptions options;
+  options.start_timeout = milliseconds_of(order.wish.start_timeout_s);
+  options.stall_timeout = milliseconds_of(order.wish.stall_timeout_s);
+  auto camera = std::make_unique<Lifeline>(order.device, std::move(open), options);
+  camera->start();
+  return camera;
+}
+
+std::unique_ptr<Camera> drive_camera(const set::Set& set, const CameraOrder& order) {
+  const CameraDriver* driver = nullptr;
+  try {
+    driver = &camera_driver(set::name_of(order.driver));
+  } catch (const Error& error) {
+    throw Error(set.file.string() + ": " + table_of(order) + ".driver: " + error.what() +
+                ", \"replay\"");
+  }
+  CameraSettings settings = order.wish.settings;
+  settings.source = order.role;
+  settings.device = order.device;
+  settings.responsivity = order.responsivity;
+  return keep_alive(set, order, [driver, settings, bracket_s = order.wish.bracket_s] {
+    std::unique_ptr<Camera> camera = driver->open(settings);
+    return bracket_s.empty() ? std::move(camera) : bracket(std::move(camera), bracket_s);
+  });
+}
+
+}  // namespace previz::rig

@@ -1,0 +1,91 @@
+// From what a set says to the rig's cameras.
+#include "daemon/rig/cameras.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "drivers/camera_drivers.hpp"
+#include "drivers/error.hpp"
+#include "tests/unit/session_fixture.hpp"
+
+namespace previz::rig {
+namespace {
+
+using std::chrono::milliseconds;
+using testing::HasSubstr;
+
+class RigCameras : public testing::Test {
+ protected:
+  void SetUp() override { session::write_small_session(take(), 30); }
+  std::filesystem::path take() const { return directory_.path() / "take"; }
+
+  set::Set replayed() const {
+    set::Set set;
+    set.file = "stage.toml";
+    set.observer.device = take().string();
+    set.light_camera.driver = set::Driver::none;
+    return set;
+  }
+
+  static std::string error_of(const set::Set& set) {
+    try {
+      open_cameras(set);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+
+  test::TemporaryDirectory directory_;
+};
+
+TEST_F(RigCameras, AReplayedCameraStreams) {
+  const Cameras cameras = open_cameras(replayed());
+  EXPECT_FALSE(cameras.light);
+  const CameraEvent event = cameras.observer->next(milliseconds(10'000));
+  ASSERT_TRUE(std::holds_alternative<FramePtr>(event));
+  EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(event), 0));
+}
+
+TEST_F(RigCameras, FaultsAreRehearsedOnATake) {
+  set::Set set = replayed();
+  set.observer.faults = {"corrupt@2", "disconnect@4+0s"};
+  const Cameras cameras = open_cameras(set);
+  std::string story;
+  while (story.size() < 40) {
+    const CameraEvent event = cameras.observer->next(milliseconds(1000));
+    if (std::holds_alternative<EndOfStream>(event)) break;
+    if (std::holds_alternative<FramePtr>(event)) story += 'f';
+    if (std::holds_alternative<DeviceTrouble>(event)) story += 't';
+  }
+  EXPECT_TRUE(story.starts_with("fftftf")) << story;
+}
+
+TEST_F(RigCameras, MistakesNameFileAndKey) {
+  set::Set set = replayed();
+  set.observer.faults = {"melt@3"};
+  EXPECT_THAT(error_of(set), HasSubstr("stage.toml: observer.faults: fault \"melt@3\""));
+  set = replayed();
+  set.observer.driver = set::Driver::libcamera;
+  EXPECT_THAT(error_of(set), HasSubstr("stage.toml: observer.driver: this build drives no"));
+  set = replayed();
+  set.light_camera.driver = set::Driver::replay;
+  EXPECT_THAT(error_of(set), HasSubstr("the session has no light frames"));
+}
+
+// A rig starts with everything absent and picks its cameras up as they come.
+TEST_F(RigCameras, ACameraThatIsNotThereIsWaitedFor) {
+  if (camera_drivers().empty()) GTEST_SKIP() << "this build has no driver for a real camera";
+  set::Set set = replayed();
+  set.observer.driver =
+      camera_drivers().back().name == "v4l2" ? set::Driver::v4l2 : set::Driver::aravis;
+  set.observer.device = "missing";
+  const Cameras cameras = open_cameras(set);
+  const CameraEvent event = cameras.observer->next(milliseconds(0));
+  ASSERT_TRUE(std::holds_alternative<DeviceTrouble>(event));
+  EXPECT_THAT(std::get<DeviceTrouble>(event).what, HasSubstr("tried again until it is there"));
+  EXPECT_EQ(cameras.observer->counters().at("not opened"), 1u);
+}
+
+}  // namespace
+}  // namespace previz::rig
