@@ -79,8 +79,8 @@ std::string response_toml(const LightCameraCalibration& calibration) {
 
 std::string balance_toml(const glm::dvec3& balance) {
   Draft draft;
-  draft.set.light_camera.balance = balance;
-  return table_toml(std::move(draft), "light_camera");
+  draft.set.lighting.balance = balance;
+  return table_toml(std::move(draft), "lighting");
 }
 
 std::string surface_toml(const Surface& surface) {

@@ -16,7 +16,7 @@ std::string lens_toml(const ThinLens& lens);                           // [obser
 std::string light_pose_toml(const glm::dmat4& world_from_camera);      // [light_camera.pose]
 std::string response_toml(const ObserverCalibration& calibration);     // [observer.response]
 std::string response_toml(const LightCameraCalibration& calibration);  // [light_camera.response]
-std::string balance_toml(const glm::dvec3& balance);                   // [light_camera]
+std::string balance_toml(const glm::dvec3& balance);                   // [lighting]
 std::string surface_toml(const Surface& surface);                      // [[surface]]
 
 }  // namespace previz::set
