@@ -9,7 +9,7 @@ packages=(
   # Vulkan: loader, Mesa's drivers (with a CPU one) and the validation layer the tests switch on
   libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers
   # pictures and video
-  libopencv-dev libopenexr-dev libimath-dev libpng-dev
+  libopencv-dev libopenexr-dev libimath-dev libpng-dev libexiv2-dev
   libavformat-dev libavcodec-dev libavutil-dev libswscale-dev libjpeg62-turbo-dev
   # cameras, buttons
   libaravis-dev libudev-dev libgpiod-dev libhidapi-dev

@@ -80,10 +80,9 @@ LightCameraCalibration known_light_camera(const set::Set& set,
 }
 
 std::string pose_by_tags(const LightOptions& options, const set::Set& set,
-                         const FisheyeIntrinsics& intrinsics, const ResponseCurve& response,
-                         std::ostream& out) {
+                         const LightCameraCalibration& camera, std::ostream& out) {
   const auto source = open_source(options.footage, "light");
-  const LightPose pose = find_light_pose(*source, intrinsics, response, set.tracking);
+  const LightPose pose = find_light_pose(*source, camera.intrinsics, camera.response, set.tracking);
   fmt::print(out,
              "pose by the tags {} in {} pictures: rms {:.3f} px; certain to {:.1f} mm and {:.2f} "
              "degrees{}\n",
@@ -114,7 +113,9 @@ void calibrate_observer(const LensOptions& options, std::ostream& out) {
   tell_fit(views, observer.fit, observer_parameters, observer.picture, out);
   plot(options, views, observer.fit, observer.picture, out);
   insist(missing_views(views, observer), options.force, out);
-  tell_tables(set::intrinsics_toml(observer.intrinsics), options.table_file, out);
+  ObserverCalibration calibration;
+  calibration.intrinsics = observer.intrinsics;
+  tell_tables(set::intrinsics_toml(calibration), options.table_file, out);
 }
 
 void calibrate_light(const LightOptions& options, std::ostream& out) {
@@ -123,17 +124,15 @@ void calibrate_light(const LightOptions& options, std::ostream& out) {
   std::string tables;
   std::optional<set::Set> set;
   if (options.tags_set) set = set::load_set(*options.tags_set);
-  FisheyeIntrinsics intrinsics;
-  ResponseCurve response = response_of(options.footage, "light");
-  if (!options.board.empty()) {
-    intrinsics = calibrate_fisheye(options, out).intrinsics;
-    tables = set::intrinsics_toml(intrinsics) + "\n";
+  LightCameraCalibration camera;
+  camera.response = response_of(options.footage, "light");
+  if (options.board.empty()) {
+    camera = known_light_camera(*set, options.footage);
   } else {
-    const LightCameraCalibration known = known_light_camera(*set, options.footage);
-    intrinsics = known.intrinsics;
-    response = known.response;
+    camera.intrinsics = calibrate_fisheye(options, out).intrinsics;
+    tables = set::intrinsics_toml(camera) + "\n";
   }
-  tables += set ? pose_by_tags(options, *set, intrinsics, response, out) : pose_by_hand;
+  tables += set ? pose_by_tags(options, *set, camera, out) : pose_by_hand;
   tell_tables(tables, options.table_file, out);
 }
 

@@ -1,10 +1,14 @@
-// `previzd calibrate observer | light`: from pictures of a board to the set file's tables.
+// `previzd calibrate ...`: from pictures to the set file's tables.
 #pragma once
 
 #include <filesystem>
 #include <optional>
 #include <ostream>
 #include <string>
+#include <vector>
+
+#include "daemon/calibrate/response_fit.hpp"
+#include "daemon/render/renderer.hpp"
 
 namespace previz::calibrate {
 
@@ -23,9 +27,31 @@ struct LightOptions : LensOptions {
   std::optional<std::filesystem::path> tags_set;
 };
 
+enum class CameraRole { observer, light };
+
+struct ResponseOptions {
+  std::filesystem::path footage;  // session or folder of pictures
+  CameraRole camera = CameraRole::light;
+  std::optional<std::filesystem::path> exposures;  // text file of NAME SECONDS
+  std::optional<ResponseMethod> method;            // absent: the one that predicts better
+  std::optional<std::filesystem::path> table_file;
+};
+
+struct BalanceOptions {
+  std::filesystem::path session;
+  std::optional<std::filesystem::path> set_file;  // instead of the session's own
+  std::vector<std::string> references;  // materials whose albedo is known; empty: all count
+  int frames = 3;
+  int samples = 64;
+  render::DeviceOptions device;
+  std::optional<std::filesystem::path> table_file;
+};
+
 // What is found is told on `out`, the TOML tables last. Throws previz::Error: what cannot be read,
 // and where views are missing (unless forced), which.
 void calibrate_observer(const LensOptions& options, std::ostream& out);
 void calibrate_light(const LightOptions& options, std::ostream& out);
+void calibrate_response(const ResponseOptions& options, std::ostream& out);
+void calibrate_balance(const BalanceOptions& options, std::ostream& out);
 
 }  // namespace previz::calibrate

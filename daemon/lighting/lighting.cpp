@@ -92,6 +92,18 @@ std::vector<std::string> describe(std::span<const FramePtr> frames, const Bracke
 
 }  // namespace
 
+namespace {
+
+// From the light camera's radiance to the film camera's.
+void apply_balance(const glm::dvec3& balance, HdrPicture& picture) {
+  if (balance == glm::dvec3(1)) return;
+  const glm::vec3 factor(balance);
+  for (glm::vec3& radiance : picture.radiance) radiance *= factor;
+  for (glm::vec3& variance : picture.variance) variance *= factor * factor;
+}
+
+}  // namespace
+
 struct Estimator::Impl {
   Impl(const LightCameraCalibration& its_calibration, const set::Lighting& its_settings,
        std::shared_ptr<const Room> room)
@@ -135,6 +147,7 @@ Lighting Estimator::operator()(std::span<const FramePtr> frames, const ObservedL
   HdrPicture picture = merge(bracket);
   expand_clipped(picture, my.settings.clipped_gain);
   undo_vignetting(my.gains, picture);
+  apply_balance(my.settings.balance, picture);
   my.smoothing(picture, bracket.newest_ns());
   Resampled map = resample(my.resampling, picture);
 

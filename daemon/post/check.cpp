@@ -106,6 +106,7 @@ std::optional<scene::Scene> load_scene(const set::Set& set, Lines& problems) {
     for (const auto& object : set.objects) {
       auto alone = set;
       alone.objects = {object};
+      alone.surfaces.clear();  // of the other objects, too
       attempt(problems, [&] { scene::load_scene(alone); });
     }
     if (problems.size() == before) problems.push_back(whole.what());  // only all together too much

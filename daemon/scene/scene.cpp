@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <string>
 #include <system_error>
 #include <vector>
 
 #include "daemon/scene/gltf.hpp"
+#include "drivers/error.hpp"
 #include "shaders/lib/render_shared.h"
 
 namespace previz::scene {
@@ -55,6 +57,30 @@ void require(const Material& material, const Scene& scene, double specular_alpha
                                                            : least_alpha < 1;
 }
 
+// Only real objects take the colours that the set knows better: a virtual object of the same file
+// keeps the material it was made with.
+void apply(const set::Surface& surface, const std::string& set_file, Scene& scene) {
+  std::map<std::uint32_t, std::uint32_t>
+      recoloured;  // materials: as loaded, as real objects have it
+  std::string known;
+  for (Instance& instance : scene.instances) {
+    if ((instance.presence & world_real) == 0) continue;
+    const std::string name = scene.materials[instance.material].name;
+    if (known.find('"' + name + '"') == std::string::npos)
+      known += (known.empty() ? "\"" : ", \"") + name + '"';
+    if (name != surface.material) continue;
+    const auto entry = recoloured.try_emplace(instance.material, scene.materials.size()).first;
+    if (entry->second == scene.materials.size()) {
+      scene.materials.push_back(scene.materials[instance.material]);
+      scene.materials.back().base_color = surface.albedo;
+    }
+    instance.material = entry->second;
+  }
+  if (recoloured.empty())
+    throw Error(set_file + ": surface.material: no real object has a material \"" +
+                surface.material + "\"; there are " + (known.empty() ? "none" : known));
+}
+
 }  // namespace
 
 Scene load_scene(const set::Set& set) {
@@ -73,6 +99,7 @@ Scene load_scene(const set::Set& set) {
     }
     file->add(object, static_cast<std::uint32_t>(i));
   }
+  for (const set::Surface& surface : set.surfaces) apply(surface, set.file.string(), scene);
   scene.lights.insert(scene.lights.end(), set.lights.begin(), set.lights.end());
   for (const GltfFile* file : in_order)
     for (std::string& note : file->notes()) scene.notes.push_back(std::move(note));

@@ -130,7 +130,8 @@ inline constexpr std::uint64_t max_file_bytes = 0xffffffffull;  // glTF binary's
 // Loads every object of the set. Geometry that nodes share (the same accessors) becomes one mesh
 // with several instances, also where objects name the same file. Throws previz::Error naming the
 // file and what is wrong in it; what can be left out (zero-area and NaN triangles, extensions that
-// are used but not required) goes into Scene::notes.
+// are used but not required) goes into Scene::notes. The set's surfaces give materials of real
+// objects their colour; a surface that none has is an error too.
 Scene load_scene(const set::Set& set);
 
 // Whether anything of this material lets light through: a texture can take metal away.

@@ -39,15 +39,15 @@ std::vector<std::string> keys_of_other_kinds(const ResponseCurve& curve) {
 
 }  // namespace
 
-std::string intrinsics_toml(const PinholeIntrinsics& intrinsics) {
+std::string intrinsics_toml(const ObserverCalibration& calibration) {
   Draft draft;
-  draft.observer.intrinsics = intrinsics;
+  draft.observer = calibration;
   return table_toml(std::move(draft), "observer.intrinsics");
 }
 
-std::string intrinsics_toml(const FisheyeIntrinsics& intrinsics) {
+std::string intrinsics_toml(const LightCameraCalibration& calibration) {
   Draft draft;
-  draft.light.intrinsics = intrinsics;
+  draft.light = calibration;
   return table_toml(std::move(draft), "light_camera.intrinsics");
 }
 
@@ -75,6 +75,21 @@ std::string response_toml(const LightCameraCalibration& calibration) {
   draft.light = calibration;
   return table_toml(std::move(draft), "light_camera.response",
                     keys_of_other_kinds(calibration.response));
+}
+
+std::string balance_toml(const glm::dvec3& balance) {
+  Draft draft;
+  draft.set.lighting.balance = balance;
+  return table_toml(std::move(draft), "lighting");
+}
+
+std::string surface_toml(const Surface& surface) {
+  Draft draft;
+  const auto keys = keys_of(draft, "surface");
+  draft.surfaces.back().surface = surface;
+  std::string text = "[[surface]]\n";
+  for (const Key& key : keys) text += key.name + " = " + key.print() + '\n';
+  return text;
 }
 
 }  // namespace previz::set

@@ -35,6 +35,7 @@ class Resolver {
     light_camera();
     tags();
     objects();
+    surfaces();
     lights();
     lighting();
     room();
@@ -267,6 +268,21 @@ class Resolver {
       object.file = existing(table, "file", draft.file);
       object.world_from_file = placed(draft);
       set_.objects.push_back(object);
+    }
+  }
+
+  void surfaces() {
+    std::map<std::string, Position> first;
+    for (const auto& draft : draft_.surfaces) {
+      const auto& material = draft.surface.material;
+      if (draft.given.good("material")) {
+        const auto [other, fresh] = first.emplace(material, draft.given.where("material"));
+        if (!fresh)
+          problem(draft.given, "material",
+                  codec::quote(material) + " is already in line " +
+                      std::to_string(other->second.line) + "; allowed: each material once");
+      }
+      set_.surfaces.push_back(draft.surface);
     }
   }
 

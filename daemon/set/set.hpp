@@ -68,6 +68,12 @@ struct Object {
 
 enum class LightType { point, spot, directional, rectangle, sphere };
 
+// What is known of a real surface better than its model says.
+struct Surface {
+  std::string material;  // as the glTF files of phantom and removed objects name it
+  glm::dvec3 albedo{0};  // its base colour factor, linear Rec. 709
+};
+
 // A lamp of the set. Gains scale its emission in the mixed and in the real world: an added light is
 // (1,0), a real light that stays is (1,1), a dimmed one (g,1).
 struct Light {
@@ -122,6 +128,7 @@ struct Lighting {
   std::string environment_as_written;
   double environment_rotation_rad = 0;  // about world Z, counter-clockwise from above
   double environment_gain = 1;
+  glm::dvec3 balance{1};  // times the light camera's radiance is the film camera's
   int resolution = 0;  // octahedral map, texels a side; 0: from the source
   UnseenRule unseen = UnseenRule::horizon;
   glm::dvec3 unseen_radiance{0};  // UnseenRule::constant
@@ -190,6 +197,7 @@ struct Set {
   LightCamera light_camera;
   Tracking tracking;
   std::vector<Object> objects;
+  std::vector<Surface> surfaces;
   std::vector<Light> lights;
   Lighting lighting;
   Estimation estimation;

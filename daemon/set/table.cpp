@@ -174,6 +174,13 @@ Keys object_keys(ObjectDraft& o) {
   };
 }
 
+Keys surface_keys(Surface& s) {
+  return {
+      {"material", &s.material, plain, "Name of the material in the glTF files of real objects.", required("\"table top\"")},
+      {"albedo", &s.albedo, plain.within(0, 1), "Its base colour, linear Rec. 709; a texture multiplies it (previzd calibrate balance measures it).", required("[0.52, 0.46, 0.38]")},
+  };
+}
+
 Keys light_keys(Light& l) {
   return {
       {"name", &l.name, plain, "What messages call it.", optional("\"key light\"")},
@@ -201,6 +208,7 @@ Keys lighting_keys(Draft& d) {
       {"environment", &d.environment, plain, "Latitude-longitude EXR in place of the light camera; Z up, the picture's middle is +X.", optional("\"env.exr\"")},
       {"environment_rotation_deg", &l.environment_rotation_rad, deg, "Turns that picture about world Z, counter-clockwise seen from above."},
       {"environment_gain", &l.environment_gain, plain.at_least(0), "Scales that picture."},
+      {"balance", &l.balance, plain.within(1e-6, 1e6), "Red, green and blue: what the light camera's radiance is multiplied by to be the film camera's (previzd calibrate balance)."},
       {"resolution", &l.resolution, plain.within(0, 4096), "Side of the light map in texels, a power of two; 0: as fine as the source."},
       {"unseen", &l.unseen, plain, "What stands where the light camera cannot see: the edge of its picture continued, its picture mirrored about the plane it stands in, what the film camera has seen there (elsewhere the edge continued), or a constant."},
       {"unseen_radiance", &d.unseen_radiance, plain.at_least(0), "With unseen = \"constant\" only: linear Rec. 709 radiance.", optional("[0.1, 0.1, 0.1]")},
@@ -299,6 +307,7 @@ std::vector<Section> sections(Draft& d) {
       once("tracking", always, "Where the film camera is, found by printed AprilTags.", [&d] { return tracking_keys(d.set.tracking); }),
       many("tag", "A printed tag; one table each. Give its pose in one of three forms.", d.tags, tag_keys),
       many("object", "A piece of geometry, real or virtual; one table each.", d.objects, object_keys),
+      many("surface", "The colour of a real surface, where it is known better than the model says; one table each.", d.surfaces, [](SurfaceDraft& s) { return surface_keys(s.surface); }),
       many("light", "A lamp that is added or whose brightness is changed; one table each. A lamp of another colour is two: the real one with gain_mixed = 0, and one that is added in its place.", d.lights, [](LightDraft& l) { return light_keys(l.light); }),
       once("lighting", always, "The light around the set.", [&d] { return lighting_keys(d); }),
       once("lighting.room", optional, "Where the light comes from, if it is near: the light camera's picture is put on these walls and seen anew from the set. Left out: from far away.", [&d] { return room_keys(d); }),

@@ -54,6 +54,11 @@ struct ObjectDraft {
   double scale = 1;
 };
 
+struct SurfaceDraft {
+  Given given;
+  Surface surface;
+};
+
 struct LightDraft {
   Given given;
   Light light;
@@ -75,6 +80,7 @@ struct Draft {
   PoseDraft room_pose;
   std::vector<TagDraft> tags;
   std::vector<ObjectDraft> objects;
+  std::vector<SurfaceDraft> surfaces;
   std::vector<LightDraft> lights;
 };
 

@@ -103,9 +103,11 @@ TEST(FisheyeCalibration, RaysAreRightAsFarAsItIsTrusted) {
 
 TEST(FisheyeCalibration, WritesTheTableThatASetFileTakes) {
   const FisheyeFit fisheye = fit_fisheye(all_around());
+  LightCameraCalibration camera;
+  camera.intrinsics = fisheye.intrinsics;
   const glm::dmat4 pose = test::look_at({0.3, 0.1, 0.2}, {0.4, 0.2, 2});
-  const set::Set set = set::parse_set(
-      set::intrinsics_toml(fisheye.intrinsics) + set::light_pose_toml(pose), "printed.toml");
+  const set::Set set =
+      set::parse_set(set::intrinsics_toml(camera) + set::light_pose_toml(pose), "printed.toml");
   ASSERT_TRUE(set.light_camera.calibration);
   EXPECT_NEAR(set.light_camera.calibration->intrinsics.fx, fisheye.intrinsics.fx, 1e-8);
   EXPECT_NEAR(set.light_camera.calibration->intrinsics.k[3], fisheye.intrinsics.k[3], 1e-11);

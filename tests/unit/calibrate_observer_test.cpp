@@ -210,7 +210,9 @@ TEST(ObserverCapture, AsksForTheBoardFromNearer) {
 
 TEST(ObserverCalibration, WritesTheTableThatASetFileTakes) {
   const ObserverFit observer = fit_observer(captured(test::careful_capture()));
-  const set::Set set = set::parse_set(set::intrinsics_toml(observer.intrinsics), "printed.toml");
+  ObserverCalibration calibration;
+  calibration.intrinsics = observer.intrinsics;
+  const set::Set set = set::parse_set(set::intrinsics_toml(calibration), "printed.toml");
   ASSERT_TRUE(set.observer.calibration);
   const PinholeIntrinsics& read = set.observer.calibration->intrinsics;
   EXPECT_EQ(read.width, width);

@@ -87,6 +87,27 @@ TEST_F(GltfMaterials, ReadsEveryFactor) {
   EXPECT_EQ(m.attenuation_distance_m, 0.5f);
 }
 
+// What the set knows better than the model: on real objects only, though a virtual one shares the
+// file and the material.
+TEST_F(GltfMaterials, SurfacesOfTheSetColourRealObjects) {
+  object.presence = set::Presence::phantom;
+  a_set.surfaces = {{"paint", {0.5, 0.25, 0.125}}};
+  set::Object shown = object;
+  shown.presence = set::Presence::virtual_object;
+  shown.file = directory / "test.gltf";
+  a_set.objects = {shown};
+  use({{"name", "paint"}});
+  const scene::Scene scene = load();
+  ASSERT_EQ(scene.instances.size(), 2u);
+  for (const scene::Instance& instance : scene.instances) {
+    const bool real = (instance.presence & scene::world_real) != 0;
+    EXPECT_EQ(scene.materials[instance.material].base_color,
+              real ? glm::vec3(0.5f, 0.25f, 0.125f) : glm::vec3(1));
+  }
+  a_set.surfaces = {{"pain", {1, 1, 1}}};
+  EXPECT_THAT(error(), HasSubstr("no real object has a material \"pain\"; there are \"paint\""));
+}
+
 TEST_F(GltfMaterials, OpaqueMeansAlphaOneAndThicknessZeroMeansThin) {
   const scene::Material m =
       loaded({{"pbrMetallicRoughness", {{"baseColorFactor", {1, 1, 1, 0.4}}}},

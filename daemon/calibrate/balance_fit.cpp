@@ -1,0 +1,141 @@
+#include "daemon/calibrate/balance_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "daemon/lighting/luminance.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::calibrate {
+namespace {
+
+constexpr std::size_t least_pixels = 8;      // of a tile
+constexpr double median_over_mean = 1.2533;  // standard errors of a Gaussian: sqrt(pi / 2)
+constexpr double sigma_over_mad = 1.4826;
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  if (values.size() % 2) return *middle;
+  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
+}
+
+struct Location {
+  double middle = 0, sigma = 0;
+};
+
+// Of values that may have outliers. Of one value nothing is known about its deviation; of two, half
+// their distance.
+Location location(const std::vector<double>& values, double least_sigma) {
+  Location at{median(values), least_sigma};
+  if (values.size() < 2) return at;
+  std::vector<double> off;
+  for (const double value : values) off.push_back(std::abs(value - at.middle));
+  const double n = double(values.size());
+  const double sigma = median_over_mean * sigma_over_mad * median(off) / std::sqrt(n);
+  // The deviation of few values is itself uncertain by 1 / sqrt(2 (n - 1)).
+  at.sigma = std::max(least_sigma, sigma * (1 + 1 / std::sqrt(2 * (n - 1))));
+  return at;
+}
+
+using Logs = std::vector<double>;
+
+// Medians of log(plate / rendered) of a channel, by tile.
+Logs tile_medians(const SurfacePixels& seen, std::uint32_t surface, int channel) {
+  std::map<std::uint32_t, Logs> by_tile;
+  for (const SurfacePixel& pixel : seen.pixels)
+    if (pixel.surface == surface && pixel.rendered[channel] > 0 && pixel.plate[channel] > 0)
+      by_tile[pixel.tile].push_back(std::log(pixel.plate[channel] / pixel.rendered[channel]));
+  Logs medians;
+  for (auto& [tile, logs] : by_tile)
+    if (logs.size() >= least_pixels) medians.push_back(median(std::move(logs)));
+  return medians;
+}
+
+std::vector<SurfaceRatio> ratios(const SurfacePixels& seen) {
+  std::vector<SurfaceRatio> all;
+  for (std::uint32_t s = 0; s < seen.surfaces.size(); ++s) {
+    SurfaceRatio surface;
+    surface.surface = s;
+    surface.pixels = std::size_t(std::ranges::count(seen.pixels, s, &SurfacePixel::surface));
+    bool all_channels = true;
+    for (int c = 0; c < 3; ++c) {
+      const Logs logs = tile_medians(seen, s, c);
+      all_channels = all_channels && !logs.empty();
+      if (logs.empty()) continue;
+      // One tile: what a step of an 8-bit code is worth in the middle of its range, 2 %.
+      const Location at = location(logs, logs.size() == 1 ? 0.02 : 0);
+      surface.tiles = logs.size();
+      surface.ratio[c] = std::exp(at.middle);
+      surface.sigma[c] = at.sigma;
+    }
+    if (all_channels) all.push_back(surface);
+  }
+  return all;
+}
+
+std::string listed(const SurfacePixels& seen, const std::vector<SurfaceRatio>& surfaces) {
+  std::string names;
+  for (const SurfaceRatio& surface : surfaces)
+    names += (names.empty() ? "" : ", ") + seen.surfaces[surface.surface].material;
+  return names.empty() ? "none" : names;
+}
+
+void mark_references(const SurfacePixels& seen, const std::vector<std::string>& references,
+                     std::vector<SurfaceRatio>& surfaces) {
+  for (SurfaceRatio& surface : surfaces) surface.reference = references.empty();
+  for (const std::string& name : references) {
+    const auto found = std::ranges::find_if(surfaces, [&](const SurfaceRatio& surface) {
+      return seen.surfaces[surface.surface].material == name;
+    });
+    if (found == surfaces.end())
+      throw Error("reference surface \"" + name +
+                  "\" is not seen well enough; seen are: " + listed(seen, surfaces));
+    found->reference = true;
+  }
+}
+
+}  // namespace
+
+Balance fit_balance(const SurfacePixels& seen, const std::vector<std::string>& references) {
+  Balance balance;
+  balance.surfaces = ratios(seen);
+  if (balance.surfaces.empty())
+    throw Error("no diffuse real surface is seen on " + std::to_string(least_pixels) +
+                " pixels of a sixteenth of the picture, unclipped: is there a phantom in the set, "
+                "and is it in the picture?");
+  mark_references(seen, references, balance.surfaces);
+  for (int c = 0; c < 3; ++c) {
+    Logs logs;
+    double least_sigma = HUGE_VAL;
+    for (const SurfaceRatio& surface : balance.surfaces) {
+      if (!surface.reference) continue;
+      logs.push_back(std::log(surface.ratio[c]));
+      least_sigma = std::min(least_sigma, surface.sigma[c]);
+    }
+    const Location at = location(logs, least_sigma);
+    balance.scale[c] = std::exp(at.middle);
+    balance.sigma[c] = at.sigma;
+  }
+  return balance;
+}
+
+double exposure_error_stops(const Balance& balance) {
+  return std::log2(lighting::luminance(glm::vec3(balance.scale)));
+}
+
+double exposure_error_sigma_stops(const Balance& balance) {
+  return std::max({balance.sigma.r, balance.sigma.g, balance.sigma.b}) / std::log(2.0);
+}
+
+AlbedoEstimate albedo_of(const SurfaceRatio& surface, const KnownSurface& known,
+                         const Balance& balance) {
+  AlbedoEstimate estimate;
+  estimate.albedo = known.albedo * surface.ratio / balance.scale;
+  for (int c = 0; c < 3; ++c)
+    estimate.sigma[c] = estimate.albedo[c] * std::hypot(surface.sigma[c], balance.sigma[c]);
+  return estimate;
+}
+
+}  // namespace previz::calibrate

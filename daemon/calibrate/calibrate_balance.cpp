@@ -1,0 +1,85 @@
+#include <fmt/ostream.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "daemon/calibrate/balance_fit.hpp"
+#include "daemon/calibrate/calibrate.hpp"
+#include "daemon/calibrate/report.hpp"
+#include "daemon/calibrate/surface_pixels.hpp"
+#include "daemon/pipeline/take.hpp"
+#include "daemon/set/print.hpp"
+
+namespace previz::calibrate {
+namespace {
+
+// Metadata that are right are so to a third of a stop, as shutters and aperture rings are.
+constexpr double stated_well_stops = 1.0 / 3;
+
+std::string percent(const glm::dvec3& v) {
+  return fmt::format("{:.1f} {:.1f} {:.1f} %", 100 * v.r, 100 * v.g, 100 * v.b);
+}
+
+void tell_exposure(const Balance& balance, std::ostream& out) {
+  const double stops = exposure_error_stops(balance), sigma = exposure_error_sigma_stops(balance);
+  if (std::abs(stops) < stated_well_stops || std::abs(stops) < 3 * sigma) {
+    fmt::print(out, "the exposures that the cameras state agree to {:+.2f} +- {:.2f} stops\n",
+               stops, sigma);
+    return;
+  }
+  fmt::print(out,
+             "THE EXPOSURES THAT THE CAMERAS STATE DISAGREE by {:.2f} +- {:.2f} stops: the light "
+             "camera's light comes out too {}. Check shutter, gain and responsivity of both; the "
+             "balance below makes up for it.\n",
+             std::abs(stops), sigma, stops > 0 ? "dark" : "bright");
+}
+
+// The suggestion for one surface, as a table with its uncertainty; a note where there is none.
+std::string suggestion(const SurfaceRatio& surface, const KnownSurface& known,
+                       const Balance& balance) {
+  const AlbedoEstimate estimate = albedo_of(surface, known, balance);
+  const std::string words = fmt::format(
+      "# {}: albedo {:.3f} {:.3f} {:.3f} +- {:.3f} {:.3f} {:.3f}, the model has {:.3f} "
+      "{:.3f} {:.3f}; {} pixels\n",
+      known.material, estimate.albedo.r, estimate.albedo.g, estimate.albedo.b, estimate.sigma.r,
+      estimate.sigma.g, estimate.sigma.b, known.albedo.r, known.albedo.g, known.albedo.b,
+      surface.pixels);
+  for (int c = 0; c < 3; ++c)
+    if (estimate.albedo[c] > 1)
+      return words + "# (no surface reflects more than all light: not suggested)\n";
+  return words + set::surface_toml({known.material, estimate.albedo});
+}
+
+void tell(const SurfacePixels& seen, const Balance& balance, std::ostream& out) {
+  fmt::print(out, "{} frames, {} pixels of diffuse real surfaces\n", seen.frames,
+             seen.pixels.size());
+  for (const SurfaceRatio& surface : balance.surfaces)
+    fmt::print(out,
+               "  {}: camera over model {:.3f} {:.3f} {:.3f} (+- {}), {} pixels in {} tiles{}\n",
+               seen.surfaces[surface.surface].material, surface.ratio.r, surface.ratio.g,
+               surface.ratio.b, percent(surface.sigma), surface.pixels, surface.tiles,
+               surface.reference ? "" : ", no reference");
+  fmt::print(out, "balance {:.4f} {:.4f} {:.4f} (+- {})\n", balance.scale.r, balance.scale.g,
+             balance.scale.b, percent(balance.sigma));
+}
+
+}  // namespace
+
+void calibrate_balance(const BalanceOptions& options, std::ostream& out) {
+  pipeline::Take take = pipeline::open_take(options.session, options.set_file);
+  const scene::Scene scene = scene::load_scene(take.set);
+  ProbeOptions probe;
+  probe.frames = options.frames;
+  probe.samples = options.samples;
+  const SurfacePixels seen =
+      probe_surfaces(take, scene, render::open_device(options.device), probe);
+  const Balance balance = fit_balance(seen, options.references);
+  tell(seen, balance, out);
+  tell_exposure(balance, out);
+  std::string tables = set::balance_toml(take.set.lighting.balance * balance.scale);
+  for (const SurfaceRatio& surface : balance.surfaces)
+    tables += fmt::format("\n{}", suggestion(surface, seen.surfaces[surface.surface], balance));
+  tell_tables(tables, options.table_file, out);
+}
+
+}  // namespace previz::calibrate

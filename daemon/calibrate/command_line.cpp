@@ -1,0 +1,90 @@
+#include "daemon/calibrate/command_line.hpp"
+
+#include <CLI/CLI.hpp>
+#include <map>
+
+#include "daemon/calibrate/board.hpp"
+
+namespace previz::calibrate {
+namespace {
+
+void add_lens_options(CLI::App& command, LensOptions& options) {
+  command.add_option("footage", options.footage, "Session, folder of pictures, or video")
+      ->required();
+  command.add_option("--board", options.board, board_grammar);
+  command.add_option("--every", options.every, "Look at every Nth picture only")
+      ->check(CLI::Range(1, 1'000'000));
+  command.add_option("--out", options.table_file, "File for the set file's tables");
+  command.add_option("--plot", options.residual_plot, "SVG file for the residuals");
+  command.add_flag("--force", options.force, "Take the calibration although views are missing");
+}
+
+void add_observer(CLI::App& calibrate, LensOptions& options) {
+  CLI::App& command = *calibrate.add_subcommand("observer", "The film camera's lens");
+  add_lens_options(command, options);
+  command.get_option("--board")->required();
+}
+
+void add_light(CLI::App& calibrate, LightOptions& options) {
+  CLI::App& command =
+      *calibrate.add_subcommand("light", "The light camera's fisheye, and where it stands");
+  add_lens_options(command, options);
+  command.add_option("--tags", options.tags_set, "Set file whose tags it sees: finds its pose");
+}
+
+void add_response(CLI::App& calibrate, ResponseOptions& options) {
+  CLI::App& command =
+      *calibrate.add_subcommand("response", "A camera's response curve, from a bracket");
+  command.add_option("footage", options.footage, "Session or folder of pictures")->required();
+  command
+      .add_option("--camera", options.camera, "Whose table is printed, and whose stream is read")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, CameraRole>{
+          {"observer", CameraRole::observer}, {"light", CameraRole::light}}));
+  command.add_option("--exposures", options.exposures,
+                     "File of lines NAME SECONDS (default: the pictures' EXIF)");
+  command.add_option("--method", options.method, "debevec or robertson (default: the better one)")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, ResponseMethod>{
+          {"debevec", ResponseMethod::debevec}, {"robertson", ResponseMethod::robertson}}));
+  command.add_option("--out", options.table_file, "File for the set file's table");
+}
+
+void add_balance(CLI::App& calibrate, BalanceOptions& options) {
+  CLI::App& command = *calibrate.add_subcommand(
+      "balance", "One scale and white balance between the cameras, and the colours of surfaces");
+  command.add_option("session", options.session, "Session directory")->required();
+  command.add_option("--set", options.set_file, "Set file, instead of the session's own");
+  command
+      .add_option("--reference", options.references,
+                  "Materials of real objects whose albedo is known (default: all count alike)")
+      ->delimiter(',');
+  command.add_option("--frames", options.frames, "Pictures to compare")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  command.add_option("--spp", options.samples, "Samples per pixel")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
+  command.add_option("--device", options.device.name, "Vulkan device whose name contains this");
+  command.add_option("--out", options.table_file, "File for the set file's tables");
+}
+
+}  // namespace
+
+void add_calibrate(CLI::App& app, Commands& commands) {
+  CLI::App& command = *app.add_subcommand("calibrate", "Measure a camera; prints set file tables");
+  command.require_subcommand(1);
+  add_observer(command, commands.observer);
+  add_light(command, commands.light);
+  add_response(command, commands.response);
+  add_balance(command, commands.balance);
+}
+
+int do_calibrate(const CLI::App& app, const Commands& commands, std::ostream& out) {
+  const CLI::App& command = *app.get_subcommand("calibrate");
+  if (command.got_subcommand("observer")) calibrate_observer(commands.observer, out);
+  if (command.got_subcommand("light")) calibrate_light(commands.light, out);
+  if (command.got_subcommand("response")) calibrate_response(commands.response, out);
+  if (command.got_subcommand("balance")) calibrate_balance(commands.balance, out);
+  return 0;
+}
+
+}  // namespace previz::calibrate

@@ -1,0 +1,26 @@
+// The command line of `previzd calibrate` and its subcommands.
+#pragma once
+
+#include <ostream>
+
+#include "daemon/calibrate/calibrate.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace previz::calibrate {
+
+struct Commands {
+  LensOptions observer;
+  LightOptions light;
+  ResponseOptions response;
+  BalanceOptions balance;
+};
+
+// Adds `calibrate` with its subcommands to `app`; `commands` must outlive it.
+void add_calibrate(CLI::App& app, Commands& commands);
+// Does the one that the command line asked for; the program's exit status.
+int do_calibrate(const CLI::App& app, const Commands& commands, std::ostream& out);
+
+}  // namespace previz::calibrate

@@ -1,0 +1,235 @@
+#include "daemon/calibrate/response_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/photo.hpp>
+
+#include "daemon/lighting/response.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::calibrate {
+namespace {
+
+constexpr std::size_t codes = 256;
+constexpr std::size_t most_pixels = 4000, least_pixels = 100;
+constexpr int debevec_side = 10;
+constexpr float debevec_smoothness = 10, robertson_threshold = 0.01f;
+constexpr int robertson_rounds = 50;
+constexpr int noise_codes = 4;  // by which a brighter exposure may be darker
+constexpr int dark_end = 15, bright_end = 240;
+constexpr std::size_t least_predicted = 50;
+
+// Codes of the chosen pixels: of exposure e, pixel p, channel c at [e][3 p + c].
+using Samples = std::vector<std::vector<std::uint8_t>>;
+
+bool rises(std::span<const BracketPicture> bracket, std::size_t sample) {
+  for (std::size_t e = 1; e < bracket.size(); ++e)
+    if (bracket[e].rgb[sample] + noise_codes < bracket[e - 1].rgb[sample]) return false;
+  return true;
+}
+
+// Neither black nor white in at least two exposures.
+bool is_seen(std::span<const BracketPicture> bracket, std::size_t sample) {
+  return std::ranges::count_if(bracket, [&](const BracketPicture& picture) {
+           return picture.rgb[sample] >= dark_end && picture.rgb[sample] <= bright_end;
+         }) >= 2;
+}
+
+// Up to `count` of the pixels, as many dark as bright ones: a picture is mostly of one brightness,
+// and a curve is needed at all.
+std::vector<std::size_t> spread(std::span<const BracketPicture> bracket,
+                                const std::vector<std::size_t>& pixels, std::size_t count) {
+  std::vector<std::vector<std::size_t>> by_brightness(32);
+  for (const std::size_t p : pixels) {
+    std::size_t sum = 0;
+    for (const BracketPicture& picture : bracket)
+      for (std::size_t c = 0; c < 3; ++c) sum += picture.rgb[3 * p + c];
+    by_brightness[sum * by_brightness.size() / (bracket.size() * 3 * codes)].push_back(p);
+  }
+  // Evenly over the picture within a brightness: those that are few give all they have.
+  std::ranges::sort(by_brightness, {}, [](const auto& some) { return some.size(); });
+  std::vector<std::size_t> chosen;
+  for (std::size_t b = 0; b < by_brightness.size(); ++b) {
+    const auto& some = by_brightness[b];
+    const std::size_t share = (count - chosen.size()) / (by_brightness.size() - b);
+    const std::size_t taken = std::min(share, some.size());
+    for (std::size_t i = 0; i < taken; ++i) chosen.push_back(some[i * some.size() / taken]);
+  }
+  return chosen;
+}
+
+Samples choose(std::span<const BracketPicture> bracket) {
+  std::vector<std::size_t> usable;
+  const std::size_t pixels = bracket[0].rgb.size() / 3;
+  for (std::size_t p = 0; p < pixels; ++p) {
+    bool use = true;
+    for (std::size_t c = 0; c < 3; ++c)
+      use = use && rises(bracket, 3 * p + c) && is_seen(bracket, 3 * p + c);
+    if (use) usable.push_back(p);
+  }
+  if (usable.size() < least_pixels)
+    throw Error("only " + std::to_string(usable.size()) +
+                " pixels get brighter with the exposure and are seen in two of them; did camera "
+                "and scene stand still, and are the exposures what the pictures were taken with?");
+  Samples samples(bracket.size());
+  for (const std::size_t p : spread(bracket, usable, most_pixels))
+    for (std::size_t e = 0; e < bracket.size(); ++e)
+      for (std::size_t c = 0; c < 3; ++c) samples[e].push_back(bracket[e].rgb[3 * p + c]);
+  return samples;
+}
+
+// Codes that no exposure showed (0 in OpenCV's answer) lie between their neighbours, in proportion
+// below the first. White stands for all that is brighter: its signal, the least that clips, goes on
+// from the codes below it.
+void complete(std::vector<double>& signal) {
+  constexpr std::size_t white = codes - 1, run = 8;
+  std::size_t last = 0;
+  for (std::size_t v = 1; v < white; ++v) {
+    if (!(signal[v] > 0)) continue;
+    const double below = last ? signal[last] : 0;
+    for (std::size_t gap = last + 1; gap < v; ++gap)
+      signal[gap] = below + (signal[v] - below) * double(gap - last) / double(v - last);
+    last = v;
+  }
+  const std::size_t from = last > run ? last - run : 0;
+  const double slope = std::max(0.0, signal[last] - (from ? signal[from] : 0)) /
+                       double(std::max<std::size_t>(1, last - from));
+  for (std::size_t v = last + 1; v <= white; ++v)
+    signal[v] = signal[last] + slope * double(v - last);
+}
+
+// Relative signal by code, by OpenCV, from all exposures but one (or none, if there is no such).
+std::vector<double> solve(const Samples& samples, std::span<const BracketPicture> bracket,
+                          ResponseMethod method, std::size_t without) {
+  std::vector<cv::Mat> pictures;
+  std::vector<float> times;
+  for (std::size_t e = 0; e < samples.size(); ++e) {
+    if (e == without) continue;
+    pictures.push_back(
+        cv::Mat(int(samples[e].size()), 1, CV_8UC1, const_cast<std::uint8_t*>(samples[e].data())));
+    times.push_back(float(bracket[e].exposure));
+  }
+  cv::Mat response;
+  if (method == ResponseMethod::debevec) {
+    // OpenCV picks its samples on a grid: it is given a picture that is the grid.
+    for (cv::Mat& picture : pictures) {
+      cv::Mat1b grid(debevec_side, debevec_side);
+      for (int i = 0; i < int(grid.total()); ++i)
+        grid(i / debevec_side, i % debevec_side) =
+            picture.at<std::uint8_t>(int(std::size_t(i) * samples[0].size() / grid.total()));
+      picture = grid;
+    }
+    cv::createCalibrateDebevec(debevec_side * debevec_side, debevec_smoothness)
+        ->process(pictures, response, times);
+  } else {
+    // OpenCV 4.6 takes it for granted that there are three channels.
+    for (cv::Mat& picture : pictures) cv::merge(std::vector<cv::Mat>(3, picture), picture);
+    cv::createCalibrateRobertson(robertson_rounds, robertson_threshold)
+        ->process(pictures, response, times);
+  }
+  std::vector<double> signal(codes);
+  cv::extractChannel(response, response, 0);
+  for (std::size_t v = 0; v < codes; ++v) signal[v] = response.at<float>(int(v));
+  complete(signal);
+  return signal;
+}
+
+LeftOut predict(const Samples& samples, std::span<const BracketPicture> bracket,
+                const ResponseCurve& curve, std::size_t left_out) {
+  const lighting::Response response(curve, 8);
+  LeftOut result{bracket[left_out].name, bracket[left_out].exposure, {}};
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::vector<int> errors;
+    for (std::size_t s = c; s < samples[0].size(); s += 3) {
+      const int seen = samples[left_out][s];
+      if (seen < dark_end || seen > bright_end) continue;
+      // What photons would say, from codes that are neither near black nor near white.
+      double signals = 0, open = 0;
+      for (std::size_t e = 0; e < samples.size(); ++e) {
+        const std::uint8_t code = samples[e][s];
+        if (e == left_out || code < dark_end || code > bright_end) continue;
+        signals += response.inverse()[code];
+        open += bracket[e].exposure;
+      }
+      if (open == 0) continue;
+      const double predicted = signals / open * bracket[left_out].exposure;
+      errors.push_back(std::abs(response.forward(predicted) - seen));
+    }
+    result.error_codes[c] = -1;
+    if (errors.size() < least_predicted) continue;
+    const auto middle = errors.begin() + std::ptrdiff_t(errors.size() / 2);
+    std::ranges::nth_element(errors, middle);
+    result.error_codes[c] = *middle;
+  }
+  return result;
+}
+
+double mean_error(const std::vector<LeftOut>& all) {
+  double sum = 0;
+  int count = 0;
+  for (const LeftOut& one : all)
+    for (const double error : one.error_codes)
+      if (error >= 0) {
+        sum += error;
+        ++count;
+      }
+  return count ? sum / count : 0;
+}
+
+}  // namespace
+
+const char* to_string(ResponseMethod method) {
+  return method == ResponseMethod::debevec ? "Debevec" : "Robertson";
+}
+
+ResponseCurve monotone_curve(std::vector<double> signal) {
+  // Pool adjacent violators (Barlow et al. 1972) over the logarithms of codes 1 to 255.
+  struct Pool {
+    double sum;
+    int count;
+    double mean() const { return sum / count; }
+  };
+  std::vector<Pool> pools;
+  for (std::size_t v = 1; v < signal.size(); ++v) {
+    pools.push_back({std::log(std::max(signal[v], 1e-12)), 1});
+    while (pools.size() > 1 && pools[pools.size() - 2].mean() >= pools.back().mean()) {
+      const Pool last = pools.back();
+      pools.pop_back();
+      pools.back() = {pools.back().sum + last.sum, pools.back().count + last.count};
+    }
+  }
+  ResponseCurve curve;
+  curve.kind = ResponseCurve::Kind::table;
+  curve.inverse_table = {0};
+  // Codes of one pool differ by a step that no one sees, and that survives being printed.
+  constexpr double step = 1e-7;
+  for (const Pool& pool : pools)
+    for (int i = 0; i < pool.count; ++i)
+      curve.inverse_table.push_back(
+          std::max(std::exp(pool.mean()), curve.inverse_table.back() * (1 + step)));
+  const double white = curve.inverse_table.back();
+  for (double& value : curve.inverse_table) value /= white;
+  curve.inverse_table.back() = 1;
+  return curve;
+}
+
+ResponseFit fit_response(std::span<const BracketPicture> bracket, ResponseMethod method) {
+  const Samples samples = choose(bracket);
+  ResponseFit fit;
+  fit.method = method;
+  fit.curve = monotone_curve(solve(samples, bracket, method, bracket.size()));
+  for (std::size_t e = 0; e < bracket.size(); ++e) {
+    const ResponseCurve others = monotone_curve(solve(samples, bracket, method, e));
+    fit.left_out.push_back(predict(samples, bracket, others, e));
+  }
+  fit.error_codes = mean_error(fit.left_out);
+  fit.darkest = 255;
+  for (const auto& picture : samples)
+    for (const std::uint8_t code : picture) {
+      if (code > 0) fit.darkest = std::min<int>(fit.darkest, code);
+      if (code < 255) fit.brightest = std::max<int>(fit.brightest, code);
+    }
+  return fit;
+}
+
+}  // namespace previz::calibrate

@@ -1,0 +1,224 @@
+#include "daemon/calibrate/surface_pixels.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "daemon/lighting/response.hpp"
+#include "daemon/pipeline/light_stage.hpp"
+#include "daemon/pipeline/preview_size.hpp"
+#include "daemon/pipeline/track_stage.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::calibrate {
+namespace {
+
+constexpr float diffuse_roughness = 0.5f;
+constexpr int tiles_a_side = 4;
+constexpr int identity_samples = 16;
+constexpr std::uint32_t no_surface = 0;  // in identity pictures surfaces count from 1
+
+bool is_diffuse(const scene::Material& m) {
+  const bool coated = m.specular > 0 && m.ior > 1 && m.roughness < diffuse_roughness;
+  return m.metallic == 0 && m.transmission == 0 && m.emission == glm::vec3(0) && !coated &&
+         m.metallic_roughness_texture == scene::no_texture &&
+         m.alpha_mode == scene::AlphaMode::opaque;
+}
+
+scene::Scene real_world(scene::Scene scene) {
+  std::erase_if(scene.instances, [](const scene::Instance& instance) {
+    return (instance.presence & scene::world_real) == 0;
+  });
+  return scene;
+}
+
+// Every surface of the real world glows with its number; black where it is not diffuse.
+scene::Scene glowing(scene::Scene scene, std::vector<KnownSurface>& surfaces) {
+  for (scene::Material& material : scene.materials) {
+    scene::Material glow;
+    glow.name = material.name;
+    glow.double_sided = material.double_sided;
+    glow.base_color = glm::vec3(0);
+    glow.specular = 0;
+    if (is_diffuse(material)) {
+      auto known = std::ranges::find(surfaces, material.name, &KnownSurface::material);
+      if (known == surfaces.end())
+        known = surfaces.insert(surfaces.end(), {material.name, glm::dvec3(material.base_color)});
+      const auto k = float(known - surfaces.begin() + 1);
+      glow.emission = glm::vec3(k, k * k, 1);
+    }
+    material = glow;
+  }
+  scene.lights.clear();
+  return scene;
+}
+
+lighting::EnvironmentMap darkness() {
+  lighting::EnvironmentMap map;
+  map.size = 1;
+  map.radiance = {glm::vec3(0)};
+  return map;
+}
+
+// The number of the one surface that all samples of a pixel met, if it is one.
+std::uint32_t surface_of(const glm::vec3& mean) {
+  constexpr float rounding = 1e-3f;
+  if (std::abs(mean.b - 1) > rounding) return no_surface;
+  const float k = std::round(mean.r);
+  const bool is_one = std::abs(mean.r - k) <= rounding && std::abs(mean.g - k * k) <= rounding * k;
+  return is_one ? std::uint32_t(k) : no_surface;
+}
+
+// By scaled pixel: whether a sample of the plate under it is black or white.
+std::vector<bool> blinded(const Plate& plate, int width, int height) {
+  std::vector<bool> blind(std::size_t(width) * std::size_t(height));
+  const int white = (1 << plate.bits) - 1;
+  for (int y = 0; y < plate.height; ++y)
+    for (int x = 0; x < plate.width; ++x) {
+      const std::uint16_t* sample =
+          &plate.samples[3 * (std::size_t(y) * std::size_t(plate.width) + std::size_t(x))];
+      const bool ends =
+          std::any_of(sample, sample + 3, [&](std::uint16_t v) { return v == 0 || v == white; });
+      if (ends)
+        blind[std::size_t(y * height / plate.height) * std::size_t(width) +
+              std::size_t(x * width / plate.width)] = true;
+    }
+  return blind;
+}
+
+// All light in one picture, lamps and all: what is compared does not depend on finding them.
+set::Set lit_by_image(set::Set set) {
+  set.lighting.mode = set::LightMode::image;
+  return set;
+}
+
+class Probe {
+ public:
+  Probe(pipeline::Take& take, const scene::Scene& scene,
+        const std::shared_ptr<render::Device>& device, const ProbeOptions& options)
+      : take_(take),
+        options_(options),
+        scale_(std::min(1.0, double(options.width) / take.observer.intrinsics.width)),
+        small_(pipeline::scaled(take.observer, scale_)),
+        light_stage_(lit_by_image(take.set), take.light, take.observer),
+        worlds_(device, paired(take.set), small_),
+        identity_(device, paired(take.set), small_) {
+    const scene::Scene real = real_world(scene);
+    worlds_.set_scene(real);
+    identity_.set_scene(glowing(real, found_.surfaces));
+    identity_.set_environment(darkness(), set::LightSampling::bsdf);
+  }
+
+  SurfacePixels run() {
+    const auto frames = tracked_frames();
+    for (const pipeline::Shot& shot : frames) {
+      see_light_until(shot.frame->timestamp_ns);
+      const pipeline::LightPtr light = light_stage_.light();
+      if (!light) continue;
+      worlds_.set_environment(light->lighting.environment, take_.set.lighting.sampling);
+      add(shot);
+      ++found_.frames;
+    }
+    if (found_.frames == 0)
+      throw Error(take_.session.directory.string() +
+                  ": no frame has both a pose and light: there is nothing to balance by");
+    return std::move(found_);
+  }
+
+ private:
+  static set::Estimation paired(const set::Set& set) {
+    set::Estimation estimation = set.estimation;
+    estimation.estimator = set::Estimator::paired;
+    estimation.composite = set::Composite::additive;
+    return estimation;
+  }
+
+  // As many as asked for, spread evenly over those that are tracked.
+  std::vector<pipeline::Shot> tracked_frames() {
+    const std::size_t count = take_.observer_stream->records().size();
+    const auto wanted = std::size_t(options_.frames);
+    std::vector<pipeline::Shot> shots;
+    pipeline::TrackStage track(take_.set, take_.observer, take_.session.track);
+    for (std::size_t i = 0; i < wanted; ++i) {
+      // The first that is tracked from here to where the next one's share begins; from the end for
+      // the last, since light comes after the first pictures of some takes.
+      for (std::size_t f = i * count / wanted; f < (i + 1) * count / wanted; ++f) {
+        pipeline::Shot shot;
+        shot.index = f;
+        shot.frame = take_.observer_stream->read(f);
+        track(shot);
+        if (!shot.track.pose) continue;
+        shots.push_back(std::move(shot));
+        break;
+      }
+    }
+    return shots;
+  }
+
+  void see_light_until(std::int64_t timestamp_ns) {
+    if (!take_.light_stream || !light_stage_.needs_frames()) return;
+    const auto& records = take_.light_stream->records();
+    for (; next_light_ < records.size() && records[next_light_].timestamp_ns <= timestamp_ns;
+         ++next_light_)
+      light_stage_.see(take_.light_stream->read(next_light_), next_light_);
+  }
+
+  void add(const pipeline::Shot& shot) {
+    const Plate full = to_plate(*shot.frame);
+    const lighting::Response response(take_.observer.response, full.bits);
+    const Plate plate = pipeline::scaled(full, scale_, response);
+    const double exposure = take_.set.observer.exposure.value_or(shot.frame->exposure);
+    const render::FrameInput input{plate, exposure, shot.track.pose->world_from_camera};
+    identity_.begin(input);
+    identity_.render(identity_samples);
+    worlds_.begin(input);
+    worlds_.render(options_.samples);
+    const std::vector<glm::vec3> identity = identity_.layers().real;
+    const std::vector<glm::vec3> real = worlds_.layers().real;
+    const std::vector<bool> blind = blinded(full, plate.width, plate.height);
+    const auto at = [&](int x, int y) {
+      return std::size_t(y) * std::size_t(plate.width) + std::size_t(x);
+    };
+    for (int y = 1; y + 1 < plate.height; ++y)
+      for (int x = 1; x + 1 < plate.width; ++x) {
+        const std::uint32_t surface = surface_of(identity[at(x, y)]);
+        const bool alone = surface != no_surface && surface == surface_of(identity[at(x - 1, y)]) &&
+                           surface == surface_of(identity[at(x + 1, y)]) &&
+                           surface == surface_of(identity[at(x, y - 1)]) &&
+                           surface == surface_of(identity[at(x, y + 1)]);
+        if (!alone || blind[at(x, y)]) continue;
+        SurfacePixel pixel{.surface = surface - 1,
+                           .tile = tile(plate, x, y),
+                           .plate = {},
+                           .rendered = glm::dvec3(real[at(x, y)])};
+        for (int c = 0; c < 3; ++c)
+          pixel.plate[c] =
+              response.inverse()[plate.samples[3 * at(x, y) + std::size_t(c)]] / exposure;
+        found_.pixels.push_back(pixel);
+      }
+  }
+
+  std::uint32_t tile(const Plate& plate, int x, int y) const {
+    const int column = x * tiles_a_side / plate.width, row = y * tiles_a_side / plate.height;
+    return std::uint32_t((found_.frames * tiles_a_side + row) * tiles_a_side + column);
+  }
+
+  pipeline::Take& take_;
+  const ProbeOptions options_;
+  const double scale_;
+  const ObserverCalibration small_;
+  pipeline::LightStage light_stage_;
+  render::Renderer worlds_, identity_;
+  std::size_t next_light_ = 0;
+  SurfacePixels found_;
+};
+
+}  // namespace
+
+SurfacePixels probe_surfaces(pipeline::Take& take, const scene::Scene& scene,
+                             const std::shared_ptr<render::Device>& device,
+                             const ProbeOptions& options) {
+  return Probe(take, scene, device, options).run();
+}
+
+}  // namespace previz::calibrate
