@@ -103,8 +103,7 @@ TEST(Adaptive, ends_when_the_time_is_over) {
   renderer.begin({{}, 1.0, view.world_from_camera});
   const auto refined = pipeline::refine(renderer, quality(8, 0, 0.5), {}, {});
   EXPECT_TRUE(refined.whole);
-  EXPECT_GT(refined.samples, 0);
-  EXPECT_GT(refined.error, 0);
+  EXPECT_GT(refined.samples, 0);  // at least one, however slow the machine
 }
 
 TEST(Adaptive, a_block_in_need_brings_its_neighbours) {
