@@ -5,9 +5,8 @@
 // The pixels of a tile share a scramble, and each shifts its points, digit by digit, by a point of
 // another net, taken in Morton order. So each pixel has a scrambled Sobol sequence, and each sample
 // of the tile's 64 pixels is a net: errors over a tile cancel, which the eye and every mean over
-// many pixels see (as Ahmed and Wonka 2020, "Screen-Space
-// Blue-Noise Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering of Pixels", but
-// for any number of samples).
+// many pixels see (as Ahmed and Wonka 2020, "Screen-Space Blue-Noise Diffusion of Monte Carlo
+// Sampling Error via Hierarchical Ordering of Pixels", but for any number of samples).
 #ifndef PREVIZ_SAMPLER_GLSL
 #define PREVIZ_SAMPLER_GLSL
 
