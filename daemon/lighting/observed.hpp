@@ -15,8 +15,8 @@
 
 namespace previz::lighting {
 
-// Radiance is what the film camera's response and exposure say, on the light camera's scale where
-// the two cameras are balanced. Each direction keeps what was seen in it last.
+// Radiance on the film camera's scale, as its response and exposures say; lighting.balance brings
+// the light camera's to the same. Each direction keeps what was seen in it last.
 class ObservedLight {
  public:
   static constexpr int max_size = 256;  // texels a side; the film camera fills in, no more

@@ -170,8 +170,8 @@ std::optional<IrradianceError> measure_resampling(const TruthSet& set, const Env
   const LightCameraCalibration& camera = *set.light_camera;
   const lighting::Fisheye lens(camera.intrinsics);
   lighting::Resampled map = lighting::resample(
-      lighting::make_resampling(
-          lens, lighting::Viewpoint(glm::dmat3(camera.world_from_camera)), truth.size),
+      lighting::make_resampling(lens, lighting::Viewpoint(glm::dmat3(camera.world_from_camera)),
+                                truth.size),
       hdr);
   return compare_irradiance(masked({truth.size, std::move(map.radiance)}, keep), truth);
 }
