@@ -15,7 +15,7 @@ namespace previz {
 namespace {
 
 const std::vector<ButtonDriver>& all_button_drivers() {
-  static const std::vector<ButtonDriver> drivers{
+  static const std::vector<ButtonDriver> all{
 #ifdef PREVIZ_WITH_GPIO
       {"gpio", open_gpio, find_gpio, gpio_device_of, nullptr},
 #endif
@@ -23,7 +23,7 @@ const std::vector<ButtonDriver>& all_button_drivers() {
       {"hid", open_hid, find_hid, hid_device_of, hid::learn},
 #endif
   };
-  return drivers;
+  return all;
 }
 
 const ButtonDriver& driver_of(const std::string& name) {

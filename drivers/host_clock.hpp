@@ -2,10 +2,16 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <thread>
 
 namespace previz {
+
+// Now on CLOCK_MONOTONIC, which steady_clock is in libstdc++ and every time stamp is taken from.
+inline std::int64_t monotonic_ns() {
+  return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
 
 struct HostClock {
   using Time = std::chrono::steady_clock::time_point;  // CLOCK_MONOTONIC in libstdc++

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <ctime>
 #include <utility>
 
 #include "drivers/aravis/configure.hpp"
@@ -11,6 +10,7 @@
 #include "drivers/aravis/pixel_formats.hpp"
 #include "drivers/clock_map.hpp"
 #include "drivers/exposure_ledger.hpp"
+#include "drivers/host_clock.hpp"
 
 namespace previz {
 namespace {
@@ -21,12 +21,10 @@ using aravis::Owned;
 // Buffers the receiver may fill while the pipeline is busy: at 60 Hz a quarter of a second.
 constexpr int buffers_in_flight = 16;
 // Many cameras latch an exposure for the next frame but one.
-constexpr int settle_frames = 2;
+constexpr int latch_frames = 2;
 
-std::int64_t clock_ns(clockid_t clock) {
-  timespec time{};
-  clock_gettime(clock, &time);
-  return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+std::int64_t time_of_day_ns() {
+  return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 // Block ids of GigE Vision 1.x have 16 bits and leave out 0; later ones have 64 bits.
@@ -59,7 +57,7 @@ class AravisCamera final : public Camera {
         camera_(aravis::find_camera(settings.device)),
         device_(arv_camera_get_device(camera_.get())),
         agreed_(aravis::configure(*camera_, settings)),
-        ledger_(agreed_.exposure, settle_frames) {
+        ledger_(agreed_.exposure, latch_frames) {
     if (agreed_.chunks) chunks_.reset(arv_camera_create_chunk_parser(camera_.get()));
     lost_handler_ =
         g_signal_connect(device_, "control-lost", G_CALLBACK(+[](ArvDevice*, gpointer self) {
@@ -133,9 +131,9 @@ class AravisCamera final : public Camera {
   bool set_exposure(double exposure_s, double gain) override {
     if (control_lost_ || !agreed_.drives_exposure) return false;
     try {
-      const std::int64_t before_ns = clock_ns(CLOCK_MONOTONIC);
+      const std::int64_t before_ns = monotonic_ns();
       const Exposure applied = aravis::set_exposure(*camera_, name(), {exposure_s, gain});
-      ledger_.changed(before_ns, clock_ns(CLOCK_MONOTONIC), applied);
+      ledger_.changed(before_ns, monotonic_ns(), applied);
       return true;
     } catch (const Error&) {
       ++counters_["exposures refused"];
@@ -210,9 +208,9 @@ class AravisCamera final : public Camera {
   // Aravis stamps a buffer's first packet with the time of day; the difference to now is the same
   // on every clock.
   static std::int64_t arrival_of(ArvBuffer& buffer) {
-    const std::int64_t age_ns = clock_ns(CLOCK_REALTIME) -
-                                static_cast<std::int64_t>(arv_buffer_get_system_timestamp(&buffer));
-    return clock_ns(CLOCK_MONOTONIC) - std::clamp<std::int64_t>(age_ns, 0, 10'000'000'000);
+    const std::int64_t age_ns =
+        time_of_day_ns() - static_cast<std::int64_t>(arv_buffer_get_system_timestamp(&buffer));
+    return monotonic_ns() - std::clamp<std::int64_t>(age_ns, 0, 10'000'000'000);
   }
 
   std::optional<Exposure> exposure_of(ArvBuffer& buffer, std::int64_t timestamp_ns) {

@@ -16,6 +16,7 @@
 #include "drivers/debouncer.hpp"
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
+#include "drivers/host_clock.hpp"
 
 namespace previz {
 namespace {
@@ -28,14 +29,8 @@ struct CloseChip {
 };
 using Chip = std::unique_ptr<gpiod_chip, CloseChip>;
 
-std::int64_t to_ns(const timespec& time) {
+std::int64_t edge_ns(const timespec& time) {
   return std::int64_t{time.tv_sec} * second_ns + time.tv_nsec;
-}
-
-std::int64_t now_ns() {
-  timespec time{};
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  return to_ns(time);
 }
 
 // "gpio", "CHIP", "LINE".
@@ -98,9 +93,9 @@ class GpioButtons final : public Buttons {
   int fd() const override { return epoll_.get(); }
 
   std::optional<ButtonsEvent> next() override {
-    if (!chip_ && now_ns() >= retry_ns_) open();
+    if (!chip_ && monotonic_ns() >= retry_ns_) open();
     for (Line& line : lines_) {
-      if (line.debouncer.settle(now_ns())) tell(line);
+      if (line.debouncer.settle(monotonic_ns())) tell(line);
       read(line);
     }
     arm();
@@ -132,7 +127,7 @@ class GpioButtons final : public Buttons {
       refusal_.clear();
     } catch (const Error& error) {
       for (Line& line : lines_) line.line = nullptr;
-      retry_ns_ = now_ns() + second_ns;
+      retry_ns_ = monotonic_ns() + second_ns;
       if (refusal_ == error.what()) return;
       refusal_ = error.what();
       events_.emplace_back(DeviceTrouble{device_, refusal_ + "; tried again until it is there"});
@@ -146,7 +141,8 @@ class GpioButtons final : public Buttons {
       throw Error("line \"" + line.label + "\" cannot be had: " + std::strerror(errno));
     watch(gpiod_line_event_get_fd(line.line));
     // Held while the rig starts: pressed from now on.
-    if (gpiod_line_get_value(line.line) == 1 && line.debouncer.edge(true, now_ns())) tell(line);
+    if (gpiod_line_get_value(line.line) == 1 && line.debouncer.edge(true, monotonic_ns()))
+      tell(line);
   }
 
   void read(Line& line) {
@@ -154,7 +150,7 @@ class GpioButtons final : public Buttons {
     while (line.line && gpiod_line_event_wait(line.line, &at_once) == 1) {
       gpiod_line_event edge{};
       if (gpiod_line_event_read(line.line, &edge) != 0) return lose(std::strerror(errno));
-      if (line.debouncer.edge(edge.event_type == GPIOD_LINE_EVENT_RISING_EDGE, to_ns(edge.ts)))
+      if (line.debouncer.edge(edge.event_type == GPIOD_LINE_EVENT_RISING_EDGE, edge_ns(edge.ts)))
         tell(line);
     }
   }
@@ -162,11 +158,12 @@ class GpioButtons final : public Buttons {
   void lose(const std::string& why) {
     for (Line& line : lines_) {
       line.line = nullptr;
-      if (line.debouncer.pressed()) events_.emplace_back(ButtonEvent{line.name, false, now_ns()});
+      if (line.debouncer.pressed())
+        events_.emplace_back(ButtonEvent{line.name, false, monotonic_ns()});
       line.debouncer.reset();
     }
     chip_.reset();
-    retry_ns_ = now_ns() + second_ns;
+    retry_ns_ = monotonic_ns() + second_ns;
     events_.emplace_back(DeviceTrouble{device_, "is lost: " + why + "; tried again"});
   }
 

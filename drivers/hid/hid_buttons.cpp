@@ -8,7 +8,6 @@
 #include <charconv>
 #include <condition_variable>
 #include <cstring>
-#include <ctime>
 #include <deque>
 #include <functional>
 #include <map>
@@ -18,18 +17,13 @@
 
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
+#include "drivers/host_clock.hpp"
 
 namespace previz {
 namespace {
 
 constexpr int poll_ms = 100;  // how late the end may be noticed
 constexpr std::chrono::seconds retry_interval{1};
-
-std::int64_t monotonic_ns() {
-  timespec time{};
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
-}
 
 struct Close {
   void operator()(hid_device* device) const { hid_close(device); }

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <ctime>
 #include <utility>
 
 #include "drivers/error.hpp"
+#include "drivers/host_clock.hpp"
 #include "drivers/v4l2/configure.hpp"
 #include "drivers/v4l2/find.hpp"
 
@@ -20,12 +20,6 @@ constexpr std::uint32_t buffers_wanted = 8;
 constexpr int settle_frames = 4;
 // A device that answers every call with an I/O error is gone, whatever it calls itself.
 constexpr int errors_until_lost = 10;
-
-std::int64_t monotonic_ns() {
-  timespec time{};
-  clock_gettime(CLOCK_MONOTONIC, &time);
-  return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
-}
 
 std::int64_t to_ns(const timeval& time) {
   return std::int64_t{time.tv_sec} * 1'000'000'000 + std::int64_t{time.tv_usec} * 1000;
