@@ -7,23 +7,14 @@
 #include <string>
 #include <variant>
 
+#include "drivers/device.hpp"
 #include "drivers/frame.hpp"
 
 namespace previz {
 
-// The stream is over and will not come back (only replay says this).
-struct EndOfStream {};
-
 // Nothing arrived within the time-out; the device may still be well.
 struct NoFrame {};
 
-// What is wrong with a device, in words for the display: the device, what happened, what follows.
-struct DeviceTrouble {
-  std::string device;
-  std::string what;
-};
-
-// Device trouble is a value in the stream, never an exception across threads.
 using CameraEvent = std::variant<FramePtr, NoFrame, EndOfStream, DeviceTrouble>;
 
 class Camera {

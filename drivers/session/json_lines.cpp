@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -110,24 +111,39 @@ TrackRecord parse_track_line(const Json& json) {
   return record;
 }
 
-std::uint64_t frame_of(const FrameLine& line) {
-  return line.record.frame;
-}
-std::uint64_t frame_of(const TrackRecord& record) {
-  return record.frame;
+std::optional<ButtonEvent> parse_button_line(const Json& json) {
+  if (!json.contains("button") && json.is_object()) return std::nullopt;
+  ButtonEvent event;
+  json.at("button").get_to(event.button);
+  get(json.at("pressed"), event.pressed);
+  get(json.at("timestamp_ns"), event.timestamp_ns);
+  return event;
 }
 
-template <typename Record>
-Lines<Record> read_lines(const std::filesystem::path& file, Record (*parse)(const Json&)) {
+bool in_order(const FrameLine& before, const FrameLine& line) {
+  return before.record.frame < line.record.frame;
+}
+bool in_order(const TrackRecord& before, const TrackRecord& record) {
+  return before.frame < record.frame;
+}
+// Events of several devices are written as they arrive.
+bool in_order(const ButtonEvent&, const ButtonEvent&) {
+  return true;
+}
+
+// `parse` returns nothing for a line of another kind.
+template <typename Record, typename Parse>
+Lines<Record> read_lines(const std::filesystem::path& file, Parse parse) {
   Lines<Record> lines;
   std::ifstream stream(file, std::ios::binary);
   std::string text;
   for (std::uint64_t number = 1; std::getline(stream, text); ++number) {
     try {
-      Record record = parse(Json::parse(text));
-      if (!lines.records.empty() && frame_of(record) <= frame_of(lines.records.back()))
+      std::optional<Record> record = parse(Json::parse(text));
+      if (!record) continue;
+      if (!lines.records.empty() && !in_order(lines.records.back(), *record))
         throw std::invalid_argument("frames go backwards");
-      lines.records.push_back(std::move(record));
+      lines.records.push_back(std::move(*record));
     } catch (const std::exception&) {
       lines.bad_lines.push_back(number);
     }
@@ -168,12 +184,22 @@ std::string to_line(const TrackRecord& record) {
   return json.dump();
 }
 
+std::string to_line(const ButtonEvent& event) {
+  return Json{
+      {"timestamp_ns", event.timestamp_ns}, {"button", event.button}, {"pressed", event.pressed}}
+      .dump();
+}
+
 Lines<FrameLine> read_frame_lines(const std::filesystem::path& file) {
   return read_lines<FrameLine>(file, parse_frame_line);
 }
 
 Lines<TrackRecord> read_track_lines(const std::filesystem::path& file) {
   return read_lines<TrackRecord>(file, parse_track_line);
+}
+
+Lines<ButtonEvent> read_button_lines(const std::filesystem::path& file) {
+  return read_lines<ButtonEvent>(file, parse_button_line);
 }
 
 }  // namespace previz::session

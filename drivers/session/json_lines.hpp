@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "drivers/buttons.hpp"
 #include "drivers/session/session.hpp"
 
 namespace previz::session {
@@ -21,15 +22,18 @@ struct FrameLine {
 // Without the newline. Throw previz::Error if a number is not finite.
 std::string to_line(const FrameLine& line);
 std::string to_line(const TrackRecord& record);
+std::string to_line(const ButtonEvent& event);
 
 template <typename Record>
 struct Lines {
-  std::vector<Record> records;           // whole lines, frames strictly increasing
+  std::vector<Record> records;           // whole lines; of frames strictly increasing
   std::vector<std::uint64_t> bad_lines;  // numbers, from 1, of lines that cannot be understood
 };
 
 // Read what can be read; a file that is not there has no lines.
 Lines<FrameLine> read_frame_lines(const std::filesystem::path& file);
 Lines<TrackRecord> read_track_lines(const std::filesystem::path& file);
+// The edges among the events: lines that have a "button". Other events are not looked at.
+Lines<ButtonEvent> read_button_lines(const std::filesystem::path& file);
 
 }  // namespace previz::session

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "drivers/buttons.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
 
@@ -96,6 +97,7 @@ class SessionWriter {
   // least 8x8 pixels.
   void write(const Frame& frame);
   void write(const TrackRecord& record);
+  void write(const ButtonEvent& event);  // to events.jsonl
   // Copies a file into assets/ under its content hash and maps `as_written` to it.
   void add_asset(const std::string& as_written, const std::filesystem::path& file);
   void close();  // flushes and finishes the files; the destructor does it too, without throwing

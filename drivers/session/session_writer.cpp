@@ -78,7 +78,7 @@ struct SessionWriter::Impl {
   std::filesystem::path directory;
   SessionFile file;
   std::map<std::string, StreamWriter> streams;
-  std::unique_ptr<LineFile> track;
+  std::unique_ptr<LineFile> track, events;
   std::chrono::steady_clock::time_point synced = std::chrono::steady_clock::now();
   bool closed = false;
 
@@ -99,7 +99,16 @@ struct SessionWriter::Impl {
   void sync() {
     for (auto& [source, stream] : streams) stream.sync();
     if (track) track->sync();
+    if (events) events->sync();
     synced = std::chrono::steady_clock::now();
+  }
+
+  // The file opens at its first line.
+  void append(std::unique_ptr<LineFile>& lines, const char* name, const std::string& line) {
+    check_open();
+    if (!lines) lines = std::make_unique<LineFile>(directory / name);
+    lines->append(line);
+    sync_when_due();
   }
 
   void sync_when_due() {
@@ -151,11 +160,11 @@ void SessionWriter::write(const Frame& frame) {
 }
 
 void SessionWriter::write(const TrackRecord& record) {
-  impl_->check_open();
-  const std::string line = to_line(record);
-  if (!impl_->track) impl_->track = std::make_unique<LineFile>(impl_->directory / "track.jsonl");
-  impl_->track->append(line);
-  impl_->sync_when_due();
+  impl_->append(impl_->track, "track.jsonl", to_line(record));
+}
+
+void SessionWriter::write(const ButtonEvent& event) {
+  impl_->append(impl_->events, "events.jsonl", to_line(event));
 }
 
 void SessionWriter::add_asset(const std::string& as_written, const std::filesystem::path& file) {
