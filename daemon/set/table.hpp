@@ -59,6 +59,11 @@ struct LightDraft {
   Light light;
 };
 
+struct ButtonDraft {
+  Given given;
+  Button button;
+};
+
 // The file as it is written. What needs no second thought is read straight into `set`; the rest is
 // brought there by resolve().
 struct Draft {
@@ -73,6 +78,7 @@ struct Draft {
   std::vector<TagDraft> tags;
   std::vector<ObjectDraft> objects;
   std::vector<LightDraft> lights;
+  std::vector<ButtonDraft> buttons;
 };
 
 // What becomes of a key that is not written. `example` is shown in the reference.
