@@ -11,6 +11,7 @@
 #include "daemon/render/layers.hpp"
 #include "daemon/tracking/tracker.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/session/session.hpp"
 
 namespace previz::pipeline {
 
@@ -29,7 +30,8 @@ struct Shot {
 
   // From tracking and lighting.
   tracking::Track track;
-  LightPtr light;  // null: no light frame was seen yet
+  LightPtr light;             // null: no light frame was seen yet
+  session::SceneState scene;  // what the crew moved or relit; empty: as in the set
 
   // From rendering. `untouched` says why the plate passes through as it is; empty: it was rendered.
   std::string untouched;

@@ -7,18 +7,18 @@ namespace previz::pipeline {
 
 TrackStage::TrackStage(const set::Set& set, const ObserverCalibration& calibration,
                        const std::vector<session::TrackRecord>& recorded) {
-  if (set.tracking.enabled) {
+  if (set.tracking.enabled)
     tracker_ =
         tracking::make_apriltag_tracker(set.tracking, calibration.intrinsics, calibration.response);
-    return;
-  }
-  if (recorded.empty())
+  else if (recorded.empty())
     throw Error(set.file.string() +
                 ": tracking.enabled: is false, but the session recorded no poses (track.jsonl)");
   for (const session::TrackRecord& record : recorded) by_timestamp_[record.timestamp_ns] = record;
 }
 
 void TrackStage::operator()(Shot& shot) {
+  const auto found = by_timestamp_.find(shot.frame->timestamp_ns);
+  if (found != by_timestamp_.end()) shot.scene = found->second.scene;
   if (tracker_) {
     if (shot.index != next_index_) tracker_->reset();
     next_index_ = shot.index + 1;
@@ -26,7 +26,6 @@ void TrackStage::operator()(Shot& shot) {
     return;
   }
   shot.track = {};
-  const auto found = by_timestamp_.find(shot.frame->timestamp_ns);
   if (found == by_timestamp_.end()) {
     shot.track.reason = "track.jsonl has no line for this frame";
   } else if (!found->second.tracked) {

@@ -20,14 +20,15 @@ class TrackStage {
   TrackStage(const set::Set& set, const ObserverCalibration& calibration,
              const std::vector<session::TrackRecord>& recorded);
 
-  // Fills shot.track. A frame that was not tracked is lost, never guessed. Frames come in order;
-  // where some are left out, the tracker forgets the last pose.
+  // Fills shot.track, and shot.scene from what was recorded. A frame that was not tracked is lost,
+  // never guessed. Frames come in order; where some are left out, the tracker forgets the last
+  // pose.
   void operator()(Shot& shot);
 
  private:
   std::unique_ptr<tracking::Tracker> tracker_;  // null: recorded poses
   std::uint64_t next_index_ = 0;
-  std::unordered_map<std::int64_t, session::TrackRecord> by_timestamp_;  // recorded poses
+  std::unordered_map<std::int64_t, session::TrackRecord> by_timestamp_;  // as recorded
 };
 
 }  // namespace previz::pipeline

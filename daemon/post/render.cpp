@@ -11,7 +11,7 @@
 #include <utility>
 #include <variant>
 
-#include "daemon/pipeline/light_stage.hpp"
+#include "daemon/pipeline/recorded_light.hpp"
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/stages.hpp"
 #include "daemon/pipeline/take.hpp"
@@ -115,32 +115,22 @@ class ObserverSource {
   pipeline::Metrics& metrics_;
 };
 
-// Gives each shot the light of the newest light frames before it.
+// Gives each shot its recorded light, and tells what the estimate has to say once.
 class LightSource {
  public:
   LightSource(pipeline::Take& take, Progress& progress)
-      : stage_(take.set, take.light), stream_(std::move(take.light_stream)), progress_(progress) {
-    if (stage_.needs_frames() && !stream_)
-      throw Error(take.session.directory.string() +
-                  ": the session has no light frames, and the set gives no lighting.environment");
-  }
+      : light_(take.set, take.light, std::move(take.light_stream), take.session.directory),
+        progress_(progress) {}
 
   void operator()(Shot& shot) {
-    while (stage_.needs_frames() && next_ < stream_->records().size() &&
-           stream_->records()[next_].timestamp_ns <= shot.frame->timestamp_ns) {
-      stage_.see(stream_->read(next_), next_);
-      ++next_;
-    }
-    shot.light = stage_.light();
+    shot.light = light_.at(shot.frame->timestamp_ns);
     if (!shot.light) return;
     for (const std::string& note : shot.light->lighting.report.notes)
       if (noted_.insert(note).second) progress_.note("light: " + note);
   }
 
  private:
-  pipeline::LightStage stage_;
-  std::unique_ptr<session::StreamReader> stream_;
-  std::size_t next_ = 0;
+  pipeline::RecordedLight light_;
   std::set<std::string> noted_;
   Progress& progress_;
 };
@@ -243,6 +233,7 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
     render_options.progress = [&](const Shot& shot, int samples) {
       progress.sample(shot.index, samples, set.quality.samples, now_s());
     };
+    render_options.note = [&](const std::string& what) { progress.note(what); };
     pipeline::RenderStage render(device, set, take.observer, scene, render_options);
 
     // A frame ahead per stage is all that keeps them busy; whole layers wait in the last queue.

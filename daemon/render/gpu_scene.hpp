@@ -23,6 +23,9 @@ class GpuScene {
   // Surfaces are perfect mirrors where their GGX alpha is at most `specular_alpha`.
   void set_scene(const scene::Scene& scene, double specular_alpha);
   void set_environment(const lighting::EnvironmentMap& map, set::LightSampling sampling);
+  // The same meshes and materials at other places, under other lamps: nothing is built anew but the
+  // top level, with the next place(). As many instances as there are.
+  void move(const std::vector<scene::Instance>& instances, const std::vector<set::Light>& lights);
   // Uploads instances, top level and lights relative to `camera_position` (world, metres).
   void place(const glm::dvec3& camera_position);
 
@@ -48,6 +51,7 @@ class GpuScene {
   void upload_materials(double specular_alpha);
   void upload_textures();
   void find_emitters();
+  void find_bounds();
   std::vector<gpu::GpuLight> placed_lights(const glm::dvec3& camera_position) const;
   void upload_lights(const glm::dvec3& camera_position);
   void upload_instances(const glm::dvec3& camera_position);
@@ -55,6 +59,7 @@ class GpuScene {
 
   Device& device_;
   scene::Scene scene_;
+  double specular_alpha_ = 0;
   std::vector<MeshPlace> places_;
   std::vector<std::uint32_t> first_light_;  // by instance; NO_INDEX: not an emitter
   std::vector<std::uint32_t> emitters_;     // instances that emit, in the order of their lights
