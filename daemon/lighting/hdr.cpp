@@ -137,4 +137,8 @@ HdrPicture merge_exposures(std::span<const FramePtr> frames, const ResponseCurve
   return picture;
 }
 
+long exposure_step(double exposure) {
+  return std::lround(std::log(exposure) / std::log1p(0.01));
+}
+
 }  // namespace previz::lighting

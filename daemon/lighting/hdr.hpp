@@ -41,4 +41,8 @@ struct SensorNoise {
 HdrPicture merge_exposures(std::span<const FramePtr> frames, const ResponseCurve& response,
                            const SensorNoise& noise = {});
 
+// Exposures of the same step belong to one place of a bracket: steps of 1 %, so that an automatic
+// exposure that wanders does not pile up frames. `exposure` is above 0.
+long exposure_step(double exposure);
+
 }  // namespace previz::lighting

@@ -1,8 +1,8 @@
 #include "daemon/pipeline/light_stage.hpp"
 
-#include <cmath>
 #include <utility>
 
+#include "daemon/lighting/hdr.hpp"
 #include "daemon/lighting/lighting.hpp"
 #include "drivers/error.hpp"
 
@@ -29,7 +29,7 @@ void LightStage::see(FramePtr frame, std::uint64_t index) {
     exposed->exposure = *exposure_;
     frame = std::move(exposed);
   }
-  newest_[std::lround(std::log(frame->exposure) / std::log1p(0.01))] = std::move(frame);
+  newest_[lighting::exposure_step(frame->exposure)] = std::move(frame);
   changed_ = true;
 }
 
