@@ -86,6 +86,7 @@ class ObserverSource {
     options.first = *to_do_.begin();
     options.last = *to_do_.rbegin();
     camera_ = replay(std::move(take.observer_stream), "observer", options);
+    camera_->start();
   }
 
   std::optional<Shot> operator()() {

@@ -25,7 +25,9 @@ std::unique_ptr<Camera> start(std::unique_ptr<session::StreamReader> stream,
   ReplayOptions options;
   options.origin = origin;
   options.loop = loop;
-  return replay(std::move(stream), name, options, {}, trouble);
+  std::unique_ptr<Camera> camera = replay(std::move(stream), name, options, {}, trouble);
+  camera->start();
+  return camera;
 }
 
 }  // namespace

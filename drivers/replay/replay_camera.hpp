@@ -1,11 +1,10 @@
-// A recorded stream behind the ordinary camera interface. Faults (drops, stalls, corruption) do not
-// belong here: they wrap any Camera.
+// A recorded stream behind the ordinary camera interface. Faults are not its concern: faults.hpp
+// wraps any camera.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -13,15 +12,15 @@
 #include <vector>
 
 #include "drivers/camera.hpp"
+#include "drivers/host_clock.hpp"
 #include "drivers/session/session.hpp"
 
 namespace previz {
 
-// Passed in so that a test can hold time still.
-struct ReplayClock {
-  using Time = std::chrono::steady_clock::time_point;
-  std::function<Time()> now = [] { return std::chrono::steady_clock::now(); };
-  std::function<void(Time)> sleep_until;  // empty: std::this_thread::sleep_until
+// Where a replayed stream stands.
+struct ReplayPosition {
+  std::size_t index = 0;  // in the stream's records
+  std::int64_t lap = 0;   // of a looped replay
 };
 
 struct ReplayOptions {
@@ -33,25 +32,29 @@ struct ReplayOptions {
   // Which capture time is due when; gives the streams of one session a common time. Absent: the
   // first frame is due when it is first asked for.
   struct Origin {
-    ReplayClock::Time due;
+    HostClock::Time due;
     std::int64_t timestamp_ns = 0;
   };
   std::optional<Origin> origin;
+  // Shared by the successive openings of one replayed device, which so goes on where it was.
+  // Absent: each opening begins at `first`.
+  std::shared_ptr<ReplayPosition> position;
 };
 
 // Delivers every frame, in order, with its recorded times, never before it is due; a frame asked
 // for late comes at once (what a late stage drops is that stage's to count). A frame that cannot be
-// read is a DeviceTrouble in its place. set_exposure() returns false. The name is
-// "<session>/<source>". `trouble` is told, one DeviceTrouble each, before the first frame.
-// Throws previz::Error if the options leave no frame, or speed is negative or not finite.
+// read is a DeviceTrouble in its place. Frames that fall due while the camera does not stream, or
+// is unplugged (see `position`), are missed as a camera's would be; at speed 0 it goes on where it
+// was. set_exposure() returns false. The name is "<session>/<source>". `trouble` is told, one
+// DeviceTrouble each, before the first frame. Throws previz::Error if the options leave no frame,
+// or speed is negative or not finite.
 std::unique_ptr<Camera> replay(std::unique_ptr<session::StreamReader> stream, std::string name,
-                               const ReplayOptions& options = {}, const ReplayClock& clock = {},
+                               const ReplayOptions& options = {}, const HostClock& clock = {},
                                const std::vector<std::string>& trouble = {});
 
 // Opens the session for one stream, "observer" or "light"; what the session lacks is the trouble.
 // Throws previz::Error if there is no such session or stream.
 std::unique_ptr<Camera> open_replay(const std::filesystem::path& session, const std::string& source,
-                                    const ReplayOptions& options = {},
-                                    const ReplayClock& clock = {});
+                                    const ReplayOptions& options = {}, const HostClock& clock = {});
 
 }  // namespace previz

@@ -89,6 +89,9 @@ class StreamReader {
  public:
   virtual ~StreamReader() = default;
   virtual const std::vector<FrameRecord>& records() const = 0;  // whole frames only
+  virtual PixelFormat format() const = 0;
+  virtual int width() const = 0;   // pixels
+  virtual int height() const = 0;  // pixels
   // Frame `index`; seeks where it must. Throws previz::Error naming file and frame if unreadable.
   virtual FramePtr read(std::size_t index) = 0;
 };

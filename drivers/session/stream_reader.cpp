@@ -26,6 +26,9 @@ class RecordedStream final : public StreamReader {
   }
 
   const std::vector<FrameRecord>& records() const override { return records_; }
+  PixelFormat format() const override { return format_.format; }
+  int width() const override { return format_.width; }
+  int height() const override { return format_.height; }
 
   FramePtr read(std::size_t index) override {
     if (index >= records_.size())

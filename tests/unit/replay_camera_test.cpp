@@ -15,9 +15,9 @@ using std::chrono::nanoseconds;
 
 // Time that passes only when somebody sleeps.
 struct HeldTime {
-  ReplayClock::Time now{};
-  ReplayClock clock() {
-    return {[this] { return now; }, [this](ReplayClock::Time time) { now = std::max(now, time); }};
+  HostClock::Time now{};
+  HostClock clock() {
+    return {[this] { return now; }, [this](HostClock::Time time) { now = std::max(now, time); }};
   }
 };
 
@@ -26,9 +26,11 @@ class Replay : public testing::Test {
   void SetUp() override { session::write_small_session(take(), 5); }
   std::filesystem::path take() const { return directory_.path() / "take"; }
   std::unique_ptr<Camera> open(const ReplayOptions& options) {
-    return open_replay(take(), "observer", options, time_.clock());
+    auto camera = open_replay(take(), "observer", options, time_.clock());
+    camera->start();
+    return camera;
   }
-  nanoseconds elapsed() const { return time_.now - ReplayClock::Time{}; }
+  nanoseconds elapsed() const { return time_.now - HostClock::Time{}; }
 
   test::TemporaryDirectory directory_;
   HeldTime time_;
@@ -147,6 +149,7 @@ TEST_F(Replay, AbsurdTimesDoNoHarm) {
     options.speed = speed;
     options.loop = true;
     const auto camera = open_replay(odd, "observer", options, time_.clock());
+    camera->start();
     for (int i = 0; i < 9; ++i) camera->next(milliseconds(1));
   }
 }
@@ -186,6 +189,52 @@ TEST_F(Replay, AnUnreadableFrameIsTroubleInItsPlace) {
     seen += std::holds_alternative<FramePtr>(camera->next(milliseconds(0))) ? 'f' : 't';
   EXPECT_EQ(std::count(seen.begin(), seen.end(), 't'), 1) << seen;
   EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera->next(milliseconds(0))));
+}
+
+TEST_F(Replay, SaysWhatItsPicturesAre) {
+  const CameraFormat format = open({})->format();
+  EXPECT_EQ(format.format, PixelFormat::rgb8);
+  EXPECT_EQ(format.width, 24);
+  EXPECT_EQ(format.height, 18);
+  EXPECT_NEAR(format.rate_hz, 1e9 / interval_ns, 1e-6);
+  ReplayOptions twice;
+  twice.speed = 2;
+  EXPECT_NEAR(open(twice)->format().rate_hz, 2e9 / interval_ns, 1e-6);
+}
+
+// Frame i of the take is due at i intervals; what falls due while stopped is gone.
+TEST_F(Replay, FramesWhileStoppedAreMissed) {
+  const auto camera = open({});
+  camera->next(milliseconds(100));
+  camera->stop();
+  EXPECT_TRUE(std::holds_alternative<NoFrame>(camera->next(milliseconds(100))));
+  time_.now += nanoseconds(2 * interval_ns + 1);
+  camera->start();
+  const CameraEvent event = camera->next(milliseconds(100));
+  ASSERT_TRUE(std::holds_alternative<FramePtr>(event));
+  EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(event), 3));
+  EXPECT_EQ(elapsed(), nanoseconds(3 * interval_ns));
+}
+
+TEST_F(Replay, AReopenedDeviceGoesOnWhereItIsByThen) {
+  ReplayOptions options;
+  options.loop = true;
+  options.origin = {time_.now, session::noise_frame("", 0, PixelFormat::rgb8, 1, 1).timestamp_ns};
+  options.position = std::make_shared<ReplayPosition>();
+  open(options)->next(milliseconds(100));
+  time_.now += nanoseconds(1000 * 5 * interval_ns + interval_ns / 2);  // a thousand laps
+  const FramePtr frame = std::get<FramePtr>(open(options)->next(milliseconds(100)));
+  EXPECT_EQ(frame->sequence, 100u + 5001);
+  EXPECT_EQ(elapsed(), nanoseconds(5001 * interval_ns));
+}
+
+TEST_F(Replay, AtSpeedZeroNothingIsMissed) {
+  ReplayOptions options;
+  options.speed = 0;
+  options.position = std::make_shared<ReplayPosition>();
+  for (int i = 0; i < 5; ++i)
+    EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(open(options)->next(milliseconds(0))), i));
+  EXPECT_TRUE(std::holds_alternative<EndOfStream>(open(options)->next(milliseconds(0))));
 }
 
 TEST_F(Replay, WrongOptionsAreErrors) {

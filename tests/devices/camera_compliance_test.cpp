@@ -1,0 +1,241 @@
+// What every camera driver must do, whatever stands behind it; see drivers/camera.hpp.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "drivers/error.hpp"
+#include "tests/devices/device_under_test.hpp"
+
+namespace previz::test {
+namespace {
+
+using std::chrono::milliseconds;
+using Clock = std::chrono::steady_clock;
+
+// Far beyond what any device takes for a frame; reached only by a failure.
+constexpr std::chrono::seconds patience{20};
+
+class CameraCompliance : public testing::TestWithParam<RegisteredDevice> {
+ protected:
+  void SetUp() override {
+    std::string why_not = "no reason was given";
+    device_ = GetParam().make(why_not);
+    if (!device_) GTEST_SKIP() << why_not;
+  }
+
+  // The next frame; none where none comes in a long time or the device is lost.
+  FramePtr next_frame(Camera& camera) {
+    for (const auto end = Clock::now() + patience; Clock::now() < end;) {
+      CameraEvent event = camera.next(milliseconds(200));
+      if (auto* frame = std::get_if<FramePtr>(&event)) return std::move(*frame);
+      if (const auto* trouble = std::get_if<DeviceTrouble>(&event)) {
+        EXPECT_EQ(trouble->device, camera.name());
+        EXPECT_TRUE(device_->may_lose_frames() && !trouble->lost) << trouble->what;
+        if (trouble->lost) return nullptr;
+      } else if (std::holds_alternative<EndOfStream>(event)) {
+        return nullptr;
+      }
+    }
+    return nullptr;
+  }
+
+  // `count` frames, each checked against the one before, also of an earlier call.
+  void take(Camera& camera, int count) {
+    for (int i = 0; i < count; ++i) {
+      FramePtr frame = next_frame(camera);
+      ASSERT_TRUE(frame) << "frame " << i << " of " << count << " did not come";
+      check(*frame, camera.format());
+      last_ = std::move(frame);
+    }
+  }
+
+  void check(const Frame& frame, const CameraFormat& format) {
+    EXPECT_EQ(frame.format, format.format);
+    EXPECT_EQ(frame.width, format.width);
+    EXPECT_EQ(frame.height, format.height);
+    EXPECT_EQ(frame.bytes.size(), frame_bytes(format.format, format.width, format.height));
+    EXPECT_GT(frame.exposure, 0);
+    EXPECT_GE(frame.arrival_ns, frame.timestamp_ns);
+    if (!last_) return;
+    EXPECT_GT(frame.sequence, last_->sequence);
+    EXPECT_GT(frame.timestamp_ns, last_->timestamp_ns);
+  }
+
+  void expect_silence(Camera& camera) {
+    EXPECT_TRUE(std::holds_alternative<NoFrame>(camera.next(milliseconds(0))));
+    EXPECT_TRUE(std::holds_alternative<NoFrame>(camera.next(milliseconds(50))));
+  }
+
+  // Until the device says that it is lost; frames before that may still come.
+  std::optional<DeviceTrouble> wait_until_lost(Camera& camera) {
+    for (const auto end = Clock::now() + patience; Clock::now() < end;) {
+      const CameraEvent event = camera.next(milliseconds(100));
+      const auto* trouble = std::get_if<DeviceTrouble>(&event);
+      if (trouble && trouble->lost) return *trouble;
+    }
+    return std::nullopt;
+  }
+
+  std::unique_ptr<DeviceUnderTest> device_;
+  FramePtr last_;
+};
+
+TEST_P(CameraCompliance, SaysWhatItsPicturesAreBeforeItStreams) {
+  const auto camera = device_->open();
+  EXPECT_FALSE(camera->name().empty());
+  EXPECT_GT(camera->format().width, 0);
+  EXPECT_GT(camera->format().height, 0);
+  expect_silence(*camera);
+}
+
+TEST_P(CameraCompliance, DeliversExactlyTheFramesAskedFor) {
+  const auto camera = device_->open();
+  for (const int count : {1, 2, 7}) {
+    camera->start();
+    ASSERT_NO_FATAL_FAILURE(take(*camera, count));
+    camera->stop();
+    expect_silence(*camera);
+  }
+}
+
+TEST_P(CameraCompliance, NumbersEveryFrameItCaptures) {
+  if (device_->may_lose_frames()) GTEST_SKIP() << "this device loses frames; gaps tell which";
+  const auto camera = device_->open();
+  camera->start();
+  ASSERT_NO_FATAL_FAILURE(take(*camera, 1));
+  const std::uint64_t first = last_->sequence;
+  ASSERT_NO_FATAL_FAILURE(take(*camera, 8));
+  EXPECT_EQ(last_->sequence, first + 8);
+}
+
+TEST_P(CameraCompliance, StartsAndStopsThreeTimes) {
+  const auto camera = device_->open();
+  for (int i = 0; i < 3; ++i) {
+    camera->start();
+    ASSERT_NO_FATAL_FAILURE(take(*camera, 3));
+    camera->stop();
+  }
+}
+
+TEST_P(CameraCompliance, StartsAndStopsWithoutAFrameTaken) {
+  const auto camera = device_->open();
+  for (int i = 0; i < 3; ++i) {
+    camera->start();
+    camera->start();
+    camera->stop();
+    camera->stop();
+  }
+  camera->start();
+  ASSERT_NO_FATAL_FAILURE(take(*camera, 1));
+}
+
+// Frames lie captured and untaken when the stream stops; none of them may come after it starts.
+TEST_P(CameraCompliance, StopsWithRequestsInFlight) {
+  const auto camera = device_->open();
+  camera->start();
+  ASSERT_NO_FATAL_FAILURE(take(*camera, 1));
+  std::this_thread::sleep_for(milliseconds(150));
+  camera->stop();
+  const std::int64_t stopped_ns = std::chrono::nanoseconds(Clock::now().time_since_epoch()).count();
+  expect_silence(*camera);
+  camera->start();
+  ASSERT_NO_FATAL_FAILURE(take(*camera, 2));
+  if (GetParam().live) {
+    EXPECT_GT(last_->timestamp_ns, stopped_ns);
+  }
+}
+
+TEST_P(CameraCompliance, ClosesWhileItStreams) {
+  for (int i = 0; i < 3; ++i) {
+    const auto camera = device_->open();
+    camera->start();
+    ASSERT_NO_FATAL_FAILURE(take(*camera, 2));
+    if (i < 2) last_ = nullptr;  // a device may count anew when it is opened
+  }
+}
+
+TEST_P(CameraCompliance, DoesNotWaitLongerThanAsked) {
+  const auto camera = device_->open();
+  camera->start();
+  ASSERT_NO_FATAL_FAILURE(take(*camera, 1));
+  // If each call waited for a frame (25 Hz or slower), a thousand would take 40 s or more.
+  const auto begin = Clock::now();
+  for (int i = 0; i < 1000; ++i) camera->next(milliseconds(0));
+  EXPECT_LT(Clock::now() - begin, patience);
+}
+
+TEST_P(CameraCompliance, ExposuresAppliedAreOnTheirFrames) {
+  const auto camera = device_->open();
+  camera->start();
+  if (device_->exposures().empty()) {
+    EXPECT_FALSE(camera->set_exposure(0.01, 1));
+    return;
+  }
+  for (int round = 0; round < 2; ++round) {
+    for (const auto& [exposure_s, gain] : device_->exposures()) {
+      ASSERT_TRUE(camera->set_exposure(exposure_s, gain));
+      bool applied = false;
+      for (int i = 0; i < 20 && !applied; ++i) {
+        ASSERT_NO_FATAL_FAILURE(take(*camera, 1));
+        EXPECT_TRUE(device_->shows_its_exposure(*last_)) << last_->sequence;
+        applied = std::abs(last_->exposure_s - exposure_s) < 1e-6 * exposure_s &&
+                  std::abs(last_->gain - gain) < 1e-6 * gain;
+      }
+      EXPECT_TRUE(applied) << exposure_s << " s, gain " << gain;
+    }
+  }
+}
+
+TEST_P(CameraCompliance, TellsThatItIsUnpluggedWhileItStreams) {
+  if (!device_->can_be_unplugged()) GTEST_SKIP() << "this device has no cable to pull";
+  const auto camera = device_->open();
+  camera->start();
+  ASSERT_NO_FATAL_FAILURE(take(*camera, 3));
+  device_->unplug();
+  const std::optional<DeviceTrouble> trouble = wait_until_lost(*camera);
+  ASSERT_TRUE(trouble);
+  EXPECT_EQ(trouble->device, camera->name());
+  EXPECT_FALSE(trouble->what.empty());
+  const CameraEvent after = camera->next(milliseconds(0));
+  EXPECT_TRUE(std::holds_alternative<DeviceTrouble>(after));
+  camera->stop();
+}
+
+TEST_P(CameraCompliance, ReopensWhenItIsBack) {
+  if (!device_->can_be_unplugged()) GTEST_SKIP() << "this device has no cable to pull";
+  for (int i = 0; i < 2; ++i) {
+    auto camera = device_->open();
+    camera->start();
+    ASSERT_NO_FATAL_FAILURE(take(*camera, 2));
+    last_ = nullptr;
+    device_->unplug();
+    ASSERT_TRUE(wait_until_lost(*camera));
+    camera.reset();
+    EXPECT_THROW(device_->open(), Error);
+    device_->plug();
+  }
+  const auto camera = device_->open();
+  camera->start();
+  ASSERT_NO_FATAL_FAILURE(take(*camera, 2));
+}
+
+TEST_P(CameraCompliance, NamesTheDeviceThatIsMissing) {
+  try {
+    device_->open_missing();
+    ADD_FAILURE() << "a device was opened that is not there";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("missing"), std::string::npos) << error.what();
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Drivers, CameraCompliance,
+                         testing::ValuesIn(registered_devices().begin(),
+                                           registered_devices().end()),
+                         [](const auto& instance) { return std::string(instance.param.name); });
+
+}  // namespace
+}  // namespace previz::test

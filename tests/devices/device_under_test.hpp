@@ -1,0 +1,50 @@
+// What the compliance suite knows of a device: how to open it, and how to pull its cable.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "drivers/camera.hpp"
+
+namespace previz::test {
+
+class DeviceUnderTest {
+ public:
+  virtual ~DeviceUnderTest() = default;
+
+  // Throws previz::Error while the device is unplugged.
+  virtual std::unique_ptr<Camera> open() = 0;
+  // Of a device that does not exist; must throw previz::Error that names it.
+  virtual std::unique_ptr<Camera> open_missing() = 0;
+
+  virtual bool can_be_unplugged() const { return true; }
+  virtual void unplug() = 0;
+  virtual void plug() = 0;
+
+  // What frames the device may lose while somebody listens (packets on a bad network).
+  virtual bool may_lose_frames() const { return false; }
+
+  // Two exposures the device can take exactly; none where it cannot be driven.
+  struct Exposure {
+    double exposure_s;
+    double gain;
+  };
+  virtual std::span<const Exposure> exposures() const { return {}; }
+  // Whether the picture shows that it was taken with the exposure the frame claims.
+  virtual bool shows_its_exposure(const Frame&) const { return true; }
+};
+
+// A driver under test: one line in registry.cpp.
+struct RegisteredDevice {
+  const char* name;
+  bool live;  // its frames carry the host's time; those of a replayed take the take's
+  // Null where this machine has no such device; `why_not` then says what is missing.
+  std::unique_ptr<DeviceUnderTest> (*make)(std::string& why_not);
+};
+
+std::span<const RegisteredDevice> registered_devices();
+
+}  // namespace previz::test

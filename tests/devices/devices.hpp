@@ -1,0 +1,15 @@
+// The devices of the registry, each in its own file.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "tests/devices/device_under_test.hpp"
+
+namespace previz::test {
+
+std::unique_ptr<DeviceUnderTest> make_replay(std::string& why_not);
+std::unique_ptr<DeviceUnderTest> make_fast_replay(std::string& why_not);
+std::unique_ptr<DeviceUnderTest> make_unpaced_replay(std::string& why_not);
+
+}  // namespace previz::test
