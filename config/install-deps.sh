@@ -10,7 +10,7 @@ packages=(
   libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers
   # pictures and video
   libopencv-dev libopenexr-dev libimath-dev libpng-dev
-  libavformat-dev libavcodec-dev libavutil-dev libswscale-dev
+  libavformat-dev libavcodec-dev libavutil-dev libswscale-dev libjpeg62-turbo-dev
   # markers, geometry, scenes
   libapriltag-dev libembree-dev libtinygltf-dev libstb-dev libglm-dev
   # files, command line, log, hashes

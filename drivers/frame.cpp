@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstring>
 #include <stdexcept>
 
+#include "drivers/convert/yuv.hpp"
 #include "drivers/error.hpp"
 
 namespace previz {
@@ -42,38 +42,22 @@ std::vector<std::uint16_t> repeat_three_times(const std::vector<std::uint16_t>& 
   return rgb;
 }
 
-std::uint16_t quantize_8_bit(double value) {
-  return static_cast<std::uint16_t>(std::floor(255.0 * std::clamp(value, 0.0, 1.0) + 0.5));
-}
-
-// Recommendation ITU-R BT.709-6, items 3.2 to 3.4 inverted: luma 16..235, chroma 16..240 around
-// 128.
-void bt709_to_rgb(double luma, double cb, double cr, std::uint16_t* rgb) {
-  constexpr double kr = 0.2126, kb = 0.0722, kg = 1.0 - kr - kb;
-  const double y = (luma - 16.0) / 219.0;
-  const double red = y + 2.0 * (1.0 - kr) * (cr - 128.0) / 224.0;
-  const double blue = y + 2.0 * (1.0 - kb) * (cb - 128.0) / 224.0;
-  const double green = (y - kr * red - kb * blue) / kg;
-  rgb[0] = quantize_8_bit(red);
-  rgb[1] = quantize_8_bit(green);
-  rgb[2] = quantize_8_bit(blue);
-}
-
 std::vector<std::uint16_t> yuv422_to_rgb(const Frame& frame) {
   const std::size_t width = frame.width, height = frame.height, chroma_width = (width + 1) / 2;
   const std::uint8_t* luma = frame.bytes.data();
   const std::uint8_t* cb = luma + width * height;
   const std::uint8_t* cr = cb + chroma_width * height;
-  std::vector<std::uint16_t> rgb(3 * width * height);
+  static const convert::YuvToRgb to_rgb(convert::YuvMatrix::bt709, convert::YuvRange::limited);
+  std::vector<std::uint8_t> rgb(3 * width * height);
   for (std::size_t y = 0; y < height; ++y) {
     for (std::size_t x = 0; x < width; ++x) {
       const std::size_t left = y * chroma_width + x / 2;
       const std::size_t right = y * chroma_width + std::min(x / 2 + x % 2, chroma_width - 1);
-      bt709_to_rgb(luma[y * width + x], 0.5 * (cb[left] + cb[right]), 0.5 * (cr[left] + cr[right]),
-                   &rgb[3 * (y * width + x)]);
+      to_rgb(luma[y * width + x], 4 * (cb[left] + cb[right]), 4 * (cr[left] + cr[right]),
+             &rgb[3 * (y * width + x)]);
     }
   }
-  return rgb;
+  return widen(rgb);
 }
 
 }  // namespace

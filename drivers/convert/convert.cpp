@@ -1,0 +1,270 @@
+#include "drivers/convert/convert.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+namespace previz::convert {
+namespace {
+
+constexpr int max_side_px = 65535;
+
+bool is_bayer(Layout layout) {
+  return layout >= Layout::bayer_rggb && layout <= Layout::bayer_bggr;
+}
+
+bool is_yuv422(Layout layout) {
+  return layout == Layout::yuyv || layout == Layout::uyvy;
+}
+
+std::size_t channels(Layout layout) {
+  return layout == Layout::rgb || layout == Layout::bgr ? 3 : 1;
+}
+
+// What is wrong with the numbers, before anything is computed from them.
+std::optional<std::string> wrong_shape(const WirePicture& picture) {
+  const auto& [format, width, height, stride, bytes] = picture;
+  const std::string size = std::to_string(width) + "x" + std::to_string(height);
+  if (width < 1 || height < 1 || width > max_side_px || height > max_side_px)
+    return "cannot be " + size + " pixels";
+  if (format.bits < 8 || format.bits > 16)
+    return "cannot have " + std::to_string(format.bits) + " bits a sample";
+  if (is_bayer(format.layout) && (width < 4 || height < 4))
+    return "is a Bayer mosaic of " + size + " pixels; 4x4 is the least";
+  if (format.layout == Layout::mjpeg) return std::nullopt;
+  const std::size_t row = row_bytes(format, width);
+  if (stride != 0 && stride < row)
+    return "has rows of " + std::to_string(stride) + " bytes; " + std::to_string(row) +
+           " are needed";
+  const std::size_t whole = picture_bytes(format, width, height, stride);
+  if (bytes.size() < whole)
+    return "is cut short: " + std::to_string(bytes.size()) + " of " + std::to_string(whole) +
+           " bytes";
+  return std::nullopt;
+}
+
+// Rows of a picture, whatever lies between them.
+class Rows {
+ public:
+  explicit Rows(const WirePicture& picture)
+      : bytes_(picture.bytes.data()),
+        stride_(picture.stride ? picture.stride : row_bytes(picture.format, picture.width)) {}
+  const std::uint8_t* operator[](std::size_t row) const { return bytes_ + row * stride_; }
+
+ private:
+  const std::uint8_t* bytes_;
+  std::size_t stride_;
+};
+
+// Sample `i` of a row.
+std::uint32_t sample(const std::uint8_t* row, std::size_t i, const WireFormat& format) {
+  const auto bits = static_cast<std::size_t>(format.bits);
+  switch (format.packing) {
+    case Packing::words:
+      return row[2 * i] | std::uint32_t{row[2 * i + 1]} << 8;
+    case Packing::bits: {
+      const std::size_t first = i * bits, last = first + bits - 1;
+      std::uint32_t window = 0;  // the at most three bytes that the sample touches
+      for (std::size_t byte = first / 8; byte <= last / 8; ++byte)
+        window |= std::uint32_t{row[byte]} << (8 * (byte - first / 8));
+      return window >> (first % 8);
+    }
+    case Packing::gige: {
+      const std::uint8_t* pair = row + 3 * (i / 2);
+      const std::size_t low_bits = bits - 8;
+      return i % 2 == 0 ? std::uint32_t{pair[0]} << low_bits | (pair[1] & 0x0fu)
+                        : std::uint32_t{pair[2]} << low_bits | pair[1] >> 4;
+    }
+  }
+  throw std::invalid_argument("unknown packing");
+}
+
+// Samples of 9 to 16 bits as full-range 16-bit words. What lies above a sample's bits is ignored.
+std::vector<std::uint8_t> deep_samples(const WirePicture& picture) {
+  const WireFormat& format = picture.format;
+  const std::uint32_t white = (1u << format.bits) - 1;
+  std::vector<std::uint16_t> full_range(white + 1);
+  for (std::uint32_t v = 0; v <= white; ++v)
+    full_range[v] = static_cast<std::uint16_t>((65535u * std::uint64_t{v} + white / 2) / white);
+
+  const std::size_t a_row = channels(format.layout) * static_cast<std::size_t>(picture.width);
+  std::vector<std::uint8_t> out(2 * a_row * static_cast<std::size_t>(picture.height));
+  std::uint8_t* at = out.data();
+  const Rows rows(picture);
+  for (std::size_t y = 0; y < static_cast<std::size_t>(picture.height); ++y) {
+    for (std::size_t i = 0; i < a_row; ++i, at += 2) {
+      const std::uint16_t value = full_range[sample(rows[y], i, format) & white];
+      std::memcpy(at, &value, 2);
+    }
+  }
+  return out;
+}
+
+std::vector<std::uint8_t> shallow_samples(const WirePicture& picture) {
+  const std::size_t a_row =
+      channels(picture.format.layout) * static_cast<std::size_t>(picture.width);
+  std::vector<std::uint8_t> out;
+  out.reserve(a_row * static_cast<std::size_t>(picture.height));
+  const Rows rows(picture);
+  for (std::size_t y = 0; y < static_cast<std::size_t>(picture.height); ++y)
+    out.insert(out.end(), rows[y], rows[y] + a_row);
+  return out;
+}
+
+template <typename Sample>
+void swap_red_and_blue(std::vector<std::uint8_t>& samples) {
+  for (std::size_t i = 0; i + 3 * sizeof(Sample) <= samples.size(); i += 3 * sizeof(Sample))
+    std::swap_ranges(&samples[i], &samples[i] + sizeof(Sample), &samples[i] + 2 * sizeof(Sample));
+}
+
+std::vector<std::uint8_t> plain_samples(const WirePicture& picture) {
+  const bool deep = picture.format.bits > 8;
+  std::vector<std::uint8_t> samples = deep ? deep_samples(picture) : shallow_samples(picture);
+  if (picture.format.layout == Layout::bgr)
+    deep ? swap_red_and_blue<std::uint16_t>(samples) : swap_red_and_blue<std::uint8_t>(samples);
+  if (is_bayer(picture.format.layout))
+    return demosaic(picture.format.layout, deep, picture.width, picture.height, samples);
+  return samples;
+}
+
+// Four bytes of a 4:2:2 row are two pixels; these are their places.
+struct MacroPixel {
+  std::size_t y, cb, cr;  // the second luma is at y + 2
+};
+
+MacroPixel macro_pixel(Layout layout) {
+  return layout == Layout::yuyv ? MacroPixel{0, 1, 3} : MacroPixel{1, 0, 2};
+}
+
+std::vector<std::uint8_t> planar_422(const WirePicture& picture) {
+  const std::size_t width = picture.width, height = picture.height, half = (width + 1) / 2;
+  const MacroPixel at = macro_pixel(picture.format.layout);
+  std::vector<std::uint8_t> out(frame_bytes(PixelFormat::yuv422p8, picture.width, picture.height));
+  std::uint8_t* luma = out.data();
+  std::uint8_t* cb = luma + width * height;
+  std::uint8_t* cr = cb + half * height;
+  const Rows rows(picture);
+  for (std::size_t y = 0; y < height; ++y) {
+    for (std::size_t x = 0; x < width; ++x) *luma++ = rows[y][2 * x + at.y];
+    for (std::size_t i = 0; i < half; ++i) *cb++ = rows[y][4 * i + at.cb];
+    for (std::size_t i = 0; i < half; ++i) *cr++ = rows[y][4 * i + at.cr];
+  }
+  return out;
+}
+
+std::vector<std::uint8_t> rgb_of_422(const WirePicture& picture) {
+  const std::size_t width = picture.width, height = picture.height, half = (width + 1) / 2;
+  const MacroPixel at = macro_pixel(picture.format.layout);
+  const YuvToRgb to_rgb(picture.format.matrix, picture.format.range);
+  std::vector<std::uint8_t> rgb(3 * width * height);
+  const Rows rows(picture);
+  for (std::size_t y = 0; y < height; ++y) {
+    const std::uint8_t* row = rows[y];
+    for (std::size_t x = 0; x < width; ++x) {
+      const std::size_t left = 4 * (x / 2), right = 4 * std::min(x / 2 + x % 2, half - 1);
+      to_rgb(row[2 * x + at.y], 4 * (row[left + at.cb] + row[right + at.cb]),
+             4 * (row[left + at.cr] + row[right + at.cr]), &rgb[3 * (y * width + x)]);
+    }
+  }
+  return rgb;
+}
+
+// 4:2:0 chroma rows lie midway between luma rows 2i and 2i+1 (MPEG-2), so a luma row takes three
+// quarters of the nearer chroma row and one of the other.
+std::vector<std::uint8_t> rgb_of_nv12(const WirePicture& picture) {
+  const std::size_t width = picture.width, height = picture.height;
+  const std::size_t chroma_width = (width + 1) / 2, chroma_height = (height + 1) / 2;
+  const YuvToRgb to_rgb(picture.format.matrix, picture.format.range);
+  std::vector<std::uint8_t> rgb(3 * width * height);
+  const Rows rows(picture);
+  for (std::size_t y = 0; y < height; ++y) {
+    const std::size_t near = y / 2;
+    const std::size_t other =
+        y % 2 ? std::min(near + 1, chroma_height - 1) : near - std::min<std::size_t>(near, 1);
+    const std::uint8_t* a = rows[height + near];
+    const std::uint8_t* b = rows[height + other];
+    const auto eighths = [&](std::size_t left, std::size_t right) {
+      return 3 * (a[left] + a[right]) + b[left] + b[right];
+    };
+    for (std::size_t x = 0; x < width; ++x) {
+      const std::size_t left = 2 * (x / 2), right = 2 * std::min(x / 2 + x % 2, chroma_width - 1);
+      to_rgb(rows[y][x], eighths(left, right), eighths(left + 1, right + 1),
+             &rgb[3 * (y * width + x)]);
+    }
+  }
+  return rgb;
+}
+
+}  // namespace
+
+PixelFormat delivered_format(const WireFormat& format) {
+  const bool deep = format.bits > 8;
+  switch (format.layout) {
+    case Layout::mono:
+      return deep ? PixelFormat::gray16 : PixelFormat::gray8;
+    case Layout::yuyv:
+    case Layout::uyvy:
+      return format.matrix == YuvMatrix::bt709 && format.range == YuvRange::limited
+                 ? PixelFormat::yuv422p8
+                 : PixelFormat::rgb8;
+    case Layout::nv12:
+    case Layout::mjpeg:
+      return PixelFormat::rgb8;
+    default:
+      return deep ? PixelFormat::rgb16 : PixelFormat::rgb8;
+  }
+}
+
+std::size_t row_bytes(const WireFormat& format, int width) {
+  const std::size_t w = width, bits = format.bits;
+  const std::size_t samples = w * channels(format.layout);
+  if (format.layout == Layout::mjpeg) return 0;
+  if (is_yuv422(format.layout)) return 4 * ((w + 1) / 2);
+  if (format.layout == Layout::nv12) return 2 * ((w + 1) / 2);
+  if (bits == 8) return samples;
+  switch (format.packing) {
+    case Packing::words:
+      return 2 * samples;
+    case Packing::bits:
+      return (samples * bits + 7) / 8;
+    case Packing::gige:
+      return 3 * ((samples + 1) / 2);
+  }
+  throw std::invalid_argument("unknown packing");
+}
+
+std::size_t picture_bytes(const WireFormat& format, int width, int height, std::size_t stride) {
+  const std::size_t row = row_bytes(format, width);
+  std::size_t rows = height;
+  if (format.layout == Layout::nv12) rows += (rows + 1) / 2;
+  return rows == 0 ? 0 : (rows - 1) * (stride ? stride : row) + row;
+}
+
+std::optional<std::string> convert(const WirePicture& picture, Frame& frame) {
+  if (std::optional<std::string> wrong = wrong_shape(picture)) return wrong;
+  const PixelFormat delivered = delivered_format(picture.format);
+  std::vector<std::uint8_t> bytes;
+  switch (picture.format.layout) {
+    case Layout::mjpeg:
+      if (auto damage = decode_jpeg(picture.bytes, picture.width, picture.height, bytes))
+        return damage;
+      break;
+    case Layout::nv12:
+      bytes = rgb_of_nv12(picture);
+      break;
+    case Layout::yuyv:
+    case Layout::uyvy:
+      bytes = delivered == PixelFormat::yuv422p8 ? planar_422(picture) : rgb_of_422(picture);
+      break;
+    default:
+      bytes = plain_samples(picture);
+  }
+  frame.format = delivered;
+  frame.width = picture.width;
+  frame.height = picture.height;
+  frame.bytes = std::move(bytes);
+  return std::nullopt;
+}
+
+}  // namespace previz::convert

@@ -1,0 +1,132 @@
+// Motion JPEG: decoded right, and refused where it is not whole.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+// jpeglib.h needs what <cstdio> declares.
+#include <jpeglib.h>
+
+#include <array>
+#include <cstdlib>
+#include <memory>
+#include <random>
+
+#include "drivers/convert/convert.hpp"
+
+namespace previz::convert {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr WireFormat mjpeg{Layout::mjpeg, 8, Packing::words, YuvMatrix::bt601, YuvRange::full};
+
+// As webcams send them: 4:2:2, the standard Huffman tables left out where `abbreviated`.
+Bytes jpeg_of(int width, int height, const Bytes& rgb, bool abbreviated = false) {
+  jpeg_compress_struct encoder{};
+  jpeg_error_mgr errors{};
+  encoder.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&encoder);
+  unsigned char* data = nullptr;
+  unsigned long size = 0;
+  jpeg_mem_dest(&encoder, &data, &size);
+  encoder.image_width = static_cast<JDIMENSION>(width);
+  encoder.image_height = static_cast<JDIMENSION>(height);
+  encoder.input_components = 3;
+  encoder.in_color_space = JCS_RGB;
+  jpeg_set_defaults(&encoder);
+  jpeg_set_quality(&encoder, 100, TRUE);
+  encoder.comp_info[0].h_samp_factor = 2;
+  encoder.comp_info[0].v_samp_factor = 1;
+  if (abbreviated)
+    for (int i = 0; i < 2; ++i)
+      encoder.dc_huff_tbl_ptrs[i]->sent_table = encoder.ac_huff_tbl_ptrs[i]->sent_table = TRUE;
+  jpeg_start_compress(&encoder, abbreviated ? FALSE : TRUE);
+  for (int y = 0; y < height; ++y) {
+    auto* row = const_cast<JSAMPLE*>(&rgb[std::size_t{3} * static_cast<std::size_t>(y * width)]);
+    jpeg_write_scanlines(&encoder, &row, 1);
+  }
+  jpeg_finish_compress(&encoder);
+  jpeg_destroy_compress(&encoder);
+  Bytes jpeg(data, data + size);
+  std::free(data);
+  return jpeg;
+}
+
+Bytes flat(int width, int height, const std::array<std::uint8_t, 3>& colour) {
+  Bytes rgb;
+  for (int i = 0; i < width * height; ++i) rgb.insert(rgb.end(), colour.begin(), colour.end());
+  return rgb;
+}
+
+Bytes noise(int width, int height) {
+  std::mt19937 random(5);
+  Bytes rgb(std::size_t{3} * static_cast<std::size_t>(width * height));
+  for (std::uint8_t& byte : rgb) byte = static_cast<std::uint8_t>(random());
+  return rgb;
+}
+
+// A flat picture has only DC terms, in steps of an eighth of 8 codes at quality 100: each of Y, Cb
+// and Cr is off by at most 1/2 (its rounding) + 1/2 (its step), so R by at most 1 + 1.402, B by
+// 1 + 1.772, G by 1 + 0.344 + 0.714, each rounded: 3.
+TEST(Mjpeg, FlatColoursComeBack) {
+  for (const bool abbreviated : {false, true}) {
+    for (const std::array<std::uint8_t, 3>& colour :
+         {std::array<std::uint8_t, 3>{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {200, 120, 40}}) {
+      const Bytes jpeg = jpeg_of(35, 18, flat(35, 18, colour), abbreviated);
+      Frame frame;
+      const auto damage = convert({mjpeg, 35, 18, 0, jpeg}, frame);
+      ASSERT_FALSE(damage) << *damage;
+      ASSERT_EQ(frame.bytes.size(), frame_bytes(PixelFormat::rgb8, 35, 18));
+      for (std::size_t i = 0; i < frame.bytes.size(); ++i)
+        ASSERT_NEAR(frame.bytes[i], colour[i % 3], 3);
+    }
+  }
+}
+
+TEST(Mjpeg, EveryCutIsNoticed) {
+  const Bytes jpeg = jpeg_of(48, 32, noise(48, 32));
+  for (std::size_t size = 0; size < jpeg.size(); size += size < 700 ? 1 : 13) {
+    // In memory of its own, so that reading past the end is seen.
+    const Bytes cut(jpeg.begin(), jpeg.begin() + static_cast<std::ptrdiff_t>(size));
+    Frame frame;
+    EXPECT_TRUE(convert({mjpeg, 48, 32, 0, cut}, frame)) << size << " of " << jpeg.size();
+    EXPECT_TRUE(frame.bytes.empty());
+  }
+  Frame frame;
+  EXPECT_TRUE(convert({mjpeg, 48, 32, 0, Bytes(jpeg.begin(), jpeg.end() - 2)}, frame));
+  EXPECT_FALSE(convert({mjpeg, 48, 32, 0, jpeg}, frame));
+}
+
+// Buffers are often longer than the picture in them, and some cameras pad before the last marker.
+TEST(Mjpeg, PaddingIsNoDamage) {
+  Bytes padded = jpeg_of(48, 32, noise(48, 32));
+  padded.insert(padded.end(), 100, 0);
+  Frame frame;
+  EXPECT_FALSE(convert({mjpeg, 48, 32, 0, padded}, frame));
+  Bytes inside = jpeg_of(48, 32, noise(48, 32));
+  inside.insert(inside.end() - 2, 7, 0);
+  EXPECT_FALSE(convert({mjpeg, 48, 32, 0, inside}, frame));
+}
+
+TEST(Mjpeg, APictureOfAnotherSizeIsRefused) {
+  const Bytes jpeg = jpeg_of(48, 32, noise(48, 32));
+  Frame frame;
+  EXPECT_EQ(convert({mjpeg, 32, 48, 0, jpeg}, frame).value_or(""),
+            "is a JPEG of 48x32 pixels; 32x48 was agreed");
+}
+
+TEST(Mjpeg, DamageDoesNoHarm) {
+  const Bytes jpeg = jpeg_of(48, 32, noise(48, 32));
+  std::mt19937 random(9);
+  for (int i = 0; i < 400; ++i) {
+    Bytes damaged = jpeg;
+    for (int flips = 0; flips <= i % 8; ++flips)
+      damaged[random() % damaged.size()] = static_cast<std::uint8_t>(random());
+    Frame frame;
+    if (!convert({mjpeg, 48, 32, 0, damaged}, frame)) {
+      EXPECT_EQ(frame.bytes.size(), frame_bytes(PixelFormat::rgb8, 48, 32));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace previz::convert

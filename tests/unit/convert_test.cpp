@@ -1,0 +1,379 @@
+#include "drivers/convert/convert.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <random>
+
+#include "daemon/lighting/response.hpp"
+
+namespace previz::convert {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+WireFormat plain(Layout layout, int bits = 8, Packing packing = Packing::words) {
+  return {layout, bits, packing, YuvMatrix::bt601, YuvRange::limited};
+}
+
+Frame converted(const WireFormat& format, int width, int height, const Bytes& bytes,
+                std::size_t stride = 0) {
+  Frame frame;
+  const auto damage = convert({format, width, height, stride, bytes}, frame);
+  EXPECT_FALSE(damage) << *damage;
+  EXPECT_EQ(frame.format, delivered_format(format));
+  EXPECT_EQ(frame.bytes.size(), frame_bytes(frame.format, width, height));
+  return frame;
+}
+
+std::vector<std::uint16_t> words_of(const Bytes& bytes) {
+  std::vector<std::uint16_t> words(bytes.size() / 2);
+  std::memcpy(words.data(), bytes.data(), 2 * words.size());
+  return words;
+}
+
+Bytes bytes_of(const std::vector<std::uint16_t>& words) {
+  Bytes bytes(2 * words.size());
+  std::memcpy(bytes.data(), words.data(), bytes.size());
+  return bytes;
+}
+
+Bytes random_bytes(std::size_t count, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  Bytes bytes(count);
+  for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random());
+  return bytes;
+}
+
+// ---- Y'CbCr
+
+struct Coding {
+  YuvMatrix matrix;
+  YuvRange range;
+};
+constexpr Coding codings[] = {{YuvMatrix::bt601, YuvRange::limited},
+                              {YuvMatrix::bt601, YuvRange::full},
+                              {YuvMatrix::bt709, YuvRange::limited},
+                              {YuvMatrix::bt709, YuvRange::full}};
+
+// The Recommendations' equations forward: R'G'B' in 0..1 to codes, not rounded.
+std::array<double, 3> encoded(const Coding& coding, double r, double g, double b) {
+  const double kr = coding.matrix == YuvMatrix::bt709 ? 0.2126 : 0.299;
+  const double kb = coding.matrix == YuvMatrix::bt709 ? 0.0722 : 0.114;
+  const double y = kr * r + (1 - kr - kb) * g + kb * b;
+  const double cb = (b - y) / (2 * (1 - kb)), cr = (r - y) / (2 * (1 - kr));
+  if (coding.range == YuvRange::full) return {255 * y, 128 + 255 * cb, 128 + 255 * cr};
+  return {16 + 219 * y, 128 + 224 * cb, 128 + 224 * cr};
+}
+
+// Decoding and encoding again comes back to the code, within what rounding R'G'B' to 8 bits moves
+// it: half a code a channel moves luma by at most 0.5 (219 or 255)/255 codes, and chroma by at most
+// 0.5 * 255/255 * (1 - k)/(2 (1 - k)) * 2 = 0.5 codes. Codes outside R'G'B' are clipped, and left
+// out.
+TEST(Yuv, DecodesWhatTheRecommendationsEncode) {
+  for (const Coding& coding : codings) {
+    const YuvToRgb to_rgb(coding.matrix, coding.range);
+    int checked = 0;
+    for (int y = 0; y < 256; y += 3) {
+      for (int cb = 0; cb < 256; cb += 5) {
+        for (int cr = 0; cr < 256; cr += 5) {
+          std::array<std::uint8_t, 3> rgb{};
+          to_rgb(y, 8 * cb, 8 * cr, rgb.data());
+          if (*std::ranges::min_element(rgb) == 0 || *std::ranges::max_element(rgb) == 255)
+            continue;
+          const auto back = encoded(coding, rgb[0] / 255.0, rgb[1] / 255.0, rgb[2] / 255.0);
+          EXPECT_NEAR(back[0], y, 0.501);
+          EXPECT_NEAR(back[1], cb, 0.501);
+          EXPECT_NEAR(back[2], cr, 0.501);
+          ++checked;
+        }
+      }
+    }
+    EXPECT_GT(checked, 10'000);
+  }
+}
+
+// 100 % colour bars of BT.601 as 8-bit limited-range codes. A code is off its exact value by at
+// most 1/2, so a channel by at most 255 (0.5/219 + 1.772 * 0.5/224) = 1.6, and rounds to within 2.
+TEST(Yuv, ColourBarsOfBt601) {
+  struct Bar {
+    std::uint8_t y, cb, cr;
+    std::array<int, 3> rgb;
+  };
+  for (const Bar& bar : {Bar{235, 128, 128, {255, 255, 255}}, Bar{210, 16, 146, {255, 255, 0}},
+                         Bar{170, 166, 16, {0, 255, 255}}, Bar{145, 54, 34, {0, 255, 0}},
+                         Bar{106, 202, 222, {255, 0, 255}}, Bar{81, 90, 240, {255, 0, 0}},
+                         Bar{41, 240, 110, {0, 0, 255}}, Bar{16, 128, 128, {0, 0, 0}}}) {
+    const Frame frame = converted(plain(Layout::yuyv), 2, 1, {bar.y, bar.cb, bar.y, bar.cr});
+    for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(frame.bytes[i], bar.rgb[i % 3], 2);
+  }
+}
+
+TEST(Yuv, Bt709Limited422KeepsItsSamples) {
+  WireFormat format{Layout::yuyv, 8, Packing::words, YuvMatrix::bt709, YuvRange::limited};
+  const Frame yuyv =
+      converted(format, 4, 2, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16});
+  EXPECT_EQ(yuyv.format, PixelFormat::yuv422p8);
+  EXPECT_EQ(yuyv.bytes, (Bytes{1, 3, 5, 7, 9, 11, 13, 15, 2, 6, 10, 14, 4, 8, 12, 16}));
+  format.layout = Layout::uyvy;
+  const Frame uyvy =
+      converted(format, 4, 2, {2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15});
+  EXPECT_EQ(uyvy.bytes, yuyv.bytes);
+}
+
+TEST(Yuv, OddWidthsHaveHalfAMacroPixel) {
+  const WireFormat format{Layout::yuyv, 8, Packing::words, YuvMatrix::bt709, YuvRange::limited};
+  EXPECT_EQ(row_bytes(format, 3), 8u);
+  const Frame frame = converted(format, 3, 1, {1, 2, 3, 4, 5, 6, 99, 8});
+  EXPECT_EQ(frame.bytes, (Bytes{1, 3, 5, 2, 6, 4, 8}));
+}
+
+// Converted here or later from yuv422p8: the same pixels.
+TEST(Yuv, BothWaysFrom422AgreeForBt709) {
+  const int width = 31, height = 9;
+  WireFormat format{Layout::uyvy, 8, Packing::words, YuvMatrix::bt709, YuvRange::limited};
+  const Bytes bytes = random_bytes(picture_bytes(format, width, height), 1);
+  const Plate plate = to_plate(converted(format, width, height, bytes));
+  const YuvToRgb to_rgb(YuvMatrix::bt709, YuvRange::limited);
+  for (int x = 0; x < width; ++x) {
+    const int left = 4 * (x / 2), right = 4 * std::min(x / 2 + x % 2, 15);
+    std::array<std::uint8_t, 3> rgb{};
+    to_rgb(bytes[2 * x + 1], 4 * (bytes[left] + bytes[right]),
+           4 * (bytes[left + 2] + bytes[right + 2]), rgb.data());
+    for (int c = 0; c < 3; ++c) EXPECT_EQ(plate.samples[3 * x + c], rgb[c]);
+  }
+}
+
+// Luma 126, Cr 128; Cb of the chroma rows 100 and 140. MPEG-2 sites chroma row i at luma row
+// 2i + 1/2, so the luma rows see 100 (edge), 110, 130, 140 (edge).
+TEST(Yuv, Nv12ChromaIsSitedBetweenTheRows) {
+  const Frame frame = converted(plain(Layout::nv12), 2, 4,
+                                {126, 126, 126, 126, 126, 126, 126, 126, 100, 128, 140, 128});
+  const double cb[] = {100, 110, 130, 140};
+  for (int y = 0; y < 4; ++y) {
+    const double grey = 255.0 * (126 - 16) / 219.0;
+    const double blue = grey + 255.0 * 1.772 * (cb[y] - 128) / 224.0;
+    EXPECT_EQ(frame.bytes[6 * y + 0], std::lround(grey));
+    EXPECT_EQ(frame.bytes[6 * y + 2], std::lround(blue));
+  }
+}
+
+TEST(Yuv, Nv12ChromaIsLinearAlongTheRows) {
+  const Frame frame =
+      converted(plain(Layout::nv12), 4, 1, {126, 126, 126, 126, 128, 100, 128, 140});
+  const double cr[] = {100, 120, 140, 140};
+  for (int x = 0; x < 4; ++x)
+    EXPECT_EQ(frame.bytes[3 * x],
+              std::lround(255.0 * (110.0 / 219.0 + 1.402 * (cr[x] - 128) / 224.0)));
+}
+
+// ---- plain samples
+
+TEST(Mono, EightBitsAreCopied) {
+  EXPECT_EQ(converted(plain(Layout::mono), 3, 2, {1, 2, 3, 4, 5, 255}).bytes,
+            (Bytes{1, 2, 3, 4, 5, 255}));
+}
+
+TEST(Mono, EveryCodeOfEveryDepthStaysApartAndOnTheLine) {
+  for (int bits = 9; bits <= 16; ++bits) {
+    const int codes = 1 << bits;
+    std::vector<std::uint16_t> all(static_cast<std::size_t>(codes));
+    for (int v = 0; v < codes; ++v)
+      all[static_cast<std::size_t>(v)] = static_cast<std::uint16_t>(v);
+    const Frame frame = converted(plain(Layout::mono, bits), 256, codes / 256, bytes_of(all));
+    EXPECT_EQ(frame.format, PixelFormat::gray16);
+    const std::vector<std::uint16_t> words = words_of(frame.bytes);
+    for (int v = 0; v < codes; ++v)
+      ASSERT_EQ(words[static_cast<std::size_t>(v)], std::lround(65535.0 * v / (codes - 1)));
+  }
+}
+
+TEST(Mono, WhatLiesAboveASamplesBitsIsIgnored) {
+  const Frame frame = converted(plain(Layout::mono, 10), 2, 1, bytes_of({0xffff, 0xfc00}));
+  EXPECT_EQ(words_of(frame.bytes), (std::vector<std::uint16_t>{65535, 0}));
+}
+
+// PFNC 2.1, "Mono10p" and "Mono12p": samples follow each other from the lowest bit of each byte.
+TEST(Mono, PackedAsOneStreamOfBits) {
+  const Frame ten = converted(plain(Layout::mono, 10, Packing::bits), 4, 1,
+                              {0xff, 0x03, 0x50, 0x95, 0xaa});  // 0x3ff, 0x000, 0x155, 0x2aa
+  for (int i = 0; i < 4; ++i)
+    EXPECT_EQ(words_of(ten.bytes)[i],
+              std::lround(65535.0 * std::array{0x3ff, 0x000, 0x155, 0x2aa}[i] / 0x3ff));
+  const Frame twelve =
+      converted(plain(Layout::mono, 12, Packing::bits), 2, 1, {0xbc, 0x3a, 0x12});  // 0xabc, 0x123
+  EXPECT_EQ(words_of(twelve.bytes)[0], std::lround(65535.0 * 0xabc / 0xfff));
+  EXPECT_EQ(words_of(twelve.bytes)[1], std::lround(65535.0 * 0x123 / 0xfff));
+}
+
+// GigE Vision 2.0, "Mono12Packed" and "Mono10Packed".
+TEST(Mono, PackedAsGigeVisionDoes) {
+  const Frame twelve = converted(plain(Layout::mono, 12, Packing::gige), 2, 1, {0xab, 0x3c, 0x12});
+  EXPECT_EQ(words_of(twelve.bytes)[0], std::lround(65535.0 * 0xabc / 0xfff));
+  EXPECT_EQ(words_of(twelve.bytes)[1], std::lround(65535.0 * 0x123 / 0xfff));
+  const Frame ten = converted(plain(Layout::mono, 10, Packing::gige), 2, 1, {0xff, 0x13, 0x80});
+  EXPECT_EQ(words_of(ten.bytes)[0], 65535);
+  EXPECT_EQ(words_of(ten.bytes)[1], std::lround(65535.0 * 0x201 / 0x3ff));
+}
+
+TEST(Rgb, BothOrdersAtEveryDepth) {
+  EXPECT_EQ(converted(plain(Layout::rgb), 2, 1, {1, 2, 3, 4, 5, 6}).bytes,
+            (Bytes{1, 2, 3, 4, 5, 6}));
+  EXPECT_EQ(converted(plain(Layout::bgr), 2, 1, {1, 2, 3, 4, 5, 6}).bytes,
+            (Bytes{3, 2, 1, 6, 5, 4}));
+  EXPECT_EQ(words_of(converted(plain(Layout::rgb, 16), 1, 1, bytes_of({1, 0x1234, 65535})).bytes),
+            (std::vector<std::uint16_t>{1, 0x1234, 65535}));
+  EXPECT_EQ(words_of(converted(plain(Layout::bgr, 12), 1, 1, bytes_of({0, 0x800, 0xfff})).bytes),
+            (std::vector<std::uint16_t>{65535, 32776, 0}));
+}
+
+TEST(Rows, WhatLiesBetweenThemIsLeftOut) {
+  EXPECT_EQ(converted(plain(Layout::mono), 2, 2, {1, 2, 99, 3, 4}, 3).bytes, (Bytes{1, 2, 3, 4}));
+  const WireFormat yuyv{Layout::yuyv, 8, Packing::words, YuvMatrix::bt709, YuvRange::limited};
+  EXPECT_EQ(converted(yuyv, 2, 2, {1, 2, 3, 4, 99, 99, 5, 6, 7, 8}, 6).bytes,
+            (Bytes{1, 3, 5, 7, 2, 6, 4, 8}));
+}
+
+// ---- Bayer
+
+struct Mosaic {
+  Layout layout;
+  const char* pattern;  // two rows of two: the channel of each pixel
+};
+constexpr Mosaic mosaics[] = {{Layout::bayer_rggb, "rggb"},
+                              {Layout::bayer_grbg, "grbg"},
+                              {Layout::bayer_gbrg, "gbrg"},
+                              {Layout::bayer_bggr, "bggr"}};
+
+std::size_t channel_at(const Mosaic& mosaic, int x, int y) {
+  return std::string("rgb").find(mosaic.pattern[2 * (y % 2) + x % 2]);
+}
+
+// Bytes of a mosaic whose pixel (x, y) has the code colour(x, y)[its channel].
+template <typename Colour>
+Bytes mosaic_of(const Mosaic& mosaic, int width, int height, bool deep, Colour colour) {
+  std::vector<std::uint16_t> words;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      words.push_back(static_cast<std::uint16_t>(colour(x, y)[channel_at(mosaic, x, y)]));
+  if (deep) return bytes_of(words);
+  return {words.begin(), words.end()};
+}
+
+TEST(Bayer, AFlatColourIsThatColourUpToTheEdge) {
+  for (const Mosaic& mosaic : mosaics) {
+    for (const int bits : {8, 10, 12, 16}) {
+      for (const auto& [width, height] : {std::pair{8, 6}, {7, 5}, {4, 4}}) {
+        const int white = (1 << bits) - 1;
+        const std::array<int, 3> colour{white, white / 3, white / 17};
+        const Frame frame =
+            converted(plain(mosaic.layout, bits), width, height,
+                      mosaic_of(mosaic, width, height, bits > 8, [&](int, int) { return colour; }));
+        const Plate plate = to_plate(frame);
+        EXPECT_EQ(plate.bits, bits > 8 ? 16 : 8);
+        const int full = (1 << plate.bits) - 1;
+        for (std::size_t i = 0; i < plate.samples.size(); ++i)
+          ASSERT_EQ(plate.samples[i], std::lround(double(full) * colour[i % 3] / white))
+              << mosaic.pattern << " " << bits << " bits, " << width << "x" << height;
+      }
+    }
+  }
+}
+
+TEST(Bayer, ASampleStaysAsItIsInItsOwnPlace) {
+  for (const Mosaic& mosaic : mosaics) {
+    const int width = 17, height = 12;
+    const Bytes bytes = random_bytes(2 * width * height, 3);
+    const std::vector<std::uint16_t> in = words_of(bytes);
+    const std::vector<std::uint16_t> out =
+        words_of(converted(plain(mosaic.layout, 16), width, height, bytes).bytes);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        ASSERT_EQ(out[3 * (y * width + x) + channel_at(mosaic, x, y)], in[y * width + x]);
+  }
+}
+
+// On a linear ramp every mean of opposite neighbours is exact; away from the edge, where the mirror
+// bends the ramp.
+TEST(Bayer, RampsAreReproducedInside) {
+  for (const Mosaic& mosaic : mosaics) {
+    const int width = 16, height = 14;
+    const auto ramp = [](int x, int y) {
+      return std::array<int, 3>{1000 + 64 * x + 128 * y, 4000 + 128 * x, 20000 - 64 * y - 32 * x};
+    };
+    const std::vector<std::uint16_t> out =
+        words_of(converted(plain(mosaic.layout, 16), width, height,
+                           mosaic_of(mosaic, width, height, true, ramp))
+                     .bytes);
+    for (int y = 2; y < height - 2; ++y)
+      for (int x = 2; x < width - 2; ++x)
+        for (int c = 0; c < 3; ++c)
+          ASSERT_EQ(out[3 * (y * width + x) + c], ramp(x, y)[c])
+              << mosaic.pattern << " " << x << " " << y;
+  }
+}
+
+// ---- malformed pictures
+
+TEST(Malformed, ShortAndAbsurdPicturesAreRefusedInWords) {
+  const std::vector<WireFormat> formats{
+      plain(Layout::mono),
+      plain(Layout::mono, 10),
+      plain(Layout::mono, 12, Packing::bits),
+      plain(Layout::mono, 12, Packing::gige),
+      plain(Layout::bayer_grbg, 12),
+      plain(Layout::rgb),
+      plain(Layout::bgr, 16),
+      plain(Layout::yuyv),
+      plain(Layout::uyvy),
+      plain(Layout::nv12),
+  };
+  for (const WireFormat& format : formats) {
+    const std::size_t whole = picture_bytes(format, 9, 7);
+    Frame frame;
+    frame.bytes = {42};
+    const auto damage_of = [&](int width, int height, std::size_t stride, std::size_t bytes) {
+      const Bytes data(bytes);
+      return convert({format, width, height, stride, data}, frame).value_or("");
+    };
+    EXPECT_EQ(damage_of(9, 7, 0, whole - 1), "is cut short: " + std::to_string(whole - 1) + " of " +
+                                                 std::to_string(whole) + " bytes");
+    EXPECT_NE(damage_of(9, 7, 0, 0), "");
+    EXPECT_NE(damage_of(9, 7, row_bytes(format, 9) - 1, 10'000).find("rows of"), std::string::npos);
+    EXPECT_NE(damage_of(9, 7, std::size_t{1} << 40, 10'000).find("cut short"), std::string::npos);
+    EXPECT_NE(damage_of(0, 7, 0, 10'000), "");
+    EXPECT_NE(damage_of(9, -7, 0, 10'000), "");
+    EXPECT_NE(damage_of(1 << 20, 1 << 20, 0, 10'000), "");
+    EXPECT_EQ(frame.bytes, (Bytes{42}));
+    EXPECT_EQ(damage_of(9, 7, 0, whole), "");
+  }
+  Frame frame;
+  const Bytes bytes(1000);
+  EXPECT_TRUE(convert({plain(Layout::mono, 17), 9, 7, 0, bytes}, frame));
+  EXPECT_TRUE(convert({plain(Layout::mono, 7), 9, 7, 0, bytes}, frame));
+  EXPECT_TRUE(convert({plain(Layout::bayer_rggb), 3, 9, 0, bytes}, frame));
+}
+
+// ---- up to the linear picture
+
+TEST(DeepSamples, KeepTheirBitsUpToTheLinearFloatPicture) {
+  std::vector<std::uint16_t> all(65536);
+  for (std::size_t v = 0; v < all.size(); ++v) all[v] = static_cast<std::uint16_t>(v);
+  const Plate plate = to_plate(converted(plain(Layout::mono, 16), 256, 256, bytes_of(all)));
+  ASSERT_EQ(plate.bits, 16);
+  ResponseCurve linear;
+  linear.kind = ResponseCurve::Kind::linear;
+  const lighting::Response response(linear, plate.bits);
+  float before = -1;
+  for (std::size_t i = 0; i < plate.samples.size(); i += 3) {
+    const auto signal = static_cast<float>(response.inverse()[plate.samples[i]]);
+    EXPECT_GT(signal, before);
+    before = signal;
+  }
+}
+
+}  // namespace
+}  // namespace previz::convert
