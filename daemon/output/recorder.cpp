@@ -226,13 +226,13 @@ void Recorder::begin_take() {
 
 void Recorder::end_take() {
   end_at_.reset();
+  take_->close();
   const std::unique_ptr<TakeWriter> take = std::move(take_);
   {
     const std::lock_guard lock(mutex_);
     if (take->observer_frames() > 0) ++status_.finished_takes;
     if (!status_.recording) late_tracks_ = false;
   }
-  take->close();
   note("recording: " + take->directory().filename().string() + " has " +
        std::to_string(take->observer_frames()) + " frames");
 }

@@ -21,6 +21,12 @@ LightStage::LightStage(const set::Set& set, std::optional<LightCameraCalibration
                 "given; one of them must light the set");
 }
 
+void LightStage::use(set::LightMode mode) {
+  if (settings_.mode == mode) return;
+  settings_.mode = mode;
+  changed_ = !newest_.empty();
+}
+
 void LightStage::see(FramePtr frame, std::uint64_t index) {
   if (given_ || (settings_.frame >= 0 && index != static_cast<std::uint64_t>(settings_.frame)))
     return;

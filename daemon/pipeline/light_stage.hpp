@@ -23,6 +23,9 @@ class LightStage {
   // True where light() needs frames: no environment is given.
   bool needs_frames() const { return !given_; }
 
+  // How the light is taken from what is seen, from the next light() on.
+  void use(set::LightMode mode);
+
   // Frames in capture order. `index` is the frame's place in its stream, from 0; it matters only
   // where the set names the one to use (lighting.frame).
   void see(FramePtr frame, std::uint64_t index);
@@ -31,7 +34,7 @@ class LightStage {
   LightPtr light();
 
  private:
-  const set::Lighting settings_;
+  set::Lighting settings_;
   const std::optional<double> exposure_;  // overrides the frames' own
   const std::optional<LightCameraCalibration> calibration_;
   std::map<long, FramePtr> newest_;  // by exposure, in steps of 1 %

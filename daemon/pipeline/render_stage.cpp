@@ -61,6 +61,7 @@ void RenderStage::operator()(Shot& shot) {
         if (options_.progress) options_.progress(shot, samples);
       });
   shot.error = refined.error;
+  shot.samples = refined.samples;
   if (!refined.whole) return;
   finish(shot);
   shot.render_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

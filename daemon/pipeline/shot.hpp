@@ -30,8 +30,9 @@ struct Shot {
 
   // From tracking and lighting.
   tracking::Track track;
-  LightPtr light;             // null: no light frame was seen yet
-  session::SceneState scene;  // what the crew moved or relit; empty: as in the set
+  bool tracking_done = false;  // false: tracking was paused, and the track says nothing
+  LightPtr light;              // null: no light frame was seen yet
+  session::SceneState scene;   // what the crew moved or relit; empty: as in the set
 
   // From rendering. `untouched` says why the plate passes through as it is; empty: it was rendered.
   std::string untouched;
@@ -40,7 +41,9 @@ struct Shot {
   render::Counters counters;
   bool whole = false;  // false: interrupted before its last sample
   double render_s = 0;
-  double error = 0;  // Refined::error
+  double error = 0;     // Refined::error
+  int samples = 0;      // of the picture; 0: untouched
+  bool frozen = false;  // a round of refining one frame, not a new one
 };
 
 }  // namespace previz::pipeline

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "drivers/error.hpp"
-#include "drivers/replay/replay_camera.hpp"
+#include "drivers/replay/replay_buttons.hpp"
 
 namespace previz::rig {
 namespace {
@@ -62,8 +62,22 @@ Cameras open_cameras(const set::Set& set, bool loop) {
     if (!cameras.recorded.info.light) cameras.recorded.info.light = session.info.light;
     cameras.light = start(std::move(light), "light", light_origin, loop, session.missing);
   }
+  if (loop) cameras.lap_ns = replay_lap_ns(observer->records());
   cameras.observer = start(std::move(observer), "observer", origin, loop, cameras.recorded.missing);
+  cameras.origin = origin;
+  cameras.clock_offset_ns =
+      origin.timestamp_ns - std::chrono::nanoseconds(origin.due.time_since_epoch()).count();
   return cameras;
+}
+
+std::vector<std::unique_ptr<Buttons>> open_buttons(const set::Set& set, const Cameras& cameras) {
+  std::vector<std::unique_ptr<Buttons>> buttons;
+  if (set.buttons.empty() || set.observer.driver != set::Driver::replay) return buttons;
+  ReplayButtonsOptions options;
+  options.due = cameras.origin.due;
+  options.timestamp_ns = cameras.origin.timestamp_ns;
+  buttons.push_back(open_replay_buttons(cameras.recorded.directory, options));
+  return buttons;
 }
 
 }  // namespace previz::rig

@@ -20,7 +20,9 @@ void HeadlessDisplay::show(pipeline::Shot shot) {
   const Clock::time_point now = Clock::now();
   const double in_device_s =
       1e-9 * static_cast<double>(shot.frame->arrival_ns - shot.frame->timestamp_ns);
-  metrics_.shown(std::chrono::duration<double>(now - shot.arrived).count() + in_device_s);
+  // A round of refining is no newer frame: it is as late as it was frozen long ago.
+  if (!shot.frozen)
+    metrics_.shown(std::chrono::duration<double>(now - shot.arrived).count() + in_device_s);
   picture_ = std::move(shot.picture);
   if (now - written_ < std::chrono::seconds(1)) return;
   write();
