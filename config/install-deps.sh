@@ -11,12 +11,14 @@ packages=(
   # pictures and video
   libopencv-dev libopenexr-dev libimath-dev libpng-dev
   libavformat-dev libavcodec-dev libavutil-dev libswscale-dev libjpeg62-turbo-dev
+  # cameras, buttons
+  libaravis-dev
   # markers, geometry, scenes
   libapriltag-dev libembree-dev libtinygltf-dev libstb-dev libglm-dev
   # files, command line, log, hashes
   libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libspdlog-dev libfmt-dev libssl-dev
   # main loop, service, D-Bus
-  libsystemd-dev
+  libsystemd-dev dbus-daemon
   # tests
   libgtest-dev libgmock-dev libbenchmark-dev
 )

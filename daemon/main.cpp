@@ -12,6 +12,8 @@
 #include <cstdlib>
 #include <iostream>
 
+#include "daemon/calibrate/board.hpp"
+#include "daemon/calibrate/calibrate.hpp"
 #include "daemon/post/check.hpp"
 #include "daemon/post/import.hpp"
 #include "daemon/post/render.hpp"
@@ -133,6 +135,39 @@ void add_trade(CLI::App& app, post::TradeOptions& options) {
   add_device_options(command, options.device);
 }
 
+struct CalibrateOptions {
+  calibrate::LensOptions observer;
+  calibrate::LightOptions light;
+};
+
+void add_lens_options(CLI::App& command, calibrate::LensOptions& options) {
+  command.add_option("footage", options.footage, "Session, folder of pictures, or video")
+      ->required();
+  command.add_option("--board", options.board, calibrate::board_grammar);
+  command.add_option("--every", options.every, "Look at every Nth picture only")
+      ->check(CLI::Range(1, 1'000'000));
+  command.add_option("--out", options.table_file, "File for the set file's tables");
+  command.add_option("--plot", options.residual_plot, "SVG file for the residuals");
+  command.add_flag("--force", options.force, "Take the calibration although views are missing");
+}
+
+void add_calibrate(CLI::App& app, CalibrateOptions& options) {
+  CLI::App& command = *app.add_subcommand("calibrate", "Measure a camera; prints set file tables");
+  command.require_subcommand(1);
+  CLI::App& observer = *command.add_subcommand("observer", "The film camera's lens");
+  add_lens_options(observer, options.observer);
+  observer.get_option("--board")->required();
+  CLI::App& light = *command.add_subcommand("light", "The light camera's fisheye, and its pose");
+  add_lens_options(light, options.light);
+  light.add_option("--tags", options.light.tags_set, "Set file whose tags it sees: finds its pose");
+}
+
+int do_calibrate(const CLI::App& command, const CalibrateOptions& options) {
+  if (command.got_subcommand("observer")) calibrate_observer(options.observer, std::cout);
+  if (command.got_subcommand("light")) calibrate_light(options.light, std::cout);
+  return 0;
+}
+
 int do_import(const post::ImportOptions& options) {
   const post::ImportReport report = post::import_session(options);
   for (const std::string& note : report.notes) std::cout << note << "\n";
@@ -185,16 +220,20 @@ int main(int argc, char** argv) {
   std::filesystem::path checked;
   post::ImportOptions import_options;
   post::TradeOptions trade_options;
+  CalibrateOptions calibrate_options;
   try {
     add_render(app, render_options);
     add_run(app, live_options);
     add_check(app, checked);
     add_import(app, import_options);
     add_trade(app, trade_options);
+    add_calibrate(app, calibrate_options);
     app.parse(argc, argv);
     start_log(level);
     const rig::StopOnSignal stop;
     if (app.got_subcommand("check")) return post::check_set(checked, std::cout);
+    if (app.got_subcommand("calibrate"))
+      return do_calibrate(*app.get_subcommand("calibrate"), calibrate_options);
     if (app.got_subcommand("import")) return do_import(import_options);
     if (app.got_subcommand("render")) return do_render(render_options, stop);
     if (app.got_subcommand("trade")) return do_trade(trade_options, stop);

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -53,10 +54,24 @@ struct ObserverCalibration {
   double responsivity = 1.0;  // exposure = exposure_s * gain * responsivity
 };
 
+// What a lens lets through at an angle off its axis, over what it lets through on it:
+// 1 + v1 t^2 + v2 t^4 + v3 t^6, t the angle.
+using Vignetting = std::array<double, 3>;
+
+double relative_illumination(const Vignetting& v, double angle_rad);
+// Its least value from the axis to an angle off it.
+double least_illumination(const Vignetting& v, double max_angle_rad);
+
+// What goes beyond these is a broken lens or sensor, or a wrong calibration.
+inline constexpr double min_illumination = 0.01, max_dark_level = 0.5;
+
+// value = forward(exposure * radiance * relative_illumination + dark_level), clipped at 1.
 struct LightCameraCalibration {
   FisheyeIntrinsics intrinsics;
+  Vignetting vignetting{};  // at least min_illumination up to intrinsics.max_angle_rad
   ResponseCurve response;
   double responsivity = 1.0;
+  glm::dvec3 dark_level{0};  // signal of a covered lens, per channel, 0 to max_dark_level
   // Rigid; OpenCV camera axes (x right, y down, z forward); metres; world Z up.
   glm::dmat4 world_from_camera{1.0};
 };

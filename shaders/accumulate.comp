@@ -23,14 +23,15 @@ bool is_finite(vec3 v) {
 }
 
 // What cannot be is counted, and the sample is then black in both worlds.
-void reject_impossible(inout vec4 mixed, inout vec4 real) {
-  const bool finite = is_finite(mixed.rgb) && is_finite(real.rgb);
-  const bool negative = any(lessThan(mixed.rgb, vec3(0.0))) || any(lessThan(real.rgb, vec3(0.0)));
+void reject_impossible(inout vec4 mixed, inout vec4 real, inout vec3 landed) {
+  const bool finite = is_finite(mixed.rgb) && is_finite(real.rgb) && is_finite(landed);
+  const bool negative = any(lessThan(min(min(mixed.rgb, real.rgb), landed), vec3(0.0)));
   if (finite && !negative) return;
   if (!finite) atomicAdd(control.dropped_not_finite, 1u);
   else atomicAdd(control.dropped_negative, 1u);
   mixed.rgb = vec3(0.0);
   real.rgb = vec3(0.0);
+  landed = vec3(0.0);
 }
 
 void main() {
@@ -43,7 +44,9 @@ void main() {
     vec4 real = sample_real[slot];
     if (real.w == SAMPLE_NONE) continue;
     const vec4 aov = sample_aov[slot];
-    reject_impossible(mixed, real);
+    vec3 landed = has_feature(FEATURE_CAMERA) ? sample_landed[slot].rgb : vec3(0.0);
+    reject_impossible(mixed, real, landed);
+    mixed.rgb -= landed;  // a difference by now, which may be below zero
     const vec3 diff = mixed.rgb - real.rgb;
     add_exactly(sums.mixed_high, sums.mixed_low, mixed);
     add_exactly(sums.diff_high, sums.diff_low, vec4(diff, aov.w));

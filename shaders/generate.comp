@@ -4,20 +4,9 @@
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shaders/lib/append.glsl"
+#include "shaders/lib/calibrated_ray.glsl"
 #include "shaders/lib/difference_bounds.glsl"
 #include "shaders/lib/sampler.glsl"
-
-layout(set = 0, binding = BINDING_RAYS) uniform textureBuffer corner_rays;
-
-// x/z and y/z of the undistorted ray through a point of the picture; pixel (0, 0) covers [0, 1]^2.
-vec2 calibrated_ray(uvec2 pixel, vec2 inside) {
-  const int stride = int(frame.width) + 1;
-  const int corner = int(pixel.y) * stride + int(pixel.x);
-  const vec2 top = mix(texelFetch(corner_rays, corner).xy, texelFetch(corner_rays, corner + 1).xy, inside.x);
-  const vec2 bottom = mix(texelFetch(corner_rays, corner + stride).xy,
-                          texelFetch(corner_rays, corner + stride + 1).xy, inside.x);
-  return mix(top, bottom, inside.y);
-}
 
 // Whether a differing object may cover a part of the pixel: its bound, widened by the pixel's own
 // extent and by the lens, meets the ray through the pixel's centre.
@@ -66,6 +55,7 @@ void main() {
     path_throughput[path] = vec4(1.0, 1.0, 1.0, uintBitsToFloat(bits));
     sample_mixed[slot] = vec4(0.0);
     sample_real[slot] = vec4(0.0, 0.0, 0.0, difference ? SAMPLE_DIFFERENCE : SAMPLE_FULL);
+    if (has_feature(FEATURE_CAMERA)) sample_landed[slot] = vec4(0.0);
     sample_aov[slot] = vec4(0.0);
   }
   append_next(wanted, 2u * slot);

@@ -4,6 +4,7 @@
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shaders/lib/append.glsl"
+#include "shaders/lib/camera.glsl"
 #include "shaders/lib/difference_bounds.glsl"
 #include "shaders/lib/environment.glsl"
 #include "shaders/lib/gather.glsl"
@@ -23,6 +24,7 @@ struct Path {
   uint depth;
   bool rough;  // some vertex so far scattered by a lobe that is not Dirac
   bool difference;  // what is the same in both worlds need not be traced
+  bool landed;      // see PATH_LANDED
 };
 
 Path load_path(uint index) {
@@ -30,16 +32,19 @@ Path load_path(uint index) {
   const vec4 direction = ray_direction[index];
   const vec4 throughput = path_throughput[index];
   const uint bits = floatBitsToUint(throughput.w);
-  return Path(index, index >> 1, origin.xyz, origin.w, direction.xyz, direction.w, throughput.rgb,
+  return Path(index, path_slot(index), origin.xyz, origin.w, direction.xyz, direction.w, throughput.rgb,
               path_worlds(bits), path_depth(bits), (bits & PATH_ROUGH) != 0u,
-              has_feature(FEATURE_DIFFERENCE) && (bits & PATH_DIFFERENCE) != 0u);
+              (has_feature(FEATURE_DIFFERENCE) || has_feature(FEATURE_CAMERA)) &&
+                  (bits & PATH_DIFFERENCE) != 0u,
+              has_feature(FEATURE_CAMERA) && (bits & PATH_LANDED) != 0u);
 }
 
 void store_path(Path p, uint index) {
   ray_origin[index] = vec4(p.origin, p.t_min);
   ray_direction[index] = vec4(p.direction, p.pdf);
   const uint bits = p.worlds | (p.rough ? PATH_ROUGH : 0u) |
-                    (p.difference ? PATH_DIFFERENCE : 0u) | (p.depth << PATH_DEPTH_SHIFT);
+                    (p.difference ? PATH_DIFFERENCE : 0u) | (p.landed ? PATH_LANDED : 0u) |
+                    (p.depth << PATH_DEPTH_SHIFT);
   path_throughput[index] = vec4(p.throughput, uintBitsToFloat(bits));
 }
 
@@ -49,6 +54,10 @@ bool is_caustic(Path p) { return p.rough && p.pdf <= 0.0; }
 // Whether light with this gain is the same in all worlds of the path, and cancels.
 bool cancels(Path p, vec2 gain) {
   return p.difference && p.worlds == WORLD_BOTH && gain.x == gain.y;
+}
+
+void receive(Path p, vec3 radiance, vec2 gain) {
+  add_radiance(p.slot, p.worlds, p.landed, radiance, gain);
 }
 
 // Power heuristic; pdf = 0 stands for a Dirac direction, which a light sample cannot find.
@@ -66,8 +75,7 @@ void meet_lights(Path p, float t_hit) {
     const float t = meet_light(lights[i], p.origin, p.direction, pdf);
     if (t < 0.0 || t <= p.t_min || t > t_hit) continue;
     const float other = (1.0 - frame.environment_selection) * lights[i].selection * pdf;
-    add_radiance(p.slot, p.worlds, p.throughput * lights[i].emission * mis_weight(p.pdf, other),
-                 lights[i].gain);
+    receive(p, p.throughput * lights[i].emission * mis_weight(p.pdf, other), lights[i].gain);
   }
 }
 
@@ -76,7 +84,7 @@ void meet_environment(Path p) {
   float weight = 1.0;
   if (has_feature(FEATURE_ENVIRONMENT_SAMPLING) && p.pdf > 0.0)
     weight = mis_weight(p.pdf, frame.environment_selection * environment_pdf(p.direction));
-  add_radiance(p.slot, p.worlds, p.throughput * environment_radiance(p.direction) * weight, vec2(1.0));
+  receive(p, p.throughput * environment_radiance(p.direction) * weight, vec2(1.0));
 }
 
 void meet_emission(Path p, Surface s, GpuHit hit) {
@@ -88,7 +96,7 @@ void meet_emission(Path p, Surface s, GpuHit hit) {
     const float pdf = triangle_pdf(light, p.direction, hit.t);
     weight = mis_weight(p.pdf, (1.0 - frame.environment_selection) * light.selection * pdf);
   }
-  add_radiance(p.slot, p.worlds, p.throughput * s.emission * weight, vec2(1.0));
+  receive(p, p.throughput * s.emission * weight, vec2(1.0));
 }
 
 // How directions are sampled at a vertex: by the BSDF, and for `share` of them towards the objects
@@ -170,7 +178,7 @@ bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, out GpuS
       delta ? 1.0 : mis_weight(pdf, combined_pdf(t, s, light.direction, bsdf_pdf));
   ray.direction = light.direction;
   ray.t_max = light.t_max;
-  ray.slot_and_worlds = (p.slot << 2) | p.worlds;
+  ray.slot_and_worlds = (p.slot << 3) | (p.landed ? 4u : 0u) | p.worlds;
   ray.contribution = p.throughput * value * light.radiance * (weight / pdf);
   ray.gain = light.gain;
   if (cancels(p, light.gain) && !meets_bounds(ray.origin, ray.direction, ray.t_max)) return false;
@@ -183,8 +191,7 @@ void meet_photons(Path p, Surface s, Lobes l) {
   if (!is_rough(l)) return;
   const bool differing = cancels(p, vec2(1.0));
   const GatheredPair gathered = gather_photons(s, l, frame.max_depth - p.depth - 1u, differing);
-  if ((p.worlds & WORLD_MIXED) != 0u) sample_mixed[p.slot].rgb += p.throughput * gathered.mixed;
-  if ((p.worlds & WORLD_REAL) != 0u) sample_real[p.slot].rgb += p.throughput * gathered.real;
+  add_pair(p.slot, p.worlds, p.landed, p.throughput * gathered.mixed, p.throughput * gathered.real);
 }
 
 // Ends a path of the difference that is far from all that differs: what can still come is little.
@@ -224,10 +231,40 @@ bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, vec2
 
 // The world that does not contain the hit goes on along the same ray, as a path of its own.
 void fork(Path p, uint other_worlds, float t_hit, out uint forked) {
-  forked = p.index ^ 1u;
+  forked = p.landed ? 2u * slot_count() + p.slot : p.index ^ 1u;
   p.worlds = other_worlds;
   p.t_min = t_hit;
   store_path(p, forked);
+}
+
+// Counts of 64 bits.
+void count_measured() {
+  if (atomicAdd(control.measured_low, 1u) == 0xffffffffu) atomicAdd(control.measured_high, 1u);
+}
+void count_unmeasured() {
+  if (atomicAdd(control.unmeasured_low, 1u) == 0xffffffffu) atomicAdd(control.unmeasured_high, 1u);
+}
+
+// At a diffuse real surface that the camera sees, its radiance in the real world has been measured. A
+// path of the real world ends there: true. One of the mixed world takes it, too, and goes on, once,
+// for what the worlds differ by at that point.
+bool meet_measured(inout Path p, Surface s, GpuHit hit) {
+  const bool is_needed = p.worlds == WORLD_REAL || !(p.landed || cancels(p, vec2(1.0)));
+  if (p.depth == 0u || !is_needed || (instances[hit.instance].presence & WORLD_REAL) == 0u)
+    return false;
+  vec3 radiance;
+  if (is_specular(s) || any(greaterThan(s.emission, vec3(0.0))) ||
+      !measured_radiance(s.position, radiance)) {
+    count_unmeasured();
+    return false;
+  }
+  count_measured();
+  receive(p, p.throughput * radiance, vec2(1.0));
+  if (p.worlds == WORLD_REAL) return true;
+  p.worlds = WORLD_BOTH;
+  p.difference = true;
+  p.landed = true;
+  return false;
 }
 
 void write_aov(Path p, Surface s, float t) {
@@ -279,7 +316,8 @@ void main() {
       const Surface s = make_surface(hit, p.direction);
       if (p.depth == 0u && (p.worlds & WORLD_MIXED) != 0u) write_aov(p, s, hit.t);
       if (takes_light) meet_emission(p, s, hit);
-      if (p.depth < frame.max_depth) {
+      const bool ends = has_feature(FEATURE_CAMERA) && meet_measured(p, s, hit);
+      if (!ends && p.depth < frame.max_depth) {
         shade_vertex(p, s, ray, lit, scattered);
         if (scattered) store_path(p, p.index);
       }

@@ -45,6 +45,19 @@ std::size_t texel_index(int size, const glm::vec3& direction) {
          static_cast<std::size_t>(texel(point.x));
 }
 
+std::size_t wrapped_texel(int size, int i, int j) {
+  const int last = size - 1;
+  if (i < 0 || i > last) {
+    i = i < 0 ? 0 : last;
+    j = last - j;
+  }
+  if (j < 0 || j > last) {
+    j = j < 0 ? 0 : last;
+    i = last - i;
+  }
+  return static_cast<std::size_t>(j) * static_cast<std::size_t>(size) + static_cast<std::size_t>(i);
+}
+
 glm::dvec3 total_flux(const EnvironmentMap& map) {
   glm::dvec3 sum(0);
   for (const glm::vec3& radiance : map.radiance) sum += glm::dvec3(radiance);

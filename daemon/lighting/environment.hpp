@@ -17,17 +17,33 @@ struct EnvironmentMap {
   std::vector<glm::vec3> radiance;
 };
 
+// A light source in the image (sources.hpp). An even disc of radiance flux / solid_angle_sr stands
+// for it.
+struct Source {
+  int id = 0;                     // the same in every frame, from 1; 0: none yet
+  glm::dvec3 direction{0, 0, 1};  // unit, to the centre of gravity of its luminance
+  double solid_angle_sr = 0;      // luminous flux / the luminance that half of it comes from above
+  glm::dvec3 flux{0};             // integral of radiance over solid angle, above the ring around it
+
+  friend bool operator==(const Source&, const Source&) = default;
+};
+
 // How the map came to be; printed, and recorded with the frame.
 struct EnvironmentReport {
   double seen_sr = 0;          // solid angle measured by the camera
   double filled_sr = 0;        // filled by the unseen rule
   double overexposed_sr = 0;   // clipped in every exposure; radiance there is a lower bound
   double underexposed_sr = 0;  // black in every exposure
+  double moved_sr = 0;         // changed between the exposures; the newest ones count there
+  double dropped_share = 0;    // of all luminous flux; 0 but for lighting.sources.residual
   std::vector<std::string> notes;
 };
 
+// Of the image that the camera saw, or a file gave. As the set's lighting.mode says, `environment`
+// is all of it, or what is left without its sources.
 struct Lighting {
   EnvironmentMap environment;
+  std::vector<Source> sources;
   EnvironmentReport report;
 };
 
@@ -46,6 +62,10 @@ double texel_sr(int size);
 glm::vec3 texel_direction(int size, int i, int j);
 // Index into `radiance` of the texel that a unit direction lies in.
 std::size_t texel_index(int size, const glm::vec3& direction);
+
+// Index of texel (i, j) with i and j from -1 to size: past an edge of the square the sphere goes on
+// mirrored along that edge.
+std::size_t wrapped_texel(int size, int i, int j);
 
 // Integral of radiance over all directions, per channel.
 glm::dvec3 total_flux(const EnvironmentMap& map);

@@ -17,9 +17,9 @@ using std::numbers::pi;
 
 // The picture with one more pixel on every side: wrapped in azimuth, repeated over the poles, so
 // that bilinear lookups need no branch.
-class Source {
+class Panorama {
  public:
-  explicit Source(const LinearPicture& picture) : width_(picture.width), height_(picture.height) {
+  explicit Panorama(const LinearPicture& picture) : width_(picture.width), height_(picture.height) {
     texels_.resize(static_cast<std::size_t>(width_ + 2) * static_cast<std::size_t>(height_ + 2));
     for (int y = -1; y <= height_; ++y) {
       const int row = std::clamp(y, 0, height_ - 1);
@@ -60,7 +60,7 @@ class Source {
 // alone and is tabulated, and the azimuth within its quadrant is ((b - a) / r + 1) pi / 4.
 class TexelMeans {
  public:
-  TexelMeans(const Source& source, int size, int samples_a_side, double rotation_rad)
+  TexelMeans(const Panorama& source, int size, int samples_a_side, double rotation_rad)
       : source_(source), size_(size), samples_a_side_(samples_a_side) {
     const int grid = size * samples_a_side;
     const double height = source.height();
@@ -105,7 +105,7 @@ class TexelMeans {
     return source_.bilinear(x - 0.5f, rows_[m]);
   }
 
-  const Source& source_;
+  const Panorama& source_;
   int size_, samples_a_side_;
   std::vector<float> rows_, radii_;  // by (a + b) / 2
   float quadrant_ = 0, start_ = 0;   // pixels: width of a quadrant; position of world azimuth 0
@@ -147,7 +147,7 @@ Lighting load_environment(const set::Lighting& settings) {
   const int size = chosen_resolution(settings.resolution, pixel_rad * pixel_rad);
   const int samples_a_side =
       std::max(4, static_cast<int>(std::ceil(4 * std::sqrt(texel_sr(size)) / pixel_rad)));
-  const Source source(picture);
+  const Panorama source(picture);
   const TexelMeans means(source, size, samples_a_side, settings.environment_rotation_rad);
   const auto gain = static_cast<float>(settings.environment_gain);
   EnvironmentMap& map = lighting.environment;

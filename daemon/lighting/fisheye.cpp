@@ -61,6 +61,14 @@ double monotonic_limit_rad(const std::array<double, 4>& k) {
   return roots.empty() ? pi : std::sqrt(roots.front());
 }
 
+glm::dvec2 fisheye_pixel(const FisheyeIntrinsics& intrinsics, const glm::dvec3& direction) {
+  const double off_axis = std::hypot(direction.x, direction.y);
+  if (off_axis == 0) return {intrinsics.cx, intrinsics.cy};
+  const double scale = radius(intrinsics.k, std::atan2(off_axis, direction.z)) / off_axis;
+  return {intrinsics.cx + intrinsics.fx * scale * direction.x,
+          intrinsics.cy + intrinsics.fy * scale * direction.y};
+}
+
 Fisheye::Fisheye(const FisheyeIntrinsics& intrinsics) : intrinsics_(intrinsics) {
   if (intrinsics.width <= 0 || intrinsics.height <= 0)
     throw Error("light camera: width and height must be above 0 pixels");
@@ -76,13 +84,8 @@ std::optional<glm::dvec2> Fisheye::project(const glm::dvec3& direction) const {
   const double off_axis = std::hypot(direction.x, direction.y);
   const double angle = std::atan2(off_axis, direction.z);
   if (!(angle <= max_angle_rad_)) return std::nullopt;
-  if (off_axis == 0) {
-    if (!(direction.z > 0)) return std::nullopt;
-    return glm::dvec2(intrinsics_.cx, intrinsics_.cy);
-  }
-  const double scale = radius(intrinsics_.k, angle) / off_axis;
-  return glm::dvec2(intrinsics_.cx + intrinsics_.fx * scale * direction.x,
-                    intrinsics_.cy + intrinsics_.fy * scale * direction.y);
+  if (off_axis == 0 && !(direction.z > 0)) return std::nullopt;
+  return fisheye_pixel(intrinsics_, direction);
 }
 
 std::optional<glm::dvec3> Fisheye::unproject(const glm::dvec2& pixel) const {

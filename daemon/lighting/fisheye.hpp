@@ -40,6 +40,11 @@ class Fisheye {
   double max_radius_ = 0;  // of the polynomial, at max_angle_rad_
 };
 
+// The pixel of a direction of any length by the polynomial alone, whatever max_angle_rad says and
+// even where the polynomial has stopped growing: for fitting it. The axis' own pixel straight
+// behind the camera.
+glm::dvec2 fisheye_pixel(const FisheyeIntrinsics& intrinsics, const glm::dvec3& direction);
+
 // The angle at which r(t) = t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9 stops growing, at most pi.
 double monotonic_limit_rad(const std::array<double, 4>& k);
 

@@ -2,136 +2,161 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <string>
 
 #include "daemon/lighting/parallel.hpp"
-#include "daemon/lighting/response.hpp"
-#include "drivers/error.hpp"
 
 namespace previz::lighting {
 namespace {
 
-std::string describe(const Frame& frame) {
-  return (frame.source.empty() ? "light" : frame.source) + " frame " +
-         std::to_string(frame.sequence);
+constexpr double confidence = 5;  // standard deviations
+
+double variance_of(double signal, double rounding_variance, const SensorNoise& noise) {
+  return std::max(signal, 0.0) * noise.signal_per_electron + noise.read_noise * noise.read_noise +
+         rounding_variance;
 }
-
-// What a code of a frame says: the signal, and the variance that is in it for not knowing the
-// signal better than the code. The same for all frames of a bit depth.
-struct Codes {
-  std::vector<double> signal;
-  std::vector<double> rounding_variance;
-  double dark = 0;  // signal below which rounding to black or to its neighbour rules
-};
-
-Codes make_codes(const ResponseCurve& response, int bits) {
-  Codes codes;
-  codes.signal = Response(response, bits).inverse();
-  const std::size_t count = codes.signal.size();
-  codes.rounding_variance.resize(count);
-  for (std::size_t v = 0; v < count; ++v) {
-    const std::size_t below = v > 0 ? v - 1 : v, above = std::min(v + 1, count - 1);
-    const double step =
-        (codes.signal[above] - codes.signal[below]) / static_cast<double>(above - below);
-    codes.rounding_variance[v] = step * step / 12;
-  }
-  codes.dark = codes.signal[std::min<std::size_t>(2, count - 1)];
-  return codes;
-}
-
-struct Exposure {
-  Plate plate;
-  double exposure = 0;
-  const Codes* codes = nullptr;
-};
 
 // 1 well inside the range of codes, falling to 0 at white, where noise would clip some samples and
 // not others.
-double trust(double signal, double dark) {
-  if (signal < dark) return 0;
-  return std::clamp((1 - signal) / 0.08, 0.0, 1.0);
+double trust(double signal, const Codes& codes) {
+  if (signal < codes.dark) return 0;
+  return std::clamp((codes.white - signal) / 0.08, 0.0, 1.0);
+}
+
+// What exposures say about one channel of a pixel, added up. Of a single one, or of several that
+// agree.
+struct Evidence {
+  double signals = 0, open = 0;   // of those that are not clipped: sums of signals, of exposures
+  double variance = 0, dark = 0;  // of `signals`
+  double at_least = 0;            // radiance that would just clip those that are
+
+  void add(const Evidence& other) {
+    signals += other.signals;
+    open += other.open;
+    variance += other.variance;
+    dark = std::max(dark, other.dark);
+    at_least = std::max(at_least, other.at_least);
+  }
+  double radiance() const { return signals / open; }
+};
+
+Evidence evidence_of(const Exposure& e, std::size_t sample, std::size_t channel,
+                     const SensorNoise& noise) {
+  const Codes& codes = (*e.codes)[channel];
+  const std::uint16_t code = e.plate.samples[sample];
+  if (codes.clipped(code)) return {0, 0, 0, 0, codes.white / e.exposure};
+  const double signal = codes.signal[code];
+  return {signal, e.exposure, variance_of(signal, codes.rounding_variance[code], noise), codes.dark,
+          0};
+}
+
+bool contradict(const Evidence& a, const Evidence& b, const SensorNoise& noise) {
+  // How far a radiance may lie below another, or below what clips.
+  const auto below = [&](const Evidence& low, double high) {
+    const double blur = (confidence * std::sqrt(low.variance) + low.dark) / low.open;
+    return low.radiance() + blur < high * (1 - noise.calibration_error);
+  };
+  if (a.open > 0 && below(a, b.at_least)) return true;
+  if (b.open > 0 && below(b, a.at_least)) return true;
+  if (a.open == 0 || b.open == 0) return false;
+  const double high = std::max({a.radiance(), b.radiance(), 0.0});
+  const double noisy =
+      confidence * std::sqrt(a.variance / (a.open * a.open) + b.variance / (b.open * b.open));
+  return std::abs(a.radiance() - b.radiance()) >
+         noisy + a.dark / a.open + b.dark / b.open + noise.calibration_error * high;
 }
 
 struct Channel {
   double radiance = 0;
+  double variance = 0;
   bool clipped = false;
   bool black = false;
 };
 
-Channel merge_channel(std::span<const Exposure> exposures, std::size_t sample,
-                      const SensorNoise& noise) {
-  double signals = 0, open = 0;
-  double shortest = exposures.front().exposure;
-  bool black = true;
-  for (const Exposure& e : exposures) {
-    const std::uint16_t code = e.plate.samples[sample];
-    shortest = std::min(shortest, e.exposure);
-    black = black && code == 0;
-    if (code + 1u == e.codes->signal.size()) continue;
-    signals += e.codes->signal[code];
-    open += e.exposure;
-  }
-  if (open == 0) return {1 / shortest, true, false};
-  if (black) return {0, false, true};
+class PixelMerger {
+ public:
+  PixelMerger(const std::vector<Exposure>& exposures, const SensorNoise& noise)
+      : exposures_(exposures), noise_(noise), agree_(exposures.size()) {}
 
-  const double first = signals / open;
-  double sum = 0, weights = 0;
-  for (const Exposure& e : exposures) {
-    const std::uint16_t code = e.plate.samples[sample];
-    if (code + 1u == e.codes->signal.size()) continue;
-    const double expected = first * e.exposure;
-    const double variance = expected * noise.signal_per_electron +
-                            noise.read_noise * noise.read_noise + e.codes->rounding_variance[code];
-    const double weight = trust(expected, e.codes->dark) * e.exposure * e.exposure / variance;
-    sum += weight * e.codes->signal[code] / e.exposure;
-    weights += weight;
+  // Whether every exposure agrees with the newer ones about the pixel; those that do will count.
+  bool select(std::size_t pixel) {
+    std::array<Evidence, 3> newer{};
+    bool all = true;
+    for (std::size_t e = 0; e < exposures_.size(); ++e) {
+      std::array<Evidence, 3> said{};
+      bool agrees = true;
+      for (std::size_t c = 0; c < 3; ++c) {
+        said[c] = evidence_of(exposures_[e], 3 * pixel + c, c, noise_);
+        agrees = agrees && !contradict(newer[c], said[c], noise_);
+      }
+      agree_[e] = agrees;
+      all = all && agrees;
+      if (agrees)
+        for (std::size_t c = 0; c < 3; ++c) newer[c].add(said[c]);
+    }
+    seen_ = newer;
+    return all;
   }
-  return {weights > 0 ? sum / weights : first, false, false};
-}
+
+  Channel channel(std::size_t pixel, std::size_t c) const {
+    const Evidence& seen = seen_[c];
+    if (seen.open == 0) return {seen.at_least, 0, true, false};
+    const double first = seen.radiance();
+    double sum = 0, weights = 0;
+    bool black = true;
+    for (std::size_t i = 0; i < exposures_.size(); ++i) {
+      if (!agree_[i]) continue;
+      const Exposure& e = exposures_[i];
+      const Codes& codes = (*e.codes)[c];
+      const std::uint16_t code = e.plate.samples[3 * pixel + c];
+      black = black && codes.black(code);
+      if (codes.clipped(code)) continue;
+      const double expected = first * e.exposure;
+      const double weight = trust(expected, codes) * e.exposure * e.exposure /
+                            variance_of(expected, codes.rounding_variance[code], noise_);
+      sum += weight * codes.signal[code] / e.exposure;
+      weights += weight;
+    }
+    if (black) return {0, seen.variance / (seen.open * seen.open), false, true};
+    const double radiance = std::max(0.0, weights > 0 ? sum / weights : first);
+    // Too noisy to deny what a newer exposure clips, and no better than it.
+    if (radiance < seen.at_least * (1 - noise_.calibration_error))
+      return {seen.at_least, 0, true, false};
+    return {radiance, weights > 0 ? 1 / weights : seen.variance / (seen.open * seen.open), false,
+            false};
+  }
+
+ private:
+  const std::vector<Exposure>& exposures_;
+  const SensorNoise& noise_;
+  std::vector<bool> agree_;         // by exposure
+  std::array<Evidence, 3> seen_{};  // of those that agree
+};
 
 }  // namespace
 
-HdrPicture merge_exposures(std::span<const FramePtr> frames, const ResponseCurve& response,
-                           const SensorNoise& noise) {
-  if (frames.empty()) throw Error("light: there is no frame to merge; at least one is needed");
+HdrPicture merge(const Bracket& bracket, const SensorNoise& noise) {
   HdrPicture picture;
-  picture.width = frames.front()->width;
-  picture.height = frames.front()->height;
-
-  std::map<int, Codes> codes;  // by bit depth
-  std::vector<Exposure> exposures;
-  for (const FramePtr& frame : frames) {
-    if (!(frame->exposure > 0) || !std::isfinite(frame->exposure))
-      throw Error(describe(*frame) + ": exposure is " + std::to_string(frame->exposure) +
-                  "; it must be above 0");
-    if (frame->width != picture.width || frame->height != picture.height)
-      throw Error(describe(*frame) + " has " + std::to_string(frame->width) + "x" +
-                  std::to_string(frame->height) + " pixels, the other exposures have " +
-                  std::to_string(picture.width) + "x" + std::to_string(picture.height));
-    Plate plate = to_plate(*frame);
-    auto entry = codes.find(plate.bits);
-    if (entry == codes.end())
-      entry = codes.emplace(plate.bits, make_codes(response, plate.bits)).first;
-    exposures.push_back({std::move(plate), frame->exposure, &entry->second});
-  }
-
+  picture.width = bracket.width();
+  picture.height = bracket.height();
   const std::size_t width = static_cast<std::size_t>(picture.width);
-  picture.radiance.resize(width * static_cast<std::size_t>(picture.height));
-  picture.flags.resize(picture.radiance.size());
+  const std::size_t pixels = width * static_cast<std::size_t>(picture.height);
+  picture.radiance.resize(pixels);
+  picture.variance.resize(pixels);
+  picture.flags.resize(pixels);
   parallel_blocks(picture.height, [&](int begin, int end) {
+    PixelMerger merger(bracket.exposures(), noise);
     for (std::size_t p = width * static_cast<std::size_t>(begin);
          p < width * static_cast<std::size_t>(end); ++p) {
-      bool clipped = false, black = true;
+      std::uint8_t flags = merger.select(p) ? 0 : moved;
+      bool black = true;
       for (int c = 0; c < 3; ++c) {
-        const Channel channel =
-            merge_channel(exposures, 3 * p + static_cast<std::size_t>(c), noise);
+        const Channel channel = merger.channel(p, static_cast<std::size_t>(c));
         picture.radiance[p][c] = static_cast<float>(channel.radiance);
-        clipped = clipped || channel.clipped;
+        picture.variance[p][c] = static_cast<float>(channel.variance);
+        if (channel.clipped) flags |= overexposed;
         black = black && channel.black;
       }
-      picture.flags[p] =
-          static_cast<std::uint8_t>((clipped ? overexposed : 0) | (black ? underexposed : 0));
+      picture.flags[p] = black ? flags | underexposed : flags;
     }
   });
   return picture;
@@ -139,6 +164,11 @@ HdrPicture merge_exposures(std::span<const FramePtr> frames, const ResponseCurve
 
 long exposure_step(double exposure) {
   return std::lround(std::log(exposure) / std::log1p(0.01));
+}
+
+HdrPicture merge_exposures(std::span<const FramePtr> frames, const ResponseCurve& response,
+                           const glm::dvec3& dark_level, const SensorNoise& noise) {
+  return merge(Bracket(frames, response, dark_level), noise);
 }
 
 }  // namespace previz::lighting

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "daemon/lighting/bracket.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
 
@@ -14,6 +15,7 @@ namespace previz::lighting {
 // Flags of a pixel of a merged picture.
 inline constexpr std::uint8_t overexposed = 1;   // a channel is clipped in every exposure
 inline constexpr std::uint8_t underexposed = 2;  // every channel is black in every exposure
+inline constexpr std::uint8_t moved = 4;  // older exposures contradict newer ones, were left out
 
 // Linear Rec. 709 radiance, row-major. An over-exposed channel holds the least radiance that clips
 // the shortest exposure, an under-exposed one 0.
@@ -22,23 +24,26 @@ struct HdrPicture {
   int height = 0;
   std::vector<glm::vec3> radiance;
   std::vector<std::uint8_t> flags;
+  std::vector<glm::vec3> variance = {};  // of the radiance, by noise and rounding
 };
 
-// What a sensor is taken to add to a signal s in [0, 1]: variance = s * signal_per_electron +
-// read_noise^2, besides rounding to codes. Only ratios between exposures depend on it.
-struct SensorNoise {
-  double signal_per_electron = 1.0 / 30000;
-  double read_noise = 3e-4;  // standard deviation, of the signal
-};
+// Frames of any count, order and exposure, of one size.
+//
+// Going from the newest exposure to the oldest, one that contradicts the newer ones in a pixel
+// (beyond 5 standard deviations of their noise and the calibration's error, in any channel; clipped
+// means at least white) is left out there: what has moved, or was switched, is shown as it is now
+// and leaves no ghost.
+//
+// Of the others each channel of a pixel is the average of signal / exposure over the frames whose
+// code is not clipped, with weights exposure^2 / variance: the variance and the range of codes that
+// count are judged at the radiance found in a first round (sum of signals / sum of exposures), not
+// at each noisy code, so that noise does not bias the average. Samples near black and white count
+// only where nothing better is there. Where every frame is clipped or black, see HdrPicture.
+HdrPicture merge(const Bracket& bracket, const SensorNoise& noise = {});
 
-// Frames of any count, order and exposure, of one size. Each channel of a pixel is the average of
-// signal / exposure over the frames whose code is not clipped, with weights exposure^2 / variance:
-// the variance and the range of codes that count are judged at the radiance found in a first round
-// (sum of signals / sum of exposures), not at each noisy code, so that noise does not bias the
-// average. Samples near black and white count only where nothing better is there. Where every
-// frame is clipped or black, see HdrPicture.
-// Throws previz::Error naming the frame whose exposure or size cannot be used.
+// The same of frames; throws as Bracket does.
 HdrPicture merge_exposures(std::span<const FramePtr> frames, const ResponseCurve& response,
+                           const glm::dvec3& dark_level = glm::dvec3(0),
                            const SensorNoise& noise = {});
 
 // Exposures of the same step belong to one place of a bracket: steps of 1 %, so that an automatic

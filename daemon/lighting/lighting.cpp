@@ -6,10 +6,16 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
+#include <optional>
 
+#include "daemon/lighting/bracket.hpp"
+#include "daemon/lighting/expansion.hpp"
 #include "daemon/lighting/hdr.hpp"
 #include "daemon/lighting/resampling.hpp"
+#include "daemon/lighting/smoothing.hpp"
 #include "daemon/lighting/unseen.hpp"
+#include "daemon/lighting/vignetting.hpp"
+#include "daemon/set/names.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::lighting {
@@ -26,31 +32,23 @@ void check_size(std::span<const FramePtr> frames, const FisheyeIntrinsics& intri
   }
 }
 
-glm::dmat3 rotation_of(const glm::dmat4& world_from_camera) {
+const glm::dmat4& rigid(const glm::dmat4& world_from_camera) {
   const glm::dmat3 rotation(world_from_camera);
   const glm::dmat3 residual = glm::transpose(rotation) * rotation - glm::dmat3(1);
   for (int c = 0; c < 3; ++c)
     for (int r = 0; r < 3; ++r)
       if (!(std::abs(residual[c][r]) < 1e-4) || !(glm::determinant(rotation) > 0))
         throw Error("light camera: world_from_camera is not a rotation and a translation");
-  return rotation;
+  return world_from_camera;
 }
 
-const char* to_string(set::UnseenRule rule) {
-  switch (rule) {
-    case set::UnseenRule::constant:
-      return "constant";
-    case set::UnseenRule::horizon:
-      return "horizon";
-    case set::UnseenRule::mirror:
-      return "mirror";
-  }
-  return "";
-}
+// Share of what the camera sees, from which on it sees nothing that matters.
+constexpr double blinded = 0.5;
 
 // What a user should know about this bracket, in plain words.
-std::vector<std::string> describe(std::span<const FramePtr> frames, const Fisheye& lens,
-                                  const EnvironmentReport& report, const set::Lighting& settings) {
+std::vector<std::string> describe(std::span<const FramePtr> frames, const Bracket& bracket,
+                                  const Fisheye& lens, const EnvironmentReport& report,
+                                  const set::Lighting& settings) {
   std::vector<std::string> notes;
   const auto [shortest, longest] = std::minmax_element(
       frames.begin(), frames.end(),
@@ -59,44 +57,108 @@ std::vector<std::string> describe(std::span<const FramePtr> frames, const Fishey
     notes.push_back(fmt::format(
         "the lens polynomial turns back at {:.1f} degrees off axis and is used up to there only",
         lens.max_angle_rad() * 180 / std::numbers::pi));
+  const auto begin = [&](double sr) {
+    return fmt::format("{}{:.4f} sr are",
+                       sr > blinded * report.seen_sr ? "the light camera is blinded: " : "", sr);
+  };
   if (report.overexposed_sr > 0)
-    notes.push_back(fmt::format(
-        "{:.4f} sr are clipped in every exposure, the light there is a lower bound; an exposure "
-        "below {:.3g} is needed",
-        report.overexposed_sr, (*shortest)->exposure));
+    notes.push_back(
+        fmt::format("{} clipped in every exposure, the light there is {}; an exposure below {:.3g} "
+                    "is needed",
+                    begin(report.overexposed_sr),
+                    settings.clipped_gain > 1
+                        ? fmt::format("taken as up to {:g} times white", settings.clipped_gain)
+                        : "a lower bound",
+                    (*shortest)->exposure));
   if (report.underexposed_sr > 0)
+    notes.push_back(
+        fmt::format("{} black in every exposure; an exposure above {:.3g} would see there",
+                    begin(report.underexposed_sr), (*longest)->exposure));
+  for (const Disagreement& d : disagreements(bracket))
     notes.push_back(fmt::format(
-        "{:.4f} sr are black in every exposure; an exposure above {:.3g} would see there",
-        report.underexposed_sr, (*longest)->exposure));
+        "light frames {} and {} disagree by {:.1f} stops all over: an exposure is stated wrongly, "
+        "or nearly all of the light changed between them; the newer one counts",
+        d.shorter, d.longer, std::abs(d.stops)));
+  if (report.moved_sr > 0)
+    notes.push_back(fmt::format(
+        "{:.4f} sr changed between the exposures of the bracket; the newest ones count there",
+        report.moved_sr));
   if (report.filled_sr > 0)
     notes.push_back(fmt::format("{:.3f} sr ({:.1f} %) are unseen and filled by the rule \"{}\"",
                                 report.filled_sr, 100 * report.filled_sr / sphere_sr,
-                                to_string(settings.unseen)));
+                                set::name_of(settings.unseen)));
   return notes;
 }
 
 }  // namespace
 
-Lighting estimate(std::span<const FramePtr> frames, const LightCameraCalibration& calibration,
-                  const set::Lighting& settings) {
-  const Fisheye lens(calibration.intrinsics);
-  check_size(frames, calibration.intrinsics);
-  const glm::dmat3 world_from_camera = rotation_of(calibration.world_from_camera);
-  const int size = chosen_resolution(settings.resolution, lens.axis_pixel_sr());
+struct Estimator::Impl {
+  Impl(const LightCameraCalibration& its_calibration, const set::Lighting& its_settings,
+       std::shared_ptr<const Room> room)
+      : calibration(its_calibration),
+        settings(its_settings),
+        lens(calibration.intrinsics),
+        viewpoint(rigid(calibration.world_from_camera), std::move(room)),
+        size(chosen_resolution(settings.resolution, lens.axis_pixel_sr())),
+        gains(vignetting_gains(lens, calibration.vignetting)),
+        resampling(make_resampling(lens, viewpoint, size)),
+        smoothing(settings.smoothing_s) {
+    if (settings.unseen == set::UnseenRule::mirror)
+      mirrored = make_resampling(lens, viewpoint.mirrored(), size);
+  }
 
-  const HdrPicture picture = merge_exposures(frames, calibration.response);
-  Resampled map = resample(make_resampling(lens, world_from_camera, size), picture);
+  const LightCameraCalibration calibration;
+  const set::Lighting settings;
+  const Fisheye lens;
+  const Viewpoint viewpoint;
+  const int size;
+  const std::vector<float> gains;
+  const Resampling resampling;
+  std::optional<Resampling> mirrored;
+  Smoothing smoothing;
+};
+
+Estimator::Estimator(const LightCameraCalibration& calibration, const set::Lighting& settings,
+                     std::shared_ptr<const Room> room)
+    : impl_(std::make_unique<Impl>(calibration, settings, std::move(room))) {}
+
+Estimator::~Estimator() = default;
+
+int Estimator::resolution() const {
+  return impl_->size;
+}
+
+Lighting Estimator::operator()(std::span<const FramePtr> frames, const ObservedLight* observed) {
+  Impl& my = *impl_;
+  check_size(frames, my.calibration.intrinsics);
+  const Bracket bracket(frames, my.calibration.response, my.calibration.dark_level);
+  HdrPicture picture = merge(bracket);
+  expand_clipped(picture, my.settings.clipped_gain);
+  undo_vignetting(my.gains, picture);
+  my.smoothing(picture, bracket.newest_ns());
+  Resampled map = resample(my.resampling, picture);
 
   Lighting lighting;
   EnvironmentReport& report = lighting.report;
-  for (const float seen : map.seen) report.seen_sr += seen * texel_sr(size);
+  for (const float seen : map.seen) report.seen_sr += seen * texel_sr(my.size);
   report.filled_sr = std::max(0.0, sphere_sr - report.seen_sr);
   report.overexposed_sr = map.overexposed_sr;
   report.underexposed_sr = map.underexposed_sr;
-  report.notes = describe(frames, lens, report, settings);
-  fill_unseen(picture, lens, world_from_camera, settings, map, report.notes);
-  lighting.environment = {size, std::move(map.radiance)};
+  report.moved_sr = map.moved_sr;
+  report.notes = describe(frames, bracket, my.lens, report, my.settings);
+  std::optional<Resampled> mirror_image;
+  if (my.mirrored) mirror_image = resample(*my.mirrored, picture);
+  const Resampled* elsewhere = mirror_image ? &*mirror_image
+                               : observed   ? &observed->map()
+                                            : nullptr;
+  fill_unseen(picture, my.lens, my.viewpoint, my.settings, elsewhere, map, report.notes);
+  lighting.environment = {my.size, std::move(map.radiance)};
   return lighting;
+}
+
+Lighting estimate(std::span<const FramePtr> frames, const LightCameraCalibration& calibration,
+                  const set::Lighting& settings, std::shared_ptr<const Room> room) {
+  return Estimator(calibration, settings, std::move(room))(frames);
 }
 
 }  // namespace previz::lighting

@@ -2,25 +2,49 @@
 #pragma once
 
 #include <filesystem>
-#include <glm/vec3.hpp>
+#include <memory>
 #include <span>
 
 #include "daemon/lighting/environment.hpp"
+#include "daemon/lighting/observed.hpp"
+#include "daemon/lighting/room.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
 
 namespace previz::lighting {
 
-// One exposure, or a bracket of several of the same scene, merged into one map (merge_exposures,
-// make_resampling, fill_unseen). Resolution 0 gives the smallest power of two whose texels are not
-// larger than a pixel on the optical axis, at most 2048.
+// What one light camera says, frame after frame: a bracket is merged (merge, expand_clipped,
+// undo_vignetting), averaged over time (Smoothing), brought to the map (make_resampling, once) and
+// completed (fill_unseen). Not thread-safe.
+//
 // The map is what the camera sees from where it stands, at infinity: the real table and cubes near
-// it are in it as well. The renderer meets their phantoms before it asks for those directions.
-// All frames have the calibration's size; throws previz::Error naming the frame otherwise, and if
-// the calibration is not one of a fisheye or its pose not rigid.
+// it are in it as well. The renderer meets their phantoms before it asks for those directions. With
+// a room it is what would be seen from Room::seen_from (Viewpoint).
+class Estimator {
+ public:
+  // Resolution 0 gives the smallest power of two whose texels are not larger than a pixel on the
+  // optical axis, at most 2048. `room`, which stands for settings.room, may be null. Throws
+  // previz::Error if the calibration is not one of a fisheye or its pose not rigid.
+  Estimator(const LightCameraCalibration& calibration, const set::Lighting& settings,
+            std::shared_ptr<const Room> room = nullptr);
+  ~Estimator();
+
+  int resolution() const;
+  // One exposure, or a bracket of several of the same scene, in any order; the newest decides where
+  // they contradict each other, and its time is the picture's. `observed` may be null; it counts
+  // where settings.unseen asks for it. Frames have the calibration's size; throws previz::Error
+  // naming the frame otherwise.
+  Lighting operator()(std::span<const FramePtr> frames, const ObservedLight* observed = nullptr);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+// A single bracket, without what came before.
 Lighting estimate(std::span<const FramePtr> frames, const LightCameraCalibration& calibration,
-                  const set::Lighting& settings);
+                  const set::Lighting& settings, std::shared_ptr<const Room> room = nullptr);
 
 // A latitude-longitude EXR: pixel centre column c, row r of w x h looks towards azimuth
 // 2 pi (0.5 - (c + 0.5) / w) from +X to +Y and elevation pi (0.5 - (r + 0.5) / h), Z up; the centre

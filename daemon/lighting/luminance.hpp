@@ -5,8 +5,11 @@
 
 namespace previz::lighting {
 
-inline double luminance(const glm::vec3& radiance) {
+inline double luminance(const glm::dvec3& radiance) {
   return 0.2126 * radiance.r + 0.7152 * radiance.g + 0.0722 * radiance.b;
+}
+inline double luminance(const glm::vec3& radiance) {
+  return luminance(glm::dvec3(radiance));
 }
 
 }  // namespace previz::lighting

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
-#include <glm/matrix.hpp>
+#include <glm/geometric.hpp>
 #include <mutex>
 #include <optional>
 
@@ -14,16 +14,21 @@
 namespace previz::lighting {
 namespace {
 
-constexpr int samples_a_side = 4;  // of a cell
+constexpr int least_samples = 4, most_samples = 64;  // of a cell, a side
 
 // Where a direction lands in the picture; nothing beyond the lens's angle.
 using Landing = std::optional<glm::dvec2>;
 
+struct Hit {
+  std::uint32_t pixel;
+  float weight;  // of a texel
+};
+
 class Gatherer {
  public:
-  Gatherer(const Fisheye& lens, const glm::dmat3& world_from_camera, int size)
+  Gatherer(const Fisheye& lens, const Viewpoint& viewpoint, int size)
       : lens_(lens),
-        camera_from_world_(glm::transpose(world_from_camera)),
+        viewpoint_(viewpoint),
         size_(size),
         cells_(std::max(size, resolution_for(lens.axis_pixel_sr()))) {}
 
@@ -31,11 +36,9 @@ class Gatherer {
   void gather(int begin, int end, std::vector<std::uint32_t>& counts,
               std::vector<std::uint32_t>& pixels, std::vector<float>& weights) const {
     const int cells_a_side = cells_ / size_;
-    const float sample_weight =
-        1.0f / static_cast<float>(cells_a_side * cells_a_side * samples_a_side * samples_a_side);
     std::vector<std::vector<Landing>> rows(static_cast<std::size_t>(cells_a_side) + 1);
     rows.back() = corner_row(begin * cells_a_side);
-    std::vector<std::uint32_t> hits;
+    std::vector<Hit> hits;
     for (int j = begin; j < end; ++j) {
       std::swap(rows.front(), rows.back());
       for (int c = 1; c <= cells_a_side; ++c)
@@ -47,7 +50,7 @@ class Gatherer {
             sample_cell(i * cells_a_side + ci, j * cells_a_side + cj,
                         rows[static_cast<std::size_t>(cj)], rows[static_cast<std::size_t>(cj) + 1],
                         hits);
-        counts.push_back(add_entries(hits, sample_weight, pixels, weights));
+        counts.push_back(add_entries(hits, pixels, weights));
       }
     }
   }
@@ -57,7 +60,8 @@ class Gatherer {
   Landing land(double i, double j) const {
     const glm::vec2 point(static_cast<float>(2 * i / cells_ - 1),
                           static_cast<float>(2 * j / cells_ - 1));
-    return lens_.project(camera_from_world_ * glm::dvec3(octahedral_direction(point)));
+    const auto direction = viewpoint_.camera_direction(glm::dvec3(octahedral_direction(point)));
+    return direction ? lens_.project(*direction) : std::nullopt;
   }
 
   std::vector<Landing> corner_row(int j) const {
@@ -73,57 +77,73 @@ class Gatherer {
     return u + v != cells_ && u + v != 2 && u + v != 2 * cells_ - 2;
   }
 
+  // Samples a side of a cell that reaches so far across the picture: at least two a pixel.
+  static int samples_across(double reach_px) {
+    return std::clamp(2 * static_cast<int>(std::ceil(reach_px)), least_samples, most_samples);
+  }
+
   // Appends the pixels of a cell's directions. Inside the picture the corners are interpolated;
-  // where an edge crosses the cell every direction is projected by itself.
+  // where an edge, of the picture or between the room's surfaces, crosses the cell every direction
+  // is projected by itself.
   void sample_cell(int i, int j, const std::vector<Landing>& above,
-                   const std::vector<Landing>& below, std::vector<std::uint32_t>& hits) const {
+                   const std::vector<Landing>& below, std::vector<Hit>& hits) const {
     const auto left = static_cast<std::size_t>(i), right = left + 1;
     if (!above[left] && !above[right] && !below[left] && !below[right]) return;
     const bool all = above[left] && above[right] && below[left] && below[right];
-    const bool interpolate = all && smooth(i, j);
-    for (int b = 0; b < samples_a_side; ++b) {
-      const double t = (b + 0.5) / samples_a_side;
-      for (int a = 0; a < samples_a_side; ++a) {
-        const double s = (a + 0.5) / samples_a_side;
+    int samples = least_samples;
+    bool interpolate = all && smooth(i, j);
+    if (!viewpoint_.far_away()) {
+      const double reach_px = all ? std::max(glm::distance(*above[left], *below[right]),
+                                             glm::distance(*above[right], *below[left]))
+                                  : 0;
+      samples = samples_across(reach_px);
+      interpolate = interpolate && samples == least_samples;
+    }
+    const int cells_a_side = cells_ / size_;
+    const float weight = 1.0f / static_cast<float>(cells_a_side * cells_a_side * samples * samples);
+    for (int b = 0; b < samples; ++b) {
+      const double t = (b + 0.5) / samples;
+      for (int a = 0; a < samples; ++a) {
+        const double s = (a + 0.5) / samples;
         const Landing landing = interpolate ? glm::mix(glm::mix(*above[left], *above[right], s),
                                                        glm::mix(*below[left], *below[right], s), t)
                                             : land(i + s, j + t);
         if (!landing) continue;
-        if (const auto pixel = lens_.pixel_at(*landing)) hits.push_back(*pixel);
+        if (const auto pixel = lens_.pixel_at(*landing)) hits.push_back({*pixel, weight});
       }
     }
   }
 
-  static std::uint32_t add_entries(std::vector<std::uint32_t>& hits, float sample_weight,
-                                   std::vector<std::uint32_t>& pixels,
+  static std::uint32_t add_entries(std::vector<Hit>& hits, std::vector<std::uint32_t>& pixels,
                                    std::vector<float>& weights) {
-    std::sort(hits.begin(), hits.end());
+    std::sort(hits.begin(), hits.end(),
+              [](const Hit& a, const Hit& b) { return a.pixel < b.pixel; });
     const std::size_t before = pixels.size();
     for (std::size_t h = 0; h < hits.size();) {
-      std::size_t next = h;
-      while (next < hits.size() && hits[next] == hits[h]) ++next;
-      pixels.push_back(hits[h]);
-      weights.push_back(static_cast<float>(next - h) * sample_weight);
-      h = next;
+      const std::uint32_t pixel = hits[h].pixel;
+      float weight = 0;
+      for (; h < hits.size() && hits[h].pixel == pixel; ++h) weight += hits[h].weight;
+      pixels.push_back(pixel);
+      weights.push_back(weight);
     }
     return static_cast<std::uint32_t>(pixels.size() - before);
   }
 
   const Fisheye& lens_;
-  glm::dmat3 camera_from_world_;
+  const Viewpoint& viewpoint_;
   int size_;
   int cells_;
 };
 
 }  // namespace
 
-Resampling make_resampling(const Fisheye& lens, const glm::dmat3& world_from_camera, int size) {
+Resampling make_resampling(const Fisheye& lens, const Viewpoint& viewpoint, int size) {
   struct Block {
     int begin = 0;
     std::vector<std::uint32_t> counts, pixels;
     std::vector<float> weights;
   };
-  const Gatherer gatherer(lens, world_from_camera, size);
+  const Gatherer gatherer(lens, viewpoint, size);
   std::vector<Block> blocks;
   std::mutex mutex;
   parallel_blocks(size, [&](int begin, int end) {
@@ -154,7 +174,7 @@ Resampled resample(const Resampling& resampling, const HdrPicture& picture) {
   result.size = resampling.size;
   result.radiance.resize(texels);
   result.seen.resize(texels);
-  double over = 0, under = 0;
+  double over = 0, under = 0, changed = 0;
   for (std::size_t t = 0; t < texels; ++t) {
     glm::vec3 radiance(0);
     float seen = 0;
@@ -165,12 +185,14 @@ Resampled resample(const Resampling& resampling, const HdrPicture& picture) {
       seen += weight;
       if (picture.flags[pixel] & overexposed) over += weight;
       if (picture.flags[pixel] & underexposed) under += weight;
+      if (picture.flags[pixel] & moved) changed += weight;
     }
     result.radiance[t] = radiance;
     result.seen[t] = seen;
   }
   result.overexposed_sr = over * texel_sr(resampling.size);
   result.underexposed_sr = under * texel_sr(resampling.size);
+  result.moved_sr = changed * texel_sr(resampling.size);
   return result;
 }
 

@@ -2,16 +2,16 @@
 #pragma once
 
 #include <cstdint>
-#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <vector>
 
 #include "daemon/lighting/fisheye.hpp"
 #include "daemon/lighting/hdr.hpp"
+#include "daemon/lighting/viewpoint.hpp"
 
 namespace previz::lighting {
 
-// How much of each texel's solid angle each pixel covers; depends on lens and orientation only, so
+// How much of each texel's solid angle each pixel covers; depends on lens, pose and room only, so
 // one serves every frame of a fixed light camera. The pixels of texel t (index into
 // EnvironmentMap::radiance) are entries first[t] .. first[t + 1] - 1.
 struct Resampling {
@@ -22,9 +22,9 @@ struct Resampling {
 };
 
 // Every texel is divided into cells of about a pixel or less and these into 4x4 directions of equal
-// solid angle; a direction takes the pixel whose square it falls in. `world_from_camera` is
-// orthogonal; it may mirror.
-Resampling make_resampling(const Fisheye& lens, const glm::dmat3& world_from_camera, int size);
+// solid angle, or up to 64x64 where a room is seen so much smaller than from the camera that a cell
+// holds many pixels; a direction takes the pixel whose square it falls in.
+Resampling make_resampling(const Fisheye& lens, const Viewpoint& viewpoint, int size);
 
 // What the picture says about each texel.
 struct Resampled {
@@ -33,6 +33,7 @@ struct Resampled {
   std::vector<float> seen;          // seen part of the texel, 0..1
   double overexposed_sr = 0;
   double underexposed_sr = 0;
+  double moved_sr = 0;
 };
 
 Resampled resample(const Resampling& resampling, const HdrPicture& picture);

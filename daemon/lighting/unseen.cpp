@@ -6,7 +6,6 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
 #include <numbers>
 
 #include "daemon/lighting/environment.hpp"
@@ -113,59 +112,57 @@ glm::vec3 continued(const Edge& edge, const glm::dvec3& direction) {
   return glm::mix(here, edge.mean, static_cast<float>(t * t * (3 - 2 * t)));
 }
 
-// Adds fill(world direction of the texel's centre) to the unseen part of every texel.
+// Adds fill(i, j, world direction of the texel's centre) to the unseen part of every texel.
 template <typename Fill>
 void fill_each(Resampled& map, const Fill& fill) {
   for (int j = 0; j < map.size; ++j) {
     for (int i = 0; i < map.size; ++i) {
       const auto t = static_cast<std::size_t>(j * map.size + i);
       if (map.seen[t] < 1)
-        map.radiance[t] += (1 - map.seen[t]) * fill(t, texel_direction(map.size, i, j));
+        map.radiance[t] += (1 - map.seen[t]) * fill(i, j, texel_direction(map.size, i, j));
     }
   }
 }
 
-// Across the plane perpendicular to the optical axis, camera axes.
-const glm::dmat3 mirror(1, 0, 0, 0, 1, 0, 0, 0, -1);
-
+// Returns the solid angle that had to be left to the fallback.
 template <typename Fallback>
-void fill_mirrored(const Resampled& mirrored, const Fallback& fallback, Resampled& map,
-                   std::vector<std::string>& notes) {
-  double unseen_twice = 0;
-  fill_each(map, [&](std::size_t t, const glm::vec3& direction) {
-    unseen_twice += (1 - map.seen[t]) * (1 - mirrored.seen[t]);
-    if (mirrored.seen[t] == 0) return fallback(direction);
-    return mirrored.radiance[t] / mirrored.seen[t];
+double fill_from(const Resampled& elsewhere, const Fallback& fallback, Resampled& map) {
+  const int step = map.size / elsewhere.size;
+  double left = 0;
+  fill_each(map, [&](int i, int j, const glm::vec3& direction) {
+    const auto e = static_cast<std::size_t>(j / step * elsewhere.size + i / step);
+    const float seen = elsewhere.seen[e];
+    left += (1 - map.seen[static_cast<std::size_t>(j * map.size + i)]) * (1 - seen);
+    return seen == 0 ? fallback(direction) : elsewhere.radiance[e] / seen;
   });
-  if (unseen_twice > 0)
-    notes.push_back(
-        fmt::format("{:.3f} sr are unseen in the mirror too and continue the picture's edge",
-                    unseen_twice * texel_sr(map.size)));
+  return left * texel_sr(map.size);
 }
 
 }  // namespace
 
-void fill_unseen(const HdrPicture& picture, const Fisheye& lens,
-                 const glm::dmat3& world_from_camera, const set::Lighting& settings, Resampled& map,
+void fill_unseen(const HdrPicture& picture, const Fisheye& lens, const Viewpoint& viewpoint,
+                 const set::Lighting& settings, const Resampled* elsewhere, Resampled& map,
                  std::vector<std::string>& notes) {
   if (settings.unseen == set::UnseenRule::constant) {
     const glm::vec3 radiance(settings.unseen_radiance);
-    fill_each(map, [&](std::size_t, const glm::vec3&) { return radiance; });
+    fill_each(map, [&](int, int, const glm::vec3&) { return radiance; });
     return;
   }
 
   const Edge edge = edge_of(picture, lens);
-  const glm::dmat3 camera_from_world = glm::transpose(world_from_camera);
   bool edge_used = false;
   const auto horizon = [&](const glm::vec3& direction) {
     edge_used = true;
-    return continued(edge, camera_from_world * glm::dvec3(direction));
+    const auto in_camera = viewpoint.camera_direction(glm::dvec3(direction));
+    return in_camera ? continued(edge, glm::normalize(*in_camera)) : edge.mean;
   };
-  if (settings.unseen == set::UnseenRule::horizon)
-    fill_each(map, [&](std::size_t, const glm::vec3& direction) { return horizon(direction); });
-  else
-    fill_mirrored(resample(make_resampling(lens, world_from_camera * mirror, map.size), picture),
-                  horizon, map, notes);
+  if (settings.unseen == set::UnseenRule::horizon || !elsewhere)
+    fill_each(map, [&](int, int, const glm::vec3& direction) { return horizon(direction); });
+  else if (const double left_sr = fill_from(*elsewhere, horizon, map); left_sr > 0)
+    notes.push_back(fmt::format("{:.3f} sr {} and continue the picture's edge", left_sr,
+                                settings.unseen == set::UnseenRule::mirror
+                                    ? "are unseen in the mirror too"
+                                    : "were not seen by the film camera either"));
   if (edge_used && edge.left_out > 0)
     notes.push_back(fmt::format(
         "{:.1f} % of the band at the picture's edge is brighter than {} times its median and was "

@@ -1,13 +1,13 @@
 // What is put where the light camera cannot see.
 #pragma once
 
-#include <glm/mat3x3.hpp>
 #include <string>
 #include <vector>
 
 #include "daemon/lighting/fisheye.hpp"
 #include "daemon/lighting/hdr.hpp"
 #include "daemon/lighting/resampling.hpp"
+#include "daemon/lighting/viewpoint.hpp"
 #include "daemon/set/set.hpp"
 
 namespace previz::lighting {
@@ -20,12 +20,15 @@ namespace previz::lighting {
 //             brighter than 8 times the median luminance of that band are left out, so that a lamp
 //             at the edge is not smeared below it. With E(psi) these averages, linear between the
 //             sectors' centres, and t = 0 at the edge to 1 opposite to the optical axis:
-//             radiance = mix(E(psi), mean of E, 3 t^2 - 2 t^3).
-//   mirror    what is seen in the direction mirrored about the plane through the camera that is
+//             radiance = mix(E(psi), mean of E, 3 t^2 - 2 t^3). Where a room hides its surface from
+//             the camera: mean of E.
+//   mirror    `elsewhere`, the picture mirrored about the plane through the camera that is
 //             perpendicular to its optical axis; where that is unseen too, as horizon.
-// What a reader of the report should know is appended to `notes`.
-void fill_unseen(const HdrPicture& picture, const Fisheye& lens,
-                 const glm::dmat3& world_from_camera, const set::Lighting& settings, Resampled& map,
+//   observer  `elsewhere`, what the film camera saw there; where it saw nothing, as horizon.
+// `elsewhere` has the map's size or one that divides it; the first two rules ignore it. What a
+// reader of the report should know is appended to `notes`.
+void fill_unseen(const HdrPicture& picture, const Fisheye& lens, const Viewpoint& viewpoint,
+                 const set::Lighting& settings, const Resampled* elsewhere, Resampled& map,
                  std::vector<std::string>& notes);
 
 }  // namespace previz::lighting

@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 
+#include "daemon/lighting/source_tracker.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration.hpp"
@@ -34,12 +35,16 @@ class LightStage {
   LightPtr light();
 
  private:
+  LightPtr finished(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
+                    std::int64_t timestamp_ns);
+
   set::Lighting settings_;
   const std::optional<double> exposure_;  // overrides the frames' own
   const std::optional<LightCameraCalibration> calibration_;
   std::map<long, FramePtr> newest_;  // by exposure, in steps of 1 %
   bool changed_ = false;
   bool given_ = false;
+  lighting::SourceTracker tracker_;
   LightPtr light_;
 };
 

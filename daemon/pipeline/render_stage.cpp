@@ -79,6 +79,7 @@ bool RenderStage::begin(Shot& shot) {
 
   if (light_ != shot.light) {
     renderer_.set_environment(shot.light->lighting.environment, set_.lighting.sampling);
+    if (set_.lighting.mode != set::LightMode::image) renderer_.set_sources(shot.light->lamps);
     light_ = shot.light;
   }
   if (placed_ != shot.scene) place(shot.scene);

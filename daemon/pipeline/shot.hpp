@@ -9,6 +9,7 @@
 
 #include "daemon/lighting/environment.hpp"
 #include "daemon/render/layers.hpp"
+#include "daemon/set/set.hpp"
 #include "daemon/tracking/tracker.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/session/session.hpp"
@@ -18,6 +19,7 @@ namespace previz::pipeline {
 // A finished light estimate and the light frames (by sequence number) it was made from.
 struct Light {
   lighting::Lighting lighting;
+  std::vector<set::Light> lamps;         // of its sources
   std::vector<std::uint64_t> sequences;  // empty: an environment given as a file
 };
 using LightPtr = std::shared_ptr<const Light>;

@@ -222,6 +222,11 @@ void print_lights(const set::Set& set, const scene::Scene& scene, std::ostream& 
                                : words("what the light camera sees; where it cannot see: ",
                                        set::name_of(lighting.unseen)))
       << '\n';
+  if (lighting.mode == set::LightMode::sources)
+    out << "    its lamps light the set; the rest is " << set::name_of(lighting.sources.residual)
+        << '\n';
+  if (lighting.mode == set::LightMode::hybrid)
+    out << "    its lamps light the set, and the rest as a picture\n";
   for (const auto& light : scene.lights) {
     const char* change = light.gain_real == 0                  ? "added"
                          : light.gain_mixed == light.gain_real ? "as it is"
@@ -270,7 +275,8 @@ void print_requirements(const scene::Requirements& required, std::ostream& out) 
        "alpha: every surface is opaque"},
       {&scene::Requirements::emissive_meshes, "glowing meshes: surfaces that are lights",
        "glowing meshes: no surface gives light"},
-      {&scene::Requirements::lights, "lamps: the set or a glTF file names some",
+      {&scene::Requirements::lights,
+       "lamps: the set or a glTF file names some, or they are found in the light around",
        "lamps: only the light around the set shines"},
   };
   out << "\nthe renderer needs\n  rays: " << plural(required.triangles, "triangle") << ", seen as "

@@ -9,9 +9,9 @@
 #include <set>
 #include <sstream>
 
+#include "daemon/footage/footage.hpp"
 #include "daemon/post/import_assets.hpp"
 #include "daemon/post/import_description.hpp"
-#include "daemon/post/import_footage.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 
@@ -96,8 +96,8 @@ class FootageImport {
 
   // The capture times of the frames written.
   std::vector<std::int64_t> run(std::vector<std::string>& notes) {
-    const auto pictures =
-        footage_.video.empty() ? open_pictures(footage_.pictures) : open_video(footage_.video);
+    const auto pictures = footage_.video.empty() ? footage::open_pictures(footage_.pictures)
+                                                 : footage::open_video(footage_.video);
     std::vector<std::int64_t> times;
     while (const auto picture = pictures->next()) {
       check(*picture);
@@ -134,13 +134,13 @@ class FootageImport {
     return count;
   }
 
-  void check_count(std::size_t i, const Picture& picture) const {
+  void check_count(std::size_t i, const footage::Picture& picture) const {
     if (listed() > 0 && i >= listed())
       throw Error(picture.name + ": is one more than the " + std::to_string(listed()) +
                   " frames that " + file_.string() + " describes under " + footage_.source);
   }
 
-  void check(const Picture& picture) {
+  void check(const footage::Picture& picture) {
     if (calibrated_ &&
         (picture.width != calibrated_->width || picture.height != calibrated_->height))
       throw Error(picture.name + ": is " + std::to_string(picture.width) + "x" +
@@ -154,7 +154,7 @@ class FootageImport {
                   " must be " + first_ + " like the first");
   }
 
-  std::int64_t time_of(std::size_t i, const Picture& picture,
+  std::int64_t time_of(std::size_t i, const footage::Picture& picture,
                        const std::vector<std::int64_t>& before) const {
     if (!footage_.timestamps_ns.empty()) return footage_.timestamps_ns[i];
     if (footage_.fps > 0)

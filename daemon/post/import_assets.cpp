@@ -58,6 +58,10 @@ std::vector<std::pair<std::string, std::filesystem::path>> assets_of(const set::
     check_self_contained(object.file);
     assets.emplace_back(object.file_as_written, object.file);
   }
+  if (const auto& room = set.lighting.room; room && !room->size_m) {
+    check_self_contained(room->file);
+    assets.emplace_back(room->file_as_written, room->file);
+  }
   if (set.lighting.environment)
     assets.emplace_back(set.lighting.environment_as_written, *set.lighting.environment);
   return assets;

@@ -24,10 +24,8 @@ constexpr std::int64_t latest_ns = std::numeric_limits<std::int64_t>::max();
 
 // ---- calibration, spelled as in the set file
 
-ResponseCurve read_response(const Members& camera, double& responsivity) {
+ResponseCurve read_response(const Members& m, double& responsivity) {
   ResponseCurve response;
-  if (!camera.has("response")) return response;
-  const Members m = camera.object("response", {"kind", "gamma", "table", "responsivity"});
   const std::string kind = m.has("kind") ? m.text("kind") : "srgb";
   if (kind == "gamma") {
     response.kind = ResponseCurve::Kind::gamma;
@@ -48,6 +46,11 @@ ResponseCurve read_response(const Members& camera, double& responsivity) {
   if (m.has("table") && kind != "table") m.fail("table", "belongs to kind \"table\" only");
   responsivity = m.number("responsivity", positive, 1.0);
   return response;
+}
+
+std::vector<std::string> response_members(std::vector<std::string> more = {}) {
+  more.insert(more.end(), {"kind", "gamma", "table", "responsivity"});
+  return more;
 }
 
 template <typename Intrinsics>
@@ -127,8 +130,19 @@ std::optional<ObserverCalibration> read_observer_calibration(const Members& came
     if (calibration.lens->focus_distance_m <= calibration.lens->focal_length_m)
       thin.fail("focus_distance_m", "must be more than the focal length");
   }
-  calibration.response = read_response(camera, calibration.responsivity);
+  if (camera.has("response"))
+    calibration.response =
+        read_response(camera.object("response", response_members()), calibration.responsivity);
   return calibration;
+}
+
+void read_vignetting(const Members& m, LightCameraCalibration& calibration) {
+  if (!m.has("vignetting")) return;
+  const auto v = m.numbers("vignetting", 3, any);
+  std::ranges::copy(v, calibration.vignetting.begin());
+  if (!(least_illumination(calibration.vignetting, calibration.intrinsics.max_angle_rad) >=
+        min_illumination))
+    m.fail("vignetting", "must leave at least 0.01 of the light up to max_angle_deg");
 }
 
 std::optional<LightCameraCalibration> read_light_calibration(const Members& camera) {
@@ -136,8 +150,8 @@ std::optional<LightCameraCalibration> read_light_calibration(const Members& came
     needs_intrinsics(camera, {"pose", "response"});
     return std::nullopt;
   }
-  const Members m = camera.object(
-      "intrinsics", {"width", "height", "fx", "fy", "cx", "cy", "k", "max_angle_deg"});
+  const Members m = camera.object("intrinsics", {"width", "height", "fx", "fy", "cx", "cy", "k",
+                                                 "max_angle_deg", "vignetting"});
   LightCameraCalibration calibration;
   FisheyeIntrinsics& lens = calibration.intrinsics;
   read_common(m, lens);
@@ -146,7 +160,15 @@ std::optional<LightCameraCalibration> read_light_calibration(const Members& came
     std::ranges::copy(k, lens.k.begin());
   }
   lens.max_angle_rad = m.number("max_angle_deg", {0, 180, true}) * std::numbers::pi / 180;
-  calibration.response = read_response(camera, calibration.responsivity);
+  read_vignetting(m, calibration);
+  if (camera.has("response")) {
+    const Members response = camera.object("response", response_members({"dark_level"}));
+    calibration.response = read_response(response, calibration.responsivity);
+    if (response.has("dark_level")) {
+      const auto dark = response.numbers("dark_level", 3, {0, max_dark_level});
+      calibration.dark_level = {dark[0], dark[1], dark[2]};
+    }
+  }
   calibration.world_from_camera = read_pose(camera);
   return calibration;
 }

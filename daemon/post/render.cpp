@@ -59,6 +59,8 @@ std::string settings_of(const pipeline::Take& take, const set::Set& set) {
   json["set"] = take.set_text;
   for (const set::Object& object : set.objects)
     json["file " + object.file_as_written] = session::sha256_of(object.file);
+  if (const auto& room = set.lighting.room; room && !room->size_m)
+    json["file " + room->file_as_written] = session::sha256_of(room->file);
   if (set.lighting.environment)
     json["file " + set.lighting.environment_as_written] =
         session::sha256_of(*set.lighting.environment);

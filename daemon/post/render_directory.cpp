@@ -99,6 +99,10 @@ std::string to_json(const FrameRecord& record) {
   json["dropped_not_finite"] = record.counters.dropped_not_finite;
   json["dropped_negative"] = record.counters.dropped_negative;
   json["stopped_in_layers"] = record.counters.stopped_in_layers;
+  if (record.counters.measured + record.counters.unmeasured > 0) {
+    json["measured"] = record.counters.measured;
+    json["unmeasured"] = record.counters.unmeasured;
+  }
   return json.dump();
 }
 
@@ -125,6 +129,8 @@ FrameRecord from_json(const std::string& line) {
   record.counters.dropped_not_finite = json.at("dropped_not_finite");
   record.counters.dropped_negative = json.at("dropped_negative");
   record.counters.stopped_in_layers = json.value("stopped_in_layers", std::uint64_t{0});
+  record.counters.measured = json.value("measured", std::uint64_t{0});
+  record.counters.unmeasured = json.value("unmeasured", std::uint64_t{0});
   return record;
 }
 

@@ -82,6 +82,9 @@ std::vector<TradeAxis> trade_axes(const TradeSettings& own,
           "composite", "how the difference is put onto the camera's picture",
           [](TradeSettings & s) -> auto& { return s.estimation.composite; }),
       spelled(
+          "real_radiance", "real surfaces seen after a bounce: simulated, or from the camera",
+          [](TradeSettings & s) -> auto& { return s.estimation.real_radiance; }),
+      spelled(
           "light_mode", "what the light around the set is made into",
           [](TradeSettings & s) -> auto& { return s.lighting.mode; }),
       spelled(

@@ -27,8 +27,9 @@ MethodRenderer::MethodRenderer(const std::shared_ptr<render::Device>& device, Tr
       renderer_(device, settings.estimation,
                 method_calibration(frame, settings, sweep_scale * settings.scale)) {
   renderer_.set_scene(scene);
-  renderer_.set_environment(frame.light(settings.lighting)->lighting.environment,
-                            settings.lighting.sampling);
+  const pipeline::LightPtr light = frame.light(settings.lighting);
+  renderer_.set_environment(light->lighting.environment, settings.lighting.sampling);
+  if (settings.lighting.mode != set::LightMode::image) renderer_.set_sources(light->lamps);
   for (const render::Part part : settings.carried) renderer_.carry(part);
 }
 

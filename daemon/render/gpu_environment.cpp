@@ -23,20 +23,6 @@ void check(const lighting::EnvironmentMap& map) {
         throw Error("environment map: a texel holds " + std::to_string(value));
 }
 
-// Texel (i, j) with i, j in [-1, size]: past an edge the square continues mirrored along that edge.
-glm::vec3 wrapped(const lighting::EnvironmentMap& map, int i, int j) {
-  const int last = map.size - 1;
-  if (i < 0 || i > last) {
-    i = i < 0 ? 0 : last;
-    j = last - j;
-  }
-  if (j < 0 || j > last) {
-    j = j < 0 ? 0 : last;
-    i = last - i;
-  }
-  return map.radiance[static_cast<std::size_t>(j) * map.size + i];
-}
-
 // Integral of the bilinear interpolation of the mean channel over each texel: positive wherever the
 // interpolation is, so sampling by it misses nothing.
 std::vector<double> texel_weights(const EncodedEnvironment& e) {
@@ -88,7 +74,8 @@ EncodedEnvironment encode_environment(const lighting::EnvironmentMap& map) {
   e.size = static_cast<std::uint32_t>(map.size);
   e.levels = static_cast<std::uint32_t>(std::countr_zero(e.size));
   for (int j = -1; j <= map.size; ++j)
-    for (int i = -1; i <= map.size; ++i) e.radiance.emplace_back(wrapped(map, i, j), 0.0f);
+    for (int i = -1; i <= map.size; ++i)
+      e.radiance.emplace_back(map.radiance[lighting::wrapped_texel(map.size, i, j)], 0.0f);
 
   std::vector<std::vector<double>> pyramid{texel_weights(e)};
   while (pyramid.back().size() > 1)

@@ -164,6 +164,10 @@ void GpuScene::set_environment(const lighting::EnvironmentMap& map, set::LightSa
   upload_texels(device_, importance_, encoded.importance, vk::Format::eR32G32B32A32Sfloat);
 }
 
+void GpuScene::set_sources(std::vector<set::Light> sources) {
+  sources_ = std::move(sources);
+}
+
 void GpuScene::place(const glm::dvec3& camera_position) {
   upload_lights(camera_position);
   upload_instances(camera_position);
@@ -208,12 +212,17 @@ void GpuScene::upload_instances(const glm::dvec3& camera_position) {
   upload_storage(device_, instances_, instances);
 }
 
-std::vector<gpu::GpuLight> GpuScene::placed_lights(const glm::dvec3& camera_position) const {
+std::vector<set::Light> GpuScene::lamps() const {
+  std::vector<set::Light> result = scene_.lights;
+  if (sources_) append(result, *sources_);
+  std::stable_partition(result.begin(), result.end(), can_be_seen);
+  return result;
+}
+
+std::vector<gpu::GpuLight> GpuScene::placed_lights(const std::vector<set::Light>& all_lamps,
+                                                   const glm::dvec3& camera_position) const {
   std::vector<gpu::GpuLight> lights;
-  for (const set::Light& light : scene_.lights)
-    if (can_be_seen(light)) lights.push_back(encode_light(light, camera_position));
-  for (const set::Light& light : scene_.lights)
-    if (!can_be_seen(light)) lights.push_back(encode_light(light, camera_position));
+  for (const set::Light& lamp : all_lamps) lights.push_back(encode_light(lamp, camera_position));
   for (const std::uint32_t i : emitters_) {
     const scene::Instance& instance = scene_.instances[i];
     append(lights, encode_emitter(instance, scene_.meshes[instance.mesh],
@@ -223,14 +232,15 @@ std::vector<gpu::GpuLight> GpuScene::placed_lights(const glm::dvec3& camera_posi
 }
 
 void GpuScene::upload_lights(const glm::dvec3& camera_position) {
-  std::vector<gpu::GpuLight> lights = placed_lights(camera_position);
-  visible_light_count_ = static_cast<std::uint32_t>(
-      std::count_if(scene_.lights.begin(), scene_.lights.end(), can_be_seen));
+  const std::vector<set::Light> all_lamps = lamps();
+  std::vector<gpu::GpuLight> lights = placed_lights(all_lamps, camera_position);
+  visible_light_count_ =
+      static_cast<std::uint32_t>(std::count_if(all_lamps.begin(), all_lamps.end(), can_be_seen));
   light_count_ = static_cast<std::uint32_t>(lights.size());
   light_power_ = select_by_power(lights, scene_radius_);
   lights_differ_ = std::any_of(lights.begin(), lights.end(),
                                [](const auto& light) { return light.gain.x != light.gain.y; });
-  auto next = static_cast<std::uint32_t>(scene_.lights.size());
+  auto next = static_cast<std::uint32_t>(all_lamps.size());
   for (const std::uint32_t i : emitters_) {
     first_light_[i] = next;
     next += static_cast<std::uint32_t>(scene_.meshes[scene_.instances[i].mesh].triangles.size());
@@ -257,15 +267,15 @@ std::uint32_t GpuScene::features() const {
   if (any_material(
           [](const scene::Material& m) { return m.alpha_mode != scene::AlphaMode::opaque; }))
     result |= gpu::FEATURE_ALPHA;
-  if (!scene_.lights.empty() || !emitters_.empty()) result |= gpu::FEATURE_LIGHTS;
-  if (std::any_of(scene_.lights.begin(), scene_.lights.end(), can_be_seen))
+  if (!scene_.lights.empty() || !emitters_.empty() || sources_) result |= gpu::FEATURE_LIGHTS;
+  if (std::any_of(scene_.lights.begin(), scene_.lights.end(), can_be_seen) || sources_)
     result |= gpu::FEATURE_VISIBLE_LIGHTS;
   if (std::any_of(scene_.instances.begin(), scene_.instances.end(),
                   [](const auto& instance) { return instance.presence != scene::world_both; }))
     result |= gpu::FEATURE_FORKS;
-  if (!specular_bounds_.empty() && (environment_mean_ > 0 || light_power_ > 0))
+  if (!specular_bounds_.empty() && (environment_mean_ > 0 || light_power_ > 0 || sources_))
     result |= gpu::FEATURE_PHOTONS;
-  if (sampling_ == set::LightSampling::importance && environment_mean_ > 0)
+  if (sampling_ == set::LightSampling::importance && (environment_mean_ > 0 || sources_))
     result |= gpu::FEATURE_ENVIRONMENT_SAMPLING;
   return result;
 }
@@ -282,9 +292,10 @@ void GpuScene::describe(gpu::GpuFrame& frame) const {
   frame.scene_center = scene_center_;
   // Wider, so that rounding leaves no surface outside.
   frame.scene_radius = static_cast<float>(scene_radius_ * 1.001);
-  // Light samples are shared out by power; the environment's is what crosses the scene's disc.
-  const double environment_power =
-      environment_mean_ * std::numbers::pi * std::numbers::pi * scene_radius_ * scene_radius_;
+  // Light samples are shared out by power: of light from afar, what crosses the scene's disc. So a
+  // lamp of the environment is sampled as often as the same lamp taken out of it.
+  const double disc = std::numbers::pi * scene_radius_ * scene_radius_;
+  const double environment_power = 4 * std::numbers::pi * environment_mean_ * disc;
   const bool sampled = (features() & gpu::FEATURE_ENVIRONMENT_SAMPLING) != 0;
   const double share = environment_share(environment_power, light_power_);
   frame.environment_selection = sampled ? static_cast<float>(share) : 0.0f;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <vector>
 
 #include "daemon/render/bounds.hpp"
@@ -26,6 +27,8 @@ class GpuScene {
   // The same meshes and materials at other places, under other lamps: nothing is built anew but the
   // top level, with the next place(). As many instances as there are.
   void move(const std::vector<scene::Instance>& instances, const std::vector<set::Light>& lights);
+  // Lamps beside the scene's own, which may change from frame to frame.
+  void set_sources(std::vector<set::Light> sources);
   // Uploads instances, top level and lights relative to `camera_position` (world, metres).
   void place(const glm::dvec3& camera_position);
 
@@ -52,7 +55,9 @@ class GpuScene {
   void upload_textures();
   void find_emitters();
   void find_bounds();
-  std::vector<gpu::GpuLight> placed_lights(const glm::dvec3& camera_position) const;
+  std::vector<set::Light> lamps() const;  // the scene's and the sources, those that rays meet first
+  std::vector<gpu::GpuLight> placed_lights(const std::vector<set::Light>& all_lamps,
+                                           const glm::dvec3& camera_position) const;
   void upload_lights(const glm::dvec3& camera_position);
   void upload_instances(const glm::dvec3& camera_position);
   void upload_bounds(const glm::dvec3& camera_position);
@@ -60,6 +65,7 @@ class GpuScene {
   Device& device_;
   scene::Scene scene_;
   double specular_alpha_ = 0;
+  std::optional<std::vector<set::Light>> sources_;  // absent: there never are any
   std::vector<MeshPlace> places_;
   std::vector<std::uint32_t> first_light_;  // by instance; NO_INDEX: not an emitter
   std::vector<std::uint32_t> emitters_;     // instances that emit, in the order of their lights

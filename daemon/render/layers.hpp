@@ -29,6 +29,10 @@ struct Counters {
   std::uint64_t dropped_not_finite = 0;  // NaN or Inf samples
   std::uint64_t dropped_negative = 0;
   std::uint64_t stopped_in_layers = 0;  // rays through more transparent surfaces than are followed
+  // With real_radiance = "camera": real surfaces whose radiance the plate gave, and those that were
+  // traced because it could not.
+  std::uint64_t measured = 0;
+  std::uint64_t unmeasured = 0;
 };
 
 }  // namespace previz::render

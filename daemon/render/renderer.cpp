@@ -63,6 +63,8 @@ struct Renderer::Impl {
   void upload_frame();
   std::uint32_t photons() const;  // a pass
   std::uint32_t features() const;
+  // The plate as linear radiance; w: 0 where a channel is clipped.
+  std::vector<glm::vec4> measured() const;
 
   std::shared_ptr<Device> device;
   set::Estimation estimation;
@@ -80,7 +82,8 @@ struct Renderer::Impl {
 void Renderer::Impl::resize() {
   const PinholeIntrinsics& picture = calibration.intrinsics;
   wavefront.reset();  // first the old memory, then the new
-  wavefront.emplace(*device, picture.width, picture.height);
+  wavefront.emplace(*device, picture.width, picture.height,
+                    estimation.real_radiance == set::RealRadiance::camera ? 3 : 2);
   upload_texels(*device, rays, corner_rays(picture), vk::Format::eR32G32Sfloat);
 }
 
@@ -99,6 +102,11 @@ void Renderer::Impl::upload_frame() {
   }
   // A carried lens of a pinhole: every ray starts at its centre, aimed at a distance of one.
   if (!calibration.lens) gpu_frame.focus_distance = 1;
+  const PinholeIntrinsics& k = calibration.intrinsics;
+  gpu_frame.focal_px = {k.fx, k.fy};
+  gpu_frame.principal_px = {k.cx, k.cy};
+  gpu_frame.radial = {k.k1, k.k2, k.k3};
+  gpu_frame.tangential = {k.p1, k.p2};
   gpu_frame.seed = frame.seed.value_or(estimation.seed);
   gpu_frame.max_depth = static_cast<std::uint32_t>(estimation.max_depth);
   gpu_frame.roulette_depth = static_cast<std::uint32_t>(estimation.roulette_depth);
@@ -123,7 +131,23 @@ std::uint32_t Renderer::Impl::features() const {
       estimation.composite == set::Composite::additive)
     result |= gpu::FEATURE_DIFFERENCE;
   if (estimation.caustics == set::Caustics::traced) result |= gpu::FEATURE_CAUSTICS;
+  if (estimation.real_radiance == set::RealRadiance::camera && !frame.plate.samples.empty())
+    result |= gpu::FEATURE_CAMERA;
   if (estimation.caustics != set::Caustics::photons) result &= ~gpu::FEATURE_PHOTONS;
+  return result;
+}
+
+std::vector<glm::vec4> Renderer::Impl::measured() const {
+  const std::vector<double>& radiance = response->inverse();
+  const auto white = static_cast<std::uint16_t>(radiance.size() - 1);
+  std::vector<glm::vec4> result;
+  result.reserve(frame.plate.samples.size() / 3);
+  for (std::size_t i = 0; i < frame.plate.samples.size(); i += 3) {
+    const std::uint16_t* rgb = &frame.plate.samples[i];
+    const bool clipped = std::max({rgb[0], rgb[1], rgb[2]}) >= white;
+    const glm::dvec3 signal(radiance[rgb[0]], radiance[rgb[1]], radiance[rgb[2]]);
+    result.emplace_back(glm::vec3(signal / frame.exposure), clipped ? 0.0f : 1.0f);
+  }
   return result;
 }
 
@@ -158,6 +182,10 @@ void Renderer::resize(const ObserverCalibration& calibration) {
   check_size(*impl_->device, calibration.intrinsics);
   impl_->calibration = calibration;
   impl_->resize();
+}
+
+void Renderer::set_sources(std::vector<set::Light> sources) {
+  impl_->scene.set_sources(std::move(sources));
 }
 
 void Renderer::carry(Part part) {
@@ -195,6 +223,7 @@ void Renderer::begin(const FrameInput& frame) {
     r.wavefront->use_photons(r.photons(), r.estimation.photon_radius_px * distance / lens.fx);
   }
   r.wavefront->bind(bindings, features);
+  if ((features & gpu::FEATURE_CAMERA) != 0) r.wavefront->use_camera(r.measured());
   r.wavefront->clear();
 }
 
@@ -240,6 +269,8 @@ Counters Renderer::counters() const {
   counters.dropped_not_finite = control.dropped_not_finite;
   counters.dropped_negative = control.dropped_negative;
   counters.stopped_in_layers = control.stopped_in_layers;
+  counters.measured = wide(control.measured_high, control.measured_low);
+  counters.unmeasured = wide(control.unmeasured_high, control.unmeasured_low);
   return counters;
 }
 

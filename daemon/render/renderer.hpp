@@ -70,6 +70,10 @@ class Renderer {
   void use(set::Estimator estimator);
   void resize(const ObserverCalibration& calibration);
   void set_environment(const lighting::EnvironmentMap& environment, set::LightSampling sampling);
+  // Lamps beside those of the scene: the sources that were taken out of the environment. From the
+  // first call on the pipelines are made for any number of them, even none, so that lamps come and
+  // go between frames without new pipelines.
+  void set_sources(std::vector<set::Light> sources);
 
   // From the next begin() on this part is in the pipelines, needed or not: what leaving it out
   // saves can then be measured.

@@ -43,12 +43,14 @@ bool is_texel_buffer(std::uint32_t binding) {
 
 }  // namespace
 
-Wavefront::Wavefront(Device& device, int width, int height)
+Wavefront::Wavefront(Device& device, int width, int height, std::uint32_t paths_a_slot)
     : device_(device),
       max_slots_(device.is_cpu() ? cpu_slots : gpu_slots),
+      paths_a_slot_(paths_a_slot),
       width_(width),
       height_(height),
-      photons_(device) {
+      photons_(device),
+      camera_(device) {
   create_layouts();
   create_tiles(width, height);
   create_paths();
@@ -62,7 +64,8 @@ void Wavefront::create_layouts() {
   });
   path_layout_ = create_set_layout(device_, gpu::PATH_BINDINGS,
                                    [](std::uint32_t) { return Type::eStorageBuffer; });
-  const vk::DescriptorSetLayout layouts[] = {*scene_layout_, *path_layout_, *photons_.set_layout()};
+  const vk::DescriptorSetLayout layouts[] = {*scene_layout_, *path_layout_, *photons_.set_layout(),
+                                             *camera_.set_layout()};
   const vk::PushConstantRange batch(vk::ShaderStageFlagBits::eCompute, 0, sizeof(gpu::GpuBatch));
   layout_ = vk::raii::PipelineLayout(device_.vk(), {{}, layouts, batch});
 }
@@ -99,7 +102,7 @@ void Wavefront::create_tiles(int width, int height) {
 void Wavefront::create_paths() {
   for (const Tile& tile : tiles_) slots_ = std::max(slots_, slots_of(tile.batch));
   slots_ = std::max(slots_, max_slots_ / slots_ * slots_);
-  const vk::DeviceSize paths = 2 * static_cast<vk::DeviceSize>(slots_);
+  const vk::DeviceSize paths = paths_a_slot_ * static_cast<vk::DeviceSize>(slots_);
   ray_origin_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
   ray_direction_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
   throughput_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
@@ -108,6 +111,8 @@ void Wavefront::create_paths() {
   shadow_rays_ = create_storage_buffer(device_, paths * sizeof(gpu::GpuShadowRay));
   sample_mixed_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
   sample_real_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
+  sample_landed_ =
+      create_storage_buffer(device_, (paths_a_slot_ > 2 ? slots_ : 1) * sizeof(gpu::vec4));
   sample_aov_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
   sampled_ = create_storage_buffer(
       device_, sizeof(std::uint32_t) * sampled_blocks(width_) * sampled_blocks(height_));
@@ -125,6 +130,7 @@ void Wavefront::write_path_set(const Tile& tile) {
   buffers[gpu::BINDING_SAMPLE_MIXED] = &sample_mixed_;
   buffers[gpu::BINDING_SAMPLE_REAL] = &sample_real_;
   buffers[gpu::BINDING_SAMPLE_AOV] = &sample_aov_;
+  buffers[gpu::BINDING_SAMPLE_LANDED] = &sample_landed_;
   buffers[gpu::BINDING_CONTROL] = &control_;
   buffers[gpu::BINDING_PIXELS] = &tile.pixels;
   buffers[gpu::BINDING_SAMPLED] = &sampled_;
@@ -148,6 +154,7 @@ void Wavefront::create_pipelines(std::uint32_t features) {
   shadow_ = create_pipeline(device_, shadow_spv, layout_, constants);
   accumulate_ = create_pipeline(device_, accumulate_spv, layout_, constants);
   if ((features & gpu::FEATURE_PHOTONS) != 0) photons_.create_pipelines(layout_, features);
+  if ((features & gpu::FEATURE_CAMERA) != 0) camera_.create_pipelines(layout_, features);
   features_ = features;
 }
 
@@ -178,7 +185,7 @@ void Wavefront::clear() {
 
 void Wavefront::bind_sets(const vk::raii::CommandBuffer& commands, const Tile& tile,
                           const gpu::GpuBatch& batch) const {
-  const vk::DescriptorSet sets[] = {*scene_set_, *tile.set, photons_.set()};
+  const vk::DescriptorSet sets[] = {*scene_set_, *tile.set, photons_.set(), camera_.set()};
   commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *layout_, 0, sets, {});
   commands.pushConstants<gpu::GpuBatch>(*layout_, vk::ShaderStageFlagBits::eCompute, 0, batch);
 }
@@ -285,6 +292,14 @@ bool Wavefront::render_with_photons(std::uint32_t first_sample, std::uint32_t sa
 void Wavefront::use_photons(std::uint32_t count, double radius) {
   photons_.resize(count);
   photon_radius_ = radius;
+}
+
+void Wavefront::use_camera(const std::vector<glm::vec4>& plate) {
+  camera_.upload(plate);
+  device_.submit([&](const vk::raii::CommandBuffer& commands) {
+    bind_sets(commands, tiles_.front(), tiles_.front().batch);
+    camera_.record(commands);
+  });
 }
 
 std::vector<gpu::GpuPixel> Wavefront::pixels() const {

@@ -6,6 +6,7 @@
 #include <functional>
 #include <vector>
 
+#include "daemon/render/camera_map.hpp"
 #include "daemon/render/device.hpp"
 #include "daemon/render/photon_map.hpp"
 #include "shaders/lib/render_shared.h"
@@ -14,7 +15,8 @@ namespace previz::render {
 
 class Wavefront {
  public:
-  Wavefront(Device& device, int width, int height);
+  // `paths_a_slot`: 2, or 3 where FEATURE_CAMERA may be asked for.
+  Wavefront(Device& device, int width, int height, std::uint32_t paths_a_slot);
 
   // Binds the scene's buffers (set 0, by binding) and makes sure that the pipelines are those for
   // `features`. Must be called whenever a buffer was recreated.
@@ -22,6 +24,8 @@ class Wavefront {
   // Photons a pass and the radius (metres) of the first, where `features` has FEATURE_PHOTONS.
   void use_photons(std::uint32_t count, double radius);
   std::uint32_t most_photons() const { return slots_; }
+  // What the camera measured, row-major (CameraMap::upload), where `features` has FEATURE_CAMERA.
+  void use_camera(const std::vector<glm::vec4>& plate);
   // Which blocks of SAMPLED_BLOCK^2 pixels are sampled from now on, row-major; 0: not.
   void sample_only(const std::vector<std::uint32_t>& blocks);
   // Forgets all samples; every pixel is sampled again.
@@ -57,10 +61,11 @@ class Wavefront {
                     const gpu::GpuBatch& batch, std::uint32_t max_depth) const;
 
   Device& device_;
-  std::uint32_t max_slots_;
+  std::uint32_t max_slots_, paths_a_slot_;
   std::uint32_t slots_ = 0;  // allocated
   int width_, height_;
   PhotonMap photons_;
+  CameraMap camera_;
   double photon_radius_ = 0;
   vk::raii::DescriptorSetLayout scene_layout_{nullptr}, path_layout_{nullptr};
   vk::raii::PipelineLayout layout_{nullptr};
@@ -70,7 +75,7 @@ class Wavefront {
   std::uint32_t features_ = 0;
   Pipeline generate_, advance_, extend_, shade_, prepare_shadow_, shadow_, accumulate_;
   Buffer ray_origin_, ray_direction_, throughput_, hits_, queue_, shadow_rays_, sample_mixed_,
-      sample_real_, sample_aov_, sampled_, control_;
+      sample_real_, sample_landed_, sample_aov_, sampled_, control_;
 };
 
 }  // namespace previz::render

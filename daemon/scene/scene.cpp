@@ -117,6 +117,7 @@ Requirements requirements(const Scene& scene, const set::Set& set) {
     const bool shines = light.gain_mixed > 0 || light.gain_real > 0;
     required.lights |= shines && largest(glm::vec3(light.emission)) > 0;
   }
+  required.lights |= set.lighting.mode != set::LightMode::image;
   required.thin_lens = set.observer.calibration && set.observer.calibration->lens;
   return required;
 }

@@ -114,7 +114,7 @@ struct Requirements {
   bool caustics = false;  // anything that can throw light on by mirrors or clear glass, and light
   bool alpha = false;     // any surface that can let rays through by alpha
   bool emissive_meshes = false;
-  bool lights = false;             // any light that shines in one of the worlds
+  bool lights = false;  // any light that shines in one of the worlds, or may be found in the image
   bool differing_objects = false;  // any instance present in one world only
   bool removed_objects = false;
   bool thin_lens = false;

@@ -31,10 +31,17 @@ constexpr auto names(LightType) {
 constexpr auto names(UnseenRule) {
   return std::to_array<Name<UnseenRule>>({{"horizon", UnseenRule::horizon},
                                           {"mirror", UnseenRule::mirror},
+                                          {"observer", UnseenRule::observer},
                                           {"constant", UnseenRule::constant}});
 }
 constexpr auto names(LightMode) {
-  return std::to_array<Name<LightMode>>({{"image", LightMode::image}});
+  return std::to_array<Name<LightMode>>({{"image", LightMode::image},
+                                         {"sources", LightMode::sources},
+                                         {"hybrid", LightMode::hybrid}});
+}
+constexpr auto names(Residual) {
+  return std::to_array<Name<Residual>>(
+      {{"blurred", Residual::blurred}, {"dropped", Residual::dropped}});
 }
 constexpr auto names(LightSampling) {
   return std::to_array<Name<LightSampling>>(
@@ -48,6 +55,10 @@ constexpr auto names(Composite) {
   return std::to_array<Name<Composite>>({{"additive", Composite::additive},
                                          {"ratio", Composite::ratio},
                                          {"hybrid", Composite::hybrid}});
+}
+constexpr auto names(RealRadiance) {
+  return std::to_array<Name<RealRadiance>>(
+      {{"traced", RealRadiance::traced}, {"camera", RealRadiance::camera}});
 }
 constexpr auto names(Caustics) {
   return std::to_array<Name<Caustics>>(

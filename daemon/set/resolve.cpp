@@ -37,6 +37,7 @@ class Resolver {
     objects();
     lights();
     lighting();
+    room();
     buttons();
     set_.recording.directory = located(set_.recording.directory);
     set_.output.directory = located(set_.output.directory);
@@ -148,6 +149,11 @@ class Resolver {
                 "the picture folds back at " +
                     codec::print_number(std::floor(*fold * 1800 / std::numbers::pi) / 10) +
                     " degrees off axis; allowed: a radius that grows up to max_angle_deg");
+    const auto& light = draft_.light;
+    if (intrinsics.good("max_angle_deg") && intrinsics.good("vignetting") &&
+        !(least_illumination(light.vignetting, light.intrinsics.max_angle_rad) >= min_illumination))
+      problem(intrinsics, "vignetting",
+              "leaves no light at some angle; allowed: at least 0.01 of it up to max_angle_deg");
     const auto& pose = given("light_camera.pose");
     if (!pose.at)
       problems_.add(*intrinsics.at, "light_camera.pose",
@@ -364,6 +370,25 @@ class Resolver {
       exclude(table, {"unseen_radiance"},
               "goes with unseen = \"constant\" only; leave one of the two out");
     }
+  }
+
+  void room() {
+    const auto& table = given("lighting.room");
+    if (!table.at) return;
+    Room& room = draft_.room;
+    if (draft_.room_file) {
+      exclude(table, {"size_m"}, "contradicts file; allowed: one of the two");
+      room.file_as_written = draft_.room_file->string();
+      room.file = existing(table, "file", *draft_.room_file);
+    } else if (!table.has("size_m")) {
+      problem(table, "size_m", "is missing; allowed: 3 numbers in m, or a file");
+    }
+    room.world_from_room = pose(draft_.room_pose.position.value_or(glm::dvec3{0}),
+                                draft_.room_pose.rotation.value_or(glm::dvec3{0}));
+    if (set_.lighting.environment)
+      problems_.add(*table.at, table.path,
+                    "does not go with lighting.environment, which is light from far away");
+    set_.lighting.room = room;
   }
 
   Draft& draft_;

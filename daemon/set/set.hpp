@@ -73,9 +73,33 @@ struct Light {
   double gain_mixed = 1, gain_real = 0;
 };
 
-enum class UnseenRule { constant, horizon, mirror };
-enum class LightMode { image };  // sources and hybrid follow
+enum class UnseenRule { constant, horizon, mirror, observer };
+enum class LightMode { image, sources, hybrid };
+enum class Residual { blurred, dropped };
 enum class LightSampling { importance, bsdf };
+
+// A rough model of what the light comes from: near walls and lamps are then seen in the right
+// direction from where the virtual objects stand, and not from where the light camera stands.
+struct Room {
+  // A box around its own origin; absent: the surfaces of `file`, a glTF.
+  std::optional<glm::dvec3> size_m;
+  std::filesystem::path file;
+  std::string file_as_written;
+  glm::dmat4 world_from_room{1.0};  // rigid
+  glm::dvec3 seen_from{0};          // the place that the light is wanted for
+
+  friend bool operator==(const Room&, const Room&) = default;
+};
+
+// What counts as a light source of the image, and what becomes of the rest (LightMode::sources).
+struct LightSources {
+  double contrast = 8;        // over the mean luminance of what is no source
+  double least_share = 0.01;  // of all luminous flux
+  Residual residual = Residual::blurred;
+  std::optional<double> distance_m;  // from the light camera; absent: at infinity
+
+  friend bool operator==(const LightSources&, const LightSources&) = default;
+};
 
 struct Lighting {
   LightMode mode = LightMode::image;
@@ -88,6 +112,10 @@ struct Lighting {
   int resolution = 0;  // octahedral map, texels a side; 0: from the source
   UnseenRule unseen = UnseenRule::horizon;
   glm::dvec3 unseen_radiance{0};  // UnseenRule::constant
+  double smoothing_s = 0.25;      // time constant; 0: none
+  double clipped_gain = 1;        // of light that every exposure clips, over white
+  std::optional<Room> room;       // absent: all light comes from far away
+  LightSources sources;           // LightMode::sources and hybrid
   // Light frame to use; -1: every bracket up to the newest before the observer frame.
   int frame = -1;
 
@@ -96,11 +124,13 @@ struct Lighting {
 
 enum class Estimator { paired, difference };
 enum class Composite { additive, ratio, hybrid };
+enum class RealRadiance { traced, camera };
 enum class Caustics { photons, traced, none };
 
 struct Estimation {
   Estimator estimator = Estimator::paired;
   Composite composite = Composite::additive;
+  RealRadiance real_radiance = RealRadiance::traced;
   double composite_floor = 0.02;  // radiance over the sensor's white, below which hybrid adds
   int max_depth = 16;             // path vertices after the camera, 1..64
   int roulette_depth = 4;         // Russian roulette from this vertex on

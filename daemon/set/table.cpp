@@ -8,8 +8,8 @@ namespace previz::set {
 namespace {
 
 // Units of the file; struct units are metres, radians and pixels.
-constexpr Unit plain{"", 1}, px{"px", 1}, m{"m", 1}, mm{"mm", 1e-3},
-    deg{"degrees", std::numbers::pi / 180}, stops{"stops", 1}, seconds{"s", 1}, megabytes{"MB", 1};
+constexpr Unit plain{"", 1}, px{"px", 1}, m{"m", 1}, mm{"mm", 1e-3}, sec{"s", 1},
+    deg{"degrees", std::numbers::pi / 180}, stops{"stops", 1}, megabytes{"MB", 1};
 
 constexpr int max_picture_side_px = 16384;
 // A distance beyond which a lens cannot tell the difference, and a float still can.
@@ -31,9 +31,9 @@ using Keys = std::vector<Key>;
 // One row, one line: name, where its value goes, unit and range, what it means, what if left out.
 // clang-format off
 
-Keys set_keys(Set& s) {
+Keys set_keys(Set& set) {
   return {
-      {"name", &s.name, plain, "What the crew calls this set; left out: the file's name.", optional("\"desk\"")},
+      {"name", &set.name, plain, "What the crew calls this set; left out: the file's name.", optional("\"desk\"")},
   };
 }
 
@@ -86,7 +86,14 @@ Keys light_camera_keys(LightCamera& c) {
   };
 }
 
-Keys fisheye_keys(FisheyeIntrinsics& i) {
+Keys light_response_keys(LightCameraCalibration& c) {
+  auto keys = response_keys(c.response, c.responsivity);
+  keys.push_back({"dark_level", &c.dark_level, plain.within(0, max_dark_level), "Signal that a covered lens shows, red, green and blue, as a share of white."});
+  return keys;
+}
+
+Keys fisheye_keys(LightCameraCalibration& c) {
+  auto& i = c.intrinsics;
   return {
       {"width", &i.width, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1024")},
       {"height", &i.height, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1024")},
@@ -96,6 +103,7 @@ Keys fisheye_keys(FisheyeIntrinsics& i) {
       {"cy", &i.cy, px, "Principal point; 0 is the centre of the topmost pixels.", required("511.5")},
       {"k", &i.k, plain, "k1 to k4 of r = t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9, t the angle off axis."},
       {"max_angle_deg", &i.max_angle_rad, deg.above(0, 180), "Angle off axis up to which the calibration holds; nothing is read beyond it.", required("100.0")},
+      {"vignetting", &c.vignetting, plain, "v1 to v3 of the light that comes through, 1 + v1 t^2 + v2 t^4 + v3 t^6, t the angle off axis in radians."},
   };
 }
 
@@ -164,15 +172,36 @@ Keys light_keys(Light& l) {
 Keys lighting_keys(Draft& d) {
   auto& l = d.set.lighting;
   return {
-      {"mode", &l.mode, plain, "The whole fisheye picture lights the scene."},
+      {"mode", &l.mode, plain, "\"image\": the whole fisheye picture lights the scene. \"sources\": its lamps do, as discs or spheres, which takes far fewer samples; what is left of it is blurred or dropped. \"hybrid\": its lamps, and all that is left of it as a picture."},
       {"sampling", &l.sampling, plain, "How directions towards the light are chosen; \"bsdf\" is noisier, for comparison."},
       {"environment", &d.environment, plain, "Latitude-longitude EXR in place of the light camera; Z up, the picture's middle is +X.", optional("\"env.exr\"")},
       {"environment_rotation_deg", &l.environment_rotation_rad, deg, "Turns that picture about world Z, counter-clockwise seen from above."},
       {"environment_gain", &l.environment_gain, plain.at_least(0), "Scales that picture."},
       {"resolution", &l.resolution, plain.within(0, 4096), "Side of the light map in texels, a power of two; 0: as fine as the source."},
-      {"unseen", &l.unseen, plain, "What stands where the light camera cannot see: the edge of its picture continued, its picture mirrored about the plane it stands in, or a constant."},
+      {"unseen", &l.unseen, plain, "What stands where the light camera cannot see: the edge of its picture continued, its picture mirrored about the plane it stands in, what the film camera has seen there (elsewhere the edge continued), or a constant."},
       {"unseen_radiance", &d.unseen_radiance, plain.at_least(0), "With unseen = \"constant\" only: linear Rec. 709 radiance.", optional("[0.1, 0.1, 0.1]")},
+      {"smoothing_s", &l.smoothing_s, sec.within(0, 60), "Time constant over which light that stays the same is averaged; what changes beyond the sensor's noise passes at once. 0: no averaging."},
+      {"clipped_gain", &l.clipped_gain, plain.within(1, 1e6), "Light that is clipped in every exposure is taken as up to this many times the white it is clipped at; 1: as white, which is its lower bound."},
       {"frame", &l.frame, plain.within(-1, 1'000'000), "Light frame to use for the whole take; -1: the newest bracket before each picture."},
+  };
+}
+
+Keys room_keys(Draft& d) {
+  return {
+      {"size_m", &d.room.size_m, m.above(0, far_m), "A box: its inner size along X, Y and Z, before it is turned. Required unless file is given.", optional("[6.0, 5.0, 2.8]")},
+      {"file", &d.room_file, plain, "In place of size_m: glTF 2.0 of the walls and lamps, as in [[object]].", optional("\"room.glb\"")},
+      {"position_m", &d.room_pose.position, m, "Where the middle of the box, or the file's origin, is in the world.", optional("[0.0, 0.0, 1.4]")},
+      {"rotation_deg", &d.room_pose.rotation, deg, "Turns about world X, then Y, then Z, before it is moved.", optional("[0.0, 0.0, 30.0]")},
+      {"seen_from_m", &d.room.seen_from, m, "The place in the set that the light is wanted for: among the virtual objects."},
+  };
+}
+
+Keys light_sources_keys(LightSources& s) {
+  return {
+      {"contrast", &s.contrast, plain.within(2, 1e6), "How many times brighter than the mean of all that is no lamp a lamp is, at least."},
+      {"least_share", &s.least_share, plain.within(0, 1), "Share of all light that a lamp brings, at least; fainter ones, such as reflections of lamps, stay in the picture."},
+      {"residual", &s.residual, plain, "With mode = \"sources\": the light of everything but the lamps, without its shapes, or none of it (how much that is, is told)."},
+      {"distance_m", &s.distance_m, m.above(0, far_m), "How far from the light camera the lamps are; left out: they are at infinity.", optional("2.5")},
   };
 }
 
@@ -180,6 +209,7 @@ Keys estimator_keys(Estimation& e) {
   return {
       {"kind", &e.estimator, plain, "\"paired\": both worlds are traced in full, with the same random numbers. \"difference\": where no virtual object covers the picture, only what differs between the worlds is traced (with composite = \"additive\"; the others need both in full)."},
       {"composite", &e.composite, plain, "How the difference of the worlds is put onto the camera picture: added; as the ratio of the worlds, which forgives a wrong albedo of the phantom but lights no black surface; or the ratio on bright surfaces and the sum on dark ones."},
+      {"real_radiance", &e.real_radiance, plain, "Where the radiance of real surfaces comes from that light reaches after a bounce: simulated; or the camera picture's own, where it shows a matt surface (specularFactor 0) in focus and unclipped: reflections then show its true texture, and paths end sooner."},
       {"composite_floor", &e.composite_floor, plain.within(0.0001, 1), "With composite = \"hybrid\": radiance below which a real surface counts as dark, as a share of the sensor's white."},
       {"max_depth", &e.max_depth, plain.within(1, 64), "Bounces of a path: vertices after the camera."},
       {"roulette_depth", &e.roulette_depth, plain.within(1, 64), "Russian roulette ends paths from this vertex on."},
@@ -226,7 +256,7 @@ Keys recording_keys(Recording& r) {
       {"directory", &r.directory, plain, "Where takes go, a folder each: SLATE_take001 and so on."},
       {"slate", &r.slate, plain, "Scene and shot as on the board; left out: the set's name.", optional("\"12A\"")},
       {"notes", &r.notes, plain, "Written into every take.", optional("\"second unit, 35 mm\"")},
-      {"preroll_s", &r.preroll_s, seconds.within(0, 60), "What the cameras saw before the button is put in front of the take; kept in memory."},
+      {"preroll_s", &r.preroll_s, sec.within(0, 60), "What the cameras saw before the button is put in front of the take; kept in memory."},
       {"queue_mb", &r.queue_mb, megabytes.within(1, 1e6), "Frames that may wait in memory for a slow disk; what does not fit is dropped, counted and told."},
       {"reserve_mb", &r.reserve_mb, megabytes.within(1, 1e9), "A take ends in order before the disk has less space left than this."},
       {"timecode_fps", &r.timecode_fps, plain.within(1, 240), "Frames of a second of timecode (time of day)."},
@@ -269,14 +299,16 @@ std::vector<Section> sections(Draft& d) {
       once("observer.lens", optional, "Depth of field; left out: everything is sharp.", [&d] { return lens_keys(d.lens); }),
       once("observer.response", optional, "How its sensor turns light into picture values.", [&d] { return response_keys(d.observer.response, d.observer.responsivity); }),
       once("light_camera", always, "The light camera.", [&d] { return light_camera_keys(d.set.light_camera); }),
-      once("light_camera.intrinsics", optional, "Its fisheye as calibrated.", [&d] { return fisheye_keys(d.light.intrinsics); }),
-      once("light_camera.response", optional, "How its sensor turns light into picture values.", [&d] { return response_keys(d.light.response, d.light.responsivity); }),
+      once("light_camera.intrinsics", optional, "Its fisheye as calibrated.", [&d] { return fisheye_keys(d.light); }),
+      once("light_camera.response", optional, "How its sensor turns light into picture values.", [&d] { return light_response_keys(d.light); }),
       once("light_camera.pose", optional, "Where it stands.", [&d] { return light_pose_keys(d.light_pose); }),
       once("tracking", always, "Where the film camera is, found by printed AprilTags.", [&d] { return tracking_keys(d.set.tracking); }),
       many("tag", "A printed tag; one table each. Give its pose in one of three forms.", d.tags, tag_keys),
       many("object", "A piece of geometry, real or virtual; one table each.", d.objects, object_keys),
       many("light", "A lamp that is added or whose brightness is changed; one table each.", d.lights, [](LightDraft& l) { return light_keys(l.light); }),
       once("lighting", always, "The light around the set.", [&d] { return lighting_keys(d); }),
+      once("lighting.room", optional, "Where the light comes from, if it is near: the light camera's picture is put on these walls and seen anew from the set. Left out: from far away.", [&d] { return room_keys(d); }),
+      once("lighting.sources", always, "The lamps that are found in the light camera's picture, with mode = \"sources\" or \"hybrid\".", [&d] { return light_sources_keys(d.set.lighting.sources); }),
       once("estimator", always, "How light is simulated.", [&d] { return estimator_keys(d.set.estimation); }),
       once("quality", always, "What a frame may cost.", [&d] { return quality_keys(d.set.quality); }),
       many("button", "What a button does; one table for each way to press it.", d.buttons, [](ButtonDraft& b) { return button_keys(b.button); }),

@@ -75,6 +75,9 @@ struct Draft {
   PoseDraft light_pose;
   std::optional<std::filesystem::path> environment;
   std::optional<glm::dvec3> unseen_radiance;
+  Room room;
+  std::optional<std::filesystem::path> room_file;
+  PoseDraft room_pose;
   std::vector<TagDraft> tags;
   std::vector<ObjectDraft> objects;
   std::vector<LightDraft> lights;
@@ -96,7 +99,10 @@ struct Key {
         need(std::move(its_need)),
         allowed(Codec<T>::describe(rule)),
         read([to, rule](const Value& value) { *to = Codec<T>::read(value, rule); }) {
-    if (need.kind == Need::Kind::defaulted) initial = Codec<T>::print(*to, rule);
+    if constexpr (requires { Codec<T>::print(*to, rule); }) {
+      print = [to, rule] { return Codec<T>::print(*to, rule); };
+      if (need.kind == Need::Kind::defaulted) initial = print();
+    }
   }
 
   std::string name;
@@ -105,6 +111,7 @@ struct Key {
   std::string allowed;                     // type, unit, range
   std::string initial;                     // the default as TOML
   std::function<void(const Value&)> read;  // throws Misread
+  std::function<std::string()> print;      // the value as it is now; "" where there is none
 };
 
 // A table of the file, or an array of tables. `open` makes room for one in the draft.

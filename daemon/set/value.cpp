@@ -2,6 +2,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <glm/matrix.hpp>
 
 namespace previz::set {
 namespace codec {
@@ -165,6 +166,14 @@ glm::dmat4 Codec<glm::dmat4>::read(const Value& value, const Rule& rule) {
     for (int column = 0; column < 4; ++column)
       out[column][row] = numbers[static_cast<std::size_t>(4 * row + column)];
   return out;
+}
+
+std::string Codec<glm::dmat4>::print(const glm::dmat4& matrix, const Rule& rule) {
+  const glm::dmat4 rows = glm::transpose(matrix);
+  std::string out = "[";
+  for (int row = 0; row < 4; ++row)
+    out += (row ? ", " : "") + codec::print_numbers(&rows[row].x, 4, rule);
+  return out + "]";
 }
 
 std::vector<double> Codec<std::vector<double>>::read(const Value& value, const Rule& rule) {

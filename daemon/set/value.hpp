@@ -192,6 +192,7 @@ struct Codec<std::array<glm::dvec3, 4>> {
 template <>
 struct Codec<glm::dmat4> {
   static glm::dmat4 read(const Value& value, const Rule& rule);
+  static std::string print(const glm::dmat4& matrix, const Rule& rule);
   static std::string describe(const Rule&) {
     return "4 rows of 4 numbers (metres), the last row 0 0 0 1";
   }
@@ -213,13 +214,17 @@ struct Codec<std::vector<std::string>> {
   static std::string describe(const Rule&) { return "list of texts"; }
 };
 
-// Keys that may be left out have no default to print.
+// Keys that may be left out: "" where they are.
 template <class T>
 struct Codec<std::optional<T>> {
   static std::optional<T> read(const Value& value, const Rule& rule) {
     return Codec<T>::read(value, rule);
   }
-  static std::string print(const std::optional<T>&, const Rule&) { return ""; }
+  static std::string print(const std::optional<T>& value, const Rule& rule) requires
+      requires(const T& one) {
+    Codec<T>::print(one, Rule{});
+  }
+  { return value ? Codec<T>::print(*value, rule) : ""; }
   static std::string describe(const Rule& rule) { return Codec<T>::describe(rule); }
 };
 

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "drivers/error.hpp"
+#include "drivers/session/light_json.hpp"
 
 namespace previz::session {
 namespace {
@@ -152,6 +153,8 @@ TrackRecord parse_track_line(const Json& json) {
   get(json.at("tracked"), record.tracked);
   get(json.at("tags"), record.tags);
   record.scene = parse_scene(json);
+  if (json.contains("captured_light"))
+    record.captured_light = captured_light_of(json.at("captured_light"));
   if (!record.tracked) return record;
   get(json.at("world_from_camera"), record.world_from_camera);
   get(json.at("covariance"), record.covariance);
@@ -227,6 +230,7 @@ std::string to_line(const TrackRecord& record) {
   for (const auto& [name, world_from_file] : record.scene.objects)
     json["objects"][name] = json_of(world_from_file, "object");
   for (const auto& [name, light] : record.scene.lights) json["lights"][name] = json_of(light);
+  if (record.captured_light) json["captured_light"] = to_json(*record.captured_light);
   return json.dump();
 }
 

@@ -62,6 +62,23 @@ struct SceneState {
   friend bool operator==(const SceneState&, const SceneState&) = default;
 };
 
+// The light around the set, as it lit the frame: sources, and the rest without its shapes.
+struct CapturedSource {
+  int id = 0;                     // the same from frame to frame
+  glm::dvec3 direction{0, 0, 1};  // unit, world, from the light camera towards it
+  double solid_angle_sr = 0;
+  glm::dvec3 flux{0};  // integral of radiance over solid angle, linear Rec. 709
+
+  friend bool operator==(const CapturedSource&, const CapturedSource&) = default;
+};
+struct CapturedLight {
+  std::vector<CapturedSource> sources;
+  int ambient_size = 0;            // equal-area octahedral map, texels a side, at most 64
+  std::vector<glm::vec3> ambient;  // radiance, row-major
+
+  friend bool operator==(const CapturedLight&, const CapturedLight&) = default;
+};
+
 // A line of track.jsonl.
 struct TrackRecord {
   std::uint64_t frame = 0;  // index of the observer frame
@@ -72,6 +89,7 @@ struct TrackRecord {
   std::array<double, 36> covariance{};
   std::vector<int> tags;  // ids used
   SceneState scene;       // when the frame was shown; empty: as in the set
+  std::optional<CapturedLight> captured_light;  // absent: none was known, or an older session
 };
 
 // A frame of a stream as recorded; `frame` is its position in the .mkv, from 0.

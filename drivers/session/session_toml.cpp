@@ -146,6 +146,9 @@ std::string light_toml(const LightCameraCalibration& calibration) {
   text += "k = " + to_list(lens.k) + "\n" + line("max_angle_rad", lens.max_angle_rad);
   text += "world_from_camera = " + to_list(rows) + "  # row-major, metres\n";
   text += line("responsivity", calibration.responsivity);
+  const glm::dvec3& dark = calibration.dark_level;
+  text += "vignetting = " + to_list(calibration.vignetting) + "\n";
+  text += "dark_level = " + to_list(std::array{dark.x, dark.y, dark.z}) + "\n";
   return text + response_toml(calibration.response, "light.calibration.response");
 }
 
@@ -259,6 +262,24 @@ ObserverCalibration parse_observer(const Place& place) {
   return calibration;
 }
 
+// Sessions of before these were known lack them: a lens and a sensor without fault.
+void parse_shading(const Place& place, LightCameraCalibration& calibration) {
+  if (place.table.contains("vignetting")) {
+    const std::vector<double> v = place.numbers("vignetting", 3);
+    std::copy(v.begin(), v.end(), calibration.vignetting.begin());
+    if (!(least_illumination(calibration.vignetting, calibration.intrinsics.max_angle_rad) >=
+          min_illumination))
+      place.fail("vignetting", "must leave at least 0.01 of the light up to max_angle_rad");
+  }
+  if (place.table.contains("dark_level")) {
+    const std::vector<double> dark = place.numbers("dark_level", 3);
+    for (const double level : dark)
+      if (!(level >= 0 && level <= max_dark_level))
+        place.fail("dark_level", "must be between 0 and 0.5");
+    calibration.dark_level = {dark[0], dark[1], dark[2]};
+  }
+}
+
 LightCameraCalibration parse_light(const Place& place) {
   LightCameraCalibration calibration;
   FisheyeIntrinsics& lens = calibration.intrinsics;
@@ -275,6 +296,7 @@ LightCameraCalibration parse_light(const Place& place) {
   for (int i = 0; i < 16; ++i) calibration.world_from_camera[i % 4][i / 4] = rows[i];
   calibration.responsivity = place.number("responsivity");
   calibration.response = parse_response(place.inner("response"));
+  parse_shading(place, calibration);
   return calibration;
 }
 

@@ -13,6 +13,7 @@ layout(scalar, set = 1, binding = BINDING_QUEUE) buffer Queue { uint queue[]; };
 layout(scalar, set = 1, binding = BINDING_SHADOW) buffer Shadow { GpuShadowRay shadow_rays[]; };
 layout(scalar, set = 1, binding = BINDING_SAMPLE_MIXED) buffer Mixed { vec4 sample_mixed[]; };
 layout(scalar, set = 1, binding = BINDING_SAMPLE_REAL) buffer Real { vec4 sample_real[]; };
+layout(scalar, set = 1, binding = BINDING_SAMPLE_LANDED) buffer Landed { vec4 sample_landed[]; };
 layout(scalar, set = 1, binding = BINDING_SAMPLE_AOV) buffer Aov { vec4 sample_aov[]; };
 layout(scalar, set = 1, binding = BINDING_CONTROL) buffer Control { GpuControl control; };
 layout(scalar, set = 1, binding = BINDING_SAMPLED) readonly buffer Sampled { uint sampled[]; };
@@ -52,11 +53,27 @@ uint next_queue_index(uint i) { return (1u - control.queue_side) * (queue.length
 uint path_worlds(uint bits) { return bits & PATH_WORLDS_MASK; }
 uint path_depth(uint bits) { return (bits >> PATH_DEPTH_SHIFT) & 0xffu; }
 
+// Slots whose paths there is room for; see set 1.
+uint slot_count() {
+  return uint(ray_origin.length()) / (has_feature(FEATURE_CAMERA) ? 3u : 2u);
+}
+uint path_slot(uint path) {
+  return has_feature(FEATURE_CAMERA) && path >= 2u * slot_count() ? path - 2u * slot_count()
+                                                                  : path >> 1;
+}
+
 // Adds light to what the worlds of a path have received. Only one path of a slot is in each world,
-// so no two invocations write the same value.
-void add_radiance(uint slot, uint worlds, vec3 radiance, vec2 gain) {
-  if ((worlds & WORLD_MIXED) != 0u) sample_mixed[slot].rgb += radiance * gain.x;
-  if ((worlds & WORLD_REAL) != 0u) sample_real[slot].rgb += radiance * gain.y;
+// and one is the real part of a landed one, so no two invocations write the same value.
+void add_pair(uint slot, uint worlds, bool landed, vec3 mixed, vec3 real) {
+  if ((worlds & WORLD_MIXED) != 0u) sample_mixed[slot].rgb += mixed;
+  if ((worlds & WORLD_REAL) == 0u) return;
+  if (has_feature(FEATURE_CAMERA) && landed)
+    sample_landed[slot].rgb += real;
+  else
+    sample_real[slot].rgb += real;
+}
+void add_radiance(uint slot, uint worlds, bool landed, vec3 radiance, vec2 gain) {
+  add_pair(slot, worlds, landed, radiance * gain.x, radiance * gain.y);
 }
 
 #endif

@@ -40,7 +40,8 @@ PREVIZ_CONST uint ALBEDO_SIDE = 32u;
 PREVIZ_CONST float LEAST_ROUGH_IOR = 1.001f;
 
 // Set 1, paths in flight and what they bring back. A slot is one sample of one pixel; it has two
-// paths, because it can fork once: path 2 slot, and path 2 slot + 1 for the world that parted.
+// paths, because it can fork once: path 2 slot, and path 2 slot + 1 for the world that parted. With
+// FEATURE_CAMERA a path that landed can fork once more: path 2 slots + slot.
 PREVIZ_CONST uint BINDING_RAY_ORIGIN = 0u;     // vec4[path]: origin, t_min
 PREVIZ_CONST uint BINDING_RAY_DIRECTION = 1u;  // vec4[path]: unit direction, pdf (0: no MIS)
 PREVIZ_CONST uint BINDING_THROUGHPUT = 2u;     // vec4[path]: throughput, bits of PATH_*
@@ -54,7 +55,8 @@ PREVIZ_CONST uint BINDING_CONTROL = 9u;        // GpuControl
 PREVIZ_CONST uint BINDING_PIXELS = 10u;        // GpuPixel[width * height]
 PREVIZ_CONST uint BINDING_SAMPLED = 11u;       // uint[]: of each block of the picture, row-major,
                                                // whether its pixels are sampled
-PREVIZ_CONST uint PATH_BINDINGS = 12u;
+PREVIZ_CONST uint BINDING_SAMPLE_LANDED = 12u; // vec4[slot]: the real part of PATH_LANDED
+PREVIZ_CONST uint PATH_BINDINGS = 13u;
 
 // Set 2, the photons of one pass, in a hash grid of cells twice as wide as the radius. What is
 // gathered from comes as texel buffers, faster on lavapipe, which are views of the last two.
@@ -71,6 +73,14 @@ PREVIZ_CONST uint BINDING_PHOTON_SORTED = 6u;   // vec4[]: FOUND_PHOTONS, to wri
 PREVIZ_CONST uint BINDING_PHOTON_BUCKETS = 7u;  // GpuPhotonBucket[], a power of two; FOUND_BUCKETS
 PREVIZ_CONST uint PHOTON_BINDINGS = 8u;
 PREVIZ_CONST uint TEXELS_PER_PHOTON = 4u;
+
+// Set 3, what the camera has measured of the real world: the plate and how far its surfaces are.
+//   SEEN_RADIANCE RGBA32F, width * height: radiance, 1 / depth of the surface (0: not to be used).
+//                 A view of PLATE, in which the fourth component says before SEEN whether it may be.
+PREVIZ_CONST uint BINDING_SEEN_RADIANCE = 0u;
+PREVIZ_CONST uint BINDING_PLATE = 1u;  // vec4[], to write
+PREVIZ_CONST uint BINDING_SEEN = 2u;   // GpuSeen[]
+PREVIZ_CONST uint CAMERA_BINDINGS = 3u;
 
 // What a slot holds, in the fourth component of its SAMPLE_REAL.
 PREVIZ_CONST float SAMPLE_FULL = 0.0f;        // both radiances
@@ -98,12 +108,15 @@ PREVIZ_CONST uint FEATURE_PHOTONS = 512u;   // photons bring it
 PREVIZ_CONST uint FEATURE_NORMAL_MAPS = 2048u;
 PREVIZ_CONST uint FEATURE_ALPHA = 4096u;  // any surface that is not there everywhere
 PREVIZ_CONST uint FEATURE_DIFFERENCE = 1024u;  // only what differs is traced, where that is enough
+PREVIZ_CONST uint FEATURE_CAMERA = 8192u;  // the plate is the real radiance of points it shows
 
 // Bits of a path's state.
 PREVIZ_CONST uint PATH_WORLDS_MASK = 3u;      // WORLD_*
 PREVIZ_CONST uint PATH_DEPTH_SHIFT = 8u;      // number of surface vertices so far
 PREVIZ_CONST uint PATH_ROUGH = 4u;            // some vertex so far scattered by a non-Dirac lobe
 PREVIZ_CONST uint PATH_DIFFERENCE = 8u;       // while in both worlds, only what differs counts
+PREVIZ_CONST uint PATH_LANDED = 16u;          // was in the mixed world, took the plate's radiance and
+                                              // goes on for Lm - Lr there
 
 struct GpuHit {
   float t;  // < 0: nothing hit
@@ -116,7 +129,7 @@ struct GpuShadowRay {
   vec3 origin;
   float t_max;
   vec3 direction;
-  uint slot_and_worlds;  // slot << 2 | WORLD_*
+  uint slot_and_worlds;  // slot << 3 | landed << 2 | WORLD_*
   vec3 contribution;     // throughput * f * cos * Le / pdf * MIS weight
   vec2 gain;             // emission gain in the (mixed, real) world
 };
@@ -153,6 +166,12 @@ struct GpuPixel {
   vec4 square_diff_low;
 };
 
+// The real world's first surface at the middle of a pixel.
+struct GpuSeen {
+  float inverse_depth;  // 1/m, along the optical axis; 0: none, or one that alpha lets through
+  uint instance;
+};
+
 struct GpuControl {
   uint extend_groups[4];  // indirect dispatch arguments (x, y, z), padding
   uint shadow_groups[4];
@@ -165,6 +184,8 @@ struct GpuControl {
   uint dropped_not_finite;
   uint dropped_negative;
   uint stopped_in_layers;
+  uint measured_low, measured_high;      // vertices whose radiance the plate gave
+  uint unmeasured_low, unmeasured_high;  // and those of the real world for which it could not
 };
 
 struct GpuInstance {
@@ -261,6 +282,9 @@ struct GpuFrame {
   float photon_environment;   // probability that a photon starts from the environment
   vec3 scene_center;
   float scene_radius;         // of a sphere that holds everything
+  vec2 focal_px, principal_px;  // of the observer's lens, OpenCV's convention
+  vec3 radial;                  // k1, k2, k3
+  vec2 tangential;              // p1, p2
 };
 
 // Push constants: the part of the picture and the samples of this batch.
@@ -274,14 +298,14 @@ struct GpuBatch {
 static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 52);
 static_assert(sizeof(GpuPixel) == 144);
-static_assert(sizeof(GpuControl) == 76);
+static_assert(sizeof(GpuControl) == 92);
 static_assert(sizeof(GpuInstance) == 112);
 static_assert(sizeof(GpuMaterial) == 84);
 static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
 static_assert(sizeof(GpuLight) == 128);
 static_assert(offsetof(GpuLight, uv0) == 96);
-static_assert(sizeof(GpuFrame) == 140);
+static_assert(sizeof(GpuFrame) == 176);
 static_assert(sizeof(GpuBatch) == 28);
 static_assert(sizeof(GpuPhoton) == 60);
 static_assert(sizeof(GpuPhotonBucket) == 8);

@@ -198,6 +198,25 @@ void apply_material(inout Surface s, uint material, vec2 uv) {
   s.alpha = roughness * roughness;
 }
 
+bool is_specular(Surface s) {
+  return s.metallic > 0.0 || s.transmission > 0.0 || (s.specular > 0.0 && s.ior > 1.0);
+}
+
+// At the silhouette of a smooth mesh, or by a normal map, a mirror direction may dip below the
+// surface, where its light would be lost. The normal is turned until that direction grazes the
+// surface: above it by MIRROR_LIFT, or by most of what the viewer is.
+const float MIRROR_LIFT = 0.01;
+
+vec3 mirroring_normal(vec3 normal, vec3 geometric_normal, vec3 wo) {
+  const float least = min(0.9 * dot(wo, geometric_normal), MIRROR_LIFT);
+  const vec3 mirrored = 2.0 * dot(normal, wo) * normal - wo;
+  const float height = dot(mirrored, geometric_normal);
+  if (height >= least) return normal;
+  const vec3 half_way = wo + normalize(mirrored + (least - height) * geometric_normal);
+  const float length_squared = dot(half_way, half_way);
+  return length_squared > 0.0 ? half_way * inversesqrt(length_squared) : geometric_normal;
+}
+
 // `direction` is the ray's; the barycentrics weigh the triangle's second and third vertex.
 Surface make_surface(GpuHit hit, vec3 direction) {
   const GpuInstance instance = instances[hit.instance];
@@ -234,6 +253,7 @@ Surface make_surface(GpuHit hit, vec3 direction) {
                           Triangle(p0, p1, p2, n0, n1, n2), uv, s.normal, outward);
   if (dot(s.normal, s.geometric_normal) < 0.0) s.normal = -s.normal;
   apply_material(s, instance.material, uv);
+  if (is_specular(s)) s.normal = mirroring_normal(s.normal, s.geometric_normal, s.wo);
   return s;
 }
 

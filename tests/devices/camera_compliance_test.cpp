@@ -47,7 +47,8 @@ class CameraCompliance : public testing::TestWithParam<RegisteredDevice> {
   void take(Camera& camera, int count) {
     for (int i = 0; i < count; ++i) {
       FramePtr frame = next_frame(camera);
-      ASSERT_TRUE(frame) << "frame " << i << " of " << count << " did not come";
+      ASSERT_TRUE(frame) << "frame " << i << " of " << count << " did not come; counted were "
+                         << testing::PrintToString(camera.counters());
       check(*frame, camera.format());
       last_ = std::move(frame);
     }
@@ -103,13 +104,16 @@ TEST_P(CameraCompliance, DeliversExactlyTheFramesAskedFor) {
 }
 
 TEST_P(CameraCompliance, NumbersEveryFrameItCaptures) {
-  if (device_->may_lose_frames()) GTEST_SKIP() << "this device loses frames; gaps tell which";
   const auto camera = device_->open();
   camera->start();
   ASSERT_NO_FATAL_FAILURE(take(*camera, 1));
   const std::uint64_t first = last_->sequence;
   ASSERT_NO_FATAL_FAILURE(take(*camera, 8));
-  EXPECT_EQ(last_->sequence, first + 8);
+  // Where frames are lost on the way, a gap tells which.
+  EXPECT_GE(last_->sequence, first + 8);
+  if (!device_->may_lose_frames()) {
+    EXPECT_EQ(last_->sequence, first + 8);
+  }
 }
 
 TEST_P(CameraCompliance, StartsAndStopsThreeTimes) {
@@ -190,8 +194,10 @@ TEST_P(CameraCompliance, ExposuresAppliedAreOnTheirFrames) {
   }
 }
 
-TEST_P(CameraCompliance, TellsThatItIsUnpluggedWhileItStreams) {
-  if (!device_->can_be_unplugged()) GTEST_SKIP() << "this device has no cable to pull";
+// The cable is pulled.
+class CameraUnplugged : public CameraCompliance {};
+
+TEST_P(CameraUnplugged, TellsSoWhileItStreams) {
   const auto camera = device_->open();
   camera->start();
   ASSERT_NO_FATAL_FAILURE(take(*camera, 3));
@@ -205,8 +211,7 @@ TEST_P(CameraCompliance, TellsThatItIsUnpluggedWhileItStreams) {
   camera->stop();
 }
 
-TEST_P(CameraCompliance, ReopensWhenItIsBack) {
-  if (!device_->can_be_unplugged()) GTEST_SKIP() << "this device has no cable to pull";
+TEST_P(CameraUnplugged, ReopensWhenItIsBack) {
   for (int i = 0; i < 2; ++i) {
     auto camera = device_->open();
     camera->start();
@@ -232,10 +237,19 @@ TEST_P(CameraCompliance, NamesTheDeviceThatIsMissing) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Drivers, CameraCompliance,
-                         testing::ValuesIn(registered_devices().begin(),
-                                           registered_devices().end()),
-                         [](const auto& instance) { return std::string(instance.param.name); });
+std::vector<RegisteredDevice> devices(bool with_a_cable) {
+  std::vector<RegisteredDevice> devices;
+  for (const RegisteredDevice& device : registered_devices())
+    if (device.has_a_cable || !with_a_cable) devices.push_back(device);
+  return devices;
+}
+
+std::string name_of(const testing::TestParamInfo<RegisteredDevice>& instance) {
+  return instance.param.name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Drivers, CameraCompliance, testing::ValuesIn(devices(false)), name_of);
+INSTANTIATE_TEST_SUITE_P(Drivers, CameraUnplugged, testing::ValuesIn(devices(true)), name_of);
 
 }  // namespace
 }  // namespace previz::test

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <ostream>
 #include <span>
 #include <string>
 
@@ -20,7 +21,6 @@ class DeviceUnderTest {
   // Of a device that does not exist; must throw previz::Error that names it.
   virtual std::unique_ptr<Camera> open_missing() = 0;
 
-  virtual bool can_be_unplugged() const { return true; }
   virtual void unplug() = 0;
   virtual void plug() = 0;
 
@@ -40,10 +40,15 @@ class DeviceUnderTest {
 // A driver under test: one line in registry.cpp.
 struct RegisteredDevice {
   const char* name;
-  bool live;  // its frames carry the host's time; those of a replayed take the take's
+  bool live;         // its frames carry the host's time; those of a replayed take the take's
+  bool has_a_cable;  // that can be pulled
   // Null where this machine has no such device; `why_not` then says what is missing.
   std::unique_ptr<DeviceUnderTest> (*make)(std::string& why_not);
 };
+
+inline void PrintTo(const RegisteredDevice& device, std::ostream* out) {
+  *out << device.name;
+}
 
 std::span<const RegisteredDevice> registered_devices();
 

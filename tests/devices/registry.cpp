@@ -7,11 +7,15 @@
 namespace previz::test {
 
 std::span<const RegisteredDevice> registered_devices() {
-  static constexpr std::array devices{
-      RegisteredDevice{"replay", false, make_replay},
-      RegisteredDevice{"replay_at_four_times_the_speed", false, make_fast_replay},
-      RegisteredDevice{"replay_as_fast_as_consumed", false, make_unpaced_replay},
-  };
+  static constexpr auto devices = std::to_array<RegisteredDevice>({
+      {"replay", false, true, make_replay},
+      {"replay_at_four_times_the_speed", false, true, make_fast_replay},
+      {"replay_as_fast_as_consumed", false, true, make_unpaced_replay},
+#ifdef PREVIZ_WITH_ARAVIS
+      {"aravis", true, true, make_aravis},
+      {"aravis_losing_a_tenth_of_its_packets", true, false, make_lossy_aravis},
+#endif
+  });
   return devices;
 }
 

@@ -32,11 +32,7 @@ View chequers(double distance) {
 }
 
 render::Layers show(const View& view) {
-  set::Estimation estimation;
-  estimation.max_depth = 1;
-  const Rendered result = render_view(view, 16, estimation);
-  expect_clean(result.counters);
-  return result.layers;
+  return render_clean(view, 16, up_to_depth(1)).layers;
 }
 
 // A sample's points on the lens are joined to one point of the focal plane, so there the picture is

@@ -9,30 +9,8 @@ namespace {
 constexpr double pi = std::numbers::pi;
 constexpr double albedo = 0.5;
 
-// The plane z = 0, so narrowly seen at the origin that the whole picture shows one point.
-View lit_point(double side_m = 20) {
-  View view;
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({side_m, side_m})),
-               add_material(view.scene, diffuse(glm::vec3(albedo))));
-  view.environment = uniform_environment(glm::vec3(0));
-  view.calibration = pinhole(24, 24, 1e-3);
-  view.world_from_camera = look_at({0, -1, 0.5}, {0, 0, 0});
-  return view;
-}
-
-set::Light lamp(set::LightType type) {
-  set::Light light;
-  light.type = type;
-  light.gain_real = 1;
-  return light;
-}
-
 render::Layers show(const View& view, int samples = 32) {
-  set::Estimation estimation;
-  estimation.max_depth = 4;
-  const Rendered result = render_view(view, samples, estimation);
-  expect_clean(result.counters);
-  return result.layers;
+  return render_clean(view, samples, up_to_depth(4)).layers;
 }
 
 // Four standard errors, and `bias`: what the picture's 1 mm and single precision may move.
@@ -48,7 +26,7 @@ void expect_irradiance(const View& view, double irradiance, double bias = 1e-3) 
 TEST(ExtremeLight, a_disc_brings_its_irradiance_at_any_angle) {
   for (const double radius : {pi / 2, 0.1, 1e-3, 1e-5, 1e-9, 1e-20, 0.0}) {
     SCOPED_TRACE(radius);
-    View view = lit_point();
+    View view = lit_point(albedo);
     set::Light sun = lamp(set::LightType::directional);
     sun.angular_radius_rad = radius;
     view.scene.lights.push_back(sun);
@@ -87,7 +65,7 @@ TEST(ExtremeLight, a_disc_looks_as_large_as_it_is) {
 TEST(ExtremeLight, a_sphere_of_almost_no_size) {
   for (const double radius : {0.1, 1e-4, 1e-9, 1e-15}) {
     SCOPED_TRACE(radius);
-    View view = lit_point();
+    View view = lit_point(albedo);
     set::Light bulb = lamp(set::LightType::sphere);
     bulb.position = {0.5, 0, 1};
     bulb.radius_m = radius;
@@ -100,7 +78,7 @@ TEST(ExtremeLight, a_sphere_of_almost_no_size) {
 TEST(ExtremeLight, a_rectangle_of_almost_no_size) {
   for (const double side : {1e-2, 1e-6, 1e-12}) {
     SCOPED_TRACE(side);
-    View view = lit_point();
+    View view = lit_point(albedo);
     set::Light panel = lamp(set::LightType::rectangle);
     panel.position = {0, 0, 1};
     panel.width_m = panel.height_m = side;
@@ -112,7 +90,7 @@ TEST(ExtremeLight, a_rectangle_of_almost_no_size) {
 
 // An area that single precision rounds to nothing is no light, and not one that fills the view.
 TEST(ExtremeLight, a_rectangle_of_no_size_is_not_seen) {
-  View view = lit_point();
+  View view = lit_point(albedo);
   set::Light panel = lamp(set::LightType::rectangle);
   panel.position = {0, -0.1, 0.05};  // between the camera and what it looks at
   panel.direction = {0, -1, 0.5};
@@ -124,7 +102,7 @@ TEST(ExtremeLight, a_rectangle_of_no_size_is_not_seen) {
 
 // A closed lamp all around: every direction brings the same radiance.
 TEST(ExtremeLight, a_lamp_that_fills_the_sphere) {
-  View view = lit_point(1);
+  View view = lit_point(albedo, 1);
   add_instance(view.scene, add_mesh(view.scene, inside_out(icosphere_mesh(5, 3))),
                add_material(view.scene, emitter(glm::vec3(2))));
   expect_irradiance(view, 2 * pi);
@@ -132,7 +110,7 @@ TEST(ExtremeLight, a_lamp_that_fills_the_sphere) {
 
 // Sphere lamps emit outwards: inside one there is no light, and no division by a negative angle.
 TEST(ExtremeLight, inside_a_sphere_lamp_it_is_dark) {
-  View view = lit_point(1);
+  View view = lit_point(albedo, 1);
   set::Light bulb = lamp(set::LightType::sphere);
   bulb.radius_m = 5;
   view.scene.lights.push_back(bulb);
@@ -144,7 +122,7 @@ TEST(ExtremeLight, inside_an_object) {
   for (const auto type : {set::LightType::point, set::LightType::spot, set::LightType::rectangle,
                           set::LightType::sphere}) {
     for (const bool opaque : {true, false}) {
-      View view = lit_point();
+      View view = lit_point(albedo);
       glm::dmat4 pose(1);
       pose[3] = {0.2, 0, 0.6, 1};
       const auto shell =
@@ -169,7 +147,7 @@ TEST(ExtremeLight, on_a_surface_and_in_the_lens) {
   for (const auto type : {set::LightType::point, set::LightType::spot, set::LightType::rectangle,
                           set::LightType::sphere}) {
     for (const glm::dvec3& place : {glm::dvec3(0), glm::dvec3(0, -1, 0.5)}) {
-      View view = lit_point();
+      View view = lit_point(albedo);
       set::Light light = lamp(type);
       light.position = place;
       light.width_m = light.height_m = light.radius_m = 0.01;
@@ -182,7 +160,7 @@ TEST(ExtremeLight, on_a_surface_and_in_the_lens) {
 // A faint lamp close by, in a stage whose sun has 1e11 times its power: half of the light here is
 // the lamp's, and it must not be forgotten when lights are chosen.
 TEST(ExtremeLight, a_candle_is_not_drowned_by_a_sun) {
-  View view = lit_point();
+  View view = lit_point(albedo);
   glm::dmat4 far(1);
   for (const double x : {-1e3, 1e3}) {
     far[3] = {x, 0, 0, 1};
@@ -199,7 +177,7 @@ TEST(ExtremeLight, a_candle_is_not_drowned_by_a_sun) {
 }
 
 TEST(ExtremeLight, black_lamps_light_nothing) {
-  View view = lit_point();
+  View view = lit_point(albedo);
   for (const auto type : {set::LightType::point, set::LightType::directional,
                           set::LightType::rectangle, set::LightType::sphere}) {
     set::Light light = lamp(type);

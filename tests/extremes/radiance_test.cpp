@@ -29,11 +29,7 @@ View brightened(View view, float factor) {
 }
 
 render::Layers show(const View& view) {
-  set::Estimation estimation;
-  estimation.max_depth = 6;
-  const Rendered result = render_view(view, 8, estimation);
-  expect_clean(result.counters);
-  return result.layers;
+  return render_clean(view, 8, up_to_depth(6)).layers;
 }
 
 TEST(Radiance, by_a_power_of_two_scales_every_bit) {

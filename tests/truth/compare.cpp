@@ -266,6 +266,18 @@ Plate displayed(const std::vector<glm::vec3>& radiance, int width, int height, d
   return plate;
 }
 
+EstimatedFrame composited(const TruthFrame& truth, EstimatedFrame estimate) {
+  estimate.composite.clear();
+  for (std::size_t i = 0; i < estimate.mask.size(); ++i) {
+    const float m = estimate.mask[i];
+    estimate.composite.push_back(m * estimate.mixed[i] +
+                                 (1 - m) * (truth.plate[i] + estimate.diff[i]));
+  }
+  estimate.picture =
+      displayed(estimate.composite, truth.width, truth.height, truth.exposure, truth.response);
+  return estimate;
+}
+
 double psnr(const Plate& a, const Plate& b) {
   double squares = 0;
   for (std::size_t i = 0; i < a.samples.size(); ++i) {

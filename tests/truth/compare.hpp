@@ -54,6 +54,10 @@ std::vector<glm::vec3> ideal_composite(const TruthFrame& truth);
 Plate displayed(const std::vector<glm::vec3>& radiance, int width, int height, double exposure,
                 const ResponseCurve& response);
 
+// The estimate with its composite over the truth's plate, M Lm + (1 - M)(Lc + D) with its own M,
+// and that as the display would show it.
+EstimatedFrame composited(const TruthFrame& truth, EstimatedFrame estimate);
+
 double psnr(const Plate& a, const Plate& b);
 // Wang et al. 2004: 11x11 Gaussian of sigma 1.5, K1 = 0.01, K2 = 0.03, windows wholly inside the
 // picture; the mean over R, G and B.

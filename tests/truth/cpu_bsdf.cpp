@@ -205,6 +205,10 @@ double fresnel_dielectric(double cos_incident, double eta) {
   return 0.5 * (parallel * parallel + perpendicular * perpendicular);
 }
 
+bool is_specular(const Bsdf& bsdf) {
+  return bsdf.metallic > 0 || bsdf.transmission > 0 || (bsdf.specular > 0 && bsdf.ior > 1);
+}
+
 bool only_dirac(const Bsdf& bsdf) {
   const bool diffuse = bsdf.metallic < 1 && bsdf.transmission < 1;
   const bool rough = !bsdf.smooth && (diffuse || bsdf.metallic > 0);

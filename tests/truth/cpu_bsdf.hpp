@@ -49,6 +49,8 @@ double pdf(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& wi);
 std::optional<BsdfSample> sample(const Bsdf& bsdf, const ShadingPoint& point, Random& random);
 // True where light arriving from behind the surface reaches the viewer by lobes that are not Dirac.
 bool scatters_behind(const Bsdf& bsdf);
+// True where any part of the surface reflects or refracts.
+bool is_specular(const Bsdf& bsdf);
 // True where evaluate() is zero everywhere.
 bool only_dirac(const Bsdf& bsdf);
 

@@ -96,12 +96,23 @@ struct Vertex {
   }
 };
 
+// A normal whose mirror direction dips below a specular surface is turned until that grazes it.
+glm::dvec3 mirroring_normal(const glm::dvec3& normal, const glm::dvec3& geometric_normal,
+                            const glm::dvec3& wo) {
+  const double least = std::min(0.9 * glm::dot(wo, geometric_normal), 0.01);
+  const glm::dvec3 mirrored = glm::reflect(-wo, normal);
+  const double height = glm::dot(mirrored, geometric_normal);
+  if (height >= least) return normal;
+  return glm::normalize(wo + glm::normalize(mirrored + (least - height) * geometric_normal));
+}
+
 Vertex vertex_at(const World& world, const Hit& hit, const glm::dvec3& wo) {
   const double side = glm::dot(hit.geometric_normal, wo) < 0 ? -1 : 1;
-  return {hit,
-          bsdf_at(world.scene, hit.instance, hit.uv, world.options.specular_roughness),
-          {side * hit.geometric_normal, side * normal_at(world.scene, world.geometry, hit), wo,
-           side > 0}};
+  const Bsdf bsdf = bsdf_at(world.scene, hit.instance, hit.uv, world.options.specular_roughness);
+  const glm::dvec3 geometric_normal = side * hit.geometric_normal;
+  glm::dvec3 normal = side * normal_at(world.scene, world.geometry, hit);
+  if (is_specular(bsdf)) normal = mirroring_normal(normal, geometric_normal, wo);
+  return {hit, bsdf, {geometric_normal, normal, wo, side > 0}};
 }
 
 // What a ray meets that shines: every lamp it crosses, then the surface or the environment behind

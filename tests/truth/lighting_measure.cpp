@@ -151,6 +151,14 @@ MeasuredLamp measure_lamp(const EnvironmentMap& map, const Lamp& lamp) {
   return {(inside - background * ring) * lighting::texel_sr(map.size), glm::normalize(moment)};
 }
 
+SourceError nearest_source(const Lamp& lamp, const glm::dvec3& true_flux,
+                           const std::vector<lighting::Source>& sources) {
+  const lighting::Source& source = *std::ranges::max_element(
+      sources, {}, [&](const auto& s) { return glm::dot(s.direction, lamp.direction); });
+  return {lamp, std::acos(std::min(glm::dot(source.direction, lamp.direction), 1.0)),
+          lighting::angular_radius(source) / lamp.radius_rad, source.flux / true_flux};
+}
+
 std::optional<IrradianceError> measure_resampling(const TruthSet& set, const EnvironmentMap& truth,
                                                   const std::vector<bool>& keep) {
   const std::filesystem::path file = set.directory / "light" / "fisheye_true.exr";
@@ -162,7 +170,9 @@ std::optional<IrradianceError> measure_resampling(const TruthSet& set, const Env
   const LightCameraCalibration& camera = *set.light_camera;
   const lighting::Fisheye lens(camera.intrinsics);
   lighting::Resampled map = lighting::resample(
-      lighting::make_resampling(lens, glm::dmat3(camera.world_from_camera), truth.size), hdr);
+      lighting::make_resampling(
+          lens, lighting::Viewpoint(glm::dmat3(camera.world_from_camera)), truth.size),
+      hdr);
   return compare_irradiance(masked({truth.size, std::move(map.radiance)}, keep), truth);
 }
 
@@ -196,11 +206,14 @@ LightingMeasure measure_lighting(const TruthSet& set, const std::vector<FramePtr
   measure.irradiance = compare_irradiance(masked(map, keep), masked_truth);
   measure.sphere = compare_irradiance(map, measure.truth);
   measure.resampling = measure_resampling(set, masked_truth, keep);
+  measure.extraction = lighting::extract_sources(map, settings.sources);
   for (const Lamp& lamp : stated_lamps(set)) {
     const MeasuredLamp measured = measure_lamp(map, lamp);
+    const MeasuredLamp truth = measure_lamp(measure.truth, lamp);
     const double cosine = glm::dot(measured.direction, lamp.direction);
-    measure.lamps.push_back({lamp, std::acos(std::min(cosine, 1.0)),
-                             measured.flux / measure_lamp(measure.truth, lamp).flux});
+    measure.lamps.push_back({lamp, std::acos(std::min(cosine, 1.0)), measured.flux / truth.flux});
+    if (!measure.extraction.sources.empty())
+      measure.sources.push_back(nearest_source(lamp, truth.flux, measure.extraction.sources));
   }
   return measure;
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "daemon/lighting/lighting.hpp"
+#include "daemon/lighting/sources.hpp"
 #include "tests/truth/truth_set.hpp"
 
 namespace previz::truth {
@@ -30,6 +31,14 @@ struct LampError {
   glm::dvec3 flux_ratio{0};  // measured / true, each above the ring around the lamp
 };
 
+// The source that is nearest to a lamp.
+struct SourceError {
+  Lamp lamp;
+  double direction_rad = 0;  // to the stated direction
+  double radius_ratio = 0;   // angular, found / stated
+  glm::dvec3 flux_ratio{0};  // found / true, the true above the ring around the lamp
+};
+
 struct LightingMeasure {
   lighting::Lighting captured;
   lighting::EnvironmentMap truth;  // of the same size
@@ -39,7 +48,9 @@ struct LightingMeasure {
   // Of fisheye_true.exr, where the set has it: the error of resampling alone.
   std::optional<IrradianceError> resampling;
   std::vector<LampError> lamps;
-  double milliseconds = 0;  // of lighting::estimate
+  lighting::Extraction extraction;   // of the captured map
+  std::vector<SourceError> sources;  // one a lamp, where any was found
+  double milliseconds = 0;           // of lighting::estimate
 };
 
 // The fisheye frames of the set, automatic exposure and brackets. Throws

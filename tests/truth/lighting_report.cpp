@@ -1,6 +1,7 @@
 // lighting_report SETDIR...: captured light against the true environment of ground truth sets, and
 // both as pictures to look at.
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <map>
 
@@ -38,6 +39,21 @@ void report(const truth::TruthSet& set, const truth::LightingMeasure& measure,
     std::printf("  lamp %s: direction off by %.3f degrees, flux ratio %.4f %.4f %.4f\n",
                 lamp.lamp.name.c_str(), lamp.direction_rad * 57.29577951, lamp.flux_ratio.r,
                 lamp.flux_ratio.g, lamp.flux_ratio.b);
+  const lighting::Extraction& extraction = measure.extraction;
+  std::printf("  %zu sources, %d bright regions left in the picture\n", extraction.sources.size(),
+              extraction.left);
+  for (const lighting::Source& source : extraction.sources)
+    std::printf("    azimuth %.2f, elevation %.2f, radius %.2f degrees, flux %.4g %.4g %.4g\n",
+                std::atan2(source.direction.y, source.direction.x) * 57.29577951,
+                std::asin(source.direction.z) * 57.29577951,
+                lighting::angular_radius(source) * 57.29577951, source.flux.r, source.flux.g,
+                source.flux.b);
+  for (const truth::SourceError& error : measure.sources)
+    std::printf(
+        "  lamp %s by its source: direction off by %.3f degrees, radius ratio %.3f, flux "
+        "ratio %.4f %.4f %.4f\n",
+        error.lamp.name.c_str(), error.direction_rad * 57.29577951, error.radius_ratio,
+        error.flux_ratio.r, error.flux_ratio.g, error.flux_ratio.b);
   for (const std::string& note : seen.notes) std::printf("  note: %s\n", note.c_str());
 }
 

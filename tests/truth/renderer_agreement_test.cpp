@@ -196,6 +196,55 @@ TEST_P(RandomSets, have_the_same_difference_by_both_estimators) {
   EXPECT_TRUE(agreement.agree) << agreement.report();
 }
 
+// Real radiance from a plate that is the renderer's own converged real world, against tracing it.
+// The plate's pixels are box means between which the camera's radiance is interpolated, so matt
+// real surfaces without textures are looked at.
+class CameraSets : public RandomSets {};
+INSTANTIATE_TEST_SUITE_P(Seeds, CameraSets, ::testing::Values(2u, 3u));  // lamps; a lens, a removed
+
+TEST_P(CameraSets, have_the_same_composite_by_the_camera) {
+  View view = RandomSets::view();
+  view.calibration.response.kind = ResponseCurve::Kind::linear;
+  for (scene::Instance& instance : view.scene.instances)
+    if ((instance.presence & scene::world_real) != 0) instance.material = 0;
+  view.scene.materials[0] = diffuse(glm::vec3(0.5f, 0.4f, 0.3f));
+  constexpr double white = 8;
+  const auto renderer_by = [&](set::RealRadiance radiance) {
+    set::Estimation estimation;
+    estimation.real_radiance = radiance;
+    auto renderer =
+        std::make_unique<render::Renderer>(shared_device(), estimation, view.calibration);
+    renderer->set_scene(view.scene);
+    renderer->set_environment(view.environment, set::LightSampling::importance);
+    return renderer;
+  };
+  Plate plate;
+  plate.width = view.calibration.intrinsics.width;
+  plate.height = view.calibration.intrinsics.height;
+  plate.bits = 16;
+  const auto converged = renderer_by(set::RealRadiance::traced);
+  converged->begin({{}, 1.0, view.world_from_camera, 7});
+  converged->render(1024);
+  for (const glm::vec3& pixel : converged->layers().real)
+    for (int c = 0; c < 3; ++c)
+      plate.samples.push_back(
+          static_cast<std::uint16_t>(std::lround(65535 * std::min(pixel[c] / white, 1.0))));
+  const auto scrambled = [&](set::RealRadiance radiance, std::uint32_t first_seed) {
+    const auto renderer = renderer_by(radiance);
+    truth::Scrambles result{plate.width, plate.height, {}};
+    for (std::uint32_t i = 0; i < scrambles; ++i) {
+      renderer->begin({plate, 1 / white, view.world_from_camera, first_seed + i});
+      renderer->render(16);
+      expect_clean(renderer->counters());
+      result.pictures.push_back(widen(renderer->layers().composite));
+    }
+    return result;
+  };
+  const truth::Agreement agreement = truth::agreement(scrambled(set::RealRadiance::traced, 100),
+                                                      scrambled(set::RealRadiance::camera, 1001));
+  EXPECT_TRUE(agreement.agree) << agreement.report();
+}
+
 // The committed glass set, or one of the others beside the project (PREVIZ_SHARED names the
 // folder).
 std::filesystem::path truth_directory(const std::string& name) {

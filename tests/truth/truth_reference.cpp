@@ -29,18 +29,6 @@ std::vector<T> enlarged(const std::vector<From>& small, int width, int height, i
   return out;
 }
 
-EstimatedFrame with_picture(const TruthFrame& truth, EstimatedFrame estimate) {
-  estimate.composite.clear();
-  for (std::size_t i = 0; i < estimate.mask.size(); ++i) {
-    const float m = estimate.mask[i];
-    estimate.composite.push_back(m * estimate.mixed[i] +
-                                 (1 - m) * (truth.plate[i] + estimate.diff[i]));
-  }
-  estimate.picture =
-      displayed(estimate.composite, truth.width, truth.height, truth.exposure, truth.response);
-  return estimate;
-}
-
 EstimatedFrame estimated(const TruthFrame& truth, const TracedPicture& mixed,
                          const TracedPicture& real, int reduction) {
   EstimatedFrame out;
@@ -48,7 +36,7 @@ EstimatedFrame estimated(const TruthFrame& truth, const TracedPicture& mixed,
   out.real = enlarged<glm::vec3>(real.mean, mixed.width, mixed.height, reduction);
   out.mask = enlarged<float>(mixed.mask, mixed.width, mixed.height, reduction);
   for (std::size_t i = 0; i < out.mixed.size(); ++i) out.diff.push_back(out.mixed[i] - out.real[i]);
-  return with_picture(truth, out);
+  return composited(truth, out);
 }
 
 EstimatedFrame mean_of(const TruthFrame& truth, const EstimatedFrame& a, const EstimatedFrame& b) {
@@ -59,7 +47,7 @@ EstimatedFrame mean_of(const TruthFrame& truth, const EstimatedFrame& a, const E
     out.diff[i] = 0.5F * (a.diff[i] + b.diff[i]);
     out.mask[i] = 0.5F * (a.mask[i] + b.mask[i]);
   }
-  return with_picture(truth, out);
+  return composited(truth, out);
 }
 
 // Truth with half the difference of the halves added: as far from truth as their mean is by chance.
@@ -71,7 +59,7 @@ EstimatedFrame noise_of(const TruthFrame& truth, const EstimatedFrame& a, const 
     out.diff[i] = truth.mixed[i] - truth.real[i] + 0.5F * (a.diff[i] - b.diff[i]);
     out.mask[i] = truth.mask[i];
   }
-  return with_picture(truth, out);
+  return composited(truth, out);
 }
 
 void run(const std::filesystem::path& directory, int frame, int reduction, int samples) {

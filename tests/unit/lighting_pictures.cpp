@@ -31,14 +31,14 @@ FramePtr make_frame(int width, int height, double exposure,
   return std::make_shared<Frame>(std::move(frame));
 }
 
-LightCameraCalibration fisheye_camera() {
+LightCameraCalibration fisheye_camera(int size) {
   LightCameraCalibration camera;
-  camera.intrinsics = {.width = 512,
-                       .height = 512,
-                       .fx = 153.3,
-                       .fy = 153.3,
-                       .cx = 255.5,
-                       .cy = 255.5,
+  camera.intrinsics = {.width = size,
+                       .height = size,
+                       .fx = 153.3 * size / 512,
+                       .fy = 153.3 * size / 512,
+                       .cx = (size - 1) / 2.0,
+                       .cy = (size - 1) / 2.0,
                        .k = {-0.02, 0.002, -0.0003, 0},
                        .max_angle_rad = 100 * degree};
   camera.response.kind = ResponseCurve::Kind::linear;

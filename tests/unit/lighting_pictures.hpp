@@ -20,9 +20,9 @@ using Sky = std::function<glm::dvec3(const glm::dvec3&)>;
 // A linear rgb16 frame; signals are row-major, clipped at 1.
 FramePtr make_frame(int width, int height, double exposure, const std::vector<glm::dvec3>& signals);
 
-// A fisheye of 200 degrees and 512x512 pixels with the truth sets' kind of polynomial and a linear
-// response, looking up.
-LightCameraCalibration fisheye_camera();
+// A fisheye of 200 degrees and size x size pixels with the truth sets' kind of polynomial and a
+// linear response, looking up.
+LightCameraCalibration fisheye_camera(int size = 512);
 // Rotation of the camera: its axis at this azimuth and elevation, turned by `roll` about itself.
 glm::dmat4 looking(double azimuth_deg, double elevation_deg, double roll_deg = 0);
 glm::dvec3 towards(double azimuth_deg, double elevation_deg);

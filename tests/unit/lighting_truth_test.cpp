@@ -19,6 +19,23 @@ std::filesystem::path shared_directory() {
                : std::filesystem::path(PREVIZ_SOURCE_DIR).parent_path() / "shared";
 }
 
+// The same bounds for the sources of the map, and 0.1 % for what sources and residual add up to.
+void expect_sources(const LightingMeasure& measure) {
+  EXPECT_EQ(measure.sources.size(), measure.lamps.size());
+  for (const SourceError& source : measure.sources) {
+    std::printf(
+        "  lamp %s as a source: %.3f degrees, radius ratio %.3f, flux ratio %.4f %.4f %.4f\n",
+        source.lamp.name.c_str(), source.direction_rad / degree, source.radius_ratio,
+        source.flux_ratio.r, source.flux_ratio.g, source.flux_ratio.b);
+    EXPECT_LT(source.direction_rad, 1 * degree) << source.lamp.name;
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(source.flux_ratio[c], 1, 0.05) << source.lamp.name;
+  }
+  glm::dvec3 flux = lighting::total_flux(measure.extraction.residual);
+  for (const lighting::Source& source : measure.extraction.sources) flux += source.flux;
+  const glm::dvec3 image = lighting::total_flux(measure.captured.environment);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(flux[c] / image[c], 1, 1e-3);
+}
+
 // Bounds are those the light stage is accepted by: irradiance 3 % mean, lamps 1 degree and 5 %.
 void expect_captured(const std::filesystem::path& directory) {
   const TruthSet set = load_truth_set(directory);
@@ -39,6 +56,7 @@ void expect_captured(const std::filesystem::path& directory) {
     EXPECT_LT(lamp.direction_rad, 1 * degree) << lamp.lamp.name;
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(lamp.flux_ratio[c], 1, 0.05) << lamp.lamp.name;
   }
+  expect_sources(measure);
 }
 
 TEST(CapturedLight, MatchesTheBundledSet) {

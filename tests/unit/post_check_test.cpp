@@ -102,7 +102,8 @@ samples = 1500
 
 TEST_F(Check, TakesSetAndCalibrationOfASession) {
   session::SessionInfo info;
-  info.set_text = "[set]\nname = 'recorded'\n[tracking]\nenabled = false\n";
+  info.set_text =
+      "[set]\nname = 'recorded'\n[tracking]\nenabled = false\n[lighting]\nmode = 'sources'\n";
   info.observer.emplace();
   info.observer->intrinsics = {.width = 16, .height = 8, .fx = 20, .fy = 20, .cx = 7.5, .cy = 3.5};
   info.observer->lens = {.focal_length_m = 0.035, .f_number = 2.8, .focus_distance_m = 1.5};
@@ -119,6 +120,8 @@ TEST_F(Check, TakesSetAndCalibrationOfASession) {
   ASSERT_EQ(check_set(directory_ / "take", out), 0) << out.str();
   said_ = out.str();
   expect_said("recorded (");
+  expect_said("its lamps light the set; the rest is blurred");
+  expect_said("lamps: the set or a glTF file names some, or they are found in the light around");
   expect_said("16x8, 35 mm lens at f/2.8, focus at 1.5 m");
   expect_said("lens sampling: the aperture blurs what is out of focus");
   expect_said("tracking is off: only a session that recorded poses can be used");

@@ -54,7 +54,6 @@ TEST(TradeAxes, WhereThereIsNothingToTradeThereIsNoAxis) {
   TradeSettings own;
   const TradePlan pinhole = plan_of(own);
   EXPECT_FALSE(axis_named(pinhole, "lens"));
-  EXPECT_FALSE(axis_named(pinhole, "light_mode"));  // one is known
   own.lens = ThinLens{0.05, 2.8, 1.0};
   const TradePlan with_lens = plan_of(own);
   EXPECT_TRUE(axis_named(with_lens, "lens"));

@@ -9,48 +9,22 @@ namespace {
 constexpr double pi = std::numbers::pi;
 constexpr double albedo = 0.6;
 
-// The plane z = 0, seen at the origin from the side by so narrow a picture that the whole of it
-// shows one point.
-View lit_point() {
-  View view;
-  const auto mesh = add_mesh(view.scene, rectangle_mesh({20, 20}));
-  add_instance(view.scene, mesh, add_material(view.scene, diffuse(glm::vec3(albedo))));
-  view.environment = uniform_environment(glm::vec3(0));
-  view.calibration = pinhole(32, 32, 1e-3);
-  view.world_from_camera = look_at({0, -1, 0.5}, {0, 0, 0});
-  return view;
-}
-
-set::Light lamp(set::LightType type) {
-  set::Light light;
-  light.name = "lamp";
-  light.type = type;
-  light.emission = glm::dvec3(2, 3, 5);
-  light.gain_real = 1;
-  return light;
-}
+const glm::dvec3 colour(2, 3, 5);
 
 // Mean of the picture against emission * factor, within four standard errors plus `bias`, the share
 // by which the picture's 1 mm extent and single precision may move it.
 void expect_radiance(const View& view, const glm::dvec3& expected, double bias = 2e-4) {
-  set::Estimation estimation;
-  estimation.max_depth = 1;
-  const Rendered result = render_view(view, 64, estimation);
+  const Rendered result = render_clean(view, 64, up_to_depth(1));
   const glm::dvec3 measured = mean(result.layers.mixed);
-  double square = 0;
-  for (const glm::vec3& pixel : result.layers.mixed)
-    square += (pixel.g - measured.g) * (pixel.g - measured.g);
-  const auto n = static_cast<double>(result.layers.mixed.size());
-  const double relative_error = std::sqrt(square / (n * (n - 1))) / measured.g;
+  const double relative_error = standard_error_of_pixels(result.layers) / measured.g;
   for (int c = 0; c < 3; ++c)
     EXPECT_NEAR(measured[c] / expected[c], 1, 4 * relative_error + bias) << "channel " << c;
   EXPECT_EQ(mean(result.layers.diff), glm::dvec3(0));  // the same light in both worlds
-  expect_clean(result.counters);
 }
 
 TEST(DirectLight, point) {
-  View view = lit_point();
-  set::Light light = lamp(set::LightType::point);
+  View view = lit_point(albedo);
+  set::Light light = lamp(set::LightType::point, colour);
   light.position = {1, 1, 2};
   view.scene.lights.push_back(light);
   const double d2 = 6;
@@ -78,7 +52,7 @@ glm::dvec3 grows(const scene::Mesh& mesh, int coordinate) {
 TEST(DirectLight, on_a_normal_map) {
   const glm::dvec3 tangent = glm::normalize(glm::dvec3(0.3, 0.5, 0.9));
   for (const bool mirrored : {false, true}) {
-    View view = lit_point();
+    View view = lit_point(albedo);
     if (mirrored) view.scene.instances[0].world_from_object[0] *= -1.0;
     const scene::Mesh& mesh = view.scene.meshes[0];
     const glm::dvec3 u = (mirrored ? -1.0 : 1.0) * grows(mesh, 0);
@@ -86,7 +60,7 @@ TEST(DirectLight, on_a_normal_map) {
         tangent.x * u - tangent.y * grows(mesh, 1) + tangent.z * glm::dvec3(0, 0, 1);
     map_normal(view, tangent);
     SCOPED_TRACE(mirrored ? "mirrored" : "as it is");
-    set::Light light = lamp(set::LightType::directional);
+    set::Light light = lamp(set::LightType::directional, colour);
     light.direction = -glm::normalize(glm::dvec3(0.2, -0.4, 0.7));
     view.scene.lights.push_back(light);
     // A half has 11 bits: the texel's error of 2^-11 in each of three components.
@@ -95,8 +69,8 @@ TEST(DirectLight, on_a_normal_map) {
 }
 
 TEST(DirectLight, spot_inside_and_between_its_cones) {
-  View view = lit_point();
-  set::Light light = lamp(set::LightType::spot);
+  View view = lit_point(albedo);
+  set::Light light = lamp(set::LightType::spot, colour);
   light.position = {0, 0, 2};
   const double off_axis = 0.4;
   light.direction = {std::sin(off_axis), 0, -std::cos(off_axis)};
@@ -110,8 +84,8 @@ TEST(DirectLight, spot_inside_and_between_its_cones) {
 
 TEST(DirectLight, directional_as_a_point_and_as_a_disc) {
   for (const double radius : {0.0, 0.00465, 0.2}) {
-    View view = lit_point();
-    set::Light light = lamp(set::LightType::directional);
+    View view = lit_point(albedo);
+    set::Light light = lamp(set::LightType::directional, colour);
     light.direction = glm::normalize(glm::dvec3(0.5, 0.2, -1));
     light.angular_radius_rad = radius;
     view.scene.lights.push_back(light);
@@ -122,8 +96,8 @@ TEST(DirectLight, directional_as_a_point_and_as_a_disc) {
 }
 
 TEST(DirectLight, sphere) {
-  View view = lit_point();
-  set::Light light = lamp(set::LightType::sphere);
+  View view = lit_point(albedo);
+  set::Light light = lamp(set::LightType::sphere, colour);
   light.position = {1, 0.5, 2};
   light.radius_m = 0.7;
   view.scene.lights.push_back(light);
@@ -140,8 +114,8 @@ double corner_form_factor(double a, double b, double c) {
 }
 
 TEST(DirectLight, rectangle) {
-  View view = lit_point();
-  set::Light light = lamp(set::LightType::rectangle);
+  View view = lit_point(albedo);
+  set::Light light = lamp(set::LightType::rectangle, colour);
   light.position = {0, 0, 1.5};
   light.direction = {0, 0, -1};
   light.up = {0, 1, 0};
@@ -152,27 +126,25 @@ TEST(DirectLight, rectangle) {
 }
 
 TEST(DirectLight, emissive_mesh_is_the_same_as_a_rectangle) {
-  View view = lit_point();
+  View view = lit_point(albedo);
   const auto mesh = add_mesh(view.scene, rectangle_mesh({1.2, 0.8}));
   glm::dmat4 above(1.0);
   above[3] = glm::dvec4(0, 0, 1.5, 1);
-  add_instance(view.scene, mesh, add_material(view.scene, emitter(glm::vec3(2, 3, 5))), above);
-  expect_radiance(view, albedo * glm::dvec3(2, 3, 5) * 4.0 * corner_form_factor(0.6, 0.4, 1.5),
-                  1e-3);
+  add_instance(view.scene, mesh, add_material(view.scene, emitter(glm::vec3(colour))), above);
+  expect_radiance(view, albedo * colour * 4.0 * corner_form_factor(0.6, 0.4, 1.5), 1e-3);
 }
 
 TEST(DirectLight, a_gain_scales_its_world_only) {
-  View view = lit_point();
-  set::Light light = lamp(set::LightType::point);
+  View view = lit_point(albedo);
+  set::Light light = lamp(set::LightType::point, colour);
   light.position = {0, 0, 2};
   light.gain_mixed = 0.25;
   light.gain_real = 1;
   view.scene.lights.push_back(light);
-  const Rendered result = render_view(view, 4);
+  const Rendered result = render_clean(view, 4);
   const double full = albedo / pi * 3 / 4;
   EXPECT_NEAR(mean(result.layers.mixed).g / full, 0.25, 1e-3);
   EXPECT_NEAR(mean(result.layers.real).g / full, 1, 1e-3);
-  expect_clean(result.counters);
 }
 
 }  // namespace

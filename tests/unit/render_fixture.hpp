@@ -37,6 +37,27 @@ inline Rendered render_view(const View& view, int samples, const set::Estimation
   return {renderer.layers(), renderer.counters()};
 }
 
+inline void expect_clean(const render::Counters& counters) {
+  EXPECT_EQ(counters.dropped_not_finite, 0u);
+  EXPECT_EQ(counters.dropped_negative, 0u);
+  EXPECT_EQ(counters.stopped_in_layers, 0u);
+  EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
+}
+
+// The same, and nothing may have been dropped on the way.
+inline Rendered render_clean(const View& view, int samples, const set::Estimation& estimation = {},
+                             set::LightSampling sampling = set::LightSampling::importance) {
+  Rendered result = render_view(view, samples, estimation, sampling);
+  expect_clean(result.counters);
+  return result;
+}
+
+inline set::Estimation up_to_depth(int max_depth) {
+  set::Estimation estimation;
+  estimation.max_depth = max_depth;
+  return estimation;
+}
+
 // Mean of a layer over the picture, per channel, in double precision.
 inline glm::dvec3 mean(const std::vector<glm::vec3>& layer) {
   glm::dvec3 sum(0);
@@ -60,13 +81,6 @@ inline double standard_error_of_pixels(const render::Layers& layers) {
   for (const glm::vec3& pixel : layers.mixed) sum += (pixel.g - centre) * (pixel.g - centre);
   const auto n = static_cast<double>(layers.mixed.size());
   return std::sqrt(sum / (n * (n - 1)));
-}
-
-inline void expect_clean(const render::Counters& counters) {
-  EXPECT_EQ(counters.dropped_not_finite, 0u);
-  EXPECT_EQ(counters.dropped_negative, 0u);
-  EXPECT_EQ(counters.stopped_in_layers, 0u);
-  EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
 }
 
 }  // namespace previz::testing

@@ -25,54 +25,17 @@ double mean_mixed(const render::Layers& layers) {
   return mean(layers.mixed).g;
 }
 
-// Standard error of the picture's mean from the spread of its pixels, which see the same thing with
-// independent scrambles.
-double spread_error(const render::Layers& layers) {
-  const double centre = mean_mixed(layers);
-  double sum = 0;
-  for (const glm::vec3& pixel : layers.mixed) sum += (pixel.g - centre) * (pixel.g - centre);
-  const auto n = static_cast<double>(layers.mixed.size());
-  return std::sqrt(sum / (n * (n - 1)));
-}
-
 // Four standard errors (one test in 16,000 fails by chance) and single precision.
 double tolerance(const render::Layers& layers) {
-  return 4 * spread_error(layers) + 1e-6;
+  return 4 * standard_error_of_pixels(layers) + 1e-6;
 }
 
 TEST(Furnace, an_empty_scene_shows_the_environment_exactly) {
   View view;
   view.environment = uniform_environment(glm::vec3(0.25f, 0.5f, 2.0f));
   view.calibration = pinhole(33, 17, 0.9);
-  const Rendered result = render_view(view, 3);
+  const Rendered result = render_clean(view, 3);
   for (const glm::vec3& pixel : result.layers.mixed) EXPECT_EQ(pixel, glm::vec3(0.25f, 0.5f, 2.0f));
-  expect_clean(result.counters);
-}
-
-TEST(Furnace, lambert_reflects_its_albedo) {
-  for (const float albedo : {0.0f, 0.5f, 1.0f}) {
-    const Rendered result = render_view(tilted_plane(diffuse(glm::vec3(albedo)), 0.6), 16);
-    EXPECT_NEAR(mean_mixed(result.layers), albedo, tolerance(result.layers));
-    expect_clean(result.counters);
-  }
-}
-
-// Inside a closed surface that emits 1 and reflects albedo: L = 1 + albedo L.
-TEST(Furnace, a_closed_box_multiplies_its_own_light) {
-  for (const float albedo : {0.0f, 0.5f}) {
-    scene::Material wall = diffuse(glm::vec3(albedo));
-    wall.emission = glm::vec3(1);
-    View view;
-    view.scene = furnace_box({2, 2, 2}, wall);
-    view.environment = uniform_environment(glm::vec3(0));
-    view.calibration = pinhole(24, 24, 1.2);
-    view.world_from_camera = look_at({0.1, -0.2, 0.1}, {0.3, 0.9, 0.2});
-    set::Estimation estimation;
-    estimation.max_depth = 64;
-    const Rendered result = render_view(view, 16, estimation);
-    EXPECT_NEAR(mean_mixed(result.layers), 1 / (1 - albedo), tolerance(result.layers)) << albedo;
-    expect_clean(result.counters);
-  }
 }
 
 // Directional albedo of GGX with Schlick's reflectance f0, by quadrature over the half vector's
@@ -108,9 +71,9 @@ double ggx_albedo(double cos_o, double alpha, double f0) {
 }
 
 // The renderer reads what single scattering loses from a table. Between its nodes bilinear
-// interpolation is off by less than this where roughness is at least 0.1 and the cosine at least
-// 0.05 (AlbedoTable.interpolates_within_its_bound).
-constexpr double table_error = 2e-3;
+// interpolation is off by less than this share where roughness is at least 0.1 and the cosine at
+// least 0.05 (AlbedoTable.interpolates_within_its_bound).
+constexpr double table_error = 2.5e-3;
 
 // A conductor gets back what single scattering loses, in proportion to its reflectance f0.
 TEST(Furnace, rough_conductors_reflect_their_compensated_albedo) {
@@ -119,14 +82,13 @@ TEST(Furnace, rough_conductors_reflect_their_compensated_albedo) {
       for (const double angle : {0.1, 1.2}) {
         const View view = tilted_plane(
             metal(glm::vec3(static_cast<float>(f0)), static_cast<float>(roughness)), angle);
-        const Rendered result = render_view(view, 32);
+        const Rendered result = render_clean(view, 32);
         const double cosine = std::cos(angle), alpha = roughness * roughness;
         const double gain = 1 + f0 * (1 / ggx_albedo(cosine, alpha, 1) - 1);
         // The quadrature's own error is below 1e-4 at these steps.
         EXPECT_NEAR(mean_mixed(result.layers), ggx_albedo(cosine, alpha, f0) * gain,
                     tolerance(result.layers) + 1e-4 + f0 * table_error)
             << "f0 " << f0 << " roughness " << roughness << " angle " << angle;
-        expect_clean(result.counters);
       }
     }
   }
@@ -144,10 +106,9 @@ TEST(Furnace, a_rough_pane_takes_nothing) {
   for (const float roughness : {0.1f, 0.5f, 1.0f}) {
     for (const double angle : {0.1, 1.2}) {
       const View view = tilted_plane(rough_glass(1.5f, roughness, true), angle);
-      const Rendered result = render_view(view, 32);
+      const Rendered result = render_clean(view, 32);
       EXPECT_NEAR(mean_mixed(result.layers), 1, tolerance(result.layers) + table_error)
           << "roughness " << roughness << " angle " << angle;
-      expect_clean(result.counters);
     }
   }
 }
@@ -163,41 +124,44 @@ TEST(Furnace, a_rough_glass_box_takes_nothing) {
       view.environment = uniform_environment(glm::vec3(1));
       view.calibration = pinhole(16, 16, 0.2);
       view.world_from_camera = look_at({0.3, -3, 0.4}, {0, 0, 0});
-      set::Estimation estimation;
-      estimation.max_depth = 64;
-      const Rendered result = render_view(view, 32, estimation);
-      constexpr double vertices = 6;  // rough on average; most paths leave after two
+      set::Estimation estimation = up_to_depth(64);
+      estimation.caustics = set::Caustics::traced;  // photons are counted with the paths
+      const Rendered result = render_clean(view, 32, estimation);
+      const double samples = 32.0 * 16 * 16;
+      const double vertices = static_cast<double>(result.counters.rays) / samples - 1;
       EXPECT_NEAR(mean_mixed(result.layers), 1, tolerance(result.layers) + vertices * table_error)
           << "ior " << ior << " roughness " << roughness;
-      expect_clean(result.counters);
     }
   }
 }
 
+// Glass that says metal, until its texture takes the metal away, is glass.
+TEST(Furnace, glass_below_a_texture_of_no_metal_takes_nothing) {
+  scene::Material material = rough_glass(1.5f, 0.5f, false);
+  material.metallic = 1;
+  View view;
+  scene::Texture no_metal;
+  no_metal.width = no_metal.height = 1;
+  no_metal.texels = {{1, 1, 0, 1}};
+  material.metallic_roughness_texture = add_texture(view.scene, no_metal);
+  add_instance(view.scene, add_mesh(view.scene, box_mesh({1, 1, 1})),
+               add_material(view.scene, material));
+  view.environment = uniform_environment(glm::vec3(1));
+  view.calibration = pinhole(16, 16, 0.2);
+  view.world_from_camera = look_at({0.3, -3, 0.4}, {0, 0, 0});
+  const Rendered textured = render_clean(view, 8, up_to_depth(64));
+  view.scene.materials[0].metallic_roughness_texture = scene::no_texture;
+  view.scene.materials[0].metallic = 0;
+  EXPECT_EQ(render_clean(view, 8, up_to_depth(64)).layers.mixed, textured.layers.mixed);
+}
+
 TEST(Furnace, a_smooth_mirror_shows_schlick_and_the_environment_behind_it) {
   const double angle = 1.1;
-  const Rendered result = render_view(tilted_plane(metal(glm::vec3(0.5f), 0.0f), angle), 1);
+  const Rendered result = render_clean(tilted_plane(metal(glm::vec3(0.5f), 0.0f), angle), 1);
   const double expected = 0.5 + 0.5 * std::pow(1 - std::cos(angle), 5);
   // One path, no chance in it; the angle varies by 5e-4 over the picture, the reflectance by less
   // than three times that.
   EXPECT_NEAR(mean_mixed(result.layers), expected, 1.5e-3);
-  expect_clean(result.counters);
-}
-
-TEST(Furnace, glass_takes_nothing) {
-  for (const float ior : {1.0f, 1.0001f, 1.5f, 2.5f}) {
-    View view;
-    const auto slab = add_mesh(view.scene, box_mesh({4, 4, 0.5}));
-    add_instance(view.scene, slab, add_material(view.scene, glass(ior)));
-    view.environment = uniform_environment(glm::vec3(1));
-    view.calibration = pinhole(24, 24, 0.6);
-    view.world_from_camera = look_at({0.3, -0.4, 3}, {0, 0, 0});
-    set::Estimation estimation;
-    estimation.max_depth = 64;
-    const Rendered result = render_view(view, 4, estimation);
-    for (const glm::vec3& pixel : result.layers.mixed) EXPECT_NEAR(pixel.g, 1, 1e-5) << ior;
-    expect_clean(result.counters);
-  }
 }
 
 // An instance that turns orientation around keeps its inside: a box refracts like its mirror image,
@@ -217,7 +181,7 @@ TEST(Furnace, mirrored_glass_is_entered_from_outside) {
     return mean(render_view(view, 64).layers.mixed);
   };
   const glm::dvec3 plain = seen(1), mirrored = seen(-1);
-  EXPECT_NEAR(mirrored.g / plain.g, 1, 0.02) << "the same paths, but for rounding";
+  EXPECT_EQ(plain, mirrored);  // the same paths, and the box's coordinates have no rounding
 }
 
 // Lower plane emits 1 and reflects a, upper reflects b: L_lower = 1 + a b L_lower. The squares are
@@ -230,11 +194,8 @@ TEST(Furnace, two_facing_planes_sum_their_interreflections) {
   view.environment = uniform_environment(glm::vec3(0));
   view.calibration = pinhole(24, 24, 0.4);
   view.world_from_camera = look_at({0, 0, 0.05}, {0.01, 0, 0});
-  set::Estimation estimation;
-  estimation.max_depth = 64;
-  const Rendered result = render_view(view, 32, estimation);
+  const Rendered result = render_clean(view, 32, up_to_depth(64));
   EXPECT_NEAR(mean_mixed(result.layers), 1 / (1 - 0.48), tolerance(result.layers) + 1e-4);
-  expect_clean(result.counters);
 }
 
 }  // namespace

@@ -78,6 +78,12 @@ TEST_F(SceneRequirements, AMetalDoesNotTransmitAndAnIorOfOneDoesNotReflect) {
   material.metallic = 1;
   add(material);
   EXPECT_FALSE(required().transmission);
+  scene::Texture no_metal;
+  no_metal.width = no_metal.height = 1;
+  no_metal.texels = {{1, 1, 0, 1}};
+  material.metallic_roughness_texture = add_texture(scene, no_metal);
+  add(material);
+  EXPECT_TRUE(required().transmission);
   scene.instances.clear();
   add(plastic({1, 1, 1}, 0.5f, 1.0f));
   EXPECT_FALSE(required().rough_specular);
@@ -130,6 +136,8 @@ TEST_F(SceneRequirements, ReadsLightsAndLens) {
   EXPECT_TRUE(required().lights);
   scene.lights[0].emission = glm::dvec3(0);
   EXPECT_FALSE(required().lights);
+  set.lighting.mode = set::LightMode::hybrid;  // lamps may be found in what the light camera sees
+  EXPECT_TRUE(required().lights);
   set.observer.calibration.emplace();
   EXPECT_FALSE(required().thin_lens);
   set.observer.calibration->lens = ThinLens{0.05, 2, 1};

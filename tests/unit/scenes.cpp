@@ -242,6 +242,25 @@ scene::Scene cornell_box() {
   return scene;
 }
 
+set::Light lamp(set::LightType type, const glm::dvec3& emission) {
+  set::Light light;
+  light.name = "lamp";
+  light.type = type;
+  light.emission = emission;
+  light.gain_real = 1;
+  return light;
+}
+
+View lit_point(double albedo, double side_m) {
+  View view;
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({side_m, side_m})),
+               add_material(view.scene, diffuse(glm::vec3(static_cast<float>(albedo)))));
+  view.environment = {4, std::vector<glm::vec3>(16, glm::vec3(0))};
+  view.calibration = pinhole(32, 32, 1e-3);
+  view.world_from_camera = look_at({0, -1, 0.5}, {0, 0, 0});
+  return view;
+}
+
 glm::dmat4 look_at(const glm::dvec3& eye, const glm::dvec3& target) {
   const glm::dvec3 forward = glm::normalize(target - eye);
   const glm::dvec3 up = std::abs(forward.z) < 0.999 ? glm::dvec3(0, 0, 1) : glm::dvec3(0, 1, 0);

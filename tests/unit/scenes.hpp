@@ -47,6 +47,9 @@ scene::Scene furnace_sphere(double radius_m, int subdivisions, const scene::Mate
 // -X, green wall at +X, a square emitter of side 0.4 just below the ceiling, two white boxes.
 scene::Scene cornell_box();
 
+// A lamp that is there in both worlds.
+set::Light lamp(set::LightType type, const glm::dvec3& emission = glm::dvec3(1));
+
 // All that a renderer is given for one picture.
 struct View {
   scene::Scene scene;
@@ -60,6 +63,10 @@ struct View {
 glm::dmat4 look_at(const glm::dvec3& eye, const glm::dvec3& target);
 // Square pixels, centred principal point, no distortion.
 ObserverCalibration pinhole(int width, int height, double horizontal_fov_rad);
+
+// A Lambert plane z = 0 in the dark, seen at the origin from the side by so narrow a picture that
+// the whole of it shows one point.
+View lit_point(double albedo, double side_m = 20);
 
 struct RandomScene {
   int width = 160, height = 120;

@@ -242,6 +242,40 @@ TEST_F(Damage, AnotherSessionsVideoIsNotShown) {
   EXPECT_TRUE(mentions(opened.missing, "30x20"));
 }
 
+// A line whose light is not light costs that line; one without any is from an older session.
+TEST_F(Damage, LightThatIsNoneCostsItsLine) {
+  const std::string source = R"({"id":1,"direction":[0,0,1],"solid_angle_sr":0.01,"flux":[1,2,3]})";
+  const auto line = [](const std::string& sources, const std::string& ambient) {
+    return R"({"frame":1,"timestamp_ns":1,"tracked":false,"tags":[],"captured_light":{"sources":[)" +
+           sources + R"(],"ambient":)" + ambient + "}}\n";
+  };
+  const std::string ambient = R"({"size":1,"radiance":[0.5,0.5,0.5]})";
+  const auto changed = [&](const std::string& from, const std::string& to) {
+    std::string text = source;
+    return text.replace(text.find(from), from.size(), to);
+  };
+  const TemporaryDirectory directory;
+  SessionWriter(directory.path(), {}).close();
+  const auto lines_read = [&](const std::string& second) {
+    write_content(directory.path() / "track.jsonl",
+                  R"({"frame":0,"timestamp_ns":0,"tracked":false,"tags":[]})"
+                  "\n" +
+                      second);
+    return open_session(directory.path()).track.size();
+  };
+  EXPECT_EQ(lines_read(line(source, ambient)), 2u);
+  for (const std::string& bad :
+       {line(changed("[0,0,1]", "[0,0,2]"), ambient), line(changed("[0,0,1]", "[0,1]"), ambient),
+        line(changed("0.01", "0"), ambient), line(changed("0.01", "13"), ambient),
+        line(changed("[1,2,3]", "[1,2,-3]"), ambient),
+        line(changed("[1,2,3]", "[1,2,1e999]"), ambient),
+        line(changed("\"id\":1", "\"id\":\"a\""), ambient),
+        line(source, R"({"size":2,"radiance":[1,1,1]})"),
+        line(source, R"({"size":3,"radiance":[]})"), line(source, R"({"size":128,"radiance":[]})"),
+        line(source, "[]")})
+    EXPECT_EQ(lines_read(bad), 1u) << bad;
+}
+
 TEST_F(Damage, TrackLinesCutAnywhere) {
   const TemporaryDirectory directory;
   {

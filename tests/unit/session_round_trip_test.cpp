@@ -101,6 +101,9 @@ TEST(Session, TwoStreamsAndTrackInOneSession) {
   for (int i = 0; i < 16; ++i) tracked.world_from_camera[i % 4][i / 4] = 1.0 / (3.0 + i);
   for (int i = 0; i < 36; ++i) tracked.covariance[i] = 1e-300 * i / 7.0;
   tracked.tags = {0, 2, 17};
+  tracked.captured_light = {{{3, {0.6, 0, 0.8}, 0.1 / 3, {1e-300, 2.0 / 7, 1e30}}},
+                            2,
+                            {{0, 1.0f / 3, 1e-30f}, {1, 2, 3}, {4, 5, 6}, {7, 8, 9}}};
   TrackRecord lost;
   lost.frame = 1;
   lost.timestamp_ns = std::numeric_limits<std::int64_t>::max();
@@ -118,6 +121,8 @@ TEST(Session, TwoStreamsAndTrackInOneSession) {
   EXPECT_EQ(session.track[0].world_from_camera, tracked.world_from_camera);
   EXPECT_EQ(session.track[0].covariance, tracked.covariance);
   EXPECT_EQ(session.track[0].tags, tracked.tags);
+  EXPECT_EQ(session.track[0].captured_light, tracked.captured_light);
+  EXPECT_FALSE(session.track[1].captured_light);
   EXPECT_EQ(session.track[1].timestamp_ns, lost.timestamp_ns);
   EXPECT_FALSE(session.track[1].tracked);
   EXPECT_TRUE(is_frame(*open_stream(session, "light")->read(1), 1));

@@ -98,6 +98,8 @@ TEST(SessionToml, EveryNumberComesBackBitForBit) {
                       255.5, 255.5, {0.1, -0.2, 0.3, -0.0}, 1.7453292519943295};
   light.response.kind = ResponseCurve::Kind::table;
   light.response.inverse_table = {0, 0.1, 0.30000000000000004, 1};
+  light.vignetting = {-0.1, 0.05, -0.02};
+  light.dark_level = {0.01, 1.0 / 3, 0};
   for (int i = 0; i < 16; ++i) light.world_from_camera[i % 4][i / 4] = std::sqrt(i) / 3;
   file.info.light = light;
   file.info.assets = {{"a.glb", "assets/1.glb"}, {"dir \"q\"/b.glb", "assets/2.glb"}};
@@ -126,6 +128,8 @@ TEST(SessionToml, EveryNumberComesBackBitForBit) {
   EXPECT_EQ(back.info.light->intrinsics.max_angle_rad, light.intrinsics.max_angle_rad);
   EXPECT_EQ(back.info.light->world_from_camera, light.world_from_camera);
   EXPECT_EQ(back.info.light->response.inverse_table, light.response.inverse_table);
+  EXPECT_EQ(back.info.light->vignetting, light.vignetting);
+  EXPECT_EQ(back.info.light->dark_level, light.dark_level);
 }
 
 TEST(SessionToml, ErrorsNameFileLineAndKey) {
@@ -133,6 +137,8 @@ TEST(SessionToml, ErrorsNameFileLineAndKey) {
   file.streams["observer"] = {PixelFormat::rgb8, 640, 480, {}};
   file.info.observer = ObserverCalibration{};
   file.info.observer->intrinsics.width = file.info.observer->intrinsics.height = 9;
+  file.info.light = LightCameraCalibration{};
+  file.info.light->intrinsics.width = file.info.light->intrinsics.height = 9;
   const std::string good = to_toml(file);
   EXPECT_EQ(error_of(good), "");
   const auto with = [&](const std::string& from, const std::string& to) {
@@ -150,6 +156,15 @@ TEST(SessionToml, ErrorsNameFileLineAndKey) {
   EXPECT_NE(with("width = 640", "width = -640").find("observer.video.width"), std::string::npos);
   EXPECT_NE(with("kind = \"srgb\"", "kind = \"log\"").find("observer.calibration.response.kind"),
             std::string::npos);
+  EXPECT_NE(with("vignetting = [0.0, 0.0, 0.0]", "vignetting = [-0.5, 0.0, 0.0]")
+                .find("light.calibration.vignetting must leave"),
+            std::string::npos);
+  EXPECT_NE(with("dark_level = [0.0, 0.0, 0.0]", "dark_level = [0.0, 0.6, 0.0]")
+                .find("light.calibration.dark_level must be"),
+            std::string::npos);
+  // Sessions of before these were known.
+  EXPECT_EQ(with("vignetting = [0.0, 0.0, 0.0]\n", ""), "");
+  EXPECT_EQ(with("dark_level = [0.0, 0.0, 0.0]\n", ""), "");
   EXPECT_NE(with("[set]", "[[set]]").find("set must be a table"), std::string::npos);
   EXPECT_NE(error_of("garbage").find("take/session.toml:1:"), std::string::npos);
   EXPECT_NE(error_of("").find("format_version is missing"), std::string::npos);

@@ -167,6 +167,7 @@ const Mistake missing[] = {
      "1:1: light.radius_m: is missing", "a sphere light needs it"},
     {"[[light]]\ntype='directional'\nemission=[1,1,1]\n", "1:1: light.direction: is missing", ""},
     {"[lighting]\nunseen='constant'\n", "1:1: lighting.unseen_radiance: is missing", "3 numbers"},
+    {"[lighting.room]\nposition_m=[0,0,1]\n", "1:1: lighting.room.size_m: is missing", "a file"},
     {"[observer.intrinsics]\n" PINHOLE "[observer.response]\nkind='table'\n",
      "8:1: observer.response.table: is missing", "strictly increasing"},
 };
@@ -192,6 +193,10 @@ const Mistake contradictions[] = {
      "constant"},
     {"[observer.intrinsics]\n" PINHOLE "[observer.response]\ngamma=2.0\n",
      "9:1: observer.response.gamma: does not go with kind \"srgb\"", "\"gamma\""},
+    {"[lighting.room]\nfile='vase.glb'\nsize_m=[3,4,2]\n",
+     "3:1: lighting.room.size_m: contradicts file", "one of the two"},
+    {"[lighting]\nenvironment='vase.glb'\n[lighting.room]\nsize_m=[3,4,2]\n",
+     "3:1: lighting.room: does not go with lighting.environment", "far away"},
     {"[[light]]\ntype='point'\nposition_m=[0,0,1]\nemission=[1,1,1]\nwidth_m=1\n",
      "5:1: light.width_m: a point light has no such thing", ""},
     {"[[light]]\ntype='spot'\nposition_m=[0,0,1]\ndirection=[0,0,-1]\nemission=[1,1,1]\n"
@@ -201,6 +206,9 @@ const Mistake contradictions[] = {
 INSTANTIATE_TEST_SUITE_P(Contradictions, SetMistake, testing::ValuesIn(contradictions));
 
 const Mistake geometry[] = {
+    {"[light_camera.intrinsics]\n" FISHEYE
+     "max_angle_deg=90\nvignetting=[-0.5,0,0]\n[light_camera.pose]\nposition_m=[0,0,0]\n",
+     "9:1: light_camera.intrinsics.vignetting: leaves no light", "at least 0.01"},
     {"[[tag]]\nid=1\nsize_m=0.1\nworld_from_tag=[[1,0,0,0],[0,1.1,0,0],[0,0,1,0],[0,0,0,1]]\n",
      "4:1: tag.world_from_tag: is not rigid", "0.21"},
     {"[[tag]]\nid=1\nsize_m=0.1\nworld_from_tag=[[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]\n",

@@ -60,15 +60,24 @@ cx = 255.5
 cy = 255.5
 k = [0.01, 0, 0, 0]
 max_angle_deg = 100
+vignetting = [-0.05, 0, 0.001]
 [light_camera.response]
 kind = "gamma"
 gamma = 2.4
+dark_level = [0.01, 0.02, 0.01]
 [light_camera.pose]
 position_m = [1, 2, 3]
 [lighting]
 environment_rotation_deg = -90
 unseen = "constant"
 unseen_radiance = [0.1, 0.2, 0.3]
+smoothing_s = 2
+clipped_gain = 8
+[lighting.room]
+size_m = [6, 5, 3]
+position_m = [1, 0, 1.5]
+rotation_deg = [0, 0, 90]
+seen_from_m = [0, 0, 0.1]
 [[light]]
 type = "spot"
 position_m = [0, 0, 2]
@@ -90,9 +99,18 @@ gain_real = 1
   EXPECT_DOUBLE_EQ(light.intrinsics.max_angle_rad, 100 * std::numbers::pi / 180);
   EXPECT_EQ(light.intrinsics.k[0], 0.01);
   EXPECT_EQ(light.response.gamma, 2.4);
+  EXPECT_EQ(light.vignetting, (Vignetting{-0.05, 0, 0.001}));
+  EXPECT_EQ(light.dark_level, glm::dvec3(0.01, 0.02, 0.01));
   expect_near(light.world_from_camera[3], {1, 2, 3, 1}, 0);
   EXPECT_DOUBLE_EQ(set.lighting.environment_rotation_rad, -std::numbers::pi / 2);
   EXPECT_EQ(set.lighting.unseen_radiance.z, 0.3);
+  EXPECT_EQ(set.lighting.smoothing_s, 2);
+  EXPECT_EQ(set.lighting.clipped_gain, 8);
+  const Room& room = set.lighting.room.value();
+  EXPECT_EQ(room.size_m, glm::dvec3(6, 5, 3));
+  EXPECT_EQ(room.world_from_room[3], glm::dvec4(1, 0, 1.5, 1));
+  EXPECT_NEAR(room.world_from_room[0][1], 1, rounding);
+  EXPECT_EQ(room.seen_from, glm::dvec3(0, 0, 0.1));
   ASSERT_EQ(set.lights.size(), 1u);
   EXPECT_EQ(set.lights[0].name, "light 1");
   EXPECT_NEAR(set.lights[0].direction.y, 0.6, rounding);

@@ -5,10 +5,10 @@ extern "C" {
 
 #include <array>
 
-#include "daemon/post/import_footage.hpp"
+#include "daemon/footage/footage.hpp"
 #include "drivers/av.hpp"
 
-namespace previz::post {
+namespace previz::footage {
 namespace {
 
 // The picture as the session will hold it, and libav's name for that.
@@ -186,4 +186,4 @@ std::unique_ptr<Footage> open_video(const std::filesystem::path& file) {
   return std::make_unique<VideoFile>(file);
 }
 
-}  // namespace previz::post
+}  // namespace previz::footage

@@ -1,10 +1,10 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "daemon/post/import_footage.hpp"
+#include "daemon/footage/footage.hpp"
 #include "drivers/error.hpp"
 
-namespace previz::post {
+namespace previz::footage {
 namespace {
 
 // An alpha channel says that a picture is no camera's, unless it says nothing.
@@ -59,4 +59,4 @@ std::unique_ptr<Footage> open_pictures(std::vector<std::filesystem::path> files)
   return std::make_unique<PictureFiles>(std::move(files));
 }
 
-}  // namespace previz::post
+}  // namespace previz::footage

@@ -1,4 +1,4 @@
-// The pictures of imported footage, one after the other, in a format that a session can hold.
+// Pictures from files, one after the other, in a format that a session can hold.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 #include "drivers/frame.hpp"
 
-namespace previz::post {
+namespace previz::footage {
 
 struct Picture {
   PixelFormat format = PixelFormat::rgb8;
@@ -32,4 +32,4 @@ class Footage {
 std::unique_ptr<Footage> open_pictures(std::vector<std::filesystem::path> files);
 std::unique_ptr<Footage> open_video(const std::filesystem::path& file);
 
-}  // namespace previz::post
+}  // namespace previz::footage

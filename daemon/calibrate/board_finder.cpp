@@ -1,0 +1,200 @@
+#include "daemon/calibrate/board_finder.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <opencv2/aruco/charuco.hpp>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "daemon/calibrate/fisheye_tags.hpp"
+#include "daemon/tracking/photometry.hpp"
+#include "daemon/tracking/tag_detector.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::calibrate {
+namespace {
+
+cv::Mat1b gray(const Frame& frame, const tracking::Photometry& photometry) {
+  const std::vector<std::uint8_t> samples = photometry.gray8(frame);
+  return cv::Mat1b(frame.height, frame.width, const_cast<std::uint8_t*>(samples.data())).clone();
+}
+
+// Half the window in which a corner is sharpened: as much of its four squares as holds no other
+// corner, at most 11 px. `ids` and `pixels` as in BoardCorners; `columns` corners a row.
+int window_px(const std::vector<int>& ids, const std::vector<cv::Point2f>& pixels, int columns) {
+  double shortest = HUGE_VAL;
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    for (std::size_t j = i + 1; j < ids.size(); ++j) {
+      const bool beside = ids[j] == ids[i] + 1 && ids[j] % columns != 0;
+      if (beside || ids[j] == ids[i] + columns)
+        shortest = std::min(shortest, cv::norm(pixels[i] - pixels[j]));
+    }
+  return std::clamp(int(0.4 * shortest), 2, 11);
+}
+
+BoardCorners sharpened(const cv::Mat1b& picture, std::vector<int> ids,
+                       std::vector<cv::Point2f> pixels, int columns) {
+  const int window = window_px(ids, pixels, columns);
+  const cv::TermCriteria until(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 50, 1e-4);
+  cv::cornerSubPix(picture, pixels, {window, window}, {-1, -1}, until);
+  BoardCorners corners{std::move(ids), {}};
+  for (const cv::Point2f& pixel : pixels) corners.pixels.emplace_back(pixel.x, pixel.y);
+  return corners;
+}
+
+class ChessboardFinder final : public BoardFinder {
+ public:
+  ChessboardFinder(const Board& board, const ResponseCurve& response)
+      : size_(board.columns, board.rows), photometry_(response) {}
+
+  BoardCorners find(const Frame& frame) override {
+    const cv::Mat1b picture = gray(frame, photometry_);
+    std::vector<cv::Point2f> pixels;
+    const bool found =
+        cv::findChessboardCornersSB(picture, size_, pixels,
+                                    cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE) ||
+        cv::findChessboardCorners(
+            picture, size_, pixels,
+            cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK);
+    if (!found) return {};
+    std::vector<int> ids(pixels.size());
+    for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = int(i);
+    return sharpened(picture, std::move(ids), std::move(pixels), size_.width);
+  }
+
+ private:
+  cv::Size size_;
+  tracking::Photometry photometry_;
+};
+
+cv::Ptr<cv::aruco::Dictionary> dictionary_by_name(const std::string& name) {
+  constexpr struct {
+    const char* name;
+    cv::aruco::PREDEFINED_DICTIONARY_NAME id;
+  } known[] = {
+      {"4x4_50", cv::aruco::DICT_4X4_50},   {"4x4_100", cv::aruco::DICT_4X4_100},
+      {"4x4_250", cv::aruco::DICT_4X4_250}, {"4x4_1000", cv::aruco::DICT_4X4_1000},
+      {"5x5_50", cv::aruco::DICT_5X5_50},   {"5x5_100", cv::aruco::DICT_5X5_100},
+      {"5x5_250", cv::aruco::DICT_5X5_250}, {"5x5_1000", cv::aruco::DICT_5X5_1000},
+      {"6x6_50", cv::aruco::DICT_6X6_50},   {"6x6_100", cv::aruco::DICT_6X6_100},
+      {"6x6_250", cv::aruco::DICT_6X6_250}, {"6x6_1000", cv::aruco::DICT_6X6_1000},
+      {"7x7_50", cv::aruco::DICT_7X7_50},   {"7x7_100", cv::aruco::DICT_7X7_100},
+      {"7x7_250", cv::aruco::DICT_7X7_250}, {"7x7_1000", cv::aruco::DICT_7X7_1000},
+  };
+  std::string names;
+  for (const auto& entry : known) {
+    if (name == entry.name) return cv::aruco::getPredefinedDictionary(entry.id);
+    names += (names.empty() ? "" : ", ") + std::string(entry.name);
+  }
+  throw Error("board: \"" + name + "\" is not a dictionary of markers; known are " + names);
+}
+
+class CharucoFinder final : public BoardFinder {
+ public:
+  CharucoFinder(const Board& board, const ResponseCurve& response)
+      : columns_(board.columns - 1),
+        dictionary_(dictionary_by_name(board.dictionary)),
+        photometry_(response) {
+    const int markers = board.columns * board.rows / 2;
+    if (markers > dictionary_->bytesList.rows)
+      throw Error("board: " + std::to_string(markers) + " markers are more than dictionary " +
+                  board.dictionary + " has");
+    board_ = cv::aruco::CharucoBoard::create(board.columns, board.rows, float(board.square_m),
+                                             float(board.marker_m), dictionary_);
+  }
+
+  BoardCorners find(const Frame& frame) override {
+    const cv::Mat1b picture = gray(frame, photometry_);
+    std::vector<std::vector<cv::Point2f>> markers;
+    std::vector<int> marker_ids, ids;
+    cv::aruco::detectMarkers(picture, dictionary_, markers, marker_ids);
+    std::vector<cv::Point2f> pixels;
+    if (!marker_ids.empty())
+      cv::aruco::interpolateCornersCharuco(markers, marker_ids, picture, board_, pixels, ids);
+    // Fewer than four points do not give a pose.
+    if (ids.size() < 4) return {};
+    return sharpened(picture, std::move(ids), std::move(pixels), columns_);
+  }
+
+ private:
+  int columns_;
+  cv::Ptr<cv::aruco::Dictionary> dictionary_;
+  cv::Ptr<cv::aruco::CharucoBoard> board_;
+  tracking::Photometry photometry_;
+};
+
+// Tags of the board's family in a picture, by id.
+using TagSearch = std::function<std::vector<tracking::TagDetection>(const Frame&)>;
+
+TagSearch tag_search(const Board& board, const ResponseCurve& response, const KnownLens& lens) {
+  const tracking::DetectorSettings settings{.family = board.dictionary};
+  if (const auto* fisheye = std::get_if<FisheyeIntrinsics>(&lens))
+    return [settings, response, fisheye = *fisheye](const Frame& frame) {
+      return detect_in_fisheye(frame, fisheye, response, settings);
+    };
+  if (const auto* pinhole = std::get_if<PinholeIntrinsics>(&lens))
+    return [detector = std::make_shared<tracking::TagDetector>(settings, *pinhole, response)](
+               const Frame& frame) { return detector->detect(frame, 1); };
+  return [settings, response](const Frame& frame) {
+    PinholeIntrinsics plain;
+    plain.width = frame.width;
+    plain.height = frame.height;
+    plain.fx = plain.fy = std::max(frame.width, frame.height);
+    plain.cx = 0.5 * (frame.width - 1);
+    plain.cy = 0.5 * (frame.height - 1);
+    return tracking::TagDetector(settings, plain, response).detect(frame, 1);
+  };
+}
+
+class AprilgridFinder final : public BoardFinder {
+ public:
+  AprilgridFinder(const Board& board, TagSearch search)
+      : board_(board), search_(std::move(search)) {}
+
+  BoardCorners find(const Frame& frame) override {
+    BoardCorners corners;
+    int last = -1;
+    for (const tracking::TagDetection& tag : search_(frame)) {
+      const int index = tag.id - board_.first_id;
+      const bool of_board = index >= 0 && index < board_.columns * board_.rows;
+      // An id seen twice is no board's: neither of the two is taken for it.
+      if (index == last) remove(index, corners);
+      if (!of_board || index == last || !tag.trouble.empty() || !tag.refined) continue;
+      last = index;
+      for (int i = 0; i < 4; ++i) {
+        corners.ids.push_back(4 * index + i);
+        corners.pixels.push_back(tag.corners[std::size_t(i)]);
+      }
+    }
+    return corners;
+  }
+
+ private:
+  static void remove(int index, BoardCorners& corners) {
+    while (!corners.ids.empty() && corners.ids.back() / 4 == index) {
+      corners.ids.pop_back();
+      corners.pixels.pop_back();
+    }
+  }
+
+  Board board_;
+  TagSearch search_;
+};
+
+}  // namespace
+
+std::unique_ptr<BoardFinder> make_board_finder(const Board& board, const ResponseCurve& response,
+                                               const KnownLens& lens) {
+  switch (board.kind) {
+    case Board::Kind::chessboard:
+      return std::make_unique<ChessboardFinder>(board, response);
+    case Board::Kind::charuco:
+      return std::make_unique<CharucoFinder>(board, response);
+    case Board::Kind::aprilgrid:
+      break;
+  }
+  return std::make_unique<AprilgridFinder>(board, tag_search(board, response, lens));
+}
+
+}  // namespace previz::calibrate

@@ -1,0 +1,41 @@
+// The board's points in one picture.
+#pragma once
+
+#include <glm/vec2.hpp>
+#include <memory>
+#include <variant>
+#include <vector>
+
+#include "daemon/calibrate/board.hpp"
+#include "drivers/calibration.hpp"
+#include "drivers/frame.hpp"
+
+namespace previz::calibrate {
+
+struct BoardCorners {
+  std::vector<int> ids;            // indices into Board::points, rising
+  std::vector<glm::dvec2> pixels;  // (0,0) is the centre of the top-left pixel
+};
+
+class BoardFinder {
+ public:
+  virtual ~BoardFinder() = default;
+  // Empty where the board is not seen. A chessboard is seen whole or not at all.
+  virtual BoardCorners find(const Frame& frame) = 0;
+};
+
+// `response` is the camera's. Chessboards: cv::findChessboardCornersSB (Duda and Frese 2018,
+// "Accurate Detection and Localization of Checkerboard Corners for Calibration"), and where that
+// finds none cv::findChessboardCorners; charuco: cv::aruco; both sharpened by cv::cornerSubPix.
+// aprilgrid: this project's own tag corners, whose edges are straight only through `lens`; where
+// none is known yet, a lens without distortion is assumed.
+using KnownLens = std::variant<std::monostate, PinholeIntrinsics, FisheyeIntrinsics>;
+std::unique_ptr<BoardFinder> make_board_finder(const Board& board, const ResponseCurve& response,
+                                               const KnownLens& lens = {});
+
+// True if a second look with the lens that the first one found is worth while.
+inline bool needs_lens(const Board& board) {
+  return board.kind == Board::Kind::aprilgrid;
+}
+
+}  // namespace previz::calibrate

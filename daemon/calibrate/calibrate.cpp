@@ -1,0 +1,140 @@
+#include "daemon/calibrate/calibrate.hpp"
+
+#include <fmt/ostream.h>
+
+#include <numbers>
+
+#include "daemon/calibrate/coverage.hpp"
+#include "daemon/calibrate/fisheye.hpp"
+#include "daemon/calibrate/light_pose.hpp"
+#include "daemon/calibrate/observer.hpp"
+#include "daemon/calibrate/report.hpp"
+#include "daemon/calibrate/residual_plot.hpp"
+#include "daemon/pipeline/take.hpp"
+#include "daemon/set/print.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "drivers/session/session.hpp"
+
+namespace previz::calibrate {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180;
+
+// Pictures are taken as sRGB unless a session says what its camera's response is.
+ResponseCurve response_of(const std::filesystem::path& footage, const std::string& stream) {
+  if (!is_session(footage)) return {};
+  const session::SessionInfo info = session::open_session(footage).info;
+  if (stream == "observer") return info.observer ? info.observer->response : ResponseCurve{};
+  return info.light ? info.light->response : ResponseCurve{};
+}
+
+Views gather(const LensOptions& options, const std::string& stream, const KnownLens& lens,
+             std::ostream& out) {
+  const Board board = parse_board(options.board);
+  const auto source = open_source(options.footage, stream);
+  const auto finder = make_board_finder(board, response_of(options.footage, stream), lens);
+  GatherOptions gathering;
+  gathering.every = options.every;
+  Views views = gather_views(*source, *finder, board, gathering,
+                             [&](const std::string& line) { out << line << '\n'; });
+  for (const std::string& note : source->notes()) out << note << '\n';
+  return views;
+}
+
+void plot(const LensOptions& options, const Views& views, const BundleFit& fit,
+          const std::vector<UncertainPixel>& picture, std::ostream& out) {
+  if (!options.residual_plot) return;
+  session::replace_file(*options.residual_plot,
+                        residual_plot_svg(views, fit, picture, options.footage.string()));
+  out << "residual plot: " << options.residual_plot->string() << '\n';
+}
+
+FisheyeFit calibrate_fisheye(const LightOptions& options, std::ostream& out) {
+  Views views = gather(options, "light", {}, out);
+  FisheyeFit fisheye = fit_fisheye(views);
+  if (needs_lens(parse_board(options.board))) {
+    out << "once more, through the lens found:\n";
+    views = gather(options, "light", fisheye.intrinsics, out);
+    fisheye = fit_fisheye(views);
+  }
+  tell_fit(views, fisheye.fit, fisheye_parameters, fisheye.picture, out);
+  fmt::print(out, "widest corner {:.1f} degrees off axis; trusted to {:.1f} degrees\n",
+             fisheye.widest_corner_rad / degree, fisheye.intrinsics.max_angle_rad / degree);
+  plot(options, views, fisheye.fit, fisheye.picture, out);
+  insist(missing_views(views, fisheye), options.force, out);
+  return fisheye;
+}
+
+// The lens where no board is given: the set's own, otherwise the session's.
+LightCameraCalibration known_light_camera(const set::Set& set,
+                                          const std::filesystem::path& footage) {
+  session::SessionInfo info;
+  if (is_session(footage)) info = session::open_session(footage).info;
+  const auto calibration = pipeline::light_calibration(set, info);
+  if (!calibration)
+    throw Error(set.file.string() +
+                ": light_camera.intrinsics: the light camera's lens is not known; give --board, or "
+                "the table in the set");
+  return *calibration;
+}
+
+std::string pose_by_tags(const LightOptions& options, const set::Set& set,
+                         const FisheyeIntrinsics& intrinsics, const ResponseCurve& response,
+                         std::ostream& out) {
+  const auto source = open_source(options.footage, "light");
+  const LightPose pose = find_light_pose(*source, intrinsics, response, set.tracking);
+  fmt::print(out,
+             "pose by the tags {} in {} pictures: rms {:.3f} px; certain to {:.1f} mm and {:.2f} "
+             "degrees{}\n",
+             fmt::join(pose.tags, ", "), pose.pictures, pose.rms_px, 1000 * pose.position_sigma_m,
+             pose.rotation_sigma_rad / degree,
+             pose.left_out.empty()
+                 ? ""
+                 : fmt::format("; not where the set says: {}", fmt::join(pose.left_out, ", ")));
+  return set::light_pose_toml(pose.world_from_camera);
+}
+
+constexpr auto pose_by_hand =
+    "# Where it stands, by hand (or by calibrate light --tags SET):\n"
+    "#[light_camera.pose]\n"
+    "#position_m = [0.0, 0.0, 0.0]\n"
+    "#rotation_deg = [0.0, 0.0, 0.0]  # unturned it looks straight up, picture down = Y\n";
+
+}  // namespace
+
+void calibrate_observer(const LensOptions& options, std::ostream& out) {
+  Views views = gather(options, "observer", {}, out);
+  ObserverFit observer = fit_observer(views);
+  if (needs_lens(parse_board(options.board))) {
+    out << "once more, through the lens found:\n";
+    views = gather(options, "observer", observer.intrinsics, out);
+    observer = fit_observer(views);
+  }
+  tell_fit(views, observer.fit, observer_parameters, observer.picture, out);
+  plot(options, views, observer.fit, observer.picture, out);
+  insist(missing_views(views, observer), options.force, out);
+  tell_tables(set::intrinsics_toml(observer.intrinsics), options.table_file, out);
+}
+
+void calibrate_light(const LightOptions& options, std::ostream& out) {
+  if (options.board.empty() && !options.tags_set)
+    throw Error("nothing to calibrate by: give --board for the lens, --tags for the pose, or both");
+  std::string tables;
+  std::optional<set::Set> set;
+  if (options.tags_set) set = set::load_set(*options.tags_set);
+  FisheyeIntrinsics intrinsics;
+  ResponseCurve response = response_of(options.footage, "light");
+  if (!options.board.empty()) {
+    intrinsics = calibrate_fisheye(options, out).intrinsics;
+    tables = set::intrinsics_toml(intrinsics) + "\n";
+  } else {
+    const LightCameraCalibration known = known_light_camera(*set, options.footage);
+    intrinsics = known.intrinsics;
+    response = known.response;
+  }
+  tables += set ? pose_by_tags(options, *set, intrinsics, response, out) : pose_by_hand;
+  tell_tables(tables, options.table_file, out);
+}
+
+}  // namespace previz::calibrate

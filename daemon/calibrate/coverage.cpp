@@ -1,0 +1,161 @@
+#include "daemon/calibrate/coverage.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+namespace previz::calibrate {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180;
+constexpr int least_views = 5;
+constexpr int columns = 3, rows = 3;
+constexpr double least_tilt_spread = 30 * degree;
+constexpr double near_extent = 1.0 / 3;  // of the picture's diagonal
+constexpr int least_near_views = 2;
+constexpr double certain_px = 1;
+
+std::string number(const char* format, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+// Calls body(view, corner) for every corner that counted.
+template <typename Body>
+void for_each_used(const Views& views, const BundleFit& fit, const Body& body) {
+  for (std::size_t v = 0; v < views.views.size(); ++v)
+    for (std::size_t i = 0; i < views.views[v].pixels.size(); ++i)
+      if (fit.used[v][i]) body(v, i);
+}
+
+bool left_out(const BundleFit& fit, std::size_t view) {
+  return std::ranges::find(fit.views_left_out, view) != fit.views_left_out.end();
+}
+
+std::string field_name(int column, int row) {
+  constexpr const char* across[] = {"left", "middle", "right"};
+  constexpr const char* down[] = {"top", "", "bottom"};
+  if (row == 1) return column == 1 ? "middle" : across[column];
+  return std::string(down[row]) + " " + across[column];
+}
+
+std::string listed(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+void miss_number(const Views& views, const BundleFit& fit, std::vector<std::string>& missing) {
+  const auto used = int(views.views.size() - fit.views_left_out.size());
+  if (used < least_views)
+    missing.push_back("more views: " + std::to_string(used) + " different ones can be used, " +
+                      std::to_string(least_views) + " are needed and 20 are good");
+}
+
+void miss_picture(const Views& views, const BundleFit& fit, std::vector<std::string>& missing) {
+  bool seen[rows][columns] = {};
+  for_each_used(views, fit, [&](std::size_t v, std::size_t i) {
+    const glm::dvec2& p = views.views[v].pixels[i];
+    const int column = std::clamp(int((p.x + 0.5) * columns / views.width), 0, columns - 1);
+    const int row = std::clamp(int((p.y + 0.5) * rows / views.height), 0, rows - 1);
+    seen[row][column] = true;
+  });
+  std::vector<std::string> empty;
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column)
+      if (!seen[row][column]) empty.push_back(field_name(column, row));
+  if (!empty.empty())
+    missing.push_back("the board in these fields of the picture: " + listed(empty));
+}
+
+void miss_tilt(const BundleFit& fit, std::vector<std::string>& missing) {
+  double low[2] = {HUGE_VAL, HUGE_VAL}, high[2] = {-HUGE_VAL, -HUGE_VAL};
+  for (std::size_t v = 0; v < fit.bundle.poses.size(); ++v) {
+    if (left_out(fit, v)) continue;
+    glm::dvec3 normal = fit.bundle.poses[v].rotation[2];
+    if (normal.z < 0) normal = -normal;
+    for (int axis = 0; axis < 2; ++axis) {
+      const double tilt = std::atan2(normal[axis], normal.z);
+      low[axis] = std::min(low[axis], tilt);
+      high[axis] = std::max(high[axis], tilt);
+    }
+  }
+  constexpr const char* how[] = {"turned to the left and to the right",
+                                 "tipped forwards and backwards"};
+  for (int axis = 0; axis < 2; ++axis)
+    if (const double spread = high[axis] - low[axis]; spread < least_tilt_spread)
+      missing.push_back(std::string("the board ") + how[axis] + ": all views lie within " +
+                        number("%.0f", spread / degree) + " degrees, at least " +
+                        number("%.0f", least_tilt_spread / degree) + " are needed");
+}
+
+void miss_distance(const Views& views, const BundleFit& fit, std::vector<std::string>& missing) {
+  const double diagonal = std::hypot(views.width, views.height);
+  int near = 0;
+  double largest = 0;
+  for (std::size_t v = 0; v < views.views.size(); ++v) {
+    if (left_out(fit, v)) continue;
+    glm::dvec2 low(HUGE_VAL), high(-HUGE_VAL);
+    for (const glm::dvec2& pixel : views.views[v].pixels) {
+      low = glm::min(low, pixel);
+      high = glm::max(high, pixel);
+    }
+    const double extent = glm::distance(low, high) / diagonal;
+    largest = std::max(largest, extent);
+    if (extent >= near_extent) ++near;
+  }
+  if (near < least_near_views)
+    missing.push_back(
+        "the board from nearer: it must reach across a third of the picture in at "
+        "least " +
+        std::to_string(least_near_views) + " views (the largest reaches " +
+        number("%.0f", 100 * largest) + " %)");
+}
+
+void miss_certainty(std::vector<UncertainPixel> picture, std::vector<std::string>& missing) {
+  if (picture.empty()) return;
+  const auto middle = picture.begin() + std::ptrdiff_t(picture.size() / 2);
+  std::ranges::nth_element(picture, middle, {}, &UncertainPixel::sigma_px);
+  if (middle->sigma_px > certain_px)
+    missing.push_back(
+        "more views, or sharper and flatter ones: over half of the picture the lens "
+        "is certain to " +
+        number("%.1f", middle->sigma_px) + " px only");
+}
+
+}  // namespace
+
+std::vector<std::string> missing_views(const Views& views, const ObserverFit& observer) {
+  std::vector<std::string> missing;
+  miss_number(views, observer.fit, missing);
+  miss_picture(views, observer.fit, missing);
+  miss_tilt(observer.fit, missing);
+  miss_distance(views, observer.fit, missing);
+  if (missing.empty()) miss_certainty(observer.picture, missing);
+  return missing;
+}
+
+std::vector<std::string> missing_views(const Views& views, const FisheyeFit& fisheye) {
+  std::vector<std::string> missing;
+  miss_number(views, fisheye.fit, missing);
+  std::size_t reached = 0;
+  for (const double reach : fisheye.sector_reach_rad)
+    if (reach >= least_fisheye_reach_rad) ++reached;
+  if (reached < least_fisheye_sectors)
+    missing.push_back(
+        "the board near the edge of the picture circle, all around: corners come to " +
+        number("%.0f", least_fisheye_reach_rad / degree) + " degrees off axis in " +
+        std::to_string(reached) + " of 8 directions around it, at least " +
+        std::to_string(least_fisheye_sectors) + " are needed (the widest is at " +
+        number("%.1f", fisheye.widest_corner_rad / degree) + ")");
+  if (missing.empty() && fisheye.uncertain_from_rad < least_fisheye_reach_rad)
+    missing.push_back("more or sharper views: beyond " +
+                      number("%.0f", fisheye.uncertain_from_rad / degree) +
+                      " degrees off axis the lens is not certain to 1 px");
+  return missing;
+}
+
+}  // namespace previz::calibrate

@@ -1,0 +1,66 @@
+#include "daemon/calibrate/report.hpp"
+
+#include <fmt/ostream.h>
+
+#include <algorithm>
+
+#include "daemon/calibrate/residual_plot.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+
+namespace previz::calibrate {
+namespace {
+
+void tell_views(const Views& views, const BundleFit& fit, std::ostream& out) {
+  for (std::size_t v = 0; v < views.views.size(); ++v) {
+    const auto left_out = std::ranges::count(fit.used[v], false);
+    if (std::ranges::find(fit.views_left_out, v) != fit.views_left_out.end())
+      fmt::print(out, "  {}: left out, most of its corners do not fit\n", views.views[v].name);
+    else
+      fmt::print(out, "  {}: rms {:.3f} px, {} corners{}\n", views.views[v].name,
+                 view_rms_px(fit, v), fit.used[v].size() - std::size_t(left_out),
+                 left_out ? fmt::format(", {} left out", left_out) : "");
+  }
+}
+
+void tell_certainty(std::vector<UncertainPixel> picture, std::ostream& out) {
+  if (picture.empty()) return;
+  std::ranges::sort(picture, {}, &UncertainPixel::sigma_px);
+  const UncertainPixel& worst = picture.back();
+  fmt::print(out,
+             "projection certain to {:.3f} px over half of the picture, {:.3f} px at worst "
+             "(near {:.0f}, {:.0f})\n",
+             picture[picture.size() / 2].sigma_px, worst.sigma_px, worst.pixel.x, worst.pixel.y);
+}
+
+}  // namespace
+
+void tell_fit(const Views& views, const BundleFit& fit, std::span<const char* const> names,
+              std::vector<UncertainPixel> picture, std::ostream& out) {
+  tell_views(views, fit, out);
+  fmt::print(out,
+             "rms {:.3f} px over {} corners of {} views; {} of {} corners left out (farther off "
+             "than 4.5 robust standard deviations and 1 px)\n",
+             fit.rms_px, fit.corners_used, views.views.size() - fit.views_left_out.size(),
+             fit.corners - fit.corners_used, fit.corners);
+  const std::vector<double> sigma = lens_sigma(fit);
+  for (std::size_t p = 0; p < sigma.size(); ++p)
+    fmt::print(out, "  {:<3} {:12.5f} +- {:.5f}\n", names[p], fit.bundle.lens[p], sigma[p]);
+  tell_certainty(std::move(picture), out);
+}
+
+void insist(const std::vector<std::string>& missing, bool force, std::ostream& out) {
+  if (missing.empty()) return;
+  std::string text = "these views are missing:";
+  for (const std::string& what : missing) text += "\n  " + what;
+  if (!force) throw Error(text + "\n(--force takes the calibration as it is)");
+  fmt::print(out, "{}\n", text);
+}
+
+void tell_tables(const std::string& tables, const std::optional<std::filesystem::path>& file,
+                 std::ostream& out) {
+  if (file) session::replace_file(*file, tables);
+  fmt::print(out, "\n{}", tables);
+}
+
+}  // namespace previz::calibrate

@@ -1,0 +1,102 @@
+#include "daemon/calibrate/views.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "drivers/error.hpp"
+
+namespace previz::calibrate {
+namespace {
+
+constexpr std::size_t looked_at_of_a_stream = 150;
+constexpr int every_of_a_video = 10;  // a third of a second
+constexpr std::size_t least_corners = 6;
+constexpr double same_view = 0.02;  // of the diagonal
+
+int step(const PictureSource& source, const GatherOptions& options) {
+  if (options.every > 0) return options.every;
+  const auto count = source.count();
+  if (!count) return every_of_a_video;
+  return int(
+      std::max<std::size_t>(1, (*count + looked_at_of_a_stream - 1) / looked_at_of_a_stream));
+}
+
+// The largest distance between the places of a corner that both have; infinite where one has
+// corners that the other has not.
+double largest_move(const BoardCorners& a, const BoardCorners& b) {
+  if (a.ids != b.ids) return HUGE_VAL;
+  double largest = 0;
+  for (std::size_t i = 0; i < a.ids.size(); ++i)
+    largest = std::max(largest, glm::distance(a.pixels[i], b.pixels[i]));
+  return largest;
+}
+
+View view_of(const BoardCorners& corners, const Board& board, const std::string& name) {
+  View view{name, {}, corners.pixels};
+  for (const int id : corners.ids) view.points.push_back(board.points[std::size_t(id)]);
+  return view;
+}
+
+// `count` of them, evenly spread over the take.
+std::vector<View> thinned(std::vector<View> views, std::size_t count) {
+  if (views.size() <= count) return views;
+  std::vector<View> kept;
+  for (std::size_t i = 0; i < count; ++i)
+    kept.push_back(std::move(views[i * views.size() / count]));
+  return kept;
+}
+
+}  // namespace
+
+Views gather_views(PictureSource& source, BoardFinder& finder, const Board& board,
+                   const GatherOptions& options,
+                   const std::function<void(const std::string&)>& tell) {
+  Views gathered;
+  std::vector<BoardCorners> taken;
+  std::size_t index = 0, looked_at = 0, alike = 0;
+  const auto every = std::size_t(step(source, options));
+  for (auto picture = source.next(); picture; picture = source.next()) {
+    if (index++ % every) continue;
+    const Frame& frame = *picture->frame;
+    if (looked_at++ == 0) {
+      gathered.width = frame.width;
+      gathered.height = frame.height;
+    } else if (frame.width != gathered.width || frame.height != gathered.height) {
+      throw Error(picture->name + ": has " + std::to_string(frame.width) + "x" +
+                  std::to_string(frame.height) + " pixels, the pictures before it " +
+                  std::to_string(gathered.width) + "x" + std::to_string(gathered.height) +
+                  "; a calibration holds for one size");
+    }
+    BoardCorners corners = finder.find(frame);
+    const double same = same_view * std::hypot(frame.width, frame.height);
+    const bool is_new = std::ranges::none_of(
+        taken, [&](const BoardCorners& other) { return largest_move(corners, other) < same; });
+    if (corners.ids.size() < least_corners) {
+      tell(picture->name + ": " +
+           (corners.ids.empty() ? "no board"
+                                : std::to_string(corners.ids.size()) + " corners only, left out"));
+    } else if (!is_new) {
+      ++alike;
+      tell(picture->name + ": as a view before it, left out");
+    } else {
+      tell(picture->name + ": " + std::to_string(corners.ids.size()) + " corners");
+      gathered.views.push_back(view_of(corners, board, picture->name));
+      taken.push_back(std::move(corners));
+    }
+  }
+  if (gathered.views.empty())
+    throw Error("the board is in none of the " + std::to_string(looked_at) +
+                " pictures looked at; is it the one that --board says, and wholly in view?");
+  const std::size_t found = gathered.views.size();
+  gathered.views = thinned(std::move(gathered.views), std::size_t(options.at_most));
+  std::string said = std::to_string(looked_at) + " of " + std::to_string(index) +
+                     " pictures looked at, " + std::to_string(found) + " different views";
+  if (alike) said += ", " + std::to_string(alike) + " like another";
+  if (gathered.views.size() < found)
+    said += ", " + std::to_string(gathered.views.size()) + " taken";
+  tell(said);
+  return gathered;
+}
+
+}  // namespace previz::calibrate

@@ -1,0 +1,41 @@
+// Views of a board, as a calibration takes them.
+#pragma once
+
+#include <functional>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <string>
+#include <vector>
+
+#include "daemon/calibrate/board.hpp"
+#include "daemon/calibrate/board_finder.hpp"
+#include "daemon/calibrate/source.hpp"
+
+namespace previz::calibrate {
+
+// Points that do not move between each other, seen in one picture.
+struct View {
+  std::string name;
+  std::vector<glm::dvec3> points;  // metres
+  std::vector<glm::dvec2> pixels;
+};
+
+struct Views {
+  int width = 0, height = 0;  // of every picture
+  std::vector<View> views;
+};
+
+struct GatherOptions {
+  int every = 0;     // picture to look at; 0: all of a folder, at most 150 of a stream or video
+  int at_most = 50;  // views; a few dozen different ones say all that there is to know
+};
+
+// Looks for the board in the pictures of a source. A picture in which every corner is within 2 % of
+// the picture's diagonal of where a view already taken has it says nothing new and is left out; so
+// are pictures with fewer than 6 corners. `tell` gets one line for every picture looked at.
+// Throws previz::Error if the pictures differ in size or the board is nowhere.
+Views gather_views(PictureSource& source, BoardFinder& finder, const Board& board,
+                   const GatherOptions& options,
+                   const std::function<void(const std::string&)>& tell);
+
+}  // namespace previz::calibrate

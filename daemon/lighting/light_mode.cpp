@@ -1,0 +1,68 @@
+#include "daemon/lighting/light_mode.hpp"
+
+#include <fmt/format.h>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "daemon/lighting/luminance.hpp"
+#include "daemon/lighting/sources.hpp"
+
+namespace previz::lighting {
+namespace {
+
+std::string counted(std::size_t number, const char* noun) {
+  return fmt::format("{} {}{}", number, noun, number == 1 ? "" : "s");
+}
+
+}  // namespace
+
+void apply_mode(Lighting& lighting, const set::Lighting& settings, SourceTracker& tracker,
+                std::int64_t timestamp_ns) {
+  if (settings.mode == set::LightMode::image) return;
+  Extraction extraction = extract_sources(lighting.environment, settings.sources, tracker.known());
+  tracker.follow(extraction.sources, timestamp_ns);
+  lighting.sources = std::move(extraction.sources);
+  std::string note = counted(lighting.sources.size(), "light source");
+  if (extraction.left > 0)
+    note += ", " + counted(static_cast<std::size_t>(extraction.left), "bright region") +
+            " left in the picture (too faint, too wide or too many)";
+  if (settings.mode == set::LightMode::hybrid) {
+    lighting.environment = std::move(extraction.residual);
+  } else if (settings.sources.residual == set::Residual::blurred) {
+    lighting.environment = blurred(extraction.residual);
+  } else {
+    const double all = luminance(total_flux(lighting.environment));
+    const double residual = luminance(total_flux(extraction.residual));
+    lighting.report.dropped_share = all > 0 ? residual / all : 0;
+    note += fmt::format("; {:.0f} % of the light is no source and dropped",
+                        100 * lighting.report.dropped_share);
+    lighting.environment = {1, {glm::vec3(0)}};
+  }
+  lighting.report.notes.push_back(std::move(note));
+}
+
+std::vector<set::Light> lamps_of(const std::vector<Source>& sources, const set::Lighting& settings,
+                                 const glm::dvec3& viewpoint) {
+  std::vector<set::Light> lamps;
+  for (const Source& source : sources) {
+    set::Light& lamp = lamps.emplace_back();
+    lamp.name = "source " + std::to_string(source.id);
+    lamp.gain_mixed = lamp.gain_real = 1;
+    const double radius = angular_radius(source), sine = std::sin(radius);
+    if (const auto distance = settings.sources.distance_m) {
+      lamp.type = set::LightType::sphere;
+      lamp.position = viewpoint + *distance * source.direction;
+      lamp.radius_m = *distance * sine;
+      lamp.emission = radiance(source);
+    } else {
+      lamp.type = set::LightType::directional;
+      lamp.direction = -source.direction;
+      lamp.angular_radius_rad = radius;
+      lamp.emission = radiance(source) * (std::numbers::pi * sine * sine);  // facing it
+    }
+  }
+  return lamps;
+}
+
+}  // namespace previz::lighting

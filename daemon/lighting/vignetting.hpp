@@ -1,0 +1,17 @@
+// What a fisheye lens loses towards its edge, given back.
+#pragma once
+
+#include <vector>
+
+#include "daemon/lighting/fisheye.hpp"
+#include "daemon/lighting/hdr.hpp"
+
+namespace previz::lighting {
+
+// By pixel: 1 / relative_illumination at its centre; 1 where the lens sees nothing. Empty for a
+// lens that loses nothing.
+std::vector<float> vignetting_gains(const Fisheye& lens, const Vignetting& vignetting);
+
+void undo_vignetting(const std::vector<float>& gains, HdrPicture& picture);
+
+}  // namespace previz::lighting

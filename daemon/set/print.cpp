@@ -1,0 +1,80 @@
+#include "daemon/set/print.hpp"
+
+#include <algorithm>
+
+#include "daemon/set/table.hpp"
+
+namespace previz::set {
+namespace {
+
+std::vector<Key> keys_of(Draft& draft, const std::string& path) {
+  const auto all = sections(draft);
+  return std::ranges::find(all, path, &Section::path)->open().keys;
+}
+
+// `without`: keys that contradict what the others say.
+std::string table_toml(Draft draft, const std::string& path,
+                       const std::vector<std::string>& without = {}) {
+  Draft untouched;
+  const auto defaults = keys_of(untouched, path);
+  const auto keys = keys_of(draft, path);
+  std::string text = '[' + path + "]\n";
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    const std::string value = keys[i].print ? keys[i].print() : "";
+    const bool is_default =
+        keys[i].need.kind == Need::Kind::defaulted && value == defaults[i].initial;
+    const bool contradicts = std::ranges::find(without, keys[i].name) != without.end();
+    if (!value.empty() && !is_default && !contradicts) text += keys[i].name + " = " + value + '\n';
+  }
+  return text;
+}
+
+// A curve has the keys of its kind only.
+std::vector<std::string> keys_of_other_kinds(const ResponseCurve& curve) {
+  std::vector<std::string> others;
+  if (curve.kind != ResponseCurve::Kind::gamma) others.push_back("gamma");
+  if (curve.kind != ResponseCurve::Kind::table) others.push_back("table");
+  return others;
+}
+
+}  // namespace
+
+std::string intrinsics_toml(const PinholeIntrinsics& intrinsics) {
+  Draft draft;
+  draft.observer.intrinsics = intrinsics;
+  return table_toml(std::move(draft), "observer.intrinsics");
+}
+
+std::string intrinsics_toml(const FisheyeIntrinsics& intrinsics) {
+  Draft draft;
+  draft.light.intrinsics = intrinsics;
+  return table_toml(std::move(draft), "light_camera.intrinsics");
+}
+
+std::string lens_toml(const ThinLens& lens) {
+  Draft draft;
+  draft.lens = lens;
+  return table_toml(std::move(draft), "observer.lens");
+}
+
+std::string light_pose_toml(const glm::dmat4& world_from_camera) {
+  Draft draft;
+  draft.light_pose.matrix = world_from_camera;
+  return table_toml(std::move(draft), "light_camera.pose");
+}
+
+std::string response_toml(const ObserverCalibration& calibration) {
+  Draft draft;
+  draft.observer = calibration;
+  return table_toml(std::move(draft), "observer.response",
+                    keys_of_other_kinds(calibration.response));
+}
+
+std::string response_toml(const LightCameraCalibration& calibration) {
+  Draft draft;
+  draft.light = calibration;
+  return table_toml(std::move(draft), "light_camera.response",
+                    keys_of_other_kinds(calibration.response));
+}
+
+}  // namespace previz::set

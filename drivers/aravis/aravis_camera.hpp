@@ -1,0 +1,24 @@
+// GigE Vision and USB3 Vision cameras, through Aravis.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "drivers/camera_drivers.hpp"
+
+namespace previz {
+
+// `settings.device` is a serial number, an Aravis device id ("Vendor-Serial"), or the address of a
+// network camera. Sequence numbers are the device's block ids, unwrapped; capture times are the
+// device's time stamps, mapped to the host's clock (clock_map.hpp). Where the camera can put its
+// exposure into each frame (chunk data) the frames say that; otherwise frames around a change are
+// left out and counted.
+//
+// Gain is driven where the camera gives it in dB (x dB is a factor of 10^(x/20)); other scales are
+// the vendor's own, and a gain asked of them is an error. Frames then say 1.
+std::unique_ptr<Camera> open_aravis(const CameraSettings& settings);
+
+// Asks all networks and the USB bus, which takes about a second.
+std::vector<FoundCamera> find_aravis();
+
+}  // namespace previz

@@ -1,0 +1,299 @@
+#include "drivers/aravis/configure.hpp"
+
+#include <arpa/inet.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "drivers/aravis/aravis_camera.hpp"
+#include "drivers/aravis/pixel_formats.hpp"
+
+namespace previz {
+namespace aravis {
+namespace {
+
+// A picture larger than this is a broken description, not a camera.
+constexpr std::int64_t most_payload = std::int64_t{1} << 30;
+
+bool is_address(const std::string& text) {
+  std::array<unsigned char, 16> ignored{};
+  return inet_pton(AF_INET, text.c_str(), ignored.data()) == 1;
+}
+
+std::string or_nothing(const char* text) {
+  return text ? text : "";
+}
+
+bool gain_is_in_db(ArvCamera& camera) {
+  ArvGcNode* node = arv_device_get_feature(arv_camera_get_device(&camera), "Gain");
+  return ARV_IS_GC_FLOAT(node) && or_nothing(arv_gc_float_get_unit(ARV_GC_FLOAT(node))) == "dB";
+}
+
+class Configuration {
+ public:
+  Configuration(ArvCamera& camera, const CameraSettings& settings)
+      : camera_(camera), settings_(settings) {}
+
+  Agreed agree() {
+    arv_camera_set_acquisition_mode(&camera_, ARV_ACQUISITION_MODE_CONTINUOUS, failure_.out());
+    check("acquisition mode");
+    agree_on_format();
+    agree_on_size();
+    agree_on_trigger();
+    agree_on_rate();
+    agree_on_exposure();
+    agree_on_white_balance();
+    agree_on_chunks();
+    agree_on_packets();
+    agree_on_payload();
+    return agreed_;
+  }
+
+ private:
+  void check(const std::string& what) const { failure_.check(settings_.device, what); }
+  [[noreturn]] void refuse(const std::string& what) const {
+    throw Error(settings_.device + ": " + what);
+  }
+
+  void agree_on_format() {
+    if (settings_.format) {
+      arv_camera_set_pixel_format_from_string(&camera_, settings_.format->c_str(), failure_.out());
+      if (failure_.failed())
+        refuse("has no pixel format \"" + *settings_.format + "\"; it has " + its_formats());
+    }
+    agreed_.pfnc = arv_camera_get_pixel_format(&camera_, failure_.out());
+    check("pixel format");
+    const std::optional<convert::WireFormat> wire = wire_format(agreed_.pfnc);
+    if (!wire) {
+      const std::string name =
+          or_nothing(arv_camera_get_pixel_format_as_string(&camera_, failure_.out()));
+      refuse("its pixel format " + name + " cannot be converted; it has " + its_formats() +
+             "; can be: " + known_formats());
+    }
+    agreed_.wire = *wire;
+    agreed_.format.format = convert::delivered_format(*wire);
+  }
+
+  std::string its_formats() {
+    unsigned count = 0;
+    Failure ignored;
+    const OwnedArray<const char*> formats(
+        arv_camera_dup_available_pixel_formats_as_strings(&camera_, &count, ignored.out()));
+    std::string names;
+    for (unsigned i = 0; i < count; ++i) {
+      names += i ? ", " : "";
+      names += formats[i];
+    }
+    return names;
+  }
+
+  void agree_on_size() {
+    if (settings_.width && settings_.height) {
+      check_side("width", *settings_.width, arv_camera_get_width_bounds,
+                 arv_camera_get_width_increment);
+      check_side("height", *settings_.height, arv_camera_get_height_bounds,
+                 arv_camera_get_height_increment);
+      arv_camera_set_region(&camera_, 0, 0, *settings_.width, *settings_.height, failure_.out());
+      check("picture size");
+    }
+    int x = 0, y = 0;
+    arv_camera_get_region(&camera_, &x, &y, &agreed_.format.width, &agreed_.format.height,
+                          failure_.out());
+    check("picture size");
+    const auto& [format, width, height, rate] = agreed_.format;
+    if (width < 1 || height < 1 || width > 65535 || height > 65535)
+      refuse("says its pictures are " + std::to_string(width) + "x" + std::to_string(height) +
+             " pixels, which cannot be");
+  }
+
+  void check_side(const char* side, int wanted, decltype(arv_camera_get_width_bounds) bounds,
+                  decltype(arv_camera_get_width_increment) increment) {
+    int least = 0, most = 0;
+    bounds(&camera_, &least, &most, failure_.out());
+    check(side);
+    const int step = std::max(1, increment(&camera_, failure_.out()));
+    if (wanted < least || wanted > most || (wanted - least) % step != 0)
+      refuse("a " + std::string(side) + " of " + std::to_string(wanted) + " is not possible; " +
+             std::to_string(least) + " to " + std::to_string(most) + " in steps of " +
+             std::to_string(step) + " is");
+  }
+
+  void agree_on_trigger() {
+    arv_camera_clear_triggers(&camera_, failure_.out());
+    check("triggers");
+    if (!settings_.trigger) return;
+    agreed_.software_trigger = *settings_.trigger == "software";
+    const char* source = agreed_.software_trigger ? "Software" : settings_.trigger->c_str();
+    arv_camera_set_trigger(&camera_, source, failure_.out());
+    check("trigger \"" + *settings_.trigger + "\"");
+  }
+
+  void agree_on_rate() {
+    if (!arv_camera_is_frame_rate_available(&camera_, failure_.out())) return;
+    if (settings_.rate_hz) {
+      double least = 0, most = 0;
+      arv_camera_get_frame_rate_bounds(&camera_, &least, &most, failure_.out());
+      check("frame rate");
+      if (!(*settings_.rate_hz >= least && *settings_.rate_hz <= most))
+        refuse("a frame rate of " + std::to_string(*settings_.rate_hz) + " Hz is not possible; " +
+               std::to_string(least) + " to " + std::to_string(most) + " is");
+      arv_camera_set_frame_rate(&camera_, *settings_.rate_hz, failure_.out());
+      check("frame rate");
+    }
+    const double rate_hz = arv_camera_get_frame_rate(&camera_, failure_.out());
+    if (!failure_.failed() && !settings_.trigger && std::isfinite(rate_hz))
+      agreed_.format.rate_hz = rate_hz;
+  }
+
+  void agree_on_exposure() {
+    agreed_.gain_in_db = gain_is_in_db(camera_);
+    agreed_.drives_exposure = arv_camera_is_exposure_time_available(&camera_, failure_.out());
+    if (!agreed_.drives_exposure && settings_.exposure_s)
+      refuse("its exposure cannot be set; leave exposure out");
+    if (settings_.gain && !agreed_.gain_in_db)
+      refuse("its gain is not in dB, so no factor can be set; leave gain out");
+    if (!agreed_.drives_exposure) return;
+    if (settings_.exposure_s && arv_camera_is_exposure_auto_available(&camera_, failure_.out()))
+      arv_camera_set_exposure_time_auto(&camera_, ARV_AUTO_OFF, failure_.out());
+    if (settings_.exposure_s && arv_camera_is_gain_auto_available(&camera_, failure_.out()))
+      arv_camera_set_gain_auto(&camera_, ARV_AUTO_OFF, failure_.out());
+    const double us = arv_camera_get_exposure_time(&camera_, failure_.out());
+    check("exposure");
+    agreed_.exposure.exposure_s = 1e-6 * us;
+    if (agreed_.gain_in_db)
+      agreed_.exposure.gain = std::pow(10.0, arv_camera_get_gain(&camera_, failure_.out()) / 20.0);
+    if (settings_.exposure_s || settings_.gain)
+      agreed_.exposure = set_exposure(camera_, settings_.device,
+                                      {settings_.exposure_s.value_or(agreed_.exposure.exposure_s),
+                                       settings_.gain.value_or(agreed_.exposure.gain)});
+  }
+
+  // SFNC knows ratios, not temperatures; which ratio a lamp needs only a calibration can say.
+  void agree_on_white_balance() const {
+    if (settings_.white_balance_k)
+      refuse("GenICam cameras have no colour temperature; leave white_balance_k out");
+  }
+
+  void agree_on_chunks() {
+    if (!arv_camera_are_chunks_available(&camera_, failure_.out())) return;
+    arv_camera_set_chunks(&camera_, "ExposureTime,Gain", failure_.out());
+    agreed_.chunks = !failure_.failed();
+  }
+
+  void agree_on_packets() {
+    if (!arv_camera_is_gv_device(&camera_)) {
+      if (settings_.packet_size) refuse("is no network camera; leave packet_size out");
+      return;
+    }
+    // Packet sockets need a privilege that the daemon does not have.
+    arv_camera_gv_set_stream_options(&camera_, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
+    if (settings_.packet_size)
+      arv_camera_gv_set_packet_size(&camera_, *settings_.packet_size, failure_.out());
+    else
+      arv_camera_gv_auto_packet_size(&camera_, failure_.out());
+    check("packet size");
+  }
+
+  void agree_on_payload() {
+    const std::int64_t payload = arv_camera_get_payload(&camera_, failure_.out());
+    check("payload size");
+    const auto least = static_cast<std::int64_t>(
+        convert::picture_bytes(agreed_.wire, agreed_.format.width, agreed_.format.height));
+    if (payload < least || payload > most_payload)
+      refuse("says that a frame is " + std::to_string(payload) + " bytes; its picture is " +
+             std::to_string(least));
+    agreed_.payload = static_cast<std::size_t>(payload);
+  }
+
+  ArvCamera& camera_;
+  const CameraSettings& settings_;
+  Failure failure_;
+  Agreed agreed_;
+};
+
+struct Listed {
+  std::string id, address, serial, vendor, model, protocol;
+};
+
+std::vector<Listed> list_devices() {
+  arv_update_device_list();
+  std::vector<Listed> devices;
+  for (unsigned i = 0; i < arv_get_n_devices(); ++i)
+    devices.push_back({or_nothing(arv_get_device_id(i)), or_nothing(arv_get_device_address(i)),
+                       or_nothing(arv_get_device_serial_nbr(i)),
+                       or_nothing(arv_get_device_vendor(i)), or_nothing(arv_get_device_model(i)),
+                       or_nothing(arv_get_device_protocol(i))});
+  return devices;
+}
+
+Owned<ArvCamera> open_camera(const std::string& id, const std::string& device) {
+  Failure failure;
+  Owned<ArvCamera> camera(arv_camera_new(id.c_str(), failure.out()));
+  if (!camera) throw Error(device + ": cannot be opened: " + failure.text());
+  return camera;
+}
+
+}  // namespace
+
+Owned<ArvCamera> find_camera(const std::string& device) {
+  if (device.empty()) throw Error("an aravis camera needs its serial number or address");
+  if (is_address(device)) return open_camera(device, device);
+  std::string seen;
+  for (const Listed& listed : list_devices()) {
+    if (device == listed.serial || device == listed.id) return open_camera(listed.id, device);
+    seen += seen.empty() ? "" : ", ";
+    seen += listed.serial + " (" + listed.address + ")";
+  }
+  throw Error(device + ": is not there; seen are: " + (seen.empty() ? "no cameras" : seen));
+}
+
+Agreed configure(ArvCamera& camera, const CameraSettings& settings) {
+  return Configuration(camera, settings).agree();
+}
+
+Exposure set_exposure(ArvCamera& camera, const std::string& device, const Exposure& wanted) {
+  const bool in_db = gain_is_in_db(camera);
+  if (!in_db && wanted.gain != 1)
+    throw Error(device + ": its gain is not in dB, so no factor can be set");
+  Failure failure;
+  double least = 0, most = 0;
+  arv_camera_get_exposure_time_bounds(&camera, &least, &most, failure.out());
+  failure.check(device, "exposure");
+  arv_camera_set_exposure_time(
+      &camera, std::clamp(1e6 * wanted.exposure_s, least, std::max(least, most)), failure.out());
+  failure.check(device, "exposure");
+  Exposure applied;
+  applied.exposure_s = 1e-6 * arv_camera_get_exposure_time(&camera, failure.out());
+  failure.check(device, "exposure");
+  if (!in_db) return applied;
+  arv_camera_get_gain_bounds(&camera, &least, &most, failure.out());
+  failure.check(device, "gain");
+  const double db = 20.0 * std::log10(wanted.gain);
+  arv_camera_set_gain(&camera, std::clamp(db, least, std::max(least, most)), failure.out());
+  failure.check(device, "gain");
+  applied.gain = std::pow(10.0, arv_camera_get_gain(&camera, failure.out()) / 20.0);
+  failure.check(device, "gain");
+  return applied;
+}
+
+// A burst of a whole frame must fit between two runs of the receiver; the kernel cuts the size to
+// net.core.rmem_max.
+void configure_gige_stream(ArvStream& stream, std::size_t payload) {
+  const int size = static_cast<int>(std::clamp<std::size_t>(4 * payload, 1 << 20, 64 << 20));
+  g_object_set(&stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
+               size, "packet-resend", ARV_GV_STREAM_PACKET_RESEND_ALWAYS, nullptr);
+}
+
+}  // namespace aravis
+
+std::vector<FoundCamera> find_aravis() {
+  std::vector<FoundCamera> found;
+  for (const aravis::Listed& listed : aravis::list_devices())
+    found.push_back(
+        {"aravis", listed.serial.empty() ? listed.id : listed.serial,
+         listed.vendor + " " + listed.model + ", " + listed.protocol + " at " + listed.address});
+  return found;
+}
+
+}  // namespace previz

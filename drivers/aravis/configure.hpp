@@ -1,0 +1,41 @@
+// Finding an Aravis camera and agreeing with it on what it will send. Not for use outside the
+// driver.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "drivers/aravis/gobject.hpp"
+#include "drivers/camera_drivers.hpp"
+#include "drivers/convert/convert.hpp"
+#include "drivers/exposure_ledger.hpp"
+
+namespace previz::aravis {
+
+// What a camera and we have settled on.
+struct Agreed {
+  CameraFormat format;
+  convert::WireFormat wire;
+  std::uint32_t pfnc = 0;   // of the wire format
+  std::size_t payload = 0;  // bytes of a buffer
+  Exposure exposure;
+  bool drives_exposure = false;
+  bool gain_in_db = false;
+  bool software_trigger = false;
+  bool chunks = false;  // frames carry their exposure
+};
+
+// Throws previz::Error that names the device.
+Owned<ArvCamera> find_camera(const std::string& device);
+
+// Writes the settings to the camera and reads back what it made of them. Throws previz::Error that
+// names the device, the setting, and what the camera can.
+Agreed configure(ArvCamera& camera, const CameraSettings& settings);
+
+// What the camera made of it: within its bounds, in its steps. Throws previz::Error.
+Exposure set_exposure(ArvCamera& camera, const std::string& device, const Exposure& wanted);
+
+void configure_gige_stream(ArvStream& stream, std::size_t payload);
+
+}  // namespace previz::aravis

@@ -1,0 +1,41 @@
+// From a device's own clock to the host's, out of nothing but when its frames arrived.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+
+namespace previz {
+
+// A frame arrives some delay after its device stamped it; the delay varies but is never negative.
+// The map is the line of least delay under the points (stamp, arrival): Moon, Skelly and Towsley,
+// "Estimation and Removal of Clock Skew from Network Delay Measurements" (INFOCOM 1999), over the
+// last half minute, so that a slowly drifting crystal is followed. What no one-way measurement can
+// know, the least delay itself, remains: mapped times are late by it.
+class ClockMap {
+ public:
+  // The host time of a frame; at most its arrival, and after every time given before. Stamps that
+  // go backwards (the device started anew) begin a new map.
+  std::int64_t to_host(std::int64_t device_ns, std::int64_t arrival_ns);
+
+  // How much faster the host's clock runs than the device's, as estimated: 1e-6 is one ppm.
+  double skew() const { return skew_; }
+
+ private:
+  struct Point {
+    double device_s;  // since the map began
+    double delay_s;   // arrival - device, since the map began; of unknown origin
+  };
+
+  void add(const Point& point);
+  double least_delay_s(double device_s);
+
+  std::optional<std::int64_t> device_origin_ns_;
+  std::int64_t offset_ns_ = 0;  // arrival - device of the first frame
+  std::int64_t last_device_ns_ = 0;
+  std::int64_t last_host_ns_ = INT64_MIN;
+  std::deque<Point> least_;  // the point of least delay of each second
+  double skew_ = 0;
+};
+
+}  // namespace previz

@@ -1,0 +1,57 @@
+// Which exposure applied to which frame, of a device that does not say so itself.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+
+namespace previz {
+
+struct Exposure {
+  double exposure_s = 0;  // shutter time; 0 where unknown
+  double gain = 1;        // linear sensor gain
+
+  friend bool operator==(const Exposure&, const Exposure&) = default;
+};
+
+// A device takes a new exposure over somewhere between the frame it is capturing when it is told
+// and a few frames later. Frames before are of the old one, frames after of the new; for those in
+// between nobody knows, and a bracket with a wrong label would be worse than a missing frame.
+class ExposureLedger {
+ public:
+  // `settle_frames`: how many frames begun after a change may still have the old exposure.
+  ExposureLedger(const Exposure& initial, int settle_frames)
+      : current_(initial), settle_frames_(settle_frames) {}
+
+  // The device was told between these two times (host clock).
+  void changed(std::int64_t before_ns, std::int64_t after_ns, const Exposure& exposure) {
+    changes_.push_back({before_ns, after_ns, exposure, settle_frames_});
+  }
+
+  // The exposure of a frame that the device stamped so; none where it is not known. To be asked
+  // once a frame, in order.
+  std::optional<Exposure> of_frame(std::int64_t timestamp_ns) {
+    while (!changes_.empty() && timestamp_ns > changes_.front().after_ns) {
+      Change& change = changes_.front();
+      const bool superseded = changes_.size() > 1 && timestamp_ns > changes_[1].after_ns;
+      if (!superseded && change.unsettled-- > 0) return std::nullopt;
+      current_ = change.exposure;
+      changes_.pop_front();
+    }
+    if (!changes_.empty() && timestamp_ns >= changes_.front().before_ns) return std::nullopt;
+    return current_;
+  }
+
+ private:
+  struct Change {
+    std::int64_t before_ns, after_ns;
+    Exposure exposure;
+    int unsettled;
+  };
+
+  Exposure current_;
+  const int settle_frames_;
+  std::deque<Change> changes_;
+};
+
+}  // namespace previz

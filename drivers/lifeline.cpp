@@ -1,0 +1,175 @@
+#include "drivers/lifeline.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace previz {
+
+using std::chrono::milliseconds;
+
+const char* to_string(DeviceState state) {
+  switch (state) {
+    case DeviceState::absent:
+      return "absent";
+    case DeviceState::starting:
+      return "starting";
+    case DeviceState::streaming:
+      return "streaming";
+    case DeviceState::stalled:
+      return "stalled";
+    case DeviceState::lost:
+      return "lost";
+  }
+  return "?";
+}
+
+Lifeline::Lifeline(std::string name, CameraOpener open, const LifelineOptions& options,
+                   HostClock clock)
+    : name_(std::move(name)),
+      open_(std::move(open)),
+      options_(options),
+      clock_(std::move(clock)),
+      counters_{{"opened", 0}, {"not opened", 0}, {"stalled", 0}, {"lost", 0}} {}
+
+CameraFormat Lifeline::format() const {
+  return format_;
+}
+
+void Lifeline::start() {
+  if (wanted_) return;
+  wanted_ = true;
+  state_ = DeviceState::absent;
+  retry_at_ = clock_.now();
+  backoff_ = milliseconds(0);
+  last_refusal_.clear();
+}
+
+void Lifeline::stop() {
+  wanted_ = false;
+  close();
+  state_ = DeviceState::absent;
+}
+
+CameraEvent Lifeline::next(milliseconds timeout) {
+  if (!wanted_) return NoFrame{};
+  const HostClock::Time deadline = clock_.now() + timeout;
+  do {
+    if (!camera_) {
+      clock_.sleep_until(std::min(retry_at_, deadline));
+      if (clock_.now() < retry_at_) return NoFrame{};
+      if (std::optional<CameraEvent> told = open()) return *std::move(told);
+      continue;
+    }
+    const HostClock::Time until = std::min(deadline, next_deadline());
+    const auto wait = std::chrono::ceil<milliseconds>(until - clock_.now());
+    if (std::optional<CameraEvent> told = take(camera_->next(std::max(wait, milliseconds(0)))))
+      return *std::move(told);
+    if (std::optional<CameraEvent> told = watch()) return *std::move(told);
+  } while (clock_.now() < deadline);
+  return NoFrame{};
+}
+
+std::optional<CameraEvent> Lifeline::open() {
+  try {
+    camera_ = open_();
+    if (exposure_) camera_->set_exposure(exposure_->exposure_s, exposure_->gain);
+    camera_->start();
+  } catch (const std::exception& error) {
+    return not_opened(error.what());
+  }
+  ++counters_["opened"];
+  last_refusal_.clear();
+  format_ = camera_->format();
+  state_ = DeviceState::starting;
+  since_ = clock_.now();
+  return std::nullopt;
+}
+
+std::optional<CameraEvent> Lifeline::not_opened(const std::string& why) {
+  camera_.reset();
+  ++counters_["not opened"];
+  state_ = DeviceState::absent;
+  retry_later();
+  if (why == last_refusal_) return std::nullopt;
+  last_refusal_ = why;
+  return DeviceTrouble{name_, why + "; tried again until it is there"};
+}
+
+void Lifeline::retry_later() {
+  backoff_ = std::clamp(2 * backoff_, options_.first_backoff, options_.last_backoff);
+  retry_at_ = clock_.now() + backoff_;
+}
+
+// What of a device's events goes on; nothing of NoFrame.
+std::optional<CameraEvent> Lifeline::take(CameraEvent event) {
+  if (std::holds_alternative<FramePtr>(event)) {
+    state_ = DeviceState::streaming;
+    since_ = clock_.now();
+    backoff_ = milliseconds(0);
+    return event;
+  }
+  if (auto* trouble = std::get_if<DeviceTrouble>(&event)) {
+    if (trouble->lost) return lose(trouble->what);
+    trouble->device = name_;
+    return event;
+  }
+  if (std::holds_alternative<EndOfStream>(event)) {
+    wanted_ = false;
+    close();
+    return event;
+  }
+  return std::nullopt;
+}
+
+HostClock::Time Lifeline::next_deadline() const {
+  switch (state_) {
+    case DeviceState::starting:
+      return since_ + options_.start_timeout;
+    case DeviceState::streaming:
+      return since_ + options_.stall_timeout;
+    default:
+      return since_ + options_.stall_timeout + options_.stall_patience;
+  }
+}
+
+std::optional<CameraEvent> Lifeline::watch() {
+  if (!camera_ || clock_.now() < next_deadline()) return std::nullopt;
+  if (state_ == DeviceState::starting)
+    return lose("sends no frame within " + std::to_string(options_.start_timeout.count()) +
+                " ms of its start");
+  if (state_ == DeviceState::streaming) {
+    state_ = DeviceState::stalled;
+    ++counters_["stalled"];
+    return DeviceTrouble{
+        name_, "has sent nothing for " + std::to_string(options_.stall_timeout.count()) + " ms"};
+  }
+  return lose("is stalled");
+}
+
+CameraEvent Lifeline::lose(const std::string& why) {
+  close();
+  ++counters_["lost"];
+  state_ = DeviceState::lost;
+  retry_later();
+  return DeviceTrouble{name_, why + "; it is opened anew"};
+}
+
+void Lifeline::close() {
+  if (!camera_) return;
+  for (const auto& [what, count] : camera_->counters()) counters_[what] += count;
+  camera_.reset();
+}
+
+bool Lifeline::set_exposure(double exposure_s, double gain) {
+  exposure_ = {exposure_s, gain};
+  return !camera_ || camera_->set_exposure(exposure_s, gain);
+}
+
+DeviceCounters Lifeline::counters() const {
+  DeviceCounters all = counters_;
+  if (camera_)
+    for (const auto& [what, count] : camera_->counters()) all[what] += count;
+  return all;
+}
+
+}  // namespace previz

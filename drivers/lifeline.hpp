@@ -1,0 +1,89 @@
+// A camera that is never given up: opened when it appears, opened again when it is lost.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "drivers/camera.hpp"
+#include "drivers/faults.hpp"
+#include "drivers/host_clock.hpp"
+
+namespace previz {
+
+enum class DeviceState {
+  absent,     // not there, or not to be opened; tried again after a while
+  starting,   // open, and no frame yet
+  streaming,  // frames come
+  stalled,    // frames came, and come no more; about to be given up
+  lost,       // closed after a failure; to be opened anew
+};
+
+const char* to_string(DeviceState state);
+
+struct LifelineOptions {
+  std::chrono::milliseconds start_timeout{5000};   // from start() to the first frame
+  std::chrono::milliseconds stall_timeout{2000};   // between frames; to stalled
+  std::chrono::milliseconds stall_patience{1000};  // in stalled; to lost
+  // Between attempts to open; doubles from the first to the last while they fail.
+  std::chrono::milliseconds first_backoff{250}, last_backoff{4000};
+};
+
+// A camera whose device may come and go. next() does in turn what is due: opens, starts, waits for
+// a frame, closes; it belongs to one thread, so that a device that hangs holds up nobody else. Each
+// time the device is opened all is agreed anew; format() may be another then, and no frame of the
+// old one follows. Sequence numbers keep increasing over all openings.
+//
+// Trouble is told once for each change to the worse, and never says `lost`. An EndOfStream of the
+// device ends this stream.
+class Lifeline final : public Camera {
+ public:
+  // `name` is what trouble is told under. Opens nothing yet.
+  Lifeline(std::string name, CameraOpener open, const LifelineOptions& options = {},
+           HostClock clock = {});
+
+  std::string name() const override { return name_; }
+  CameraFormat format() const override;  // of the last opening; before the first all zero
+  void start() override;                 // always succeeds; the device follows when it can
+  void stop() override;                  // closes the device
+  CameraEvent next(std::chrono::milliseconds timeout) override;
+  // Also for openings to come. True where the device, or no device yet, takes it.
+  bool set_exposure(double exposure_s, double gain) override;
+  // Of all openings together, and "opened", "lost", "stalled", "not opened".
+  DeviceCounters counters() const override;
+
+  DeviceState state() const { return state_; }
+
+ private:
+  std::optional<CameraEvent> open();
+  std::optional<CameraEvent> take(CameraEvent event);
+  std::optional<CameraEvent> watch();
+  std::optional<CameraEvent> not_opened(const std::string& why);
+  CameraEvent lose(const std::string& why);
+  void retry_later();
+  void close();
+  HostClock::Time next_deadline() const;
+
+  const std::string name_;
+  const CameraOpener open_;
+  const LifelineOptions options_;
+  const HostClock clock_;
+
+  DeviceState state_ = DeviceState::absent;
+  bool wanted_ = false;         // started
+  HostClock::Time since_{};     // the state, or the last frame
+  HostClock::Time retry_at_{};  // absent and lost only
+  std::chrono::milliseconds backoff_{0};
+  std::string last_refusal_;        // why the device could not be opened, as last told
+  std::unique_ptr<Camera> camera_;  // starting, streaming and stalled only
+  CameraFormat format_;
+  struct Wanted {
+    double exposure_s, gain;
+  };
+  std::optional<Wanted> exposure_;
+  DeviceCounters counters_;  // of closed openings, and our own
+};
+
+}  // namespace previz

@@ -1,0 +1,15 @@
+// The light of a track line as JSON. Not for use outside drivers/.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "drivers/session/session.hpp"
+
+namespace previz::session {
+
+// Throws previz::Error if a number is not finite.
+nlohmann::ordered_json to_json(const CapturedLight& light);
+// Throws std::exception if it is not what to_json makes.
+CapturedLight captured_light_of(const nlohmann::ordered_json& json);
+
+}  // namespace previz::session

@@ -1,0 +1,24 @@
+// What the camera sees of the real world: the first surface at the middle of each pixel.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shaders/lib/batch.glsl"
+#include "shaders/lib/calibrated_ray.glsl"
+#include "shaders/lib/trace.glsl"
+
+layout(scalar, set = 3, binding = BINDING_SEEN) writeonly buffer SeenBuffer { GpuSeen seen[]; };
+
+void main() {
+  const uint index = gl_GlobalInvocationID.x;
+  if (index >= frame.width * frame.height) return;
+  const uvec2 pixel = uvec2(index % frame.width, index / frame.width);
+  const vec3 ray = vec3(calibrated_ray(pixel, vec2(0.5)), 1.0);
+  const float depth_of_unit = inversesqrt(dot(ray, ray));
+  const vec3 direction = transform_vector(frame.world_from_camera, ray * depth_of_unit);
+  Hit hit;
+  seen[index] = GpuSeen(0.0, NO_INDEX);
+  if (!trace_closest(vec3(0.0), direction, 0.0, 3.4e38, WORLD_REAL, hit)) return;
+  if (materials[instances[hit.instance].material].alpha_mode != ALPHA_OPAQUE) return;
+  seen[index] = GpuSeen(1.0 / (hit.t * depth_of_unit), hit.instance);
+}

@@ -1,0 +1,19 @@
+// The camera's lens as calibrated: the ray through a point of the picture.
+#ifndef PREVIZ_CALIBRATED_RAY_GLSL
+#define PREVIZ_CALIBRATED_RAY_GLSL
+
+#include "shaders/lib/scene.glsl"
+
+layout(set = 0, binding = BINDING_RAYS) uniform textureBuffer corner_rays;
+
+// x/z and y/z of the undistorted ray through a point of the picture; pixel (0, 0) covers [0, 1]^2.
+vec2 calibrated_ray(uvec2 pixel, vec2 inside) {
+  const int stride = int(frame.width) + 1;
+  const int corner = int(pixel.y) * stride + int(pixel.x);
+  const vec2 top = mix(texelFetch(corner_rays, corner).xy, texelFetch(corner_rays, corner + 1).xy, inside.x);
+  const vec2 bottom = mix(texelFetch(corner_rays, corner + stride).xy,
+                          texelFetch(corner_rays, corner + stride + 1).xy, inside.x);
+  return mix(top, bottom, inside.y);
+}
+
+#endif

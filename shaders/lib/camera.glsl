@@ -1,0 +1,55 @@
+// The camera as a measurement of the real world: the radiance of points that the plate shows
+// (estimator.md, "What makes it fast", 3).
+#ifndef PREVIZ_CAMERA_GLSL
+#define PREVIZ_CAMERA_GLSL
+
+#include "shaders/lib/calibrated_ray.glsl"
+
+layout(set = 3, binding = BINDING_SEEN_RADIANCE) uniform textureBuffer seen_radiance;
+
+// How far a point may be from the surface that the plate shows, over its depth.
+const float SEEN_DEPTH_TOLERANCE = 2e-3;
+// How far off the calibrated ray its projection may be, in pixels: beyond, the lens's polynomial has
+// folded back into the picture.
+const float SEEN_RAY_TOLERANCE = 0.5;
+
+// Where x/z and y/z appear in the picture, pixel centres at whole numbers (Brown 1966, Conrady 1919;
+// OpenCV's order).
+vec2 project(vec2 ray) {
+  const float r2 = dot(ray, ray);
+  const float radial = 1.0 + r2 * (frame.radial.x + r2 * (frame.radial.y + r2 * frame.radial.z));
+  const vec2 p = frame.tangential;
+  const vec2 bent = ray * radial + 2.0 * p * ray.x * ray.y + p.yx * (r2 + 2.0 * ray * ray);
+  return frame.focal_px * bent + frame.principal_px;
+}
+
+// The radiance that the plate shows of a surface point, between the four pixels around it. False:
+// the point is not in the picture, is hidden, or any of the four is not to be used.
+bool measured_radiance(vec3 position, out vec3 radiance) {
+  radiance = vec3(0.0);
+  const vec3 camera = frame.world_from_camera[0].xyz * position.x +
+                      frame.world_from_camera[1].xyz * position.y +
+                      frame.world_from_camera[2].xyz * position.z;
+  if (camera.z <= 0.0) return false;
+  const vec2 ray = camera.xy / camera.z;
+  const vec2 at = project(ray);
+  const vec2 last = vec2(frame.width, frame.height) - 1.0;
+  if (!all(greaterThanEqual(at, vec2(0.0))) || !all(lessThan(at, last))) return false;
+  const uvec2 pixel = uvec2(at + 0.5);
+  const vec2 off = (calibrated_ray(pixel, at + 0.5 - vec2(pixel)) - ray) * frame.focal_px;
+  if (dot(off, off) > SEEN_RAY_TOLERANCE * SEEN_RAY_TOLERANCE) return false;
+  const vec2 low = floor(at);
+  const int first = int(low.y) * int(frame.width) + int(low.x);
+  const int below = first + int(frame.width);
+  const vec4 p00 = texelFetch(seen_radiance, first), p10 = texelFetch(seen_radiance, first + 1);
+  const vec4 p01 = texelFetch(seen_radiance, below), p11 = texelFetch(seen_radiance, below + 1);
+  if (min(min(p00.w, p10.w), min(p01.w, p11.w)) <= 0.0) return false;
+  const vec2 f = at - low;
+  const vec4 seen = mix(mix(p00, p10, f.x), mix(p01, p11, f.x), f.y);
+  // The inverse depth of a plane is linear over the picture.
+  if (abs(seen.w * camera.z - 1.0) > SEEN_DEPTH_TOLERANCE) return false;
+  radiance = seen.rgb;
+  return true;
+}
+
+#endif

@@ -1,0 +1,39 @@
+// Blender Cycles' shadow catcher as a method: tests/bench/cycles/shadow_catcher.py renders, this
+// reads.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tests/truth/compare.hpp"
+
+namespace previz::bench {
+
+struct CyclesOptions {
+  std::filesystem::path script;  // shadow_catcher.py
+  std::filesystem::path set;
+  int frame = 0, width = 160, threads = 1;
+};
+
+struct CyclesRender {
+  int samples = 0;
+  double cpu_s = 0;  // of all threads, without what renders share
+  std::filesystem::path file;
+};
+
+// Renders each number of samples into `directory`, by the command `blender`. Throws previz::Error
+// with what failed; Blender's own words are in DIRECTORY/blender.log.
+std::vector<CyclesRender> render_with_cycles(const CyclesOptions& options,
+                                             const std::vector<int>& samples, std::uint32_t seed,
+                                             const std::filesystem::path& directory);
+
+// What a user composites: Combined over the plate times the Shadow Catcher pass, the ratio of the
+// catcher's light with and without the virtual objects. As layers: the mask is Combined's alpha,
+// the difference plate (ratio - 1), mixed Combined without its factor alpha, real the plate.
+// Without composite and picture. Throws previz::Error naming the file.
+truth::EstimatedFrame read_shadow_catcher(const std::filesystem::path& file,
+                                          const truth::TruthFrame& plate);
+
+}  // namespace previz::bench

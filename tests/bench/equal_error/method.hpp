@@ -1,0 +1,44 @@
+// A way to make the difference of the two worlds: one renderer of both, or two of one each.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/render/renderer.hpp"
+#include "tests/bench/equal_error/view.hpp"
+#include "tests/truth/compare.hpp"
+
+namespace previz::bench {
+
+struct Method {
+  std::string name;
+  set::Estimation estimation;
+  bool separate = false;  // each world alone, with random numbers of its own; estimator is ignored
+};
+
+// A method at work on a view. Time is CPU time of all threads, of rendering alone.
+class MethodRun {
+ public:
+  // Compiles its pipelines, which is not timed.
+  MethodRun(const std::shared_ptr<render::Device>& device, const View& view, const Method& method);
+
+  // Forgets what was rendered and the time it took.
+  void begin(std::uint32_t seed);
+  void render(int samples);
+
+  int samples() const { return samples_; }
+  double cpu_s() const { return cpu_s_; }
+  // Segments and shadow rays so far.
+  render::Counters counters() const;
+  // Without composite and picture; with method.separate the mask of the mixed world alone is 0.
+  truth::EstimatedFrame estimate() const;
+
+ private:
+  glm::dmat4 world_from_camera_;
+  std::vector<std::unique_ptr<render::Renderer>> renderers_;  // of both worlds; of mixed, of real
+  int samples_ = 0;
+  double cpu_s_ = 0;
+};
+
+}  // namespace previz::bench

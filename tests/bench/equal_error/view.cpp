@@ -1,0 +1,61 @@
+#include "tests/bench/equal_error/view.hpp"
+
+#include <algorithm>
+
+#include "daemon/lighting/lighting.hpp"
+#include "daemon/set/set.hpp"
+#include "drivers/error.hpp"
+#include "tests/truth/cpu_camera.hpp"
+
+namespace previz::bench {
+namespace {
+
+set::Object object(const char* name, const std::filesystem::path& file, set::Presence presence) {
+  set::Object result;
+  result.name = name;
+  result.file = file;
+  result.file_as_written = file.string();
+  result.presence = presence;
+  return result;
+}
+
+int chosen_frame(const truth::TruthSet& set, std::optional<int> frame) {
+  if (set.truth_frames.empty()) throw Error(set.directory.string() + ": has no truth frame");
+  if (!frame) return set.truth_frames.front();
+  if (std::ranges::find(set.truth_frames, *frame) == set.truth_frames.end())
+    throw Error(set.directory.string() + ": has no truth of frame " + std::to_string(*frame));
+  return *frame;
+}
+
+}  // namespace
+
+View load_view(const std::filesystem::path& directory, std::optional<int> frame, int width) {
+  const truth::TruthSet truth = truth::load_truth_set(directory);
+  View view;
+  view.set = truth.name;
+  view.frame = chosen_frame(truth, frame);
+  set::Set set;
+  set.objects = {object("phantom", truth.phantom, set::Presence::phantom),
+                 object("virtual", truth.virtual_objects, set::Presence::virtual_object)};
+  set.lighting.environment = truth.environment;
+  set.lighting.environment_as_written = truth.environment.string();
+  view.scene = scene::load_scene(set);
+  view.environment = lighting::load_environment(set.lighting).environment;
+  view.camera = truth::resized(truth.observer, 1.0 * width / truth.observer.intrinsics.width);
+  view.world_from_camera = truth::observer_frame(truth, view.frame).world_from_camera;
+  view.exposure = truth.exposure;
+  return view;
+}
+
+scene::Scene world_alone(const scene::Scene& scene, std::uint32_t world) {
+  scene::Scene alone = scene;
+  std::erase_if(alone.instances,
+                [&](const scene::Instance& instance) { return (instance.presence & world) == 0; });
+  for (scene::Instance& instance : alone.instances) instance.presence = scene::world_both;
+  for (set::Light& light : alone.lights)
+    light.gain_mixed = light.gain_real =
+        world == scene::world_mixed ? light.gain_mixed : light.gain_real;
+  return alone;
+}
+
+}  // namespace previz::bench

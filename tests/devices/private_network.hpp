@@ -1,0 +1,11 @@
+// A loopback network of the test's own, so that fixed ports do not meet those of other processes.
+#pragma once
+
+namespace previz::test {
+
+// Moves the calling thread, and those it starts from now on, into a network of which they see
+// nothing but an own loopback device. Where the kernel does not allow it, everything stays as it
+// is. Once a process; to be called before other threads run.
+void enter_private_network();
+
+}  // namespace previz::test

@@ -1,0 +1,48 @@
+#include "tests/unit/calibrate_pictures.hpp"
+
+#include <glm/gtc/matrix_transform.hpp>
+#include <glm/matrix.hpp>
+
+namespace previz::test {
+namespace {
+
+glm::dmat3 turned(const Held& held) {
+  glm::dmat4 m(1.0);
+  m = glm::rotate(m, held.turn_deg * degree, glm::dvec3(0, 1, 0));
+  m = glm::rotate(m, held.tip_deg * degree, glm::dvec3(1, 0, 0));
+  m = glm::rotate(m, held.roll_deg * degree, glm::dvec3(0, 0, 1));
+  return glm::dmat3(m);
+}
+
+}  // namespace
+
+calibrate::Views hold(const calibrate::Board& board, const std::vector<Held>& how, const Lens& lens,
+                      int width, int height, double noise_px, std::mt19937& random) {
+  glm::dvec3 centre(0);
+  for (const glm::dvec3& point : board.points) centre += point / double(board.points.size());
+  std::normal_distribution<double> noise(0, 1);
+  calibrate::Views views{width, height, {}};
+  for (const Held& held : how) {
+    calibrate::View view{"view " + std::to_string(views.views.size()), {}, {}};
+    for (const glm::dvec3& point : board.points) {
+      const auto pixel = lens(turned(held) * (point - centre) + held.middle);
+      if (!pixel || pixel->x < 0 || pixel->y < 0 || pixel->x > width - 1 || pixel->y > height - 1)
+        continue;
+      view.points.push_back(point);
+      view.pixels.push_back(*pixel + noise_px * glm::dvec2(noise(random), noise(random)));
+    }
+    views.views.push_back(std::move(view));
+  }
+  return views;
+}
+
+std::vector<Held> careful_capture() {
+  std::vector<Held> how;
+  for (const double turn : {-35.0, 0.0, 35.0})
+    for (const double tip : {-35.0, 0.0, 35.0})
+      for (const double depth : {0.30, 0.45})
+        how.push_back({turn, tip, 10 * turn / 35 + 5, {0.12 * turn / 35, 0.09 * tip / 35, depth}});
+  return how;
+}
+
+}  // namespace previz::test

@@ -1,0 +1,194 @@
+// A device that comes and goes, in a time that passes only when somebody sleeps.
+#include "drivers/lifeline.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "drivers/error.hpp"
+#include "drivers/replay/replay_camera.hpp"
+#include "tests/unit/session_fixture.hpp"
+
+namespace previz {
+namespace {
+
+using std::chrono::milliseconds;
+using Kind = Fault::Kind;
+
+constexpr LifelineOptions options{milliseconds(5000), milliseconds(2000), milliseconds(1000),
+                                  milliseconds(250), milliseconds(4000)};
+
+class LifelineTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    session::write_small_session(directory_ / "take", 10);
+    replay_.loop = true;
+    replay_.origin = {now_, session::noise_frame("", 0, PixelFormat::rgb8, 1, 1).timestamp_ns};
+    replay_.position = std::make_shared<ReplayPosition>();
+  }
+
+  HostClock clock() {
+    return {[this] { return now_; }, [this](HostClock::Time time) { now_ = std::max(now_, time); }};
+  }
+
+  CameraOpener take() {
+    return [this] { return open_replay(directory_ / "take", "observer", replay_, clock()); };
+  }
+
+  Lifeline started(CameraOpener open) {
+    Lifeline lifeline("observer", std::move(open), options, clock());
+    lifeline.start();
+    return lifeline;
+  }
+
+  milliseconds elapsed() const {
+    return std::chrono::floor<milliseconds>(now_ - HostClock::Time{});
+  }
+
+  // What is told until `end`: one letter a frame, the words of trouble between them.
+  std::string story(Lifeline& lifeline, milliseconds end) {
+    std::string story;
+    while (elapsed() < end) {
+      const CameraEvent event = lifeline.next(milliseconds(100));
+      if (std::holds_alternative<FramePtr>(event)) {
+        if (!story.ends_with('f')) story += 'f';
+      } else if (const auto* trouble = std::get_if<DeviceTrouble>(&event)) {
+        EXPECT_EQ(trouble->device, "observer");
+        EXPECT_FALSE(trouble->lost);
+        story += " [" + trouble->what + "] ";
+      } else if (std::holds_alternative<EndOfStream>(event)) {
+        return story + " end";
+      }
+    }
+    return story;
+  }
+
+  test::TemporaryDirectory directory_;
+  ReplayOptions replay_;
+  HostClock::Time now_{};
+};
+
+TEST_F(LifelineTest, ADeviceThatIsWellIsJustACamera) {
+  Lifeline lifeline = started(take());
+  EXPECT_EQ(lifeline.state(), DeviceState::absent);
+  EXPECT_EQ(story(lifeline, milliseconds(3000)), "f");
+  EXPECT_EQ(lifeline.state(), DeviceState::streaming);
+  EXPECT_EQ(lifeline.format().width, 24);
+  EXPECT_EQ(lifeline.counters().at("opened"), 1u);
+  lifeline.stop();
+  EXPECT_EQ(lifeline.state(), DeviceState::absent);
+  EXPECT_TRUE(std::holds_alternative<NoFrame>(lifeline.next(milliseconds(100))));
+}
+
+// Attempts at 0, 250, 750, 1750, 3750, 7750 ms, and from then on every 4 s.
+TEST_F(LifelineTest, AnAbsentDeviceIsTriedEverLessOftenAndToldOnce) {
+  std::vector<int> attempts_ms;
+  Lifeline lifeline = started([&]() -> std::unique_ptr<Camera> {
+    attempts_ms.push_back(static_cast<int>(elapsed().count()));
+    if (elapsed() < milliseconds(12'000)) throw Error("is not there");
+    return take()();
+  });
+  EXPECT_EQ(story(lifeline, milliseconds(17'000)),
+            " [is not there; tried again until it is there] f");
+  EXPECT_EQ(attempts_ms, (std::vector<int>{0, 250, 750, 1750, 3750, 7750, 11'750, 15'750}));
+  EXPECT_EQ(lifeline.counters().at("not opened"), 7u);
+}
+
+TEST_F(LifelineTest, ADeviceThatNeverStartsIsOpenedAnew) {
+  Lifeline lifeline = started(with_faults(take(), {{Kind::stall, 0}}, clock()));
+  EXPECT_EQ(story(lifeline, milliseconds(6000)),
+            " [sends no frame within 5000 ms of its start; it is opened anew] f");
+  EXPECT_EQ(lifeline.counters().at("opened"), 2u);
+  EXPECT_EQ(lifeline.counters().at("lost"), 1u);
+}
+
+TEST_F(LifelineTest, AStalledDeviceIsToldThenLostThenBack) {
+  Lifeline lifeline = started(with_faults(take(), {{Kind::stall, 20}}, clock()));
+  std::vector<DeviceState> states;
+  for (int i = 0; i < 60; ++i) {
+    lifeline.next(milliseconds(100));
+    if (states.empty() || states.back() != lifeline.state()) states.push_back(lifeline.state());
+  }
+  EXPECT_EQ(states, (std::vector{DeviceState::streaming, DeviceState::stalled, DeviceState::lost,
+                                 DeviceState::streaming}));
+  EXPECT_EQ(lifeline.counters().at("stalled"), 1u);
+  EXPECT_EQ(lifeline.counters().at("lost"), 1u);
+}
+
+TEST_F(LifelineTest, AStallThatEndsByItselfIsNotGivenUp) {
+  // 60 frames of 40 ms are 2.4 s: longer than the stall time-out, shorter than the patience.
+  Lifeline lifeline = started(with_faults(take(), {{Kind::drop, 20, 60}}, clock()));
+  EXPECT_EQ(story(lifeline, milliseconds(6000)), "f [has sent nothing for 2000 ms] f");
+  EXPECT_EQ(lifeline.counters().at("opened"), 1u);
+}
+
+TEST_F(LifelineTest, ALostDeviceIsPickedUpWhenItIsBack) {
+  Lifeline lifeline =
+      started(with_faults(take(), {{Kind::disconnect, 20, 1, std::chrono::seconds(3)}}, clock()));
+  EXPECT_EQ(story(lifeline, milliseconds(9000)),
+            "f [was unplugged; it is opened anew] "
+            " [the device is unplugged; tried again until it is there] f");
+  EXPECT_EQ(lifeline.state(), DeviceState::streaming);
+}
+
+TEST_F(LifelineTest, TroubleOfOneFrameIsPassedOn) {
+  Lifeline lifeline = started(with_faults(take(), {{Kind::corrupt, 3}}, clock()));
+  EXPECT_EQ(story(lifeline, milliseconds(1000)), "f [frame 103 is damaged and left out] f");
+  EXPECT_EQ(lifeline.counters().at("opened"), 1u);
+}
+
+TEST_F(LifelineTest, TheEndOfATakeIsTheEnd) {
+  replay_.loop = false;
+  Lifeline lifeline = started(take());
+  EXPECT_EQ(story(lifeline, milliseconds(1000)), "f end");
+  EXPECT_TRUE(std::holds_alternative<NoFrame>(lifeline.next(milliseconds(0))));
+}
+
+TEST_F(LifelineTest, ADeviceMayComeBackWithAnotherFormat) {
+  session::write_small_session(directory_ / "other", 10, 40, 30);
+  int opened = 0;
+  Lifeline lifeline = started(with_faults(
+      [&] {
+        const char* name = opened++ == 0 ? "take" : "other";
+        return open_replay(directory_ / name, "observer", replay_, clock());
+      },
+      {{Kind::disconnect, 5, 1, milliseconds(0)}}, clock()));
+  for (int i = 0; i < 30; ++i) {
+    const CameraEvent event = lifeline.next(milliseconds(100));
+    const auto* frame = std::get_if<FramePtr>(&event);
+    if (!frame) continue;
+    EXPECT_EQ((*frame)->width, lifeline.counters().at("opened") == 1 ? 24 : 40);
+  }
+  EXPECT_EQ(lifeline.format().height, 30);
+}
+
+// A device as a recorder of what it is asked.
+class Asked final : public Camera {
+ public:
+  explicit Asked(std::vector<double>& exposures) : exposures_(exposures) {}
+  std::string name() const override { return "asked"; }
+  CameraFormat format() const override { return {}; }
+  void start() override {}
+  void stop() override {}
+  CameraEvent next(milliseconds) override { return DeviceTrouble{"asked", "is gone", true}; }
+  bool set_exposure(double exposure_s, double) override {
+    exposures_.push_back(exposure_s);
+    return true;
+  }
+  DeviceCounters counters() const override { return {{"frames cut short", 2}}; }
+
+ private:
+  std::vector<double>& exposures_;
+};
+
+TEST_F(LifelineTest, ExposuresAndCountersOutliveAnOpening) {
+  std::vector<double> exposures;
+  Lifeline lifeline = started([&] { return std::make_unique<Asked>(exposures); });
+  EXPECT_TRUE(lifeline.set_exposure(0.25, 1));
+  story(lifeline, milliseconds(800));  // opened at 0, 250 and 750 ms
+  EXPECT_EQ(exposures, (std::vector<double>{0.25, 0.25, 0.25}));
+  EXPECT_EQ(lifeline.counters().at("frames cut short"), 6u);
+}
+
+}  // namespace
+}  // namespace previz

@@ -1,0 +1,214 @@
+// The plate as the radiance of real surfaces: what mirrors and virtual objects take from it, and
+// where it may not be taken.
+#include <numbers>
+
+#include "tests/unit/render_fixture.hpp"
+
+namespace previz::testing {
+namespace {
+
+constexpr int width = 48, height = 36;
+constexpr double white = 4;  // of the sensor, whose response is linear with 16 bits
+constexpr float albedo = 0.5f;
+
+set::Estimation by_camera(set::Estimator estimator = set::Estimator::paired) {
+  set::Estimation estimation = up_to_depth(8);
+  estimation.real_radiance = set::RealRadiance::camera;
+  estimation.estimator = estimator;
+  return estimation;
+}
+
+// A matt floor in the lower half of the picture, and a virtual mirror in its upper half that leans
+// over it, so that what it shows of the floor is in the picture, too.
+View floor_and_mirror() {
+  View view;
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({8, 8})),
+               add_material(view.scene, diffuse(glm::vec3(albedo))));
+  glm::dmat4 pose(1);
+  // Its back edge at y = 1.5, 0.4 above the floor; it faces the camera and down.
+  const double lean = 1.9;
+  pose[1] = {0, std::cos(lean), std::sin(lean), 0};
+  pose[2] = {0, -std::sin(lean), std::cos(lean), 0};
+  pose[3] = {0, 1.5, 0.8, 1};
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({0.8, 0.8})),
+               add_material(view.scene, metal(glm::vec3(1), 0)), pose, scene::world_mixed);
+  view.environment = uniform_environment(glm::vec3(0));
+  view.calibration = pinhole(width, height, 0.9);
+  view.calibration.response.kind = ResponseCurve::Kind::linear;
+  view.world_from_camera = look_at({0, -1.5, 1}, {0, 0.6, 0.3});
+  return view;
+}
+
+Plate plate_of(const std::function<glm::dvec3(int x, int y)>& radiance) {
+  Plate plate;
+  plate.width = width;
+  plate.height = height;
+  plate.bits = 16;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      for (int c = 0; c < 3; ++c)
+        plate.samples.push_back(
+            static_cast<std::uint16_t>(std::lround(radiance(x, y)[c] / white * 65535)));
+  return plate;
+}
+
+Rendered render_over(const View& view, const Plate& plate, const set::Estimation& estimation,
+                     int samples = 4, std::uint32_t seed = 1) {
+  render::Renderer renderer(shared_device(), estimation, view.calibration);
+  renderer.set_scene(view.scene);
+  renderer.set_environment(view.environment, set::LightSampling::importance);
+  renderer.begin({plate, 1 / white, view.world_from_camera, seed});
+  renderer.render(samples);
+  expect_clean(renderer.counters());
+  return {renderer.layers(), renderer.counters()};
+}
+
+// The pixel on whose middle this one's mirror image falls, if all of the pixel shows the mirror and
+// the floor in it; -1, -1: none.
+glm::dvec2 mirrored_pixel(const View& view, int x, int y) {
+  const PinholeIntrinsics& k = view.calibration.intrinsics;
+  const glm::dmat4& camera = view.world_from_camera;
+  const glm::dmat4& mirror = view.scene.instances[1].world_from_object;
+  const glm::dvec3 eye(camera[3]), normal(mirror[2]), middle(mirror[3]);
+  const glm::dvec3 ray(glm::dmat3(camera) * glm::dvec3((x - k.cx) / k.fx, (y - k.cy) / k.fy, 1));
+  const double t = glm::dot(middle - eye, normal) / glm::dot(ray, normal);
+  const glm::dvec3 hit = eye + t * ray;
+  const glm::dvec2 inside(glm::dot(hit - middle, glm::dvec3(mirror[0])),
+                          glm::dot(hit - middle, glm::dvec3(mirror[1])));
+  if (t <= 0 || std::max(std::abs(inside.x), std::abs(inside.y)) > 0.35) return {-1, -1};
+  const glm::dvec3 reflected = glm::reflect(ray, normal);
+  if (reflected.z >= 0) return {-1, -1};
+  const glm::dvec3 floor = hit - reflected * (hit.z / reflected.z);
+  const glm::dvec3 seen = glm::inverse(glm::dmat3(camera)) * (floor - eye);
+  return {k.cx + k.fx * seen.x / seen.z, k.cy + k.fy * seen.y / seen.z};
+}
+
+bool is_inside(const glm::dvec2& pixel) {
+  return pixel.x > 3 && pixel.y > 3 && pixel.x < width - 4 && pixel.y < height - 4;
+}
+
+// The floor is dark in the model, and bright in the plate, rising from left to right: the mirror
+// shows the plate's floor.
+TEST(CameraRadiance, a_mirror_shows_the_plate) {
+  const View view = floor_and_mirror();
+  const auto shade = [](double x) { return 0.2 + x / width; };
+  const Plate plate = plate_of([&](int x, int) { return glm::dvec3(1, 0.5, 0.25) * shade(x); });
+  for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
+    const Rendered result = render_over(view, plate, by_camera(estimator), 16);
+    EXPECT_GT(result.counters.measured, 0u);
+    int compared = 0;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        const glm::dvec2 seen = mirrored_pixel(view, x, y);
+        const auto i = static_cast<std::size_t>(y) * width + x;
+        if (!is_inside(seen) || result.layers.mask[i] != 1) continue;
+        // Samples are spread over the pixel: its image is less than three pixels wide, of whose
+        // slope of 1/width the 16 stratified samples' mean is off by less than a quarter.
+        EXPECT_NEAR(result.layers.composite[i].g, 0.5 * shade(seen.x), 0.25 * 3 * 0.5 / width);
+        ++compared;
+      }
+    }
+    EXPECT_GT(compared, 20) << "the mirror must show the floor";
+  }
+}
+
+// In the sun, the mirror shows the plate's floor and on it the shadow of a virtual ball, darker
+// than the plate by what the model says the sun brings.
+TEST(CameraRadiance, a_mirror_shows_the_plate_with_virtual_shadows) {
+  View view = floor_and_mirror();
+  set::Light sun = lamp(set::LightType::directional, glm::dvec3(3));
+  sun.direction = glm::normalize(glm::dvec3(0, 0.5, -1));
+  view.scene.lights.push_back(sun);
+  // A roof far above that shades all that the mirror shows.
+  glm::dmat4 pose(1);
+  pose[3] = {0, -40, 80, 1};
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({60, 60})),
+               add_material(view.scene, emitter(glm::vec3(0))), pose, scene::world_mixed);
+  const double brought = albedo / std::numbers::pi * 3 * -sun.direction.z;
+  const Plate plate = plate_of([](int, int) { return glm::dvec3(2); });
+  set::Estimation estimation = by_camera();
+  estimation.max_depth = 2;  // mirror, floor: not what the mirror adds to the floor
+  const Rendered result = render_over(view, plate, estimation, 16);
+  render::Layers shown;  // the pixels that show the floor in the mirror; all expect the same
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const auto i = static_cast<std::size_t>(y) * width + x;
+      if (is_inside(mirrored_pixel(view, x, y)) && result.layers.mask[i] == 1)
+        shown.mixed.push_back(result.layers.composite[i]);
+    }
+  }
+  ASSERT_GT(shown.mixed.size(), 20u);
+  // The difference is followed by chance, so far from the roof.
+  EXPECT_NEAR(mean(shown.mixed).g, 2 - brought, 4 * standard_error_of_pixels(shown));
+  EXPECT_LT(standard_error_of_pixels(shown), 0.01);
+}
+
+// Where the plate is clipped, or the floor not matt, the model's own radiance is traced: here none.
+TEST(CameraRadiance, what_cannot_be_measured_is_traced_and_counted) {
+  const auto expect_traced = [](const View& view, const Plate& plate) {
+    const Rendered result = render_over(view, plate, by_camera());
+    EXPECT_EQ(result.counters.measured, 0u);
+    EXPECT_GT(result.counters.unmeasured, 0u);
+    EXPECT_EQ(mean(result.layers.mixed), glm::dvec3(0));
+  };
+  const Plate gray = plate_of([](int, int) { return glm::dvec3(1); });
+  View view = floor_and_mirror();
+  expect_traced(view, plate_of([](int, int) { return glm::dvec3(1, white, 1); }));
+  view.scene.materials[0] = plastic(glm::vec3(albedo), 0.5f);
+  expect_traced(view, gray);
+  view.scene.materials[0] = emitter(glm::vec3(0));
+  view.scene.materials[0].emission_texture = scene::no_texture;
+  view.scene.materials[0].specular = 1;
+  expect_traced(view, gray);
+}
+
+// A wall before the floor hides what the mirror shows of it.
+TEST(CameraRadiance, what_is_hidden_is_traced) {
+  View view = floor_and_mirror();
+  glm::dmat4 pose(1);
+  pose[1] = {0, 0, 1, 0};
+  pose[2] = {0, -1, 0, 0};
+  pose[3] = {0, -1.2, 0, 1};
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({4, 2.6})), 0, pose);
+  view.scene.instances.back().presence = scene::world_real;  // the mixed rays pass it
+  const Plate plate = plate_of([](int, int) { return glm::dvec3(1); });
+  const Rendered result = render_over(view, plate, by_camera());
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const auto i = static_cast<std::size_t>(y) * width + x;
+      if (is_inside(mirrored_pixel(view, x, y)) && result.layers.mask[i] == 1) {
+        EXPECT_EQ(result.layers.mixed[i], glm::vec3(0)) << x << ' ' << y;
+      }
+    }
+  }
+}
+
+TEST(CameraRadiance, with_nothing_virtual_the_plate_is_untouched) {
+  View view = floor_and_mirror();
+  view.scene.instances.pop_back();
+  view.environment = uniform_environment(glm::vec3(1));
+  const Plate plate =
+      plate_of([](int x, int y) { return glm::dvec3(0.1 + 0.01 * x, 1, 0.02 * y); });
+  for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
+    render::Renderer renderer(shared_device(), by_camera(estimator), view.calibration);
+    renderer.set_scene(view.scene);
+    renderer.set_environment(view.environment, set::LightSampling::importance);
+    renderer.begin({plate, 1 / white, view.world_from_camera, 1});
+    renderer.render(4);
+    EXPECT_EQ(renderer.picture().samples, plate.samples);
+    expect_clean(renderer.counters());
+  }
+}
+
+// Without a plate there is nothing to take: the pictures are those that are traced, bit for bit.
+TEST(CameraRadiance, without_a_plate_all_is_traced) {
+  View view = floor_and_mirror();
+  view.environment = uniform_environment(glm::vec3(1));
+  set::Estimation traced = by_camera();
+  traced.real_radiance = set::RealRadiance::traced;
+  EXPECT_EQ(render_view(view, 4, by_camera()).layers.mixed,
+            render_view(view, 4, traced).layers.mixed);
+}
+
+}  // namespace
+}  // namespace previz::testing
