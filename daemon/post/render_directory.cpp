@@ -60,6 +60,13 @@ void write_exr(const std::filesystem::path& file, const pipeline::Shot& shot, co
   metadata.set_name = set.name;
   metadata.pose = to_string(shot.track.status);
   if (shot.track.pose) metadata.world_from_camera = shot.track.pose->world_from_camera;
+  metadata.exposure_s = shot.frame->exposure_s;
+  if (const auto& calibration = set.observer.calibration) {
+    metadata.lens = calibration->lens;
+    if (calibration->intrinsics.width == shot.layers.width &&
+        calibration->intrinsics.height == shot.layers.height)
+      metadata.intrinsics = calibration->intrinsics;
+  }
   output::write_exr(file, shot.layers, metadata);
 }
 
