@@ -14,6 +14,7 @@
 
 #include "daemon/calibrate/board.hpp"
 #include "daemon/calibrate/calibrate.hpp"
+#include "daemon/post/camera_track.hpp"
 #include "daemon/post/check.hpp"
 #include "daemon/post/import.hpp"
 #include "daemon/post/render.hpp"
@@ -101,6 +102,7 @@ void add_run(CLI::App& app, rig::LiveOptions& options) {
   command.add_option("--spp", options.samples, "Samples per pixel (default: quality.samples)")
       ->check(CLI::Range(1, 1'000'000));
   command.add_option("--out", options.directory, "Directory for picture.png and metrics.json");
+  command.add_flag("--bus", options.bus, "Serve org.previz.Rig1 on the system bus (previzctl)");
   command.add_flag("--loop", options.loop, "Replayed cameras start again at their end, for ever");
   add_device_options(command, options.device);
 }
@@ -115,6 +117,13 @@ void add_import(CLI::App& app, post::ImportOptions& options) {
   CLI::App& command = *app.add_subcommand("import", "Make a session of footage");
   command.add_option("description", options.description, "FRAMES.json")->required();
   command.add_option("session", options.session, "Session directory to make")->required();
+}
+
+void add_export(CLI::App& app, post::ExportOptions& options) {
+  CLI::App& command =
+      *app.add_subcommand("export", "Write a take's camera for USD and Nuke, with its scene");
+  command.add_option("session", options.session, "Session directory")->required();
+  command.add_option("directory", options.directory, "Directory for the files")->required();
 }
 
 void add_trade(CLI::App& app, post::TradeOptions& options) {
@@ -219,6 +228,7 @@ int main(int argc, char** argv) {
   rig::LiveOptions live_options;
   std::filesystem::path checked;
   post::ImportOptions import_options;
+  post::ExportOptions export_options;
   post::TradeOptions trade_options;
   CalibrateOptions calibrate_options;
   try {
@@ -226,6 +236,7 @@ int main(int argc, char** argv) {
     add_run(app, live_options);
     add_check(app, checked);
     add_import(app, import_options);
+    add_export(app, export_options);
     add_trade(app, trade_options);
     add_calibrate(app, calibrate_options);
     app.parse(argc, argv);
@@ -234,6 +245,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("check")) return post::check_set(checked, std::cout);
     if (app.got_subcommand("calibrate"))
       return do_calibrate(*app.get_subcommand("calibrate"), calibrate_options);
+    if (app.got_subcommand("export")) return post::export_take(export_options, std::cout), 0;
     if (app.got_subcommand("import")) return do_import(import_options);
     if (app.got_subcommand("render")) return do_render(render_options, stop);
     if (app.got_subcommand("trade")) return do_trade(trade_options, stop);

@@ -79,7 +79,9 @@ bool RenderStage::begin(Shot& shot) {
 
   if (light_ != shot.light) {
     renderer_.set_environment(shot.light->lighting.environment, set_.lighting.sampling);
-    if (set_.lighting.mode != set::LightMode::image) renderer_.set_sources(shot.light->lamps);
+    // Once there can be lamps there may be none again: the mode changes live.
+    has_sources_ |= set_.lighting.mode != set::LightMode::image || !shot.light->lamps.empty();
+    if (has_sources_) renderer_.set_sources(shot.light->lamps);
     light_ = shot.light;
   }
   if (placed_ != shot.scene) place(shot.scene);

@@ -66,6 +66,7 @@ class RenderStage {
   scene::Scene scene_;             // as in the set; instances and lamps only
   session::SceneState placed_;     // what the renderer holds
   LightPtr light_;                 // the one the renderer holds
+  bool has_sources_ = false;       // lamps beside the scene\'s were ever set
   std::set<std::string> unknown_;  // names of recorded states that were told
 };
 

@@ -19,6 +19,7 @@ FramePtr CameraSource::next() {
       arrived(**frame);
       return std::move(*frame);
     }
+    if (std::chrono::steady_clock::now() - last_ > silence) lose();
   }
   return nullptr;
 }
@@ -26,8 +27,11 @@ FramePtr CameraSource::next() {
 void CameraSource::trouble(const DeviceTrouble& trouble) {
   told_.note(trouble.device + ": " + trouble.what);
   told_.metrics.count(stage_ + ": device trouble");
-  if (!trouble.lost || lost_) return;
-  lost_ = true;
+  if (trouble.lost) lose();
+}
+
+void CameraSource::lose() {
+  if (std::exchange(lost_, true)) return;
   if (told_.presence) told_.presence(true);
 }
 
@@ -36,6 +40,7 @@ void CameraSource::arrived(const Frame& frame) {
   if (last_sequence_ && frame.sequence > *last_sequence_ + 1)
     told_.metrics.dropped(stage_, "by the device", frame.sequence - *last_sequence_ - 1);
   last_sequence_ = frame.sequence;
+  last_ = std::chrono::steady_clock::now();
   exposure_s_ = frame.exposure_s;
   gain_ = frame.gain;
 }

@@ -1,6 +1,8 @@
 // Frames of a camera for the pipeline; trouble is noted, counted and told to the desk.
 #pragma once
 
+#include <chrono>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <stop_token>
@@ -22,6 +24,9 @@ class CameraSource {
   };
   CameraSource(Camera& camera, std::string stage, Told told);
 
+  // A camera counts as lost once it has said so, or said nothing for this long.
+  static constexpr std::chrono::seconds silence{1};
+
   // The next frame; null at the end of the stream, or once a stop is requested.
   FramePtr next();
 
@@ -30,12 +35,14 @@ class CameraSource {
 
  private:
   void trouble(const DeviceTrouble& trouble);
+  void lose();
   void arrived(const Frame& frame);
 
   Camera& camera_;
   const std::string stage_;
   Told told_;
   bool lost_ = false;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   std::optional<std::uint64_t> last_sequence_;
   double exposure_s_ = 0, gain_ = 1;  // of the last frame
 };

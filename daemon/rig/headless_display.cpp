@@ -29,10 +29,13 @@ void HeadlessDisplay::show(pipeline::Shot shot) {
   written_ = Clock::now();
 }
 
+pipeline::MetricsSnapshot HeadlessDisplay::metrics() const {
+  return metrics_.snapshot(std::chrono::duration<double>(Clock::now() - start_).count());
+}
+
 pipeline::MetricsSnapshot HeadlessDisplay::write() {
   if (!picture_.samples.empty()) output::write_png(directory_ / "picture.png", picture_);
-  const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
-  pipeline::MetricsSnapshot snapshot = metrics_.snapshot(seconds);
+  pipeline::MetricsSnapshot snapshot = metrics();
   session::replace_file(directory_ / "metrics.json", to_json(snapshot));
   return snapshot;
 }

@@ -22,6 +22,7 @@ struct LiveOptions {
   std::optional<int> samples;                      // quality.samples
   std::optional<std::filesystem::path> directory;  // output.directory
   bool loop = false;                               // replayed cameras start again at their end
+  bool bus = false;                                // org.previz.Rig1 on the system bus
   render::DeviceOptions device;
   std::stop_token stop;
   // Devices besides those the set names: a test's own.

@@ -71,7 +71,8 @@ struct LivePipeline::Impl {
   pipeline::RenderStage render_stage;
   std::optional<CameraSource> observer;
   std::uint64_t next_index = 0;
-  int exposure_steps = 0;  // of Look::exposure_steps, done
+  set::LightMode light_mode = parts.set.lighting.mode;  // of an environment file
+  int exposure_steps = 0;                               // of Look::exposure_steps, done
 
   // Every exposure of a bracket counts, so light frames queue; the estimate takes all that wait.
   pipeline::BoundedQueue<LightFrame> light_frames{16};
@@ -184,6 +185,11 @@ std::optional<Shot> LivePipeline::Impl::capture() {
 Shot LivePipeline::Impl::track(Shot shot) {
   const std::shared_ptr<const Look> look = parts.look.get();
   if (!tracks(look->state)) return shot;
+  if (!lighting.needs_frames() && look->light_mode != light_mode) {
+    light_mode = look->light_mode;
+    lighting.use(light_mode);
+    lights.push(lighting.light());
+  }
   track_stage(shot);
   shot.scene = pipeline::scene_state(parts.set, look->edits);
   parts.recorder.offer(record_of(shot));
@@ -192,9 +198,11 @@ Shot LivePipeline::Impl::track(Shot shot) {
 
 void LivePipeline::Impl::output_stages() {
   stages->sink("display", rendered, [this](Shot shot) { show(std::move(shot)); });
-  stages->sink("snapshot", snapshots, [this](const Shot& shot) {
+  set::Set set = parts.set;
+  set.observer.calibration = calibration;
+  stages->sink("snapshot", snapshots, [this, set = std::move(set)](const Shot& shot) {
     try {
-      parts.note.again("snapshot: " + write_snapshot(shot, parts.set).string());
+      parts.note.again("snapshot: " + write_snapshot(shot, set).string());
     } catch (const Error& error) {
       parts.note.again(std::string("snapshot: ") + error.what());
     }

@@ -90,6 +90,10 @@ void Rig::open_buttons() {
 std::optional<LoadedSet> Rig::run() {
   const auto inbox_watch = parts_.loop.on_readable(inbox_.fd(), [this] { inbox(); });
   const auto timer = parts_.loop.every(tick_interval, [this] { tick(); });
+  std::unique_ptr<EventLoop::Watch> watchdog;
+  if (const auto interval = service::watchdog_interval())
+    watchdog = parts_.loop.every(*interval, [this] { feed_watchdog(); });
+  service::ready("set \"" + loaded_.set.name + "\"");
   parts_.loop.run();
   if (next_) return std::move(next_);
   pipeline_.wait();
@@ -149,6 +153,8 @@ void Rig::tell(const Outcome& outcome, const std::string& by) {
   publish();
   if (outcome.request) carry_out(*outcome.request);
   recorder_.offer_event(now_ns(), line);
+  service::status(line);
+  last_said_ = line;
   if (changed_) changed_();
 }
 
@@ -236,6 +242,13 @@ void Rig::look_at_set_file() {
   set_time_ = time;
   parts_.note.again(loaded_.set.file.string() + ": the file has changed");
   change_set(loaded_.set.file);
+}
+
+void Rig::feed_watchdog() {
+  const Progress now = progress_of(parts_.metrics.snapshot(0), controls_.look().state);
+  if (!advances(progress_, now)) return;
+  progress_ = now;
+  service::feed_watchdog();
 }
 
 std::int64_t Rig::now_ns() const {

@@ -23,6 +23,7 @@
 #include "daemon/rig/notes.hpp"
 #include "daemon/rig/press.hpp"
 #include "daemon/rig/review.hpp"
+#include "daemon/rig/service.hpp"
 
 namespace previz::rig {
 
@@ -55,6 +56,7 @@ class Rig {
 
   const Controls& controls() const { return controls_; }
   const LoadedSet& loaded() const { return loaded_; }
+  const std::string& last_said() const { return last_said_; }
   output::RecorderStatus recorder_status() const { return recorder_.status(); }
   // Called after anything of the above has changed.
   void on_change(std::function<void()> changed) { changed_ = std::move(changed); }
@@ -73,6 +75,7 @@ class Rig {
   void tick();
   void look_at_recorder();
   void look_at_set_file();
+  void feed_watchdog();
   void tell(const Outcome& outcome, const std::string& by);
   void carry_out(Request request);
   void change_set(const std::filesystem::path& file);
@@ -92,10 +95,12 @@ class Rig {
   std::uint64_t finished_takes_ = 0, failures_ = 0;
   std::filesystem::file_time_type set_time_;
   int ticks_ = 0;
+  Progress progress_;  // when the watchdog was last fed
   std::unique_ptr<Review> review_;
   std::vector<std::unique_ptr<Review>> ended_reviews_;
   std::optional<LoadedSet> next_;
   std::function<void()> changed_;
+  std::string last_said_;
   LivePipeline pipeline_;  // last: its threads use all of the above
 };
 

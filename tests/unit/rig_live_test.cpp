@@ -3,9 +3,13 @@
 #include "daemon/rig/live.hpp"
 
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 
 #include <algorithm>
+#include <array>
 #include <condition_variable>
 #include <deque>
 #include <fstream>
@@ -16,6 +20,7 @@
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/post/render.hpp"
+#include "daemon/rig/service.hpp"
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
@@ -102,6 +107,8 @@ class RigLive : public testing::Test {
     test::write_small_take(directory_.path(), true, text);
   }
 
+  std::function<void()> while_shown_ = [] {};  // on the display's thread
+
   // Runs the daemon, looping the take, until the script has ended.
   void run(const std::function<void()>& script) {
     LiveOptions options;
@@ -116,9 +123,11 @@ class RigLive : public testing::Test {
       return buttons;
     };
     options.on_shown = [&](const Shot& shot, const Look& look) {
-      const std::lock_guard lock(mutex_);
+      std::unique_lock lock(mutex_);
       shown_ = {shot, look, shown_.count + 1};
       seen_.notify_all();
+      lock.unlock();
+      while_shown_();
     };
     std::jthread crew([&] {
       script();
@@ -355,6 +364,78 @@ TEST_F(RigLive, ARecordedTakePressesItsButtonsAgain) {
   session::Session session = session::open_session(directory_ / "takes/12A_take001");
   EXPECT_TRUE(session.missing.empty());
   EXPECT_GT(session::open_stream(session, "observer")->records().size(), 0u);
+}
+
+// systemd's end of the notification socket.
+class NotifySocket {
+ public:
+  explicit NotifySocket(const std::filesystem::path& path)
+      : descriptor_(socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path.string().copy(address.sun_path, sizeof address.sun_path - 1);
+    EXPECT_EQ(bind(descriptor_.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    setenv("NOTIFY_SOCKET", path.c_str(), 1);
+    setenv("WATCHDOG_USEC", "200000", 1);
+  }
+  ~NotifySocket() {
+    unsetenv("NOTIFY_SOCKET");
+    unsetenv("WATCHDOG_USEC");
+  }
+  // The next message; empty where none came within the time.
+  std::string next(int milliseconds) {
+    pollfd poll_one{descriptor_.get(), POLLIN, 0};
+    if (poll(&poll_one, 1, milliseconds) != 1) return "";
+    std::array<char, 1024> text{};
+    const ssize_t size = recv(descriptor_.get(), text.data(), text.size(), 0);
+    return {text.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
+  }
+  void until(const std::string& words) {
+    while (next(60'000).find(words) == std::string::npos) continue;
+  }
+
+ private:
+  OwnedDescriptor descriptor_;
+};
+
+// A display that hangs: the camera goes on, and the watchdog starves although the loop is alive.
+TEST_F(RigLive, TheWatchdogIsFedOnlyWhileFramesAdvance) {
+  write_set();
+  NotifySocket systemd(directory_ / "notify");
+  std::mutex gate;
+  while_shown_ = [&] { const std::lock_guard wait(gate); };
+  run([&] {
+    systemd.until("READY=1");
+    systemd.until("WATCHDOG=1");
+    {
+      const std::lock_guard hang(gate);
+      std::this_thread::sleep_for(std::chrono::milliseconds(500));  // what was under way is over
+      while (!systemd.next(0).empty()) continue;
+      press("samples_up");  // the loop answers
+      systemd.until("STATUS=button samples_up");
+      for (std::string said = systemd.next(500); !said.empty(); said = systemd.next(500))
+        EXPECT_EQ(said.find("WATCHDOG=1"), std::string::npos);
+    }
+    systemd.until("WATCHDOG=1");
+  });
+  systemd.until("STOPPING=1");
+}
+
+TEST(Progress, EveryStageWithSomethingToDoMustDoIt) {
+  const Progress start;
+  const auto with = [](auto change) {
+    Progress now{10, 10, 3, 1, false, false};
+    change(now);
+    return now;
+  };
+  EXPECT_TRUE(advances(start, with([](Progress&) {})));
+  EXPECT_FALSE(advances(start, with([](Progress& p) { p.captured = 0; })));
+  EXPECT_FALSE(advances(start, with([](Progress& p) { p.shown = 0; })));
+  EXPECT_FALSE(advances(start, with([](Progress& p) { p.light_estimates = 0; })));
+  EXPECT_TRUE(advances(start, with([](Progress& p) { p.lights = p.light_estimates = 0; })));
+  EXPECT_TRUE(advances(start, with([](Progress& p) { p.shown = 0, p.dark = true; })));
+  EXPECT_TRUE(
+      advances(start, with([](Progress& p) { p.captured = p.shown = 0, p.camera_lost = true; })));
 }
 
 }  // namespace
