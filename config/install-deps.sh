@@ -17,6 +17,8 @@ packages=(
   libapriltag-dev libembree-dev libtinygltf-dev libstb-dev libglm-dev
   # files, command line, log, hashes
   libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libspdlog-dev libfmt-dev libssl-dev
+  # main loop, service, D-Bus
+  libsystemd-dev dbus-daemon
   # tests
   libgtest-dev libgmock-dev libbenchmark-dev
 )

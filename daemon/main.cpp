@@ -13,6 +13,7 @@
 #include <iostream>
 
 #include "daemon/calibrate/command_line.hpp"
+#include "daemon/post/camera_track.hpp"
 #include "daemon/post/check.hpp"
 #include "daemon/post/import.hpp"
 #include "daemon/post/render.hpp"
@@ -101,6 +102,7 @@ void add_run(CLI::App& app, rig::LiveOptions& options) {
   command.add_option("--spp", options.samples, "Samples per pixel (default: quality.samples)")
       ->check(CLI::Range(1, 1'000'000));
   command.add_option("--out", options.directory, "Directory for picture.png and metrics.json");
+  command.add_flag("--bus", options.bus, "Serve org.previz.Rig1 on the system bus (previzctl)");
   command.add_flag("--loop", options.loop, "Replayed cameras start again at their end, for ever");
   add_device_options(command, options.device);
 }
@@ -122,6 +124,13 @@ void add_import(CLI::App& app, post::ImportOptions& options) {
   CLI::App& command = *app.add_subcommand("import", "Make a session of footage");
   command.add_option("description", options.description, "FRAMES.json")->required();
   command.add_option("session", options.session, "Session directory to make")->required();
+}
+
+void add_export(CLI::App& app, post::ExportOptions& options) {
+  CLI::App& command =
+      *app.add_subcommand("export", "Write a take's camera for USD and Nuke, with its scene");
+  command.add_option("session", options.session, "Session directory")->required();
+  command.add_option("directory", options.directory, "Directory for the files")->required();
 }
 
 void add_trade(CLI::App& app, post::TradeOptions& options) {
@@ -199,6 +208,7 @@ int main(int argc, char** argv) {
   std::filesystem::path checked;
   bool learn = false;
   post::ImportOptions import_options;
+  post::ExportOptions export_options;
   post::TradeOptions trade_options;
   calibrate::Commands calibrate_options;
   try {
@@ -207,6 +217,7 @@ int main(int argc, char** argv) {
     add_check(app, checked);
     add_devices(app, learn);
     add_import(app, import_options);
+    add_export(app, export_options);
     add_trade(app, trade_options);
     calibrate::add_calibrate(app, calibrate_options);
     app.parse(argc, argv);
@@ -216,6 +227,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("calibrate"))
       return calibrate::do_calibrate(app, calibrate_options, std::cout);
     if (app.got_subcommand("devices")) return do_devices(learn, stop);
+    if (app.got_subcommand("export")) return post::export_take(export_options, std::cout), 0;
     if (app.got_subcommand("import")) return do_import(import_options);
     if (app.got_subcommand("render")) return do_render(render_options, stop);
     if (app.got_subcommand("trade")) return do_trade(trade_options, stop);

@@ -34,13 +34,17 @@ scene::Scene real_world(scene::Scene scene) {
 
 // Every surface of the real world glows with its number; black where it is not diffuse.
 scene::Scene glowing(scene::Scene scene, std::vector<KnownSurface>& surfaces) {
-  for (scene::Material& material : scene.materials) {
+  // A recoloured surface leaves the material of its file behind, under the same name.
+  std::vector<bool> used(scene.materials.size());
+  for (const scene::Instance& instance : scene.instances) used[instance.material] = true;
+  for (std::size_t i = 0; i < scene.materials.size(); ++i) {
+    scene::Material& material = scene.materials[i];
     scene::Material glow;
     glow.name = material.name;
     glow.double_sided = material.double_sided;
     glow.base_color = glm::vec3(0);
     glow.specular = 0;
-    if (is_diffuse(material)) {
+    if (used[i] && is_diffuse(material)) {
       auto known = std::ranges::find(surfaces, material.name, &KnownSurface::material);
       if (known == surfaces.end())
         known = surfaces.insert(surfaces.end(), {material.name, glm::dvec3(material.base_color)});

@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <array>
+#include <glm/matrix.hpp>
 #include <limits>
 
 #include "daemon/output/file.hpp"
@@ -63,6 +64,27 @@ Imf::FrameBuffer frame_buffer(const render::Layers& layers) {
   return buffer;
 }
 
+// Imath's matrices are of row vectors.
+Imath::M44f row_vector_matrix(const glm::dmat4& matrix) {
+  Imath::M44f result;
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j) result[i][j] = static_cast<float>(matrix[i][j]);
+  return result;
+}
+
+void add_camera(Imf::Header& header, const ExrMetadata& metadata) {
+  const glm::dmat4 camera_from_world = glm::inverse(metadata.world_from_camera);
+  const glm::dmat4 y_up{{1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
+  Imf::addWorldToCamera(header, row_vector_matrix(y_up * camera_from_world));
+  if (!metadata.intrinsics) return;
+  const PinholeIntrinsics& i = *metadata.intrinsics;
+  const glm::dmat4 ndc_from_camera{{i.fx / i.width, 0, 0, 0},
+                                   {0, i.fy / i.height, 0, 0},
+                                   {(i.cx + 0.5) / i.width, (i.cy + 0.5) / i.height, 1, 1},
+                                   {0, 0, 0, 0}};
+  Imf::addWorldToNDC(header, row_vector_matrix(ndc_from_camera * camera_from_world));
+}
+
 Imf::Header header(const render::Layers& layers, const ExrMetadata& metadata) {
   Imf::Header header(layers.width, layers.height);
   header.compression() = Imf::ZIP_COMPRESSION;
@@ -87,6 +109,12 @@ Imf::Header header(const render::Layers& layers, const ExrMetadata& metadata) {
       for (int column = 0; column < 4; ++column)
         matrix[row][column] = metadata.world_from_camera[column][row];
     header.insert("previz.world_from_camera", Imf::M44dAttribute(matrix));
+    add_camera(header, metadata);
+  }
+  if (metadata.exposure_s > 0) Imf::addExpTime(header, static_cast<float>(metadata.exposure_s));
+  if (metadata.lens) {
+    Imf::addAperture(header, static_cast<float>(metadata.lens->f_number));
+    Imf::addFocus(header, static_cast<float>(metadata.lens->focus_distance_m));
   }
   return header;
 }

@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <glm/mat4x4.hpp>
+#include <optional>
 #include <string>
 
 #include "daemon/render/layers.hpp"
+#include "drivers/calibration.hpp"
 
 namespace previz::output {
 
@@ -15,13 +17,19 @@ namespace previz::output {
 //   previz.samples (int), previz.exposure (double), previz.timestamp_ns (string; EXR has no 64-bit
 //   integers), previz.set (string), previz.pose (string: "tracked", "lost" or "ambiguous"),
 //   previz.world_from_camera (m44d; element [row][column] as the matrix is written, it multiplies
-//   column vectors; OpenCV camera axes, metres; absent unless the pose is tracked).
+//   column vectors; OpenCV camera axes, metres; absent unless the pose is tracked),
+// and OpenEXR's own (ImfStandardAttributes.h): worldToCamera and worldToNDC (m44f, of row vectors;
+//   the camera left-handed: right, up, forward; without lens distortion; absent unless tracked),
+//   expTime, aperture and focus where they are known.
 struct ExrMetadata {
   double exposure = 1;
   std::int64_t timestamp_ns = 0;
   std::string set_name;
   std::string pose = "tracked";
   glm::dmat4 world_from_camera{1.0};
+  std::optional<PinholeIntrinsics> intrinsics;  // of the picture's size
+  std::optional<ThinLens> lens;
+  double exposure_s = 0;  // 0: not known
 };
 
 // Channels, 32-bit float, ZIP compressed: composite.R/.G/.B, mixed.R/.G/.B, real.R/.G/.B,

@@ -1,6 +1,7 @@
 // What stands between two stages: a mailbox (newest value only) or a bounded queue (never drops).
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -56,6 +57,18 @@ class Mailbox final : public Channel<T> {
   std::optional<T> try_pop() override {
     const std::lock_guard lock(mutex_);
     return std::exchange(value_, std::nullopt);
+  }
+
+  // For readers with something else to look after: empty also once the time is over.
+  std::optional<T> pop_for(std::chrono::milliseconds timeout) {
+    std::unique_lock lock(mutex_);
+    filled_.wait_for(lock, timeout, [this] { return value_ || closed_; });
+    return std::exchange(value_, std::nullopt);
+  }
+  // Closed and drained: nothing will ever come.
+  bool finished() const {
+    const std::lock_guard lock(mutex_);
+    return closed_ && !value_;
   }
 
   void close() override { close(false); }

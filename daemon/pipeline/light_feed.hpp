@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "daemon/pipeline/channel.hpp"
@@ -40,6 +41,8 @@ class LightFeed {
   // From any one thread each; neither waits.
   void see_observer(ObserverView view) { views_.push(std::move(view)); }
   LightPtr newest();
+  // A light that no frame tells of, such as that of a file; from any thread.
+  void put(LightPtr light) { lights_.push(std::move(light)); }
 
  private:
   // Every exposure of a bracket counts, so light frames queue; the estimate takes all that wait.

@@ -1,9 +1,9 @@
 #include "daemon/pipeline/light_stage.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
+#include "daemon/lighting/hdr.hpp"
 #include "daemon/lighting/light_mode.hpp"
 #include "daemon/pipeline/room_model.hpp"
 #include "drivers/error.hpp"
@@ -47,6 +47,13 @@ LightStage::LightStage(const set::Set& set, std::optional<LightCameraCalibration
 bool LightStage::remembers() const {
   return needs_frames() &&
          (settings_.smoothing_s > 0 || needs_observer() || settings_.mode != set::LightMode::image);
+}
+
+void LightStage::use(set::LightMode mode) {
+  if (settings_.mode == mode) return;
+  settings_.mode = mode;
+  if (given_) light_ = finished(lighting::load_environment(settings_), {}, 0);
+  changed_ = !newest_.empty();
 }
 
 bool LightStage::usable(const Frame& frame) {
@@ -94,7 +101,7 @@ void LightStage::see(FramePtr frame, std::uint64_t index) {
     frame = std::move(exposed);
   }
   if (!usable(*frame)) return;
-  newest_[std::lround(std::log(frame->exposure) / std::log1p(0.01))] = std::move(frame);
+  newest_[lighting::exposure_step(frame->exposure)] = std::move(frame);
   if (newest_.size() > max_exposures) drop_oldest();
   changed_ = true;
 }

@@ -37,6 +37,9 @@ class LightStage {
   // the middle of a take has to go through all the frames before it.
   bool remembers() const;
 
+  // How the light is taken from what is seen, from the next light() on.
+  void use(set::LightMode mode);
+
   // Frames in capture order. `index` is the frame's place in its stream, from 0; it matters only
   // where the set names the one to use (lighting.frame). A frame that cannot be used (another size
   // than the calibration's, no exposure) is left out, the light stays as it was, and troubles()
@@ -57,7 +60,7 @@ class LightStage {
   bool usable(const Frame& frame);
   void drop_oldest();
 
-  const set::Lighting settings_;
+  set::Lighting settings_;
   const std::optional<double> exposure_;           // overrides the frames' own
   const std::optional<double> observer_exposure_;  // likewise
   const bool given_;

@@ -21,6 +21,11 @@ void Metrics::worked(const std::string& stage, double seconds) {
   stages_[stage].busy_s += seconds;
 }
 
+void Metrics::busy(const std::string& stage, double seconds) {
+  const std::lock_guard lock(mutex_);
+  stages_[stage].busy_s += seconds;
+}
+
 void Metrics::dropped(const std::string& stage, const std::string& cause, std::uint64_t frames) {
   if (frames == 0) return;
   const std::lock_guard lock(mutex_);

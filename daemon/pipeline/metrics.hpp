@@ -28,6 +28,7 @@ struct MetricsSnapshot {
 class Metrics {
  public:
   void worked(const std::string& stage, double seconds);
+  void busy(const std::string& stage, double seconds);  // of a frame that worked() counts
   void dropped(const std::string& stage, const std::string& cause, std::uint64_t frames = 1);
   void count(const std::string& event, std::uint64_t times = 1);
   void shown(double latency_s);

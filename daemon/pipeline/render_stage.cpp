@@ -5,6 +5,7 @@
 
 #include "daemon/pipeline/preview_size.hpp"
 #include "daemon/pipeline/refinement.hpp"
+#include "daemon/scene/placement.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::pipeline {
@@ -46,33 +47,79 @@ RenderStage::RenderStage(std::shared_ptr<render::Device> device, const set::Set&
       options_(std::move(options)),
       renderer_(std::move(device), set.estimation, scaled(calibration, options_.scale)) {
   renderer_.set_scene(scene);
+  scene_.instances = scene.instances;
+  scene_.lights = scene.lights;
+  scene_.light_objects = scene.light_objects;
 }
 
 void RenderStage::operator()(Shot& shot) {
   if (!shot.wanted) return;
-  const auto begin = std::chrono::steady_clock::now();
-  const double exposure = set_.observer.exposure.value_or(shot.frame->exposure);
+  const auto start = std::chrono::steady_clock::now();
+  if (!begin(shot)) return;
+  const Refined refined = refine(
+      renderer_, set_.quality, [&] { return cancelled(); },
+      [&](int samples) {
+        if (options_.progress) options_.progress(shot, samples);
+      });
+  shot.error = refined.error;
+  shot.samples = refined.samples;
+  if (!refined.whole) return;
+  finish(shot);
+  shot.render_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+bool RenderStage::begin(Shot& shot) {
+  shot.whole = false;
   Plate plate = plate_of(*shot.frame);
-  if (!shot.track.pose) return pass_through(shot, std::move(plate), why_no_pose(shot.track));
-  if (!shot.light) return pass_through(shot, std::move(plate), "no light frame was seen yet");
+  const auto untouched = [&](std::string reason) {
+    pass_through(shot, std::move(plate), std::move(reason));
+    return false;
+  };
+  if (!shot.track.pose) return untouched(why_no_pose(shot.track));
+  if (!shot.light) return untouched("no light frame was seen yet");
 
   if (light_ != shot.light) {
     renderer_.set_environment(shot.light->encoded, set_.lighting.sampling);
-    if (set_.lighting.mode != set::LightMode::image) renderer_.set_sources(shot.light->lamps);
+    // Once there can be lamps there may be none again: the mode changes live.
+    has_sources_ |= set_.lighting.mode != set::LightMode::image || !shot.light->lamps.empty();
+    if (has_sources_) renderer_.set_sources(shot.light->lamps);
     light_ = shot.light;
   }
-  renderer_.begin({std::move(plate), exposure, shot.track.pose->world_from_camera});
-  const auto cancelled = [&] { return options_.cancelled && options_.cancelled(); };
-  const Refined refined = refine(renderer_, set_.quality, cancelled, [&](int samples) {
-    if (options_.progress) options_.progress(shot, samples);
-  });
-  shot.whole = refined.whole;
-  shot.error = refined.error;
-  if (!shot.whole) return;
-  shot.picture = renderer_.picture();
+  if (placed_ != shot.scene) place(shot.scene);
+  renderer_.begin({std::move(plate), exposure_of(shot), shot.track.pose->world_from_camera});
+  return true;
+}
+
+bool RenderStage::add_samples(int samples) {
+  renderer_.render(samples, [&] { return cancelled(); });
+  return !cancelled();
+}
+
+void RenderStage::finish(Shot& shot) {
+  shot.whole = true;
   shot.counters = renderer_.counters();
-  if (options_.layers) shot.layers = renderer_.layers();
-  shot.render_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const bool composite = view_ == render::View::composite;
+  if (options_.layers || !composite) shot.layers = renderer_.layers();
+  shot.picture = composite ? renderer_.picture()
+                           : picture_of(view_, shot.layers, *response_, exposure_of(shot));
+}
+
+void RenderStage::resize(double scale) {
+  if (scale == options_.scale) return;
+  renderer_.resize(scaled(calibration_, scale));
+  options_.scale = scale;
+}
+
+double RenderStage::exposure_of(const Shot& shot) const {
+  return set_.observer.exposure.value_or(shot.frame->exposure);
+}
+
+void RenderStage::place(const session::SceneState& state) {
+  const scene::Placement placement = scene::place(scene_, set_, state);
+  for (const std::string& what : placement.unknown)
+    if (unknown_.insert(what).second && options_.note) options_.note(what);
+  renderer_.move(placement.instances, placement.lights);
+  placed_ = state;
 }
 
 Plate RenderStage::plate_of(const Frame& frame) {
@@ -89,8 +136,7 @@ Plate RenderStage::plate_of(const Frame& frame) {
 }
 
 void RenderStage::pass_through(Shot& shot, Plate plate, std::string reason) const {
-  const double exposure = set_.observer.exposure.value_or(shot.frame->exposure);
-  if (options_.layers) shot.layers = plate_layers(plate, exposure, *response_);
+  if (options_.layers) shot.layers = plate_layers(plate, exposure_of(shot), *response_);
   shot.untouched = std::move(reason);
   shot.picture = std::move(plate);
   shot.whole = true;

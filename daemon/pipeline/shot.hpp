@@ -13,6 +13,7 @@
 #include "daemon/set/set.hpp"
 #include "daemon/tracking/tracker.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/session/session.hpp"
 
 namespace previz::pipeline {
 
@@ -34,7 +35,9 @@ struct Shot {
 
   // From tracking and lighting.
   tracking::Track track;
-  LightPtr light;  // null: no light frame was seen yet
+  bool tracking_done = false;  // false: tracking was paused, and the track says nothing
+  LightPtr light;              // null: no light frame was seen yet
+  session::SceneState scene;   // what the crew moved or relit; empty: as in the set
 
   // From rendering. `untouched` says why the plate passes through as it is; empty: it was rendered.
   std::string untouched;
@@ -43,7 +46,9 @@ struct Shot {
   render::Counters counters;
   bool whole = false;  // false: interrupted before its last sample
   double render_s = 0;
-  double error = 0;  // Refined::error
+  double error = 0;     // Refined::error
+  int samples = 0;      // of the picture; 0: untouched
+  bool frozen = false;  // a round of refining one frame, not a new one
 };
 
 }  // namespace previz::pipeline

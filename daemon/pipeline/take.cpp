@@ -37,6 +37,7 @@ Take open_take(const std::filesystem::path& session_directory,
   take.set = set::parse_set(take.set_text, name, assets);
 
   take.observer = observer_calibration(take.set, take.session.info);
+  take.set.observer.calibration = take.observer;
   take.light = light_calibration(take.set, take.session.info);
   take.observer_stream = session::open_stream(take.session, "observer");
   take.light_stream = session::open_stream(take.session, "light");

@@ -15,7 +15,7 @@ namespace previz::pipeline {
 
 struct Take {
   session::Session session;
-  set::Set set;
+  set::Set set;          // with the observer's calibration in force
   std::string set_text;  // what `set` was read from
   ObserverCalibration observer;
   std::optional<LightCameraCalibration> light;  // absent: only an environment file can light it

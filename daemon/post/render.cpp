@@ -11,8 +11,8 @@
 #include <utility>
 #include <variant>
 
-#include "daemon/pipeline/light_stage.hpp"
 #include "daemon/pipeline/news.hpp"
+#include "daemon/pipeline/recorded_light.hpp"
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/stages.hpp"
 #include "daemon/pipeline/take.hpp"
@@ -126,33 +126,23 @@ class ObserverSource {
   pipeline::Metrics& metrics_;
 };
 
-// Gives each shot the light of the newest light frames before it.
+// Gives each shot its recorded light, and tells what the estimate has to say once.
 class LightSource {
  public:
   LightSource(pipeline::Take& take, Progress& progress, pipeline::Metrics& metrics)
-      : stage_(take.set, take.light, take.observer),
-        stream_(std::move(take.light_stream)),
+      : light_(take.set, take.light, take.observer, std::move(take.light_stream),
+               take.session.directory),
         progress_(progress),
-        metrics_(metrics) {
-    if (stage_.needs_frames() && !stream_)
-      throw Error(take.session.directory.string() +
-                  ": the session has no light frames, and the set gives no lighting.environment");
-  }
+        metrics_(metrics) {}
 
-  bool remembers() const { return stage_.remembers(); }
+  bool remembers() const { return light_.remembers(); }
 
   void operator()(Shot& shot) {
-    while (stage_.needs_frames() && next_ < stream_->records().size() &&
-           stream_->records()[next_].timestamp_ns <= shot.frame->timestamp_ns) {
-      stage_.see(stream_->read(next_), next_);
-      ++next_;
-    }
-    if (shot.track.pose) stage_.see_observer(*shot.frame, shot.track.pose->world_from_camera);
-    for (const std::string& trouble : stage_.troubles()) {
+    shot.light = light_.at(shot);
+    for (const std::string& trouble : light_.troubles()) {
       note(trouble);
       metrics_.dropped("lighting", "not usable");
     }
-    shot.light = stage_.light();
     if (!shot.light) return;
     for (const std::string& what : shot.light->lighting.report.notes) note(what);
   }
@@ -162,9 +152,7 @@ class LightSource {
     if (news_.is_new(what)) progress_.note("light: " + what);
   }
 
-  pipeline::LightStage stage_;
-  std::unique_ptr<session::StreamReader> stream_;
-  std::size_t next_ = 0;
+  pipeline::RecordedLight light_;
   pipeline::News news_;
   Progress& progress_;
   pipeline::Metrics& metrics_;
@@ -268,6 +256,7 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
     render_options.progress = [&](const Shot& shot, int samples) {
       progress.sample(shot.index, samples, set.quality.samples, now_s());
     };
+    render_options.note = [&](const std::string& what) { progress.note(what); };
     pipeline::RenderStage render(device, set, take.observer, scene, render_options);
 
     // A frame ahead per stage is all that keeps them busy; whole layers wait in the last queue.

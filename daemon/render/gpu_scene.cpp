@@ -1,6 +1,7 @@
 #include "daemon/render/gpu_scene.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <glm/gtc/packing.hpp>
 #include <limits>
@@ -70,12 +71,25 @@ void append(std::vector<T>& to, const std::vector<T>& from) {
 
 void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha) {
   scene_ = scene;
+  specular_alpha_ = specular_alpha;
   upload_meshes();
   upload_materials(specular_alpha);
   upload_textures();
   find_emitters();
+  find_bounds();
+}
+
+void GpuScene::move(const std::vector<scene::Instance>& instances,
+                    const std::vector<set::Light>& lights) {
+  assert(instances.size() == scene_.instances.size());
+  scene_.instances = instances;
+  scene_.lights = lights;
+  find_bounds();
+}
+
+void GpuScene::find_bounds() {
   difference_bounds_ = difference_bounds(scene_);
-  specular_bounds_ = specular_bounds(scene_, specular_alpha);
+  specular_bounds_ = specular_bounds(scene_, specular_alpha_);
 }
 
 void GpuScene::upload_meshes() {

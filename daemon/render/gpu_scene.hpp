@@ -24,6 +24,9 @@ class GpuScene {
   // Surfaces are perfect mirrors where their GGX alpha is at most `specular_alpha`.
   void set_scene(const scene::Scene& scene, double specular_alpha);
   void set_environment(const EncodedEnvironment& encoded, set::LightSampling sampling);
+  // The same meshes and materials at other places, under other lamps: nothing is built anew but the
+  // top level, with the next place(). As many instances as there are.
+  void move(const std::vector<scene::Instance>& instances, const std::vector<set::Light>& lights);
   // Lamps beside the scene's own, which may change from frame to frame.
   void set_sources(std::vector<set::Light> sources);
   // Uploads instances, top level and lights relative to `camera_position` (world, metres).
@@ -51,6 +54,7 @@ class GpuScene {
   void upload_materials(double specular_alpha);
   void upload_textures();
   void find_emitters();
+  void find_bounds();
   std::vector<set::Light> lamps() const;  // the scene's and the sources, those that rays meet first
   std::vector<gpu::GpuLight> placed_lights(const std::vector<set::Light>& all_lamps,
                                            const glm::dvec3& camera_position) const;
@@ -60,6 +64,7 @@ class GpuScene {
 
   Device& device_;
   scene::Scene scene_;
+  double specular_alpha_ = 0;
   std::optional<std::vector<set::Light>> sources_;  // absent: there never are any
   std::vector<MeshPlace> places_;
   std::vector<std::uint32_t> first_light_;  // by instance; NO_INDEX: not an emitter

@@ -31,6 +31,13 @@ constexpr std::array part_table = {
     PartEntry{Part::lens, "lens", gpu::FEATURE_LENS},
     PartEntry{Part::forks, "two worlds", gpu::FEATURE_FORKS}};
 
+void check_size(const Device& device, const PinholeIntrinsics& picture) {
+  refuse_too_large(picture.width, picture.height,
+                   {.bytes = device.memory_bytes(),
+                    .texels = device.limits().maxTexelBufferElements,
+                    .read_back = device.is_cpu()});
+}
+
 const PartEntry& entry_of(Part part) {
   return *std::ranges::find(part_table, part, &PartEntry::part);
 }
@@ -47,11 +54,11 @@ struct Renderer::Impl {
       : device(std::move(the_device)),
         estimation(the_estimation),
         calibration(the_calibration),
-        scene(*device),
-        wavefront(*device, calibration.intrinsics.width, calibration.intrinsics.height,
-                  estimation.real_radiance == set::RealRadiance::camera ? 3 : 2) {
-    upload_texels(*device, rays, corner_rays(calibration.intrinsics), vk::Format::eR32G32Sfloat);
+        scene(*device) {
+    resize();
   }
+
+  void resize();
 
   void upload_frame();
   std::uint32_t photons() const;  // a pass
@@ -63,7 +70,7 @@ struct Renderer::Impl {
   set::Estimation estimation;
   ObserverCalibration calibration;
   GpuScene scene;
-  Wavefront wavefront;
+  std::optional<Wavefront> wavefront;
   Buffer rays, frame_buffer;
   std::uint32_t carried = 0;  // FEATURE_* bits
   bool has_scene = false, has_environment = false;
@@ -71,6 +78,14 @@ struct Renderer::Impl {
   std::optional<lighting::Response> response;
   std::int64_t samples = 0;
 };
+
+void Renderer::Impl::resize() {
+  const PinholeIntrinsics& picture = calibration.intrinsics;
+  wavefront.reset();  // first the old memory, then the new
+  wavefront.emplace(*device, picture.width, picture.height,
+                    estimation.real_radiance == set::RealRadiance::camera ? 3 : 2);
+  upload_texels(*device, rays, corner_rays(picture), vk::Format::eR32G32Sfloat);
+}
 
 void Renderer::Impl::upload_frame() {
   gpu::GpuFrame gpu_frame{};
@@ -104,7 +119,7 @@ void Renderer::Impl::upload_frame() {
 
 std::uint32_t Renderer::Impl::photons() const {
   return photon_count(estimation.photons, calibration.intrinsics.width,
-                      calibration.intrinsics.height, wavefront.most_photons());
+                      calibration.intrinsics.height, wavefront->most_photons());
 }
 
 // FEATURE_* of this frame: what the scene requires and the set asks for.
@@ -138,11 +153,7 @@ std::vector<glm::vec4> Renderer::Impl::measured() const {
 
 Renderer::Renderer(std::shared_ptr<Device> device, const set::Estimation& estimation,
                    const ObserverCalibration& calibration) {
-  const PinholeIntrinsics& picture = calibration.intrinsics;
-  refuse_too_large(picture.width, picture.height,
-                   {.bytes = device->memory_bytes(),
-                    .texels = device->limits().maxTexelBufferElements,
-                    .read_back = device->is_cpu()});
+  check_size(*device, calibration.intrinsics);
   impl_ = std::make_unique<Impl>(std::move(device), estimation, calibration);
 }
 Renderer::~Renderer() = default;
@@ -160,6 +171,21 @@ void Renderer::set_environment(const lighting::EnvironmentMap& environment,
 void Renderer::set_environment(const EncodedEnvironment& environment, set::LightSampling sampling) {
   impl_->scene.set_environment(environment, sampling);
   impl_->has_environment = true;
+}
+
+void Renderer::move(const std::vector<scene::Instance>& instances,
+                    const std::vector<set::Light>& lights) {
+  impl_->scene.move(instances, lights);
+}
+
+void Renderer::use(set::Estimator estimator) {
+  impl_->estimation.estimator = estimator;
+}
+
+void Renderer::resize(const ObserverCalibration& calibration) {
+  check_size(*impl_->device, calibration.intrinsics);
+  impl_->calibration = calibration;
+  impl_->resize();
 }
 
 void Renderer::set_sources(std::vector<set::Light> sources) {
@@ -198,35 +224,35 @@ void Renderer::begin(const FrameInput& frame) {
   if ((features & gpu::FEATURE_PHOTONS) != 0) {
     const double distance =
         r.scene.nearest_specular_distance(glm::dvec3(frame.world_from_camera[3]));
-    r.wavefront.use_photons(r.photons(), r.estimation.photon_radius_px * distance / lens.fx);
+    r.wavefront->use_photons(r.photons(), r.estimation.photon_radius_px * distance / lens.fx);
   }
-  r.wavefront.bind(bindings, features);
-  if ((features & gpu::FEATURE_CAMERA) != 0) r.wavefront.use_camera(r.measured());
-  r.wavefront.clear();
+  r.wavefront->bind(bindings, features);
+  if ((features & gpu::FEATURE_CAMERA) != 0) r.wavefront->use_camera(r.measured());
+  r.wavefront->clear();
 }
 
 void Renderer::render(int samples, const std::function<bool()>& cancelled) {
   Impl& r = *impl_;
-  const bool whole = r.wavefront.render(
+  const bool whole = r.wavefront->render(
       static_cast<std::uint32_t>(r.samples), static_cast<std::uint32_t>(std::max(samples, 0)),
       static_cast<std::uint32_t>(r.estimation.max_depth), cancelled);
   if (whole) {
     r.samples += samples;
   } else {
-    r.wavefront.clear();
+    r.wavefront->clear();
     r.samples = 0;
   }
 }
 
 void Renderer::sample_only(const std::vector<std::uint32_t>& blocks) {
-  impl_->wavefront.sample_only(blocks);
+  impl_->wavefront->sample_only(blocks);
 }
 
 Layers Renderer::layers() const {
   const Impl& r = *impl_;
   const PinholeIntrinsics& lens = r.calibration.intrinsics;
   const auto plate = plate_radiance(r.frame.plate, *r.response, r.frame.exposure);
-  return make_layers(r.wavefront.pixels(), lens.width, lens.height,
+  return make_layers(r.wavefront->pixels(), lens.width, lens.height,
                      std::max<std::int64_t>(r.samples, 1), plate,
                      {r.estimation.composite, r.estimation.composite_floor / r.frame.exposure});
 }
@@ -237,7 +263,7 @@ Plate Renderer::picture() const {
 }
 
 Counters Renderer::counters() const {
-  const gpu::GpuControl control = impl_->wavefront.control();
+  const gpu::GpuControl control = impl_->wavefront->control();
   const auto wide = [](std::uint32_t high, std::uint32_t low) {
     return static_cast<std::uint64_t>(high) << 32 | low;
   };

@@ -64,6 +64,12 @@ class Renderer {
 
   // Uploads; may be called between any two frames (P13). Nothing is precomputed beyond BVHs.
   void set_scene(const scene::Scene& scene);
+  // The scene set, with its instances elsewhere and other lamps: no BVH of a mesh is built.
+  void move(const std::vector<scene::Instance>& instances, const std::vector<set::Light>& lights);
+  // From the next begin() on: another estimator; the picture at another size, by the calibration of
+  // that size. Scene and environment stay.
+  void use(set::Estimator estimator);
+  void resize(const ObserverCalibration& calibration);
   void set_environment(const lighting::EnvironmentMap& environment, set::LightSampling sampling);
   // The same, encoded elsewhere: what is left to do is the upload.
   void set_environment(const EncodedEnvironment& environment, set::LightSampling sampling);

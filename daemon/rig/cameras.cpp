@@ -6,7 +6,7 @@
 
 #include "daemon/rig/driven_camera.hpp"
 #include "drivers/error.hpp"
-#include "drivers/replay/replay_camera.hpp"
+#include "drivers/replay/replay_buttons.hpp"
 
 namespace previz::rig {
 namespace {
@@ -91,10 +91,26 @@ Cameras open_cameras(const set::Set& set, bool loop) {
   } else if (light_driver != Driver::none) {
     cameras.light = drive_camera(set, light_order(set));
   }
-  if (observer)
+  if (observer) {
+    if (loop) cameras.lap_ns = replay_lap_ns(observer->records());
     cameras.observer =
         start_replay(set, observer_order(set), cameras.recorded, std::move(observer), options);
+    cameras.origin = *options.origin;
+    cameras.clock_offset_ns =
+        cameras.origin.timestamp_ns -
+        std::chrono::nanoseconds(cameras.origin.due.time_since_epoch()).count();
+  }
   return cameras;
+}
+
+std::vector<std::unique_ptr<Buttons>> open_buttons(const set::Set& set, const Cameras& cameras) {
+  std::vector<std::unique_ptr<Buttons>> buttons;
+  if (set.buttons.empty() || set.observer.driver != set::Driver::replay) return buttons;
+  ReplayButtonsOptions options;
+  options.due = cameras.origin.due;
+  options.timestamp_ns = cameras.origin.timestamp_ns;
+  buttons.push_back(open_replay_buttons(cameras.recorded.directory, options));
+  return buttons;
 }
 
 }  // namespace previz::rig

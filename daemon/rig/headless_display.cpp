@@ -20,17 +20,22 @@ void HeadlessDisplay::show(pipeline::Shot shot) {
   const Clock::time_point now = Clock::now();
   const double in_device_s =
       1e-9 * static_cast<double>(shot.frame->arrival_ns - shot.frame->timestamp_ns);
-  metrics_.shown(std::chrono::duration<double>(now - shot.arrived).count() + in_device_s);
+  // A round of refining is no newer frame: it is as late as it was frozen long ago.
+  if (!shot.frozen)
+    metrics_.shown(std::chrono::duration<double>(now - shot.arrived).count() + in_device_s);
   picture_ = std::move(shot.picture);
   if (now - written_ < std::chrono::seconds(1)) return;
   write();
   written_ = Clock::now();
 }
 
+pipeline::MetricsSnapshot HeadlessDisplay::metrics() const {
+  return metrics_.snapshot(std::chrono::duration<double>(Clock::now() - start_).count());
+}
+
 pipeline::MetricsSnapshot HeadlessDisplay::write() {
   if (!picture_.samples.empty()) output::write_png(directory_ / "picture.png", picture_);
-  const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
-  pipeline::MetricsSnapshot snapshot = metrics_.snapshot(seconds);
+  pipeline::MetricsSnapshot snapshot = metrics();
   session::replace_file(directory_ / "metrics.json", to_json(snapshot));
   return snapshot;
 }

@@ -17,6 +17,8 @@ class HeadlessDisplay {
   HeadlessDisplay(std::filesystem::path directory, pipeline::Metrics& metrics);
 
   void show(pipeline::Shot shot);
+  // What the pipeline did so far; from any thread.
+  pipeline::MetricsSnapshot metrics() const;
   // Writes picture.png (if anything was shown) and metrics.json.
   pipeline::MetricsSnapshot write();
 

@@ -2,12 +2,18 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <iosfwd>
+#include <memory>
 #include <optional>
 #include <stop_token>
+#include <vector>
 
 #include "daemon/pipeline/metrics.hpp"
+#include "daemon/pipeline/shot.hpp"
 #include "daemon/render/renderer.hpp"
+#include "daemon/rig/controls.hpp"
+#include "drivers/buttons.hpp"
 
 namespace previz::rig {
 
@@ -16,15 +22,20 @@ struct LiveOptions {
   std::optional<int> samples;                      // quality.samples
   std::optional<std::filesystem::path> directory;  // output.directory
   bool loop = false;                               // replayed cameras start again at their end
+  bool bus = false;                                // org.previz.Rig1 on the system bus
   render::DeviceOptions device;
   std::stop_token stop;
+  // Devices besides those the set names: a test's own.
+  std::function<std::vector<std::unique_ptr<Buttons>>()> buttons;
+  // Called with every picture as it is shown, on the display's thread.
+  std::function<void(const pipeline::Shot&, const Look&)> on_shown;
 };
 
-// Runs until the observer's stream ends or a stop is requested. About once a second, and at the
-// end, writes what a display would show, at the set's quality.scale, to DIR/picture.png and what
-// the pipeline did to DIR/metrics.json. A frame whose pose is lost, or that comes before the first
-// light, shows its plate untouched. Notes go to `out`. Throws previz::Error on anything that keeps
-// the rig from running.
+// Runs until the observer's stream ends or a stop is requested; buttons, and changes of the set
+// file, act as the set says. About once a second, and at the end, writes what a display would show
+// to DIR/picture.png and what the pipeline did to DIR/metrics.json. A frame whose pose is lost, or
+// that comes before the first light, shows its plate untouched. Notes go to `out`. Throws
+// previz::Error on anything that keeps the rig from running.
 pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out);
 
 }  // namespace previz::rig

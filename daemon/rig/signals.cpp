@@ -20,6 +20,11 @@ sigset_t stop_signals() {
 StopOnSignal::StopOnSignal() {
   const sigset_t signals = stop_signals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  // The waiting thread must leave SIGHUP to the rig's loop.
+  sigset_t hangup, before;
+  sigemptyset(&hangup);
+  sigaddset(&hangup, SIGHUP);
+  pthread_sigmask(SIG_BLOCK, &hangup, &before);
   waiter_ = std::jthread([this, signals](const std::stop_token& done) {
     const timespec poll{0, 100'000'000};  // how late the destructor may be noticed
     while (!done.stop_requested()) {
@@ -30,6 +35,7 @@ StopOnSignal::StopOnSignal() {
       stop_.request_stop();
     }
   });
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
 StopOnSignal::~StopOnSignal() {

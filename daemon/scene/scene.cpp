@@ -98,9 +98,11 @@ Scene load_scene(const set::Set& set) {
       in_order.push_back(file.get());
     }
     file->add(object, static_cast<std::uint32_t>(i));
+    scene.light_objects.resize(scene.lights.size(), static_cast<std::uint32_t>(i));
   }
   for (const set::Surface& surface : set.surfaces) apply(surface, set.file.string(), scene);
   scene.lights.insert(scene.lights.end(), set.lights.begin(), set.lights.end());
+  scene.light_objects.resize(scene.lights.size(), no_object);
   for (const GltfFile* file : in_order)
     for (std::string& note : file->notes()) scene.notes.push_back(std::move(note));
   return scene;

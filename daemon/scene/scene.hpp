@@ -46,6 +46,7 @@ struct Instance {
 };
 
 inline constexpr std::uint32_t no_texture = 0xffffffffu;
+inline constexpr std::uint32_t no_object = 0xffffffffu;
 
 // `mask`: a hit counts where alpha >= alpha_cutoff; `blend`: with probability alpha.
 enum class AlphaMode : std::uint32_t { opaque, mask, blend };
@@ -97,6 +98,9 @@ struct Scene {
   // linear Rec. 709: candela as W/sr, lux as W/m^2. Gains follow the object's presence: virtual
   // (1, 0), phantom (1, 1), removed (0, 1).
   std::vector<set::Light> lights;
+  // Per light the index of the [[object]] whose file it came with; no_object: the set's own lamps,
+  // which are the last, in the set's order.
+  std::vector<std::uint32_t> light_objects;
   // What was dropped or not understood while loading, in plain words (counted, never silent).
   std::vector<std::string> notes;
 };

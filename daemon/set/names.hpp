@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include "daemon/set/actions.hpp"
 #include "daemon/set/set.hpp"
 
 namespace previz::set {
@@ -65,6 +66,17 @@ constexpr auto names(RealRadiance) {
 constexpr auto names(Caustics) {
   return std::to_array<Name<Caustics>>(
       {{"photons", Caustics::photons}, {"traced", Caustics::traced}, {"none", Caustics::none}});
+}
+constexpr auto names(PressKind) {
+  return std::to_array<Name<PressKind>>({{"short", PressKind::short_press},
+                                         {"long", PressKind::long_press},
+                                         {"double", PressKind::double_press}});
+}
+constexpr auto names(Mode) {
+  return std::to_array<Name<Mode>>({{"standby", Mode::standby},
+                                    {"live", Mode::live},
+                                    {"refine", Mode::refine},
+                                    {"review", Mode::review}});
 }
 constexpr auto names(ResponseCurve::Kind) {
   return std::to_array<Name<ResponseCurve::Kind>>({{"srgb", ResponseCurve::Kind::srgb},

@@ -39,6 +39,8 @@ class Resolver {
     lights();
     lighting();
     room();
+    buttons();
+    set_.recording.directory = located(set_.recording.directory);
     set_.output.directory = located(set_.output.directory);
   }
 
@@ -358,6 +360,23 @@ class Resolver {
       light.up = glm::normalize(across);
     else
       problem(table, "up", "has no part across the light's direction; allowed: any that has");
+  }
+
+  void buttons() {
+    std::map<std::pair<std::string, PressKind>, Position> first;
+    for (const auto& [table, button] : draft_.buttons) {
+      if (table.good("name")) {
+        if (button.name.empty()) problem(table, "name", "is empty; allowed: text");
+        const auto [other, fresh] =
+            first.emplace(std::pair(button.name, button.press), table.where("name"));
+        if (!fresh)
+          problem(table, "name",
+                  std::string("a ") + name_of(button.press) + " press of " +
+                      codec::quote(button.name) + " is already in line " +
+                      std::to_string(other->second.line) + "; allowed: one action a press");
+      }
+      set_.buttons.push_back(button);
+    }
   }
 
   void lighting() {

@@ -171,6 +171,33 @@ struct Quality {
   double error = 0;    // rms error over the picture's rms to go on to; 0: samples decide
   double seconds = 0;  // a frame may take; 0: samples decide
   double scale = 1.0;  // of the observer's resolution, preview only
+  double fps = 0;      // preview: held by samples, then by size; 0: the others decide
+};
+
+// What the rig's buttons do, and by how much.
+enum class PressKind { short_press, long_press, double_press };
+struct Button {
+  std::string name;  // as its driver calls it
+  PressKind press = PressKind::short_press;
+  std::string action;  // of daemon/set/actions.hpp
+};
+struct Control {
+  double move_step_m = 0.01;
+  double turn_step_rad = 5 * std::numbers::pi / 180;
+  double scale_step = 1.05;
+  double light_step_stops = 1.0 / 3;
+  double tint_step_stops = 0.1;  // between red and blue, or green and the others
+  double exposure_step_stops = 1.0 / 3;
+};
+
+struct Recording {
+  std::filesystem::path directory = "takes";
+  std::string slate;        // scene and shot, as on the board; empty: the set's name
+  std::string notes;        // written into every take
+  double preroll_s = 2;     // kept in memory, and put in front of a take
+  double queue_mb = 1024;   // of frames may wait for a slow disk
+  double reserve_mb = 512;  // a take ends before the disk has less left
+  double timecode_fps = 25;
 };
 
 struct Output {
@@ -202,6 +229,9 @@ struct Set {
   Lighting lighting;
   Estimation estimation;
   Quality quality;
+  std::vector<Button> buttons;
+  Control control;
+  Recording recording;
   Output output;
 };
 

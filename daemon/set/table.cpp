@@ -2,12 +2,14 @@
 
 #include <numbers>
 
+#include "daemon/set/actions.hpp"
+
 namespace previz::set {
 namespace {
 
 // Units of the file; struct units are metres, radians and pixels.
 constexpr Unit plain{"", 1}, px{"px", 1}, m{"m", 1}, mm{"mm", 1e-3}, seconds{"s", 1},
-    deg{"degrees", std::numbers::pi / 180};
+    deg{"degrees", std::numbers::pi / 180}, stops{"stops", 1}, megabytes{"MB", 1};
 
 constexpr int max_picture_side_px = 16384;
 // A distance beyond which a lens cannot tell the difference, and a float still can.
@@ -260,6 +262,38 @@ Keys quality_keys(Quality& q) {
       {"error", &q.error, plain.within(0, 1), "Goes on where the picture's estimated error is above this share of its mean radiance; 0: samples alone decide."},
       {"seconds", &q.seconds, plain.within(0, 86'400), "Goes on for so long, where the picture needs it most; 0: samples alone decide."},
       {"scale", &q.scale, plain.within(0.01, 1), "Size of the preview over the camera's picture; offline rendering is always full size."},
+      {"fps", &q.fps, plain.within(0, 240), "Pictures a second that the preview holds, with 1 to 50 samples, then by a smaller picture (scale is the largest); 0: the keys above decide."},
+  };
+}
+
+Keys button_keys(Button& b) {
+  return {
+      {"name", &b.name, plain, "The button, as `previzd devices` lists it.", required("\"pedal:left\"")},
+      {"press", &b.press, plain, "How it is pressed: let go at once, held for 0.6 s, or pushed twice within 0.3 s."},
+      {"action", &b.action, Rule{.words = action_names()}, "What it does; `previzctl actions` explains each.", required("\"record\"")},
+  };
+}
+
+Keys control_keys(Control& c) {
+  return {
+      {"move_step_m", &c.move_step_m, m.above(0, 100), "A step of move_left and the like."},
+      {"turn_step_deg", &c.turn_step_rad, deg.above(0, 180), "A step of turn_left and the like."},
+      {"scale_step", &c.scale_step, plain.above(1, 100), "Factor of scale_up."},
+      {"light_step_stops", &c.light_step_stops, stops.above(0, 20), "A step of light_up and light_down; a stop is a factor of two."},
+      {"tint_step_stops", &c.tint_step_stops, stops.above(0, 20), "A step of light_warmer and light_greener, between the colours' strengths."},
+      {"exposure_step_stops", &c.exposure_step_stops, stops.above(0, 20), "A step of exposure_up and exposure_down."},
+  };
+}
+
+Keys recording_keys(Recording& r) {
+  return {
+      {"directory", &r.directory, plain, "Where takes go, a folder each: SLATE_take001 and so on."},
+      {"slate", &r.slate, plain, "Scene and shot as on the board; left out: the set's name.", optional("\"12A\"")},
+      {"notes", &r.notes, plain, "Written into every take.", optional("\"second unit, 35 mm\"")},
+      {"preroll_s", &r.preroll_s, seconds.within(0, 60), "What the cameras saw before the button is put in front of the take; kept in memory."},
+      {"queue_mb", &r.queue_mb, megabytes.within(1, 1e6), "Frames that may wait in memory for a slow disk; what does not fit is dropped, counted and told."},
+      {"reserve_mb", &r.reserve_mb, megabytes.within(1, 1e9), "A take ends in order before the disk has less space left than this."},
+      {"timecode_fps", &r.timecode_fps, plain.within(1, 240), "Frames of a second of timecode (time of day)."},
   };
 }
 
@@ -314,6 +348,9 @@ std::vector<Section> sections(Draft& d) {
       once("lighting.sources", always, "The lamps that are found in the light camera's picture, with mode = \"sources\" or \"hybrid\".", [&d] { return light_sources_keys(d.set.lighting.sources); }),
       once("estimator", always, "How light is simulated.", [&d] { return estimator_keys(d.set.estimation); }),
       once("quality", always, "What a frame may cost.", [&d] { return quality_keys(d.set.quality); }),
+      many("button", "What a button does; one table for each way to press it.", d.buttons, [](ButtonDraft& b) { return button_keys(b.button); }),
+      once("control", always, "How much an action changes.", [&d] { return control_keys(d.set.control); }),
+      once("recording", always, "Takes.", [&d] { return recording_keys(d.set.recording); }),
       once("output", always, "What is written.", [&d] { return output_keys(d.set.output); }),
   };
   // clang-format on

@@ -64,6 +64,11 @@ struct LightDraft {
   Light light;
 };
 
+struct ButtonDraft {
+  Given given;
+  Button button;
+};
+
 // The file as it is written. What needs no second thought is read straight into `set`; the rest is
 // brought there by resolve().
 struct Draft {
@@ -82,6 +87,7 @@ struct Draft {
   std::vector<ObjectDraft> objects;
   std::vector<SurfaceDraft> surfaces;
   std::vector<LightDraft> lights;
+  std::vector<ButtonDraft> buttons;
 };
 
 // What becomes of a key that is not written. `example` is shown in the reference.

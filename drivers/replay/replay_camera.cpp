@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <span>
 #include <utility>
 
 #include "drivers/error.hpp"
@@ -100,13 +101,9 @@ class ReplayCamera final : public Camera {
     return options_.origin->due + nanoseconds(static_cast<std::int64_t>(wait_ns));
   }
 
-  // From a frame to the same frame a lap later: the frames' span and one mean interval.
   std::int64_t lap_ns() const {
-    const auto& records = stream_->records();
-    const std::int64_t span =
-        difference(records[options_.last].timestamp_ns, records[options_.first].timestamp_ns);
-    const auto intervals = static_cast<std::int64_t>(options_.last - options_.first);
-    return intervals > 0 ? sum(span, span / intervals) : 1'000'000'000;
+    return replay_lap_ns(
+        std::span(stream_->records()).subspan(options_.first, options_.last - options_.first + 1));
   }
 
   double rate_hz() const {
@@ -175,6 +172,13 @@ class ReplayCamera final : public Camera {
 };
 
 }  // namespace
+
+// The frames' span and one mean interval.
+std::int64_t replay_lap_ns(std::span<const session::FrameRecord> records) {
+  const std::int64_t span = difference(records.back().timestamp_ns, records.front().timestamp_ns);
+  const auto intervals = static_cast<std::int64_t>(records.size() - 1);
+  return intervals > 0 ? sum(span, span / intervals) : 1'000'000'000;
+}
 
 std::unique_ptr<Camera> replay(std::unique_ptr<session::StreamReader> stream, std::string name,
                                const ReplayOptions& options, const HostClock& clock,

@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,10 @@ struct ReplayOptions {
   // Absent: each opening begins at `first`.
   std::shared_ptr<ReplayPosition> position;
 };
+
+// From a frame of a looped replay to the same frame a lap later. `records`: those replayed, at
+// least one.
+std::int64_t replay_lap_ns(std::span<const session::FrameRecord> records);
 
 // Delivers every frame, in order, with its recorded times, never before it is due; a frame asked
 // for late comes at once (what a late stage drops is that stage's to count). A frame that cannot be

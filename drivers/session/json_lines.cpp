@@ -82,6 +82,56 @@ void get(const Json& json, std::vector<int>& values) {
   for (const Json& item : json) get(item, values.emplace_back());
 }
 
+void get(const Json& json, glm::dvec3& value) {
+  std::array<double, 3> numbers{};
+  get(json, numbers);
+  value = {numbers[0], numbers[1], numbers[2]};
+}
+
+// A 4x4 as 16 numbers, row by row.
+void get(const Json& json, glm::dmat4& value) {
+  std::array<double, 16> rows{};
+  get(json, rows);
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column) value[column][row] = rows[4 * row + column];
+}
+
+Json json_of(const glm::dmat4& matrix, const char* key) {
+  std::array<double, 16> rows{};
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column)
+      rows[4 * row + column] = finite(matrix[column][row], key);
+  return rows;
+}
+
+Json json_of(const glm::dvec3& v, const char* key) {
+  return Json::array({finite(v.x, key), finite(v.y, key), finite(v.z, key)});
+}
+
+Json json_of(const LightState& light) {
+  return Json{{"position", json_of(light.position, "light position")},
+              {"direction", json_of(light.direction, "light direction")},
+              {"up", json_of(light.up, "light up")},
+              {"gain_mixed", finite(light.gain_mixed, "light gain_mixed")},
+              {"tint", json_of(light.tint, "light tint")}};
+}
+
+SceneState parse_scene(const Json& json) {
+  SceneState scene;
+  if (json.contains("objects"))
+    for (const auto& [name, rows] : json.at("objects").items()) get(rows, scene.objects[name]);
+  if (json.contains("lights"))
+    for (const auto& [name, state] : json.at("lights").items()) {
+      LightState& light = scene.lights[name];
+      get(state.at("position"), light.position);
+      get(state.at("direction"), light.direction);
+      get(state.at("up"), light.up);
+      get(state.at("gain_mixed"), light.gain_mixed);
+      get(state.at("tint"), light.tint);
+    }
+  return scene;
+}
+
 FrameLine parse_frame_line(const Json& json) {
   FrameLine line;
   get(json.at("frame"), line.record.frame);
@@ -102,14 +152,11 @@ TrackRecord parse_track_line(const Json& json) {
   get(json.at("timestamp_ns"), record.timestamp_ns);
   get(json.at("tracked"), record.tracked);
   get(json.at("tags"), record.tags);
+  record.scene = parse_scene(json);
   if (json.contains("captured_light"))
     record.captured_light = captured_light_of(json.at("captured_light"));
   if (!record.tracked) return record;
-  std::array<double, 16> rows{};
-  get(json.at("world_from_camera"), rows);
-  for (int row = 0; row < 4; ++row)
-    for (int column = 0; column < 4; ++column)
-      record.world_from_camera[column][row] = rows[4 * row + column];
+  get(json.at("world_from_camera"), record.world_from_camera);
   get(json.at("covariance"), record.covariance);
   return record;
 }
@@ -176,14 +223,13 @@ std::string to_line(const TrackRecord& record) {
             {"tracked", record.tracked},
             {"tags", record.tags}};
   if (record.tracked) {
-    std::array<double, 16> rows{};
-    for (int row = 0; row < 4; ++row)
-      for (int column = 0; column < 4; ++column)
-        rows[4 * row + column] = finite(record.world_from_camera[column][row], "world_from_camera");
     for (const double value : record.covariance) finite(value, "covariance");
-    json["world_from_camera"] = rows;
+    json["world_from_camera"] = json_of(record.world_from_camera, "world_from_camera");
     json["covariance"] = record.covariance;
   }
+  for (const auto& [name, world_from_file] : record.scene.objects)
+    json["objects"][name] = json_of(world_from_file, "object");
+  for (const auto& [name, light] : record.scene.lights) json["lights"][name] = json_of(light);
   if (record.captured_light) json["captured_light"] = to_json(*record.captured_light);
   return json.dump();
 }
@@ -192,6 +238,10 @@ std::string to_line(const ButtonEvent& event) {
   return Json{
       {"timestamp_ns", event.timestamp_ns}, {"button", event.button}, {"pressed", event.pressed}}
       .dump();
+}
+
+std::string to_line(std::int64_t timestamp_ns, const std::string& event) {
+  return Json{{"timestamp_ns", timestamp_ns}, {"event", event}}.dump();
 }
 
 Lines<FrameLine> read_frame_lines(const std::filesystem::path& file) {

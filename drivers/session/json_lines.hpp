@@ -23,6 +23,7 @@ struct FrameLine {
 std::string to_line(const FrameLine& line);
 std::string to_line(const TrackRecord& record);
 std::string to_line(const ButtonEvent& event);
+std::string to_line(std::int64_t timestamp_ns, const std::string& event);
 
 template <typename Record>
 struct Lines {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <map>
@@ -21,6 +22,18 @@ namespace previz::session {
 
 inline constexpr int format_version = 1;
 
+// Which take a session is: what stands on the board.
+struct TakeInfo {
+  int number = 0;
+  std::string slate;     // scene and shot
+  std::string timecode;  // of the first observer frame, time of day: "14:03:27:12"
+  double timecode_fps = 25;
+  std::string notes;
+  bool good = false;  // the crew's choice
+
+  friend bool operator==(const TakeInfo&, const TakeInfo&) = default;
+};
+
 // session.toml. `set_text` is the set file verbatim; `set_name` the file name to use in errors.
 struct SessionInfo {
   std::string name;
@@ -31,6 +44,22 @@ struct SessionInfo {
   std::optional<LightCameraCalibration> light;
   // Paths as the set file writes them -> paths below the session ("assets/<sha256>.glb").
   std::map<std::string, std::string> assets;
+  std::optional<TakeInfo> take;  // recorded on a rig
+};
+
+// What was moved or relit: only what is not as the set file has it, by name.
+struct LightState {
+  glm::dvec3 position{0}, direction{0, 0, -1}, up{0, 1, 0};
+  double gain_mixed = 1;
+  glm::dvec3 tint{1};  // times its emission, in the mixed world
+
+  friend bool operator==(const LightState&, const LightState&) = default;
+};
+struct SceneState {
+  std::map<std::string, glm::dmat4> objects;  // world_from_file
+  std::map<std::string, LightState> lights;
+
+  friend bool operator==(const SceneState&, const SceneState&) = default;
 };
 
 // The light around the set, as it lit the frame: sources, and the rest without its shapes.
@@ -58,7 +87,8 @@ struct TrackRecord {
   glm::dmat4 world_from_camera{1.0};  // OpenCV camera axes, metres
   // Row-major 6x6: rotation (rad) then translation (m), in the camera frame.
   std::array<double, 36> covariance{};
-  std::vector<int> tags;                        // ids used
+  std::vector<int> tags;  // ids used
+  SceneState scene;       // when the frame was shown; empty: as in the set
   std::optional<CapturedLight> captured_light;  // absent: none was known, or an older session
 };
 
@@ -120,6 +150,9 @@ class SessionWriter {
   void write(const Frame& frame);
   void write(const TrackRecord& record);
   void write(const ButtonEvent& event);  // to events.jsonl
+  // Anything else that happened, in words, to events.jsonl.
+  void write_event(std::int64_t timestamp_ns, const std::string& what);
+  void set_take(const TakeInfo& take);  // replaces session.toml
   // Copies a file into assets/ under its content hash and maps `as_written` to it.
   void add_asset(const std::string& as_written, const std::filesystem::path& file);
   void close();  // flushes and finishes the files; the destructor does it too, without throwing
@@ -128,5 +161,9 @@ class SessionWriter {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+// Changes what a finished session says of its take. Throws previz::Error naming the file.
+void change_take(const std::filesystem::path& directory,
+                 const std::function<void(TakeInfo&)>& change);
 
 }  // namespace previz::session

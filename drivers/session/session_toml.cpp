@@ -159,6 +159,14 @@ std::string stream_toml(const std::string& source, const StreamFormat& stream) {
   return text;
 }
 
+std::string take_toml(const TakeInfo& take) {
+  return "\n[take]  # as on the board\n" + line("number", take.number) +
+         "slate = " + quote(take.slate) + "\ntimecode = " + quote(take.timecode) +
+         "  # of the first observer frame, time of day\n" +
+         line("timecode_fps", take.timecode_fps) + "notes = " + quote(take.notes) +
+         "\ngood = " + (take.good ? "true" : "false") + "\n";
+}
+
 // ---- reading
 
 // Where a value is looked for, so that an error can name it.
@@ -309,6 +317,19 @@ StreamFormat parse_stream(const Place& place) {
   return stream;
 }
 
+TakeInfo parse_take(const Place& place) {
+  TakeInfo take;
+  const auto number = place.get<std::int64_t>("number", "a whole number");
+  if (number < 0 || number > 1'000'000) place.fail("number", "must be between 0 and 1000000");
+  take.number = static_cast<int>(number);
+  take.slate = place.text("slate");
+  take.timecode = place.text("timecode");
+  take.timecode_fps = place.number("timecode_fps");
+  take.notes = place.text("notes");
+  take.good = place.get<bool>("good", "true or false");
+  return take;
+}
+
 void parse_set(const Place& place, SessionInfo& info) {
   info.set_name = place.text("name");
   if (!place.table.contains("text_base64")) {
@@ -333,6 +354,7 @@ std::string to_toml(const SessionFile& file) {
   for (const auto& [source, stream] : file.streams) text += stream_toml(source, stream);
   if (file.info.observer) text += observer_toml(*file.info.observer);
   if (file.info.light) text += light_toml(*file.info.light);
+  if (file.info.take) text += take_toml(*file.info.take);
   text += "\n[assets]  # as the set writes them = where they are below this directory\n";
   for (const auto& [as_written, path] : file.info.assets)
     text += quote(as_written) + " = " + quote(path) + "\n";
@@ -379,6 +401,7 @@ SessionFile parse_session_toml(const std::string& text, const std::filesystem::p
       top.inner("assets").fail(std::string(key.str()).c_str(), "must be a path");
     file.info.assets[std::string(key.str())] = value.value_or<std::string>("");
   }
+  if (top.find("take")) file.info.take = parse_take(top.inner("take"));
   parse_set(top.inner("set"), file.info);
   return file;
 }

@@ -167,6 +167,16 @@ void SessionWriter::write(const ButtonEvent& event) {
   impl_->append(impl_->events, "events.jsonl", to_line(event));
 }
 
+void SessionWriter::write_event(std::int64_t timestamp_ns, const std::string& what) {
+  impl_->append(impl_->events, "events.jsonl", to_line(timestamp_ns, what));
+}
+
+void SessionWriter::set_take(const TakeInfo& take) {
+  impl_->check_open();
+  impl_->file.info.take = take;
+  impl_->write_toml();
+}
+
 void SessionWriter::add_asset(const std::string& as_written, const std::filesystem::path& file) {
   impl_->check_open();
   const std::string path = "assets/" + sha256_of(file) + file.extension().string();
@@ -190,6 +200,15 @@ void SessionWriter::add_asset(const std::string& as_written, const std::filesyst
 
 void SessionWriter::close() {
   impl_->close();
+}
+
+void change_take(const std::filesystem::path& directory,
+                 const std::function<void(TakeInfo&)>& change) {
+  const std::filesystem::path toml = directory / "session.toml";
+  SessionFile file = parse_session_toml(read_file(toml), toml);
+  if (!file.info.take) file.info.take.emplace();
+  change(*file.info.take);
+  replace_file(toml, to_toml(file));
 }
 
 }  // namespace previz::session

@@ -62,7 +62,8 @@ double true_signal(double value) {
 }
 
 // A curve is known up to its scale. Codes are rounded, and noisy to about 1: over those that are
-// neither black nor white the curve is right to 2 codes (rms).
+// neither black nor white the curve is right to 2 codes (rms) where it is kept smooth. Robertson's
+// method finds each code by itself, and keeps the noise of the few pixels that show it.
 TEST_P(ResponseMethods, FindTheCurve) {
   const ResponseFit fit = fit_response(make_bracket(6, 1.6), GetParam());
   const lighting::Response found(fit.curve, 8);
@@ -78,7 +79,8 @@ TEST_P(ResponseMethods, FindTheCurve) {
     const double slope = 0.5 * std::log(true_signal(value + step) / true_signal(value - step));
     squares += std::pow((ratios[i] - scale) / slope, 2);
   }
-  EXPECT_LT(std::sqrt(squares / double(ratios.size())), 2);
+  const double bound = GetParam() == ResponseMethod::debevec ? 2 : 3;
+  EXPECT_LT(std::sqrt(squares / double(ratios.size())), bound);
   EXPECT_LT(fit.error_codes, 2);
 }
 

@@ -41,6 +41,34 @@ render::Layers sample_layers(int width, int height) {
   return layers;
 }
 
+// A camera at (1, 2, 3) that looks along +Y: a point 2 m ahead, 0.5 m right and 1 m up of it, as
+// OpenEXR's camera sees it and where it is in the picture.
+TEST(Exr, StandardCameraAttributesProjectAKnownPoint) {
+  const TemporaryDirectory directory;
+  ExrMetadata metadata;
+  metadata.world_from_camera = {{1, 0, 0, 0}, {0, 0, -1, 0}, {0, 1, 0, 0}, {1, 2, 3, 1}};
+  metadata.intrinsics = PinholeIntrinsics{64, 48, 60, 60, 31.5, 23.5};
+  metadata.lens = ThinLens{0.035, 2.8, 1.5};
+  metadata.exposure_s = 0.02;
+  write_exr(directory / "frame.exr", sample_layers(5, 3), metadata);
+  const Imf::InputFile file((directory / "frame.exr").c_str());
+  const Imf::Header& header = file.header();
+  const Imath::V3f world(1.5f, 4.0f, 4.0f);
+  Imath::V3f camera, ndc;
+  Imf::worldToCamera(header).multVecMatrix(world, camera);
+  Imf::worldToNDC(header).multVecMatrix(world, ndc);
+  EXPECT_EQ(camera, Imath::V3f(0.5f, 1.0f, 2.0f));
+  EXPECT_FLOAT_EQ(ndc.x, (32 + 60 * 0.25f) / 64);
+  EXPECT_FLOAT_EQ(ndc.y, (24 - 60 * 0.5f) / 48);
+  EXPECT_FLOAT_EQ(Imf::aperture(header), 2.8f);
+  EXPECT_FLOAT_EQ(Imf::focus(header), 1.5f);
+  EXPECT_FLOAT_EQ(Imf::expTime(header), 0.02f);
+
+  metadata.pose = "lost";
+  write_exr(directory / "lost.exr", sample_layers(5, 3), metadata);
+  EXPECT_FALSE(Imf::hasWorldToCamera(Imf::InputFile((directory / "lost.exr").c_str()).header()));
+}
+
 TEST(Exr, ChannelsAreExactlyTheNamedOnesIn32BitFloat) {
   const TemporaryDirectory directory;
   write_exr(directory / "frame.exr", sample_layers(5, 3), {});
@@ -88,7 +116,10 @@ TEST(Exr, DifferenceIsThatOfTheUncoveredPart) {
 
 TEST(Exr, HeaderSaysWhatThePictureIs) {
   const TemporaryDirectory directory;
-  ExrMetadata metadata{1.25, 1'700'000'000'567'008'006, "glass", "tracked", glm::dmat4(1.0)};
+  ExrMetadata metadata;
+  metadata.exposure = 1.25;
+  metadata.timestamp_ns = 1'700'000'000'567'008'006;
+  metadata.set_name = "glass";
   metadata.world_from_camera[3] = {0.5, -0.25, 2.0, 1.0};  // glm: the fourth column
   write_exr(directory / "frame.exr", sample_layers(2, 2), metadata);
   const Imf::InputFile file((directory / "frame.exr").c_str());
@@ -112,7 +143,10 @@ TEST(Exr, HeaderSaysWhatThePictureIs) {
 
 TEST(Exr, LostPoseIsNotWritten) {
   const TemporaryDirectory directory;
-  write_exr(directory / "frame.exr", sample_layers(2, 2), {1, 0, "glass", "lost", glm::dmat4(1)});
+  ExrMetadata metadata;
+  metadata.set_name = "glass";
+  metadata.pose = "lost";
+  write_exr(directory / "frame.exr", sample_layers(2, 2), metadata);
   const Imf::InputFile file((directory / "frame.exr").c_str());
   EXPECT_EQ(file.header().findTypedAttribute<Imf::M44dAttribute>("previz.world_from_camera"),
             nullptr);

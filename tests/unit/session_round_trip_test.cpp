@@ -52,6 +52,46 @@ INSTANTIATE_TEST_SUITE_P(
                     Picture{PixelFormat::gray8, 37, 21}, Picture{PixelFormat::rgb8, 643, 481},
                     Picture{PixelFormat::gray16, 643, 481}));
 
+TEST(Session, WhatWasMovedAndRelitComesBackBitForBit) {
+  const TemporaryDirectory directory;
+  TrackRecord record;
+  record.scene.objects["card"] = glm::dmat4(1.0 / 3);
+  record.scene.objects["a \"b\""][3] = {1e-9, -7, 0.1, 1};
+  record.scene.lights["key"] = {{0.1, 0.2, 0.3}, {0, 0, -1}, {0, 1, 0}, 1.0 / 7, {1.1, 1, 0.9}};
+  TrackRecord plain;
+  plain.frame = 1;
+  {
+    SessionWriter writer(directory.path(), {});
+    writer.write(record);
+    writer.write(plain);
+  }
+  const Session session = open_session(directory.path());
+  ASSERT_EQ(session.track.size(), 2u);
+  EXPECT_EQ(session.track[0].scene, record.scene);
+  EXPECT_EQ(session.track[1].scene, SceneState{});
+}
+
+TEST(Session, TheTakeIsKnownAndCanBeMarkedAfterwards) {
+  const TemporaryDirectory directory;
+  const TakeInfo take{7, "12A \"close\"", "14:03:27:12", 23.976, "two\nlines", false};
+  {
+    SessionInfo info;
+    info.take = TakeInfo{7, "12A \"close\"", "", 23.976, "two\nlines", false};
+    SessionWriter writer(directory.path(), info);
+    writer.write(noise_frame("observer", 0, PixelFormat::rgb8, 24, 18));
+    writer.set_take(take);
+    writer.write_event(17, "record \"on\"");
+  }
+  EXPECT_EQ(open_session(directory.path()).info.take, take);
+  change_take(directory.path(), [](TakeInfo& info) { info.good = true; });
+  Session session = open_session(directory.path());
+  EXPECT_TRUE(session.info.take->good);
+  EXPECT_TRUE(session.missing.empty());
+  EXPECT_EQ(open_stream(session, "observer")->records().size(), 1u);
+  EXPECT_EQ(content_of(directory / "events.jsonl"),
+            "{\"timestamp_ns\":17,\"event\":\"record \\\"on\\\"\"}\n");
+}
+
 TEST(Session, TwoStreamsAndTrackInOneSession) {
   const TemporaryDirectory directory;
   TrackRecord tracked;

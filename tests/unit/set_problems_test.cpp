@@ -77,7 +77,7 @@ const Mistake unknown[] = {
     {"[quality]\nseed = 4\n", "2:1: quality.seed: ", "did you mean it under [estimator]?"},
     {"[set]\nsize_m = 4\n", "2:1: set.size_m: ", "did you mean it under [[tag]]?"},
     {"[quality]\nzzzzzzzzzz = 4\n",
-     "2:1: quality.zzzzzzzzzz: ", "allowed: samples, error, seconds, scale"},
+     "2:1: quality.zzzzzzzzzz: ", "allowed: samples, error, seconds, scale, fps"},
     {"[quality]\n\"a\\nb\" = 4\n", "2:1: quality.a\\nb: ", "unknown key"},
 };
 INSTANTIATE_TEST_SUITE_P(Unknown, SetMistake, testing::ValuesIn(unknown));
@@ -109,6 +109,10 @@ const Mistake types[] = {
      "4:16: tag.world_from_tag: the last row", "0 0 0 1"},
     {"[[tag]]\nid=1\ncorners_m=[[0,0,0],[1,0,0],[1,1,0]]\n", "3:11: tag.corners_m: a list of 3",
      "4 points of 3 numbers"},
+    {"[[button]]\nname='red'\naction='recrod'\n", "3:8: button.action: \"recrod\"",
+     "\"record\" | "},
+    {"[[button]]\nname='red'\naction='live'\npress='hard'\n", "4:7: button.press: \"hard\"",
+     "\"short\" | \"long\" | \"double\""},
     {VASE "nodes='all'\n", "5:7: object.nodes: \"all\"", "list of texts"},
     {VASE "nodes=['a',3]\n", "5:12: object.nodes: 3", "text in quotes"},
     {"[lighting]\nenvironment=''\n", "2:13: lighting.environment: \"\"", "path"},
@@ -140,6 +144,7 @@ const Mistake ranges[] = {
 INSTANTIATE_TEST_SUITE_P(Ranges, SetMistake, testing::ValuesIn(ranges));
 
 const Mistake missing[] = {
+    {"[[button]]\nname='red'\n", "1:1: button.action: is missing", "\"record\""},
     {"[observer.intrinsics]\nwidth=64\nheight=48\nfx=60.0\ncx=31.5\ncy=23.5\n",
      "1:1: observer.intrinsics.fy: is missing", "number in px, above 0"},
     {"[observer.lens]\nf_number=2.0\nfocal_length_mm=35\nfocus_distance_m=1.0\n",
@@ -176,6 +181,8 @@ const Mistake contradictions[] = {
     {"[[tag]]\nid=7\nsize_m=0.1\nposition_m=[0,0,0]\n[[tag]]\nid=7\nsize_m=0.1\nposition_m=[1,0,0]"
      "\n",
      "6:1: tag.id: tag 7 is already in line 2", "each id once"},
+    {"[[button]]\nname='red'\naction='record'\n[[button]]\naction='live'\nname='red'\n",
+     "6:1: button.name: a short press of \"red\" is already in line 2", "one action a press"},
     {VASE VASE, "6:1: object.name: \"v\" is already in line 2", "each name once"},
     {"[[tag]]\nid=1\nsize_m=0.1\nposition_m=[0,0,0]\nworld_from_tag=" IDENTITY,
      "4:1: tag.position_m: contradicts world_from_tag", "one of the two"},

@@ -39,7 +39,9 @@ TEST(SetReference, ParsesToTheDefaults) {
   parsed.set = parse_set(reference_toml(), "config/reference.toml");
   EXPECT_EQ(parsed.set.name, "reference");
   EXPECT_EQ(parsed.set.output.directory, "config/out");
+  EXPECT_EQ(parsed.set.recording.directory, "config/takes");
   parsed.set.output.directory = defaults.set.output.directory;
+  parsed.set.recording.directory = defaults.set.recording.directory;
   EXPECT_EQ(printed(parsed), printed(defaults));
   EXPECT_FALSE(parsed.set.observer.calibration);
   EXPECT_FALSE(parsed.set.light_camera.calibration);

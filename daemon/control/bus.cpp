@@ -1,0 +1,210 @@
+#include "daemon/control/bus.hpp"
+
+#include <systemd/sd-bus.h>
+
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <deque>
+#include <map>
+#include <vector>
+
+#include "daemon/set/names.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::control {
+namespace {
+
+constexpr const char* refused_error = "org.previz.Error.Refused";
+
+void check(int result, const std::string& what) {
+  if (result < 0) throw Error("D-Bus: " + what + ": " + std::strerror(-result));
+}
+
+struct Property {
+  const char* name;
+  const char* type;
+  int (*append)(sd_bus_message*, const Status&);
+  bool (*same)(const Status&, const Status&);
+};
+
+template <auto Member>
+int append_value(sd_bus_message* message, const Status& status) {
+  const auto& value = status.*Member;
+  using T = std::remove_cvref_t<decltype(value)>;
+  if constexpr (std::is_same_v<T, std::string>) {
+    return sd_bus_message_append(message, "s", value.c_str());
+  } else if constexpr (std::is_same_v<T, bool>) {
+    return sd_bus_message_append(message, "b", int{value});
+  } else if constexpr (std::is_same_v<T, std::uint64_t>) {
+    return sd_bus_message_append(message, "t", value);
+  } else {
+    return sd_bus_message_append(message, "i", value);
+  }
+}
+
+template <auto Member>
+constexpr Property property(const char* name, const char* type) {
+  return {name, type,
+          [](sd_bus_message* message, const Status& status) {
+            return append_value<Member>(message, status);
+          },
+          [](const Status& a, const Status& b) { return a.*Member == b.*Member; }};
+}
+
+constexpr Property properties[] = {
+    property<&Status::mode>("Mode", "s"),
+    property<&Status::recording>("Recording", "b"),
+    property<&Status::take>("Take", "s"),
+    property<&Status::take_frames>("TakeFrames", "t"),
+    property<&Status::take_dropped>("TakeDropped", "t"),
+    property<&Status::fault>("Fault", "s"),
+    property<&Status::camera_lost>("CameraLost", "b"),
+    property<&Status::samples>("Samples", "i"),
+    property<&Status::set>("Set", "s"),
+    property<&Status::object>("Object", "s"),
+    property<&Status::light>("Light", "s"),
+    property<&Status::message>("Message", "s"),
+};
+
+int answer_with(sd_bus_message* call, const Answer& answer) {
+  return answer.refused ? sd_bus_reply_method_errorf(call, refused_error, "%s", answer.said.c_str())
+                        : sd_bus_reply_method_return(call, "s", answer.said.c_str());
+}
+
+int invalid(sd_bus_message* call, const std::string& what) {
+  return sd_bus_reply_method_errorf(call, SD_BUS_ERROR_INVALID_ARGS, "%s", what.c_str());
+}
+
+int on_action(sd_bus_message* call, void* data, sd_bus_error*) {
+  const char* name = nullptr;
+  if (const int result = sd_bus_message_read(call, "s", &name); result < 0) return result;
+  const set::Action* action = set::find_action(name);
+  if (!action) return invalid(call, std::string("there is no action \"") + name + "\"");
+  return answer_with(call, static_cast<Verbs*>(data)->perform(*action));
+}
+
+// A method of its own: which one, its name says.
+int on_own_method(sd_bus_message* call, void* data, sd_bus_error*) {
+  const std::string member = sd_bus_message_get_member(call);
+  for (const set::Action& action : set::actions())
+    if (method_name(action.name) == member)
+      return answer_with(call, static_cast<Verbs*>(data)->perform(action));
+  return invalid(call, member);
+}
+
+int on_set_mode(sd_bus_message* call, void* data, sd_bus_error*) {
+  const char* wanted = nullptr;
+  if (const int result = sd_bus_message_read(call, "s", &wanted); result < 0) return result;
+  for (const auto& [name, mode] : set::names(set::Mode{}))
+    if (std::strcmp(name, wanted) == 0)
+      return answer_with(call, static_cast<Verbs*>(data)->go(mode));
+  return invalid(call, std::string("there is no mode \"") + wanted +
+                           "\"; allowed: standby, live, refine, review");
+}
+
+int on_record(sd_bus_message* call, void* data, sd_bus_error*) {
+  int on = 0;
+  if (const int result = sd_bus_message_read(call, "b", &on); result < 0) return result;
+  return answer_with(call, static_cast<Verbs*>(data)->record(on != 0));
+}
+
+int on_metrics(sd_bus_message* call, void* data, sd_bus_error*) {
+  return sd_bus_reply_method_return(call, "s", static_cast<Verbs*>(data)->metrics().c_str());
+}
+
+int on_actions(sd_bus_message* call, void*, sd_bus_error*) {
+  sd_bus_message* reply = nullptr;
+  int result = sd_bus_message_new_method_return(call, &reply);
+  if (result >= 0) result = sd_bus_message_open_container(reply, 'a', "(ss)");
+  for (const set::Action& action : set::actions())
+    if (result >= 0) result = sd_bus_message_append(reply, "(ss)", action.name, action.about);
+  if (result >= 0) result = sd_bus_message_close_container(reply);
+  if (result >= 0) result = sd_bus_send(nullptr, reply, nullptr);
+  sd_bus_message_unref(reply);
+  return result;
+}
+
+int on_get(sd_bus*, const char*, const char*, const char* name, sd_bus_message* reply, void* data,
+           sd_bus_error*) {
+  for (const Property& property : properties)
+    if (std::strcmp(property.name, name) == 0)
+      return property.append(reply, static_cast<Verbs*>(data)->status());
+  return -ENOENT;
+}
+
+}  // namespace
+
+std::string method_name(const std::string& action) {
+  std::string name;
+  bool upper = true;
+  for (const char c : action) {
+    if (c != '_')
+      name += upper ? static_cast<char>(std::toupper(static_cast<unsigned char>(c))) : c;
+    upper = c == '_';
+  }
+  return name;
+}
+
+struct Bus::Impl {
+  Verbs verbs;
+  std::deque<std::string> names;  // of methods; the table points at them
+  std::vector<sd_bus_vtable> table;
+  sd_bus* bus = nullptr;
+  Status told;
+
+  Impl(sd_event* loop, Verbs the_verbs) : verbs(std::move(the_verbs)) {
+    fill_table();
+    try {
+      check(sd_bus_open_system(&bus), "the system bus cannot be reached");
+      check(
+          sd_bus_add_object_vtable(bus, nullptr, object_path, interface_name, table.data(), &verbs),
+          "the interface is not accepted");
+      check(sd_bus_request_name(bus, bus_name, 0), std::string("the name ") + bus_name);
+      check(sd_bus_attach_event(bus, loop, SD_EVENT_PRIORITY_NORMAL), "no event loop");
+    } catch (...) {
+      sd_bus_unref(bus);
+      throw;
+    }
+    told = verbs.status();
+  }
+  ~Impl() {
+    sd_bus_detach_event(bus);
+    sd_bus_flush_close_unref(bus);
+  }
+
+  void fill_table() {
+    table.push_back(SD_BUS_VTABLE_START(0));
+    table.push_back(SD_BUS_METHOD("Action", "s", "s", on_action, SD_BUS_VTABLE_UNPRIVILEGED));
+    table.push_back(SD_BUS_METHOD("SetMode", "s", "s", on_set_mode, SD_BUS_VTABLE_UNPRIVILEGED));
+    table.push_back(SD_BUS_METHOD("Record", "b", "s", on_record, SD_BUS_VTABLE_UNPRIVILEGED));
+    table.push_back(SD_BUS_METHOD("Metrics", "", "s", on_metrics, SD_BUS_VTABLE_UNPRIVILEGED));
+    table.push_back(SD_BUS_METHOD("Actions", "", "a(ss)", on_actions, SD_BUS_VTABLE_UNPRIVILEGED));
+    for (const set::Action& action : set::actions()) {
+      const std::string& name = names.emplace_back(method_name(action.name));
+      if (name == "Record") continue;  // has a method that says on or off
+      table.push_back(
+          SD_BUS_METHOD(name.c_str(), "", "s", on_own_method, SD_BUS_VTABLE_UNPRIVILEGED));
+    }
+    for (const Property& property : properties)
+      table.push_back(SD_BUS_PROPERTY(property.name, property.type, on_get, 0,
+                                      SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE));
+    table.push_back(SD_BUS_VTABLE_END);
+  }
+};
+
+Bus::Bus(sd_event* loop, Verbs verbs) : impl_(std::make_unique<Impl>(loop, std::move(verbs))) {}
+Bus::~Bus() = default;
+
+void Bus::changed() {
+  const Status now = impl_->verbs.status();
+  std::vector<char*> names;
+  for (const Property& property : properties)
+    if (!property.same(impl_->told, now)) names.push_back(const_cast<char*>(property.name));
+  impl_->told = now;
+  if (names.empty()) return;
+  names.push_back(nullptr);
+  sd_bus_emit_properties_changed_strv(impl_->bus, object_path, interface_name, names.data());
+}
+
+}  // namespace previz::control

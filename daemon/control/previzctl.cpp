@@ -1,0 +1,194 @@
+// previzctl: the rig from a shell. Exit status: 0 done; 1 refused or no rig, one line says why; 2
+// the command line cannot be understood.
+#include <systemd/sd-bus.h>
+
+#include <CLI/CLI.hpp>
+#include <cstring>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "daemon/control/bus.hpp"
+#include "drivers/error.hpp"
+
+namespace {
+
+using namespace previz;
+
+struct BusCloser {
+  void operator()(sd_bus* bus) const { sd_bus_flush_close_unref(bus); }
+};
+struct MessageCloser {
+  void operator()(sd_bus_message* message) const { sd_bus_message_unref(message); }
+};
+using BusPtr = std::unique_ptr<sd_bus, BusCloser>;
+using MessagePtr = std::unique_ptr<sd_bus_message, MessageCloser>;
+
+class ErrorText {
+ public:
+  ~ErrorText() { sd_bus_error_free(&error_); }
+  sd_bus_error* out() { return &error_; }
+  // Throws what the bus said, if the call failed.
+  void check(int result) const {
+    if (result < 0) throw Error(error_.message ? error_.message : std::strerror(-result));
+  }
+
+ private:
+  sd_bus_error error_ = SD_BUS_ERROR_NULL;
+};
+
+BusPtr open_bus() {
+  sd_bus* bus = nullptr;
+  if (const int result = sd_bus_open_system(&bus); result < 0)
+    throw Error(std::string("the system bus cannot be reached: ") + std::strerror(-result));
+  return BusPtr(bus);
+}
+
+template <class... Arguments>
+std::string call(const char* method, const char* types, Arguments... arguments) {
+  const BusPtr bus = open_bus();
+  ErrorText error;
+  sd_bus_message* reply = nullptr;
+  error.check(sd_bus_call_method(bus.get(), control::bus_name, control::object_path,
+                                 control::interface_name, method, error.out(), &reply, types,
+                                 arguments...));
+  const MessagePtr owned(reply);
+  const char* said = nullptr;
+  error.check(sd_bus_message_read(reply, "s", &said));
+  return said;
+}
+
+// One property's value, of the types the rig has.
+std::string value_text(sd_bus_message* message) {
+  char type = 0;
+  const char* contents = nullptr;
+  sd_bus_message_peek_type(message, &type, &contents);
+  const std::string signature = contents ? contents : "";
+  sd_bus_message_enter_container(message, 'v', contents);
+  std::string text;
+  if (signature == "s") {
+    const char* value = nullptr;
+    sd_bus_message_read(message, "s", &value);
+    text = value;
+  } else if (signature == "b") {
+    int value = 0;
+    sd_bus_message_read(message, "b", &value);
+    text = value != 0 ? "yes" : "no";
+  } else if (signature == "t") {
+    std::uint64_t value = 0;
+    sd_bus_message_read(message, "t", &value);
+    text = std::to_string(value);
+  } else if (signature == "i") {
+    std::int32_t value = 0;
+    sd_bus_message_read(message, "i", &value);
+    text = std::to_string(value);
+  } else {
+    sd_bus_message_skip(message, nullptr);
+  }
+  sd_bus_message_exit_container(message);
+  return text;
+}
+
+// A line a property of an a{sv}.
+void print_properties(sd_bus_message* message) {
+  sd_bus_message_enter_container(message, 'a', "{sv}");
+  while (sd_bus_message_enter_container(message, 'e', "sv") > 0) {
+    const char* name = nullptr;
+    sd_bus_message_read(message, "s", &name);
+    std::cout << name << ": " << value_text(message) << "\n";
+    sd_bus_message_exit_container(message);
+  }
+  sd_bus_message_exit_container(message);
+  std::cout << std::flush;
+}
+
+void print_status() {
+  const BusPtr bus = open_bus();
+  ErrorText error;
+  sd_bus_message* reply = nullptr;
+  error.check(sd_bus_call_method(bus.get(), control::bus_name, control::object_path,
+                                 "org.freedesktop.DBus.Properties", "GetAll", error.out(), &reply,
+                                 "s", control::interface_name));
+  const MessagePtr owned(reply);
+  print_properties(reply);
+}
+
+int on_changed(sd_bus_message* signal, void*, sd_bus_error*) {
+  sd_bus_message_skip(signal, "s");
+  print_properties(signal);
+  return 0;
+}
+
+// Until it is interrupted.
+void watch() {
+  print_status();
+  const BusPtr bus = open_bus();
+  ErrorText error;
+  error.check(sd_bus_match_signal(bus.get(), nullptr, control::bus_name, control::object_path,
+                                  "org.freedesktop.DBus.Properties", "PropertiesChanged",
+                                  on_changed, nullptr));
+  for (;;) {
+    error.check(sd_bus_process(bus.get(), nullptr));
+    error.check(sd_bus_wait(bus.get(), UINT64_MAX));
+  }
+}
+
+// Needs no rig: the table is built in.
+void print_actions(bool names_only) {
+  for (const set::Action& action : set::actions()) {
+    std::cout << action.name;
+    if (!names_only) std::cout << "\t" << action.about;
+    std::cout << "\n";
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"previzctl: operates a camera rig that runs previzd"};
+  app.require_subcommand(1);
+  std::string mode, name, which;
+  std::string on;
+  bool names_only = false;
+  app.add_subcommand("status", "What the rig is doing");
+  app.add_subcommand("watch", "The same, and every change of it");
+  app.add_subcommand("metrics", "Rates, drops and latency, as JSON");
+  app.add_subcommand("mode", "Go to a mode")
+      ->add_option("mode", mode)
+      ->required()
+      ->check(CLI::IsMember({"standby", "live", "refine", "review"}));
+  app.add_subcommand("record", "Start or end a take")
+      ->add_option("on", on)
+      ->required()
+      ->check(CLI::IsMember({"on", "off"}));
+  app.add_subcommand("action", "Do what a button could do")->add_option("name", name)->required();
+  app.add_subcommand("actions", "All actions")->add_flag("--names", names_only, "Names only");
+  app.add_subcommand("set", "Change the set")
+      ->add_option("which", which)
+      ->required()
+      ->check(CLI::IsMember({"reload", "next", "previous"}));
+  try {
+    app.parse(argc, argv);
+    if (app.got_subcommand("status")) return print_status(), 0;
+    if (app.got_subcommand("watch")) return watch(), 0;
+    if (app.got_subcommand("actions")) return print_actions(names_only), 0;
+    std::string said;
+    if (app.got_subcommand("metrics"))
+      said = call("Metrics", "");
+    else if (app.got_subcommand("mode"))
+      said = call("SetMode", "s", mode.c_str());
+    else if (app.got_subcommand("record"))
+      said = call("Record", "b", int{on == "on"});
+    else if (app.got_subcommand("action"))
+      said = call("Action", "s", name.c_str());
+    else
+      said = call("Action", "s", which == "reload" ? "reload_set" : (which + "_set").c_str());
+    std::cout << said << std::endl;
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const std::exception& error) {
+    std::cerr << "previzctl: " << error.what() << std::endl;
+    return 1;
+  }
+}

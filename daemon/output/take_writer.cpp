@@ -1,0 +1,121 @@
+#include "daemon/output/take_writer.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+
+#include "drivers/error.hpp"
+
+namespace previz::output {
+namespace {
+
+session::TakeInfo numbered(const TakeTemplate& take) {
+  session::TakeInfo info = take.info.take.value_or(session::TakeInfo{});
+  info.number = next_take_number(take.directory, info.slate);
+  return info;
+}
+
+session::SessionInfo session_info(const TakeTemplate& take, const session::TakeInfo& numbered) {
+  session::SessionInfo info = take.info;
+  info.take = numbered;
+  info.name = take_name(numbered.slate, numbered.number);
+  return info;
+}
+
+}  // namespace
+
+std::string timecode(std::chrono::nanoseconds since_midnight, double fps) {
+  const auto seconds = std::chrono::floor<std::chrono::seconds>(since_midnight);
+  const auto rate = std::max(1, static_cast<int>(std::lround(fps)));
+  const double part = std::chrono::duration<double>(since_midnight - seconds).count();
+  const int frame = std::min(static_cast<int>(part * rate), rate - 1);
+  const auto total = static_cast<int>(seconds.count() % 86'400);
+  std::array<char, 24> text{};
+  std::snprintf(text.data(), text.size(), "%02d:%02d:%02d:%02d", total / 3600, total / 60 % 60,
+                total % 60, frame);
+  return text.data();
+}
+
+std::string timecode_of(std::chrono::system_clock::time_point time, double fps) {
+  const std::time_t whole =
+      std::chrono::system_clock::to_time_t(std::chrono::floor<std::chrono::seconds>(time));
+  std::tm local{};
+  localtime_r(&whole, &local);
+  const auto part = time - std::chrono::floor<std::chrono::seconds>(time);
+  return timecode(std::chrono::hours(local.tm_hour) + std::chrono::minutes(local.tm_min) +
+                      std::chrono::seconds(local.tm_sec) + part,
+                  fps);
+}
+
+std::string take_name(const std::string& slate, int number) {
+  std::string name = slate;
+  for (char& c : name) {
+    const auto code = static_cast<unsigned char>(c);
+    const bool letter = std::isalnum(code) != 0 || code >= 0x80;  // UTF-8 stays
+    if (!letter && c != '-' && c != '+' && c != '.') c = '_';
+  }
+  if (name.empty() || name.front() == '.') name.insert(name.begin(), '_');
+  std::array<char, 16> digits{};
+  std::snprintf(digits.data(), digits.size(), "%03d", number);
+  return name + "_take" + digits.data();
+}
+
+int next_take_number(const std::filesystem::path& directory, const std::string& slate) {
+  std::string stem = take_name(slate, 0);
+  stem.resize(stem.size() - 3);
+  int highest = 0;
+  std::error_code none_yet;
+  for (const auto& entry : std::filesystem::directory_iterator(directory, none_yet)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(stem)) continue;
+    int number = 0;
+    const char* end = name.data() + name.size();
+    const auto [stop, code] = std::from_chars(name.data() + stem.size(), end, number);
+    if (code == std::errc{} && stop == end) highest = std::max(highest, number);
+  }
+  return highest + 1;
+}
+
+TakeWriter::TakeWriter(const TakeTemplate& take)
+    : take_(numbered(take)),
+      directory_(take.directory / take_name(take_.slate, take_.number)),
+      writer_(directory_, session_info(take, take_)) {
+  for (const auto& [as_written, file] : take.assets) writer_.add_asset(as_written, file);
+}
+
+bool TakeWriter::fits(const Frame& frame) const {
+  const auto found = formats_.find(frame.source);
+  if (found == formats_.end()) return true;
+  const Format& known = found->second;
+  return frame.format == known.format && frame.width == known.width && frame.height == known.height;
+}
+
+void TakeWriter::write(const Frame& frame, std::chrono::system_clock::time_point captured) {
+  const bool observer = frame.source == "observer";
+  if (observer && frame_of_.empty()) {
+    take_.timecode = timecode_of(captured, take_.timecode_fps);
+    writer_.set_take(take_);
+  }
+  writer_.write(frame);
+  formats_.try_emplace(frame.source, Format{frame.format, frame.width, frame.height});
+  if (observer) frame_of_.emplace(frame.timestamp_ns, frame_of_.size());
+}
+
+void TakeWriter::write(session::TrackRecord record) {
+  const auto found = frame_of_.find(record.timestamp_ns);
+  if (found == frame_of_.end() || found->second < next_track_) return;
+  record.frame = found->second;
+  writer_.write(record);
+  next_track_ = record.frame + 1;
+}
+
+void TakeWriter::mark_good() {
+  take_.good = true;
+  writer_.set_take(take_);
+}
+
+}  // namespace previz::output

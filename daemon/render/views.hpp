@@ -1,0 +1,25 @@
+// What can be shown of a frame: the composite, or one of the layers it was made of.
+#pragma once
+
+#include <array>
+
+#include "daemon/lighting/response.hpp"
+#include "daemon/render/layers.hpp"
+#include "drivers/frame.hpp"
+
+namespace previz::render {
+
+enum class View { composite, mixed, real, difference, mask, depth, normal, noise };
+inline constexpr std::array all_views = {View::composite,  View::mixed, View::real,
+                                         View::difference, View::mask,  View::depth,
+                                         View::normal,     View::noise};
+const char* name_of(View view);
+
+// A layer as a picture of the response's bits. Radiance goes through exposure and response as the
+// camera's would; the difference is laid about middle grey at half its contrast; depth is
+// 1 m / (1 m + depth), black where nothing was met; normals are 0.5 + 0.5 n; noise is the standard
+// error of the composite, eight times.
+Plate picture_of(View view, const Layers& layers, const lighting::Response& response,
+                 double exposure);
+
+}  // namespace previz::render

@@ -1,0 +1,233 @@
+#include "daemon/rig/controls.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <glm/gtc/matrix_transform.hpp>
+#include <iterator>
+#include <variant>
+
+#include "daemon/set/names.hpp"
+
+namespace previz::rig {
+namespace {
+
+template <class... Arguments>
+std::string text(const char* format, Arguments... arguments) {
+  char buffer[160];
+  std::snprintf(buffer, sizeof buffer, format, arguments...);
+  return buffer;
+}
+
+// The name after (or before) this one in the enumeration, around its end.
+template <class E>
+E next_named(E value) {
+  const auto all = set::names(E{});
+  const auto at = std::ranges::find_if(all, [&](const auto& name) { return name.second == value; });
+  return (at == all.end() || at + 1 == all.end() ? all.begin() : at + 1)->second;
+}
+
+std::size_t around(std::size_t index, int next, std::size_t size) {
+  return (index + size + static_cast<std::size_t>(next + static_cast<int>(size))) % size;
+}
+
+Outcome none_of(const char* what) {
+  return {std::string("this set has no ") + what, true, {}};
+}
+
+}  // namespace
+
+Controls::Controls(const set::Set& set) : control_(set.control) {
+  for (const set::Object& object : set.objects)
+    if (object.presence == set::Presence::virtual_object) objects_.push_back(object.name);
+  for (const set::Light& light : set.lights) lights_.push_back(light.name);
+  look_.samples = set.quality.samples;
+  look_.governed = set.quality.fps > 0;
+  look_.estimator = set.estimation.estimator;
+  look_.light_mode = set.lighting.mode;
+}
+
+std::string Controls::selected_object() const {
+  return objects_.empty() ? "" : objects_[object_];
+}
+
+std::string Controls::selected_light() const {
+  return lights_.empty() ? "" : lights_[light_];
+}
+
+Outcome Controls::perform(const set::Action& action) {
+  return std::visit([this](const auto& effect) { return apply(effect); }, action.effect);
+}
+
+bool Controls::pushed() {
+  const Mode before = look_.state.mode;
+  change(Event::press);
+  return look_.state.mode != before;
+}
+
+bool Controls::is_mode(const set::Action& action) {
+  return std::holds_alternative<set::ToMode>(action.effect);
+}
+
+Outcome Controls::happened(Event event) {
+  return change(event);
+}
+
+Outcome Controls::change(Event event) {
+  const State before = look_.state;
+  const Step taken = step(before, event);
+  if (taken.refused) return {taken.refused, true, {}};
+  look_.state = taken.state;
+  Outcome outcome;
+  if (taken.state.recording != before.recording) {
+    outcome.request = taken.state.recording ? Request::start_take : Request::stop_take;
+    outcome.said = taken.state.recording ? "recording" : "recording ended";
+  } else {
+    outcome.said = set::name_of(taken.state.mode);
+  }
+  return outcome;
+}
+
+Outcome Controls::apply(const set::ToMode& effect) {
+  switch (effect.mode) {
+    case Mode::standby:
+      return change(Event::toggle_standby);
+    case Mode::live:
+      return change(Event::wish_live);
+    case Mode::refine:
+      return change(Event::toggle_refine);
+    case Mode::review:
+      return change(Event::toggle_review);
+  }
+  return {};
+}
+
+Outcome Controls::apply(const set::Record&) {
+  return change(Event::record_toggle);
+}
+
+Outcome Controls::apply(const set::MarkGood&) {
+  if (!look_.state.recording && !look_.state.has_take)
+    return {"no take was recorded yet; there is nothing to mark", true, {}};
+  return {"take marked good", false, Request::mark_good};
+}
+
+Outcome Controls::apply(const set::Snapshot&) {
+  ++look_.snapshots;
+  return {"snapshot", false, {}};
+}
+
+Outcome Controls::apply(const set::ReloadSet&) {
+  if (look_.state.recording) return {"recording goes on; stop it first", true, {}};
+  return {"reading the set again", false, Request::reload_set};
+}
+
+Outcome Controls::apply(const set::OtherSet& effect) {
+  if (look_.state.recording) return {"recording goes on; stop it first", true, {}};
+  return {effect.next > 0 ? "next set" : "previous set", false,
+          effect.next > 0 ? Request::next_set : Request::previous_set};
+}
+
+Outcome Controls::apply(const set::ChangeSamples& effect) {
+  look_.governed = false;
+  const int* const end = std::end(sample_steps);
+  if (effect.next > 0) {
+    const int* const above = std::upper_bound(std::begin(sample_steps), end, look_.samples);
+    if (above != end) look_.samples = *above;
+  } else {
+    const int* const at = std::lower_bound(std::begin(sample_steps), end, look_.samples);
+    if (at != std::begin(sample_steps)) look_.samples = *(at - 1);
+  }
+  return {text("%d samples", look_.samples), false, {}};
+}
+
+Outcome Controls::apply(const set::NextEstimator&) {
+  look_.estimator = next_named(look_.estimator);
+  return {std::string("estimator: ") + set::name_of(look_.estimator), false, {}};
+}
+
+Outcome Controls::apply(const set::NextLightMode&) {
+  look_.light_mode = next_named(look_.light_mode);
+  return {std::string("light: ") + set::name_of(look_.light_mode), false, {}};
+}
+
+Outcome Controls::apply(const set::NextView&) {
+  const auto at = std::ranges::find(render::all_views, look_.view);
+  look_.view = at + 1 == render::all_views.end() ? render::all_views.front() : *(at + 1);
+  return {std::string("view: ") + render::name_of(look_.view), false, {}};
+}
+
+Outcome Controls::apply(const set::SelectObject& effect) {
+  if (objects_.empty()) return none_of("virtual object");
+  object_ = around(object_, effect.next, objects_.size());
+  return {"object: " + selected_object(), false, {}};
+}
+
+Outcome Controls::apply(const set::MoveObject& effect) {
+  if (objects_.empty()) return none_of("virtual object");
+  glm::dvec3& offset = look_.edits.objects[selected_object()].offset_m;
+  offset += control_.move_step_m * effect.steps;
+  return {text("%s moved to %+.3f %+.3f %+.3f m", selected_object().c_str(), offset.x, offset.y,
+               offset.z),
+          false,
+          {}};
+}
+
+Outcome Controls::apply(const set::TurnObject& effect) {
+  if (objects_.empty()) return none_of("virtual object");
+  glm::dmat3& turn = look_.edits.objects[selected_object()].turn;
+  turn = glm::dmat3(glm::rotate(glm::dmat4(1), control_.turn_step_rad * glm::length(effect.steps),
+                                glm::normalize(effect.steps))) *
+         turn;
+  return {selected_object() + " turned", false, {}};
+}
+
+Outcome Controls::apply(const set::ScaleObject& effect) {
+  if (objects_.empty()) return none_of("virtual object");
+  double& scale = look_.edits.objects[selected_object()].scale;
+  scale *= effect.steps > 0 ? control_.scale_step : 1 / control_.scale_step;
+  return {text("%s at %.3g of its size", selected_object().c_str(), scale), false, {}};
+}
+
+Outcome Controls::apply(const set::ResetObject&) {
+  if (objects_.empty()) return none_of("virtual object");
+  look_.edits.objects.erase(selected_object());
+  return {selected_object() + " is where the set has it", false, {}};
+}
+
+Outcome Controls::apply(const set::SelectLight& effect) {
+  if (lights_.empty()) return none_of("lamp");
+  light_ = around(light_, effect.next, lights_.size());
+  return {"lamp: " + selected_light(), false, {}};
+}
+
+Outcome Controls::apply(const set::DimLight& effect) {
+  if (lights_.empty()) return none_of("lamp");
+  double& stops = look_.edits.lights[selected_light()].stops;
+  stops += effect.steps * control_.light_step_stops;
+  return {text("%s %+.2f stops", selected_light().c_str(), stops), false, {}};
+}
+
+Outcome Controls::apply(const set::TintLight& effect) {
+  if (lights_.empty()) return none_of("lamp");
+  pipeline::LightEdit& edit = look_.edits.lights[selected_light()];
+  edit.warm_stops += effect.warmer * control_.tint_step_stops;
+  edit.green_stops += effect.greener * control_.tint_step_stops;
+  return {text("%s warm %+.2f green %+.2f stops", selected_light().c_str(), edit.warm_stops,
+               edit.green_stops),
+          false,
+          {}};
+}
+
+Outcome Controls::apply(const set::ResetLight&) {
+  if (lights_.empty()) return none_of("lamp");
+  look_.edits.lights.erase(selected_light());
+  return {selected_light() + " is as the set has it", false, {}};
+}
+
+Outcome Controls::apply(const set::ChangeExposure& effect) {
+  look_.exposure_steps += effect.steps;
+  return {
+      text("exposure %+.2f stops", look_.exposure_steps * control_.exposure_step_stops), false, {}};
+}
+
+}  // namespace previz::rig

@@ -1,0 +1,56 @@
+// What the stages' threads tell the rig's main thread: events, in order, behind one descriptor.
+#pragma once
+
+#include <sys/eventfd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "daemon/rig/mode.hpp"
+#include "drivers/descriptor.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::rig {
+
+class Inbox {
+ public:
+  Inbox() : descriptor_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    if (!descriptor_) throw Error(std::string("no eventfd can be made: ") + std::strerror(errno));
+  }
+
+  int fd() const { return descriptor_.get(); }  // readable while something waits
+
+  void post(Event event) {
+    const std::lock_guard lock(mutex_);
+    events_.push_back(event);
+    eventfd_write(descriptor_.get(), 1);
+  }
+  // Everything ended: the observer's stream, or a stage with an error.
+  void finish() {
+    const std::lock_guard lock(mutex_);
+    finished_ = true;
+    eventfd_write(descriptor_.get(), 1);
+  }
+
+  std::vector<Event> take() {
+    const std::lock_guard lock(mutex_);
+    eventfd_t ignored = 0;
+    eventfd_read(descriptor_.get(), &ignored);
+    return std::exchange(events_, {});
+  }
+  bool finished() const {
+    const std::lock_guard lock(mutex_);
+    return finished_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::vector<Event> events_;
+  bool finished_ = false;
+  OwnedDescriptor descriptor_;
+};
+
+}  // namespace previz::rig

@@ -1,0 +1,56 @@
+// The rig's stages for one set: cameras, tracking, lighting, rendering and display, each a thread,
+// with mailboxes between them and the recorder beside them.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <stop_token>
+#include <string>
+
+#include "daemon/output/recorder.hpp"
+#include "daemon/pipeline/channel.hpp"
+#include "daemon/pipeline/metrics.hpp"
+#include "daemon/pipeline/newest.hpp"
+#include "daemon/pipeline/shot.hpp"
+#include "daemon/render/renderer.hpp"
+#include "daemon/rig/cameras.hpp"
+#include "daemon/rig/controls.hpp"
+#include "daemon/rig/inbox.hpp"
+#include "daemon/rig/notes.hpp"
+#include "daemon/scene/scene.hpp"
+
+namespace previz::rig {
+
+class LivePipeline {
+ public:
+  // Everything outlives the pipeline.
+  struct Parts {
+    const set::Set& set;
+    Cameras& cameras;
+    const scene::Scene& scene;
+    std::shared_ptr<render::Device> device;
+    output::Recorder& recorder;
+    const pipeline::Newest<Look>& look;
+    Inbox& inbox;
+    Notes& note;
+    pipeline::Metrics& metrics;
+    std::function<void(pipeline::Shot)> show;  // on the display's thread
+  };
+
+  // Throws previz::Error on anything that keeps the set from running; nothing runs then.
+  LivePipeline(Parts parts, std::stop_token stop);
+  ~LivePipeline();  // stops it
+  LivePipeline(const LivePipeline&) = delete;
+  LivePipeline& operator=(const LivePipeline&) = delete;
+
+  // The end of every stage, after Inbox::finish; throws what the first failing stage threw.
+  void wait();
+
+  pipeline::Mailbox<pipeline::Shot>& reviewed();  // where a review puts its frames
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace previz::rig

@@ -1,0 +1,165 @@
+#include "daemon/rig/live_render.hpp"
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "daemon/render/error_estimate.hpp"
+
+namespace previz::rig {
+
+using pipeline::Shot;
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds patience{100};  // how late a change of mode may be noticed
+constexpr int most_round = 64;
+constexpr int most_samples = 1 << 24;  // up to where the sums are exact enough (P4)
+
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+}  // namespace
+
+LiveRender::LiveRender(const set::Set& set, const pipeline::Newest<Look>& look, Inbox& inbox,
+                       pipeline::Metrics& metrics, Channels channels, std::stop_token stop)
+    : set_(set),
+      look_(look),
+      inbox_(inbox),
+      metrics_(metrics),
+      channels_(channels),
+      stop_(std::move(stop)) {
+  if (set.quality.fps > 0) governor_.emplace(set.quality.fps, set.quality.scale);
+}
+
+bool LiveRender::interrupted() const {
+  return stop_.stop_requested() || (refining_ && look_.get()->state.mode != Mode::refine);
+}
+
+std::optional<Shot> LiveRender::next() {
+  for (;;) {
+    const std::shared_ptr<const Look> look = look_.get();
+    // What a button was pressed at is what is saved, also where the press ended the refinement.
+    if (wants_snapshot(*look) && refined_) save(*look, *refined_);
+    if (look->state.mode != Mode::refine) refining_ = false;
+    std::optional<Shot> shot =
+        look->state.mode == Mode::refine ? refine(*look) : wait_for_frame(*look);
+    if (shot) return shot;
+    if (channels_.tracked.finished()) return std::nullopt;
+  }
+}
+
+std::optional<Shot> LiveRender::refine(const Look& look) {
+  while (channels_.tracked.try_pop()) metrics_.dropped("render", "refining");
+  if (refining_ && refined_edits_ != look.edits) {  // P14: moved while it is refined
+    good_->scene = pipeline::scene_state(set_, look.edits);
+    refining_ = false;
+  }
+  if (!refining_ && !begin_refinement(look)) return std::nullopt;
+  Shot& shot = *good_;
+  if (shot.samples >= most_samples) {
+    std::this_thread::sleep_for(patience);
+    return std::nullopt;
+  }
+  const auto begin = Clock::now();
+  const int round = shot.samples == 0 ? look.samples : std::min(shot.samples, most_round);
+  if (!stage_->add_samples(round)) {
+    refining_ = false;
+    return std::nullopt;
+  }
+  shot.samples += round;
+  Shot shown = shot;
+  stage_->show(look.view);
+  stage_->finish(shown);
+  shown.error = render::estimate_error(shown.layers).picture;
+  refined_ = shown;
+  metrics_.busy("refine", seconds_since(begin));
+  metrics_.count("refine rounds");
+  return shown;
+}
+
+// Full size, whatever the preview's: what is refined is what `previzd render` makes.
+bool LiveRender::begin_refinement(const Look& look) {
+  if (!good_) return false;
+  Shot& shot = *good_;
+  shot.samples = 0;
+  stage_->fill_layers(true);
+  stage_->use(look.estimator);
+  stage_->resize(1);
+  refining_ = stage_->begin(shot);
+  refined_edits_ = look.edits;
+  return refining_;
+}
+
+std::optional<Shot> LiveRender::wait_for_frame(const Look& look) {
+  const bool review = look.state.mode == Mode::review;
+  std::optional<Shot> shot = (review ? channels_.reviewed : channels_.tracked).pop_for(patience);
+  if (review && channels_.tracked.try_pop()) metrics_.dropped("render", "review");
+  if (!shot) return std::nullopt;
+  if (look.state.mode == Mode::standby) {
+    metrics_.dropped("render", "standby");
+    return std::nullopt;
+  }
+  if (!shot->tracking_done) {  // it came while tracking paused
+    metrics_.dropped("render", "refining");
+    return std::nullopt;
+  }
+  if (!review) {
+    shot->light = channels_.light.newest();
+  }
+  return render(look, std::move(*shot));
+}
+
+Shot LiveRender::render(const Look& look, Shot shot) {
+  const auto begin = Clock::now();
+  const bool governed = look.governed && governor_;
+  set::Quality quality = set_.quality;
+  quality.samples = look.samples;
+  if (governed) {
+    quality.samples = governor_->samples();
+    quality.error = quality.seconds = 0;
+  }
+  const bool snapshot = wants_snapshot(look);
+  stage_->use(quality);
+  stage_->use(look.estimator);
+  stage_->show(look.view);
+  stage_->fill_layers(snapshot);
+  stage_->resize(governed ? governor_->scale() : set_.quality.scale);
+  (*stage_)(shot);
+  refined_.reset();
+  const double took = seconds_since(begin);
+  metrics_.busy("render", took);
+  metrics_.worked("render", 0);
+  if (!shot.whole) return shot;
+  if (shot.untouched.empty()) {
+    keep_as_good(shot);
+    if (governed) governor_->took(took);
+  }
+  if (snapshot) save(look, shot);
+  return shot;
+}
+
+// The frame and what belongs to it, without what was made of it.
+void LiveRender::keep_as_good(const Shot& shot) {
+  if (!good_) inbox_.post(Event::good_frame);
+  Shot good;
+  good.index = shot.index;
+  good.frame = shot.frame;
+  good.arrived = shot.arrived;
+  good.track = shot.track;
+  good.light = shot.light;
+  good.scene = shot.scene;
+  good.tracking_done = true;
+  good.frozen = true;
+  good_ = std::move(good);
+}
+
+void LiveRender::save(const Look& look, const Shot& shot) {
+  snapshots_ = look.snapshots;
+  if (!channels_.snapshots.push(shot)) metrics_.dropped("snapshot", "stopped");
+}
+
+}  // namespace previz::rig

@@ -1,0 +1,69 @@
+// The render thread of the rig: a picture of each new frame, or rounds of refining the last good
+// one, as the desk says.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <stop_token>
+
+#include "daemon/pipeline/channel.hpp"
+#include "daemon/pipeline/governor.hpp"
+#include "daemon/pipeline/light_feed.hpp"
+#include "daemon/pipeline/metrics.hpp"
+#include "daemon/pipeline/newest.hpp"
+#include "daemon/pipeline/render_stage.hpp"
+#include "daemon/pipeline/shot.hpp"
+#include "daemon/rig/controls.hpp"
+#include "daemon/rig/inbox.hpp"
+
+namespace previz::rig {
+
+class LiveRender {
+ public:
+  struct Channels {
+    pipeline::Mailbox<pipeline::Shot>& tracked;   // of the camera
+    pipeline::Mailbox<pipeline::Shot>& reviewed;  // of a take, with their light
+    pipeline::LightFeed& light;
+    pipeline::BoundedQueue<pipeline::Shot>& snapshots;  // out: with layers
+  };
+
+  // The stage must ask interrupted().
+  LiveRender(const set::Set& set, const pipeline::Newest<Look>& look, Inbox& inbox,
+             pipeline::Metrics& metrics, Channels channels, std::stop_token stop);
+
+  void use(pipeline::RenderStage& stage) { stage_ = &stage; }
+
+  // The next picture to show; nothing once the camera's frames have ended. A refinement's rounds
+  // grow: first the preview's samples, then as many again as there are, at most 64.
+  std::optional<pipeline::Shot> next();
+
+  // Whether what is being rendered is no longer wanted; from the render thread.
+  bool interrupted() const;
+
+ private:
+  bool wants_snapshot(const Look& look) const { return look.snapshots > snapshots_; }
+  void save(const Look& look, const pipeline::Shot& shot);
+  std::optional<pipeline::Shot> refine(const Look& look);
+  bool begin_refinement(const Look& look);
+  std::optional<pipeline::Shot> wait_for_frame(const Look& look);
+  pipeline::Shot render(const Look& look, pipeline::Shot shot);
+  void keep_as_good(const pipeline::Shot& shot);
+
+  const set::Set& set_;
+  const pipeline::Newest<Look>& look_;
+  Inbox& inbox_;
+  pipeline::Metrics& metrics_;
+  Channels channels_;
+  const std::stop_token stop_;
+  pipeline::RenderStage* stage_ = nullptr;
+  std::optional<pipeline::Governor> governor_;
+  std::optional<pipeline::Shot> good_;     // the last one with pose and light: its frame only
+  std::optional<pipeline::Shot> refined_;  // the last round's, with layers, while it is shown
+  bool refining_ = false;
+  pipeline::Edits refined_edits_;
+  std::uint64_t snapshots_ = 0;  // of look.snapshots, done
+};
+
+}  // namespace previz::rig

@@ -1,0 +1,25 @@
+// A set with everything that its files can be wrong about already read: all of it or nothing.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "daemon/scene/scene.hpp"
+#include "daemon/set/set.hpp"
+
+namespace previz::rig {
+
+struct LoadedSet {
+  set::Set set;
+  std::string text;  // of the file, as it goes into takes
+  scene::Scene scene;
+};
+
+// Throws previz::Error with every problem of the set, or of its scene.
+LoadedSet load_whole_set(const std::filesystem::path& file);
+
+// The set file `next` places after `file` in its folder, by name and around the end; files are
+// those that end in .toml.
+std::filesystem::path neighbour(const std::filesystem::path& file, int next);
+
+}  // namespace previz::rig

@@ -1,0 +1,57 @@
+// From edges of buttons to presses: short, long and double.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/set/set.hpp"
+#include "drivers/buttons.hpp"
+
+namespace previz::rig {
+
+struct Press {
+  std::string button;
+  set::PressKind kind = set::PressKind::short_press;
+  std::int64_t timestamp_ns = 0;  // when it was certain which kind it is
+
+  friend bool operator==(const Press&, const Press&) = default;
+};
+
+// A press is told as soon as it is certain, so a button that only has a short press answers at
+// once. With a long press: short at its release, long while it is still held. With a double press:
+// short only once the time for a second has passed. Time comes from the caller.
+class PressRecognizer {
+ public:
+  static constexpr std::int64_t long_ns = 600'000'000;    // held so long: long
+  static constexpr std::int64_t double_ns = 300'000'000;  // from release to the second push
+
+  // Which presses have an action. A button that has none is not told of.
+  explicit PressRecognizer(const std::vector<set::Button>& buttons);
+
+  // Edges of a button come in order; what is told never is.
+  std::vector<Press> edge(const ButtonEvent& event);
+  // What became certain by the passing of time; to be called at deadline().
+  std::vector<Press> tick(std::int64_t now_ns);
+  std::optional<std::int64_t> deadline() const;
+
+ private:
+  enum class Phase { idle, down, told, released };
+  struct Button {
+    bool has_short = false, has_long = false, has_double = false;
+    Phase phase = Phase::idle;
+    std::int64_t since_ns = 0;  // of the phase
+  };
+
+  static std::optional<std::int64_t> due(const Button& button);
+  static void push(const std::string& name, Button& button, std::int64_t now_ns,
+                   std::vector<Press>& told);
+  static void release(const std::string& name, Button& button, std::int64_t now_ns,
+                      std::vector<Press>& told);
+
+  std::map<std::string, Button> buttons_;
+};
+
+}  // namespace previz::rig

@@ -1,0 +1,259 @@
+#include "daemon/rig/rig.hpp"
+
+#include <algorithm>
+#include <variant>
+
+#include "daemon/pipeline/take.hpp"
+#include "daemon/post/import_assets.hpp"
+#include "daemon/set/names.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::rig {
+namespace {
+
+constexpr std::chrono::milliseconds tick_interval{20};
+constexpr int ticks_a_second = 50;
+
+output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& cameras, Notes& note) {
+  const set::Set& set = loaded.set;
+  output::TakeTemplate take;
+  take.directory = set.recording.directory;
+  take.info.set_name = set.file.filename().string();
+  take.info.set_text = loaded.text;
+  take.info.observer = pipeline::observer_calibration(set, cameras.recorded.info);
+  take.info.light = pipeline::light_calibration(set, cameras.recorded.info);
+  take.info.take = session::TakeInfo{0,
+                                     set.recording.slate.empty() ? set.name : set.recording.slate,
+                                     "",
+                                     set.recording.timecode_fps,
+                                     set.recording.notes,
+                                     false};
+  try {
+    take.assets = post::assets_of(set);
+  } catch (const Error& error) {
+    note(std::string("takes will lack the scene: ") + error.what());
+  }
+  return take;
+}
+
+output::RecorderOptions recorder_options(const LoadedSet& loaded, const Cameras& cameras,
+                                         Notes& note) {
+  const set::Recording& recording = loaded.set.recording;
+  output::RecorderOptions options;
+  options.take = take_template(loaded, cameras, note);
+  options.preroll_s = recording.preroll_s;
+  options.queue_bytes = static_cast<std::uint64_t>(recording.queue_mb * 1e6);
+  options.reserve_bytes = static_cast<std::uint64_t>(recording.reserve_mb * 1e6);
+  options.note = [&note](const std::string& what) { note.again(what); };
+  return options;
+}
+
+}  // namespace
+
+Rig::Rig(const LoadedSet& loaded, Parts parts)
+    : loaded_(loaded),
+      parts_(std::move(parts)),
+      cameras_(open_cameras(loaded.set, parts_.loop_cameras)),
+      controls_(loaded.set),
+      look_(controls_.look()),
+      recorder_(recorder_options(loaded, cameras_, parts_.note)),
+      presses_(loaded.set.buttons),
+      set_time_(std::filesystem::last_write_time(loaded.set.file)),
+      pipeline_(
+          {.set = loaded.set,
+           .cameras = cameras_,
+           .scene = loaded.scene,
+           .device = parts_.device,
+           .recorder = recorder_,
+           .look = look_,
+           .inbox = inbox_,
+           .note = parts_.note,
+           .metrics = parts_.metrics,
+           .show = [this](pipeline::Shot shot) { parts_.show(std::move(shot), *look_.get()); }},
+          parts_.stop) {
+  for (const std::string& what : loaded.scene.notes) parts_.note("scene: " + what);
+  open_buttons();
+}
+
+Rig::~Rig() = default;
+
+void Rig::open_buttons() {
+  for (std::unique_ptr<Buttons>& buttons : rig::open_buttons(loaded_.set, cameras_))
+    devices_.push_back({std::move(buttons), nullptr});
+  if (parts_.more_buttons)
+    for (std::unique_ptr<Buttons>& buttons : parts_.more_buttons())
+      devices_.push_back({std::move(buttons), nullptr});
+  for (Device& device : devices_)
+    device.watch = parts_.loop.on_readable(device.buttons->fd(), [this, &device] { read(device); });
+}
+
+std::optional<LoadedSet> Rig::run() {
+  const auto inbox_watch = parts_.loop.on_readable(inbox_.fd(), [this] { inbox(); });
+  const auto timer = parts_.loop.every(tick_interval, [this] { tick(); });
+  std::unique_ptr<EventLoop::Watch> watchdog;
+  if (const auto interval = service::watchdog_interval())
+    watchdog = parts_.loop.every(*interval, [this] { feed_watchdog(); });
+  service::ready("set \"" + loaded_.set.name + "\"");
+  parts_.loop.run();
+  if (next_) return std::move(next_);
+  pipeline_.wait();
+  return std::nullopt;
+}
+
+void Rig::read(Device& device) {
+  while (std::optional<ButtonsEvent> event = device.buttons->next()) {
+    bool over = std::holds_alternative<EndOfStream>(*event);
+    if (const auto* pushed = std::get_if<ButtonEvent>(&*event)) edge(*pushed);
+    if (const auto* trouble = std::get_if<DeviceTrouble>(&*event)) {
+      parts_.note(trouble->device + ": " + trouble->what);
+      over = trouble->lost;
+    }
+    if (over) return device.watch.reset();
+  }
+}
+
+void Rig::edge(const ButtonEvent& event) {
+  recorder_.offer(event);
+  if (event.pressed) {
+    ended_refinement_.erase(event.button);
+    if (controls_.pushed()) {
+      ended_refinement_.insert(event.button);
+      tell({"live", false, {}}, "button " + event.button);
+    }
+  }
+  for (const Press& press : presses_.edge(event)) act(press);
+}
+
+void Rig::act(const Press& press) {
+  const auto mapped = std::ranges::find_if(loaded_.set.buttons, [&](const set::Button& button) {
+    return button.name == press.button && button.press == press.kind;
+  });
+  if (mapped == loaded_.set.buttons.end()) return;
+  const set::Action& action = *set::find_action(mapped->action);
+  // A press that ended the refinement has gone where a mode button goes: to live.
+  if (ended_refinement_.erase(press.button) > 0 && Controls::is_mode(action)) return;
+  perform(action, "button " + press.button);
+}
+
+Outcome Rig::perform(const set::Action& action, const std::string& by) {
+  const Outcome outcome = controls_.perform(action);
+  tell(outcome, by);
+  return outcome;
+}
+
+Outcome Rig::wish(Event event, const std::string& by) {
+  const Outcome outcome = controls_.happened(event);
+  tell(outcome, by);
+  return outcome;
+}
+
+void Rig::tell(const Outcome& outcome, const std::string& by) {
+  const std::string line = by + ": " + outcome.said + (outcome.refused ? " (refused)" : "");
+  parts_.note.again(line);
+  publish();
+  if (outcome.request) carry_out(*outcome.request);
+  recorder_.offer_event(now_ns(), line);
+  service::status(line);
+  last_said_ = line;
+  if (changed_) changed_();
+}
+
+void Rig::publish() {
+  look_.set(controls_.look());
+  const bool review = controls_.look().state.mode == Mode::review;
+  if (review && !review_) {
+    pipeline_.reviewed().try_pop();
+    review_ = std::make_unique<Review>(recorder_.status().directory, loaded_.text,
+                                       pipeline_.reviewed(), inbox_, parts_.note);
+  } else if (!review && review_) {
+    review_->stop();
+    ended_reviews_.push_back(std::move(review_));
+  }
+}
+
+void Rig::carry_out(Request request) {
+  switch (request) {
+    case Request::start_take:
+      return recorder_.start();
+    case Request::stop_take:
+      return recorder_.stop();
+    case Request::mark_good:
+      return recorder_.mark_good();
+    case Request::reload_set:
+      return change_set(loaded_.set.file);
+    case Request::next_set:
+      return change_set(neighbour(loaded_.set.file, 1));
+    case Request::previous_set:
+      return change_set(neighbour(loaded_.set.file, -1));
+  }
+}
+
+// All or nothing: a set with a fault leaves this one running.
+void Rig::change_set(const std::filesystem::path& file) {
+  try {
+    next_ = load_whole_set(file);
+    parts_.loop.exit();
+  } catch (const std::exception& error) {
+    parts_.note.again(std::string(error.what()) + "\nthe set stays as it was");
+  }
+}
+
+void Rig::inbox() {
+  for (const Event event : inbox_.take()) {
+    const State before = controls_.look().state;
+    const Outcome outcome = controls_.happened(event);
+    if (controls_.look().state == before) continue;
+    if (event == Event::good_frame)
+      publish();
+    else
+      tell(event == Event::camera_lost   ? Outcome{"camera lost", false, {}}
+           : event == Event::camera_back ? Outcome{"camera is back", false, {}}
+                                         : outcome,
+           "rig");
+  }
+  if (inbox_.finished()) parts_.loop.exit();
+}
+
+void Rig::tick() {
+  for (const Press& press : presses_.tick(now_ns())) act(press);
+  look_at_recorder();
+  std::erase_if(ended_reviews_, [](const auto& review) { return review->done(); });
+  if (++ticks_ % ticks_a_second == 0) look_at_set_file();
+}
+
+void Rig::look_at_recorder() {
+  const output::RecorderStatus status = recorder_.status();
+  const auto tell_of = [&](std::uint64_t& known, std::uint64_t now, Event event,
+                           const std::string& said) {
+    if (now == known) return;
+    known = now;
+    controls_.happened(event);
+    tell({said, false, {}}, "recorder");
+  };
+  tell_of(failures_, status.failures, Event::recorder_failed, "take ended, " + status.fault);
+  tell_of(finished_takes_, status.finished_takes, Event::take_finished,
+          "take " + status.directory.filename().string() + " is finished");
+}
+
+void Rig::look_at_set_file() {
+  std::error_code gone;
+  const auto time = std::filesystem::last_write_time(loaded_.set.file, gone);
+  if (gone || time == set_time_ || controls_.look().state.recording) return;
+  set_time_ = time;
+  parts_.note.again(loaded_.set.file.string() + ": the file has changed");
+  change_set(loaded_.set.file);
+}
+
+void Rig::feed_watchdog() {
+  const Progress now = progress_of(parts_.metrics.snapshot(0), controls_.look().state);
+  if (!advances(progress_, now)) return;
+  progress_ = now;
+  service::feed_watchdog();
+}
+
+std::int64_t Rig::now_ns() const {
+  const auto now = std::chrono::steady_clock::now().time_since_epoch();
+  return std::chrono::nanoseconds(now).count() + cameras_.clock_offset_ns;
+}
+
+}  // namespace previz::rig

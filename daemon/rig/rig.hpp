@@ -1,0 +1,107 @@
+// The rig running one set: desk, buttons, recorder and pipeline, on the main thread's event loop.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <stop_token>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/output/recorder.hpp"
+#include "daemon/pipeline/metrics.hpp"
+#include "daemon/pipeline/newest.hpp"
+#include "daemon/rig/cameras.hpp"
+#include "daemon/rig/controls.hpp"
+#include "daemon/rig/event_loop.hpp"
+#include "daemon/rig/inbox.hpp"
+#include "daemon/rig/live_pipeline.hpp"
+#include "daemon/rig/loaded_set.hpp"
+#include "daemon/rig/notes.hpp"
+#include "daemon/rig/press.hpp"
+#include "daemon/rig/review.hpp"
+#include "daemon/rig/service.hpp"
+
+namespace previz::rig {
+
+class Rig {
+ public:
+  struct Parts {  // outlive the rig
+    EventLoop& loop;
+    Notes& note;
+    pipeline::Metrics& metrics;
+    std::shared_ptr<render::Device> device;
+    std::function<void(pipeline::Shot, const Look&)> show;                // on the display's thread
+    std::function<std::vector<std::unique_ptr<Buttons>>()> more_buttons;  // or empty
+    bool loop_cameras = false;
+    std::stop_token stop;
+  };
+
+  // Opens the devices and starts; throws previz::Error on anything that keeps the set from running.
+  Rig(const LoadedSet& loaded, Parts parts);
+  ~Rig();
+  Rig(const Rig&) = delete;
+  Rig& operator=(const Rig&) = delete;
+
+  // Until the observer's stream ends or a stop is requested; or until another set is wanted, which
+  // is returned, read without fault. Throws what a stage threw.
+  std::optional<LoadedSet> run();
+
+  // From the loop's thread; `by` is who asks, for the log and the take: "button red", "bus".
+  Outcome perform(const set::Action& action, const std::string& by);
+  Outcome wish(Event event, const std::string& by);
+
+  const Controls& controls() const { return controls_; }
+  const LoadedSet& loaded() const { return loaded_; }
+  const std::string& last_said() const { return last_said_; }
+  output::RecorderStatus recorder_status() const { return recorder_.status(); }
+  // Called after anything of the above has changed.
+  void on_change(std::function<void()> changed) { changed_ = std::move(changed); }
+
+ private:
+  struct Device {
+    std::unique_ptr<Buttons> buttons;
+    std::unique_ptr<EventLoop::Watch> watch;
+  };
+
+  void open_buttons();
+  void read(Device& device);
+  void edge(const ButtonEvent& event);
+  void act(const Press& press);
+  void inbox();
+  void tick();
+  void look_at_recorder();
+  void look_at_set_file();
+  void feed_watchdog();
+  void tell(const Outcome& outcome, const std::string& by);
+  void carry_out(Request request);
+  void change_set(const std::filesystem::path& file);
+  void publish();
+  std::int64_t now_ns() const;  // the cameras' clock
+
+  const LoadedSet& loaded_;
+  Parts parts_;
+  Cameras cameras_;
+  Controls controls_;
+  pipeline::Newest<Look> look_;
+  Inbox inbox_;
+  output::Recorder recorder_;
+  PressRecognizer presses_;
+  std::set<std::string> ended_refinement_;  // buttons whose running press did
+  std::vector<Device> devices_;
+  std::uint64_t finished_takes_ = 0, failures_ = 0;
+  std::filesystem::file_time_type set_time_;
+  int ticks_ = 0;
+  Progress progress_;  // when the watchdog was last fed
+  std::unique_ptr<Review> review_;
+  std::vector<std::unique_ptr<Review>> ended_reviews_;
+  std::optional<LoadedSet> next_;
+  std::function<void()> changed_;
+  std::string last_said_;
+  LivePipeline pipeline_;  // last: its threads use all of the above
+};
+
+}  // namespace previz::rig

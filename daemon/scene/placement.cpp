@@ -1,0 +1,79 @@
+#include "daemon/scene/placement.hpp"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+namespace previz::scene {
+namespace {
+
+void move_lamp(set::Light& light, const glm::dmat4& moved_from_set) {
+  light.position = glm::dvec3(moved_from_set * glm::dvec4(light.position, 1));
+  const auto turn = [&](const glm::dvec3& v) {
+    const glm::dvec3 turned = glm::dmat3(moved_from_set) * v;
+    return turned / glm::length(turned);
+  };
+  light.direction = turn(light.direction);
+  light.up = turn(light.up);
+}
+
+// Everything that came from the set's object with this index.
+void move_object(const Scene& scene, std::size_t object, const glm::dmat4& moved_from_set,
+                 Placement& placement) {
+  for (Instance& instance : placement.instances)
+    if (instance.object == object)
+      instance.world_from_object = moved_from_set * instance.world_from_object;
+  for (std::size_t i = 0; i < scene.lights.size(); ++i)
+    if (scene.light_objects[i] == object) move_lamp(placement.lights[i], moved_from_set);
+}
+
+void relight(set::Light& light, const session::LightState& state, std::vector<set::Light>& more) {
+  light.position = state.position;
+  light.direction = state.direction;
+  light.up = state.up;
+  light.gain_mixed = state.gain_mixed;
+  if (state.tint == glm::dvec3(1)) return;
+  if (light.gain_real > 0) {
+    set::Light real = light;
+    real.gain_mixed = 0;
+    more.push_back(real);
+    light.gain_real = 0;
+  }
+  light.emission *= state.tint;
+}
+
+}  // namespace
+
+session::LightState state_of(const set::Light& light) {
+  return {light.position, light.direction, light.up, light.gain_mixed, glm::dvec3(1)};
+}
+
+Placement place(const Scene& scene, const set::Set& set, const session::SceneState& state) {
+  Placement placement{scene.instances, scene.lights, {}};
+  for (const auto& [name, world_from_file] : state.objects) {
+    const auto found = std::ranges::find(set.objects, name, &set::Object::name);
+    if (found == set.objects.end()) {
+      placement.unknown.push_back("object \"" + name + "\" was moved; this set has none such");
+      continue;
+    }
+    if (world_from_file == found->world_from_file) continue;
+    move_object(scene, static_cast<std::size_t>(found - set.objects.begin()),
+                world_from_file * glm::inverse(found->world_from_file), placement);
+  }
+  // The set's own lamps are the last of the scene's.
+  const std::size_t first = scene.lights.size() - set.lights.size();
+  std::vector<set::Light> more;
+  for (const auto& [name, light] : state.lights) {
+    const auto found = std::ranges::find(set.lights, name, &set::Light::name);
+    if (found == set.lights.end()) {
+      placement.unknown.push_back("light \"" + name + "\" was changed; this set has none such");
+      continue;
+    }
+    relight(placement.lights[first + static_cast<std::size_t>(found - set.lights.begin())], light,
+            more);
+  }
+  placement.lights.insert(placement.lights.end(), more.begin(), more.end());
+  return placement;
+}
+
+}  // namespace previz::scene

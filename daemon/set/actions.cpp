@@ -1,0 +1,78 @@
+#include "daemon/set/actions.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace previz::set {
+namespace {
+
+// clang-format off
+constexpr Action table[] = {
+    {"live", "Live preview.", ToMode{Mode::live}},
+    {"refine", "Freeze the last good frame and refine it; again: live.", ToMode{Mode::refine}},
+    {"review", "Play the last take; again: live.", ToMode{Mode::review}},
+    {"standby", "Picture off, cameras open; again: live.", ToMode{Mode::standby}},
+    {"record", "Start a take; again: end it.", Record{}},
+    {"mark_good", "Mark the running take, or the last one, as good.", MarkGood{}},
+    {"snapshot", "Write what is shown, as EXR and PNG.", Snapshot{}},
+    {"reload_set", "Read the set file again; a wrong one leaves the old in force.", ReloadSet{}},
+    {"next_set", "Change to the next set file of the folder.", OtherSet{1}},
+    {"previous_set", "Change to the previous set file of the folder.", OtherSet{-1}},
+    {"samples_up", "More samples per pixel: less noise, fewer pictures a second.", ChangeSamples{1}},
+    {"samples_down", "Fewer samples per pixel.", ChangeSamples{-1}},
+    {"estimator", "Next estimator: paired, difference.", NextEstimator{}},
+    {"light_mode", "Next way to light the scene from the light camera.", NextLightMode{}},
+    {"debug_view", "Show the next layer in place of the composite.", NextView{}},
+    {"next_object", "Select the next virtual object.", SelectObject{1}},
+    {"previous_object", "Select the previous virtual object.", SelectObject{-1}},
+    {"move_left", "Move the selected object a step along -X.", MoveObject{{-1, 0, 0}}},
+    {"move_right", "Move the selected object a step along +X.", MoveObject{{1, 0, 0}}},
+    {"move_back", "Move the selected object a step along -Y.", MoveObject{{0, -1, 0}}},
+    {"move_forward", "Move the selected object a step along +Y.", MoveObject{{0, 1, 0}}},
+    {"move_down", "Move the selected object a step along -Z.", MoveObject{{0, 0, -1}}},
+    {"move_up", "Move the selected object a step along +Z.", MoveObject{{0, 0, 1}}},
+    {"turn_left", "Turn the selected object a step counter-clockwise, seen from above.", TurnObject{{0, 0, 1}}},
+    {"turn_right", "Turn the selected object a step clockwise, seen from above.", TurnObject{{0, 0, -1}}},
+    {"tilt_forward", "Turn the selected object a step about +X.", TurnObject{{1, 0, 0}}},
+    {"tilt_back", "Turn the selected object a step about -X.", TurnObject{{-1, 0, 0}}},
+    {"roll_right", "Turn the selected object a step about +Y.", TurnObject{{0, 1, 0}}},
+    {"roll_left", "Turn the selected object a step about -Y.", TurnObject{{0, -1, 0}}},
+    {"scale_up", "Make the selected object a step larger.", ScaleObject{1}},
+    {"scale_down", "Make the selected object a step smaller.", ScaleObject{-1}},
+    {"reset_object", "Put the selected object back as the set has it.", ResetObject{}},
+    {"next_light", "Select the next lamp of the set.", SelectLight{1}},
+    {"previous_light", "Select the previous lamp of the set.", SelectLight{-1}},
+    {"light_up", "Make the selected lamp a step brighter.", DimLight{1}},
+    {"light_down", "Make the selected lamp a step darker.", DimLight{-1}},
+    {"light_warmer", "Make the selected lamp a step warmer.", TintLight{1, 0}},
+    {"light_cooler", "Make the selected lamp a step cooler.", TintLight{-1, 0}},
+    {"light_greener", "Make the selected lamp a step greener.", TintLight{0, 1}},
+    {"light_pinker", "Make the selected lamp a step pinker.", TintLight{0, -1}},
+    {"reset_light", "Put the selected lamp back as the set has it.", ResetLight{}},
+    {"exposure_up", "Longer shutter of the film camera, by a step.", ChangeExposure{1}},
+    {"exposure_down", "Shorter shutter of the film camera, by a step.", ChangeExposure{-1}},
+};
+// clang-format on
+
+constexpr auto names = [] {
+  std::array<const char*, std::size(table)> list{};
+  std::ranges::transform(table, list.begin(), &Action::name);
+  return list;
+}();
+
+}  // namespace
+
+std::span<const Action> actions() {
+  return table;
+}
+
+const Action* find_action(const std::string& name) {
+  const auto* found = std::ranges::find_if(table, [&](const Action& a) { return a.name == name; });
+  return found == std::end(table) ? nullptr : found;
+}
+
+std::span<const char* const> action_names() {
+  return names;
+}
+
+}  // namespace previz::set

@@ -1,0 +1,191 @@
+// The rig's bus on a bus of its own, operated by previzctl as from a shell.
+#include "daemon/control/bus.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <systemd/sd-bus.h>
+#include <systemd/sd-event.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/unit/temporary_directory.hpp"
+
+namespace previz::control {
+namespace {
+
+// A message bus that nobody else is on, in the place of the system's.
+class PrivateBus {
+ public:
+  PrivateBus() {
+    const std::string address = "unix:path=" + (directory_ / "bus").string();
+    int ready[2];
+    if (pipe(ready) != 0) return;
+    child_ = fork();
+    if (child_ == 0) {
+      const std::string print = "--print-address=" + std::to_string(ready[1]);
+      execlp("dbus-daemon", "dbus-daemon", "--session", "--nofork", "--nopidfile",
+             ("--address=" + address).c_str(), print.c_str(), nullptr);
+      _exit(127);
+    }
+    close(ready[1]);
+    char byte = 0;
+    running_ = read(ready[0], &byte, 1) == 1;  // nothing where it could not be started
+    close(ready[0]);
+    setenv("DBUS_SYSTEM_BUS_ADDRESS", address.c_str(), 1);
+  }
+  ~PrivateBus() {
+    kill(child_, SIGTERM);
+    waitpid(child_, nullptr, 0);
+    unsetenv("DBUS_SYSTEM_BUS_ADDRESS");
+  }
+  bool running() const { return running_; }
+
+ private:
+  test::TemporaryDirectory directory_;
+  pid_t child_ = -1;
+  bool running_ = false;
+};
+
+struct Said {
+  std::string out;
+  int status = 0;
+};
+Said previzctl(const std::string& arguments) {
+  Said said;
+  FILE* pipe =
+      popen((PREVIZ_BINARY_DIR "/daemon/control/previzctl " + arguments + " 2>&1").c_str(), "r");
+  std::array<char, 256> line{};
+  while (fgets(line.data(), line.size(), pipe)) said.out += line.data();
+  said.status = WEXITSTATUS(pclose(pipe));
+  return said;
+}
+
+class RigOnTheBus : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!bus_.running()) GTEST_SKIP() << "dbus-daemon is not installed";
+    sd_event_new(&event_);
+    Verbs verbs;
+    verbs.perform = [this](const set::Action& action) {
+      status_.message = action.name;
+      rig_->changed();
+      return Answer{action.name, std::string(action.name) == "standby"};
+    };
+    verbs.go = [this](set::Mode mode) {
+      status_.mode = mode == set::Mode::refine ? "refine" : "live";
+      return Answer{status_.mode};
+    };
+    verbs.record = [this](bool on) {
+      status_.recording = on;
+      return Answer{on ? "recording" : "recording ended"};
+    };
+    verbs.status = [this] { return status_; };
+    verbs.metrics = [] { return std::string("{}"); };
+    rig_ = std::make_unique<Bus>(event_, std::move(verbs));
+    loop_ = std::thread([this] {
+      while (!quit_) sd_event_run(event_, 10'000);
+    });
+  }
+  void TearDown() override {
+    if (!loop_.joinable()) return;
+    quit_ = true;
+    loop_.join();
+    rig_.reset();
+    sd_event_unref(event_);
+  }
+
+  PrivateBus bus_;
+  sd_event* event_ = nullptr;
+  static Status first_status() {
+    Status status;
+    status.mode = "live";
+    status.take = "12A_take003";
+    status.take_frames = 120;
+    status.samples = 16;
+    status.set = "desk";
+    return status;
+  }
+  Status status_ = first_status();
+  std::unique_ptr<Bus> rig_;
+  std::atomic<bool> quit_ = false;
+  std::thread loop_;
+};
+
+TEST(MethodName, IsTheActionInCamelCase) {
+  EXPECT_EQ(method_name("record"), "Record");
+  EXPECT_EQ(method_name("move_left"), "MoveLeft");
+}
+
+TEST_F(RigOnTheBus, PrevizctlOperatesIt) {
+  const Said status = previzctl("status");
+  EXPECT_EQ(status.status, 0) << status.out;
+  for (const char* line : {"Mode: live\n", "Recording: no\n", "Take: 12A_take003\n",
+                           "TakeFrames: 120\n", "Samples: 16\n", "Set: desk\n"})
+    EXPECT_NE(status.out.find(line), std::string::npos) << status.out;
+  EXPECT_EQ(previzctl("mode refine").out, "refine\n");
+  EXPECT_EQ(previzctl("record on").out, "recording\n");
+  EXPECT_NE(previzctl("status").out.find("Recording: yes\n"), std::string::npos);
+  EXPECT_EQ(previzctl("action move_left").out, "move_left\n");
+  EXPECT_EQ(previzctl("set next").out, "next_set\n");
+  EXPECT_EQ(previzctl("metrics").out, "{}\n");
+}
+
+TEST_F(RigOnTheBus, WhatIsRefusedOrUnknownIsSaidAndFails) {
+  const Said refused = previzctl("action standby");
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_EQ(refused.out, "previzctl: standby\n");
+  const Said unknown = previzctl("action make_coffee");
+  EXPECT_EQ(unknown.status, 1);
+  EXPECT_NE(unknown.out.find("\"make_coffee\""), std::string::npos);
+  EXPECT_EQ(previzctl("mode faster").status, 2);
+}
+
+// Every action of the table has its own method, and a change its signal.
+TEST_F(RigOnTheBus, EveryActionIsAMethodAndEveryChangeASignal) {
+  sd_bus* client = nullptr;
+  ASSERT_GE(sd_bus_open_system(&client), 0);
+  int signals = 0;
+  ASSERT_GE(sd_bus_match_signal(
+                client, nullptr, bus_name, object_path, "org.freedesktop.DBus.Properties",
+                "PropertiesChanged",
+                [](sd_bus_message*, void* count, sd_bus_error*) {
+                  return ++*static_cast<int*>(count), 0;
+                },
+                &signals),
+            0);
+  int calls = 0;
+  for (const set::Action& action : set::actions()) {
+    const std::string method = method_name(action.name);
+    if (method == "Record" || method == "Standby") continue;  // takes on or off; refused here
+    sd_bus_error error = SD_BUS_ERROR_NULL;
+    EXPECT_GE(sd_bus_call_method(client, bus_name, object_path, interface_name, method.c_str(),
+                                 &error, nullptr, ""),
+              0)
+        << method << ": " << error.message;
+    sd_bus_error_free(&error);
+    ++calls;
+  }
+  while (signals < calls && sd_bus_wait(client, 1'000'000) >= 0)
+    while (sd_bus_process(client, nullptr) > 0) continue;
+  EXPECT_EQ(signals, calls);
+  sd_bus_flush_close_unref(client);
+}
+
+TEST(RigWithoutABus, SaysSo) {
+  setenv("DBUS_SYSTEM_BUS_ADDRESS", "unix:path=/nonexistent/bus", 1);
+  const Said said = previzctl("status");
+  EXPECT_EQ(said.status, 1);
+  EXPECT_NE(said.out.find("bus cannot be reached"), std::string::npos) << said.out;
+  unsetenv("DBUS_SYSTEM_BUS_ADDRESS");
+}
+
+}  // namespace
+}  // namespace previz::control

@@ -1,0 +1,336 @@
+// Takes: every frame is in them or counted, whatever happens to process and disk.
+#include "daemon/output/recorder.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <csignal>
+#include <thread>
+
+#include "drivers/error.hpp"
+#include "tests/unit/session_fixture.hpp"
+
+namespace previz::output {
+namespace {
+
+using session::is_frame;
+using session::mentions;
+using session::noise_frame;
+using session::TemporaryDirectory;
+
+constexpr std::int64_t interval_ns = 40'000'003;  // of noise_frame
+
+FramePtr picture(std::uint64_t index, const std::string& source = "observer", int width = 32) {
+  return std::make_shared<Frame>(noise_frame(source, index, PixelFormat::rgb8, width, 24));
+}
+
+session::TrackRecord track_of(std::uint64_t index) {
+  session::TrackRecord record;
+  record.timestamp_ns = picture(index)->timestamp_ns;
+  record.tracked = true;
+  record.world_from_camera[3][0] = static_cast<double>(index);
+  return record;
+}
+
+RecorderOptions options_in(const std::filesystem::path& directory) {
+  RecorderOptions options;
+  options.take.directory = directory;
+  options.take.info.take = session::TakeInfo{0, "12A", "", 25, "rain", false};
+  options.preroll_s = 0;
+  options.reserve_bytes = 0;
+  return options;
+}
+
+// What the take has: positions of its frames in the stream of noise, each compared bit for bit.
+std::vector<std::uint64_t> frames_of(const std::filesystem::path& take,
+                                     const std::string& source = "observer") {
+  session::Session session = session::open_session(take);
+  const auto stream = session::open_stream(session, source);
+  std::vector<std::uint64_t> indices;
+  if (!stream) return indices;
+  for (std::size_t i = 0; i < stream->records().size(); ++i) {
+    const std::uint64_t index = stream->records()[i].sequence - 100;
+    EXPECT_TRUE(is_frame(*stream->read(i), index)) << index;
+    indices.push_back(index);
+  }
+  return indices;
+}
+
+std::vector<std::uint64_t> count_from(std::uint64_t first, std::uint64_t last) {
+  std::vector<std::uint64_t> numbers;
+  for (; first <= last; ++first) numbers.push_back(first);
+  return numbers;
+}
+
+void wait_for(const std::function<bool()>& condition) {
+  while (!condition()) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+}
+
+TEST(Timecode, CountsFramesOfTheNearestWholeRate) {
+  using namespace std::chrono_literals;
+  EXPECT_EQ(timecode(0s, 25), "00:00:00:00");
+  EXPECT_EQ(timecode(14h + 3min + 27s + 480ms, 25), "14:03:27:12");
+  EXPECT_EQ(timecode(23h + 59min + 59s + 999ms, 25), "23:59:59:24");
+  EXPECT_EQ(timecode(1s + 999ms, 23.976), "00:00:01:23");
+}
+
+TEST(TakeName, IsWhatAFileSystemCanHold) {
+  EXPECT_EQ(take_name("12A", 7), "12A_take007");
+  EXPECT_EQ(take_name("attic, sc. 3/4", 1234), "attic__sc._3_4_take1234");
+  EXPECT_EQ(take_name("", 1), "__take001");
+  EXPECT_EQ(take_name("../x", 1), "_.._x_take001");
+}
+
+TEST(Recorder, ATakeHasEveryFrameFromStartToStopWithItsTrack) {
+  const TemporaryDirectory directory;
+  {
+    Recorder recorder(options_in(directory.path()));
+    for (int i = 0; i < 12; ++i) {
+      if (i == 3) recorder.start();
+      if (i == 9) recorder.stop();
+      recorder.offer(picture(i));
+      recorder.offer(track_of(i));
+    }
+    recorder.offer_event(17, "is of no take");
+  }
+  const std::filesystem::path take = directory / "12A_take001";
+  // The ring of no seconds still holds the newest frame: frame 2 was there when it started.
+  EXPECT_EQ(frames_of(take), count_from(2, 8));
+  const session::Session session = session::open_session(take);
+  EXPECT_TRUE(session.missing.empty());
+  EXPECT_EQ(session.info.name, "12A_take001");
+  EXPECT_EQ(session.info.take->number, 1);
+  EXPECT_EQ(session.info.take->notes, "rain");
+  EXPECT_EQ(session.info.take->timecode.size(), std::string("14:03:27:12").size());
+  ASSERT_EQ(session.track.size(), 7u);
+  for (std::size_t i = 0; i < 7; ++i) {
+    EXPECT_EQ(session.track[i].frame, i);
+    EXPECT_EQ(session.track[i].world_from_camera[3][0], static_cast<double>(i + 2));
+  }
+  EXPECT_FALSE(std::filesystem::exists(take / "events.jsonl"));
+}
+
+TEST(Recorder, TheRingPutsWhatCameBeforeInFrontWithItsLight) {
+  const TemporaryDirectory directory;
+  {
+    RecorderOptions options = options_in(directory.path());
+    options.preroll_s = 5e-9 * interval_ns;
+    Recorder recorder(std::move(options));
+    for (const std::uint64_t light : {0, 1, 2}) recorder.offer(picture(light, "light"));
+    for (int i = 3; i <= 20; ++i) recorder.offer(picture(i));
+    recorder.start();
+    recorder.offer(picture(21));
+  }
+  const std::filesystem::path take = directory / "12A_take001";
+  EXPECT_EQ(frames_of(take), count_from(15, 21));
+  EXPECT_EQ(frames_of(take, "light"), count_from(0, 2));  // older than the ring, and still needed
+}
+
+TEST(Recorder, TheNextTakeHasTheLightThatWasSeenDuringTheLast) {
+  const TemporaryDirectory directory;
+  {
+    Recorder recorder(options_in(directory.path()));
+    recorder.start();
+    recorder.offer(picture(0, "light"));
+    recorder.offer(picture(1));
+    recorder.stop();
+    recorder.start();
+    recorder.offer(picture(2));
+  }
+  EXPECT_EQ(frames_of(directory / "12A_take002", "light"), count_from(0, 0));
+  EXPECT_EQ(frames_of(directory / "12A_take002"), count_from(2, 2));
+}
+
+TEST(Recorder, TheTrackOfTheLastFrameMayComeAfterTheButton) {
+  const TemporaryDirectory directory;
+  {
+    Recorder recorder(options_in(directory.path()));
+    recorder.start();
+    recorder.offer(picture(0));
+    recorder.stop();
+    recorder.offer(picture(1));
+    recorder.offer(track_of(0));
+    recorder.offer(track_of(1));
+  }
+  EXPECT_EQ(session::open_session(directory / "12A_take001").track.size(), 1u);
+}
+
+TEST(Recorder, TakesAreNumberedOnFromWhatIsThere) {
+  const TemporaryDirectory directory;
+  for (const char* name : {"12A_take041", "12A_take009", "12A_takeover", "12B_take100"})
+    std::filesystem::create_directory(directory / name);
+  {
+    Recorder recorder(options_in(directory.path()));
+    recorder.start();
+    recorder.offer(picture(0));
+  }
+  EXPECT_EQ(frames_of(directory / "12A_take042"), count_from(0, 0));
+}
+
+TEST(Recorder, MarksTheRunningTakeOrTheLast) {
+  const TemporaryDirectory directory;
+  {
+    Recorder recorder(options_in(directory.path()));
+    recorder.start();
+    recorder.offer(picture(0));
+    recorder.mark_good();
+    recorder.stop();
+    recorder.start();
+    recorder.offer(picture(1));
+    recorder.stop();
+    recorder.mark_good();
+  }
+  EXPECT_TRUE(session::open_session(directory / "12A_take001").info.take->good);
+  EXPECT_TRUE(session::open_session(directory / "12A_take002").info.take->good);
+}
+
+TEST(Recorder, AnotherFormatBeginsTheNextTake) {
+  const TemporaryDirectory directory;
+  {
+    Recorder recorder(options_in(directory.path()));
+    recorder.start();
+    recorder.offer(picture(0));
+    recorder.offer(picture(1, "observer", 40));
+    recorder.offer(picture(2, "observer", 40));
+  }
+  EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(0, 0));
+  EXPECT_EQ(frames_of(directory / "12A_take002"), count_from(1, 2));
+}
+
+// Room for three frames: what the disk cannot take in time is counted, and the rest is whole.
+TEST(Recorder, ASlowDiskCostsFramesThatAreCounted) {
+  const TemporaryDirectory directory;
+  RecorderOptions options = options_in(directory.path());
+  options.queue_bytes = 3 * picture(0)->bytes.size();
+  std::vector<std::string> notes;
+  options.note = [&](const std::string& what) { notes.push_back(what); };
+  constexpr std::uint64_t offered = 400;
+  std::vector<FramePtr> pictures;
+  for (std::uint64_t i = 0; i < offered; ++i) pictures.push_back(picture(i));
+  RecorderStatus status;
+  {
+    Recorder recorder(std::move(options));
+    recorder.start();
+    for (const FramePtr& frame : pictures) recorder.offer(frame);
+    recorder.stop();
+    wait_for([&] { return recorder.status().finished_takes == 1; });
+    status = recorder.status();
+  }
+  EXPECT_EQ(frames_of(directory / "12A_take001").size(), status.frames);
+  EXPECT_EQ(status.frames + status.dropped, offered);
+  EXPECT_GT(status.dropped, 0u);
+  EXPECT_TRUE(mentions(notes, "too slow"));
+  EXPECT_EQ(status.failures, 0u);
+}
+
+TEST(Recorder, AnAlmostFullDiskEndsTheTakeInOrder) {
+  const TemporaryDirectory directory;
+  RecorderOptions options = options_in(directory.path());
+  options.reserve_bytes = 100;
+  std::atomic<std::uint64_t> free = 1000;
+  options.free_bytes = [&] { return free.load(); };
+  Recorder recorder(std::move(options));
+  recorder.start();
+  std::uint64_t next = 0;
+  for (; next < 5; ++next) recorder.offer(picture(next));
+  wait_for([&] { return recorder.status().frames == 5; });
+  free = 50;
+  wait_for([&] {
+    recorder.offer(picture(next++));
+    return !recorder.status().recording;
+  });
+  const RecorderStatus status = recorder.status();
+  EXPECT_NE(status.fault.find("almost full"), std::string::npos) << status.fault;
+  EXPECT_EQ(status.failures, 1u);
+  EXPECT_EQ(status.finished_takes, 1u);
+  EXPECT_TRUE(session::open_session(directory / "12A_take001").missing.empty());  // closed
+  EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(0, status.frames - 1));
+
+  recorder.start();  // refused by the same disk
+  wait_for([&] { return recorder.status().failures == 2; });
+  EXPECT_FALSE(recorder.status().recording);
+  free = 1000;
+  recorder.start();
+  recorder.offer(picture(next));
+  wait_for([&] { return recorder.status().frames > 0; });
+  EXPECT_TRUE(recorder.status().fault.empty());
+}
+
+// Files may not grow past this: as on a full disk, a write fails in the middle of a frame.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &before_);
+    rlimit now = before_;
+    now.rlim_cur = bytes;
+    setrlimit(RLIMIT_FSIZE, &now);
+  }
+  ~FileSizeLimit() { setrlimit(RLIMIT_FSIZE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+TEST(Recorder, AFullDiskEndsTheTakeWithEverythingSoFarReadable) {
+  const TemporaryDirectory directory;
+  Recorder recorder(options_in(directory.path()));
+  std::uint64_t next = 0;
+  {
+    const FileSizeLimit limit(60'000);  // about 25 frames of noise
+    recorder.start();
+    wait_for([&] {
+      recorder.offer(picture(next));
+      recorder.offer(track_of(next++));
+      return !recorder.status().recording;
+    });
+  }
+  const RecorderStatus status = recorder.status();
+  EXPECT_NE(status.fault.find("12A_take001"), std::string::npos) << status.fault;
+  EXPECT_GT(status.frames, 10u);
+  EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(0, status.frames - 1));
+  recorder.start();  // and it goes on when there is room again
+  recorder.offer(picture(next));
+  recorder.stop();
+  wait_for([&] { return recorder.status().finished_takes == 2; });
+  // With the frame the ring held.
+  EXPECT_EQ(frames_of(directory / "12A_take002").back(), next);
+}
+
+// kill -9 at 25 frames a second: what was offered more than a second before is there.
+TEST(RecorderDeath, AKilledProcessLosesLessThanASecond) {
+  const TemporaryDirectory directory;
+  int told[2];
+  ASSERT_EQ(pipe(told), 0);
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    Recorder recorder(options_in(directory.path()));
+    recorder.start();
+    for (std::uint64_t i = 0;; ++i) {
+      recorder.offer(picture(i));
+      recorder.offer(track_of(i));
+      if (write(told[1], &i, sizeof i) != sizeof i) _exit(1);
+      std::this_thread::sleep_for(std::chrono::nanoseconds(interval_ns));
+    }
+  }
+  close(told[1]);
+  std::uint64_t offered = 0;
+  while (offered < 40) ASSERT_EQ(read(told[0], &offered, sizeof offered), ssize_t{8});
+  ASSERT_EQ(kill(child, SIGKILL), 0);
+  waitpid(child, nullptr, 0);
+  while (read(told[0], &offered, sizeof offered) == ssize_t{8}) continue;
+  close(told[0]);
+
+  const std::vector<std::uint64_t> there = frames_of(directory / "12A_take001");
+  ASSERT_FALSE(there.empty());
+  EXPECT_EQ(there, count_from(0, there.back()));
+  EXPECT_GE(there.back() + 25, offered);
+  EXPECT_TRUE(mentions(session::open_session(directory / "12A_take001").missing, "not closed"));
+}
+
+}  // namespace
+}  // namespace previz::output

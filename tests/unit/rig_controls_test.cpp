@@ -1,0 +1,181 @@
+// Every action of the table, by what it sets.
+#include "daemon/rig/controls.hpp"
+
+#include <gtest/gtest.h>
+
+#include <glm/gtc/matrix_transform.hpp>
+#include <set>
+
+namespace previz::rig {
+namespace {
+
+set::Set stage() {
+  set::Set set;
+  set.objects.resize(3);
+  set.objects[0].name = "table";
+  set.objects[0].presence = set::Presence::phantom;
+  set.objects[1].name = "vase";
+  set.objects[2].name = "bird";
+  set.objects[1].world_from_file = glm::translate(glm::dmat4(1), {1, 2, 3});
+  set.lights.resize(2);
+  set.lights[0].name = "key";
+  set.lights[0].gain_mixed = 0.5;
+  set.lights[1].name = "fill";
+  set.quality.samples = 16;
+  return set;
+}
+
+struct Desk {
+  set::Set set = stage();
+  Controls controls{set};
+  Outcome operator()(const char* action) { return controls.perform(*set::find_action(action)); }
+  session::SceneState scene() const { return pipeline::scene_state(set, controls.look().edits); }
+};
+
+TEST(ActionTable, NamesAreUniqueAndEveryOneIsExplained) {
+  std::set<std::string> names;
+  for (const set::Action& action : set::actions()) {
+    EXPECT_TRUE(names.insert(action.name).second) << action.name;
+    EXPECT_EQ(set::find_action(action.name), &action);
+    EXPECT_EQ(std::string(action.about).back(), '.') << action.name;
+  }
+  EXPECT_EQ(set::action_names().size(), names.size());
+  EXPECT_EQ(set::find_action("make_coffee"), nullptr);
+}
+
+// In any state whatever: an action says something, and either does something or is refused.
+TEST(ActionTable, EveryActionAnswers) {
+  for (const set::Action& action : set::actions()) {
+    Desk desk;
+    const Outcome outcome = desk.controls.perform(action);
+    EXPECT_FALSE(outcome.said.empty()) << action.name;
+    Controls bare{set::Set{}};
+    EXPECT_FALSE(bare.perform(action).said.empty()) << action.name;
+  }
+}
+
+TEST(Controls, SamplesGoThroughTheirStepsAndStopAtTheEnds) {
+  Desk desk;
+  EXPECT_EQ(desk("samples_up").said, "24 samples");
+  for (int i = 0; i < 5; ++i) desk("samples_up");
+  EXPECT_EQ(desk.controls.look().samples, 50);
+  for (int i = 0; i < 20; ++i) desk("samples_down");
+  EXPECT_EQ(desk.controls.look().samples, 1);
+  desk.set.quality.samples = 64;  // more than a preview has steps for
+  Controls controls(desk.set);
+  EXPECT_EQ(controls.perform(*set::find_action("samples_up")).said, "64 samples");
+  EXPECT_EQ(controls.perform(*set::find_action("samples_down")).said, "50 samples");
+}
+
+TEST(Controls, ANumberOfSamplesEndsTheGovernor) {
+  set::Set set = stage();
+  set.quality.fps = 25;
+  Controls controls(set);
+  EXPECT_TRUE(controls.look().governed);
+  controls.perform(*set::find_action("samples_up"));
+  EXPECT_FALSE(controls.look().governed);
+}
+
+TEST(Controls, OnlyVirtualObjectsAreMovedAndEachKeepsItsPlace) {
+  Desk desk;
+  EXPECT_EQ(desk.controls.selected_object(), "vase");
+  desk("move_right");
+  desk("move_right");
+  desk("move_up");
+  EXPECT_EQ(desk("next_object").said, "object: bird");
+  desk("move_back");
+  EXPECT_EQ(desk("next_object").said, "object: vase");
+  EXPECT_EQ(desk("previous_object").said, "object: bird");
+  const session::SceneState scene = desk.scene();
+  ASSERT_EQ(scene.objects.size(), 2u);
+  const glm::dvec3 vase(scene.objects.at("vase")[3]), bird(scene.objects.at("bird")[3]);
+  EXPECT_NEAR(glm::length(vase - glm::dvec3(1.02, 2, 3.01)), 0, 1e-15);
+  EXPECT_NEAR(glm::length(bird - glm::dvec3(0, -0.01, 0)), 0, 1e-15);
+}
+
+// 18 turns of 5 degrees are a quarter, about the vase's own place.
+TEST(Controls, TurningAndScalingAreAboutTheObjectsOrigin) {
+  Desk desk;
+  for (int i = 0; i < 18; ++i) desk("turn_left");
+  desk("scale_up");
+  const glm::dmat4 vase = desk.scene().objects.at("vase");
+  EXPECT_NEAR(glm::length(glm::dvec3(vase[3]) - glm::dvec3(1, 2, 3)), 0, 1e-14);
+  EXPECT_NEAR(glm::length(glm::dvec3(vase[0]) - glm::dvec3(0, 1.05, 0)), 0, 1e-14);
+  desk("reset_object");
+  EXPECT_TRUE(desk.scene().objects.empty());
+}
+
+TEST(Controls, OppositeStepsComeBack) {
+  const char* pairs[][2] = {{"move_left", "move_right"},      {"move_back", "move_forward"},
+                            {"move_up", "move_down"},         {"turn_left", "turn_right"},
+                            {"tilt_forward", "tilt_back"},    {"roll_left", "roll_right"},
+                            {"scale_up", "scale_down"},       {"light_up", "light_down"},
+                            {"light_warmer", "light_cooler"}, {"light_greener", "light_pinker"},
+                            {"exposure_up", "exposure_down"}};
+  for (const auto& [there, back] : pairs) {
+    Desk desk;
+    desk(there);
+    EXPECT_TRUE(desk.scene() != session::SceneState{} || desk.controls.look().exposure_steps != 0)
+        << there;
+    desk(back);
+    for (const auto& [name, matrix] : desk.scene().objects)
+      for (int c = 0; c < 4; ++c)
+        EXPECT_NEAR(glm::length(matrix[c] - desk.set.objects[1].world_from_file[c]), 0, 1e-15);
+    for (const auto& [name, light] : desk.scene().lights) {
+      EXPECT_NEAR(light.gain_mixed, 0.5, 1e-15);
+      EXPECT_NEAR(glm::length(light.tint - glm::dvec3(1)), 0, 1e-15);
+    }
+    EXPECT_EQ(desk.controls.look().exposure_steps, 0);
+  }
+}
+
+// Three steps of a third are a stop.
+TEST(Controls, LampsAreDimmedInStopsAndTinted) {
+  Desk desk;
+  for (int i = 0; i < 3; ++i) desk("light_up");
+  desk("next_light");
+  desk("light_warmer");
+  const session::SceneState scene = desk.scene();
+  EXPECT_NEAR(scene.lights.at("key").gain_mixed, 1.0, 1e-15);
+  const glm::dvec3 fill = scene.lights.at("fill").tint;
+  EXPECT_NEAR(std::log2(fill.r / fill.b), 0.1, 1e-15);
+  EXPECT_EQ(fill.g, 1);
+  desk("reset_light");
+  EXPECT_EQ(desk.scene().lights.size(), 1u);
+}
+
+TEST(Controls, RecordingAsksForATakeAndForItsEnd) {
+  Desk desk;
+  EXPECT_EQ(desk("record").request, Request::start_take);
+  EXPECT_TRUE(desk("reload_set").refused);
+  EXPECT_TRUE(desk("next_set").refused);
+  EXPECT_TRUE(desk("standby").refused);
+  EXPECT_EQ(desk("mark_good").request, Request::mark_good);
+  EXPECT_EQ(desk("record").request, Request::stop_take);
+  EXPECT_EQ(desk("reload_set").request, Request::reload_set);
+  EXPECT_EQ(desk("next_set").request, Request::next_set);
+  EXPECT_EQ(desk("previous_set").request, Request::previous_set);
+  EXPECT_TRUE(desk("mark_good").refused);  // no frame was recorded
+}
+
+TEST(Controls, APushEndsARefinementBeforeItsKindIsKnown) {
+  Desk desk;
+  EXPECT_TRUE(desk("refine").refused);
+  desk.controls.happened(Event::good_frame);
+  EXPECT_EQ(desk("refine").said, "refine");
+  EXPECT_TRUE(desk.controls.pushed());
+  EXPECT_EQ(desk.controls.look().state.mode, Mode::live);
+  EXPECT_FALSE(desk.controls.pushed());
+}
+
+TEST(Controls, EstimatorAndViewGoAround) {
+  Desk desk;
+  EXPECT_EQ(desk("estimator").said, "estimator: difference");
+  EXPECT_EQ(desk("estimator").said, "estimator: paired");
+  for (std::size_t i = 0; i + 1 < render::all_views.size(); ++i) desk("debug_view");
+  EXPECT_EQ(desk.controls.look().view, render::all_views.back());
+  EXPECT_EQ(desk("debug_view").said, "view: composite");
+}
+
+}  // namespace
+}  // namespace previz::rig

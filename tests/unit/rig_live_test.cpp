@@ -1,0 +1,451 @@
+// The daemon from end to end: a replayed take, a crew that presses buttons when it sees what it
+// waits for, and afterwards what was shown, said and recorded.
+#include "daemon/rig/live.hpp"
+
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+
+#include <algorithm>
+#include <array>
+#include <condition_variable>
+#include <deque>
+#include <fstream>
+#include <mutex>
+#include <set>
+#include <sstream>
+#include <thread>
+
+#include "daemon/output/exr.hpp"
+#include "daemon/output/png.hpp"
+#include "daemon/post/render.hpp"
+#include "daemon/rig/service.hpp"
+#include "drivers/descriptor.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "tests/unit/small_take.hpp"
+#include "tests/unit/temporary_directory.hpp"
+
+namespace previz::rig {
+namespace {
+
+using pipeline::Shot;
+
+// Buttons that a thread of the test pushes.
+class Hand {
+ public:
+  class Device final : public Buttons {
+   public:
+    explicit Device(Hand& hand) : hand_(hand) {}
+    std::string name() const override { return "hand"; }
+    int fd() const override { return hand_.descriptor_.get(); }
+    std::optional<ButtonsEvent> next() override {
+      const std::lock_guard lock(hand_.mutex_);
+      eventfd_t ignored = 0;
+      eventfd_read(fd(), &ignored);
+      if (hand_.events_.empty()) return std::nullopt;
+      ButtonsEvent event = hand_.events_.front();
+      hand_.events_.pop_front();
+      if (!hand_.events_.empty()) eventfd_write(fd(), 1);
+      return event;
+    }
+
+   private:
+    Hand& hand_;
+  };
+
+  void press(const std::string& button) {
+    const std::lock_guard lock(mutex_);
+    for (const bool pushed : {true, false}) events_.push_back({button, pushed, 0});
+    eventfd_write(descriptor_.get(), 1);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::deque<ButtonEvent> events_;
+  OwnedDescriptor descriptor_{eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)};
+};
+
+// A log that another thread may read.
+class Log : public std::stringbuf {
+ public:
+  std::string text() const {
+    const std::lock_guard lock(mutex_);
+    return lines_;
+  }
+
+ private:
+  int sync() override {
+    const std::lock_guard lock(mutex_);
+    lines_ += str();
+    str("");
+    return 0;
+  }
+  mutable std::mutex mutex_;
+  std::string lines_;
+};
+
+class RigLive : public testing::Test {
+ protected:
+  struct Shown {
+    Shot shot;
+    Look look;
+    int count = 0;
+  };
+
+  // The small take with a button for every action, named like it, and a lamp.
+  void write_set(const std::string& more = "") {
+    std::string text =
+        "[[light]]\nname = \"key\"\ntype = \"point\"\nposition_m = [0.3, 0, 0.6]\n"
+        "emission = [1, 1, 1]\n[recording]\nslate = \"12A\"\nreserve_mb = 1\n"
+        "directory = \"takes\"\n" +
+        more;
+    for (const set::Action& action : set::actions())
+      text += std::string("[[button]]\nname = \"") + action.name + "\"\naction = \"" + action.name +
+              "\"\n";
+    test::write_small_take(directory_.path(), true, text);
+  }
+
+  std::function<void()> while_shown_ = [] {};  // on the display's thread
+
+  // Runs the daemon, looping the take, until the script has ended.
+  void run(const std::function<void()>& script) {
+    LiveOptions options;
+    options.set_file = directory_ / "set.toml";
+    options.directory = directory_ / "live";
+    options.loop = true;
+    std::stop_source stop;
+    options.stop = stop.get_token();
+    options.buttons = [&] {
+      std::vector<std::unique_ptr<Buttons>> buttons;
+      buttons.push_back(std::make_unique<Hand::Device>(hand_));
+      return buttons;
+    };
+    options.on_shown = [&](const Shot& shot, const Look& look) {
+      std::unique_lock lock(mutex_);
+      shown_ = {shot, look, shown_.count + 1};
+      seen_.notify_all();
+      lock.unlock();
+      while_shown_();
+    };
+    std::jthread crew([&] {
+      script();
+      stop.request_stop();
+    });
+    std::ostream out(&log_);
+    metrics_ = run_live(options, out);
+  }
+
+  // A press, then whatever is shown until the condition holds: no time is assumed.
+  Shown until(const std::function<bool(const Shown&)>& condition) {
+    std::unique_lock lock(mutex_);
+    seen_.wait(lock, [&] { return shown_.shot.frame && condition(shown_); });
+    return shown_;
+  }
+  Shown until_mode(Mode mode) {
+    return until([mode](const Shown& s) {
+      return s.look.state.mode == mode && s.shot.frozen == (mode == Mode::refine);
+    });
+  }
+  void until_said(const std::string& words) {
+    while (log_.text().find(words) == std::string::npos)
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  void press(const std::string& button) { hand_.press(button); }
+
+  // The layers of the frame as `previzd render` makes them.
+  render::Layers rendered(const std::filesystem::path& take, std::int64_t timestamp_ns,
+                          std::int64_t samples) {
+    session::Session session = session::open_session(take);
+    const auto stream = session::open_stream(session, "observer");
+    std::uint64_t frame = 0;
+    while (stream->records().at(frame).timestamp_ns != timestamp_ns) ++frame;
+    post::RenderOptions options;
+    options.session = take;
+    options.directory = directory_ / ("post" + std::to_string(frame));
+    options.frames = post::FrameRange{frame, frame};
+    options.samples = static_cast<int>(samples);
+    render::Layers layers;
+    options.on_frame = [&](const Shot& shot) { layers = shot.layers; };
+    std::ostringstream ignored;
+    post::render_session(options, ignored);
+    return layers;
+  }
+
+  test::TemporaryDirectory directory_;
+  Hand hand_;
+  Log log_;
+  std::mutex mutex_;
+  std::condition_variable seen_;
+  Shown shown_;
+  pipeline::MetricsSnapshot metrics_;
+};
+
+void expect_same(const render::Layers& a, const render::Layers& b) {
+  EXPECT_EQ(a.samples, b.samples);
+  EXPECT_TRUE(a.composite == b.composite);
+  EXPECT_TRUE(a.mixed == b.mixed);
+  EXPECT_TRUE(a.real == b.real);
+  EXPECT_TRUE(a.variance == b.variance);
+  EXPECT_TRUE(a.mask == b.mask);
+  EXPECT_TRUE(a.depth == b.depth);
+}
+
+// The lines that tell what was done, in order.
+std::vector<std::string> told(const std::string& log) {
+  std::vector<std::string> lines;
+  std::istringstream text(log);
+  for (std::string line; std::getline(text, line);)
+    for (const char* who : {"button ", "recorder: ", "recording: ", "rig: "})
+      if (line.starts_with(who)) lines.push_back(line);
+  return lines;
+}
+
+TEST_F(RigLive, ThroughEveryModeByButtons) {
+  write_set();
+  Shown refined, reviewed;
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    press("move_right");
+    until([](const Shown& s) { return s.shot.scene.objects.contains("card"); });
+    press("light_up");
+    until([](const Shown& s) { return s.shot.scene.lights.contains("key"); });
+    press("samples_up");
+    until([](const Shown& s) { return s.shot.samples == 3; });
+    press("debug_view");
+    until([](const Shown& s) { return s.look.view == render::View::mixed; });
+    for (std::size_t i = 1; i < render::all_views.size(); ++i) press("debug_view");
+    until([](const Shown& s) { return s.look.view == render::View::composite; });
+
+    press("record");
+    const int first = until([](const Shown& s) { return s.look.state.recording; }).count;
+    until([&](const Shown& s) { return s.count > first + 3 && s.shot.samples == 3; });
+    press("refine");  // what is frozen is in the take, which goes on
+    refined = until([](const Shown& s) { return s.shot.frozen && s.shot.samples >= 9; });
+    EXPECT_TRUE(refined.look.state.recording);
+    press("snapshot");
+    until_mode(Mode::live);
+    until_said("snapshot: ");
+    press("record");
+    until_said("12A_take001 is finished");
+    press("mark_good");
+    until_said("marked good");
+
+    std::set<std::int64_t> in_take;
+    for (const session::TrackRecord& record :
+         session::open_session(directory_ / "takes/12A_take001").track)
+      in_take.insert(record.timestamp_ns);
+    const int before = until([](const Shown&) { return true; }).count;
+    press("review");
+    until([&](const Shown& s) {
+      return s.count > before + 2 && s.look.state.mode == Mode::review && s.shot.samples == 3 &&
+             in_take.contains(s.shot.frame->timestamp_ns);
+    });
+    press("refine");
+    reviewed = until([](const Shown& s) { return s.shot.frozen && s.shot.samples >= 6; });
+    press("snapshot");
+    until_mode(Mode::live);
+    until_said("snapshot_0002");
+    press("standby");
+    until_said("button standby: standby");
+    press("standby");
+    const int dark = until([](const Shown&) { return true; }).count;
+    until([&](const Shown& s) { return s.count > dark; });
+  });
+
+  const std::vector<std::string> transcript = {
+      "button move_right: card moved to +0.010 +0.000 +0.000 m",
+      "button light_up: key +0.33 stops",
+      "button samples_up: 3 samples",
+      "button debug_view: view: mixed",
+      "button debug_view: view: real",
+      "button debug_view: view: difference",
+      "button debug_view: view: mask",
+      "button debug_view: view: depth",
+      "button debug_view: view: normal",
+      "button debug_view: view: noise",
+      "button debug_view: view: composite",
+      "button record: recording",
+      "button refine: refine",
+      "button snapshot: live",
+      "button snapshot: snapshot",
+      "button record: recording ended",
+      "recorder: take 12A_take001 is finished",
+      "button mark_good: take marked good",
+      "button review: review",
+      "button refine: refine",
+      "button snapshot: live",
+      "button snapshot: snapshot",
+      "button standby: standby",
+      "button standby: live"};
+  std::vector<std::string> lines = told(log_.text());
+  std::erase_if(lines, [](const std::string& line) { return line.starts_with("recording: "); });
+  EXPECT_EQ(lines, transcript);
+
+  // Every frame of the take is the camera's, in an unbroken row.
+  const std::filesystem::path take = directory_ / "takes/12A_take001";
+  session::Session session = session::open_session(take);
+  EXPECT_TRUE(session.missing.empty());
+  EXPECT_TRUE(session.info.take->good);
+  const auto stream = session::open_stream(session, "observer");
+  const auto& records = stream->records();
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    EXPECT_EQ(records[i].sequence, records[0].sequence + i);
+    EXPECT_EQ(stream->read(i)->bytes,
+              test::small_take_frame(static_cast<int>(records[i].sequence % 8)).bytes);
+  }
+  EXPECT_EQ(session.track.back().scene.objects.count("card"), 1u);
+
+  // Both refinements were saved as they were shown; that of the take's frame is bit for bit what
+  // `previzd render` makes of it. (What light a live frame had depends on when its thread was
+  // done.)
+  const auto saved = [&](const char* number) {
+    return output::read_exr(directory_ / (std::string("live/snapshot_") + number + ".exr"));
+  };
+  EXPECT_GE(saved("0001").samples, refined.shot.samples);
+  const render::Layers from_take = saved("0002");
+  EXPECT_GE(from_take.samples, reviewed.shot.samples);
+  expect_same(from_take, rendered(take, reviewed.shot.frame->timestamp_ns, from_take.samples));
+  EXPECT_EQ(output::read_png(directory_ / "live/snapshot_0002.png").width, 48);
+  EXPECT_GT(metrics_.counts.at("refine rounds"), 0u);
+}
+
+// Captured = rendered + dropped by cause, whatever was done in between.
+TEST_F(RigLive, EveryCapturedFrameIsRenderedOrCounted) {
+  write_set();
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    press("refine");
+    until([](const Shown& s) { return s.shot.frozen && s.shot.samples >= 4; });
+    press("standby");  // only ends the refinement
+    until_mode(Mode::live);
+    press("standby");
+    until_said("button standby: standby");
+    std::this_thread::sleep_for(std::chrono::milliseconds(150));  // a few frames in the dark
+    press("live");
+    until_mode(Mode::live);
+  });
+  std::uint64_t accounted = metrics_.stages.at("render").frames;
+  for (const char* stage : {"tracking", "render"})
+    for (const auto& [cause, frames] : metrics_.stages.at(stage).dropped) accounted += frames;
+  EXPECT_EQ(accounted, metrics_.stages.at("observer").frames);
+}
+
+TEST_F(RigLive, ABadSetLeavesTheOldOneRunningAndAGoodOneTakesOver) {
+  write_set();
+  const std::string good = session::read_file(directory_ / "set.toml");
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    std::ofstream(directory_ / "set.toml") << "[quality]\nsamples = none\n";
+    press("reload_set");
+    until_said("the set stays as it was");
+    const int before = until([](const Shown&) { return true; }).count;
+    until([&](const Shown& s) { return s.count > before + 2; });  // it goes on
+    std::string other = good;
+    other.replace(other.find("samples = 2"), 11, "samples = 4");
+    std::ofstream(directory_ / "set.toml") << other;
+    press("reload_set");
+    until([](const Shown& s) { return s.shot.samples == 4; });
+    std::ofstream(directory_ / "z.toml") << good;
+    press("next_set");
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    press("previous_set");
+    until([](const Shown& s) { return s.shot.samples == 4; });
+  });
+  EXPECT_NE(log_.text().find("set.toml:2:"), std::string::npos) << log_.text();
+}
+
+// The buttons of a replayed take are pressed again, at its own times.
+TEST_F(RigLive, ARecordedTakePressesItsButtonsAgain) {
+  write_set("preroll_s = 0\n");
+  const std::int64_t start = test::small_take_frame(0).timestamp_ns;
+  std::ofstream events(directory_ / "session/events.jsonl");
+  for (const auto& [ms, pushed] : {std::pair(100, "true"), {120, "false"}})
+    events << "{\"timestamp_ns\":" << start + ms * 1'000'000
+           << ",\"button\":\"record\",\"pressed\":" << pushed << "}\n";
+  events.close();
+  run([&] {
+    const int first = until([](const Shown& s) { return s.look.state.recording; }).count;
+    until([&](const Shown& s) { return s.count > first + 2; });
+  });
+  session::Session session = session::open_session(directory_ / "takes/12A_take001");
+  EXPECT_TRUE(session.missing.empty());
+  EXPECT_GT(session::open_stream(session, "observer")->records().size(), 0u);
+}
+
+// systemd's end of the notification socket.
+class NotifySocket {
+ public:
+  explicit NotifySocket(const std::filesystem::path& path)
+      : descriptor_(socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path.string().copy(address.sun_path, sizeof address.sun_path - 1);
+    EXPECT_EQ(bind(descriptor_.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+    setenv("NOTIFY_SOCKET", path.c_str(), 1);
+    setenv("WATCHDOG_USEC", "200000", 1);
+  }
+  ~NotifySocket() {
+    unsetenv("NOTIFY_SOCKET");
+    unsetenv("WATCHDOG_USEC");
+  }
+  // The next message; empty where none came within the time.
+  std::string next(int milliseconds) {
+    pollfd poll_one{descriptor_.get(), POLLIN, 0};
+    if (poll(&poll_one, 1, milliseconds) != 1) return "";
+    std::array<char, 1024> text{};
+    const ssize_t size = recv(descriptor_.get(), text.data(), text.size(), 0);
+    return {text.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
+  }
+  void until(const std::string& words) {
+    while (next(60'000).find(words) == std::string::npos) continue;
+  }
+
+ private:
+  OwnedDescriptor descriptor_;
+};
+
+// A display that hangs: the camera goes on, and the watchdog starves although the loop is alive.
+TEST_F(RigLive, TheWatchdogIsFedOnlyWhileFramesAdvance) {
+  write_set();
+  NotifySocket systemd(directory_ / "notify");
+  std::mutex gate;
+  while_shown_ = [&] { const std::lock_guard wait(gate); };
+  run([&] {
+    systemd.until("READY=1");
+    systemd.until("WATCHDOG=1");
+    {
+      const std::lock_guard hang(gate);
+      std::this_thread::sleep_for(std::chrono::milliseconds(500));  // what was under way is over
+      while (!systemd.next(0).empty()) continue;
+      press("samples_up");  // the loop answers
+      systemd.until("STATUS=button samples_up");
+      for (std::string said = systemd.next(500); !said.empty(); said = systemd.next(500))
+        EXPECT_EQ(said.find("WATCHDOG=1"), std::string::npos);
+    }
+    systemd.until("WATCHDOG=1");
+  });
+  systemd.until("STOPPING=1");
+}
+
+TEST(Progress, EveryStageWithSomethingToDoMustDoIt) {
+  const Progress start;
+  const auto with = [](auto change) {
+    Progress now{10, 10, 3, 1, false, false};
+    change(now);
+    return now;
+  };
+  EXPECT_TRUE(advances(start, with([](Progress&) {})));
+  EXPECT_FALSE(advances(start, with([](Progress& p) { p.captured = 0; })));
+  EXPECT_FALSE(advances(start, with([](Progress& p) { p.shown = 0; })));
+  EXPECT_FALSE(advances(start, with([](Progress& p) { p.light_estimates = 0; })));
+  EXPECT_TRUE(advances(start, with([](Progress& p) { p.lights = p.light_estimates = 0; })));
+  EXPECT_TRUE(advances(start, with([](Progress& p) { p.shown = 0, p.dark = true; })));
+  EXPECT_TRUE(
+      advances(start, with([](Progress& p) { p.captured = p.shown = 0, p.camera_lost = true; })));
+}
+
+}  // namespace
+}  // namespace previz::rig

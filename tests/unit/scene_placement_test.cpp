@@ -1,0 +1,112 @@
+// A scene with things moved and relit: what moves, what goes along, and what stays bit for bit.
+#include "daemon/scene/placement.hpp"
+
+#include <gtest/gtest.h>
+
+#include <glm/gtc/matrix_transform.hpp>
+
+namespace previz::scene {
+namespace {
+
+// Two objects of the set, the second with a lamp of its own, and one lamp of the set.
+struct Stage {
+  set::Set set;
+  Scene scene;
+  Stage() {
+    set.objects.resize(2);
+    set.objects[0].name = "vase";
+    set.objects[1].name = "torch";
+    set.objects[1].world_from_file = glm::translate(glm::dmat4(1), {1, 0, 0});
+    scene.instances.resize(3);
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      scene.instances[i].object = i == 0 ? 0 : 1;
+      scene.instances[i].world_from_object = glm::translate(glm::dmat4(1), {0.1 * i, 1.0 / 3, 0});
+    }
+    set::Light flame;
+    flame.position = {1, 0, 0.5};
+    scene.lights = {flame};
+    scene.light_objects = {1, no_object};
+    set::Light key;
+    key.name = "key";
+    key.emission = {2, 3, 4};
+    key.gain_real = 1;
+    set.lights = {key};
+    scene.lights.push_back(key);
+  }
+};
+
+TEST(Placement, OfNothingIsTheSceneItself) {
+  const Stage stage;
+  const Placement placement = place(stage.scene, stage.set, {});
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_EQ(placement.instances[i].world_from_object, stage.scene.instances[i].world_from_object);
+  EXPECT_EQ(placement.lights.size(), 2u);
+  EXPECT_TRUE(placement.unknown.empty());
+}
+
+// A quarter turn about Z through the world's origin, then 1 m up.
+TEST(Placement, AnObjectTakesItsLampsAlongAndLeavesTheOthers) {
+  const Stage stage;
+  session::SceneState state;
+  const glm::dmat4 moved = glm::translate(glm::dmat4(1), {0, 0, 1}) *
+                           glm::rotate(glm::dmat4(1), glm::radians(90.0), {0, 0, 1});
+  state.objects["torch"] = moved * stage.set.objects[1].world_from_file;
+  const Placement placement = place(stage.scene, stage.set, state);
+  EXPECT_EQ(placement.instances[0].world_from_object, stage.scene.instances[0].world_from_object);
+  for (std::size_t i = 1; i < 3; ++i) {
+    const glm::dvec3 was = stage.scene.instances[i].world_from_object[3];
+    const glm::dvec3 is = placement.instances[i].world_from_object[3];
+    EXPECT_NEAR(glm::length(is - glm::dvec3(-was.y, was.x, was.z + 1)), 0, 1e-15);
+  }
+  EXPECT_NEAR(glm::length(placement.lights[0].position - glm::dvec3(0, 1, 1.5)), 0, 1e-15);
+  EXPECT_EQ(placement.lights[1].position, stage.scene.lights[1].position);
+}
+
+TEST(Placement, AnObjectWhereTheSetHasItIsBitForBitWhereItWas) {
+  const Stage stage;
+  session::SceneState state;
+  state.objects["torch"] = stage.set.objects[1].world_from_file;
+  const Placement placement = place(stage.scene, stage.set, state);
+  EXPECT_EQ(placement.instances[1].world_from_object, stage.scene.instances[1].world_from_object);
+}
+
+TEST(Placement, DimmingIsOfTheMixedWorldOnly) {
+  const Stage stage;
+  session::SceneState state;
+  state.lights["key"] = state_of(stage.set.lights[0]);
+  state.lights["key"].gain_mixed = 0.25;
+  const Placement placement = place(stage.scene, stage.set, state);
+  ASSERT_EQ(placement.lights.size(), 2u);
+  EXPECT_EQ(placement.lights[1].gain_mixed, 0.25);
+  EXPECT_EQ(placement.lights[1].gain_real, 1);
+  EXPECT_EQ(placement.lights[1].emission, stage.set.lights[0].emission);
+}
+
+// The real world keeps the lamp as it is: together they are what the state says.
+TEST(Placement, ATintedRealLampIsSplitInTwo) {
+  const Stage stage;
+  session::SceneState state;
+  state.lights["key"] = state_of(stage.set.lights[0]);
+  state.lights["key"].tint = {2, 1, 0.5};
+  const Placement placement = place(stage.scene, stage.set, state);
+  ASSERT_EQ(placement.lights.size(), 3u);
+  EXPECT_EQ(placement.lights[1].gain_real, 0);
+  EXPECT_EQ(placement.lights[1].emission, glm::dvec3(4, 3, 2));
+  EXPECT_EQ(placement.lights[2].gain_mixed, 0);
+  EXPECT_EQ(placement.lights[2].gain_real, 1);
+  EXPECT_EQ(placement.lights[2].emission, stage.set.lights[0].emission);
+}
+
+TEST(Placement, NamesTheSetHasNotAreTold) {
+  const Stage stage;
+  session::SceneState state;
+  state.objects["ghost"] = glm::dmat4(1);
+  state.lights["moon"] = {};
+  const Placement placement = place(stage.scene, stage.set, state);
+  ASSERT_EQ(placement.unknown.size(), 2u);
+  EXPECT_NE(placement.unknown[0].find("\"ghost\""), std::string::npos);
+  EXPECT_NE(placement.unknown[1].find("\"moon\""), std::string::npos);
+}
+
+}  // namespace
+}  // namespace previz::scene
