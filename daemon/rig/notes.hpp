@@ -1,4 +1,5 @@
-// What is worth a line to whoever runs the rig: each different one once, other figures in it or not.
+// What is worth a line to whoever runs the rig: each different one once, other figures in it or
+// not.
 #pragma once
 
 #include <mutex>

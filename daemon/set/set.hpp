@@ -129,7 +129,7 @@ struct Lighting {
   double environment_rotation_rad = 0;  // about world Z, counter-clockwise from above
   double environment_gain = 1;
   glm::dvec3 balance{1};  // times the light camera's radiance is the film camera's
-  int resolution = 0;  // octahedral map, texels a side; 0: from the source
+  int resolution = 0;     // octahedral map, texels a side; 0: from the source
   UnseenRule unseen = UnseenRule::horizon;
   glm::dvec3 unseen_radiance{0};  // UnseenRule::constant
   double smoothing_s = 0.25;      // time constant; 0: none

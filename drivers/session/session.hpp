@@ -87,8 +87,8 @@ struct TrackRecord {
   glm::dmat4 world_from_camera{1.0};  // OpenCV camera axes, metres
   // Row-major 6x6: rotation (rad) then translation (m), in the camera frame.
   std::array<double, 36> covariance{};
-  std::vector<int> tags;  // ids used
-  SceneState scene;       // when the frame was shown; empty: as in the set
+  std::vector<int> tags;                        // ids used
+  SceneState scene;                             // when the frame was shown; empty: as in the set
   std::optional<CapturedLight> captured_light;  // absent: none was known, or an older session
 };
 
