@@ -6,6 +6,7 @@
 #include "daemon/pipeline/take.hpp"
 #include "daemon/post/import_assets.hpp"
 #include "daemon/set/names.hpp"
+#include "drivers/button_drivers.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::rig {
@@ -78,11 +79,17 @@ Rig::Rig(const LoadedSet& loaded, Parts parts)
 Rig::~Rig() = default;
 
 void Rig::open_buttons() {
-  for (std::unique_ptr<Buttons>& buttons : rig::open_buttons(loaded_.set, cameras_))
-    devices_.push_back({std::move(buttons), nullptr});
-  if (parts_.more_buttons)
-    for (std::unique_ptr<Buttons>& buttons : parts_.more_buttons())
-      devices_.push_back({std::move(buttons), nullptr});
+  const auto add = [this](std::vector<std::unique_ptr<Buttons>> opened, std::int64_t offset_ns) {
+    for (std::unique_ptr<Buttons>& buttons : opened)
+      devices_.push_back({std::move(buttons), nullptr, offset_ns});
+  };
+  add(rig::open_buttons(loaded_.set, cameras_), 0);
+  std::vector<std::string> plugged;
+  for (const set::Button& button : loaded_.set.buttons)
+    if (is_button_name(button.name) && std::ranges::find(plugged, button.name) == plugged.end())
+      plugged.push_back(button.name);
+  add(previz::open_buttons(plugged, {}), cameras_.clock_offset_ns);
+  if (parts_.more_buttons) add(parts_.more_buttons(), 0);
   for (Device& device : devices_)
     device.watch = parts_.loop.on_readable(device.buttons->fd(), [this, &device] { read(device); });
 }
@@ -103,7 +110,10 @@ std::optional<LoadedSet> Rig::run() {
 void Rig::read(Device& device) {
   while (std::optional<ButtonsEvent> event = device.buttons->next()) {
     bool over = std::holds_alternative<EndOfStream>(*event);
-    if (const auto* pushed = std::get_if<ButtonEvent>(&*event)) edge(*pushed);
+    if (auto* pushed = std::get_if<ButtonEvent>(&*event)) {
+      pushed->timestamp_ns += device.clock_offset_ns;
+      edge(*pushed);
+    }
     if (const auto* trouble = std::get_if<DeviceTrouble>(&*event)) {
       parts_.note(trouble->device + ": " + trouble->what);
       over = trouble->lost;

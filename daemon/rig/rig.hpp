@@ -65,6 +65,7 @@ class Rig {
   struct Device {
     std::unique_ptr<Buttons> buttons;
     std::unique_ptr<EventLoop::Watch> watch;
+    std::int64_t clock_offset_ns = 0;  // of the cameras' clock, in which presses are recorded
   };
 
   void open_buttons();

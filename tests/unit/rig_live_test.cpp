@@ -313,6 +313,14 @@ TEST_F(RigLive, ThroughEveryModeByButtons) {
 }
 
 // Captured = rendered + dropped by cause, whatever was done in between.
+TEST_F(RigLive, AButtonThatIsNotThereIsToldOfAndHoldsUpNobody) {
+  write_set("[[button]]\nname = \"gpio:absent:3\"\naction = \"record\"\n");
+  run([&] {
+    until_said("gpio:absent");
+    until([](const Shown& s) { return s.shot.samples == 2; });
+  });
+}
+
 TEST_F(RigLive, EveryCapturedFrameIsRenderedOrCounted) {
   write_set();
   run([&] {
