@@ -9,10 +9,10 @@
 namespace previz::calibrate {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
+constexpr double coverage_degree = std::numbers::pi / 180;
 constexpr int least_views = 5;
-constexpr int columns = 3, rows = 3;
-constexpr double least_tilt_spread = 30 * degree;
+constexpr int cover_columns = 3, cover_rows = 3;
+constexpr double least_tilt_spread = 30 * coverage_degree;
 constexpr double near_extent = 1.0 / 3;  // of the picture's diagonal
 constexpr int least_near_views = 2;
 constexpr double certain_px = 1;
@@ -56,16 +56,17 @@ void miss_number(const Views& views, const BundleFit& fit, std::vector<std::stri
 }
 
 void miss_picture(const Views& views, const BundleFit& fit, std::vector<std::string>& missing) {
-  bool seen[rows][columns] = {};
+  bool seen[cover_rows][cover_columns] = {};
   for_each_used(views, fit, [&](std::size_t v, std::size_t i) {
     const glm::dvec2& p = views.views[v].pixels[i];
-    const int column = std::clamp(int((p.x + 0.5) * columns / views.width), 0, columns - 1);
-    const int row = std::clamp(int((p.y + 0.5) * rows / views.height), 0, rows - 1);
+    const int column =
+        std::clamp(int((p.x + 0.5) * cover_columns / views.width), 0, cover_columns - 1);
+    const int row = std::clamp(int((p.y + 0.5) * cover_rows / views.height), 0, cover_rows - 1);
     seen[row][column] = true;
   });
   std::vector<std::string> empty;
-  for (int row = 0; row < rows; ++row)
-    for (int column = 0; column < columns; ++column)
+  for (int row = 0; row < cover_rows; ++row)
+    for (int column = 0; column < cover_columns; ++column)
       if (!seen[row][column]) empty.push_back(field_name(column, row));
   if (!empty.empty())
     missing.push_back("the board in these fields of the picture: " + listed(empty));
@@ -88,8 +89,8 @@ void miss_tilt(const BundleFit& fit, std::vector<std::string>& missing) {
   for (int axis = 0; axis < 2; ++axis)
     if (const double spread = high[axis] - low[axis]; spread < least_tilt_spread)
       missing.push_back(std::string("the board ") + how[axis] + ": all views lie within " +
-                        number("%.0f", spread / degree) + " degrees, at least " +
-                        number("%.0f", least_tilt_spread / degree) + " are needed");
+                        number("%.0f", spread / coverage_degree) + " degrees, at least " +
+                        number("%.0f", least_tilt_spread / coverage_degree) + " are needed");
 }
 
 void miss_distance(const Views& views, const BundleFit& fit, std::vector<std::string>& missing) {
@@ -147,13 +148,13 @@ std::vector<std::string> missing_views(const Views& views, const FisheyeFit& fis
   if (reached < least_fisheye_sectors)
     missing.push_back(
         "the board near the edge of the picture circle, all around: corners come to " +
-        number("%.0f", least_fisheye_reach_rad / degree) + " degrees off axis in " +
+        number("%.0f", least_fisheye_reach_rad / coverage_degree) + " degrees off axis in " +
         std::to_string(reached) + " of 8 directions around it, at least " +
         std::to_string(least_fisheye_sectors) + " are needed (the widest is at " +
-        number("%.1f", fisheye.widest_corner_rad / degree) + ")");
+        number("%.1f", fisheye.widest_corner_rad / coverage_degree) + ")");
   if (missing.empty() && fisheye.uncertain_from_rad < least_fisheye_reach_rad)
     missing.push_back("more or sharper views: beyond " +
-                      number("%.0f", fisheye.uncertain_from_rad / degree) +
+                      number("%.0f", fisheye.uncertain_from_rad / coverage_degree) +
                       " degrees off axis the lens is not certain to 1 px");
   return missing;
 }

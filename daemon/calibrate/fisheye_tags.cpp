@@ -14,9 +14,8 @@
 namespace previz::calibrate {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
-constexpr double half_view = 45 * degree;
-constexpr double off_axis = 60 * degree;
+constexpr double half_view = std::numbers::pi / 4;
+constexpr double off_axis = std::numbers::pi / 3;
 constexpr int views_around = 6;
 
 // Linear luminance of a frame, once.

@@ -33,7 +33,7 @@ std::vector<CvView> to_cv(const std::vector<View>& views) {
 }
 
 // Focal lengths from the vanishing points of each view (Zhang 2000), no distortion yet.
-Bundle started(const Views& views) {
+Bundle started_lens(const Views& views) {
   const std::vector<CvView> all = to_cv(views.views);
   std::vector<std::vector<cv::Point3f>> points;
   std::vector<std::vector<cv::Point2f>> pixels;
@@ -100,7 +100,7 @@ std::optional<glm::dvec2> project_pinhole(std::span<const double> lens, const gl
 }
 
 ObserverFit fit_observer(const Views& views) {
-  Bundle start = started(views);
+  Bundle start = started_lens(views);
   start.lens.resize(k3_parameter);
   ObserverFit observer;
   observer.fit = fit_bundle(views.views, start, project_pinhole);

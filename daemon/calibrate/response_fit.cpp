@@ -10,8 +10,8 @@
 namespace previz::calibrate {
 namespace {
 
-constexpr std::size_t codes = 256;
-constexpr std::size_t most_pixels = 4000, least_pixels = 100;
+constexpr std::size_t code_count = 256;
+constexpr std::size_t most_pixels = 4000, least_samples = 100;
 constexpr int debevec_side = 10;
 constexpr float debevec_smoothness = 10, robertson_threshold = 0.01f;
 constexpr int robertson_rounds = 50;
@@ -44,7 +44,7 @@ std::vector<std::size_t> spread(std::span<const BracketPicture> bracket,
     std::size_t sum = 0;
     for (const BracketPicture& picture : bracket)
       for (std::size_t c = 0; c < 3; ++c) sum += picture.rgb[3 * p + c];
-    by_brightness[sum * by_brightness.size() / (bracket.size() * 3 * codes)].push_back(p);
+    by_brightness[sum * by_brightness.size() / (bracket.size() * 3 * code_count)].push_back(p);
   }
   // Evenly over the picture within a brightness: those that are few give all they have.
   std::ranges::sort(by_brightness, {}, [](const auto& some) { return some.size(); });
@@ -67,7 +67,7 @@ Samples choose(std::span<const BracketPicture> bracket) {
       use = use && rises(bracket, 3 * p + c) && is_seen(bracket, 3 * p + c);
     if (use) usable.push_back(p);
   }
-  if (usable.size() < least_pixels)
+  if (usable.size() < least_samples)
     throw Error("only " + std::to_string(usable.size()) +
                 " pixels get brighter with the exposure and are seen in two of them; did camera "
                 "and scene stand still, and are the exposures what the pictures were taken with?");
@@ -82,7 +82,7 @@ Samples choose(std::span<const BracketPicture> bracket) {
 // below the first. White stands for all that is brighter: its signal, the least that clips, goes on
 // from the codes below it.
 void complete(std::vector<double>& signal) {
-  constexpr std::size_t white = codes - 1, run = 8;
+  constexpr std::size_t white = code_count - 1, run = 8;
   std::size_t last = 0;
   for (std::size_t v = 1; v < white; ++v) {
     if (!(signal[v] > 0)) continue;
@@ -127,9 +127,9 @@ std::vector<double> solve(const Samples& samples, std::span<const BracketPicture
     cv::createCalibrateRobertson(robertson_rounds, robertson_threshold)
         ->process(pictures, response, times);
   }
-  std::vector<double> signal(codes);
+  std::vector<double> signal(code_count);
   cv::extractChannel(response, response, 0);
-  for (std::size_t v = 0; v < codes; ++v) signal[v] = response.at<float>(int(v));
+  for (std::size_t v = 0; v < code_count; ++v) signal[v] = response.at<float>(int(v));
   complete(signal);
   return signal;
 }

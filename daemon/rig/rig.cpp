@@ -146,13 +146,13 @@ void Rig::act(const Press& press) {
 }
 
 Outcome Rig::perform(const set::Action& action, const std::string& by) {
-  const Outcome outcome = controls_.perform(action);
+  Outcome outcome = controls_.perform(action);
   tell(outcome, by);
   return outcome;
 }
 
 Outcome Rig::wish(Event event, const std::string& by) {
-  const Outcome outcome = controls_.happened(event);
+  Outcome outcome = controls_.happened(event);
   tell(outcome, by);
   return outcome;
 }

@@ -7,7 +7,7 @@ namespace previz::set {
 namespace {
 
 // clang-format off
-constexpr Action table[] = {
+constexpr Action action_table[] = {
     {"live", "Live preview.", ToMode{Mode::live}},
     {"refine", "Freeze the last good frame and refine it; again: live.", ToMode{Mode::refine}},
     {"review", "Play the last take; again: live.", ToMode{Mode::review}},
@@ -54,25 +54,26 @@ constexpr Action table[] = {
 };
 // clang-format on
 
-constexpr auto names = [] {
-  std::array<const char*, std::size(table)> list{};
-  std::ranges::transform(table, list.begin(), &Action::name);
+constexpr auto action_list = [] {
+  std::array<const char*, std::size(action_table)> list{};
+  std::ranges::transform(action_table, list.begin(), &Action::name);
   return list;
 }();
 
 }  // namespace
 
 std::span<const Action> actions() {
-  return table;
+  return action_table;
 }
 
 const Action* find_action(const std::string& name) {
-  const auto* found = std::ranges::find_if(table, [&](const Action& a) { return a.name == name; });
-  return found == std::end(table) ? nullptr : found;
+  const auto* found =
+      std::ranges::find_if(action_table, [&](const Action& a) { return a.name == name; });
+  return found == std::end(action_table) ? nullptr : found;
 }
 
 std::span<const char* const> action_names() {
-  return names;
+  return action_list;
 }
 
 }  // namespace previz::set

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 namespace previz::convert {
@@ -29,7 +30,7 @@ class YuvToRgb {
 
   static std::uint8_t to_code(float value) {
     if (value <= 0) return 0;
-    return value >= 255 ? 255 : static_cast<std::uint8_t>(value + 0.5f);
+    return value >= 255 ? 255 : static_cast<std::uint8_t>(std::lround(value));
   }
 
   std::array<float, 256> luma_{};  // R' = G' = B' of grey, in codes 0..255

@@ -209,7 +209,7 @@ void learn(const std::string& device, const std::function<bool()>& stop,
 
 // hid:VENDOR:PRODUCT[:SERIAL]:SELECTOR without the selector.
 std::string hid_device_of(const std::string& name) {
-  const std::string device = name.substr(0, name.rfind(':'));
+  std::string device = name.substr(0, name.rfind(':'));
   parse_device(device);
   hid::parse_selector(name.substr(name.rfind(':') + 1));
   return device;

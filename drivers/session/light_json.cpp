@@ -22,7 +22,7 @@ void add(Json& list, Number value, const char* what) {
 }
 
 template <class Vector>
-Json list_of(const Vector& v, const char* what) {
+Json components_of(const Vector& v, const char* what) {
   Json list = Json::array();
   for (int i = 0; i < 3; ++i) add(list, v[i], what);
   return list;
@@ -71,9 +71,9 @@ Json to_json(const CapturedLight& light) {
     Json angle = Json::array();
     add(angle, source.solid_angle_sr, "solid angle");
     sources.push_back({{"id", source.id},
-                       {"direction", list_of(source.direction, "direction")},
+                       {"direction", components_of(source.direction, "direction")},
                        {"solid_angle_sr", angle[0]},
-                       {"flux", list_of(source.flux, "flux")}});
+                       {"flux", components_of(source.flux, "flux")}});
   }
   Json radiance = Json::array();
   for (const glm::vec3& texel : light.ambient)

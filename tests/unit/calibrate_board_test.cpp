@@ -140,9 +140,10 @@ TEST(BoardFinder, AprilgridCornersHaveTheirIds) {
   test::TagScene scene;
   scene.lens = test::plain_lens(width, height, 600);
   scene.world_from_camera = test::look_at({0.1, -0.2, 0.45}, {0.11, 0.07, 0});
-  for (int i = 0; i < 6; ++i)
-    scene.tags.push_back(
-        test::flat_tag(7 + i, 0.06, {0.03 + 0.08 * (i % 3), 0.03 + 0.08 * (i / 3), 0}));
+  for (int i = 0; i < 6; ++i) {
+    const int column = i % 3, row = i / 3;
+    scene.tags.push_back(test::flat_tag(7 + i, 0.06, {0.03 + 0.08 * column, 0.03 + 0.08 * row, 0}));
+  }
   std::mt19937 random(1);
   const Frame frame =
       test::expose(test::render(scene), {.full_well_e = 20000, .response = {}}, random);

@@ -157,7 +157,8 @@ class TagRoom {
       for (int x = 0; x < picture.width; ++x) {
         double sum = 0;
         for (int s = 0; s < 16; ++s) {
-          const auto ray = lens.unproject({x - 0.375 + 0.25 * (s % 4), y - 0.375 + 0.25 * (s / 4)});
+          const int across = s % 4, down = s / 4;
+          const auto ray = lens.unproject({x - 0.375 + 0.25 * across, y - 0.375 + 0.25 * down});
           if (ray) sum += radiance(world_from_camera, *ray) / 16;
         }
         picture.value.push_back(sum);

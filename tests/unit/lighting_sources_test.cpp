@@ -38,7 +38,8 @@ EnvironmentMap map_of(const Sky& sky, int size) {
     for (int i = 0; i < size; ++i) {
       glm::dvec3 sum(0);
       for (int s = 0; s < samples * samples; ++s) {
-        const double u = i + (s % samples + 0.5) / samples, v = j + (s / samples + 0.5) / samples;
+        const int across = s % samples, down = s / samples;
+        const double u = i + (across + 0.5) / samples, v = j + (down + 0.5) / samples;
         const glm::vec2 at(2 * u / size - 1, 2 * v / size - 1);
         sum += sky(glm::dvec3(octahedral_direction(at)));
       }
