@@ -37,6 +37,13 @@ struct ResponseOptions {
   std::optional<std::filesystem::path> table_file;
 };
 
+struct ThinLensOptions {
+  std::optional<double> focal_length_mm, f_number, focus_distance_m, sensor_width_mm;
+  std::optional<std::filesystem::path> photo;     // of the lens as it is set, with EXIF
+  std::optional<std::filesystem::path> set_file;  // with the observer's intrinsics
+  std::optional<std::filesystem::path> table_file;
+};
+
 struct BalanceOptions {
   std::filesystem::path session;
   std::optional<std::filesystem::path> set_file;  // instead of the session's own
@@ -52,6 +59,7 @@ struct BalanceOptions {
 void calibrate_observer(const LensOptions& options, std::ostream& out);
 void calibrate_light(const LightOptions& options, std::ostream& out);
 void calibrate_response(const ResponseOptions& options, std::ostream& out);
+void calibrate_lens(const ThinLensOptions& options, std::ostream& out);
 void calibrate_balance(const BalanceOptions& options, std::ostream& out);
 
 }  // namespace previz::calibrate

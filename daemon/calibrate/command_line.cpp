@@ -48,6 +48,18 @@ void add_response(CLI::App& calibrate, ResponseOptions& options) {
   command.add_option("--out", options.table_file, "File for the set file's table");
 }
 
+void add_lens(CLI::App& calibrate, ThinLensOptions& options) {
+  CLI::App& command = *calibrate.add_subcommand("lens", "What depth of field needs of the lens");
+  command.add_option("--focal-length", options.focal_length_mm, "As engraved, mm");
+  command.add_option("--f-number", options.f_number, "As the ring says");
+  command.add_option("--focus", options.focus_distance_m, "Focus distance, m");
+  command.add_option("--sensor-width", options.sensor_width_mm,
+                     "Width of the sensor that the picture shows, mm");
+  command.add_option("--photo", options.photo, "Photograph whose EXIF says what is not given here");
+  command.add_option("--set", options.set_file, "Set file with the observer's intrinsics");
+  command.add_option("--out", options.table_file, "File for the set file's table");
+}
+
 void add_balance(CLI::App& calibrate, BalanceOptions& options) {
   CLI::App& command = *calibrate.add_subcommand(
       "balance", "One scale and white balance between the cameras, and the colours of surfaces");
@@ -75,6 +87,7 @@ void add_calibrate(CLI::App& app, Commands& commands) {
   add_observer(command, commands.observer);
   add_light(command, commands.light);
   add_response(command, commands.response);
+  add_lens(command, commands.lens);
   add_balance(command, commands.balance);
 }
 
@@ -83,6 +96,7 @@ int do_calibrate(const CLI::App& app, const Commands& commands, std::ostream& ou
   if (command.got_subcommand("observer")) calibrate_observer(commands.observer, out);
   if (command.got_subcommand("light")) calibrate_light(commands.light, out);
   if (command.got_subcommand("response")) calibrate_response(commands.response, out);
+  if (command.got_subcommand("lens")) calibrate_lens(commands.lens, out);
   if (command.got_subcommand("balance")) calibrate_balance(commands.balance, out);
   return 0;
 }

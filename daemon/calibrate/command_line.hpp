@@ -15,6 +15,7 @@ struct Commands {
   LensOptions observer;
   LightOptions light;
   ResponseOptions response;
+  ThinLensOptions lens;
   BalanceOptions balance;
 };
 
