@@ -59,7 +59,7 @@ std::vector<Method> all_methods() {
 }
 
 std::vector<Method> chosen_methods(const std::vector<std::string>& names) {
-  const std::vector<Method> all = all_methods();
+  std::vector<Method> all = all_methods();
   if (names.empty()) return all;
   std::vector<Method> methods;
   for (const std::string& name : names) {

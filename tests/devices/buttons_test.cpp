@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <string_view>
 
 #include "drivers/button_drivers.hpp"
 #include "drivers/debouncer.hpp"
@@ -201,8 +202,8 @@ class UhidPad {
         0x15, 0x00, 0x25, 0x01, 0x75, 0x01, 0x95, 0x08, 0x81, 0x02, 0xc0};
     uhid_event event{};
     event.type = UHID_CREATE2;
-    std::strcpy(reinterpret_cast<char*>(event.u.create2.name), "previzd test pad");
-    std::strcpy(reinterpret_cast<char*>(event.u.create2.uniq), "PREVIZ1");
+    std::string_view("previzd test pad").copy(reinterpret_cast<char*>(event.u.create2.name), 16);
+    std::string_view("PREVIZ1").copy(reinterpret_cast<char*>(event.u.create2.uniq), 7);
     event.u.create2.rd_size = sizeof description;
     event.u.create2.bus = 3;  // USB
     event.u.create2.vendor = 0x1209;

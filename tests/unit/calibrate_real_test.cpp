@@ -27,7 +27,7 @@ fs::path real(const std::string& name) {
 }
 
 #define PREVIZ_REAL(folder) \
-  if (!fs::is_directory(folder)) GTEST_SKIP() << folder << " is not there; set PREVIZ_SHARED"
+  if (!fs::is_directory(folder)) GTEST_SKIP() << (folder) << " is not there; set PREVIZ_SHARED"
 
 Views look(const fs::path& folder, const std::string& board_text) {
   const Board board = parse_board(board_text);
