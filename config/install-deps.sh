@@ -11,8 +11,11 @@ packages=(
   # pictures and video
   libopencv-dev libopenexr-dev libimath-dev libpng-dev libexiv2-dev
   libavformat-dev libavcodec-dev libavutil-dev libswscale-dev libjpeg62-turbo-dev
+  # the display and its text
+  libegl-dev libgles-dev libegl-mesa0 libgl1-mesa-dri libgbm-dev libdrm-dev libfreetype-dev libharfbuzz-dev
+  fonts-dejavu-core
   # cameras, buttons
-  libaravis-dev libudev-dev libgpiod-dev libhidapi-dev
+  libaravis-dev libcamera-dev libudev-dev libusb-1.0-0-dev libgpiod-dev libhidapi-dev
   # markers, geometry, scenes
   libapriltag-dev libembree-dev libtinygltf-dev libstb-dev libglm-dev
   # files, command line, log, hashes
@@ -20,7 +23,9 @@ packages=(
   # main loop, service, D-Bus
   libsystemd-dev dbus-daemon
   # tests
-  libgtest-dev libgmock-dev libbenchmark-dev
+  libgtest-dev libgmock-dev libbenchmark-dev groff-base
+  # package, and its test in a bare system
+  dpkg-dev file lintian mmdebstrap systemd
 )
 
 missing=()

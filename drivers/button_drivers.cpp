@@ -10,6 +10,7 @@
 #ifdef PREVIZ_WITH_HID
 #include "drivers/hid/hid_buttons.hpp"
 #endif
+#include "drivers/registry.hpp"
 
 namespace previz {
 namespace {
@@ -28,14 +29,11 @@ const std::vector<ButtonDriver>& all_button_drivers() {
 
 const ButtonDriver& driver_of(const std::string& name) {
   const std::string wanted = name.substr(0, name.find(':'));
-  std::string known;
-  for (const ButtonDriver& driver : all_button_drivers()) {
-    if (driver.name == wanted) return driver;
-    known += known.empty() ? "" : ", ";
-    known += driver.name;
+  try {
+    return driver_named(all_button_drivers(), wanted, "buttons");
+  } catch (const Error& error) {
+    throw Error("button \"" + name + "\": " + error.what());
   }
-  throw Error("button \"" + name + "\": this build drives no \"" + wanted + "\" buttons; it has " +
-              (known.empty() ? "none" : known));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "drivers/button_settings.hpp"
 #include "drivers/buttons.hpp"
 
 namespace previz {
@@ -16,14 +17,6 @@ namespace previz {
 //   hid:VENDOR:PRODUCT:SELECTOR    of the first such device; hexadecimal; see hid/selector.hpp
 //   hid:VENDOR:PRODUCT:SERIAL:SELECTOR
 bool is_button_name(const std::string& name);
-
-// For contacts on GPIO lines.
-struct ButtonSettings {
-  enum class Bias { as_is, none, pull_up, pull_down };
-  bool active_low = true;  // pressed pulls the line to ground
-  Bias bias = Bias::pull_up;
-  double debounce_s = 0.005;
-};
 
 struct FoundButton {
   std::string name;  // of a line; of a HID device without the selector

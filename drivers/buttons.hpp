@@ -37,6 +37,9 @@ class Buttons {
   // The next edge, in order; none where nothing waits. Never blocks. A button held when the device
   // is lost gets its release first. After EndOfStream or trouble that says `lost` nothing follows.
   virtual std::optional<ButtonsEvent> next() = 0;
+
+  // Since the object was made; to be asked by the thread that owns it.
+  virtual DeviceCounters counters() const { return {}; }
 };
 
 }  // namespace previz

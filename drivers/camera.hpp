@@ -3,7 +3,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <map>
 #include <string>
 #include <variant>
 
@@ -22,12 +21,10 @@ struct CameraFormat {
   PixelFormat format = PixelFormat::rgb8;
   int width = 0, height = 0;  // pixels
   double rate_hz = 0;         // nominal; 0 where the camera has none (triggered, or not told)
+  BayerPattern bayer = BayerPattern::none;
 
   friend bool operator==(const CameraFormat&, const CameraFormat&) = default;
 };
-
-// Total since the camera was opened, by what was counted: "frames cut short", "packets missing".
-using DeviceCounters = std::map<std::string, std::uint64_t>;
 
 // An open camera; making it opens the device and settles its format, destroying it gives the device
 // back whatever state it is in. Everything but the destructor may throw previz::Error only where it
@@ -62,6 +59,7 @@ class Camera {
   // frame; between two exposures frames may be left out whose exposure is not known.
   virtual bool set_exposure(double exposure_s, double gain) = 0;
 
+  // Since the camera was opened.
   virtual DeviceCounters counters() const = 0;
 };
 

@@ -2,9 +2,12 @@
 
 #include <array>
 
-#include "drivers/error.hpp"
+#include "drivers/registry.hpp"
 #ifdef PREVIZ_WITH_ARAVIS
 #include "drivers/aravis/aravis_camera.hpp"
+#endif
+#ifdef PREVIZ_WITH_LIBCAMERA
+#include "drivers/libcamera/libcamera_camera.hpp"
 #endif
 #ifdef PREVIZ_WITH_V4L2
 #include "drivers/v4l2/v4l2_camera.hpp"
@@ -15,10 +18,13 @@ namespace {
 
 constexpr auto drivers = std::to_array<CameraDriver>({
 #ifdef PREVIZ_WITH_ARAVIS
-    {"aravis", open_aravis, find_aravis},
+    {"aravis", open_aravis, find_aravis, usb_place_of_aravis},
+#endif
+#ifdef PREVIZ_WITH_LIBCAMERA
+    {"libcamera", open_libcamera, find_libcamera, usb_place_of_libcamera},
 #endif
 #ifdef PREVIZ_WITH_V4L2
-    {"v4l2", open_v4l2, find_v4l2},
+    {"v4l2", open_v4l2, find_v4l2, usb_place_of_v4l2},
 #endif
 });
 
@@ -29,13 +35,7 @@ std::span<const CameraDriver> camera_drivers() {
 }
 
 const CameraDriver& camera_driver(std::string_view name) {
-  std::string known;
-  for (const CameraDriver& driver : drivers) {
-    if (driver.name == name) return driver;
-    known += known.empty() ? "" : ", ";
-    known += driver.name;
-  }
-  throw Error("this build drives no \"" + std::string(name) + "\" cameras; it has " + known);
+  return driver_named(drivers, name, "cameras");
 }
 
 }  // namespace previz

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -9,6 +10,8 @@
 
 #include "drivers/camera.hpp"
 #include "drivers/camera_settings.hpp"
+#include "drivers/exposure_ledger.hpp"
+#include "drivers/usb/usb.hpp"
 
 namespace previz {
 
@@ -24,6 +27,8 @@ struct CameraDriver {
   // Throws previz::Error that names the device and says what is wrong.
   std::unique_ptr<Camera> (*open)(const CameraSettings& settings);
   std::vector<FoundCamera> (*find)();
+  // Where on the USB a camera is, also one that does not answer; none where it is not there.
+  std::optional<usb::Place> (*usb_place)(const std::string& device);
 };
 
 // Those this build has.
@@ -32,9 +37,12 @@ std::span<const CameraDriver> camera_drivers();
 // Throws previz::Error that says which drivers this build has, if it has not this one.
 const CameraDriver& camera_driver(std::string_view name);
 
-// The absolute exposure of a frame. A shutter time that is not known (0) counts as 1 s.
-inline double absolute_exposure(double exposure_s, double gain, double responsivity) {
-  return (exposure_s > 0 ? exposure_s : 1.0) * gain * responsivity;
+// What a frame was taken with. A shutter time that is not known (0) counts as 1 s.
+inline void tell_exposure(Frame& frame, const Exposure& exposure, double responsivity) {
+  frame.exposure_s = exposure.exposure_s;
+  frame.gain = exposure.gain;
+  frame.exposure =
+      (exposure.exposure_s > 0 ? exposure.exposure_s : 1.0) * exposure.gain * responsivity;
 }
 
 }  // namespace previz

@@ -50,7 +50,7 @@ class ExposureLedger {
   };
 
   Exposure current_;
-  const int settle_frames_;
+  int settle_frames_;
   std::deque<Change> changes_;
 };
 

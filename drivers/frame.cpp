@@ -5,7 +5,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "drivers/convert/yuv.hpp"
+#include "drivers/convert/convert.hpp"
 #include "drivers/error.hpp"
 
 namespace previz {
@@ -23,6 +23,11 @@ constexpr FormatName format_names[] = {
     {PixelFormat::rgb8, "rgb8"},         {PixelFormat::rgb16, "rgb16"},
     {PixelFormat::gray8, "gray8"},       {PixelFormat::gray16, "gray16"},
     {PixelFormat::yuv422p8, "yuv422p8"},
+};
+
+constexpr std::pair<BayerPattern, const char*> pattern_names[] = {
+    {BayerPattern::none, "none"}, {BayerPattern::rggb, "rggb"}, {BayerPattern::grbg, "grbg"},
+    {BayerPattern::gbrg, "gbrg"}, {BayerPattern::bggr, "bggr"},
 };
 
 std::vector<std::uint16_t> widen(const std::vector<std::uint8_t>& bytes) {
@@ -60,6 +65,19 @@ std::vector<std::uint16_t> yuv422_to_rgb(const Frame& frame) {
   return widen(rgb);
 }
 
+void check_size(const Frame& frame) {
+  if (frame.bytes.size() != frame_bytes(frame.format, frame.width, frame.height))
+    throw Error("frame " + std::to_string(frame.sequence) + " of " + frame.source + " holds " +
+                std::to_string(frame.bytes.size()) + " bytes; " + to_string(frame.format) + " of " +
+                std::to_string(frame.width) + "x" + std::to_string(frame.height) + " needs " +
+                std::to_string(frame_bytes(frame.format, frame.width, frame.height)));
+}
+
+std::vector<std::uint8_t> colours_of(const Frame& frame) {
+  return convert::demosaic(frame.bayer, frame.format == PixelFormat::gray16, frame.width,
+                           frame.height, frame.bytes);
+}
+
 }  // namespace
 
 std::size_t frame_bytes(PixelFormat format, int width, int height) {
@@ -94,19 +112,39 @@ PixelFormat pixel_format_from_string(const std::string& name) {
                               "\"; allowed: rgb8, rgb16, gray8, gray16, yuv422p8");
 }
 
+const char* to_string(BayerPattern pattern) {
+  for (const auto& [known, name] : pattern_names)
+    if (known == pattern) return name;
+  throw std::invalid_argument("unknown Bayer pattern");
+}
+
+BayerPattern bayer_pattern_from_string(const std::string& name) {
+  for (const auto& [pattern, known] : pattern_names)
+    if (name == known) return pattern;
+  throw std::invalid_argument("unknown Bayer pattern \"" + name +
+                              "\"; allowed: none, rggb, grbg, gbrg, bggr");
+}
+
+FramePtr demosaiced(const FramePtr& frame) {
+  if (frame->bayer == BayerPattern::none) return frame;
+  check_size(*frame);
+  auto colour = std::make_shared<Frame>(*frame);
+  colour->format = frame->format == PixelFormat::gray16 ? PixelFormat::rgb16 : PixelFormat::rgb8;
+  colour->bayer = BayerPattern::none;
+  colour->bytes = colours_of(*frame);
+  return colour;
+}
+
 Plate to_plate(const Frame& frame) {
-  if (frame.bytes.size() != frame_bytes(frame.format, frame.width, frame.height))
-    throw Error("frame " + std::to_string(frame.sequence) + " of " + frame.source + " holds " +
-                std::to_string(frame.bytes.size()) + " bytes; " + to_string(frame.format) + " of " +
-                std::to_string(frame.width) + "x" + std::to_string(frame.height) + " needs " +
-                std::to_string(frame_bytes(frame.format, frame.width, frame.height)));
+  check_size(frame);
   Plate plate{frame.width, frame.height, 8, {}};
   switch (frame.format) {
     case PixelFormat::rgb8:
       plate.samples = widen(frame.bytes);
       break;
     case PixelFormat::gray8:
-      plate.samples = repeat_three_times(widen(frame.bytes));
+      plate.samples = frame.bayer == BayerPattern::none ? repeat_three_times(widen(frame.bytes))
+                                                        : widen(colours_of(frame));
       break;
     case PixelFormat::yuv422p8:
       plate.samples = yuv422_to_rgb(frame);
@@ -117,7 +155,9 @@ Plate to_plate(const Frame& frame) {
       break;
     case PixelFormat::gray16:
       plate.bits = 16;
-      plate.samples = repeat_three_times(samples_of_16_bit(frame.bytes));
+      plate.samples = frame.bayer == BayerPattern::none
+                          ? repeat_three_times(samples_of_16_bit(frame.bytes))
+                          : samples_of_16_bit(colours_of(frame));
       break;
   }
   return plate;

@@ -18,6 +18,10 @@ enum class PixelFormat {
   yuv422p8,  // planar Y, Cb, Cr; chroma half width; BT.709 limited range
 };
 
+// The colour filters over a sensor's samples, by its first two rows. A frame with a pattern is
+// gray8 or gray16, as the sensor counted; who wants its colours asks demosaiced() or to_plate().
+enum class BayerPattern { none, rggb, grbg, gbrg, bggr };
+
 // Immutable once published; stages share it by FramePtr.
 struct Frame {
   std::string source;             // device role: "observer" or "light"
@@ -29,6 +33,7 @@ struct Frame {
   // Absolute exposure: radiance = inverse_response(value) / exposure. Always > 0.
   double exposure = 1.0;
   PixelFormat format = PixelFormat::rgb8;
+  BayerPattern bayer = BayerPattern::none;
   int width = 0;   // pixels
   int height = 0;  // pixels
   // Rows packed without padding; planes one after the other.
@@ -46,6 +51,15 @@ const char* to_string(PixelFormat format);
 // Inverse of to_string; throws std::invalid_argument naming the unknown format.
 PixelFormat pixel_format_from_string(const std::string& name);
 
+// The same for patterns: "none", "rggb", ...
+const char* to_string(BayerPattern pattern);
+BayerPattern bayer_pattern_from_string(const std::string& name);
+
+// The frame in colour: with a Bayer pattern as rgb8 or rgb16, any other is itself. Edge-aware
+// (OpenCV), up to the picture's edge; a sample stays as it is in its own place. Throws
+// previz::Error if `bytes` has not the length of its format and size.
+FramePtr demosaiced(const FramePtr& frame);
+
 // The converted RGB plate: interleaved RGB, 8 or 16 bits a sample. "Bit for bit" refers to this.
 struct Plate {
   int width = 0;
@@ -54,9 +68,10 @@ struct Plate {
   std::vector<std::uint16_t> samples;  // 3*width*height, row-major, 0..2^bits-1
 };
 
-// Converts a frame to its RGB plate. gray repeats the sample; yuv422p8 is BT.709 limited range
-// (ITU-R BT.709-6), chroma sited on the even columns and linear between them, rounded to nearest,
-// clipped to 0..255. Throws previz::Error if `bytes` has not the length of its format and size.
+// Converts a frame to its RGB plate. Bayer is demosaiced(), other gray repeats the sample; yuv422p8
+// is BT.709 limited range (ITU-R BT.709-6), chroma sited on the even columns and linear between
+// them, rounded to nearest, clipped to 0..255. Throws previz::Error if `bytes` has not the length
+// of its format and size.
 Plate to_plate(const Frame& frame);
 
 }  // namespace previz

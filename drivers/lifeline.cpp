@@ -7,29 +7,16 @@ namespace previz {
 
 using std::chrono::milliseconds;
 
-const char* to_string(DeviceState state) {
-  switch (state) {
-    case DeviceState::absent:
-      return "absent";
-    case DeviceState::starting:
-      return "starting";
-    case DeviceState::streaming:
-      return "streaming";
-    case DeviceState::stalled:
-      return "stalled";
-    case DeviceState::lost:
-      return "lost";
-  }
-  return "?";
-}
-
 Lifeline::Lifeline(std::string name, CameraOpener open, const LifelineOptions& options,
-                   HostClock clock)
+                   HostClock clock, LifelineHooks hooks)
     : name_(std::move(name)),
       open_(std::move(open)),
       options_(options),
       clock_(std::move(clock)),
-      counters_{{"opened", 0}, {"not opened", 0}, {"stalled", 0}, {"lost", 0}} {}
+      hooks_(std::move(hooks)),
+      backoff_(options.backoff),
+      counters_{{"opened", 0},   {"not opened", 0}, {"stalled", 0}, {"lost", 0},
+                {"returned", 0}, {"back-offs", 0},  {"reset", 0}} {}
 
 CameraFormat Lifeline::format() const {
   return format_;
@@ -39,8 +26,7 @@ void Lifeline::start() {
   if (wanted_) return;
   wanted_ = true;
   state_ = DeviceState::absent;
-  retry_at_ = clock_.now();
-  backoff_ = milliseconds(0);
+  backoff_.reset();
   last_refusal_.clear();
 }
 
@@ -55,8 +41,9 @@ CameraEvent Lifeline::next(milliseconds timeout) {
   const HostClock::Time deadline = clock_.now() + timeout;
   do {
     if (!camera_) {
-      clock_.sleep_until(std::min(retry_at_, deadline));
-      if (clock_.now() < retry_at_) return NoFrame{};
+      look_for_arrivals();
+      clock_.sleep_until(std::min(backoff_.at(), deadline));
+      if (!backoff_.due(clock_.now())) return NoFrame{};
       if (std::optional<CameraEvent> told = open()) return *std::move(told);
       continue;
     }
@@ -78,6 +65,7 @@ std::optional<CameraEvent> Lifeline::open() {
     return not_opened(error.what());
   }
   ++counters_["opened"];
+  if (counters_["lost"] > counters_["returned"]) ++counters_["returned"];
   last_refusal_.clear();
   format_ = camera_->format();
   state_ = DeviceState::starting;
@@ -89,15 +77,11 @@ std::optional<CameraEvent> Lifeline::not_opened(const std::string& why) {
   camera_.reset();
   ++counters_["not opened"];
   state_ = DeviceState::absent;
-  retry_later();
+  backoff_.failed(clock_.now());
+  ++counters_["back-offs"];
   if (why == last_refusal_) return std::nullopt;
   last_refusal_ = why;
   return DeviceTrouble{name_, why + "; tried again until it is there"};
-}
-
-void Lifeline::retry_later() {
-  backoff_ = std::clamp(2 * backoff_, options_.first_backoff, options_.last_backoff);
-  retry_at_ = clock_.now() + backoff_;
 }
 
 // What of a device's events goes on; nothing of NoFrame.
@@ -105,7 +89,7 @@ std::optional<CameraEvent> Lifeline::take(CameraEvent event) {
   if (std::holds_alternative<FramePtr>(event)) {
     state_ = DeviceState::streaming;
     since_ = clock_.now();
-    backoff_ = milliseconds(0);
+    backoff_.reset();
     return event;
   }
   if (auto* trouble = std::get_if<DeviceTrouble>(&event)) {
@@ -135,23 +119,42 @@ HostClock::Time Lifeline::next_deadline() const {
 std::optional<CameraEvent> Lifeline::watch() {
   if (!camera_ || clock_.now() < next_deadline()) return std::nullopt;
   if (state_ == DeviceState::starting)
-    return lose("sends no frame within " + std::to_string(options_.start_timeout.count()) +
-                " ms of its start");
+    return lose_silent("sends no frame within " + std::to_string(options_.start_timeout.count()) +
+                       " ms of its start");
   if (state_ == DeviceState::streaming) {
     state_ = DeviceState::stalled;
     ++counters_["stalled"];
     return DeviceTrouble{
         name_, "has sent nothing for " + std::to_string(options_.stall_timeout.count()) + " ms"};
   }
-  return lose("is stalled");
+  return lose_silent("is stalled");
 }
 
 CameraEvent Lifeline::lose(const std::string& why) {
   close();
   ++counters_["lost"];
   state_ = DeviceState::lost;
-  retry_later();
+  backoff_.failed(clock_.now());
+  ++counters_["back-offs"];
   return DeviceTrouble{name_, why + "; it is opened anew"};
+}
+
+// A device that was pulled says so; one that only says nothing may be wedged.
+CameraEvent Lifeline::lose_silent(const std::string& why) {
+  close();
+  const std::optional<std::string> why_not = hooks_.reset ? hooks_.reset() : std::nullopt;
+  if (!why_not) return lose(why);
+  if (!why_not->empty()) return lose(why + "; it cannot be reset (" + *why_not + ")");
+  ++counters_["reset"];
+  return lose(why + "; it was reset");
+}
+
+// Whatever came may be ours. Its node may follow a little later: attempts start as close together
+// as at first.
+void Lifeline::look_for_arrivals() {
+  const std::uint64_t arrivals = hooks_.arrivals ? hooks_.arrivals() : 0;
+  if (std::exchange(arrivals_, arrivals) == arrivals) return;
+  backoff_.reset();
 }
 
 void Lifeline::close() {

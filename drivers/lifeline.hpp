@@ -7,28 +7,28 @@
 #include <optional>
 #include <string>
 
+#include "drivers/backoff.hpp"
 #include "drivers/camera.hpp"
 #include "drivers/faults.hpp"
 #include "drivers/host_clock.hpp"
 
 namespace previz {
 
-enum class DeviceState {
-  absent,     // not there, or not to be opened; tried again after a while
-  starting,   // open, and no frame yet
-  streaming,  // frames come
-  stalled,    // frames came, and come no more; about to be given up
-  lost,       // closed after a failure; to be opened anew
-};
-
-const char* to_string(DeviceState state);
-
 struct LifelineOptions {
   std::chrono::milliseconds start_timeout{5000};   // from start() to the first frame
   std::chrono::milliseconds stall_timeout{2000};   // between frames; to stalled
   std::chrono::milliseconds stall_patience{1000};  // in stalled; to lost
-  // Between attempts to open; doubles from the first to the last while they fail.
-  std::chrono::milliseconds first_backoff{250}, last_backoff{4000};
+  BackoffLimits backoff;                           // between attempts to open
+};
+
+// What a lifeline can ask of the bus its device is on; empty: nothing.
+struct LifelineHooks {
+  // How many devices have been plugged in so far. When it grows, the next attempt to open is due at
+  // once.
+  std::function<std::uint64_t()> arrivals;
+  // Resets a device that is silent while it should stream, before it is opened anew. Empty, or why
+  // it could not be done; none where there is nothing to reset.
+  std::function<std::optional<std::string>()> reset;
 };
 
 // A camera whose device may come and go. next() does in turn what is due: opens, starts, waits for
@@ -42,7 +42,7 @@ class Lifeline final : public Camera {
  public:
   // `name` is what trouble is told under. Opens nothing yet.
   Lifeline(std::string name, CameraOpener open, const LifelineOptions& options = {},
-           HostClock clock = {});
+           HostClock clock = {}, LifelineHooks hooks = {});
 
   std::string name() const override { return name_; }
   CameraFormat format() const override;  // of the last opening; before the first all zero
@@ -51,7 +51,8 @@ class Lifeline final : public Camera {
   CameraEvent next(std::chrono::milliseconds timeout) override;
   // Also for openings to come. True where the device, or no device yet, takes it.
   bool set_exposure(double exposure_s, double gain) override;
-  // Of all openings together, and "opened", "lost", "stalled", "not opened".
+  // Of all openings together; and "opened", "not opened", "stalled", "lost", "returned" (opened
+  // after a loss), "back-offs" (waits before an attempt to open), "reset".
   DeviceCounters counters() const override;
 
   DeviceState state() const { return state_; }
@@ -62,7 +63,8 @@ class Lifeline final : public Camera {
   std::optional<CameraEvent> watch();
   std::optional<CameraEvent> not_opened(const std::string& why);
   CameraEvent lose(const std::string& why);
-  void retry_later();
+  CameraEvent lose_silent(const std::string& why);
+  void look_for_arrivals();
   void close();
   HostClock::Time next_deadline() const;
 
@@ -70,12 +72,13 @@ class Lifeline final : public Camera {
   const CameraOpener open_;
   const LifelineOptions options_;
   const HostClock clock_;
+  const LifelineHooks hooks_;
 
+  std::uint64_t arrivals_ = 0;  // seen
   DeviceState state_ = DeviceState::absent;
-  bool wanted_ = false;         // started
-  HostClock::Time since_{};     // the state, or the last frame
-  HostClock::Time retry_at_{};  // absent and lost only
-  std::chrono::milliseconds backoff_{0};
+  bool wanted_ = false;             // started
+  HostClock::Time since_{};         // the state, or the last frame
+  Backoff backoff_;                 // absent and lost only
   std::string last_refusal_;        // why the device could not be opened, as last told
   std::unique_ptr<Camera> camera_;  // starting, streaming and stalled only
   CameraFormat format_;

@@ -173,10 +173,7 @@ class AravisCamera final : public Camera {
         clock_.to_host(static_cast<std::int64_t>(arv_buffer_get_timestamp(&buffer)), arrival_ns);
     const std::optional<Exposure> exposure = exposure_of(buffer, frame->timestamp_ns);
     if (!exposure) return left_out("frames between two exposures");
-    frame->exposure_s = exposure->exposure_s;
-    frame->gain = exposure->gain;
-    frame->exposure =
-        absolute_exposure(exposure->exposure_s, exposure->gain, settings_.responsivity);
+    tell_exposure(*frame, *exposure, settings_.responsivity);
     return frame;
   }
 
@@ -227,12 +224,12 @@ class AravisCamera final : public Camera {
     return Exposure{1e-6 * us, agreed_.gain_in_db ? std::pow(10.0, gain_db / 20.0) : 1.0};
   }
 
-  // Aravis' own: n_completed_buffers, n_missing_packets, n_resent_packets, ...
+  // All of Aravis' own, which depend on the kind of stream.
   void add_stream_counters(DeviceCounters& counters) const {
     if (!stream_) return;
     for (unsigned i = 0; i < arv_stream_get_n_infos(stream_.get()); ++i)
       if (arv_stream_get_info_type(stream_.get(), i) == G_TYPE_UINT64)
-        counters[std::string("aravis ") + arv_stream_get_info_name(stream_.get(), i)] +=
+        counters[aravis::counter_name(arv_stream_get_info_name(stream_.get(), i))] +=
             arv_stream_get_info_uint64(stream_.get(), i);
   }
 

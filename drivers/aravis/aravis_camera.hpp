@@ -21,4 +21,6 @@ std::unique_ptr<Camera> open_aravis(const CameraSettings& settings);
 // Asks all networks and the USB bus, which takes about a second.
 std::vector<FoundCamera> find_aravis();
 
+std::optional<usb::Place> usb_place_of_aravis(const std::string& device);
+
 }  // namespace previz

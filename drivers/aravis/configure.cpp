@@ -30,6 +30,14 @@ bool gain_is_in_db(ArvCamera& camera) {
   return ARV_IS_GC_FLOAT(node) && or_nothing(arv_gc_float_get_unit(ARV_GC_FLOAT(node))) == "dB";
 }
 
+// Radiance is divided by it.
+void check_exposure(const std::string& device, const Exposure& exposure) {
+  const double product = exposure.exposure_s * exposure.gain;
+  if (exposure.exposure_s > 0 && exposure.gain > 0 && std::isnormal(product)) return;
+  throw Error(device + ": says its exposure is " + std::to_string(exposure.exposure_s) +
+              " s with gain " + std::to_string(exposure.gain) + ", which cannot be");
+}
+
 class Configuration {
  public:
   Configuration(ArvCamera& camera, const CameraSettings& settings)
@@ -73,6 +81,7 @@ class Configuration {
     }
     agreed_.wire = *wire;
     agreed_.format.format = convert::delivered_format(*wire);
+    agreed_.format.bayer = convert::bayer_pattern(*wire);
   }
 
   std::string its_formats() {
@@ -101,7 +110,7 @@ class Configuration {
     arv_camera_get_region(&camera_, &x, &y, &agreed_.format.width, &agreed_.format.height,
                           failure_.out());
     check("picture size");
-    const auto& [format, width, height, rate] = agreed_.format;
+    const auto& [format, width, height, rate, bayer] = agreed_.format;
     if (width < 1 || height < 1 || width > 65535 || height > 65535)
       refuse("says its pictures are " + std::to_string(width) + "x" + std::to_string(height) +
              " pixels, which cannot be");
@@ -142,7 +151,7 @@ class Configuration {
       check("frame rate");
     }
     const double rate_hz = arv_camera_get_frame_rate(&camera_, failure_.out());
-    if (!failure_.failed() && !settings_.trigger && std::isfinite(rate_hz))
+    if (!failure_.failed() && !settings_.trigger && std::isfinite(rate_hz) && rate_hz > 0)
       agreed_.format.rate_hz = rate_hz;
   }
 
@@ -167,6 +176,7 @@ class Configuration {
     agreed_.exposure.exposure_s = 1e-6 * us;
     if (agreed_.gain_in_db)
       agreed_.exposure.gain = std::pow(10.0, arv_camera_get_gain(&camera_, failure_.out()) / 20.0);
+    check_exposure(settings_.device, agreed_.exposure);
     if (settings_.exposure_s || settings_.gain)
       agreed_.exposure = set_exposure(camera_, settings_.device,
                                       {settings_.exposure_s.value_or(agreed_.exposure.exposure_s),
@@ -270,6 +280,7 @@ Exposure set_exposure(ArvCamera& camera, const std::string& device, const Exposu
   Exposure applied;
   applied.exposure_s = 1e-6 * arv_camera_get_exposure_time(&camera, failure.out());
   failure.check(device, "exposure");
+  check_exposure(device, applied);
   if (!in_db) return applied;
   arv_camera_get_gain_bounds(&camera, &least, &most, failure.out());
   failure.check(device, "gain");
@@ -278,7 +289,14 @@ Exposure set_exposure(ArvCamera& camera, const std::string& device, const Exposu
   failure.check(device, "gain");
   applied.gain = std::pow(10.0, arv_camera_get_gain(&camera, failure.out()) / 20.0);
   failure.check(device, "gain");
+  check_exposure(device, applied);
   return applied;
+}
+
+std::string counter_name(std::string aravis_name) {
+  if (aravis_name.starts_with("n_")) aravis_name.erase(0, 2);
+  std::ranges::replace(aravis_name, '_', ' ');
+  return "stream " + aravis_name;
 }
 
 // A burst of a whole frame must fit between two runs of the receiver; the kernel cuts the size to
@@ -298,6 +316,11 @@ std::vector<FoundCamera> find_aravis() {
         {"aravis", listed.serial.empty() ? listed.id : listed.serial,
          listed.vendor + " " + listed.model + ", " + listed.protocol + " at " + listed.address});
   return found;
+}
+
+// USB3 Vision cameras; a network camera's serial number is on no USB.
+std::optional<usb::Place> usb_place_of_aravis(const std::string& device) {
+  return usb::place_of_serial(device);
 }
 
 }  // namespace previz

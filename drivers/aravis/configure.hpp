@@ -36,6 +36,9 @@ Agreed configure(ArvCamera& camera, const CameraSettings& settings);
 // What the camera made of it: within its bounds, in its steps. Throws previz::Error.
 Exposure set_exposure(ArvCamera& camera, const std::string& device, const Exposure& wanted);
 
+// What Aravis calls n_missing_packets is told as "stream missing packets".
+std::string counter_name(std::string aravis_name);
+
 void configure_gige_stream(ArvStream& stream, std::size_t payload);
 
 }  // namespace previz::aravis

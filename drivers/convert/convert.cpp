@@ -123,8 +123,6 @@ std::vector<std::uint8_t> plain_samples(const WirePicture& picture) {
   std::vector<std::uint8_t> samples = deep ? deep_samples(picture) : shallow_samples(picture);
   if (picture.format.layout == Layout::bgr)
     deep ? swap_red_and_blue<std::uint16_t>(samples) : swap_red_and_blue<std::uint8_t>(samples);
-  if (is_bayer(picture.format.layout))
-    return demosaic(picture.format.layout, deep, picture.width, picture.height, samples);
   return samples;
 }
 
@@ -202,6 +200,10 @@ PixelFormat delivered_format(const WireFormat& format) {
   const bool deep = format.bits > 8;
   switch (format.layout) {
     case Layout::mono:
+    case Layout::bayer_rggb:
+    case Layout::bayer_grbg:
+    case Layout::bayer_gbrg:
+    case Layout::bayer_bggr:
       return deep ? PixelFormat::gray16 : PixelFormat::gray8;
     case Layout::yuyv:
     case Layout::uyvy:
@@ -213,6 +215,21 @@ PixelFormat delivered_format(const WireFormat& format) {
       return PixelFormat::rgb8;
     default:
       return deep ? PixelFormat::rgb16 : PixelFormat::rgb8;
+  }
+}
+
+BayerPattern bayer_pattern(const WireFormat& format) {
+  switch (format.layout) {
+    case Layout::bayer_rggb:
+      return BayerPattern::rggb;
+    case Layout::bayer_grbg:
+      return BayerPattern::grbg;
+    case Layout::bayer_gbrg:
+      return BayerPattern::gbrg;
+    case Layout::bayer_bggr:
+      return BayerPattern::bggr;
+    default:
+      return BayerPattern::none;
   }
 }
 
@@ -261,6 +278,7 @@ std::optional<std::string> convert(const WirePicture& picture, Frame& frame) {
       bytes = plain_samples(picture);
   }
   frame.format = delivered;
+  frame.bayer = bayer_pattern(picture.format);
   frame.width = picture.width;
   frame.height = picture.height;
   frame.bytes = std::move(bytes);

@@ -52,26 +52,28 @@ struct WirePicture {
   std::span<const std::uint8_t> bytes;  // may be more than the picture needs
 };
 
-// What a picture becomes: gray8 or gray16; rgb8 or rgb16; yuv422p8 for 4:2:2 that is coded as
-// yuv422p8 is (BT.709, limited range), whose samples so stay as they are. Samples of 9 to 15 bits
-// become 16 bits of full range, v -> round(65535 v / (2^bits - 1)), which keeps every code apart.
+// What a picture becomes: gray8 or gray16, also of Bayer, whose samples stay a mosaic; rgb8 or
+// rgb16; yuv422p8 for 4:2:2 that is coded as yuv422p8 is (BT.709, limited range), whose samples so
+// stay as they are. Samples of 9 to 15 bits become 16 bits of full range, v -> round(65535 v /
+// (2^bits - 1)), which keeps every code apart.
 PixelFormat delivered_format(const WireFormat& format);
+BayerPattern bayer_pattern(const WireFormat& format);
 
 // The least bytes of a row, and of a whole picture (mjpeg: 0, which says nothing).
 std::size_t row_bytes(const WireFormat& format, int width);
 std::size_t picture_bytes(const WireFormat& format, int width, int height, std::size_t stride = 0);
 
-// Fills in frame.format, width, height and bytes. Returns what is wrong with the picture, in words
-// ("is cut short: 100 of 3072 bytes"), and leaves the frame alone, if it is not whole.
+// Fills in frame.format, bayer, width, height and bytes. Returns what is wrong with the picture, in
+// words ("is cut short: 100 of 3072 bytes"), and leaves the frame alone, if it is not whole.
 //
-// Bayer is demosaiced edge-aware (OpenCV), up to the picture's edge; a sample stays as it is in its
-// own place. 4:2:0 and 4:2:2 chroma is sited as MPEG-2 has it and linear in between.
+// 4:2:0 and 4:2:2 chroma is sited as MPEG-2 has it and linear in between.
 std::optional<std::string> convert(const WirePicture& picture, Frame& frame);
 
 // Parts of the above in files of their own.
 std::optional<std::string> decode_jpeg(std::span<const std::uint8_t> jpeg, int width, int height,
                                        std::vector<std::uint8_t>& rgb);
-std::vector<std::uint8_t> demosaic(Layout layout, bool deep, int width, int height,
-                                   std::span<std::uint8_t> mosaic);
+// Interleaved RGB of as many bits. A mosaic is 2x2 pixels at least.
+std::vector<std::uint8_t> demosaic(BayerPattern pattern, bool deep, int width, int height,
+                                   std::span<const std::uint8_t> mosaic);
 
 }  // namespace previz::convert

@@ -8,15 +8,15 @@ namespace {
 
 // OpenCV names a mosaic by the two samples in its second row, second and third column; the
 // constants with four letters, as here, name the first two rows.
-int edge_aware_code(Layout layout) {
-  switch (layout) {
-    case Layout::bayer_rggb:
+int edge_aware_code(BayerPattern pattern) {
+  switch (pattern) {
+    case BayerPattern::rggb:
       return cv::COLOR_BayerRGGB2RGB_EA;
-    case Layout::bayer_grbg:
+    case BayerPattern::grbg:
       return cv::COLOR_BayerGRBG2RGB_EA;
-    case Layout::bayer_gbrg:
+    case BayerPattern::gbrg:
       return cv::COLOR_BayerGBRG2RGB_EA;
-    case Layout::bayer_bggr:
+    case BayerPattern::bggr:
       return cv::COLOR_BayerBGGR2RGB_EA;
     default:
       throw std::invalid_argument("no Bayer mosaic");
@@ -27,13 +27,15 @@ int edge_aware_code(Layout layout) {
 
 // OpenCV copies the outermost pixels from those inside. The mosaic is therefore mirrored about its
 // edge pixels by two, which keeps its pattern, and what OpenCV makes up is cut off again.
-std::vector<std::uint8_t> demosaic(Layout layout, bool deep, int width, int height,
-                                   std::span<std::uint8_t> mosaic) {
+std::vector<std::uint8_t> demosaic(BayerPattern pattern, bool deep, int width, int height,
+                                   std::span<const std::uint8_t> mosaic) {
   constexpr int margin = 2;
-  const cv::Mat samples(height, width, deep ? CV_16UC1 : CV_8UC1, mosaic.data());
+  // Not written to; OpenCV has no read-only pictures.
+  const cv::Mat samples(height, width, deep ? CV_16UC1 : CV_8UC1,
+                        const_cast<std::uint8_t*>(mosaic.data()));
   cv::Mat padded, colour;
   cv::copyMakeBorder(samples, padded, margin, margin, margin, margin, cv::BORDER_REFLECT_101);
-  cv::demosaicing(padded, colour, edge_aware_code(layout));
+  cv::demosaicing(padded, colour, edge_aware_code(pattern));
   std::vector<std::uint8_t> rgb(static_cast<std::size_t>(width) * height * (deep ? 6 : 3));
   cv::Mat out(height, width, deep ? CV_16UC3 : CV_8UC3, rgb.data());
   colour(cv::Rect(margin, margin, width, height)).copyTo(out);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <cmath>
 #include <cstdint>
 
 namespace previz::convert {
@@ -30,7 +29,8 @@ class YuvToRgb {
 
   static std::uint8_t to_code(float value) {
     if (value <= 0) return 0;
-    return value >= 255 ? 255 : static_cast<std::uint8_t>(std::lround(value));
+    const float half_up = value + 0.5f;  // three a pixel: std::lround would be a call each
+    return value >= 255 ? 255 : static_cast<std::uint8_t>(half_up);
   }
 
   std::array<float, 256> luma_{};  // R' = G' = B' of grey, in codes 0..255

@@ -63,12 +63,12 @@ gpiod_line* find_line(gpiod_chip& chip, const std::string& line) {
   return found;
 }
 
-int request_flags(const ButtonSettings& settings) {
-  using Bias = ButtonSettings::Bias;
-  int flags = settings.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0;
-  if (settings.bias == Bias::none) flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_DISABLE;
-  if (settings.bias == Bias::pull_up) flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP;
-  if (settings.bias == Bias::pull_down) flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_DOWN;
+int request_flags(const ContactWiring& wiring) {
+  using Bias = ContactWiring::Bias;
+  int flags = wiring.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0;
+  if (wiring.bias == Bias::none) flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_DISABLE;
+  if (wiring.bias == Bias::pull_up) flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP;
+  if (wiring.bias == Bias::pull_down) flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_DOWN;
   return flags;
 }
 
@@ -77,20 +77,22 @@ class GpioButtons final : public Buttons {
   GpioButtons(std::string device, const std::vector<std::string>& names,
               const ButtonSettings& settings)
       : device_(std::move(device)),
-        settings_(settings),
         epoll_(epoll_create1(EPOLL_CLOEXEC)),
         timer_(timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK)) {
     if (!epoll_ || !timer_)
       throw Error(device_ + ": cannot be waited for: " + std::strerror(errno));
-    for (const std::string& name : names)
-      lines_.push_back({name, parts_of(name)[2], nullptr,
-                        Debouncer(static_cast<std::int64_t>(1e9 * settings.debounce_s))});
+    for (const std::string& name : names) {
+      const ContactWiring wiring = settings.wiring_of(name);
+      lines_.push_back({name, parts_of(name)[2], request_flags(wiring), nullptr,
+                        Debouncer(static_cast<std::int64_t>(1e9 * wiring.debounce_s))});
+    }
     watch(timer_.get());
     arm();
   }
 
   std::string name() const override { return device_; }
   int fd() const override { return epoll_.get(); }
+  DeviceCounters counters() const override { return counters_; }
 
   std::optional<ButtonsEvent> next() override {
     if (!chip_ && monotonic_ns() >= retry_ns_) open();
@@ -109,7 +111,8 @@ class GpioButtons final : public Buttons {
   struct Line {
     std::string name;   // of the button
     std::string label;  // name or offset of the line
-    gpiod_line* line;   // the chip's; null while it is not there
+    int request_flags;
+    gpiod_line* line;  // the chip's; null while it is not there
     Debouncer debouncer;
   };
 
@@ -125,9 +128,11 @@ class GpioButtons final : public Buttons {
       for (Line& line : lines_) request(*chip, line);
       chip_ = std::move(chip);
       refusal_.clear();
+      ++counters_["opened"];
     } catch (const Error& error) {
       for (Line& line : lines_) line.line = nullptr;
       retry_ns_ = monotonic_ns() + second_ns;
+      ++counters_["not opened"];
       if (refusal_ == error.what()) return;
       refusal_ = error.what();
       events_.emplace_back(DeviceTrouble{device_, refusal_ + "; tried again until it is there"});
@@ -136,8 +141,7 @@ class GpioButtons final : public Buttons {
 
   void request(gpiod_chip& chip, Line& line) {
     line.line = find_line(chip, line.label);
-    if (gpiod_line_request_both_edges_events_flags(line.line, consumer, request_flags(settings_)) !=
-        0)
+    if (gpiod_line_request_both_edges_events_flags(line.line, consumer, line.request_flags) != 0)
       throw Error("line \"" + line.label + "\" cannot be had: " + std::strerror(errno));
     watch(gpiod_line_event_get_fd(line.line));
     // Held while the rig starts: pressed from now on.
@@ -164,6 +168,7 @@ class GpioButtons final : public Buttons {
     }
     chip_.reset();
     retry_ns_ = monotonic_ns() + second_ns;
+    ++counters_["lost"];
     events_.emplace_back(DeviceTrouble{device_, "is lost: " + why + "; tried again"});
   }
 
@@ -173,14 +178,14 @@ class GpioButtons final : public Buttons {
   }
 
   // The timer wakes for what the lines themselves do not: events that wait, a contact that is to
-  // settle, a chip to look for.
+  // settle, a chip to look for, one that has gone (the kernel then fails reads, but wakes nobody).
   void arm() {
     std::optional<std::int64_t> due_ns;
     const auto at = [&](std::int64_t time_ns) {
       due_ns = std::min(due_ns.value_or(time_ns), time_ns);
     };
     if (!events_.empty()) at(1);
-    if (!chip_) at(std::max<std::int64_t>(1, retry_ns_));
+    at(chip_ ? monotonic_ns() + second_ns : std::max<std::int64_t>(1, retry_ns_));
     for (const Line& line : lines_)
       if (line.debouncer.settles_ns()) at(*line.debouncer.settles_ns());
     itimerspec spec{};
@@ -189,13 +194,13 @@ class GpioButtons final : public Buttons {
   }
 
   const std::string device_;
-  const ButtonSettings settings_;
   OwnedDescriptor epoll_, timer_;
   Chip chip_;
   std::int64_t retry_ns_ = 0;
   std::string refusal_;  // as last told
   std::list<Line> lines_;
   std::deque<ButtonsEvent> events_;
+  DeviceCounters counters_{{"opened", 0}, {"not opened", 0}, {"lost", 0}};
 };
 
 std::string or_empty(const char* text) {

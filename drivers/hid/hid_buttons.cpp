@@ -1,8 +1,8 @@
 #include "drivers/hid/hid_buttons.hpp"
 
-#include <hidapi.h>
 #include <sys/eventfd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <charconv>
@@ -17,6 +17,7 @@
 
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
+#include "drivers/hid/backend.hpp"
 #include "drivers/host_clock.hpp"
 
 namespace previz {
@@ -24,11 +25,7 @@ namespace {
 
 constexpr int poll_ms = 100;  // how late the end may be noticed
 constexpr std::chrono::seconds retry_interval{1};
-
-struct Close {
-  void operator()(hid_device* device) const { hid_close(device); }
-};
-using Device = std::unique_ptr<hid_device, Close>;
+constexpr const char* cut_short = "reports too short for a button";
 
 struct DeviceName {
   unsigned short vendor = 0, product = 0;
@@ -70,10 +67,13 @@ std::string narrow(const wchar_t* text) {
   return narrow;
 }
 
-Device open_device(const DeviceName& name) {
-  hid_init();
+hid::Device open_device(const DeviceName& name) {
   const std::wstring serial(name.serial.begin(), name.serial.end());
-  return Device(hid_open(name.vendor, name.product, serial.empty() ? nullptr : serial.c_str()));
+  for (const hid::Backend& backend : hid::backends())
+    if (hid_device* device =
+            backend.open(name.vendor, name.product, serial.empty() ? nullptr : serial.c_str()))
+      return {backend, device};
+  return {};
 }
 
 // A thread reads, since hidapi has nothing to wait on.
@@ -84,12 +84,18 @@ class HidButtons final : public Buttons {
         device_name_(parse_device(device_)),
         reader_(names),
         signal_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    hid::backends();  // throws here, not in the thread
     if (!signal_) throw Error(device_ + ": cannot be waited for: " + std::strerror(errno));
     thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   }
 
   std::string name() const override { return device_; }
   int fd() const override { return signal_.get(); }
+
+  DeviceCounters counters() const override {
+    const std::lock_guard lock(mutex_);
+    return counters_;
+  }
 
   std::optional<ButtonsEvent> next() override {
     const std::lock_guard lock(mutex_);
@@ -107,11 +113,14 @@ class HidButtons final : public Buttons {
   void run(const std::stop_token& stop) {
     bool told = false;
     while (!stop.stop_requested()) {
-      const Device device = open_device(device_name_);
+      const hid::Device device = open_device(device_name_);
+      count(device ? "opened" : "not opened");
       if (device) {
+        count(std::string("opened through ") + device.backend());
         told = false;
-        read(*device, stop);
+        read(device, stop);
         if (stop.stop_requested()) return;
+        count("lost");
         for (ButtonEvent& event : reader_.release_all(monotonic_ns())) tell(std::move(event));
       }
       if (!std::exchange(told, true))
@@ -123,20 +132,28 @@ class HidButtons final : public Buttons {
     }
   }
 
-  void read(hid_device& device, const std::stop_token& stop) {
+  void read(const hid::Device& device, const std::stop_token& stop) {
     std::array<unsigned char, 4096> report{};
     while (!stop.stop_requested()) {
-      const int size = hid_read_timeout(&device, report.data(), report.size(), poll_ms);
+      const int size = device.read(report, poll_ms);
       if (size < 0) return;
       if (size == 0) continue;
       const std::uint64_t short_before = reader_.reports_cut_short();
+      count("reports");
       for (ButtonEvent& event :
            reader_.read({report.data(), static_cast<std::size_t>(size)}, monotonic_ns()))
         tell(std::move(event));
-      if (short_before == 0 && reader_.reports_cut_short() > 0)
+      if (reader_.reports_cut_short() == short_before) continue;
+      count(cut_short);
+      if (short_before == 0)
         tell(DeviceTrouble{device_, "sends reports of " + std::to_string(size) +
                                         " bytes, too short for a button of the set"});
     }
+  }
+
+  void count(const std::string& what) {
+    const std::lock_guard lock(mutex_);
+    ++counters_[what];
   }
 
   void tell(ButtonsEvent event) {
@@ -149,9 +166,11 @@ class HidButtons final : public Buttons {
   const DeviceName device_name_;
   hid::ReportReader reader_;  // the thread's
   OwnedDescriptor signal_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable_any wake_;
   std::deque<ButtonsEvent> events_;
+  DeviceCounters counters_{
+      {"opened", 0}, {"not opened", 0}, {"lost", 0}, {"reports", 0}, {cut_short, 0}};
   std::jthread thread_;
 };
 
@@ -167,15 +186,17 @@ ReportReader::ReportReader(const std::vector<std::string>& names) {
 std::vector<ButtonEvent> ReportReader::read(std::span<const std::uint8_t> report,
                                             std::int64_t time_ns) {
   std::vector<ButtonEvent> events;
-  bool cut_short = false;
+  if (std::ranges::any_of(
+          buttons_, [&](const Button& button) { return button.selector.too_short(report); })) {
+    ++reports_cut_short_;
+    return events;
+  }
   for (Button& button : buttons_) {
-    cut_short = cut_short || button.selector.too_short(report);
     if (!button.selector.speaks(report)) continue;
     const bool pressed = button.selector.pressed(report);
     if (std::exchange(button.pressed, pressed) != pressed)
       events.push_back({button.name, pressed, time_ns});
   }
-  reports_cut_short_ += cut_short ? 1 : 0;
   return events;
 }
 
@@ -194,7 +215,7 @@ void learn(const std::string& device, const std::function<bool()>& stop,
   // By report number and length; the first of a kind is compared with nothing held.
   std::map<std::pair<unsigned char, int>, std::vector<std::uint8_t>> before;
   while (!stop()) {
-    const int size = hid_read_timeout(opened.get(), report.data(), report.size(), poll_ms);
+    const int size = opened.read(report, poll_ms);
     if (size < 0) throw Error(device + ": was unplugged");
     if (size == 0) continue;
     std::vector<std::uint8_t>& last = before[{size > 1 ? report[0] : 0, size}];
@@ -222,16 +243,25 @@ std::unique_ptr<Buttons> open_hid(const std::string& device, const std::vector<s
 
 std::vector<FoundButton> find_hid() {
   std::vector<FoundButton> found;
-  hid_init();
-  hid_device_info* all = hid_enumerate(0, 0);
-  for (const hid_device_info* info = all; info; info = info->next) {
-    char ids[16];
-    std::snprintf(ids, sizeof ids, "%04x:%04x", info->vendor_id, info->product_id);
-    const std::string serial = narrow(info->serial_number);
-    found.push_back({std::string("hid:") + ids + (serial.empty() ? "" : ":" + serial),
+  for (const hid::Backend& backend : hid::backends()) {
+    std::vector<FoundButton> its;
+    hid_device_info* all = backend.enumerate(0, 0);
+    for (const hid_device_info* info = all; info; info = info->next) {
+      char ids[16];
+      std::snprintf(ids, sizeof ids, "%04x:%04x", info->vendor_id, info->product_id);
+      const std::string device = std::string("hid:") + ids;
+      // libusb sees again what hidraw has found.
+      if (std::ranges::any_of(found, [&](const FoundButton& other) {
+            return other.name == device || other.name.starts_with(device + ':');
+          }))
+        continue;
+      const std::string serial = narrow(info->serial_number);
+      its.push_back({device + (serial.empty() ? "" : ":" + serial),
                      narrow(info->manufacturer_string) + " " + narrow(info->product_string)});
+    }
+    backend.free_enumeration(all);
+    found.insert(found.end(), its.begin(), its.end());
   }
-  hid_free_enumeration(all);
   return found;
 }
 

@@ -14,7 +14,8 @@ namespace previz {
 
 // `device` is "hid:VENDOR:PRODUCT" or "hid:VENDOR:PRODUCT:SERIAL". A device that is not there, or
 // is unplugged, is trouble told once, and looked for every second; its buttons are then released.
-// Reports that are too short for a button are counted and say nothing of it.
+// It is read through hidraw, or through libusb where hidraw may not be opened.
+// A report that is too short for one of its buttons is counted and left out.
 std::unique_ptr<Buttons> open_hid(const std::string& device, const std::vector<std::string>& names,
                                   const ButtonSettings& settings);
 

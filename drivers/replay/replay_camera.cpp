@@ -46,7 +46,7 @@ class ReplayCamera final : public Camera {
       options_.position = std::make_shared<ReplayPosition>(ReplayPosition{options_.first, 0});
     at_ = options_.position;
     at_->index = std::clamp(at_->index, options_.first, options_.last + 1);
-    format_ = {stream_->format(), stream_->width(), stream_->height(), rate_hz()};
+    format_ = {stream_->format(), stream_->width(), stream_->height(), rate_hz(), stream_->bayer()};
   }
 
   std::string name() const override { return name_; }

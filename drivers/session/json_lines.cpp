@@ -96,7 +96,7 @@ void get(const Json& json, glm::dmat4& value) {
     for (int column = 0; column < 4; ++column) value[column][row] = rows[4 * row + column];
 }
 
-Json json_of(const glm::dmat4& matrix, const char* key) {
+Json json_of(const glm::dmat4& matrix, const char* key = "object") {
   std::array<double, 16> rows{};
   for (int row = 0; row < 4; ++row)
     for (int column = 0; column < 4; ++column)
@@ -116,20 +116,42 @@ Json json_of(const LightState& light) {
               {"tint", json_of(light.tint, "light tint")}};
 }
 
-SceneState parse_scene(const Json& json) {
-  SceneState scene;
-  if (json.contains("objects"))
-    for (const auto& [name, rows] : json.at("objects").items()) get(rows, scene.objects[name]);
-  if (json.contains("lights"))
-    for (const auto& [name, state] : json.at("lights").items()) {
-      LightState& light = scene.lights[name];
-      get(state.at("position"), light.position);
-      get(state.at("direction"), light.direction);
-      get(state.at("up"), light.up);
-      get(state.at("gain_mixed"), light.gain_mixed);
-      get(state.at("tint"), light.tint);
-    }
-  return scene;
+Json json_of(const CarrierState& carrier) {
+  for (const double value : carrier.covariance) finite(value, "carrier covariance");
+  return Json{{"world_from_carrier", json_of(carrier.world_from_carrier, "carrier")},
+              {"covariance", carrier.covariance},
+              {"tags", carrier.tags}};
+}
+
+void get(const Json& json, LightState& light) {
+  get(json.at("position"), light.position);
+  get(json.at("direction"), light.direction);
+  get(json.at("up"), light.up);
+  get(json.at("gain_mixed"), light.gain_mixed);
+  get(json.at("tint"), light.tint);
+}
+
+void get(const Json& json, CarrierState& carrier) {
+  get(json.at("world_from_carrier"), carrier.world_from_carrier);
+  get(json.at("covariance"), carrier.covariance);
+  get(json.at("tags"), carrier.tags);
+}
+
+template <typename Value>
+void get(const Json& json, std::optional<Value>& value) {
+  if (!json.is_null()) get(json, value.emplace());
+}
+
+// The members of an object, read into the values of a map.
+template <typename Value>
+void get_members(const Json& json, const char* key, std::map<std::string, Value>& values) {
+  if (!json.contains(key)) return;
+  for (const auto& [name, value] : json.at(key).items()) get(value, values[name]);
+}
+
+template <typename Value>
+Json json_of(const std::optional<Value>& value) {
+  return value ? json_of(*value) : Json();
 }
 
 FrameLine parse_frame_line(const Json& json) {
@@ -152,7 +174,10 @@ TrackRecord parse_track_line(const Json& json) {
   get(json.at("timestamp_ns"), record.timestamp_ns);
   get(json.at("tracked"), record.tracked);
   get(json.at("tags"), record.tags);
-  record.scene = parse_scene(json);
+  get_members(json, "objects", record.scene.objects);
+  get_members(json, "lights", record.scene.lights);
+  get_members(json, "carriers", record.carriers);
+  if (json.contains("animation_s")) get(json.at("animation_s"), record.scene.animation_s.emplace());
   if (json.contains("captured_light"))
     record.captured_light = captured_light_of(json.at("captured_light"));
   if (!record.tracked) return record;
@@ -228,8 +253,11 @@ std::string to_line(const TrackRecord& record) {
     json["covariance"] = record.covariance;
   }
   for (const auto& [name, world_from_file] : record.scene.objects)
-    json["objects"][name] = json_of(world_from_file, "object");
+    json["objects"][name] = json_of(world_from_file);
   for (const auto& [name, light] : record.scene.lights) json["lights"][name] = json_of(light);
+  for (const auto& [name, carrier] : record.carriers) json["carriers"][name] = json_of(carrier);
+  if (record.scene.animation_s)
+    json["animation_s"] = finite(*record.scene.animation_s, "animation_s");
   if (record.captured_light) json["captured_light"] = to_json(*record.captured_light);
   return json.dump();
 }

@@ -56,11 +56,24 @@ struct LightState {
   friend bool operator==(const LightState&, const LightState&) = default;
 };
 struct SceneState {
-  std::map<std::string, glm::dmat4> objects;  // world_from_file
-  std::map<std::string, LightState> lights;
+  // world_from_file; nothing: its carrier was not found yet, and it is nowhere.
+  std::map<std::string, std::optional<glm::dmat4>> objects;
+  std::map<std::string, std::optional<LightState>> lights;
+  std::optional<double> animation_s;  // played; absent: nothing is animated
 
   friend bool operator==(const SceneState&, const SceneState&) = default;
 };
+
+// Where something that is moved by hand was, by its tags.
+struct CarrierState {
+  glm::dmat4 world_from_carrier{1.0};  // the last that is known
+  // Row-major 6x6: rotation (rad) then translation (m), in the carrier's frame.
+  std::array<double, 36> covariance{};
+  std::vector<int> tags;  // it was found by in this frame; none: it was not
+
+  friend bool operator==(const CarrierState&, const CarrierState&) = default;
+};
+using Carriers = std::map<std::string, CarrierState>;  // those that were found at least once
 
 // The light around the set, as it lit the frame: sources, and the rest without its shapes.
 struct CapturedSource {
@@ -87,8 +100,9 @@ struct TrackRecord {
   glm::dmat4 world_from_camera{1.0};  // OpenCV camera axes, metres
   // Row-major 6x6: rotation (rad) then translation (m), in the camera frame.
   std::array<double, 36> covariance{};
-  std::vector<int> tags;                        // ids used
-  SceneState scene;                             // when the frame was shown; empty: as in the set
+  std::vector<int> tags;  // ids used
+  SceneState scene;       // when the frame was shown; empty: as in the set
+  Carriers carriers;
   std::optional<CapturedLight> captured_light;  // absent: none was known, or an older session
 };
 
@@ -108,6 +122,7 @@ class StreamReader {
   virtual ~StreamReader() = default;
   virtual const std::vector<FrameRecord>& records() const = 0;  // whole frames only
   virtual PixelFormat format() const = 0;
+  virtual BayerPattern bayer() const = 0;
   virtual int width() const = 0;   // pixels
   virtual int height() const = 0;  // pixels
   // Frame `index`; seeks where it must. Throws previz::Error naming file and frame if unreadable.
@@ -126,9 +141,9 @@ struct Session {
 // Throws previz::Error naming the file (and line) if session.toml cannot be understood. Checks the
 // assets' content hashes, and with them reads the assets once.
 Session open_session(const std::filesystem::path& directory);
-// `source` is "observer" or "light"; null where the session has no such stream. What is missing of
-// the stream is appended to session.missing. Reads the video once from end to end, so that a
-// damaged picture is known here (packet checksums) and never shown.
+// `source` is "observer", "light" or "composite" (what was shown); null where the session has no
+// such stream. What is missing of the stream is appended to session.missing. Reads the video once
+// from end to end, so that a damaged picture is known here (packet checksums) and never shown.
 std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& source);
 
 // Writes a session directory; every call leaves a readable session behind. FFV1 in Matroska,
@@ -145,8 +160,8 @@ class SessionWriter {
   SessionWriter(const SessionWriter&) = delete;
   SessionWriter& operator=(const SessionWriter&) = delete;
 
-  // Goes to the stream that frame.source names. Frames of a stream have one format and size, at
-  // least 8x8 pixels.
+  // Goes to the stream that frame.source names. Frames of a stream have one format, Bayer pattern
+  // and size, at least 8x8 pixels.
   void write(const Frame& frame);
   void write(const TrackRecord& record);
   void write(const ButtonEvent& event);  // to events.jsonl

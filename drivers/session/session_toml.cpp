@@ -155,6 +155,8 @@ std::string light_toml(const LightCameraCalibration& calibration) {
 std::string stream_toml(const std::string& source, const StreamFormat& stream) {
   std::string text = "\n[" + source + ".video]\nformat = " + quote(to_string(stream.format)) + "\n";
   text += line("width", stream.width) + line("height", stream.height);
+  if (stream.bayer != BayerPattern::none)
+    text += "bayer = " + quote(to_string(stream.bayer)) + "\n";
   if (stream.frames) text += "frames = " + std::to_string(*stream.frames) + "\n";
   return text;
 }
@@ -307,6 +309,15 @@ StreamFormat parse_stream(const Place& place) {
   } catch (const std::invalid_argument& error) {
     place.fail("format", std::string("is not understood: ") + error.what());
   }
+  if (place.table.contains("bayer")) {
+    try {
+      stream.bayer = bayer_pattern_from_string(place.text("bayer"));
+    } catch (const std::invalid_argument& error) {
+      place.fail("bayer", std::string("is not understood: ") + error.what());
+    }
+    if (stream.format != PixelFormat::gray8 && stream.format != PixelFormat::gray16)
+      place.fail("bayer", std::string("does not go with ") + to_string(stream.format));
+  }
   stream.width = place.pixels("width");
   stream.height = place.pixels("height");
   if (place.table.contains("frames")) {
@@ -386,11 +397,11 @@ SessionFile parse_session_toml(const std::string& text, const std::filesystem::p
   file.info.name = top.text("name");
   file.info.clock = top.text("clock");
   file.closed = top.get<bool>("closed", "true or false");
-  for (const char* source : {"observer", "light"}) {
+  for (const char* source : {"observer", "light", "composite"}) {
     if (!top.find(source)) continue;
     const Place place = top.inner(source);
     if (place.find("video")) file.streams[source] = parse_stream(place.inner("video"));
-    if (!place.find("calibration")) continue;
+    if (source == std::string_view("composite") || !place.find("calibration")) continue;
     if (source == std::string_view("observer"))
       file.info.observer = parse_observer(place.inner("calibration"));
     else

@@ -16,6 +16,7 @@ struct StreamFormat {
   PixelFormat format = PixelFormat::rgb8;
   int width = 0, height = 0;            // pixels
   std::optional<std::uint64_t> frames;  // known once the session was closed
+  BayerPattern bayer = BayerPattern::none;
 };
 
 struct SessionFile {

@@ -45,8 +45,8 @@ void check(const Frame& frame) {
     throw Error("frame " + std::to_string(frame.sequence) + " of \"" + frame.source + "\" " + what +
                 " and cannot be recorded");
   };
-  if (frame.source != "observer" && frame.source != "light")
-    fail("comes from neither \"observer\" nor \"light\"");
+  if (frame.source != "observer" && frame.source != "light" && frame.source != "composite")
+    fail("comes from none of \"observer\", \"light\" and \"composite\"");
   // libav's FFV1 decoder silently leaves out slices of a single row or column; none is at 8.
   if (frame.width < 8 || frame.height < 8 || frame.width > 65535 || frame.height > 65535)
     fail("has a width or height outside 8 to 65535 pixels");
@@ -59,8 +59,10 @@ void check(const Frame& frame) {
 }
 
 std::string text(const StreamFormat& format) {
-  return std::string(to_string(format.format)) + " " + std::to_string(format.width) + "x" +
-         std::to_string(format.height);
+  const bool mosaic = format.bayer != BayerPattern::none;
+  return std::string(to_string(format.format)) + " " +
+         (mosaic ? std::string(to_string(format.bayer)) + " " : "") + std::to_string(format.width) +
+         "x" + std::to_string(format.height);
 }
 
 void make_empty_directory(const std::filesystem::path& directory) {
@@ -90,7 +92,7 @@ struct SessionWriter::Impl {
 
   // session.toml announces a stream before its files are there, so that their loss is noticed.
   StreamWriter& open(const Frame& frame) {
-    const StreamFormat format{frame.format, frame.width, frame.height, {}};
+    const StreamFormat format{frame.format, frame.width, frame.height, {}, frame.bayer};
     file.streams[frame.source] = format;
     write_toml();
     return streams.try_emplace(frame.source, directory, frame.source, format).first->second;
@@ -150,10 +152,11 @@ void SessionWriter::write(const Frame& frame) {
   const auto found = impl_->streams.find(frame.source);
   StreamWriter& stream = found == impl_->streams.end() ? impl_->open(frame) : found->second;
   const StreamFormat& format = impl_->file.streams.at(frame.source);
-  if (frame.format != format.format || frame.width != format.width || frame.height != format.height)
+  if (frame.format != format.format || frame.bayer != format.bayer || frame.width != format.width ||
+      frame.height != format.height)
     throw Error((impl_->directory / (frame.source + ".mkv")).string() + ": frame " +
                 std::to_string(frame.sequence) + " is " +
-                text(StreamFormat{frame.format, frame.width, frame.height, {}}) +
+                text(StreamFormat{frame.format, frame.width, frame.height, {}, frame.bayer}) +
                 "; the stream is " + text(format) + " from its first frame on");
   stream.write(frame);
   impl_->sync_when_due();

@@ -27,6 +27,7 @@ class RecordedStream final : public StreamReader {
 
   const std::vector<FrameRecord>& records() const override { return records_; }
   PixelFormat format() const override { return format_.format; }
+  BayerPattern bayer() const override { return format_.bayer; }
   int width() const override { return format_.width; }
   int height() const override { return format_.height; }
 
@@ -44,6 +45,7 @@ class RecordedStream final : public StreamReader {
     frame->gain = record.gain;
     frame->exposure = record.exposure;
     frame->format = format_.format;
+    frame->bayer = format_.bayer;
     frame->width = format_.width;
     frame->height = format_.height;
     try {

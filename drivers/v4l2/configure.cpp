@@ -141,7 +141,7 @@ class Configuration {
     agreed_.wire = *wire;
     agreed_.stride = wire->layout == convert::Layout::mjpeg ? 0 : picture.bytesperline;
     agreed_.format = {convert::delivered_format(*wire), static_cast<int>(picture.width),
-                      static_cast<int>(picture.height), 0};
+                      static_cast<int>(picture.height), 0, convert::bayer_pattern(*wire)};
   }
 
   static std::string size_text(std::uint32_t width, std::uint32_t height) {

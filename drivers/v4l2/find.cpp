@@ -2,6 +2,8 @@
 
 #include <libudev.h>
 
+#include <charconv>
+#include <cstring>
 #include <memory>
 #include <sstream>
 
@@ -33,6 +35,20 @@ std::string link_below(const std::string& directory, const std::string& links) {
   return {};
 }
 
+int number(udev_device& device, const char* attribute) {
+  const char* text = udev_device_get_sysattr_value(&device, attribute);
+  int value = 0;
+  if (text) std::from_chars(text, text + std::strlen(text), value);
+  return value;
+}
+
+// Of the USB device that a node belongs to; the parent is the child's.
+std::optional<usb::Place> usb_place(udev_device& device) {
+  udev_device* parent = udev_device_get_parent_with_subsystem_devtype(&device, "usb", "usb_device");
+  if (!parent) return std::nullopt;
+  return usb::Place{number(*parent, "busnum"), number(*parent, "devnum")};
+}
+
 FoundNode describe(udev_device& device) {
   const std::string links = property(device, "DEVLINKS");
   FoundNode node;
@@ -41,6 +57,7 @@ FoundNode describe(udev_device& device) {
   node.by_id = link_below(by_id_directory, links);
   node.by_path = link_below(by_path_directory, links);
   node.serial = property(device, "ID_SERIAL_SHORT");
+  node.usb = usb_place(device);
   node.product = property(device, "ID_V4L_PRODUCT");
   return node;
 }

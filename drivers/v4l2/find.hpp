@@ -1,8 +1,11 @@
 // Which video node a stable name means. Not for use outside the driver.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "drivers/usb/usb.hpp"
 
 namespace previz::v4l2 {
 
@@ -13,6 +16,7 @@ struct FoundNode {
   std::string by_path;  // name below /dev/v4l/by-path
   std::string serial;
   std::string product;
+  std::optional<usb::Place> usb = {};  // of cameras on the USB
 };
 
 // Asks udev. None where there is no udev.

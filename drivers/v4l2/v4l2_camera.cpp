@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "drivers/error.hpp"
+#include "drivers/frame_order.hpp"
 #include "drivers/host_clock.hpp"
 #include "drivers/v4l2/configure.hpp"
 #include "drivers/v4l2/find.hpp"
@@ -17,7 +18,7 @@ namespace {
 
 constexpr std::uint32_t buffers_wanted = 8;
 // UVC cameras take an exposure over within a few frames of the control's transfer.
-constexpr int settle_frames = 4;
+constexpr int v4l2_settle_frames = 4;
 // A device that answers every call with an I/O error is gone, whatever it calls itself.
 constexpr int errors_until_lost = 10;
 
@@ -39,7 +40,8 @@ class V4l2Camera final : public Camera {
       : settings_(settings),
         node_(std::move(node)),
         agreed_(v4l2::configure(*node_, settings)),
-        ledger_(agreed_.exposure, settle_frames) {}
+        ledger_(agreed_.exposure, v4l2_settle_frames),
+        order_(counters_) {}
   ~V4l2Camera() override { stop(); }
   V4l2Camera(const V4l2Camera&) = delete;
   V4l2Camera& operator=(const V4l2Camera&) = delete;
@@ -64,7 +66,7 @@ class V4l2Camera final : public Camera {
     }
     streaming_ = true;
     errors_ = 0;
-    device_sequence_.reset();
+    order_.restart();
   }
 
   // The kernel takes all buffers back, so that none of them can come again.
@@ -158,7 +160,7 @@ class V4l2Camera final : public Camera {
   }
 
   FramePtr read(const v4l2_buffer& buffer, std::int64_t arrival_ns) {
-    const std::uint64_t sequence = sequence_of(buffer.sequence);
+    const std::uint64_t sequence = order_.sequence_of(buffer.sequence);
     if (buffer.flags & V4L2_BUF_FLAG_ERROR) return left_out("frames the device says are damaged");
     const std::span<const std::uint8_t> memory = memory_[buffer.index];
     if (buffer.bytesused > memory.size()) return left_out("frames longer than their buffer");
@@ -170,13 +172,10 @@ class V4l2Camera final : public Camera {
     frame->source = settings_.source;
     frame->sequence = sequence;
     frame->arrival_ns = arrival_ns;
-    frame->timestamp_ns = time_of(buffer, arrival_ns);
+    frame->timestamp_ns = order_.time_of(stamp_of(buffer), arrival_ns);
     const std::optional<Exposure> exposure = ledger_.of_frame(frame->timestamp_ns);
     if (!exposure) return left_out("frames between two exposures");
-    frame->exposure_s = exposure->exposure_s;
-    frame->gain = exposure->gain;
-    frame->exposure =
-        absolute_exposure(exposure->exposure_s, exposure->gain, settings_.responsivity);
+    tell_exposure(*frame, *exposure, settings_.responsivity);
     return frame;
   }
 
@@ -185,23 +184,10 @@ class V4l2Camera final : public Camera {
     return nullptr;
   }
 
-  // The kernel counts from 0 after each start, in 32 bits.
-  std::uint64_t sequence_of(std::uint32_t device_sequence) {
-    const std::uint32_t step =
-        device_sequence_ ? device_sequence - *device_sequence_ : std::uint32_t{1};
-    device_sequence_ = device_sequence;
-    // A step backwards, or none, is a driver that does not count.
-    return sequence_ += step == 0 || step > 0x7fffffff ? 1 : step;
-  }
-
-  // Strictly increasing, at most the arrival; drivers without monotonic stamps get the arrival.
-  std::int64_t time_of(const v4l2_buffer& buffer, std::int64_t arrival_ns) {
-    std::int64_t time_ns = arrival_ns;
-    if ((buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC)
-      time_ns = std::min(arrival_ns, to_ns(buffer.timestamp));
-    else
-      ++counters_["frames without a time stamp of the kernel"];
-    return last_time_ns_ = std::max(time_ns, last_time_ns_ + 1);
+  static std::optional<std::int64_t> stamp_of(const v4l2_buffer& buffer) {
+    if ((buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) != V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC)
+      return std::nullopt;
+    return to_ns(buffer.timestamp);
   }
 
   const CameraSettings settings_;
@@ -212,10 +198,8 @@ class V4l2Camera final : public Camera {
   bool streaming_ = false;
   std::string lost_;  // why nothing more comes; empty while all is well
   int errors_ = 0;    // in a row
-  std::optional<std::uint32_t> device_sequence_;
-  std::uint64_t sequence_ = 0;
-  std::int64_t last_time_ns_ = 0;
   DeviceCounters counters_;
+  FrameOrder order_;
 };
 
 }  // namespace
@@ -234,6 +218,16 @@ std::vector<FoundCamera> find_v4l2() {
   for (const v4l2::FoundNode& node : v4l2::find_nodes())
     found.push_back({"v4l2", v4l2::stable_name(node), node.product + " at " + node.by_path});
   return found;
+}
+
+std::optional<usb::Place> usb_place_of_v4l2(const std::string& device) {
+  const std::vector<v4l2::FoundNode> found = v4l2::find_nodes();
+  try {
+    const std::string file = v4l2::resolve(device, found);
+    return std::ranges::find(found, file, &v4l2::FoundNode::node)->usb;
+  } catch (const Error&) {
+    return std::nullopt;  // not there
+  }
 }
 
 }  // namespace previz

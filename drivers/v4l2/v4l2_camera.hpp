@@ -18,6 +18,8 @@ std::unique_ptr<Camera> open_v4l2(const CameraSettings& settings);
 
 std::vector<FoundCamera> find_v4l2();
 
+std::optional<usb::Place> usb_place_of_v4l2(const std::string& device);
+
 // The same on a node that is open already.
 std::unique_ptr<Camera> open_v4l2(std::unique_ptr<v4l2::Node> node, const CameraSettings& settings);
 

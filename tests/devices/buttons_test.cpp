@@ -3,13 +3,12 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <linux/uhid.h>
 #include <poll.h>
 
 #include <chrono>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <string_view>
 
@@ -18,10 +17,13 @@
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
 #include "drivers/hid/hid_buttons.hpp"
+#include "tests/devices/leftovers.hpp"
+#include "tests/devices/uhid_pad.hpp"
 
 namespace previz {
 namespace {
 
+using test::UhidPad;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using Report = std::vector<std::uint8_t>;
@@ -98,7 +100,10 @@ TEST(HidReports, OfAnyLengthDoNoHarm) {
   hid::ReportReader reader({"hid:1:1:3.0", "hid:1:1:2-5=1e"});
   for (std::size_t size = 0; size < 10; ++size) {
     const Report report(size, 0xff);
-    reader.read(report, 0);
+    const std::vector<ButtonEvent> events = reader.read(report, 0);
+    if (size < 6) {
+      EXPECT_THAT(events, ElementsAre()) << size;  // also where the first button's byte is there
+    }
   }
   EXPECT_EQ(reader.reports_cut_short(), 6u);  // of 0 to 5 bytes
 }
@@ -118,6 +123,15 @@ TEST(ButtonNames, MistakesSayWhatIsAllowed) {
   EXPECT_THAT(error_of("gpio:chip"), HasSubstr("gpio:CHIP:LINE"));
   EXPECT_THAT(error_of("hid:12:zz:0.1"), HasSubstr("hexadecimal"));
   EXPECT_THAT(error_of("hid:12:13:0.9"), HasSubstr("BYTE.BIT"));
+}
+
+TEST(ButtonWiring, ALinesOwnGoesBeforeItsChips) {
+  ButtonSettings settings;
+  settings.wiring["gpio:pads"] = {false, ContactWiring::Bias::as_is, 0.01};
+  settings.wiring["gpio:pads:stop"] = {true, ContactWiring::Bias::none, 0};
+  EXPECT_EQ(settings.wiring_of("gpio:pads:go"), settings.wiring["gpio:pads"]);
+  EXPECT_EQ(settings.wiring_of("gpio:pads:stop"), settings.wiring["gpio:pads:stop"]);
+  EXPECT_EQ(settings.wiring_of("gpio:others:go"), ContactWiring{});
 }
 
 // ---- devices
@@ -149,39 +163,66 @@ void expect_trouble(Buttons& buttons, const std::string& words) {
   EXPECT_FALSE(std::get<DeviceTrouble>(*event).lost);
 }
 
+// Whether the device is opened once more; what it tells meanwhile is taken.
+bool opens_again(Buttons& buttons, std::uint64_t opened_before) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (std::chrono::steady_clock::now() < end) {
+    while (buttons.next()) {
+    }
+    if (buttons.counters().at("opened") > opened_before) return true;
+    pollfd fd{buttons.fd(), POLLIN, 0};
+    poll(&fd, 1, 50);
+  }
+  return false;
+}
+
 TEST(ButtonDevices, WhatIsNotThereIsToldOnceAndWaitedFor) {
   for (const char* name : {"gpio:no such chip:1", "hid:1209:fffe:0.1"}) {
     const auto buttons = open_buttons(std::vector<std::string>{name}, {});
     ASSERT_EQ(buttons.size(), 1u);
     expect_trouble(*buttons[0], "until it is there");
     EXPECT_FALSE(buttons[0]->next());
+    EXPECT_GE(buttons[0]->counters().at("not opened"), 1u);
+    EXPECT_EQ(buttons[0]->counters().at("opened"), 0u);
   }
 }
 
-// The chip of tests/rig_vm: four lines button1..button4, active high.
-TEST(ButtonDevices, LinesOfGpioSim) {
-  const std::filesystem::path config = "/sys/kernel/config/gpio-sim/rig";
-  if (!std::filesystem::exists(config)) GTEST_SKIP() << "this machine has no gpio-sim chip \"rig\"";
-  std::string device, chip;
-  std::ifstream(config / "dev_name") >> device;
-  std::ifstream(config / "bank0/chip_name") >> chip;
-  const auto pull = [&](int line, const char* way) {
+// The gpio-sim chip "rig" with the lines button1 to button4, active high.
+class GpioSim {
+ public:
+  static bool possible() { return std::filesystem::exists(config / "live"); }
+
+  static void pull(int line, const char* way) {
+    std::string device, chip;
+    std::ifstream(config / "dev_name") >> device;
+    std::ifstream(config / "bank0/chip_name") >> chip;
     std::ofstream(std::filesystem::path("/sys/devices/platform") / device / chip /
                   ("sim_gpio" + std::to_string(line)) / "pull")
         << way;
-  };
-  ButtonSettings settings;
-  settings.active_low = false;
-  settings.bias = ButtonSettings::Bias::as_is;
+  }
+  static void plug(bool in) { std::ofstream(config / "live") << (in ? 1 : 0); }
+
+  static ButtonSettings settings() {
+    ButtonSettings settings;
+    settings.wiring["gpio:rig-buttons"] = {false, ContactWiring::Bias::as_is, 0.005};
+    return settings;
+  }
+
+ private:
+  static inline const std::filesystem::path config = "/sys/kernel/config/gpio-sim/rig";
+};
+
+TEST(ButtonDevices, LinesOfGpioSim) {
+  if (!GpioSim::possible()) GTEST_SKIP() << "this machine has no gpio-sim chip \"rig\"";
   const std::vector<std::string> names{"gpio:rig-buttons:button1", "gpio:rig-buttons:button3"};
-  const auto buttons = open_buttons(names, settings);
+  const auto buttons = open_buttons(names, GpioSim::settings());
   ASSERT_EQ(buttons.size(), 1u);
   EXPECT_FALSE(buttons[0]->next());
   for (int i = 0; i < 3; ++i) {
     for (const int line : {0, 2}) {
-      pull(line, "pull-up");
+      GpioSim::pull(line, "pull-up");
       expect_edge(*buttons[0], names[static_cast<std::size_t>(line / 2)], true);
-      pull(line, "pull-down");
+      GpioSim::pull(line, "pull-down");
       expect_edge(*buttons[0], names[static_cast<std::size_t>(line / 2)], false);
     }
   }
@@ -190,42 +231,51 @@ TEST(ButtonDevices, LinesOfGpioSim) {
       found, [](const FoundButton& button) { return button.name == "gpio:rig-buttons:button2"; }));
 }
 
-// A pad of eight buttons made through /dev/uhid: to hidraw and hidapi it is real.
-class UhidPad {
- public:
-  static bool possible() { return access("/dev/uhid", W_OK) == 0; }
-
-  UhidPad() : descriptor_(open("/dev/uhid", O_RDWR | O_CLOEXEC)) {
-    static constexpr std::uint8_t description[] = {
-        0x06, 0x00, 0xff, 0x09, 0x01, 0xa1, 0x01,  // vendor's page, application
-        0x05, 0x09, 0x19, 0x01, 0x29, 0x08,        // buttons 1 to 8
-        0x15, 0x00, 0x25, 0x01, 0x75, 0x01, 0x95, 0x08, 0x81, 0x02, 0xc0};
-    uhid_event event{};
-    event.type = UHID_CREATE2;
-    std::string_view("previzd test pad").copy(reinterpret_cast<char*>(event.u.create2.name), 16);
-    std::string_view("PREVIZ1").copy(reinterpret_cast<char*>(event.u.create2.uniq), 7);
-    event.u.create2.rd_size = sizeof description;
-    event.u.create2.bus = 3;  // USB
-    event.u.create2.vendor = 0x1209;
-    event.u.create2.product = 0x0001;
-    std::memcpy(event.u.create2.rd_data, description, sizeof description);
-    send(event);
+// What is left behind by `cycle`, a hundred times over, after a few that make what is made once.
+void expect_nothing_left_behind(const std::function<void()>& cycle) {
+  constexpr int cycles = 100, warm_cycles = 10;
+  std::size_t descriptors = 0, bytes = 0;
+  for (int i = 0; i < cycles; ++i) {
+    if (i == warm_cycles) descriptors = test::open_descriptors(), bytes = test::live_bytes();
+    ASSERT_NO_FATAL_FAILURE(cycle()) << "cycle " << i;
   }
+  EXPECT_EQ(test::open_descriptors(), descriptors);
+  // A device left behind in each cycle would be far more.
+  EXPECT_LT(test::live_bytes(), bytes + (cycles - warm_cycles) * 256);
+}
 
-  void report(const Report& bytes) {
-    uhid_event event{};
-    event.type = UHID_INPUT2;
-    event.u.input2.size = static_cast<__u16>(bytes.size());
-    std::memcpy(event.u.input2.data, bytes.data(), bytes.size());
-    send(event);
-  }
+TEST(ButtonDevices, AGpioChipThatGoesAHundredTimes) {
+  if (!GpioSim::possible()) GTEST_SKIP() << "this machine has no gpio-sim chip \"rig\"";
+  const std::string name = "gpio:rig-buttons:button1";
+  const auto buttons = open_buttons(std::vector{name}, GpioSim::settings());
+  EXPECT_FALSE(buttons[0]->next());
+  expect_nothing_left_behind([&] {
+    GpioSim::pull(0, "pull-up");
+    ASSERT_NO_FATAL_FAILURE(expect_edge(*buttons[0], name, true));
+    GpioSim::plug(false);
+    ASSERT_NO_FATAL_FAILURE(expect_edge(*buttons[0], name, false));  // released by its going
+    ASSERT_NO_FATAL_FAILURE(expect_trouble(*buttons[0], "is lost"));
+    const std::uint64_t opened = buttons[0]->counters().at("opened");
+    GpioSim::plug(true);
+    ASSERT_TRUE(opens_again(*buttons[0], opened));
+  });
+  EXPECT_EQ(buttons[0]->counters().at("lost"), 100u);
+}
 
- private:
-  void send(const uhid_event& event) const {
-    ASSERT_EQ(write(descriptor_.get(), &event, sizeof event), static_cast<ssize_t>(sizeof event));
-  }
-  OwnedDescriptor descriptor_;
-};
+TEST(ButtonDevices, APadThatIsPulledAHundredTimes) {
+  if (!UhidPad::possible()) GTEST_SKIP() << "this machine has no /dev/uhid that may be written";
+  const auto buttons = open_buttons(std::vector<std::string>{"hid:1209:0001:PREVIZ1:0.0"}, {});
+  ASSERT_NO_FATAL_FAILURE(expect_trouble(*buttons[0], "not there"));
+  std::uint64_t opened = 0;
+  expect_nothing_left_behind([&] {
+    const auto pad = std::make_unique<UhidPad>("PREVIZ1");
+    ASSERT_TRUE(opens_again(*buttons[0], opened));
+    opened = buttons[0]->counters().at("opened");
+    pad->report(Report{1});
+    // The pad's end is told after whatever it said before, or instead of it.
+  });
+  EXPECT_GE(buttons[0]->counters().at("lost"), 99u);
+}
 
 TEST(ButtonDevices, APadOfUhidPressedUnpluggedAndBack) {
   if (!UhidPad::possible()) GTEST_SKIP() << "this machine has no /dev/uhid that may be written";
@@ -234,13 +284,13 @@ TEST(ButtonDevices, APadOfUhidPressedUnpluggedAndBack) {
   ASSERT_EQ(buttons.size(), 1u);
   expect_trouble(*buttons[0], "not there");
   for (int i = 0; i < 2; ++i) {
-    auto pad = std::make_unique<UhidPad>();
+    auto pad = std::make_unique<UhidPad>("PREVIZ1");
     // Reports before the driver has found the pad are nobody's; it looks once a second.
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(10);
     std::optional<ButtonsEvent> first;
     while (!first && std::chrono::steady_clock::now() < end) {
-      pad->report({0});
-      pad->report({1});
+      pad->report(Report{0});
+      pad->report(Report{1});
       pollfd fd{buttons[0]->fd(), POLLIN, 0};
       if (poll(&fd, 1, 100) > 0) first = buttons[0]->next();
     }
@@ -248,8 +298,8 @@ TEST(ButtonDevices, APadOfUhidPressedUnpluggedAndBack) {
     EXPECT_EQ(std::get<ButtonEvent>(*first).button, names[0]);
     while (buttons[0]->next()) {
     }
-    pad->report({1});
-    pad->report({0x21});
+    pad->report(Report{1});
+    pad->report(Report{0x21});
     std::optional<ButtonsEvent> event;
     while ((event = wait_for_event(*buttons[0])) &&
            std::get<ButtonEvent>(*event).button != names[1]) {

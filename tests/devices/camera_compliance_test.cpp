@@ -166,10 +166,19 @@ TEST_P(CameraCompliance, DoesNotWaitLongerThanAsked) {
   const auto camera = device_->open();
   camera->start();
   ASSERT_NO_FATAL_FAILURE(take(*camera, 1));
-  // If each call waited for a frame (25 Hz or slower), a thousand would take 40 s or more.
-  const auto begin = Clock::now();
-  for (int i = 0; i < 1000; ++i) camera->next(milliseconds(0));
-  EXPECT_LT(Clock::now() - begin, patience);
+  // If each call waited for a frame (25 Hz or slower), a thousand would take 40 s or more. On a
+  // machine slower than the camera most calls find a frame, and converting it takes its time.
+  Clock::duration in_all{0}, in_vain{0};
+  int found_none = 0;
+  for (int i = 0; i < 1000 && found_none < 100; ++i) {
+    const auto begin = Clock::now();
+    const bool none = std::holds_alternative<NoFrame>(camera->next(milliseconds(0)));
+    in_all += Clock::now() - begin;
+    if (!none) continue;
+    in_vain += Clock::now() - begin;
+    ++found_none;
+  }
+  EXPECT_LT(found_none > 0 ? in_vain : in_all, patience);
 }
 
 TEST_P(CameraCompliance, ExposuresAppliedAreOnTheirFrames) {
@@ -195,7 +204,13 @@ TEST_P(CameraCompliance, ExposuresAppliedAreOnTheirFrames) {
 }
 
 // The cable is pulled.
-class CameraUnplugged : public CameraCompliance {};
+class CameraUnplugged : public CameraCompliance {
+ protected:
+  void SetUp() override {
+    CameraCompliance::SetUp();
+    if (device_ && !device_->why_no_cable().empty()) GTEST_SKIP() << device_->why_no_cable();
+  }
+};
 
 TEST_P(CameraUnplugged, TellsSoWhileItStreams) {
   const auto camera = device_->open();

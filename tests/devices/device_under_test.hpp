@@ -1,6 +1,7 @@
 // What the compliance suite knows of a device: how to open it, and how to pull its cable.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -23,6 +24,10 @@ class DeviceUnderTest {
 
   virtual void unplug() = 0;
   virtual void plug() = 0;
+  // Why its cable cannot be pulled on this machine; empty where it can.
+  virtual std::string why_no_cable() const { return {}; }
+  // After which silence it may be taken to be unplugged; longer where it says so itself.
+  virtual std::chrono::milliseconds stall_timeout() const { return std::chrono::milliseconds(150); }
 
   // Whether frames may be lost while somebody listens: on a bad network, under load.
   virtual bool may_lose_frames() const { return false; }

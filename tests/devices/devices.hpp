@@ -14,6 +14,7 @@ std::unique_ptr<DeviceUnderTest> make_unpaced_replay(std::string& why_not);
 std::unique_ptr<DeviceUnderTest> make_aravis(std::string& why_not);
 std::unique_ptr<DeviceUnderTest> make_lossy_aravis(std::string& why_not);
 std::unique_ptr<DeviceUnderTest> make_triggered_aravis(std::string& why_not);
+std::unique_ptr<DeviceUnderTest> make_libcamera(std::string& why_not);
 std::unique_ptr<DeviceUnderTest> make_v4l2(std::string& why_not);
 
 }  // namespace previz::test

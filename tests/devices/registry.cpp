@@ -16,8 +16,11 @@ std::span<const RegisteredDevice> registered_devices() {
       {"aravis_triggered_by_software", true, false, make_triggered_aravis},
       {"aravis_losing_a_tenth_of_its_packets", true, false, make_lossy_aravis},
 #endif
+#ifdef PREVIZ_WITH_LIBCAMERA
+      {"libcamera", true, true, make_libcamera},
+#endif
 #ifdef PREVIZ_WITH_V4L2
-      {"v4l2", true, false, make_v4l2},
+      {"v4l2", true, true, make_v4l2},
 #endif
   });
   return devices;

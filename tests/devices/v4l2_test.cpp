@@ -291,6 +291,14 @@ TEST_F(V4l2Stream, ABrokenClockOrCounterDoesNoHarm) {
   EXPECT_EQ(counted("frames without a time stamp of the kernel"), 1u);
 }
 
+TEST_F(V4l2Stream, GapsInTheSequenceAreCounted) {
+  start();
+  for (const std::uint32_t sequence : {0u, 1u, 5u, 6u})
+    device_.send(now_ns(), 1, [&](v4l2_buffer& buffer) { buffer.sequence = sequence; });
+  for (int i = 0; i < 4; ++i) ASSERT_TRUE(next());
+  EXPECT_EQ(counted("frames missing in the sequence"), 3u);
+}
+
 TEST_F(V4l2Stream, NoFrameFromBeforeAStop) {
   start();
   device_.send(now_ns(), 1);

@@ -1,0 +1,44 @@
+// The kernel's numbers and times of video frames, made to increase whatever the driver below does.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+
+#include "drivers/device.hpp"
+
+namespace previz {
+
+class FrameOrder {
+ public:
+  // What is odd is counted there.
+  explicit FrameOrder(DeviceCounters& counters) : counters_(counters) {}
+
+  // The kernel counts from 0 after each start, in 32 bits.
+  void restart() { device_sequence_.reset(); }
+
+  std::uint64_t sequence_of(std::uint32_t device_sequence) {
+    const std::uint32_t step =
+        device_sequence_ ? device_sequence - *device_sequence_ : std::uint32_t{1};
+    device_sequence_ = device_sequence;
+    // A step backwards, or none, is a driver that does not count.
+    const std::uint32_t forward = step == 0 || step > 0x7fffffff ? 1 : step;
+    if (forward > 1) counters_["frames missing in the sequence"] += forward - 1;
+    return sequence_ += forward;
+  }
+
+  // Strictly increasing, at most the arrival; drivers without monotonic stamps get the arrival.
+  std::int64_t time_of(std::optional<std::int64_t> stamp_ns, std::int64_t arrival_ns) {
+    if (!stamp_ns) ++counters_["frames without a time stamp of the kernel"];
+    const std::int64_t time_ns = std::min(arrival_ns, stamp_ns.value_or(arrival_ns));
+    return last_time_ns_ = std::max(time_ns, last_time_ns_ + 1);
+  }
+
+ private:
+  DeviceCounters& counters_;
+  std::optional<std::uint32_t> device_sequence_;
+  std::uint64_t sequence_ = 0;
+  std::int64_t last_time_ns_ = 0;
+};
+
+}  // namespace previz

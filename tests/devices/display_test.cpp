@@ -1,0 +1,208 @@
+// Displays: the modes of screens as numbers, and a real screen where this machine has one to spare.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "drivers/display_drivers.hpp"
+#include "drivers/display_lifeline.hpp"
+#include "drivers/error.hpp"
+#ifdef PREVIZ_WITH_KMS
+#include "drivers/kms/modes.hpp"
+#endif
+
+namespace previz {
+namespace {
+
+#ifdef PREVIZ_WITH_KMS
+drmModeModeInfo timing(int width, int height, int clock_khz, int total_width, int total_height,
+                       unsigned flags = 0) {
+  drmModeModeInfo info{};
+  info.hdisplay = static_cast<std::uint16_t>(width);
+  info.vdisplay = static_cast<std::uint16_t>(height);
+  info.clock = static_cast<std::uint32_t>(clock_khz);
+  info.htotal = static_cast<std::uint16_t>(total_width);
+  info.vtotal = static_cast<std::uint16_t>(total_height);
+  info.flags = flags;
+  return info;
+}
+
+// CTA-861's timings of 1080p50, 1080p59.94, 1080p60, 1080i50, and 720p50.
+std::array<drmModeModeInfo, 5> television() {
+  return {timing(1920, 1080, 148500, 2640, 1125), timing(1920, 1080, 148352, 2200, 1125),
+          timing(1920, 1080, 148500, 2200, 1125),
+          timing(1920, 1080, 74250, 2640, 1125, DRM_MODE_FLAG_INTERLACE),
+          timing(1280, 720, 74250, 1980, 750)};
+}
+
+TEST(KmsModes, RatesComeFromThePixelClock) {
+  const auto modes = television();
+  const double expected[] = {50, 59.94, 60, 50, 50};
+  for (std::size_t i = 0; i < modes.size(); ++i)
+    EXPECT_NEAR(kms::mode_of(modes[i]).rate_hz, expected[i], 0.001) << i;
+  EXPECT_EQ(kms::list_of(modes),
+            "1920x1080@50, 1920x1080@59.94, 1920x1080@60, 1920x1080@50 interlaced, 1280x720@50");
+}
+
+TEST(KmsModes, TheNearestRateOfTheSizeProgressiveFirst) {
+  auto modes = television();
+  const auto chosen = [&](const std::optional<DisplayMode>& wanted) {
+    return &kms::choose_mode(modes, wanted) - modes.data();
+  };
+  EXPECT_EQ(chosen(std::nullopt), 0);  // none is preferred: the first
+  modes[4].type = DRM_MODE_TYPE_PREFERRED;
+  EXPECT_EQ(chosen(std::nullopt), 4);
+  EXPECT_EQ(chosen(DisplayMode{1920, 1080, 50}), 0);
+  EXPECT_EQ(chosen(DisplayMode{1920, 1080, 59.94}), 1);
+  EXPECT_EQ(chosen(DisplayMode{1920, 1080, 60}), 2);
+  EXPECT_EQ(chosen(DisplayMode{1920, 1080, 0}), 2);  // the highest
+  for (const DisplayMode& wanted : {DisplayMode{1920, 1080, 24}, DisplayMode{3840, 2160, 0}}) {
+    try {
+      chosen(wanted);
+      FAIL() << to_string(wanted);
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("1280x720@50"), std::string::npos);
+    }
+  }
+}
+
+// A screen that nobody uses: PREVIZ_TEST_SCREEN=CONNECTOR. What is on somebody's screen is not to
+// be touched unasked.
+class KmsScreen : public testing::Test {
+ protected:
+  void SetUp() override {
+    const char* connector = std::getenv("PREVIZ_TEST_SCREEN");
+    if (!connector)
+      GTEST_SKIP() << "no screen to spare: PREVIZ_TEST_SCREEN names no connector of this machine";
+    settings_.connector = connector;
+    for (const FoundDisplay& found : display_driver("kms").find())
+      if (found.connector == connector && found.description.find("640x480") != std::string::npos)
+        settings_.mode = DisplayMode{640, 480, 0};  // a small one, for the sake of emulated cards
+  }
+  std::unique_ptr<Display> open() { return display_driver("kms").open(settings_); }
+
+  static Screenful screenful(const DisplayMode& mode, int step) {
+    auto plate = std::make_shared<Plate>(Plate{mode.width, mode.height, 8, {}});
+    plate->samples.assign(3 * static_cast<std::size_t>(mode.width * mode.height),
+                          static_cast<std::uint16_t>(step % 256));
+    return {std::move(plate), {}};
+  }
+
+  DisplaySettings settings_;
+};
+
+TEST_F(KmsScreen, FlipsAtItsPaceAndTellsWhen) {
+  const auto display = open();
+  EXPECT_EQ(display->name(), settings_.connector);
+  const DisplayMode mode = display->mode();
+  std::int64_t last_ns = 0;
+  for (int i = 0; i < 5; ++i) {
+    const DisplayEvent event = display->show(screenful(mode, 20 * i));
+    ASSERT_TRUE(std::holds_alternative<Shown>(event)) << std::get<DeviceTrouble>(event).what;
+    EXPECT_GT(std::get<Shown>(event).timestamp_ns, last_ns);
+    last_ns = std::get<Shown>(event).timestamp_ns;
+  }
+  EXPECT_TRUE(display->read_back().samples == screenful(mode, 20 * 4).picture->samples);
+}
+
+TEST_F(KmsScreen, IsReleasedToOthersAndTakenBack) {
+  const auto display = open();
+  const DisplayMode mode = display->mode();
+  ASSERT_TRUE(std::holds_alternative<Shown>(display->show(screenful(mode, 100))));
+  display->release();
+  {
+    const auto other = open();
+    EXPECT_TRUE(std::holds_alternative<Shown>(other->show(screenful(mode, 50))));
+    const DisplayEvent refused = display->show(screenful(mode, 100));
+    ASSERT_TRUE(std::holds_alternative<DeviceTrouble>(refused));
+    EXPECT_FALSE(std::get<DeviceTrouble>(refused).lost);
+    EXPECT_THROW(open(), Error);
+  }
+  EXPECT_TRUE(std::holds_alternative<Shown>(display->show(screenful(mode, 100))));
+}
+
+TEST_F(KmsScreen, IsOpenedAgainAndAgainWithoutALeak) {
+  const auto descriptors = [] {
+    return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {});
+  };
+  std::ptrdiff_t first = 0;
+  for (int i = 0; i < 5; ++i) {
+    const auto display = open();
+    ASSERT_TRUE(std::holds_alternative<Shown>(display->show(screenful(display->mode(), 10 * i))));
+    if (i == 1) first = descriptors();
+  }
+  EXPECT_LE(descriptors(), first);
+}
+
+// The cable by the kernel's own switch for connectors, and its word that something has changed.
+class Cable {
+ public:
+  explicit Cable(const std::string& connector) {
+    for (const auto& entry : std::filesystem::directory_iterator("/sys/class/drm"))
+      if (entry.path().filename().string().ends_with("-" + connector)) connector_ = entry.path();
+  }
+  bool may_be_pulled() const {
+    return !connector_.empty() && access((connector_ / "status").c_str(), W_OK) == 0;
+  }
+  void pull() { set("off"); }
+  void plug() { set("detect"); }
+
+ private:
+  void set(const char* status) {
+    std::ofstream(connector_ / "status") << status;
+    std::ofstream(connector_ / "device/uevent") << "change";  // of the card
+  }
+  std::filesystem::path connector_;
+};
+
+TEST_F(KmsScreen, IsGivenUpWhenItIsUnpluggedAndBackAfterIt) {
+  Cable cable(settings_.connector);
+  if (!cable.may_be_pulled()) GTEST_SKIP() << "the kernel's switch of connectors needs root";
+  DisplayLifeline life(settings_.connector, [this] { return open(); },
+                       {std::chrono::milliseconds(10), std::chrono::milliseconds(10)});
+  const auto told = [&]() -> std::string {
+    const auto event = life.show([](const DisplayMode& mode) { return screenful(mode, 100); });
+    if (!event) return "";
+    const auto* trouble = std::get_if<DeviceTrouble>(&*event);
+    return trouble ? trouble->what : "shown";
+  };
+  const auto until = [&](const std::string& words) {
+    std::string last;
+    for (int i = 0; i < 500 && last.find(words) == std::string::npos; ++i) {
+      if (i > 0) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      last = told();
+    }
+    return last;
+  };
+  EXPECT_EQ(told(), "shown");
+  cable.pull();
+  EXPECT_EQ(until("unplugged"), "the screen was unplugged; it is opened anew");
+  EXPECT_EQ(until("no screen"),
+            settings_.connector + ": no screen is plugged in; tried again until it is there");
+  EXPECT_EQ(life.display(), nullptr);
+  cable.plug();
+  EXPECT_EQ(until("shown"), "shown");
+}
+
+TEST_F(KmsScreen, AnUnknownConnectorOrModeIsToldWithWhatThereIs) {
+  DisplaySettings wrong = settings_;
+  wrong.mode = DisplayMode{1234, 567, 0};
+  for (const DisplaySettings& settings : {DisplaySettings{"DSI-7", {}, {}}, wrong}) {
+    try {
+      display_driver("kms").open(settings);
+      FAIL();
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(settings_.connector), std::string::npos)
+          << error.what();
+    }
+  }
+}
+#endif
+
+}  // namespace
+}  // namespace previz
