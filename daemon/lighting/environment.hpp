@@ -42,7 +42,7 @@ struct EnvironmentReport {
 // Of the image that the camera saw, or a file gave. As the set's lighting.mode says, `environment`
 // is all of it, or what is left without its sources.
 struct Lighting {
-  EnvironmentMap environment;
+  EnvironmentMap environment{1, {glm::vec3(0)}};
   std::vector<Source> sources;
   EnvironmentReport report;
 };

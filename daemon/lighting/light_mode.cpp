@@ -42,15 +42,15 @@ void apply_mode(Lighting& lighting, const set::Lighting& settings, SourceTracker
   lighting.report.notes.push_back(std::move(note));
 }
 
-std::vector<set::Light> lamps_of(const std::vector<Source>& sources, const set::Lighting& settings,
-                                 const glm::dvec3& viewpoint) {
+std::vector<set::Light> lamps_of(const std::vector<Source>& sources, const glm::dvec3& viewpoint,
+                                 const SourceDistance& distance_of) {
   std::vector<set::Light> lamps;
   for (const Source& source : sources) {
     set::Light& lamp = lamps.emplace_back();
     lamp.name = "source " + std::to_string(source.id);
     lamp.gain_mixed = lamp.gain_real = 1;
     const double radius = angular_radius(source), sine = std::sin(radius);
-    if (const auto distance = settings.sources.distance_m) {
+    if (const auto distance = distance_of(source.direction)) {
       lamp.type = set::LightType::sphere;
       lamp.position = viewpoint + *distance * source.direction;
       lamp.radius_m = *distance * sine;

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <vector>
 
 #include "daemon/lighting/environment.hpp"
@@ -21,10 +23,15 @@ namespace previz::lighting {
 void apply_mode(Lighting& lighting, const set::Lighting& settings, SourceTracker& tracker,
                 std::int64_t timestamp_ns);
 
-// A lamp for each source, the same in both worlds: a distant disc or, with
-// settings.sources.distance_m, a sphere at that distance from `viewpoint` (world, metres) that
-// sends there the same flux under the same solid angle.
-std::vector<set::Light> lamps_of(const std::vector<Source>& sources, const set::Lighting& settings,
-                                 const glm::dvec3& viewpoint);
+// How far from the viewpoint a source in this direction is, metres; nothing: at infinity.
+using SourceDistance = std::function<std::optional<double>(const glm::dvec3& direction)>;
+inline std::optional<double> at_infinity(const glm::dvec3&) {
+  return std::nullopt;
+}
+
+// A lamp for each source, the same in both worlds: a distant disc, or a sphere at its distance from
+// `viewpoint` (world, metres) that sends there the same flux under the same solid angle.
+std::vector<set::Light> lamps_of(const std::vector<Source>& sources, const glm::dvec3& viewpoint,
+                                 const SourceDistance& distance_of);
 
 }  // namespace previz::lighting

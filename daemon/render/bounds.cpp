@@ -5,6 +5,7 @@
 #include <functional>
 #include <glm/geometric.hpp>
 #include <glm/mat4x4.hpp>
+#include <glm/matrix.hpp>
 #include <limits>
 
 namespace previz::render {
@@ -46,15 +47,24 @@ glm::dvec4 merged_spheres(const glm::dvec4& a, const glm::dvec4& b) {
   return {glm::dvec3(a) + between * ((radius - a.w) / distance), radius};
 }
 
-Bounds bounds_where(const scene::Scene& scene,
+// The most that the linear part stretches any vector, from above: the root of the largest row sum
+// of A^T A, which for a rotation and one scale is that scale.
+double stretch(const glm::dmat3& a) {
+  const glm::dmat3 product = glm::transpose(a) * a;
+  double largest = 0;
+  for (int i = 0; i < 3; ++i)
+    largest =
+        std::max(largest, std::abs(product[i].x) + std::abs(product[i].y) + std::abs(product[i].z));
+  return std::sqrt(largest);
+}
+
+Bounds bounds_where(const scene::Scene& scene, const Spheres& spheres,
                     const std::function<bool(const scene::Instance&)>& wanted) {
   static constexpr std::size_t most_bounds = 16;
   Bounds bounds;
-  for (const scene::Instance& instance : scene.instances) {
-    const scene::Mesh& mesh = scene.meshes[instance.mesh];
-    if (!wanted(instance)) continue;
-    const glm::dvec4 sphere = bounding_sphere(mesh, instance.world_from_object);
-    if (sphere.w < 0) continue;
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const glm::dvec4& sphere = spheres[i];
+    if (!wanted(scene.instances[i]) || sphere.w < 0) continue;
     if (bounds.size() < most_bounds)
       bounds.push_back(sphere);
     else
@@ -65,18 +75,38 @@ Bounds bounds_where(const scene::Scene& scene,
 
 }  // namespace
 
-Bounds difference_bounds(const scene::Scene& scene) {
-  return bounds_where(scene, [](const scene::Instance& instance) {
-    return instance.presence != scene::world_both;
+Spheres bounding_spheres(const scene::Scene& scene) {
+  Spheres spheres;
+  for (const scene::Instance& instance : scene.instances)
+    spheres.push_back(bounding_sphere(scene.meshes[instance.mesh], instance.world_from_object));
+  return spheres;
+}
+
+Spheres moved_spheres(const Spheres& spheres, const std::vector<scene::Instance>& before,
+                      const std::vector<scene::Instance>& now) {
+  Spheres moved = spheres;
+  for (std::size_t i = 0; i < spheres.size(); ++i) {
+    if (spheres[i].w < 0 || now[i].world_from_object == before[i].world_from_object) continue;
+    const glm::dmat4 motion = now[i].world_from_object * glm::inverse(before[i].world_from_object);
+    moved[i] = motion * glm::dvec4(glm::dvec3(spheres[i]), 1);
+    moved[i].w = spheres[i].w * stretch(glm::dmat3(motion));
+  }
+  return moved;
+}
+
+Bounds difference_bounds(const scene::Scene& scene, const Spheres& spheres) {
+  return bounds_where(scene, spheres, [](const scene::Instance& instance) {
+    return instance.presence == scene::world_mixed || instance.presence == scene::world_real;
   });
 }
 
-Bounds specular_bounds(const scene::Scene& scene, double specular_alpha) {
+Bounds specular_bounds(const scene::Scene& scene, const Spheres& spheres, double specular_alpha) {
   std::vector<bool> dirac;
   for (const scene::Material& material : scene.materials)
     dirac.push_back(scene::can_be_dirac(scene, material, specular_alpha));
-  return bounds_where(
-      scene, [&](const scene::Instance& instance) -> bool { return dirac[instance.material]; });
+  return bounds_where(scene, spheres, [&](const scene::Instance& instance) -> bool {
+    return dirac[instance.material];
+  });
 }
 
 }  // namespace previz::render

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <utility>
 
 #include "drivers/error.hpp"
 #include "shaders/lib/render_shared.h"
@@ -69,10 +70,31 @@ std::string lacks(const vk::raii::PhysicalDevice& physical) {
 
 }  // namespace
 
-Device::Device(const DeviceOptions& options) {
+Device::Device(DeviceOptions options) : options_(std::move(options)) {
+  open();
+}
+
+void Device::reopen() {
+  close();
+  open();
+}
+
+// The instance too: a card that was gone has another physical device when it is back.
+void Device::close() {
+  fence_.clear();
+  commands_.clear();
+  pool_.clear();
+  queue_.clear();
+  device_.clear();
+  physical_.clear();
+  messenger_.clear();
+  instance_.clear();
+}
+
+void Device::open() {
   try {
-    create_instance(options.validation);
-    pick_physical_device(options.name);
+    create_instance(options_.validation);
+    pick_physical_device(options_.name);
     create_device();
   } catch (const vk::SystemError& error) {
     throw Error(std::string("Vulkan: ") + error.what());
@@ -187,6 +209,8 @@ void Device::submit(const std::function<void(const vk::raii::CommandBuffer&)>& r
     if (device_.waitForFences(*fence_, VK_TRUE, gpu_timeout_ns) != vk::Result::eSuccess)
       throw Error("Vulkan: " + name_ + " did not finish within ten minutes");
     device_.resetFences(*fence_);
+  } catch (const vk::DeviceLostError& error) {
+    throw DeviceLost("Vulkan: " + name_ + " is lost: " + error.what());
   } catch (const vk::SystemError& error) {
     throw Error("Vulkan: " + name_ + ": " + error.what());
   }
@@ -362,6 +386,9 @@ void barrier(const vk::raii::CommandBuffer& commands) {
 
 std::shared_ptr<Device> open_device(const DeviceOptions& options) {
   return std::make_shared<Device>(options);
+}
+void reopen_device(Device& device) {
+  device.reopen();
 }
 std::string device_name(const Device& device) {
   return device.name();

@@ -17,7 +17,9 @@ namespace previz::render {
 class Device {
  public:
   // Throws previz::Error saying what is missing and which devices were found.
-  explicit Device(const DeviceOptions& options);
+  explicit Device(DeviceOptions options);
+  // All of it anew; throws as the constructor does, and can be called again.
+  void reopen();
 
   const vk::raii::Device& vk() const { return device_; }
   const std::string& name() const { return name_; }
@@ -31,14 +33,17 @@ class Device {
   std::uint32_t memory_type(std::uint32_t allowed_bits, vk::MemoryPropertyFlags wanted,
                             vk::MemoryPropertyFlags preferred) const;
 
-  // Records, submits and waits. Throws previz::Error naming the device if it is lost.
+  // Records, submits and waits. Throws DeviceLost naming the device if it is lost.
   void submit(const std::function<void(const vk::raii::CommandBuffer&)>& record);
 
  private:
+  void open();
+  void close();
   void create_instance(bool validation);
   void pick_physical_device(const std::string& wanted_name);
   void create_device();
 
+  const DeviceOptions options_;
   vk::raii::Context context_;
   std::atomic<std::uint64_t> validation_messages_ = 0;
   vk::raii::Instance instance_{nullptr};

@@ -76,7 +76,9 @@ void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha) {
   upload_materials(specular_alpha);
   upload_textures();
   find_emitters();
-  find_bounds();
+  spheres_ = bounding_spheres(scene_);
+  instances_as_set_ = scene_.instances;
+  find_bounds(spheres_);
 }
 
 void GpuScene::move(const std::vector<scene::Instance>& instances,
@@ -84,12 +86,12 @@ void GpuScene::move(const std::vector<scene::Instance>& instances,
   assert(instances.size() == scene_.instances.size());
   scene_.instances = instances;
   scene_.lights = lights;
-  find_bounds();
+  find_bounds(moved_spheres(spheres_, instances_as_set_, scene_.instances));
 }
 
-void GpuScene::find_bounds() {
-  difference_bounds_ = difference_bounds(scene_);
-  specular_bounds_ = specular_bounds(scene_, specular_alpha_);
+void GpuScene::find_bounds(const Spheres& spheres) {
+  difference_bounds_ = difference_bounds(scene_, spheres);
+  specular_bounds_ = specular_bounds(scene_, spheres, specular_alpha_);
 }
 
 void GpuScene::upload_meshes() {

@@ -54,7 +54,7 @@ class GpuScene {
   void upload_materials(double specular_alpha);
   void upload_textures();
   void find_emitters();
-  void find_bounds();
+  void find_bounds(const Spheres& spheres);
   std::vector<set::Light> lamps() const;  // the scene's and the sources, those that rays meet first
   std::vector<gpu::GpuLight> placed_lights(const std::vector<set::Light>& all_lamps,
                                            const glm::dvec3& camera_position) const;
@@ -65,6 +65,8 @@ class GpuScene {
   Device& device_;
   scene::Scene scene_;
   double specular_alpha_ = 0;
+  std::vector<scene::Instance> instances_as_set_;   // by set_scene()
+  Spheres spheres_;                                 // of those
   std::optional<std::vector<set::Light>> sources_;  // absent: there never are any
   std::vector<MeshPlace> places_;
   std::vector<std::uint32_t> first_light_;  // by instance; NO_INDEX: not an emitter

@@ -15,6 +15,7 @@
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration.hpp"
+#include "drivers/error.hpp"
 #include "drivers/frame.hpp"
 
 namespace previz::render {
@@ -25,8 +26,18 @@ struct DeviceOptions {
   std::string name;         // substring of the device's name; empty: the first discrete, else any
 };
 
+// The device is gone (VK_ERROR_DEVICE_LOST): a driver that fell over, a cable, a hang it was reset
+// for. Everything on it is lost with it.
+class DeviceLost : public Error {
+ public:
+  using Error::Error;
+};
+
 class Device;  // daemon/render/device.hpp
 std::shared_ptr<Device> open_device(const DeviceOptions& options = {});
+// Opens it anew, by the same options, after it was lost. Nothing that was made on it may be left.
+// Throws previz::Error while there is none; it can be tried again.
+void reopen_device(Device& device);
 std::string device_name(const Device& device);
 std::uint64_t validation_messages(const Device& device);
 

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 
+#include "daemon/scene/gltf_animation.hpp"
 #include "daemon/scene/gltf_material.hpp"
 #include "daemon/scene/gltf_mesh.hpp"
 #include "daemon/scene/gltf_nodes.hpp"
@@ -32,13 +33,6 @@ std::uint32_t presence_bits(set::Presence presence) {
   return world_both;
 }
 
-bool is_invertible(const glm::dmat4& transform) {
-  const glm::dmat3 linear(transform);
-  const double size = glm::length(linear[0]) * glm::length(linear[1]) * glm::length(linear[2]);
-  return is_finite(transform) && std::isfinite(size) && size > 0 &&
-         std::abs(glm::determinant(linear)) > 1e-12 * size;
-}
-
 }  // namespace
 
 struct GltfFile::Loader {
@@ -52,7 +46,6 @@ struct GltfFile::Loader {
     const auto ignored = [&](std::size_t count, const char* what) {
       if (count > 0) notes.add("has " + std::to_string(count) + " " + what + "; ignored");
     };
-    ignored(model.animations.size(), "animations");
     ignored(model.skins.size(), "skins");
     ignored(model.cameras.size(), "cameras");
   }
@@ -76,6 +69,9 @@ struct GltfFile::Loader {
 
 void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index) {
   const std::size_t before = scene.instances.size() + scene.lights.size();
+  std::optional<GltfAnimation> played;
+  if (!object.animation.empty()) played.emplace(model, object.animation, file, notes);
+  Animation animation;
   for (const PlacedNode& placed : place_nodes(model, object.nodes, file, notes)) {
     const tinygltf::Node& node = model.nodes[static_cast<std::size_t>(placed.node)];
     Instance instance;
@@ -83,8 +79,26 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
     instance.presence = presence_bits(object.presence);
     instance.object = object_index;
     instance.world_from_object = object.world_from_file * z_up_from_y_up * placed.file_from_node;
+    const auto first_instance = static_cast<std::uint32_t>(scene.instances.size());
+    const auto first_light = static_cast<std::uint32_t>(scene.lights.size());
     if (node.mesh >= 0) add_mesh(placed, instance);
     add_light(placed, instance.world_from_object, instance.presence);
+    if (!played) continue;
+    const std::uint32_t moved = played->use(placed.node, animation.nodes);
+    if (moved == no_node) continue;
+    for (auto i = first_instance; i < scene.instances.size(); ++i)
+      animation.instances.push_back({i, moved});
+    for (auto i = first_light; i < scene.lights.size(); ++i) animation.lights.push_back({i, moved});
+  }
+  if (!played && !model.animations.empty())
+    notes.add("object \"" + set::printable(object.name) + "\" plays none of its " +
+              std::to_string(model.animations.size()) + " animations");
+  if (played) {
+    animation.object = object_index;
+    animation.duration_s = played->duration_s();
+    animation.loops = object.loops;
+    animation.world_from_file = object.world_from_file * z_up_from_y_up;
+    scene.animations.push_back(std::move(animation));
   }
   if (scene.instances.size() + scene.lights.size() == before)
     notes.add("object \"" + set::printable(object.name) + "\" has nothing to see in it");

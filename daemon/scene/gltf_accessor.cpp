@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <glm/ext/vector_float1.hpp>
 #include <limits>
 
 #include "drivers/error.hpp"
@@ -168,6 +169,20 @@ std::vector<glm::vec2> read_vec2s(const tinygltf::Model& model, int accessor,
 std::vector<glm::vec3> read_vec3s(const tinygltf::Model& model, int accessor,
                                   const std::string& where) {
   return read_vectors<glm::vec3>(model, accessor, TINYGLTF_TYPE_VEC3, where);
+}
+
+std::vector<glm::vec4> read_vec4s(const tinygltf::Model& model, int accessor,
+                                  const std::string& where) {
+  return read_vectors<glm::vec4>(model, accessor, TINYGLTF_TYPE_VEC4, where);
+}
+
+std::vector<float> read_scalars(const tinygltf::Model& model, int accessor,
+                                const std::string& where) {
+  std::vector<float> values;
+  for (const glm::vec1& value :
+       read_vectors<glm::vec1>(model, accessor, TINYGLTF_TYPE_SCALAR, where))
+    values.push_back(value.x);
+  return values;
 }
 
 std::vector<std::uint32_t> read_indices(const tinygltf::Model& model, int index,

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,6 +19,10 @@ std::vector<glm::vec2> read_vec2s(const tinygltf::Model& model, int accessor,
                                   const std::string& where);
 std::vector<glm::vec3> read_vec3s(const tinygltf::Model& model, int accessor,
                                   const std::string& where);
+std::vector<glm::vec4> read_vec4s(const tinygltf::Model& model, int accessor,
+                                  const std::string& where);
+std::vector<float> read_scalars(const tinygltf::Model& model, int accessor,
+                                const std::string& where);
 std::vector<std::uint32_t> read_indices(const tinygltf::Model& model, int accessor,
                                         const std::string& where);
 

@@ -14,30 +14,6 @@
 namespace previz::scene {
 namespace {
 
-// A matrix, or translation * rotation * scale.
-glm::dmat4 parent_from_node(const tinygltf::Node& node, const std::string& where) {
-  const auto has = [&](const std::vector<double>& values, std::size_t count) {
-    if (values.empty()) return false;
-    if (values.size() != count)
-      throw Error(where + ": its transform has " + std::to_string(values.size()) +
-                  " numbers where it must have " + std::to_string(count));
-    return true;
-  };
-  if (has(node.matrix, 16)) return glm::make_mat4(node.matrix.data());
-  glm::dmat4 transform(1.0);
-  if (has(node.translation, 3))
-    transform = glm::translate(transform, glm::make_vec3(node.translation.data()));
-  if (has(node.rotation, 4)) {
-    const std::vector<double>& q = node.rotation;  // x, y, z, w
-    const glm::dquat rotation(q[3], q[0], q[1], q[2]);
-    if (!(glm::length(rotation) > 1e-12))
-      throw Error(where + ": its rotation is not a quaternion of length 1");
-    transform *= glm::mat4_cast(glm::normalize(rotation));
-  }
-  if (has(node.scale, 3)) transform = glm::scale(transform, glm::make_vec3(node.scale.data()));
-  return transform;
-}
-
 std::vector<int> root_nodes(const tinygltf::Model& model, const std::string& file, Notes& notes) {
   if (!model.scenes.empty()) {
     const int scene = model.defaultScene < 0 ? 0 : model.defaultScene;
@@ -60,6 +36,35 @@ std::vector<int> root_nodes(const tinygltf::Model& model, const std::string& fil
 }
 
 }  // namespace
+
+// A matrix, or translation * rotation * scale.
+NodeTransform transform_of(const tinygltf::Node& node, const std::string& where) {
+  const auto has = [&](const std::vector<double>& values, std::size_t count) {
+    if (values.empty()) return false;
+    if (values.size() != count)
+      throw Error(where + ": its transform has " + std::to_string(values.size()) +
+                  " numbers where it must have " + std::to_string(count));
+    return true;
+  };
+  NodeTransform transform;
+  if (has(node.matrix, 16)) {
+    transform.parent_from_node = glm::make_mat4(node.matrix.data());
+    return transform;
+  }
+  if (has(node.translation, 3)) transform.translation = glm::make_vec3(node.translation.data());
+  if (has(node.rotation, 4)) {
+    const std::vector<double>& q = node.rotation;  // x, y, z, w
+    const glm::dquat rotation(q[3], q[0], q[1], q[2]);
+    if (!(glm::length(rotation) > 1e-12))
+      throw Error(where + ": its rotation is not a quaternion of length 1");
+    transform.rotation = glm::normalize(rotation);
+  }
+  if (has(node.scale, 3)) transform.scale = glm::make_vec3(node.scale.data());
+  transform.parent_from_node = glm::scale(
+      glm::translate(glm::dmat4(1.0), transform.translation) * glm::mat4_cast(transform.rotation),
+      transform.scale);
+  return transform;
+}
 
 std::string node_name(const tinygltf::Model& model, int node) {
   const std::string& name = model.nodes[static_cast<std::size_t>(node)].name;
@@ -95,7 +100,8 @@ std::vector<PlacedNode> place_nodes(const tinygltf::Model& model,
                   " has two parents or is its own ancestor");
     visited[static_cast<std::size_t>(index)] = true;
     const tinygltf::Node& node = model.nodes[static_cast<std::size_t>(index)];
-    visit.placed.file_from_node *= parent_from_node(node, file + ": " + node_name(model, index));
+    visit.placed.file_from_node *=
+        transform_of(node, file + ": " + node_name(model, index)).parent_from_node;
     if (!node.name.empty()) known.insert(node.name);
     const bool is_wanted =
         visit.is_wanted || std::find(names.begin(), names.end(), node.name) != names.end();

@@ -3,7 +3,9 @@
 
 #include <tiny_gltf.h>
 
+#include <glm/gtc/quaternion.hpp>
 #include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
 #include <string>
 #include <vector>
 
@@ -22,6 +24,15 @@ struct PlacedNode {
 std::vector<PlacedNode> place_nodes(const tinygltf::Model& model,
                                     const std::vector<std::string>& names, const std::string& file,
                                     Notes& notes);
+
+// What a node says of its own place; a matrix has no parts.
+struct NodeTransform {
+  glm::dmat4 parent_from_node{1.0};
+  glm::dvec3 translation{0}, scale{1};
+  glm::dquat rotation{1, 0, 0, 0};
+};
+// Throws previz::Error beginning with `where` where the numbers are none of it.
+NodeTransform transform_of(const tinygltf::Node& node, const std::string& where);
 
 // "node 3 "cow"", for messages.
 std::string node_name(const tinygltf::Model& model, int node);

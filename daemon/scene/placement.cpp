@@ -4,6 +4,8 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
+#include "daemon/scene/transform.hpp"
+
 namespace previz::scene {
 namespace {
 
@@ -25,6 +27,35 @@ void move_object(const Scene& scene, std::size_t object, const glm::dmat4& moved
       instance.world_from_object = moved_from_set * instance.world_from_object;
   for (std::size_t i = 0; i < scene.lights.size(); ++i)
     if (scene.light_objects[i] == object) move_lamp(placement.lights[i], moved_from_set);
+}
+
+void put_out(set::Light& light) {
+  light.gain_mixed = light.gain_real = 0;
+}
+
+// What is flattened is not seen.
+void play(const Animation& animation, double time_s, Placement& placement) {
+  const std::vector<glm::dmat4> now = world_from_nodes(animation, time_s);
+  for (const Animation::Use& use : animation.instances) {
+    Instance& instance = placement.instances[use.what];
+    instance.world_from_object = now[use.node];
+    if (!is_invertible(now[use.node])) instance.presence = 0;
+  }
+  if (animation.lights.empty()) return;
+  const std::vector<glm::dmat4> rest = world_from_nodes_at_rest(animation);
+  for (const Animation::Use& use : animation.lights)
+    if (is_invertible(now[use.node]) && is_invertible(rest[use.node]))
+      move_lamp(placement.lights[use.what], now[use.node] * glm::inverse(rest[use.node]));
+    else
+      put_out(placement.lights[use.what]);
+}
+
+// It stays in the scene, so that it is back at once, but in neither world.
+void take_away_object(const Scene& scene, std::size_t object, Placement& placement) {
+  for (Instance& instance : placement.instances)
+    if (instance.object == object) instance.presence = 0;
+  for (std::size_t i = 0; i < scene.lights.size(); ++i)
+    if (scene.light_objects[i] == object) put_out(placement.lights[i]);
 }
 
 void relight(set::Light& light, const session::LightState& state, std::vector<set::Light>& more) {
@@ -50,15 +81,20 @@ session::LightState state_of(const set::Light& light) {
 
 Placement place(const Scene& scene, const set::Set& set, const session::SceneState& state) {
   Placement placement{scene.instances, scene.lights, {}};
+  if (state.animation_s)
+    for (const Animation& animation : scene.animations)
+      play(animation, *state.animation_s, placement);
   for (const auto& [name, world_from_file] : state.objects) {
     const auto found = std::ranges::find(set.objects, name, &set::Object::name);
     if (found == set.objects.end()) {
       placement.unknown.push_back("object \"" + name + "\" was moved; this set has none such");
       continue;
     }
-    if (world_from_file == found->world_from_file) continue;
-    move_object(scene, static_cast<std::size_t>(found - set.objects.begin()),
-                world_from_file * glm::inverse(found->world_from_file), placement);
+    const auto index = static_cast<std::size_t>(found - set.objects.begin());
+    if (!world_from_file)
+      take_away_object(scene, index, placement);
+    else if (*world_from_file != found->world_from_file)
+      move_object(scene, index, *world_from_file * glm::inverse(found->world_from_file), placement);
   }
   // The set's own lamps are the last of the scene's.
   const std::size_t first = scene.lights.size() - set.lights.size();
@@ -69,8 +105,12 @@ Placement place(const Scene& scene, const set::Set& set, const session::SceneSta
       placement.unknown.push_back("light \"" + name + "\" was changed; this set has none such");
       continue;
     }
-    relight(placement.lights[first + static_cast<std::size_t>(found - set.lights.begin())], light,
-            more);
+    set::Light& placed =
+        placement.lights[first + static_cast<std::size_t>(found - set.lights.begin())];
+    if (light)
+      relight(placed, *light, more);
+    else
+      put_out(placed);
   }
   placement.lights.insert(placement.lights.end(), more.begin(), more.end());
   return placement;

@@ -18,8 +18,8 @@ struct Placement {
 };
 
 // `scene` is load_scene(set). An object takes its own lamps along. What the state does not name is
-// bit for bit as it was. A tint is of the mixed world only: a lamp that also shines in the real one
-// is split in two.
+// bit for bit as it was; what it says is nowhere is in neither world. A tint is of the mixed world
+// only: a lamp that also shines in the real one is split in two.
 Placement place(const Scene& scene, const set::Set& set, const session::SceneState& state);
 
 // The lamp as the set has it: a state that changes nothing.

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/scene/animation.hpp"
 #include "daemon/set/set.hpp"
 
 namespace previz::scene {
@@ -101,6 +102,7 @@ struct Scene {
   // Per light the index of the [[object]] whose file it came with; no_object: the set's own lamps,
   // which are the last, in the set's order.
   std::vector<std::uint32_t> light_objects;
+  std::vector<Animation> animations;  // one an object at most
   // What was dropped or not understood while loading, in plain words (counted, never silent).
   std::vector<std::string> notes;
 };

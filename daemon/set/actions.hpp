@@ -34,6 +34,7 @@ struct ChangeSamples {
 struct NextEstimator {};
 struct NextLightMode {};
 struct NextView {};
+struct ToggleOsd {};
 struct SelectObject {
   int next = 1;
 };
@@ -47,6 +48,8 @@ struct ScaleObject {
   int steps = 1;
 };
 struct ResetObject {};
+struct PlayAnimations {};  // from their beginning
+struct HoldAnimations {};  // and go on
 struct SelectLight {
   int next = 1;
 };
@@ -61,10 +64,11 @@ struct ChangeExposure {
   int steps = 1;
 };
 
-using Effect = std::variant<ToMode, Record, MarkGood, Snapshot, ReloadSet, OtherSet, ChangeSamples,
-                            NextEstimator, NextLightMode, NextView, SelectObject, MoveObject,
-                            TurnObject, ScaleObject, ResetObject, SelectLight, DimLight, TintLight,
-                            ResetLight, ChangeExposure>;
+using Effect =
+    std::variant<ToMode, Record, MarkGood, Snapshot, ReloadSet, OtherSet, ChangeSamples,
+                 NextEstimator, NextLightMode, NextView, ToggleOsd, SelectObject, MoveObject,
+                 TurnObject, ScaleObject, ResetObject, PlayAnimations, HoldAnimations, SelectLight,
+                 DimLight, TintLight, ResetLight, ChangeExposure>;
 
 struct Action {
   const char* name;

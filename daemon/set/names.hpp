@@ -17,7 +17,17 @@ constexpr auto names(Driver) {
   return std::to_array<Name<Driver>>({{"replay", Driver::replay},
                                       {"v4l2", Driver::v4l2},
                                       {"aravis", Driver::aravis},
+                                      {"libcamera", Driver::libcamera},
                                       {"none", Driver::none}});
+}
+constexpr auto names(DisplayDriver) {
+  return std::to_array<Name<DisplayDriver>>({{"kms", DisplayDriver::kms},
+                                             {"headless", DisplayDriver::headless},
+                                             {"none", DisplayDriver::none}});
+}
+constexpr auto names(DisplayScale) {
+  return std::to_array<Name<DisplayScale>>(
+      {{"letterbox", DisplayScale::letterbox}, {"1:1", DisplayScale::one_to_one}});
 }
 constexpr auto names(Presence) {
   return std::to_array<Name<Presence>>({{"phantom", Presence::phantom},
@@ -36,6 +46,11 @@ constexpr auto names(UnseenRule) {
                                           {"mirror", UnseenRule::mirror},
                                           {"observer", UnseenRule::observer},
                                           {"constant", UnseenRule::constant}});
+}
+constexpr auto names(LightFrom) {
+  return std::to_array<Name<LightFrom>>({{"camera", LightFrom::camera},
+                                         {"recording", LightFrom::recording},
+                                         {"set", LightFrom::set}});
 }
 constexpr auto names(LightMode) {
   return std::to_array<Name<LightMode>>({{"image", LightMode::image},
@@ -71,6 +86,12 @@ constexpr auto names(PressKind) {
   return std::to_array<Name<PressKind>>({{"short", PressKind::short_press},
                                          {"long", PressKind::long_press},
                                          {"double", PressKind::double_press}});
+}
+constexpr auto names(ContactWiring::Bias) {
+  return std::to_array<Name<ContactWiring::Bias>>({{"as_is", ContactWiring::Bias::as_is},
+                                                   {"none", ContactWiring::Bias::none},
+                                                   {"pull_up", ContactWiring::Bias::pull_up},
+                                                   {"pull_down", ContactWiring::Bias::pull_down}});
 }
 constexpr auto names(Mode) {
   return std::to_array<Name<Mode>>({{"standby", Mode::standby},

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <numbers>
+#include <set>
 
 #include "daemon/set/pose.hpp"
 
@@ -40,6 +41,8 @@ class Resolver {
     lighting();
     room();
     buttons();
+    contacts();
+    display();
     set_.recording.directory = located(set_.recording.directory);
     set_.output.directory = located(set_.output.directory);
   }
@@ -203,6 +206,7 @@ class Resolver {
 
   void tags() {
     std::map<int, Position> first;
+    std::set<std::string> frames;  // carriers that a tag without a place is the frame of
     for (const auto& draft : draft_.tags) {
       const auto& table = draft.given;
       if (table.good("id")) {
@@ -219,10 +223,40 @@ class Resolver {
         if (!table.has("size_m"))
           problem(table, "size_m",
                   "is missing; allowed: the outer edge of the black border in m, or corners_m");
-        tag.world_from_tag = rigid(table, draft.pose, "world_from_tag");
+        const bool is_frame = is_carrier_itself(draft);
+        if (is_frame && !frames.insert(draft.carrier).second)
+          problem(table, "carrier",
+                  "another tag of " + codec::quote(draft.carrier) +
+                      " is its frame already; allowed: position_m, where it is from there");
+        tag.world_from_tag = is_frame ? glm::dmat4{1} : rigid(table, draft.pose, "world_from_tag");
       }
-      set_.tracking.tags.push_back(tag);
+      (draft.carrier.empty() ? set_.tracking.tags : carrier(draft.carrier).tags).push_back(tag);
     }
+  }
+
+  // A carried tag without a pose: its frame is the carrier's.
+  static bool is_carrier_itself(const TagDraft& draft) {
+    const auto& table = draft.given;
+    return !draft.carrier.empty() && !table.has("position_m") && !table.has("rotation_deg") &&
+           !table.has("world_from_tag");
+  }
+
+  Carrier& carrier(const std::string& name) {
+    auto& carriers = set_.tracking.carriers;
+    const auto found = std::ranges::find(carriers, name, &Carrier::name);
+    return found != carriers.end() ? *found : carriers.emplace_back(Carrier{name, {}});
+  }
+
+  void carried(const Given& table, const std::string& by) {
+    const auto& carriers = set_.tracking.carriers;
+    if (by.empty() || std::ranges::find(carriers, by, &Carrier::name) != carriers.end()) return;
+    std::vector<std::string> known;
+    for (const Carrier& carrier : carriers) known.push_back(carrier.name);
+    const std::string near = nearest(by, known);
+    problem(table, "carrier",
+            "no tag is on a carrier " + codec::quote(by) +
+                (near.empty() ? "; allowed: the carrier of a [[tag]]"
+                              : "; did you mean " + codec::quote(near) + "?"));
   }
 
   // A tag given by its four corners.
@@ -269,6 +303,7 @@ class Resolver {
       object.file_as_written = draft.file.string();
       object.file = existing(table, "file", draft.file);
       object.world_from_file = placed(draft);
+      carried(table, object.carrier);
       set_.objects.push_back(object);
     }
   }
@@ -310,6 +345,7 @@ class Resolver {
       ++number;
       if (draft.light.name.empty()) draft.light.name = "light " + std::to_string(number);
       if (draft.given.good("type")) light(draft.given, draft.light);
+      carried(draft.given, draft.light.carrier);
       set_.lights.push_back(draft.light);
     }
   }
@@ -379,12 +415,59 @@ class Resolver {
     }
   }
 
+  void display() {
+    const Display& display = set_.display;
+    if (display.driver == DisplayDriver::kms) return;
+    const std::string no = std::string("driver \"") + name_of(display.driver) + "\" has no ";
+    exclude(given("display"), {"connector"}, no + "connector; leave it out");
+    if (display.driver == DisplayDriver::none)
+      exclude(given("display"), {"mode"}, no + "mode; leave it out");
+  }
+
+  // A table that no button goes by would be a typing error that nobody notices.
+  void contacts() {
+    std::map<std::string, Position> first;
+    for (const auto& [table, contact] : draft_.contacts) {
+      if (!table.good("name")) continue;
+      const std::string quoted = codec::quote(contact.name);
+      const auto [other, fresh] = first.emplace(contact.name, table.where("name"));
+      const std::string& name = contact.name;  // clang 14 captures no structured binding
+      const bool wires_a_button = std::ranges::any_of(set_.buttons, [&name](const Button& button) {
+        return button.name == name || button.name.starts_with(name + ':');
+      });
+      if (!contact.name.starts_with("gpio:"))
+        problem(table, "name", quoted + " is no GPIO line; allowed: gpio:CHIP or gpio:CHIP:LINE");
+      else if (!fresh)
+        problem(table, "name",
+                quoted + " is already in line " + std::to_string(other->second.line) +
+                    "; allowed: each name once");
+      else if (!wires_a_button)
+        problem(table, "name",
+                quoted +
+                    " has no [[button]]; allowed: a button's name, or its part before the "
+                    "last colon");
+      set_.contacts.push_back(contact);
+    }
+  }
+
   void lighting() {
     const auto& table = given("lighting");
     auto& lighting = set_.lighting;
     if (draft_.environment) {
       lighting.environment_as_written = draft_.environment->string();
       lighting.environment = existing(table, "environment", *draft_.environment);
+    }
+    if (given("lighting.room").at)
+      exclude(
+          given("lighting.sources"), {"distance_m"},
+          "contradicts [lighting.room], on whose walls the lamps are; leave one of the two out");
+    if (lighting.from == LightFrom::recording) {
+      exclude(table, {"environment"}, "does not go with from = \"recording\"; leave one out");
+      if (lighting.mode != LightMode::sources)
+        problem(table, table.has("mode") ? "mode" : "from",
+                std::string("a recording has sources and no picture, so mode \"") +
+                    name_of(lighting.mode) +
+                    "\" cannot be had of it; allowed: mode = \"sources\", or from = \"camera\"");
     }
     if (table.good("resolution") && lighting.resolution != 0 &&
         !std::has_single_bit(static_cast<unsigned>(lighting.resolution)))

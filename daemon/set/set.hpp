@@ -11,8 +11,10 @@
 #include <string>
 #include <vector>
 
+#include "drivers/button_settings.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/camera_settings.hpp"
+#include "drivers/display.hpp"
 
 namespace previz::set {
 
@@ -53,6 +55,13 @@ struct Tag {
   glm::dmat4 world_from_tag{1.0};
 };
 
+// What is moved by hand with tags on it: a stick, a tray. Its own frame stands for the world in the
+// poses of its tags, and of the objects and lamps fixed to it.
+struct Carrier {
+  std::string name;
+  std::vector<Tag> tags;
+};
+
 enum class Presence { phantom, virtual_object, removed };  // in (mixed, real): (1,1) (1,0) (0,1)
 
 // A glTF file (all its nodes) put into the world. glTF is Y up, the world Z up; world_from_file
@@ -64,6 +73,9 @@ struct Object {
   Presence presence = Presence::virtual_object;
   glm::dmat4 world_from_file{1.0};
   std::vector<std::string> nodes;  // glTF node names to take; empty: all
+  std::string carrier;             // whose frame stands for the world; empty: it stays
+  std::string animation;           // of the file, that is played; empty: none
+  bool loops = true;               // the animation, from its end to its beginning
 };
 
 enum class LightType { point, spot, directional, rectangle, sphere };
@@ -90,9 +102,11 @@ struct Light {
   double angular_radius_rad = 0;     // directional: 0 is a delta light
   double inner_cone_rad = 0, outer_cone_rad = std::numbers::pi / 4;  // spot, half angles
   double gain_mixed = 1, gain_real = 0;
+  std::string carrier;  // whose frame stands for the world; empty: it stays
 };
 
 enum class UnseenRule { constant, horizon, mirror, observer };
+enum class LightFrom { camera, recording, set };
 enum class LightMode { image, sources, hybrid };
 enum class Residual { blurred, dropped };
 enum class LightSampling { importance, bsdf };
@@ -115,12 +129,16 @@ struct LightSources {
   double contrast = 8;        // over the mean luminance of what is no source
   double least_share = 0.01;  // of all luminous flux
   Residual residual = Residual::blurred;
-  std::optional<double> distance_m;  // from the light camera; absent: at infinity
+  // From the light camera; absent: on the walls of the room, or at infinity.
+  std::optional<double> distance_m;
 
   friend bool operator==(const LightSources&, const LightSources&) = default;
 };
 
 struct Lighting {
+  // camera: its frames, or `environment` in their place. recording: as the session's track.jsonl
+  // carries it. set: `environment`, or none but the set's lights.
+  LightFrom from = LightFrom::camera;
   LightMode mode = LightMode::image;
   LightSampling sampling = LightSampling::importance;
   // EXR, latitude-longitude; instead of a fisheye.
@@ -181,6 +199,11 @@ struct Button {
   PressKind press = PressKind::short_press;
   std::string action;  // of daemon/set/actions.hpp
 };
+// How the contacts of a GPIO chip, or of one of its lines, are wired.
+struct GpioContact {
+  std::string name;  // "gpio:CHIP" or "gpio:CHIP:LINE"
+  ContactWiring wiring;
+};
 struct Control {
   double move_step_m = 0.01;
   double turn_step_rad = 5 * std::numbers::pi / 180;
@@ -198,6 +221,21 @@ struct Recording {
   double queue_mb = 1024;   // of frames may wait for a slow disk
   double reserve_mb = 512;  // a take ends before the disk has less left
   double timecode_fps = 25;
+  bool composite = false;  // what was shown is recorded too
+};
+
+enum class DisplayDriver { none, kms, headless };
+
+// The crew's screen.
+struct Display {
+  DisplayDriver driver = DisplayDriver::none;
+  std::string connector;            // its stable name; empty: the first that has a screen
+  std::optional<DisplayMode> mode;  // absent: what the screen prefers
+  DisplayScale scale = DisplayScale::letterbox;
+  bool osd = true;                // words over the picture
+  double text_height = 1.0 / 24;  // of the words, over the screen's height
+
+  friend bool operator==(const Display&, const Display&) = default;
 };
 
 struct Output {
@@ -213,8 +251,9 @@ struct Tracking {
   double decimate = 1.0;
   double min_margin = 20.0;  // decision margin of a detection
   int max_hamming = 1;
-  double ambiguity_ratio = 0.2;  // best/second reprojection error above which one tag is ambiguous
-  std::vector<Tag> tags;
+  double ambiguity_ratio = 0.2;   // best/second reprojection error above which one tag is ambiguous
+  std::vector<Tag> tags;          // that stay where they are: the camera is found by them
+  std::vector<Carrier> carriers;  // found once the camera is
 };
 
 struct Set {
@@ -230,8 +269,10 @@ struct Set {
   Estimation estimation;
   Quality quality;
   std::vector<Button> buttons;
+  std::vector<GpioContact> contacts;
   Control control;
   Recording recording;
+  Display display;
   Output output;
 };
 

@@ -114,7 +114,7 @@ Keys light_camera_keys(LightCamera& c) {
 
 Keys light_response_keys(LightCameraCalibration& c) {
   auto keys = response_keys(c.response, c.responsivity);
-  keys.push_back({"dark_level", &c.dark_level, plain.within(0, max_dark_level), "Signal that a covered lens shows, red, green and blue, as a share of white."});
+  keys.push_back({"dark_level", &c.dark_level, plain.within(0, max_dark_level), "Signal that a covered lens shows, red, green and blue, as a share of white (previzd calibrate dark)."});
   return keys;
 }
 
@@ -129,7 +129,7 @@ Keys fisheye_keys(LightCameraCalibration& c) {
       {"cy", &i.cy, px, "Principal point; 0 is the centre of the topmost pixels.", required("511.5")},
       {"k", &i.k, plain, "k1 to k4 of r = t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9, t the angle off axis."},
       {"max_angle_deg", &i.max_angle_rad, deg.above(0, 180), "Angle off axis up to which the calibration holds; nothing is read beyond it.", required("100.0")},
-      {"vignetting", &c.vignetting, plain, "v1 to v3 of the light that comes through, 1 + v1 t^2 + v2 t^4 + v3 t^6, t the angle off axis in radians."},
+      {"vignetting", &c.vignetting, plain, "v1 to v3 of the light that comes through, 1 + v1 t^2 + v2 t^4 + v3 t^6, t the angle off axis in radians (previzd calibrate vignetting)."},
   };
 }
 
@@ -160,6 +160,7 @@ Keys tag_keys(TagDraft& t) {
       {"rotation_deg", &t.pose.rotation, deg, "Turns about world X, then Y, then Z. Unturned it lies face up, its right = X; [90, 0, 0] hangs it on a wall facing -Y.", optional("[0.0, 0.0, 0.0]")},
       {"corners_m", &t.corners, m, "In place of position and rotation: lower left, lower right, upper right, upper left of the black border, as printed.", optional("[[-0.04, -0.04, 0], [0.04, -0.04, 0], [0.04, 0.04, 0], [-0.04, 0.04, 0]]")},
       {"world_from_tag", &t.pose.matrix, plain, "In place of position and rotation: the rigid transform; tag axes right, up, out of the paper.", optional("[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]")},
+      {"carrier", &t.carrier, plain, "Name of what it is stuck to, where that is moved by hand: a stick, a tray. Its frame then stands for the world in the pose, which may be left out: the tag's frame is the carrier's.", optional("\"stick\"")},
   };
 }
 
@@ -169,9 +170,12 @@ Keys object_keys(ObjectDraft& o) {
       {"file", &o.file, plain, "glTF 2.0 (.glb or .gltf); its Y-up is turned to the world's Z-up.", required("\"vase.glb\"")},
       {"presence", &o.object.presence, plain, "\"phantom\" stands for something real, \"virtual\" is added, \"removed\" is real and taken away.", required("\"virtual\"")},
       {"nodes", &o.object.nodes, plain, "Names of the glTF nodes to take; empty: all of the file."},
+      {"animation", &o.object.animation, plain, "Name of the file's animation that is played (translation, rotation and scale of its nodes), with the time of the pictures; left out: nothing moves.", optional("\"walk\"")},
+      {"loops", &o.object.loops, plain, "The animation begins again at its end; false: it stays there."},
       {"position_m", &o.pose.position, m, "Where the file's origin goes in the world.", optional("[0.2, 0.1, 0.0]")},
       {"rotation_deg", &o.pose.rotation, deg, "Turns about world X, then Y, then Z, before it is moved.", optional("[0.0, 0.0, 45.0]")},
       {"scale", &o.scale, plain.above(0, 1e6), "Size factor, before it is turned."},
+      {"carrier", &o.object.carrier, plain, "Carrier of a [[tag]] that it is fixed to: it moves with it, and its pose is in the carrier's frame.", optional("\"stick\"")},
       {"world_from_file", &o.pose.matrix, plain, "In place of the three: any invertible transform.", optional("[[1, 0, 0, 0.2], [0, 1, 0, 0.1], [0, 0, 1, 0], [0, 0, 0, 1]]")},
   };
 }
@@ -197,6 +201,7 @@ Keys light_keys(Light& l) {
       {"angular_radius_deg", &l.angular_radius_rad, deg.within(0, 90), "Directional: half the angle it is seen under; 0: a sharp shadow. The sun: 0.265.", optional("0.265")},
       {"inner_cone_deg", &l.inner_cone_rad, deg.within(0, 90), "Spot: half angle of full intensity; left out: 0.", optional("20.0")},
       {"outer_cone_deg", &l.outer_cone_rad, deg.above(0, 90), "Spot: half angle where its light ends; left out: 45.", optional("35.0")},
+      {"carrier", &l.carrier, plain, "Carrier of a [[tag]] that it is fixed to: it moves with it, and its pose is in the carrier's frame.", optional("\"stick\"")},
       {"gain_mixed", &l.gain_mixed, plain.at_least(0), "Brightness in the picture that is made: 1 as it is, 0 off, 0.3 dimmed."},
       {"gain_real", &l.gain_real, plain.at_least(0), "Brightness in the real scene: 0 for a lamp that is added, 1 for one that is there."},
   };
@@ -205,6 +210,7 @@ Keys light_keys(Light& l) {
 Keys lighting_keys(Draft& d) {
   auto& l = d.set.lighting;
   return {
+      {"from", &l.from, plain, "\"camera\": the light is estimated from the light camera's frames, live or recorded. \"recording\": it is as it was when the session was recorded, with mode = \"sources\". \"set\": neither; all light is what this file says, by environment and [[light]]."},
       {"mode", &l.mode, plain, "\"image\": the whole fisheye picture lights the scene. \"sources\": its lamps do, as discs or spheres, which takes far fewer samples; what is left of it is blurred or dropped. \"hybrid\": its lamps, and all that is left of it as a picture."},
       {"sampling", &l.sampling, plain, "How directions towards the light are chosen; \"bsdf\" is noisier, for comparison."},
       {"environment", &d.environment, plain, "Latitude-longitude EXR in place of the light camera; Z up, the picture's middle is +X.", optional("\"env.exr\"")},
@@ -235,7 +241,7 @@ Keys light_sources_keys(LightSources& l) {
       {"contrast", &l.contrast, plain.within(2, 1e6), "How many times brighter than the mean of all that is no lamp a lamp is, at least."},
       {"least_share", &l.least_share, plain.within(0, 1), "Share of all light that a lamp brings, at least; fainter ones, such as reflections of lamps, stay in the picture."},
       {"residual", &l.residual, plain, "With mode = \"sources\": the light of everything but the lamps, without its shapes, or none of it (how much that is, is told)."},
-      {"distance_m", &l.distance_m, m.above(0, far_m), "How far from the light camera the lamps are; left out: they are at infinity.", optional("2.5")},
+      {"distance_m", &l.distance_m, m.above(0, far_m), "How far from the light camera the lamps are; left out: on the walls of [lighting.room], without one at infinity.", optional("2.5")},
   };
 }
 
@@ -274,6 +280,15 @@ Keys button_keys(Button& b) {
   };
 }
 
+Keys gpio_keys(GpioContact& c) {
+  return {
+      {"name", &c.name, plain, "A button on a GPIO line, or without its last part all lines of the chip that have no table of their own.", required("\"gpio:rig-buttons\"")},
+      {"active_low", &c.wiring.active_low, plain, "Whether a pressed button pulls the line low (a contact to ground)."},
+      {"bias", &c.wiring.bias, plain, "The chip's own resistor on the line; \"as_is\" leaves it alone."},
+      {"debounce_s", &c.wiring.debounce_s, seconds.within(0, 1), "What follows an edge within this time is the contact's bouncing."},
+  };
+}
+
 Keys control_keys(Control& c) {
   return {
       {"move_step_m", &c.move_step_m, m.above(0, 100), "A step of move_left and the like."},
@@ -294,6 +309,18 @@ Keys recording_keys(Recording& r) {
       {"queue_mb", &r.queue_mb, megabytes.within(1, 1e6), "Frames that may wait in memory for a slow disk; what does not fit is dropped, counted and told."},
       {"reserve_mb", &r.reserve_mb, megabytes.within(1, 1e9), "A take ends in order before the disk has less space left than this."},
       {"timecode_fps", &r.timecode_fps, plain.within(1, 240), "Frames of a second of timecode (time of day)."},
+      {"composite", &r.composite, plain, "Record what was shown too, without overlay: composite.mkv, lossless, for whoever looks at takes elsewhere."},
+  };
+}
+
+Keys display_keys(Display& d) {
+  return {
+      {"driver", &d.driver, plain, "\"kms\": a screen on this computer's graphics card, which no window system uses. \"headless\": drawn the same, and written to screen.png beside the output about once a second. \"none\": nothing is drawn."},
+      {"connector", &d.connector, plain, "The screen's stable name as `previzd devices` prints it; left out: the first that has a screen.", optional("\"HDMI-A-1\"")},
+      {"mode", &d.mode, plain, "Size and rate; left out: what the screen prefers.", optional("\"1920x1080@50\"")},
+      {"scale", &d.scale, plain, "\"letterbox\": as large as fits. \"1:1\": a pixel of the picture is one of the screen."},
+      {"osd", &d.osd, plain, "Words over the picture: mode, take, tracking, faults; never in what is recorded. The action \"osd\" changes it."},
+      {"text_height", &d.text_height, plain.within(0.01, 0.2), "Size of the words, over the screen's height."},
   };
 }
 
@@ -349,8 +376,10 @@ std::vector<Section> sections(Draft& d) {
       once("estimator", always, "How light is simulated.", [&d] { return estimator_keys(d.set.estimation); }),
       once("quality", always, "What a frame may cost.", [&d] { return quality_keys(d.set.quality); }),
       many("button", "What a button does; one table for each way to press it.", d.buttons, [](ButtonDraft& b) { return button_keys(b.button); }),
+      many("gpio", "How buttons on GPIO lines are wired; one table for each chip or line that is wired otherwise than as below.", d.contacts, [](GpioDraft& g) { return gpio_keys(g.contact); }),
       once("control", always, "How much an action changes.", [&d] { return control_keys(d.set.control); }),
       once("recording", always, "Takes.", [&d] { return recording_keys(d.set.recording); }),
+      once("display", always, "The crew's screen.", [&d] { return display_keys(d.set.display); }),
       once("output", always, "What is written.", [&d] { return output_keys(d.set.output); }),
   };
   // clang-format on

@@ -44,6 +44,7 @@ struct TagDraft {
   std::optional<double> size;
   PoseDraft pose;
   std::optional<std::array<glm::dvec3, 4>> corners;
+  std::string carrier;
 };
 
 struct ObjectDraft {
@@ -69,6 +70,11 @@ struct ButtonDraft {
   Button button;
 };
 
+struct GpioDraft {
+  Given given;
+  GpioContact contact;
+};
+
 // The file as it is written. What needs no second thought is read straight into `set`; the rest is
 // brought there by resolve().
 struct Draft {
@@ -88,6 +94,7 @@ struct Draft {
   std::vector<SurfaceDraft> surfaces;
   std::vector<LightDraft> lights;
   std::vector<ButtonDraft> buttons;
+  std::vector<GpioDraft> contacts;
 };
 
 // What becomes of a key that is not written. `example` is shown in the reference.

@@ -179,6 +179,18 @@ struct Codec<glm::dvec3> {
   static std::string describe(const Rule& rule) { return Array::describe(rule); }
 };
 
+template <>
+struct Codec<DisplayMode> {
+  static DisplayMode read(const Value& value, const Rule& rule) {
+    if (const auto mode = parse_display_mode(codec::text(value))) return *mode;
+    codec::misread(value, describe(rule));
+  }
+  static std::string print(const DisplayMode& mode, const Rule&) {
+    return codec::quote(to_string(mode));
+  }
+  static std::string describe(const Rule&) { return "text, WIDTHxHEIGHT or WIDTHxHEIGHT@RATE"; }
+};
+
 // Four points, each of three numbers.
 template <>
 struct Codec<std::array<glm::dvec3, 4>> {

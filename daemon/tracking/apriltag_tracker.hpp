@@ -16,7 +16,8 @@ namespace previz::tracking {
 // A pose that two views explain about equally well (one tag seen face on, a small flat map) is
 // ambiguous unless a pose tracked at most 0.5 s before lies within reach (3 rad/s) of one of them
 // only. A frame that follows a tracked one is searched at `settings.decimate`, and once more at
-// full resolution if that finds no pose; every other frame at full resolution.
+// full resolution if that finds no pose, or not that of a carrier which the frame before showed;
+// every other frame at full resolution. Carriers are found by the same rules, each by its own tags.
 std::unique_ptr<Tracker> make_apriltag_tracker(const set::Tracking& settings,
                                                const PinholeIntrinsics& intrinsics,
                                                const ResponseCurve& response = {});

@@ -77,6 +77,7 @@ Photometry::Photometry(const ResponseCurve& response)
 }
 
 std::vector<std::uint8_t> Photometry::gray8(const Frame& frame) const {
+  if (frame.bayer != BayerPattern::none) return gray8(*demosaiced(std::make_shared<Frame>(frame)));
   const std::size_t pixels = std::size_t(frame.width) * std::size_t(frame.height);
   std::vector<std::uint8_t> gray(pixels);
   const std::uint8_t* bytes = frame.bytes.data();

@@ -110,6 +110,8 @@ TagDetector::TagDetector(const DetectorSettings& settings, const PinholeIntrinsi
 TagDetector::~TagDetector() = default;
 
 std::vector<TagDetection> TagDetector::detect(const Frame& frame, double decimate) {
+  if (frame.bayer != BayerPattern::none)
+    return detect(*demosaiced(std::make_shared<Frame>(frame)), decimate);
   std::vector<TagDetection> tags;
   if (frame.width < kMinPictureSide * decimate || frame.height < kMinPictureSide * decimate)
     return tags;

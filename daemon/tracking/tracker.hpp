@@ -20,6 +20,19 @@ struct Pose {
   std::vector<int> tags;  // ids used
 };
 
+// Where a carrier of the set is.
+struct CarrierPose {
+  glm::dmat4 world_from_carrier{1.0};
+  // As Pose::covariance, of the camera's pose too, in the carrier's frame.
+  std::array<double, 36> covariance{};
+  std::vector<int> tags;  // ids used
+};
+struct CarrierTrack {
+  std::string name;
+  std::optional<CarrierPose> pose;  // absent: not found in this frame, or the camera was not
+  std::string reason;               // as Track::reason
+};
+
 enum class TrackStatus { tracked, ambiguous, lost };
 const char* to_string(TrackStatus status);  // "tracked" and so on
 
@@ -29,7 +42,8 @@ struct Track {
   std::vector<Pose> candidates;  // ambiguous: both poses, likelier first
   // Lost or ambiguous: why, in plain words. Tracked: which tags were left out and why, if any.
   std::string reason;
-  std::vector<int> seen_tags;  // every id detected, of the map or not
+  std::vector<int> seen_tags;          // every id detected, of the map or not
+  std::vector<CarrierTrack> carriers;  // all of the set's
 };
 
 class Tracker {

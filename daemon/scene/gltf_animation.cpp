@@ -1,0 +1,180 @@
+#include "daemon/scene/gltf_animation.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "daemon/scene/gltf_accessor.hpp"
+#include "daemon/scene/gltf_nodes.hpp"
+#include "daemon/set/problems.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::scene {
+namespace {
+
+std::size_t place(int index) {
+  return static_cast<std::size_t>(index);
+}
+
+const tinygltf::Animation& animation_named(const tinygltf::Model& model, const std::string& name,
+                                           const std::string& file) {
+  std::vector<std::string> known;
+  for (const tinygltf::Animation& animation : model.animations) {
+    if (animation.name == name) return animation;
+    known.push_back(animation.name);
+  }
+  const std::string near = set::nearest(name, known);
+  throw Error(file + ": has no animation \"" + set::printable(name) + "\"" +
+              (near.empty() ? std::string() : "; did you mean \"" + set::printable(near) + "\"?"));
+}
+
+Interpolation interpolation_of(const tinygltf::AnimationSampler& sampler,
+                               const std::string& where) {
+  if (sampler.interpolation == "STEP") return Interpolation::step;
+  if (sampler.interpolation == "CUBICSPLINE") return Interpolation::cubic_spline;
+  if (sampler.interpolation == "LINEAR" || sampler.interpolation.empty())
+    return Interpolation::linear;
+  throw Error(where + ": interpolation \"" + set::printable(sampler.interpolation) +
+              "\" is not one of glTF's");
+}
+
+std::vector<double> times_of(const tinygltf::Model& model, int accessor, const std::string& where) {
+  std::vector<double> times;
+  for (const float time : read_scalars(model, accessor, where + ", input")) times.push_back(time);
+  const bool sound = !times.empty() && times.front() >= 0 && std::isfinite(times.back()) &&
+                     std::ranges::adjacent_find(times, std::greater_equal<>()) == times.end();
+  if (!sound) throw Error(where + ": its times are not increasing from 0 s or later");
+  return times;
+}
+
+AnimationChannel channel_of(const tinygltf::Model& model, const tinygltf::AnimationSampler& sampler,
+                            bool is_rotation, const std::string& where) {
+  AnimationChannel channel;
+  channel.interpolation = interpolation_of(sampler, where);
+  channel.times_s = times_of(model, sampler.input, where);
+  const std::string output = where + ", output";
+  if (is_rotation)
+    for (const glm::vec4& value : read_vec4s(model, sampler.output, output))
+      channel.values.emplace_back(value);
+  else
+    for (const glm::vec3& value : read_vec3s(model, sampler.output, output))
+      channel.values.emplace_back(value, 0);
+
+  const bool is_cubic = channel.interpolation == Interpolation::cubic_spline;
+  const std::size_t wanted = channel.times_s.size() * (is_cubic ? 3 : 1);
+  if (channel.values.size() != wanted)
+    throw Error(output + ": has " + std::to_string(channel.values.size()) +
+                " values where its times ask for " + std::to_string(wanted));
+  for (std::size_t i = 0; i < wanted; ++i) {
+    const glm::dvec4& value = channel.values[i];
+    const bool is_key = !is_cubic || i % 3 == 1;  // tangents may be anything
+    if (!std::isfinite(value.x + value.y + value.z + value.w) ||
+        (is_rotation && is_key && !(glm::dot(value, value) > 1e-12)))
+      throw Error(output + ": value " + std::to_string(i) + " is not finite, or no rotation");
+  }
+  return channel;
+}
+
+}  // namespace
+
+GltfAnimation::GltfAnimation(const tinygltf::Model& model, const std::string& name,
+                             const std::string& file, Notes& notes)
+    : model_(model),
+      file_(file),
+      notes_(notes),
+      parents_(model.nodes.size(), -1),
+      moved_(model.nodes.size()),
+      is_moved_(model.nodes.size()),
+      taken_up_(model.nodes.size(), no_node) {
+  const tinygltf::Animation& animation = animation_named(model, name, file);
+  for (std::size_t i = 0; i < animation.channels.size(); ++i)
+    read_channel(
+        animation, animation.channels[i],
+        file + ": animation \"" + set::printable(name) + "\", channel " + std::to_string(i));
+  if (!(duration_s_ > 0))
+    throw Error(file + ": animation \"" + set::printable(name) +
+                "\" moves nothing, or for no time");
+  find_parents();
+  find_moved();
+}
+
+void GltfAnimation::read_channel(const tinygltf::Animation& animation,
+                                 const tinygltf::AnimationChannel& given,
+                                 const std::string& where) {
+  if (given.target_node < 0) return;  // glTF 2.0, 3.11: to be ignored
+  if (place(given.target_node) >= moved_.size())
+    throw Error(where + ": there is no node " + std::to_string(given.target_node));
+  const tinygltf::Node& node = model_.nodes[place(given.target_node)];
+  AnimatedNode& moved = moved_[place(given.target_node)];
+  AnimationChannel* const channel = given.target_path == "translation" ? &moved.translations
+                                    : given.target_path == "rotation"  ? &moved.rotations
+                                    : given.target_path == "scale"     ? &moved.scales
+                                                                       : nullptr;
+  if (!channel)
+    return notes_.add("animation \"" + set::printable(animation.name) + "\": its channels of \"" +
+                      set::printable(given.target_path) + "\" are not played");
+  if (!node.matrix.empty())
+    throw Error(where + ": " + node_name(model_, given.target_node) +
+                " has a matrix; only translation, rotation and scale can be animated");
+  if (given.sampler < 0 || place(given.sampler) >= animation.samplers.size())
+    throw Error(where + ": there is no sampler " + std::to_string(given.sampler));
+  *channel = channel_of(model_, animation.samplers[place(given.sampler)],
+                        channel == &moved.rotations, where);
+  moved.moves = true;
+  duration_s_ = std::max(duration_s_, channel->times_s.back());
+}
+
+void GltfAnimation::find_parents() {
+  for (std::size_t i = 0; i < parents_.size(); ++i)
+    for (const int child : model_.nodes[i].children) {
+      if (child < 0 || place(child) >= parents_.size())
+        throw Error(file_ + ": there is no node " + std::to_string(child));
+      if (parents_[place(child)] >= 0)
+        throw Error(file_ + ": " + node_name(model_, child) + " has two parents");
+      parents_[place(child)] = static_cast<int>(i);
+    }
+}
+
+// Each node is looked at once: up to one that is known, and down again.
+void GltfAnimation::find_moved() {
+  std::vector<bool> is_known(parents_.size());
+  std::vector<int> path;
+  for (std::size_t i = 0; i < parents_.size(); ++i) {
+    int above = static_cast<int>(i);
+    for (path.clear(); above >= 0 && !is_known[place(above)]; above = parents_[place(above)]) {
+      if (path.size() == parents_.size())
+        throw Error(file_ + ": " + node_name(model_, above) + " is its own ancestor");
+      path.push_back(above);
+    }
+    for (auto node = path.rbegin(); node != path.rend(); above = *node++) {
+      is_moved_[place(*node)] =
+          moved_[place(*node)].moves || (above >= 0 && is_moved_[place(above)]);
+      is_known[place(*node)] = true;
+    }
+  }
+}
+
+std::uint32_t GltfAnimation::use(int node, std::vector<AnimatedNode>& nodes) {
+  return is_moved_[place(node)] ? take_up(node, nodes) : no_node;
+}
+
+std::uint32_t GltfAnimation::take_up(int node, std::vector<AnimatedNode>& nodes) {
+  std::vector<int> path;  // from the node up to the first that is there already, or a root
+  for (int at = node; at >= 0 && taken_up_[place(at)] == no_node; at = parents_[place(at)])
+    path.push_back(at);
+  for (auto at = path.rbegin(); at != path.rend(); ++at) {
+    AnimatedNode taken = moved_[place(*at)];
+    const int parent = parents_[place(*at)];
+    if (parent >= 0) taken.parent = taken_up_[place(parent)];
+    const NodeTransform rest =
+        transform_of(model_.nodes[place(*at)], file_ + ": " + node_name(model_, *at));
+    taken.parent_from_node = rest.parent_from_node;
+    taken.translation = rest.translation;
+    taken.rotation = rest.rotation;
+    taken.scale = rest.scale;
+    taken_up_[place(*at)] = static_cast<std::uint32_t>(nodes.size());
+    nodes.push_back(std::move(taken));
+  }
+  return taken_up_[place(node)];
+}
+
+}  // namespace previz::scene

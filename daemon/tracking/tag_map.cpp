@@ -1,0 +1,158 @@
+#include "daemon/tracking/tag_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <set>
+
+#include "drivers/error.hpp"
+
+namespace previz::tracking {
+namespace {
+
+constexpr std::int64_t kMemoryNs = 500'000'000;           // a pose older than this says nothing
+constexpr double kReachRad = 0.035, kReachRadPerS = 3.0;  // how far a camera may have turned
+// Likelihood ratio exp(-10): below this difference of chi-squares noise alone could swap two poses.
+constexpr double kDecisiveChiSquare = 20;
+constexpr double kSamePoseChiSquare = 16;  // two poses within each other's noise, 6 degrees
+
+Pose to_pose(const FittedPose& fit, const std::vector<TagObservation>& tags) {
+  Pose pose;
+  pose.world_from_camera = world_from_camera(fit.pose);
+  pose.covariance = fit.covariance;
+  pose.reprojection_rms_px = fit.rms_px;
+  for (std::size_t i : fit.used) pose.tags.push_back(tags[i].id);
+  return pose;
+}
+
+// Whether b lies within the noise of a: then there is nothing to choose between.
+bool within_noise(const FittedPose& a, const FittedPose& b) {
+  const glm::dmat3 turn = a.pose.rotation * glm::transpose(b.pose.rotation);
+  const glm::dvec3 axis(turn[1][2] - turn[2][1], turn[2][0] - turn[0][2], turn[0][1] - turn[1][0]);
+  const double sine = glm::length(axis) / 2;
+  const double angle = std::atan2(sine, (turn[0][0] + turn[1][1] + turn[2][2] - 1) / 2);
+  const glm::dvec3 w = sine > 1e-12 ? axis / (2 * sine) * angle : glm::dvec3(0);
+  const glm::dmat4 between = glm::inverse(world_from_camera(a.pose)) * world_from_camera(b.pose);
+  const cv::Matx<double, 6, 1> d(w.x, w.y, w.z, between[3][0], between[3][1], between[3][2]);
+  const cv::Matx<double, 6, 6> covariance(a.covariance.data());
+  return d.dot(covariance.solve(d, cv::DECOMP_SVD)) < kSamePoseChiSquare;
+}
+
+}  // namespace
+
+std::string tags_in_words(const std::vector<int>& ids) {
+  std::string text;
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    text += (i == 0 ? "" : i + 1 == ids.size() ? " and " : ", ") + std::to_string(ids[i]);
+  return (ids.size() == 1 ? "tag " : "tags ") + text;
+}
+
+TagMap::TagMap(const std::vector<set::Tag>& tags, const PinholeIntrinsics& lens,
+               double ambiguity_ratio)
+    : lens_(lens), ambiguity_ratio_(ambiguity_ratio) {
+  for (const set::Tag& tag : tags) {
+    const std::string key = "tracking.tags: tag " + std::to_string(tag.id);
+    if (!(tag.size_m > 0)) throw Error(key + ": the size must be above 0 m");
+    if (!tags_.emplace(tag.id, tag).second) throw Error(key + " is in the map twice");
+  }
+}
+
+Track TagMap::locate(const std::vector<TagDetection>& detections, std::int64_t time_ns) const {
+  Track track;
+  std::vector<TagObservation> tags;
+  std::string trouble;
+  const auto add = [&](const std::string& text) {
+    trouble += (trouble.empty() ? "" : "; ") + text;
+  };
+  for (const TagDetection& d : detections) {
+    const auto known = tags_.find(d.id);
+    if (known == tags_.end()) continue;
+    if (!d.trouble.empty())
+      add(tags_in_words({d.id}) + ": " + d.trouble);
+    else
+      tags.push_back(
+          {d.id, known->second.size_m, known->second.world_from_tag, d.corners, d.covariance});
+  }
+  if (tags.empty()) {
+    track.reason = trouble;
+    return track;
+  }
+
+  choose(solve_joint_pose(tags, lens_, last_), tags, time_ns, &track);
+  if (track.pose) {
+    std::vector<int> left_out;
+    std::multiset<int> used(track.pose->tags.begin(), track.pose->tags.end());
+    for (const TagObservation& tag : tags) {
+      const auto found = used.find(tag.id);
+      if (found == used.end())
+        left_out.push_back(tag.id);
+      else
+        used.erase(found);
+    }
+    if (!left_out.empty()) add(tags_in_words(left_out) + ": not where the map says");
+  }
+  if (!trouble.empty()) track.reason += (track.reason.empty() ? "" : "; ") + trouble;
+  return track;
+}
+
+void TagMap::remember(const Pose& pose, std::int64_t time_ns) {
+  last_ = camera_from_world(pose.world_from_camera);
+  last_time_ns_ = time_ns;
+}
+
+void TagMap::forget_if_old(std::int64_t now_ns) {
+  if (last_ && !(now_ns >= last_time_ns_ && now_ns - last_time_ns_ <= kMemoryNs)) last_.reset();
+}
+
+bool TagMap::within_reach(const FittedPose& fit, std::int64_t time_ns) const {
+  const double seconds = 1e-9 * double(time_ns - last_time_ns_);
+  return last_ && rotation_between(*last_, fit.pose) <= kReachRad + kReachRadPerS * seconds;
+}
+
+void TagMap::choose(const std::vector<FittedPose>& poses, const std::vector<TagObservation>& tags,
+                    std::int64_t time_ns, Track* track) const {
+  std::vector<int> ids;
+  for (const TagObservation& tag : tags) ids.push_back(tag.id);
+  const double gate_px = consistency_gate_px(lens_);
+  if (poses.empty() || !(poses.front().rms_px <= gate_px)) {
+    track->reason = "no pose explains " + tags_in_words(ids);
+    return;
+  }
+
+  // The poses that cannot be ruled out, better first.
+  const FittedPose& best = poses.front();
+  const double variance = std::max(1.0, best.chi_square / std::max(1, best.degrees_of_freedom));
+  bool contradiction = false;
+  std::vector<const FittedPose*> plausible{&best};
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    const FittedPose& rival = poses[i];
+    const bool worse = best.rms_px <= ambiguity_ratio_ * rival.rms_px &&
+                       rival.chi_square - best.chi_square > kDecisiveChiSquare * variance;
+    if (worse || (rival.used == best.used && within_noise(best, rival))) continue;
+    contradiction = contradiction || rival.used != best.used;
+    plausible.push_back(&rival);
+  }
+
+  const FittedPose* chosen = plausible.size() == 1 ? &best : nullptr;
+  if (!chosen) {
+    std::vector<const FittedPose*> reachable;
+    for (const FittedPose* p : plausible)
+      if (within_reach(*p, time_ns)) reachable.push_back(p);
+    if (reachable.size() == 1) chosen = reachable.front();
+  }
+  if (chosen) {
+    track->status = TrackStatus::tracked;
+    track->pose = to_pose(*chosen, tags);
+    return;
+  }
+  if (contradiction) {
+    track->reason = tags_in_words(ids) + " contradict each other in this map";
+    return;
+  }
+  track->status = TrackStatus::ambiguous;
+  track->reason =
+      std::to_string(plausible.size()) + " poses explain " + tags_in_words(ids) + " alike";
+  for (const FittedPose* p : plausible) track->candidates.push_back(to_pose(*p, tags));
+}
+
+}  // namespace previz::tracking

@@ -1,0 +1,49 @@
+// Tags that keep their places among each other, and the camera's pose among them: those of the
+// stage, or those of a carrier, whose frame then stands for the world.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/set/set.hpp"
+#include "daemon/tracking/joint_pose.hpp"
+#include "daemon/tracking/tag_detector.hpp"
+#include "daemon/tracking/tracker.hpp"
+#include "drivers/calibration.hpp"
+
+namespace previz::tracking {
+
+// "tags 3, 5 and 8"
+std::string tags_in_words(const std::vector<int>& ids);
+
+// Remembers the last pose, which settles what one picture leaves open.
+class TagMap {
+ public:
+  // Throws previz::Error naming the key where a tag's size is not positive or an id is used twice.
+  TagMap(const std::vector<set::Tag>& tags, const PinholeIntrinsics& lens, double ambiguity_ratio);
+
+  bool has(int id) const { return tags_.contains(id); }
+
+  // The camera's pose by those detections that are of this map. Fills neither seen_tags nor
+  // carriers.
+  Track locate(const std::vector<TagDetection>& detections, std::int64_t time_ns) const;
+  void remember(const Pose& pose, std::int64_t time_ns);
+  void forget_if_old(std::int64_t now_ns);
+  void reset() { last_.reset(); }
+
+ private:
+  bool within_reach(const FittedPose& fit, std::int64_t time_ns) const;
+  void choose(const std::vector<FittedPose>& poses, const std::vector<TagObservation>& tags,
+              std::int64_t time_ns, Track* track) const;
+
+  PinholeIntrinsics lens_;
+  double ambiguity_ratio_;
+  std::map<int, set::Tag> tags_;
+  std::optional<CameraFromWorld> last_;
+  std::int64_t last_time_ns_ = 0;
+};
+
+}  // namespace previz::tracking
