@@ -2,32 +2,19 @@
 
 #include <fmt/ostream.h>
 
-#include <numbers>
-
 #include "daemon/calibrate/coverage.hpp"
 #include "daemon/calibrate/fisheye.hpp"
+#include "daemon/calibrate/known_camera.hpp"
 #include "daemon/calibrate/light_pose.hpp"
 #include "daemon/calibrate/observer.hpp"
 #include "daemon/calibrate/report.hpp"
 #include "daemon/calibrate/residual_plot.hpp"
-#include "daemon/pipeline/take.hpp"
 #include "daemon/set/print.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
-#include "drivers/session/session.hpp"
 
 namespace previz::calibrate {
 namespace {
-
-constexpr double degree = std::numbers::pi / 180;
-
-// Pictures are taken as sRGB unless a session says what its camera's response is.
-ResponseCurve response_of(const std::filesystem::path& footage, const std::string& stream) {
-  if (!is_session(footage)) return {};
-  const session::SessionInfo info = session::open_session(footage).info;
-  if (stream == "observer") return info.observer ? info.observer->response : ResponseCurve{};
-  return info.light ? info.light->response : ResponseCurve{};
-}
 
 Views gather(const LensOptions& options, const std::string& stream, const KnownLens& lens,
              std::ostream& out) {
@@ -64,19 +51,6 @@ FisheyeFit calibrate_fisheye(const LightOptions& options, std::ostream& out) {
   plot(options, views, fisheye.fit, fisheye.picture, out);
   insist(missing_views(views, fisheye), options.force, out);
   return fisheye;
-}
-
-// The lens where no board is given: the set's own, otherwise the session's.
-LightCameraCalibration known_light_camera(const set::Set& set,
-                                          const std::filesystem::path& footage) {
-  session::SessionInfo info;
-  if (is_session(footage)) info = session::open_session(footage).info;
-  const auto calibration = pipeline::light_calibration(set, info);
-  if (!calibration)
-    throw Error(set.file.string() +
-                ": light_camera.intrinsics: the light camera's lens is not known; give --board, or "
-                "the table in the set");
-  return *calibration;
 }
 
 std::string pose_by_tags(const LightOptions& options, const set::Set& set,

@@ -37,6 +37,19 @@ struct ResponseOptions {
   std::optional<std::filesystem::path> table_file;
 };
 
+struct DarkOptions {
+  std::filesystem::path footage;                  // session, folder of pictures, or video
+  std::optional<std::filesystem::path> set_file;  // with the light camera's response
+  std::optional<std::filesystem::path> table_file;
+};
+
+struct VignettingOptions {
+  std::filesystem::path footage;   // likewise, of something evenly lit
+  std::filesystem::path set_file;  // with the light camera's lens, response and dark level
+  bool force = false;              // print the table although the light was not even
+  std::optional<std::filesystem::path> table_file;
+};
+
 struct ThinLensOptions {
   std::optional<double> focal_length_mm, f_number, focus_distance_m, sensor_width_mm;
   std::optional<std::filesystem::path> photo;     // of the lens as it is set, with EXIF
@@ -59,6 +72,8 @@ struct BalanceOptions {
 void calibrate_observer(const LensOptions& options, std::ostream& out);
 void calibrate_light(const LightOptions& options, std::ostream& out);
 void calibrate_response(const ResponseOptions& options, std::ostream& out);
+void calibrate_dark(const DarkOptions& options, std::ostream& out);
+void calibrate_vignetting(const VignettingOptions& options, std::ostream& out);
 void calibrate_lens(const ThinLensOptions& options, std::ostream& out);
 void calibrate_balance(const BalanceOptions& options, std::ostream& out);
 

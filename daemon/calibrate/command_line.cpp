@@ -48,6 +48,27 @@ void add_response(CLI::App& calibrate, ResponseOptions& options) {
   command.add_option("--out", options.table_file, "File for the set file's table");
 }
 
+void add_dark(CLI::App& calibrate, DarkOptions& options) {
+  CLI::App& command = *calibrate.add_subcommand(
+      "dark", "The light camera's dark level, from pictures of the covered lens");
+  command.add_option("footage", options.footage, "Session, folder of pictures, or video")
+      ->required();
+  command.add_option("--set", options.set_file, "Set file with its response (default: session's)");
+  command.add_option("--out", options.table_file, "File for the set file's table");
+}
+
+void add_vignetting(CLI::App& calibrate, VignettingOptions& options) {
+  CLI::App& command = *calibrate.add_subcommand(
+      "vignetting",
+      "What the fisheye loses towards its edge, from pictures of something evenly lit");
+  command.add_option("footage", options.footage, "Session, folder of pictures, or video")
+      ->required();
+  command.add_option("--set", options.set_file, "Set file with its lens, response and dark level")
+      ->required();
+  command.add_option("--out", options.table_file, "File for the set file's table");
+  command.add_flag("--force", options.force, "Take it although the light was not even");
+}
+
 void add_lens(CLI::App& calibrate, ThinLensOptions& options) {
   CLI::App& command = *calibrate.add_subcommand("lens", "What depth of field needs of the lens");
   command.add_option("--focal-length", options.focal_length_mm, "As engraved, mm");
@@ -87,6 +108,8 @@ void add_calibrate(CLI::App& app, Commands& commands) {
   add_observer(command, commands.observer);
   add_light(command, commands.light);
   add_response(command, commands.response);
+  add_dark(command, commands.dark);
+  add_vignetting(command, commands.vignetting);
   add_lens(command, commands.lens);
   add_balance(command, commands.balance);
 }
@@ -96,6 +119,8 @@ int do_calibrate(const CLI::App& app, const Commands& commands, std::ostream& ou
   if (command.got_subcommand("observer")) calibrate_observer(commands.observer, out);
   if (command.got_subcommand("light")) calibrate_light(commands.light, out);
   if (command.got_subcommand("response")) calibrate_response(commands.response, out);
+  if (command.got_subcommand("dark")) calibrate_dark(commands.dark, out);
+  if (command.got_subcommand("vignetting")) calibrate_vignetting(commands.vignetting, out);
   if (command.got_subcommand("lens")) calibrate_lens(commands.lens, out);
   if (command.got_subcommand("balance")) calibrate_balance(commands.balance, out);
   return 0;

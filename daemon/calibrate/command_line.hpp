@@ -15,6 +15,8 @@ struct Commands {
   LensOptions observer;
   LightOptions light;
   ResponseOptions response;
+  DarkOptions dark;
+  VignettingOptions vignetting;
   ThinLensOptions lens;
   BalanceOptions balance;
 };

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <numbers>
 #include <optional>
 #include <ostream>
 #include <span>
@@ -13,6 +14,8 @@
 #include "daemon/calibrate/views.hpp"
 
 namespace previz::calibrate {
+
+inline constexpr double degree = std::numbers::pi / 180;
 
 // Views with their rms, what was left out, the parameters with their standard deviations, and how
 // certain the projection is.

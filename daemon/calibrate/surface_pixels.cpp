@@ -142,7 +142,8 @@ class Probe {
     const std::size_t count = take_.observer_stream->records().size();
     const auto wanted = std::size_t(options_.frames);
     std::vector<pipeline::Shot> shots;
-    pipeline::TrackStage track(take_.set, take_.observer, take_.session.track);
+    pipeline::TrackStage track(take_.set, take_.observer, take_.session.track,
+                               pipeline::start_of(take_));
     for (std::size_t i = 0; i < wanted; ++i) {
       // The first that is tracked from here to where the next one's share begins; from the end for
       // the last, since light comes after the first pictures of some takes.

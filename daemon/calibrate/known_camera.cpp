@@ -1,0 +1,38 @@
+#include "daemon/calibrate/known_camera.hpp"
+
+#include "daemon/calibrate/source.hpp"
+#include "daemon/pipeline/take.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/session.hpp"
+
+namespace previz::calibrate {
+
+ResponseCurve response_of(const std::filesystem::path& footage, const std::string& stream) {
+  if (!is_session(footage)) return {};
+  const session::SessionInfo info = session::open_session(footage).info;
+  if (stream == "observer") return info.observer ? info.observer->response : ResponseCurve{};
+  return info.light ? info.light->response : ResponseCurve{};
+}
+
+ResponseCurve light_response(const std::optional<std::filesystem::path>& set_file,
+                             const std::filesystem::path& footage) {
+  if (set_file)
+    if (const auto calibration = set::load_set(*set_file).light_camera.calibration)
+      return calibration->response;
+  return response_of(footage, "light");
+}
+
+LightCameraCalibration known_light_camera(const set::Set& set,
+                                          const std::filesystem::path& footage) {
+  session::SessionInfo info;
+  if (is_session(footage)) info = session::open_session(footage).info;
+  const auto calibration = pipeline::light_calibration(set, info);
+  if (!calibration)
+    throw Error(
+        set.file.string() +
+        ": light_camera.intrinsics: the light camera's lens is not known; it needs the table "
+        "in the set, which `previzd calibrate light --board` prints");
+  return *calibration;
+}
+
+}  // namespace previz::calibrate
