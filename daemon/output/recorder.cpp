@@ -60,6 +60,17 @@ void Recorder::offer(const FramePtr& frame) {
   note("recording: the disk is too slow; frames are left out");
 }
 
+void Recorder::offer_shown(const FramePtr& frame) {
+  const Captured captured{frame, WallClock::now()};
+  {
+    const std::lock_guard lock(mutex_);
+    if (!status_.recording) return;
+    if (queued_bytes_ + bytes_of(captured) <= options_.queue_bytes / 2) return enqueue(captured);
+    if (++status_.dropped_shown > 1) return;
+  }
+  note("recording: the disk is too slow; pictures that were shown are left out");
+}
+
 void Recorder::remember_light(const Captured& captured) {
   older_light_[lighting::exposure_step(captured.frame->exposure)] = captured;
 }
@@ -107,7 +118,8 @@ void Recorder::start() {
   if (status_.recording) return;
   status_.recording = true;
   late_tracks_ = false;
-  status_.dropped = status_.frames = 0;
+  status_.dropped = status_.dropped_shown = status_.frames = 0;
+  status_.seconds = 0;
   status_.fault.clear();
   enqueue(Start{});
   std::vector<Captured> lights;
@@ -205,6 +217,11 @@ void Recorder::handle(Entry& entry) {
 }
 
 void Recorder::write(const Captured& captured) {
+  if (!take_->fits(*captured.frame) && captured.frame->source == "composite") {
+    const std::lock_guard lock(mutex_);  // of a camera as it was before its format changed
+    ++status_.dropped_shown;
+    return;
+  }
   if (!take_->fits(*captured.frame)) {
     note("recording: the " + captured.frame->source + " camera changed its format; " +
          take_->directory().filename().string() + " ends and the next take begins");
@@ -212,8 +229,12 @@ void Recorder::write(const Captured& captured) {
     begin_take();
   }
   take_->write(*captured.frame, captured.at);
+  if (captured.frame->source != "observer") return;
+  const std::int64_t now_ns = captured.frame->timestamp_ns;
+  if (take_->observer_frames() == 1) take_begins_ns_ = now_ns;
   const std::lock_guard lock(mutex_);
   status_.frames = take_->observer_frames();
+  status_.seconds = 1e-9 * static_cast<double>(now_ns - take_begins_ns_);
 }
 
 void Recorder::begin_take() {
@@ -260,14 +281,30 @@ void Recorder::fail(const std::string& why) {
 void Recorder::check_disk() {
   checked_ = Clock::now();
   std::filesystem::create_directories(options_.take.directory);
-  const std::uint64_t free = options_.free_bytes
-                                 ? options_.free_bytes()
-                                 : std::filesystem::space(options_.take.directory).available;
+  const std::uint64_t free = free_on_disk();
   if (free >= options_.reserve_bytes) return;
   if (take_) take_->close();
   throw Error(options_.take.directory.string() + ": the disk is almost full, " + megabytes(free) +
               " are left and " + megabytes(options_.reserve_bytes) +
               " are kept free (recording.reserve_mb)");
+}
+
+// The directory may not be there yet: then the disk is the one it will be made on.
+std::uint64_t Recorder::free_on_disk() const {
+  if (options_.free_bytes) return options_.free_bytes();
+  std::filesystem::path folder = std::filesystem::absolute(options_.take.directory);
+  while (!std::filesystem::exists(folder) && folder.has_relative_path())
+    folder = folder.parent_path();
+  return std::filesystem::space(folder).available;
+}
+
+std::optional<std::uint64_t> Recorder::free_bytes() const {
+  try {
+    const std::uint64_t free = free_on_disk();
+    return free - std::min(free, options_.reserve_bytes);
+  } catch (const std::filesystem::filesystem_error&) {
+    return std::nullopt;
+  }
 }
 
 }  // namespace previz::output

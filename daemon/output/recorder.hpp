@@ -37,7 +37,9 @@ struct RecorderStatus {
   std::filesystem::path directory;  // of the running take, or of the last; empty: none yet
   int number = 0;
   std::uint64_t frames = 0;          // observer frames of that take on disk
+  double seconds = 0;                // from the first to the last of them
   std::uint64_t dropped = 0;         // frames of that take, of either camera, that are not
+  std::uint64_t dropped_shown = 0;   // pictures that were shown in that take and are not in it
   std::uint64_t finished_takes = 0;  // since the start; a take without a frame is none
   std::uint64_t failures = 0;        // takes that ended by themselves
   std::string fault;                 // why the last one did; empty once another has begun
@@ -56,6 +58,9 @@ class Recorder {
   // Every frame either camera delivers, recording or not. One that does not fit the queue is
   // dropped and counted. A frame of another format or size begins the next take.
   void offer(const FramePtr& frame);
+  // What was shown, where the set wants that in its takes (shown_frame.hpp): of less worth than
+  // what the cameras saw, it has half of the queue.
+  void offer_shown(const FramePtr& frame);
   // What tracking made of an observer frame, in order; `frame` is filled in here.
   void offer(const session::TrackRecord& record);
   void offer(const ButtonEvent& event);
@@ -66,6 +71,8 @@ class Recorder {
   void mark_good();  // the running take, else the last
 
   RecorderStatus status() const;
+  // What takes may still use of the disk, before its reserve; none where the disk does not say.
+  std::optional<std::uint64_t> free_bytes() const;
 
  private:
   using WallClock = std::chrono::system_clock;
@@ -96,6 +103,7 @@ class Recorder {
   void end_take();  // in order
   void fail(const std::string& why);
   void check_disk();
+  std::uint64_t free_on_disk() const;
   void note(const std::string& what) const;
 
   const RecorderOptions options_;
@@ -116,6 +124,7 @@ class Recorder {
 
   // The writer thread's own.
   std::unique_ptr<TakeWriter> take_;
+  std::int64_t take_begins_ns_ = 0;                              // its first observer frame
   std::optional<std::chrono::steady_clock::time_point> end_at_;  // stopped; waits for its tracks
   std::chrono::steady_clock::time_point checked_;
   std::jthread thread_;  // last: it uses all of the above

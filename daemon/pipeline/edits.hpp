@@ -1,4 +1,5 @@
-// What the crew changed of a set's objects and lamps, as steps from where the set has them.
+// What the crew changed of a set's objects and lamps, as steps from where the set has them; and
+// with what is moved by hand, where everything is.
 #pragma once
 
 #include <glm/mat3x3.hpp>
@@ -11,9 +12,10 @@
 
 namespace previz::pipeline {
 
+// Axes are the stage's, or those of the object's carrier.
 struct ObjectEdit {
-  glm::dvec3 offset_m{0};  // along the stage's axes
-  glm::dmat3 turn{1};      // about the stage's axes, through the object's origin
+  glm::dvec3 offset_m{0};
+  glm::dmat3 turn{1};  // through the object's origin
   double scale = 1;
 
   friend bool operator==(const ObjectEdit&, const ObjectEdit&) = default;
@@ -38,7 +40,14 @@ glm::dmat4 edited(const glm::dmat4& world_from_file, const ObjectEdit& edit);
 // taken from both others.
 glm::dvec3 tint(const LightEdit& edit);
 
-// Everything that is not as the set has it. Names the set has not are left out.
-session::SceneState scene_state(const set::Set& set, const Edits& edits);
+// What moves without the crew's buttons.
+struct Motion {
+  session::Carriers carriers;
+  double animation_s = 0;
+};
+
+// Everything that is not as the set has it, and everything that moves by itself or is carried.
+// Names the set has not are left out.
+session::SceneState scene_state(const set::Set& set, const Edits& edits, const Motion& motion = {});
 
 }  // namespace previz::pipeline

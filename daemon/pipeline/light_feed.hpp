@@ -32,17 +32,12 @@ class LightFeed {
   using Estimate =
       std::function<LightPtr(std::vector<LightFrame>, const std::optional<ObserverView>&)>;
 
-  // `first`: the light until the first estimate; may be null.
-  explicit LightFeed(LightPtr first = nullptr) : newest_(std::move(first)) {}
-
   // Adds the two stages "light camera" and "lighting". `stages` ends before this object.
   void start(StageThreads& stages, Source source, Estimate estimate);
 
-  // From any one thread each; neither waits.
+  // From any one thread each; neither waits. Null until the first estimate.
   void see_observer(ObserverView view) { views_.push(std::move(view)); }
   LightPtr newest();
-  // A light that no frame tells of, such as that of a file; from any thread.
-  void put(LightPtr light) { lights_.push(std::move(light)); }
 
  private:
   // Every exposure of a bracket counts, so light frames queue; the estimate takes all that wait.

@@ -5,14 +5,13 @@
 
 #include "daemon/lighting/hdr.hpp"
 #include "daemon/lighting/light_mode.hpp"
+#include "daemon/pipeline/light_record.hpp"
 #include "daemon/pipeline/room_model.hpp"
+#include "daemon/set/names.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::pipeline {
 namespace {
-
-// Over which the shapes of sources are averaged.
-constexpr double source_smoothing_s = 0.25;
 
 bool is_exposure(double exposure) {
   return exposure > 0 && std::isfinite(exposure);
@@ -25,23 +24,36 @@ LightStage::LightStage(const set::Set& set, std::optional<LightCameraCalibration
     : settings_(set.lighting),
       exposure_(set.light_camera.exposure),
       observer_exposure_(set.observer.exposure),
-      given_(set.lighting.environment.has_value()),
-      tracker_(source_smoothing_s) {
-  if (given_) {
-    light_ = finished(lighting::load_environment(settings_), {}, 0);
+      tracker_(set.lighting.smoothing_s) {
+  if (given()) {
+    load_given();
     return;
   }
+  if (calibration) {
+    room_ = open_room(set, glm::dvec3(calibration->world_from_camera[3]));
+    seen_from_ = room_ ? room_->seen_from() : glm::dvec3(calibration->world_from_camera[3]);
+  }
+  if (settings_.from == set::LightFrom::recording) return;
   if (!calibration)
     throw Error(set.file.string() +
                 ": lighting: neither lighting.environment nor a light camera with a calibration is "
-                "given; one of them must light the set");
+                "given; one of them must light the set, or with from = \"set\" its own lights");
   intrinsics_ = calibration->intrinsics;
-  const glm::dvec3 camera(calibration->world_from_camera[3]);
-  const auto room = open_room(set, camera);
-  seen_from_ = room ? room->seen_from() : camera;
-  estimator_.emplace(*calibration, settings_, room);
+  estimator_.emplace(*calibration, settings_, room_);
   if (settings_.unseen == set::UnseenRule::observer)
-    observed_ = std::make_unique<lighting::ObservedLight>(observer, estimator_->resolution(), room);
+    observed_ =
+        std::make_unique<lighting::ObservedLight>(observer, estimator_->resolution(), room_);
+}
+
+// By the set file, once and for all.
+bool LightStage::given() const {
+  return settings_.environment || settings_.from == set::LightFrom::set;
+}
+
+void LightStage::load_given() {
+  lighting::Lighting lighting;
+  if (settings_.environment) lighting = lighting::load_environment(settings_);
+  light_ = finished(std::move(lighting), {}, 0);
 }
 
 bool LightStage::remembers() const {
@@ -51,8 +63,13 @@ bool LightStage::remembers() const {
 
 void LightStage::use(set::LightMode mode) {
   if (settings_.mode == mode) return;
+  if (settings_.from == set::LightFrom::recording) {
+    troubles_.push_back(std::string("a recording has sources and no picture: light mode ") +
+                        set::name_of(mode) + " cannot be had of it");
+    return;
+  }
   settings_.mode = mode;
-  if (given_) light_ = finished(lighting::load_environment(settings_), {}, 0);
+  if (given()) load_given();
   changed_ = !newest_.empty();
 }
 
@@ -81,19 +98,41 @@ void LightStage::drop_oldest() {
 }
 
 // The image's sources stand where the set says, seen from where the image is.
-LightPtr LightStage::finished(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
-                              std::int64_t timestamp_ns) {
-  lighting::apply_mode(lighting, settings_, tracker_, timestamp_ns);
+LightPtr LightStage::placed(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
+                            session::CapturedLight record) const {
   Light light;
-  light.lamps = lighting::lamps_of(lighting.sources, settings_, seen_from_);
+  light.lamps = lighting::lamps_of(
+      lighting.sources, seen_from_, [&](const glm::dvec3& direction) -> std::optional<double> {
+        if (settings_.sources.distance_m) return settings_.sources.distance_m;
+        return room_ ? room_->distance(seen_from_, direction) : std::nullopt;
+      });
   light.encoded = render::encode_environment(lighting.environment);
   light.lighting = std::move(lighting);
   light.sequences = std::move(sequences);
+  light.record = std::move(record);
   return std::make_shared<const Light>(std::move(light));
 }
 
+// A take carries sources, whatever the picture is lit by.
+LightPtr LightStage::finished(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
+                              std::int64_t timestamp_ns) {
+  session::CapturedLight record;
+  if (settings_.mode == set::LightMode::image) {
+    lighting::Lighting as_sources = lighting;
+    set::Lighting settings = settings_;
+    settings.mode = set::LightMode::hybrid;
+    lighting::apply_mode(as_sources, settings, tracker_, timestamp_ns);
+    record = to_record(as_sources);
+  } else {
+    lighting::apply_mode(lighting, settings_, tracker_, timestamp_ns);
+    record = to_record(lighting);
+  }
+  return placed(std::move(lighting), std::move(sequences), std::move(record));
+}
+
 void LightStage::see(FramePtr frame, std::uint64_t index) {
-  if (given_ || (settings_.frame >= 0 && index != static_cast<std::uint64_t>(settings_.frame)))
+  if (!needs_frames() ||
+      (settings_.frame >= 0 && index != static_cast<std::uint64_t>(settings_.frame)))
     return;
   if (exposure_) {
     auto exposed = std::make_shared<Frame>(*frame);
@@ -125,6 +164,16 @@ LightPtr LightStage::light() {
     light_ = finished((*estimator_)(bracket, observed_.get()), std::move(sequences), newest_ns);
     changed_ = false;
   }
+  return light_;
+}
+
+LightPtr LightStage::light_for(const Shot& shot) {
+  if (settings_.from != set::LightFrom::recording) return light();
+  if (!shot.recorded_light) return nullptr;
+  // Lights change seldom; the same one need not be put into the renderer again.
+  if (!shown_ || *shown_ != *shot.recorded_light)
+    light_ = placed(from_record(*shot.recorded_light), {}, *shot.recorded_light);
+  shown_ = shot.recorded_light;
   return light_;
 }
 

@@ -19,18 +19,18 @@ namespace previz::pipeline {
 
 // Keeps the newest light frame of every exposure seen so far; together they are the bracket that is
 // merged. (Two exposures within 1 % are the same one; of an auto-exposure that wanders, the newest
-// max_exposures stay.) A set that gives an environment file needs no light frames.
+// max_exposures stay.) A set whose light does not come from a camera needs no light frames.
 class LightStage {
  public:
   static constexpr std::size_t max_exposures = 24;
 
   // Loads the environment if the set gives one, and the room if it has one. Throws previz::Error
-  // if it gives none and the light camera's calibration is not known.
+  // if the light camera's calibration is needed and not known.
   LightStage(const set::Set& set, std::optional<LightCameraCalibration> calibration,
              const ObserverCalibration& observer);
 
-  // True where light() needs frames: no environment is given.
-  bool needs_frames() const { return !given_; }
+  // True where the light is made of frames.
+  bool needs_frames() const { return estimator_.has_value(); }
   // True where the film camera's pictures fill in what the light camera cannot see.
   bool needs_observer() const { return observed_ != nullptr; }
   // True where the light depends on more than the newest bracket: who wants the light of a frame in
@@ -50,26 +50,34 @@ class LightStage {
 
   // The light from what was seen so far, computed only if that changed. Null: nothing usable yet.
   LightPtr light();
+  // The same for an observer frame, tracked: with lighting.from = "recording" the light recorded
+  // with it, null where none was.
+  LightPtr light_for(const Shot& shot);
 
   // What was left out since the last call, in plain words.
   std::vector<std::string> troubles() { return std::exchange(troubles_, {}); }
 
  private:
+  bool given() const;
+  void load_given();
   LightPtr finished(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
                     std::int64_t timestamp_ns);
+  LightPtr placed(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
+                  session::CapturedLight record) const;
   bool usable(const Frame& frame);
   void drop_oldest();
 
   set::Lighting settings_;
   const std::optional<double> exposure_;           // overrides the frames' own
   const std::optional<double> observer_exposure_;  // likewise
-  const bool given_;
-  std::optional<lighting::Estimator> estimator_;  // where it needs frames
-  FisheyeIntrinsics intrinsics_;                  // of the light camera
-  glm::dvec3 seen_from_{0};                       // where the image is seen from; world, metres
+  std::optional<lighting::Estimator> estimator_;   // where it needs frames
+  FisheyeIntrinsics intrinsics_;                   // of the light camera
+  std::shared_ptr<const lighting::Room> room_;
+  glm::dvec3 seen_from_{0};  // where the image is seen from; world, metres
   std::unique_ptr<lighting::ObservedLight> observed_;
   std::map<long, FramePtr> newest_;  // by exposure, in steps of 1 %
   std::vector<std::string> troubles_;
+  std::shared_ptr<const session::CapturedLight> shown_;  // what light_ is, if it is recorded
   bool changed_ = false;
   lighting::SourceTracker tracker_;
   LightPtr light_;

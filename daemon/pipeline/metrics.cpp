@@ -37,6 +37,11 @@ void Metrics::count(const std::string& event, std::uint64_t times) {
   counts_[event] += times;
 }
 
+void Metrics::device_counted(const std::string& device, const DeviceCounters& more) {
+  const std::lock_guard lock(mutex_);
+  for (const auto& [what, count] : more) devices_[device][what] += count;
+}
+
 void Metrics::shown(double latency_s) {
   const std::lock_guard lock(mutex_);
   if (latencies_s_.size() < latency_window) {
@@ -49,7 +54,12 @@ void Metrics::shown(double latency_s) {
 
 MetricsSnapshot Metrics::snapshot(double seconds) const {
   const std::lock_guard lock(mutex_);
-  return {seconds, stages_, counts_, quantile(latencies_s_, 0.50), quantile(latencies_s_, 0.99)};
+  return {seconds,
+          stages_,
+          counts_,
+          devices_,
+          quantile(latencies_s_, 0.50),
+          quantile(latencies_s_, 0.99)};
 }
 
 std::string to_json(const MetricsSnapshot& snapshot) {
@@ -63,6 +73,7 @@ std::string to_json(const MetricsSnapshot& snapshot) {
                             {"dropped", stage.dropped}};
   }
   json["counts"] = snapshot.counts;
+  json["devices"] = snapshot.devices;
   json["latency_s"] = {{"p50", snapshot.latency_p50_s}, {"p99", snapshot.latency_p99_s}};
   return json.dump(2) + "\n";
 }

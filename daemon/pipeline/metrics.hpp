@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "drivers/device.hpp"
+
 namespace previz::pipeline {
 
 struct StageMetrics {
@@ -19,7 +21,8 @@ struct StageMetrics {
 struct MetricsSnapshot {
   double seconds = 0;  // since the start
   std::map<std::string, StageMetrics> stages;
-  std::map<std::string, std::uint64_t> counts;  // events that are no drops: "pose lost"
+  std::map<std::string, std::uint64_t> counts;    // events that are no drops: "pose lost"
+  std::map<std::string, DeviceCounters> devices;  // as their drivers count, by device
   double latency_p50_s = 0;  // capture to display, over the last frames; 0 where none was shown
   double latency_p99_s = 0;
 };
@@ -31,6 +34,8 @@ class Metrics {
   void busy(const std::string& stage, double seconds);  // of a frame that worked() counts
   void dropped(const std::string& stage, const std::string& cause, std::uint64_t frames = 1);
   void count(const std::string& event, std::uint64_t times = 1);
+  // What a device has counted since this was last called for it.
+  void device_counted(const std::string& device, const DeviceCounters& more);
   void shown(double latency_s);
 
   // `seconds` since the start, by the caller's clock.
@@ -42,13 +47,15 @@ class Metrics {
   mutable std::mutex mutex_;
   std::map<std::string, StageMetrics> stages_;
   std::map<std::string, std::uint64_t> counts_;
+  std::map<std::string, DeviceCounters> devices_;
   std::vector<double> latencies_s_;  // a ring once full
   std::size_t next_latency_ = 0;
 };
 
 // {"seconds": ..., "stages": {"render": {"frames": ..., "frames_per_second": ...,
 //  "busy_fraction": ..., "dropped": {"newer frame": ...}}}, "counts": {...},
-//  "latency_s": {"p50": ..., "p99": ...}}
+//  "devices": {"observer": {"lost": ..., "stream missing packets": ...}}, "latency_s": {"p50": ...,
+//  "p99": ...}}
 std::string to_json(const MetricsSnapshot& snapshot);
 
 // The smallest value that at least `fraction` (0..1) of the values do not exceed; 0 of none.

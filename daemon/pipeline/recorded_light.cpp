@@ -23,7 +23,7 @@ LightPtr RecordedLight::at(const Shot& shot) {
     ++next_;
   }
   if (shot.track.pose) stage_.see_observer(*shot.frame, shot.track.pose->world_from_camera);
-  return stage_.light();
+  return stage_.light_for(shot);
 }
 
 }  // namespace previz::pipeline

@@ -50,6 +50,7 @@ RenderStage::RenderStage(std::shared_ptr<render::Device> device, const set::Set&
   scene_.instances = scene.instances;
   scene_.lights = scene.lights;
   scene_.light_objects = scene.light_objects;
+  scene_.animations = scene.animations;
 }
 
 void RenderStage::operator()(Shot& shot) {

@@ -17,7 +17,9 @@ lighting::Triangles file_triangles(const set::Room& room) {
                                .file_as_written = room.file_as_written,
                                .presence = set::Presence::phantom,
                                .world_from_file = room.world_from_room,
-                               .nodes = {}});
+                               .nodes = {},
+                               .carrier = {},
+                               .animation = {}});
   const scene::Scene scene = scene::load_scene(only_room);
   lighting::Triangles triangles;
   for (const scene::Instance& instance : scene.instances) {

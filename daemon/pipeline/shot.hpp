@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/lighting/environment.hpp"
+#include "daemon/pipeline/edits.hpp"
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/layers.hpp"
 #include "daemon/set/set.hpp"
@@ -23,6 +24,7 @@ struct Light {
   std::vector<set::Light> lamps;       // of its sources
   render::EncodedEnvironment encoded;  // as the renderer takes it, so that no frame waits for that
   std::vector<std::uint64_t> sequences;  // empty: an environment given as a file
+  session::CapturedLight record;         // as a take carries it
 };
 using LightPtr = std::shared_ptr<const Light>;
 
@@ -37,7 +39,9 @@ struct Shot {
   tracking::Track track;
   bool tracking_done = false;  // false: tracking was paused, and the track says nothing
   LightPtr light;              // null: no light frame was seen yet
-  session::SceneState scene;   // what the crew moved or relit; empty: as in the set
+  std::shared_ptr<const session::CapturedLight> recorded_light;  // null: none came with the frame
+  Motion motion;              // what is moved by hand, and by itself
+  session::SceneState scene;  // what was moved or relit; empty: as in the set
 
   // From rendering. `untouched` says why the plate passes through as it is; empty: it was rendered.
   std::string untouched;

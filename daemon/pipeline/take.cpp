@@ -46,4 +46,8 @@ Take open_take(const std::filesystem::path& session_directory,
   return take;
 }
 
+std::int64_t start_of(const Take& take) {
+  return take.observer_stream->records().front().timestamp_ns;
+}
+
 }  // namespace previz::pipeline

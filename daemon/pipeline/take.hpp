@@ -29,6 +29,9 @@ struct Take {
 Take open_take(const std::filesystem::path& session_directory,
                const std::optional<std::filesystem::path>& set_file);
 
+// When its first observer frame was taken; the stream must still be there.
+std::int64_t start_of(const Take& take);
+
 // The calibration of each camera: the set's own, otherwise the session's. Throws previz::Error
 // naming the set file if the observer has none.
 ObserverCalibration observer_calibration(const set::Set& set, const session::SessionInfo& session);

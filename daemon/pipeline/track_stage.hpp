@@ -1,8 +1,11 @@
 // Tracking as a stage: the pose of each observer frame, from the tags or from the session's track.
 #pragma once
 
+#include <map>
 #include <memory>
-#include <unordered_map>
+#include <set>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/pipeline/shot.hpp"
@@ -15,23 +18,44 @@ namespace previz::pipeline {
 
 class TrackStage {
  public:
-  // `recorded` is used where the set says tracking.enabled = false; throws previz::Error if it is
-  // empty then. `lap_ns`: of frames that are replayed in a loop (replay_lap_ns), otherwise 0.
+  // `recorded` is used where the set says tracking.enabled = false or lighting.from =
+  // "recording"; throws previz::Error if it holds no poses or no light then. Animations begin at
+  // `start_ns`, that of the take. `lap_ns`: of frames that are replayed in a loop (replay_lap_ns),
+  // otherwise 0.
   TrackStage(const set::Set& set, const ObserverCalibration& calibration,
-             const std::vector<session::TrackRecord>& recorded, std::int64_t lap_ns = 0);
+             const std::vector<session::TrackRecord>& recorded, std::int64_t start_ns,
+             std::int64_t lap_ns = 0);
 
-  // Fills shot.track, and shot.scene from what was recorded. A frame that was not tracked is lost,
-  // never guessed. Frames come in order; where some are left out, the tracker forgets the last
-  // pose.
+  // Fills shot.track, shot.motion and shot.scene, and shot.recorded_light from what was recorded. A
+  // frame that was not tracked is lost, never guessed; a carrier that is not found stays where it
+  // was. What was recorded of carriers and scene comes back as it was recorded, in frames without a
+  // line as in the last one that has one. Frames come in order; where some are left out, the
+  // tracker forgets the last pose.
   void operator()(Shot& shot);
 
- private:
-  const session::TrackRecord* recorded_at(std::int64_t timestamp_ns) const;
+  // True where a frame depends on those before it: who wants one in the middle of a take has to go
+  // through them.
+  bool remembers() const;
 
+  // What is not found where it should be, since the last call, in plain words.
+  std::vector<std::string> troubles() { return std::exchange(troubles_, {}); }
+
+ private:
+  using Records = std::map<std::int64_t, session::TrackRecord>;
+  std::int64_t recorded_ns(const Shot& shot) const;
+  const session::TrackRecord* newest_record(const Shot& shot) const;
+  void track_camera(Shot& shot, const session::TrackRecord* record);
+  void follow_carriers(const Shot& shot);
+  void place(Shot& shot, const session::TrackRecord* record) const;
+
+  const set::Set set_;
   std::unique_ptr<tracking::Tracker> tracker_;  // null: recorded poses
   std::uint64_t next_index_ = 0;
-  std::unordered_map<std::int64_t, session::TrackRecord> by_timestamp_;  // as recorded
-  std::int64_t first_ns_ = 0, lap_ns_ = 0;
+  std::shared_ptr<const Records> by_timestamp_;  // as recorded
+  std::set<std::string> recorded_carriers_;      // their names
+  std::int64_t start_ns_ = 0, first_ns_ = 0, lap_ns_ = 0;
+  session::Carriers carriers_;
+  std::vector<std::string> troubles_;
 };
 
 }  // namespace previz::pipeline

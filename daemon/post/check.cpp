@@ -152,7 +152,7 @@ void remark_on_cameras(Checked& checked) {
         "the observer has no calibration here: it must come with the session that is rendered");
   const bool has_light_camera =
       set.light_camera.driver != set::Driver::none && set.light_camera.calibration;
-  if (!set.lighting.environment && !has_light_camera)
+  if (set.lighting.from == set::LightFrom::camera && !set.lighting.environment && !has_light_camera)
     checked.remarks.push_back(
         "no environment and no calibrated light camera here: the light must come with the session");
 }
@@ -228,9 +228,12 @@ void print_objects(const set::Set& set, const scene::Scene& scene, std::ostream&
 void print_lights(const set::Set& set, const scene::Scene& scene, std::ostream& out) {
   const auto& lighting = set.lighting;
   out << "\nlight\n  around the set: "
-      << (lighting.environment ? "the picture " + lighting.environment_as_written
-                               : words("what the light camera sees; where it cannot see: ",
-                                       set::name_of(lighting.unseen)))
+      << (lighting.environment                   ? "the picture " + lighting.environment_as_written
+          : lighting.from == set::LightFrom::set ? std::string("none")
+          : lighting.from == set::LightFrom::recording
+              ? std::string("as the session recorded it")
+              : words("what the light camera sees; where it cannot see: ",
+                      set::name_of(lighting.unseen)))
       << '\n';
   if (lighting.mode == set::LightMode::sources)
     out << "    its lamps light the set; the rest is " << set::name_of(lighting.sources.residual)

@@ -158,6 +158,31 @@ class LightSource {
   pipeline::Metrics& metrics_;
 };
 
+// Gives each shot its poses, and tells what is not found.
+class TrackSource {
+ public:
+  TrackSource(const pipeline::Take& take, Progress& progress, pipeline::Metrics& metrics)
+      : track_(take.set, take.observer, take.session.track, pipeline::start_of(take)),
+        progress_(progress),
+        metrics_(metrics) {}
+
+  bool remembers() const { return track_.remembers(); }
+
+  void operator()(Shot& shot) {
+    track_(shot);
+    for (const std::string& trouble : track_.troubles()) {
+      metrics_.count("carrier not found");
+      if (news_.is_new(trouble)) progress_.note(trouble);
+    }
+  }
+
+ private:
+  pipeline::TrackStage track_;
+  pipeline::News news_;
+  Progress& progress_;
+  pipeline::Metrics& metrics_;
+};
+
 std::string percent_words(double share) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.2g %%", 100 * share);
@@ -248,8 +273,8 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
 
     Progress progress(out, options.terminal, to_do.size(), now_s());
     LightSource light(take, progress, metrics);
-    ObserverSource observer(take, to_do, light.remembers(), progress, metrics);
-    pipeline::TrackStage track(set, take.observer, take.session.track);
+    TrackSource track(take, progress, metrics);
+    ObserverSource observer(take, to_do, light.remembers() || track.remembers(), progress, metrics);
     pipeline::RenderStageOptions render_options;
     render_options.layers = true;
     render_options.cancelled = [&] { return options.stop.stop_requested(); };

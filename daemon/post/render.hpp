@@ -60,7 +60,9 @@ struct FrameRecord {
   double render_s = 0;
   double error = 0;  // estimated, where quality.error or .seconds was asked for
   std::optional<tracking::Pose> pose;
-  std::vector<std::uint64_t> light_frames;  // sequence numbers; empty: environment file
+  std::vector<std::uint64_t> light_frames;  // sequence numbers; empty: not from the light camera
+  std::vector<lighting::Source> light_sources;
+  double light_dropped_share = 0;  // of all luminous flux, by lighting.sources.residual = "dropped"
   render::Counters counters;
 };
 

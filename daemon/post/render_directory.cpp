@@ -34,6 +34,14 @@ glm::dmat4 matrix_of(const nlohmann::json& rows) {
   return matrix;
 }
 
+nlohmann::ordered_json numbers(const glm::dvec3& v) {
+  return {v.x, v.y, v.z};
+}
+
+glm::dvec3 vector_of(const nlohmann::json& json) {
+  return {json.at(0), json.at(1), json.at(2)};
+}
+
 // "quality.samples is 16 there and 64 now": the first few settings that differ.
 std::string differences(const nlohmann::json& there, const nlohmann::json& now) {
   std::string text;
@@ -80,7 +88,11 @@ FrameRecord record_of(const pipeline::Shot& shot) {
   record.render_s = shot.render_s;
   record.error = shot.error;
   record.pose = shot.track.pose;
-  if (shot.light) record.light_frames = shot.light->sequences;
+  if (shot.light) {
+    record.light_frames = shot.light->sequences;
+    record.light_sources = shot.light->lighting.sources;
+    record.light_dropped_share = shot.light->lighting.report.dropped_share;
+  }
   record.counters = shot.counters;
   return record;
 }
@@ -101,6 +113,12 @@ std::string to_json(const FrameRecord& record) {
     json["tags"] = record.pose->tags;
   }
   json["light_frames"] = record.light_frames;
+  for (const lighting::Source& source : record.light_sources)
+    json["light_sources"].push_back({{"id", source.id},
+                                     {"direction", numbers(source.direction)},
+                                     {"solid_angle_sr", source.solid_angle_sr},
+                                     {"flux", numbers(source.flux)}});
+  if (record.light_dropped_share > 0) json["light_dropped_share"] = record.light_dropped_share;
   json["rays"] = record.counters.rays;
   json["shadow_rays"] = record.counters.shadow_rays;
   json["dropped_not_finite"] = record.counters.dropped_not_finite;
@@ -131,6 +149,11 @@ FrameRecord from_json(const std::string& line) {
     record.pose->tags = json.at("tags").get<std::vector<int>>();
   }
   record.light_frames = json.at("light_frames").get<std::vector<std::uint64_t>>();
+  if (json.contains("light_sources"))
+    for (const nlohmann::json& source : json["light_sources"])
+      record.light_sources.push_back({source.at("id"), vector_of(source.at("direction")),
+                                      source.at("solid_angle_sr"), vector_of(source.at("flux"))});
+  record.light_dropped_share = json.value("light_dropped_share", 0.0);
   record.counters.rays = json.at("rays");
   record.counters.shadow_rays = json.at("shadow_rays");
   record.counters.dropped_not_finite = json.at("dropped_not_finite");

@@ -36,6 +36,14 @@ TradeAxis numbered(std::string name, std::string what, TradeSettings own,
   return axis;
 }
 
+// What was recorded are sources; there is no image to go back to.
+TradeAxis light_modes(const set::Lighting& own) {
+  if (own.from == set::LightFrom::recording) return {"light_mode", "", {}, set::name_of(own.mode)};
+  return spelled(
+      "light_mode", "what the light around the set is made into",
+      [](TradeSettings & s) -> auto& { return s.lighting.mode; });
+}
+
 TradeAxis left_out(const std::vector<render::Part>& unneeded) {
   TradeAxis axis{parts_axis,
                  "parts that this scene has no need of: left out, and carried along",
@@ -84,9 +92,7 @@ std::vector<TradeAxis> trade_axes(const TradeSettings& own,
       spelled(
           "real_radiance", "real surfaces seen after a bounce: simulated, or from the camera",
           [](TradeSettings & s) -> auto& { return s.estimation.real_radiance; }),
-      spelled(
-          "light_mode", "what the light around the set is made into",
-          [](TradeSettings & s) -> auto& { return s.lighting.mode; }),
+      light_modes(own.lighting),
       spelled(
           "light_sampling", "whether paths look for the light around the set",
           [](TradeSettings & s) -> auto& { return s.lighting.sampling; }),

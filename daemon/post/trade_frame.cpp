@@ -44,10 +44,11 @@ TradeFrame::TradeFrame(const fs::path& set_file, std::optional<std::uint64_t> in
     throw Error(take.session.directory.string() + ": --frame " + std::to_string(*index) +
                 ": the last observer frame is " + std::to_string(frames - 1));
 
-  pipeline::TrackStage track(set_, calibration_, take.session.track);
+  pipeline::TrackStage track(set_, calibration_, take.session.track, pipeline::start_of(take));
   std::string lacks;
   for (std::size_t i = index.value_or(0); i < (index ? *index + 1 : frames); ++i) {
     shot_ = {};
+    lights_.clear();
     shot_.index = i;
     shot_.frame = take.observer_stream->read(i);
     track(shot_);
@@ -64,13 +65,11 @@ TradeFrame::TradeFrame(const fs::path& set_file, std::optional<std::uint64_t> in
 
 // The light frames up to this observer frame.
 void TradeFrame::see_light(session::StreamReader& stream) {
-  if (set_.lighting.environment) return;
+  if (set_.lighting.environment || set_.lighting.from != set::LightFrom::camera) return;
   const auto& records = stream.records();
   for (std::size_t next = light_frames_.size();
-       next < records.size() && records[next].timestamp_ns <= shot_.frame->timestamp_ns; ++next) {
+       next < records.size() && records[next].timestamp_ns <= shot_.frame->timestamp_ns; ++next)
     light_frames_.push_back(stream.read(next));
-    lights_.clear();
-  }
 }
 
 // Why the frame cannot be rendered; empty: it can.
@@ -98,7 +97,7 @@ pipeline::LightPtr TradeFrame::light(const set::Lighting& settings) {
   pipeline::LightStage stage(set, light_calibration_, calibration_);
   for (std::size_t i = 0; i < light_frames_.size(); ++i) stage.see(light_frames_[i], i);
   if (shot_.track.pose) stage.see_observer(*shot_.frame, shot_.track.pose->world_from_camera);
-  lights_.emplace_back(settings, stage.light());
+  lights_.emplace_back(settings, stage.light_for(shot_));
   return lights_.back().second;
 }
 
