@@ -9,6 +9,7 @@
 #include <string>
 
 #include "daemon/control/bus.hpp"
+#include "daemon/control/request.hpp"
 #include "drivers/error.hpp"
 
 namespace {
@@ -145,44 +146,26 @@ void print_actions(bool names_only) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"previzctl: operates a camera rig that runs previzd"};
-  app.require_subcommand(1);
-  std::string mode, name, which;
-  std::string on;
-  bool names_only = false;
-  app.add_subcommand("status", "What the rig is doing");
-  app.add_subcommand("watch", "The same, and every change of it");
-  app.add_subcommand("metrics", "Rates, drops and latency, as JSON");
-  app.add_subcommand("mode", "Go to a mode")
-      ->add_option("mode", mode)
-      ->required()
-      ->check(CLI::IsMember({"standby", "live", "refine", "review"}));
-  app.add_subcommand("record", "Start or end a take")
-      ->add_option("on", on)
-      ->required()
-      ->check(CLI::IsMember({"on", "off"}));
-  app.add_subcommand("action", "Do what a button could do")->add_option("name", name)->required();
-  app.add_subcommand("actions", "All actions")->add_flag("--names", names_only, "Names only");
-  app.add_subcommand("set", "Change the set")
-      ->add_option("which", which)
-      ->required()
-      ->check(CLI::IsMember({"reload", "next", "previous"}));
+  CLI::App app{"Operates a camera rig that runs previzd", "previzctl"};
+  control::Request asked;
   try {
+    control::add_requests(app, asked);
     app.parse(argc, argv);
     if (app.got_subcommand("status")) return print_status(), 0;
     if (app.got_subcommand("watch")) return watch(), 0;
-    if (app.got_subcommand("actions")) return print_actions(names_only), 0;
+    if (app.got_subcommand("actions")) return print_actions(asked.names_only), 0;
     std::string said;
     if (app.got_subcommand("metrics"))
       said = call("Metrics", "");
     else if (app.got_subcommand("mode"))
-      said = call("SetMode", "s", mode.c_str());
+      said = call("SetMode", "s", asked.mode.c_str());
     else if (app.got_subcommand("record"))
-      said = call("Record", "b", int{on == "on"});
+      said = call("Record", "b", int{asked.record == "on"});
     else if (app.got_subcommand("action"))
-      said = call("Action", "s", name.c_str());
+      said = call("Action", "s", asked.action.c_str());
     else
-      said = call("Action", "s", which == "reload" ? "reload_set" : (which + "_set").c_str());
+      said =
+          call("Action", "s", asked.set == "reload" ? "reload_set" : (asked.set + "_set").c_str());
     std::cout << said << std::endl;
     return 0;
   } catch (const CLI::ParseError& error) {

@@ -6,12 +6,17 @@
 
 namespace previz::rig {
 
-CameraSource::CameraSource(Camera& camera, std::string stage, Told told)
-    : camera_(camera), stage_(std::move(stage)), told_(std::move(told)) {}
+CameraSource::CameraSource(Camera& camera, std::string stage, std::string crews_name, Told told)
+    : camera_(camera),
+      stage_(std::move(stage)),
+      crews_name_(std::move(crews_name)),
+      told_(std::move(told)),
+      counts_(told_.metrics, stage_) {}
 
 FramePtr CameraSource::next() {
   while (!told_.stop.stop_requested()) {
     CameraEvent event = camera_.next(std::chrono::milliseconds(100));
+    counts_.tell(camera_.counters());
     if (std::holds_alternative<EndOfStream>(event)) return nullptr;
     if (const auto* what = std::get_if<DeviceTrouble>(&event)) {
       trouble(*what);
@@ -27,6 +32,7 @@ FramePtr CameraSource::next() {
 void CameraSource::trouble(const DeviceTrouble& trouble) {
   told_.note(trouble.device + ": " + trouble.what);
   told_.metrics.count(stage_ + ": device trouble");
+  told_.faults.tell(crews_name_, trouble.what);
   if (trouble.lost) lose();
 }
 
@@ -36,6 +42,7 @@ void CameraSource::lose() {
 }
 
 void CameraSource::arrived(const Frame& frame) {
+  told_.faults.well(crews_name_);
   if (std::exchange(lost_, false) && told_.presence) told_.presence(false);
   if (last_sequence_ && frame.sequence > *last_sequence_ + 1)
     told_.metrics.dropped(stage_, "by the device", frame.sequence - *last_sequence_ - 1);

@@ -9,6 +9,8 @@
 #include <string>
 
 #include "daemon/pipeline/metrics.hpp"
+#include "daemon/rig/device_counts.hpp"
+#include "daemon/rig/faults.hpp"
 #include "daemon/rig/notes.hpp"
 #include "drivers/camera.hpp"
 
@@ -20,9 +22,11 @@ class CameraSource {
     std::stop_token stop;
     Notes& note;
     pipeline::Metrics& metrics;
+    Faults& faults;
     std::function<void(bool lost)> presence;  // told when it changes
   };
-  CameraSource(Camera& camera, std::string stage, Told told);
+  // Metrics are counted under the stage's name; the crew is told of trouble under its own.
+  CameraSource(Camera& camera, std::string stage, std::string crews_name, Told told);
 
   // A camera counts as lost once it has said so, or said nothing for this long.
   static constexpr std::chrono::seconds silence{1};
@@ -39,8 +43,9 @@ class CameraSource {
   void arrived(const Frame& frame);
 
   Camera& camera_;
-  const std::string stage_;
+  const std::string stage_, crews_name_;
   Told told_;
+  DeviceCounts counts_;
   bool lost_ = false;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   std::optional<std::uint64_t> last_sequence_;

@@ -4,7 +4,6 @@
 #include <string>
 #include <utility>
 
-#include "daemon/rig/driven_camera.hpp"
 #include "drivers/error.hpp"
 #include "drivers/replay/replay_buttons.hpp"
 
@@ -54,7 +53,7 @@ std::unique_ptr<session::StreamReader> open_frames(session::Session& session,
 
 }  // namespace
 
-Cameras open_cameras(const set::Set& set, bool loop) {
+Cameras open_cameras(const set::Set& set, bool loop, const Usb& usb) {
   using set::Driver;
   if (set.observer.driver == Driver::none)
     throw Error(set.file.string() + ": observer.driver: \"none\" shows nothing live");
@@ -72,7 +71,7 @@ Cameras open_cameras(const set::Set& set, bool loop) {
     observer = open_frames(cameras.recorded, "observer");
     options.origin->timestamp_ns = observer->records().front().timestamp_ns;
   } else {
-    cameras.observer = drive_camera(set, observer_order(set));
+    cameras.observer = drive_camera(set, observer_order(set), usb);
   }
 
   if (light_driver == Driver::replay) {
@@ -89,7 +88,7 @@ Cameras open_cameras(const set::Set& set, bool loop) {
     if (!cameras.recorded.info.light) cameras.recorded.info.light = session.info.light;
     cameras.light = start_replay(set, light_order(set), session, std::move(light), light_options);
   } else if (light_driver != Driver::none) {
-    cameras.light = drive_camera(set, light_order(set));
+    cameras.light = drive_camera(set, light_order(set), usb);
   }
   if (observer) {
     if (loop) cameras.lap_ns = replay_lap_ns(observer->records());

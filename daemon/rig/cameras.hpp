@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "daemon/rig/driven_camera.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/buttons.hpp"
 #include "drivers/camera.hpp"
@@ -25,9 +26,10 @@ struct Cameras {
   std::int64_t clock_offset_ns = 0;
 };
 
+// `usb` wakes those who wait for a camera.
 // `loop`: replayed streams start again at their end. Throws previz::Error naming the key whose
 // driver this build has not, or the session that cannot be read.
-Cameras open_cameras(const set::Set& set, bool loop = false);
+Cameras open_cameras(const set::Set& set, bool loop = false, const Usb& usb = nullptr);
 
 // The rig's buttons. With a replayed observer they are those of its session, pressed again when its
 // frames come; none where the set maps no button.

@@ -1,7 +1,8 @@
 #include "daemon/rig/controls.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <cstdio>
 #include <glm/gtc/matrix_transform.hpp>
 #include <iterator>
 #include <variant>
@@ -10,13 +11,6 @@
 
 namespace previz::rig {
 namespace {
-
-template <class... Arguments>
-std::string text(const char* format, Arguments... arguments) {
-  char buffer[160];
-  std::snprintf(buffer, sizeof buffer, format, arguments...);
-  return buffer;
-}
 
 // The name after (or before) this one in the enumeration, around its end.
 template <class E>
@@ -36,7 +30,10 @@ Outcome none_of(const char* what) {
 
 }  // namespace
 
-Controls::Controls(const set::Set& set) : control_(set.control) {
+Controls::Controls(const set::Set& set)
+    : control_(set.control),
+      is_animated_(std::ranges::any_of(
+          set.objects, [](const set::Object& object) { return !object.animation.empty(); })) {
   for (const set::Object& object : set.objects)
     if (object.presence == set::Presence::virtual_object) objects_.push_back(object.name);
   for (const set::Light& light : set.lights) lights_.push_back(light.name);
@@ -44,6 +41,7 @@ Controls::Controls(const set::Set& set) : control_(set.control) {
   look_.governed = set.quality.fps > 0;
   look_.estimator = set.estimation.estimator;
   look_.light_mode = set.lighting.mode;
+  look_.osd = set.display.osd;
 }
 
 std::string Controls::selected_object() const {
@@ -137,7 +135,7 @@ Outcome Controls::apply(const set::ChangeSamples& effect) {
     const int* const at = std::lower_bound(std::begin(sample_steps), end, look_.samples);
     if (at != std::begin(sample_steps)) look_.samples = *(at - 1);
   }
-  return {text("%d samples", look_.samples), false, {}};
+  return {fmt::format("{} samples", look_.samples), false, {}};
 }
 
 Outcome Controls::apply(const set::NextEstimator&) {
@@ -156,6 +154,11 @@ Outcome Controls::apply(const set::NextView&) {
   return {std::string("view: ") + render::name_of(look_.view), false, {}};
 }
 
+Outcome Controls::apply(const set::ToggleOsd&) {
+  look_.osd = !look_.osd;
+  return {look_.osd ? "overlay on" : "overlay off", false, {}};
+}
+
 Outcome Controls::apply(const set::SelectObject& effect) {
   if (objects_.empty()) return none_of("virtual object");
   object_ = around(object_, effect.next, objects_.size());
@@ -166,8 +169,8 @@ Outcome Controls::apply(const set::MoveObject& effect) {
   if (objects_.empty()) return none_of("virtual object");
   glm::dvec3& offset = look_.edits.objects[selected_object()].offset_m;
   offset += control_.move_step_m * effect.steps;
-  return {text("%s moved to %+.3f %+.3f %+.3f m", selected_object().c_str(), offset.x, offset.y,
-               offset.z),
+  return {fmt::format("{} moved to {:+.3f} {:+.3f} {:+.3f} m", selected_object(), offset.x,
+                      offset.y, offset.z),
           false,
           {}};
 }
@@ -185,13 +188,26 @@ Outcome Controls::apply(const set::ScaleObject& effect) {
   if (objects_.empty()) return none_of("virtual object");
   double& scale = look_.edits.objects[selected_object()].scale;
   scale *= effect.steps > 0 ? control_.scale_step : 1 / control_.scale_step;
-  return {text("%s at %.3g of its size", selected_object().c_str(), scale), false, {}};
+  return {fmt::format("{} at {:.3g} of its size", selected_object(), scale), false, {}};
 }
 
 Outcome Controls::apply(const set::ResetObject&) {
   if (objects_.empty()) return none_of("virtual object");
   look_.edits.objects.erase(selected_object());
   return {selected_object() + " is where the set has it", false, {}};
+}
+
+Outcome Controls::apply(const set::PlayAnimations&) {
+  if (!is_animated_) return none_of("animation");
+  ++look_.plays;
+  look_.animations_held = false;
+  return {"animations play from their beginning", false, {}};
+}
+
+Outcome Controls::apply(const set::HoldAnimations&) {
+  if (!is_animated_) return none_of("animation");
+  look_.animations_held = !look_.animations_held;
+  return {look_.animations_held ? "animations held" : "animations go on", false, {}};
 }
 
 Outcome Controls::apply(const set::SelectLight& effect) {
@@ -204,7 +220,7 @@ Outcome Controls::apply(const set::DimLight& effect) {
   if (lights_.empty()) return none_of("lamp");
   double& stops = look_.edits.lights[selected_light()].stops;
   stops += effect.steps * control_.light_step_stops;
-  return {text("%s %+.2f stops", selected_light().c_str(), stops), false, {}};
+  return {fmt::format("{} {:+.2f} stops", selected_light(), stops), false, {}};
 }
 
 Outcome Controls::apply(const set::TintLight& effect) {
@@ -212,8 +228,8 @@ Outcome Controls::apply(const set::TintLight& effect) {
   pipeline::LightEdit& edit = look_.edits.lights[selected_light()];
   edit.warm_stops += effect.warmer * control_.tint_step_stops;
   edit.green_stops += effect.greener * control_.tint_step_stops;
-  return {text("%s warm %+.2f green %+.2f stops", selected_light().c_str(), edit.warm_stops,
-               edit.green_stops),
+  return {fmt::format("{} warm {:+.2f} green {:+.2f} stops", selected_light(), edit.warm_stops,
+                      edit.green_stops),
           false,
           {}};
 }
@@ -227,7 +243,9 @@ Outcome Controls::apply(const set::ResetLight&) {
 Outcome Controls::apply(const set::ChangeExposure& effect) {
   look_.exposure_steps += effect.steps;
   return {
-      text("exposure %+.2f stops", look_.exposure_steps * control_.exposure_step_stops), false, {}};
+      fmt::format("exposure {:+.2f} stops", look_.exposure_steps * control_.exposure_step_stops),
+      false,
+      {}};
 }
 
 }  // namespace previz::rig

@@ -22,7 +22,10 @@ struct Look {
   set::Estimator estimator = set::Estimator::paired;
   set::LightMode light_mode = set::LightMode::image;
   render::View view = render::View::composite;
+  bool osd = true;
   pipeline::Edits edits;
+  std::uint64_t plays = 0;  // of the animations, begun anew so far
+  bool animations_held = false;
   int exposure_steps = 0;       // asked for so far, up less down
   std::uint64_t snapshots = 0;  // asked for so far
 };
@@ -69,11 +72,14 @@ class Controls {
   Outcome apply(const set::NextEstimator& effect);
   Outcome apply(const set::NextLightMode& effect);
   Outcome apply(const set::NextView& effect);
+  Outcome apply(const set::ToggleOsd& effect);
   Outcome apply(const set::SelectObject& effect);
   Outcome apply(const set::MoveObject& effect);
   Outcome apply(const set::TurnObject& effect);
   Outcome apply(const set::ScaleObject& effect);
   Outcome apply(const set::ResetObject& effect);
+  Outcome apply(const set::PlayAnimations& effect);
+  Outcome apply(const set::HoldAnimations& effect);
   Outcome apply(const set::SelectLight& effect);
   Outcome apply(const set::DimLight& effect);
   Outcome apply(const set::TintLight& effect);
@@ -83,6 +89,7 @@ class Controls {
   const set::Control control_;
   std::vector<std::string> objects_;  // the virtual ones
   std::vector<std::string> lights_;
+  const bool is_animated_;
   std::size_t object_ = 0, light_ = 0;
   Look look_;
 };

@@ -8,8 +8,10 @@
 #include <thread>
 #include <vector>
 
+#include "daemon/set/value.hpp"
 #include "drivers/button_drivers.hpp"
 #include "drivers/camera_drivers.hpp"
+#include "drivers/display_drivers.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::rig {
@@ -24,7 +26,7 @@ void list_cameras(std::ostream& out) {
   std::size_t count = 0;
   for (const CameraDriver& driver : camera_drivers()) {
     for (const FoundCamera& camera : driver.find()) {
-      print(out, "driver = \"" + camera.driver + "\", device = \"" + camera.device + "\"",
+      print(out, "driver = \"" + camera.driver + "\", device = " + set::codec::quote(camera.device),
             camera.description);
       ++count;
     }
@@ -44,11 +46,27 @@ void list_buttons(std::ostream& out) {
   if (count == 0) out << "  none\n";
 }
 
+void list_displays(std::ostream& out) {
+  out << "displays (driver and connector of [display])\n";
+  std::size_t count = 0;
+  for (const DisplayDriver& driver : display_drivers()) {
+    for (const FoundDisplay& display : driver.find()) {
+      print(out,
+            "driver = \"" + std::string(driver.name) + "\", connector = \"" + display.connector +
+                "\"",
+            display.description);
+      ++count;
+    }
+  }
+  if (count == 0) out << "  none\n";
+}
+
 }  // namespace
 
 void list_devices(std::ostream& out) {
   list_cameras(out);
   list_buttons(out);
+  list_displays(out);
 }
 
 // A device is read by a thread of its own; two interfaces of one device have one name, and the

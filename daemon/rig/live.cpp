@@ -7,10 +7,11 @@
 
 #include "daemon/control/bus.hpp"
 #include "daemon/rig/event_loop.hpp"
-#include "daemon/rig/headless_display.hpp"
+#include "daemon/rig/live_files.hpp"
 #include "daemon/rig/loaded_set.hpp"
 #include "daemon/rig/notes.hpp"
 #include "daemon/rig/rig.hpp"
+#include "daemon/rig/screen.hpp"
 #include "daemon/rig/service.hpp"
 #include "daemon/set/actions.hpp"
 #include "daemon/set/names.hpp"
@@ -25,6 +26,31 @@ LoadedSet overridden(LoadedSet loaded, const LiveOptions& options) {
   if (options.directory) loaded.set.output.directory = *options.directory;
   return loaded;
 }
+
+// The screen stays as it is from one set to the next, as far as both say the same of it.
+class CrewScreen {
+ public:
+  CrewScreen(Notes& note, pipeline::Metrics& metrics, decltype(LiveOptions::on_screen) on_screen)
+      : note_(note), metrics_(metrics), on_screen_(std::move(on_screen)) {}
+
+  void use(const set::Set& set) {
+    if (screen_ && set.display == used_ && set.output.directory == directory_) return;
+    screen_.reset();  // before another opens the same display
+    screen_.emplace(set, Screen::Parts{note_, metrics_, set.output.directory, on_screen_});
+    used_ = set.display;
+    directory_ = set.output.directory;
+  }
+  void close() { screen_.reset(); }
+  Screen* operator->() { return &*screen_; }
+
+ private:
+  Notes& note_;
+  pipeline::Metrics& metrics_;
+  const decltype(LiveOptions::on_screen) on_screen_;
+  std::optional<Screen> screen_;
+  set::Display used_;
+  std::filesystem::path directory_;
+};
 
 control::Status status_of(const Rig& rig) {
   const Look& look = rig.controls().look();
@@ -79,16 +105,21 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out
   LoadedSet loaded = overridden(load_whole_set(options.set_file), options);
   std::optional<LoadedSet> before;  // what ran until now, should this one not start
   const std::shared_ptr<render::Device> device = render::open_device(options.device);
+  CrewScreen screen(note, metrics, options.on_screen);
   for (;;) {
     EventLoop loop;
-    HeadlessDisplay display(loaded.set.output.directory, metrics);
+    LiveFiles files(loaded.set.output.directory, metrics);
     const auto show = [&](pipeline::Shot shot, const Look& look) {
       if (options.on_shown) options.on_shown(shot, look);
-      display.show(std::move(shot));
+      const auto picture = std::make_shared<const Plate>(std::move(shot.picture));
+      screen->show(shot, picture);
+      files.take(picture);
     };
+    const auto tell = [&](RigFacts facts) { screen->tell(std::move(facts)); };
     std::unique_ptr<Rig> rig;
     try {
-      rig = std::make_unique<Rig>(loaded, Rig::Parts{loop, note, metrics, device, show,
+      screen.use(loaded.set);
+      rig = std::make_unique<Rig>(loaded, Rig::Parts{loop, note, metrics, device, show, tell,
                                                      options.buttons, options.loop, options.stop});
     } catch (const Error& error) {
       if (!before) throw;
@@ -100,7 +131,7 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out
                std::to_string(loaded.set.quality.samples) + " samples a frame");
     std::optional<control::Bus> bus;
     if (options.bus) {
-      bus.emplace(loop.handle(), verbs_of(*rig, [&] { return to_json(display.metrics()); }));
+      bus.emplace(loop.handle(), verbs_of(*rig, [&] { return to_json(files.metrics()); }));
       rig->on_change([&] { bus->changed(); });
     }
     const auto reload =
@@ -110,7 +141,10 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out
     rig->on_change({});
     bus.reset();
     rig.reset();
-    if (!next) return display.write();
+    if (!next) {
+      screen.close();
+      return files.write();
+    }
     before = std::exchange(loaded, overridden(std::move(*next), options));
   }
 }

@@ -1,4 +1,4 @@
-// `previzd run`: the live pipeline, headless. Newest value only between stages; drops are counted.
+// `previzd run`: the live pipeline. Newest value only between stages; drops are counted.
 #pragma once
 
 #include <filesystem>
@@ -9,6 +9,7 @@
 #include <stop_token>
 #include <vector>
 
+#include "daemon/output/osd_page.hpp"
 #include "daemon/pipeline/metrics.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/render/renderer.hpp"
@@ -27,13 +28,15 @@ struct LiveOptions {
   std::stop_token stop;
   // Devices besides those the set names: a test's own.
   std::function<std::vector<std::unique_ptr<Buttons>>()> buttons;
-  // Called with every picture as it is shown, on the display's thread.
+  // Called with every picture as it goes to the display, on the pipeline's last thread.
   std::function<void(const pipeline::Shot&, const Look&)> on_shown;
+  // Called with all that the display shows, read back, and the overlay's words; on its thread.
+  std::function<void(const Plate&, const output::OsdPage&)> on_screen;
 };
 
 // Runs until the observer's stream ends or a stop is requested; buttons, and changes of the set
-// file, act as the set says. About once a second, and at the end, writes what a display would show
-// to DIR/picture.png and what the pipeline did to DIR/metrics.json. A frame whose pose is lost, or
+// file, act as the set says. About once a second, and at the end, writes the newest picture to
+// DIR/picture.png and what the pipeline did to DIR/metrics.json. A frame whose pose is lost, or
 // that comes before the first light, shows its plate untouched. Notes go to `out`. Throws
 // previz::Error on anything that keeps the rig from running.
 pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out);

@@ -15,6 +15,7 @@
 #include "daemon/render/renderer.hpp"
 #include "daemon/rig/cameras.hpp"
 #include "daemon/rig/controls.hpp"
+#include "daemon/rig/faults.hpp"
 #include "daemon/rig/inbox.hpp"
 #include "daemon/rig/notes.hpp"
 #include "daemon/scene/scene.hpp"
@@ -33,6 +34,7 @@ class LivePipeline {
     const pipeline::Newest<Look>& look;
     Inbox& inbox;
     Notes& note;
+    Faults& faults;
     pipeline::Metrics& metrics;
     std::function<void(pipeline::Shot)> show;  // on the display's thread
   };

@@ -39,7 +39,19 @@ bool LiveRender::interrupted() const {
   return stop_.stop_requested() || (refining_ && look_.get()->state.mode != Mode::refine);
 }
 
-std::optional<Shot> LiveRender::next() {
+std::optional<Shot> LiveRender::next(const std::function<bool(const render::DeviceLost&)>& renew) {
+  for (;;) {
+    try {
+      return next_picture();
+    } catch (const render::DeviceLost& lost) {
+      refining_ = false;
+      refined_.reset();
+      if (!renew(lost)) return std::nullopt;
+    }
+  }
+}
+
+std::optional<Shot> LiveRender::next_picture() {
   for (;;) {
     const std::shared_ptr<const Look> look = look_.get();
     // What a button was pressed at is what is saved, also where the press ended the refinement.
@@ -55,7 +67,7 @@ std::optional<Shot> LiveRender::next() {
 std::optional<Shot> LiveRender::refine(const Look& look) {
   while (channels_.tracked.try_pop()) metrics_.dropped("render", "refining");
   if (refining_ && refined_edits_ != look.edits) {  // P14: moved while it is refined
-    good_->scene = pipeline::scene_state(set_, look.edits);
+    good_->scene = pipeline::scene_state(set_, look.edits, good_->motion);
     refining_ = false;
   }
   if (!refining_ && !begin_refinement(look)) return std::nullopt;
@@ -107,9 +119,6 @@ std::optional<Shot> LiveRender::wait_for_frame(const Look& look) {
     metrics_.dropped("render", "refining");
     return std::nullopt;
   }
-  if (!review) {
-    shot->light = channels_.light.newest();
-  }
   return render(look, std::move(*shot));
 }
 
@@ -128,11 +137,21 @@ Shot LiveRender::render(const Look& look, Shot shot) {
   stage_->show(look.view);
   stage_->fill_layers(snapshot);
   stage_->resize(governed ? governor_->scale() : set_.quality.scale);
-  (*stage_)(shot);
+  // What is reviewed was not captured now.
+  const bool captured = look.state.mode != Mode::review;
+  try {
+    (*stage_)(shot);
+  } catch (const render::DeviceLost&) {
+    if (captured) metrics_.dropped("render", "device lost");
+    throw;
+  }
   refined_.reset();
   const double took = seconds_since(begin);
   metrics_.busy("render", took);
-  metrics_.worked("render", 0);
+  if (captured)
+    metrics_.worked("render", 0);
+  else
+    metrics_.count("pictures reviewed");
   if (!shot.whole) return shot;
   if (shot.untouched.empty()) {
     keep_as_good(shot);
@@ -151,6 +170,7 @@ void LiveRender::keep_as_good(const Shot& shot) {
   good.arrived = shot.arrived;
   good.track = shot.track;
   good.light = shot.light;
+  good.motion = shot.motion;
   good.scene = shot.scene;
   good.tracking_done = true;
   good.frozen = true;

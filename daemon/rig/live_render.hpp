@@ -10,7 +10,6 @@
 
 #include "daemon/pipeline/channel.hpp"
 #include "daemon/pipeline/governor.hpp"
-#include "daemon/pipeline/light_feed.hpp"
 #include "daemon/pipeline/metrics.hpp"
 #include "daemon/pipeline/newest.hpp"
 #include "daemon/pipeline/render_stage.hpp"
@@ -23,9 +22,8 @@ namespace previz::rig {
 class LiveRender {
  public:
   struct Channels {
-    pipeline::Mailbox<pipeline::Shot>& tracked;   // of the camera
-    pipeline::Mailbox<pipeline::Shot>& reviewed;  // of a take, with their light
-    pipeline::LightFeed& light;
+    pipeline::Mailbox<pipeline::Shot>& tracked;         // of the camera
+    pipeline::Mailbox<pipeline::Shot>& reviewed;        // of a take, with their light
     pipeline::BoundedQueue<pipeline::Shot>& snapshots;  // out: with layers
   };
 
@@ -35,14 +33,17 @@ class LiveRender {
 
   void use(pipeline::RenderStage& stage) { stage_ = &stage; }
 
-  // The next picture to show; nothing once the camera's frames have ended. A refinement's rounds
-  // grow: first the preview's samples, then as many again as there are, at most 64.
-  std::optional<pipeline::Shot> next();
+  // The next picture to show; nothing once the camera's frames have ended. Where the device is lost
+  // while it is made, `renew` is called until there is another stage to use(); false: there will be
+  // none, because of a stop. A refinement's rounds grow: first the preview's samples, then as many
+  // again as there are, at most 64.
+  std::optional<pipeline::Shot> next(const std::function<bool(const render::DeviceLost&)>& renew);
 
   // Whether what is being rendered is no longer wanted; from the render thread.
   bool interrupted() const;
 
  private:
+  std::optional<pipeline::Shot> next_picture();
   bool wants_snapshot(const Look& look) const { return look.snapshots > snapshots_; }
   void save(const Look& look, const pipeline::Shot& shot);
   std::optional<pipeline::Shot> refine(const Look& look);

@@ -21,7 +21,7 @@ void play(const std::stop_token& stop, const std::filesystem::path& directory,
     throw Error(directory.string() + ": was recorded with another set; run that one to review it");
   for (const std::string& what : take.session.missing) note(directory.string() + ": " + what);
   if (!take.session.track.empty()) take.set.tracking.enabled = false;
-  pipeline::TrackStage track(take.set, take.observer, take.session.track);
+  pipeline::TrackStage track(take.set, take.observer, take.session.track, pipeline::start_of(take));
   pipeline::RecordedLight light(take.set, take.light, take.observer, std::move(take.light_stream),
                                 directory);
   const std::unique_ptr<Camera> camera = replay(std::move(take.observer_stream), "review");

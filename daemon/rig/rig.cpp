@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::chrono::milliseconds tick_interval{20};
 constexpr int ticks_a_second = 50;
+constexpr int ticks_a_page = 5;  // the overlay's clock and faults
 
 output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& cameras, Notes& note) {
   const set::Set& set = loaded.set;
@@ -49,12 +50,22 @@ output::RecorderOptions recorder_options(const LoadedSet& loaded, const Cameras&
   return options;
 }
 
+// Without it cameras are found too, but only when the next attempt is due.
+Usb watch_usb(Notes& note) {
+  try {
+    return std::make_shared<const usb::Hotplug>();
+  } catch (const Error& error) {
+    note(error.what());
+    return nullptr;
+  }
+}
+
 }  // namespace
 
 Rig::Rig(const LoadedSet& loaded, Parts parts)
     : loaded_(loaded),
       parts_(std::move(parts)),
-      cameras_(open_cameras(loaded.set, parts_.loop_cameras)),
+      cameras_(open_cameras(loaded.set, parts_.loop_cameras, watch_usb(parts_.note))),
       controls_(loaded.set),
       look_(controls_.look()),
       recorder_(recorder_options(loaded, cameras_, parts_.note)),
@@ -69,26 +80,34 @@ Rig::Rig(const LoadedSet& loaded, Parts parts)
            .look = look_,
            .inbox = inbox_,
            .note = parts_.note,
+           .faults = faults_,
            .metrics = parts_.metrics,
            .show = [this](pipeline::Shot shot) { parts_.show(std::move(shot), *look_.get()); }},
           parts_.stop) {
   for (const std::string& what : loaded.scene.notes) parts_.note("scene: " + what);
   open_buttons();
+  free_bytes_ = recorder_.free_bytes();
+  tell_screen();
 }
 
 Rig::~Rig() = default;
 
 void Rig::open_buttons() {
   const auto add = [this](std::vector<std::unique_ptr<Buttons>> opened, std::int64_t offset_ns) {
-    for (std::unique_ptr<Buttons>& buttons : opened)
-      devices_.push_back({std::move(buttons), nullptr, offset_ns});
+    for (std::unique_ptr<Buttons>& buttons : opened) {
+      DeviceCounts counts(parts_.metrics, buttons->name());
+      devices_.push_back({std::move(buttons), std::move(counts), nullptr, offset_ns});
+    }
   };
   add(rig::open_buttons(loaded_.set, cameras_), 0);
   std::vector<std::string> plugged;
   for (const set::Button& button : loaded_.set.buttons)
     if (is_button_name(button.name) && std::ranges::find(plugged, button.name) == plugged.end())
       plugged.push_back(button.name);
-  add(previz::open_buttons(plugged, {}), cameras_.clock_offset_ns);
+  ButtonSettings settings;
+  for (const set::GpioContact& contact : loaded_.set.contacts)
+    settings.wiring[contact.name] = contact.wiring;
+  add(previz::open_buttons(plugged, settings), cameras_.clock_offset_ns);
   if (parts_.more_buttons) add(parts_.more_buttons(), 0);
   for (Device& device : devices_)
     device.watch = parts_.loop.on_readable(device.buttons->fd(), [this, &device] { read(device); });
@@ -111,11 +130,13 @@ void Rig::read(Device& device) {
   while (std::optional<ButtonsEvent> event = device.buttons->next()) {
     bool over = std::holds_alternative<EndOfStream>(*event);
     if (auto* pushed = std::get_if<ButtonEvent>(&*event)) {
+      faults_.well(device.buttons->name());
       pushed->timestamp_ns += device.clock_offset_ns;
       edge(*pushed);
     }
     if (const auto* trouble = std::get_if<DeviceTrouble>(&*event)) {
       parts_.note(trouble->device + ": " + trouble->what);
+      faults_.tell(device.buttons->name(), trouble->what);
       over = trouble->lost;
     }
     if (over) return device.watch.reset();
@@ -165,6 +186,10 @@ void Rig::tell(const Outcome& outcome, const std::string& by) {
   recorder_.offer_event(now_ns(), line);
   service::status(line);
   last_said_ = line;
+  // The mode has its own place on the display.
+  if (outcome.said != set::name_of(controls_.look().state.mode))
+    news_.tell({outcome.said, outcome.refused});
+  tell_screen();
   if (changed_) changed_();
 }
 
@@ -205,6 +230,8 @@ void Rig::change_set(const std::filesystem::path& file) {
     parts_.loop.exit();
   } catch (const std::exception& error) {
     parts_.note.again(std::string(error.what()) + "\nthe set stays as it was");
+    const std::string what = error.what();
+    faults_.pass("the set stays as it was", what.substr(0, what.find('\n')));
   }
 }
 
@@ -228,7 +255,12 @@ void Rig::tick() {
   for (const Press& press : presses_.tick(now_ns())) act(press);
   look_at_recorder();
   std::erase_if(ended_reviews_, [](const auto& review) { return review->done(); });
-  if (++ticks_ % ticks_a_second == 0) look_at_set_file();
+  if (++ticks_ % ticks_a_second == 0) {
+    for (Device& device : devices_) device.counts.tell(device.buttons->counters());
+    look_at_set_file();
+    free_bytes_ = recorder_.free_bytes();
+  }
+  if (ticks_ % ticks_a_page == 0) tell_screen();
 }
 
 void Rig::look_at_recorder() {
@@ -245,6 +277,21 @@ void Rig::look_at_recorder() {
           "take " + status.directory.filename().string() + " is finished");
 }
 
+void Rig::tell_screen() {
+  if (!parts_.tell) return;
+  const output::RecorderStatus recorder = recorder_.status();
+  RigFacts facts;
+  facts.look = controls_.look();
+  facts.take = recorder.directory.filename().string();
+  facts.recorded_s = recorder.seconds;
+  facts.frames_lost = recorder.dropped;
+  facts.recorder_fault = recorder.fault;
+  facts.free_bytes = free_bytes_;
+  facts.news = news_.fresh();
+  facts.faults = faults_.words();
+  parts_.tell(std::move(facts));
+}
+
 void Rig::look_at_set_file() {
   std::error_code gone;
   const auto time = std::filesystem::last_write_time(loaded_.set.file, gone);
@@ -255,7 +302,8 @@ void Rig::look_at_set_file() {
 }
 
 void Rig::feed_watchdog() {
-  const Progress now = progress_of(parts_.metrics.snapshot(0), controls_.look().state);
+  const bool has_screen = loaded_.set.display.driver != set::DisplayDriver::none;
+  const Progress now = progress_of(parts_.metrics.snapshot(0), controls_.look().state, has_screen);
   if (!advances(progress_, now)) return;
   progress_ = now;
   service::feed_watchdog();

@@ -1,6 +1,7 @@
 // The rig running one set: desk, buttons, recorder and pipeline, on the main thread's event loop.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <map>
 #include <memory>
@@ -16,11 +17,15 @@
 #include "daemon/pipeline/newest.hpp"
 #include "daemon/rig/cameras.hpp"
 #include "daemon/rig/controls.hpp"
+#include "daemon/rig/device_counts.hpp"
 #include "daemon/rig/event_loop.hpp"
+#include "daemon/rig/faults.hpp"
 #include "daemon/rig/inbox.hpp"
 #include "daemon/rig/live_pipeline.hpp"
 #include "daemon/rig/loaded_set.hpp"
+#include "daemon/rig/news_ticker.hpp"
 #include "daemon/rig/notes.hpp"
+#include "daemon/rig/osd.hpp"
 #include "daemon/rig/press.hpp"
 #include "daemon/rig/review.hpp"
 #include "daemon/rig/service.hpp"
@@ -34,7 +39,8 @@ class Rig {
     Notes& note;
     pipeline::Metrics& metrics;
     std::shared_ptr<render::Device> device;
-    std::function<void(pipeline::Shot, const Look&)> show;                // on the display's thread
+    std::function<void(pipeline::Shot, const Look&)> show;  // on the pipeline's last thread
+    std::function<void(RigFacts)> tell;                     // what the overlay may say
     std::function<std::vector<std::unique_ptr<Buttons>>()> more_buttons;  // or empty
     bool loop_cameras = false;
     std::stop_token stop;
@@ -64,6 +70,7 @@ class Rig {
  private:
   struct Device {
     std::unique_ptr<Buttons> buttons;
+    DeviceCounts counts;
     std::unique_ptr<EventLoop::Watch> watch;
     std::int64_t clock_offset_ns = 0;  // of the cameras' clock, in which presses are recorded
   };
@@ -77,6 +84,7 @@ class Rig {
   void look_at_recorder();
   void look_at_set_file();
   void feed_watchdog();
+  void tell_screen();
   void tell(const Outcome& outcome, const std::string& by);
   void carry_out(Request request);
   void change_set(const std::filesystem::path& file);
@@ -89,6 +97,7 @@ class Rig {
   Controls controls_;
   pipeline::Newest<Look> look_;
   Inbox inbox_;
+  Faults faults_;
   output::Recorder recorder_;
   PressRecognizer presses_;
   std::set<std::string> ended_refinement_;  // buttons whose running press did
@@ -102,6 +111,8 @@ class Rig {
   std::optional<LoadedSet> next_;
   std::function<void()> changed_;
   std::string last_said_;
+  NewsTicker news_;  // the same for the display
+  std::optional<std::uint64_t> free_bytes_;
   LivePipeline pipeline_;  // last: its threads use all of the above
 };
 

@@ -6,20 +6,38 @@
 
 namespace previz::rig {
 
-Progress progress_of(const pipeline::MetricsSnapshot& metrics, const State& state) {
+Progress progress_of(const pipeline::MetricsSnapshot& metrics, const State& state,
+                     bool has_screen) {
   const auto frames_of = [&](const char* stage) {
     const auto found = metrics.stages.find(stage);
     return found == metrics.stages.end() ? 0 : found->second.frames;
   };
-  return {frames_of("observer"), frames_of("display"), frames_of("light camera"),
-          frames_of("lighting"), state.camera_lost,    state.mode == Mode::standby};
+  const auto count_of = [&](const char* event) {
+    const auto found = metrics.counts.find(event);
+    return found == metrics.counts.end() ? 0 : found->second;
+  };
+  // A picture that no display was there for did not stop the screen.
+  std::uint64_t screened = frames_of("screen");
+  if (const auto screen = metrics.stages.find("screen"); screen != metrics.stages.end())
+    for (const auto& [cause, dropped] : screen->second.dropped) screened += dropped;
+  const bool no_device = count_of("device lost") > count_of("device opened again");
+  return {.captured = frames_of("observer"),
+          .shown = frames_of("display"),
+          .screened = screened,
+          .lights = frames_of("light camera"),
+          .light_estimates = frames_of("lighting"),
+          .has_screen = has_screen,
+          .camera_lost = state.camera_lost,
+          .dark = state.mode == Mode::standby || no_device};
 }
 
 bool advances(const Progress& before, const Progress& now) {
   const bool captures = now.camera_lost || now.captured > before.captured;
-  const bool shows = now.camera_lost || now.dark || now.shown > before.shown;
+  const bool idle = now.camera_lost || now.dark;
+  const bool shows = idle || now.shown > before.shown;
+  const bool screens = idle || !now.has_screen || now.screened > before.screened;
   const bool lights = now.lights == before.lights || now.light_estimates > before.light_estimates;
-  return captures && shows && lights;
+  return captures && shows && screens && lights;
 }
 
 namespace service {

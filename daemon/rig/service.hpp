@@ -14,14 +14,17 @@ namespace previz::rig {
 // How far the pipeline has come.
 struct Progress {
   std::uint64_t captured = 0, shown = 0;          // observer frames; pictures
+  std::uint64_t screened = 0;                     // pictures the screen showed, or could not
   std::uint64_t lights = 0, light_estimates = 0;  // light frames; what lighting made of them
-  bool camera_lost = false, dark = false;         // dark: standby
+  bool has_screen = false;
+  bool camera_lost = false, dark = false;  // dark: standby, or the GPU is lost
 };
-Progress progress_of(const pipeline::MetricsSnapshot& metrics, const State& state);
+Progress progress_of(const pipeline::MetricsSnapshot& metrics, const State& state, bool has_screen);
 
 // Whether everything that has something to do has done something: cameras that are there deliver,
-// what they deliver is shown (but not in standby) and lights the scene. A rig without a camera
-// waits for it, and is well.
+// what they deliver is shown (but not in standby), on the screen too if there is one, and lights
+// the scene. A rig without a camera waits for it, and is well; so does one that opens its GPU
+// again.
 bool advances(const Progress& before, const Progress& now);
 
 // The other end of systemd's notification socket; outside systemd every call does nothing.

@@ -1,35 +1,35 @@
-// The display of a rig without one: the newest picture and the metrics as files.
+// What the rig does, as files: the newest picture and the metrics.
 #pragma once
 
 #include <chrono>
 #include <filesystem>
+#include <memory>
 
 #include "daemon/pipeline/metrics.hpp"
-#include "daemon/pipeline/shot.hpp"
+#include "drivers/frame.hpp"
 
 namespace previz::rig {
 
-// Latency is from the capture time to the call of show(): the device's own part (arrival minus
-// capture, as the driver reports it) and ours.
-class HeadlessDisplay {
+class LiveFiles {
  public:
   // Makes the directory; throws previz::Error if it cannot.
-  HeadlessDisplay(std::filesystem::path directory, pipeline::Metrics& metrics);
+  LiveFiles(std::filesystem::path directory, const pipeline::Metrics& metrics);
 
-  void show(pipeline::Shot shot);
+  // Writes about once a second; from one thread.
+  void take(std::shared_ptr<const Plate> picture);
   // What the pipeline did so far; from any thread.
   pipeline::MetricsSnapshot metrics() const;
-  // Writes picture.png (if anything was shown) and metrics.json.
+  // Writes picture.png (if there was any) and metrics.json.
   pipeline::MetricsSnapshot write();
 
  private:
   using Clock = std::chrono::steady_clock;
 
   const std::filesystem::path directory_;
-  pipeline::Metrics& metrics_;
+  const pipeline::Metrics& metrics_;
   const Clock::time_point start_ = Clock::now();
   Clock::time_point written_ = start_;
-  Plate picture_;
+  std::shared_ptr<const Plate> picture_;
 };
 
 }  // namespace previz::rig

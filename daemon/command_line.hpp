@@ -1,0 +1,32 @@
+// The command line of previzd: its subcommands, and what each of them was told. The program parses
+// by it, and the manual page and the shell completion are printed from it.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "daemon/calibrate/command_line.hpp"
+#include "daemon/post/camera_track.hpp"
+#include "daemon/post/import.hpp"
+#include "daemon/post/render.hpp"
+#include "daemon/post/trade.hpp"
+#include "daemon/rig/live.hpp"
+
+namespace previz {
+
+struct CommandLine {
+  std::string log_level = "info";
+  post::RenderOptions render;
+  rig::LiveOptions run;
+  std::filesystem::path check;
+  bool learn = false;
+  post::ImportOptions import_session;
+  post::ExportOptions export_take;
+  post::TradeOptions trade;
+  calibrate::Commands calibrate;
+};
+
+// Adds everything to `app`; `said` must outlive it.
+void add_commands(CLI::App& app, CommandLine& said);
+
+}  // namespace previz

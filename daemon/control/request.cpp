@@ -1,0 +1,32 @@
+#include "daemon/control/request.hpp"
+
+#include <CLI/CLI.hpp>
+
+namespace previz::control {
+
+void add_requests(CLI::App& app, Request& asked) {
+  app.set_version_flag("--version", "previzctl " PREVIZ_VERSION, "The version, and nothing else");
+  app.require_subcommand(1);
+  app.add_subcommand("status", "What the rig is doing");
+  app.add_subcommand("watch", "The same, and every change of it");
+  app.add_subcommand("metrics", "Rates, drops and latency, as JSON");
+  app.add_subcommand("mode", "Go to a mode")
+      ->add_option("mode", asked.mode)
+      ->required()
+      ->check(CLI::IsMember({"standby", "live", "refine", "review"}));
+  app.add_subcommand("record", "Start or end a take")
+      ->add_option("on", asked.record)
+      ->required()
+      ->check(CLI::IsMember({"on", "off"}));
+  app.add_subcommand("action", "Do what a button could do")
+      ->add_option("name", asked.action)
+      ->required()
+      ->type_name("ACTION");
+  app.add_subcommand("actions", "All actions")->add_flag("--names", asked.names_only, "Names only");
+  app.add_subcommand("set", "Change the set")
+      ->add_option("which", asked.set)
+      ->required()
+      ->check(CLI::IsMember({"reload", "next", "previous"}));
+}
+
+}  // namespace previz::control

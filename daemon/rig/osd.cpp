@@ -1,0 +1,134 @@
+#include "daemon/rig/osd.hpp"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "daemon/set/names.hpp"
+
+namespace previz::rig {
+namespace {
+
+using output::OsdPage;
+using output::OsdText;
+using output::OsdTone;
+using tracking::TrackStatus;
+
+constexpr std::uint64_t little_space = 10'000'000'000;  // bytes, beside the reserve
+
+// "1 tag", "2 tags"
+std::string counted(int number, const char* noun) {
+  return fmt::format("{} {}{}", number, noun, number == 1 ? "" : "s");
+}
+
+// 00:04:31
+std::string clock(double seconds) {
+  const auto whole = static_cast<long>(seconds);
+  return fmt::format("{:02}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
+}
+
+OsdText mode(const Look& look) {
+  switch (look.state.mode) {
+    case Mode::live:
+      return {"LIVE", OsdTone::plain};
+    case Mode::refine:
+      return {"REFINE", OsdTone::mode};
+    case Mode::review:
+      return {"REVIEW", OsdTone::mode};
+    case Mode::standby:
+      return {"STANDBY", OsdTone::mode};
+  }
+  return {};
+}
+
+OsdText space(std::uint64_t bytes) {
+  const double gigabytes = 1e-9 * static_cast<double>(bytes);
+  return {fmt::format("{:.{}f} GB free", gigabytes, gigabytes < 100 ? 1 : 0),
+          bytes == 0             ? OsdTone::alarm
+          : bytes < little_space ? OsdTone::warning
+                                 : OsdTone::plain};
+}
+
+std::string samples(const PictureFacts& picture, const Look& look) {
+  if (picture.samples == 0) return "camera only";
+  std::string text = counted(picture.samples, "sample");
+  if (look.state.mode == Mode::refine && picture.error > 0)
+    text += fmt::format(" · error {:.2g} %", 100 * picture.error);
+  return text;
+}
+
+OsdText tracking_words(const PictureFacts& picture) {
+  switch (picture.tracking) {
+    case TrackStatus::lost:
+      return {"tracking lost", OsdTone::alarm};
+    case TrackStatus::ambiguous:
+      return {"tracking ambiguous", OsdTone::alarm};
+    case TrackStatus::tracked:
+      break;
+  }
+  std::string text = counted(picture.tags, "tag");
+  if (picture.deviation_mm > 0) text += fmt::format(" · ±{:.2g} mm", picture.deviation_mm);
+  return {text, picture.tracking_trouble.empty() ? OsdTone::plain : OsdTone::warning};
+}
+
+void add_notices(const RigFacts& rig, const PictureFacts* picture, OsdPage& page) {
+  for (const std::string& fault : rig.faults) page.notices.push_back({fault, OsdTone::alarm});
+  if (rig.look.state.camera_lost && rig.faults.empty())
+    page.notices.push_back({"film camera: no pictures come", OsdTone::alarm});
+  if (!rig.recorder_fault.empty())
+    page.notices.push_back({"recording ended: " + rig.recorder_fault, OsdTone::alarm});
+  if (rig.frames_lost > 0)
+    page.notices.push_back(
+        {fmt::format("{} frames are missing in the take: the disk is too slow", rig.frames_lost),
+         OsdTone::alarm});
+  if (!picture && !rig.look.state.camera_lost)
+    page.notices.push_back({"waiting for the film camera", OsdTone::warning});
+  if (picture && !picture->untouched.empty())
+    page.notices.push_back({"camera only: " + picture->untouched, OsdTone::warning});
+  else if (picture && !picture->tracking_trouble.empty())
+    page.notices.push_back({"tracking: " + picture->tracking_trouble, OsdTone::warning});
+  for (const News& news : rig.news)
+    page.notices.push_back({news.what, news.refused ? OsdTone::warning : OsdTone::plain});
+}
+
+}  // namespace
+
+PictureFacts facts_of(const pipeline::Shot& shot) {
+  PictureFacts facts;
+  facts.samples = shot.samples;
+  facts.error = shot.error;
+  facts.untouched = shot.untouched;
+  facts.tracking = shot.track.status;
+  facts.tracking_trouble = shot.track.reason;
+  if (shot.track.pose) {
+    facts.tags = static_cast<int>(shot.track.pose->tags.size());
+    double variance_m2 = 0;  // of the place: the lower half of the 6x6's diagonal
+    for (const std::size_t axis : {3, 4, 5}) variance_m2 += shot.track.pose->covariance[7 * axis];
+    facts.deviation_mm = 1e3 * std::sqrt(variance_m2);
+  }
+  return facts;
+}
+
+OsdPage osd_page(const RigFacts& rig, const PictureFacts* picture, const Pace& pace) {
+  OsdPage page;
+  const Look& look = rig.look;
+  page.top_left.push_back(mode(look));
+  if (look.state.recording)
+    page.top_left.push_back({"● " + clock(rig.recorded_s), OsdTone::recording});
+  if (look.state.recording && !rig.take.empty()) page.top_left.push_back({rig.take});
+  if (look.view != render::View::composite)
+    page.top_left.push_back({std::string("view: ") + render::name_of(look.view), OsdTone::mode});
+  if (rig.free_bytes) page.top_right.push_back(space(*rig.free_bytes));
+  if (picture) {
+    page.bottom_left.push_back({samples(*picture, look)});
+    if (look.state.mode != Mode::refine && pace.fps > 0)
+      page.bottom_left.push_back(
+          {fmt::format("{:.1f} fps · {:.0f} ms", pace.fps, 1e3 * pace.latency_s)});
+    page.bottom_right.push_back(tracking_words(*picture));
+  }
+  page.bottom_right.push_back({std::string("light: ") + set::name_of(look.light_mode)});
+  add_notices(rig, picture, page);
+  return page;
+}
+
+}  // namespace previz::rig

@@ -1,0 +1,219 @@
+#include "daemon/rig/screen.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <deque>
+#include <optional>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "daemon/output/osd_painter.hpp"
+#include "daemon/output/png.hpp"
+#include "daemon/pipeline/channel.hpp"
+#include "daemon/pipeline/newest.hpp"
+#include "daemon/set/names.hpp"
+#include "drivers/display_drivers.hpp"
+#include "drivers/display_lifeline.hpp"
+#include "drivers/error.hpp"
+#include "drivers/host_clock.hpp"
+
+namespace previz::rig {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds words_interval{
+    100};  // between looks at words without a picture
+constexpr std::chrono::seconds file_interval{1};
+
+struct Picture {
+  std::shared_ptr<const Plate> plate;
+  PictureFacts facts;
+  Clock::time_point arrived;  // at the daemon
+  double in_device_s = 0;     // before: from capture to arrival, as the driver reports it
+  bool frozen = false;        // of a refinement: no newer frame, and as late as it was frozen
+
+  double latency_s(std::int64_t shown_ns) const {
+    const auto arrived_ns = std::chrono::nanoseconds(arrived.time_since_epoch()).count();
+    return in_device_s + 1e-9 * static_cast<double>(shown_ns - arrived_ns);
+  }
+};
+
+// Rate and median latency of what was shown in the last second, or of the last two pictures, read
+// off twice a second: figures that change with every picture cannot be read.
+class PaceMeter {
+ public:
+  void shown(std::int64_t now_ns, double latency_s) {
+    shown_.push_back({now_ns, latency_s});
+    while (shown_.size() > 2 && now_ns - shown_.front().at_ns > second_ns) shown_.pop_front();
+    if (now_ns - read_off_ns_ < second_ns / 2) return;
+    read_off_ns_ = now_ns;
+    std::vector<double> latencies;
+    for (const Entry& entry : shown_) latencies.push_back(entry.latency_s);
+    const double span_s = 1e-9 * static_cast<double>(now_ns - shown_.front().at_ns);
+    pace_ = {span_s > 0 ? static_cast<double>(shown_.size() - 1) / span_s : 0,
+             pipeline::quantile(std::move(latencies), 0.5)};
+  }
+  const Pace& read() const { return pace_; }
+
+ private:
+  static constexpr std::int64_t second_ns = 1'000'000'000;
+  struct Entry {
+    std::int64_t at_ns;
+    double latency_s;
+  };
+  std::deque<Entry> shown_;
+  std::int64_t read_off_ns_ = 0;
+  Pace pace_;
+};
+
+DisplayOpener opener_of(const set::Set& set) {
+  const set::Display& display = set.display;
+  const DisplaySettings settings{display.connector, display.mode, display.scale};
+  try {
+    const DisplayDriver& driver = display_driver(set::name_of(display.driver));
+    return [&driver, settings] { return driver.open(settings); };
+  } catch (const Error& error) {
+    throw Error(set.file.string() + ": display.driver: " + error.what());
+  }
+}
+
+}  // namespace
+
+struct Screen::Impl {
+  Impl(const set::Set& set, Parts the_parts);
+  ~Impl() {
+    pictures.close();
+    thread.join();
+  }
+
+  void run();
+  void look_after(std::optional<Picture> newest);
+  void put(const output::OsdPage& next, bool fresh);
+  Screenful compose(const DisplayMode& mode, const output::OsdPage& next);
+  void was_shown(const Shown& shown, bool fresh);
+  void read_back();
+
+  const set::Display settings;
+  const Parts parts;
+  pipeline::Mailbox<Picture> pictures;
+  pipeline::Newest<RigFacts> rig{{}};
+
+  // The thread's own.
+  DisplayLifeline life;
+  std::optional<output::OsdPainter> painter;
+  DisplayMode painted_for;
+  output::OsdPage painted;
+  std::vector<Overlay> overlays;  // `painted`, for `painted_for`
+  std::optional<Picture> picture;
+  PaceMeter pace;
+  output::OsdPage page;
+  bool up_to_date = false;  // the screen shows `picture` and `page`
+  bool dark = false;
+  Clock::time_point written;
+  std::jthread thread;
+};
+
+Screen::Impl::Impl(const set::Set& set, Parts the_parts)
+    : settings(set.display),
+      parts(std::move(the_parts)),
+      life(set.display.connector.empty() ? "display" : "display " + set.display.connector,
+           opener_of(set)) {
+  const output::Font is_there(output::default_font(), 1);  // throws now, and not on the thread
+  thread = std::jthread([this] { run(); });
+}
+
+void Screen::Impl::run() {
+  while (!pictures.finished()) look_after(pictures.pop_for(words_interval));
+  parts.metrics.dropped("screen", "newer frame", pictures.dropped());
+}
+
+void Screen::Impl::look_after(std::optional<Picture> newest) {
+  const std::shared_ptr<const RigFacts> facts = rig.get();
+  const bool fresh = newest.has_value();
+  if (fresh) picture = std::move(newest);
+  if (facts->look.state.mode == Mode::standby) {
+    if (fresh) parts.metrics.dropped("screen", "standby");
+    if (!std::exchange(dark, true)) life.release();
+    up_to_date = false;
+    return;
+  }
+  dark = false;
+  output::OsdPage next;
+  if (facts->look.osd) next = osd_page(*facts, picture ? &picture->facts : nullptr, pace.read());
+  if (fresh || !up_to_date || next != page) put(next, fresh);
+}
+
+void Screen::Impl::put(const output::OsdPage& next, bool fresh) {
+  const auto begin = Clock::now();
+  const std::optional<DisplayEvent> event =
+      life.show([&](const DisplayMode& mode) { return compose(mode, next); });
+  up_to_date = event && std::holds_alternative<Shown>(*event);
+  if (up_to_date) {
+    page = next;
+    was_shown(std::get<Shown>(*event), fresh);
+    if (fresh)
+      parts.metrics.worked("screen", std::chrono::duration<double>(Clock::now() - begin).count());
+    return;
+  }
+  if (fresh) parts.metrics.dropped("screen", "no display");
+  if (!event) return;
+  const DeviceTrouble& trouble = std::get<DeviceTrouble>(*event);
+  parts.metrics.count("screen: device trouble");
+  parts.note.again(trouble.device + ": " + trouble.what);
+}
+
+Screenful Screen::Impl::compose(const DisplayMode& mode, const output::OsdPage& next) {
+  const bool other_screen = !painter || mode != painted_for;
+  if (other_screen) painter.emplace(mode.width, mode.height, settings.text_height);
+  if (other_screen || next != painted) overlays = painter->paint(next);
+  painted_for = mode;
+  painted = next;
+  return {picture ? picture->plate : nullptr, overlays};
+}
+
+void Screen::Impl::was_shown(const Shown& shown, bool fresh) {
+  if (fresh && !picture->frozen) {
+    const double latency_s = picture->latency_s(shown.timestamp_ns);
+    parts.metrics.shown(latency_s);
+    pace.shown(shown.timestamp_ns, latency_s);
+  }
+  read_back();
+}
+
+void Screen::Impl::read_back() {
+  if (parts.on_screen) parts.on_screen(life.display()->read_back(), page);
+  if (settings.driver != set::DisplayDriver::headless || Clock::now() - written < file_interval)
+    return;
+  written = Clock::now();
+  try {
+    output::write_png(parts.directory / "screen.png", life.display()->read_back());
+  } catch (const Error& error) {
+    parts.note(error.what());
+  }
+}
+
+Screen::Screen(const set::Set& set, Parts parts)
+    : metrics_(parts.metrics),
+      impl_(set.display.driver == set::DisplayDriver::none
+                ? nullptr
+                : std::make_unique<Impl>(set, std::move(parts))) {}
+
+Screen::~Screen() = default;
+
+void Screen::show(const pipeline::Shot& shot, std::shared_ptr<const Plate> picture) {
+  Picture shown{std::move(picture), facts_of(shot), shot.arrived,
+                1e-9 * static_cast<double>(shot.frame->arrival_ns - shot.frame->timestamp_ns),
+                shot.frozen};
+  if (impl_)
+    impl_->pictures.push(std::move(shown));
+  else if (!shown.frozen)
+    metrics_.shown(shown.latency_s(monotonic_ns()));
+}
+
+void Screen::tell(RigFacts facts) {
+  if (impl_) impl_->rig.set(std::move(facts));
+}
+
+}  // namespace previz::rig
