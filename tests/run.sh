@@ -6,6 +6,9 @@
 #
 #   tests/run.sh              all of it
 #   tests/run.sh release      only the named steps: release asan format lint
+# Two more steps are taken only if they are named, for they need root or user namespaces, and time:
+#   package   builds the .deb, and installs it in a bare Debian (tests/package/run.sh, 3 minutes)
+#   rig_vm    runs that on a rig in a VM (tests/rig_vm/run.sh, 20 minutes)
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit
 jobs=$(nproc)
@@ -74,8 +77,10 @@ for name in "${steps[@]}"; do
       ;;
     format) check "format" format ;;
     lint) check "lint" lint ;;
+    package | rig_vm) check "$name" "tests/$name/run.sh" ;;
     *)
-      echo "tests/run.sh: no step '$name'; release, asan, format and lint are allowed" >&2
+      echo "tests/run.sh: no step '$name'; release, asan, format, lint, package and rig_vm are" \
+        "allowed" >&2
       exit 2
       ;;
   esac

@@ -44,8 +44,11 @@ FramePtr read_light_frame(const LightFrame& file) {
 // Per texel: whether the camera sees the environment there.
 std::vector<bool> comparable(const TruthSet& set, int size) {
   set::Set phantom_only;
-  phantom_only.objects.push_back(
-      {"phantom", set.phantom, set.phantom.string(), set::Presence::phantom, glm::dmat4(1), {}});
+  set::Object& phantom = phantom_only.objects.emplace_back();
+  phantom.name = "phantom";
+  phantom.file = set.phantom;
+  phantom.file_as_written = set.phantom.string();
+  phantom.presence = set::Presence::phantom;
   const scene::Scene scene = scene::load_scene(phantom_only);
   Geometry geometry(scene);
   const glm::dmat4& pose = set.light_camera->world_from_camera;

@@ -80,6 +80,31 @@ void expect_agreement(const View& view, int samples, bool caustics) {
   EXPECT_TRUE(real.agree) << "real: " << real.report();
 }
 
+// The same picture by both estimators.
+void expect_same_difference(const View& view, int samples, bool caustics) {
+  const auto scrambled = [&](set::Estimator estimator, std::uint32_t first_seed) {
+    set::Estimation estimation;
+    estimation.estimator = estimator;
+    if (!caustics) estimation.caustics = set::Caustics::none;
+    render::Renderer renderer(shared_device(), estimation, view.calibration);
+    renderer.set_scene(view.scene);
+    renderer.set_environment(view.environment, set::LightSampling::importance);
+    truth::Scrambles result;
+    result.width = view.calibration.intrinsics.width;
+    result.height = view.calibration.intrinsics.height;
+    for (std::uint32_t i = 0; i < scrambles; ++i) {
+      renderer.begin({{}, 1.0, view.world_from_camera, first_seed + i});
+      renderer.render(samples);
+      expect_clean(renderer.counters());
+      result.pictures.push_back(widen(renderer.layers().composite));
+    }
+    return result;
+  };
+  const truth::Agreement agreement = truth::agreement(scrambled(set::Estimator::paired, 1),
+                                                      scrambled(set::Estimator::difference, 1001));
+  EXPECT_TRUE(agreement.agree) << agreement.report();
+}
+
 class RandomSets : public ::testing::TestWithParam<std::uint32_t> {
  protected:
   static View view() {
@@ -200,27 +225,7 @@ TEST(RoughMaterials, agree_with_the_cpu_tracer) {
 // picture, and by the composite over black everywhere. Lamps differ between the worlds in every
 // other set, objects are taken away in the rest.
 TEST_P(RandomSets, have_the_same_difference_by_both_estimators) {
-  const View view = RandomSets::view();
-  const auto scrambled = [&](set::Estimator estimator, std::uint32_t first_seed) {
-    set::Estimation estimation;
-    estimation.estimator = estimator;
-    render::Renderer renderer(shared_device(), estimation, view.calibration);
-    renderer.set_scene(view.scene);
-    renderer.set_environment(view.environment, set::LightSampling::importance);
-    truth::Scrambles result;
-    result.width = view.calibration.intrinsics.width;
-    result.height = view.calibration.intrinsics.height;
-    for (std::uint32_t i = 0; i < scrambles; ++i) {
-      renderer.begin({{}, 1.0, view.world_from_camera, first_seed + i});
-      renderer.render(16);
-      expect_clean(renderer.counters());
-      result.pictures.push_back(widen(renderer.layers().composite));
-    }
-    return result;
-  };
-  const truth::Agreement agreement = truth::agreement(scrambled(set::Estimator::paired, 1),
-                                                      scrambled(set::Estimator::difference, 1001));
-  EXPECT_TRUE(agreement.agree) << agreement.report();
+  expect_same_difference(view(), 16, true);
 }
 
 // Real radiance from a plate that is the renderer's own converged real world, against tracing it.
@@ -308,6 +313,13 @@ TEST_P(TruthScenes, agree_with_the_cpu_tracer) {
   if (!std::filesystem::exists(directory / "set.json"))
     GTEST_SKIP() << "no ground truth set at " << directory;
   expect_agreement(truth_view(directory), 32, false);
+}
+
+TEST_P(TruthScenes, have_the_same_difference_by_both_estimators) {
+  const auto directory = truth_directory(GetParam());
+  if (!std::filesystem::exists(directory / "set.json"))
+    GTEST_SKIP() << "no ground truth set at " << directory;
+  expect_same_difference(truth_view(directory), 32, false);
 }
 
 INSTANTIATE_TEST_SUITE_P(Sets, TruthScenes, ::testing::Values("glass", "desk", "statues"),

@@ -211,6 +211,9 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"paired", "full", "captured"}));
   app.add_option("--frames", arguments.frames, "only these truth frames, as 0,12 [all]")
       ->delimiter(',');
+  app.add_option("--lighting", arguments.take.lighting,
+                 "a line for the set file's [lighting], as 'mode = \"sources\"'; repeatable")
+      ->allow_extra_args(false);
   app.add_option("--estimator", arguments.take.estimator,
                  "a line for the set file's [estimator], as 'caustics = \"traced\"'; repeatable")
       ->allow_extra_args(false);

@@ -101,6 +101,7 @@ std::string set_file_text(const TruthSet& set, const TakeOptions& options) {
   if (options.light == LightFrom::truth) {
     out << "environment = " << quoted(as_written(set.environment)) << "\n";
   }
+  for (const std::string& line : options.lighting) out << line << "\n";
   out << "\n[estimator]\nmax_depth = 16\n";
   for (const std::string& line : options.estimator) out << line << "\n";
   return out.str();

@@ -16,7 +16,8 @@ enum class PoseFrom { truth, tracked };    // the set's poses, or the tags in th
 struct TakeOptions {
   LightFrom light = LightFrom::truth;
   PoseFrom pose = PoseFrom::truth;
-  std::vector<std::string> estimator = {};  // lines for the set file's section, "key = value"
+  // Lines for the set file's sections, "key = value".
+  std::vector<std::string> lighting = {}, estimator = {};
 };
 
 // The set file: calibration is the session's, objects and environment its assets. Truth was

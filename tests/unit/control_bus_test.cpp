@@ -5,54 +5,19 @@
 #include <sys/wait.h>
 #include <systemd/sd-bus.h>
 #include <systemd/sd-event.h>
-#include <unistd.h>
 
 #include <array>
 #include <atomic>
-#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/unit/private_bus.hpp"
 
 namespace previz::control {
 namespace {
-
-// A message bus that nobody else is on, in the place of the system's.
-class PrivateBus {
- public:
-  PrivateBus() {
-    const std::string address = "unix:path=" + (directory_ / "bus").string();
-    int ready[2];
-    if (pipe(ready) != 0) return;
-    child_ = fork();
-    if (child_ == 0) {
-      const std::string print = "--print-address=" + std::to_string(ready[1]);
-      execlp("dbus-daemon", "dbus-daemon", "--session", "--nofork", "--nopidfile",
-             ("--address=" + address).c_str(), print.c_str(), nullptr);
-      _exit(127);
-    }
-    close(ready[1]);
-    char byte = 0;
-    running_ = read(ready[0], &byte, 1) == 1;  // nothing where it could not be started
-    close(ready[0]);
-    setenv("DBUS_SYSTEM_BUS_ADDRESS", address.c_str(), 1);
-  }
-  ~PrivateBus() {
-    kill(child_, SIGTERM);
-    waitpid(child_, nullptr, 0);
-    unsetenv("DBUS_SYSTEM_BUS_ADDRESS");
-  }
-  bool running() const { return running_; }
-
- private:
-  test::TemporaryDirectory directory_;
-  pid_t child_ = -1;
-  bool running_ = false;
-};
 
 struct Said {
   std::string out;
@@ -102,7 +67,7 @@ class RigOnTheBus : public testing::Test {
     sd_event_unref(event_);
   }
 
-  PrivateBus bus_;
+  test::PrivateBus bus_;
   sd_event* event_ = nullptr;
   static Status first_status() {
     Status status;

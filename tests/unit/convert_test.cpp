@@ -273,6 +273,7 @@ TEST(Bayer, AFlatColourIsThatColourUpToTheEdge) {
             converted(plain(mosaic.layout, bits), width, height,
                       mosaic_of(mosaic, width, height, bits > 8, [&](int, int) { return colour; }));
         const Plate plate = to_plate(frame);
+        EXPECT_EQ(to_plate(*demosaiced(std::make_shared<Frame>(frame))).samples, plate.samples);
         EXPECT_EQ(plate.bits, bits > 8 ? 16 : 8);
         const int full = (1 << plate.bits) - 1;
         for (std::size_t i = 0; i < plate.samples.size(); ++i)
@@ -288,8 +289,11 @@ TEST(Bayer, ASampleStaysAsItIsInItsOwnPlace) {
     const int width = 17, height = 12;
     const Bytes bytes = random_bytes(2 * width * height, 3);
     const std::vector<std::uint16_t> in = words_of(bytes);
-    const std::vector<std::uint16_t> out =
-        words_of(converted(plain(mosaic.layout, 16), width, height, bytes).bytes);
+    const Frame frame = converted(plain(mosaic.layout, 16), width, height, bytes);
+    EXPECT_EQ(frame.format, PixelFormat::gray16);
+    EXPECT_EQ(to_string(frame.bayer), std::string(mosaic.pattern));
+    EXPECT_EQ(frame.bytes, bytes);  // what is recorded
+    const std::vector<std::uint16_t> out = to_plate(frame).samples;
     for (int y = 0; y < height; ++y)
       for (int x = 0; x < width; ++x)
         ASSERT_EQ(out[3 * (y * width + x) + channel_at(mosaic, x, y)], in[y * width + x]);
@@ -305,9 +309,9 @@ TEST(Bayer, RampsAreReproducedInside) {
       return std::array<int, 3>{1000 + 64 * x + 128 * y, 4000 + 128 * x, 20000 - 64 * y - 32 * x};
     };
     const std::vector<std::uint16_t> out =
-        words_of(converted(plain(mosaic.layout, 16), width, height,
-                           mosaic_of(mosaic, width, height, true, ramp))
-                     .bytes);
+        to_plate(converted(plain(mosaic.layout, 16), width, height,
+                           mosaic_of(mosaic, width, height, true, ramp)))
+            .samples;
     for (int y = 2; y < height - 2; ++y)
       for (int x = 2; x < width - 2; ++x)
         for (int c = 0; c < 3; ++c)

@@ -15,8 +15,10 @@ namespace {
 using std::chrono::milliseconds;
 using Kind = Fault::Kind;
 
-constexpr LifelineOptions options{milliseconds(5000), milliseconds(2000), milliseconds(1000),
-                                  milliseconds(250), milliseconds(4000)};
+constexpr LifelineOptions options{milliseconds(5000),
+                                  milliseconds(2000),
+                                  milliseconds(1000),
+                                  {milliseconds(250), milliseconds(4000)}};
 
 class LifelineTest : public testing::Test {
  protected:
@@ -92,6 +94,8 @@ TEST_F(LifelineTest, AnAbsentDeviceIsTriedEverLessOftenAndToldOnce) {
             " [is not there; tried again until it is there] f");
   EXPECT_EQ(attempts_ms, (std::vector<int>{0, 250, 750, 1750, 3750, 7750, 11'750, 15'750}));
   EXPECT_EQ(lifeline.counters().at("not opened"), 7u);
+  EXPECT_EQ(lifeline.counters().at("back-offs"), 7u);
+  EXPECT_EQ(lifeline.counters().at("returned"), 0u);
 }
 
 TEST_F(LifelineTest, ADeviceThatNeverStartsIsOpenedAnew) {
@@ -113,6 +117,7 @@ TEST_F(LifelineTest, AStalledDeviceIsToldThenLostThenBack) {
                                  DeviceState::streaming}));
   EXPECT_EQ(lifeline.counters().at("stalled"), 1u);
   EXPECT_EQ(lifeline.counters().at("lost"), 1u);
+  EXPECT_EQ(lifeline.counters().at("returned"), 1u);
 }
 
 TEST_F(LifelineTest, AStallThatEndsByItselfIsNotGivenUp) {
@@ -160,6 +165,48 @@ TEST_F(LifelineTest, ADeviceMayComeBackWithAnotherFormat) {
     EXPECT_EQ((*frame)->width, lifeline.counters().at("opened") == 1 ? 24 : 40);
   }
   EXPECT_EQ(lifeline.format().height, 30);
+}
+
+TEST_F(LifelineTest, ADeviceThatIsPluggedInIsNotKeptWaiting) {
+  std::vector<int> attempts_ms;
+  std::uint64_t arrivals = 3;
+  Lifeline lifeline("observer",
+                    [&]() -> std::unique_ptr<Camera> {
+                      attempts_ms.push_back(static_cast<int>(elapsed().count()));
+                      if (elapsed() < milliseconds(5100)) throw Error("is not there");
+                      return take()();
+                    },
+                    options, clock(), {[&] { return arrivals; }, {}});
+  lifeline.start();
+  story(lifeline, milliseconds(5000));
+  arrivals = 4;  // its node follows 100 ms later
+  EXPECT_EQ(story(lifeline, milliseconds(6000)), "f");
+  EXPECT_EQ(attempts_ms, (std::vector<int>{0, 250, 750, 1750, 3750, 5000, 5250}));
+}
+
+TEST_F(LifelineTest, ADeviceThatIsSilentIsResetBeforeItIsOpenedAnew) {
+  for (const char* why_not : {"", "Access denied"}) {
+    now_ = {};
+    replay_.position = std::make_shared<ReplayPosition>();
+    Lifeline lifeline("observer", with_faults(take(), {{Kind::stall, 5}}, clock()), options,
+                      clock(), {{}, [&] { return std::optional<std::string>(why_not); }});
+    lifeline.start();
+    const std::string said =
+        *why_not ? "is stalled; it cannot be reset (Access denied); it is opened anew"
+                 : "is stalled; it was reset; it is opened anew";
+    EXPECT_EQ(story(lifeline, milliseconds(5000)),
+              "f [has sent nothing for 2000 ms]  [" + said + "] f");
+    EXPECT_EQ(lifeline.counters().at("reset"), *why_not ? 0u : 1u);
+  }
+}
+
+// It says itself that it is gone: there is nothing to reset.
+TEST_F(LifelineTest, ADeviceThatIsPulledIsNotReset) {
+  Lifeline lifeline("observer", with_faults(take(), {{Kind::disconnect, 5}}, clock()), options,
+                    clock(), {{}, [] { return std::optional<std::string>(""); }});
+  lifeline.start();
+  EXPECT_EQ(story(lifeline, milliseconds(2000)), "f [was unplugged; it is opened anew] f");
+  EXPECT_EQ(lifeline.counters().at("reset"), 0u);
 }
 
 // A device as a recorder of what it is asked.

@@ -319,8 +319,7 @@ TEST(LightMode, ALampSendsTheFluxOfItsSource) {
   Source source = source_at(towards(60, 35), 4 * degree);
   source.flux = {3, 2, 1};
   const double sr = source.solid_angle_sr;
-  set::Lighting settings;
-  const set::Light distant = lamps_of({source}, settings, {1, 2, 3}).front();
+  const set::Light distant = lamps_of({source}, {1, 2, 3}, at_infinity).front();
   EXPECT_EQ(distant.type, set::LightType::directional);
   EXPECT_LT(angle(-distant.direction, source.direction), 1e-12);
   EXPECT_NEAR(distant.angular_radius_rad, 4 * degree, 1e-12);
@@ -329,8 +328,8 @@ TEST(LightMode, ALampSendsTheFluxOfItsSource) {
   EXPECT_EQ(distant.gain_mixed, 1);
   EXPECT_EQ(distant.gain_real, 1);
 
-  settings.sources.distance_m = 2.5;
-  const set::Light near = lamps_of({source}, settings, {1, 2, 3}).front();
+  const auto distance = [](const glm::dvec3&) { return std::optional(2.5); };
+  const set::Light near = lamps_of({source}, {1, 2, 3}, distance).front();
   EXPECT_EQ(near.type, set::LightType::sphere);
   EXPECT_LT(glm::length(near.position - (glm::dvec3(1, 2, 3) + 2.5 * source.direction)), 1e-12);
   // A sphere is seen under the angle whose sine is radius over distance.

@@ -129,6 +129,26 @@ TEST(Recorder, TheRingPutsWhatCameBeforeInFrontWithItsLight) {
   EXPECT_EQ(frames_of(take, "light"), count_from(0, 2));  // older than the ring, and still needed
 }
 
+TEST(Recorder, TellsTheTimeOfATakeAndTheRoomThatIsLeft) {
+  const TemporaryDirectory directory;
+  std::atomic<std::uint64_t> free = 700;
+  RecorderOptions options = options_in(directory / "not/made/yet");
+  options.reserve_bytes = 200;
+  EXPECT_GT(Recorder(options).free_bytes().value(), 0u);  // of the disk it will be made on
+  options.free_bytes = [&] { return free.load(); };
+  Recorder recorder(std::move(options));
+  EXPECT_EQ(recorder.free_bytes(), 500u);
+  free = 100;
+  EXPECT_EQ(recorder.free_bytes(), 0u);
+  free = 700;
+  recorder.start();
+  for (const std::uint64_t i : {10, 11, 12, 13}) recorder.offer(picture(i));
+  recorder.offer(picture(20, "light"));
+  recorder.offer(picture(14));
+  wait_for([&] { return recorder.status().frames == 5; });
+  EXPECT_DOUBLE_EQ(recorder.status().seconds, 4e-9 * interval_ns);
+}
+
 TEST(Recorder, TheNextTakeHasTheLightThatWasSeenDuringTheLast) {
   const TemporaryDirectory directory;
   {

@@ -32,7 +32,9 @@ pipeline::Shot sample_shot(std::uint64_t index) {
   shot.track.pose->tags = {0, 3};
   pipeline::Light light;
   light.sequences = {4, 5};
-  shot.light = std::make_shared<const pipeline::Light>(std::move(light));
+  light.lighting.sources = {{3, {0.6, 0, 0.8}, 0.01, {3, 2, 1.0 / 3}}};
+  light.lighting.report.dropped_share = 0.25;
+  shot.light = std::make_shared<pipeline::Light>(light);
   shot.picture = {width, height, 8, std::vector<std::uint16_t>(3 * width * height, 99)};
   render::Layers& layers = shot.layers;
   layers.width = width;
@@ -77,6 +79,9 @@ TEST_F(RenderDirectoryTest, WritesNumberedFilesAndALineAFrame) {
   EXPECT_EQ(record->pose->covariance[7], 1e-6);
   EXPECT_EQ(record->pose->tags, (std::vector<int>{0, 3}));
   EXPECT_EQ(record->light_frames, (std::vector<std::uint64_t>{4, 5}));
+  ASSERT_EQ(record->light_sources.size(), 1u);
+  EXPECT_EQ(record->light_sources[0], sample_shot(7).light->lighting.sources[0]);
+  EXPECT_EQ(record->light_dropped_share, 0.25);
   EXPECT_EQ(record->counters.rays, 1234u);
 }
 

@@ -89,6 +89,39 @@ TEST_F(RenderSession, TheVirtualCardCoversThePlateAndTheRestShowsIt) {
   EXPECT_EQ(seen.composite[middle], seen.mixed[middle]);
 }
 
+// Of the light camera's frames nothing is used: the frame before the first of them is lit too, by
+// ten times the light's red as of the others.
+TEST_F(RenderSession, TheRecordedLightLightsEveryFrame) {
+  session::CapturedLight light{{{1, {0, 0, 1}, 0.01, {10, 1, 1}}}, 1, {{0, 0, 0}}};
+  test::write_small_take(directory_.path(), true,
+                         "[lighting]\nmode = \"sources\"\nfrom = \"recording\"\n", light);
+  render::Layers seen;
+  RenderOptions options;
+  options.frames = FrameRange{small_take_unlit, small_take_unlit};
+  options.on_frame = [&](const pipeline::Shot& shot) { seen = shot.layers; };
+  const RenderReport report = render(options);
+  EXPECT_EQ(report.frames.front().status, FrameStatus::rendered);
+  const glm::vec3 card = seen.mixed[18 * 48 + 24];
+  EXPECT_GT(card.g, 0);
+  EXPECT_NEAR(card.r / card.g, 10, 1e-4);
+  ASSERT_EQ(report.frames.front().light_sources.size(), 1u);
+  EXPECT_EQ(report.frames.front().light_sources[0].flux.r, 10);
+}
+
+// A take may be lit by what its set says alone, whatever the light camera saw.
+TEST_F(RenderSession, TheSetsOwnLightLightsEveryFrame) {
+  test::write_small_take(directory_.path(), true,
+                         "[lighting]\nfrom = \"set\"\n[[light]]\ntype = \"directional\"\n"
+                         "direction = [0, 0, -1]\nemission = [3, 2, 1]\ngain_real = 1\n");
+  render::Layers seen;
+  RenderOptions options;
+  options.frames = FrameRange{small_take_unlit, small_take_unlit};
+  options.on_frame = [&](const pipeline::Shot& shot) { seen = shot.layers; };
+  EXPECT_EQ(render(options).frames.front().status, FrameStatus::rendered);
+  const glm::vec3 card = seen.mixed[18 * 48 + 24];
+  EXPECT_NEAR(card.r / card.b, 3, 1e-4);
+}
+
 TEST_F(RenderSession, WithNothingVirtualEveryPictureIsThePlateBitForBit) {
   test::write_small_take(directory_.path(), false);
   render({});

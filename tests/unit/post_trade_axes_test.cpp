@@ -54,6 +54,9 @@ TEST(TradeAxes, WhereThereIsNothingToTradeThereIsNoAxis) {
   TradeSettings own;
   const TradePlan pinhole = plan_of(own);
   EXPECT_FALSE(axis_named(pinhole, "lens"));
+  EXPECT_TRUE(axis_named(pinhole, "light_mode"));
+  own.lighting.from = set::LightFrom::recording;
+  EXPECT_FALSE(axis_named(plan_of(own), "light_mode"));
   own.lens = ThinLens{0.05, 2.8, 1.0};
   const TradePlan with_lens = plan_of(own);
   EXPECT_TRUE(axis_named(with_lens, "lens"));

@@ -48,10 +48,10 @@ Lit split(const lighting::EnvironmentMap& map, set::LightMode mode,
   lighting.environment = map;
   set::Lighting settings;
   settings.mode = mode;
-  settings.sources.distance_m = distance_m;
   lighting::SourceTracker tracker(0);
   lighting::apply_mode(lighting, settings, tracker, 0);
-  return {lighting.environment, lighting::lamps_of(lighting.sources, settings, glm::dvec3(0))};
+  return {lighting.environment, lighting::lamps_of(lighting.sources, glm::dvec3(0),
+                                                   [=](const glm::dvec3&) { return distance_m; })};
 }
 
 class SourceLight : public ::testing::Test {

@@ -4,6 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "daemon/rig/camera_source.hpp"
 #include "drivers/camera_drivers.hpp"
 #include "drivers/error.hpp"
 #include "tests/unit/session_fixture.hpp"
@@ -66,7 +70,7 @@ TEST_F(RigCameras, MistakesNameFileAndKey) {
   set.observer.faults = {"melt@3"};
   EXPECT_THAT(error_of(set), HasSubstr("stage.toml: observer.faults: fault \"melt@3\""));
   set = replayed();
-  set.observer.driver = set::Driver::libcamera;
+  set.observer.driver = set::Driver{-1};  // one that this build lacks
   EXPECT_THAT(error_of(set), HasSubstr("stage.toml: observer.driver: this build drives no"));
   set = replayed();
   set.light_camera.driver = set::Driver::replay;
@@ -85,6 +89,30 @@ TEST_F(RigCameras, ACameraThatIsNotThereIsWaitedFor) {
   ASSERT_TRUE(std::holds_alternative<DeviceTrouble>(event));
   EXPECT_THAT(std::get<DeviceTrouble>(event).what, HasSubstr("tried again until it is there"));
   EXPECT_EQ(cameras.observer->counters().at("not opened"), 1u);
+}
+
+// `previzctl metrics` prints them; they go on over sets that are loaded anew.
+TEST_F(RigCameras, WhatADeviceCountsIsInTheMetrics) {
+  set::Set set = replayed();
+  set.observer.faults = {"disconnect@2+0s"};
+  std::ostringstream out;
+  Notes note(out);
+  pipeline::Metrics metrics;
+  Faults faults;
+  for (int loaded = 1; loaded <= 2; ++loaded) {
+    const Cameras cameras = open_cameras(set);
+    CameraSource source(*cameras.observer, "observer", "film camera",
+                        {{}, note, metrics, faults, {}});
+    for (int i = 0; i < 4; ++i) ASSERT_TRUE(source.next());
+    const pipeline::MetricsSnapshot snapshot = metrics.snapshot(1);
+    const DeviceCounters& counted = snapshot.devices.at("observer");
+    EXPECT_EQ(counted.at("opened"), 2u * loaded);
+    EXPECT_EQ(counted.at("lost"), 1u * loaded);
+    EXPECT_EQ(counted.at("returned"), 1u * loaded);
+    EXPECT_EQ(counted.at("stalled"), 0u);  // there before anything is counted
+  }
+  const auto json = nlohmann::json::parse(to_json(metrics.snapshot(1)));
+  EXPECT_EQ(json["devices"]["observer"]["lost"], 2);
 }
 
 }  // namespace

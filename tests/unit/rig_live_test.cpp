@@ -4,14 +4,12 @@
 
 #include <gtest/gtest.h>
 #include <poll.h>
-#include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 
 #include <algorithm>
 #include <array>
 #include <condition_variable>
-#include <deque>
 #include <fstream>
 #include <mutex>
 #include <set>
@@ -25,6 +23,7 @@
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
+#include "tests/unit/crewed_rig.hpp"
 #include "tests/unit/small_take.hpp"
 #include "tests/unit/temporary_directory.hpp"
 
@@ -32,41 +31,7 @@ namespace previz::rig {
 namespace {
 
 using pipeline::Shot;
-
-// Buttons that a thread of the test pushes.
-class Hand {
- public:
-  class Device final : public Buttons {
-   public:
-    explicit Device(Hand& hand) : hand_(hand) {}
-    std::string name() const override { return "hand"; }
-    int fd() const override { return hand_.descriptor_.get(); }
-    std::optional<ButtonsEvent> next() override {
-      const std::lock_guard lock(hand_.mutex_);
-      eventfd_t ignored = 0;
-      eventfd_read(fd(), &ignored);
-      if (hand_.events_.empty()) return std::nullopt;
-      ButtonsEvent event = hand_.events_.front();
-      hand_.events_.pop_front();
-      if (!hand_.events_.empty()) eventfd_write(fd(), 1);
-      return event;
-    }
-
-   private:
-    Hand& hand_;
-  };
-
-  void press(const std::string& button) {
-    const std::lock_guard lock(mutex_);
-    for (const bool pushed : {true, false}) events_.push_back({button, pushed, 0});
-    eventfd_write(descriptor_.get(), 1);
-  }
-
- private:
-  std::mutex mutex_;
-  std::deque<ButtonEvent> events_;
-  OwnedDescriptor descriptor_{eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)};
-};
+using test::Hand;
 
 // A log that another thread may read.
 class Log : public std::stringbuf {
@@ -102,9 +67,7 @@ class RigLive : public testing::Test {
         "emission = [1, 1, 1]\n[recording]\nslate = \"12A\"\nreserve_mb = 1\n"
         "directory = \"takes\"\n" +
         more;
-    for (const set::Action& action : set::actions())
-      text += std::string("[[button]]\nname = \"") + action.name + "\"\naction = \"" + action.name +
-              "\"\n";
+    text += test::button_for_every_action();
     test::write_small_take(directory_.path(), true, text);
   }
 
@@ -113,16 +76,6 @@ class RigLive : public testing::Test {
   // Runs the daemon, looping the take, until the script has ended.
   void run(const std::function<void()>& script) {
     LiveOptions options;
-    options.set_file = directory_ / "set.toml";
-    options.directory = directory_ / "live";
-    options.loop = true;
-    std::stop_source stop;
-    options.stop = stop.get_token();
-    options.buttons = [&] {
-      std::vector<std::unique_ptr<Buttons>> buttons;
-      buttons.push_back(std::make_unique<Hand::Device>(hand_));
-      return buttons;
-    };
     options.on_shown = [&](const Shot& shot, const Look& look) {
       std::unique_lock lock(mutex_);
       shown_ = {shot, look, shown_.count + 1};
@@ -130,18 +83,16 @@ class RigLive : public testing::Test {
       lock.unlock();
       while_shown_();
     };
-    std::jthread crew([&] {
-      script();
-      stop.request_stop();
-    });
     std::ostream out(&log_);
-    metrics_ = run_live(options, out);
+    metrics_ = test::run_crewed(std::move(options), directory_.path(), hand_, script, out);
   }
 
   // A press, then whatever is shown until the condition holds: no time is assumed.
   Shown until(const std::function<bool(const Shown&)>& condition) {
     std::unique_lock lock(mutex_);
-    seen_.wait(lock, [&] { return shown_.shot.frame && condition(shown_); });
+    test::await(
+        seen_, lock, [&] { return shown_.shot.frame && condition(shown_); },
+        [&] { return "picture " + std::to_string(shown_.count) + "\n" + log_.text(); });
     return shown_;
   }
   Shown until_mode(Mode mode) {
@@ -150,8 +101,11 @@ class RigLive : public testing::Test {
     });
   }
   void until_said(const std::string& words) {
-    while (log_.text().find(words) == std::string::npos)
+    for (int waited_ms = 0; log_.text().find(words) == std::string::npos; waited_ms += 2) {
+      if (std::chrono::milliseconds(waited_ms) > test::crew_patience)
+        throw test::WaitedInVain("\"" + words + "\" is not said in\n" + log_.text());
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
   }
   void press(const std::string& button) { hand_.press(button); }
 
@@ -297,6 +251,7 @@ TEST_F(RigLive, ThroughEveryModeByButtons) {
               test::small_take_frame(static_cast<int>(records[i].sequence % 8)).bytes);
   }
   EXPECT_EQ(session.track.back().scene.objects.count("card"), 1u);
+  EXPECT_TRUE(session.track.back().captured_light);
 
   // Both refinements were saved as they were shown; that of the take's frame is bit for bit what
   // `previzd render` makes of it. (What light a live frame had depends on when its thread was
@@ -335,10 +290,7 @@ TEST_F(RigLive, EveryCapturedFrameIsRenderedOrCounted) {
     press("live");
     until_mode(Mode::live);
   });
-  std::uint64_t accounted = metrics_.stages.at("render").frames;
-  for (const char* stage : {"tracking", "render"})
-    for (const auto& [cause, frames] : metrics_.stages.at(stage).dropped) accounted += frames;
-  EXPECT_EQ(accounted, metrics_.stages.at("observer").frames);
+  EXPECT_EQ(test::accounted_for(metrics_), metrics_.stages.at("observer").frames);
 }
 
 TEST_F(RigLive, ABadSetLeavesTheOldOneRunningAndAGoodOneTakesOver) {
@@ -408,7 +360,9 @@ class NotifySocket {
     return {text.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
   }
   void until(const std::string& words) {
-    while (next(60'000).find(words) == std::string::npos) continue;
+    for (std::string said = next(60'000); said.find(words) == std::string::npos;
+         said = next(60'000))
+      if (said.empty()) throw test::WaitedInVain("systemd is not told " + words);
   }
 
  private:
@@ -441,18 +395,22 @@ TEST_F(RigLive, TheWatchdogIsFedOnlyWhileFramesAdvance) {
 TEST(Progress, EveryStageWithSomethingToDoMustDoIt) {
   const Progress start;
   const auto with = [](auto change) {
-    Progress now{10, 10, 3, 1, false, false};
+    Progress now{.captured = 10, .shown = 10, .screened = 10, .lights = 3, .light_estimates = 1};
+    now.has_screen = true;
     change(now);
     return now;
   };
   EXPECT_TRUE(advances(start, with([](Progress&) {})));
   EXPECT_FALSE(advances(start, with([](Progress& p) { p.captured = 0; })));
   EXPECT_FALSE(advances(start, with([](Progress& p) { p.shown = 0; })));
+  EXPECT_FALSE(advances(start, with([](Progress& p) { p.screened = 0; })));
+  EXPECT_TRUE(advances(start, with([](Progress& p) { p.screened = 0, p.has_screen = false; })));
   EXPECT_FALSE(advances(start, with([](Progress& p) { p.light_estimates = 0; })));
   EXPECT_TRUE(advances(start, with([](Progress& p) { p.lights = p.light_estimates = 0; })));
-  EXPECT_TRUE(advances(start, with([](Progress& p) { p.shown = 0, p.dark = true; })));
-  EXPECT_TRUE(
-      advances(start, with([](Progress& p) { p.captured = p.shown = 0, p.camera_lost = true; })));
+  EXPECT_TRUE(advances(start, with([](Progress& p) { p.shown = p.screened = 0, p.dark = true; })));
+  EXPECT_TRUE(advances(start, with([](Progress& p) {
+                         p.captured = p.shown = p.screened = 0, p.camera_lost = true;
+                       })));
 }
 
 }  // namespace

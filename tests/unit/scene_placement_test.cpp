@@ -70,11 +70,59 @@ TEST(Placement, AnObjectWhereTheSetHasItIsBitForBitWhereItWas) {
   EXPECT_EQ(placement.instances[1].world_from_object, stage.scene.instances[1].world_from_object);
 }
 
+// Of a carrier that was not found yet: back at once when it is.
+TEST(Placement, WhatIsNowhereIsInNeitherWorld) {
+  const Stage stage;
+  session::SceneState state;
+  state.objects["torch"] = std::nullopt;
+  state.lights["key"] = std::nullopt;
+  const Placement placement = place(stage.scene, stage.set, state);
+  ASSERT_EQ(placement.instances.size(), 3u);
+  EXPECT_EQ(placement.instances[0].presence, world_both);
+  EXPECT_EQ(placement.instances[1].presence, 0u);
+  EXPECT_EQ(placement.instances[2].presence, 0u);
+  for (const set::Light& light : placement.lights) {
+    EXPECT_EQ(light.gain_mixed, 0);
+    EXPECT_EQ(light.gain_real, 0);
+  }
+}
+
+// The node goes along X by 2 m a second, and shrinks to nothing at 1 s; then the crew's move.
+TEST(Placement, AnimatesBeforeItMoves) {
+  Stage stage;
+  Animation animation;
+  animation.object = 1;
+  animation.duration_s = 2;
+  AnimatedNode node;
+  node.moves = true;
+  node.translations = {Interpolation::linear, {0, 2}, {{0, 0, 0, 0}, {4, 0, 0, 0}}};
+  node.scales = {Interpolation::linear, {0, 1, 2}, {{1, 1, 1, 0}, {0, 0, 0, 0}, {1, 1, 1, 0}}};
+  animation.nodes = {node};
+  animation.instances = {{2, 0}};
+  animation.lights = {{0, 0}};
+  stage.scene.animations = {animation};
+  session::SceneState state;
+  state.animation_s = 0.5;
+  state.objects["torch"] =
+      glm::translate(glm::dmat4(1), {0, 0, 3}) * stage.set.objects[1].world_from_file;
+  Placement placement = place(stage.scene, stage.set, state);
+  EXPECT_EQ(placement.instances[2].world_from_object[3], glm::dvec4(1, 0, 3, 1));
+  EXPECT_EQ(placement.instances[2].world_from_object[0], glm::dvec4(0.5, 0, 0, 0));
+  // The lamp was at (1, 0, 0.5) of the node at rest.
+  EXPECT_EQ(placement.lights[0].position, glm::dvec3(1.5, 0, 3.25));
+  EXPECT_EQ(placement.instances[0].world_from_object, stage.scene.instances[0].world_from_object);
+
+  state.animation_s = 3;  // 1 s into its second time
+  placement = place(stage.scene, stage.set, state);
+  EXPECT_EQ(placement.instances[2].presence, 0u);
+  EXPECT_EQ(placement.lights[0].gain_mixed, 0);
+}
+
 TEST(Placement, DimmingIsOfTheMixedWorldOnly) {
   const Stage stage;
   session::SceneState state;
   state.lights["key"] = state_of(stage.set.lights[0]);
-  state.lights["key"].gain_mixed = 0.25;
+  state.lights["key"]->gain_mixed = 0.25;
   const Placement placement = place(stage.scene, stage.set, state);
   ASSERT_EQ(placement.lights.size(), 2u);
   EXPECT_EQ(placement.lights[1].gain_mixed, 0.25);
@@ -87,7 +135,7 @@ TEST(Placement, ATintedRealLampIsSplitInTwo) {
   const Stage stage;
   session::SceneState state;
   state.lights["key"] = state_of(stage.set.lights[0]);
-  state.lights["key"].tint = {2, 1, 0.5};
+  state.lights["key"]->tint = {2, 1, 0.5};
   const Placement placement = place(stage.scene, stage.set, state);
   ASSERT_EQ(placement.lights.size(), 3u);
   EXPECT_EQ(placement.lights[1].gain_real, 0);

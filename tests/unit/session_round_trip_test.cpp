@@ -52,12 +52,41 @@ INSTANTIATE_TEST_SUITE_P(
                     Picture{PixelFormat::gray8, 37, 21}, Picture{PixelFormat::rgb8, 643, 481},
                     Picture{PixelFormat::gray16, 643, 481}));
 
+// As the sensor counted, with the pattern that makes colours of it.
+TEST(Session, ABayerMosaicComesBackBitForBit) {
+  for (const PixelFormat format : {PixelFormat::gray8, PixelFormat::gray16}) {
+    const TemporaryDirectory directory;
+    Frame mosaic = noise_frame("observer", 0, format, 24, 18);
+    mosaic.bayer = BayerPattern::gbrg;
+    SessionWriter writer(directory.path(), {});
+    writer.write(mosaic);
+    Frame other = noise_frame("observer", 1, format, 24, 18);
+    EXPECT_THROW(writer.write(other), Error);  // the pattern is the stream's
+    writer.close();
+    Session session = open_session(directory.path());
+    const auto stream = open_stream(session, "observer");
+    EXPECT_EQ(stream->bayer(), BayerPattern::gbrg);
+    const FramePtr frame = stream->read(0);
+    EXPECT_TRUE(is_frame(*frame, 0));
+    EXPECT_EQ(frame->bayer, BayerPattern::gbrg);
+    EXPECT_EQ(to_plate(*frame).samples, to_plate(mosaic).samples);
+  }
+}
+
 TEST(Session, WhatWasMovedAndRelitComesBackBitForBit) {
   const TemporaryDirectory directory;
   TrackRecord record;
   record.scene.objects["card"] = glm::dmat4(1.0 / 3);
-  record.scene.objects["a \"b\""][3] = {1e-9, -7, 0.1, 1};
-  record.scene.lights["key"] = {{0.1, 0.2, 0.3}, {0, 0, -1}, {0, 1, 0}, 1.0 / 7, {1.1, 1, 0.9}};
+  record.scene.objects["a \"b\""].emplace()[3] = {1e-9, -7, 0.1, 1};
+  record.scene.objects["not there yet"] = std::nullopt;
+  record.scene.lights["key"] =
+      LightState{{0.1, 0.2, 0.3}, {0, 0, -1}, {0, 1, 0}, 1.0 / 7, {1.1, 1, 0.9}};
+  record.scene.lights["torch"] = std::nullopt;
+  record.scene.animation_s = 1.0 / 3;
+  CarrierState& stick = record.carriers["stick"];
+  stick.world_from_carrier = glm::dmat4(1.0 / 7);
+  stick.covariance[7] = 1e-9 / 3;
+  stick.tags = {7, 11};
   TrackRecord plain;
   plain.frame = 1;
   {
@@ -68,7 +97,9 @@ TEST(Session, WhatWasMovedAndRelitComesBackBitForBit) {
   const Session session = open_session(directory.path());
   ASSERT_EQ(session.track.size(), 2u);
   EXPECT_EQ(session.track[0].scene, record.scene);
+  EXPECT_EQ(session.track[0].carriers, record.carriers);
   EXPECT_EQ(session.track[1].scene, SceneState{});
+  EXPECT_TRUE(session.track[1].carriers.empty());
 }
 
 TEST(Session, TheTakeIsKnownAndCanBeMarkedAfterwards) {

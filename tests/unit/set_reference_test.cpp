@@ -89,7 +89,7 @@ TEST(SetExample, Parses) {
                 {{"stage/set.glb", file}, {"stage/creature.glb", file}, {"stage/lamp.glb", file}});
   EXPECT_EQ(set.tracking.tags.size(), 3u);
   EXPECT_EQ(set.objects.size(), 3u);
-  EXPECT_EQ(set.lights.size(), 2u);
+  EXPECT_EQ(set.lights.size(), 3u);
   ASSERT_TRUE(set.observer.calibration && set.observer.calibration->lens);
   EXPECT_TRUE(set.light_camera.calibration);
 }

@@ -242,5 +242,43 @@ TEST(SetPose, FoldAngleIsWhereTheRadiusStopsGrowing) {
   EXPECT_FALSE(fold_angle(fisheye));
 }
 
+// A stick with one tag, which is its frame, and a tray with two.
+TEST(SetValues, CarriersAreWhatTagsAreStuckTo) {
+  const auto set = parse(R"(
+[[tag]]
+id = 1
+size_m = 0.08
+position_m = [0, 0, 0]
+[[tag]]
+id = 5
+size_m = 0.05
+carrier = "stick"
+[[tag]]
+id = 6
+size_m = 0.05
+carrier = "tray"
+position_m = [0.1, 0, 0]
+[[tag]]
+id = 7
+carrier = "tray"
+corners_m = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+[[light]]
+type = "point"
+emission = [1, 1, 1]
+position_m = [0, 0, 0.1]
+carrier = "stick"
+)");
+  ASSERT_EQ(set.tracking.tags.size(), 1u);
+  ASSERT_EQ(set.tracking.carriers.size(), 2u);
+  const Carrier &stick = set.tracking.carriers[0], &tray = set.tracking.carriers[1];
+  EXPECT_EQ(stick.name, "stick");
+  ASSERT_EQ(stick.tags.size(), 1u);
+  EXPECT_EQ(stick.tags[0].world_from_tag, glm::dmat4(1));
+  ASSERT_EQ(tray.tags.size(), 2u);
+  EXPECT_EQ(tray.tags[0].world_from_tag[3], glm::dvec4(0.1, 0, 0, 1));
+  EXPECT_NEAR(tray.tags[1].size_m, 1, rounding);
+  EXPECT_EQ(set.lights.at(0).carrier, "stick");
+}
+
 }  // namespace
 }  // namespace previz::set

@@ -79,7 +79,8 @@ Frame small_take_frame(int index) {
 }
 
 void write_small_take(const std::filesystem::path& directory, bool with_card,
-                      const std::string& more) {
+                      const std::string& more, const std::optional<session::CapturedLight>& light,
+                      std::int64_t interval_ns) {
   write_square(directory / "floor.gltf", 2.0f, 0.0f);
   write_square(directory / "card.gltf", 0.3f, 0.1f);
   session::SessionInfo info = session_info();
@@ -91,12 +92,14 @@ void write_small_take(const std::filesystem::path& directory, bool with_card,
   if (with_card) writer.add_asset("card.gltf", directory / "card.gltf");
   for (int i = 0; i < 3; ++i) writer.write(light_frame(i));
   for (int i = 0; i < small_take_frames; ++i) {
-    const Frame frame = small_take_frame(i);
+    Frame frame = small_take_frame(i);
+    frame.timestamp_ns = start_ns + i * interval_ns;
     writer.write(frame);
     session::TrackRecord record;
     record.frame = static_cast<std::uint64_t>(i);
     record.timestamp_ns = frame.timestamp_ns;
     record.tracked = i != small_take_lost;
+    record.captured_light = light;
     // A metre above the floor, looking straight down, picture up along Y.
     record.world_from_camera = {{1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}, {0, 0.01 * i, 1, 1}};
     writer.write(record);

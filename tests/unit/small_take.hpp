@@ -3,9 +3,11 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "drivers/frame.hpp"
+#include "drivers/session/session.hpp"
 
 namespace previz::test {
 
@@ -18,8 +20,11 @@ inline constexpr std::int64_t small_take_interval_ns = 40'000'000;
 Frame small_take_frame(int index);
 
 // Makes `directory`/session (the session, with the set in it), floor.gltf, card.gltf and set.toml.
-// `with_card` false: nothing virtual in the set. `more` is appended to the set file.
+// `with_card` false: nothing virtual in the set. `more` is appended to the set file. `light`: in
+// every line of track.jsonl.
 void write_small_take(const std::filesystem::path& directory, bool with_card = true,
-                      const std::string& more = "");
+                      const std::string& more = "",
+                      const std::optional<session::CapturedLight>& light = {},
+                      std::int64_t interval_ns = small_take_interval_ns);
 
 }  // namespace previz::test

@@ -12,7 +12,7 @@ MethodRun::MethodRun(const std::shared_ptr<render::Device>& device, const View& 
   const auto add = [&](const scene::Scene& scene) {
     renderers_.push_back(std::make_unique<render::Renderer>(device, estimation, view.camera));
     renderers_.back()->set_scene(scene);
-    renderers_.back()->set_environment(view.environment, set::LightSampling::importance);
+    renderers_.back()->set_environment(view.environment, method.sampling);
     if (!view.lamps.empty()) renderers_.back()->set_sources(view.lamps);
   };
   if (method.separate) {

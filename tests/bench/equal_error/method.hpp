@@ -15,6 +15,7 @@ struct Method {
   std::string name;
   set::Estimation estimation;
   bool separate = false;  // each world alone, with random numbers of its own; estimator is ignored
+  set::LightSampling sampling = set::LightSampling::importance;  // of the view's environment
 };
 
 // A method at work on a view. Time is CPU time of all threads, of rendering alone.

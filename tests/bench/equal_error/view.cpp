@@ -46,7 +46,7 @@ View load_view(const std::filesystem::path& directory, std::optional<int> frame,
   lighting::Lighting lighting = lighting::load_environment(set.lighting);
   lighting::SourceTracker tracker(0);
   lighting::apply_mode(lighting, set.lighting, tracker, 0);
-  view.lamps = lighting::lamps_of(lighting.sources, set.lighting, glm::dvec3(0));
+  view.lamps = lighting::lamps_of(lighting.sources, glm::dvec3(0), lighting::at_infinity);
   view.environment = std::move(lighting.environment);
   view.camera = truth::resized(truth.observer, 1.0 * width / truth.observer.intrinsics.width);
   view.world_from_camera = truth::observer_frame(truth, view.frame).world_from_camera;

@@ -1,0 +1,102 @@
+// What it costs that things move: the time of a frame before which a large virtual object and a
+// lamp were moved, over that of a frame before which nothing was (P13, P14). Both alternate.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <glm/gtc/matrix_transform.hpp>
+#include <vector>
+
+#include "daemon/render/renderer.hpp"
+#include "drivers/error.hpp"
+#include "tests/bench/measure.hpp"
+#include "tests/bench/tracers/shapes.hpp"
+
+namespace previz::bench {
+namespace {
+
+struct Options {
+  int levels = 7;  // 20 * 4^levels triangles
+  int rounds = 15;
+  int width = 320, height = 240;
+};
+
+scene::Scene make_scene(int levels) {
+  scene::Scene scene = scene_of(grid(4, 8));  // the real table
+  scene.meshes.push_back(bumpy_sphere(levels, 0.5, 0.2, 7));
+  scene::Instance sphere;
+  sphere.name = "virtual";
+  sphere.mesh = 1;
+  sphere.presence = scene::world_mixed;
+  scene.instances.push_back(sphere);
+  set::Light lamp;
+  lamp.position = {1, 0, 2};
+  scene.lights.push_back(lamp);
+  scene.light_objects.push_back(scene::no_object);
+  return scene;
+}
+
+void run(const Options& options) {
+  const auto device = render::open_device();
+  const scene::Scene scene = make_scene(options.levels);
+  ObserverCalibration calibration;
+  calibration.intrinsics = {options.width,
+                            options.height,
+                            1.0 * options.height,
+                            1.0 * options.height,
+                            0.5 * (options.width - 1),
+                            0.5 * (options.height - 1)};
+  set::Estimation estimation;
+  estimation.max_depth = 4;
+  render::Renderer renderer(device, estimation, calibration);
+  renderer.set_scene(scene);
+  renderer.set_environment({4, std::vector<glm::vec3>(16, glm::vec3(0.5f))},
+                           set::LightSampling::importance);
+  render::FrameInput frame;
+  // 3 m above, looking down.
+  frame.world_from_camera = {{1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}, {0, 0, 3, 1}};
+
+  // [0]: nothing moved, [1]: everything did. In CPU time: the machine may be busy.
+  std::vector<double> placed_ms[2], whole_ms[2];
+  for (int round = -2; round < 2 * options.rounds; ++round) {
+    const std::size_t moved = round & 1;
+    std::vector<scene::Instance> instances = scene.instances;
+    std::vector<set::Light> lights = scene.lights;
+    const glm::dvec3 step(0.01 * round, 0, 0.5);
+    instances[1].world_from_object = glm::translate(glm::dmat4(1), step);
+    lights[0].position += step;
+    const double start = cpu_seconds();
+    if (moved != 0) renderer.move(instances, lights);
+    renderer.begin(frame);
+    const double placed = cpu_seconds();
+    renderer.render(1);
+    if (round < 0) continue;  // compiles the pipelines
+    placed_ms[moved].push_back(1e3 * (placed - start));
+    whole_ms[moved].push_back(1e3 * (cpu_seconds() - start));
+  }
+  std::printf("%s, %zu triangles, %dx%d, 1 sample, CPU ms\n\n",
+              render::device_name(*device).c_str(), scene.meshes[1].triangles.size(), options.width,
+              options.height);
+  std::printf("| frame | until the first ray | whole |\n| --- | --- | --- |\n");
+  for (const std::size_t moved : {0, 1})
+    std::printf("| %s | %.2f | %.1f |\n", moved != 0 ? "moved" : "still", median(placed_ms[moved]),
+                median(whole_ms[moved]));
+}
+
+}  // namespace
+}  // namespace previz::bench
+
+int main(int argc, char** argv) {
+  CLI::App app("The time of frames between which things move");
+  previz::bench::Options options;
+  app.add_option("--levels", options.levels, "20 * 4^levels triangles")->check(CLI::Range(0, 8));
+  app.add_option("--rounds", options.rounds)->check(CLI::Range(1, 1000));
+  app.add_option("--width", options.width)->check(CLI::Range(8, 8192));
+  app.add_option("--height", options.height)->check(CLI::Range(8, 8192));
+  CLI11_PARSE(app, argc, argv);
+  try {
+    previz::bench::run(options);
+  } catch (const previz::Error& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

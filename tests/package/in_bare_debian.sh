@@ -1,0 +1,58 @@
+# Runs as root in the bare Debian that run.sh makes, where no systemd runs.
+set -euo pipefail
+cd /tmp/package
+export DEBIAN_FRONTEND=noninteractive
+
+step() { echo "== $* =="; }
+fail() {
+  echo "tests/package: $*" >&2
+  exit 1
+}
+files() { find / -xdev \( -path /proc -o -path /sys -o -path /tmp -o -path /dev \) -prune -o -print | sort; }
+
+step "install"
+apt-get install --quiet=2 ./previzd.deb >apt.log 2>&1 || { cat apt.log; fail "does not install"; }
+previzd --version
+# The set that the unit names, which is the conffile.
+previzd check "$(sed -n 's/^ExecStart=.* //p' /lib/systemd/system/previzd.service)"
+previzctl actions --names | grep -qx refine
+id previz | grep -q video || fail "the user previz may not open cameras"
+[[ $(stat -c '%U %a' /var/lib/previzd) == "previz 750" ]] || fail "/var/lib/previzd: wrong owner"
+systemctl is-enabled --quiet previzd.service || fail "the service is not enabled"
+# That it can be started: every program, user and key that its unit names.
+systemd-analyze verify --man=no previzd.service
+bash -c 'source /usr/share/bash-completion/completions/previzd; complete -p previzd' >/dev/null
+
+step "the demonstration set renders"
+mkdir -m 777 pictures
+setpriv --reuid=previz --regid=previz --init-groups env XDG_CACHE_HOME=/tmp \
+  previzd --log-level warning render /usr/share/previzd/demo/session --set /etc/previzd/set.toml \
+  --frames 0 --spp 1 --no-exr --no-video --out pictures
+[[ -s pictures/0000.png ]] || fail "no picture"
+
+step "upgrade, with a set that was changed"
+echo '# ours' >>/etc/previzd/set.toml
+systemctl disable --quiet previzd.service
+dpkg --force-confdef --install later.deb
+grep -qx '# ours' /etc/previzd/set.toml || fail "the upgrade lost the changed set"
+[[ -f /etc/previzd/set.toml.dpkg-dist ]] || fail "the later default set is not beside it"
+! systemctl is-enabled --quiet previzd.service || fail "the upgrade enabled a disabled service"
+
+step "remove"
+dpkg --remove previzd
+[[ -f /etc/previzd/set.toml ]] || fail "remove took the configuration"
+[[ ! -e /usr/bin/previzd ]] || fail "remove left the program"
+
+step "purge, with a take"
+mkdir -p /var/lib/previzd/takes/1
+dpkg --purge previzd
+[[ -d /var/lib/previzd/takes/1 ]] || fail "purge took a recorded take"
+rm -r /var/lib/previzd
+
+step "install, and purge"
+files >before
+dpkg --install previzd.deb
+dpkg --purge previzd
+files >after
+grep -v -e /var/lib/dpkg -e /etc/group- -e /etc/passwd- -e shadow- after | grep -vxFf before >left || true
+[[ ! -s left ]] || fail "purge left: $(cat left)"

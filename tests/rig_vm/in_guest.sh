@@ -1,0 +1,143 @@
+# Runs as root in the guest, in the folder that run.sh has filled.
+set -uo pipefail
+start=$SECONDS
+
+step() { printf '== %s (%d s) ==\n' "$*" $((SECONDS - start)); }
+fail() {
+  echo "rig_vm: $*" >&2
+  journalctl --unit=previzd --no-pager --lines=40 --output=cat >&2
+  previzctl status >&2
+  exit 1
+}
+# Waits until a command succeeds: within SECONDS, WHAT.
+within() {
+  local seconds=$1 what=$2 end=$((SECONDS + $1))
+  shift 2
+  until "$@"; do
+    [[ $SECONDS -lt $end ]] || fail "not within $seconds s: $what"
+    sleep 1
+  done
+  echo "   $what"
+}
+status() { previzctl status | sed -n "s/^$1: //p"; }
+status_is() { [[ $(status "$1") == "$2" ]]; }
+metric() { previzctl metrics | jq "$1 // 0"; }
+above() { [[ $(metric "$1") -gt $2 ]]; }
+advances() { within 120 "$2" above ".stages.\"$1\".frames" "$(metric ".stages.\"$1\".frames")"; }
+tap() {
+  rig-devices press "$1"
+  sleep 0.3
+  rig-devices release "$1"
+}
+pad() { echo "$*" >&"$pad"; }
+
+# To be read on the host while the guest runs: what the daemon says.
+journalctl --follow --unit=previzd --output=short-monotonic >journal.txt &
+
+step "devices"
+rig-devices vivid
+rig-devices gpio
+modprobe uhid
+coproc PAD { ./rig_vm_pad; }
+pad=${PAD[1]}
+camera() { ./rig_vm_camera /usr/share/previzd/demo/session 2 & camera=$!; }
+
+step "install: the service starts by itself"
+mkdir -p /etc/previzd /etc/systemd/system/previzd.service.d
+cp rig.toml /etc/previzd/set.toml
+# Compiling the shaders alone takes minutes here.
+printf '[Service]\nWatchdogSec=120\nTimeoutStartSec=600\nEnvironment=LP_NATIVE_VECTOR_WIDTH=128\n' \
+  >/etc/systemd/system/previzd.service.d/slow.conf
+dpkg --force-confold --install previzd.deb || fail "the package does not install"
+systemctl is-active --quiet previzd || fail "the service does not run"
+within 60 "the bus answers" status_is Set rig
+status_is CameraLost yes || fail "a camera that is not there is not told"
+
+step "the film camera is plugged in"
+camera
+within 600 "frames are shown" above '.stages.display.frames' 0
+status_is CameraLost no || fail "the camera is still told as lost"
+advances render "rendering goes on"
+advances lighting "the light camera lights the scene"
+
+step "the screen"
+touch screen.wanted
+within 60 "it is photographed" test -s screen.ppm
+lit=$(tr -d '\0' <screen.ppm | wc -c)
+all=$(wc -c <screen.ppm)
+echo "   $lit of $all bytes are not black"
+[[ $lit -gt $((all / 4)) ]] || fail "nothing is on the screen"
+
+step "who may operate the rig"
+as_nobody=(setpriv --reuid=nobody --regid=nogroup)
+"${as_nobody[@]}" --clear-groups previzctl mode live 2>/dev/null && fail "everybody may"
+"${as_nobody[@]}" --groups=previz previzctl mode live || fail "the group previz may not"
+
+step "buttons: contacts and a pad"
+samples=$(status Samples)
+tap 1
+within 60 "a contact starts a take" status_is Recording yes
+pad press 1
+pad release 1
+within 60 "the pad changes the samples" status_is Samples $((samples + 1))
+take_grows() { [[ $(status TakeFrames) -ge 5 ]]; }
+within 240 "five frames are in the take" take_grows
+
+step "the light camera is unplugged while recording, and comes back"
+trouble=$(metric '.counts."light camera: device trouble"')
+rig-devices unplug-vivid
+within 120 "it is missed" above '.counts."light camera: device trouble"' "$trouble"
+advances render "the picture goes on without it"
+rig-devices plug-vivid
+advances "light camera" "it delivers again"
+status_is Recording yes || fail "the take ended with the light camera"
+
+step "the film camera is unplugged while recording, and comes back"
+kill "$camera"
+wait "$camera"
+within 120 "it is missed" status_is CameraLost yes
+camera
+within 240 "it is back" status_is CameraLost no
+advances display "frames are shown again"
+status_is Recording yes || fail "the take ended with the film camera"
+
+step "the pad is unplugged, and comes back"
+pad unplug
+sleep 3
+pad plug
+samples=$(status Samples)
+pad_works() {
+  pad press 1
+  pad release 1
+  sleep 2
+  [[ $(status Samples) -gt $samples ]]
+}
+within 60 "its button works" pad_works
+
+step "the take"
+tap 1
+within 120 "a contact ends the take" status_is Recording no
+take=/var/lib/previzd/takes/$(status Take)
+[[ -z $(status Fault) ]] || fail "the take ended by itself: $(status Fault)"
+frames=$(status TakeFrames)
+cp -r "$take" take
+cp /var/lib/previzd/picture.png .
+lines=$(wc -l <"$take/observer.jsonl")
+lights=$(wc -l <"$take/light.jsonl")
+echo "   $frames frames: $lines of the film camera, $lights of the light camera"
+[[ $lines -ge 5 && $lights -ge 1 ]] || fail "the take is not complete"
+grep -q '"record"\|button1' "$take/events.jsonl" || fail "the take does not tell the button"
+previzctl metrics >metrics.json
+
+step "a daemon that stands still is started anew"
+kill -STOP "$(systemctl show --property=MainPID --value previzd)"
+restarted() { [[ $(systemctl show --property=NRestarts --value previzd) -eq 1 ]]; }
+within 300 "the watchdog has ended it" restarted
+within 300 "it shows frames again" above '.stages.display.frames' 0
+
+step "purge"
+dpkg --purge previzd
+[[ ! -e /etc/previzd && ! -e /usr/bin/previzd ]] || fail "the package left files"
+systemctl is-active --quiet previzd && fail "the service still runs"
+[[ -d $take ]] || fail "purge took a take"
+step "done"

@@ -1,0 +1,221 @@
+// The rig for minutes on a looped take that comes faster than it can be rendered, with a crew that
+// keeps pressing buttons: memory and file descriptors must stay flat, and every captured frame must
+// have been rendered or dropped for a cause that is told. Prints the figures; 0: all of it held.
+#include <malloc.h>
+#include <sys/timerfd.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <mutex>
+#include <sstream>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "daemon/rig/live.hpp"
+#include "drivers/descriptor.hpp"
+#include "drivers/error.hpp"
+#include "tests/devices/leftovers.hpp"
+#include "tests/unit/crewed_rig.hpp"
+#include "tests/unit/small_take.hpp"
+#include "tests/unit/temporary_directory.hpp"
+
+namespace previz {
+namespace {
+
+using namespace std::chrono_literals;
+
+// A button pressed every second, in turn.
+class Crew final : public Buttons {
+ public:
+  Crew() {
+    const itimerspec each_second{{1, 0}, {1, 0}};
+    if (!timer_ || timerfd_settime(timer_.get(), 0, &each_second, nullptr) != 0)
+      throw Error("no timer can be made");
+  }
+  std::string name() const override { return "crew"; }
+  int fd() const override { return timer_.get(); }
+  std::optional<ButtonsEvent> next() override {
+    if (is_down_) {
+      is_down_ = false;
+      return ButtonEvent{buttons[pressed_++ % buttons.size()], false, 0};
+    }
+    std::uint64_t times = 0;
+    if (read(timer_.get(), &times, sizeof times) != sizeof times) return std::nullopt;
+    is_down_ = true;
+    return ButtonEvent{buttons[pressed_ % buttons.size()], true, 0};
+  }
+
+  static inline const std::vector<std::string> buttons = {
+      "record",       "move_right", "refine",   "live",      "light_up",
+      "record",       "review",     "live",     "move_left", "samples_up",
+      "samples_down", "debug_view", "snapshot", "standby",   "live"};
+
+ private:
+  OwnedDescriptor timer_{timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC)};
+  std::size_t pressed_ = 0;
+  bool is_down_ = false;
+};
+
+struct Sample {
+  double minutes = 0;
+  double allocated_mb = 0;  // by the program
+  double resident_mb = 0;   // after the allocator gave back what it only kept
+  double descriptors = 0;
+};
+
+Sample sample_at(double minutes) {
+  malloc_trim(0);
+  std::ifstream statm("/proc/self/statm");
+  std::uint64_t total_pages = 0, resident_pages = 0;
+  statm >> total_pages >> resident_pages;
+  return {minutes, 1e-6 * static_cast<double>(test::live_bytes()),
+          1e-6 * static_cast<double>(resident_pages) * static_cast<double>(sysconf(_SC_PAGESIZE)),
+          static_cast<double>(test::open_descriptors())};
+}
+
+// Over the samples of a time; of all of them the mean, of each member the most.
+struct Usage {
+  Sample mean, most;
+};
+
+Usage usage(const std::vector<Sample>& samples, double from, double to) {
+  Usage found;
+  double count = 0;
+  for (const Sample& sample : samples) {
+    if (sample.minutes < from || sample.minutes >= to) continue;
+    ++count;
+    for (double Sample::*member :
+         {&Sample::allocated_mb, &Sample::resident_mb, &Sample::descriptors}) {
+      found.mean.*member += sample.*member;
+      found.most.*member = std::max(found.most.*member, sample.*member);
+    }
+  }
+  for (double Sample::*member : {&Sample::allocated_mb, &Sample::resident_mb})
+    found.mean.*member /= count;
+  return found;
+}
+
+bool check(bool holds, const std::string& what) {
+  std::cout << (holds ? "holds: " : "FAILS: ") << what << std::endl;
+  return holds;
+}
+
+bool all_accounted_for(const pipeline::MetricsSnapshot& metrics) {
+  const std::uint64_t captured = metrics.stages.at("observer").frames;
+  std::cout << captured << " captured, " << metrics.stages.at("render").frames << " rendered";
+  for (const char* stage : {"tracking", "render"})
+    for (const auto& [cause, frames] : metrics.stages.at(stage).dropped)
+      std::cout << ", " << frames << " dropped by " << stage << " (" << cause << ")";
+  std::cout << std::endl;
+  return check(test::accounted_for(metrics) == captured, "captured = rendered + dropped by cause");
+}
+
+// The first quarter is for what grows once: buffers, caches, libraries. What is used goes up and
+// down with the mode and with frames that wait, so means over a quarter are compared, which is
+// three rounds of the crew's buttons in three minutes; those moved by less than 3 MB where nothing
+// leaks. A twentieth of the frames that come in half of three minutes would be 6 MB.
+bool stays_flat(const std::vector<Sample>& samples, double minutes) {
+  constexpr double allowed_mb = 3, allowed_ratio = 1.1;
+  const Usage early = usage(samples, minutes / 4, minutes / 2);
+  const Usage late = usage(samples, minutes * 3 / 4, 2 * minutes);
+  std::printf(
+      "second quarter: %.1f MB allocated, %.1f MB resident, %.0f descriptors; last: %.1f MB, "
+      "%.1f MB, %.0f\n",
+      early.mean.allocated_mb, early.mean.resident_mb, early.most.descriptors,
+      late.mean.allocated_mb, late.mean.resident_mb, late.most.descriptors);
+  const bool no_leak =
+      check(late.mean.allocated_mb <= early.mean.allocated_mb + allowed_mb, "memory is flat");
+  const bool no_bloat = check(late.mean.resident_mb <= allowed_ratio * early.mean.resident_mb,
+                              "resident memory is flat");
+  return check(late.most.descriptors <= early.most.descriptors, "file descriptors are flat") &&
+         no_leak && no_bloat;
+}
+
+std::string set_text(const std::filesystem::path& takes) {
+  std::string text =
+      "[[light]]\nname = \"key\"\ntype = \"point\"\nposition_m = [0.3, 0, 0.6]\n"
+      "emission = [1, 1, 1]\n[recording]\nslate = \"soak\"\nreserve_mb = 100\nqueue_mb = 16\n"
+      "preroll_s = 0.2\ncomposite = true\ndirectory = \"" +
+      takes.string() + "\"\n";
+  std::vector<std::string> names = Crew::buttons;
+  std::ranges::sort(names);
+  names.erase(std::unique(names.begin(), names.end()), names.end());
+  for (const std::string& name : names)
+    text += "[[button]]\nname = \"" + name + "\"\naction = \"" + name + "\"\n";
+  return text;
+}
+
+// Takes would fill the disk in half an hour.
+void forget_old_takes(const std::filesystem::path& takes) {
+  std::vector<std::filesystem::path> there;
+  std::error_code none_yet;
+  for (const auto& entry : std::filesystem::directory_iterator(takes, none_yet))
+    there.push_back(entry.path());
+  std::ranges::sort(there);
+  for (std::size_t i = 0; i + 3 < there.size(); ++i)
+    std::filesystem::remove_all(there[i], none_yet);
+}
+
+bool soak(double minutes) {
+  const test::TemporaryDirectory directory;
+  constexpr std::int64_t interval_ns = 4'000'000;  // 250 frames a second
+  test::write_small_take(directory.path(), true, set_text(directory / "takes"), {}, interval_ns);
+  rig::LiveOptions options;
+  options.set_file = directory / "set.toml";
+  options.directory = directory / "live";
+  options.loop = true;
+  options.buttons = [] {
+    std::vector<std::unique_ptr<Buttons>> buttons;
+    buttons.push_back(std::make_unique<Crew>());
+    return buttons;
+  };
+  std::stop_source stop;
+  options.stop = stop.get_token();
+
+  std::vector<Sample> samples;
+  std::jthread watch([&] {
+    const auto begin = std::chrono::steady_clock::now();
+    for (double now = 0; now < minutes;) {
+      std::this_thread::sleep_for(1s);
+      now = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / 60;
+      samples.push_back(sample_at(now));
+      forget_old_takes(directory / "takes");
+    }
+    stop.request_stop();
+  });
+  std::ostringstream log;
+  const pipeline::MetricsSnapshot metrics = rig::run_live(options, log);
+  watch.join();
+
+  std::printf("%.1f minutes, %.1f frames a second captured, %.1f rendered\n", metrics.seconds / 60,
+              static_cast<double>(metrics.stages.at("observer").frames) / metrics.seconds,
+              static_cast<double>(metrics.stages.at("render").frames) / metrics.seconds);
+  std::printf("latency, capture to display: median %.1f ms, 99 in 100 below %.1f ms\n",
+              1e3 * metrics.latency_p50_s, 1e3 * metrics.latency_p99_s);
+  const bool accounted = all_accounted_for(metrics);
+  return stays_flat(samples, minutes) && accounted;
+}
+
+}  // namespace
+}  // namespace previz
+
+int main(int argc, char** argv) {
+  CLI::App app("A rig for minutes: memory, file descriptors, drops, latency");
+  double minutes = 3;
+  app.add_option("--minutes", minutes)->check(CLI::Range(0.1, 10000.0))->capture_default_str();
+  CLI11_PARSE(app, argc, argv);
+  try {
+    return previz::soak(minutes) ? 0 : 1;
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << std::endl;
+    return 1;
+  }
+}

@@ -1,0 +1,87 @@
+// The rig on the small take, which is looped, with a crew of one hand.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <ostream>
+#include <stdexcept>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "daemon/rig/live.hpp"
+#include "daemon/set/actions.hpp"
+#include "tests/unit/hand.hpp"
+
+namespace previz::test {
+
+// For a set file: a button for every action, named like it.
+inline std::string button_for_every_action() {
+  std::string text;
+  for (const set::Action& action : set::actions())
+    text += std::string("[[button]]\nname = \"") + action.name + "\"\naction = \"" + action.name +
+            "\"\n";
+  return text;
+}
+
+// What a crew waits for comes within this even under sanitizers on a busy machine, or never.
+inline constexpr std::chrono::minutes crew_patience{2};
+
+struct WaitedInVain : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+// Until the condition, whose change `news` announces, holds. `seen` tells what there was instead.
+template <typename Condition, typename Seen>
+void await(std::condition_variable& news, std::unique_lock<std::mutex>& lock, Condition condition,
+           Seen seen) {
+  if (!news.wait_for(lock, crew_patience, condition))
+    throw WaitedInVain("the crew waited in vain; seen last: " + seen());
+}
+
+// Until the script, on a thread of its own, has ended or waited in vain. set.toml is in
+// `directory`; `options` says what is to be done with what is shown.
+inline pipeline::MetricsSnapshot run_crewed(rig::LiveOptions options,
+                                            const std::filesystem::path& directory, Hand& hand,
+                                            const std::function<void()>& script,
+                                            std::ostream& out) {
+  options.set_file = directory / "set.toml";
+  options.directory = directory / "live";
+  options.loop = true;
+  std::stop_source stop;
+  options.stop = stop.get_token();
+  options.buttons = [&hand] {
+    std::vector<std::unique_ptr<Buttons>> buttons;
+    buttons.push_back(std::make_unique<Hand::Device>(hand));
+    return buttons;
+  };
+  std::jthread crew([&] {
+    try {
+      script();
+    } catch (const WaitedInVain& what) {
+      ADD_FAILURE() << what.what();
+    }
+    stop.request_stop();
+  });
+  return rig::run_live(options, out);
+}
+
+// Frames that were rendered, or dropped on the way there by a cause that is told: of those
+// captured, all.
+inline std::uint64_t accounted_for(const pipeline::MetricsSnapshot& metrics) {
+  std::uint64_t frames = metrics.stages.at("render").frames;
+  for (const char* stage : {"tracking", "render"})
+    for (const auto& [cause, dropped] : metrics.stages.at(stage).dropped) frames += dropped;
+  return frames;
+}
+
+}  // namespace previz::test

@@ -1,0 +1,215 @@
+// What the crew sees, from end to end: a replayed take on a headless display that is read back.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <sstream>
+#include <thread>
+
+#include "daemon/output/osd_painter.hpp"
+#include "daemon/output/png.hpp"
+#include "daemon/rig/live.hpp"
+#include "daemon/set/actions.hpp"
+#include "drivers/session/session.hpp"
+#include "tests/unit/crewed_rig.hpp"
+#include "tests/unit/small_take.hpp"
+#include "tests/unit/temporary_directory.hpp"
+
+namespace previz::rig {
+namespace {
+
+using output::OsdPage;
+using output::OsdText;
+
+constexpr int screen_width = 480, screen_height = 270;
+constexpr int picture_width = 48, picture_height = 36;  // small_take_frame's
+
+bool says(const std::vector<OsdText>& texts, const std::string& words) {
+  return std::ranges::any_of(
+      texts, [&](const OsdText& text) { return text.text.find(words) != std::string::npos; });
+}
+
+std::string words_of(const OsdPage& page) {
+  std::string words;
+  for (const auto* texts :
+       {&page.top_left, &page.top_right, &page.bottom_left, &page.bottom_right, &page.notices})
+    for (const OsdText& text : *texts) words += text.text + "\n";
+  return words;
+}
+
+class RigDisplay : public testing::Test {
+ protected:
+  void write_set(const std::string& display) {
+    std::string text = "[recording]\nslate = \"12A\"\nreserve_mb = 1\ndirectory = \"takes\"\n";
+    text += test::button_for_every_action();
+    test::write_small_take(directory_.path(), true, text + display);
+  }
+
+  void run(const std::function<void()>& script) {
+    LiveOptions options;
+    options.on_shown = [&](const pipeline::Shot& shot, const Look&) {
+      const std::lock_guard lock(mutex_);
+      pictures_.push_back(shot.picture);
+      if (pictures_.size() > 64) pictures_.pop_front();
+      news_.notify_all();
+    };
+    options.on_screen = [&](const Plate& screen, const OsdPage& page) {
+      const std::lock_guard lock(mutex_);
+      unread_.push_back(page);
+      ++count_;
+      news_.notify_all();
+      if (is_shown_picture(screen, page)) ++as_expected_;
+    };
+    std::ostringstream out;
+    metrics_ = test::run_crewed(std::move(options), directory_.path(), hand_, script, out);
+    log_ = out.str();
+  }
+
+  // Reads page after page until the condition holds: no time is assumed, and no page is missed.
+  OsdPage until(const std::function<bool(const OsdPage&)>& condition) {
+    std::unique_lock lock(mutex_);
+    OsdPage page;
+    const auto found = [&] {
+      while (!unread_.empty()) {
+        page = unread_.front();
+        unread_.pop_front();
+        if (condition(page)) return true;
+      }
+      return false;
+    };
+    test::await(news_, lock, found, [&] { return words_of(page); });
+    return page;
+  }
+  OsdPage until_mode(const std::string& mode) {
+    return until([&](const OsdPage& page) { return says(page.top_left, mode); });
+  }
+  // The pages before it are of no interest any more.
+  void press(const std::string& button) {
+    const std::lock_guard lock(mutex_);
+    unread_.clear();
+    hand_.press(button);
+  }
+
+  // 1:1 in the middle: outside the words' boxes every pixel is one of the pictures handed to the
+  // display, or black beside it.
+  bool is_shown_picture(const Plate& screen, const OsdPage& page) const {
+    const std::vector<Overlay> boxes =
+        output::OsdPainter(screen_width, screen_height, 0.05).paint(page);
+    return std::ranges::any_of(pictures_, [&](const Plate& picture) {
+      for (int y = 0; y < screen_height; ++y)
+        for (int x = 0; x < screen_width; ++x)
+          if (!covered(boxes, x, y) && !same(screen, picture, x, y)) return false;
+      return true;
+    });
+  }
+  static bool covered(const std::vector<Overlay>& boxes, int x, int y) {
+    return std::ranges::any_of(boxes, [&](const Overlay& box) {
+      return x >= box.x && x < box.x + box.width && y >= box.y && y < box.y + box.height;
+    });
+  }
+  static bool same(const Plate& screen, const Plate& picture, int x, int y) {
+    const int px = x - (screen_width - picture_width) / 2;
+    const int py = y - (screen_height - picture_height) / 2;
+    const bool inside = px >= 0 && py >= 0 && px < picture_width && py < picture_height;
+    for (int c = 0; c < 3; ++c) {
+      const int shown = screen.samples[static_cast<std::size_t>(3 * (y * screen_width + x) + c)];
+      const int wanted =
+          inside ? picture.samples[static_cast<std::size_t>(3 * (py * picture_width + px) + c)] : 0;
+      if (shown != wanted) return false;
+    }
+    return true;
+  }
+
+  test::TemporaryDirectory directory_;
+  test::Hand hand_;
+  std::mutex mutex_;
+  std::condition_variable news_;
+  std::deque<Plate> pictures_{
+      // what may be seen: black before the first
+      Plate{picture_width, picture_height, 8,
+            std::vector<std::uint16_t>(3 * picture_width * picture_height, 0)}};
+  std::deque<OsdPage> unread_;
+  int count_ = 0, as_expected_ = 0;
+  pipeline::MetricsSnapshot metrics_;
+  std::string log_;
+};
+
+TEST_F(RigDisplay, ShowsThePictureAndTheWordsOfEveryMode) {
+  write_set(
+      "[display]\ndriver = \"headless\"\nmode = \"480x270\"\nscale = \"1:1\"\n"
+      "text_height = 0.05\n");
+  run([&] {
+    until([](const OsdPage& page) { return says(page.bottom_left, "2 samples"); });
+    until([](const OsdPage& page) { return says(page.notices, "camera only: pose lost"); });
+    press("debug_view");
+    until_mode("view: mixed");
+    for (std::size_t i = 1; i < render::all_views.size(); ++i) press("debug_view");
+    press("record");
+    until_mode("● 00:");
+    press("refine");
+    const OsdPage refined =
+        until([](const OsdPage& page) { return says(page.bottom_left, "· error"); });
+    EXPECT_TRUE(says(refined.top_left, "REFINE"));
+    EXPECT_TRUE(says(refined.top_left, "12A_take001"));
+    press("live");
+    press("standby");  // refused: a take runs
+    until([](const OsdPage& page) { return says(page.notices, "stop it first"); });
+    press("record");
+    press("snapshot");
+    until([](const OsdPage& page) { return says(page.notices, "snapshot"); });
+    press("osd");
+    until([](const OsdPage& page) { return page == OsdPage{}; });
+    press("osd");
+    until_mode("LIVE");
+  });
+  // The words lay over the pictures and changed nothing else, from the first screenful to the last.
+  EXPECT_GT(count_, 0);
+  EXPECT_EQ(as_expected_, count_);
+  EXPECT_GT(metrics_.stages.at("screen").frames, 0u);
+  EXPECT_GT(metrics_.latency_p50_s, 0.0);
+
+  // None of them is in what was written.
+  const Plate snapshot = output::read_png(directory_ / "live/snapshot_0001.png");
+  EXPECT_EQ(snapshot.width, picture_width);
+  session::Session take = session::open_session(directory_ / "takes/12A_take001");
+  const auto stream = session::open_stream(take, "observer");
+  for (std::size_t i = 0; i < stream->records().size(); ++i)
+    EXPECT_EQ(stream->read(i)->bytes,
+              test::small_take_frame(static_cast<int>(stream->records()[i].sequence % 8)).bytes);
+  EXPECT_EQ(output::read_png(directory_ / "live/screen.png").width, screen_width);
+}
+
+TEST_F(RigDisplay, IsFreeForOthersInStandbyAndBackAfterIt) {
+  write_set("[display]\ndriver = \"headless\"\nmode = \"480x270\"\n");
+  run([&] {
+    until_mode("LIVE");
+    press("standby");
+    std::unique_lock lock(mutex_);  // nothing more is shown
+    for (int before = -1; before != count_;) {
+      before = count_;
+      news_.wait_for(lock, std::chrono::milliseconds(400));
+    }
+    lock.unlock();
+    press("standby");
+    until_mode("LIVE");
+  });
+}
+
+TEST_F(RigDisplay, WithoutAScreenTheRigGoesOnAndSaysSoOnce) {
+  write_set("[display]\ndriver = \"kms\"\nconnector = \"HDMI-A-9\"\n");
+  run([&] {
+    std::unique_lock lock(mutex_);
+    test::await(
+        news_, lock, [&] { return pictures_.size() >= 20; },
+        [&] { return std::to_string(pictures_.size()) + " pictures"; });
+  });
+  const auto first = log_.find("tried again until it is there");
+  EXPECT_NE(first, std::string::npos) << log_;
+  EXPECT_EQ(log_.find("tried again until it is there", first + 1), std::string::npos);
+  EXPECT_GT(metrics_.stages.at("screen").dropped.at("no display"), 0u);
+}
+
+}  // namespace
+}  // namespace previz::rig

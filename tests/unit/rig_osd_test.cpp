@@ -1,0 +1,198 @@
+// The overlay's words for every state of the rig, as data.
+#include "daemon/rig/osd.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "daemon/rig/faults.hpp"
+#include "daemon/rig/news_ticker.hpp"
+
+namespace previz::rig {
+namespace {
+
+using output::OsdPage;
+using output::OsdText;
+using output::OsdTone;
+using Texts = std::vector<OsdText>;
+
+PictureFacts tracked() {
+  PictureFacts facts;
+  facts.samples = 8;
+  facts.tracking = tracking::TrackStatus::tracked;
+  facts.tags = 6;
+  facts.deviation_mm = 0.83;
+  return facts;
+}
+
+RigFacts in(Mode mode) {
+  RigFacts rig;
+  rig.look.state.mode = mode;
+  rig.free_bytes = 412'300'000'000;
+  return rig;
+}
+
+constexpr Pace pace{24.96, 0.0834};
+
+TEST(OsdWords, LivePreview) {
+  const PictureFacts picture = tracked();
+  const OsdPage page = osd_page(in(Mode::live), &picture, pace);
+  EXPECT_EQ(page.top_left, (Texts{{"LIVE"}}));
+  EXPECT_EQ(page.top_right, (Texts{{"412 GB free"}}));
+  EXPECT_EQ(page.bottom_left, (Texts{{"8 samples"}, {"25.0 fps · 83 ms"}}));
+  EXPECT_EQ(page.bottom_right, (Texts{{"6 tags · ±0.83 mm"}, {"light: image"}}));
+  EXPECT_TRUE(page.notices.empty());
+}
+
+TEST(OsdWords, RefiningTellsSamplesAndErrorInPlaceOfThePace) {
+  PictureFacts picture = tracked();
+  picture.samples = 256;
+  picture.error = 0.0184;
+  const OsdPage page = osd_page(in(Mode::refine), &picture, pace);
+  EXPECT_EQ(page.top_left, (Texts{{"REFINE", OsdTone::mode}}));
+  EXPECT_EQ(page.bottom_left, (Texts{{"256 samples · error 1.8 %"}}));
+}
+
+TEST(OsdWords, ATakeTellsItsTimeInEveryModeItCanRunIn) {
+  const PictureFacts picture = tracked();
+  for (const Mode mode : {Mode::live, Mode::refine}) {
+    RigFacts rig = in(mode);
+    rig.look.state.recording = true;
+    rig.recorded_s = 3600 + 2 * 60 + 3.9;
+    rig.take = "12A_take003";
+    const OsdPage page = osd_page(rig, &picture, pace);
+    ASSERT_EQ(page.top_left.size(), 3u);
+    EXPECT_EQ(page.top_left[1], (OsdText{"● 01:02:03", OsdTone::recording}));
+    EXPECT_EQ(page.top_left[2], OsdText{"12A_take003"});
+  }
+}
+
+TEST(OsdWords, ReviewStandbyLightModeAndDebugViews) {
+  const PictureFacts picture = tracked();
+  EXPECT_EQ(osd_page(in(Mode::review), &picture, pace).top_left,
+            (Texts{{"REVIEW", OsdTone::mode}}));
+  EXPECT_EQ(osd_page(in(Mode::standby), &picture, pace).top_left,
+            (Texts{{"STANDBY", OsdTone::mode}}));
+  RigFacts rig = in(Mode::live);
+  rig.look.light_mode = set::LightMode::hybrid;
+  EXPECT_EQ(osd_page(rig, &picture, pace).bottom_right.back(), OsdText{"light: hybrid"});
+  for (const render::View view : render::all_views) {
+    rig.look.view = view;
+    const Texts top = osd_page(rig, &picture, pace).top_left;
+    if (view == render::View::composite)
+      EXPECT_EQ(top.size(), 1u);
+    else
+      EXPECT_EQ(top.back(),
+                (OsdText{std::string("view: ") + render::name_of(view), OsdTone::mode}));
+  }
+}
+
+TEST(OsdWords, FreeSpaceWarnsBeforeItIsGone) {
+  RigFacts rig = in(Mode::live);
+  const auto space = [&](std::uint64_t bytes) {
+    rig.free_bytes = bytes;
+    return osd_page(rig, nullptr, {}).top_right;
+  };
+  EXPECT_EQ(space(52'340'000'000), (Texts{{"52.3 GB free"}}));
+  EXPECT_EQ(space(9'940'000'000), (Texts{{"9.9 GB free", OsdTone::warning}}));
+  EXPECT_EQ(space(0), (Texts{{"0.0 GB free", OsdTone::alarm}}));
+  rig.free_bytes.reset();
+  EXPECT_TRUE(osd_page(rig, nullptr, {}).top_right.empty());
+}
+
+TEST(OsdWords, TrackingInTrouble) {
+  PictureFacts picture = tracked();
+  picture.tags = 1;
+  picture.tracking_trouble = "tag 7: not where the map says";
+  OsdPage page = osd_page(in(Mode::live), &picture, pace);
+  EXPECT_EQ(page.bottom_right.front(), (OsdText{"1 tag · ±0.83 mm", OsdTone::warning}));
+  EXPECT_EQ(page.notices, (Texts{{"tracking: tag 7: not where the map says", OsdTone::warning}}));
+
+  picture = {};
+  picture.tracking_trouble = "no tag in the picture";
+  picture.untouched = "pose lost: no tag in the picture";
+  page = osd_page(in(Mode::live), &picture, pace);
+  EXPECT_EQ(page.bottom_left.front(), OsdText{"camera only"});
+  EXPECT_EQ(page.bottom_right.front(), (OsdText{"tracking lost", OsdTone::alarm}));
+  EXPECT_EQ(page.notices,
+            (Texts{{"camera only: pose lost: no tag in the picture", OsdTone::warning}}));
+}
+
+TEST(OsdWords, FaultsInPlainWordsAndWhatAButtonDid) {
+  const PictureFacts picture = tracked();
+  RigFacts rig = in(Mode::live);
+  rig.look.state.camera_lost = true;
+  const std::string moved = "card moved to +0.010 +0.000 +0.000 m";
+  rig.news = {{moved}};
+  EXPECT_EQ(osd_page(rig, &picture, pace).notices,
+            (Texts{{"film camera: no pictures come", OsdTone::alarm}, {moved}}));
+  rig.faults = {"film camera: was unplugged; it is opened anew", "light camera: is stalled"};
+  rig.recorder_fault = "the disk is almost full";
+  rig.frames_lost = 12;
+  rig.news.push_back({"recording goes on; stop it first", true});
+  EXPECT_EQ(osd_page(rig, &picture, pace).notices,
+            (Texts{{rig.faults[0], OsdTone::alarm},
+                   {rig.faults[1], OsdTone::alarm},
+                   {"recording ended: the disk is almost full", OsdTone::alarm},
+                   {"12 frames are missing in the take: the disk is too slow", OsdTone::alarm},
+                   {moved},
+                   {rig.news[1].what, OsdTone::warning}}));
+}
+
+TEST(OsdWords, BeforeTheFirstPicture) {
+  const OsdPage page = osd_page(in(Mode::live), nullptr, {});
+  EXPECT_EQ(page.notices, (Texts{{"waiting for the film camera", OsdTone::warning}}));
+  EXPECT_TRUE(page.bottom_left.empty());
+}
+
+// The deviation of a place is the root of its three variances' sum.
+TEST(OsdWords, FactsOfAShot) {
+  pipeline::Shot shot;
+  shot.samples = 4;
+  shot.track.status = tracking::TrackStatus::tracked;
+  shot.track.pose.emplace();
+  shot.track.pose->tags = {1, 2, 5};
+  const double variances_m2[] = {1, 1, 1, 4e-8, 4e-8, 1e-8};  // the first three are of rotation
+  for (std::size_t axis = 0; axis < 6; ++axis)
+    shot.track.pose->covariance[7 * axis] = variances_m2[axis];
+  const PictureFacts facts = facts_of(shot);
+  EXPECT_EQ(facts.tags, 3);
+  EXPECT_NEAR(facts.deviation_mm, 0.3, 1e-12);
+}
+
+TEST(NewsTicker, EachStaysLongEnoughToBeReadAlsoWhereTheNextFollowsAtOnce) {
+  NewsTicker ticker;
+  const NewsTicker::Clock::time_point begin{};
+  const auto later = [&](int milliseconds) {
+    return begin + std::chrono::milliseconds(milliseconds);
+  };
+  ticker.tell({"recording ended"}, begin);
+  ticker.tell({"snapshot"}, later(1000));
+  ticker.tell({"recording goes on", true}, later(1001));
+  const std::vector<News> all = {{"recording ended"}, {"snapshot"}, {"recording goes on", true}};
+  EXPECT_EQ(ticker.fresh(later(1001)), all);
+  ticker.tell({"snapshot"}, later(2000));  // again: it stands once, at the end
+  EXPECT_EQ(ticker.fresh(later(2000)), (std::vector<News>{all[0], all[2], all[1]}));
+  ticker.tell({"3 samples"}, later(2000));
+  EXPECT_EQ(ticker.fresh(later(2000)), (std::vector<News>{all[2], all[1], {"3 samples"}}));
+  EXPECT_EQ(ticker.fresh(later(4500)), (std::vector<News>{all[1], {"3 samples"}}));
+  EXPECT_TRUE(ticker.fresh(later(5000)).empty());
+}
+
+TEST(Faults, StayUntilTheDeviceIsWellAndLongEnoughToBeRead) {
+  Faults faults;
+  const Faults::Clock::time_point begin{};
+  faults.tell("film camera", "was unplugged", begin);
+  faults.tell("pedal", "sends nonsense", begin);
+  faults.well("pedal");
+  const std::vector<std::string> both = {"film camera: was unplugged", "pedal: sends nonsense"};
+  EXPECT_EQ(faults.words(begin + std::chrono::seconds(3)), both);
+  EXPECT_EQ(faults.words(begin + Faults::reading_time),
+            (std::vector<std::string>{"film camera: was unplugged"}));
+  EXPECT_EQ(faults.words(begin + std::chrono::hours(1)).size(), 1u);
+  faults.well("film camera");
+  EXPECT_TRUE(faults.words(begin + std::chrono::hours(1)).empty());
+}
+
+}  // namespace
+}  // namespace previz::rig
