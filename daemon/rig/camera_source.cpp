@@ -14,6 +14,7 @@ CameraSource::CameraSource(Camera& camera, std::string stage, std::string crews_
       counts_(told_.metrics, stage_) {}
 
 FramePtr CameraSource::next() {
+  const std::chrono::duration<double> silence(told_.silence_s);
   while (!told_.stop.stop_requested()) {
     CameraEvent event = camera_.next(std::chrono::milliseconds(100));
     counts_.tell(camera_.counters());

@@ -23,13 +23,11 @@ class CameraSource {
     Notes& note;
     pipeline::Metrics& metrics;
     Faults& faults;
+    double silence_s;  // a camera counts as lost once it has said so, or said nothing for so long
     std::function<void(bool lost)> presence;  // told when it changes
   };
   // Metrics are counted under the stage's name; the crew is told of trouble under its own.
   CameraSource(Camera& camera, std::string stage, std::string crews_name, Told told);
-
-  // A camera counts as lost once it has said so, or said nothing for this long.
-  static constexpr std::chrono::seconds silence{1};
 
   // The next frame; null at the end of the stream, or once a stop is requested.
   FramePtr next();

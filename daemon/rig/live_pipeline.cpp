@@ -69,8 +69,8 @@ struct LivePipeline::Impl {
   void tell_of_carriers(const Shot& shot);
   void show(Shot shot);
   void record_shown(const Shot& shot);
-  CameraSource source(Camera& camera, const char* stage, const char* crews_name,
-                      std::function<void(bool)> presence);
+  CameraSource source(Camera& camera, const set::CameraWish& wish, const char* stage,
+                      const char* crews_name, std::function<void(bool)> presence);
 
   Parts parts;
   std::stop_source stop_source;
@@ -159,18 +159,22 @@ bool LivePipeline::Impl::renew_device(const render::DeviceLost& lost) {
   return false;
 }
 
-CameraSource LivePipeline::Impl::source(Camera& camera, const char* stage, const char* crews_name,
+CameraSource LivePipeline::Impl::source(Camera& camera, const set::CameraWish& wish,
+                                        const char* stage, const char* crews_name,
                                         std::function<void(bool)> presence) {
   return {camera,
           stage,
           crews_name,
-          {stop_source.get_token(), parts.note, parts.metrics, parts.faults, std::move(presence)}};
+          {stop_source.get_token(), parts.note, parts.metrics, parts.faults, wish.stall_timeout_s,
+           std::move(presence)}};
 }
 
 void LivePipeline::Impl::light_stages() {
   light_feed.start(
       *stages,
-      [this, camera = source(*parts.cameras.light, "light camera", "light camera", {}),
+      [this,
+       camera = source(*parts.cameras.light, parts.set.light_camera.camera, "light camera",
+                       "light camera", {}),
        index = std::uint64_t{0}]() mutable -> std::optional<pipeline::LightFrame> {
         FramePtr frame = camera.next();
         if (!frame) return std::nullopt;
@@ -204,9 +208,9 @@ LightPtr LivePipeline::Impl::estimate(std::vector<pipeline::LightFrame> frames,
 }
 
 void LivePipeline::Impl::observer_stages() {
-  observer.emplace(source(*parts.cameras.observer, "observer", "film camera", [this](bool lost) {
-    parts.inbox.post(lost ? Event::camera_lost : Event::camera_back);
-  }));
+  observer.emplace(source(
+      *parts.cameras.observer, parts.set.observer.camera, "observer", "film camera",
+      [this](bool lost) { parts.inbox.post(lost ? Event::camera_lost : Event::camera_back); }));
   stages->source("observer", seen, [this] { return capture(); });
   stages->stage("tracking", seen, tracked, [this](Shot shot) { return track(std::move(shot)); });
   stages->source("picture", rendered, [this] {

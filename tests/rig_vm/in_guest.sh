@@ -45,8 +45,8 @@ camera() { ./rig_vm_camera /usr/share/previzd/demo/session 2 & camera=$!; }
 step "install: the service starts by itself"
 mkdir -p /etc/previzd /etc/systemd/system/previzd.service.d
 cp rig.toml /etc/previzd/set.toml
-# Compiling the shaders alone takes minutes here.
-printf '[Service]\nWatchdogSec=120\nTimeoutStartSec=600\nEnvironment=LP_NATIVE_VECTOR_WIDTH=128\n' \
+# Compiling the shaders alone, at the first frame, takes minutes here.
+printf '[Service]\nWatchdogSec=600\nTimeoutStartSec=600\nEnvironment=LP_NATIVE_VECTOR_WIDTH=128\n' \
   >/etc/systemd/system/previzd.service.d/slow.conf
 dpkg --force-confold --install previzd.deb || fail "the package does not install"
 systemctl is-active --quiet previzd || fail "the service does not run"

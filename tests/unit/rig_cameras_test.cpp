@@ -102,7 +102,7 @@ TEST_F(RigCameras, WhatADeviceCountsIsInTheMetrics) {
   for (int loaded = 1; loaded <= 2; ++loaded) {
     const Cameras cameras = open_cameras(set);
     CameraSource source(*cameras.observer, "observer", "film camera",
-                        {{}, note, metrics, faults, {}});
+                        {{}, note, metrics, faults, 1.0, {}});
     for (int i = 0; i < 4; ++i) ASSERT_TRUE(source.next());
     const pipeline::MetricsSnapshot snapshot = metrics.snapshot(1);
     const DeviceCounters& counted = snapshot.devices.at("observer");
