@@ -37,7 +37,18 @@ std::optional<DisplayEvent> DisplayLifeline::show(const Composer& compose) {
 }
 
 void DisplayLifeline::release() {
-  if (display_) display_->release();
+  try {
+    if (display_) display_->release();
+  } catch (const Error&) {
+    display_.reset();  // free for others, too; opened anew when something is to be shown
+    state_ = DeviceState::lost;
+  }
+}
+
+void DisplayLifeline::close() {
+  display_.reset();
+  state_ = DeviceState::absent;
+  told_.clear();
 }
 
 std::optional<DisplayEvent> DisplayLifeline::open() {

@@ -27,6 +27,9 @@ class DisplayLifeline {
   // shown and that was told before.
   std::optional<DisplayEvent> show(const Composer& compose);
   void release();
+  // Gives the display up. Whoever ends the thread that the calls came from calls it there: a
+  // graphics context stays that thread's.
+  void close();
 
   DeviceState state() const { return state_; }  // absent, starting, streaming, lost
   // Null while there is none; for mode() and read_back().

@@ -68,6 +68,7 @@ std::optional<CameraEvent> Lifeline::open() {
   if (counters_["lost"] > counters_["returned"]) ++counters_["returned"];
   last_refusal_.clear();
   format_ = camera_->format();
+  sequence_offset_.reset();
   state_ = DeviceState::starting;
   since_ = clock_.now();
   return std::nullopt;
@@ -86,11 +87,11 @@ std::optional<CameraEvent> Lifeline::not_opened(const std::string& why) {
 
 // What of a device's events goes on; nothing of NoFrame.
 std::optional<CameraEvent> Lifeline::take(CameraEvent event) {
-  if (std::holds_alternative<FramePtr>(event)) {
+  if (auto* frame = std::get_if<FramePtr>(&event)) {
     state_ = DeviceState::streaming;
     since_ = clock_.now();
     backoff_.reset();
-    return event;
+    return numbered(std::move(*frame));
   }
   if (auto* trouble = std::get_if<DeviceTrouble>(&event)) {
     if (trouble->lost) return lose(trouble->what);
@@ -103,6 +104,17 @@ std::optional<CameraEvent> Lifeline::take(CameraEvent event) {
     return event;
   }
   return std::nullopt;
+}
+
+// A device that was opened anew may count from its beginning again.
+FramePtr Lifeline::numbered(FramePtr frame) {
+  if (!sequence_offset_)
+    sequence_offset_ = frame->sequence < next_sequence_ ? next_sequence_ - frame->sequence : 0;
+  next_sequence_ = frame->sequence + *sequence_offset_ + 1;
+  if (*sequence_offset_ == 0) return frame;
+  auto renumbered = std::make_shared<Frame>(*frame);
+  renumbered->sequence += *sequence_offset_;
+  return renumbered;
 }
 
 HostClock::Time Lifeline::next_deadline() const {

@@ -60,6 +60,7 @@ class Lifeline final : public Camera {
  private:
   std::optional<CameraEvent> open();
   std::optional<CameraEvent> take(CameraEvent event);
+  FramePtr numbered(FramePtr frame);
   std::optional<CameraEvent> watch();
   std::optional<CameraEvent> not_opened(const std::string& why);
   CameraEvent lose(const std::string& why);
@@ -82,6 +83,8 @@ class Lifeline final : public Camera {
   std::string last_refusal_;        // why the device could not be opened, as last told
   std::unique_ptr<Camera> camera_;  // starting, streaming and stalled only
   CameraFormat format_;
+  std::uint64_t next_sequence_ = 0;               // the least that increases
+  std::optional<std::uint64_t> sequence_offset_;  // of this opening; none before its first frame
   struct Wanted {
     double exposure_s, gain;
   };

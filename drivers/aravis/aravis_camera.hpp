@@ -8,7 +8,8 @@
 
 namespace previz {
 
-// `settings.device` is a serial number, an Aravis device id ("Vendor-Serial"), or the address of a
+// `settings.device` is a serial number, an Aravis device id ("Vendor-Model-Serial", or without
+// the model), or the address of a
 // network camera. Sequence numbers are the device's block ids, unwrapped; capture times are the
 // device's time stamps, mapped to the host's clock (clock_map.hpp). Where the camera can put its
 // exposure into each frame (chunk data) the frames say that; otherwise frames around a change are

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <mutex>
 
 #include "drivers/aravis/aravis_camera.hpp"
 #include "drivers/aravis/pixel_formats.hpp"
@@ -139,7 +140,14 @@ class Configuration {
   }
 
   void agree_on_rate() {
-    if (!arv_camera_is_frame_rate_available(&camera_, failure_.out())) return;
+    if (settings_.trigger) {  // setting a rate would end it
+      if (settings_.rate_hz) refuse("its trigger sets its rate; leave rate_hz out");
+      return;
+    }
+    if (!arv_camera_is_frame_rate_available(&camera_, failure_.out())) {
+      if (settings_.rate_hz) refuse("its rate cannot be set; leave rate_hz out");
+      return;
+    }
     if (settings_.rate_hz) {
       double least = 0, most = 0;
       arv_camera_get_frame_rate_bounds(&camera_, &least, &most, failure_.out());
@@ -151,7 +159,7 @@ class Configuration {
       check("frame rate");
     }
     const double rate_hz = arv_camera_get_frame_rate(&camera_, failure_.out());
-    if (!failure_.failed() && !settings_.trigger && std::isfinite(rate_hz) && rate_hz > 0)
+    if (!failure_.failed() && std::isfinite(rate_hz) && rate_hz > 0)
       agreed_.format.rate_hz = rate_hz;
   }
 
@@ -162,15 +170,12 @@ class Configuration {
       refuse("its exposure cannot be set; leave exposure out");
     if (settings_.gain && !agreed_.gain_in_db)
       refuse("its gain is not in dB, so no factor can be set; raw_gain sets it");
+    end_automatics();
     if (settings_.raw_gain) {
       arv_camera_set_gain(&camera_, *settings_.raw_gain, failure_.out());
       check("raw_gain");
     }
-    if (!agreed_.drives_exposure) return;
-    if (settings_.exposure_s && arv_camera_is_exposure_auto_available(&camera_, failure_.out()))
-      arv_camera_set_exposure_time_auto(&camera_, ARV_AUTO_OFF, failure_.out());
-    if (settings_.exposure_s && arv_camera_is_gain_auto_available(&camera_, failure_.out()))
-      arv_camera_set_gain_auto(&camera_, ARV_AUTO_OFF, failure_.out());
+    if (!agreed_.drives_exposure || is_automatic()) return;
     const double us = arv_camera_get_exposure_time(&camera_, failure_.out());
     check("exposure");
     agreed_.exposure.exposure_s = 1e-6 * us;
@@ -181,6 +186,28 @@ class Configuration {
       agreed_.exposure = set_exposure(camera_, settings_.device,
                                       {settings_.exposure_s.value_or(agreed_.exposure.exposure_s),
                                        settings_.gain.value_or(agreed_.exposure.gain)});
+  }
+
+  // What the set states is not to be changed by the camera.
+  void end_automatics() {
+    if ((settings_.exposure_s || settings_.gain) &&
+        arv_camera_is_exposure_auto_available(&camera_, failure_.out())) {
+      arv_camera_set_exposure_time_auto(&camera_, ARV_AUTO_OFF, failure_.out());
+      check("automatic exposure");
+    }
+    if ((settings_.exposure_s || settings_.gain || settings_.raw_gain) &&
+        arv_camera_is_gain_auto_available(&camera_, failure_.out())) {
+      arv_camera_set_gain_auto(&camera_, ARV_AUTO_OFF, failure_.out());
+      check("automatic gain");
+    }
+  }
+
+  // Then a frame's exposure is only what its chunk data say.
+  bool is_automatic() {
+    return (arv_camera_is_exposure_auto_available(&camera_, failure_.out()) &&
+            arv_camera_get_exposure_time_auto(&camera_, failure_.out()) != ARV_AUTO_OFF) ||
+           (arv_camera_is_gain_auto_available(&camera_, failure_.out()) &&
+            arv_camera_get_gain_auto(&camera_, failure_.out()) != ARV_AUTO_OFF);
   }
 
   // SFNC knows ratios, not temperatures; which ratio a lamp needs only a calibration can say.
@@ -230,7 +257,10 @@ struct Listed {
   std::string id, address, serial, vendor, model, protocol;
 };
 
+// Of one list, which another thread that looks for its camera would free.
 std::vector<Listed> list_devices() {
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
   arv_update_device_list();
   std::vector<Listed> devices;
   for (unsigned i = 0; i < arv_get_n_devices(); ++i)
@@ -255,7 +285,9 @@ Owned<ArvCamera> find_camera(const std::string& device) {
   if (is_address(device)) return open_camera(device, device);
   std::string seen;
   for (const Listed& listed : list_devices()) {
-    if (device == listed.serial || device == listed.id) return open_camera(listed.id, device);
+    if (device == listed.serial || device == listed.id ||
+        device == listed.vendor + "-" + listed.serial)
+      return open_camera(listed.id, device);
     seen += seen.empty() ? "" : ", ";
     seen += listed.serial + " (" + listed.address + ")";
   }
@@ -320,7 +352,9 @@ std::vector<FoundCamera> find_aravis() {
 
 // USB3 Vision cameras; a network camera's serial number is on no USB.
 std::optional<usb::Place> usb_place_of_aravis(const std::string& device) {
-  return usb::place_of_serial(device);
+  if (const std::optional<usb::Place> place = usb::place_of_serial(device)) return place;
+  const std::size_t dash = device.rfind('-');  // an id ends in the serial
+  return dash == std::string::npos ? std::nullopt : usb::place_of_serial(device.substr(dash + 1));
 }
 
 }  // namespace previz

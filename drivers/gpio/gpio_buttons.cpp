@@ -33,17 +33,16 @@ std::int64_t edge_ns(const timespec& time) {
   return std::int64_t{time.tv_sec} * second_ns + time.tv_nsec;
 }
 
-// "gpio", "CHIP", "LINE".
-std::vector<std::string> parts_of(const std::string& name) {
-  std::vector<std::string> parts;
-  std::size_t begin = 0;
-  for (std::size_t end = 0; end != std::string::npos; begin = end + 1) {
-    end = name.find(':', begin);
-    parts.push_back(name.substr(begin, end - begin));
-  }
-  if (parts.size() != 3 || parts[1].empty() || parts[2].empty())
+struct Contact {
+  std::string chip, line;
+};
+
+// Of gpio:CHIP:LINE; a chip's label may have colons ("INTC1057:00").
+Contact contact_of(const std::string& name) {
+  const std::size_t begin = name.find(':') + 1, end = name.rfind(':');
+  if (end <= begin || end + 1 == name.size())
     throw Error("button \"" + name + "\": allowed is gpio:CHIP:LINE, CHIP its label");
-  return parts;
+  return {name.substr(begin, end - begin), name.substr(end + 1)};
 }
 
 // By label only: the number of a gpiochip changes from boot to boot.
@@ -83,7 +82,7 @@ class GpioButtons final : public Buttons {
       throw Error(device_ + ": cannot be waited for: " + std::strerror(errno));
     for (const std::string& name : names) {
       const ContactWiring wiring = settings.wiring_of(name);
-      lines_.push_back({name, parts_of(name)[2], request_flags(wiring), nullptr,
+      lines_.push_back({name, contact_of(name).line, request_flags(wiring), nullptr,
                         Debouncer(static_cast<std::int64_t>(1e9 * wiring.debounce_s))});
     }
     watch(timer_.get());
@@ -128,6 +127,7 @@ class GpioButtons final : public Buttons {
       for (Line& line : lines_) request(*chip, line);
       chip_ = std::move(chip);
       refusal_.clear();
+      for (Line& line : lines_) see_held(line);
       ++counters_["opened"];
     } catch (const Error& error) {
       for (Line& line : lines_) line.line = nullptr;
@@ -144,7 +144,10 @@ class GpioButtons final : public Buttons {
     if (gpiod_line_request_both_edges_events_flags(line.line, consumer, line.request_flags) != 0)
       throw Error("line \"" + line.label + "\" cannot be had: " + std::strerror(errno));
     watch(gpiod_line_event_get_fd(line.line));
-    // Held while the rig starts: pressed from now on.
+  }
+
+  // Held while the rig starts: pressed from now on.
+  void see_held(Line& line) {
     if (gpiod_line_get_value(line.line) == 1 && line.debouncer.edge(true, monotonic_ns()))
       tell(line);
   }
@@ -210,7 +213,7 @@ std::string or_empty(const char* text) {
 }  // namespace
 
 std::string gpio_device_of(const std::string& name) {
-  return "gpio:" + parts_of(name)[1];
+  return "gpio:" + contact_of(name).chip;
 }
 
 std::unique_ptr<Buttons> open_gpio(const std::string& device, const std::vector<std::string>& names,

@@ -50,4 +50,9 @@ std::span<const Backend> backends() {
   return libraries.loaded;
 }
 
+std::mutex& library_mutex() {
+  static std::mutex mutex;
+  return mutex;
+}
+
 }  // namespace previz::hid

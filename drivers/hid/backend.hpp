@@ -4,6 +4,7 @@
 #include <hidapi.h>
 
 #include <memory>
+#include <mutex>
 #include <span>
 
 namespace previz::hid {
@@ -20,6 +21,10 @@ struct Backend {
 // Those this machine has, hidraw first: libusb takes a device away from the kernel, and is for
 // where hidraw may not be opened. Throws previz::Error where there is none.
 std::span<const Backend> backends();
+
+// Held while devices are looked for or opened: hidapi keeps the text of its last error in one
+// place, unguarded.
+std::mutex& library_mutex();
 
 // An open device.
 class Device {

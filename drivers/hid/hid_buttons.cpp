@@ -32,14 +32,12 @@ struct DeviceName {
   std::string serial;  // empty: any
 };
 
-std::vector<std::string> split(const std::string& text) {
-  std::vector<std::string> parts;
-  std::size_t begin = 0;
-  for (std::size_t end = 0; end != std::string::npos; begin = end + 1) {
-    end = text.find(':', begin);
-    parts.push_back(text.substr(begin, end - begin));
-  }
-  return parts;
+// What is before the next colon, which is taken off with it.
+std::string take_part(std::string& text) {
+  const std::size_t end = text.find(':');
+  std::string part = text.substr(0, end);
+  text.erase(0, end == std::string::npos ? end : end + 1);
+  return part;
 }
 
 std::optional<unsigned short> hexadecimal(const std::string& text) {
@@ -51,11 +49,10 @@ std::optional<unsigned short> hexadecimal(const std::string& text) {
 }
 
 DeviceName parse_device(const std::string& device) {
-  const std::vector<std::string> parts = split(device);
-  if (parts.size() == 3 || parts.size() == 4) {
-    const auto vendor = hexadecimal(parts[1]), product = hexadecimal(parts[2]);
-    if (vendor && product) return {*vendor, *product, parts.size() == 4 ? parts[3] : ""};
-  }
+  std::string serial = device;  // which may have colons: some pads give their network address
+  take_part(serial);
+  const auto vendor = hexadecimal(take_part(serial)), product = hexadecimal(take_part(serial));
+  if (vendor && product) return {*vendor, *product, serial};
   throw Error("\"" + device +
               "\": allowed is hid:VENDOR:PRODUCT or hid:VENDOR:PRODUCT:SERIAL, "
               "VENDOR and PRODUCT hexadecimal");
@@ -69,6 +66,7 @@ std::string narrow(const wchar_t* text) {
 
 hid::Device open_device(const DeviceName& name) {
   const std::wstring serial(name.serial.begin(), name.serial.end());
+  const std::lock_guard lock(hid::library_mutex());
   for (const hid::Backend& backend : hid::backends())
     if (hid_device* device =
             backend.open(name.vendor, name.product, serial.empty() ? nullptr : serial.c_str()))
@@ -243,6 +241,7 @@ std::unique_ptr<Buttons> open_hid(const std::string& device, const std::vector<s
 
 std::vector<FoundButton> find_hid() {
   std::vector<FoundButton> found;
+  const std::lock_guard lock(hid::library_mutex());
   for (const hid::Backend& backend : hid::backends()) {
     std::vector<FoundButton> its;
     hid_device_info* all = backend.enumerate(0, 0);

@@ -117,7 +117,11 @@ KmsDisplay::KmsDisplay(Target target, const DisplaySettings& settings)
       painter_(mode_.hdisplay, mode_.vdisplay, settings.scale) {}
 
 KmsDisplay::~KmsDisplay() {
-  scanout_.begin();
+  try {
+    scanout_.begin();
+  } catch (const Error&) {
+    // The GPU was reset: what the painter had is gone with its context. The screen is not.
+  }
   if (!master_) return;
   output_.restore();
   drmDropMaster(card_);

@@ -72,7 +72,7 @@ Scanout::~Scanout() {
   give_back(waiting_);
   give_back(on_screen_);
   if (drawn_ == EGL_NO_SURFACE) return;
-  context_.use(EGL_NO_SURFACE);
+  eglMakeCurrent(context_.display(), EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
   eglDestroySurface(context_.display(), drawn_);
 }
 

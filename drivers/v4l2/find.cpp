@@ -2,6 +2,7 @@
 
 #include <libudev.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cstring>
 #include <memory>
@@ -87,8 +88,10 @@ std::vector<FoundNode> find_nodes() {
   return found;
 }
 
-std::string stable_name(const FoundNode& node) {
-  return node.by_id.empty() ? node.by_path : node.by_id;
+std::string stable_name(const FoundNode& node, const std::vector<FoundNode>& found) {
+  const bool by_id =
+      !node.by_id.empty() && std::ranges::count(found, node.by_id, &FoundNode::by_id) == 1;
+  return by_id ? node.by_id : node.by_path;
 }
 
 std::string resolve(const std::string& device, const std::vector<FoundNode>& found) {
@@ -98,16 +101,16 @@ std::string resolve(const std::string& device, const std::vector<FoundNode>& fou
   for (const FoundNode& node : found) {
     if (device == node.node)
       throw Error(device + ": the number of a video node changes; this one is called \"" +
-                  stable_name(node) + "\"");
+                  stable_name(node, found) + "\"");
     if (without(by_id_directory, device) == node.by_id ||
         without(by_path_directory, device) == node.by_path || device == node.serial) {
-      if (meant && device == node.serial)
-        throw Error(device + ": two cameras have this serial number; \"" + stable_name(*meant) +
-                    "\" and \"" + stable_name(node) + "\" tell them apart");
+      if (meant)
+        throw Error(device + ": two cameras are called so; \"" + meant->by_path + "\" and \"" +
+                    node.by_path + "\" tell them apart");
       meant = &node;
     }
     there += there.empty() ? "" : ", ";
-    there += stable_name(node);
+    there += stable_name(node, found);
   }
   if (meant) return meant->node;
   if (device.starts_with("/dev/video"))

@@ -22,8 +22,9 @@ struct FoundNode {
 // Asks udev. None where there is no udev.
 std::vector<FoundNode> find_nodes();
 
-// The name to write into a set.
-std::string stable_name(const FoundNode& node);
+// The name to write into a set: by-id, but by-path where another of those found has the same id
+// (udev makes it from the model where there is no serial number).
+std::string stable_name(const FoundNode& node, const std::vector<FoundNode>& found);
 
 // The node that `device` names. Throws previz::Error that says why it is none, or which are there.
 std::string resolve(const std::string& device, const std::vector<FoundNode>& found);

@@ -214,10 +214,12 @@ std::unique_ptr<Camera> open_v4l2(const CameraSettings& settings) {
 }
 
 std::vector<FoundCamera> find_v4l2() {
-  std::vector<FoundCamera> found;
-  for (const v4l2::FoundNode& node : v4l2::find_nodes())
-    found.push_back({"v4l2", v4l2::stable_name(node), node.product + " at " + node.by_path});
-  return found;
+  std::vector<FoundCamera> cameras;
+  const std::vector<v4l2::FoundNode> found = v4l2::find_nodes();
+  for (const v4l2::FoundNode& node : found)
+    cameras.push_back(
+        {"v4l2", v4l2::stable_name(node, found), node.product + " at " + node.by_path});
+  return cameras;
 }
 
 std::optional<usb::Place> usb_place_of_v4l2(const std::string& device) {

@@ -16,6 +16,7 @@
 #include "drivers/debouncer.hpp"
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
+#include "drivers/gpio/gpio_buttons.hpp"
 #include "drivers/hid/hid_buttons.hpp"
 #include "tests/devices/leftovers.hpp"
 #include "tests/devices/uhid_pad.hpp"
@@ -123,6 +124,14 @@ TEST(ButtonNames, MistakesSayWhatIsAllowed) {
   EXPECT_THAT(error_of("gpio:chip"), HasSubstr("gpio:CHIP:LINE"));
   EXPECT_THAT(error_of("hid:12:zz:0.1"), HasSubstr("hexadecimal"));
   EXPECT_THAT(error_of("hid:12:13:0.9"), HasSubstr("BYTE.BIT"));
+}
+
+// A chip's label and a pad's serial number may have colons: ACPI's and Bluetooth's do.
+TEST(ButtonNames, MayHaveColonsInTheMiddle) {
+  EXPECT_EQ(gpio_device_of("gpio:INTC1057:00:12"), "gpio:INTC1057:00");
+  EXPECT_EQ(hid_device_of("hid:054c:09cc:aa:bb:cc:dd:ee:ff:5.4"),
+            "hid:054c:09cc:aa:bb:cc:dd:ee:ff");
+  EXPECT_EQ(hid_device_of("hid:054c:09cc:5.4"), "hid:054c:09cc");
 }
 
 TEST(ButtonWiring, ALinesOwnGoesBeforeItsChips) {

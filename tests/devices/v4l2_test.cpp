@@ -62,8 +62,8 @@ TEST(V4l2Find, ByEveryStableName) {
                            "/dev/v4l/by-path/pci-0-usb-0:1:1.0-video-index0"})
     EXPECT_EQ(resolve(name, found), "/dev/video0");
   EXPECT_EQ(resolve("platform-vivid.0-video-index0", found), "/dev/video2");
-  EXPECT_EQ(stable_name(found[0]), "usb-Acme_Cam_S1-video-index0");
-  EXPECT_EQ(stable_name(found[1]), "platform-vivid.0-video-index0");
+  EXPECT_EQ(stable_name(found[0], found), "usb-Acme_Cam_S1-video-index0");
+  EXPECT_EQ(stable_name(found[1], found), "platform-vivid.0-video-index0");
 }
 
 TEST(V4l2Find, NeverByNumber) {
@@ -78,6 +78,17 @@ TEST(V4l2Find, WhatIsNotThereOrNotOneIsAnError) {
   EXPECT_THAT(error_of([] { resolve("missing", {}); }), HasSubstr("no cameras"));
   EXPECT_THAT(error_of([] { resolve("", found); }), HasSubstr("by-id"));
   EXPECT_THAT(error_of([] { resolve("S2", found); }), HasSubstr("two cameras"));
+}
+
+TEST(V4l2Find, TwinsWithoutASerialNumberAreToldApartByTheirPlaces) {
+  const std::string id = "usb-Acme_Cam-video-index0";
+  const std::vector<FoundNode> twins{
+      {"/dev/video0", id, "pci-0-usb-0:1:1.0-video-index0", "", "Acme"},
+      {"/dev/video2", id, "pci-0-usb-0:2:1.0-video-index0", "", "Acme"}};
+  EXPECT_EQ(stable_name(twins[0], twins), "pci-0-usb-0:1:1.0-video-index0");
+  EXPECT_THAT(error_of([&] { resolve(id, twins); }), HasSubstr("usb-0:1:1.0"));
+  EXPECT_THAT(error_of([&] { resolve(id, twins); }), HasSubstr("usb-0:2:1.0"));
+  EXPECT_EQ(resolve("pci-0-usb-0:2:1.0-video-index0", twins), "/dev/video2");
 }
 
 // ---- formats

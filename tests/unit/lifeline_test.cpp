@@ -167,6 +167,25 @@ TEST_F(LifelineTest, ADeviceMayComeBackWithAnotherFormat) {
   EXPECT_EQ(lifeline.format().height, 30);
 }
 
+TEST_F(LifelineTest, SequenceNumbersIncreaseOverAllOpenings) {
+  std::uint64_t openings = 0;
+  Lifeline lifeline = started(with_faults(
+      [&] {
+        replay_.position = std::make_shared<ReplayPosition>();  // counts from the beginning again
+        ++openings;
+        return open_replay(directory_ / "take", "observer", replay_, clock());
+      },
+      {{Kind::disconnect, 5, 1, milliseconds(0)}}, clock()));
+  std::vector<std::uint64_t> sequences;
+  while (sequences.size() < 12) {
+    const CameraEvent event = lifeline.next(milliseconds(100));
+    if (const auto* frame = std::get_if<FramePtr>(&event)) sequences.push_back((*frame)->sequence);
+  }
+  EXPECT_EQ(openings, 2u);
+  for (std::size_t i = 1; i < sequences.size(); ++i)
+    EXPECT_EQ(sequences[i], sequences[i - 1] + 1) << i;
+}
+
 TEST_F(LifelineTest, ADeviceThatIsPluggedInIsNotKeptWaiting) {
   std::vector<int> attempts_ms;
   std::uint64_t arrivals = 3;
