@@ -50,4 +50,7 @@ HdrPicture merge_exposures(std::span<const FramePtr> frames, const ResponseCurve
 // exposure that wanders does not pile up frames. `exposure` is above 0.
 long exposure_step(double exposure);
 
+// Of an automatic exposure that wanders, the newest of so many steps are kept.
+inline constexpr std::size_t most_exposures = 24;
+
 }  // namespace previz::lighting

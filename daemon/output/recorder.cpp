@@ -15,6 +15,8 @@ using Clock = std::chrono::steady_clock;
 // A stopped take waits so long for what tracking still has in hand of its last frame.
 constexpr std::chrono::milliseconds track_patience{500};
 constexpr std::chrono::seconds disk_interval{1};
+// A frame that was offered when the button was pressed may have been captured so much earlier.
+constexpr std::chrono::seconds late{1};
 
 std::string megabytes(std::uint64_t bytes) {
   return std::to_string(bytes / 1'000'000) + " MB";
@@ -42,7 +44,7 @@ std::uint64_t Recorder::bytes_of(const Entry& entry) {
 }
 
 void Recorder::offer(const FramePtr& frame) {
-  const Captured captured{frame, WallClock::now()};
+  const Captured captured{frame};
   {
     const std::lock_guard lock(mutex_);
     if (!status_.recording) {
@@ -61,7 +63,7 @@ void Recorder::offer(const FramePtr& frame) {
 }
 
 void Recorder::offer_shown(const FramePtr& frame) {
-  const Captured captured{frame, WallClock::now()};
+  const Captured captured{frame};
   {
     const std::lock_guard lock(mutex_);
     if (!status_.recording) return;
@@ -72,7 +74,19 @@ void Recorder::offer_shown(const FramePtr& frame) {
 }
 
 void Recorder::remember_light(const Captured& captured) {
+  forget_lights_unlike(*captured.frame);
   older_light_[lighting::exposure_step(captured.frame->exposure)] = captured;
+  if (older_light_.size() <= lighting::most_exposures) return;
+  older_light_.erase(std::ranges::min_element(
+      older_light_, {}, [](const auto& older) { return older.second.frame->timestamp_ns; }));
+}
+
+void Recorder::forget_lights_unlike(const Frame& frame) {
+  std::erase_if(older_light_, [&](const auto& older) {
+    const Frame& known = *older.second.frame;
+    return known.format != frame.format || known.bayer != frame.bayer ||
+           known.width != frame.width || known.height != frame.height;
+  });
 }
 
 void Recorder::offer(const session::TrackRecord& record) {
@@ -107,10 +121,25 @@ void Recorder::trim_ring() {
     const auto* captured = std::get_if<Captured>(&ring_.front());
     const bool old = !captured || newest - captured->frame->timestamp_ns > keep_ns;
     if (!old && ring_bytes_ <= options_.queue_bytes / 2) break;
-    ring_bytes_ -= bytes_of(ring_.front());
-    if (captured && captured->frame->source == "light") remember_light(*captured);
-    ring_.pop_front();
+    forget_first_of_ring();
   }
+}
+
+void Recorder::forget_first_of_ring() {
+  ring_bytes_ -= bytes_of(ring_.front());
+  const auto* captured = std::get_if<Captured>(&ring_.front());
+  if (captured && captured->frame->source == "light") remember_light(*captured);
+  ring_.pop_front();
+}
+
+// Nothing is offered in standby, or by a camera that is not there: the ring then ends long ago.
+void Recorder::forget_what_is_long_ago() {
+  const auto keep = std::chrono::duration<double>(options_.preroll_s) + late;
+  const auto is_long_ago = [&](const Entry& entry) {
+    const auto* captured = std::get_if<Captured>(&entry);
+    return !captured || Clock::now() - captured->offered > keep;
+  };
+  while (!ring_.empty() && is_long_ago(ring_.front())) forget_first_of_ring();
 }
 
 void Recorder::start() {
@@ -122,6 +151,11 @@ void Recorder::start() {
   status_.seconds = 0;
   status_.fault.clear();
   enqueue(Start{});
+  forget_what_is_long_ago();
+  for (const Entry& entry : ring_)
+    if (const auto* captured = std::get_if<Captured>(&entry);
+        captured && captured->frame->source == "light")
+      forget_lights_unlike(*captured->frame);
   std::vector<Captured> lights;
   for (const auto& [step, light] : older_light_) lights.push_back(light);
   std::ranges::sort(lights, {}, [](const Captured& c) { return c.frame->timestamp_ns; });

@@ -78,7 +78,8 @@ class Recorder {
   using WallClock = std::chrono::system_clock;
   struct Captured {
     FramePtr frame;
-    WallClock::time_point at;
+    WallClock::time_point at = WallClock::now();
+    std::chrono::steady_clock::time_point offered = std::chrono::steady_clock::now();
   };
   struct Event {
     std::int64_t timestamp_ns;
@@ -94,7 +95,10 @@ class Recorder {
   // With the lock held:
   void enqueue(Entry entry);
   void trim_ring();
+  void forget_first_of_ring();
+  void forget_what_is_long_ago();
   void remember_light(const Captured& captured);
+  void forget_lights_unlike(const Frame& frame);  // of another format: they fit no take with it
   // On the writer thread, without it:
   void run();
   void handle(Entry& entry);
@@ -114,8 +118,8 @@ class Recorder {
   std::uint64_t queued_bytes_ = 0;
   std::deque<Entry> ring_;  // while nothing is recorded
   std::uint64_t ring_bytes_ = 0;
-  // Light frames that are not in the ring, the newest of each exposure: a take begins with its
-  // light, however old.
+  // Light frames that are not in the ring, the newest of each exposure (lighting::most_exposures at
+  // the most, of one format): a take begins with its light, however old.
   std::map<long, Captured> older_light_;
   std::int64_t last_frame_ns_ = 0;  // of the observer, offered to the running take
   bool late_tracks_ = false;        // of the take that was stopped last are still welcome

@@ -89,9 +89,11 @@ TakeWriter::TakeWriter(const TakeTemplate& take)
 
 bool TakeWriter::fits(const Frame& frame) const {
   const auto found = formats_.find(frame.source);
-  if (found == formats_.end()) return true;
-  const Format& known = found->second;
-  return frame.format == known.format && frame.width == known.width && frame.height == known.height;
+  return found == formats_.end() || found->second == format_of(frame);
+}
+
+TakeWriter::Format TakeWriter::format_of(const Frame& frame) {
+  return {frame.format, frame.width, frame.height, frame.bayer};
 }
 
 void TakeWriter::write(const Frame& frame, std::chrono::system_clock::time_point captured) {
@@ -101,7 +103,7 @@ void TakeWriter::write(const Frame& frame, std::chrono::system_clock::time_point
     writer_.set_take(take_);
   }
   writer_.write(frame);
-  formats_.try_emplace(frame.source, Format{frame.format, frame.width, frame.height});
+  formats_.try_emplace(frame.source, format_of(frame));
   if (observer) frame_of_.emplace(frame.timestamp_ns, frame_of_.size());
 }
 

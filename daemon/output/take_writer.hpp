@@ -62,7 +62,10 @@ class TakeWriter {
   struct Format {
     PixelFormat format;
     int width, height;
+    BayerPattern bayer;
+    bool operator==(const Format&) const = default;
   };
+  static Format format_of(const Frame& frame);
 
   session::TakeInfo take_;
   const std::filesystem::path directory_;

@@ -26,7 +26,8 @@ LightStage::LightStage(const set::Set& set, std::optional<LightCameraCalibration
       observer_exposure_(set.observer.exposure),
       tracker_(set.lighting.smoothing_s) {
   if (given()) {
-    load_given();
+    if (settings_.environment) given_ = lighting::load_environment(settings_);
+    show_given();
     return;
   }
   if (calibration) {
@@ -50,10 +51,8 @@ bool LightStage::given() const {
   return settings_.environment || settings_.from == set::LightFrom::set;
 }
 
-void LightStage::load_given() {
-  lighting::Lighting lighting;
-  if (settings_.environment) lighting = lighting::load_environment(settings_);
-  light_ = finished(std::move(lighting), {}, 0);
+void LightStage::show_given() {
+  light_ = finished(given_, {}, 0);
 }
 
 bool LightStage::remembers() const {
@@ -69,7 +68,7 @@ void LightStage::use(set::LightMode mode) {
     return;
   }
   settings_.mode = mode;
-  if (given()) load_given();
+  if (given()) show_given();
   changed_ = !newest_.empty();
 }
 
@@ -92,7 +91,7 @@ void LightStage::drop_oldest() {
   const auto oldest = std::ranges::min_element(
       newest_, {}, [](const auto& entry) { return entry.second->timestamp_ns; });
   troubles_.push_back("light frame " + std::to_string(oldest->second->sequence) +
-                      " is left out: more than " + std::to_string(max_exposures) +
+                      " is left out: more than " + std::to_string(lighting::most_exposures) +
                       " different exposures were seen since");
   newest_.erase(oldest);
 }
@@ -141,7 +140,7 @@ void LightStage::see(FramePtr frame, std::uint64_t index) {
   }
   if (!usable(*frame)) return;
   newest_[lighting::exposure_step(frame->exposure)] = std::move(frame);
-  if (newest_.size() > max_exposures) drop_oldest();
+  if (newest_.size() > lighting::most_exposures) drop_oldest();
   changed_ = true;
 }
 

@@ -19,11 +19,10 @@ namespace previz::pipeline {
 
 // Keeps the newest light frame of every exposure seen so far; together they are the bracket that is
 // merged. (Two exposures within 1 % are the same one; of an auto-exposure that wanders, the newest
-// max_exposures stay.) A set whose light does not come from a camera needs no light frames.
+// lighting::most_exposures stay.) A set whose light does not come from a camera needs no light
+// frames.
 class LightStage {
  public:
-  static constexpr std::size_t max_exposures = 24;
-
   // Loads the environment if the set gives one, and the room if it has one. Throws previz::Error
   // if the light camera's calibration is needed and not known.
   LightStage(const set::Set& set, std::optional<LightCameraCalibration> calibration,
@@ -59,7 +58,7 @@ class LightStage {
 
  private:
   bool given() const;
-  void load_given();
+  void show_given();
   LightPtr finished(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
                     std::int64_t timestamp_ns);
   LightPtr placed(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
@@ -71,6 +70,7 @@ class LightStage {
   const std::optional<double> exposure_;           // overrides the frames' own
   const std::optional<double> observer_exposure_;  // likewise
   std::optional<lighting::Estimator> estimator_;   // where it needs frames
+  lighting::Lighting given_;                       // by the set file
   FisheyeIntrinsics intrinsics_;                   // of the light camera
   std::shared_ptr<const lighting::Room> room_;
   glm::dvec3 seen_from_{0};  // where the image is seen from; world, metres

@@ -10,6 +10,7 @@
 #include <csignal>
 #include <thread>
 
+#include "daemon/lighting/hdr.hpp"
 #include "drivers/error.hpp"
 #include "tests/unit/session_fixture.hpp"
 
@@ -129,6 +130,43 @@ TEST(Recorder, TheRingPutsWhatCameBeforeInFrontWithItsLight) {
   EXPECT_EQ(frames_of(take, "light"), count_from(0, 2));  // older than the ring, and still needed
 }
 
+// In standby nothing is offered: what is in the ring then is no pre-roll.
+TEST(Recorder, WhatTheRingHasFromLongAgoIsNotInFront) {
+  const TemporaryDirectory directory;
+  {
+    RecorderOptions options = options_in(directory.path());
+    options.preroll_s = 0.04;
+    Recorder recorder(std::move(options));
+    recorder.offer(picture(0, "light"));
+    recorder.offer(picture(1));
+    // Longer than the pre-roll and the second that a captured frame may be late.
+    std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+    recorder.start();
+    recorder.offer(picture(2));
+  }
+  EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(2, 2));
+  EXPECT_EQ(frames_of(directory / "12A_take001", "light"), count_from(0, 0));
+}
+
+// An automatic exposure that wanders, and a light camera that came back with another format.
+TEST(Recorder, OfLightFromBeforeTheTakeTheNewestExposuresOfOneFormatAreInIt) {
+  const TemporaryDirectory directory;
+  constexpr std::uint64_t last = 40;
+  {
+    RecorderOptions options = options_in(directory.path());
+    options.preroll_s = 1e-9;
+    Recorder recorder(std::move(options));
+    recorder.offer(picture(0, "light", 40));
+    for (std::uint64_t i = 1; i <= last; ++i) recorder.offer(picture(i, "light"));
+    recorder.start();
+    recorder.offer(picture(last + 1));
+  }
+  EXPECT_EQ(frames_of(directory / "12A_take001", "light"),
+            count_from(last - lighting::most_exposures, last));  // one of them is in the ring
+  EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(last + 1, last + 1));
+  EXPECT_FALSE(std::filesystem::exists(directory / "12A_take002"));
+}
+
 TEST(Recorder, TellsTheTimeOfATakeAndTheRoomThatIsLeft) {
   const TemporaryDirectory directory;
   std::atomic<std::uint64_t> free = 700;
@@ -218,6 +256,26 @@ TEST(Recorder, AnotherFormatBeginsTheNextTake) {
   }
   EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(0, 0));
   EXPECT_EQ(frames_of(directory / "12A_take002"), count_from(1, 2));
+}
+
+TEST(Recorder, AnotherBayerPatternBeginsTheNextTake) {
+  const TemporaryDirectory directory;
+  const auto mosaic = [](std::uint64_t index, BayerPattern bayer) {
+    auto frame =
+        std::make_shared<Frame>(noise_frame("observer", index, PixelFormat::gray8, 32, 24));
+    frame->bayer = bayer;
+    return frame;
+  };
+  {
+    Recorder recorder(options_in(directory.path()));
+    recorder.start();
+    recorder.offer(mosaic(0, BayerPattern::rggb));
+    recorder.offer(mosaic(1, BayerPattern::none));
+    wait_for([&] { return recorder.status().frames == 1 && recorder.status().number == 2; });
+    EXPECT_EQ(recorder.status().failures, 0u);
+  }
+  EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(0, 0));
+  EXPECT_EQ(frames_of(directory / "12A_take002"), count_from(1, 1));
 }
 
 // Room for three frames: what the disk cannot take in time is counted, and the rest is whole.
