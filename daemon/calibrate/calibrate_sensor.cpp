@@ -39,8 +39,7 @@ std::vector<std::string> missing_light(const VignettingFit& fit, double max_angl
 
 void calibrate_dark(const DarkOptions& options, std::ostream& out) {
   const auto source = open_source(options.footage, "light");
-  LightCameraCalibration camera;
-  camera.response = light_response(options.set_file, options.footage);
+  LightCameraCalibration camera = light_sensor(options.set_file, options.footage);
   const DarkFit fit = fit_dark(*source, camera.response);
   for (const std::string& note : source->notes()) out << note << '\n';
   fmt::print(out,

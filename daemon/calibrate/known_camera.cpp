@@ -14,12 +14,14 @@ ResponseCurve response_of(const std::filesystem::path& footage, const std::strin
   return info.light ? info.light->response : ResponseCurve{};
 }
 
-ResponseCurve light_response(const std::optional<std::filesystem::path>& set_file,
-                             const std::filesystem::path& footage) {
+LightCameraCalibration light_sensor(const std::optional<std::filesystem::path>& set_file,
+                                    const std::filesystem::path& footage) {
   if (set_file)
     if (const auto calibration = set::load_set(*set_file).light_camera.calibration)
-      return calibration->response;
-  return response_of(footage, "light");
+      return *calibration;
+  if (is_session(footage))
+    if (const auto calibration = session::open_session(footage).info.light) return *calibration;
+  return {};
 }
 
 LightCameraCalibration known_light_camera(const set::Set& set,

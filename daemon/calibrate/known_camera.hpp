@@ -14,9 +14,10 @@ namespace previz::calibrate {
 // "observer" or "light".
 ResponseCurve response_of(const std::filesystem::path& footage, const std::string& stream);
 
-// The set's, where it gives a lens, otherwise response_of.
-ResponseCurve light_response(const std::optional<std::filesystem::path>& set_file,
-                             const std::filesystem::path& footage);
+// What is known of the light camera's sensor: the set's, where it gives a lens, otherwise the
+// session's; sRGB and no more where neither says anything.
+LightCameraCalibration light_sensor(const std::optional<std::filesystem::path>& set_file,
+                                    const std::filesystem::path& footage);
 
 // The set's own, otherwise the session's. Throws previz::Error where neither has a lens.
 LightCameraCalibration known_light_camera(const set::Set& set,

@@ -340,10 +340,19 @@ class Resolver {
   }
 
   void lights() {
+    std::map<std::string, Position> first;
     int number = 0;
     for (auto& draft : draft_.lights) {
       ++number;
       if (draft.light.name.empty()) draft.light.name = "light " + std::to_string(number);
+      const char* key = draft.given.has("name") ? "name" : "type";
+      if (draft.given.good(key)) {
+        const auto [other, fresh] = first.emplace(draft.light.name, draft.given.where(key));
+        if (!fresh)
+          problem(draft.given, key,
+                  codec::quote(draft.light.name) + " is already in line " +
+                      std::to_string(other->second.line) + "; allowed: each name once");
+      }
       if (draft.given.good("type")) light(draft.given, draft.light);
       carried(draft.given, draft.light.carrier);
       set_.lights.push_back(draft.light);

@@ -201,6 +201,9 @@ const Mistake contradictions[] = {
      "8:1: tag.carrier: another tag of \"a\" is its frame already", "position_m"},
     {"[[tag]]\nid=1\nsize_m=0.1\ncarrier='a'\n[[tag]]\nid=1\nsize_m=0.1\ncarrier='b'\n",
      "6:1: tag.id: tag 1 is already in line 2", "each id once"},
+    {"[[light]]\nname='key'\ntype='point'\nposition_m=[0,0,1]\nemission=[1,1,1]\n"
+     "[[light]]\nname='key'\ntype='point'\nposition_m=[0,0,1]\nemission=[1,1,1]\n",
+     "7:1: light.name: \"key\" is already in line 2", "each name once"},
     {VASE VASE, "6:1: object.name: \"v\" is already in line 2", "each name once"},
     {"[[tag]]\nid=1\nsize_m=0.1\nposition_m=[0,0,0]\nworld_from_tag=" IDENTITY,
      "4:1: tag.position_m: contradicts world_from_tag", "one of the two"},
