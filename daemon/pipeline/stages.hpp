@@ -13,17 +13,19 @@
 #include <vector>
 
 #include "daemon/pipeline/channel.hpp"
+#include "daemon/pipeline/drop_count.hpp"
 #include "daemon/pipeline/metrics.hpp"
 
 namespace previz::pipeline {
 
 // Every stage ends when its input ends (and then ends its output), so a stream's end runs through
 // the whole line in order, and what was begun is finished. A stop ends the sources. An exception in
-// any stage abandons every channel at once. Channels must outlive this object.
+// any stage abandons every channel at once, and calls `on_failure`, which is to end sources that
+// wait for something else than their channel. Channels must outlive this object.
 class StageThreads {
  public:
-  StageThreads(Metrics& metrics, std::stop_token stop)
-      : metrics_(metrics), stop_(std::move(stop)) {}
+  StageThreads(Metrics& metrics, std::stop_token stop, std::function<void()> on_failure = {})
+      : metrics_(metrics), stop_(std::move(stop)), on_failure_(std::move(on_failure)) {}
   ~StageThreads() {
     abandon();
     join();
@@ -52,13 +54,15 @@ class StageThreads {
     know(input);
     know(output);
     start([this, name = std::move(name), &input, &output, work = std::move(work)]() mutable {
+      DropCount drops(metrics_, name, input);
       while (std::optional<In> value = input.pop()) {
+        drops.tell();
         const auto begin = std::chrono::steady_clock::now();
         Out result = work(std::move(*value));
         metrics_.worked(name, seconds_since(begin));
         if (!output.push(std::move(result))) break;
       }
-      metrics_.dropped(name, "newer frame", input.dropped());
+      drops.tell();
       output.close();
     });
   }
@@ -68,12 +72,14 @@ class StageThreads {
   void sink(std::string name, Channel<In>& input, Consume consume) {
     know(input);
     start([this, name = std::move(name), &input, consume = std::move(consume)]() mutable {
+      DropCount drops(metrics_, name, input);
       while (std::optional<In> value = input.pop()) {
+        drops.tell();
         const auto begin = std::chrono::steady_clock::now();
         consume(std::move(*value));
         metrics_.worked(name, seconds_since(begin));
       }
-      metrics_.dropped(name, "newer frame", input.dropped());
+      drops.tell();
     });
   }
 
@@ -106,6 +112,7 @@ class StageThreads {
           if (!failure_) failure_ = std::current_exception();
         }
         abandon();
+        if (on_failure_) on_failure_();
       }
     });
   }
@@ -123,6 +130,7 @@ class StageThreads {
 
   Metrics& metrics_;
   const std::stop_token stop_;
+  const std::function<void()> on_failure_;
   std::mutex mutex_;
   std::vector<std::function<void()>> abandon_channel_;
   bool abandoned_ = false;

@@ -390,6 +390,9 @@ std::shared_ptr<Device> open_device(const DeviceOptions& options) {
 void reopen_device(Device& device) {
   device.reopen();
 }
+bool is_open(const Device& device) {
+  return device.is_open();
+}
 std::string device_name(const Device& device) {
   return device.name();
 }

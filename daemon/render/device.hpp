@@ -20,6 +20,7 @@ class Device {
   explicit Device(DeviceOptions options);
   // All of it anew; throws as the constructor does, and can be called again.
   void reopen();
+  bool is_open() const { return static_cast<bool>(*device_); }  // not after a reopen() that threw
 
   const vk::raii::Device& vk() const { return device_; }
   const std::string& name() const { return name_; }

@@ -38,6 +38,7 @@ std::shared_ptr<Device> open_device(const DeviceOptions& options = {});
 // Opens it anew, by the same options, after it was lost. Nothing that was made on it may be left.
 // Throws previz::Error while there is none; it can be tried again.
 void reopen_device(Device& device);
+bool is_open(const Device& device);  // not after a reopen_device() that threw
 std::string device_name(const Device& device);
 std::uint64_t validation_messages(const Device& device);
 

@@ -1,6 +1,7 @@
 #include "daemon/rig/live.hpp"
 
 #include <array>
+#include <chrono>
 #include <csignal>
 #include <ostream>
 #include <utility>
@@ -102,26 +103,33 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out
   pthread_sigmask(SIG_BLOCK, &hangup, nullptr);
   Notes note(out);
   pipeline::Metrics metrics;
+  const auto start = std::chrono::steady_clock::now();
+  const auto snapshot = [&] {
+    const std::chrono::duration<double> since = std::chrono::steady_clock::now() - start;
+    return metrics.snapshot(since.count());
+  };
   LoadedSet loaded = overridden(load_whole_set(options.set_file), options);
   std::optional<LoadedSet> before;  // what ran until now, should this one not start
   const std::shared_ptr<render::Device> device = render::open_device(options.device);
   CrewScreen screen(note, metrics, options.on_screen);
   for (;;) {
     EventLoop loop;
-    LiveFiles files(loaded.set.output.directory, metrics);
+    std::optional<LiveFiles> files;
     const auto show = [&](pipeline::Shot shot, const Look& look) {
       if (options.on_shown) options.on_shown(shot, look);
       const auto picture = std::make_shared<const Plate>(std::move(shot.picture));
       screen->show(shot, picture);
-      files.take(picture);
+      files->take(picture);
     };
     const auto tell = [&](RigFacts facts) { screen->tell(std::move(facts)); };
     std::unique_ptr<Rig> rig;
     try {
+      files.emplace(
+          loaded.set.output.directory, [&] { return to_json(snapshot()); }, note);
       screen.use(loaded.set);
       rig = std::make_unique<Rig>(loaded, Rig::Parts{loop, note, metrics, device, show, tell,
                                                      options.buttons, options.loop, options.stop});
-    } catch (const Error& error) {
+    } catch (const std::exception& error) {
       if (!before) throw;
       note.again(std::string(error.what()) + "\nback to " + before->set.file.string());
       loaded = *std::exchange(before, std::nullopt);
@@ -131,7 +139,7 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out
                std::to_string(loaded.set.quality.samples) + " samples a frame");
     std::optional<control::Bus> bus;
     if (options.bus) {
-      bus.emplace(loop.handle(), verbs_of(*rig, [&] { return to_json(files.metrics()); }));
+      bus.emplace(loop.handle(), verbs_of(*rig, [&] { return to_json(snapshot()); }));
       rig->on_change([&] { bus->changed(); });
     }
     const auto reload =
@@ -143,7 +151,7 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out
     rig.reset();
     if (!next) {
       screen.close();
-      return files.write();
+      return snapshot();
     }
     before = std::exchange(loaded, overridden(std::move(*next), options));
   }

@@ -1,6 +1,6 @@
 #include "daemon/rig/live_files.hpp"
 
-#include <utility>
+#include <chrono>
 
 #include "daemon/output/png.hpp"
 #include "drivers/error.hpp"
@@ -8,30 +8,40 @@
 
 namespace previz::rig {
 
-LiveFiles::LiveFiles(std::filesystem::path directory, const pipeline::Metrics& metrics)
-    : directory_(std::move(directory)), metrics_(metrics) {
+LiveFiles::LiveFiles(std::filesystem::path directory, std::function<std::string()> metrics,
+                     Notes& note)
+    : directory_(std::move(directory)), metrics_(std::move(metrics)), note_(note) {
   std::error_code code;
   std::filesystem::create_directories(directory_, code);
   if (!std::filesystem::is_directory(directory_))
     throw Error(directory_.string() + ": cannot be made: " + code.message());
+  thread_ = std::jthread([this] { run(); });
 }
 
-void LiveFiles::take(std::shared_ptr<const Plate> picture) {
-  picture_ = std::move(picture);
-  if (Clock::now() - written_ < std::chrono::seconds(1)) return;
-  write();
-  written_ = Clock::now();
+LiveFiles::~LiveFiles() {
+  pictures_.close();
 }
 
-pipeline::MetricsSnapshot LiveFiles::metrics() const {
-  return metrics_.snapshot(std::chrono::duration<double>(Clock::now() - start_).count());
+void LiveFiles::run() {
+  using Clock = std::chrono::steady_clock;
+  std::shared_ptr<const Plate> newest;
+  Clock::time_point written = Clock::now();
+  while (std::optional<std::shared_ptr<const Plate>> picture = pictures_.pop()) {
+    newest = *std::move(picture);
+    if (Clock::now() - written < std::chrono::seconds(1)) continue;
+    write(newest.get());
+    written = Clock::now();
+  }
+  write(newest.get());
 }
 
-pipeline::MetricsSnapshot LiveFiles::write() {
-  if (picture_) output::write_png(directory_ / "picture.png", *picture_);
-  pipeline::MetricsSnapshot snapshot = metrics();
-  session::replace_file(directory_ / "metrics.json", to_json(snapshot));
-  return snapshot;
+void LiveFiles::write(const Plate* picture) const {
+  try {
+    if (picture) output::write_png(directory_ / "picture.png", *picture);
+    session::replace_file(directory_ / "metrics.json", metrics_());
+  } catch (const Error& error) {
+    note_(error.what());
+  }
 }
 
 }  // namespace previz::rig

@@ -1,35 +1,40 @@
 // What the rig does, as files: the newest picture and the metrics.
 #pragma once
 
-#include <chrono>
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <string>
+#include <thread>
+#include <utility>
 
-#include "daemon/pipeline/metrics.hpp"
+#include "daemon/pipeline/channel.hpp"
+#include "daemon/rig/notes.hpp"
 #include "drivers/frame.hpp"
 
 namespace previz::rig {
 
+// For whoever looks on; a disk that does not take them is told, and no reason to stop.
 class LiveFiles {
  public:
-  // Makes the directory; throws previz::Error if it cannot.
-  LiveFiles(std::filesystem::path directory, const pipeline::Metrics& metrics);
+  // Makes the directory; throws previz::Error if it cannot. `metrics` gives metrics.json.
+  LiveFiles(std::filesystem::path directory, std::function<std::string()> metrics, Notes& note);
+  ~LiveFiles();  // writes the last ones
+  LiveFiles(const LiveFiles&) = delete;
+  LiveFiles& operator=(const LiveFiles&) = delete;
 
-  // Writes about once a second; from one thread.
-  void take(std::shared_ptr<const Plate> picture);
-  // What the pipeline did so far; from any thread.
-  pipeline::MetricsSnapshot metrics() const;
-  // Writes picture.png (if there was any) and metrics.json.
-  pipeline::MetricsSnapshot write();
+  // Written about once a second, on a thread that waits for the disk. Never waits.
+  void take(std::shared_ptr<const Plate> picture) { pictures_.push(std::move(picture)); }
 
  private:
-  using Clock = std::chrono::steady_clock;
+  void run();
+  void write(const Plate* picture) const;
 
   const std::filesystem::path directory_;
-  const pipeline::Metrics& metrics_;
-  const Clock::time_point start_ = Clock::now();
-  Clock::time_point written_ = start_;
-  std::shared_ptr<const Plate> picture_;
+  const std::function<std::string()> metrics_;
+  Notes& note_;
+  pipeline::Mailbox<std::shared_ptr<const Plate>> pictures_;
+  std::jthread thread_;
 };
 
 }  // namespace previz::rig

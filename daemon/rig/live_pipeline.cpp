@@ -60,6 +60,7 @@ struct LivePipeline::Impl {
   void observer_stages();
   void output_stages();
   void make_render_stage();
+  void make_render_stage_anyhow();
   bool renew_device(const render::DeviceLost& lost);
   LightPtr estimate(std::vector<pipeline::LightFrame> frames,
                     const std::optional<pipeline::ObserverView>& view);
@@ -69,12 +70,15 @@ struct LivePipeline::Impl {
   void tell_of_carriers(const Shot& shot);
   void show(Shot shot);
   void record_shown(const Shot& shot);
-  CameraSource source(Camera& camera, const set::CameraWish& wish, const char* stage,
-                      const char* crews_name, std::function<void(bool)> presence);
+  CameraSource source(std::stop_token stop, Camera& camera, const set::CameraWish& wish,
+                      const char* stage, const char* crews_name,
+                      std::function<void(bool)> presence);
 
   Parts parts;
-  std::stop_source stop_source;
+  std::stop_source stop_source, light_stop;
   std::stop_callback<std::function<void()>> stop_from_outside;
+  std::stop_callback<std::function<void()>> stop_light{stop_source.get_token(),
+                                                       [this] { light_stop.request_stop(); }};
   const ObserverCalibration calibration;
   pipeline::TrackStage track_stage;
   pipeline::AnimationClock animation_clock;
@@ -109,8 +113,8 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
   if (lighting.needs_frames() && !parts.cameras.light)
     throw Error(parts.set.file.string() +
                 ": lighting: the set has neither a light camera nor lighting.environment");
-  make_render_stage();
-  stages.emplace(parts.metrics, stop_source.get_token());
+  make_render_stage_anyhow();
+  stages.emplace(parts.metrics, stop_source.get_token(), [this] { stop_source.request_stop(); });
   if (parts.cameras.light) light_stages();
   observer_stages();
   output_stages();
@@ -120,7 +124,7 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
     } catch (...) {
       failure = std::current_exception();
     }
-    parts.metrics.dropped("render", "newer frame", tracked.dropped());
+    live_render.tell_dropped();
     if (tracked.try_pop()) parts.metrics.dropped("render", "stopped");
     parts.inbox.finish();
   });
@@ -134,6 +138,16 @@ void LivePipeline::Impl::make_render_stage() {
                                    .progress = {},
                                    .note = [this](const std::string& what) { parts.note(what); }});
   live_render.use(*render_stage);
+}
+
+// A set may be read again while the device is lost.
+void LivePipeline::Impl::make_render_stage_anyhow() {
+  try {
+    if (!render::is_open(*parts.device)) render::reopen_device(*parts.device);
+    make_render_stage();
+  } catch (const render::DeviceLost& lost) {
+    if (!renew_device(lost)) throw;
+  }
 }
 
 // On the render thread: nobody else waits for it, and frames go on into the recorder.
@@ -159,13 +173,14 @@ bool LivePipeline::Impl::renew_device(const render::DeviceLost& lost) {
   return false;
 }
 
-CameraSource LivePipeline::Impl::source(Camera& camera, const set::CameraWish& wish,
-                                        const char* stage, const char* crews_name,
+CameraSource LivePipeline::Impl::source(std::stop_token stop, Camera& camera,
+                                        const set::CameraWish& wish, const char* stage,
+                                        const char* crews_name,
                                         std::function<void(bool)> presence) {
   return {camera,
           stage,
           crews_name,
-          {stop_source.get_token(), parts.note, parts.metrics, parts.faults, wish.stall_timeout_s,
+          {std::move(stop), parts.note, parts.metrics, parts.faults, wish.stall_timeout_s,
            std::move(presence)}};
 }
 
@@ -173,8 +188,8 @@ void LivePipeline::Impl::light_stages() {
   light_feed.start(
       *stages,
       [this,
-       camera = source(*parts.cameras.light, parts.set.light_camera.camera, "light camera",
-                       "light camera", {}),
+       camera = source(light_stop.get_token(), *parts.cameras.light, parts.set.light_camera.camera,
+                       "light camera", "light camera", {}),
        index = std::uint64_t{0}]() mutable -> std::optional<pipeline::LightFrame> {
         FramePtr frame = camera.next();
         if (!frame) return std::nullopt;
@@ -208,9 +223,10 @@ LightPtr LivePipeline::Impl::estimate(std::vector<pipeline::LightFrame> frames,
 }
 
 void LivePipeline::Impl::observer_stages() {
-  observer.emplace(source(
-      *parts.cameras.observer, parts.set.observer.camera, "observer", "film camera",
-      [this](bool lost) { parts.inbox.post(lost ? Event::camera_lost : Event::camera_back); }));
+  observer.emplace(source(stop_source.get_token(), *parts.cameras.observer,
+                          parts.set.observer.camera, "observer", "film camera", [this](bool lost) {
+                            parts.inbox.post(lost ? Event::camera_lost : Event::camera_back);
+                          }));
   stages->source("observer", seen, [this] { return capture(); });
   stages->stage("tracking", seen, tracked, [this](Shot shot) { return track(std::move(shot)); });
   stages->source("picture", rendered, [this] {
@@ -229,7 +245,10 @@ std::optional<Shot> LivePipeline::Impl::capture() {
 
   Shot shot;
   shot.frame = observer->next();
-  if (!shot.frame) return std::nullopt;
+  if (!shot.frame) {
+    light_stop.request_stop();  // a light camera alone has nothing to light
+    return std::nullopt;
+  }
   shot.index = next_index++;
   shot.arrived = std::chrono::steady_clock::now();
   if (parts.look.get()->state.mode != Mode::standby) parts.recorder.offer(shot.frame);

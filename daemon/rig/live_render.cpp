@@ -16,6 +16,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds patience{100};  // how late a change of mode may be noticed
 constexpr int most_round = 64;
+constexpr double round_s = 1;
 constexpr int most_samples = 1 << 24;  // up to where the sums are exact enough (P4)
 
 double seconds_since(Clock::time_point begin) {
@@ -31,7 +32,8 @@ LiveRender::LiveRender(const set::Set& set, const pipeline::Newest<Look>& look, 
       inbox_(inbox),
       metrics_(metrics),
       channels_(channels),
-      stop_(std::move(stop)) {
+      stop_(std::move(stop)),
+      drops_(metrics, "render", channels.tracked) {
   if (set.quality.fps > 0) governor_.emplace(set.quality.fps, set.quality.scale);
 }
 
@@ -53,6 +55,7 @@ std::optional<Shot> LiveRender::next(const std::function<bool(const render::Devi
 
 std::optional<Shot> LiveRender::next_picture() {
   for (;;) {
+    tell_dropped();
     const std::shared_ptr<const Look> look = look_.get();
     // What a button was pressed at is what is saved, also where the press ended the refinement.
     if (wants_snapshot(*look) && refined_) save(*look, *refined_);
@@ -72,17 +75,18 @@ std::optional<Shot> LiveRender::refine(const Look& look) {
   }
   if (!refining_ && !begin_refinement(look)) return std::nullopt;
   Shot& shot = *good_;
-  if (shot.samples >= most_samples) {
+  if (shot.samples >= most_samples) {  // the picture stays, and is shown to be there
     std::this_thread::sleep_for(patience);
-    return std::nullopt;
+    return refined_;
   }
   const auto begin = Clock::now();
-  const int round = shot.samples == 0 ? look.samples : std::min(shot.samples, most_round);
+  const int round = next_round(look);
   if (!stage_->add_samples(round)) {
     refining_ = false;
     return std::nullopt;
   }
   shot.samples += round;
+  sample_s_ = seconds_since(begin) / round;
   Shot shown = shot;
   stage_->show(look.view);
   stage_->finish(shown);
@@ -93,11 +97,20 @@ std::optional<Shot> LiveRender::refine(const Look& look) {
   return shown;
 }
 
+// The crew sees it grow: as many again as there are, but about a second's worth at the most.
+int LiveRender::next_round(const Look& look) const {
+  const int wanted = good_->samples == 0 ? look.samples : std::min(good_->samples, most_round);
+  if (!(sample_s_ > 0)) return 1;  // to learn the pace
+  return std::clamp(static_cast<int>(round_s / sample_s_), 1, wanted);
+}
+
 // Full size, whatever the preview's: what is refined is what `previzd render` makes.
 bool LiveRender::begin_refinement(const Look& look) {
   if (!good_) return false;
   Shot& shot = *good_;
   shot.samples = 0;
+  // Moved since it was captured: in standby, or without a camera or tags.
+  if (!good_is_reviewed_) shot.scene = pipeline::scene_state(set_, look.edits, shot.motion);
   stage_->fill_layers(true);
   stage_->use(look.estimator);
   stage_->resize(1);
@@ -154,7 +167,7 @@ Shot LiveRender::render(const Look& look, Shot shot) {
     metrics_.count("pictures reviewed");
   if (!shot.whole) return shot;
   if (shot.untouched.empty()) {
-    keep_as_good(shot);
+    keep_as_good(shot, !captured);
     if (governed) governor_->took(took);
   }
   if (snapshot) save(look, shot);
@@ -162,7 +175,7 @@ Shot LiveRender::render(const Look& look, Shot shot) {
 }
 
 // The frame and what belongs to it, without what was made of it.
-void LiveRender::keep_as_good(const Shot& shot) {
+void LiveRender::keep_as_good(const Shot& shot, bool reviewed) {
   if (!good_) inbox_.post(Event::good_frame);
   Shot good;
   good.index = shot.index;
@@ -175,6 +188,7 @@ void LiveRender::keep_as_good(const Shot& shot) {
   good.tracking_done = true;
   good.frozen = true;
   good_ = std::move(good);
+  good_is_reviewed_ = reviewed;
 }
 
 void LiveRender::save(const Look& look, const Shot& shot) {

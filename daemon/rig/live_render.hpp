@@ -9,6 +9,7 @@
 #include <stop_token>
 
 #include "daemon/pipeline/channel.hpp"
+#include "daemon/pipeline/drop_count.hpp"
 #include "daemon/pipeline/governor.hpp"
 #include "daemon/pipeline/metrics.hpp"
 #include "daemon/pipeline/newest.hpp"
@@ -36,8 +37,12 @@ class LiveRender {
   // The next picture to show; nothing once the camera's frames have ended. Where the device is lost
   // while it is made, `renew` is called until there is another stage to use(); false: there will be
   // none, because of a stop. A refinement's rounds grow: first the preview's samples, then as many
-  // again as there are, at most 64.
+  // again as there are, at most 64 and what takes about a second.
   std::optional<pipeline::Shot> next(const std::function<bool(const render::DeviceLost&)>& renew);
+
+  // Frames that a newer one took the place of, to the metrics: those since the last call. next()
+  // does it too.
+  void tell_dropped() { drops_.tell(); }
 
   // Whether what is being rendered is no longer wanted; from the render thread.
   bool interrupted() const;
@@ -47,10 +52,11 @@ class LiveRender {
   bool wants_snapshot(const Look& look) const { return look.snapshots > snapshots_; }
   void save(const Look& look, const pipeline::Shot& shot);
   std::optional<pipeline::Shot> refine(const Look& look);
+  int next_round(const Look& look) const;
   bool begin_refinement(const Look& look);
   std::optional<pipeline::Shot> wait_for_frame(const Look& look);
   pipeline::Shot render(const Look& look, pipeline::Shot shot);
-  void keep_as_good(const pipeline::Shot& shot);
+  void keep_as_good(const pipeline::Shot& shot, bool reviewed);
 
   const set::Set& set_;
   const pipeline::Newest<Look>& look_;
@@ -61,9 +67,12 @@ class LiveRender {
   pipeline::RenderStage* stage_ = nullptr;
   std::optional<pipeline::Governor> governor_;
   std::optional<pipeline::Shot> good_;     // the last one with pose and light: its frame only
+  bool good_is_reviewed_ = false;          // and so its scene is the take's, not the rig's
   std::optional<pipeline::Shot> refined_;  // the last round's, with layers, while it is shown
   bool refining_ = false;
   pipeline::Edits refined_edits_;
+  double sample_s_ = 0;  // that a sample of a refinement took last; 0: not known
+  pipeline::DropCount<pipeline::Shot> drops_;
   std::uint64_t snapshots_ = 0;  // of look.snapshots, done
 };
 

@@ -9,6 +9,8 @@ namespace previz::rig {
 
 LoadedSet load_whole_set(const std::filesystem::path& file) {
   LoadedSet loaded;
+  std::error_code missing;  // which reading it tells in better words
+  loaded.changed = std::filesystem::last_write_time(file, missing);
   loaded.text = session::read_file(file);
   loaded.set = set::parse_set(loaded.text, file);
   loaded.scene = scene::load_scene(loaded.set);

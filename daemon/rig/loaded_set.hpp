@@ -11,7 +11,8 @@ namespace previz::rig {
 
 struct LoadedSet {
   set::Set set;
-  std::string text;  // of the file, as it goes into takes
+  std::string text;                         // of the file, as it goes into takes
+  std::filesystem::file_time_type changed;  // the file, before it was read
   scene::Scene scene;
 };
 

@@ -70,7 +70,7 @@ Rig::Rig(const LoadedSet& loaded, Parts parts)
       look_(controls_.look()),
       recorder_(recorder_options(loaded, cameras_, parts_.note)),
       presses_(loaded.set.buttons),
-      set_time_(std::filesystem::last_write_time(loaded.set.file)),
+      set_time_(loaded.changed),
       pipeline_(
           {.set = loaded.set,
            .cameras = cameras_,
@@ -90,7 +90,11 @@ Rig::Rig(const LoadedSet& loaded, Parts parts)
   tell_screen();
 }
 
-Rig::~Rig() = default;
+// Reviews hand what they play to the pipeline.
+Rig::~Rig() {
+  review_.reset();
+  ended_reviews_.clear();
+}
 
 void Rig::open_buttons() {
   const auto add = [this](std::vector<std::unique_ptr<Buttons>> opened, std::int64_t offset_ns) {
@@ -120,6 +124,7 @@ std::optional<LoadedSet> Rig::run() {
   if (const auto interval = service::watchdog_interval())
     watchdog = parts_.loop.every(*interval, [this] { feed_watchdog(); });
   service::ready("set \"" + loaded_.set.name + "\"");
+  service::feed_watchdog();  // a set that was read again took its time
   parts_.loop.run();
   if (next_) return std::move(next_);
   pipeline_.wait();
@@ -167,22 +172,21 @@ void Rig::act(const Press& press) {
 }
 
 Outcome Rig::perform(const set::Action& action, const std::string& by) {
-  Outcome outcome = controls_.perform(action);
-  tell(outcome, by);
-  return outcome;
+  return tell(controls_.perform(action), by);
 }
 
 Outcome Rig::wish(Event event, const std::string& by) {
-  Outcome outcome = controls_.happened(event);
-  tell(outcome, by);
-  return outcome;
+  return tell(controls_.happened(event), by);
 }
 
-void Rig::tell(const Outcome& outcome, const std::string& by) {
+Outcome Rig::tell(Outcome outcome, const std::string& by) {
+  publish();
+  if (outcome.request) {
+    if (std::optional<std::string> why_not = carry_out(*outcome.request))
+      outcome = {*std::move(why_not), true, {}};
+  }
   const std::string line = by + ": " + outcome.said + (outcome.refused ? " (refused)" : "");
   parts_.note.again(line);
-  publish();
-  if (outcome.request) carry_out(*outcome.request);
   recorder_.offer_event(now_ns(), line);
   service::status(line);
   last_said_ = line;
@@ -191,6 +195,7 @@ void Rig::tell(const Outcome& outcome, const std::string& by) {
     news_.tell({outcome.said, outcome.refused});
   tell_screen();
   if (changed_) changed_();
+  return outcome;
 }
 
 void Rig::publish() {
@@ -206,32 +211,41 @@ void Rig::publish() {
   }
 }
 
-void Rig::carry_out(Request request) {
+std::optional<std::string> Rig::carry_out(Request request) {
   switch (request) {
     case Request::start_take:
-      return recorder_.start();
+      recorder_.start();
+      break;
     case Request::stop_take:
-      return recorder_.stop();
+      recorder_.stop();
+      break;
     case Request::mark_good:
-      return recorder_.mark_good();
+      recorder_.mark_good();
+      break;
     case Request::reload_set:
-      return change_set(loaded_.set.file);
+      return change_set(0);
     case Request::next_set:
-      return change_set(neighbour(loaded_.set.file, 1));
+      return change_set(1);
     case Request::previous_set:
-      return change_set(neighbour(loaded_.set.file, -1));
+      return change_set(-1);
   }
+  return std::nullopt;
 }
 
 // All or nothing: a set with a fault leaves this one running.
-void Rig::change_set(const std::filesystem::path& file) {
+std::optional<std::string> Rig::change_set(int next) {
+  service::feed_watchdog();
   try {
-    next_ = load_whole_set(file);
+    const std::filesystem::path& file = loaded_.set.file;
+    next_ = load_whole_set(next == 0 ? file : neighbour(file, next));
     parts_.loop.exit();
+    return std::nullopt;
   } catch (const std::exception& error) {
     parts_.note.again(std::string(error.what()) + "\nthe set stays as it was");
     const std::string what = error.what();
-    faults_.pass("the set stays as it was", what.substr(0, what.find('\n')));
+    const std::string first = what.substr(0, what.find('\n'));
+    faults_.pass("the set stays as it was", first);
+    return "the set stays as it was: " + first;
   }
 }
 
@@ -298,7 +312,7 @@ void Rig::look_at_set_file() {
   if (gone || time == set_time_ || controls_.look().state.recording) return;
   set_time_ = time;
   parts_.note.again(loaded_.set.file.string() + ": the file has changed");
-  change_set(loaded_.set.file);
+  change_set(0);
 }
 
 void Rig::feed_watchdog() {

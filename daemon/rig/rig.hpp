@@ -85,9 +85,11 @@ class Rig {
   void look_at_set_file();
   void feed_watchdog();
   void tell_screen();
-  void tell(const Outcome& outcome, const std::string& by);
-  void carry_out(Request request);
-  void change_set(const std::filesystem::path& file);
+  // Does what the outcome asks for, and tells everybody; returns what then became of it.
+  Outcome tell(Outcome outcome, const std::string& by);
+  // Why it was not done, where it was not.
+  std::optional<std::string> carry_out(Request request);
+  std::optional<std::string> change_set(int next);  // to that file of the folder; 0: this one again
   void publish();
   std::int64_t now_ns() const;  // the cameras' clock
 

@@ -11,6 +11,7 @@
 #include "daemon/output/osd_painter.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/pipeline/channel.hpp"
+#include "daemon/pipeline/drop_count.hpp"
 #include "daemon/pipeline/newest.hpp"
 #include "daemon/set/names.hpp"
 #include "drivers/display_drivers.hpp"
@@ -125,8 +126,12 @@ Screen::Impl::Impl(const set::Set& set, Parts the_parts)
 }
 
 void Screen::Impl::run() {
-  while (!pictures.finished()) look_after(pictures.pop_for(words_interval));
-  parts.metrics.dropped("screen", "newer frame", pictures.dropped());
+  pipeline::DropCount drops(parts.metrics, "screen", pictures);
+  while (!pictures.finished()) {
+    look_after(pictures.pop_for(words_interval));
+    drops.tell();
+  }
+  life.close();
 }
 
 void Screen::Impl::look_after(std::optional<Picture> newest) {

@@ -61,7 +61,7 @@ void feed_watchdog() {
 std::optional<std::chrono::milliseconds> watchdog_interval() {
   std::uint64_t microseconds = 0;
   if (sd_watchdog_enabled(0, &microseconds) <= 0) return std::nullopt;
-  return std::chrono::milliseconds(std::max<std::uint64_t>(microseconds / 2000, 1));
+  return std::chrono::milliseconds(std::max<std::uint64_t>(microseconds / 4000, 1));
 }
 
 }  // namespace service

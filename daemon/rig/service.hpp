@@ -34,7 +34,8 @@ void ready(const std::string& status);
 void status(const std::string& status);
 void stopping();
 void feed_watchdog();
-// Half of WatchdogSec=, as sd_watchdog_enabled recommends; none: no watchdog waits for food.
+// A quarter of WatchdogSec=: sd_watchdog_enabled recommends a half, and frames that are late by one
+// interval are not yet a reason to be ended. None: no watchdog waits for food.
 std::optional<std::chrono::milliseconds> watchdog_interval();
 }  // namespace service
 

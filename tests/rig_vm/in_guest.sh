@@ -51,7 +51,7 @@ printf '[Service]\nWatchdogSec=600\nTimeoutStartSec=600\nEnvironment=LP_NATIVE_V
 dpkg --force-confold --install previzd.deb || fail "the package does not install"
 systemctl is-active --quiet previzd || fail "the service does not run"
 within 60 "the bus answers" status_is Set rig
-status_is CameraLost yes || fail "a camera that is not there is not told"
+within 60 "a camera that is not there is told" status_is CameraLost yes
 
 step "the film camera is plugged in"
 camera
@@ -128,6 +128,14 @@ echo "   $frames frames: $lines of the film camera, $lights of the light camera"
 [[ $lines -ge 5 && $lights -ge 1 ]] || fail "the take is not complete"
 grep -q '"record"\|button1' "$take/events.jsonl" || fail "the take does not tell the button"
 previzctl metrics >metrics.json
+
+step "a stop and a start: in order, and as soon as the shaders are known"
+systemctl stop previzd
+[[ $(systemctl show --property=Result --value previzd) == success ]] || fail "it did not end in order"
+sed -i 's/WatchdogSec=.*/WatchdogSec=100/' /etc/systemd/system/previzd.service.d/slow.conf
+systemctl daemon-reload
+systemctl start previzd
+within 300 "it shows frames again" above '.stages.display.frames' 0
 
 step "a daemon that stands still is started anew"
 kill -STOP "$(systemctl show --property=MainPID --value previzd)"

@@ -35,7 +35,7 @@ cat "$run/monitor.out" >/dev/null &
 ) &
 helpers=$(jobs -p | tail -n +2)
 # shellcheck disable=SC2064,SC2086
-trap "kill $qemu $helpers 2>/dev/null || true" EXIT
+trap "kill $qemu $helpers >/dev/null 2>&1 || true" EXIT
 tail -q -f -s 0.2 -n +1 --retry --pid=$qemu "$run/output" 2>/dev/null || true
 status=0
 wait $qemu || status=$?

@@ -91,6 +91,36 @@ TEST(StageThreads, AnErrorEndsEveryStageAndIsThrown) {
   }
 }
 
+// A camera that is silent waits for its device, and never pushes.
+TEST(StageThreads, AnErrorEndsSourcesThatWaitForSomethingElse) {
+  Metrics metrics;
+  Mailbox<int> silent, running;
+  std::stop_source stop;
+  StageThreads stages(metrics, stop.get_token(), [&] { stop.request_stop(); });
+  stages.source("silent camera", silent, [&]() -> std::optional<int> {
+    while (!stop.stop_requested()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return std::nullopt;
+  });
+  stages.source("camera", running, []() -> std::optional<int> { return 1; });
+  stages.sink("faulty", running, [](int) { throw std::runtime_error("lamp fell down"); });
+  EXPECT_THROW(stages.wait(), std::runtime_error);
+}
+
+TEST(StageThreads, DropsAreToldAsTheyHappen) {
+  Metrics metrics;
+  Mailbox<int> mailbox;
+  std::atomic<bool> looked = false;
+  StageThreads stages(metrics, {});
+  for (int i = 0; i < 3; ++i) mailbox.push(i);
+  stages.sink("display", mailbox, [&](int) {
+    EXPECT_EQ(metrics.snapshot(1).stages.at("display").dropped.at("newer frame"), 2u);
+    looked = true;
+    mailbox.close();
+  });
+  stages.wait();
+  EXPECT_TRUE(looked);
+}
+
 TEST(StageThreads, LeavingTheScopeEndsThem) {
   Metrics metrics;
   Mailbox<std::unique_ptr<int>> mailbox;

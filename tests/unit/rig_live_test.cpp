@@ -293,6 +293,59 @@ TEST_F(RigLive, EveryCapturedFrameIsRenderedOrCounted) {
   EXPECT_EQ(test::accounted_for(metrics_), metrics_.stages.at("observer").frames);
 }
 
+// A review's own thread plays until it is told to end.
+TEST_F(RigLive, MayEndOrChangeItsSetInAReview) {
+  write_set("preroll_s = 0\n");
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    press("record");
+    until([](const Shown& s) { return s.look.state.recording; });
+    press("record");
+    until_said("12A_take001 is finished");
+    const auto review = [&] {
+      press("review");
+      until([](const Shown& s) { return s.look.state.mode == Mode::review; });
+    };
+    review();
+    press("reload_set");
+    until_said("reading the set again");
+    until_mode(Mode::live);
+    press("record");
+    until([](const Shown& s) { return s.look.state.recording; });
+    press("record");
+    until_said("12A_take002 is finished");
+    review();
+  });
+}
+
+// What is moved while no picture is made is where it was put when the frozen one is refined.
+TEST_F(RigLive, ARefinementShowsWhatWasMovedInStandby) {
+  write_set();
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    press("standby");
+    until_said("button standby: standby");
+    press("move_right");
+    until_said("card moved to +0.010");
+    press("refine");
+    const Shown refined = until([](const Shown& s) { return s.shot.frozen; });
+    EXPECT_TRUE(refined.shot.scene.objects.contains("card"));
+  });
+}
+
+// A disk that does not take picture.png is told of, and no reason to stop.
+TEST_F(RigLive, GoesOnWhereItsFilesCannotBeWritten) {
+  write_set();
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    std::filesystem::remove_all(directory_ / "live");
+    std::ofstream(directory_ / "live") << "a file where the directory was";
+    until_said((directory_ / "live").string());
+    const int before = until([](const Shown&) { return true; }).count;
+    until([&](const Shown& s) { return s.count > before + 2; });
+  });
+}
+
 TEST_F(RigLive, ABadSetLeavesTheOldOneRunningAndAGoodOneTakesOver) {
   write_set();
   const std::string good = session::read_file(directory_ / "set.toml");
@@ -301,6 +354,7 @@ TEST_F(RigLive, ABadSetLeavesTheOldOneRunningAndAGoodOneTakesOver) {
     std::ofstream(directory_ / "set.toml") << "[quality]\nsamples = none\n";
     press("reload_set");
     until_said("the set stays as it was");
+    until_said("button reload_set: the set stays as it was: ");  // and so says the bus
     const int before = until([](const Shown&) { return true; }).count;
     until([&](const Shown& s) { return s.count > before + 2; });  // it goes on
     std::string other = good;
