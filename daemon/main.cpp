@@ -86,8 +86,9 @@ int do_trade(post::TradeOptions& options, const rig::StopOnSignal& stop) {
 
 int do_run(rig::LiveOptions& options, const rig::StopOnSignal& stop) {
   options.stop = stop.token();
-  std::cout << to_json(rig::run_live(options, std::cout));
-  return stop.received() ? 128 + stop.received() : 0;
+  const std::string metrics = to_json(rig::run_live(options, std::cout));
+  if (!options.bus) std::cout << metrics;  // as a service it is asked for them
+  return 0;                                // a rig runs until it is told to stop
 }
 
 }  // namespace

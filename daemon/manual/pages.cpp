@@ -42,7 +42,7 @@ const Chapter previzd_status{"EXIT STATUS", R"(
 0: Done.
 1: An error; one line on standard error says which.
 2: The command line cannot be understood.
-128+N: Stopped by signal N. What was finished is on disk, and a render goes on there when it is called again.
+128+N: Stopped by signal N. What was finished is on disk, and a render goes on there when it is called again. (A rig that is stopped has done its work: 0.)
 )"};
 
 const Chapter previzd_files{"FILES", R"(

@@ -115,7 +115,8 @@ TEST(DaemonDeath, KilledItLosesLessThanASecondOfTheTake) {
   EXPECT_GE(frames_of(take) + 25, captured);
 }
 
-// A tmpfs of its own, 2 MB: some 380 frames, less the 1 MB that is kept free.
+// A tmpfs of its own, 2 MB, of which 1 MB is kept free. The disk is looked at once a second, so
+// that of 25 frames a second at least 25 are there (with their light, some 20 kB each).
 TEST(DaemonDeath, OnAFullDiskTheTakeEndsReadableAndTheDaemonGoesOn) {
   Daemon daemon([](const std::filesystem::path& takes) {
     const int spaces = CLONE_NEWNS | (geteuid() == 0 ? 0 : CLONE_NEWUSER);
@@ -130,12 +131,12 @@ TEST(DaemonDeath, OnAFullDiskTheTakeEndsReadableAndTheDaemonGoesOn) {
       GTEST_SKIP() << "this process may not mount a file system of its own";
     FAIL() << daemon.log();
   }
-  EXPECT_GT(frames_of(daemon.takes() / "1_take001"), 50u);
+  EXPECT_GT(frames_of(daemon.takes() / "1_take001"), 24u);
   const std::uint64_t captured = daemon.captured();
   daemon.until([&] { return daemon.captured() > captured + 25; });  // it goes on
   ASSERT_FALSE(daemon.is_over()) << daemon.log();
   const int status = daemon.end(SIGTERM);
-  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 128 + SIGTERM) << daemon.log();
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << daemon.log();
 }
 
 }  // namespace
