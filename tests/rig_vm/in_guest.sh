@@ -19,9 +19,9 @@ within() {
   done
   echo "   $what"
 }
-status() { previzctl status | sed -n "s/^$1: //p"; }
+status() { previzctl status 2>/dev/null | sed -n "s/^$1: //p"; }
 status_is() { [[ $(status "$1") == "$2" ]]; }
-metric() { previzctl metrics | jq "$1 // 0"; }
+metric() { previzctl metrics 2>/dev/null | jq "$1 // 0"; }
 above() { [[ $(metric "$1") -gt $2 ]]; }
 advances() { within 120 "$2" above ".stages.\"$1\".frames" "$(metric ".stages.\"$1\".frames")"; }
 tap() {
@@ -30,6 +30,11 @@ tap() {
   rig-devices release "$1"
 }
 pad() { echo "$*" >&"$pad"; }
+# The kernel's own switch of a connector ("off", "detect"), and its word that something has changed.
+screen() {
+  echo "$1" >/sys/class/drm/card0-Virtual-1/status
+  echo change >/sys/class/drm/card0/uevent
+}
 
 # To be read on the host while the guest runs: what the daemon says.
 journalctl --follow --unit=previzd --output=short-monotonic >journal.txt &
@@ -100,6 +105,15 @@ camera
 within 240 "it is back" status_is CameraLost no
 advances display "frames are shown again"
 status_is Recording yes || fail "the take ended with the film camera"
+
+step "the screen is unplugged while recording, and comes back"
+trouble=$(metric '.counts."screen: device trouble"')
+screen off
+within 60 "it is missed" above '.counts."screen: device trouble"' "$trouble"
+advances display "the pictures go on without it"
+screen detect
+advances screen "they are on it again"
+status_is Recording yes || fail "the take ended with the screen"
 
 step "the pad is unplugged, and comes back"
 pad unplug
