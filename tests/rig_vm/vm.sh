@@ -33,7 +33,7 @@ cat "$run/monitor.out" >/dev/null &
   sleep 2 # until it is written to its end
   mv "$share/screen.part" "$share/screen.ppm"
 ) &
-helpers=$(jobs -p | tail -n +2)
+helpers=$(jobs -p | tail -n +2 | tr '\n' ' ')
 # shellcheck disable=SC2064,SC2086
 trap "kill $qemu $helpers >/dev/null 2>&1 || true" EXIT
 tail -q -f -s 0.2 -n +1 --retry --pid=$qemu "$run/output" 2>/dev/null || true
