@@ -11,6 +11,7 @@
 #include <iterator>
 #include <memory>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "drivers/error.hpp"
@@ -22,47 +23,38 @@ namespace {
   throw Error(file.string() + ": " + what + ": " + std::strerror(errno));
 }
 
-void write_all(int descriptor, std::string_view content, const std::filesystem::path& file) {
-  while (!content.empty()) {
-    const ssize_t written = ::write(descriptor, content.data(), content.size());
+}  // namespace
+
+OpenFile::OpenFile(std::filesystem::path file, int flags)
+    : file_(std::move(file)), descriptor_(::open(file_.c_str(), flags | O_CLOEXEC, 0666)) {
+  if (!descriptor_) fail(file_, "cannot be opened");
+}
+
+void OpenFile::append(std::string_view text) const {
+  while (!text.empty()) {
+    const ssize_t written = ::write(get(), text.data(), text.size());
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0) fail(file, "cannot be written");
-    content.remove_prefix(static_cast<std::size_t>(written));
+    if (written < 0) fail(file_, "cannot be written");
+    text.remove_prefix(static_cast<std::size_t>(written));
   }
 }
 
-}  // namespace
-
-Descriptor::Descriptor(const std::filesystem::path& file, int flags)
-    : file_(file), descriptor_(::open(file.c_str(), flags | O_CLOEXEC, 0666)) {
-  if (descriptor_ < 0) fail(file, "cannot be opened");
-}
-
-Descriptor::~Descriptor() {
-  ::close(descriptor_);
-}
-
-void Descriptor::sync() const {
-  if (::fdatasync(descriptor_) != 0) fail(file_, "cannot be brought to the disk");
+void OpenFile::sync() const {
+  if (::fdatasync(get()) != 0) fail(file_, "cannot be brought to the disk");
 }
 
 LineFile::LineFile(const std::filesystem::path& file)
-    : file_(file), descriptor_(file, O_WRONLY | O_CREAT | O_EXCL | O_APPEND) {}
-
-void LineFile::append(std::string line) {
-  line += '\n';
-  write_all(descriptor_.get(), line, file_);
-}
+    : file_(file, O_WRONLY | O_CREAT | O_EXCL | O_APPEND) {}
 
 void replace_file(const std::filesystem::path& file, const std::string& content) {
   const std::filesystem::path draft = file.string() + ".part";
   {
-    const Descriptor descriptor(draft, O_WRONLY | O_CREAT | O_TRUNC);
-    write_all(descriptor.get(), content, draft);
-    descriptor.sync();
+    const OpenFile written(draft, O_WRONLY | O_CREAT | O_TRUNC);
+    written.append(content);
+    written.sync();
   }
   if (std::rename(draft.c_str(), file.c_str()) != 0) fail(file, "cannot be replaced");
-  const Descriptor directory(file.parent_path(), O_RDONLY | O_DIRECTORY);
+  const OpenFile directory(file.parent_path(), O_RDONLY | O_DIRECTORY);
   ::fsync(directory.get());  // the rename itself; not every file system can, and then need not
 }
 

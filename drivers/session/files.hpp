@@ -3,36 +3,35 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
+
+#include "drivers/descriptor.hpp"
 
 namespace previz::session {
 
-// A file descriptor that closes itself.
-class Descriptor {
+class OpenFile {
  public:
   // Throws previz::Error naming the file. `flags` as for open(2), always with O_CLOEXEC.
-  Descriptor(const std::filesystem::path& file, int flags);
-  ~Descriptor();
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return descriptor_; }
+  OpenFile(std::filesystem::path file, int flags);
+  int get() const { return descriptor_.get(); }
+  void append(std::string_view text) const;
   // Waits until what was written is on the medium; throws previz::Error.
   void sync() const;
 
  private:
   std::filesystem::path file_;
-  int descriptor_;
+  OwnedDescriptor descriptor_;
 };
 
 // A text file that grows by whole lines; each is the kernel's as soon as append() returns.
 class LineFile {
  public:
   explicit LineFile(const std::filesystem::path& file);
-  void append(std::string line);  // adds the newline
-  void sync() const { descriptor_.sync(); }
+  void append(const std::string& line) const { file_.append(line + '\n'); }
+  void sync() const { file_.sync(); }
 
  private:
-  std::filesystem::path file_;
-  Descriptor descriptor_;
+  OpenFile file_;
 };
 
 // Replaces the file's content at once: a crash leaves the old or the new, never a part.

@@ -191,7 +191,7 @@ void SessionWriter::add_asset(const std::string& as_written, const std::filesyst
       std::filesystem::copy_file(file, draft, std::filesystem::copy_options::overwrite_existing);
       std::filesystem::permissions(draft, std::filesystem::perms::owner_write,
                                    std::filesystem::perm_options::add);
-      Descriptor(draft, O_RDONLY).sync();
+      OpenFile(draft, O_RDONLY).sync();
       std::filesystem::rename(draft, target);
     }
   } catch (const std::filesystem::filesystem_error& error) {

@@ -74,7 +74,7 @@ struct VideoWriter::Impl {
   StreamFormat format;
   av::Codec encoder;
   av::Muxer muxer;
-  Descriptor descriptor;  // the same file once more: libav does not hand out its own for sync
+  OpenFile same_file;  // the same file once more: libav does not hand out its own for sync
   av::Picture picture;
   av::Packet packet;
   std::int64_t first_ns = 0;
@@ -85,7 +85,7 @@ struct VideoWriter::Impl {
         format(stream_format),
         encoder(open_encoder(format, file)),
         muxer(open_muxer(*encoder, file)),
-        descriptor(file, O_RDONLY),
+        same_file(file, O_RDONLY),
         picture(av_frame_alloc()),
         packet(av_packet_alloc()) {
     picture->width = format.width;
@@ -138,7 +138,7 @@ VideoWriter::Stamp VideoWriter::write(const Frame& frame) {
 }
 
 void VideoWriter::sync() const {
-  impl_->descriptor.sync();
+  impl_->same_file.sync();
 }
 
 void VideoWriter::finish() {
