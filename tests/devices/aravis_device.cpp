@@ -36,9 +36,11 @@ class AravisDevice final : public DeviceUnderTest {
   std::unique_ptr<Camera> open() override {
     CameraSettings settings;
     settings.device = address_;
-    settings.rate_hz = rate_hz;
+    if (triggered_)
+      settings.trigger = "software";
+    else
+      settings.rate_hz = rate_hz;
     settings.exposure_s = 0.010;
-    if (triggered_) settings.trigger = "software";
     settings.packet_size = 1500;  // three packets a frame, a leader and a trailer
     return camera_driver("aravis").open(settings);
   }
