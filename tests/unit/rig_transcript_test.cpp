@@ -185,6 +185,8 @@ class RigTranscript : public testing::Test {
 
   void perform() {
     const Listener listener([this](Changes changes) {
+      // On a machine that is busy enough the replayed camera may seem lost: no line of this one.
+      if (changes["Message"].starts_with("rig: ")) return;
       const std::lock_guard lock(mutex_);
       signals_.push_back(std::move(changes));
       news_.notify_all();
