@@ -4,8 +4,8 @@
 # unplugs and replugs every device, and checks what the recorder and the metrics say of it.
 #   tests/rig_vm/run.sh [BUILD]         BUILD: a build folder that is there (default: build/release)
 # The guest is built the first time, and when what the package depends on or guest/ has changed: as
-# root, six minutes and the network. The run itself takes eight minutes on two cores, for the guest's
-# processor is emulated. What it leaves is in out/rig_vm.
+# root, six minutes and the network. The run itself takes ten minutes, thirteen on two busy cores, for
+# the guest's processor is emulated. What it leaves is in out/rig_vm.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 here=tests/rig_vm
