@@ -52,7 +52,8 @@ std::string Controls::selected_light() const {
   return lights_.empty() ? "" : lights_[light_];
 }
 
-Outcome Controls::perform(const set::Action& action) {
+Outcome Controls::perform(const set::Action& action, bool ended_refinement) {
+  ended_refinement_ = ended_refinement;
   return std::visit([this](const auto& effect) { return apply(effect); }, action.effect);
 }
 
@@ -110,7 +111,8 @@ Outcome Controls::apply(const set::MarkGood&) {
 }
 
 Outcome Controls::apply(const set::Snapshot&) {
-  ++look_.snapshots;
+  const bool refined = ended_refinement_ || look_.state.mode == Mode::refine;
+  ++(refined ? look_.refined_snapshots : look_.snapshots);
   return {"snapshot", false, {}};
 }
 

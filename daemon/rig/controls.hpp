@@ -26,8 +26,9 @@ struct Look {
   pipeline::Edits edits;
   std::uint64_t plays = 0;  // of the animations, begun anew so far
   bool animations_held = false;
-  int exposure_steps = 0;       // asked for so far, up less down
-  std::uint64_t snapshots = 0;  // asked for so far
+  int exposure_steps = 0;               // asked for so far, up less down
+  std::uint64_t snapshots = 0;          // asked for so far of live pictures
+  std::uint64_t refined_snapshots = 0;  // and of refined ones
 };
 
 // What only somebody with devices and files can do.
@@ -51,8 +52,9 @@ class Controls {
   std::string selected_object() const;
   std::string selected_light() const;
 
-  // Of D-Bus or previzctl, or of a press once its kind is known.
-  Outcome perform(const set::Action& action);
+  // Of D-Bus or previzctl, or of a press once its kind is known: what it was pressed at may be a
+  // refinement that it ended itself.
+  Outcome perform(const set::Action& action, bool ended_refinement = false);
   // A button went down: a refinement ends at once, before it is known what was pressed.
   // True if one did: a mode that the same press asks for is then not wanted.
   bool pushed();
@@ -90,6 +92,7 @@ class Controls {
   std::vector<std::string> objects_;  // the virtual ones
   std::vector<std::string> lights_;
   const bool is_animated_;
+  bool ended_refinement_ = false;  // what is being performed
   std::size_t object_ = 0, light_ = 0;
   Look look_;
 };

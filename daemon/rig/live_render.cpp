@@ -57,8 +57,7 @@ std::optional<Shot> LiveRender::next_picture() {
   for (;;) {
     tell_dropped();
     const std::shared_ptr<const Look> look = look_.get();
-    // What a button was pressed at is what is saved, also where the press ended the refinement.
-    if (wants_snapshot(*look) && refined_) save(*look, *refined_);
+    save_refined(*look);
     if (look->state.mode != Mode::refine) refining_ = false;
     std::optional<Shot> shot =
         look->state.mode == Mode::refine ? refine(*look) : wait_for_frame(*look);
@@ -108,6 +107,7 @@ int LiveRender::next_round(const Look& look) const {
 bool LiveRender::begin_refinement(const Look& look) {
   if (!good_) return false;
   Shot& shot = *good_;
+  refined_.reset();
   shot.samples = 0;
   // Moved since it was captured: in standby, or without a camera or tags.
   if (!good_is_reviewed_) shot.scene = pipeline::scene_state(set_, look.edits, shot.motion);
@@ -144,7 +144,9 @@ Shot LiveRender::render(const Look& look, Shot shot) {
     quality.samples = governor_->samples();
     quality.error = quality.seconds = 0;
   }
-  const bool snapshot = wants_snapshot(look);
+  // Of a refinement that ended before its first round there is only this one.
+  const bool of_live = look.snapshots > snapshots_;
+  const bool snapshot = of_live || look.refined_snapshots > refined_snapshots_;
   stage_->use(quality);
   stage_->use(look.estimator);
   stage_->show(look.view);
@@ -158,7 +160,6 @@ Shot LiveRender::render(const Look& look, Shot shot) {
     if (captured) metrics_.dropped("render", "device lost");
     throw;
   }
-  refined_.reset();
   const double took = seconds_since(begin);
   metrics_.busy("render", took);
   if (captured)
@@ -170,7 +171,10 @@ Shot LiveRender::render(const Look& look, Shot shot) {
     keep_as_good(shot, !captured);
     if (governed) governor_->took(took);
   }
-  if (snapshot) save(look, shot);
+  if (snapshot) {
+    ++(of_live ? snapshots_ : refined_snapshots_);
+    save(shot);
+  }
   return shot;
 }
 
@@ -191,8 +195,16 @@ void LiveRender::keep_as_good(const Shot& shot, bool reviewed) {
   good_is_reviewed_ = reviewed;
 }
 
-void LiveRender::save(const Look& look, const Shot& shot) {
-  snapshots_ = look.snapshots;
+// What a button was pressed at is what is saved, also where the press ended the refinement and
+// another picture was shown before it was known what the press asks for.
+void LiveRender::save_refined(const Look& look) {
+  while (refined_ && refined_snapshots_ < look.refined_snapshots) {
+    ++refined_snapshots_;
+    save(*refined_);
+  }
+}
+
+void LiveRender::save(const Shot& shot) {
   if (!channels_.snapshots.push(shot)) metrics_.dropped("snapshot", "stopped");
 }
 

@@ -49,8 +49,8 @@ class LiveRender {
 
  private:
   std::optional<pipeline::Shot> next_picture();
-  bool wants_snapshot(const Look& look) const { return look.snapshots > snapshots_; }
-  void save(const Look& look, const pipeline::Shot& shot);
+  void save_refined(const Look& look);
+  void save(const pipeline::Shot& shot);
   std::optional<pipeline::Shot> refine(const Look& look);
   int next_round(const Look& look) const;
   bool begin_refinement(const Look& look);
@@ -68,12 +68,12 @@ class LiveRender {
   std::optional<pipeline::Governor> governor_;
   std::optional<pipeline::Shot> good_;     // the last one with pose and light: its frame only
   bool good_is_reviewed_ = false;          // and so its scene is the take's, not the rig's
-  std::optional<pipeline::Shot> refined_;  // the last round's, with layers, while it is shown
+  std::optional<pipeline::Shot> refined_;  // the last round's, with layers, until the next begins
   bool refining_ = false;
   pipeline::Edits refined_edits_;
   double sample_s_ = 0;  // that a sample of a refinement took last; 0: not known
   pipeline::DropCount<pipeline::Shot> drops_;
-  std::uint64_t snapshots_ = 0;  // of look.snapshots, done
+  std::uint64_t snapshots_ = 0, refined_snapshots_ = 0;  // of the look's, done
 };
 
 }  // namespace previz::rig

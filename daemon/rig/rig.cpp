@@ -167,8 +167,9 @@ void Rig::act(const Press& press) {
   if (mapped == loaded_.set.buttons.end()) return;
   const set::Action& action = *set::find_action(mapped->action);
   // A press that ended the refinement has gone where a mode button goes: to live.
-  if (ended_refinement_.erase(press.button) > 0 && Controls::is_mode(action)) return;
-  perform(action, "button " + press.button);
+  const bool ended_refinement = ended_refinement_.erase(press.button) > 0;
+  if (ended_refinement && Controls::is_mode(action)) return;
+  tell(controls_.perform(action, ended_refinement), "button " + press.button);
 }
 
 Outcome Rig::perform(const set::Action& action, const std::string& by) {

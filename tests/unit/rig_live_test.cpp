@@ -174,8 +174,11 @@ TEST_F(RigLive, ThroughEveryModeByButtons) {
     until([](const Shown& s) { return s.look.view == render::View::composite; });
 
     press("record");
-    const int first = until([](const Shown& s) { return s.look.state.recording; }).count;
-    until([&](const Shown& s) { return s.count > first + 3 && s.shot.samples == 3; });
+    const Shown first = until([](const Shown& s) { return s.look.state.recording; });
+    until([&](const Shown& s) {  // long enough for a press to fall into its review
+      return s.shot.frame->timestamp_ns > first.shot.frame->timestamp_ns + 2'000'000'000 &&
+             s.shot.samples == 3;
+    });
     press("refine");  // what is frozen is in the take, which goes on
     refined = until([](const Shown& s) { return s.shot.frozen && s.shot.samples >= 9; });
     EXPECT_TRUE(refined.look.state.recording);
@@ -267,7 +270,28 @@ TEST_F(RigLive, ThroughEveryModeByButtons) {
   EXPECT_GT(metrics_.counts.at("refine rounds"), 0u);
 }
 
-// Captured = rendered + dropped by cause, whatever was done in between.
+// The press ends the refinement at once, but what it asks for is known only once it cannot become
+// a double press any more; live pictures were shown by then.
+TEST_F(RigLive, ASnapshotIsOfTheRefinementThatItsPressEnded) {
+  write_set("[[button]]\nname = \"snapshot\"\npress = \"double\"\naction = \"standby\"\n");
+  Shown refined;
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    press("refine");
+    refined = until([](const Shown& s) { return s.shot.frozen && s.shot.samples >= 6; });
+    press("snapshot");
+    until_mode(Mode::live);
+    until_said("snapshot_0001");
+    press("snapshot");
+    until_said("snapshot_0002");
+  });
+  const auto samples = [&](const char* name) {
+    return output::read_exr(directory_ / "live" / name).samples;
+  };
+  EXPECT_GE(samples("snapshot_0001.exr"), refined.shot.samples);
+  EXPECT_EQ(samples("snapshot_0002.exr"), 2);
+}
+
 TEST_F(RigLive, AButtonThatIsNotThereIsToldOfAndHoldsUpNobody) {
   write_set("[[button]]\nname = \"gpio:absent:3\"\naction = \"record\"\n");
   run([&] {
@@ -276,6 +300,7 @@ TEST_F(RigLive, AButtonThatIsNotThereIsToldOfAndHoldsUpNobody) {
   });
 }
 
+// Captured = rendered + dropped by cause, whatever was done in between.
 TEST_F(RigLive, EveryCapturedFrameIsRenderedOrCounted) {
   write_set();
   run([&] {
