@@ -19,6 +19,9 @@ void add_render(CLI::App& app, post::RenderOptions& options) {
       "Observer frames: 7, 3-9 or 3- (default: all)");
   command.add_option("--spp", options.samples, "Samples per pixel (default: quality.samples)")
       ->check(CLI::Range(1, 1'000'000));
+  command.add_flag("--adaptive,!--even", options.adaptive,
+                   "The samples on average, spent where they bring most, or the same number for "
+                   "every pixel (default: quality.adaptive)");
   command
       .add_option("--error", options.error,
                   "Go on to this error, over the picture's mean radiance (default: quality.error)")

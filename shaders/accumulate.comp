@@ -37,12 +37,14 @@ void reject_impossible(inout vec4 mixed, inout vec4 real, inout vec3 landed) {
 void main() {
   if (gl_GlobalInvocationID.x >= batch.width * batch.height) return;
   const uvec2 in_tile = uvec2(gl_GlobalInvocationID.x % batch.width, gl_GlobalInvocationID.x / batch.width);
+  const uint limit = sample_limit(uvec2(batch.x, batch.y) + in_tile);
+  if (limit <= batch.first_sample) return;
+  const uint samples = min(batch.samples, limit - batch.first_sample);
   GpuPixel sums = pixels[gl_GlobalInvocationID.x];
-  for (uint s = 0u; s < batch.samples; ++s) {
+  for (uint s = 0u; s < samples; ++s) {
     const uint slot = s * tile_slots() + pixel_slot(in_tile);
     vec4 mixed = sample_mixed[slot];
     vec4 real = sample_real[slot];
-    if (real.w == SAMPLE_NONE) continue;
     const vec4 aov = sample_aov[slot];
     vec3 landed = has_feature(FEATURE_CAMERA) ? sample_landed[slot].rgb : vec3(0.0);
     reject_impossible(mixed, real, landed);

@@ -26,19 +26,13 @@ bool may_be_covered(uvec2 pixel) {
   return false;
 }
 
-bool is_sampled(uvec2 pixel) {
-  const uint blocks_x = (frame.width + SAMPLED_BLOCK - 1u) / SAMPLED_BLOCK;
-  return sampled[pixel.y / SAMPLED_BLOCK * blocks_x + pixel.x / SAMPLED_BLOCK] != 0u;
-}
-
 void main() {
   const uint slot = gl_GlobalInvocationID.x;
   const uvec2 in_tile = slot_pixel(slot);
   const bool valid = slot < tile_slots() * batch.samples &&
                      all(lessThan(in_tile, uvec2(batch.width, batch.height)));
   const uvec2 pixel = uvec2(batch.x, batch.y) + in_tile;
-  const bool wanted = valid && is_sampled(pixel);
-  if (valid && !wanted) sample_real[slot] = vec4(0.0, 0.0, 0.0, SAMPLE_NONE);
+  const bool wanted = valid && slot_sample(slot) < sample_limit(pixel);
   if (wanted) {
     const Sampler random = make_sampler(frame.seed, pixel, slot_sample(slot));
     vec3 target = vec3(calibrated_ray(pixel, sample_2d(random, PAIR_PIXEL)), 1.0);

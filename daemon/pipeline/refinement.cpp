@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
+#include <vector>
 
 #include "daemon/render/error_estimate.hpp"
+#include "shaders/lib/render_shared.h"
 
 namespace previz::pipeline {
 namespace {
@@ -13,6 +16,46 @@ constexpr int batches_a_round = 32;
 // Fewer samples do not know their own spread.
 constexpr int least_samples = 8;
 constexpr int most_samples = 1 << 24;
+// Of the samples, those that tell where the others are needed.
+constexpr int pilot_share = 16;
+// With fewer samples too many of them would be spent on that.
+constexpr int least_adaptive_samples = 32;
+
+std::vector<std::uint32_t> limits_of(const std::vector<bool>& active, int samples) {
+  std::vector<std::uint32_t> limits;
+  for (const bool more : active)
+    limits.push_back(more ? gpu::UNLIMITED : static_cast<std::uint32_t>(samples));
+  return limits;
+}
+
+// A number of samples on average, spent where they bring most. What the first tell decides only
+// where the others go: they are not in the picture, which would be biased by what they have missed.
+Refined spread(render::Renderer& renderer, int samples, const std::function<bool()>& cancelled,
+               const std::function<void(int samples)>& progress) {
+  Refined refined;
+  const int pilot_samples = std::max(least_samples, samples / pilot_share);
+  const std::optional<render::Layers> pilot = renderer.pilot(pilot_samples, cancelled);
+  if (!pilot) return refined;
+  const std::vector<std::uint32_t> limits = render::spread_samples(
+      render::estimate_error(*pilot), pilot->width, pilot->height, samples - pilot_samples);
+  renderer.limit_samples(limits);
+
+  const std::uint32_t most = *std::ranges::max_element(limits);
+  const std::uint32_t batch = std::max(1u, most / batches_a_round);
+  for (std::uint32_t done = 0; done < most;) {
+    const std::uint32_t now = std::min(batch, most - done);
+    renderer.render(static_cast<int>(now), cancelled);
+    if (cancelled && cancelled()) return refined;
+    done += now;
+    double spent = 0;
+    for (const std::uint32_t limit : limits) spent += std::min(limit, done);
+    refined.samples = pilot_samples + static_cast<int>(spent / static_cast<double>(limits.size()));
+    if (progress) progress(refined.samples);
+  }
+  refined.whole = true;
+  refined.samples = samples;
+  return refined;
+}
 
 }  // namespace
 
@@ -25,6 +68,9 @@ Refined refine(render::Renderer& renderer, const set::Quality& quality,
     return quality.seconds > 0 &&
            std::chrono::duration<double>(Clock::now() - begin).count() >= quality.seconds;
   };
+  const bool has_target = quality.error > 0 || quality.seconds > 0;
+  if (quality.adaptive && !has_target && quality.samples >= least_adaptive_samples)
+    return spread(renderer, quality.samples, cancelled, progress);
   Refined refined;
   const auto add = [&](int samples) {
     const int batch = std::max(1, samples / batches_a_round);
@@ -38,7 +84,6 @@ Refined refine(render::Renderer& renderer, const set::Quality& quality,
     }
     return true;
   };
-  const bool has_target = quality.error > 0 || quality.seconds > 0;
   int samples = has_target ? std::max(quality.samples, least_samples) : quality.samples;
   while (add(samples)) {
     if (!has_target) {
@@ -50,12 +95,12 @@ Refined refine(render::Renderer& renderer, const set::Quality& quality,
     refined.error = estimate.picture;
     const double allowed = quality.error > 0 ? quality.error : 0.5 * estimate.picture;
     const auto blocks = render::blocks_above(estimate, layers.width, layers.height, allowed);
-    const bool converged = std::find(blocks.begin(), blocks.end(), 1u) == blocks.end();
+    const bool converged = std::ranges::find(blocks, true) == blocks.end();
     if (converged || late() || refined.samples >= most_samples) {
       refined.whole = true;
       break;
     }
-    renderer.sample_only(blocks);
+    renderer.limit_samples(limits_of(blocks, refined.samples));
     samples = refined.samples;
   }
   return refined;

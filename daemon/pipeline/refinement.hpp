@@ -11,14 +11,16 @@ namespace previz::pipeline {
 
 struct Refined {
   bool whole = false;  // false: cancelled
-  int samples = 0;     // the most that a pixel got
+  int samples = 0;     // the most that a pixel got; with quality.adaptive the average
   double error = 0;    // estimated rms error over the picture's rms; 0 where nothing was asked for
 };
 
 // Gives the frame that the renderer has begun its samples. With neither quality.error nor .seconds
-// every pixel gets quality.samples. Else every pixel gets that many (at least 8), and then, round
-// after round, twice as many where 8x8 blocks are still above the error (with a time alone: above
-// half of the picture's), until none is or the time is over. `progress` is told the samples so far.
+// every pixel gets quality.samples, or with quality.adaptive (and 32 samples or more) that many on
+// average, where they bring most; a sixteenth of them, at least 8, tell where. Else every pixel
+// gets that many (at least 8), and then, round after round, twice as many where 8x8 blocks are
+// still above the error (with a time alone: above half of the picture's), until none is or the time
+// is over. `progress` is told the samples so far.
 Refined refine(render::Renderer& renderer, const set::Quality& quality,
                const std::function<bool()>& cancelled,
                const std::function<void(int samples)>& progress);

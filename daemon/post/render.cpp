@@ -36,6 +36,7 @@ double now_s() {
 
 void override_set(set::Set& set, const RenderOptions& options) {
   if (options.samples) set.quality.samples = *options.samples;
+  if (options.adaptive) set.quality.adaptive = *options.adaptive;
   if (options.error) set.quality.error = *options.error;
   if (options.seconds) set.quality.seconds = *options.seconds;
   if (options.seed) set.estimation.seed = *options.seed;
@@ -53,6 +54,7 @@ std::string settings_of(const pipeline::Take& take, const set::Set& set) {
   json["session"] = take.session.info.name;
   json["session_start_ns"] = take.observer_stream->records().front().timestamp_ns;
   json["samples"] = set.quality.samples;
+  json["adaptive"] = set.quality.adaptive;
   json["error"] = set.quality.error;
   json["seconds"] = set.quality.seconds;
   json["seed"] = set.estimation.seed;
@@ -193,13 +195,14 @@ std::string done_text(const Shot& shot) {
   const std::string frame = "frame " + std::to_string(shot.index) + ": ";
   if (!shot.untouched.empty()) return frame + "plate untouched, " + shot.untouched;
   std::string text =
-      frame + std::to_string(shot.layers.samples) + " samples in " + duration_words(shot.render_s);
+      frame + std::to_string(shot.samples) + " samples in " + duration_words(shot.render_s);
   if (shot.error > 0) text += ", error " + percent_words(shot.error);
   return text;
 }
 
 std::string quality_words(const set::Quality& quality) {
   std::string text = std::to_string(quality.samples) + " samples";
+  if (quality.adaptive) text += " on average";
   if (quality.error > 0) text += ", then to an error of " + percent_words(quality.error);
   if (quality.seconds > 0)
     text += ", then for " + duration_words(quality.seconds) + " a frame at most";

@@ -34,6 +34,7 @@ struct RenderOptions {
   std::optional<FrameRange> frames;               // all
   std::optional<int> samples;                     // quality.samples
   std::optional<double> error;                    // quality.error
+  std::optional<bool> adaptive;                   // quality.adaptive
   std::optional<double> seconds;                  // quality.seconds
   std::optional<std::uint32_t> seed;              // estimation.seed
   std::optional<set::Estimator> estimator;

@@ -103,6 +103,7 @@ void Sweep::plan() {
   own.estimation = frame_.set().estimation;
   own.lighting = frame_.set().lighting;
   own.lens = frame_.calibration().lens;
+  own.adaptive = frame_.set().quality.adaptive;
   MethodRenderer renderer(device_, frame_, scene_, own, options_.scale);
   renderer.begin(own.estimation.seed);
   std::vector<render::Part> unneeded;
@@ -158,7 +159,7 @@ TradePicture Sweep::reference_half(int half, ShareProgress& progress) const {
   const int samples = report_.reference_samples / 2;
   for (int done = 0; done < samples;) {
     const int now = std::min(std::max(samples / parts_of_half, 1), samples - done);
-    renderer.render(now);
+    renderer.add(now);
     stop_if_asked();
     done += now;
     progress.worked(name, now, steady_s());

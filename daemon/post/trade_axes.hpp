@@ -17,6 +17,7 @@ struct TradeSettings {
   set::Estimation estimation;
   set::Lighting lighting;
   std::optional<ThinLens> lens;
+  bool adaptive = false;              // quality.adaptive
   double scale = 1;                   // of the sweep's own picture size
   std::vector<render::Part> carried;  // parts the frame has no need of
 

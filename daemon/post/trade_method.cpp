@@ -3,6 +3,7 @@
 #include <chrono>
 
 #include "daemon/pipeline/preview_size.hpp"
+#include "daemon/pipeline/refinement.hpp"
 #include "daemon/render/composite.hpp"
 
 namespace previz::post {
@@ -22,6 +23,7 @@ MethodRenderer::MethodRenderer(const std::shared_ptr<render::Device>& device, Tr
                                double sweep_scale)
     : exposure_(frame.exposure()),
       world_from_camera_(frame.world_from_camera()),
+      adaptive_(settings.adaptive),
       plate_(frame.plate(sweep_scale * settings.scale)),
       camera_(render::plate_radiance(plate_, frame.response(), exposure_).value),
       renderer_(device, settings.estimation,
@@ -44,7 +46,10 @@ void MethodRenderer::begin(std::uint32_t seed) {
 
 double MethodRenderer::render(int samples) {
   const auto start = std::chrono::steady_clock::now();
-  renderer_.render(samples);
+  set::Quality quality;
+  quality.samples = samples;
+  quality.adaptive = adaptive_;
+  pipeline::refine(renderer_, quality, {}, {});
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 

@@ -23,8 +23,10 @@ class MethodRenderer {
   void warm_up();
   // Forgets what was rendered.
   void begin(std::uint32_t seed);
-  // Seconds.
+  // All the samples of a frame begun, as the settings spread them. Seconds.
   double render(int samples);
+  // Some more for every pixel.
+  void add(int samples) { renderer_.render(samples); }
 
   bool needs(render::Part part) const { return renderer_.needs(part); }
   render::Layers layers() const { return renderer_.layers(); }
@@ -33,6 +35,7 @@ class MethodRenderer {
  private:
   const double exposure_;
   const glm::dmat4 world_from_camera_;
+  const bool adaptive_;
   const Plate plate_;
   const std::vector<double> camera_;  // the plate's radiance, interleaved RGB
   render::Renderer renderer_;

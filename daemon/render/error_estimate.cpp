@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
 
 #include "shaders/lib/render_shared.h"
 
@@ -15,30 +14,71 @@ int blocks_in(int pixels) {
   return (pixels + block - 1) / block;
 }
 
+// Of a channel's mean, as it is seen: how far a standard error reaches below white, and white
+// itself at the most.
+double seen_variance(double mean, double variance, double white) {
+  if (mean <= white) return std::min(variance, white * white);
+  const double below = std::clamp(std::sqrt(variance) - (mean - white), 0.0, white);
+  return below * below;
+}
+
+struct Grid {
+  int columns, rows;
+
+  std::size_t size() const { return static_cast<std::size_t>(columns) * rows; }
+  std::size_t at(int x, int y) const { return static_cast<std::size_t>(y) * columns + x; }
+  void each_neighbour(std::size_t cell, const auto& visit) const {
+    const int x = static_cast<int>(cell) % columns, y = static_cast<int>(cell) / columns;
+    for (int v = std::max(y - 1, 0); v <= std::min(y + 1, rows - 1); ++v)
+      for (int u = std::max(x - 1, 0); u <= std::min(x + 1, columns - 1); ++u) visit(at(u, v));
+  }
+};
+
+Grid grid_of(int width, int height) {
+  return {blocks_in(width), blocks_in(height)};
+}
+
+// The standard error of each block, smoothed; its own variance counts half.
+std::vector<double> smoothed(const ErrorEstimate& estimate, const Grid& grid) {
+  constexpr double own_weight = 8;
+  std::vector<double> result;
+  for (std::size_t cell = 0; cell < grid.size(); ++cell) {
+    double sum = 0, weights = 0;
+    grid.each_neighbour(cell, [&](std::size_t other) {
+      const double weight = other == cell ? own_weight : 1;
+      sum += weight * estimate.blocks[other] * estimate.blocks[other];
+      weights += weight;
+    });
+    result.push_back(std::sqrt(sum / weights));
+  }
+  return result;
+}
+
 }  // namespace
 
 ErrorEstimate estimate_error(const Layers& layers) {
-  const int columns = blocks_in(layers.width);
-  const std::size_t count = static_cast<std::size_t>(columns) * blocks_in(layers.height);
-  std::vector<double> variance(count), pixels(count);
+  const Grid grid = grid_of(layers.width, layers.height);
+  std::vector<double> variance(grid.size()), pixels(grid.size());
   double square = 0;
   for (int y = 0; y < layers.height; ++y) {
     for (int x = 0; x < layers.width; ++x) {
       const std::size_t pixel = static_cast<std::size_t>(y) * layers.width + x;
-      const std::size_t at = static_cast<std::size_t>(y / block) * columns + x / block;
-      const glm::dvec3 v(layers.variance[pixel]);
-      variance[at] += v.r + v.g + v.b;
-      pixels[at] += 1;
-      const glm::dvec3 radiance(layers.composite[pixel]);
-      square += glm::dot(radiance, radiance);
+      const std::size_t cell = grid.at(x / block, y / block);
+      for (int c = 0; c < 3; ++c) {
+        const double mean = layers.composite[pixel][c];
+        variance[cell] += seen_variance(mean, layers.variance[pixel][c], layers.white);
+        const double seen = std::min(mean, layers.white);
+        square += seen * seen;
+      }
+      pixels[cell] += 1;
     }
   }
   ErrorEstimate estimate;
-  estimate.blocks.resize(count);
+  estimate.blocks.resize(grid.size());
   if (!(square > 0)) return estimate;
   const double mean_square = square / static_cast<double>(layers.composite.size());
   double total = 0;
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < grid.size(); ++i) {
     total += variance[i];
     estimate.blocks[i] = static_cast<float>(std::sqrt(variance[i] / pixels[i] / mean_square));
   }
@@ -46,19 +86,41 @@ ErrorEstimate estimate_error(const Layers& layers) {
   return estimate;
 }
 
-std::vector<std::uint32_t> blocks_above(const ErrorEstimate& estimate, int width, int height,
-                                        double error) {
-  const int columns = blocks_in(width), rows = blocks_in(height);
-  std::vector<std::uint32_t> result(estimate.blocks.size());
-  for (int y = 0; y < rows; ++y) {
-    for (int x = 0; x < columns; ++x) {
-      if (estimate.blocks[static_cast<std::size_t>(y) * columns + x] <= error) continue;
-      for (int v = std::max(y - 1, 0); v <= std::min(y + 1, rows - 1); ++v)
-        for (int u = std::max(x - 1, 0); u <= std::min(x + 1, columns - 1); ++u)
-          result[static_cast<std::size_t>(v) * columns + u] = 1;
-    }
-  }
+std::vector<bool> blocks_above(const ErrorEstimate& estimate, int width, int height, double error) {
+  const Grid grid = grid_of(width, height);
+  std::vector<bool> result(grid.size());
+  for (std::size_t cell = 0; cell < grid.size(); ++cell)
+    if (estimate.blocks[cell] > error)
+      grid.each_neighbour(cell, [&](std::size_t other) { result[other] = true; });
   return result;
+}
+
+std::vector<std::uint32_t> spread_samples(const ErrorEstimate& estimate, int width, int height,
+                                          int samples) {
+  constexpr double least_share = 1.0 / 8, most_share = 8;
+  constexpr int halvings = 60;  // of an interval of doubles: all there are
+  const Grid grid = grid_of(width, height);
+  const std::vector<double> error = smoothed(estimate, grid);
+  const auto share = [&](std::size_t cell, double gain) {
+    return std::clamp(gain * error[cell], least_share, most_share);
+  };
+  const auto mean_share = [&](double gain) {
+    double sum = 0;
+    for (std::size_t cell = 0; cell < grid.size(); ++cell) sum += share(cell, gain);
+    return sum / static_cast<double>(grid.size());
+  };
+  // Blocks at a bound leave more, or less, to the others.
+  const double least = *std::ranges::min_element(error);
+  if (!(least > 0) && !(*std::ranges::max_element(error) > 0))
+    return std::vector<std::uint32_t>(grid.size(), static_cast<std::uint32_t>(samples));
+  double low = 0, high = most_share / std::max(least, 1e-12);
+  for (int i = 0; i < halvings; ++i)
+    (mean_share((low + high) / 2) < 1 ? low : high) = (low + high) / 2;
+  std::vector<std::uint32_t> limits;
+  for (std::size_t cell = 0; cell < grid.size(); ++cell)
+    limits.push_back(
+        static_cast<std::uint32_t>(std::lround(std::max(samples * share(cell, low), 1.0))));
+  return limits;
 }
 
 }  // namespace previz::render

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <vector>
 
 namespace previz::render {
@@ -11,7 +12,8 @@ namespace previz::render {
 struct Layers {
   int width = 0;
   int height = 0;
-  std::int64_t samples = 0;          // per pixel; the most, where some were left out
+  std::int64_t samples = 0;  // per pixel; the most, where some were left out
+  double white = std::numeric_limits<double>::infinity();  // radiance at which the sensor clips
   std::vector<glm::vec3> composite;  // by the set's rule: daemon/render/composite.hpp
   std::vector<glm::vec3> mixed;      // mean(Lm)
   std::vector<glm::vec3> real;       // mean(Lr); Lc where only the difference was traced

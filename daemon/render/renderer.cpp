@@ -244,17 +244,34 @@ void Renderer::render(int samples, const std::function<bool()>& cancelled) {
   }
 }
 
-void Renderer::sample_only(const std::vector<std::uint32_t>& blocks) {
-  impl_->wavefront->sample_only(blocks);
+std::optional<Layers> Renderer::pilot(int samples, const std::function<bool()>& cancelled) {
+  Impl& r = *impl_;
+  const std::optional<std::uint32_t> seed = r.frame.seed;
+  r.frame.seed = ~seed.value_or(r.estimation.seed);
+  r.upload_frame();
+  render(samples, cancelled);
+  std::optional<Layers> result;
+  if (r.samples == samples) result = layers();
+  r.frame.seed = seed;
+  r.upload_frame();
+  r.wavefront->clear();
+  r.samples = 0;
+  return result;
+}
+
+void Renderer::limit_samples(const std::vector<std::uint32_t>& limits) {
+  impl_->wavefront->limit_samples(limits);
 }
 
 Layers Renderer::layers() const {
   const Impl& r = *impl_;
   const PinholeIntrinsics& lens = r.calibration.intrinsics;
   const auto plate = plate_radiance(r.frame.plate, *r.response, r.frame.exposure);
-  return make_layers(r.wavefront->pixels(), lens.width, lens.height,
-                     std::max<std::int64_t>(r.samples, 1), plate,
-                     {r.estimation.composite, r.estimation.composite_floor / r.frame.exposure});
+  Layers layers = make_layers(
+      r.wavefront->pixels(), lens.width, lens.height, std::max<std::int64_t>(r.samples, 1), plate,
+      {r.estimation.composite, r.estimation.composite_floor / r.frame.exposure});
+  layers.white = 1 / r.frame.exposure;
+  return layers;
 }
 
 Plate Renderer::picture() const {

@@ -101,9 +101,13 @@ class Renderer {
   // Adds samples to every pixel of the frame begun. The i-th sample of a pixel is the same however
   // the calls split them (P8). `cancelled` is asked between batches.
   void render(int samples, const std::function<bool()>& cancelled = {});
-  // From now on only these blocks of SAMPLED_BLOCK^2 pixels are given samples (row-major; 0: not):
-  // adaptive sampling, daemon/render/error_estimate.hpp. begin() samples all again.
-  void sample_only(const std::vector<std::uint32_t>& blocks);
+  // Layers of samples of their own, with other random numbers, which are forgotten again: what is
+  // decided by them biases no picture. For a frame begun that has no samples yet; nothing where
+  // `cancelled` ended it.
+  std::optional<Layers> pilot(int samples, const std::function<bool()>& cancelled = {});
+  // From now on the pixels of a block of SAMPLED_BLOCK^2 (row-major) get no more than so many
+  // samples: adaptive sampling, daemon/render/error_estimate.hpp. begin() takes the limits away.
+  void limit_samples(const std::vector<std::uint32_t>& limits);
   // Layers of the samples so far.
   Layers layers() const;
   // The composite through exposure and response, as the display shows it: the plate's own bits

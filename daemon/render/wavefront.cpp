@@ -1,6 +1,7 @@
 #include "daemon/render/wavefront.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "daemon/render/photon_schedule.hpp"
 #include "shaders/accumulate.spv.h"
@@ -114,7 +115,7 @@ void Wavefront::create_paths() {
   sample_landed_ =
       create_storage_buffer(device_, (paths_a_slot_ > 2 ? slots_ : 1) * sizeof(gpu::vec4));
   sample_aov_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
-  sampled_ = create_storage_buffer(
+  limits_ = create_storage_buffer(
       device_, sizeof(std::uint32_t) * sampled_blocks(width_) * sampled_blocks(height_));
   control_ = create_indirect_buffer(device_, sizeof(gpu::GpuControl));
 }
@@ -133,7 +134,7 @@ void Wavefront::write_path_set(const Tile& tile) {
   buffers[gpu::BINDING_SAMPLE_LANDED] = &sample_landed_;
   buffers[gpu::BINDING_CONTROL] = &control_;
   buffers[gpu::BINDING_PIXELS] = &tile.pixels;
-  buffers[gpu::BINDING_SAMPLED] = &sampled_;
+  buffers[gpu::BINDING_LIMITS] = &limits_;
   for (std::uint32_t i = 0; i < gpu::PATH_BINDINGS; ++i)
     write_descriptor(device_, tile.set, i, *buffers[i], false);
 }
@@ -158,21 +159,24 @@ void Wavefront::create_pipelines(std::uint32_t features) {
   features_ = features;
 }
 
-void Wavefront::sample_only(const std::vector<std::uint32_t>& blocks) {
-  upload_bytes(device_, sampled_, std::as_bytes(std::span(blocks)));
+void Wavefront::limit_samples(const std::vector<std::uint32_t>& limits) {
+  upload_bytes(device_, limits_, std::as_bytes(std::span(limits)));
+  sampled_until_ = limits;
+  std::ranges::sort(sampled_until_);
   const std::size_t columns = sampled_blocks(width_);
   for (Tile& tile : tiles_) {
     const std::size_t first = tile.batch.y / gpu::SAMPLED_BLOCK;
     const std::size_t last = (tile.batch.y + tile.batch.height - 1) / gpu::SAMPLED_BLOCK;
-    tile.sampled = std::any_of(blocks.begin() + static_cast<std::ptrdiff_t>(first * columns),
-                               blocks.begin() + static_cast<std::ptrdiff_t>((last + 1) * columns),
-                               [](std::uint32_t wanted) { return wanted != 0; });
+    tile.limit =
+        *std::max_element(limits.begin() + static_cast<std::ptrdiff_t>(first * columns),
+                          limits.begin() + static_cast<std::ptrdiff_t>((last + 1) * columns));
   }
 }
 
 void Wavefront::clear() {
-  sample_only(
-      std::vector<std::uint32_t>(std::size_t{sampled_blocks(width_)} * sampled_blocks(height_), 1));
+  limit_samples(std::vector<std::uint32_t>(
+      std::size_t{sampled_blocks(width_)} * sampled_blocks(height_), gpu::UNLIMITED));
+  photons_owed_ = 0;
   gpu::GpuControl control{};
   control.extend_groups[1] = control.extend_groups[2] = 1;
   control.shadow_groups[1] = control.shadow_groups[2] = 1;
@@ -246,13 +250,13 @@ bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::u
   if ((features_ & gpu::FEATURE_PHOTONS) != 0)
     return render_with_photons(first_sample, samples, max_depth, cancelled);
   for (const Tile& tile : tiles_) {
-    if (!tile.sampled) continue;
     const std::uint32_t at_once = std::max(slots_ / slots_of(tile.batch), 1u);
-    for (std::uint32_t done = 0; done < samples; done += at_once) {
+    const std::uint32_t end = std::min(first_sample + samples, tile.limit);
+    for (std::uint32_t sample = first_sample; sample < end; sample += at_once) {
       if (cancelled && cancelled()) return false;
       gpu::GpuBatch batch = tile.batch;
-      batch.first_sample = first_sample + done;
-      batch.samples = std::min(at_once, samples - done);
+      batch.first_sample = sample;
+      batch.samples = std::min(at_once, end - sample);
       device_.submit([&](const vk::raii::CommandBuffer& commands) {
         record_batch(commands, tile, batch, max_depth);
       });
@@ -261,29 +265,41 @@ bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::u
   return true;
 }
 
-// Sample by sample: each has photons of its own, which all tiles share.
+// Of the picture's blocks, those that get the sample.
+double Wavefront::share_of(std::uint32_t sample) const {
+  const auto first = std::ranges::upper_bound(sampled_until_, sample);
+  return static_cast<double>(sampled_until_.end() - first) /
+         static_cast<double>(sampled_until_.size());
+}
+
+// Sample by sample: each has photons of its own, which all tiles share. They cost the same however
+// few pixels look for them; so where a part of the picture is sampled, some samples share them. (As
+// many as make up a whole picture would leave the last photons with most of the weight.)
 bool Wavefront::render_with_photons(std::uint32_t first_sample, std::uint32_t samples,
                                     std::uint32_t max_depth,
                                     const std::function<bool()>& cancelled) {
   for (std::uint32_t sample = first_sample; sample < first_sample + samples; ++sample) {
-    const double radius =
-        std::max(photon_radius_ * photon_radius_factor(sample), least_photon_radius);
-    bool has_photons = false;
+    photons_owed_ += std::sqrt(share_of(sample));
+    bool trace_photons = photons_owed_ >= 1;
+    if (trace_photons) {
+      photons_owed_ -= 1;
+      traced_radius_ = std::max(photon_radius_ * photon_radius_factor(sample), least_photon_radius);
+    }
     for (const Tile& tile : tiles_) {
-      if (!tile.sampled) continue;
+      if (sample >= tile.limit) continue;
       if (cancelled && cancelled()) return false;
       gpu::GpuBatch batch = tile.batch;
       batch.first_sample = sample;
       batch.samples = 1;
-      batch.photon_radius = static_cast<float>(radius);
+      batch.photon_radius = static_cast<float>(traced_radius_);
       device_.submit([&](const vk::raii::CommandBuffer& commands) {
-        if (!has_photons) {
+        if (trace_photons) {
           bind_sets(commands, tile, batch);
           record_photons(commands, max_depth);
         }
         record_batch(commands, tile, batch, max_depth);
       });
-      has_photons = true;
+      trace_photons = false;
     }
   }
   return true;

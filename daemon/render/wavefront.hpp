@@ -26,12 +26,13 @@ class Wavefront {
   std::uint32_t most_photons() const { return slots_; }
   // What the camera measured, row-major (CameraMap::upload), where `features` has FEATURE_CAMERA.
   void use_camera(const std::vector<glm::vec4>& plate);
-  // Which blocks of SAMPLED_BLOCK^2 pixels are sampled from now on, row-major; 0: not.
-  void sample_only(const std::vector<std::uint32_t>& blocks);
-  // Forgets all samples; every pixel is sampled again.
+  // How many samples the pixels of each block of SAMPLED_BLOCK^2 get at most, row-major.
+  void limit_samples(const std::vector<std::uint32_t>& limits);
+  // Forgets all samples; every pixel is sampled again, without a limit.
   void clear();
-  // Adds samples first_sample .. first_sample + samples - 1 to every pixel. Returns false where
-  // `cancelled` stopped it between two batches: the sums are then uneven and must be cleared.
+  // Adds samples first_sample .. first_sample + samples - 1 to every pixel, up to its limit.
+  // Returns false where `cancelled` stopped it between two batches: the sums are then uneven and
+  // must be cleared.
   bool render(std::uint32_t first_sample, std::uint32_t samples, std::uint32_t max_depth,
               const std::function<bool()>& cancelled);
 
@@ -40,8 +41,8 @@ class Wavefront {
 
  private:
   struct Tile {
-    gpu::GpuBatch batch;  // its rectangle
-    bool sampled = true;  // any of its pixels
+    gpu::GpuBatch batch;      // its rectangle
+    std::uint32_t limit = 0;  // the largest of its blocks'
     Buffer pixels;
     vk::raii::DescriptorSet set{nullptr};
   };
@@ -53,6 +54,7 @@ class Wavefront {
   void write_path_set(const Tile& tile);
   void bind_sets(const vk::raii::CommandBuffer& commands, const Tile& tile,
                  const gpu::GpuBatch& batch) const;
+  double share_of(std::uint32_t sample) const;
   bool render_with_photons(std::uint32_t first_sample, std::uint32_t samples,
                            std::uint32_t max_depth, const std::function<bool()>& cancelled);
   void record_extension(const vk::raii::CommandBuffer& commands) const;
@@ -66,7 +68,10 @@ class Wavefront {
   int width_, height_;
   PhotonMap photons_;
   CameraMap camera_;
-  double photon_radius_ = 0;
+  std::vector<std::uint32_t> sampled_until_;  // the limits of all blocks, least first
+  double photon_radius_ = 0;                  // metres, of the first sample
+  double traced_radius_ = 0;                  // and of the photons that there are
+  double photons_owed_ = 0;                   // passes: at 1 they are traced anew
   vk::raii::DescriptorSetLayout scene_layout_{nullptr}, path_layout_{nullptr};
   vk::raii::PipelineLayout layout_{nullptr};
   vk::raii::DescriptorPool descriptors_{nullptr};
@@ -75,7 +80,7 @@ class Wavefront {
   std::uint32_t features_ = 0;
   Pipeline generate_, advance_, extend_, shade_, prepare_shadow_, shadow_, accumulate_;
   Buffer ray_origin_, ray_direction_, throughput_, hits_, queue_, shadow_rays_, sample_mixed_,
-      sample_real_, sample_landed_, sample_aov_, sampled_, control_;
+      sample_real_, sample_landed_, sample_aov_, limits_, control_;
 };
 
 }  // namespace previz::render

@@ -140,6 +140,7 @@ Shot LiveRender::render(const Look& look, Shot shot) {
   const bool governed = look.governed && governor_;
   set::Quality quality = set_.quality;
   quality.samples = look.samples;
+  quality.adaptive = false;
   if (governed) {
     quality.samples = governor_->samples();
     quality.error = quality.seconds = 0;

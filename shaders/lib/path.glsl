@@ -16,7 +16,7 @@ layout(scalar, set = 1, binding = BINDING_SAMPLE_REAL) buffer Real { vec4 sample
 layout(scalar, set = 1, binding = BINDING_SAMPLE_LANDED) buffer Landed { vec4 sample_landed[]; };
 layout(scalar, set = 1, binding = BINDING_SAMPLE_AOV) buffer Aov { vec4 sample_aov[]; };
 layout(scalar, set = 1, binding = BINDING_CONTROL) buffer Control { GpuControl control; };
-layout(scalar, set = 1, binding = BINDING_SAMPLED) readonly buffer Sampled { uint sampled[]; };
+layout(scalar, set = 1, binding = BINDING_LIMITS) readonly buffer Limits { uint limits[]; };
 layout(scalar, set = 1, binding = BINDING_PIXELS) buffer Pixels { GpuPixel pixels[]; };
 
 // Slots of a tile: pixels in blocks of 8x4 for coherent rays, rounded up; then sample by sample.
@@ -42,6 +42,12 @@ uint pixel_slot(uvec2 pixel) {
   const uvec2 block = pixel / BLOCK;
   const uvec2 in_block = pixel % BLOCK;
   return (block.y * blocks_x + block.x) * BLOCK.x * BLOCK.y + in_block.y * BLOCK.x + in_block.x;
+}
+
+// How many samples a pixel of the picture gets at most.
+uint sample_limit(uvec2 pixel) {
+  const uint blocks_x = (frame.width + SAMPLED_BLOCK - 1u) / SAMPLED_BLOCK;
+  return limits[pixel.y / SAMPLED_BLOCK * blocks_x + pixel.x / SAMPLED_BLOCK];
 }
 
 uint slot_sample(uint slot) { return batch.first_sample + slot / tile_slots(); }

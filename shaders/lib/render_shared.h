@@ -53,8 +53,8 @@ PREVIZ_CONST uint BINDING_SAMPLE_REAL = 7u;    // vec4[slot]: Lr, one of SAMPLE_
 PREVIZ_CONST uint BINDING_SAMPLE_AOV = 8u;     // vec4[slot]: normal, depth (0: no hit)
 PREVIZ_CONST uint BINDING_CONTROL = 9u;        // GpuControl
 PREVIZ_CONST uint BINDING_PIXELS = 10u;        // GpuPixel[width * height]
-PREVIZ_CONST uint BINDING_SAMPLED = 11u;       // uint[]: of each block of the picture, row-major,
-                                               // whether its pixels are sampled
+PREVIZ_CONST uint BINDING_LIMITS = 11u;        // uint[]: of each block of the picture, row-major,
+                                               // how many samples its pixels get
 PREVIZ_CONST uint BINDING_SAMPLE_LANDED = 12u; // vec4[slot]: the real part of PATH_LANDED
 PREVIZ_CONST uint PATH_BINDINGS = 13u;
 
@@ -85,10 +85,10 @@ PREVIZ_CONST uint CAMERA_BINDINGS = 3u;
 // What a slot holds, in the fourth component of its SAMPLE_REAL.
 PREVIZ_CONST float SAMPLE_FULL = 0.0f;        // both radiances
 PREVIZ_CONST float SAMPLE_DIFFERENCE = 1.0f;  // only what differs between them
-PREVIZ_CONST float SAMPLE_NONE = 2.0f;        // nothing: its pixel is not sampled any more
 
-// Sides of the blocks of pixels that are sampled or not.
+// Sides of the blocks of pixels that get the same number of samples.
 PREVIZ_CONST uint SAMPLED_BLOCK = 8u;
+PREVIZ_CONST uint UNLIMITED = 0xffffffffu;
 
 PREVIZ_CONST uint WORKGROUP_SIZE = 64u;
 PREVIZ_CONST uint NO_INDEX = 0xffffffffu;

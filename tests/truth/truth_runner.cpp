@@ -30,6 +30,7 @@ struct Arguments {
   std::vector<fs::path> sets;
   TakeOptions take;
   int samples = 256;
+  bool adaptive = false;
   fs::path out;
   std::optional<std::string> bounds;
   std::vector<int> frames;  // empty: every truth frame
@@ -50,6 +51,7 @@ post::FrameRecord render_frame(const TruthSet& set, int frame, const Arguments& 
   options.session = directory / "session";
   options.frames = post::FrameRange{index, index};
   options.samples = arguments.samples;
+  options.adaptive = arguments.adaptive;
   options.directory = directory / "render";
   options.exr = options.png = true;
   options.video = false;
@@ -206,6 +208,7 @@ int main(int argc, char** argv) {
       ->type_name("truth|tracked");
   app.add_option("--spp", arguments.samples, "samples per pixel [256]")
       ->check(CLI::Range(1, 1000000));
+  app.add_flag("--adaptive", arguments.adaptive, "so many on average, where they bring most");
   app.add_option("--out", arguments.out, "directory for the pictures and figures")->required();
   app.add_option("--bounds", arguments.bounds, "judge by this row of bounds")
       ->check(CLI::IsMember({"paired", "full", "captured"}));

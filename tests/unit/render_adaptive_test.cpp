@@ -1,4 +1,6 @@
 // Adaptive sampling: the estimated error is the true one, and samples go where it is.
+#include <numeric>
+
 #include "daemon/pipeline/refinement.hpp"
 #include "daemon/render/error_estimate.hpp"
 #include "tests/unit/render_fixture.hpp"
@@ -14,7 +16,8 @@ View small_set() {
 }
 
 struct SetRenderer : render::Renderer {
-  explicit SetRenderer(const View& view) : render::Renderer(shared_device(), {}, view.calibration) {
+  explicit SetRenderer(const View& view, const set::Estimation& estimation = {})
+      : render::Renderer(shared_device(), estimation, view.calibration) {
     set_scene(view.scene);
     set_environment(view.environment, set::LightSampling::importance);
   }
@@ -74,16 +77,19 @@ TEST(Adaptive, reaches_the_error_with_fewer_samples_than_even_sampling) {
   EXPECT_LT(rays, renderer.counters().rays * 3 / 4);
 }
 
+// Without photons, which a part of a picture shares among its samples.
 TEST(Adaptive, leaves_the_samples_of_a_pixel_as_they_are) {
   const View view = small_set();
-  SetRenderer renderer(view);
+  set::Estimation estimation;
+  estimation.caustics = set::Caustics::traced;
+  SetRenderer renderer(view, estimation);
   renderer.begin({{}, 1.0, view.world_from_camera});
   renderer.render(8);
   const render::Layers before = renderer.layers();
-  std::vector<std::uint32_t> blocks(8 * 6, 0);
-  blocks[8 * 3 + 4] = 1;  // x 32..39, y 24..31
-  renderer.sample_only(blocks);
-  renderer.render(8);
+  std::vector<std::uint32_t> limits(8 * 6, 8);
+  limits[8 * 3 + 4] = 16;  // x 32..39, y 24..31
+  renderer.limit_samples(limits);
+  renderer.render(20);
   const render::Layers after = renderer.layers();
   renderer.begin({{}, 1.0, view.world_from_camera});
   renderer.render(16);
@@ -111,7 +117,100 @@ TEST(Adaptive, a_block_in_need_brings_its_neighbours) {
   estimate.blocks.assign(12, 0.0f);  // 4 x 3 blocks of 8 x 8 pixels
   estimate.blocks[5] = 0.2f;
   const auto blocks = render::blocks_above(estimate, 32, 24, 0.1);
-  EXPECT_EQ(blocks, (std::vector<std::uint32_t>{1, 1, 1, 0, 1, 1, 1, 0, 1, 1, 1, 0}));
+  EXPECT_EQ(blocks, (std::vector<bool>{1, 1, 1, 0, 1, 1, 1, 0, 1, 1, 1, 0}));
+}
+
+// One block of four by one has all the noise: half of a smoothed variance is a block's own, a tenth
+// its only neighbour's, and what has none gets the least.
+TEST(Adaptive, samples_are_spread_as_the_noise_is) {
+  render::ErrorEstimate estimate;
+  estimate.blocks = {3.0f, 0.0f, 0.0f, 0.0f};
+  const auto limits = render::spread_samples(estimate, 32, 8, 80);
+  const double share = (4 - 2 * 0.125) / (std::sqrt(8.0 / 9) + std::sqrt(1.0 / 10));
+  EXPECT_NEAR(limits[0], 80 * share * std::sqrt(8.0 / 9), 1);
+  EXPECT_NEAR(limits[1], 80 * share * std::sqrt(1.0 / 10), 1);
+  EXPECT_EQ(limits[2], 10u);
+  EXPECT_EQ(limits[3], 10u);
+
+  // Even noise, or none: the same for all.
+  estimate.blocks.assign(4, 0.5f);
+  EXPECT_EQ(render::spread_samples(estimate, 32, 8, 80), std::vector<std::uint32_t>(4, 80));
+  estimate.blocks.assign(4, 0.0f);
+  EXPECT_EQ(render::spread_samples(estimate, 32, 8, 80), std::vector<std::uint32_t>(4, 80));
+}
+
+// No block gets more than eight times the average, however little the others need.
+TEST(Adaptive, one_noisy_block_of_many_gets_the_most_there_is) {
+  render::ErrorEstimate estimate;
+  estimate.blocks.assign(32 * 32, 0.0f);
+  estimate.blocks[500] = 1;
+  const auto limits = render::spread_samples(estimate, 256, 256, 64);
+  EXPECT_EQ(limits[500], 512u);
+  EXPECT_EQ(limits[0], 8u);
+}
+
+TEST(Adaptive, noise_above_white_is_not_seen) {
+  render::Layers layers;
+  layers.width = 24;
+  layers.height = 8;
+  layers.white = 2;
+  layers.composite.assign(24 * 8, glm::vec3(1));
+  layers.variance.assign(24 * 8, glm::vec3(0.01f));
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 8; x < 16; ++x) layers.composite[24 * y + x] = glm::vec3(2.05f);
+    for (int x = 16; x < 24; ++x) layers.composite[24 * y + x] = glm::vec3(50);
+    for (int x = 16; x < 24; ++x) layers.variance[24 * y + x] = glm::vec3(25);
+  }
+  const render::ErrorEstimate estimate = render::estimate_error(layers);
+  const double rms = std::sqrt(3 * (1 + 4 + 4) / 3.0);
+  EXPECT_NEAR(estimate.blocks[0], std::sqrt(3 * 0.01) / rms, 1e-6);
+  EXPECT_NEAR(estimate.blocks[1], std::sqrt(3 * 0.05 * 0.05) / rms, 1e-6);
+  EXPECT_EQ(estimate.blocks[2], 0);
+}
+
+struct Group {  // of pictures that differ in their random numbers
+  double squared_error = 0;
+  std::vector<double> sums;
+
+  double mean() const { return std::accumulate(sums.begin(), sums.end(), 0.0) / count(); }
+  double squared_standard_error() const {
+    double square = 0;
+    for (const double sum : sums) square += (sum - mean()) * (sum - mean());
+    return square / (count() - 1) / count();
+  }
+  double count() const { return static_cast<double>(sums.size()); }
+};
+
+// With the same number of samples; and as a whole the mean of many pictures is that of even ones.
+TEST(Adaptive, a_budget_spent_by_need_makes_the_better_picture_and_no_other) {
+  const View view = small_set();
+  SetRenderer renderer(view);
+  const auto picture = [&](int samples, bool adaptive, std::uint32_t seed) {
+    set::Quality wish = quality(samples, 0);
+    wish.adaptive = adaptive;
+    renderer.begin({{}, 1.0, view.world_from_camera, seed});
+    const pipeline::Refined refined = pipeline::refine(renderer, wish, {}, {});
+    EXPECT_TRUE(refined.whole);
+    EXPECT_EQ(refined.samples, wish.samples);
+    expect_clean(renderer.counters());
+    return renderer.layers();
+  };
+  const render::Layers reference = picture(256, false, 1000);
+  const auto add = [&](Group& group, const render::Layers& layers) {
+    group.squared_error += std::pow(rms_difference(layers, reference), 2);
+    double sum = 0;
+    for (const glm::vec3& value : layers.composite) sum += value.r + value.g + value.b;
+    group.sums.push_back(sum);
+  };
+  Group even, adaptive;
+  for (std::uint32_t seed = 1; seed <= 6; ++seed) {
+    add(even, picture(32, false, seed));
+    add(adaptive, picture(32, true, seed));
+  }
+  EXPECT_LT(adaptive.squared_error, 0.8 * even.squared_error);
+  const double standard_error =
+      std::sqrt(even.squared_standard_error() + adaptive.squared_standard_error());
+  EXPECT_LT(std::abs(adaptive.mean() - even.mean()), 4 * standard_error);
 }
 
 }  // namespace

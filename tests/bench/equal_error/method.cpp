@@ -1,12 +1,15 @@
 #include "tests/bench/equal_error/method.hpp"
 
+#include "daemon/pipeline/refinement.hpp"
 #include "tests/bench/measure.hpp"
 
 namespace previz::bench {
 
 MethodRun::MethodRun(const std::shared_ptr<render::Device>& device, const View& view,
                      const Method& method)
-    : world_from_camera_(view.world_from_camera) {
+    : world_from_camera_(view.world_from_camera),
+      exposure_(view.exposure),
+      adaptive_(method.adaptive) {
   set::Estimation estimation = method.estimation;
   if (method.separate) estimation.estimator = set::Estimator::paired;
   const auto add = [&](const scene::Scene& scene) {
@@ -28,19 +31,34 @@ MethodRun::MethodRun(const std::shared_ptr<render::Device>& device, const View& 
 void MethodRun::begin(std::uint32_t seed) {
   samples_ = 0;
   cpu_s_ = 0;
+  seed_ = seed;
+  begin_frame();
+}
+
+void MethodRun::begin_frame() {
   for (std::size_t i = 0; i < renderers_.size(); ++i) {
     render::FrameInput frame;
     frame.world_from_camera = world_from_camera_;
-    frame.seed = 2 * seed + static_cast<std::uint32_t>(i);
+    frame.exposure = exposure_;
+    frame.seed = 2 * seed_ + static_cast<std::uint32_t>(i);
     renderers_[i]->begin(frame);
   }
 }
 
 void MethodRun::render(int samples) {
-  const double start = cpu_seconds();
-  for (const auto& renderer : renderers_) renderer->render(samples);
-  cpu_s_ += cpu_seconds() - start;
   samples_ += samples;
+  if (adaptive_) begin_frame();
+  const double start = cpu_seconds();
+  if (!adaptive_) {
+    for (const auto& renderer : renderers_) renderer->render(samples);
+    cpu_s_ += cpu_seconds() - start;
+    return;
+  }
+  set::Quality quality;
+  quality.samples = samples_;
+  quality.adaptive = true;
+  pipeline::refine(*renderers_.front(), quality, {}, {});
+  cpu_s_ = cpu_seconds() - start;
 }
 
 render::Counters MethodRun::counters() const {

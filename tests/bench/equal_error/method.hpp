@@ -16,12 +16,13 @@ struct Method {
   set::Estimation estimation;
   bool separate = false;  // each world alone, with random numbers of its own; estimator is ignored
   set::LightSampling sampling = set::LightSampling::importance;  // of the view's environment
+  bool adaptive = false;  // quality.adaptive: what was rendered before is rendered again
 };
 
 // A method at work on a view. Time is CPU time of all threads, of rendering alone.
 class MethodRun {
  public:
-  // Compiles its pipelines, which is not timed.
+  // Compiles its pipelines, which is not timed. An adaptive method is not separate.
   MethodRun(const std::shared_ptr<render::Device>& device, const View& view, const Method& method);
 
   // Forgets what was rendered and the time it took.
@@ -36,7 +37,12 @@ class MethodRun {
   truth::EstimatedFrame estimate() const;
 
  private:
+  void begin_frame();
+
   glm::dmat4 world_from_camera_;
+  double exposure_;
+  bool adaptive_;
+  std::uint32_t seed_ = 0;
   std::vector<std::unique_ptr<render::Renderer>> renderers_;  // of both worlds; of mixed, of real
   int samples_ = 0;
   double cpu_s_ = 0;
