@@ -9,11 +9,10 @@
 namespace previz {
 
 // `settings.device` is a serial number, an Aravis device id ("Vendor-Model-Serial", or without
-// the model), or the address of a
-// network camera. Sequence numbers are the device's block ids, unwrapped; capture times are the
-// device's time stamps, mapped to the host's clock (clock_map.hpp). Where the camera can put its
-// exposure into each frame (chunk data) the frames say that; otherwise frames around a change are
-// left out and counted.
+// the model), or the address of a network camera. Sequence numbers are the device's block ids,
+// unwrapped; capture times are the device's time stamps, mapped to the host's clock
+// (clock_map.hpp). Where the camera can put its exposure into each frame (chunk data) the frames
+// say that; otherwise frames around a change are left out and counted.
 //
 // Gain is driven where the camera gives it in dB (x dB is a factor of 10^(x/20)); other scales are
 // the vendor's own, and a gain asked of them is an error. Frames then say 1.
