@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -49,11 +50,11 @@ Refined spread(render::Renderer& renderer, int samples, const std::function<bool
     done += now;
     double spent = 0;
     for (const std::uint32_t limit : limits) spent += std::min(limit, done);
-    refined.samples = pilot_samples + static_cast<int>(spent / static_cast<double>(limits.size()));
+    refined.samples =
+        pilot_samples + static_cast<int>(std::lround(spent / static_cast<double>(limits.size())));
     if (progress) progress(refined.samples);
   }
   refined.whole = true;
-  refined.samples = samples;
   return refined;
 }
 

@@ -11,7 +11,7 @@ namespace previz::pipeline {
 
 struct Refined {
   bool whole = false;  // false: cancelled
-  int samples = 0;     // the most that a pixel got; with quality.adaptive the average
+  int samples = 0;     // the most that a pixel got; with quality.adaptive their mean
   double error = 0;    // estimated rms error over the picture's rms; 0 where nothing was asked for
 };
 

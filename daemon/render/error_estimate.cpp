@@ -99,6 +99,7 @@ std::vector<std::uint32_t> spread_samples(const ErrorEstimate& estimate, int wid
                                           int samples) {
   constexpr double least_share = 1.0 / 8, most_share = 8;
   constexpr int halvings = 60;  // of an interval of doubles: all there are
+  constexpr double no_error = 1e-12;
   const Grid grid = grid_of(width, height);
   const std::vector<double> error = smoothed(estimate, grid);
   const auto share = [&](std::size_t cell, double gain) {
@@ -109,11 +110,10 @@ std::vector<std::uint32_t> spread_samples(const ErrorEstimate& estimate, int wid
     for (std::size_t cell = 0; cell < grid.size(); ++cell) sum += share(cell, gain);
     return sum / static_cast<double>(grid.size());
   };
-  // Blocks at a bound leave more, or less, to the others.
-  const double least = *std::ranges::min_element(error);
-  if (!(least > 0) && !(*std::ranges::max_element(error) > 0))
+  if (*std::ranges::max_element(error) < no_error)
     return std::vector<std::uint32_t>(grid.size(), static_cast<std::uint32_t>(samples));
-  double low = 0, high = most_share / std::max(least, 1e-12);
+  // Blocks at a bound leave more, or less, to the others.
+  double low = 0, high = most_share / no_error;
   for (int i = 0; i < halvings; ++i)
     (mean_share((low + high) / 2) < 1 ? low : high) = (low + high) / 2;
   std::vector<std::uint32_t> limits;

@@ -70,6 +70,7 @@ Cameras open_cameras(const set::Set& set, bool loop, const Usb& usb) {
     cameras.recorded = session::open_session(set.observer.device);
     observer = open_frames(cameras.recorded, "observer");
     options.origin->timestamp_ns = observer->records().front().timestamp_ns;
+    options.lap_ns = replay_lap_ns(observer->records());
   } else {
     cameras.observer = drive_camera(set, observer_order(set), usb);
   }
@@ -80,9 +81,11 @@ Cameras open_cameras(const set::Set& set, bool loop, const Usb& usb) {
     auto light = open_frames(session, "light");
     ReplayOptions light_options = options;
     light_options.origin->timestamp_ns = light->records().front().timestamp_ns;
+    light_options.lap_ns = replay_lap_ns(light->records());
     if (session.directory == cameras.recorded.directory) {
       options.origin->timestamp_ns =
           std::min(options.origin->timestamp_ns, light_options.origin->timestamp_ns);
+      options.lap_ns = std::max(options.lap_ns, light_options.lap_ns);
       light_options = options;
     }
     if (!cameras.recorded.info.light) cameras.recorded.info.light = session.info.light;
@@ -91,7 +94,7 @@ Cameras open_cameras(const set::Set& set, bool loop, const Usb& usb) {
     cameras.light = drive_camera(set, light_order(set), usb);
   }
   if (observer) {
-    if (loop) cameras.lap_ns = replay_lap_ns(observer->records());
+    if (loop) cameras.lap_ns = options.lap_ns;
     cameras.observer =
         start_replay(set, observer_order(set), cameras.recorded, std::move(observer), options);
     cameras.origin = *options.origin;

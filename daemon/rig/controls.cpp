@@ -76,6 +76,7 @@ Outcome Controls::change(Event event) {
   const Step taken = step(before, event);
   if (taken.refused) return {taken.refused, true, {}};
   look_.state = taken.state;
+  if (taken.state.mode == Mode::refine && before.mode != Mode::refine) ++look_.refinements;
   Outcome outcome;
   if (taken.state.recording != before.recording) {
     outcome.request = taken.state.recording ? Request::start_take : Request::stop_take;

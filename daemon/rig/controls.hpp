@@ -29,6 +29,7 @@ struct Look {
   int exposure_steps = 0;               // asked for so far, up less down
   std::uint64_t snapshots = 0;          // asked for so far of live pictures
   std::uint64_t refined_snapshots = 0;  // and of refined ones
+  std::uint64_t refinements = 0;        // begun so far
 };
 
 // What only somebody with devices and files can do.

@@ -58,7 +58,8 @@ std::optional<Shot> LiveRender::next_picture() {
     tell_dropped();
     const std::shared_ptr<const Look> look = look_.get();
     save_refined(*look);
-    if (look->state.mode != Mode::refine) refining_ = false;
+    if (look->state.mode != Mode::refine || look->refinements != refinements_) refining_ = false;
+    refinements_ = look->refinements;
     std::optional<Shot> shot =
         look->state.mode == Mode::refine ? refine(*look) : wait_for_frame(*look);
     if (shot) return shot;

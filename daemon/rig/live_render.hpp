@@ -73,7 +73,7 @@ class LiveRender {
   pipeline::Edits refined_edits_;
   double sample_s_ = 0;  // that a sample of a refinement took last; 0: not known
   pipeline::DropCount<pipeline::Shot> drops_;
-  std::uint64_t snapshots_ = 0, refined_snapshots_ = 0;  // of the look's, done
+  std::uint64_t snapshots_ = 0, refined_snapshots_ = 0, refinements_ = 0;  // of the look's, done
 };
 
 }  // namespace previz::rig

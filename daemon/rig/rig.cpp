@@ -131,8 +131,12 @@ std::optional<LoadedSet> Rig::run() {
   return std::nullopt;
 }
 
+// What was pressed after a set was read again is the next rig's.
 void Rig::read(Device& device) {
-  while (std::optional<ButtonsEvent> event = device.buttons->next()) {
+  inbox();  // a frame that came before the press
+  while (!next_) {
+    std::optional<ButtonsEvent> event = device.buttons->next();
+    if (!event) return;
     bool over = std::holds_alternative<EndOfStream>(*event);
     if (auto* pushed = std::get_if<ButtonEvent>(&*event)) {
       faults_.well(device.buttons->name());
@@ -181,11 +185,13 @@ Outcome Rig::wish(Event event, const std::string& by) {
 }
 
 Outcome Rig::tell(Outcome outcome, const std::string& by) {
-  publish();
+  // The recorder takes what is shown from when it is told that there is a take.
+  if (outcome.request != Request::start_take) publish();
   if (outcome.request) {
     if (std::optional<std::string> why_not = carry_out(*outcome.request))
       outcome = {*std::move(why_not), true, {}};
   }
+  if (outcome.request == Request::start_take) publish();
   const std::string line = by + ": " + outcome.said + (outcome.refused ? " (refused)" : "");
   parts_.note.again(line);
   recorder_.offer_event(now_ns(), line);

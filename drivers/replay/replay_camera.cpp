@@ -101,13 +101,14 @@ class ReplayCamera final : public Camera {
     return options_.origin->due + nanoseconds(static_cast<std::int64_t>(wait_ns));
   }
 
-  std::int64_t lap_ns() const {
+  std::int64_t own_lap_ns() const {
     return replay_lap_ns(
         std::span(stream_->records()).subspan(options_.first, options_.last - options_.first + 1));
   }
+  std::int64_t lap_ns() const { return options_.lap_ns > 0 ? options_.lap_ns : own_lap_ns(); }
 
   double rate_hz() const {
-    const std::int64_t lap = lap_ns();
+    const std::int64_t lap = own_lap_ns();
     const auto frames = static_cast<double>(options_.last - options_.first + 1);
     return lap > 0 && frames > 1 ? options_.speed * frames * 1e9 / static_cast<double>(lap) : 0;
   }

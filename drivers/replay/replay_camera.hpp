@@ -27,6 +27,9 @@ struct ReplayPosition {
 struct ReplayOptions {
   double speed = 1.0;  // 1: as recorded; 2: twice as fast; 0: as fast as frames are asked for
   bool loop = false;   // at the end from the start again; timestamps and sequence keep increasing
+  // From a frame of a loop to the same a lap later; 0: replay_lap_ns of this stream. Streams that
+  // keep a common time need a common lap, the longest of theirs.
+  std::int64_t lap_ns = 0;
   // Positions in the stream's records, both included; beyond the last record means the last.
   std::size_t first = 0;
   std::size_t last = std::numeric_limits<std::size_t>::max();

@@ -89,6 +89,22 @@ TEST_F(RenderSession, TheVirtualCardCoversThePlateAndTheRestShowsIt) {
   EXPECT_EQ(seen.composite[middle], seen.mixed[middle]);
 }
 
+TEST_F(RenderSession, AnAdaptivePictureSaysSoAndIsNoOther) {
+  test::write_small_take(directory_.path());
+  RenderOptions options;
+  options.frames = FrameRange{1, 1};
+  options.samples = 64;
+  options.adaptive = true;
+  std::vector<pipeline::Shot> shots;
+  options.on_frame = [&](const pipeline::Shot& shot) { shots.push_back(shot); };
+  render(options);
+  EXPECT_NE(out_.str().find("64 samples on average"), std::string::npos) << out_.str();
+  EXPECT_NEAR(shots.at(0).samples, 64, 1);
+  EXPECT_GT(shots.at(0).layers.samples, 64);  // where it was noisy
+  options.adaptive = false;
+  EXPECT_THROW(render(options), Error);  // what is there already was made otherwise
+}
+
 // Of the light camera's frames nothing is used: the frame before the first of them is lit too, by
 // ten times the light's red as of the others.
 TEST_F(RenderSession, TheRecordedLightLightsEveryFrame) {
@@ -249,7 +265,14 @@ TEST_F(RenderSession, LiveShowsThePreviewAtTheSetsScaleAndOfflineIsFullSize) {
 
 TEST_F(RenderSession, LiveFillsTheLightFromTheFilmCamera) {
   test::write_small_take(directory_.path(), true, "[lighting]\nunseen = \"observer\"\n");
-  const pipeline::MetricsSnapshot metrics = rig::run_live(live_options(), out_);
+  std::stop_source stop;
+  rig::LiveOptions options = live_options();
+  options.loop = true;
+  options.stop = stop.get_token();
+  options.on_shown = [&](const pipeline::Shot& shot, const rig::Look&) {
+    if (shot.light) stop.request_stop();
+  };
+  const pipeline::MetricsSnapshot metrics = rig::run_live(options, out_);
   EXPECT_GT(metrics.stages.at("lighting").frames, 0u);
   EXPECT_NE(out_.str().find("filled by the rule \"observer\""), std::string::npos) << out_.str();
 }

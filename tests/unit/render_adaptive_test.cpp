@@ -191,7 +191,7 @@ TEST(Adaptive, a_budget_spent_by_need_makes_the_better_picture_and_no_other) {
     renderer.begin({{}, 1.0, view.world_from_camera, seed});
     const pipeline::Refined refined = pipeline::refine(renderer, wish, {}, {});
     EXPECT_TRUE(refined.whole);
-    EXPECT_EQ(refined.samples, wish.samples);
+    EXPECT_NEAR(refined.samples, wish.samples, 1);  // rounded block by block
     expect_clean(renderer.counters());
     return renderer.layers();
   };

@@ -11,6 +11,7 @@
 #include "drivers/camera_drivers.hpp"
 #include "drivers/error.hpp"
 #include "tests/unit/session_fixture.hpp"
+#include "tests/unit/small_take.hpp"
 
 namespace previz::rig {
 namespace {
@@ -54,15 +55,33 @@ TEST_F(RigCameras, AReplayedCameraStreams) {
 TEST_F(RigCameras, FaultsAreRehearsedOnATake) {
   set::Set set = replayed();
   set.observer.faults = {"corrupt@2", "disconnect@4+0s"};
-  const Cameras cameras = open_cameras(set);
+  const Cameras cameras = open_cameras(set, /*loop=*/true);
   std::string story;
-  while (story.size() < 40) {
+  while (story.size() < 6) {
     const CameraEvent event = cameras.observer->next(milliseconds(1000));
     if (std::holds_alternative<EndOfStream>(event)) break;
     if (std::holds_alternative<FramePtr>(event)) story += 'f';
     if (std::holds_alternative<DeviceTrouble>(event)) story += 't';
   }
   EXPECT_TRUE(story.starts_with("fftftf")) << story;
+}
+
+// The light's three frames last 3 ms, the film camera's eight 320: each lap is as long as the
+// longer.
+TEST_F(RigCameras, LoopedStreamsOfASessionStayTogether) {
+  test::write_small_take(directory_.path());
+  set::Set set = replayed();
+  set.observer.device = (directory_.path() / "session").string();
+  set.light_camera.driver = set::Driver::replay;
+  const Cameras cameras = open_cameras(set, /*loop=*/true);
+  EXPECT_EQ(cameras.lap_ns, 8 * test::small_take_interval_ns);
+  std::vector<FramePtr> frames;
+  while (frames.size() < 4) {
+    CameraEvent event = cameras.light->next(milliseconds(10'000));
+    ASSERT_TRUE(std::holds_alternative<FramePtr>(event));
+    frames.push_back(std::get<FramePtr>(event));
+  }
+  EXPECT_EQ(frames[3]->timestamp_ns, frames[0]->timestamp_ns + cameras.lap_ns);
 }
 
 TEST_F(RigCameras, MistakesNameFileAndKey) {
@@ -100,7 +119,7 @@ TEST_F(RigCameras, WhatADeviceCountsIsInTheMetrics) {
   pipeline::Metrics metrics;
   Faults faults;
   for (int loaded = 1; loaded <= 2; ++loaded) {
-    const Cameras cameras = open_cameras(set);
+    const Cameras cameras = open_cameras(set, /*loop=*/true);
     CameraSource source(*cameras.observer, "observer", "film camera",
                         {{}, note, metrics, faults, 1.0, {}});
     for (int i = 0; i < 4; ++i) ASSERT_TRUE(source.next());
