@@ -19,7 +19,7 @@ class Accumulator {
  public:
   explicit Accumulator(Device& device) : device_(device) {
     const auto storage = [](std::uint32_t) { return vk::DescriptorType::eStorageBuffer; };
-    scene_layout_ = render::create_set_layout(device, 0, storage);
+    scene_layout_ = render::create_set_layout(device, gpu::SCENE_BINDINGS, storage);
     path_layout_ = render::create_set_layout(device, gpu::PATH_BINDINGS, storage);
     const vk::DescriptorSetLayout layouts[] = {*scene_layout_, *path_layout_};
     const vk::PushConstantRange constants(vk::ShaderStageFlagBits::eCompute, 0,
@@ -33,6 +33,10 @@ class Accumulator {
       *buffer = render::create_storage_buffer(device, samples);
     render::upload_storage(device, pixels_, std::vector<gpu::GpuPixel>(1));
     render::upload_storage(device, control_, std::vector<gpu::GpuControl>(1));
+    render::upload_storage(device, limits_, std::vector{gpu::UNLIMITED});
+    gpu::GpuFrame frame{};
+    frame.width = frame.height = 1;
+    render::upload_storage(device, frame_, std::vector{frame});
     bind();
   }
 
@@ -45,7 +49,8 @@ class Accumulator {
     const gpu::GpuBatch batch{0, 0, 1, 1, 0, static_cast<std::uint32_t>(mixed.size()), 0};
     device_.submit([&](const vk::raii::CommandBuffer& commands) {
       commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipeline_.pipeline);
-      commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *layout_, 1, *set_, {});
+      const vk::DescriptorSet sets[] = {*scene_set_, *path_set_};
+      commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *layout_, 0, sets, {});
       commands.pushConstants<gpu::GpuBatch>(*layout_, vk::ShaderStageFlagBits::eCompute, 0, batch);
       commands.dispatch(1, 1, 1);
       render::barrier(commands);
@@ -75,26 +80,33 @@ class Accumulator {
   }
 
   void bind() {
-    const vk::DescriptorPoolSize size(vk::DescriptorType::eStorageBuffer, gpu::PATH_BINDINGS);
+    const vk::DescriptorPoolSize size(vk::DescriptorType::eStorageBuffer,
+                                      gpu::SCENE_BINDINGS + gpu::PATH_BINDINGS);
     pool_ = vk::raii::DescriptorPool(
-        device_.vk(), {vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet, 1, size});
-    set_ = std::move(vk::raii::DescriptorSets(device_.vk(), {*pool_, *path_layout_}).front());
+        device_.vk(), {vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet, 2, size});
+    const auto allocate = [&](const vk::raii::DescriptorSetLayout& layout) {
+      const vk::DescriptorSetLayout raw = *layout;
+      return std::move(vk::raii::DescriptorSets(device_.vk(), {*pool_, raw}).front());
+    };
+    scene_set_ = allocate(scene_layout_);
+    path_set_ = allocate(path_layout_);
+    render::write_descriptor(device_, scene_set_, gpu::BINDING_FRAME, frame_, false);
     for (const auto& [binding, buffer] :
          {std::pair(gpu::BINDING_SAMPLE_MIXED, &mixed_),
           std::pair(gpu::BINDING_SAMPLE_REAL, &real_),
           std::pair(gpu::BINDING_SAMPLE_LANDED, &landed_),
           std::pair(gpu::BINDING_SAMPLE_AOV, &aov_), std::pair(gpu::BINDING_CONTROL, &control_),
-          std::pair(gpu::BINDING_PIXELS, &pixels_)})
-      render::write_descriptor(device_, set_, binding, *buffer, false);
+          std::pair(gpu::BINDING_PIXELS, &pixels_), std::pair(gpu::BINDING_LIMITS, &limits_)})
+      render::write_descriptor(device_, path_set_, binding, *buffer, false);
   }
 
   Device& device_;
   vk::raii::DescriptorSetLayout scene_layout_{nullptr}, path_layout_{nullptr};
   vk::raii::PipelineLayout layout_{nullptr};
   render::Pipeline pipeline_;
-  Buffer mixed_, real_, landed_, aov_, pixels_, control_;
+  Buffer mixed_, real_, landed_, aov_, pixels_, control_, limits_, frame_;
   vk::raii::DescriptorPool pool_{nullptr};
-  vk::raii::DescriptorSet set_{nullptr};
+  vk::raii::DescriptorSet scene_set_{nullptr}, path_set_{nullptr};
   std::vector<gpu::vec4> staging_;
 };
 
