@@ -175,6 +175,7 @@ TEST_F(RigDisplay, ShowsThePictureAndTheWordsOfEveryMode) {
     until([](const OsdPage& page) { return page == OsdPage{}; });
     press("osd");
     until_mode("LIVE");
+    // It is written by a thread of its own, which tells no page; an end would leave it out.
     const auto saved = directory_ / "live/snapshot_0001.exr";
     const auto end = std::chrono::steady_clock::now() + test::crew_patience;
     while (!std::filesystem::exists(saved) && std::chrono::steady_clock::now() < end)
