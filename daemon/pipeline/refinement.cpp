@@ -22,6 +22,10 @@ constexpr int pilot_share = 16;
 // With fewer samples too many of them would be spent on that.
 constexpr int least_adaptive_samples = 32;
 
+bool goes_on(const set::Quality& quality) {
+  return quality.error > 0 || quality.seconds > 0;
+}
+
 std::vector<std::uint32_t> limits_of(const std::vector<bool>& active, int samples) {
   std::vector<std::uint32_t> limits;
   for (const bool more : active)
@@ -50,15 +54,19 @@ Refined spread(render::Renderer& renderer, int samples, const std::function<bool
     done += now;
     double spent = 0;
     for (const std::uint32_t limit : limits) spent += std::min(limit, done);
-    refined.samples =
-        pilot_samples + static_cast<int>(std::lround(spent / static_cast<double>(limits.size())));
-    if (progress) progress(refined.samples);
+    const double mean = pilot_samples + spent / static_cast<double>(limits.size());
+    if (progress) progress(static_cast<int>(std::lround(mean)));
   }
+  refined.samples = static_cast<int>(most);
   refined.whole = true;
   return refined;
 }
 
 }  // namespace
+
+bool spreads_samples(const set::Quality& quality) {
+  return quality.adaptive && !goes_on(quality) && quality.samples >= least_adaptive_samples;
+}
 
 Refined refine(render::Renderer& renderer, const set::Quality& quality,
                const std::function<bool()>& cancelled,
@@ -69,9 +77,7 @@ Refined refine(render::Renderer& renderer, const set::Quality& quality,
     return quality.seconds > 0 &&
            std::chrono::duration<double>(Clock::now() - begin).count() >= quality.seconds;
   };
-  const bool has_target = quality.error > 0 || quality.seconds > 0;
-  if (quality.adaptive && !has_target && quality.samples >= least_adaptive_samples)
-    return spread(renderer, quality.samples, cancelled, progress);
+  if (spreads_samples(quality)) return spread(renderer, quality.samples, cancelled, progress);
   Refined refined;
   const auto add = [&](int samples) {
     const int batch = std::max(1, samples / batches_a_round);
@@ -85,6 +91,7 @@ Refined refine(render::Renderer& renderer, const set::Quality& quality,
     }
     return true;
   };
+  const bool has_target = goes_on(quality);
   int samples = has_target ? std::max(quality.samples, least_samples) : quality.samples;
   while (add(samples)) {
     if (!has_target) {

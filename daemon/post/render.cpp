@@ -13,6 +13,7 @@
 
 #include "daemon/pipeline/news.hpp"
 #include "daemon/pipeline/recorded_light.hpp"
+#include "daemon/pipeline/refinement.hpp"
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/stages.hpp"
 #include "daemon/pipeline/take.hpp"
@@ -195,14 +196,17 @@ std::string done_text(const Shot& shot) {
   const std::string frame = "frame " + std::to_string(shot.index) + ": ";
   if (!shot.untouched.empty()) return frame + "plate untouched, " + shot.untouched;
   std::string text =
-      frame + std::to_string(shot.samples) + " samples in " + duration_words(shot.render_s);
+      frame + std::to_string(shot.layers.samples) + " samples in " + duration_words(shot.render_s);
   if (shot.error > 0) text += ", error " + percent_words(shot.error);
   return text;
 }
 
 std::string quality_words(const set::Quality& quality) {
   std::string text = std::to_string(quality.samples) + " samples";
-  if (quality.adaptive) text += " on average";
+  if (pipeline::spreads_samples(quality))
+    text += " on average";
+  else if (quality.adaptive)
+    text += ", the same for every pixel (adaptive takes 32 or more, and neither error nor seconds)";
   if (quality.error > 0) text += ", then to an error of " + percent_words(quality.error);
   if (quality.seconds > 0)
     text += ", then for " + duration_words(quality.seconds) + " a frame at most";

@@ -53,7 +53,8 @@ std::string Controls::selected_light() const {
 }
 
 Outcome Controls::perform(const set::Action& action, bool ended_refinement) {
-  ended_refinement_ = ended_refinement;
+  if (ended_refinement && std::holds_alternative<set::Snapshot>(action.effect))
+    return snapshot(&Look::refined_snapshots);
   return std::visit([this](const auto& effect) { return apply(effect); }, action.effect);
 }
 
@@ -112,8 +113,11 @@ Outcome Controls::apply(const set::MarkGood&) {
 }
 
 Outcome Controls::apply(const set::Snapshot&) {
-  const bool refined = ended_refinement_ || look_.state.mode == Mode::refine;
-  ++(refined ? look_.refined_snapshots : look_.snapshots);
+  return snapshot(look_.state.mode == Mode::refine ? &Look::refined_snapshots : &Look::snapshots);
+}
+
+Outcome Controls::snapshot(std::uint64_t Look::*of) {
+  ++(look_.*of);
   return {"snapshot", false, {}};
 }
 

@@ -65,6 +65,7 @@ class Controls {
 
  private:
   Outcome change(Event event);
+  Outcome snapshot(std::uint64_t Look::*of);
   Outcome apply(const set::ToMode& effect);
   Outcome apply(const set::Record& effect);
   Outcome apply(const set::MarkGood& effect);
@@ -93,7 +94,6 @@ class Controls {
   std::vector<std::string> objects_;  // the virtual ones
   std::vector<std::string> lights_;
   const bool is_animated_;
-  bool ended_refinement_ = false;  // what is being performed
   std::size_t object_ = 0, light_ = 0;
   Look look_;
 };

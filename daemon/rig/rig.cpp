@@ -185,13 +185,11 @@ Outcome Rig::wish(Event event, const std::string& by) {
 }
 
 Outcome Rig::tell(Outcome outcome, const std::string& by) {
-  // The recorder takes what is shown from when it is told that there is a take.
-  if (outcome.request != Request::start_take) publish();
   if (outcome.request) {
     if (std::optional<std::string> why_not = carry_out(*outcome.request))
       outcome = {*std::move(why_not), true, {}};
   }
-  if (outcome.request == Request::start_take) publish();
+  publish();  // after it: there is a take before what is shown is to be in it
   const std::string line = by + ": " + outcome.said + (outcome.refused ? " (refused)" : "");
   parts_.note.again(line);
   recorder_.offer_event(now_ns(), line);

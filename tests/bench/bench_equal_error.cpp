@@ -52,12 +52,12 @@ std::vector<Method> all_methods() {
       method("paper", paired, 0, photons),
       method("difference, caustics traced", difference, bounds, set::Caustics::traced),
       method("paper, caustics traced", paired, 0, set::Caustics::traced),
-      method("difference, adaptive", difference, bounds, photons),
-      method("paper, light by BSDF", paired, 0, photons),
-      method("two renders", paired, 0, photons),
   };
-  methods[methods.size() - 3].adaptive = true;
-  methods[methods.size() - 2].sampling = set::LightSampling::bsdf;
+  methods.push_back(method("difference, adaptive", difference, bounds, photons));
+  methods.back().adaptive = true;
+  methods.push_back(method("paper, light by BSDF", paired, 0, photons));
+  methods.back().sampling = set::LightSampling::bsdf;
+  methods.push_back(method("two renders", paired, 0, photons));
   methods.back().separate = true;
   return methods;
 }

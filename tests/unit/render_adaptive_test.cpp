@@ -191,7 +191,7 @@ TEST(Adaptive, a_budget_spent_by_need_makes_the_better_picture_and_no_other) {
     renderer.begin({{}, 1.0, view.world_from_camera, seed});
     const pipeline::Refined refined = pipeline::refine(renderer, wish, {}, {});
     EXPECT_TRUE(refined.whole);
-    EXPECT_NEAR(refined.samples, wish.samples, 1);  // rounded block by block
+    EXPECT_EQ(refined.samples > wish.samples, adaptive);  // the most that a pixel got
     expect_clean(renderer.counters());
     return renderer.layers();
   };
@@ -207,6 +207,8 @@ TEST(Adaptive, a_budget_spent_by_need_makes_the_better_picture_and_no_other) {
     add(even, picture(32, false, seed));
     add(adaptive, picture(32, true, seed));
   }
+  // Spread at random it would be 32/24: eight of the samples are the pilot's. With these seeds it
+  // is 0.65.
   EXPECT_LT(adaptive.squared_error, 0.8 * even.squared_error);
   const double standard_error =
       std::sqrt(even.squared_standard_error() + adaptive.squared_standard_error());

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <condition_variable>
 #include <deque>
+#include <memory>
 #include <mutex>
 #include <sstream>
 #include <thread>
@@ -42,6 +43,8 @@ std::string words_of(const OsdPage& page) {
 
 class RigDisplay : public testing::Test {
  protected:
+  using Pictures = std::deque<std::shared_ptr<const Plate>>;
+
   void write_set(const std::string& display) {
     std::string text = "[recording]\nslate = \"12A\"\nreserve_mb = 1\ndirectory = \"takes\"\n";
     text += test::button_for_every_action();
@@ -52,7 +55,7 @@ class RigDisplay : public testing::Test {
     LiveOptions options;
     options.on_shown = [&](const pipeline::Shot& shot, const Look&) {
       const std::lock_guard lock(mutex_);
-      pictures_.push_back(shot.picture);
+      pictures_.push_back(std::make_shared<const Plate>(shot.picture));
       if (pictures_.size() > 1024) pictures_.pop_front();
       news_.notify_all();
     };
@@ -61,7 +64,7 @@ class RigDisplay : public testing::Test {
       unread_.push_back(page);
       ++count_;
       news_.notify_all();
-      const std::deque<Plate> pictures = pictures_;
+      const Pictures pictures = pictures_;
       lock.unlock();
       if (is_a_picture(screen, page, pictures)) ++as_expected_;
     };
@@ -97,15 +100,14 @@ class RigDisplay : public testing::Test {
 
   // 1:1 in the middle: outside the words' boxes every pixel is one of the pictures handed to the
   // display, most likely the last, or black beside it.
-  static bool is_a_picture(const Plate& screen, const OsdPage& page,
-                           const std::deque<Plate>& pictures) {
+  static bool is_a_picture(const Plate& screen, const OsdPage& page, const Pictures& pictures) {
     const std::vector<Overlay> boxes =
         output::OsdPainter(screen_width, screen_height, 0.05).paint(page);
-    const auto found = std::find_if(pictures.rbegin(), pictures.rend(), [&](const Plate& picture) {
-      return is_the_same(screen, picture, boxes, left, top, picture_width, picture_height);
+    const auto found = std::find_if(pictures.rbegin(), pictures.rend(), [&](const auto& picture) {
+      return is_the_same(screen, *picture, boxes, left, top, picture_width, picture_height);
     });
     return found != pictures.rend() &&
-           is_the_same(screen, *found, boxes, 0, 0, screen_width, screen_height);
+           is_the_same(screen, **found, boxes, 0, 0, screen_width, screen_height);
   }
   // Within a part of the screen.
   static bool is_the_same(const Plate& screen, const Plate& picture,
@@ -138,10 +140,10 @@ class RigDisplay : public testing::Test {
   test::Hand hand_;
   std::mutex mutex_;
   std::condition_variable news_;
-  std::deque<Plate> pictures_{
-      // what may be seen: black before the first
-      Plate{picture_width, picture_height, 8,
-            std::vector<std::uint16_t>(3 * picture_width * picture_height, 0)}};
+  Pictures pictures_{// what may be seen: black before the first
+                     std::make_shared<const Plate>(
+                         Plate{picture_width, picture_height, 8,
+                               std::vector<std::uint16_t>(3 * picture_width * picture_height, 0)})};
   std::deque<OsdPage> unread_;
   int count_ = 0, as_expected_ = 0;
   pipeline::MetricsSnapshot metrics_;

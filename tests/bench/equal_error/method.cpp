@@ -47,16 +47,18 @@ void MethodRun::begin_frame() {
 
 void MethodRun::render(int samples) {
   samples_ += samples;
-  if (adaptive_) begin_frame();
+  if (adaptive_) return render_anew();
   const double start = cpu_seconds();
-  if (!adaptive_) {
-    for (const auto& renderer : renderers_) renderer->render(samples);
-    cpu_s_ += cpu_seconds() - start;
-    return;
-  }
+  for (const auto& renderer : renderers_) renderer->render(samples);
+  cpu_s_ += cpu_seconds() - start;
+}
+
+void MethodRun::render_anew() {
+  begin_frame();
   set::Quality quality;
   quality.samples = samples_;
   quality.adaptive = true;
+  const double start = cpu_seconds();
   pipeline::refine(*renderers_.front(), quality, {}, {});
   cpu_s_ = cpu_seconds() - start;
 }

@@ -38,6 +38,7 @@ class MethodRun {
 
  private:
   void begin_frame();
+  void render_anew();  // all samples so far, and the time of that alone
 
   glm::dmat4 world_from_camera_;
   double exposure_;
