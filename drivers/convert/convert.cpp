@@ -30,6 +30,9 @@ std::optional<std::string> wrong_shape(const WirePicture& picture) {
     return "cannot be " + size + " pixels";
   if (format.bits < 8 || format.bits > 16)
     return "cannot have " + std::to_string(format.bits) + " bits a sample";
+  if (format.packing == Packing::csi2 && format.bits != 8 && format.bits != 10 &&
+      format.bits != 12 && format.bits != 14)
+    return "cannot have " + std::to_string(format.bits) + " bits a sample as CSI-2 packs them";
   if (is_bayer(format.layout) && (width < 4 || height < 4))
     return "is a Bayer mosaic of " + size + " pixels; 4x4 is the least";
   if (format.layout == Layout::mjpeg) return std::nullopt;
@@ -57,6 +60,21 @@ class Rows {
   std::size_t stride_;
 };
 
+// CSI-2: the fewest samples whose low bits fill whole bytes.
+std::size_t csi2_group(std::size_t bits) {
+  return bits == 12 ? 2 : 4;
+}
+
+std::uint32_t csi2_sample(const std::uint8_t* row, std::size_t i, std::size_t bits) {
+  const std::size_t group = csi2_group(bits), at = i % group, low_bits = bits - 8;
+  const std::uint8_t* high = row + i / group * (group * bits / 8);
+  const std::uint8_t* low = high + group;
+  const std::size_t first = at * low_bits, last = first + low_bits - 1;
+  const std::uint32_t window =
+      low[first / 8] | std::uint32_t{last / 8 > first / 8 ? low[last / 8] : std::uint8_t{0}} << 8;
+  return std::uint32_t{high[at]} << low_bits | ((window >> (first % 8)) & ((1u << low_bits) - 1));
+}
+
 // Sample `i` of a row.
 std::uint32_t sample(const std::uint8_t* row, std::size_t i, const WireFormat& format) {
   const auto bits = static_cast<std::size_t>(format.bits);
@@ -76,6 +94,8 @@ std::uint32_t sample(const std::uint8_t* row, std::size_t i, const WireFormat& f
       return i % 2 == 0 ? std::uint32_t{pair[0]} << low_bits | (pair[1] & 0x0fu)
                         : std::uint32_t{pair[2]} << low_bits | pair[1] >> 4;
     }
+    case Packing::csi2:
+      return csi2_sample(row, i, bits);
   }
   throw std::invalid_argument("unknown packing");
 }
@@ -247,6 +267,10 @@ std::size_t row_bytes(const WireFormat& format, int width) {
       return (samples * bits + 7) / 8;
     case Packing::gige:
       return 3 * ((samples + 1) / 2);
+    case Packing::csi2: {
+      const std::size_t group = csi2_group(bits);
+      return (samples + group - 1) / group * (group * bits / 8);
+    }
   }
   throw std::invalid_argument("unknown packing");
 }

@@ -33,6 +33,7 @@ enum class Packing {
   words,  // little-endian 16-bit words, the sample in the low bits
   bits,   // one stream of bits, lowest first (GenICam PFNC "p": Mono10p, BayerRG12p)
   gige,   // two samples in three bytes (GigE Vision "Packed"): high bits, both low bits, high bits
+  csi2,   // groups (MIPI CSI-2 RAW10, RAW12, RAW14): a byte of high bits each, then all low bits
 };
 
 struct WireFormat {

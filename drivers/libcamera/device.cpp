@@ -23,6 +23,7 @@ namespace {
 
 namespace lc = ::libcamera;
 using convert::Layout;
+using convert::Packing;
 
 // libcamera allows one manager in a process, and ends a process that makes a second.
 class ManagerUse {
@@ -63,6 +64,7 @@ struct Known {
   lc::PixelFormat format;
   Layout layout;
   int bits = 8;
+  Packing packing = Packing::words;
 };
 
 // libcamera's formats are DRM's, which name a packed pixel from its highest byte down: RGB888 has
@@ -87,6 +89,15 @@ constexpr auto known_pixel_formats = std::to_array<Known>({
     {lc::formats::SGRBG16, Layout::bayer_grbg, 16},
     {lc::formats::SGBRG16, Layout::bayer_gbrg, 16},
     {lc::formats::SBGGR16, Layout::bayer_bggr, 16},
+    {lc::formats::R10_CSI2P, Layout::mono, 10, Packing::csi2},
+    {lc::formats::SRGGB10_CSI2P, Layout::bayer_rggb, 10, Packing::csi2},
+    {lc::formats::SGRBG10_CSI2P, Layout::bayer_grbg, 10, Packing::csi2},
+    {lc::formats::SGBRG10_CSI2P, Layout::bayer_gbrg, 10, Packing::csi2},
+    {lc::formats::SBGGR10_CSI2P, Layout::bayer_bggr, 10, Packing::csi2},
+    {lc::formats::SRGGB12_CSI2P, Layout::bayer_rggb, 12, Packing::csi2},
+    {lc::formats::SGRBG12_CSI2P, Layout::bayer_grbg, 12, Packing::csi2},
+    {lc::formats::SGBRG12_CSI2P, Layout::bayer_gbrg, 12, Packing::csi2},
+    {lc::formats::SBGGR12_CSI2P, Layout::bayer_bggr, 12, Packing::csi2},
     {lc::formats::BGR888, Layout::rgb},
     {lc::formats::RGB888, Layout::bgr},
     {lc::formats::YUYV, Layout::yuyv},
@@ -110,7 +121,7 @@ std::string names_of(const std::vector<lc::PixelFormat>& formats) {
 }
 
 convert::WireFormat wire_format(const Known& known, const std::optional<lc::ColorSpace>& space) {
-  convert::WireFormat wire{known.layout, known.bits};
+  convert::WireFormat wire{known.layout, known.bits, known.packing};
   if (!space) return wire;
   if (space->ycbcrEncoding == lc::ColorSpace::YcbcrEncoding::Rec709)
     wire.matrix = convert::YuvMatrix::bt709;

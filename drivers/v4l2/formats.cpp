@@ -6,11 +6,13 @@ namespace previz::v4l2 {
 namespace {
 
 using convert::Layout;
+using convert::Packing;
 
 struct Known {
   std::uint32_t fourcc;
   Layout layout;
   int bits = 8;
+  Packing packing = Packing::words;
 };
 
 // The kernel's Documentation/userspace-api/media/v4l/pixfmt.rst.
@@ -40,6 +42,19 @@ constexpr auto table = std::to_array<Known>({
     {V4L2_PIX_FMT_SGRBG16, Layout::bayer_grbg, 16},
     {V4L2_PIX_FMT_SGBRG16, Layout::bayer_gbrg, 16},
     {V4L2_PIX_FMT_SBGGR16, Layout::bayer_bggr, 16},
+    {V4L2_PIX_FMT_Y10P, Layout::mono, 10, Packing::csi2},
+    {V4L2_PIX_FMT_SRGGB10P, Layout::bayer_rggb, 10, Packing::csi2},
+    {V4L2_PIX_FMT_SGRBG10P, Layout::bayer_grbg, 10, Packing::csi2},
+    {V4L2_PIX_FMT_SGBRG10P, Layout::bayer_gbrg, 10, Packing::csi2},
+    {V4L2_PIX_FMT_SBGGR10P, Layout::bayer_bggr, 10, Packing::csi2},
+    {V4L2_PIX_FMT_SRGGB12P, Layout::bayer_rggb, 12, Packing::csi2},
+    {V4L2_PIX_FMT_SGRBG12P, Layout::bayer_grbg, 12, Packing::csi2},
+    {V4L2_PIX_FMT_SGBRG12P, Layout::bayer_gbrg, 12, Packing::csi2},
+    {V4L2_PIX_FMT_SBGGR12P, Layout::bayer_bggr, 12, Packing::csi2},
+    {V4L2_PIX_FMT_SRGGB14P, Layout::bayer_rggb, 14, Packing::csi2},
+    {V4L2_PIX_FMT_SGRBG14P, Layout::bayer_grbg, 14, Packing::csi2},
+    {V4L2_PIX_FMT_SGBRG14P, Layout::bayer_gbrg, 14, Packing::csi2},
+    {V4L2_PIX_FMT_SBGGR14P, Layout::bayer_bggr, 14, Packing::csi2},
     {V4L2_PIX_FMT_RGB24, Layout::rgb},
     {V4L2_PIX_FMT_BGR24, Layout::bgr},
     {V4L2_PIX_FMT_YUYV, Layout::yuyv},
@@ -53,7 +68,7 @@ constexpr auto table = std::to_array<Known>({
 
 std::optional<convert::WireFormat> wire_format(std::uint32_t fourcc) {
   for (const Known& known : table)
-    if (known.fourcc == fourcc) return convert::WireFormat{known.layout, known.bits};
+    if (known.fourcc == fourcc) return convert::WireFormat{known.layout, known.bits, known.packing};
   return std::nullopt;
 }
 

@@ -219,6 +219,28 @@ TEST(Mono, PackedAsGigeVisionDoes) {
   EXPECT_EQ(words_of(ten.bytes)[1], std::lround(65535.0 * 0x201 / 0x3ff));
 }
 
+// MIPI CSI-2, "RAW10", "RAW12" and "RAW14": the high bytes of a group, then its low bits, the first
+// sample's lowest.
+TEST(Mono, PackedAsCsi2Does) {
+  const auto expect = [](const Frame& frame, const std::vector<int>& codes, int white) {
+    for (std::size_t i = 0; i < codes.size(); ++i)
+      EXPECT_EQ(words_of(frame.bytes)[i], std::lround(65535.0 * codes[i] / white)) << i;
+  };
+  // 0x3ff, 0x001, 0x156, 0x2aa: low bits 3, 1, 2, 2
+  expect(converted(plain(Layout::mono, 10, Packing::csi2), 4, 1, {0xff, 0x00, 0x55, 0xaa, 0xa7}),
+         {0x3ff, 0x001, 0x156, 0x2aa}, 0x3ff);
+  expect(
+      converted(plain(Layout::mono, 12, Packing::csi2), 4, 1, {0xab, 0x12, 0x3c, 0xff, 0x00, 0x1f}),
+      {0xabc, 0x123, 0xfff, 0x001}, 0xfff);
+  // 0x3fff, 0x0001, 0x2aaa, 0x1555: low bits 3f, 01, 2a, 15
+  expect(converted(plain(Layout::mono, 14, Packing::csi2), 4, 1,
+                   {0xff, 0x00, 0xaa, 0x55, 0x7f, 0xa0, 0x56}),
+         {0x3fff, 0x0001, 0x2aaa, 0x1555}, 0x3fff);
+  // A row that ends within a group still has the whole group.
+  EXPECT_EQ(row_bytes(plain(Layout::mono, 10, Packing::csi2), 5), 10u);
+  EXPECT_EQ(row_bytes(plain(Layout::mono, 12, Packing::csi2), 5), 9u);
+}
+
 TEST(Rgb, BothOrdersAtEveryDepth) {
   EXPECT_EQ(converted(plain(Layout::rgb), 2, 1, {1, 2, 3, 4, 5, 6}).bytes,
             (Bytes{1, 2, 3, 4, 5, 6}));
