@@ -23,7 +23,7 @@ packages=(
   # main loop, service, D-Bus
   libsystemd-dev dbus-daemon
   # tests
-  libgtest-dev libgmock-dev libbenchmark-dev groff-base
+  libgtest-dev libgmock-dev libbenchmark-dev libusbredirparser-dev groff-base
   # package, and its test in a bare system
   dpkg-dev file lintian mmdebstrap systemd
 )

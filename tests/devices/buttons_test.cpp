@@ -6,6 +6,7 @@
 #include <poll.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -194,6 +195,35 @@ TEST(ButtonDevices, WhatIsNotThereIsToldOnceAndWaitedFor) {
     EXPECT_GE(buttons[0]->counters().at("not opened"), 1u);
     EXPECT_EQ(buttons[0]->counters().at("opened"), 0u);
   }
+}
+
+// A pad on the USB whose cable is the file PREVIZ_TEST_USB_PAD (tests/rig_vm), where hidraw may not
+// be opened.
+TEST(ButtonDevices, APadOnTheUsbIsReadPastTheKernel) {
+  const char* cable = std::getenv("PREVIZ_TEST_USB_PAD");
+  if (!cable) GTEST_SKIP() << "there is no pad on the USB to be pressed (tests/rig_vm)";
+  const std::filesystem::path held = std::string(cable) + ".held";
+  const std::string name = "hid:1209:0003:RIGPAD1:0.0";
+  const auto buttons = open_buttons(std::vector{name}, {});
+  ASSERT_TRUE(opens_again(*buttons[0], 0));
+  const auto press = [&] {
+    std::ofstream{held};
+    expect_edge(*buttons[0], name, true);
+  };
+  ASSERT_NO_FATAL_FAILURE(press());
+  std::filesystem::remove(held);
+  ASSERT_NO_FATAL_FAILURE(expect_edge(*buttons[0], name, false));
+  ASSERT_NO_FATAL_FAILURE(press());
+  std::filesystem::remove(cable);
+  ASSERT_NO_FATAL_FAILURE(expect_edge(*buttons[0], name, false));  // released by its going
+  ASSERT_NO_FATAL_FAILURE(expect_trouble(*buttons[0], "unplugged"));
+  std::filesystem::remove(held);
+  std::ofstream{cable};
+  ASSERT_TRUE(opens_again(*buttons[0], 1));
+  ASSERT_NO_FATAL_FAILURE(press());
+  std::filesystem::remove(held);
+  const DeviceCounters counters = buttons[0]->counters();
+  EXPECT_EQ(counters.at("opened through libusb"), counters.at("opened"));
 }
 
 // The gpio-sim chip "rig" with the lines button1 to button4, active high.

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <fstream>
+#include <iostream>
 #include <thread>
 #include <utility>
 
@@ -27,11 +29,22 @@ std::filesystem::path usb_device_at(const usb::Place& place) {
   return {};
 }
 
+// Until udev has followed: a device that came back while udev still takes it away is found, and is
+// gone a moment later.
+void tell_kernel(const std::filesystem::path& file, const std::string& word) {
+  std::ofstream(file) << word;
+  if (std::system("udevadm settle --timeout=20") != 0)
+    std::cerr << "udev does not follow " << file << " within 20 s\n";
+}
+
 }  // namespace
 
 KernelCable::KernelCable(std::string driver, std::string device)
     : driver_(std::move(driver)), device_(std::move(device)) {
-  if (const auto place = camera_driver(driver_).usb_place(device_)) {
+  const auto place = camera_driver(driver_).usb_place(device_);
+  if (const char* file = std::getenv("PREVIZ_TEST_USB_CABLE"); file && place) {
+    file_ = file;
+  } else if (place) {
     out_ = in_ = usb_device_at(*place) / "authorized";
     out_word_ = std::string(1, '0');
     in_word_ = std::string(1, '1');
@@ -43,23 +56,37 @@ KernelCable::KernelCable(std::string driver, std::string device)
 }
 
 std::string KernelCable::why_not() const {
+  if (!file_.empty()) return "";
   if (out_.empty()) return device_ + " is neither a USB camera nor vivid";
   return access(out_.c_str(), W_OK) == 0 ? "" : out_.string() + " may not be written";
 }
 
 void KernelCable::unplug() {
-  if (std::exchange(plugged_, false)) std::ofstream(out_) << out_word_;
+  if (!std::exchange(plugged_, false)) return;
+  if (file_.empty()) {
+    tell_kernel(out_, out_word_);
+  } else {
+    remove(file_);
+    wait_until_found(false);
+  }
 }
 
 void KernelCable::plug() {
   if (std::exchange(plugged_, true)) return;
-  std::ofstream(in_) << in_word_;
+  if (file_.empty())
+    tell_kernel(in_, in_word_);
+  else
+    std::ofstream{file_};
+  wait_until_found(true);
+}
+
+void KernelCable::wait_until_found(bool found) const {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-  const auto there = [this] {
-    const std::vector<FoundCamera> found = camera_driver(driver_).find();
-    return std::ranges::find(found, device_, &FoundCamera::device) != found.end();
+  const auto is_found = [this] {
+    const std::vector<FoundCamera> all = camera_driver(driver_).find();
+    return std::ranges::find(all, device_, &FoundCamera::device) != all.end();
   };
-  while (!there() && std::chrono::steady_clock::now() < end)
+  while (is_found() != found && std::chrono::steady_clock::now() < end)
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
 }
 

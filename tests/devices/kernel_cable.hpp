@@ -1,4 +1,6 @@
-// The cable of a camera that the kernel drives, pulled by telling the kernel to let it go.
+// The cable of a camera that the kernel drives: pulled by telling the kernel to let it go, or,
+// where PREVIZ_TEST_USB_CABLE names the file that stands for a USB camera's cable, really
+// (tests/rig_vm).
 #pragma once
 
 #include <filesystem>
@@ -17,13 +19,16 @@ class KernelCable {
   // Why it cannot be pulled; empty where it can.
   std::string why_not() const;
 
-  void unplug();
-  void plug();  // returns when the driver finds the camera again
+  void unplug();  // a real cable: returns when the driver does not find the camera any more
+  void plug();    // returns when the driver finds the camera again
 
  private:
+  void wait_until_found(bool found) const;
+
   const std::string driver_, device_;
   // USB: "authorized" of the device, which takes 0 and 1. vivid: unbind and bind of its driver.
   std::filesystem::path out_, in_;
+  std::filesystem::path file_;  // a real cable's; empty: none
   std::string out_word_, in_word_;
   bool plugged_ = true;
 };

@@ -43,13 +43,23 @@ step "devices"
 rig-devices vivid
 rig-devices gpio
 modprobe uhid
+touch usb_camera
 coproc PAD { ./rig_vm_pad; }
 pad=${PAD[1]}
 camera() { ./rig_vm_camera /usr/share/previzd/demo/session 2 & camera=$!; }
 
-step "install: the service starts by itself"
+step "the set names the light camera as it is found"
+dpkg-deb --extract previzd.deb unpacked
+found() { unpacked/usr/bin/previzd devices 2>/dev/null | sed -n 's/.*driver = "libcamera", device = "\([^"]*\)".*/\1/p'; }
+is_found() { [[ -n $(found) ]]; }
+within 60 "the USB camera is found" is_found
+usb_camera=$(found)
+set=$(<rig_usb.toml)
 mkdir -p /etc/previzd /etc/systemd/system/previzd.service.d
-cp rig.toml /etc/previzd/set.toml
+printf '%s\n' "${set/USB_CAMERA/"$usb_camera"}" >/etc/previzd/set.toml
+grep "$(basename "${usb_camera##*-}")" /etc/previzd/set.toml
+
+step "install: the service starts by itself"
 # Compiling the shaders alone, at the first frame, takes minutes here.
 printf '[Service]\nWatchdogSec=600\nTimeoutStartSec=600\nEnvironment=LP_NATIVE_VECTOR_WIDTH=128\n' \
   >/etc/systemd/system/previzd.service.d/slow.conf
@@ -90,10 +100,17 @@ within 240 "five frames are in the take" take_grows
 
 step "the light camera is unplugged while recording, and comes back"
 trouble=$(metric '.counts."light camera: device trouble"')
-rig-devices unplug-vivid
+rm usb_camera
 within 120 "it is missed" above '.counts."light camera: device trouble"' "$trouble"
 advances render "the picture goes on without it"
-rig-devices plug-vivid
+touch usb_camera
+advances "light camera" "it delivers again"
+status_is Recording yes || fail "the take ended with the light camera"
+
+step "the light camera is wedged while recording, and is reset"
+touch usb_camera.wedged
+is_reset() { [[ ! -e usb_camera.wedged ]]; }
+within 240 "it is reset" is_reset
 advances "light camera" "it delivers again"
 status_is Recording yes || fail "the take ended with the light camera"
 
@@ -117,7 +134,7 @@ status_is Recording yes || fail "the take ended with the screen"
 
 step "the pad is unplugged, and comes back"
 pad unplug
-sleep 3
+within 60 "it is missed" above '.devices."hid:1209:0001:RIG0001".lost' 0
 pad plug
 samples=$(status Samples)
 pad_works() {
@@ -142,6 +159,13 @@ echo "   $frames frames: $lines of the film camera, $lights of the light camera"
 [[ $lines -ge 5 && $lights -ge 1 ]] || fail "the take is not complete"
 grep -q '"record"\|button1' "$take/events.jsonl" || fail "the take does not tell the button"
 previzctl metrics >metrics.json
+
+step "another light camera, by another set while the daemon runs"
+sed 's/^name = "rig"$/name = "other"/' rig_vivid.toml >/etc/previzd/set.toml
+previzctl set reload || fail "the set is not taken"
+within 120 "the set is taken" status_is Set other
+advances "light camera" "it delivers"
+advances lighting "it lights the scene"
 
 step "a stop and a start: in order, and as soon as the shaders are known"
 systemctl stop previzd

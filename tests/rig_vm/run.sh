@@ -1,16 +1,19 @@
 #!/usr/bin/env bash
-# The rig in a VM: installs the package in a Debian 12 guest and runs the daemon there as its users
-# do, under systemd, on real device nodes with simulated hardware behind them. Presses buttons,
-# unplugs and replugs every device, and checks what the recorder and the metrics say of it.
-#   tests/rig_vm/run.sh [BUILD]         BUILD: a build folder that is there (default: build/release)
+# previzd in a VM, a Debian 12 guest with real device nodes and simulated hardware behind them.
+#   tests/rig_vm/run.sh [BUILD [PART]...]
+#     BUILD: a build folder, made where it is not there (default: build/release)
+#     PART (default: both):
+#       drivers   every driver on the kernel's own devices, unplugged a hundred times
+#       rig       the package and its daemon under systemd: a take, buttons, every device unplugged
 # The guest is built the first time, and when what the package depends on or guest/ has changed: as
-# root, six minutes and the network. The run itself takes ten minutes, thirteen on two busy cores, for
-# the guest's processor is emulated. What it leaves is in out/rig_vm.
+# root, six minutes and the network. The guest's processor is emulated: "drivers" takes fifteen
+# minutes, "rig" ten, thirteen on two busy cores. What they leave is in out/rig_vm.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 here=tests/rig_vm
 build=${1:-build/release}
-share=out/rig_vm
+parts=("${@:2}")
+[[ ${#parts[@]} -gt 0 ]] || parts=(drivers rig)
 limit_s=3000
 
 for tool in qemu-system-x86_64 mmdebstrap mke2fs cpio busybox; do
@@ -21,7 +24,8 @@ for tool in qemu-system-x86_64 mmdebstrap mke2fs cpio busybox; do
 done
 
 [[ -e $build/CMakeCache.txt ]] || cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release
-cmake --build "$build" --parallel "$(nproc)" --target deb rig_vm_devices
+suites=(camera_compliance replug usb buttons display_devices)
+cmake --build "$build" --parallel "$(nproc)" --target deb rig_vm_devices previzd "${suites[@]/#/test_}"
 deb=$(ls "$build"/previzd_*.deb)
 
 key=$( (dpkg-deb --field "$deb" Depends; cat "$here"/guest/*) | sha256sum | cut -c1-16)
@@ -32,17 +36,46 @@ if [[ ! -e $guest/root.ext4 ]]; then
   mv "$guest.part" "$guest"
 fi
 
-rm -rf "$share"
-mkdir -p "$share"
-cp "$deb" "$share/previzd.deb"
-cp "$build"/tests/rig_vm/rig_vm_{camera,pad} "$here/in_guest.sh" "$share/"
-cp "$here/rig.toml" "$share/rig.toml"
-# The demo's tags and objects, from where the package puts them.
-sed -n '/^\[tracking\]/,/^# The light is what/p' "$build/systemd/package/set.toml" | sed '$d' >>"$share/rig.toml"
+usb=()
+trap '[[ ${#usb[@]} -eq 0 ]] || kill "${usb[@]}" 2>/dev/null || true' EXIT
 
-if "$here/vm.sh" "$guest" "$share" "$limit_s" 'bash in_guest.sh'; then
-  echo "rig_vm: passed in $SECONDS s"
-else
-  echo "rig_vm: FAILED; $share/.run has the journal" >&2
-  exit 1
-fi
+# Runs PART_in_guest.sh in the guest, in SHARE. What is plugged in to its USB is plugged in by
+# the files usb_camera and usb_pad there.
+run_part() {
+  local part=$1 share=$2
+  cp "$build"/tests/rig_vm/rig_vm_{camera,pad} "$here/${part}_in_guest.sh" "$share/"
+  "$build/tests/rig_vm/rig_vm_usb_camera" "$share/.run/usb0" "$share/usb_camera" config/demo/session 10 &
+  usb+=($!)
+  "$build/tests/rig_vm/rig_vm_usb_pad" "$share/.run/usb1" "$share/usb_pad" &
+  usb+=($!)
+  if "$here/vm.sh" "$guest" "$share" "$limit_s" "bash ${part}_in_guest.sh"; then
+    echo "rig_vm: $part passed after $SECONDS s"
+  else
+    echo "rig_vm: $part FAILED; $share/.run has the journal" >&2
+    exit 1
+  fi
+}
+
+for part in "${parts[@]}"; do
+  share=out/rig_vm/$part
+  rm -rf "$share"
+  mkdir -p "$share"
+  case $part in
+  drivers)
+    cp "$build/daemon/previzd" systemd/70-previzd.rules "${suites[@]/#/$build/tests/devices/test_}" "$share/"
+    ;;
+  rig)
+    cp "$deb" "$share/previzd.deb"
+    # The demo's tags and objects, from where the package puts them.
+    sed -n '/^\[tracking\]/,/^# The light is what/p' "$build/systemd/package/set.toml" | sed '$d' >"$share/demo.toml"
+    for light in usb vivid; do
+      cat "$here/rig.toml" "$here/light_$light.toml" "$share/demo.toml" >"$share/rig_$light.toml"
+    done
+    ;;
+  *)
+    echo "rig_vm: no part \"$part\"; there are drivers and rig" >&2
+    exit 2
+    ;;
+  esac
+  run_part "$part" "$share"
+done

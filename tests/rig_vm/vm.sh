@@ -3,7 +3,7 @@
 #   vm.sh GUEST SHARE SECONDS 'command'
 # SHARE is /rig in the guest and the command's working directory; what its screen shows is put into
 # SHARE/screen.ppm when SHARE/screen.wanted comes into being. In SHARE/.run are left: output, status,
-# console, dmesg, journal.
+# console, dmesg, journal. The sockets SHARE/.run/usb0 and usb1 are two ports of its USB (usbredir).
 # Nothing that the guest writes elsewhere is kept. Needs no KVM; no right but to read GUEST.
 set -euo pipefail
 guest=$1 share=$(realpath "$2") limit=$3
@@ -23,6 +23,9 @@ timeout --foreground "$limit" qemu-system-x86_64 -M q35 -accel tcg,thread=multi,
   -device virtio-serial-pci \
   -chardev "file,id=out,path=$run/output" -device virtserialport,chardev=out,name=rig.out \
   -serial "file:$run/console" -monitor "pipe:$run/monitor" \
+  -device qemu-xhci,id=usb \
+  -chardev "socket,id=usb0,path=$run/usb0,server=on,wait=off" -device usb-redir,chardev=usb0,bus=usb.0 \
+  -chardev "socket,id=usb1,path=$run/usb1,server=on,wait=off" -device usb-redir,chardev=usb1,bus=usb.0 \
   -vga none -device virtio-gpu-pci,xres=640,yres=400 -device virtio-rng-pci </dev/null &
 qemu=$!
 cat "$run/monitor.out" >/dev/null &

@@ -1,0 +1,109 @@
+// What the USB itself can do for a device, on one that is really there: PREVIZ_TEST_USB_CABLE names
+// the file that stands for a USB camera's cable (tests/rig_vm).
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+#include <vector>
+
+#include "drivers/camera_drivers.hpp"
+#include "drivers/lifeline.hpp"
+#include "drivers/usb/usb.hpp"
+
+namespace previz::test {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr std::chrono::seconds patience{30};
+
+class UsbCamera : public testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override {
+    const char* cable = std::getenv("PREVIZ_TEST_USB_CABLE");
+    if (!cable) GTEST_SKIP() << "there is no USB camera to be wedged and unplugged (tests/rig_vm)";
+    cable_ = cable;
+    for (const FoundCamera& camera : driver_.find())
+      if (driver_.usb_place(camera.device)) name_ = camera.device;
+    ASSERT_FALSE(name_.empty()) << "the USB camera is not found";
+  }
+
+  std::unique_ptr<Camera> open() const {
+    CameraSettings settings;
+    settings.device = name_;
+    return driver_.open(settings);
+  }
+
+  std::filesystem::path wedge() const { return cable_.string() + ".wedged"; }
+
+  const CameraDriver& driver_ = camera_driver(GetParam());
+  std::filesystem::path cable_;
+  std::string name_;
+};
+
+// The trouble that is told until a frame comes.
+std::vector<std::string> trouble_until_a_frame(Lifeline& lifeline, const auto& may_come) {
+  std::vector<std::string> told;
+  const auto end = std::chrono::steady_clock::now() + patience;
+  while (std::chrono::steady_clock::now() < end) {
+    const CameraEvent event = lifeline.next(milliseconds(50));
+    if (const auto* trouble = std::get_if<DeviceTrouble>(&event)) told.push_back(trouble->what);
+    if (std::holds_alternative<FramePtr>(event) && may_come()) return told;
+  }
+  ADD_FAILURE() << "no frame came; told was " << testing::PrintToString(told);
+  return told;
+}
+
+// The wedge is gone when the device was reset: nothing else takes it away while it is plugged in.
+TEST_P(UsbCamera, ThatIsWedgedIsResetAndSendsAgain) {
+  LifelineHooks hooks;
+  hooks.reset = [this]() -> std::optional<std::string> {
+    const std::optional<usb::Place> place = driver_.usb_place(name_);
+    return place ? std::optional(usb::reset(*place)) : std::nullopt;
+  };
+  const LifelineOptions options{milliseconds(5000), milliseconds(2000), milliseconds(100), {}};
+  Lifeline lifeline(
+      "film camera", [this] { return open(); }, options, HostClock{}, hooks);
+  lifeline.start();
+  trouble_until_a_frame(lifeline, [] { return true; });
+  std::ofstream{wedge()};
+  const std::vector<std::string> told =
+      trouble_until_a_frame(lifeline, [this] { return !exists(wedge()); });
+  EXPECT_THAT(told, testing::Contains(testing::HasSubstr("it was reset")));
+  EXPECT_GE(lifeline.counters().at("reset"), 1u);
+}
+
+TEST_P(UsbCamera, ThatIsPluggedInIsTold) {
+  const usb::Hotplug hotplug;
+  const std::uint64_t before = hotplug.arrivals();
+  std::filesystem::remove(cable_);
+  const auto waits_for = [](const auto& condition) {
+    const auto end = std::chrono::steady_clock::now() + patience;
+    while (!condition() && std::chrono::steady_clock::now() < end)
+      std::this_thread::sleep_for(milliseconds(20));
+    return condition();
+  };
+  EXPECT_TRUE(waits_for([this] { return !driver_.usb_place(name_); }));
+  std::ofstream{cable_};
+  EXPECT_TRUE(waits_for([&] { return hotplug.arrivals() > before; }));
+  EXPECT_TRUE(waits_for(
+      [this] { return std::ranges::count(driver_.find(), name_, &FoundCamera::device) == 1; }));
+}
+
+std::vector<std::string> drivers_of_usb_cameras() {
+  std::vector<std::string> names;
+  for (const CameraDriver& driver : camera_drivers())
+    if (driver.name == "v4l2" || driver.name == "libcamera") names.emplace_back(driver.name);
+  return names;
+}
+
+INSTANTIATE_TEST_SUITE_P(Drivers, UsbCamera, testing::ValuesIn(drivers_of_usb_cameras()),
+                         [](const auto& instance) { return instance.param; });
+
+}  // namespace
+}  // namespace previz::test
