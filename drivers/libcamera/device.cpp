@@ -252,8 +252,9 @@ struct Device::Impl {
     acquired = false;
   }
 
+  // ControlInfoMap::count() of 0.0.3 counts every control that libcamera knows.
   bool has(const lc::ControlId& control) const {
-    return camera->controls().count(control.id()) > 0;
+    return camera->controls().find(control.id()) != camera->controls().end();
   }
 
   void agree() {
