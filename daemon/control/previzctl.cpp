@@ -31,7 +31,11 @@ class ErrorText {
   sd_bus_error* out() { return &error_; }
   // Throws what the bus said, if the call failed.
   void check(int result) const {
-    if (result < 0) throw Error(error_.message ? error_.message : std::strerror(-result));
+    if (result >= 0) return;
+    if (sd_bus_error_has_name(&error_, SD_BUS_ERROR_SERVICE_UNKNOWN) != 0 ||
+        sd_bus_error_has_name(&error_, SD_BUS_ERROR_NAME_HAS_NO_OWNER) != 0)
+      throw Error("previzd does not answer: it is not running, or it is just loading a set");
+    throw Error(error_.message ? error_.message : std::strerror(-result));
   }
 
  private:

@@ -131,7 +131,10 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out
                                                      options.buttons, options.loop, options.stop});
     } catch (const std::exception& error) {
       if (!before) throw;
-      note.again(std::string(error.what()) + "\nback to " + before->set.file.string());
+      note.again(std::string(error.what()) +
+                 "\nback to the set as it was: " + before->set.file.string());
+      // Of the same file: not tried again until it is changed again.
+      if (before->set.file == loaded.set.file) before->changed = loaded.changed;
       loaded = *std::exchange(before, std::nullopt);
       continue;
     }

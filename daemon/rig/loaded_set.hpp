@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
 
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
@@ -14,6 +15,22 @@ struct LoadedSet {
   std::string text;                         // of the file, as it goes into takes
   std::filesystem::file_time_type changed;  // the file, before it was read
   scene::Scene scene;
+};
+
+// Whether a set file was changed, as it is looked at now and then: by its time, once that is what
+// it was at the look before, for until then it may still be being written.
+class SetFileWatch {
+ public:
+  using Time = std::filesystem::file_time_type;
+  explicit SetFileWatch(Time known) : known_(known), seen_(known) {}
+  bool is_changed(Time time) {
+    if (std::exchange(seen_, time) != time || time == known_) return false;
+    known_ = time;
+    return true;
+  }
+
+ private:
+  Time known_, seen_;
 };
 
 // Throws previz::Error with every problem of the set, or of its scene.

@@ -70,7 +70,7 @@ Rig::Rig(const LoadedSet& loaded, Parts parts)
       look_(controls_.look()),
       recorder_(recorder_options(loaded, cameras_, parts_.note)),
       presses_(loaded.set.buttons),
-      set_time_(loaded.changed),
+      set_file_(loaded.changed),
       pipeline_(
           {.set = loaded.set,
            .cameras = cameras_,
@@ -314,8 +314,7 @@ void Rig::tell_screen() {
 void Rig::look_at_set_file() {
   std::error_code gone;
   const auto time = std::filesystem::last_write_time(loaded_.set.file, gone);
-  if (gone || time == set_time_ || controls_.look().state.recording) return;
-  set_time_ = time;
+  if (gone || controls_.look().state.recording || !set_file_.is_changed(time)) return;
   parts_.note.again(loaded_.set.file.string() + ": the file has changed");
   change_set(0);
 }

@@ -105,7 +105,7 @@ class Rig {
   std::set<std::string> ended_refinement_;  // buttons whose running press did
   std::vector<Device> devices_;
   std::uint64_t finished_takes_ = 0, failures_ = 0;
-  std::filesystem::file_time_type set_time_;
+  SetFileWatch set_file_;
   int ticks_ = 0;
   Progress progress_;  // when the watchdog was last fed
   std::unique_ptr<Review> review_;

@@ -19,6 +19,7 @@
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/post/render.hpp"
+#include "daemon/rig/loaded_set.hpp"
 #include "daemon/rig/service.hpp"
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
@@ -389,6 +390,41 @@ TEST_F(RigLive, ABadSetLeavesTheOldOneRunningAndAGoodOneTakesOver) {
     until([](const Shown& s) { return s.shot.samples == 4; });
   });
   EXPECT_NE(log_.text().find("set.toml:2:"), std::string::npos) << log_.text();
+}
+
+// A set that can be read and cannot be started is not started again and again.
+TEST_F(RigLive, ASetThatCannotStartIsTriedOnce) {
+  write_set();
+  const std::string good = session::read_file(directory_ / "set.toml");
+  const auto other = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    EXPECT_NE(text.find(from), std::string::npos) << good;
+    return text.replace(text.find(from), from.size(), to);
+  };
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    std::ofstream(directory_ / "set.toml")
+        << other("[observer]\n", "[observer]\nfaults = [\"nonsense\"]\n");
+    until_said("back to the set as it was");  // the rig saw the file by itself
+    // What must not happen cannot be waited for: its next looks at the file, one a second.
+    std::this_thread::sleep_for(std::chrono::seconds(4));
+    EXPECT_EQ(log_.text().find("back to"), log_.text().rfind("back to")) << log_.text();
+    std::ofstream(directory_ / "set.toml") << other("samples = 2", "samples = 4");
+    until([](const Shown& s) { return s.shot.samples == 4; });
+  });
+}
+
+TEST(SetFileWatch, WaitsUntilAFileIsWritten) {
+  const rig::SetFileWatch::Time start{};
+  const auto at = [&](int second) { return start + std::chrono::seconds(second); };
+  rig::SetFileWatch watch(start);
+  EXPECT_FALSE(watch.is_changed(start));
+  EXPECT_FALSE(watch.is_changed(at(1)));  // just changed
+  EXPECT_FALSE(watch.is_changed(at(2)));  // and once more
+  EXPECT_TRUE(watch.is_changed(at(2)));
+  EXPECT_FALSE(watch.is_changed(at(2)));  // told once
+  EXPECT_FALSE(watch.is_changed(start));  // an older file put in its place
+  EXPECT_TRUE(watch.is_changed(start));
 }
 
 // The buttons of a replayed take are pressed again, at its own times.
