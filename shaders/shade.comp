@@ -99,6 +99,9 @@ void meet_emission(Path p, Surface s, GpuHit hit) {
   receive(p, p.throughput * s.emission * weight, vec2(1.0));
 }
 
+// Of bound_share; less is not worth the work.
+const float least_bound_part = 0.04;
+
 // How directions are sampled at a vertex: by the BSDF, and for `share` of them towards the objects
 // that differ. Depends on shared data alone, so it is the same in both worlds.
 struct Technique {
@@ -106,10 +109,19 @@ struct Technique {
   float total;
 };
 
+// The part of the light that light samples do not find behind the objects by themselves: what comes
+// from a narrower solid angle than theirs they do.
+float part_for_bounds(float total) {
+  const float environment = max(1.0 - total / frame.environment_spread, 0.0);
+  const float lamps = max(1.0 - total / frame.lamp_spread, 0.0);
+  return mix(environment, lamps, frame.lamp_part);
+}
+
 Technique make_technique(Path p, Surface s, Lobes l) {
   if (!has_feature(FEATURE_FORKS) || p.worlds != WORLD_BOTH || !is_rough(l)) return Technique(0.0, 0.0);
   const float total = bounds_total(s.position);
-  return Technique(total > 0.0 ? frame.bound_share : 0.0, total);
+  const float part = total > 0.0 ? part_for_bounds(total) : 0.0;
+  return Technique(part >= least_bound_part ? part * frame.bound_share : 0.0, total);
 }
 
 // Density over both techniques of a direction that the BSDF alone has with bsdf_pdf.

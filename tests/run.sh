@@ -8,7 +8,7 @@
 #   tests/run.sh release      only the named steps: release asan format lint
 # Two more steps are taken only if they are named, for they need root or user namespaces, and time:
 #   package   builds the .deb, and installs it in a bare Debian (tests/package/run.sh, 3 minutes)
-#   rig_vm    runs that on a rig in a VM (tests/rig_vm/run.sh, 15 minutes)
+#   rig_vm    runs the drivers, then that, on a rig in a VM (tests/rig_vm/run.sh, 45 minutes)
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit
 jobs=$(nproc)

@@ -77,8 +77,9 @@ std::vector<TradeAxis> trade_axes(const TradeSettings& own,
           "estimator", "both worlds in full, or what differs between them",
           [](TradeSettings & s) -> auto& { return s.estimation.estimator; }),
       numbered(
-          "difference_sampling", "share of the directions sent towards what is in one world only",
-          own, {0.0, 0.25, 0.5, 0.75},
+          "difference_sampling",
+          "largest share of directions sent towards what is in one world only", own,
+          {0.0, 0.25, 0.5, 0.75},
           [](TradeSettings & s) -> auto& { return s.estimation.difference_sampling; }),
       numbered(
           "depth", "bounces that a path may have", own, {1, 2, 4, 8},

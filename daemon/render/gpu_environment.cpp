@@ -1,5 +1,6 @@
 #include "daemon/render/gpu_environment.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <string>
@@ -66,6 +67,19 @@ std::vector<glm::vec4> quads(const std::vector<double>& weights, std::size_t siz
   return result;
 }
 
+// Of a level of the pyramid; texels all have the same solid angle.
+double spread_of(const std::vector<double>& weights, double mean) {
+  double information = 0;
+  for (const double weight : weights) {
+    const double density = weight / mean;
+    if (density > 0) information += density * std::log(density);
+  }
+  return 2 * std::exp(-information / static_cast<double>(weights.size()));
+}
+
+// At most this many texels a side are looked at for the spread: a texel is then a lamp of a degree.
+constexpr std::size_t spread_size = 256;
+
 }  // namespace
 
 EncodedEnvironment encode_environment(const lighting::EnvironmentMap& map) {
@@ -81,6 +95,9 @@ EncodedEnvironment encode_environment(const lighting::EnvironmentMap& map) {
   while (pyramid.back().size() > 1)
     pyramid.push_back(halved(pyramid.back(), std::size_t{1} << (e.levels + 1 - pyramid.size())));
   e.mean = pyramid.back().front();
+  const auto coarse = std::ranges::find_if(
+      pyramid, [](const auto& level) { return level.size() <= spread_size * spread_size; });
+  if (e.mean > 0) e.spread = spread_of(*coarse, e.mean);
 
   // A black map is sampled uniformly.
   if (!(e.mean > 0)) {

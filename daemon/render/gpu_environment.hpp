@@ -15,6 +15,9 @@ struct EncodedEnvironment {
   std::vector<glm::vec4> radiance;    // (size + 2)^2, border wrapped by the octahedral rule
   std::vector<glm::vec4> importance;  // densities, level by level; see render_shared.h
   double mean = 0;                    // mean of (r + g + b) / 3 over the sphere
+  // Solid angle over 2 pi that its light comes from, the exponential of the entropy of where: 2 for
+  // an even sphere, a lamp's disc where all comes from that.
+  double spread = 2;
 };
 
 // Throws previz::Error if the size is not a power of two up to 4096 or a texel is negative or not

@@ -54,6 +54,20 @@ double power(const gpu::GpuLight& light, double scene_radius) {
   }
 }
 
+// Over 2 pi, of a light that faces the scene from one scene radius away; of a point as if it were a
+// disc as wide as one direction is in floats.
+double solid_angle(const gpu::GpuLight& light, double scene_radius) {
+  const double area = glm::length(glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v)));
+  const double least = least_disc_rad * least_disc_rad / 2;
+  const double squared = scene_radius * scene_radius;
+  double result = least;
+  if (light.type == gpu::LIGHT_DIRECTIONAL) result = light.cone_sr / (2 * pi);
+  if (light.type == gpu::LIGHT_RECTANGLE) result = area / squared / (2 * pi);
+  if (light.type == gpu::LIGHT_TRIANGLE) result = area / 2 / squared / (2 * pi);
+  if (light.type == gpu::LIGHT_SPHERE) result = light.radius * light.radius / squared / 2;
+  return std::clamp(result, least, 2.0);
+}
+
 bool has_disc(const set::Light& light) {
   return light.type == set::LightType::directional && light.angular_radius_rad > least_disc_rad;
 }
@@ -154,6 +168,17 @@ double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius) 
     below = light.cdf;
   }
   return total;
+}
+
+double spread_of(const std::vector<gpu::GpuLight>& lights, double scene_radius) {
+  double total = 0, information = 0;
+  for (const gpu::GpuLight& light : lights) {
+    const double watts = power(light, scene_radius);
+    if (!(watts > 0)) continue;
+    total += watts;
+    information += watts * std::log(watts / solid_angle(light, scene_radius));
+  }
+  return total > 0 ? std::min(total * std::exp(-information / total), 2.0) : 2.0;
 }
 
 }  // namespace previz::render

@@ -27,4 +27,8 @@ std::vector<gpu::GpuLight> encode_emitter(const scene::Instance& instance, const
 // channel, mean of the channels).
 double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius);
 
+// Solid angle over 2 pi that the light of all comes from, as EncodedEnvironment::spread, each light
+// taken to face the scene from one scene radius (metres) away. 2 where no light shines.
+double spread_of(const std::vector<gpu::GpuLight>& lights, double scene_radius);
+
 }  // namespace previz::render

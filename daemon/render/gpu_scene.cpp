@@ -160,6 +160,7 @@ void GpuScene::set_environment(const EncodedEnvironment& encoded, set::LightSamp
   environment_size_ = encoded.size;
   environment_levels_ = encoded.levels;
   environment_mean_ = encoded.mean;
+  environment_spread_ = encoded.spread;
   sampling_ = sampling;
   upload_texels(device_, environment_, encoded.radiance, vk::Format::eR32G32B32A32Sfloat);
   upload_texels(device_, importance_, encoded.importance, vk::Format::eR32G32B32A32Sfloat);
@@ -170,6 +171,7 @@ void GpuScene::set_sources(std::vector<set::Light> sources) {
 }
 
 void GpuScene::place(const glm::dvec3& camera_position) {
+  find_extent(camera_position);
   upload_lights(camera_position);
   upload_instances(camera_position);
   upload_bounds(camera_position);
@@ -183,10 +185,23 @@ void GpuScene::upload_bounds(const glm::dvec3& camera_position) {
   upload_storage(device_, bounds_buffer_, bounds);
 }
 
+void GpuScene::find_extent(const glm::dvec3& camera_position) {
+  scene::Aabb all;
+  for (const scene::Instance& instance : scene_.instances) {
+    const scene::Aabb bounds =
+        scene::transform_bounds(places_[instance.mesh].bvh.bounds,
+                                relative_to(instance.world_from_object, camera_position));
+    all.low = glm::min(all.low, bounds.low);
+    all.high = glm::max(all.high, bounds.high);
+  }
+  if (!(all.low.x <= all.high.x)) return;  // there is nothing
+  scene_radius_ = 0.5 * glm::length(glm::dvec3(all.high - all.low));
+  scene_center_ = 0.5f * (all.low + all.high);
+}
+
 void GpuScene::upload_instances(const glm::dvec3& camera_position) {
   std::vector<scene::TopInstance> top;
   std::vector<gpu::GpuInstance> instances;
-  scene::Aabb all;
   for (std::uint32_t i = 0; i < scene_.instances.size(); ++i) {
     const scene::Instance& instance = scene_.instances[i];
     const MeshPlace& place = places_[instance.mesh];
@@ -200,13 +215,6 @@ void GpuScene::upload_instances(const glm::dvec3& camera_position) {
     record.presence = instance.presence;
     instances.push_back(record);
     top.push_back({&place.bvh, place.first_record, instance.presence, world});
-    const scene::Aabb bounds = scene::transform_bounds(place.bvh.bounds, world);
-    all.low = glm::min(all.low, bounds.low);
-    all.high = glm::max(all.high, bounds.high);
-  }
-  if (all.low.x <= all.high.x) {
-    scene_radius_ = 0.5 * glm::length(glm::dvec3(all.high - all.low));
-    scene_center_ = 0.5f * (all.low + all.high);
   }
   const scene::TopBvh top_bvh = scene::build_top_bvh(top);
   upload_bytes(device_, bvh_, std::as_bytes(std::span(top_bvh.texels)));
@@ -239,6 +247,7 @@ void GpuScene::upload_lights(const glm::dvec3& camera_position) {
       static_cast<std::uint32_t>(std::count_if(all_lamps.begin(), all_lamps.end(), can_be_seen));
   light_count_ = static_cast<std::uint32_t>(lights.size());
   light_power_ = select_by_power(lights, scene_radius_);
+  light_spread_ = spread_of(lights, scene_radius_);
   lights_differ_ = std::any_of(lights.begin(), lights.end(),
                                [](const auto& light) { return light.gain.x != light.gain.y; });
   auto next = static_cast<std::uint32_t>(all_lamps.size());
@@ -301,6 +310,11 @@ void GpuScene::describe(gpu::GpuFrame& frame) const {
   const double share = environment_share(environment_power, light_power_);
   frame.environment_selection = sampled ? static_cast<float>(share) : 0.0f;
   frame.photon_environment = static_cast<float>(share);
+  // What light samples do not look for counts as if it came from everywhere.
+  frame.environment_spread = sampled ? static_cast<float>(environment_spread_) : 2.0f;
+  frame.lamp_spread = static_cast<float>(light_spread_);
+  const double all_power = environment_power + light_power_;
+  frame.lamp_part = all_power > 0 ? static_cast<float>(light_power_ / all_power) : 0.0f;
 }
 
 double GpuScene::nearest_specular_distance(const glm::dvec3& camera_position) const {

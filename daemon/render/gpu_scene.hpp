@@ -58,6 +58,7 @@ class GpuScene {
   std::vector<set::Light> lamps() const;  // the scene's and the sources, those that rays meet first
   std::vector<gpu::GpuLight> placed_lights(const std::vector<set::Light>& all_lamps,
                                            const glm::dvec3& camera_position) const;
+  void find_extent(const glm::dvec3& camera_position);
   void upload_lights(const glm::dvec3& camera_position);
   void upload_instances(const glm::dvec3& camera_position);
   void upload_bounds(const glm::dvec3& camera_position);
@@ -75,10 +76,10 @@ class GpuScene {
   glm::vec3 scene_center_{0.0f};  // of the instances' bounds, relative to the camera
   double scene_radius_ = 1;
   std::uint32_t environment_size_ = 1, environment_levels_ = 0;
-  double environment_mean_ = 0;
+  double environment_mean_ = 0, environment_spread_ = 2;
   set::LightSampling sampling_ = set::LightSampling::importance;
   std::uint32_t light_count_ = 0, visible_light_count_ = 0;
-  double light_power_ = 0;
+  double light_power_ = 0, light_spread_ = 2;
   bool lights_differ_ = false;  // between the worlds
 
   Buffer bvh_, vertices_, triangles_, texels_, environment_, importance_, albedo_, instances_,

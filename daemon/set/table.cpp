@@ -255,7 +255,7 @@ Keys estimator_keys(Estimation& e) {
       {"roulette_depth", &e.roulette_depth, plain.within(1, 64), "Russian roulette ends paths from this vertex on."},
       {"seed", &e.seed, plain, "The same seed gives the same noise."},
       {"specular_roughness", &e.specular_roughness, plain.within(0, 0.1), "GGX alpha at or below which a surface is a perfect mirror."},
-      {"difference_sampling", &e.difference_sampling, plain.within(0, 0.8), "Share of directions sampled towards objects of one world only, where the worlds can differ; 0: none, as in the paper."},
+      {"difference_sampling", &e.difference_sampling, plain.within(0, 0.8), "Largest share of directions sampled towards objects of one world only, where the worlds can differ; less where light comes from hardly more solid angle than theirs; 0: none, as in the paper."},
       {"caustics", &e.caustics, plain, "How light comes to rough surfaces by way of mirrors and glass: by photons (soft at first, then sharper), by paths that happen to find it (noisy), or not at all."},
       {"photons", &e.photons, plain.within(0.001, 10), "With caustics = \"photons\": photons of a sample, for each pixel of the picture; at least 1024 in all."},
       {"photon_radius_px", &e.photon_radius_px, plain.within(0.1, 100), "Radius over which photons of the first sample are gathered, in pixels at the distance of the nearest mirror or glass; later ones take less."},

@@ -275,7 +275,10 @@ struct GpuFrame {
   uint light_count;
   uint visible_light_count;   // the first lights, those with an extent that are not triangles
   uint bound_count;
-  float bound_share;          // of a shared path's directions that go towards those BOUNDS
+  float bound_share;          // of a shared path's directions, at most, towards those BOUNDS
+  float environment_spread;   // solid angle over 2 pi that light samples find its light in
+  float lamp_spread;          // the same of the lights
+  float lamp_part;            // of all light, that of the lights
   float difference_roulette;  // survival of a path of the difference over the bounds' solid angle
   uint specular_bound_count;  // the BOUNDS after them
   uint photon_count;          // emitted a pass
@@ -305,7 +308,7 @@ static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
 static_assert(sizeof(GpuLight) == 128);
 static_assert(offsetof(GpuLight, uv0) == 96);
-static_assert(sizeof(GpuFrame) == 176);
+static_assert(sizeof(GpuFrame) == 188);
 static_assert(sizeof(GpuBatch) == 28);
 static_assert(sizeof(GpuPhoton) == 60);
 static_assert(sizeof(GpuPhotonBucket) == 8);

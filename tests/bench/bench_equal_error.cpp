@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,6 +27,7 @@ struct Options {
   double error = 0.1;
   int rounds = 3;
   int reference_samples = 1024;
+  int samples = 0;  // of a round; 0: until the error is reached
   double limit_s = 60;
   std::vector<std::string> methods;
   set::LightMode light = set::LightMode::image;
@@ -92,11 +94,18 @@ void measure(MethodRun& run, std::uint32_t seed, const Reference& reference, con
   std::vector<Point> points;
   truth::Measures measures;
   run.begin(seed);
-  do {
-    run.render(std::max(run.samples(), 1));
+  const auto render = [&](int samples) {
+    run.render(samples);
     measures = error_of(reference, run.estimate());
     points.push_back({run.cpu_s(), without(measures.e_diff, reference.noise.e_diff)});
-  } while (points.back().error > options.error && 2 * run.cpu_s() < options.limit_s);
+  };
+  if (options.samples > 0) {
+    render(options.samples);
+  } else {
+    do {
+      render(std::max(run.samples(), 1));
+    } while (points.back().error > options.error && 2 * run.cpu_s() < options.limit_s);
+  }
   const render::Counters counters = run.counters();
   const double samples = 1.0 * run.samples() * reference.frame.width * reference.frame.height;
   result.rays = static_cast<double>(counters.rays) / samples;
@@ -109,7 +118,17 @@ void measure(MethodRun& run, std::uint32_t seed, const Reference& reference, con
   result.seconds.push_back(time.cpu_s);
 }
 
-void print(const std::vector<Method>& methods, const std::vector<Result>& results) {
+double mean(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+// Of rounds: the median of times that were measured, the mean of those that follow from an error.
+double middle(const std::vector<double>& values, const Options& options) {
+  return options.samples > 0 ? mean(values) : median(values);
+}
+
+void print(const std::vector<Method>& methods, const std::vector<Result>& results,
+           const Options& options) {
   std::printf(
       "| method | CPU s | over the first | spread | rays | shadow rays | ns | samples | bias |\n"
       "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
@@ -119,8 +138,10 @@ void print(const std::vector<Method>& methods, const std::vector<Result>& result
     for (std::size_t i = 0; i < r.seconds.size(); ++i)
       ratios.push_back(r.seconds[i] / results[0].seconds[i]);
     const auto [low, high] = std::ranges::minmax(ratios);
+    const double ratio =
+        options.samples > 0 ? mean(r.seconds) / mean(results[0].seconds) : median(ratios);
     std::printf("| %s | %.3g%s | %.2f | %.2f to %.2f | %.2f | %.2f | %.0f | %.0f | %+.3f |\n",
-                methods[m].name.c_str(), median(r.seconds), r.is_beyond ? " *" : "", median(ratios),
+                methods[m].name.c_str(), middle(r.seconds, options), r.is_beyond ? " *" : "", ratio,
                 low, high, r.rays, r.shadow_rays, r.ns, r.samples, r.bias);
   }
   std::printf("\n");
@@ -148,7 +169,7 @@ void run(const Options& options) {
     for (int round = 1; round <= options.rounds; ++round)
       for (std::size_t m = 0; m < methods.size(); ++m)
         measure(*runs[m], static_cast<std::uint32_t>(round), reference, options, results[m]);
-    print(methods, results);
+    print(methods, results, options);
   }
 }
 
@@ -165,6 +186,9 @@ int main(int argc, char** argv) {
   app.add_option("--error", options.error, "A share, as 0.05");
   app.add_option("--rounds", options.rounds, "With random numbers of their own");
   app.add_option("--reference", options.reference_samples, "Its samples, in two halves");
+  app.add_option("--samples", options.samples,
+                 "Of a round, from whose error the time follows [until the error is reached]")
+      ->check(CLI::PositiveNumber);
   app.add_option("--limit", options.limit_s, "CPU seconds of a method and round");
   app.add_option("--method", options.methods, "Only these, compared with the first; repeatable")
       ->allow_extra_args(false);

@@ -4,13 +4,14 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
-#include <iostream>
 #include <thread>
 #include <utility>
 
 #include "drivers/camera_drivers.hpp"
+#include "drivers/error.hpp"
 
 namespace previz::test {
 namespace {
@@ -29,12 +30,12 @@ std::filesystem::path usb_device_at(const usb::Place& place) {
   return {};
 }
 
-// Until udev has followed: a device that came back while udev still takes it away is found, and is
-// gone a moment later.
+// Returns when udev has followed: a device that comes back while udev is still removing it is found
+// and gone again a moment later.
 void tell_kernel(const std::filesystem::path& file, const std::string& word) {
   std::ofstream(file) << word;
   if (std::system("udevadm settle --timeout=20") != 0)
-    std::cerr << "udev does not follow " << file << " within 20 s\n";
+    throw Error("udev does not follow " + file.string() + " within 20 s");
 }
 
 }  // namespace
@@ -52,6 +53,14 @@ KernelCable::KernelCable(std::string driver, std::string device)
     out_ = "/sys/bus/platform/drivers/vivid/unbind";
     in_ = "/sys/bus/platform/drivers/vivid/bind";
     out_word_ = in_word_ = "vivid.0";
+  }
+}
+
+KernelCable::~KernelCable() {
+  try {
+    plug();
+  } catch (const Error& error) {
+    std::fprintf(stderr, "%s\n", error.what());
   }
 }
 
@@ -86,8 +95,11 @@ void KernelCable::wait_until_found(bool found) const {
     const std::vector<FoundCamera> all = camera_driver(driver_).find();
     return std::ranges::find(all, device_, &FoundCamera::device) != all.end();
   };
-  while (is_found() != found && std::chrono::steady_clock::now() < end)
+  while (is_found() != found) {
+    if (std::chrono::steady_clock::now() > end)
+      throw Error(device_ + (found ? " is not found" : " is still found") + " after 20 s");
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
 }
 
 }  // namespace previz::test

@@ -12,13 +12,14 @@ class KernelCable {
  public:
   // Of a camera that is there.
   KernelCable(std::string driver, std::string device);
-  ~KernelCable() { plug(); }
+  ~KernelCable();
   KernelCable(const KernelCable&) = delete;
   KernelCable& operator=(const KernelCable&) = delete;
 
   // Why it cannot be pulled; empty where it can.
   std::string why_not() const;
 
+  // They throw previz::Error where nothing comes of it within 20 s.
   void unplug();  // a real cable: returns when the driver does not find the camera any more
   void plug();    // returns when the driver finds the camera again
 

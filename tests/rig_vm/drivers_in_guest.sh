@@ -1,21 +1,7 @@
 # Runs as root in the guest, in the folder that run.sh has filled.
 set -uo pipefail
-start=$SECONDS
+. ./steps.sh
 
-step() { printf '== %s (%d s) ==\n' "$*" $((SECONDS - start)); }
-fail() {
-  echo "rig_vm: $*" >&2
-  exit 1
-}
-within() {
-  local seconds=$1 what=$2 end=$((SECONDS + $1))
-  shift 2
-  until "$@"; do
-    [[ $SECONDS -lt $end ]] || fail "not within $seconds s: $what"
-    sleep 1
-  done
-  echo "   $what"
-}
 # Runs tests of a suite: SUITE FILTER [COMMAND...], as COMMAND does. Here every device is there: none
 # may be skipped.
 suite() {
@@ -32,7 +18,9 @@ udevadm control --reload
 rig-devices vivid
 rig-devices gpio
 modprobe uhid
-touch usb_camera usb_pad
+mkdir pad
+chown nobody pad # who presses it later
+touch usb_camera pad/cable
 usb_camera=usb-previz_Rig_camera_RIGUSB1-video-index0
 vivid=platform-vivid.0-video-index0
 is_found() { ./previzd devices 2>/dev/null >found.txt; grep -q "$1" found.txt; }
@@ -68,8 +56,7 @@ echo 'SUBSYSTEM=="hidraw", ATTRS{idVendor}=="1209", ATTRS{idProduct}=="0003", GR
   >/etc/udev/rules.d/71-rig.rules
 udevadm control --reload
 udevadm trigger --settle --subsystem-match=hidraw
-export PREVIZ_TEST_USB_PAD=$PWD/usb_pad
-chmod 777 . # where the pad is worked
+export PREVIZ_TEST_USB_PAD=$PWD/pad/cable
 suite buttons '*Usb*' setpriv --reuid=nobody --regid=nogroup --groups=input
 
 step "the screen"

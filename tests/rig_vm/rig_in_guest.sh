@@ -1,23 +1,9 @@
 # Runs as root in the guest, in the folder that run.sh has filled.
 set -uo pipefail
-start=$SECONDS
-
-step() { printf '== %s (%d s) ==\n' "$*" $((SECONDS - start)); }
-fail() {
-  echo "rig_vm: $*" >&2
-  journalctl --unit=previzd --no-pager --lines=40 --output=cat >&2
-  previzctl status >&2
-  exit 1
-}
-# Waits until a command succeeds: within SECONDS, WHAT.
-within() {
-  local seconds=$1 what=$2 end=$((SECONDS + $1))
-  shift 2
-  until "$@"; do
-    [[ $SECONDS -lt $end ]] || fail "not within $seconds s: $what"
-    sleep 1
-  done
-  echo "   $what"
+. ./steps.sh
+tell_more() {
+  journalctl --unit=previzd --no-pager --lines=40 --output=cat
+  previzctl status
 }
 status() { previzctl status 2>/dev/null | sed -n "s/^$1: //p"; }
 status_is() { [[ $(status "$1") == "$2" ]]; }
@@ -57,7 +43,7 @@ usb_camera=$(found)
 set=$(<rig_usb.toml)
 mkdir -p /etc/previzd /etc/systemd/system/previzd.service.d
 printf '%s\n' "${set/USB_CAMERA/"$usb_camera"}" >/etc/previzd/set.toml
-grep "$(basename "${usb_camera##*-}")" /etc/previzd/set.toml
+grep -qF "$usb_camera" /etc/previzd/set.toml || fail "the set does not name the camera"
 
 step "install: the service starts by itself"
 # Compiling the shaders alone, at the first frame, takes minutes here.
@@ -76,6 +62,7 @@ advances render "rendering goes on"
 advances lighting "the light camera lights the scene"
 
 step "the screen"
+for page in one another; do advances screen "it shows $page page"; done # the second has a picture
 touch screen.wanted
 within 60 "it is photographed" test -s screen.ppm
 lit=$(tr -d '\0' <screen.ppm | wc -c)

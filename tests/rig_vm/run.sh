@@ -14,6 +14,11 @@ here=tests/rig_vm
 build=${1:-build/release}
 parts=("${@:2}")
 [[ ${#parts[@]} -gt 0 ]] || parts=(drivers rig)
+for part in "${parts[@]}"; do
+  [[ $part == drivers || $part == rig ]] && continue
+  echo "rig_vm: no part \"$part\"; there are drivers and rig" >&2
+  exit 2
+done
 limit_s=3000
 
 for tool in qemu-system-x86_64 mmdebstrap mke2fs cpio busybox; do
@@ -37,23 +42,30 @@ if [[ ! -e $guest/root.ext4 ]]; then
 fi
 
 usb=()
-trap '[[ ${#usb[@]} -eq 0 ]] || kill "${usb[@]}" 2>/dev/null || true' EXIT
+unplug_all() {
+  [[ ${#usb[@]} -eq 0 ]] || kill "${usb[@]}" 2>/dev/null || true
+  wait "${usb[@]}" 2>/dev/null || true
+  usb=()
+}
+trap unplug_all EXIT
 
-# Runs PART_in_guest.sh in the guest, in SHARE. What is plugged in to its USB is plugged in by
-# the files usb_camera and usb_pad there.
+# Runs PART_in_guest.sh in the guest, in SHARE. The files usb_camera and pad/cable there plug in its
+# USB devices.
 run_part() {
-  local part=$1 share=$2
-  cp "$build"/tests/rig_vm/rig_vm_{camera,pad} "$here/${part}_in_guest.sh" "$share/"
-  "$build/tests/rig_vm/rig_vm_usb_camera" "$share/.run/usb0" "$share/usb_camera" config/demo/session 10 &
+  local part=$1 share=$2 passed=true
+  cp "$build"/tests/rig_vm/rig_vm_{camera,pad} "$here"/{steps.sh,"${part}_in_guest.sh"} "$share/"
+  "$build/tests/rig_vm/rig_vm_usb_camera" "$share/.run/usb0" "$share/usb_camera" \
+    config/demo/session 10 &
   usb+=($!)
-  "$build/tests/rig_vm/rig_vm_usb_pad" "$share/.run/usb1" "$share/usb_pad" &
+  "$build/tests/rig_vm/rig_vm_usb_pad" "$share/.run/usb1" "$share/pad/cable" &
   usb+=($!)
-  if "$here/vm.sh" "$guest" "$share" "$limit_s" "bash ${part}_in_guest.sh"; then
-    echo "rig_vm: $part passed after $SECONDS s"
-  else
+  "$here/vm.sh" "$guest" "$share" "$limit_s" "bash ${part}_in_guest.sh" || passed=false
+  unplug_all
+  if ! $passed; then
     echo "rig_vm: $part FAILED; $share/.run has the journal" >&2
     exit 1
   fi
+  echo "rig_vm: $part passed after $SECONDS s"
 }
 
 for part in "${parts[@]}"; do
@@ -62,7 +74,8 @@ for part in "${parts[@]}"; do
   mkdir -p "$share"
   case $part in
   drivers)
-    cp "$build/daemon/previzd" systemd/70-previzd.rules "${suites[@]/#/$build/tests/devices/test_}" "$share/"
+    cp "$build/daemon/previzd" systemd/70-previzd.rules \
+      "${suites[@]/#/$build/tests/devices/test_}" "$share/"
     ;;
   rig)
     cp "$deb" "$share/previzd.deb"
@@ -71,10 +84,6 @@ for part in "${parts[@]}"; do
     for light in usb vivid; do
       cat "$here/rig.toml" "$here/light_$light.toml" "$share/demo.toml" >"$share/rig_$light.toml"
     done
-    ;;
-  *)
-    echo "rig_vm: no part \"$part\"; there are drivers and rig" >&2
-    exit 2
     ;;
   esac
   run_part "$part" "$share"

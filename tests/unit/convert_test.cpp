@@ -236,7 +236,15 @@ TEST(Mono, PackedAsCsi2Does) {
   expect(converted(plain(Layout::mono, 14, Packing::csi2), 4, 1,
                    {0xff, 0x00, 0xaa, 0x55, 0x7f, 0xa0, 0x56}),
          {0x3fff, 0x0001, 0x2aaa, 0x1555}, 0x3fff);
-  // A row that ends within a group still has the whole group.
+  // 5x2: a row that ends within a group still has the whole group.
+  expect(converted(plain(Layout::mono, 10, Packing::csi2), 5, 2,
+                   {0, 0, 0, 0, 0, 0xff, 0, 0, 0, 0x03, 0, 0, 0, 0, 0, 0x80, 0, 0, 0, 0x01}),
+         {0, 0, 0, 0, 0x3ff, 0, 0, 0, 0, 0x201}, 0x3ff);
+  for (const int bits : {9, 11, 13, 15, 16}) {
+    const Bytes bytes(100);
+    Frame frame;
+    EXPECT_TRUE(convert({plain(Layout::mono, bits, Packing::csi2), 4, 1, 0, bytes}, frame)) << bits;
+  }
   EXPECT_EQ(row_bytes(plain(Layout::mono, 10, Packing::csi2), 5), 10u);
   EXPECT_EQ(row_bytes(plain(Layout::mono, 12, Packing::csi2), 5), 9u);
 }

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <deque>
 #include <memory>
@@ -50,7 +51,9 @@ class Plugged {
  public:
   Plugged(UsbDevice& device, const std::filesystem::path& path)
       : device_(device), socket_(connected(path)), parser_(usbredirparser_create()) {
-    set_up_parser();
+    carry_bytes();
+    answer_about_itself();
+    answer_transfers();
     std::uint32_t capabilities[USB_REDIR_CAPS_SIZE] = {};
     for (const int capability :
          {usb_redir_cap_connect_device_version, usb_redir_cap_ep_info_max_packet_size,
@@ -78,7 +81,7 @@ class Plugged {
 
   static Plugged& self(void* pointer) { return *static_cast<Plugged*>(pointer); }
 
-  void set_up_parser() {
+  void carry_bytes() {
     usbredirparser& parser = *parser_;
     parser.priv = this;
     parser.log_func = [](void*, int level, const char* text) {
@@ -94,6 +97,10 @@ class Plugged {
       return static_cast<int>(
           send(self(plugged).socket_.get(), from, static_cast<std::size_t>(size), MSG_NOSIGNAL));
     };
+  }
+
+  void answer_about_itself() {
+    usbredirparser& parser = *parser_;
     parser.hello_func = [](void* plugged, usb_redir_hello_header*) { self(plugged).introduce(); };
     parser.reset_func = [](void* plugged) {
       self(plugged).wanted_.clear();
@@ -116,6 +123,10 @@ class Plugged {
                                      usb_redir_get_alt_setting_header* asked) {
       self(plugged).set_to_first_alternative(id, asked->interface);
     };
+  }
+
+  void answer_transfers() {
+    usbredirparser& parser = *parser_;
     parser.control_packet_func = [](void* plugged, std::uint64_t id,
                                     usb_redir_control_packet_header* header, std::uint8_t* data,
                                     int size) {

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <initializer_list>
 #include <optional>
 #include <span>
 #include <string>
@@ -63,8 +64,8 @@ Bytes joined(const Parts&... parts) {
 }
 Bytes number(std::uint64_t value, int bytes);
 
-// Keeps the device plugged in to QEMU's socket for as long as the file `cable` is there, until QEMU
-// ends. Throws std::runtime_error.
+// Keeps the device plugged in to QEMU's socket for as long as the file `cable` is there. Returns
+// when QEMU ends while it is plugged in. Throws std::runtime_error.
 void serve(UsbDevice& device, const std::filesystem::path& socket,
            const std::filesystem::path& cable);
 

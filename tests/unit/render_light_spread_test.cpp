@@ -1,0 +1,172 @@
+// From how wide a solid angle light comes, which decides where directions towards objects are worth
+// their work.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/ext/matrix_transform.hpp>
+#include <numbers>
+
+#include "daemon/render/gpu_environment.hpp"
+#include "daemon/render/gpu_lights.hpp"
+#include "tests/unit/render_fixture.hpp"
+
+namespace previz::testing {
+namespace {
+
+// Texels that `lit` picks by their direction, the others as bright as `rest`.
+lighting::EnvironmentMap map_of(int size, const auto& lit, float rest = 0) {
+  lighting::EnvironmentMap map = uniform_environment(glm::vec3(rest), size);
+  for (int j = 0; j < size; ++j)
+    for (int i = 0; i < size; ++i)
+      if (lit(lighting::texel_direction(size, i, j)))
+        map.radiance[static_cast<std::size_t>(j * size + i)] = glm::vec3(1);
+  return map;
+}
+
+double spread(const lighting::EnvironmentMap& map) {
+  return render::encode_environment(map).spread;
+}
+
+TEST(LightSpread, OfAnEvenSkyIsItsSolidAngle) {
+  EXPECT_NEAR(spread(map_of(64, [](const auto&) { return true; })), 2, 1e-6);
+  // The interpolation widens the edge by a texel: 4 * 128 of 128^2.
+  EXPECT_NEAR(spread(map_of(128, [](const auto& d) { return d.z > 0; })), 1, 4.0 / 128);
+  EXPECT_EQ(spread(map_of(1, [](const auto&) { return true; })), 2);
+}
+
+TEST(LightSpread, OfNoLightIsThatOfAnEvenSky) {
+  EXPECT_EQ(spread(map_of(32, [](const auto&) { return false; })), 2);
+}
+
+// The rim has 2 pi sin(r) / t texels of the side t that are lit in part; the entropy may count each
+// as whole, t^2 / (2 pi) more of solid angle over 2 pi.
+TEST(LightSpread, OfALampIsItsDisc) {
+  const double radius = 0.2, side = std::sqrt(4 * std::numbers::pi) / 256;
+  const double cap = 1 - std::cos(radius);
+  const double lamp = spread(map_of(1024, [&](const auto& d) { return d.z > std::cos(radius); }));
+  EXPECT_GE(lamp, cap * (1 - 1e-3));
+  EXPECT_LE(lamp, cap + std::sin(radius) * side);
+}
+
+gpu::GpuLight shining(std::uint32_t type) {
+  gpu::GpuLight light{};
+  light.type = type;
+  light.emission = glm::vec3(1);
+  light.gain = glm::vec2(1);
+  return light;
+}
+
+TEST(LightSpread, OfLightsIsThatOfAllTogether) {
+  gpu::GpuLight lamp = shining(gpu::LIGHT_DIRECTIONAL);
+  lamp.cone_sr = 2e-3f;
+  const double disc = 2e-3 / (2 * std::numbers::pi);
+  EXPECT_NEAR(render::spread_of({lamp}, 1), disc, 1e-6 * disc);
+  EXPECT_NEAR(render::spread_of({lamp, lamp}, 1), 2 * disc, 1e-6 * disc);
+  gpu::GpuLight black = lamp;
+  black.emission = glm::vec3(0);
+  EXPECT_NEAR(render::spread_of({lamp, black}, 1), disc, 1e-6 * disc);
+  EXPECT_EQ(render::spread_of({}, 1), 2);
+  EXPECT_EQ(render::spread_of({black}, 1), 2);
+}
+
+TEST(LightSpread, OfALightIsItsSizeAtTheScenesRadius) {
+  const double two_pi = 2 * std::numbers::pi;
+  gpu::GpuLight panel = shining(gpu::LIGHT_RECTANGLE);
+  panel.edge_u = {2, 0, 0};
+  panel.edge_v = {0, 1, 0};
+  EXPECT_NEAR(render::spread_of({panel}, 10), 0.02 / two_pi, 1e-8);
+  panel.type = gpu::LIGHT_TRIANGLE;
+  EXPECT_NEAR(render::spread_of({panel}, 10), 0.01 / two_pi, 1e-8);
+  gpu::GpuLight ball = shining(gpu::LIGHT_SPHERE);
+  ball.radius = 1;
+  EXPECT_NEAR(render::spread_of({ball}, 10), std::numbers::pi * 0.01 / two_pi, 1e-8);
+  const double point = render::spread_of({shining(gpu::LIGHT_POINT)}, 10);
+  EXPECT_GT(point, 0);
+  EXPECT_LT(point, 1e-12);
+}
+
+// A floor and a virtual box on it.
+View box_on_a_floor() {
+  View view;
+  const std::uint32_t grey = add_material(view.scene, diffuse(glm::vec3(0.5f)));
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({3, 3})), grey);
+  add_instance(view.scene, add_mesh(view.scene, box_mesh(glm::dvec3(0.5))), grey,
+               glm::translate(glm::dmat4(1), glm::dvec3(0, 0, 0.25)), scene::world_mixed);
+  view.calibration = pinhole(32, 24, 0.9);
+  view.world_from_camera = look_at({0, -2, 1.5}, {0, 0, 0.2});
+  view.environment = uniform_environment(glm::vec3(0));
+  return view;
+}
+
+// The rays of a sample a pixel, with directions towards the box and without.
+struct Rays {
+  std::uint64_t with, without;
+  bool same_picture;
+};
+
+Rays rays_of(const View& view, set::LightSampling sampling = set::LightSampling::importance) {
+  set::Estimation estimation;
+  const Rendered with = render_clean(view, 4, estimation, sampling);
+  estimation.difference_sampling = 0;
+  const Rendered without = render_clean(view, 4, estimation, sampling);
+  return {with.counters.rays, without.counters.rays,
+          with.layers.mixed == without.layers.mixed && with.layers.diff == without.layers.diff};
+}
+
+TEST(DirectionsTowardsWhatDiffers, AreTakenUnderASkyAndNotUnderALamp) {
+  View view = box_on_a_floor();
+  view.environment = uniform_environment(glm::vec3(1));
+  const Rays sky = rays_of(view);
+  EXPECT_GT(sky.with, sky.without);
+  EXPECT_FALSE(sky.same_picture);
+
+  set::Light sun = lamp(set::LightType::directional);
+  sun.direction = {0.3, 0.2, -1};
+  sun.angular_radius_rad = 0.0047;
+  view.environment = uniform_environment(glm::vec3(0));
+  view.scene.lights = {sun};
+  EXPECT_TRUE(rays_of(view).same_picture);
+
+  // A lamp that is faint beside the sky changes nothing that could be told.
+  sun.emission = glm::dvec3(1e-6);
+  view.environment = uniform_environment(glm::vec3(1));
+  view.scene.lights = {sun};
+  const Rays both = rays_of(view);
+  const auto more = [](const Rays& rays) {
+    return static_cast<double>(rays.with) / static_cast<double>(rays.without);
+  };
+  EXPECT_NEAR(more(both), more(sky), 0.05 * more(sky));
+}
+
+// What is left to luck is looked for in every way there is.
+TEST(DirectionsTowardsWhatDiffers, AreTakenWhereALampIsFoundByLuck) {
+  View view = box_on_a_floor();
+  view.environment = map_of(256, [](const auto& d) { return d.z > std::cos(0.02f); });
+  EXPECT_TRUE(rays_of(view).same_picture);
+  EXPECT_FALSE(rays_of(view, set::LightSampling::bsdf).same_picture);
+}
+
+TEST(DirectionsTowardsWhatDiffers, AreThoseOfTheFrameHoweverOftenItIsBegun) {
+  View view = box_on_a_floor();
+  set::Light panel = lamp(set::LightType::rectangle, glm::dvec3(5));
+  panel.position = {0, 0, 3};
+  panel.direction = {0, 0, -1};
+  panel.up = {0, 1, 0};
+  panel.width_m = panel.height_m = 2;
+  view.scene.lights = {panel};
+  render::Renderer renderer(shared_device(), {}, view.calibration);
+  renderer.set_scene(view.scene);
+  renderer.set_environment(view.environment, set::LightSampling::importance);
+  render::FrameInput frame;
+  frame.world_from_camera = view.world_from_camera;
+  std::vector<std::vector<glm::vec3>> pictures;
+  for (int begun = 0; begun < 2; ++begun) {
+    renderer.begin(frame);
+    renderer.render(4);
+    pictures.push_back(renderer.layers().mixed);
+  }
+  EXPECT_EQ(pictures[0], pictures[1]);
+}
+
+}  // namespace
+}  // namespace previz::testing
