@@ -17,8 +17,8 @@ struct LoadedSet {
   scene::Scene scene;
 };
 
-// Tells once that a set file has changed: when two looks one after the other find the same new time,
-// because until then it may still be being written.
+// Tells once that a set file has changed: when two looks one after the other find the same new
+// time, because until then it may still be being written.
 class SetFileWatch {
  public:
   using Time = std::filesystem::file_time_type;
