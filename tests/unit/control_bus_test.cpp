@@ -144,6 +144,18 @@ TEST_F(RigOnTheBus, EveryActionIsAMethodAndEveryChangeASignal) {
   sd_bus_flush_close_unref(client);
 }
 
+TEST(BusWithoutARig, IsToldInPlainWords) {
+  const test::PrivateBus bus;
+  if (!bus.running()) GTEST_SKIP() << "dbus-daemon is not installed";
+  for (const char* request : {"status", "mode live"}) {
+    const Said said = previzctl(request);
+    EXPECT_EQ(said.status, 1);
+    EXPECT_EQ(said.out,
+              "previzctl: previzd does not answer: it is not running, or it is loading a set just "
+              "now\n");
+  }
+}
+
 TEST(RigWithoutABus, SaysSo) {
   setenv("DBUS_SYSTEM_BUS_ADDRESS", "unix:path=/nonexistent/bus", 1);
   const Said said = previzctl("status");
