@@ -207,7 +207,7 @@ TEST(ButtonDevices, APadOnTheUsbIsReadPastTheKernel) {
   const auto buttons = open_buttons(std::vector{name}, {});
   ASSERT_TRUE(opens_again(*buttons[0], 0));
   const auto press = [&] {
-    std::ofstream{held};
+    std::ofstream(held).close();
     expect_edge(*buttons[0], name, true);
   };
   ASSERT_NO_FATAL_FAILURE(press());
@@ -218,7 +218,7 @@ TEST(ButtonDevices, APadOnTheUsbIsReadPastTheKernel) {
   ASSERT_NO_FATAL_FAILURE(expect_edge(*buttons[0], name, false));  // released by its going
   ASSERT_NO_FATAL_FAILURE(expect_trouble(*buttons[0], "unplugged"));
   std::filesystem::remove(held);
-  std::ofstream{cable};
+  std::ofstream(cable).close();
   ASSERT_TRUE(opens_again(*buttons[0], 1));
   ASSERT_NO_FATAL_FAILURE(press());
   std::filesystem::remove(held);

@@ -85,7 +85,7 @@ void KernelCable::plug() {
   if (file_.empty())
     tell_kernel(in_, in_word_);
   else
-    std::ofstream{file_};
+    std::ofstream(file_).close();
   wait_until_found(true);
 }
 

@@ -37,7 +37,7 @@ class UsbCamera : public testing::TestWithParam<std::string> {
   void TearDown() override {
     if (cable_.empty()) return;
     std::filesystem::remove(wedge());
-    std::ofstream{cable_};
+    std::ofstream(cable_).close();
   }
 
   std::unique_ptr<Camera> open() const {
@@ -78,7 +78,7 @@ TEST_P(UsbCamera, ThatIsWedgedIsResetAndSendsAgain) {
       "film camera", [this] { return open(); }, options, HostClock{}, hooks);
   lifeline.start();
   trouble_until_a_frame(lifeline, [] { return true; });
-  std::ofstream{wedge()};
+  std::ofstream(wedge()).close();
   const std::vector<std::string> told =
       trouble_until_a_frame(lifeline, [this] { return !exists(wedge()); });
   EXPECT_THAT(told, testing::Contains(testing::HasSubstr("it was reset")));
@@ -96,7 +96,7 @@ TEST_P(UsbCamera, ThatIsPluggedInIsTold) {
   };
   EXPECT_TRUE(waits_for([this] { return !driver_.usb_place(name_); }));
   const std::uint64_t before = hotplug.arrivals();
-  std::ofstream{cable_};
+  std::ofstream(cable_).close();
   EXPECT_TRUE(waits_for([&] { return hotplug.arrivals() > before; }));
   EXPECT_TRUE(waits_for(
       [this] { return std::ranges::count(driver_.find(), name_, &FoundCamera::device) == 1; }));
