@@ -99,7 +99,7 @@ void meet_emission(Path p, Surface s, GpuHit hit) {
   receive(p, p.throughput * s.emission * weight, vec2(1.0));
 }
 
-// Of bound_share; less is not worth the work.
+// Of bound_share. Where less would do, the objects are left to the BSDF, at no cost.
 const float least_bound_part = 0.04;
 
 // How directions are sampled at a vertex: by the BSDF, and for `share` of them towards the objects

@@ -269,8 +269,8 @@ TEST_P(KmsCable, AHundredTimesUnpluggedLeavesNothingBehind) {
   }
   ASSERT_EQ(life.until("shown"), "shown");
   EXPECT_EQ(test::open_descriptors(), descriptors);
-  // A framebuffer left behind in each cycle would be a mapping, a context far more bytes than this
-  // beside what GBM and EGL keep.
+  // A framebuffer left behind in each cycle would be as many mappings as cycles, a context far more
+  // bytes than this beside what GBM and EGL keep.
   EXPECT_LT(test::mappings(), mappings + (cycles - warm_cycles) / 2);
   const std::size_t kept = test::live_bytes() - std::min(bytes, test::live_bytes());
   const std::size_t opened = life.openings() - openings;

@@ -7,7 +7,7 @@
 #       rig       the package and its daemon under systemd: a take, buttons, every device unplugged
 # The guest is built the first time, and when what the package depends on or guest/ has changed: as
 # root, six minutes and the network. The guest's processor is emulated: "drivers" takes twenty
-# minutes, "rig" eleven, seventeen on two busy cores. What they leave is in out/rig_vm.
+# minutes, "rig" nine, eighteen on two busy cores. What they leave is in out/rig_vm.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 here=tests/rig_vm

@@ -127,7 +127,8 @@ TEST(DirectionsTowardsWhatDiffers, AreTakenUnderASkyAndNotUnderALamp) {
   view.scene.lights = {sun};
   EXPECT_TRUE(rays_of(view).same_picture);
 
-  // A lamp that is faint beside the sky changes nothing that could be told.
+  // A lamp that is faint beside the sky changes nothing that could be told: of the rays that the
+  // directions cost, some thousand, less than a tenth, three deviations of such a number.
   sun.emission = glm::dvec3(1e-6);
   view.environment = uniform_environment(glm::vec3(1));
   view.scene.lights = {sun};
@@ -135,7 +136,7 @@ TEST(DirectionsTowardsWhatDiffers, AreTakenUnderASkyAndNotUnderALamp) {
   const auto more = [](const Rays& rays) {
     return static_cast<double>(rays.with) / static_cast<double>(rays.without);
   };
-  EXPECT_NEAR(more(both), more(sky), 0.05 * more(sky));
+  EXPECT_NEAR(more(both), more(sky), 0.1 * (more(sky) - 1));
 }
 
 // What is left to luck is looked for in every way there is.
