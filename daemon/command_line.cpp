@@ -22,6 +22,8 @@ void add_render(CLI::App& app, post::RenderOptions& options) {
   command.add_flag("--adaptive,!--even", options.adaptive,
                    "The samples on average, spent where they bring most, or the same number for "
                    "every pixel (default: quality.adaptive)");
+  command.add_flag("--denoise,!--noisy", options.denoise,
+                   "Take noise out of the composite, or leave it (default: quality.denoise)");
   command
       .add_option("--error", options.error,
                   "Go on to this error, over the picture's mean radiance (default: quality.error)")

@@ -34,6 +34,7 @@ struct ExrMetadata {
 
 // Channels, 32-bit float, ZIP compressed: composite.R/.G/.B, mixed.R/.G/.B, real.R/.G/.B,
 // diff.R/.G/.B, mask.Y, depth.Z, normal.X/.Y/.Z, variance.R/.G/.B.
+// composite and variance are denoised where quality.denoise says so, the others never.
 // diff is what virtual things do to real pixels: (1 - mask) * (Lm - Lr), which is Lm - Lr where the
 // mask is 0 and 0 where it is 1. The file appears whole or not at all; throws previz::Error naming
 // it on failure.

@@ -99,10 +99,12 @@ bool RenderStage::add_samples(int samples) {
 void RenderStage::finish(Shot& shot) {
   shot.whole = true;
   shot.counters = renderer_.counters();
-  const bool composite = view_ == render::View::composite;
-  if (options_.layers || !composite) shot.layers = renderer_.layers();
-  shot.picture = composite ? renderer_.picture()
-                           : picture_of(view_, shot.layers, *response_, exposure_of(shot));
+  render::Layers layers = renderer_.layers();
+  if (set_.quality.denoise) renderer_.denoise(layers);
+  shot.picture = view_ == render::View::composite
+                     ? renderer_.picture(layers)
+                     : picture_of(view_, layers, *response_, exposure_of(shot));
+  if (options_.layers) shot.layers = std::move(layers);
 }
 
 void RenderStage::resize(double scale) {

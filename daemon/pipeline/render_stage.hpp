@@ -17,7 +17,7 @@
 namespace previz::pipeline {
 
 struct RenderStageOptions {
-  bool layers = false;  // fill shot.layers (they cost a download)
+  bool layers = false;  // fill shot.layers
   double scale = 1;     // of everything a shot gets, over the observer's size (preview_size.hpp)
   std::function<bool()> cancelled;
   std::function<void(const Shot&, int samples_done)> progress;  // a few times per frame

@@ -38,6 +38,7 @@ double now_s() {
 void override_set(set::Set& set, const RenderOptions& options) {
   if (options.samples) set.quality.samples = *options.samples;
   if (options.adaptive) set.quality.adaptive = *options.adaptive;
+  if (options.denoise) set.quality.denoise = *options.denoise;
   if (options.error) set.quality.error = *options.error;
   if (options.seconds) set.quality.seconds = *options.seconds;
   if (options.seed) set.estimation.seed = *options.seed;
@@ -56,6 +57,7 @@ std::string settings_of(const pipeline::Take& take, const set::Set& set) {
   json["session_start_ns"] = take.observer_stream->records().front().timestamp_ns;
   json["samples"] = set.quality.samples;
   json["adaptive"] = set.quality.adaptive;
+  json["denoise"] = set.quality.denoise;
   json["error"] = set.quality.error;
   json["seconds"] = set.quality.seconds;
   json["seed"] = set.estimation.seed;
@@ -210,6 +212,7 @@ std::string quality_words(const set::Quality& quality) {
   if (quality.error > 0) text += ", then to an error of " + percent_words(quality.error);
   if (quality.seconds > 0)
     text += ", then for " + duration_words(quality.seconds) + " a frame at most";
+  if (quality.denoise) text += ", denoised";
   return text;
 }
 

@@ -35,6 +35,7 @@ struct RenderOptions {
   std::optional<int> samples;                     // quality.samples
   std::optional<double> error;                    // quality.error
   std::optional<bool> adaptive;                   // quality.adaptive
+  std::optional<bool> denoise;                    // quality.denoise
   std::optional<double> seconds;                  // quality.seconds
   std::optional<std::uint32_t> seed;              // estimation.seed
   std::optional<set::Estimator> estimator;

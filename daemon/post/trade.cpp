@@ -104,6 +104,7 @@ void Sweep::plan() {
   own.lighting = frame_.set().lighting;
   own.lens = frame_.calibration().lens;
   own.adaptive = frame_.set().quality.adaptive;
+  own.denoise = frame_.set().quality.denoise;
   MethodRenderer renderer(device_, frame_, scene_, own, options_.scale);
   renderer.begin(own.estimation.seed);
   std::vector<render::Part> unneeded;

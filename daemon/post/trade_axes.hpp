@@ -18,6 +18,7 @@ struct TradeSettings {
   set::Lighting lighting;
   std::optional<ThinLens> lens;
   bool adaptive = false;              // quality.adaptive
+  bool denoise = false;               // quality.denoise
   double scale = 1;                   // of the sweep's own picture size
   std::vector<render::Part> carried;  // parts the frame has no need of
 

@@ -24,6 +24,7 @@ MethodRenderer::MethodRenderer(const std::shared_ptr<render::Device>& device, Tr
     : exposure_(frame.exposure()),
       world_from_camera_(frame.world_from_camera()),
       adaptive_(settings.adaptive),
+      denoise_(settings.denoise),
       plate_(frame.plate(sweep_scale * settings.scale)),
       camera_(render::plate_radiance(plate_, frame.response(), exposure_).value),
       renderer_(device, settings.estimation,
@@ -37,7 +38,7 @@ MethodRenderer::MethodRenderer(const std::shared_ptr<render::Device>& device, Tr
 
 void MethodRenderer::warm_up() {
   begin(0);
-  renderer_.render(1);
+  render(1);
 }
 
 void MethodRenderer::begin(std::uint32_t seed) {
@@ -50,11 +51,18 @@ double MethodRenderer::render(int samples) {
   quality.samples = samples;
   quality.adaptive = adaptive_;
   pipeline::refine(renderer_, quality, {}, {});
+  layers_ = renderer_.layers();
+  if (denoise_) renderer_.denoise(layers_);
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+void MethodRenderer::add(int samples) {
+  renderer_.render(samples);
+  layers_ = renderer_.layers();
+}
+
 TradePicture MethodRenderer::picture() const {
-  return trade_picture(renderer_.layers(), camera_, 1 / exposure_);
+  return trade_picture(layers_, camera_, 1 / exposure_);
 }
 
 }  // namespace previz::post

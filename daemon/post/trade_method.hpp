@@ -23,22 +23,24 @@ class MethodRenderer {
   void warm_up();
   // Forgets what was rendered.
   void begin(std::uint32_t seed);
-  // All the samples of a frame begun, as the settings spread them. Seconds.
+  // All the samples of a frame begun, as the settings spread them, and what they do to the picture
+  // then. Seconds.
   double render(int samples);
-  // Some more for every pixel.
-  void add(int samples) { renderer_.render(samples); }
+  // Some more for every pixel, of which layers() and picture() then are as they came.
+  void add(int samples);
 
   bool needs(render::Part part) const { return renderer_.needs(part); }
-  render::Layers layers() const { return renderer_.layers(); }
+  const render::Layers& layers() const { return layers_; }
   TradePicture picture() const;
 
  private:
   const double exposure_;
   const glm::dmat4 world_from_camera_;
-  const bool adaptive_;
+  const bool adaptive_, denoise_;
   const Plate plate_;
   const std::vector<double> camera_;  // the plate's radiance, interleaved RGB
   render::Renderer renderer_;
+  render::Layers layers_;
 };
 
 }  // namespace previz::post

@@ -121,9 +121,14 @@ Plate make_picture(const Layers& layers, const Plate& plate, const lighting::Res
   picture.height = layers.height;
   picture.bits = response.bits();
   picture.samples.resize(3 * layers.composite.size());
+  const std::vector<double>& radiance = response.inverse();
+  const auto own = [&](std::size_t sample) {
+    return static_cast<float>(radiance[plate.samples[sample]] / exposure);
+  };
   for (std::size_t i = 0; i < layers.composite.size(); ++i) {
     const bool untouched =
-        !plate.samples.empty() && layers.mask[i] == 0 && layers.diff[i] == glm::vec3(0);
+        !plate.samples.empty() && layers.mask[i] == 0 &&
+        layers.composite[i] == glm::vec3(own(3 * i), own(3 * i + 1), own(3 * i + 2));
     for (int c = 0; c < 3; ++c)
       picture.samples[3 * i + c] =
           untouched ? plate.samples[3 * i + c]

@@ -5,6 +5,7 @@
 
 #include "daemon/lighting/response.hpp"
 #include "daemon/render/composite.hpp"
+#include "daemon/render/denoiser.hpp"
 #include "daemon/render/gpu_scene.hpp"
 #include "daemon/render/photon_schedule.hpp"
 #include "daemon/render/picture_memory.hpp"
@@ -71,6 +72,7 @@ struct Renderer::Impl {
   ObserverCalibration calibration;
   GpuScene scene;
   std::optional<Wavefront> wavefront;
+  std::optional<Denoiser> denoiser;  // made when it is first asked for
   Buffer rays, frame_buffer;
   std::uint32_t carried = 0;  // FEATURE_* bits
   bool has_scene = false, has_environment = false;
@@ -274,9 +276,15 @@ Layers Renderer::layers() const {
   return layers;
 }
 
-Plate Renderer::picture() const {
+void Renderer::denoise(Layers& layers) {
+  Impl& r = *impl_;
+  if (!r.denoiser) r.denoiser.emplace(*r.device);
+  r.denoiser->denoise(layers, plate_radiance(r.frame.plate, *r.response, r.frame.exposure).value);
+}
+
+Plate Renderer::picture(const Layers& layers) const {
   const Impl& r = *impl_;
-  return make_picture(layers(), r.frame.plate, *r.response, r.frame.exposure);
+  return make_picture(layers, r.frame.plate, *r.response, r.frame.exposure);
 }
 
 Counters Renderer::counters() const {

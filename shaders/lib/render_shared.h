@@ -82,6 +82,21 @@ PREVIZ_CONST uint BINDING_PLATE = 1u;  // vec4[], to write
 PREVIZ_CONST uint BINDING_SEEN = 2u;   // GpuSeen[]
 PREVIZ_CONST uint CAMERA_BINDINGS = 3u;
 
+// Set 0 of the passes that take noise out of a picture (daemon/render/denoiser.hpp); texel buffers
+// RGBA32F, width * height, and those to write, which the next pass reads.
+//   DENOISE_SIGNAL    signal over the sensor's white, 1 / depth (0: none)
+//   DENOISE_VARIANCE  the signal's
+//   DENOISE_SURFACE   normal, mean(M)
+PREVIZ_CONST uint BINDING_DENOISE_SIGNAL = 0u;
+PREVIZ_CONST uint BINDING_DENOISE_VARIANCE = 1u;
+PREVIZ_CONST uint BINDING_DENOISE_SURFACE = 2u;
+PREVIZ_CONST uint BINDING_DENOISED_SIGNAL = 3u;    // vec4[]
+PREVIZ_CONST uint BINDING_DENOISED_VARIANCE = 4u;  // vec4[]
+PREVIZ_CONST uint DENOISE_BINDINGS = 5u;
+
+// Pixels from which the variance of a single sample is taken, to each side.
+PREVIZ_CONST uint DENOISE_VARIANCE_REACH = 3u;
+
 // What a slot holds, in the fourth component of its SAMPLE_REAL.
 PREVIZ_CONST float SAMPLE_FULL = 0.0f;        // both radiances
 PREVIZ_CONST float SAMPLE_DIFFERENCE = 1.0f;  // only what differs between them
@@ -297,7 +312,15 @@ struct GpuBatch {
   float photon_radius;        // metres; photons of a pass serve the sample of the same index
 };
 
+// Push constants of the passes that take noise out.
+struct GpuDenoise {
+  uint width, height;
+  uint step;           // pixels between neighbours
+  uint single_sample;  // 1: what a pixel has is one sample, and its variance is not known
+};
+
 #ifdef __cplusplus
+static_assert(sizeof(GpuDenoise) == 16);
 static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 52);
 static_assert(sizeof(GpuPixel) == 144);

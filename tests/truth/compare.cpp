@@ -278,6 +278,14 @@ EstimatedFrame composited(const TruthFrame& truth, EstimatedFrame estimate) {
   return estimate;
 }
 
+EstimatedFrame as_composited(const TruthFrame& truth, EstimatedFrame estimate) {
+  for (std::size_t i = 0; i < estimate.composite.size(); ++i) {
+    if (estimate.mask[i] == 0) estimate.diff[i] = estimate.composite[i] - truth.plate[i];
+    if (estimate.mask[i] == 1) estimate.mixed[i] = estimate.composite[i];
+  }
+  return estimate;
+}
+
 double psnr(const Plate& a, const Plate& b) {
   double squares = 0;
   for (std::size_t i = 0; i < a.samples.size(); ++i) {

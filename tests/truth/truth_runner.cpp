@@ -30,7 +30,7 @@ struct Arguments {
   std::vector<fs::path> sets;
   TakeOptions take;
   int samples = 256;
-  bool adaptive = false;
+  bool adaptive = false, denoise = false;
   fs::path out;
   std::optional<std::string> bounds;
   std::vector<int> frames;  // empty: every truth frame
@@ -52,6 +52,7 @@ post::FrameRecord render_frame(const TruthSet& set, int frame, const Arguments& 
   options.frames = post::FrameRange{index, index};
   options.samples = arguments.samples;
   options.adaptive = arguments.adaptive;
+  options.denoise = arguments.denoise;
   options.directory = directory / "render";
   options.exr = options.png = true;
   options.video = false;
@@ -82,6 +83,7 @@ JudgedFrame judge_frame(const TruthSet& set, int frame, const Arguments& argumen
   estimate.mask = std::move(layers.mask);
 
   const TruthFrame truth = load_truth_frame(set, frame);
+  if (arguments.denoise) estimate = as_composited(truth, std::move(estimate));
   out.measures = compare(truth, estimate);
   output::write_png(directory / (frame_name(frame) + "_compare.png"),
                     comparison_sheet(truth, estimate));
@@ -209,6 +211,7 @@ int main(int argc, char** argv) {
   app.add_option("--spp", arguments.samples, "samples per pixel [256]")
       ->check(CLI::Range(1, 1000000));
   app.add_flag("--adaptive", arguments.adaptive, "so many on average, where they bring most");
+  app.add_flag("--denoise", arguments.denoise, "take noise out of the composite");
   app.add_option("--out", arguments.out, "directory for the pictures and figures")->required();
   app.add_option("--bounds", arguments.bounds, "judge by this row of bounds")
       ->check(CLI::IsMember({"paired", "full", "captured"}));

@@ -23,7 +23,7 @@ Plate show(const View& view, const Plate& plate, int samples) {
   renderer.begin({plate, 0.85, view.world_from_camera});
   renderer.render(samples);
   expect_clean(renderer.counters());
-  return renderer.picture();
+  return renderer.picture(renderer.layers());
 }
 
 View real_set() {

@@ -1,0 +1,53 @@
+// One level of an edge-avoiding wavelet transform, guided by variance: a B3 spline of 5x5 pixels
+// `step` apart, in which neighbours count as far as they show the same surface and differ by no
+// more than their noise (Dammertz et al. 2010, "Edge-Avoiding A-Trous Wavelet Transform"; Schied et
+// al. 2017, "Spatiotemporal Variance-Guided Filtering").
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shaders/lib/denoise.glsl"
+
+// Standard deviations of a difference at which a neighbour's weight has fallen to 1 / e. More blurs
+// what is there, fewer leave noise; 1.5 to 3 differ little (tests/truth/RESULTS.md).
+const float NOISE_SCALE = 2.0;
+// Variance, over the sensor's white, squared: far below what 16 bits show.
+const float LEAST_VARIANCE = 1e-12;
+
+const float SPLINE[3] = float[3](0.375, 0.25, 0.0625);
+
+// Squared distance of two pixels' signals over what noise makes of equal ones, mean over channels.
+float signal_distance(Pixel a, Pixel b) {
+  const vec3 off = a.signal - b.signal;
+  const vec3 expected = NOISE_SCALE * NOISE_SCALE * (a.variance + b.variance) + LEAST_VARIANCE;
+  return dot(off * off / expected, vec3(1.0 / 3.0));
+}
+
+void main() {
+  const uint index = gl_GlobalInvocationID.x;
+  if (index >= denoise.width * denoise.height) return;
+  const ivec2 at = ivec2(index % denoise.width, index / denoise.width);
+  const Pixel here = load_pixel(at);
+  const vec2 slope = vec2(inverse_depth_slope(at, ivec2(1, 0), here.inverse_depth),
+                          inverse_depth_slope(at, ivec2(0, 1), here.inverse_depth));
+  vec3 signal = vec3(0.0);
+  vec3 variance = vec3(0.0);
+  float total = 0.0;
+  for (int y = -2; y <= 2; ++y)
+    for (int x = -2; x <= 2; ++x) {
+      const ivec2 off = int(denoise.step) * ivec2(x, y);
+      if (!is_inside(at + off)) continue;
+      const Pixel there = load_pixel(at + off);
+      float weight = SPLINE[abs(x)] * SPLINE[abs(y)];
+      if (x != 0 || y != 0) {
+        if (!are_alike(here, there)) continue;
+        const float foretold = here.inverse_depth + dot(slope, vec2(off));
+        weight *= exp(-(signal_distance(here, there) + surface_distance(here, there, foretold)));
+      }
+      signal += weight * there.signal;
+      variance += weight * weight * there.variance;
+      total += weight;
+    }
+  denoised_signals[index] = vec4(signal / total, here.inverse_depth);
+  denoised_variances[index] = vec4(variance / (total * total), 0.0);
+}

@@ -1,0 +1,50 @@
+// Before noise is taken out: a few samples do not know their variance well, so it is the mean over
+// a pixel's neighbours; a single sample does not know it at all, so it is that of the neighbours.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shaders/lib/denoise.glsl"
+
+vec3 mean_variance(ivec2 at, Pixel here) {
+  vec3 sum = vec3(0.0);
+  float count = 0.0;
+  for (int y = -1; y <= 1; ++y)
+    for (int x = -1; x <= 1; ++x) {
+      if (!is_inside(at + ivec2(x, y))) continue;
+      const Pixel there = load_pixel(at + ivec2(x, y));
+      if (!are_alike(here, there)) continue;
+      sum += there.variance;
+      count += 1.0;
+    }
+  return sum / count;
+}
+
+vec3 variance_of_neighbours(ivec2 at, Pixel here) {
+  const int reach = int(DENOISE_VARIANCE_REACH);
+  vec3 sum = vec3(0.0);
+  vec3 square = vec3(0.0);
+  float count = 0.0;
+  for (int y = -reach; y <= reach; ++y)
+    for (int x = -reach; x <= reach; ++x) {
+      if (!is_inside(at + ivec2(x, y))) continue;
+      const Pixel there = load_pixel(at + ivec2(x, y));
+      if (!are_alike(here, there)) continue;
+      const vec3 off = there.signal - here.signal;
+      sum += off;
+      square += off * off;
+      count += 1.0;
+    }
+  return max(square / count - (sum / count) * (sum / count), vec3(0.0));
+}
+
+void main() {
+  const uint index = gl_GlobalInvocationID.x;
+  if (index >= denoise.width * denoise.height) return;
+  const ivec2 at = ivec2(index % denoise.width, index / denoise.width);
+  const Pixel here = load_pixel(at);
+  const vec3 variance =
+      denoise.single_sample != 0u ? variance_of_neighbours(at, here) : mean_variance(at, here);
+  denoised_signals[index] = vec4(here.signal, here.inverse_depth);
+  denoised_variances[index] = vec4(variance, 0.0);
+}
