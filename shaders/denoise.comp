@@ -14,6 +14,11 @@ const float NOISE_SCALE = 2.0;
 // Variance, over the sensor's white, squared: far below what 16 bits show.
 const float LEAST_VARIANCE = 1e-12;
 
+// Neighbours that earlier levels have blended share pixels: with full weights a level leaves a quarter
+// of their variance, where of 13.4 independent ones, as many as the weights are worth, it would leave
+// 1 / 13.4. So the variance falls with this power of the number that the weights are worth.
+const float OVERLAP_POWER = 0.535;
+
 const float SPLINE[3] = float[3](0.375, 0.25, 0.0625);
 
 // Squared distance of two pixels' signals over what noise makes of equal ones, mean over channels.
@@ -30,9 +35,11 @@ void main() {
   const Pixel here = load_pixel(at);
   const vec2 slope = vec2(inverse_depth_slope(at, ivec2(1, 0), here.inverse_depth),
                           inverse_depth_slope(at, ivec2(0, 1), here.inverse_depth));
-  vec3 signal = vec3(0.0);
+  vec3 change = vec3(0.0);
   vec3 variance = vec3(0.0);
+  float overlap = 0.0;
   float total = 0.0;
+  float squares = 0.0;
   for (int y = -2; y <= 2; ++y)
     for (int x = -2; x <= 2; ++x) {
       const ivec2 off = int(denoise.step) * ivec2(x, y);
@@ -44,10 +51,14 @@ void main() {
         const float foretold = here.inverse_depth + dot(slope, vec2(off));
         weight *= exp(-(signal_distance(here, there) + surface_distance(here, there, foretold)));
       }
-      signal += weight * there.signal;
+      change += weight * (there.signal - here.signal);
       variance += weight * weight * there.variance;
+      overlap += weight * there.overlap;
       total += weight;
+      squares += weight * weight;
     }
-  denoised_signals[index] = vec4(signal / total, here.inverse_depth);
-  denoised_variances[index] = vec4(variance / (total * total), 0.0);
+  overlap /= total;
+  if (denoise.step > 1u) overlap *= pow(total * total / squares, 1.0 - OVERLAP_POWER);
+  denoised_signals[index] = vec4(here.signal + change / total, here.inverse_depth);
+  denoised_variances[index] = vec4(variance / (total * total), overlap);
 }

@@ -1,5 +1,5 @@
-// Before noise is taken out: a few samples do not know their variance well, so it is the mean over
-// a pixel's neighbours; a single sample does not know it at all, so it is that of the neighbours.
+// Before noise is taken out: a few samples do not know their variance well, so it is at least the mean
+// over a pixel's neighbours; a single sample does not know it at all, so it is that of the neighbours.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -43,8 +43,9 @@ void main() {
   if (index >= denoise.width * denoise.height) return;
   const ivec2 at = ivec2(index % denoise.width, index / denoise.width);
   const Pixel here = load_pixel(at);
-  const vec3 variance =
-      denoise.single_sample != 0u ? variance_of_neighbours(at, here) : mean_variance(at, here);
+  const vec3 variance = denoise.single_sample != 0u
+                            ? variance_of_neighbours(at, here)
+                            : max(here.variance, mean_variance(at, here));
   denoised_signals[index] = vec4(here.signal, here.inverse_depth);
-  denoised_variances[index] = vec4(variance, 0.0);
+  denoised_variances[index] = vec4(variance, 1.0);
 }

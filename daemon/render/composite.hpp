@@ -37,8 +37,8 @@ Layers make_layers(std::span<const gpu::GpuPixel> pixels, int width, int height,
                    std::int64_t samples, const PlateRadiance& plate,
                    const CompositeRule& rule = {});
 
-// The composite through exposure and response. Where nothing virtual touches a pixel, so that it has
-// the plate's own radiance, it is the plate's own samples, bit for bit.
+// The composite through exposure and response. Where nothing virtual touches a pixel, so that it
+// has the plate's own radiance, it is the plate's own samples, bit for bit.
 Plate make_picture(const Layers& layers, const Plate& plate, const lighting::Response& response,
                    double exposure);
 

@@ -12,8 +12,8 @@ namespace {
 
 // Levels of the transform: steps of 1, 2, 4 and 8 pixels.
 constexpr int levels = 4;
-// Rows above and below that a row's result depends on: two steps of every level, the neighbours that
-// give a slope, and those that give the variance.
+// Rows above and below that a row's result depends on: two steps of every level, the neighbours
+// that give a slope, and those that give the variance.
 constexpr int reach = 2 * ((1 << levels) - 1) + 1 + static_cast<int>(gpu::DENOISE_VARIANCE_REACH);
 
 // Share of the sensor's white that is left of a pixel which is no outlier.
@@ -57,8 +57,7 @@ struct Band {
     for (std::size_t i = first; i < last; ++i) {
       const glm::vec3 through = seen_through(layers, camera, i);
       const glm::vec3 shown = glm::min(layers.composite[i], glm::max(through, white));
-      signal.emplace_back((shown - through) / unit,
-                          layers.depth[i] > 0 ? 1 / layers.depth[i] : 0);
+      signal.emplace_back((shown - through) / unit, layers.depth[i] > 0 ? 1 / layers.depth[i] : 0);
       variance.emplace_back(glm::min(layers.variance[i], most_variance) / (unit * unit), 0);
       surface.emplace_back(layers.normal[i], layers.mask[i]);
     }
@@ -164,7 +163,7 @@ void Denoiser::denoise(Layers& layers, const std::vector<double>& camera) {
           seen_through(layers, camera, i) + unit * glm::vec3(signal[i - first]);
       if (is_white(composite[i], 1, layers) && is_white(denoised, nearly_white, layers)) continue;
       composite[i] = denoised;
-      variance[i] = unit * unit * glm::vec3(left[i - first]);
+      variance[i] = unit * unit * left[i - first].w * glm::vec3(left[i - first]);
     }
   }
   layers.composite = std::move(composite);

@@ -1,10 +1,10 @@
 // Takes noise out of a composite, guided by its own variance (P26): an edge-avoiding wavelet
 // transform in Vulkan compute (shaders/denoise.comp).
 //
-// What is filtered is the one picture that is laid over the camera's: composite - (1 - M) Lc. So the
-// two worlds never get different weights, what the camera saw keeps its sharpness, and where nothing
-// virtual is near, the plate stays as it is, bit for bit. With more samples the variance falls, and
-// with it what the filter blurs: it converges to the same picture.
+// What is filtered is the one picture that is laid over the camera's: composite - (1 - M) Lc. So
+// the two worlds never get different weights, what the camera saw keeps its sharpness, and where
+// nothing virtual is near, the plate stays as it is, bit for bit. With more samples the variance
+// falls, and with it what the filter blurs: it converges to the same picture.
 #pragma once
 
 #include <vector>

@@ -29,7 +29,8 @@ const float DEPTH_SCALE = 0.01;
 struct Pixel {
   vec3 signal;
   float inverse_depth;  // 0: the ray met nothing
-  vec3 variance;
+  vec3 variance;        // as of independent neighbours
+  float overlap;        // by how much more they vary together, because they were made of the same pixels
   vec3 normal;
   float cover;          // mean(M)
 };
@@ -45,7 +46,8 @@ Pixel load_pixel(ivec2 at) {
   const int index = pixel_index(at);
   const vec4 signal = texelFetch(signals, index);
   const vec4 surface = texelFetch(surfaces, index);
-  return Pixel(signal.rgb, signal.w, texelFetch(variances, index).rgb, surface.xyz, surface.w);
+  const vec4 variance = texelFetch(variances, index);
+  return Pixel(signal.rgb, signal.w, variance.rgb, variance.w, surface.xyz, surface.w);
 }
 
 // The difference Lm - Lr is not blended with what covers it, nor a hit with a miss.

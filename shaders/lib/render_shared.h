@@ -85,7 +85,7 @@ PREVIZ_CONST uint CAMERA_BINDINGS = 3u;
 // Set 0 of the passes that take noise out of a picture (daemon/render/denoiser.hpp); texel buffers
 // RGBA32F, width * height, and those to write, which the next pass reads.
 //   DENOISE_SIGNAL    signal over the sensor's white, 1 / depth (0: none)
-//   DENOISE_VARIANCE  the signal's
+//   DENOISE_VARIANCE  the signal's, to be multiplied by the fourth component
 //   DENOISE_SURFACE   normal, mean(M)
 PREVIZ_CONST uint BINDING_DENOISE_SIGNAL = 0u;
 PREVIZ_CONST uint BINDING_DENOISE_VARIANCE = 1u;

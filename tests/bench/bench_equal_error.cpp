@@ -57,6 +57,10 @@ std::vector<Method> all_methods() {
   };
   methods.push_back(method("difference, adaptive", difference, bounds, photons));
   methods.back().adaptive = true;
+  methods.push_back(method("difference, denoised", difference, bounds, photons));
+  methods.back().denoise = true;
+  methods.push_back(method("paper, denoised", paired, 0, photons));
+  methods.back().denoise = true;
   methods.push_back(method("paper, light by BSDF", paired, 0, photons));
   methods.back().sampling = set::LightSampling::bsdf;
   methods.push_back(method("two renders", paired, 0, photons));

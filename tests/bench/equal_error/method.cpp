@@ -9,7 +9,8 @@ MethodRun::MethodRun(const std::shared_ptr<render::Device>& device, const View& 
                      const Method& method)
     : world_from_camera_(view.world_from_camera),
       exposure_(view.exposure),
-      adaptive_(method.adaptive) {
+      adaptive_(method.adaptive),
+      denoise_(method.denoise) {
   set::Estimation estimation = method.estimation;
   if (method.separate) estimation.estimator = set::Estimator::paired;
   const auto add = [&](const scene::Scene& scene) {
@@ -30,7 +31,7 @@ MethodRun::MethodRun(const std::shared_ptr<render::Device>& device, const View& 
 
 void MethodRun::begin(std::uint32_t seed) {
   samples_ = 0;
-  cpu_s_ = 0;
+  cpu_s_ = denoise_s_ = 0;
   seed_ = seed;
   begin_frame();
 }
@@ -76,8 +77,20 @@ render::Counters MethodRun::counters() const {
   return sum;
 }
 
-truth::EstimatedFrame MethodRun::estimate() const {
+// There is no plate: the composite is laid over black.
+void MethodRun::denoise(render::Layers& layers) {
+  const double start = cpu_seconds();
+  renderers_.front()->denoise(layers);
+  denoise_s_ = cpu_seconds() - start;
+  for (std::size_t i = 0; i < layers.composite.size(); ++i) {
+    if (layers.mask[i] == 0) layers.diff[i] = layers.composite[i];
+    if (layers.mask[i] == 1) layers.mixed[i] = layers.composite[i];
+  }
+}
+
+truth::EstimatedFrame MethodRun::estimate() {
   render::Layers first = renderers_.front()->layers();
+  if (denoise_) denoise(first);
   truth::EstimatedFrame estimate;
   estimate.mixed = std::move(first.mixed);
   estimate.real =

@@ -1,0 +1,264 @@
+// Noise taken out of a composite: as much as its variance foretells, and nothing of what is no
+// noise.
+#include <random>
+
+#include "daemon/render/denoiser.hpp"
+#include "tests/unit/render_fixture.hpp"
+
+namespace previz::testing {
+namespace {
+
+constexpr int width = 96, height = 80;
+
+// A flat wall that covers the whole picture.
+render::Layers wall(const std::function<glm::vec3(int x, int y)>& radiance, double variance = 0,
+                    double white = 1) {
+  render::Layers layers;
+  layers.width = width;
+  layers.height = height;
+  layers.samples = 16;
+  layers.white = white;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) layers.composite.push_back(radiance(x, y));
+  const std::size_t pixels = layers.composite.size();
+  layers.mixed = layers.real = layers.diff = layers.composite;
+  layers.normal.assign(pixels, glm::vec3(0, 0, 1));
+  layers.variance.assign(pixels, glm::vec3(variance));
+  layers.mask.assign(pixels, 1.0f);
+  layers.depth.assign(pixels, 2.0f);
+  return layers;
+}
+
+std::function<glm::vec3(int, int)> noise_around(double mean, double deviation, unsigned seed = 1) {
+  return [mean, random = std::mt19937(seed),
+          normal = std::normal_distribution<double>(0, deviation)](int, int) mutable {
+    return glm::vec3(mean + normal(random), mean + normal(random), mean + normal(random));
+  };
+}
+
+render::Layers denoised(render::Layers layers, const std::vector<double>& camera = {},
+                        std::size_t most_pixels = std::size_t{1} << 21) {
+  render::Denoiser(*shared_device(), most_pixels).denoise(layers, camera);
+  EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
+  return layers;
+}
+
+struct Spread {
+  double mean = 0, variance = 0, foretold = 0;
+  std::size_t values = 0;
+};
+
+// Of the first channel's composite where `wanted`.
+Spread spread(const render::Layers& layers, const std::function<bool(int x, int y)>& wanted) {
+  Spread s;
+  double square = 0;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      if (!wanted(x, y)) continue;
+      const auto i = static_cast<std::size_t>(y) * width + x;
+      const double value = layers.composite[i].r;
+      s.mean += value;
+      square += value * value;
+      s.foretold += layers.variance[i].r;
+      ++s.values;
+    }
+  const auto n = static_cast<double>(s.values);
+  s.mean /= n;
+  s.variance = square / n - s.mean * s.mean;
+  s.foretold /= n;
+  return s;
+}
+
+bool everywhere(int, int) {
+  return true;
+}
+
+// The spline of each level keeps (35 / 128)^2 of the variance of independent neighbours; later
+// levels see what the ones before have blended, so less than 1 / 50 is left only if most weights
+// are near 1: values of one sigma differ by sqrt(2) of it, and exp(-2 / (4 * 2)) = 0.8 is their
+// mean weight.
+TEST(Denoise, leaves_little_of_noise_and_the_mean_as_it_is) {
+  const double sigma = 0.05;
+  const render::Layers raw = wall(noise_around(0.5, sigma), sigma * sigma);
+  const Spread before = spread(raw, everywhere);
+  const Spread after = spread(denoised(raw), everywhere);
+  EXPECT_LT(after.variance, before.variance / 50);
+  EXPECT_NEAR(after.mean, before.mean, 4 * sigma / std::sqrt(static_cast<double>(after.values)));
+  EXPECT_GT(after.foretold, after.variance / 3);
+  EXPECT_LT(after.foretold, 3 * after.variance);
+}
+
+// What a single sample is off by shows in its neighbours only.
+TEST(Denoise, of_single_samples_the_neighbours_tell_the_noise) {
+  const double sigma = 0.05;
+  render::Layers raw = wall(noise_around(0.5, sigma), 0);
+  EXPECT_EQ(denoised(raw).composite, raw.composite) << "sixteen equal samples: no noise";
+  raw.samples = 1;
+  EXPECT_LT(spread(denoised(raw), everywhere).variance, sigma * sigma / 50);
+}
+
+TEST(Denoise, leaves_what_differs_by_more_than_its_noise) {
+  const double sigma = 0.005;
+  const auto bright = [](int x, int y) { return (x / 3 + y / 3) % 2 == 0; };
+  auto noise = noise_around(0, sigma);
+  const render::Layers raw =
+      wall([&](int x, int y) { return glm::vec3(bright(x, y) ? 0.6f : 0.3f) + noise(x, y); },
+           sigma * sigma);
+  const render::Layers clean = denoised(raw);
+  for (const bool side : {true, false}) {
+    const Spread s = spread(clean, [&](int x, int y) { return bright(x, y) == side; });
+    EXPECT_NEAR(s.mean, side ? 0.6 : 0.3, 1e-3);
+    EXPECT_LT(s.variance, sigma * sigma / 2);
+  }
+}
+
+// Two halves of equal brightness but for less than their noise, which only their surfaces tell
+// apart.
+class Denoise_edges : public ::testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(NormalDepthMask, Denoise_edges, ::testing::Values(0, 1, 2, 3));
+
+TEST_P(Denoise_edges, stay_between_surfaces) {
+  const double sigma = 0.1;
+  const auto left = [](int x, int) { return x < width / 2; };
+  auto noise = noise_around(0, sigma);
+  render::Layers raw =
+      wall([&](int x, int y) { return glm::vec3(left(x, y) ? 0.45f : 0.55f) + noise(x, y); },
+           sigma * sigma);
+  for (int y = 0; y < height; ++y)
+    for (int x = width / 2; x < width; ++x) {
+      const auto i = static_cast<std::size_t>(y) * width + x;
+      if (GetParam() == 0) raw.normal[i] = glm::vec3(1, 0, 0);
+      if (GetParam() == 1) raw.depth[i] = 2.2f;
+      if (GetParam() == 2) raw.mask[i] = 0;
+      if (GetParam() == 3) raw.depth[i] = 0;  // nothing was met
+    }
+  const render::Layers clean = denoised(raw);
+  // Beside the edge, where the halves would be blended first.
+  const Spread a = spread(clean, [&](int x, int) { return x == width / 2 - 1; });
+  const Spread b = spread(clean, [&](int x, int) { return x == width / 2; });
+  EXPECT_NEAR(b.mean - a.mean, 0.1, 4 * std::sqrt((a.variance + b.variance) / height) + 0.01);
+}
+
+// Depth rises towards the camera's horizon; what is foretold of a plane is not an edge.
+TEST(Denoise, takes_a_slanted_plane_for_one_surface) {
+  const double sigma = 0.05;
+  render::Layers raw = wall(noise_around(0.5, sigma), sigma * sigma);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      raw.depth[static_cast<std::size_t>(y) * width + x] =
+          1.0f / (0.02f + 0.01f * static_cast<float>(y));
+  EXPECT_LT(spread(denoised(raw), everywhere).variance, sigma * sigma / 50);
+}
+
+TEST(Denoise, takes_outliers_beyond_white_away_and_leaves_lights) {
+  const double sigma = 0.02;
+  auto noise = noise_around(0.4, sigma);
+  const auto is_lamp = [](int x, int y) { return x < 20 && y < 20; };
+  const auto is_outlier = [](int x, int y) { return x == 60 && y == 40; };
+  render::Layers raw = wall(
+      [&](int x, int y) {
+        return is_lamp(x, y) ? glm::vec3(3) : is_outlier(x, y) ? glm::vec3(1000) : noise(x, y);
+      },
+      sigma * sigma);
+  raw.samples = 4;  // of which one met it
+  raw.variance[40 * width + 60] = glm::vec3(250'000.0f);
+  const render::Layers clean = denoised(raw);
+  EXPECT_EQ(spread(clean, is_lamp).mean, 3);
+  EXPECT_NEAR(spread(clean, is_outlier).mean, 0.4, 0.1);
+  // The neighbours take no more than a single pixel of white in a first level's 25.
+  const auto beside = [&](int x, int y) {
+    return !is_outlier(x, y) && std::abs(x - 60) <= 4 && std::abs(y - 40) <= 4;
+  };
+  EXPECT_NEAR(spread(clean, beside).mean, 0.4, 0.6 / 25);
+}
+
+TEST(Denoise, scales_with_radiance) {
+  const double sigma = 0.05;
+  const render::Layers one = denoised(wall(noise_around(0.5, sigma), sigma * sigma));
+  for (const double scale : {1e-6, 1e6}) {
+    const render::Layers other = denoised(
+        wall(noise_around(0.5 * scale, sigma * scale), sigma * sigma * scale * scale, scale));
+    double worst = 0;
+    for (std::size_t i = 0; i < one.composite.size(); ++i)
+      worst = std::max(worst, std::abs(other.composite[i].r / scale - one.composite[i].r));
+    EXPECT_LT(worst, 1e-4 * 0.5) << scale;
+  }
+}
+
+// Bands of a few rows, each with the rows that it depends on, against the picture at once.
+TEST(Denoise, does_not_depend_on_its_bands) {
+  const double sigma = 0.05;
+  const render::Layers raw = wall(noise_around(0.5, sigma), sigma * sigma);
+  const render::Layers whole = denoised(raw);
+  const render::Layers bands = denoised(raw, {}, width);
+  EXPECT_EQ(bands.composite, whole.composite);
+  EXPECT_EQ(bands.variance, whole.variance);
+}
+
+TEST(Denoise, changes_no_other_layer_and_no_untouched_plate) {
+  RandomScene options;
+  options.width = 70;
+  options.height = 50;
+  options.virtual_objects = 0;
+  const View view = random_scene(3, options);
+  render::Renderer renderer(shared_device(), {}, view.calibration);
+  renderer.set_scene(view.scene);
+  renderer.set_environment(view.environment, set::LightSampling::importance);
+  std::mt19937 random(7);
+  for (const int bits : {8, 16}) {
+    Plate plate{70, 50, bits, {}};
+    for (int i = 0; i < 3 * 70 * 50; ++i)
+      plate.samples.push_back(static_cast<std::uint16_t>(random() & ((1u << bits) - 1)));
+    renderer.begin({plate, 0.85, view.world_from_camera});
+    renderer.render(2);
+    const render::Layers raw = renderer.layers();
+    render::Layers clean = raw;
+    renderer.denoise(clean);
+    EXPECT_EQ(renderer.picture(clean).samples, plate.samples) << bits << " bits";
+    EXPECT_EQ(clean.mixed, raw.mixed);
+    EXPECT_EQ(clean.real, raw.real);
+    EXPECT_EQ(clean.diff, raw.diff);
+    EXPECT_EQ(clean.mask, raw.mask);
+  }
+}
+
+// On rendered sets, against many samples: nearer to the truth, and with more samples nearer still.
+TEST(Denoise, brings_a_rendered_picture_nearer_to_its_limit) {
+  RandomScene options;
+  options.width = 96;
+  options.height = 72;
+  for (const unsigned seed : {2u, 3u}) {
+    const View view = random_scene(seed, options);
+    render::Renderer renderer(shared_device(), {}, view.calibration);
+    renderer.set_scene(view.scene);
+    renderer.set_environment(view.environment, set::LightSampling::importance);
+    const auto render = [&](int samples, std::uint32_t random) {
+      renderer.begin({{}, 1.0, view.world_from_camera, random});
+      renderer.render(samples);
+      expect_clean(renderer.counters());
+      return renderer.layers();
+    };
+    const render::Layers limit = render(512, 99);
+    const auto error = [&](const render::Layers& layers) {
+      double sum = 0;
+      for (std::size_t i = 0; i < layers.composite.size(); ++i) {
+        const glm::dvec3 off = glm::min(layers.composite[i], glm::vec3(1.0f)) -
+                               glm::min(limit.composite[i], glm::vec3(1.0f));
+        sum += glm::dot(off, off);
+      }
+      return std::sqrt(sum / static_cast<double>(layers.composite.size()));
+    };
+    double before = 1e9;
+    for (const int samples : {1, 4, 16}) {
+      const render::Layers raw = render(samples, 1);
+      render::Layers clean = raw;
+      renderer.denoise(clean);
+      EXPECT_LT(error(clean), 0.95 * error(raw)) << seed << ", " << samples << " samples";
+      EXPECT_LT(error(clean), before) << seed << ", " << samples << " samples";
+      before = error(clean);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace previz::testing
