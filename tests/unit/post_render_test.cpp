@@ -109,6 +109,26 @@ TEST_F(RenderSession, AnAdaptivePictureSaysSoAndIsNoOther) {
   EXPECT_NE(out_.str().find("16 samples, the same for every pixel"), std::string::npos);
 }
 
+TEST_F(RenderSession, ADenoisedPictureSaysSoAndItsOtherLayersAreAsRendered) {
+  test::write_small_take(directory_.path());
+  RenderOptions options;
+  options.frames = FrameRange{1, 1};
+  std::vector<render::Layers> seen;
+  options.on_frame = [&](const pipeline::Shot& shot) { seen.push_back(shot.layers); };
+  options.denoise = false;
+  render(options);
+  const Plate noisy = output::read_png(directory_ / "out/0001.png");
+  options.denoise = true;
+  EXPECT_THROW(render(options), Error);  // what is there already was made otherwise
+  options.force = true;
+  render(options);
+  EXPECT_NE(out_.str().find("2 samples, denoised"), std::string::npos) << out_.str();
+  EXPECT_NE(output::read_png(directory_ / "out/0001.png").samples, noisy.samples);
+  EXPECT_NE(seen.at(1).composite, seen.at(0).composite);
+  EXPECT_EQ(seen.at(1).mixed, seen.at(0).mixed);
+  EXPECT_EQ(seen.at(1).diff, seen.at(0).diff);
+}
+
 // Of the light camera's frames nothing is used: the frame before the first of them is lit too, by
 // ten times the light's red as of the others.
 TEST_F(RenderSession, TheRecordedLightLightsEveryFrame) {

@@ -114,10 +114,10 @@ TEST(Denoise, leaves_what_differs_by_more_than_its_noise) {
 
 // Two halves of equal brightness but for less than their noise, which only their surfaces tell
 // apart.
-class Denoise_edges : public ::testing::TestWithParam<int> {};
-INSTANTIATE_TEST_SUITE_P(NormalDepthMask, Denoise_edges, ::testing::Values(0, 1, 2, 3));
+class DenoiseEdges : public ::testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(NormalDepthMask, DenoiseEdges, ::testing::Values(0, 1, 2, 3));
 
-TEST_P(Denoise_edges, stay_between_surfaces) {
+TEST_P(DenoiseEdges, stay_between_surfaces) {
   const double sigma = 0.1;
   const auto left = [](int x, int) { return x < width / 2; };
   auto noise = noise_around(0, sigma);
