@@ -9,7 +9,9 @@
 #include "shaders/lib/denoise.glsl"
 
 // Standard deviations of a difference at which a neighbour's weight has fallen to 1 / e. More blurs
-// what is there, fewer leave noise; 1.5 to 3 differ little (tests/truth/RESULTS.md).
+// what is there, fewer leave noise; 1.5 to 3 differ little. They are those of independent neighbours:
+// with the overlap, coarse levels blend more, and what noise they take away they lose in blur
+// (tests/truth/RESULTS.md).
 const float NOISE_SCALE = 2.0;
 // Variance, over the sensor's white, squared: far below what 16 bits show.
 const float LEAST_VARIANCE = 1e-12;

@@ -99,6 +99,7 @@ Imf::Header header(const render::Layers& layers, const ExrMetadata& metadata) {
   header.insert("software", Imf::StringAttribute("previzd " PREVIZ_VERSION));
   header.insert("previz.set", Imf::StringAttribute(metadata.set_name));
   header.insert("previz.pose", Imf::StringAttribute(metadata.pose));
+  header.insert("previz.denoised", Imf::IntAttribute(layers.denoised ? 1 : 0));
   header.insert("previz.exposure", Imf::DoubleAttribute(metadata.exposure));
   header.insert("previz.timestamp_ns", Imf::StringAttribute(std::to_string(metadata.timestamp_ns)));
   header.insert("previz.samples", Imf::IntAttribute(static_cast<int>(std::min<std::int64_t>(

@@ -14,7 +14,9 @@ namespace previz::output {
 
 // What stands in the file's header beside the picture. Attribute names:
 //   software (string), chromaticities (Rec. 709, D65),
-//   previz.samples (int), previz.exposure (double), previz.timestamp_ns (string; EXR has no 64-bit
+//   previz.samples (int), previz.denoised (int: 1 where noise was taken out of composite, and
+//   variance says what seems to be left; outliers beyond the sensor's white are then gone, too),
+//   previz.exposure (double), previz.timestamp_ns (string; EXR has no 64-bit
 //   integers), previz.set (string), previz.pose (string: "tracked", "lost" or "ambiguous"),
 //   previz.world_from_camera (m44d; element [row][column] as the matrix is written, it multiplies
 //   column vectors; OpenCV camera axes, metres; absent unless the pose is tracked),
@@ -34,7 +36,6 @@ struct ExrMetadata {
 
 // Channels, 32-bit float, ZIP compressed: composite.R/.G/.B, mixed.R/.G/.B, real.R/.G/.B,
 // diff.R/.G/.B, mask.Y, depth.Z, normal.X/.Y/.Z, variance.R/.G/.B.
-// composite and variance are denoised where quality.denoise says so, the others never.
 // diff is what virtual things do to real pixels: (1 - mask) * (Lm - Lr), which is Lm - Lr where the
 // mask is 0 and 0 where it is 1. The file appears whole or not at all; throws previz::Error naming
 // it on failure.

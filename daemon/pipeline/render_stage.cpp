@@ -5,6 +5,7 @@
 
 #include "daemon/pipeline/preview_size.hpp"
 #include "daemon/pipeline/refinement.hpp"
+#include "daemon/render/error_estimate.hpp"
 #include "daemon/scene/placement.hpp"
 #include "drivers/error.hpp"
 
@@ -100,6 +101,7 @@ void RenderStage::finish(Shot& shot) {
   shot.whole = true;
   shot.counters = renderer_.counters();
   render::Layers layers = renderer_.layers();
+  if (options_.layers) error_ = render::estimate_error(layers).picture;
   if (set_.quality.denoise) renderer_.denoise(layers);
   shot.picture = view_ == render::View::composite
                      ? renderer_.picture(layers)

@@ -41,6 +41,9 @@ class RenderStage {
   // False: cancelled; the frame has then no samples and must be begun again.
   bool add_samples(int samples);
   void finish(Shot& shot);
+  // Estimated from the samples of the last shot that was given layers, over the picture's rms; what
+  // denoising then took away is not known well enough to be left out.
+  double error() const { return error_; }
 
   // From the next begin() on. `scale` as in the options; costs new buffers, and no scene.
   void use(const set::Quality& quality) { set_.quality = quality; }
@@ -63,7 +66,8 @@ class RenderStage {
   RenderStageOptions options_;
   render::View view_ = render::View::composite;
   render::Renderer renderer_;
-  scene::Scene scene_;             // as in the set; instances and lamps only
+  scene::Scene scene_;  // as in the set; instances and lamps only
+  double error_ = 0;
   session::SceneState placed_;     // what the renderer holds
   LightPtr light_;                 // the one the renderer holds
   bool has_sources_ = false;       // lamps beside the scene\'s were ever set

@@ -12,12 +12,17 @@ namespace {
 
 // Levels of the transform: steps of 1, 2, 4 and 8 pixels.
 constexpr int levels = 4;
-// Rows above and below that a row's result depends on: two steps of every level, the neighbours
-// that give a slope, and those that give the variance.
-constexpr int reach = 2 * ((1 << levels) - 1) + 1 + static_cast<int>(gpu::DENOISE_VARIANCE_REACH);
+// Rows above and below that a row's result depends on: two steps of every level, and the neighbours
+// that give the variance there. A slope comes from rows nearer than those.
+constexpr int reach = 2 * ((1 << levels) - 1) + static_cast<int>(gpu::DENOISE_VARIANCE_REACH);
+static_assert(gpu::DENOISE_VARIANCE_REACH >= 2);
 
-// Share of the sensor's white that is left of a pixel which is no outlier.
-constexpr double nearly_white = 0.95;
+// A channel that comes out at this share of the sensor's white is white: a step of 8 bits below it.
+constexpr float nearly_white = 0.99f;
+
+// A mean of n samples, each no brighter than white, is off by white / sqrt(n) at most. More samples
+// than so many do not make it any surer, or what one of them met would never count as an outlier.
+constexpr std::int64_t most_sure_samples = 16;
 
 bool is_texel_buffer(std::uint32_t binding) {
   return binding <= gpu::BINDING_DENOISE_SURFACE;
@@ -39,30 +44,63 @@ float unit_of(const Layers& layers) {
   return std::isfinite(layers.white) ? static_cast<float>(layers.white) : 1;
 }
 
-bool is_white(const glm::vec3& radiance, double share_of_white, const Layers& layers) {
-  return static_cast<double>(std::max({radiance.r, radiance.g, radiance.b})) >=
-         share_of_white * layers.white;
-}
+// What is filtered is counted in the unit or, where the composite multiplies it, in the camera's
+// picture, whose texture is then not blurred. The floor keeps what is added to black.
+struct Scale {
+  const Layers& layers;
+  const std::vector<double>& camera;
+  const CompositeRule& rule;
+  float unit = unit_of(layers);
+
+  glm::vec3 operator()(std::size_t i) const {
+    if (rule.kind == set::Composite::additive || layers.mask[i] > 0) return glm::vec3(unit);
+    return camera_pixel(camera, i) + std::max(static_cast<float>(rule.floor), 1e-3f * unit);
+  }
+};
 
 // Pixels [first, last) as the shaders read them.
 struct Band {
   std::vector<glm::vec4> signal, variance, surface;
 
-  Band(const Layers& layers, const std::vector<double>& camera, std::size_t first,
-       std::size_t last) {
+  Band(const Layers& layers, const std::vector<double>& camera, const Scale& scale,
+       std::size_t first, std::size_t last) {
     const auto white = static_cast<float>(layers.white);
-    const float unit = unit_of(layers);
-    const float most_variance =
-        white * white / static_cast<float>(std::max<std::int64_t>(layers.samples, 1));
+    const auto samples =
+        static_cast<float>(std::clamp<std::int64_t>(layers.samples, 1, most_sure_samples));
+    const float most_variance = white * white / samples;
     for (std::size_t i = first; i < last; ++i) {
+      const glm::vec3 units = scale(i);
       const glm::vec3 through = seen_through(layers, camera, i);
       const glm::vec3 shown = glm::min(layers.composite[i], glm::max(through, white));
-      signal.emplace_back((shown - through) / unit, layers.depth[i] > 0 ? 1 / layers.depth[i] : 0);
-      variance.emplace_back(glm::min(layers.variance[i], most_variance) / (unit * unit), 0);
+      signal.emplace_back((shown - through) / units, layers.depth[i] > 0 ? 1 / layers.depth[i] : 0);
+      variance.emplace_back(glm::min(layers.variance[i], most_variance) / (units * units), 0);
       surface.emplace_back(layers.normal[i], layers.mask[i]);
     }
   }
 };
+
+// What came back of pixels from `uploaded` on, of which [first, last) are to be kept.
+struct Result {
+  std::size_t uploaded = 0, first = 0, last = 0;
+  std::vector<glm::vec4> signal, variance;
+};
+
+void keep(const Result& result, Layers& layers, const std::vector<double>& camera,
+          const Scale& scale) {
+  const auto white = static_cast<float>(layers.white);
+  for (std::size_t i = result.first; i < result.last; ++i) {
+    const glm::vec4& signal = result.signal[i - result.uploaded];
+    const glm::vec4& variance = result.variance[i - result.uploaded];
+    const glm::vec3 units = scale(i);
+    const glm::vec3 denoised = seen_through(layers, camera, i) + units * glm::vec3(signal);
+    const glm::vec3 left = units * units * variance.w * glm::vec3(variance);
+    for (int c = 0; c < 3; ++c) {
+      if (layers.composite[i][c] >= white && denoised[c] >= nearly_white * white) continue;
+      layers.composite[i][c] = denoised[c];
+      layers.variance[i][c] = left[c];
+    }
+  }
+}
 
 }  // namespace
 
@@ -87,7 +125,7 @@ Denoiser::Denoiser(Device& device, std::size_t most_pixels)
 
 void Denoiser::resize(std::size_t pixels) {
   if (pixels <= pixels_) return;
-  pixels_ = pixels;
+  pixels_ = 0;  // until all is there, whatever is thrown on the way
   const auto texels = [&] {
     return create_texel_buffer(device_, pixels * sizeof(gpu::vec4),
                                vk::Format::eR32G32B32A32Sfloat);
@@ -108,6 +146,7 @@ void Denoiser::resize(std::size_t pixels) {
       write_descriptor(device_, sets_[static_cast<std::size_t>(side)], i, *buffers[i],
                        is_texel_buffer(i));
   }
+  pixels_ = pixels;
 }
 
 // Each pass goes to the other side, from 0: first the one for the variance.
@@ -135,39 +174,35 @@ void Denoiser::run(int width, int rows, bool single_sample) {
   });
 }
 
-void Denoiser::denoise(Layers& layers, const std::vector<double>& camera) {
+void Denoiser::denoise(Layers& layers, const std::vector<double>& camera,
+                       const CompositeRule& rule) {
   const auto width = static_cast<std::size_t>(layers.width);
   const auto fitting = static_cast<int>(std::min<std::size_t>(
       most_pixels_ / width, static_cast<std::size_t>(layers.height) + 2 * reach));
-  const int band = std::max(fitting - 2 * reach, 1);
-  const float unit = unit_of(layers);
-  std::vector<glm::vec3> composite = layers.composite;
-  std::vector<glm::vec3> variance = layers.variance;
+  // At least as many as a band needs above it: those are then the band before's alone.
+  const int band = std::max(fitting - 2 * reach, reach);
+  const Scale scale{layers, camera, rule};
+  Result before;
   for (int y = 0; y < layers.height; y += band) {
     const int top = std::max(y - reach, 0);
     const int end = std::min(y + band, layers.height);
     const int bottom = std::min(end + reach, layers.height);
     const std::size_t first = static_cast<std::size_t>(top) * width;
     const std::size_t last = static_cast<std::size_t>(bottom) * width;
-    const Band input(layers, camera, first, last);
+    const Band input(layers, camera, scale, first, last);
+    // Only now may the rows above change: this band was made of some of them.
+    keep(before, layers, camera, scale);
     resize(last - first);
     upload_bytes(device_, signal_[0], std::as_bytes(std::span(input.signal)));
     upload_bytes(device_, variance_[0], std::as_bytes(std::span(input.variance)));
     upload_bytes(device_, surface_, std::as_bytes(std::span(input.surface)));
     run(layers.width, bottom - top, layers.samples < 2);
-    const auto signal = download<glm::vec4>(device_, signal_[result_side], last - first);
-    const auto left = download<glm::vec4>(device_, variance_[result_side], last - first);
-    for (std::size_t i = static_cast<std::size_t>(y) * width;
-         i < static_cast<std::size_t>(end) * width; ++i) {
-      const glm::vec3 denoised =
-          seen_through(layers, camera, i) + unit * glm::vec3(signal[i - first]);
-      if (is_white(composite[i], 1, layers) && is_white(denoised, nearly_white, layers)) continue;
-      composite[i] = denoised;
-      variance[i] = unit * unit * left[i - first].w * glm::vec3(left[i - first]);
-    }
+    before = {first, static_cast<std::size_t>(y) * width, static_cast<std::size_t>(end) * width,
+              download<glm::vec4>(device_, signal_[result_side], last - first),
+              download<glm::vec4>(device_, variance_[result_side], last - first)};
   }
-  layers.composite = std::move(composite);
-  layers.variance = std::move(variance);
+  keep(before, layers, camera, scale);
+  layers.denoised = true;
 }
 
 }  // namespace previz::render

@@ -9,6 +9,7 @@
 
 #include <vector>
 
+#include "daemon/render/composite.hpp"
 #include "daemon/render/device.hpp"
 #include "daemon/render/layers.hpp"
 
@@ -16,16 +17,20 @@ namespace previz::render {
 
 class Denoiser {
  public:
-  // `most_pixels` are worked on at once, in bands of whole rows: 80 bytes each.
+  // About `most_pixels` are worked on at once, in bands of whole rows: 80 bytes of device memory
+  // each.
   explicit Denoiser(Device& device, std::size_t most_pixels = std::size_t{1} << 21);
 
   // Changes composite and variance, which is then an estimate of the noise left; no other layer.
-  // `camera`: the plate's radiance, interleaved RGB; empty: black.
+  // `camera`: the plate's radiance, interleaved RGB; empty: black. `rule`: by which the composite
+  // was made; what ratio and hybrid multiply the plate by is filtered, and not the plate.
   //
-  // What is brighter than the sensor's white counts as white, and deviates by as much at most: a
-  // lamp in a mirror, met by one sample of many, would else spread over all its neighbours. Where
-  // what comes out is white still, the pixel stays as bright as it was.
-  void denoise(Layers& layers, const std::vector<double>& camera);
+  // What is brighter than the sensor's white counts as white, and as no surer than a few samples
+  // would be: a lamp in a mirror, met by one sample of many, would else stay, or spread over all
+  // its neighbours. A channel that comes out white still stays as bright as it was.
+  //
+  // Throws previz::Error where the device has no memory for it.
+  void denoise(Layers& layers, const std::vector<double>& camera, const CompositeRule& rule = {});
 
  private:
   void resize(std::size_t pixels);

@@ -12,6 +12,7 @@ namespace previz::render {
 struct Layers {
   int width = 0;
   int height = 0;
+  bool denoised = false;  // noise was taken out of the composite; variance is what seems to be left
   std::int64_t samples = 0;  // per pixel; the most, where some were left out
   double white = std::numeric_limits<double>::infinity();  // radiance at which the sensor clips
   std::vector<glm::vec3> composite;  // by the set's rule: daemon/render/composite.hpp
@@ -19,7 +20,7 @@ struct Layers {
   std::vector<glm::vec3> real;       // mean(Lr); Lc where only the difference was traced
   std::vector<glm::vec3> diff;       // mean(Lm - Lr), accumulated as a difference
   std::vector<glm::vec3> normal;     // mean world normal of the mixed world's first hit
-  std::vector<glm::vec3> variance;   // of the composite's mean
+  std::vector<glm::vec3> variance;   // of the composite
   std::vector<float> mask;           // mean(M), 0..1
   std::vector<float> depth;          // metres along the optical axis, mean over hits; 0: no hit
 };

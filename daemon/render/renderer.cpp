@@ -64,6 +64,9 @@ struct Renderer::Impl {
   void upload_frame();
   std::uint32_t photons() const;  // a pass
   std::uint32_t features() const;
+  CompositeRule rule() const {
+    return {estimation.composite, estimation.composite_floor / frame.exposure};
+  }
   // The plate as linear radiance; w: 0 where a channel is clipped.
   std::vector<glm::vec4> measured() const;
 
@@ -269,9 +272,8 @@ Layers Renderer::layers() const {
   const Impl& r = *impl_;
   const PinholeIntrinsics& lens = r.calibration.intrinsics;
   const auto plate = plate_radiance(r.frame.plate, *r.response, r.frame.exposure);
-  Layers layers = make_layers(
-      r.wavefront->pixels(), lens.width, lens.height, std::max<std::int64_t>(r.samples, 1), plate,
-      {r.estimation.composite, r.estimation.composite_floor / r.frame.exposure});
+  Layers layers = make_layers(r.wavefront->pixels(), lens.width, lens.height,
+                              std::max<std::int64_t>(r.samples, 1), plate, r.rule());
   layers.white = 1 / r.frame.exposure;
   return layers;
 }
@@ -279,7 +281,8 @@ Layers Renderer::layers() const {
 void Renderer::denoise(Layers& layers) {
   Impl& r = *impl_;
   if (!r.denoiser) r.denoiser.emplace(*r.device);
-  r.denoiser->denoise(layers, plate_radiance(r.frame.plate, *r.response, r.frame.exposure).value);
+  r.denoiser->denoise(layers, plate_radiance(r.frame.plate, *r.response, r.frame.exposure).value,
+                      r.rule());
 }
 
 Plate Renderer::picture(const Layers& layers) const {

@@ -110,8 +110,9 @@ class Renderer {
   void limit_samples(const std::vector<std::uint32_t>& limits);
   // Layers of the samples so far.
   Layers layers() const;
-  // Takes noise out of their composite (daemon/render/denoiser.hpp), and says in their variance
-  // what is left.
+  // Takes noise out of the composite of the begun frame's layers (daemon/render/denoiser.hpp), and
+  // says in their variance what is left. Throws previz::Error where the device has no memory for
+  // it.
   void denoise(Layers& layers);
   // Their composite through exposure and response, as the display shows it: the plate's own bits
   // where nothing virtual touches it.

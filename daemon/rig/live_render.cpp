@@ -4,8 +4,6 @@
 #include <thread>
 #include <utility>
 
-#include "daemon/render/error_estimate.hpp"
-
 namespace previz::rig {
 
 using pipeline::Shot;
@@ -90,7 +88,7 @@ std::optional<Shot> LiveRender::refine(const Look& look) {
   Shot shown = shot;
   stage_->show(look.view);
   stage_->finish(shown);
-  shown.error = render::estimate_error(shown.layers).picture;
+  shown.error = stage_->error();
   refined_ = shown;
   metrics_.busy("refine", seconds_since(begin));
   metrics_.count("refine rounds");

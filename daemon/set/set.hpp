@@ -187,7 +187,7 @@ struct Estimation {
 struct Quality {
   int samples = 16;       // per pixel and frame, 1..1'000'000
   bool adaptive = false;  // `samples` on average, where the picture is noisy; not in the preview
-  bool denoise = false;   // the composite, guided by its own variance
+  bool denoise = true;    // the composite, guided by its own variance
   double error = 0;       // rms error over the picture's rms to go on to; 0: samples decide
   double seconds = 0;     // a frame may take; 0: samples decide
   double scale = 1.0;     // of the observer's resolution, preview only

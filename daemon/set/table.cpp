@@ -266,7 +266,7 @@ Keys quality_keys(Quality& q) {
   return {
       {"samples", &q.samples, plain.within(1, 1'000'000), "Samples per pixel and frame; with error or seconds: the first round, in every pixel."},
       {"adaptive", &q.adaptive, plain, "Spends the samples where the picture is noisy: so many on average, in a pixel between an eighth and eight times as many. Offline only, from 32 samples on, and where neither error nor seconds is set."},
-      {"denoise", &q.denoise, plain, "Takes noise out of the composite where its own variance says that it is noise. The fewer the samples, the more it helps and the more it blurs; the other layers of an EXR file stay as they are."},
+      {"denoise", &q.denoise, plain, "Takes noise out of the composite, in the preview, too, where its own variance says that it is noise. The fewer the samples, the more it helps and the more it blurs; the other layers of an EXR file stay as they are."},
       {"error", &q.error, plain.within(0, 1), "Goes on where the picture's estimated error is above this share of its mean radiance; 0: samples alone decide."},
       {"seconds", &q.seconds, plain.within(0, 86'400), "Goes on for so long, where the picture needs it most; 0: samples alone decide."},
       {"scale", &q.scale, plain.within(0.01, 1), "Size of the preview over the camera's picture; offline rendering is always full size."},

@@ -30,7 +30,7 @@ struct Pixel {
   vec3 signal;
   float inverse_depth;  // 0: the ray met nothing
   vec3 variance;        // as of independent neighbours
-  float overlap;        // by how much more they vary together, because they were made of the same pixels
+  float overlap;        // the true one over that: neighbours were made of the same pixels
   vec3 normal;
   float cover;          // mean(M)
 };
@@ -55,17 +55,21 @@ bool are_alike(Pixel a, Pixel b) {
   return (a.cover > 0.0) == (b.cover > 0.0) && (a.inverse_depth > 0.0) == (b.inverse_depth > 0.0);
 }
 
-// Change of the inverse depth, which is linear over the picture of a plane, to the next pixel, by
-// the flatter side: the other may be another surface's.
+// Change of the inverse depth from pixel to pixel, which on a plane is the same all over the picture:
+// the mean of both sides, or, where an edge is between them, the flatter side's. Over two pixels,
+// because with few samples a pixel's depth is that of some point in it.
 float inverse_depth_slope(ivec2 at, ivec2 off, float here) {
-  float slope = 3.4e38;
-  for (int side = -1; side <= 1; side += 2) {
-    const ivec2 next = at + side * off;
-    if (!is_inside(next)) continue;
-    const float change = float(side) * (texelFetch(signals, pixel_index(next)).w - here);
-    if (abs(change) < abs(slope)) slope = change;
-  }
-  return slope;
+  const int reach = 2;
+  const ivec2 before = at - reach * off;
+  const ivec2 behind = at + reach * off;
+  float falling = 3.4e38;
+  float rising = 3.4e38;
+  if (is_inside(before)) falling = (here - texelFetch(signals, pixel_index(before)).w) / float(reach);
+  if (is_inside(behind)) rising = (texelFetch(signals, pixel_index(behind)).w - here) / float(reach);
+  const bool is_one_surface = max(rising, falling) < 3.4e38 &&
+                              abs(rising - falling) <= 0.5 * max(abs(rising), abs(falling));
+  if (is_one_surface) return 0.5 * (rising + falling);
+  return abs(rising) < abs(falling) ? rising : falling;
 }
 
 // Squared distance of two pixels as parts of one surface; `foretold`: what the first one's slope

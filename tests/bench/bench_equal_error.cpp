@@ -155,6 +155,9 @@ void print(const std::vector<Method>& methods, const std::vector<Result>& result
 void run(const Options& options) {
   const auto device = render::open_device();
   const std::vector<Method> methods = chosen_methods(options.methods);
+  if (options.samples > 0 && std::ranges::any_of(methods, &Method::denoise))
+    throw Error(
+        "--samples: the error of what is denoised does not fall as noise does; name methods");
   for (const std::filesystem::path& directory : options.sets) {
     const View view = load_view(directory, options.frame, options.width, options.light);
     const Reference reference =

@@ -142,6 +142,22 @@ TEST(Compare, IdealCompositeKeepsThePlateWhereNothingChanges) {
   EXPECT_EQ(shown.samples, plate.samples);
 }
 
+TEST(Compare, WhatACompositeShowsIsMeasuredInPlaceOfItsLayers) {
+  TruthFrame t = constructed();
+  t.mask[0] = 0.5F;
+  EstimatedFrame e = perfect(t);
+  const glm::vec3 partly_diff = e.diff[0], partly_mixed = e.mixed[0];
+  for (glm::vec3& pixel : e.composite) pixel += 0.01F;
+  const EstimatedFrame shown = as_composited(t, e);
+  const auto covered = static_cast<std::size_t>(t.width - 1);
+  EXPECT_EQ(shown.diff[0], partly_diff);
+  EXPECT_EQ(shown.mixed[0], partly_mixed);
+  EXPECT_NEAR(shown.diff[1].r, -0.1 + 0.01, 1e-6);
+  EXPECT_EQ(shown.mixed[1], e.mixed[1]);
+  EXPECT_NEAR(shown.mixed[covered].r, 0.4 + 0.01, 1e-6);
+  EXPECT_EQ(shown.diff[covered], e.diff[covered]);
+}
+
 TEST(Compare, PsnrOfAKnownDifference) {
   Plate a{16, 16, 8, std::vector<std::uint16_t>(16 * 16 * 3, 100)};
   Plate b = a;

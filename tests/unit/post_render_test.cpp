@@ -78,6 +78,7 @@ TEST_F(RenderSession, TheVirtualCardCoversThePlateAndTheRestShowsIt) {
   test::write_small_take(directory_.path());
   RenderOptions options;
   options.frames = FrameRange{1, 1};
+  options.denoise = false;
   render::Layers seen;
   options.on_frame = [&](const pipeline::Shot& shot) { seen = shot.layers; };
   render(options);

@@ -139,14 +139,17 @@ TEST_P(DenoiseEdges, stay_between_surfaces) {
   EXPECT_NEAR(b.mean - a.mean, 0.1, 4 * std::sqrt((a.variance + b.variance) / height) + 0.01);
 }
 
-// Depth rises towards the camera's horizon; what is foretold of a plane is not an edge.
+// Depth rises towards the camera's horizon; what is foretold of a plane is not an edge. With one
+// sample a pixel's depth is that of a point anywhere in it.
 TEST(Denoise, takes_a_slanted_plane_for_one_surface) {
   const double sigma = 0.05;
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> jitter(-0.5f, 0.5f);
   render::Layers raw = wall(noise_around(0.5, sigma), sigma * sigma);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
       raw.depth[static_cast<std::size_t>(y) * width + x] =
-          1.0f / (0.02f + 0.01f * static_cast<float>(y));
+          1.0f / (0.5f + 0.004f * (static_cast<float>(y) + jitter(random)));
   EXPECT_LT(spread(denoised(raw), everywhere).variance, sigma * sigma / 50);
 }
 
@@ -160,16 +163,18 @@ TEST(Denoise, takes_outliers_beyond_white_away_and_leaves_lights) {
         return is_lamp(x, y) ? glm::vec3(3) : is_outlier(x, y) ? glm::vec3(1000) : noise(x, y);
       },
       sigma * sigma);
-  raw.samples = 4;  // of which one met it
-  raw.variance[40 * width + 60] = glm::vec3(250'000.0f);
-  const render::Layers clean = denoised(raw);
-  EXPECT_EQ(spread(clean, is_lamp).mean, 3);
-  EXPECT_NEAR(spread(clean, is_outlier).mean, 0.4, 0.1);
-  // The neighbours take no more than a single pixel of white in a first level's 25.
-  const auto beside = [&](int x, int y) {
-    return !is_outlier(x, y) && std::abs(x - 60) <= 4 && std::abs(y - 40) <= 4;
-  };
-  EXPECT_NEAR(spread(clean, beside).mean, 0.4, 0.6 / 25);
+  raw.variance[40 * width + 60] = glm::vec3(1e6f);
+  for (const int samples : {4, 64, 1024}) {
+    raw.samples = samples;
+    const render::Layers clean = denoised(raw);
+    EXPECT_EQ(spread(clean, is_lamp).mean, 3) << samples;
+    EXPECT_LT(spread(clean, is_outlier).mean, 0.8) << samples;
+    // The neighbours take no more than a single pixel of white in a first level's 25.
+    const auto beside = [&](int x, int y) {
+      return !is_outlier(x, y) && std::abs(x - 60) <= 4 && std::abs(y - 40) <= 4;
+    };
+    EXPECT_NEAR(spread(clean, beside).mean, 0.4, 0.6 / 25) << samples;
+  }
 }
 
 TEST(Denoise, scales_with_radiance) {
@@ -185,14 +190,106 @@ TEST(Denoise, scales_with_radiance) {
   }
 }
 
-// Bands of a few rows, each with the rows that it depends on, against the picture at once.
+// Bands with the rows that they depend on, against the picture at once; the variance of single
+// samples reaches furthest.
 TEST(Denoise, does_not_depend_on_its_bands) {
   const double sigma = 0.05;
-  const render::Layers raw = wall(noise_around(0.5, sigma), sigma * sigma);
-  const render::Layers whole = denoised(raw);
-  const render::Layers bands = denoised(raw, {}, width);
-  EXPECT_EQ(bands.composite, whole.composite);
-  EXPECT_EQ(bands.variance, whole.variance);
+  for (const int samples : {1, 16}) {
+    render::Layers raw = wall(noise_around(0.5, sigma), sigma * sigma);
+    raw.samples = samples;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        raw.depth[static_cast<std::size_t>(y) * width + x] = 2.0f + 0.01f * static_cast<float>(y);
+    const render::Layers whole = denoised(raw);
+    for (const std::size_t most_rows : {1, 104, 110}) {
+      const render::Layers bands = denoised(raw, {}, most_rows * width);
+      EXPECT_EQ(bands.composite, whole.composite) << most_rows;
+      EXPECT_EQ(bands.variance, whole.variance) << most_rows;
+    }
+  }
+}
+
+TEST(Denoise, takes_pictures_of_a_single_row_or_column) {
+  for (const auto& [columns, rows] : {std::pair(1, 1), std::pair(5, 1), std::pair(1, 5)}) {
+    render::Layers raw = wall(noise_around(0.5, 0.05), 0.0025);
+    raw.width = columns;
+    raw.height = rows;
+    const auto pixels = static_cast<std::size_t>(columns * rows);
+    for (auto* layer : {&raw.composite, &raw.normal, &raw.variance}) layer->resize(pixels);
+    raw.mask.resize(pixels);
+    raw.depth.resize(pixels);
+    raw.white = std::numeric_limits<double>::infinity();
+    for (const glm::vec3& pixel : denoised(raw).composite)
+      for (int c = 0; c < 3; ++c) EXPECT_TRUE(pixel[c] > 0.2f && pixel[c] < 0.8f);
+  }
+}
+
+// A shadow that halves a checkered plate, of which two pixels in three are at the sensor's white:
+// what was clipped is no other, and the squares stay as sharp as the camera saw them, whatever the
+// rule.
+class DenoiseRules : public ::testing::TestWithParam<set::Composite> {};
+INSTANTIATE_TEST_SUITE_P(All, DenoiseRules,
+                         ::testing::Values(set::Composite::additive, set::Composite::ratio,
+                                           set::Composite::hybrid));
+
+TEST_P(DenoiseRules, keep_the_plates_texture) {
+  const auto camera_at = [](int x, int y) { return (x + y) % 3 == 0 ? 0.5f : 1.0f; };
+  const bool multiplied = GetParam() != set::Composite::additive;
+  std::vector<double> camera;
+  auto noise = noise_around(0, 0.1);
+  render::Layers raw = wall([&](int x, int y) {
+    const float plate = camera_at(x, y);
+    for (int c = 0; c < 3; ++c) camera.push_back(plate);
+    const glm::vec3 off = noise(x, y);
+    return multiplied ? plate * (0.5f + off) : plate + (-0.25f + off);
+  });
+  for (std::size_t i = 0; i < raw.mask.size(); ++i) {
+    raw.mask[i] = 0;
+    const double gain = multiplied ? camera[3 * i] : 1;
+    raw.variance[i] = glm::vec3(0.01 * gain * gain);
+  }
+  render::Layers clean = raw;
+  render::Denoiser(*shared_device()).denoise(clean, camera, {GetParam(), 0});
+  double square = 0;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const float plate = camera_at(x, y);
+      const double off =
+          clean.composite[static_cast<std::size_t>(y) * width + x].r -
+          (multiplied ? 0.5 * static_cast<double>(plate) : static_cast<double>(plate) - 0.25);
+      square += off * off / (width * height);
+    }
+  EXPECT_LT(square, 0.01 / 20);
+}
+
+// A virtual wall before the left third of a real one on which nothing changes: noise on the one
+// does not reach the other.
+TEST(Denoise, leaves_a_real_surface_beside_a_virtual_one_bit_for_bit) {
+  std::vector<double> camera;
+  auto noise = noise_around(0.4, 0.1);
+  const auto covered = [](int x) { return x < width / 3; };
+  std::mt19937 random(3);
+  render::Layers raw = wall(
+      [&](int x, int y) {
+        for (int c = 0; c < 3; ++c) camera.push_back(std::ldexp(1.0 * (random() & 0xffffu), -16));
+        if (covered(x)) return noise(x, y);
+        return glm::vec3(glm::dvec3(camera.end()[-3], camera.end()[-2], camera.end()[-1]));
+      },
+      0.01);
+  for (int y = 0; y < height; ++y)
+    for (int x = width / 3; x < width; ++x) {
+      const auto i = static_cast<std::size_t>(y) * width + x;
+      raw.mask[i] = 0;
+      raw.variance[i] = glm::vec3(0);
+    }
+  const render::Layers clean = denoised(raw, camera);
+  EXPECT_TRUE(clean.denoised);
+  for (int y = 0; y < height; ++y)
+    for (int x = width / 3; x < width; ++x) {
+      const auto i = static_cast<std::size_t>(y) * width + x;
+      EXPECT_EQ(clean.composite[i], raw.composite[i]) << x << ", " << y;
+    }
+  EXPECT_LT(spread(clean, [&](int x, int) { return covered(x); }).variance, 0.01 / 20);
 }
 
 TEST(Denoise, changes_no_other_layer_and_no_untouched_plate) {

@@ -27,6 +27,7 @@ MethodRun::MethodRun(const std::shared_ptr<render::Device>& device, const View& 
   }
   begin(0);
   render(1);
+  if (denoise_) estimate();
 }
 
 void MethodRun::begin(std::uint32_t seed) {
