@@ -1,9 +1,18 @@
 #include "daemon/command_line.hpp"
 
 #include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
 
 namespace previz {
 namespace {
+
+// A pair of flags, "--yes,!--no". CLI11's own for an optional says no where neither was given.
+void add_choice(CLI::App& command, const std::string& flags, std::optional<bool>& choice,
+                const std::string& what) {
+  command.add_flag_function(
+      flags, [&choice](std::int64_t count) { choice = count > 0; }, what);
+}
 
 void add_device_options(CLI::App& command, render::DeviceOptions& device) {
   command.add_option("--device", device.name, "Vulkan device whose name contains this");
@@ -19,11 +28,11 @@ void add_render(CLI::App& app, post::RenderOptions& options) {
       "Observer frames: 7, 3-9 or 3- (default: all)");
   command.add_option("--spp", options.samples, "Samples per pixel (default: quality.samples)")
       ->check(CLI::Range(1, 1'000'000));
-  command.add_flag("--adaptive,!--even", options.adaptive,
-                   "The samples on average, spent where they bring most, or the same number for "
-                   "every pixel (default: quality.adaptive)");
-  command.add_flag("--denoise,!--noisy", options.denoise,
-                   "Take noise out of the composite, or leave it (default: quality.denoise)");
+  add_choice(command, "--adaptive,!--even", options.adaptive,
+             "The samples on average, spent where they bring most, or the same number for "
+             "every pixel (default: quality.adaptive)");
+  add_choice(command, "--denoise,!--noisy", options.denoise,
+             "Take noise out of the composite, or leave it (default: quality.denoise)");
   command
       .add_option("--error", options.error,
                   "Go on to this error, over the picture's mean radiance (default: quality.error)")

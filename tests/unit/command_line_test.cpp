@@ -1,0 +1,39 @@
+// What the command line leaves to the set file, and what it does not.
+#include "daemon/command_line.hpp"
+
+#include <gtest/gtest.h>
+
+#include <CLI/CLI.hpp>
+
+namespace previz {
+namespace {
+
+post::RenderOptions render_options(const std::string& arguments) {
+  CLI::App app;
+  CommandLine said;
+  add_commands(app, said);
+  app.parse("render session " + arguments, false);
+  return said.render;
+}
+
+TEST(CommandLine, LeavesToTheSetWhatItDoesNotSay) {
+  const post::RenderOptions options = render_options("");
+  EXPECT_FALSE(options.samples);
+  EXPECT_FALSE(options.adaptive);
+  EXPECT_FALSE(options.denoise);
+  EXPECT_FALSE(options.error);
+  EXPECT_FALSE(options.seconds);
+  EXPECT_FALSE(options.seed);
+  EXPECT_FALSE(options.estimator);
+  EXPECT_FALSE(options.directory);
+}
+
+TEST(CommandLine, SaysBothSidesOfAChoice) {
+  EXPECT_EQ(render_options("--adaptive").adaptive, true);
+  EXPECT_EQ(render_options("--even").adaptive, false);
+  EXPECT_EQ(render_options("--denoise").denoise, true);
+  EXPECT_EQ(render_options("--noisy").denoise, false);
+}
+
+}  // namespace
+}  // namespace previz
