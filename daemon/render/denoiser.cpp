@@ -11,10 +11,11 @@ namespace previz::render {
 namespace {
 
 // Levels of the transform: steps of 1, 2, 4 and 8 pixels.
-constexpr int levels = 4;
+constexpr int wavelet_levels = 4;
 // Rows above and below that a row's result depends on: two steps of every level, and the neighbours
 // that give the variance there. A slope comes from rows nearer than those.
-constexpr int reach = 2 * ((1 << levels) - 1) + static_cast<int>(gpu::DENOISE_VARIANCE_REACH);
+constexpr int reach =
+    2 * ((1 << wavelet_levels) - 1) + static_cast<int>(gpu::DENOISE_VARIANCE_REACH);
 static_assert(gpu::DENOISE_VARIANCE_REACH >= 2);
 
 // A channel that comes out at this share of the sensor's white is white: a step of 8 bits below it.
@@ -24,7 +25,7 @@ constexpr float nearly_white = 0.99f;
 // than so many do not make it any surer, or what one of them met would never count as an outlier.
 constexpr std::int64_t most_sure_samples = 16;
 
-bool is_texel_buffer(std::uint32_t binding) {
+bool is_read_as_texels(std::uint32_t binding) {
   return binding <= gpu::BINDING_DENOISE_SURFACE;
 }
 
@@ -108,7 +109,7 @@ Denoiser::Denoiser(Device& device, std::size_t most_pixels)
     : device_(device), most_pixels_(most_pixels) {
   using Type = vk::DescriptorType;
   set_layout_ = create_set_layout(device, gpu::DENOISE_BINDINGS, [](std::uint32_t binding) {
-    return is_texel_buffer(binding) ? Type::eUniformTexelBuffer : Type::eStorageBuffer;
+    return is_read_as_texels(binding) ? Type::eUniformTexelBuffer : Type::eStorageBuffer;
   });
   const vk::PushConstantRange constants(vk::ShaderStageFlagBits::eCompute, 0,
                                         sizeof(gpu::GpuDenoise));
@@ -144,13 +145,13 @@ void Denoiser::resize(std::size_t pixels) {
     buffers[gpu::BINDING_DENOISED_VARIANCE] = &variance_[1 - side];
     for (std::uint32_t i = 0; i < gpu::DENOISE_BINDINGS; ++i)
       write_descriptor(device_, sets_[static_cast<std::size_t>(side)], i, *buffers[i],
-                       is_texel_buffer(i));
+                       is_read_as_texels(i));
   }
   pixels_ = pixels;
 }
 
 // Each pass goes to the other side, from 0: first the one for the variance.
-constexpr int result_side = (1 + levels) % 2;
+constexpr int result_side = (1 + wavelet_levels) % 2;
 
 void Denoiser::run(int width, int rows, bool single_sample) {
   gpu::GpuDenoise constants{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(rows), 0,
@@ -167,7 +168,7 @@ void Denoiser::run(int width, int rows, bool single_sample) {
       side = 1 - side;
     };
     pass(variance_pass_);
-    for (int level = 0; level < levels; ++level) {
+    for (int level = 0; level < wavelet_levels; ++level) {
       constants.step = 1u << level;
       pass(level_pass_);
     }
