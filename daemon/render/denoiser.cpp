@@ -21,8 +21,9 @@ static_assert(gpu::DENOISE_VARIANCE_REACH >= 2);
 // A channel that comes out at this share of the sensor's white is white: a step of 8 bits below it.
 constexpr float nearly_white = 0.99f;
 
-// A mean of n samples, each no brighter than white, is off by white / sqrt(n) at most. More samples
-// than so many do not make it any surer, or what one of them met would never count as an outlier.
+// A mean of n samples, each no brighter than white, deviates by white / sqrt(n) at most. More
+// samples than so many do not make it any surer, or what one of them met would never count as an
+// outlier.
 constexpr std::int64_t most_sure_samples = 16;
 
 bool is_read_as_texels(std::uint32_t binding) {
