@@ -167,6 +167,9 @@ render::Layers read_exr(const std::filesystem::path& path) {
         throw Error(path.string() + ": has no channel " + channel.name());
     if (const auto* samples = file.header().findTypedAttribute<Imf::IntAttribute>("previz.samples"))
       layers.samples = samples->value();
+    if (const auto* denoised =
+            file.header().findTypedAttribute<Imf::IntAttribute>("previz.denoised"))
+      layers.denoised = denoised->value() != 0;
     file.setFrameBuffer(buffer);
     file.readPixels(window.min.y, window.max.y);
     return layers;

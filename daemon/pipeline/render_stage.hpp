@@ -66,8 +66,8 @@ class RenderStage {
   RenderStageOptions options_;
   render::View view_ = render::View::composite;
   render::Renderer renderer_;
-  scene::Scene scene_;  // as in the set; instances and lamps only
   double error_ = 0;
+  scene::Scene scene_;             // as in the set; instances and lamps only
   session::SceneState placed_;     // what the renderer holds
   LightPtr light_;                 // the one the renderer holds
   bool has_sources_ = false;       // lamps beside the scene\'s were ever set

@@ -48,7 +48,7 @@ void expect_shown(int width, int height) {
   expect_clean(renderer.counters());
   const render::Layers layers = renderer.layers();
   ASSERT_EQ(layers.mixed.size(), static_cast<std::size_t>(width) * height);
-  const Plate picture = renderer.picture(renderer.layers());
+  const Plate picture = renderer.picture(layers);
   ASSERT_EQ(picture.samples.size(), plate.samples.size());
   std::size_t covered = 0;
   for (std::size_t i = 0; i < layers.mixed.size(); ++i) {

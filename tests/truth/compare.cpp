@@ -278,9 +278,10 @@ EstimatedFrame composited(const TruthFrame& truth, EstimatedFrame estimate) {
   return estimate;
 }
 
-EstimatedFrame as_composited(const TruthFrame& truth, EstimatedFrame estimate) {
+EstimatedFrame as_composited(const std::vector<glm::vec3>& plate, EstimatedFrame estimate) {
   for (std::size_t i = 0; i < estimate.composite.size(); ++i) {
-    if (estimate.mask[i] == 0) estimate.diff[i] = estimate.composite[i] - truth.plate[i];
+    if (estimate.mask[i] == 0)
+      estimate.diff[i] = estimate.composite[i] - (plate.empty() ? glm::vec3(0) : plate[i]);
     if (estimate.mask[i] == 1) estimate.mixed[i] = estimate.composite[i];
   }
   return estimate;

@@ -58,10 +58,10 @@ Plate displayed(const std::vector<glm::vec3>& radiance, int width, int height, d
 // and that as the display would show it.
 EstimatedFrame composited(const TruthFrame& truth, EstimatedFrame estimate);
 
-// The estimate with what its composite over the truth's plate shows in place of diff, where its
-// mask is 0, and of mixed, where it is 1: a composite from which noise was taken is not made of
+// The estimate with what its composite over a plate (empty: black) shows in place of diff, where
+// its mask is 0, and of mixed, where it is 1: a composite from which noise was taken is not made of
 // them.
-EstimatedFrame as_composited(const TruthFrame& truth, EstimatedFrame estimate);
+EstimatedFrame as_composited(const std::vector<glm::vec3>& plate, EstimatedFrame estimate);
 
 double psnr(const Plate& a, const Plate& b);
 // Wang et al. 2004: 11x11 Gaussian of sigma 1.5, K1 = 0.01, K2 = 0.03, windows wholly inside the

@@ -148,7 +148,7 @@ TEST(Compare, WhatACompositeShowsIsMeasuredInPlaceOfItsLayers) {
   EstimatedFrame e = perfect(t);
   const glm::vec3 partly_diff = e.diff[0], partly_mixed = e.mixed[0];
   for (glm::vec3& pixel : e.composite) pixel += 0.01F;
-  const EstimatedFrame shown = as_composited(t, e);
+  const EstimatedFrame shown = as_composited(t.plate, e);
   const auto covered = static_cast<std::size_t>(t.width - 1);
   EXPECT_EQ(shown.diff[0], partly_diff);
   EXPECT_EQ(shown.mixed[0], partly_mixed);
@@ -156,6 +156,7 @@ TEST(Compare, WhatACompositeShowsIsMeasuredInPlaceOfItsLayers) {
   EXPECT_EQ(shown.mixed[1], e.mixed[1]);
   EXPECT_NEAR(shown.mixed[covered].r, 0.4 + 0.01, 1e-6);
   EXPECT_EQ(shown.diff[covered], e.diff[covered]);
+  EXPECT_EQ(as_composited({}, e).diff[1], e.composite[1]);
 }
 
 TEST(Compare, PsnrOfAKnownDifference) {

@@ -83,7 +83,7 @@ JudgedFrame judge_frame(const TruthSet& set, int frame, const Arguments& argumen
   estimate.mask = std::move(layers.mask);
 
   const TruthFrame truth = load_truth_frame(set, frame);
-  if (arguments.denoise) estimate = as_composited(truth, std::move(estimate));
+  if (arguments.denoise) estimate = as_composited(truth.plate, std::move(estimate));
   out.measures = compare(truth, estimate);
   output::write_png(directory / (frame_name(frame) + "_compare.png"),
                     comparison_sheet(truth, estimate));

@@ -29,6 +29,7 @@ render::Layers sample_layers(int width, int height) {
   layers.width = width;
   layers.height = height;
   layers.samples = 256;
+  layers.denoised = true;
   float next = 0.001f;
   const auto value = [&] { return next = next * -1.01f - 0.37f; };
   for (int i = 0; i < width * height; ++i) {
@@ -96,6 +97,7 @@ TEST(Exr, EveryValueComesBackBitForBit) {
   EXPECT_EQ(read.width, 7);
   EXPECT_EQ(read.height, 4);
   EXPECT_EQ(read.samples, 256);
+  EXPECT_EQ(read.denoised, written.denoised);
   EXPECT_EQ(read.composite, written.composite);
   EXPECT_EQ(read.mixed, written.mixed);
   EXPECT_EQ(read.real, written.real);

@@ -97,11 +97,12 @@ TEST(PreviewSize, EveryPixelIsTheMeanOfItsOwnArea) {
 constexpr int samples = 64;
 
 // The small take's card under even light, rendered at this size.
-render::Layers render_card(double scale) {
+Shot card(double scale, bool denoise) {
   const test::TemporaryDirectory directory;
   test::write_small_take(directory.path());
   Take take = open_take(directory / "session", {});
   take.set.quality.samples = samples;
+  take.set.quality.denoise = denoise;
   RenderStageOptions options;
   options.layers = true;
   options.scale = scale;
@@ -117,7 +118,23 @@ render::Layers render_card(double scale) {
   stage(shot);
   EXPECT_EQ(shot.untouched, "");
   EXPECT_EQ(shot.picture.width, shot.layers.width);
-  return shot.layers;
+  shot.error = stage.error();
+  return shot;
+}
+
+render::Layers render_card(double scale) {
+  return card(scale, true).layers;
+}
+
+// What is taken away is no error that is known to be gone.
+TEST(RenderStageError, IsThatOfTheSamplesWhetherDenoisedOrNot) {
+  const Shot noisy = card(1, false);
+  const Shot clean = card(1, true);
+  EXPECT_GT(noisy.error, 0);
+  EXPECT_EQ(clean.error, noisy.error);
+  EXPECT_NE(clean.layers.variance, noisy.layers.variance);
+  EXPECT_FALSE(noisy.layers.denoised);
+  EXPECT_TRUE(clean.layers.denoised);
 }
 
 // In units of the picture's width and height.

@@ -15,14 +15,6 @@ View small_set() {
   return random_scene(2, options);
 }
 
-struct SetRenderer : render::Renderer {
-  explicit SetRenderer(const View& view, const set::Estimation& estimation = {})
-      : render::Renderer(shared_device(), estimation, view.calibration) {
-    set_scene(view.scene);
-    set_environment(view.environment, set::LightSampling::importance);
-  }
-};
-
 double rms_difference(const render::Layers& a, const render::Layers& b) {
   double sum = 0, square = 0;
   for (std::size_t i = 0; i < a.composite.size(); ++i) {

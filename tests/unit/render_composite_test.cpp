@@ -17,9 +17,7 @@ Plate random_plate(int width, int height, int bits) {
 }
 
 Plate show(const View& view, const Plate& plate, int samples) {
-  render::Renderer renderer(shared_device(), {}, view.calibration);
-  renderer.set_scene(view.scene);
-  renderer.set_environment(view.environment, set::LightSampling::importance);
+  SetRenderer renderer(view);
   renderer.begin({plate, 0.85, view.world_from_camera});
   renderer.render(samples);
   expect_clean(renderer.counters());
@@ -57,9 +55,7 @@ TEST(Composite, samples_do_not_depend_on_how_they_are_asked_for) {
   options.width = 45;
   options.height = 31;
   const View view = random_scene(2, options);
-  render::Renderer renderer(shared_device(), {}, view.calibration);
-  renderer.set_scene(view.scene);
-  renderer.set_environment(view.environment, set::LightSampling::importance);
+  SetRenderer renderer(view);
   renderer.begin({{}, 1.0, view.world_from_camera});
   renderer.render(7);
   const render::Layers whole = renderer.layers();
@@ -132,9 +128,7 @@ TEST(Composite, two_float_sums_keep_what_one_float_loses) {
 
 TEST(Composite, a_frame_of_another_size_is_refused) {
   const View view = real_set();
-  render::Renderer renderer(shared_device(), {}, view.calibration);
-  renderer.set_scene(view.scene);
-  renderer.set_environment(view.environment, set::LightSampling::importance);
+  SetRenderer renderer(view);
   EXPECT_THROW(renderer.begin({random_plate(32, 32, 8), 1.0, view.world_from_camera}),
                std::exception);
 }

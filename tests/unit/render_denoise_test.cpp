@@ -107,6 +107,7 @@ TEST(Denoise, leaves_what_differs_by_more_than_its_noise) {
   const render::Layers clean = denoised(raw);
   for (const bool side : {true, false}) {
     const Spread s = spread(clean, [&](int x, int y) { return bright(x, y) == side; });
+    // A weight of one in 300 across would show; of nine pixels of a square some are always blended.
     EXPECT_NEAR(s.mean, side ? 0.6 : 0.3, 1e-3);
     EXPECT_LT(s.variance, sigma * sigma / 2);
   }
@@ -133,7 +134,8 @@ TEST_P(DenoiseEdges, stay_between_surfaces) {
       if (GetParam() == 3) raw.depth[i] = 0;  // nothing was met
     }
   const render::Layers clean = denoised(raw);
-  // Beside the edge, where the halves would be blended first.
+  // Beside the edge, where the halves would be blended first: to nearly nothing of the 0.1, where
+  // this leaves nine tenths of it.
   const Spread a = spread(clean, [&](int x, int) { return x == width / 2 - 1; });
   const Spread b = spread(clean, [&](int x, int) { return x == width / 2; });
   EXPECT_NEAR(b.mean - a.mean, 0.1, 4 * std::sqrt((a.variance + b.variance) / height) + 0.01);
@@ -298,9 +300,7 @@ TEST(Denoise, changes_no_other_layer_and_no_untouched_plate) {
   options.height = 50;
   options.virtual_objects = 0;
   const View view = random_scene(3, options);
-  render::Renderer renderer(shared_device(), {}, view.calibration);
-  renderer.set_scene(view.scene);
-  renderer.set_environment(view.environment, set::LightSampling::importance);
+  SetRenderer renderer(view);
   std::mt19937 random(7);
   for (const int bits : {8, 16}) {
     Plate plate{70, 50, bits, {}};
@@ -326,9 +326,7 @@ TEST(Denoise, brings_a_rendered_picture_nearer_to_its_limit) {
   options.height = 72;
   for (const unsigned seed : {2u, 3u}) {
     const View view = random_scene(seed, options);
-    render::Renderer renderer(shared_device(), {}, view.calibration);
-    renderer.set_scene(view.scene);
-    renderer.set_environment(view.environment, set::LightSampling::importance);
+    SetRenderer renderer(view);
     const auto render = [&](int samples, std::uint32_t random) {
       renderer.begin({{}, 1.0, view.world_from_camera, random});
       renderer.render(samples);
@@ -350,6 +348,7 @@ TEST(Denoise, brings_a_rendered_picture_nearer_to_its_limit) {
       const render::Layers raw = render(samples, 1);
       render::Layers clean = raw;
       renderer.denoise(clean);
+      // On six such sets the ratio is 0.52 to 0.90.
       EXPECT_LT(error(clean), 0.95 * error(raw)) << seed << ", " << samples << " samples";
       EXPECT_LT(error(clean), before) << seed << ", " << samples << " samples";
       before = error(clean);

@@ -20,6 +20,15 @@ inline lighting::EnvironmentMap uniform_environment(const glm::vec3& radiance, i
   return {size, std::vector<glm::vec3>(static_cast<std::size_t>(size) * size, radiance)};
 }
 
+// Holds a view's scene and environment.
+struct SetRenderer : render::Renderer {
+  explicit SetRenderer(const View& view, const set::Estimation& estimation = {})
+      : render::Renderer(shared_device(), estimation, view.calibration) {
+    set_scene(view.scene);
+    set_environment(view.environment, set::LightSampling::importance);
+  }
+};
+
 struct Rendered {
   render::Layers layers;
   render::Counters counters;

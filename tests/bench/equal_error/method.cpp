@@ -78,15 +78,10 @@ render::Counters MethodRun::counters() const {
   return sum;
 }
 
-// There is no plate: the composite is laid over black.
 void MethodRun::denoise(render::Layers& layers) {
   const double start = cpu_seconds();
   renderers_.front()->denoise(layers);
   denoise_s_ = cpu_seconds() - start;
-  for (std::size_t i = 0; i < layers.composite.size(); ++i) {
-    if (layers.mask[i] == 0) layers.diff[i] = layers.composite[i];
-    if (layers.mask[i] == 1) layers.mixed[i] = layers.composite[i];
-  }
 }
 
 truth::EstimatedFrame MethodRun::estimate() {
@@ -101,6 +96,10 @@ truth::EstimatedFrame MethodRun::estimate() {
     for (std::size_t i = 0; i < estimate.diff.size(); ++i)
       estimate.diff[i] = estimate.mixed[i] - estimate.real[i];
   estimate.mask = std::move(first.mask);
+  if (!denoise_) return estimate;
+  estimate.composite = std::move(first.composite);
+  estimate = truth::as_composited({}, std::move(estimate));  // there is no plate
+  estimate.composite.clear();
   return estimate;
 }
 
