@@ -87,6 +87,7 @@ EncodedEnvironment encode_environment(const lighting::EnvironmentMap& map) {
   EncodedEnvironment e;
   e.size = static_cast<std::uint32_t>(map.size);
   e.levels = static_cast<std::uint32_t>(std::countr_zero(e.size));
+  e.radiance.clear();
   for (int j = -1; j <= map.size; ++j)
     for (int i = -1; i <= map.size; ++i)
       e.radiance.emplace_back(map.radiance[lighting::wrapped_texel(map.size, i, j)], 0.0f);

@@ -9,10 +9,12 @@
 
 namespace previz::render {
 
+// Black until it is made.
 struct EncodedEnvironment {
   std::uint32_t size = 1;
-  std::uint32_t levels = 0;           // log2(size)
-  std::vector<glm::vec4> radiance;    // (size + 2)^2, border wrapped by the octahedral rule
+  std::uint32_t levels = 0;  // log2(size)
+  // (size + 2)^2, border wrapped by the octahedral rule
+  std::vector<glm::vec4> radiance = std::vector<glm::vec4>(9);
   std::vector<glm::vec4> importance;  // densities, level by level; see render_shared.h
   double mean = 0;                    // mean of (r + g + b) / 3 over the sphere
   // Solid angle over 2 pi that its light comes from, the exponential of the entropy of where: 2 for
