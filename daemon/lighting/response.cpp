@@ -101,4 +101,10 @@ std::uint16_t Response::forward(double signal) const {
       std::floor(max * curve_value(curve_, std::min(signal, 1.0)) + 0.5));
 }
 
+double Response::least_signal(std::uint16_t code) const {
+  if (code == 0) return 0;
+  const double max = static_cast<double>((1 << bits_) - 1);
+  return curve_signal(curve_, (static_cast<double>(code) - 0.5) / max);
+}
+
 }  // namespace previz::lighting

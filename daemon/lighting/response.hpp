@@ -21,6 +21,8 @@ class Response {
   const std::vector<double>& inverse() const { return inverse_; }
   // floor(max * curve(clip(signal)) + 0.5); NaN becomes 0 and is the caller's bug.
   std::uint16_t forward(double signal) const;
+  // The least signal that forward() makes this code of, but for rounding; 0 for code 0.
+  double least_signal(std::uint16_t code) const;
 
  private:
   ResponseCurve curve_;

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "daemon/render/each_pixel.hpp"
+
 namespace previz::pipeline {
 
 namespace {
@@ -33,14 +35,19 @@ ObserverCalibration scaled(ObserverCalibration calibration, double scale) {
 Plate scaled(const Plate& plate, double scale, const lighting::Response& response) {
   assert(response.bits() == plate.bits);
   const int width = scaled_side(plate.width, scale), height = scaled_side(plate.height, scale);
+  const std::vector<double>& inverse = response.inverse();
   cv::Mat3d full(plate.height, plate.width);
-  std::transform(plate.samples.begin(), plate.samples.end(), full.ptr<double>(),
-                 [&](std::uint16_t sample) { return response.inverse()[sample]; });
+  render::each_pixel(full.total(), [&](std::size_t i) {
+    for (std::size_t c = 0; c < 3; ++c)
+      full.ptr<double>()[3 * i + c] = inverse[plate.samples[3 * i + c]];
+  });
   cv::Mat3d small;
   cv::resize(full, small, {width, height}, 0, 0, cv::INTER_AREA);
   Plate result{width, height, plate.bits, std::vector<std::uint16_t>(3 * small.total())};
-  std::transform(small.ptr<double>(), small.ptr<double>() + result.samples.size(),
-                 result.samples.begin(), [&](double signal) { return response.forward(signal); });
+  render::each_pixel(small.total(), [&](std::size_t i) {
+    for (std::size_t c = 0; c < 3; ++c)
+      result.samples[3 * i + c] = response.forward(small.ptr<double>()[3 * i + c]);
+  });
   return result;
 }
 

@@ -100,12 +100,16 @@ bool RenderStage::add_samples(int samples) {
 void RenderStage::finish(Shot& shot) {
   shot.whole = true;
   shot.counters = renderer_.counters();
+  const bool composite = view_ == render::View::composite;
+  if (composite && !options_.layers) {
+    shot.picture = renderer_.show(set_.quality.denoise);
+    return;
+  }
   render::Layers layers = renderer_.layers();
   if (options_.layers) error_ = render::estimate_error(layers).picture;
-  if (set_.quality.denoise) renderer_.denoise(layers);
-  shot.picture = view_ == render::View::composite
-                     ? renderer_.picture(layers)
-                     : picture_of(view_, layers, *response_, exposure_of(shot));
+  if (composite || set_.quality.denoise)
+    shot.picture = renderer_.show(set_.quality.denoise, &layers);
+  if (!composite) shot.picture = picture_of(view_, layers, *response_, exposure_of(shot));
   if (options_.layers) shot.layers = std::move(layers);
 }
 

@@ -52,7 +52,7 @@ double MethodRenderer::render(int samples) {
   quality.adaptive = adaptive_;
   pipeline::refine(renderer_, quality, {}, {});
   layers_ = renderer_.layers();
-  if (denoise_) renderer_.denoise(layers_);
+  if (denoise_) renderer_.show(true, &layers_);
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "daemon/render/each_pixel.hpp"
+
 namespace previz::render {
 namespace {
 
@@ -65,32 +67,45 @@ double gain(const CompositeRule& rule, double camera, double real, double plate_
 PlateRadiance plate_radiance(const Plate& plate, const lighting::Response& response,
                              double exposure) {
   const std::vector<double>& inverse = response.inverse();
-  PlateRadiance result;
-  result.value.reserve(plate.samples.size());
-  result.variance.reserve(plate.samples.size());
-  for (const std::uint16_t sample : plate.samples) {
-    const std::size_t low = sample > 0 ? sample - 1u : 0u;
-    const std::size_t high = std::min<std::size_t>(sample + 1u, inverse.size() - 1);
+  PlateRadiance of_code;
+  for (std::size_t code = 0; code < inverse.size(); ++code) {
+    const std::size_t low = code > 0 ? code - 1 : 0;
+    const std::size_t high = std::min(code + 1, inverse.size() - 1);
     const double step = (inverse[high] - inverse[low]) / static_cast<double>(high - low) / exposure;
-    result.value.push_back(inverse[sample] / exposure);
-    result.variance.push_back(step * step / 12);
+    of_code.value.push_back(inverse[code] / exposure);
+    of_code.variance.push_back(step * step / 12);
   }
+  PlateRadiance result{std::vector<double>(plate.samples.size()),
+                       std::vector<double>(plate.samples.size())};
+  each_pixel(plate.samples.size() / 3, [&](std::size_t pixel) {
+    for (std::size_t i = 3 * pixel; i < 3 * pixel + 3; ++i) {
+      result.value[i] = of_code.value[plate.samples[i]];
+      result.variance[i] = of_code.variance[plate.samples[i]];
+    }
+  });
   return result;
 }
 
-Layers make_layers(std::span<const gpu::GpuPixel> pixels, int width, int height,
-                   std::int64_t samples, const PlateRadiance& plate, const CompositeRule& rule) {
+Layers make_layers(int width, int height, std::int64_t samples) {
   Layers layers;
   layers.width = width;
   layers.height = height;
   layers.samples = samples;
+  const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   for (auto* layer : {&layers.composite, &layers.mixed, &layers.real, &layers.diff, &layers.normal,
                       &layers.variance})
-    layer->resize(pixels.size());
-  layers.mask.resize(pixels.size());
-  layers.depth.resize(pixels.size());
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    Means m = means(pixels[i]);
+    layer->resize(pixels);
+  layers.mask.resize(pixels);
+  layers.depth.resize(pixels);
+  return layers;
+}
+
+void composite(Layers& layers, std::size_t first, std::span<const gpu::GpuPixel> pixels,
+               const PlateRadiance& plate, const CompositeRule& rule) {
+  each_pixel(pixels.size(), [&](std::size_t at) {
+    const gpu::GpuPixel& sums = pixels[at];
+    const std::size_t i = first + at;
+    Means m = means(sums);
     const glm::dvec3 camera = pixel_of(plate.value, i);
     const glm::dvec3 plate_variance = pixel_of(plate.variance, i);
     // Where only the difference was traced, the camera has measured the real world.
@@ -108,33 +123,9 @@ Layers make_layers(std::span<const gpu::GpuPixel> pixels, int width, int height,
         uncovered * uncovered * gains * gains * variance_of_mean(m.diff, m.diff_square, m.samples));
     layers.mask[i] = static_cast<float>(m.mask);
     layers.depth[i] = static_cast<float>(m.hits > 0 ? m.depth_sum / m.hits : 0);
-    const glm::dvec3 normal(pixels[i].normal.x, pixels[i].normal.y, pixels[i].normal.z);
+    const glm::dvec3 normal(sums.normal.x, sums.normal.y, sums.normal.z);
     layers.normal[i] = glm::vec3(m.hits > 0 ? normal / m.hits : glm::dvec3(0));
-  }
-  return layers;
-}
-
-Plate make_picture(const Layers& layers, const Plate& plate, const lighting::Response& response,
-                   double exposure) {
-  Plate picture;
-  picture.width = layers.width;
-  picture.height = layers.height;
-  picture.bits = response.bits();
-  picture.samples.resize(3 * layers.composite.size());
-  const std::vector<double>& radiance = response.inverse();
-  const auto own = [&](std::size_t sample) {
-    return static_cast<float>(radiance[plate.samples[sample]] / exposure);
-  };
-  for (std::size_t i = 0; i < layers.composite.size(); ++i) {
-    const bool untouched =
-        !plate.samples.empty() && layers.mask[i] == 0 &&
-        layers.composite[i] == glm::vec3(own(3 * i), own(3 * i + 1), own(3 * i + 2));
-    for (int c = 0; c < 3; ++c)
-      picture.samples[3 * i + c] =
-          untouched ? plate.samples[3 * i + c]
-                    : response.forward(exposure * static_cast<double>(layers.composite[i][c]));
-  }
-  return picture;
+  });
 }
 
 }  // namespace previz::render

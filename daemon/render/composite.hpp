@@ -1,4 +1,4 @@
-// From accumulated pixels and the plate to layers and to the picture that is shown (P2, P5).
+// From accumulated pixels and the plate to layers, in double precision (P2).
 #pragma once
 
 #include <span>
@@ -30,16 +30,14 @@ struct CompositeRule {
   double floor = 0;  // radiance, of hybrid
 };
 
-// All layers from per-pixel sums and the plate (empty: black). `samples`: the most a pixel has.
-// composite = mean(M) mean(Lm) + (1 - mean(M)) U with U by `rule`; with additive that is
-// estimator.md's mean(Lm) + (1 - mean(M)) (Lc - mean(Lr)) without subtracting two large sums.
-Layers make_layers(std::span<const gpu::GpuPixel> pixels, int width, int height,
-                   std::int64_t samples, const PlateRadiance& plate,
-                   const CompositeRule& rule = {});
+// Layers of a picture of this size, all zero. `samples`: the most a pixel has.
+Layers make_layers(int width, int height, std::int64_t samples);
 
-// The composite through exposure and response. Where nothing virtual touches a pixel, so that it
-// has the plate's own radiance, it is the plate's own samples, bit for bit.
-Plate make_picture(const Layers& layers, const Plate& plate, const lighting::Response& response,
-                   double exposure);
+// Fills in all layers of the pixels from `first` on, row-major, from their sums and the plate (of
+// the whole picture; empty: black). composite = mean(M) mean(Lm) + (1 - mean(M)) U with U by
+// `rule`; with additive that is estimator.md's mean(Lm) + (1 - mean(M)) (Lc - mean(Lr)) without
+// subtracting two large sums.
+void composite(Layers& layers, std::size_t first, std::span<const gpu::GpuPixel> pixels,
+               const PlateRadiance& plate, const CompositeRule& rule = {});
 
 }  // namespace previz::render

@@ -1,8 +1,8 @@
 #include "daemon/render/denoiser.hpp"
 
 #include <algorithm>
-#include <cmath>
 
+#include "daemon/render/each_pixel.hpp"
 #include "shaders/denoise.spv.h"
 #include "shaders/denoise_variance.spv.h"
 #include "shaders/lib/render_shared.h"
@@ -17,14 +17,6 @@ constexpr int wavelet_levels = 4;
 constexpr int reach =
     2 * ((1 << wavelet_levels) - 1) + static_cast<int>(gpu::DENOISE_VARIANCE_REACH);
 static_assert(gpu::DENOISE_VARIANCE_REACH >= 2);
-
-// A channel that comes out at this share of the sensor's white is white: a step of 8 bits below it.
-constexpr float nearly_white = 0.99f;
-
-// A mean of n samples, each no brighter than white, deviates by white / sqrt(n) at most. More
-// samples than so many do not make it any surer, or what one of them met would never count as an
-// outlier.
-constexpr std::int64_t most_sure_samples = 16;
 
 bool is_read_as_texels(std::uint32_t binding) {
   return binding <= gpu::BINDING_DENOISE_SURFACE;
@@ -41,70 +33,30 @@ glm::vec3 seen_through(const Layers& layers, const std::vector<double>& camera, 
   return (1 - layers.mask[i]) * camera_pixel(camera, i);
 }
 
-// Signals are counted in it: the sensor's white, where it is known.
-float unit_of(const Layers& layers) {
-  return std::isfinite(layers.white) ? static_cast<float>(layers.white) : 1;
-}
-
-// What is filtered is counted in the unit or, where the composite multiplies it, in the camera's
-// picture, whose texture is then not blurred. The floor keeps what is added to black.
+// What a signal is counted in: the sensor's white or, where the composite multiplies the camera's
+// picture, that, whose texture is then not blurred. The floor keeps what is added to black.
 struct Scale {
   const Layers& layers;
   const std::vector<double>& camera;
   const CompositeRule& rule;
-  float unit = unit_of(layers);
+  float white;
 
   glm::vec3 operator()(std::size_t i) const {
-    if (rule.kind == set::Composite::additive || layers.mask[i] > 0) return glm::vec3(unit);
-    return camera_pixel(camera, i) + std::max(static_cast<float>(rule.floor), 1e-3f * unit);
+    if (rule.kind == set::Composite::additive || layers.mask[i] > 0) return glm::vec3(white);
+    return camera_pixel(camera, i) + std::max(static_cast<float>(rule.floor), 1e-3f * white);
   }
 };
-
-// Pixels [first, last) as the shaders read them.
-struct Band {
-  std::vector<glm::vec4> signal, variance, surface;
-
-  Band(const Layers& layers, const std::vector<double>& camera, const Scale& scale,
-       std::size_t first, std::size_t last) {
-    const auto white = static_cast<float>(layers.white);
-    const auto samples =
-        static_cast<float>(std::clamp<std::int64_t>(layers.samples, 1, most_sure_samples));
-    const float most_variance = white * white / samples;
-    for (std::size_t i = first; i < last; ++i) {
-      const glm::vec3 units = scale(i);
-      const glm::vec3 through = seen_through(layers, camera, i);
-      const glm::vec3 shown = glm::min(layers.composite[i], glm::max(through, white));
-      signal.emplace_back((shown - through) / units, layers.depth[i] > 0 ? 1 / layers.depth[i] : 0);
-      variance.emplace_back(glm::min(layers.variance[i], most_variance) / (units * units), 0);
-      surface.emplace_back(layers.normal[i], layers.mask[i]);
-    }
-  }
-};
-
-// What came back of pixels from `uploaded` on, of which [first, last) are to be kept.
-struct Result {
-  std::size_t uploaded = 0, first = 0, last = 0;
-  std::vector<glm::vec4> signal, variance;
-};
-
-void keep(const Result& result, Layers& layers, const std::vector<double>& camera,
-          const Scale& scale) {
-  const auto white = static_cast<float>(layers.white);
-  for (std::size_t i = result.first; i < result.last; ++i) {
-    const glm::vec4& signal = result.signal[i - result.uploaded];
-    const glm::vec4& variance = result.variance[i - result.uploaded];
-    const glm::vec3 units = scale(i);
-    const glm::vec3 denoised = seen_through(layers, camera, i) + units * glm::vec3(signal);
-    const glm::vec3 left = units * units * variance.w * glm::vec3(variance);
-    for (int c = 0; c < 3; ++c) {
-      if (layers.composite[i][c] >= white && denoised[c] >= nearly_white * white) continue;
-      layers.composite[i][c] = denoised[c];
-      layers.variance[i][c] = left[c];
-    }
-  }
-}
 
 }  // namespace
+
+// A mean of n samples, each no brighter than white, deviates by white / sqrt(n) at most. More
+// samples than so many do not make it any surer, or what one of them met would never count as an
+// outlier.
+float most_sure_variance(float white, std::int64_t samples) {
+  constexpr std::int64_t most_sure_samples = 16;
+  return white * white /
+         static_cast<float>(std::clamp<std::int64_t>(samples, 1, most_sure_samples));
+}
 
 Denoiser::Denoiser(Device& device, std::size_t most_pixels)
     : device_(device), most_pixels_(most_pixels) {
@@ -125,7 +77,7 @@ Denoiser::Denoiser(Device& device, std::size_t most_pixels)
   level_pass_ = create_pipeline(device, denoise_spv, layout_, {});
 }
 
-void Denoiser::resize(std::size_t pixels) {
+void Denoiser::reserve(std::size_t pixels) {
   if (pixels <= pixels_) return;
   pixels_ = 0;  // until all is there, whatever is thrown on the way
   const auto texels = [&] {
@@ -154,57 +106,68 @@ void Denoiser::resize(std::size_t pixels) {
 // Each pass goes to the other side, from 0: first the one for the variance.
 constexpr int result_side = (1 + wavelet_levels) % 2;
 
-void Denoiser::run(int width, int rows, bool single_sample) {
-  gpu::GpuDenoise constants{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(rows), 0,
-                            single_sample ? 1u : 0u};
-  device_.submit([&](const vk::raii::CommandBuffer& commands) {
-    std::size_t side = 0;
-    const auto pass = [&](const Pipeline& pipeline) {
-      commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipeline.pipeline);
-      commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *layout_, 0, *sets_[side], {});
-      commands.pushConstants<gpu::GpuDenoise>(*layout_, vk::ShaderStageFlagBits::eCompute, 0,
-                                              constants);
-      commands.dispatch(work_groups(constants.width * constants.height), 1, 1);
-      barrier(commands);
-      side = 1 - side;
-    };
-    pass(variance_pass_);
-    for (int level = 0; level < wavelet_levels; ++level) {
-      constants.step = 1u << level;
-      pass(level_pass_);
-    }
-  });
+const Buffer& Denoiser::denoised_signal() const {
+  return signal_[result_side];
 }
 
-void Denoiser::denoise(Layers& layers, const std::vector<double>& camera,
-                       const CompositeRule& rule) {
-  const auto width = static_cast<std::size_t>(layers.width);
-  const auto fitting = static_cast<int>(std::min<std::size_t>(
-      most_pixels_ / width, static_cast<std::size_t>(layers.height) + 2 * reach));
-  // At least as many as a band needs above it: those are then the band before's alone.
-  const int band = std::max(fitting - 2 * reach, reach);
-  const Scale scale{layers, camera, rule};
-  Result before;
-  for (int y = 0; y < layers.height; y += band) {
-    const int top = std::max(y - reach, 0);
-    const int end = std::min(y + band, layers.height);
-    const int bottom = std::min(end + reach, layers.height);
-    const std::size_t first = static_cast<std::size_t>(top) * width;
-    const std::size_t last = static_cast<std::size_t>(bottom) * width;
-    const Band input(layers, camera, scale, first, last);
-    // Only now may the rows above change: this band was made of some of them.
-    keep(before, layers, camera, scale);
-    resize(last - first);
-    upload_bytes(device_, signal_[0], std::as_bytes(std::span(input.signal)));
-    upload_bytes(device_, variance_[0], std::as_bytes(std::span(input.variance)));
-    upload_bytes(device_, surface_, std::as_bytes(std::span(input.surface)));
-    run(layers.width, bottom - top, layers.samples < 2);
-    before = {first, static_cast<std::size_t>(y) * width, static_cast<std::size_t>(end) * width,
-              download<glm::vec4>(device_, signal_[result_side], last - first),
-              download<glm::vec4>(device_, variance_[result_side], last - first)};
+void Denoiser::record(const vk::raii::CommandBuffer& commands, int width, int rows,
+                      bool single_sample) const {
+  gpu::GpuDenoise constants{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(rows), 0,
+                            single_sample ? 1u : 0u};
+  std::size_t side = 0;
+  const auto pass = [&](const Pipeline& pipeline) {
+    commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipeline.pipeline);
+    commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *layout_, 0, *sets_[side], {});
+    commands.pushConstants<gpu::GpuDenoise>(*layout_, vk::ShaderStageFlagBits::eCompute, 0,
+                                            constants);
+    commands.dispatch(work_groups(constants.width * constants.height), 1, 1);
+    barrier(commands);
+    side = 1 - side;
+  };
+  pass(variance_pass_);
+  for (int level = 0; level < wavelet_levels; ++level) {
+    constants.step = 1u << level;
+    pass(level_pass_);
   }
-  keep(before, layers, camera, scale);
-  layers.denoised = true;
+}
+
+std::vector<Denoiser::Band> Denoiser::bands(int width, int height) const {
+  const auto fitting = static_cast<int>(std::min<std::size_t>(
+      most_pixels_ / static_cast<std::size_t>(width), static_cast<std::size_t>(height)));
+  if (fitting == height) return {{0, height, 0, height}};
+  // Even where that is more than fits: a band of fewer rows would be mostly what others need, too.
+  const int rows = std::max(fitting - 2 * reach, reach);
+  std::vector<Band> bands;
+  for (int first = 0; first < height; first += rows) {
+    const int last = std::min(first + rows, height);
+    bands.push_back({first, last, std::max(first - reach, 0), std::min(last + reach, height)});
+  }
+  return bands;
+}
+
+void Denoiser::read(const Band& band, Layers& layers, const std::vector<double>& camera,
+                    const CompositeRule& rule) const {
+  const auto width = static_cast<std::size_t>(layers.width);
+  const std::size_t top = static_cast<std::size_t>(band.top) * width;
+  const std::size_t first = static_cast<std::size_t>(band.first) * width;
+  const std::size_t last = static_cast<std::size_t>(band.last) * width;
+  const auto signals = download<glm::vec4>(device_, signal_[result_side], last - top);
+  const auto variances = download<glm::vec4>(device_, variance_[result_side], last - top);
+  const auto white = static_cast<float>(layers.white);
+  const Scale scale{layers, camera, rule, white};
+  each_pixel(last - first, [&](std::size_t at) {
+    const std::size_t i = first + at;
+    const glm::vec4& variance = variances[i - top];
+    const glm::vec3 units = scale(i);
+    const glm::vec3 denoised =
+        seen_through(layers, camera, i) + units * glm::vec3(signals[i - top]);
+    const glm::vec3 left = units * units * variance.w * glm::vec3(variance);
+    for (int c = 0; c < 3; ++c) {
+      if (layers.composite[i][c] >= white && denoised[c] >= gpu::NEARLY_WHITE * white) continue;
+      layers.composite[i][c] = denoised[c];
+      layers.variance[i][c] = left[c];
+    }
+  });
 }
 
 }  // namespace previz::render

@@ -218,6 +218,15 @@ void Device::submit(const std::function<void(const vk::raii::CommandBuffer&)>& r
 
 namespace {
 
+vk::raii::DeviceMemory allocate(Device& device, const vk::MemoryAllocateInfo& what) {
+  try {
+    return {device.vk(), what};
+  } catch (const vk::OutOfDeviceMemoryError&) {
+    throw Error("Vulkan: " + device.name() + " has no memory left for a buffer of " +
+                std::to_string(what.allocationSize) + " bytes");
+  }
+}
+
 Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags usage,
                      vk::MemoryPropertyFlags wanted, vk::MemoryPropertyFlags preferred) {
   using Usage = vk::BufferUsageFlagBits;
@@ -227,7 +236,7 @@ Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags u
   result.buffer = vk::raii::Buffer(device.vk(), {{}, result.size, usage});
   const auto requirements = result.buffer.getMemoryRequirements();
   const auto type = device.memory_type(requirements.memoryTypeBits, wanted, preferred);
-  result.memory = vk::raii::DeviceMemory(device.vk(), {requirements.size, type});
+  result.memory = allocate(device, {requirements.size, type});
   result.buffer.bindMemory(*result.memory, 0);
   return result;
 }
@@ -314,22 +323,28 @@ void upload_bytes(Device& device, Buffer& buffer, std::span<const std::byte> byt
   });
 }
 
-void download_bytes(Device& device, const Buffer& buffer, std::span<std::byte> bytes) {
-  if (bytes.empty()) return;
+void read_bytes(Device& device, const Buffer& buffer, vk::DeviceSize size,
+                const std::function<void(const std::byte*)>& visit) {
+  if (size == 0) return;
   if (buffer.mapped) {
-    std::memcpy(bytes.data(), buffer.mapped, bytes.size());
+    visit(static_cast<const std::byte*>(buffer.mapped));
     return;
   }
-  Buffer staging = create_staging_buffer(device, bytes.size());
+  Buffer staging = create_staging_buffer(device, size);
   device.submit([&](const vk::raii::CommandBuffer& commands) {
     barrier(commands);
-    commands.copyBuffer(*buffer.buffer, *staging.buffer, vk::BufferCopy(0, 0, bytes.size()));
+    commands.copyBuffer(*buffer.buffer, *staging.buffer, vk::BufferCopy(0, 0, size));
     vk::MemoryBarrier2 to_host(vk::PipelineStageFlagBits2::eCopy,
                                vk::AccessFlagBits2::eTransferWrite,
                                vk::PipelineStageFlagBits2::eHost, vk::AccessFlagBits2::eHostRead);
     commands.pipelineBarrier2(vk::DependencyInfo({}, to_host));
   });
-  std::memcpy(bytes.data(), staging.mapped, bytes.size());
+  visit(static_cast<const std::byte*>(staging.mapped));
+}
+
+void download_bytes(Device& device, const Buffer& buffer, std::span<std::byte> bytes) {
+  read_bytes(device, buffer, bytes.size(),
+             [&](const std::byte* from) { std::memcpy(bytes.data(), from, bytes.size()); });
 }
 
 Pipeline create_pipeline(Device& device, std::span<const std::uint32_t> spirv,

@@ -80,6 +80,9 @@ Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format forma
 void upload_bytes(Device& device, Buffer& buffer, std::span<const std::byte> bytes,
                   vk::DeviceSize offset = 0);
 void download_bytes(Device& device, const Buffer& buffer, std::span<std::byte> bytes);
+// The first `size` bytes, where they are if the host can read them, else a copy that is gone after.
+void read_bytes(Device& device, const Buffer& buffer, vk::DeviceSize size,
+                const std::function<void(const std::byte*)>& visit);
 
 // (Re)creates `buffer` where it is too small, then uploads. Returns true if it was recreated, so
 // that descriptors must be written again.
@@ -98,6 +101,12 @@ bool upload_texels(Device& device, Buffer& buffer, const std::vector<T>& data, v
   if (grow) buffer = create_texel_buffer(device, size, format);
   upload_bytes(device, buffer, std::as_bytes(std::span(data)));
   return grow;
+}
+template <typename T>
+void read(Device& device, const Buffer& buffer, std::size_t count, const auto& visit) {
+  read_bytes(device, buffer, count * sizeof(T), [&](const std::byte* bytes) {
+    visit(std::span(reinterpret_cast<const T*>(bytes), count));
+  });
 }
 template <typename T>
 std::vector<T> download(Device& device, const Buffer& buffer, std::size_t count) {

@@ -1,5 +1,6 @@
 #include "daemon/render/picture_memory.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <glm/vec2.hpp>
 #include <string>
@@ -14,6 +15,10 @@ namespace {
 // A pixel of Layers: six of three floats and two of one; of the plate's radiance and its variance
 // (daemon/render/composite.hpp): three doubles each.
 constexpr std::uint64_t layer_bytes = (6 * 3 + 2) * sizeof(float) + 2 * 3 * sizeof(double);
+
+// A pixel of a band: six arrays of four floats (denoiser.hpp, presenter.hpp), and two of three
+// samples.
+constexpr std::uint64_t band_bytes = 6 * 4 * sizeof(float) + 2 * 3 * sizeof(std::uint16_t);
 
 std::uint64_t rays_of(int width, int height) {
   return (static_cast<std::uint64_t>(width) + 1) * (static_cast<std::uint64_t>(height) + 1);
@@ -30,9 +35,10 @@ std::string gigabytes(std::uint64_t bytes) {
 std::uint64_t picture_bytes(int width, int height, bool read_back) {
   const std::uint64_t pixels =
       static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
-  const std::uint64_t device =
-      pixels * sizeof(gpu::GpuPixel) + rays_of(width, height) * sizeof(glm::vec2);
-  return read_back ? device + pixels * (sizeof(gpu::GpuPixel) + layer_bytes) : device;
+  const std::uint64_t device = pixels * sizeof(gpu::GpuPixel) +
+                               rays_of(width, height) * sizeof(glm::vec2) +
+                               std::min<std::uint64_t>(pixels, most_band_pixels) * band_bytes;
+  return read_back ? device + pixels * layer_bytes : device;
 }
 
 void refuse_too_large(int width, int height, const PictureMemory& memory) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 #include "daemon/lighting/response.hpp"
 #include "daemon/render/composite.hpp"
@@ -9,6 +10,7 @@
 #include "daemon/render/gpu_scene.hpp"
 #include "daemon/render/photon_schedule.hpp"
 #include "daemon/render/picture_memory.hpp"
+#include "daemon/render/presenter.hpp"
 #include "daemon/render/view.hpp"
 #include "daemon/render/wavefront.hpp"
 #include "drivers/error.hpp"
@@ -67,6 +69,7 @@ struct Renderer::Impl {
   CompositeRule rule() const {
     return {estimation.composite, estimation.composite_floor / frame.exposure};
   }
+  std::int64_t sampled() const { return std::max<std::int64_t>(samples, 1); }
   // The plate as linear radiance; w: 0 where a channel is clipped.
   std::vector<glm::vec4> measured() const;
 
@@ -75,7 +78,8 @@ struct Renderer::Impl {
   ObserverCalibration calibration;
   GpuScene scene;
   std::optional<Wavefront> wavefront;
-  std::optional<Denoiser> denoiser;  // made when it is first asked for
+  std::optional<Denoiser> denoiser;    // made when a picture is first shown
+  std::optional<Presenter> presenter;  // likewise, for the response
   Buffer rays, frame_buffer;
   std::uint32_t carried = 0;  // FEATURE_* bits
   bool has_scene = false, has_environment = false;
@@ -205,7 +209,7 @@ bool Renderer::needs(Part part) const {
   return (impl_->features() & entry_of(part).feature) != 0;
 }
 
-void Renderer::begin(const FrameInput& frame) {
+void Renderer::begin(FrameInput frame) {
   Impl& r = *impl_;
   if (!r.has_scene || !r.has_environment)
     throw Error("renderer: a frame was begun before the scene and the environment were set");
@@ -215,11 +219,14 @@ void Renderer::begin(const FrameInput& frame) {
     throw Error("observer: a frame of " + std::to_string(frame.plate.width) + "x" +
                 std::to_string(frame.plate.height) + " does not fit the calibration's " +
                 std::to_string(lens.width) + "x" + std::to_string(lens.height));
-  r.frame = frame;
-  if (!r.response || r.response->bits() != frame.plate.bits)
-    r.response.emplace(r.calibration.response, frame.plate.bits);
+  r.frame = std::move(frame);
+  const Plate& plate = r.frame.plate;
+  if (!r.response || r.response->bits() != plate.bits) {
+    r.response.emplace(r.calibration.response, plate.bits);
+    r.presenter.reset();
+  }
   r.samples = 0;
-  r.scene.place(glm::dvec3(frame.world_from_camera[3]));
+  r.scene.place(glm::dvec3(r.frame.world_from_camera[3]));
   r.upload_frame();
 
   std::vector<const Buffer*> bindings = r.scene.bindings();
@@ -228,7 +235,7 @@ void Renderer::begin(const FrameInput& frame) {
   const std::uint32_t features = r.features() | r.carried;
   if ((features & gpu::FEATURE_PHOTONS) != 0) {
     const double distance =
-        r.scene.nearest_specular_distance(glm::dvec3(frame.world_from_camera[3]));
+        r.scene.nearest_specular_distance(glm::dvec3(r.frame.world_from_camera[3]));
     r.wavefront->use_photons(r.photons(), r.estimation.photon_radius_px * distance / lens.fx);
   }
   r.wavefront->bind(bindings, features);
@@ -271,23 +278,33 @@ void Renderer::limit_samples(const std::vector<std::uint32_t>& limits) {
 Layers Renderer::layers() const {
   const Impl& r = *impl_;
   const PinholeIntrinsics& lens = r.calibration.intrinsics;
-  const auto plate = plate_radiance(r.frame.plate, *r.response, r.frame.exposure);
-  Layers layers = make_layers(r.wavefront->pixels(), lens.width, lens.height,
-                              std::max<std::int64_t>(r.samples, 1), plate, r.rule());
+  const PlateRadiance plate = plate_radiance(r.frame.plate, *r.response, r.frame.exposure);
+  Layers layers = make_layers(lens.width, lens.height, r.sampled());
   layers.white = 1 / r.frame.exposure;
+  for (const Wavefront::Sums& tile : r.wavefront->sums()) {
+    const std::size_t first = static_cast<std::size_t>(tile.first_row) * lens.width;
+    const std::size_t count = static_cast<std::size_t>(tile.rows) * lens.width;
+    read<gpu::GpuPixel>(*r.device, tile.pixels, count, [&](std::span<const gpu::GpuPixel> pixels) {
+      composite(layers, first, pixels, plate, r.rule());
+    });
+  }
   return layers;
 }
 
-void Renderer::denoise(Layers& layers) {
+Plate Renderer::show(bool denoise, Layers* layers) {
   Impl& r = *impl_;
   if (!r.denoiser) r.denoiser.emplace(*r.device);
-  r.denoiser->denoise(layers, plate_radiance(r.frame.plate, *r.response, r.frame.exposure).value,
-                      r.rule());
-}
-
-Plate Renderer::picture(const Layers& layers) const {
-  const Impl& r = *impl_;
-  return make_picture(layers, r.frame.plate, *r.response, r.frame.exposure);
+  if (!r.presenter) r.presenter.emplace(*r.device, *r.response);
+  const PinholeIntrinsics& lens = r.calibration.intrinsics;
+  const ToPresent what{r.wavefront->sums(), lens.width, lens.height, r.frame.plate,
+                       r.frame.exposure,    r.rule(),   r.sampled(), denoise};
+  if (!denoise || !layers) return r.presenter->present(what, *r.denoiser);
+  const PlateRadiance plate = plate_radiance(r.frame.plate, *r.response, r.frame.exposure);
+  Plate picture = r.presenter->present(what, *r.denoiser, [&](const Denoiser::Band& band) {
+    r.denoiser->read(band, *layers, plate.value, r.rule());
+  });
+  layers->denoised = true;
+  return picture;
 }
 
 Counters Renderer::counters() const {

@@ -97,7 +97,7 @@ class Renderer {
   bool needs(Part part) const;
 
   // Starts a frame: clears what was accumulated.
-  void begin(const FrameInput& frame);
+  void begin(FrameInput frame);
   // Adds samples to every pixel of the frame begun. The i-th sample of a pixel is the same however
   // the calls split them (P8). `cancelled` is asked between batches.
   void render(int samples, const std::function<bool()>& cancelled = {});
@@ -110,13 +110,12 @@ class Renderer {
   void limit_samples(const std::vector<std::uint32_t>& limits);
   // Layers of the samples so far.
   Layers layers() const;
-  // Takes noise out of the composite of the begun frame's layers (daemon/render/denoiser.hpp), and
-  // says in their variance what is left. Throws previz::Error where the device has no memory for
-  // it.
-  void denoise(Layers& layers);
-  // Their composite through exposure and response, as the display shows it: the plate's own bits
-  // where nothing virtual touches it.
-  Plate picture(const Layers& layers) const;
+  // The composite of the samples so far through exposure and response, as the display shows it: the
+  // plate's own bits where nothing virtual touches it. `denoise`: noise is taken out of it
+  // (daemon/render/denoiser.hpp), also of the composite of these layers, which are those of the
+  // same samples; their variance then says what is left. Throws previz::Error where the device has
+  // no memory for it.
+  Plate show(bool denoise, Layers* layers = nullptr);
   Counters counters() const;
 
  private:

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <functional>
 
+#include "daemon/render/each_pixel.hpp"
+
 namespace previz::render {
 namespace {
 
@@ -65,10 +67,11 @@ Plate picture_of(View view, const Layers& layers, const lighting::Response& resp
 
   Plate picture{layers.width, layers.height, response.bits(),
                 std::vector<std::uint16_t>(3 * layers.mask.size())};
-  for (std::size_t i = 0; i < layers.mask.size(); ++i)
+  each_pixel(layers.mask.size(), [&](std::size_t i) {
     for (int c = 0; c < 3; ++c)
       picture.samples[3 * i + static_cast<std::size_t>(c)] =
           static_cast<std::uint16_t>(signal(i, c));
+  });
   return picture;
 }
 

@@ -318,14 +318,11 @@ void Wavefront::use_camera(const std::vector<glm::vec4>& plate) {
   });
 }
 
-std::vector<gpu::GpuPixel> Wavefront::pixels() const {
-  std::vector<gpu::GpuPixel> result;
-  result.reserve(static_cast<std::size_t>(width_) * height_);
-  for (const Tile& tile : tiles_) {
-    const auto part = download<gpu::GpuPixel>(
-        device_, tile.pixels, static_cast<std::size_t>(tile.batch.width) * tile.batch.height);
-    result.insert(result.end(), part.begin(), part.end());
-  }
+std::vector<Wavefront::Sums> Wavefront::sums() const {
+  std::vector<Sums> result;
+  for (const Tile& tile : tiles_)
+    result.push_back(
+        {tile.pixels, static_cast<int>(tile.batch.y), static_cast<int>(tile.batch.height)});
   return result;
 }
 

@@ -36,8 +36,13 @@ class Wavefront {
   bool render(std::uint32_t first_sample, std::uint32_t samples, std::uint32_t max_depth,
               const std::function<bool()>& cancelled);
 
-  std::vector<gpu::GpuPixel> pixels() const;  // row-major
-  gpu::GpuControl control() const;            // counters since the last clear
+  // What the picture's pixels have gathered, in tiles of whole rows from the top: GpuPixel[].
+  struct Sums {
+    const Buffer& pixels;
+    int first_row, rows;
+  };
+  std::vector<Sums> sums() const;
+  gpu::GpuControl control() const;  // counters since the last clear
 
  private:
   struct Tile {

@@ -84,7 +84,8 @@ PREVIZ_CONST uint CAMERA_BINDINGS = 3u;
 
 // Set 0 of the passes that take noise out of a picture (daemon/render/denoiser.hpp); texel buffers
 // RGBA32F, width * height, and those to write, which the next pass reads.
-//   DENOISE_SIGNAL    signal over the sensor's white, 1 / depth (0: none)
+//   DENOISE_SIGNAL    signal over the sensor's white (ratio, hybrid: over the camera's picture where
+//                     nothing covers it), 1 / depth (0: none)
 //   DENOISE_VARIANCE  the signal's, to be multiplied by the fourth component
 //   DENOISE_SURFACE   normal, mean(M)
 PREVIZ_CONST uint BINDING_DENOISE_SIGNAL = 0u;
@@ -96,6 +97,28 @@ PREVIZ_CONST uint DENOISE_BINDINGS = 5u;
 
 // Pixels from which the variance of a single sample is taken, to each side.
 PREVIZ_CONST uint DENOISE_VARIANCE_REACH = 3u;
+// A channel that comes out at this share of the sensor's white is white: a step of 8 bits below it.
+PREVIZ_CONST float NEARLY_WHITE = 0.99f;
+
+// Set 0 of the passes that make the picture that is shown (daemon/render/presenter.hpp), a band of
+// rows at a time.
+PREVIZ_CONST uint BINDING_SHOW_PIXELS = 0u;      // GpuPixel[], a tile's
+PREVIZ_CONST uint BINDING_SHOW_PLATE = 1u;       // uint[], the band's: samples, interleaved RGB, two
+                                                 // in each
+PREVIZ_CONST uint BINDING_SHOW_SIGNAL_OF = 2u;   // float[]: the linear signal of each code
+PREVIZ_CONST uint BINDING_SHOW_LEAST_OF = 3u;    // float[]: the least signal that becomes the code
+PREVIZ_CONST uint BINDING_SHOW_COMPOSITE = 4u;   // vec4[], the band's: composite, mean(M)
+PREVIZ_CONST uint BINDING_SHOW_SIGNAL = 5u;      // vec4[]: DENOISE_SIGNAL, to write
+PREVIZ_CONST uint BINDING_SHOW_VARIANCE = 6u;    // vec4[]: DENOISE_VARIANCE, to write
+PREVIZ_CONST uint BINDING_SHOW_SURFACE = 7u;     // vec4[]: DENOISE_SURFACE, to write
+PREVIZ_CONST uint BINDING_SHOW_DENOISED = 8u;    // vec4[]: SIGNAL to read, denoised or as it was
+PREVIZ_CONST uint BINDING_SHOW_PICTURE = 9u;     // uint[], to write: as PLATE, of what is shown
+PREVIZ_CONST uint SHOW_BINDINGS = 10u;
+
+// How the difference is put onto the camera's picture: set::Composite.
+PREVIZ_CONST uint COMPOSITE_ADDITIVE = 0u;
+PREVIZ_CONST uint COMPOSITE_RATIO = 1u;
+PREVIZ_CONST uint COMPOSITE_HYBRID = 2u;
 
 // What a slot holds, in the fourth component of its SAMPLE_REAL.
 PREVIZ_CONST float SAMPLE_FULL = 0.0f;        // both radiances
@@ -319,8 +342,24 @@ struct GpuDenoise {
   uint single_sample;  // 1: what a pixel has is one sample, and its variance is not known
 };
 
+// Push constants of the passes that make what is shown: pixels of a band.
+struct GpuShow {
+  uint count;
+  uint in_tile;        // the first of them among the tile's
+  uint in_band;        // and among the band's
+  uint has_plate;      // 0: over black
+  uint most;           // the largest code
+  uint composite;      // COMPOSITE_*
+  float floor;         // of COMPOSITE_HYBRID, radiance
+  float exposure;      // signal over radiance
+  float white;         // radiance at which the sensor clips, 1 / exposure
+  float most_variance; // radiance squared
+  uint is_denoised;    // the signals are: the composite's place is theirs
+};
+
 #ifdef __cplusplus
 static_assert(sizeof(GpuDenoise) == 16);
+static_assert(sizeof(GpuShow) == 44);
 static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 52);
 static_assert(sizeof(GpuPixel) == 144);

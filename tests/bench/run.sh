@@ -1,6 +1,6 @@
 #!/bin/sh
 # All benchmarks of a build: run.sh BUILD_DIR OUT_DIR [SETDIR...]. Writes rays.md, instances.md,
-# frame.md, frame.csv and frame.svg, and where ground truth sets are given equal_error.md.
+# frame.md, frame.csv and frame.svg, picture.md, move.md, and where ground truth sets are given equal_error.md.
 # CLOCK=cpu (default where the device is lavapipe: wall elsewhere) or wall. Beside Cycles: cycles/run.
 set -eu
 if [ $# -lt 2 ]; then
@@ -16,4 +16,6 @@ mkdir -p "$out"
 "$bench/bench_rays" --instanced --triangles 98000 1000000 | tee "$out/instances.md"
 if head -n 1 "$out/rays.md" | grep -q llvmpipe; then default=cpu; else default=wall; fi
 "$bench/bench_frame" --clock "${CLOCK:-$default}" --out "$out" | tee "$out/frame.md"
+"$bench/bench_picture" | tee "$out/picture.md"
+"$bench/bench_move" | tee "$out/move.md"
 [ $# -eq 0 ] || "$bench/bench_equal_error" "$@" | tee "$out/equal_error.md"

@@ -3,10 +3,8 @@
 #include <cmath>
 #include <random>
 
-#include "daemon/render/composite.hpp"
-#include "daemon/render/device.hpp"
 #include "shaders/accumulate.spv.h"
-#include "tests/unit/render_fixture.hpp"
+#include "tests/unit/pixels_by_hand.hpp"
 
 namespace previz::testing {
 namespace {
@@ -59,7 +57,7 @@ class Accumulator {
 
   render::Layers layers(std::int64_t samples) const {
     const auto pixels = render::download<gpu::GpuPixel>(device_, pixels_, 1);
-    return render::make_layers(pixels, 1, 1, samples, {});
+    return layers_of(pixels, samples);
   }
   gpu::GpuPixel pixel() const {
     return render::download<gpu::GpuPixel>(device_, pixels_, 1).front();

@@ -43,6 +43,9 @@ TEST_P(EveryCurve, ReturnsEveryCodeAndIncreases) {
     ASSERT_EQ(response.forward(inverse[code]), code);
     if (code > 0) {
       ASSERT_GT(inverse[code], inverse[code - 1]);
+      const double least = response.least_signal(static_cast<std::uint16_t>(code));
+      ASSERT_EQ(response.forward(least * (1 + 1e-9)), code);
+      ASSERT_EQ(response.forward(least * (1 - 1e-9)), code - 1);
     }
   }
 }

@@ -195,7 +195,7 @@ TEST(CameraRadiance, with_nothing_virtual_the_plate_is_untouched) {
     renderer.set_environment(view.environment, set::LightSampling::importance);
     renderer.begin({plate, 1 / white, view.world_from_camera, 1});
     renderer.render(4);
-    EXPECT_EQ(renderer.picture(renderer.layers()).samples, plate.samples);
+    EXPECT_EQ(renderer.show(false).samples, plate.samples);
     expect_clean(renderer.counters());
   }
 }

@@ -2,8 +2,7 @@
 // the equation itself.
 #include <random>
 
-#include "daemon/render/composite.hpp"
-#include "tests/unit/render_fixture.hpp"
+#include "tests/unit/pixels_by_hand.hpp"
 
 namespace previz::testing {
 namespace {
@@ -21,7 +20,7 @@ Plate show(const View& view, const Plate& plate, int samples) {
   renderer.begin({plate, 0.85, view.world_from_camera});
   renderer.render(samples);
   expect_clean(renderer.counters());
-  return renderer.picture(renderer.layers());
+  return renderer.show(false);
 }
 
 View real_set() {
@@ -76,7 +75,7 @@ TEST(Composite, covered_pixels_use_means_not_samples) {
   pixel.diff_high = gpu::vec4(-0.5f, -0.5f, -0.5f, 0.0f);
   pixel.square_diff_high.w = 2;
   const render::PlateRadiance plate{std::vector<double>(3, 0.5), std::vector<double>(3, 0.0)};
-  const render::Layers layers = render::make_layers(std::span(&pixel, 1), 1, 1, 2, plate);
+  const render::Layers layers = layers_of(std::span(&pixel, 1), 2, plate);
   // 0.25 + (1 - 0.5) (0.5 - 0.5)
   EXPECT_FLOAT_EQ(layers.composite[0].g, 0.25f);
   EXPECT_FLOAT_EQ(layers.real[0].g, 0.5f);
@@ -90,7 +89,7 @@ double composited(double camera, double mixed, double real, const render::Compos
   pixel.mixed_high.w = 0;
   pixel.diff_high = gpu::vec4(static_cast<float>(mixed - real));
   const render::PlateRadiance plate{std::vector<double>(3, camera), std::vector<double>(3, 1e-6)};
-  return render::make_layers(std::span(&pixel, 1), 1, 1, 1, plate, rule).composite[0].g;
+  return layers_of(std::span(&pixel, 1), 1, plate, rule).composite[0].g;
 }
 
 // A shadow halves the light on a surface whose albedo the phantom has wrong by a factor of two.
@@ -121,7 +120,7 @@ TEST(Composite, two_float_sums_keep_what_one_float_loses) {
   gpu::GpuPixel pixel{};
   pixel.mixed_high = gpu::vec4(16777216.0f, 0, 0, 0);
   pixel.mixed_low = gpu::vec4(0.5f, 0, 0, 0);
-  const render::Layers layers = render::make_layers(std::span(&pixel, 1), 1, 1, 1, {});
+  const render::Layers layers = layers_of(std::span(&pixel, 1), 1);
   EXPECT_FLOAT_EQ(layers.mixed[0].r, static_cast<float>(16777216.5));
   EXPECT_EQ(layers.composite[0].r, 0.0f);  // nothing covered, a black plate, no difference
 }

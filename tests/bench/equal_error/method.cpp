@@ -80,7 +80,7 @@ render::Counters MethodRun::counters() const {
 
 void MethodRun::denoise(render::Layers& layers) {
   const double start = cpu_seconds();
-  renderers_.front()->denoise(layers);
+  renderers_.front()->show(true, &layers);
   denoise_s_ = cpu_seconds() - start;
 }
 

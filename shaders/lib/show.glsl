@@ -1,0 +1,36 @@
+// Pixels of a band on their way from sums to the picture that is shown.
+#ifndef PREVIZ_SHOW_GLSL
+#define PREVIZ_SHOW_GLSL
+
+#include "shaders/lib/render_shared.h"
+
+layout(local_size_x = WORKGROUP_SIZE) in;
+
+layout(scalar, push_constant) uniform Show { GpuShow show; };
+layout(scalar, set = 0, binding = BINDING_SHOW_PLATE) readonly buffer PlateSamples { uint plate[]; };
+layout(scalar, set = 0, binding = BINDING_SHOW_SIGNAL_OF) readonly buffer SignalOf {
+  float signal_of[];
+};
+
+uvec3 plate_codes(uint pixel) {
+  uvec3 codes;
+  for (uint c = 0u; c < 3u; ++c) {
+    const uint at = 3u * pixel + c;
+    codes[c] = bitfieldExtract(plate[at / 2u], int(at % 2u) * 16, 16);
+  }
+  return codes;
+}
+
+// The largest code is white, to the last bit.
+vec3 radiance_of(uvec3 codes) {
+  return show.white * vec3(signal_of[codes.r], signal_of[codes.g], signal_of[codes.b]);
+}
+
+// What the denoiser counts signals in: white or, where the composite multiplies the camera's
+// picture, that, whose texture is then not blurred. The least of it keeps what is added to black.
+vec3 denoise_unit(vec3 camera, float mask) {
+  if (show.composite == COMPOSITE_ADDITIVE || mask > 0.0) return vec3(show.white);
+  return camera + max(show.floor, 1e-3 * show.white);
+}
+
+#endif

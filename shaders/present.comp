@@ -1,0 +1,62 @@
+// The composite through exposure and response: codes as the display shows them, two pixels at once,
+// whose six samples are three words. Where nothing virtual touches a pixel they are the plate's own.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shaders/lib/show.glsl"
+
+layout(scalar, set = 0, binding = BINDING_SHOW_LEAST_OF) readonly buffer LeastOf { float least_of[]; };
+layout(scalar, set = 0, binding = BINDING_SHOW_COMPOSITE) readonly buffer Composites {
+  vec4 composites[];
+};
+layout(scalar, set = 0, binding = BINDING_SHOW_DENOISED) readonly buffer Signals { vec4 signals[]; };
+layout(scalar, set = 0, binding = BINDING_SHOW_PICTURE) writeonly buffer Picture { uint picture[]; };
+
+// A channel that comes out at NEARLY_WHITE of the sensor's white was white, and stays it.
+vec3 without_noise(vec3 composite, vec3 camera, float mask, vec3 signal) {
+  const vec3 clean = (1.0 - mask) * camera + denoise_unit(camera, mask) * signal;
+  for (uint c = 0u; c < 3u; ++c)
+    if (composite[c] < show.white || clean[c] < NEARLY_WHITE * show.white) composite[c] = clean[c];
+  return composite;
+}
+
+// The largest code whose least signal is not above this; 0 for NaN.
+uint code_of(float signal) {
+  if (!(signal > 0.0)) return 0u;
+  uint code = 0u;
+  uint above = show.most + 1u;
+  while (above - code > 1u) {
+    const uint middle = (code + above) / 2u;
+    if (least_of[middle] <= signal) code = middle;
+    else above = middle;
+  }
+  return code;
+}
+
+uvec3 codes_of(uint pixel) {
+  const uint index = show.in_band + pixel;
+  const vec4 shown = composites[index];
+  const vec3 signal = signals[index].rgb;
+  vec3 camera = vec3(0.0);
+  if (show.has_plate != 0u) {
+    const uvec3 own = plate_codes(index);
+    if (shown.w == 0.0 && signal == vec3(0.0)) return own;
+    camera = radiance_of(own);
+  }
+  const vec3 radiance =
+      show.is_denoised != 0u ? without_noise(shown.rgb, camera, shown.w, signal) : shown.rgb;
+  const vec3 exposed = show.exposure * radiance;
+  return uvec3(code_of(exposed.r), code_of(exposed.g), code_of(exposed.b));
+}
+
+void main() {
+  const uint first = 2u * gl_GlobalInvocationID.x;
+  if (first >= show.count) return;
+  const uvec3 a = codes_of(first);
+  const uvec3 b = first + 1u < show.count ? codes_of(first + 1u) : uvec3(0u);
+  const uint word = 3u * gl_GlobalInvocationID.x;
+  picture[word] = a.r | a.g << 16u;
+  picture[word + 1u] = a.b | b.r << 16u;
+  picture[word + 2u] = b.g | b.b << 16u;
+}

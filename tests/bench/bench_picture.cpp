@@ -1,0 +1,128 @@
+// What a frame costs beside its samples: from the camera's picture to the renderer, and from its
+// sums to the picture that is shown.
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <functional>
+#include <glm/gtc/matrix_transform.hpp>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/render/renderer.hpp"
+#include "tests/bench/measure.hpp"
+#include "tests/bench/tracers/shapes.hpp"
+
+namespace previz::bench {
+namespace {
+
+constexpr int rounds = 3;
+
+struct Options {
+  int width = 1920, height = 1080;
+};
+
+// A real floor under a real sphere and a virtual one, seen from above.
+scene::Scene make_scene() {
+  scene::Scene scene = scene_of(sphere_field(4'000));
+  scene.meshes.push_back(bumpy_sphere(3, 0.5, 0.2, 99));
+  scene::Instance sphere;
+  sphere.name = "virtual";
+  sphere.mesh = 1;
+  sphere.presence = scene::world_mixed;
+  sphere.world_from_object = glm::translate(glm::dmat4(1), glm::dvec3(0, 0, 1.4));
+  scene.instances.push_back(sphere);
+  return scene;
+}
+
+Plate noise(const Options& options) {
+  Plate plate{options.width, options.height, 8,
+              std::vector<std::uint16_t>(std::size_t{3} * options.width * options.height)};
+  std::minstd_rand random;
+  for (std::uint16_t& sample : plate.samples)
+    sample = static_cast<std::uint16_t>(random() >> 8 & 0xff);
+  return plate;
+}
+
+render::FrameInput frame_of(const Options& options) {
+  render::FrameInput frame;
+  frame.plate = noise(options);
+  glm::dmat4 pose =
+      glm::inverse(glm::lookAt(glm::dvec3(-6, -8, 5), glm::dvec3(0), glm::dvec3(0, 0, 1)));
+  pose[1] = -pose[1];  // OpenGL's axes to OpenCV's
+  pose[2] = -pose[2];
+  frame.world_from_camera = pose;
+  return frame;
+}
+
+struct Step {
+  std::string name;
+  std::function<void()> run;
+  std::vector<double> wall_ms{}, cpu_ms{};
+
+  void measure() {
+    const auto start = std::chrono::steady_clock::now();
+    const double cpu_start = cpu_seconds();
+    run();
+    const std::chrono::duration<double, std::milli> wall = std::chrono::steady_clock::now() - start;
+    wall_ms.push_back(wall.count());
+    cpu_ms.push_back(1e3 * (cpu_seconds() - cpu_start));
+  }
+};
+
+void run(const Options& options) {
+  const auto device = render::open_device();
+  ObserverCalibration calibration;
+  PinholeIntrinsics& lens = calibration.intrinsics;
+  lens.width = options.width;
+  lens.height = options.height;
+  lens.fx = lens.fy = options.height;
+  lens.cx = 0.5 * (options.width - 1);
+  lens.cy = 0.5 * (options.height - 1);
+  render::Renderer renderer(device, {}, calibration);
+  renderer.set_scene(make_scene());
+  renderer.set_environment(lighting::EnvironmentMap{1, {glm::vec3(0.3F)}},
+                           set::LightSampling::importance);
+  const render::FrameInput frame = frame_of(options);
+
+  render::Layers layers;
+  Plate picture;
+  Step steps[] = {
+      {"begin", [&] { renderer.begin(frame); }},
+      {"one sample", [&] { renderer.render(1); }},
+      {"layers", [&] { layers = renderer.layers(); }},
+      {"picture", [&] { picture = renderer.show(false); }},
+      {"picture, denoised", [&] { picture = renderer.show(true); }},
+      {"picture and layers, denoised", [&] { picture = renderer.show(true, &layers); }}};
+  for (int round = -1; round < rounds; ++round) {
+    for (Step& step : steps) step.measure();
+    if (round >= 0) continue;  // compiles the pipelines
+    for (Step& step : steps) {
+      step.wall_ms.clear();
+      step.cpu_ms.clear();
+    }
+  }
+  std::printf("%s, %dx%d\n\n| step | ms | CPU ms |\n| --- | --- | --- |\n",
+              render::device_name(*device).c_str(), options.width, options.height);
+  for (const Step& step : steps)
+    std::printf("| %s | %.1f | %.1f |\n", step.name.c_str(), median(step.wall_ms),
+                median(step.cpu_ms));
+}
+
+}  // namespace
+}  // namespace previz::bench
+
+int main(int argc, char** argv) {
+  previz::bench::Options options;
+  CLI::App app("Milliseconds of a frame beside its samples");
+  app.add_option("--width", options.width, "Pixels");
+  app.add_option("--height", options.height, "Pixels");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    previz::bench::run(options);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "bench_picture: %s\n", error.what());
+    return 1;
+  }
+}
