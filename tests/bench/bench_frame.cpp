@@ -5,7 +5,6 @@
 #include <chrono>
 #include <cstdio>
 #include <fstream>
-#include <glm/gtc/matrix_transform.hpp>
 #include <string>
 #include <vector>
 
@@ -41,19 +40,6 @@ std::string name_of(std::size_t triangles) {
                                : std::to_string((triangles + 500'000) / 1'000'000) + " M triangles";
 }
 
-// The field is real, and among it stands one virtual sphere.
-scene::Scene make_scene(std::size_t triangles) {
-  scene::Scene scene = scene_of(sphere_field(triangles));
-  scene.meshes.push_back(bumpy_sphere(3, 0.5, 0.2, 99));
-  scene::Instance sphere;
-  sphere.name = "virtual";
-  sphere.mesh = 1;
-  sphere.presence = scene::world_mixed;
-  sphere.world_from_object = glm::translate(glm::dmat4(1), glm::dvec3(0, 0, 1.4));
-  scene.instances.push_back(sphere);
-  return scene;
-}
-
 lighting::EnvironmentMap sky() {
   lighting::EnvironmentMap map{32, {}};
   map.radiance.resize(std::size_t{32} * 32);
@@ -65,27 +51,6 @@ lighting::EnvironmentMap sky() {
     }
   }
   return map;
-}
-
-glm::dmat4 world_from_camera(const scene::Scene& scene) {
-  double edge = 0;
-  for (const glm::vec3& p : scene.meshes[0].positions)
-    edge = std::max(edge, static_cast<double>(p.x));
-  const glm::dvec3 eye(-0.55 * edge, -0.75 * edge, 0.45 * edge);
-  glm::dmat4 pose = glm::inverse(glm::lookAt(eye, glm::dvec3(0), glm::dvec3(0, 0, 1)));
-  pose[1] = -pose[1];  // OpenGL's axes to OpenCV's
-  pose[2] = -pose[2];
-  return pose;
-}
-
-ObserverCalibration calibration_of(const Resolution& r) {
-  ObserverCalibration calibration;
-  calibration.intrinsics.width = r.width;
-  calibration.intrinsics.height = r.height;
-  calibration.intrinsics.fx = calibration.intrinsics.fy = r.height;
-  calibration.intrinsics.cx = 0.5 * (r.width - 1);
-  calibration.intrinsics.cy = 0.5 * (r.height - 1);
-  return calibration;
 }
 
 Times measure(render::Renderer& renderer, const render::FrameInput& frame, int rounds) {
@@ -123,18 +88,18 @@ void run(const Options& options) {
   set::Estimation estimation;
   estimation.max_depth = options.depth;
   for (const std::size_t triangles : options.triangles) {
-    const scene::Scene scene = make_scene(triangles);
+    const scene::Scene scene = field_with_a_virtual_sphere(triangles);
     const std::size_t count = scene.meshes[0].triangles.size() + scene.meshes[1].triangles.size();
     Curve& curve = chart.curves.emplace_back();
     curve.name = name_of(count);
     for (const Resolution& r : resolutions) {
-      render::Renderer renderer(device, estimation, calibration_of(r));
+      render::Renderer renderer(device, estimation, camera_of(r.width, r.height));
       renderer.set_scene(scene);
       renderer.set_environment(sky(), set::LightSampling::importance);
       render::FrameInput frame;
       frame.plate = {r.width, r.height, 8,
                      std::vector<std::uint16_t>(std::size_t{3} * r.width * r.height, 128)};
-      frame.world_from_camera = world_from_camera(scene);
+      frame.world_from_camera = view_of_field(scene);
       const Times times = measure(renderer, frame, options.rounds);
       std::printf("| %zu | %dx%d | %.0f | %.0f |\n", count, r.width, r.height, times.wall_ms,
                   times.cpu_ms);

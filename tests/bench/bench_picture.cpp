@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cstdio>
 #include <functional>
-#include <glm/gtc/matrix_transform.hpp>
 #include <random>
 #include <string>
 #include <utility>
@@ -23,19 +22,6 @@ struct Options {
   int width = 1920, height = 1080;
 };
 
-// A real floor under a real sphere and a virtual one, seen from above.
-scene::Scene make_scene() {
-  scene::Scene scene = scene_of(sphere_field(4'000));
-  scene.meshes.push_back(bumpy_sphere(3, 0.5, 0.2, 99));
-  scene::Instance sphere;
-  sphere.name = "virtual";
-  sphere.mesh = 1;
-  sphere.presence = scene::world_mixed;
-  sphere.world_from_object = glm::translate(glm::dmat4(1), glm::dvec3(0, 0, 1.4));
-  scene.instances.push_back(sphere);
-  return scene;
-}
-
 Plate noise(const Options& options) {
   Plate plate{options.width, options.height, 8,
               std::vector<std::uint16_t>(std::size_t{3} * options.width * options.height)};
@@ -43,17 +29,6 @@ Plate noise(const Options& options) {
   for (std::uint16_t& sample : plate.samples)
     sample = static_cast<std::uint16_t>(random() >> 8 & 0xff);
   return plate;
-}
-
-render::FrameInput frame_of(const Options& options) {
-  render::FrameInput frame;
-  frame.plate = noise(options);
-  glm::dmat4 pose =
-      glm::inverse(glm::lookAt(glm::dvec3(-6, -8, 5), glm::dvec3(0), glm::dvec3(0, 0, 1)));
-  pose[1] = -pose[1];  // OpenGL's axes to OpenCV's
-  pose[2] = -pose[2];
-  frame.world_from_camera = pose;
-  return frame;
 }
 
 struct Step {
@@ -73,18 +48,12 @@ struct Step {
 
 void run(const Options& options) {
   const auto device = render::open_device();
-  ObserverCalibration calibration;
-  PinholeIntrinsics& lens = calibration.intrinsics;
-  lens.width = options.width;
-  lens.height = options.height;
-  lens.fx = lens.fy = options.height;
-  lens.cx = 0.5 * (options.width - 1);
-  lens.cy = 0.5 * (options.height - 1);
-  render::Renderer renderer(device, {}, calibration);
-  renderer.set_scene(make_scene());
+  const scene::Scene scene = field_with_a_virtual_sphere(4'000);
+  render::Renderer renderer(device, {}, camera_of(options.width, options.height));
+  renderer.set_scene(scene);
   renderer.set_environment(lighting::EnvironmentMap{1, {glm::vec3(0.3F)}},
                            set::LightSampling::importance);
-  const render::FrameInput frame = frame_of(options);
+  const render::FrameInput frame{noise(options), 1, view_of_field(scene)};
 
   render::Layers layers;
   Plate picture;

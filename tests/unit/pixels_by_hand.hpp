@@ -2,12 +2,21 @@
 // sampled.
 #pragma once
 
+#include <random>
 #include <span>
 
 #include "daemon/render/presenter.hpp"
 #include "tests/unit/render_fixture.hpp"
 
 namespace previz::testing {
+
+inline Plate random_plate(int width, int height, int bits) {
+  Plate plate{width, height, bits, {}};
+  std::mt19937 random(7);
+  for (int i = 0; i < 3 * width * height; ++i)
+    plate.samples.push_back(static_cast<std::uint16_t>(random() & ((1u << bits) - 1)));
+  return plate;
+}
 
 // One row of them.
 inline render::Layers layers_of(std::span<const gpu::GpuPixel> pixels, std::int64_t samples,

@@ -1,19 +1,9 @@
 // The composite: untouched plates bit for bit, samples independent of how they are asked for, and
 // the equation itself.
-#include <random>
-
 #include "tests/unit/pixels_by_hand.hpp"
 
 namespace previz::testing {
 namespace {
-
-Plate random_plate(int width, int height, int bits) {
-  Plate plate{width, height, bits, {}};
-  std::mt19937 random(7);
-  for (int i = 0; i < 3 * width * height; ++i)
-    plate.samples.push_back(static_cast<std::uint16_t>(random() & ((1u << bits) - 1)));
-  return plate;
-}
 
 Plate show(const View& view, const Plate& plate, int samples) {
   SetRenderer renderer(view);

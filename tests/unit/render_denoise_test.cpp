@@ -300,11 +300,8 @@ TEST(Denoise, changes_no_other_layer_and_no_untouched_plate) {
   options.virtual_objects = 0;
   const View view = random_scene(3, options);
   SetRenderer renderer(view);
-  std::mt19937 random(7);
   for (const int bits : {8, 16}) {
-    Plate plate{70, 50, bits, {}};
-    for (int i = 0; i < 3 * 70 * 50; ++i)
-      plate.samples.push_back(static_cast<std::uint16_t>(random() & ((1u << bits) - 1)));
+    const Plate plate = random_plate(70, 50, bits);
     renderer.begin({plate, 0.85, view.world_from_camera});
     renderer.render(2);
     const render::Layers raw = renderer.layers();

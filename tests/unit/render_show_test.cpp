@@ -6,14 +6,6 @@
 namespace previz::testing {
 namespace {
 
-Plate random_plate(int width, int height, int bits) {
-  Plate plate{width, height, bits, {}};
-  std::mt19937 random(7);
-  for (int i = 0; i < 3 * width * height; ++i)
-    plate.samples.push_back(static_cast<std::uint16_t>(random() & ((1u << bits) - 1)));
-  return plate;
-}
-
 // What the device must come to, in double precision.
 Plate reference(const render::Layers& layers, const Plate& plate, int bits, double exposure) {
   const lighting::Response response({}, bits);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
 #include <map>
 #include <random>
 #include <utility>
@@ -176,6 +177,40 @@ scene::Scene scene_of(scene::Mesh mesh) {
   instance.name = "mesh";
   scene.instances.push_back(instance);
   return scene;
+}
+
+scene::Scene field_with_a_virtual_sphere(std::size_t triangles) {
+  scene::Scene scene = scene_of(sphere_field(triangles));
+  scene.meshes.push_back(bumpy_sphere(3, 0.5, 0.2, 99));
+  scene::Instance sphere;
+  sphere.name = "virtual";
+  sphere.mesh = 1;
+  sphere.presence = scene::world_mixed;
+  sphere.world_from_object = glm::translate(glm::dmat4(1), glm::dvec3(0, 0, 1.4));
+  scene.instances.push_back(sphere);
+  return scene;
+}
+
+glm::dmat4 view_of_field(const scene::Scene& scene) {
+  double edge = 0;
+  for (const glm::vec3& p : scene.meshes[0].positions)
+    edge = std::max(edge, static_cast<double>(p.x));
+  const glm::dvec3 eye(-0.55 * edge, -0.75 * edge, 0.45 * edge);
+  glm::dmat4 pose = glm::inverse(glm::lookAt(eye, glm::dvec3(0), glm::dvec3(0, 0, 1)));
+  pose[1] = -pose[1];  // OpenGL's axes to OpenCV's
+  pose[2] = -pose[2];
+  return pose;
+}
+
+ObserverCalibration camera_of(int width, int height) {
+  ObserverCalibration calibration;
+  PinholeIntrinsics& lens = calibration.intrinsics;
+  lens.width = width;
+  lens.height = height;
+  lens.fx = lens.fy = height;
+  lens.cx = 0.5 * (width - 1);
+  lens.cy = 0.5 * (height - 1);
+  return calibration;
 }
 
 }  // namespace previz::bench

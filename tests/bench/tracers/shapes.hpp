@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "daemon/scene/scene.hpp"
+#include "drivers/calibration.hpp"
 
 namespace previz::bench {
 
@@ -21,6 +22,12 @@ scene::Mesh sphere_field(std::size_t triangles);
 scene::Mesh random_triangles(std::size_t count, float extent, float size, std::uint32_t seed);
 
 scene::Scene scene_of(scene::Mesh mesh);
+
+// The field of about so many triangles, real, and among it one virtual sphere; where a camera sees
+// it from, and that camera.
+scene::Scene field_with_a_virtual_sphere(std::size_t triangles);
+glm::dmat4 view_of_field(const scene::Scene& scene);
+ObserverCalibration camera_of(int width, int height);
 
 // The same field as instances, one a sphere, of four meshes and the ground.
 scene::Scene instanced_field(std::size_t triangles);
