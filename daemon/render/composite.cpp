@@ -1,8 +1,7 @@
 #include "daemon/render/composite.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <glm/geometric.hpp>
+#include <glm/common.hpp>
 
 #include "daemon/render/each_pixel.hpp"
 

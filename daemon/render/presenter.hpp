@@ -1,7 +1,7 @@
 // The picture that is shown, made where the samples are: composite (P2), denoising (P26) and
-// response (P5) on the device, so that a live frame costs one upload of the plate and one download
-// of the picture. In single precision; the layers are made by daemon/render/composite.hpp in
-// double.
+// response (P5) on the device, so that of a live frame the plate goes up and the picture comes
+// down, and nothing else. In single precision; the layers are made by daemon/render/composite.hpp
+// in double.
 #pragma once
 
 #include <cstdint>
