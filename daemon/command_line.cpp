@@ -86,20 +86,20 @@ void add_devices(CLI::App& app, bool& learn) {
                    "Print the name of every button that is pressed, until Ctrl-C");
 }
 
-void add_import(CLI::App& app, post::ImportOptions& options) {
+void add_import(CLI::App& app, exchange::ImportOptions& options) {
   CLI::App& command = *app.add_subcommand("import", "Make a session of footage");
   command.add_option("description", options.description, "FRAMES.json")->required();
   command.add_option("session", options.session, "Session directory to make")->required();
 }
 
-void add_export(CLI::App& app, post::ExportOptions& options) {
+void add_export(CLI::App& app, exchange::ExportOptions& options) {
   CLI::App& command =
       *app.add_subcommand("export", "Write a take's camera for USD and Nuke, with its scene");
   command.add_option("session", options.session, "Session directory")->required();
   command.add_option("directory", options.directory, "Directory for the files")->required();
 }
 
-void add_trade(CLI::App& app, post::TradeOptions& options) {
+void add_trade(CLI::App& app, trade::TradeOptions& options) {
   CLI::App& command =
       *app.add_subcommand("trade", "Measure what time buys on a set: a table and a page");
   command.add_option("set", options.set_file, "Set file whose cameras are replayed")->required();

@@ -6,11 +6,11 @@
 #include <string>
 
 #include "daemon/calibrate/command_line.hpp"
-#include "daemon/post/camera_track.hpp"
-#include "daemon/post/import.hpp"
+#include "daemon/exchange/camera_track.hpp"
+#include "daemon/exchange/import.hpp"
 #include "daemon/post/render.hpp"
-#include "daemon/post/trade.hpp"
 #include "daemon/rig/live.hpp"
+#include "daemon/trade/trade.hpp"
 
 namespace previz {
 
@@ -20,9 +20,9 @@ struct CommandLine {
   rig::LiveOptions run;
   std::filesystem::path check;
   bool learn = false;
-  post::ImportOptions import_session;
-  post::ExportOptions export_take;
-  post::TradeOptions trade;
+  exchange::ImportOptions import_session;
+  exchange::ExportOptions export_take;
+  trade::TradeOptions trade;
   calibrate::Commands calibrate;
 };
 

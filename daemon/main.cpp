@@ -13,10 +13,10 @@
 #include <iostream>
 
 #include "daemon/command_line.hpp"
+#include "daemon/devices.hpp"
 #include "daemon/post/check.hpp"
-#include "daemon/post/trade_page.hpp"
-#include "daemon/rig/devices.hpp"
-#include "daemon/rig/signals.hpp"
+#include "daemon/signals.hpp"
+#include "daemon/trade/page.hpp"
 #include "drivers/error.hpp"
 
 namespace {
@@ -48,13 +48,13 @@ void start_log(const std::string& level) {
   spdlog::set_default_logger(std::move(log));
 }
 
-int do_devices(bool learn, const rig::StopOnSignal& stop) {
-  learn ? rig::learn_buttons(std::cout, stop.token()) : rig::list_devices(std::cout);
+int do_devices(bool learn, const StopOnSignal& stop) {
+  learn ? learn_buttons(std::cout, stop.token()) : list_devices(std::cout);
   return stop.received() ? 128 + stop.received() : 0;
 }
 
-int do_import(const post::ImportOptions& options) {
-  const post::ImportReport report = post::import_session(options);
+int do_import(const exchange::ImportOptions& options) {
+  const exchange::ImportReport report = exchange::import_session(options);
   for (const std::string& note : report.notes) std::cout << note << "\n";
   std::cout << options.session.string() << ": " << report.observer_frames << " observer frames, "
             << report.light_frames << " light frames, " << report.poses << " poses, "
@@ -62,7 +62,7 @@ int do_import(const post::ImportOptions& options) {
   return 0;
 }
 
-int do_render(post::RenderOptions& options, const rig::StopOnSignal& stop) {
+int do_render(post::RenderOptions& options, const StopOnSignal& stop) {
   options.stop = stop.token();
   options.terminal = isatty(STDOUT_FILENO) != 0;
   const post::RenderReport report = post::render_session(options, std::cout);
@@ -72,19 +72,19 @@ int do_render(post::RenderOptions& options, const rig::StopOnSignal& stop) {
   return report.interrupted ? 128 + stop.received() : 0;
 }
 
-int do_trade(post::TradeOptions& options, const rig::StopOnSignal& stop) {
+int do_trade(trade::TradeOptions& options, const StopOnSignal& stop) {
   options.stop = stop.token();
   options.terminal = isatty(STDOUT_FILENO) != 0;
-  const post::TradeReport report = post::run_trade(options, std::cout);
+  const trade::TradeReport report = trade::run_trade(options, std::cout);
   if (report.interrupted) return 128 + stop.received();
   std::cout << "\n";
-  for (const post::TradeFrontPoint& at : post::told_front_of(report))
-    std::cout << post::front_words(report, at) << "\n";
+  for (const trade::TradeFrontPoint& at : trade::told_front_of(report))
+    std::cout << trade::front_words(report, at) << "\n";
   std::cout << "\n" << report.csv.string() << "\n" << report.page.string() << std::endl;
   return 0;
 }
 
-int do_run(rig::LiveOptions& options, const rig::StopOnSignal& stop) {
+int do_run(rig::LiveOptions& options, const StopOnSignal& stop) {
   options.stop = stop.token();
   const std::string metrics = to_json(rig::run_live(options, std::cout));
   if (!options.bus) std::cout << metrics;  // as a service it is asked for them
@@ -100,12 +100,12 @@ int main(int argc, char** argv) {
     add_commands(app, said);
     app.parse(argc, argv);
     start_log(said.log_level);
-    const rig::StopOnSignal stop;
+    const StopOnSignal stop;
     if (app.got_subcommand("check")) return post::check_set(said.check, std::cout);
     if (app.got_subcommand("calibrate"))
       return calibrate::do_calibrate(app, said.calibrate, std::cout);
     if (app.got_subcommand("devices")) return do_devices(said.learn, stop);
-    if (app.got_subcommand("export")) return post::export_take(said.export_take, std::cout), 0;
+    if (app.got_subcommand("export")) return exchange::export_take(said.export_take, std::cout), 0;
     if (app.got_subcommand("import")) return do_import(said.import_session);
     if (app.got_subcommand("render")) return do_render(said.render, stop);
     if (app.got_subcommand("trade")) return do_trade(said.trade, stop);

@@ -1,5 +1,6 @@
 #include "drivers/bracket.hpp"
 
+#include <cmath>
 #include <utility>
 
 #include "drivers/error.hpp"
@@ -28,7 +29,7 @@ class Bracket final : public Camera {
     if (std::exchange(refused_, false))
       return DeviceTrouble{name(), "does not take an exposure of its bracket"};
     CameraEvent event = camera_->next(timeout);
-    if (std::holds_alternative<FramePtr>(event) && !advance() && !std::exchange(told_, true))
+    if (std::holds_alternative<FramePtr>(event) && !advance() && !std::exchange(reported_, true))
       refused_ = true;
     return event;
   }
@@ -43,14 +44,18 @@ class Bracket final : public Camera {
   std::unique_ptr<Camera> camera_;
   const std::vector<double> exposures_s_;
   std::size_t next_ = 0;
-  bool refused_ = false;  // and not told yet
-  bool told_ = false;
+  bool refused_ = false;  // the camera refused an exposure, which next() has not reported yet
+  bool reported_ = false;
 };
 
 }  // namespace
 
 std::unique_ptr<Camera> bracket(std::unique_ptr<Camera> camera, std::vector<double> exposures_s) {
   return std::make_unique<Bracket>(std::move(camera), std::move(exposures_s));
+}
+
+long exposure_step(double exposure) {
+  return std::lround(std::log(exposure) / std::log1p(0.01));
 }
 
 }  // namespace previz

@@ -4,7 +4,7 @@
 #include <array>
 #include <cctype>
 
-#include "daemon/footage/footage.hpp"
+#include "daemon/exchange/footage.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 
@@ -46,11 +46,11 @@ class SessionPictures final : public PictureSource {
 
 class FootagePictures final : public PictureSource {
  public:
-  FootagePictures(std::unique_ptr<footage::Footage> footage, std::optional<std::size_t> count)
+  FootagePictures(std::unique_ptr<exchange::Footage> footage, std::optional<std::size_t> count)
       : footage_(std::move(footage)), count_(count) {}
 
   std::optional<NamedFrame> next() override {
-    std::optional<footage::Picture> picture = footage_->next();
+    std::optional<exchange::Picture> picture = footage_->next();
     if (!picture) return std::nullopt;
     Frame frame;
     frame.sequence = index_++;
@@ -64,7 +64,7 @@ class FootagePictures final : public PictureSource {
   std::vector<std::string> notes() const override { return footage_->notes(); }
 
  private:
-  std::unique_ptr<footage::Footage> footage_;
+  std::unique_ptr<exchange::Footage> footage_;
   std::optional<std::size_t> count_;
   std::uint64_t index_ = 0;
 };
@@ -90,10 +90,10 @@ std::unique_ptr<PictureSource> open_source(const fs::path& path, const std::stri
   if (fs::is_directory(path)) {
     auto files = picture_files(path);
     const std::size_t count = files.size();
-    return std::make_unique<FootagePictures>(footage::open_pictures(std::move(files)), count);
+    return std::make_unique<FootagePictures>(exchange::open_pictures(std::move(files)), count);
   }
   if (fs::is_regular_file(path))
-    return std::make_unique<FootagePictures>(footage::open_video(path), std::nullopt);
+    return std::make_unique<FootagePictures>(exchange::open_video(path), std::nullopt);
   throw Error(path.string() +
               ": there is no such thing; allowed: a session, a folder of pictures, a video");
 }

@@ -165,10 +165,6 @@ HdrPicture merge(const Bracket& bracket, const SensorNoise& noise) {
   return picture;
 }
 
-long exposure_step(double exposure) {
-  return std::lround(std::log(exposure) / std::log1p(0.01));
-}
-
 HdrPicture merge_exposures(std::span<const FramePtr> frames, const ResponseCurve& response,
                            const glm::dvec3& dark_level, const SensorNoise& noise) {
   return merge(Bracket(frames, response, dark_level), noise);

@@ -46,11 +46,4 @@ HdrPicture merge_exposures(std::span<const FramePtr> frames, const ResponseCurve
                            const glm::dvec3& dark_level = glm::dvec3(0),
                            const SensorNoise& noise = {});
 
-// Exposures of the same step belong to one place of a bracket: steps of 1 %, so that an automatic
-// exposure that wanders does not pile up frames. `exposure` is above 0.
-long exposure_step(double exposure);
-
-// Of an automatic exposure that wanders, the newest of so many steps are kept.
-inline constexpr std::size_t most_exposures = 24;
-
 }  // namespace previz::lighting

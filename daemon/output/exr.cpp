@@ -132,6 +132,24 @@ void require_whole(const std::filesystem::path& path, const render::Layers& laye
 
 }  // namespace
 
+ExrMetadata exr_metadata(const render::Layers& layers, const Frame& frame,
+                         const tracking::Track& track, const set::Set& set) {
+  ExrMetadata metadata;
+  metadata.exposure = set.observer.exposure.value_or(frame.exposure);
+  metadata.timestamp_ns = frame.timestamp_ns;
+  metadata.set_name = set.name;
+  metadata.pose = to_string(track.status);
+  if (track.pose) metadata.world_from_camera = track.pose->world_from_camera;
+  metadata.exposure_s = frame.exposure_s;
+  if (const auto& calibration = set.observer.calibration) {
+    metadata.lens = calibration->lens;
+    if (calibration->intrinsics.width == layers.width &&
+        calibration->intrinsics.height == layers.height)
+      metadata.intrinsics = calibration->intrinsics;
+  }
+  return metadata;
+}
+
 void write_exr(const std::filesystem::path& path, const render::Layers& layers,
                const ExrMetadata& metadata) {
   require_whole(path, layers);

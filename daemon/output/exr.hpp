@@ -8,7 +8,10 @@
 #include <string>
 
 #include "daemon/render/layers.hpp"
+#include "daemon/set/set.hpp"
+#include "daemon/tracking/tracker.hpp"
 #include "drivers/calibration.hpp"
+#include "drivers/frame.hpp"
 
 namespace previz::output {
 
@@ -33,6 +36,10 @@ struct ExrMetadata {
   std::optional<ThinLens> lens;
   double exposure_s = 0;  // 0: not known
 };
+
+// The metadata of a picture of these layers, rendered into `frame` as `track` saw it.
+ExrMetadata exr_metadata(const render::Layers& layers, const Frame& frame,
+                         const tracking::Track& track, const set::Set& set);
 
 // Channels, 32-bit float, ZIP compressed: composite.R/.G/.B, mixed.R/.G/.B, real.R/.G/.B,
 // diff.R/.G/.B, mask.Y, depth.Z, normal.X/.Y/.Z, variance.R/.G/.B.

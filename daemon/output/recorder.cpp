@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/lighting/hdr.hpp"
+#include "drivers/bracket.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::output {
@@ -75,8 +75,8 @@ void Recorder::offer_shown(const FramePtr& frame) {
 
 void Recorder::remember_light(const Captured& captured) {
   forget_lights_unlike(*captured.frame);
-  older_light_[lighting::exposure_step(captured.frame->exposure)] = captured;
-  if (older_light_.size() <= lighting::most_exposures) return;
+  older_light_[exposure_step(captured.frame->exposure)] = captured;
+  if (older_light_.size() <= most_exposures) return;
   older_light_.erase(std::ranges::min_element(
       older_light_, {}, [](const auto& older) { return older.second.frame->timestamp_ns; }));
 }

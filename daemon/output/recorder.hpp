@@ -118,7 +118,7 @@ class Recorder {
   std::uint64_t queued_bytes_ = 0;
   std::deque<Entry> ring_;  // while nothing is recorded
   std::uint64_t ring_bytes_ = 0;
-  // Light frames that are not in the ring, the newest of each exposure (lighting::most_exposures at
+  // Light frames that are not in the ring, the newest of each exposure (most_exposures at
   // the most, of one format): a take begins with its light, however old.
   std::map<long, Captured> older_light_;
   std::int64_t last_frame_ns_ = 0;  // of the observer, offered to the running take

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <utility>
 
-#include "daemon/lighting/hdr.hpp"
 #include "daemon/lighting/light_mode.hpp"
 #include "daemon/pipeline/light_record.hpp"
 #include "daemon/pipeline/room_model.hpp"
 #include "daemon/set/names.hpp"
+#include "drivers/bracket.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::pipeline {
@@ -91,7 +91,7 @@ void LightStage::drop_oldest() {
   const auto oldest = std::ranges::min_element(
       newest_, {}, [](const auto& entry) { return entry.second->timestamp_ns; });
   troubles_.push_back("light frame " + std::to_string(oldest->second->sequence) +
-                      " is left out: more than " + std::to_string(lighting::most_exposures) +
+                      " is left out: more than " + std::to_string(most_exposures) +
                       " different exposures were seen since");
   newest_.erase(oldest);
 }
@@ -139,8 +139,8 @@ void LightStage::see(FramePtr frame, std::uint64_t index) {
     frame = std::move(exposed);
   }
   if (!usable(*frame)) return;
-  newest_[lighting::exposure_step(frame->exposure)] = std::move(frame);
-  if (newest_.size() > lighting::most_exposures) drop_oldest();
+  newest_[exposure_step(frame->exposure)] = std::move(frame);
+  if (newest_.size() > most_exposures) drop_oldest();
   changed_ = true;
 }
 

@@ -19,7 +19,7 @@ namespace previz::pipeline {
 
 // Keeps the newest light frame of every exposure seen so far; together they are the bracket that is
 // merged. (Two exposures within 1 % are the same one; of an auto-exposure that wanders, the newest
-// lighting::most_exposures stay.) A set whose light does not come from a camera needs no light
+// most_exposures stay.) A set whose light does not come from a camera needs no light
 // frames.
 class LightStage {
  public:

@@ -11,6 +11,7 @@
 #include <utility>
 #include <variant>
 
+#include "daemon/output/progress.hpp"
 #include "daemon/pipeline/news.hpp"
 #include "daemon/pipeline/recorded_light.hpp"
 #include "daemon/pipeline/refinement.hpp"
@@ -18,7 +19,6 @@
 #include "daemon/pipeline/stages.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/pipeline/track_stage.hpp"
-#include "daemon/post/progress.hpp"
 #include "daemon/post/render_directory.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/names.hpp"
@@ -88,7 +88,7 @@ FrameRange range_of(const RenderOptions& options, const pipeline::Take& take) {
 class ObserverSource {
  public:
   ObserverSource(pipeline::Take& take, std::set<std::uint64_t> to_do, bool from_start,
-                 Progress& progress, pipeline::Metrics& metrics)
+                 output::Progress& progress, pipeline::Metrics& metrics)
       : next_(from_start ? 0 : *to_do.begin()),
         from_start_(from_start),
         to_do_(std::move(to_do)),
@@ -127,14 +127,14 @@ class ObserverSource {
   std::uint64_t next_;
   const bool from_start_;
   const std::set<std::uint64_t> to_do_;
-  Progress& progress_;
+  output::Progress& progress_;
   pipeline::Metrics& metrics_;
 };
 
 // Gives each shot its recorded light, and tells what the estimate has to say once.
 class LightSource {
  public:
-  LightSource(pipeline::Take& take, Progress& progress, pipeline::Metrics& metrics)
+  LightSource(pipeline::Take& take, output::Progress& progress, pipeline::Metrics& metrics)
       : light_(take.set, take.light, take.observer, std::move(take.light_stream),
                take.session.directory),
         progress_(progress),
@@ -159,14 +159,14 @@ class LightSource {
 
   pipeline::RecordedLight light_;
   pipeline::News news_;
-  Progress& progress_;
+  output::Progress& progress_;
   pipeline::Metrics& metrics_;
 };
 
 // Gives each shot its poses, and tells what is not found.
 class TrackSource {
  public:
-  TrackSource(const pipeline::Take& take, Progress& progress, pipeline::Metrics& metrics)
+  TrackSource(const pipeline::Take& take, output::Progress& progress, pipeline::Metrics& metrics)
       : track_(take.set, take.observer, take.session.track, pipeline::start_of(take)),
         progress_(progress),
         metrics_(metrics) {}
@@ -184,7 +184,7 @@ class TrackSource {
  private:
   pipeline::TrackStage track_;
   pipeline::News news_;
-  Progress& progress_;
+  output::Progress& progress_;
   pipeline::Metrics& metrics_;
 };
 
@@ -197,8 +197,8 @@ std::string percent_words(double share) {
 std::string done_text(const Shot& shot) {
   const std::string frame = "frame " + std::to_string(shot.index) + ": ";
   if (!shot.untouched.empty()) return frame + "plate untouched, " + shot.untouched;
-  std::string text =
-      frame + std::to_string(shot.layers.samples) + " samples in " + duration_words(shot.render_s);
+  std::string text = frame + std::to_string(shot.layers.samples) + " samples in " +
+                     output::duration_words(shot.render_s);
   if (shot.error > 0) text += ", error " + percent_words(shot.error);
   return text;
 }
@@ -211,7 +211,7 @@ std::string quality_words(const set::Quality& quality) {
     text += ", the same for every pixel (adaptive takes 32 or more, and neither error nor seconds)";
   if (quality.error > 0) text += ", then to an error of " + percent_words(quality.error);
   if (quality.seconds > 0)
-    text += ", then for " + duration_words(quality.seconds) + " a frame at most";
+    text += ", then for " + output::duration_words(quality.seconds) + " a frame at most";
   if (quality.denoise) text += ", denoised";
   return text;
 }
@@ -281,7 +281,7 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
         << take.observer.intrinsics.width << "x" << take.observer.intrinsics.height << ", "
         << quality_words(set.quality) << ", on " << render::device_name(*device) << std::endl;
 
-    Progress progress(out, options.terminal, to_do.size(), now_s());
+    output::Progress progress(out, options.terminal, to_do.size(), now_s());
     LightSource light(take, progress, metrics);
     TrackSource track(take, progress, metrics);
     ObserverSource observer(take, to_do, light.remembers() || track.remembers(), progress, metrics);

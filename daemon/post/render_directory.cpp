@@ -61,23 +61,6 @@ std::string differences(const nlohmann::json& there, const nlohmann::json& now) 
 
 }  // namespace
 
-void write_exr(const std::filesystem::path& file, const pipeline::Shot& shot, const set::Set& set) {
-  output::ExrMetadata metadata;
-  metadata.exposure = set.observer.exposure.value_or(shot.frame->exposure);
-  metadata.timestamp_ns = shot.frame->timestamp_ns;
-  metadata.set_name = set.name;
-  metadata.pose = to_string(shot.track.status);
-  if (shot.track.pose) metadata.world_from_camera = shot.track.pose->world_from_camera;
-  metadata.exposure_s = shot.frame->exposure_s;
-  if (const auto& calibration = set.observer.calibration) {
-    metadata.lens = calibration->lens;
-    if (calibration->intrinsics.width == shot.layers.width &&
-        calibration->intrinsics.height == shot.layers.height)
-      metadata.intrinsics = calibration->intrinsics;
-  }
-  output::write_exr(file, shot.layers, metadata);
-}
-
 FrameRecord record_of(const pipeline::Shot& shot) {
   FrameRecord record;
   record.frame = shot.index;
@@ -216,7 +199,9 @@ const FrameRecord* RenderDirectory::finished(std::uint64_t frame) const {
 }
 
 void RenderDirectory::write(const pipeline::Shot& shot, const set::Set& set) {
-  if (output_.exr) write_exr(file(shot.index, ".exr"), shot, set);
+  if (output_.exr)
+    output::write_exr(file(shot.index, ".exr"), shot.layers,
+                      output::exr_metadata(shot.layers, *shot.frame, shot.track, set));
   if (wants_png()) output::write_png(file(shot.index, ".png"), shot.picture);
 
   const FrameRecord record = record_of(shot);

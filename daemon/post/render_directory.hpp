@@ -46,9 +46,6 @@ class RenderDirectory {
 std::string to_json(const FrameRecord& record);
 FrameRecord from_json(const std::string& line);
 
-// The shot's layers, with what is known of it in the header.
-void write_exr(const std::filesystem::path& file, const pipeline::Shot& shot, const set::Set& set);
-
 // What is recorded of a shot.
 FrameRecord record_of(const pipeline::Shot& shot);
 

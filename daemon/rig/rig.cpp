@@ -4,7 +4,7 @@
 #include <variant>
 
 #include "daemon/pipeline/take.hpp"
-#include "daemon/post/import_assets.hpp"
+#include "daemon/scene/assets.hpp"
 #include "daemon/set/names.hpp"
 #include "drivers/button_drivers.hpp"
 #include "drivers/error.hpp"
@@ -31,7 +31,7 @@ output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& camer
                                      set.recording.notes,
                                      false};
   try {
-    take.assets = post::assets_of(set);
+    take.assets = scene::assets_of(set);
   } catch (const Error& error) {
     note(std::string("takes will lack the scene: ") + error.what());
   }

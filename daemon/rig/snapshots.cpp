@@ -3,8 +3,8 @@
 #include <array>
 #include <cstdio>
 
+#include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
-#include "daemon/post/render_directory.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::rig {
@@ -22,7 +22,8 @@ std::filesystem::path write_snapshot(const pipeline::Shot& shot, const set::Set&
         !std::filesystem::exists(with(stem, ".png")))
       break;
   }
-  post::write_exr(with(stem, ".exr"), shot, set);
+  output::write_exr(with(stem, ".exr"), shot.layers,
+                    output::exr_metadata(shot.layers, *shot.frame, shot.track, set));
   output::write_png(with(stem, ".png"), shot.picture);
   return stem;
 }

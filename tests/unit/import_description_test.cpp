@@ -7,7 +7,7 @@
 #include "drivers/session/session.hpp"
 #include "tests/unit/import_fixture.hpp"
 
-namespace previz::post {
+namespace previz::exchange {
 namespace {
 
 using namespace std::string_literals;
@@ -296,4 +296,4 @@ TEST(ImportDescription, WhatIsNotJsonIsAnError) {
 }
 
 }  // namespace
-}  // namespace previz::post
+}  // namespace previz::exchange

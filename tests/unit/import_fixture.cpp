@@ -12,7 +12,7 @@ extern "C" {
 
 #include "drivers/av.hpp"
 
-namespace previz::post {
+namespace previz::exchange {
 
 std::string numbered(const std::string& before, int number, const std::string& after) {
   return before + std::to_string(number) + after;
@@ -107,4 +107,4 @@ std::string Shoot::error() const {
   }
 }
 
-}  // namespace previz::post
+}  // namespace previz::exchange

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "daemon/post/import.hpp"
+#include "daemon/exchange/import.hpp"
 #include "tests/unit/session_fixture.hpp"
 
-namespace previz::post {
+namespace previz::exchange {
 
 using Json = nlohmann::json;
 
@@ -45,4 +45,4 @@ class Shoot {
   test::TemporaryDirectory directory_;
 };
 
-}  // namespace previz::post
+}  // namespace previz::exchange

@@ -7,7 +7,7 @@
 #include "drivers/session/session.hpp"
 #include "tests/unit/import_fixture.hpp"
 
-namespace previz::post {
+namespace previz::exchange {
 namespace {
 
 std::unique_ptr<session::StreamReader> open(const Shoot& shoot, const std::string& source) {
@@ -281,4 +281,4 @@ TEST(Import, TransparencyIsAnErrorUnlessThereIsNone) {
 }
 
 }  // namespace
-}  // namespace previz::post
+}  // namespace previz::exchange

@@ -10,7 +10,7 @@
 #include <csignal>
 #include <thread>
 
-#include "daemon/lighting/hdr.hpp"
+#include "drivers/bracket.hpp"
 #include "drivers/error.hpp"
 #include "tests/unit/session_fixture.hpp"
 
@@ -162,7 +162,7 @@ TEST(Recorder, OfLightFromBeforeTheTakeTheNewestExposuresOfOneFormatAreInIt) {
     recorder.offer(picture(last + 1));
   }
   EXPECT_EQ(frames_of(directory / "12A_take001", "light"),
-            count_from(last - lighting::most_exposures, last));  // one of them is in the ring
+            count_from(last - most_exposures, last));  // one of them is in the ring
   EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(last + 1, last + 1));
   EXPECT_FALSE(std::filesystem::exists(directory / "12A_take002"));
 }

@@ -11,6 +11,7 @@
 
 #include "daemon/pipeline/light_feed.hpp"
 #include "daemon/pipeline/light_stage.hpp"
+#include "drivers/bracket.hpp"
 #include "drivers/error.hpp"
 #include "tests/unit/gltf_writer.hpp"
 #include "tests/unit/lighting_pictures.hpp"
@@ -161,10 +162,10 @@ TEST(LightStage, FramesThatCannotBeUsedAreLeftOutAndToldAndTheLightStays) {
 TEST(LightStage, AWanderingExposureKeepsTheNewestOnly) {
   Studio studio;
   LightStage stage(plain_set(), light_camera(), film_camera());
-  for (std::size_t i = 0; i < lighting::most_exposures + 3; ++i)
+  for (std::size_t i = 0; i < most_exposures + 3; ++i)
     stage.see(studio.photograph(std::pow(1.05, static_cast<double>(i))), i);
   const LightPtr light = stage.light();
-  EXPECT_EQ(light->sequences.size(), lighting::most_exposures);
+  EXPECT_EQ(light->sequences.size(), most_exposures);
   EXPECT_EQ(light->sequences.front(), 3u);
   EXPECT_EQ(stage.troubles().size(), 3u);
 }

@@ -1,5 +1,5 @@
 // The exported camera against matrices that are known, and against what OpenCV's model projects.
-#include "daemon/post/camera_track.hpp"
+#include "daemon/exchange/camera_track.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 
 #include "drivers/error.hpp"
 
-namespace previz::post {
+namespace previz::exchange {
 namespace {
 
 // At (1, 2, 3), level, looking along the world's +Y: right = X, down = -Z, forward = Y.
@@ -122,4 +122,4 @@ TEST(CameraTrack, FramesThatWereNotTrackedHaveNoKey) {
 }
 
 }  // namespace
-}  // namespace previz::post
+}  // namespace previz::exchange

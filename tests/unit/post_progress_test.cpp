@@ -1,11 +1,11 @@
 // What people see while a long job runs.
-#include "daemon/post/progress.hpp"
+#include "daemon/output/progress.hpp"
 
 #include <gtest/gtest.h>
 
 #include <sstream>
 
-namespace previz::post {
+namespace previz::output {
 namespace {
 
 TEST(Progress, DurationsReadLikeAClock) {
@@ -53,4 +53,4 @@ TEST(ShareProgress, TellsTheShareOfTheWorkAndTheTimeLeft) {
 }
 
 }  // namespace
-}  // namespace previz::post
+}  // namespace previz::output

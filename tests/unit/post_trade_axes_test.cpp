@@ -1,5 +1,5 @@
 // What `previzd trade` makes of its table of axes.
-#include "daemon/post/trade_axes.hpp"
+#include "daemon/trade/axes.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 
 #include "drivers/error.hpp"
 
-namespace previz::post {
+namespace previz::trade {
 namespace {
 
 TradePlan plan_of(const TradeSettings& own, const std::vector<std::string>& wanted = {}) {
@@ -70,4 +70,4 @@ TEST(TradeAxes, OnlyThoseWantedAreSwept) {
 }
 
 }  // namespace
-}  // namespace previz::post
+}  // namespace previz::trade

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <random>
 
-#include "daemon/post/trade_measure.hpp"
+#include "daemon/trade/measure.hpp"
 
-namespace previz::post {
+namespace previz::trade {
 namespace {
 
 // Left half uncovered, right half covered; every channel the same.
@@ -151,4 +151,4 @@ TEST(TradeFront, TheKneeIsFurthestBelowTheLineBetweenTheEnds) {
 }
 
 }  // namespace
-}  // namespace previz::post
+}  // namespace previz::trade

@@ -1,15 +1,15 @@
 // The table and the page of `previzd trade`, of a made-up sweep.
-#include "daemon/post/trade_page.hpp"
+#include "daemon/trade/page.hpp"
 
 #include <gtest/gtest.h>
 
 #include <regex>
 #include <sstream>
 
-#include "daemon/post/trade_chart.hpp"
+#include "daemon/trade/chart.hpp"
 #include "drivers/error.hpp"
 
-namespace previz::post {
+namespace previz::trade {
 namespace {
 
 Plate grey(int width, int height) {
@@ -125,4 +125,4 @@ TEST(TradeChart, EveryDotIsInside) {
 }
 
 }  // namespace
-}  // namespace previz::post
+}  // namespace previz::trade

@@ -1,5 +1,5 @@
 // `previzd trade` from end to end on a small take, on whatever Vulkan device there is.
-#include "daemon/post/trade.hpp"
+#include "daemon/trade/trade.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include "tests/unit/small_take.hpp"
 #include "tests/unit/temporary_directory.hpp"
 
-namespace previz::post {
+namespace previz::trade {
 namespace {
 
 class Trade : public testing::Test {
@@ -154,4 +154,4 @@ TEST_F(Trade, AStopLeavesNothing) {
 }
 
 }  // namespace
-}  // namespace previz::post
+}  // namespace previz::trade

@@ -1,5 +1,5 @@
 // SIGINT and SIGTERM become a stop request that the pipeline sees.
-#include "daemon/rig/signals.hpp"
+#include "daemon/signals.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -9,7 +9,7 @@
 
 #include "daemon/pipeline/stages.hpp"
 
-namespace previz::rig {
+namespace previz {
 namespace {
 
 TEST(StopOnSignal, EitherSignalStopsARunningPipeline) {
@@ -50,4 +50,4 @@ TEST(StopOnSignalDeathTest, ASecondSignalEndsTheProcessAtOnce) {
 }
 
 }  // namespace
-}  // namespace previz::rig
+}  // namespace previz

@@ -1,0 +1,171 @@
+#include "daemon/exchange/camera_track.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <glm/trigonometric.hpp>
+#include <numbers>
+#include <ostream>
+
+#include "daemon/pipeline/take.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+
+namespace previz::exchange {
+namespace {
+
+// Still-photographers' full frame: what a focal length of an unknown sensor is told for.
+constexpr double full_frame_width_m = 0.036;
+constexpr double tenths = 10;  // of a scene unit (metre), UsdGeomCamera's unit of lengths on film
+
+// The shortest text that comes back bit for bit.
+std::string number_text(double value) {
+  std::array<char, 32> buffer{};
+  const auto end =
+      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value == 0 ? 0.0 : value).ptr;
+  return {buffer.data(), end};
+}
+
+std::string tuple_text(const glm::dvec4& row) {
+  return std::string("(") + number_text(row.x) + ", " + number_text(row.y) + ", " +
+         number_text(row.z) + ", " + number_text(row.w) + ")";
+}
+
+// From a camera that looks along -Z with Y up to one that looks along Z with Y down.
+glm::dmat4 turned(const glm::dmat4& world_from_camera) {
+  glm::dmat4 matrix = world_from_camera;
+  matrix[1] = -matrix[1];
+  matrix[2] = -matrix[2];
+  return matrix;
+}
+
+std::string attribute(const char* type, const char* name, const std::string& value) {
+  return std::string("    ") + type + " " + name + " = " + value + "\n";
+}
+
+std::string quoted_text(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  }
+  return quoted + '"';
+}
+
+std::string usd_lens(const ObserverCalibration& calibration) {
+  const PinholeIntrinsics& i = calibration.intrinsics;
+  const double focal = tenths * (calibration.lens ? calibration.lens->focal_length_m
+                                                  : full_frame_width_m * i.fx / i.width);
+  std::string text;
+  text += attribute("float", "focalLength", number_text(focal));
+  text += attribute("float", "horizontalAperture", number_text(focal * i.width / i.fx));
+  text += attribute("float", "verticalAperture", number_text(focal * i.height / i.fy));
+  // Where the middle of the film lies, seen from the axis; pixel 0 is the centre of the first.
+  text += attribute("float", "horizontalApertureOffset",
+                    number_text(focal * (0.5 * i.width - (i.cx + 0.5)) / i.fx));
+  text += attribute("float", "verticalApertureOffset",
+                    number_text(focal * ((i.cy + 0.5) - 0.5 * i.height) / i.fy));
+  text += attribute("float2", "clippingRange", "(0.01, 10000)");
+  if (calibration.lens) {
+    text += attribute("float", "fStop", number_text(calibration.lens->f_number));
+    text += attribute("float", "focusDistance", number_text(calibration.lens->focus_distance_m));
+  }
+  return text;
+}
+
+std::string distortion_words(const PinholeIntrinsics& i) {
+  return std::string("Lens distortion, Brown-Conrady: k1 ") + number_text(i.k1) + ", k2 " +
+         number_text(i.k2) + ", p1 " + number_text(i.p1) + ", p2 " + number_text(i.p2) + ", k3 " +
+         number_text(i.k3);
+}
+
+}  // namespace
+
+CameraTrack camera_track(const session::Session& session,
+                         const std::vector<session::FrameRecord>& frames,
+                         const ObserverCalibration& calibration) {
+  CameraTrack track{session.info.name, calibration, 25, frames.size(), {}};
+  for (const session::TrackRecord& record : session.track)
+    if (record.tracked) track.keys.push_back({record.frame, record.world_from_camera});
+  if (track.keys.empty())
+    throw Error(session.directory.string() +
+                ": track.jsonl has no pose; there is no camera to export");
+  if (frames.size() > 1)
+    track.fps = static_cast<double>(frames.size() - 1) * 1e9 /
+                static_cast<double>(frames.back().timestamp_ns - frames.front().timestamp_ns);
+  return track;
+}
+
+std::string to_usda(const CameraTrack& track) {
+  std::string text =
+      "#usda 1.0\n(\n    defaultPrim = \"camera\"\n    metersPerUnit = 1\n"
+      "    upAxis = \"Z\"\n    startTimeCode = 0\n    endTimeCode = " +
+      std::to_string(track.frames == 0 ? 0 : track.frames - 1) +
+      "\n    timeCodesPerSecond = " + number_text(track.fps) +
+      "\n    framesPerSecond = " + number_text(track.fps) + "\n)\n\n";
+  text += "def Camera \"camera\" (\n    doc = " +
+          quoted_text(track.name + ". " + distortion_words(track.calibration.intrinsics)) +
+          "\n)\n{\n" + usd_lens(track.calibration);
+  text += "    matrix4d xformOp:transform.timeSamples = {\n";
+  for (const CameraKey& key : track.keys) {
+    const glm::dmat4 m = turned(key.world_from_camera);
+    text += "        " + std::to_string(key.frame) + ": (" + tuple_text(m[0]) + ", " +
+            tuple_text(m[1]) + ", " + tuple_text(m[2]) + ", " + tuple_text(m[3]) + "),\n";
+  }
+  return text + "    }\n    uniform token[] xformOpOrder = [\"xformOp:transform\"]\n}\n";
+}
+
+glm::dvec3 zxy_degrees(const glm::dmat3& rotation) {
+  const auto at = [&](int row, int column) { return rotation[column][row]; };
+  const double x = std::asin(std::clamp(-at(1, 2), -1.0, 1.0));
+  const double y = std::atan2(at(0, 2), at(2, 2));
+  const double z = std::atan2(at(1, 0), at(1, 1));
+  // Looking straight up or down, only the sum of the other two is known.
+  if (std::abs(at(1, 2)) > 1 - 1e-12)
+    return glm::degrees(glm::dvec3(x, 0, std::atan2(-at(0, 1), at(0, 0))));
+  return glm::degrees(glm::dvec3(x, y, z));
+}
+
+std::string to_chan(const CameraTrack& track) {
+  const glm::dmat4 y_up_from_z_up{{1, 0, 0, 0}, {0, 0, -1, 0}, {0, 1, 0, 0}, {0, 0, 0, 1}};
+  const PinholeIntrinsics& lens = track.calibration.intrinsics;
+  const double vfov = glm::degrees(std::atan((lens.cy + 0.5) / lens.fy) +
+                                   std::atan((lens.height - (lens.cy + 0.5)) / lens.fy));
+  std::string text;
+  for (const CameraKey& key : track.keys) {
+    const glm::dmat4 m = y_up_from_z_up * turned(key.world_from_camera);
+    const glm::dvec3 turn = zxy_degrees(glm::dmat3(m));
+    text += std::to_string(key.frame);
+    for (const double value : {m[3].x, m[3].y, m[3].z, turn.x, turn.y, turn.z, vfov})
+      text.append("\t").append(number_text(value));
+    text += "\n";
+  }
+  return text;
+}
+
+void export_take(const ExportOptions& options, std::ostream& out) {
+  const pipeline::Take take = pipeline::open_take(options.session, {});
+  for (const std::string& what : take.session.missing) out << "session: " << what << std::endl;
+  const CameraTrack track =
+      camera_track(take.session, take.observer_stream->records(), take.observer);
+  std::error_code code;
+  std::filesystem::create_directories(options.directory, code);
+  if (!std::filesystem::is_directory(options.directory))
+    throw Error(options.directory.string() + ": cannot be made: " + code.message());
+  session::replace_file(options.directory / "camera.usda", to_usda(track));
+  session::replace_file(options.directory / "camera.chan", to_chan(track));
+  for (const set::Object& object : take.set.objects) {
+    const std::filesystem::path to =
+        options.directory / std::filesystem::path(object.file_as_written).filename();
+    std::filesystem::copy_file(object.file, to, std::filesystem::copy_options::overwrite_existing,
+                               code);
+    if (code) throw Error(to.string() + ": cannot be written: " + code.message());
+  }
+  out << options.directory.string() << ": camera.usda, camera.chan, " << track.keys.size()
+      << " poses of " << track.frames << " frames";
+  if (track.keys.size() < track.frames) out << "; the others were not tracked and have none";
+  out << std::endl;
+}
+
+}  // namespace previz::exchange

@@ -1,0 +1,35 @@
+// Pictures from files, one after the other, in a format that a session can hold.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/frame.hpp"
+
+namespace previz::exchange {
+
+struct Picture {
+  PixelFormat format = PixelFormat::rgb8;
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> bytes;           // as Frame::bytes
+  std::string name;                          // for errors: the file, or file and frame
+  std::optional<std::int64_t> container_ns;  // a video's own time, from its first frame
+};
+
+class Footage {
+ public:
+  virtual ~Footage() = default;
+  // Nothing after the last picture. Throws previz::Error naming the picture that cannot be read.
+  virtual std::optional<Picture> next() = 0;
+  // What was converted, in plain words; known after the first picture.
+  virtual std::vector<std::string> notes() const { return {}; }
+};
+
+std::unique_ptr<Footage> open_pictures(std::vector<std::filesystem::path> files);
+std::unique_ptr<Footage> open_video(const std::filesystem::path& file);
+
+}  // namespace previz::exchange

@@ -1,0 +1,250 @@
+#include "daemon/exchange/import.hpp"
+
+#include <stdlib.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "daemon/exchange/footage.hpp"
+#include "daemon/exchange/import_description.hpp"
+#include "daemon/scene/assets.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/session.hpp"
+
+namespace previz::exchange {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A folder beside `target` that takes its name when it is complete, and otherwise goes away.
+class Draft {
+ public:
+  explicit Draft(const fs::path& target) : target_(fs::absolute(target)) {
+    if (!target_.has_filename()) target_ = target_.parent_path();
+    std::error_code failure;
+    if (fs::exists(target_) && !(fs::is_directory(target_) && fs::is_empty(target_)))
+      throw Error(target_.string() + ": is there already; a session needs a name of its own");
+    fs::create_directories(target_.parent_path(), failure);
+    std::string name = target_.parent_path() / ".";
+    name += target_.filename().string();
+    name += ".XXXXXX";
+    if (!::mkdtemp(name.data()))
+      throw Error(target_.parent_path().string() + ": no folder can be made in it");
+    path_ = name;
+    fs::permissions(path_, fs::perms{0755});
+  }
+  ~Draft() {
+    std::error_code ignored;
+    if (!path_.empty()) fs::remove_all(path_, ignored);
+  }
+  Draft(const Draft&) = delete;
+  Draft& operator=(const Draft&) = delete;
+
+  const fs::path& path() const { return path_; }
+  const fs::path& target() const { return target_; }
+
+  void complete() {
+    std::error_code failure;
+    fs::rename(path_, target_, failure);
+    if (failure) throw Error(target_.string() + ": cannot be made: " + failure.message());
+    path_.clear();
+  }
+
+ private:
+  fs::path target_, path_;
+};
+
+std::string content_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  if (!stream || (stream.peek() != EOF && !(text << stream.rdbuf())))
+    throw Error(file.string() + ": cannot be read");
+  return text.str();
+}
+
+std::uintmax_t size_of(const fs::path& folder) {
+  std::uintmax_t bytes = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder))
+    if (entry.is_regular_file()) bytes += entry.file_size();
+  return bytes;
+}
+
+double one_of(const std::vector<double>& series, std::size_t i, double none) {
+  if (series.empty()) return none;
+  return series.size() == 1 ? series[0] : series[i];
+}
+
+struct Size {
+  int width = 0, height = 0;
+};
+
+std::string text(PixelFormat format, int width, int height) {
+  return std::string(to_string(format)) + " " + std::to_string(width) + "x" +
+         std::to_string(height);
+}
+
+// Reads one camera's footage and writes it into the session.
+class FootageImport {
+ public:
+  FootageImport(const fs::path& description_file, const FootageDescription& footage,
+                std::optional<Size> calibrated, session::SessionWriter& writer)
+      : file_(description_file), footage_(footage), calibrated_(calibrated), writer_(writer) {}
+
+  // The capture times of the frames written.
+  std::vector<std::int64_t> run(std::vector<std::string>& notes) {
+    const auto pictures =
+        footage_.video.empty() ? open_pictures(footage_.pictures) : open_video(footage_.video);
+    std::vector<std::int64_t> times;
+    while (const auto picture = pictures->next()) {
+      check(*picture);
+      const std::size_t i = times.size();
+      check_count(i, *picture);
+      Frame frame;
+      frame.source = footage_.source;
+      frame.sequence = i;
+      frame.timestamp_ns = frame.arrival_ns = time_of(i, *picture, times);
+      frame.exposure = one_of(footage_.exposure, i, 1);
+      frame.exposure_s = one_of(footage_.exposure_s, i, 0);
+      frame.gain = one_of(footage_.gain, i, 1);
+      frame.format = picture->format;
+      frame.width = picture->width;
+      frame.height = picture->height;
+      frame.bytes = picture->bytes;
+      writer_.write(frame);
+      times.push_back(frame.timestamp_ns);
+    }
+    if (times.empty()) fail("holds no frame");
+    if (listed() > 0 && times.size() != listed())
+      fail("has " + std::to_string(times.size()) + " frames; " + std::to_string(listed()) +
+           " are described");
+    for (const std::string& note : pictures->notes()) notes.push_back(note);
+    return times;
+  }
+
+ private:
+  // How many frames the lists are for; 0 if there is none.
+  std::size_t listed() const {
+    std::size_t count = footage_.timestamps_ns.size();
+    for (const auto* series : {&footage_.exposure, &footage_.exposure_s, &footage_.gain})
+      if (series->size() > 1) count = std::max(count, series->size());
+    return count;
+  }
+
+  void check_count(std::size_t i, const Picture& picture) const {
+    if (listed() > 0 && i >= listed())
+      throw Error(picture.name + ": is one more than the " + std::to_string(listed()) +
+                  " frames that " + file_.string() + " describes under " + footage_.source);
+  }
+
+  void check(const Picture& picture) {
+    if (calibrated_ &&
+        (picture.width != calibrated_->width || picture.height != calibrated_->height))
+      throw Error(picture.name + ": is " + std::to_string(picture.width) + "x" +
+                  std::to_string(picture.height) + "; " + file_.string() + ": " + footage_.source +
+                  ".intrinsics is for " + std::to_string(calibrated_->width) + "x" +
+                  std::to_string(calibrated_->height));
+    const std::string is = text(picture.format, picture.width, picture.height);
+    if (first_.empty()) first_ = is;
+    if (is != first_)
+      throw Error(picture.name + ": is " + is + "; all pictures of " + footage_.source +
+                  " must be " + first_ + " like the first");
+  }
+
+  std::int64_t time_of(std::size_t i, const Picture& picture,
+                       const std::vector<std::int64_t>& before) const {
+    if (!footage_.timestamps_ns.empty()) return footage_.timestamps_ns[i];
+    if (footage_.fps > 0)
+      return footage_.start_ns + std::llround(static_cast<double>(i) / footage_.fps * 1e9);
+    if (!picture.container_ns) throw Error(picture.name + ": its container gives it no time");
+    const std::int64_t time = footage_.start_ns + *picture.container_ns;
+    if (time < 0 || (!before.empty() && time <= before.back()))
+      throw Error(picture.name +
+                  ": its container's times do not increase; give fps or "
+                  "timestamps_ns");
+    return time;
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error(file_.string() + ": " + footage_.source + " " + what);
+  }
+
+  const fs::path& file_;
+  const FootageDescription& footage_;
+  std::optional<Size> calibrated_;
+  session::SessionWriter& writer_;
+  std::string first_;  // format and size of the first picture
+};
+
+template <typename Calibration>
+std::optional<Size> size_of_pictures(const std::optional<Calibration>& calibration) {
+  if (!calibration) return std::nullopt;
+  return Size{calibration->intrinsics.width, calibration->intrinsics.height};
+}
+
+std::uint64_t write_track(const ImportDescription& description, const fs::path& file,
+                          const std::vector<std::int64_t>& times, session::SessionWriter& writer) {
+  if (description.track.empty()) return 0;
+  if (const auto last = description.track.back().frame; last >= times.size())
+    throw Error(file.string() + ": track has a pose for frame " + std::to_string(last) +
+                "; observer has frames 0 to " + std::to_string(times.size() - 1));
+  auto pose = description.track.begin();
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    session::TrackRecord record;
+    if (pose != description.track.end() && pose->frame == i) record = *pose++;
+    record.frame = i;
+    record.timestamp_ns = times[i];
+    writer.write(record);
+  }
+  return description.track.size();
+}
+
+session::SessionInfo info_of(const ImportDescription& description, const fs::path& target) {
+  session::SessionInfo info;
+  info.name = description.name.empty() ? target.filename().string() : description.name;
+  info.clock = description.clock;
+  info.observer = description.observer_calibration;
+  info.light = description.light_calibration;
+  if (description.set) {
+    info.set_name = description.set->file.filename().string();
+    info.set_text = content_of(description.set->file);
+  }
+  return info;
+}
+
+}  // namespace
+
+ImportReport import_session(const ImportOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  const ImportDescription description = read_description(options.description);
+  const auto assets = description.set ? scene::assets_of(*description.set)
+                                      : std::vector<std::pair<std::string, fs::path>>{};
+  ImportReport report;
+  Draft draft(options.session);
+  {
+    session::SessionWriter writer(draft.path(), info_of(description, draft.target()));
+    for (const auto& [as_written, file] : assets) writer.add_asset(as_written, file);
+    if (description.light)
+      report.light_frames = FootageImport(options.description, *description.light,
+                                          size_of_pictures(description.light_calibration), writer)
+                                .run(report.notes)
+                                .size();
+    const std::vector<std::int64_t> times =
+        FootageImport(options.description, description.observer,
+                      size_of_pictures(description.observer_calibration), writer)
+            .run(report.notes);
+    report.observer_frames = times.size();
+    report.poses = write_track(description, options.description, times, writer);
+    writer.close();
+  }
+  report.assets = std::set<std::pair<std::string, fs::path>>(assets.begin(), assets.end()).size();
+  report.bytes = size_of(draft.path());
+  draft.complete();
+  report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return report;
+}
+
+}  // namespace previz::exchange

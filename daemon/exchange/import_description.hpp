@@ -1,0 +1,41 @@
+// FRAMES.json as plain data, checked as far as it can be without decoding a picture.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/set/set.hpp"
+#include "drivers/calibration.hpp"
+#include "drivers/session/session.hpp"
+
+namespace previz::exchange {
+
+// The frames of a camera. Lists have one entry a frame; `exposure` is resolved, never empty.
+struct FootageDescription {
+  std::string source;                           // "observer" or "light"
+  std::vector<std::filesystem::path> pictures;  // empty: video
+  std::filesystem::path video;
+  std::vector<std::int64_t> timestamps_ns;  // empty: fps, or the container's if that is 0
+  double fps = 0;
+  std::int64_t start_ns = 0;
+  // One entry for all frames, or one a frame.
+  std::vector<double> exposure, exposure_s, gain;
+};
+
+struct ImportDescription {
+  std::string name, clock;
+  std::optional<set::Set> set;
+  FootageDescription observer;
+  std::optional<FootageDescription> light;
+  std::optional<ObserverCalibration> observer_calibration;
+  std::optional<LightCameraCalibration> light_calibration;
+  std::vector<session::TrackRecord> track;  // timestamps not filled in
+};
+
+// Throws previz::Error as import_session() does.
+ImportDescription read_description(const std::filesystem::path& file);
+
+}  // namespace previz::exchange

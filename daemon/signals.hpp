@@ -1,0 +1,30 @@
+// SIGINT and SIGTERM as a stop request.
+#pragma once
+
+#include <atomic>
+#include <stop_token>
+#include <thread>
+
+namespace previz {
+
+// While it lives, SIGINT and SIGTERM are blocked in the constructing thread and in every thread
+// started after it, and the first one to come requests a stop; a second one ends the process at
+// once. Construct it in main, before any other thread.
+class StopOnSignal {
+ public:
+  StopOnSignal();
+  ~StopOnSignal();
+  StopOnSignal(const StopOnSignal&) = delete;
+  StopOnSignal& operator=(const StopOnSignal&) = delete;
+
+  std::stop_token token() const { return stop_.get_token(); }
+  // The signal that came, 0 if none did.
+  int received() const { return received_; }
+
+ private:
+  std::stop_source stop_;
+  std::atomic<int> received_ = 0;
+  std::jthread waiter_;
+};
+
+}  // namespace previz

@@ -1,0 +1,151 @@
+#include "daemon/trade/axes.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <utility>
+
+#include "daemon/set/names.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::trade {
+namespace {
+
+std::string number_words(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%g", value);
+  return text;
+}
+
+// Every spelling that the set file knows; `field`: TradeSettings& -> the enumeration.
+template <class Field>
+TradeAxis spelled(std::string name, std::string what, Field field) {
+  TradeAxis axis{std::move(name), std::move(what), {}, ""};
+  TradeSettings blank;
+  for (const auto& [word, value] : set::names(field(blank)))
+    axis.variants.push_back({word, [=, value = value](TradeSettings& s) { field(s) = value; }});
+  return axis;
+}
+
+// A few numbers; `field`: TradeSettings& -> the number.
+template <class Field, class Number>
+TradeAxis numbered(std::string name, std::string what, TradeSettings own,
+                   std::initializer_list<Number> values, Field field) {
+  TradeAxis axis{std::move(name), std::move(what), {}, number_words(field(own))};
+  for (const Number value : values)
+    axis.variants.push_back({number_words(value), [=](TradeSettings& s) { field(s) = value; }});
+  return axis;
+}
+
+// What was recorded are sources; there is no image to go back to.
+TradeAxis light_modes(const set::Lighting& own) {
+  if (own.from == set::LightFrom::recording) return {"light_mode", "", {}, set::name_of(own.mode)};
+  return spelled(
+      "light_mode", "what the light around the set is made into",
+      [](TradeSettings & s) -> auto& { return s.lighting.mode; });
+}
+
+TradeAxis left_out(const std::vector<render::Part>& unneeded) {
+  TradeAxis axis{parts_axis,
+                 "parts that this scene has no need of: left out, and carried along",
+                 {},
+                 "left out"};
+  for (const render::Part part : unneeded)
+    axis.variants.push_back(
+        {render::name_of(part), [=](TradeSettings& s) { s.carried.push_back(part); }});
+  return axis;
+}
+
+void keep_wanted(std::vector<TradeAxis>& axes, const std::vector<std::string>& wanted) {
+  if (wanted.empty()) return;
+  for (const std::string& name : wanted) {
+    if (std::ranges::find(axes, name, &TradeAxis::name) != axes.end()) continue;
+    std::string allowed;
+    for (const TradeAxis& axis : axes) allowed += (allowed.empty() ? "" : ", ") + axis.name;
+    throw Error("--axes " + name + ": there is no such axis; " + allowed + " are allowed");
+  }
+  std::erase_if(axes, [&](const TradeAxis& axis) {
+    return std::ranges::find(wanted, axis.name) == wanted.end();
+  });
+}
+
+}  // namespace
+
+std::vector<TradeAxis> trade_axes(const TradeSettings& own,
+                                  const std::vector<render::Part>& unneeded) {
+  return {
+      spelled(
+          "estimator", "both worlds in full, or what differs between them",
+          [](TradeSettings & s) -> auto& { return s.estimation.estimator; }),
+      numbered(
+          "difference_sampling",
+          "largest share of directions sent towards what is in one world only", own,
+          {0.0, 0.25, 0.5, 0.75},
+          [](TradeSettings & s) -> auto& { return s.estimation.difference_sampling; }),
+      numbered(
+          "depth", "bounces that a path may have", own, {1, 2, 4, 8},
+          [](TradeSettings & s) -> auto& { return s.estimation.max_depth; }),
+      spelled(
+          "caustics", "how light comes through glass and by mirrors",
+          [](TradeSettings & s) -> auto& { return s.estimation.caustics; }),
+      spelled(
+          "composite", "how the difference is put onto the camera's picture",
+          [](TradeSettings & s) -> auto& { return s.estimation.composite; }),
+      spelled(
+          "real_radiance", "real surfaces seen after a bounce: simulated, or from the camera",
+          [](TradeSettings & s) -> auto& { return s.estimation.real_radiance; }),
+      light_modes(own.lighting),
+      spelled(
+          "light_sampling", "whether paths look for the light around the set",
+          [](TradeSettings & s) -> auto& { return s.lighting.sampling; }),
+      {"light_resolution",
+       "how fine the light around the set is, texels a side",
+       {{"16", [](TradeSettings& s) { s.lighting.resolution = 16; }},
+        {"64", [](TradeSettings& s) { s.lighting.resolution = 64; }}},
+       own.lighting.resolution > 0 ? number_words(own.lighting.resolution) : "as it was seen"},
+      {"resolution",
+       "picture size, then enlarged (the camera's picture with it, as in a preview)",
+       {{"half", [](TradeSettings& s) { s.scale = 0.5; }},
+        {"quarter", [](TradeSettings& s) { s.scale = 0.25; }}},
+       "full"},
+      {"spread",
+       "the same number of samples for every pixel, or (32 and more) most where it is noisy",
+       {{"even", [](TradeSettings& s) { s.adaptive = false; }},
+        {"adaptive", [](TradeSettings& s) { s.adaptive = true; }}},
+       ""},
+      {"noise",
+       "left in the picture, or taken out of it by what its variance says",
+       {{"left", [](TradeSettings& s) { s.denoise = false; }},
+        {"denoised", [](TradeSettings& s) { s.denoise = true; }}},
+       ""},
+      {"lens",
+       "the lens's aperture, or a pinhole that keeps everything sharp",
+       {{"pinhole", [](TradeSettings& s) { s.lens.reset(); }}},
+       "aperture"},
+      left_out(unneeded),
+  };
+}
+
+TradePlan plan_trade(const TradeSettings& own, std::vector<TradeAxis> axes,
+                     const std::vector<std::string>& wanted) {
+  keep_wanted(axes, wanted);
+  TradePlan plan;
+  plan.methods.push_back({"the set's own settings", own});
+  for (const TradeAxis& axis : axes) {
+    TradePlan::Axis planned{axis.name, axis.what, {}};
+    for (const TradeVariant& variant : axis.variants) {
+      TradeSettings settings = own;
+      variant.change(settings);
+      auto known = std::ranges::find(plan.methods, settings, &TradePlan::Method::settings);
+      if (known == plan.methods.end())
+        known = plan.methods.insert(known, {axis.name + " " + variant.name, std::move(settings)});
+      planned.entries.push_back(
+          {variant.name, static_cast<std::size_t>(known - plan.methods.begin())});
+    }
+    if (std::ranges::find(planned.entries, 0u, &TradePlan::Entry::method) == planned.entries.end())
+      planned.entries.insert(planned.entries.begin(), {axis.own, 0});
+    if (planned.entries.size() > 1) plan.axes.push_back(std::move(planned));
+  }
+  return plan;
+}
+
+}  // namespace previz::trade

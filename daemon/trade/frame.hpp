@@ -1,0 +1,50 @@
+// The one frame that `previzd trade` renders over and over: its pixels, pose and light.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/lighting/response.hpp"
+#include "daemon/pipeline/shot.hpp"
+#include "daemon/set/set.hpp"
+#include "drivers/calibration.hpp"
+#include "drivers/frame.hpp"
+#include "drivers/session/session.hpp"
+
+namespace previz::trade {
+
+class TradeFrame {
+ public:
+  // Frame `index` of the take that stands in for the set's observer; absent: the first with a pose
+  // and light. Throws previz::Error if there is none.
+  TradeFrame(const std::filesystem::path& set_file, std::optional<std::uint64_t> index);
+
+  const set::Set& set() const { return set_; }
+  std::uint64_t index() const { return shot_.index; }
+  double exposure() const;
+  const glm::dmat4& world_from_camera() const { return shot_.track.pose->world_from_camera; }
+  const ObserverCalibration& calibration() const { return calibration_; }
+  const lighting::Response& response() const { return *response_; }
+  Plate plate(double scale) const;
+  // As these settings make it of the light frames before this one; made once for each. Null where
+  // there are none.
+  pipeline::LightPtr light(const set::Lighting& settings);
+
+ private:
+  void see_light(session::StreamReader& stream);
+  std::string what_lacks();
+
+  set::Set set_;
+  ObserverCalibration calibration_;
+  std::optional<LightCameraCalibration> light_calibration_;
+  std::vector<FramePtr> light_frames_;  // from the stream's first on
+  std::vector<std::pair<set::Lighting, pipeline::LightPtr>> lights_;
+  pipeline::Shot shot_;
+  std::optional<lighting::Response> response_;  // of the plate's bits
+};
+
+}  // namespace previz::trade

@@ -1,0 +1,205 @@
+#include "daemon/trade/measure.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+namespace previz::trade {
+namespace {
+
+constexpr std::size_t block_px = 8;
+// An error is claimed where the reference's own is at most this part of it.
+constexpr double allowed_noise = 0.1;
+
+// Sums of squares over pixels and channels.
+struct Squares {
+  double error = 0, signal = 0;
+  void add(const glm::vec3& wrong, const glm::vec3& right) {
+    const glm::dvec3 e = glm::dvec3(wrong) - glm::dvec3(right);
+    error += glm::dot(e, e);
+    signal += glm::dot(glm::dvec3(right), glm::dvec3(right));
+  }
+  std::optional<double> relative() const {
+    if (!(signal > 0)) return std::nullopt;
+    return std::sqrt(error / signal);
+  }
+};
+
+std::vector<glm::vec3> middle(const std::vector<glm::vec3>& a, const std::vector<glm::vec3>& b) {
+  std::vector<glm::vec3> mean(a.size());
+  for (std::size_t i = 0; i < a.size(); ++i) mean[i] = 0.5f * (a[i] + b[i]);
+  return mean;
+}
+
+TradePicture middle(const TradePicture& a, const TradePicture& b) {
+  TradePicture mean{a.width, a.height, middle(a.shown, b.shown), middle(a.added, b.added), a.mask};
+  for (std::size_t i = 0; i < mean.mask.size(); ++i) mean.mask[i] = 0.5f * (a.mask[i] + b.mask[i]);
+  return mean;
+}
+
+std::vector<glm::vec3> enlarged_layer(const std::vector<glm::vec3>& layer, int from_width,
+                                      int from_height, int width, int height) {
+  // OpenCV reads and writes the vectors in place; it leaves `from` alone.
+  const cv::Mat from(from_height, from_width, CV_32FC3, const_cast<glm::vec3*>(layer.data()));
+  std::vector<glm::vec3> result(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  cv::Mat to(height, width, CV_32FC3, result.data());
+  cv::resize(from, to, to.size(), 0, 0, cv::INTER_LINEAR);
+  return result;
+}
+
+// What is known of one pixel's differences from the set's own picture, over its channels.
+struct CommonDifference {
+  double common = 0;  // the mean of d e over all pairs of differences
+  // A product of two noises, as d e is where d and e are nothing else: two combinations of the
+  // first three in which everything cancels but noise, each of one's variance and uncorrelated.
+  double noise = 0;
+};
+
+CommonDifference common_difference(std::span<const TradePicture> alike,
+                                   std::span<const TradePicture> own, std::size_t i) {
+  const auto difference = [&](std::size_t k) {
+    return glm::dvec3(alike[k].shown[i]) - glm::dvec3(own[k].shown[i]);
+  };
+  glm::dvec3 sum(0);
+  double squares = 0;
+  for (std::size_t k = 0; k < alike.size(); ++k) {
+    const glm::dvec3 d = difference(k);
+    sum += d;
+    squares += glm::dot(d, d);
+  }
+  const auto count = static_cast<double>(alike.size());
+  const glm::dvec3 x = difference(0), y = difference(1), z = difference(2);
+  return {(glm::dot(sum, sum) - squares) / (count * (count - 1)),
+          glm::dot(x - y, x + y - 2.0 * z) / std::sqrt(12.0)};
+}
+
+}  // namespace
+
+TradePicture trade_picture(const render::Layers& layers, const std::vector<double>& camera,
+                           double white) {
+  TradePicture picture{layers.width, layers.height, {}, {}, layers.mask};
+  picture.shown.reserve(layers.composite.size());
+  picture.added.reserve(layers.composite.size());
+  for (std::size_t i = 0; i < layers.composite.size(); ++i) {
+    const glm::dvec3 seen(camera[3 * i], camera[3 * i + 1], camera[3 * i + 2]);
+    const glm::dvec3 shown = glm::clamp(glm::dvec3(layers.composite[i]), 0.0, white);
+    picture.shown.emplace_back(shown);
+    // Untouched is untouched, whatever rounding made of the camera's value.
+    const bool same = glm::vec3(seen) == layers.composite[i];
+    picture.added.emplace_back(same ? glm::dvec3(0) : shown - seen);
+  }
+  return picture;
+}
+
+TradePicture enlarged(const TradePicture& picture, int width, int height) {
+  if (picture.width == width && picture.height == height) return picture;
+  const auto layer = [&](const std::vector<glm::vec3>& from) {
+    return enlarged_layer(from, picture.width, picture.height, width, height);
+  };
+  // The mask that counts is the reference's.
+  return {width, height, layer(picture.shown), layer(picture.added), {}};
+}
+
+// The mean of the halves is as far from the truth, in expectation, as from either half.
+TradeReference::TradeReference(const TradePicture& a, const TradePicture& b)
+    : mean_(middle(a, b)), noise_(errors(a)) {}
+
+TradeErrors TradeReference::errors(const TradePicture& picture) const {
+  assert(picture.shown.size() == mean_.shown.size());
+  Squares uncovered, covered, all;
+  for (std::size_t i = 0; i < mean_.shown.size(); ++i) {
+    if (mean_.mask[i] == 0) uncovered.add(picture.added[i], mean_.added[i]);
+    if (mean_.mask[i] == 1) covered.add(picture.shown[i], mean_.shown[i]);
+    all.add(picture.shown[i], mean_.shown[i]);
+  }
+  return {uncovered.relative(), covered.relative(), all.relative()};
+}
+
+TradeReference::Bias TradeReference::bias(std::span<const TradePicture> alike,
+                                          std::span<const TradePicture> own) const {
+  assert(alike.size() >= 3 && own.size() == alike.size());
+  const auto width = static_cast<std::size_t>(mean_.width);
+  const auto height = static_cast<std::size_t>(mean_.height);
+  const std::size_t columns = (width + block_px - 1) / block_px;
+  // By block of 8x8 pixels, because pixels that share photons share their noise.
+  std::vector<double> noise(columns * ((height + block_px - 1) / block_px));
+  double common = 0, signal = 0;
+  for (std::size_t i = 0; i < mean_.shown.size(); ++i) {
+    const CommonDifference pixel = common_difference(alike, own, i);
+    common += pixel.common;
+    noise[i / width / block_px * columns + i % width / block_px] += pixel.noise;
+    signal += glm::dot(glm::dvec3(mean_.shown[i]), glm::dvec3(mean_.shown[i]));
+  }
+  if (!(signal > 0)) return {};
+  double variance = 0;  // of one product's sum; those of different pairs are uncorrelated
+  for (const double block : noise) variance += block * block;
+  const auto pairs = static_cast<double>(alike.size() * (alike.size() - 1)) / 2;
+  const double three_errors = 3 * std::sqrt(variance / pairs);
+  Bias bias;
+  bias.least = std::sqrt(three_errors / signal);
+  if (common > three_errors) bias.value = std::sqrt(common / signal);
+  return bias;
+}
+
+TradeErrors rms(std::span<const TradeErrors> errors) {
+  assert(!errors.empty());
+  const auto of = [&](std::optional<double> TradeErrors::*measure) -> std::optional<double> {
+    double sum = 0;
+    for (const TradeErrors& one : errors) {
+      if (!(one.*measure)) return std::nullopt;
+      sum += *(one.*measure) * *(one.*measure);
+    }
+    return std::sqrt(sum / static_cast<double>(errors.size()));
+  };
+  return {of(&TradeErrors::difference), of(&TradeErrors::virtual_part), of(&TradeErrors::picture)};
+}
+
+std::string within_noise(const TradeErrors& errors, const TradeErrors& noise) {
+  std::string names;
+  const auto check = [&](const char* name, std::optional<double> TradeErrors::*measure) {
+    const auto &error = errors.*measure, &own = noise.*measure;
+    if (!error || !own || *own <= allowed_noise * *error) return;
+    if (!names.empty()) names += ' ';
+    names += name;
+  };
+  check("e_diff", &TradeErrors::difference);
+  check("e_virtual", &TradeErrors::virtual_part);
+  check("e_picture", &TradeErrors::picture);
+  return names;
+}
+
+std::vector<bool> pareto_front(std::span<const TradeCost> costs) {
+  std::vector<bool> front;
+  for (const TradeCost& one : costs) {
+    front.push_back(std::ranges::none_of(costs, [&](const TradeCost& other) {
+      return other.seconds <= one.seconds && other.error <= one.error &&
+             (other.seconds < one.seconds || other.error < one.error);
+    }));
+  }
+  return front;
+}
+
+std::size_t knee(std::span<const TradeCost> front) {
+  assert(!front.empty());
+  const auto share = [](double value, double from, double to) {
+    return to > from ? std::log(value / from) / std::log(to / from) : 0;
+  };
+  std::size_t best = 0;
+  double deepest = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i + 1 < front.size(); ++i) {
+    const double x = share(front[i].seconds, front.front().seconds, front.back().seconds);
+    const double y = share(front[i].error, front.back().error, front.front().error);
+    if (1 - x - y > deepest) {
+      deepest = 1 - x - y;
+      best = i;
+    }
+  }
+  return best;
+}
+
+}  // namespace previz::trade

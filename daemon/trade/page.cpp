@@ -1,0 +1,354 @@
+#include "daemon/trade/page.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdio>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "daemon/trade/chart.hpp"
+
+namespace previz::trade {
+namespace {
+
+// The page's look: a system font, one column, and colours that follow the reader's light or dark.
+// The six hues stay apart for readers who see no red or no green; names stand at the curves too.
+constexpr const char* style = R"(
+:root { color-scheme: light dark; --paper: #fdfdfc; --ink: #1c1d1f; --soft: #62666d; --line: #e3e4e6;
+  --doubt: #f1efe8; --accent: #c2410c; --s1: #0f6cbd; --s2: #b4540a; --s3: #12805c; --s4: #8a3ea8;
+  --s5: #a8862a; --s6: #c0356b; }
+@media (prefers-color-scheme: dark) { :root { --paper: #17181a; --ink: #e9e9e6; --soft: #9a9fa7;
+  --line: #2f3237; --doubt: #24231f; --accent: #ff8a4c; --s1: #5fb0ff; --s2: #f0a35e; --s3: #4fc79b;
+  --s4: #cf94e8; --s5: #d9bd62; --s6: #ff85ae; } }
+body { margin: 0 auto; max-width: 61rem; padding: 2.5rem 1.25rem 5rem; background: var(--paper);
+  color: var(--ink); font: 16px/1.55 system-ui, sans-serif; }
+h1 { font-size: 1.9rem; line-height: 1.2; margin: 0 0 .6rem; font-weight: 650; }
+h2 { font-size: 1.25rem; margin: 3.2rem 0 .4rem; font-weight: 650; }
+p { max-width: 44rem; margin: .4rem 0 1rem; } .soft, figcaption, th { color: var(--soft); }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; margin: .8rem 0 0; width: 100%; }
+th, td { text-align: left; padding: .35rem 1.2rem .35rem 0; border-bottom: 1px solid var(--line); }
+th { font-weight: 500; font-size: .87rem; } td.n, th.n { text-align: right; } td.n { white-space: nowrap; }
+.bend td { color: var(--accent); font-weight: 600; }
+.charts, .pictures { display: grid; gap: 1.4rem; grid-template-columns: repeat(auto-fit, minmax(20rem, 1fr)); }
+figure { margin: 0; } figcaption { font-size: .9rem; margin-top: .35rem; }
+figcaption b { color: var(--ink); font-weight: 600; }
+img { width: 100%; display: block; image-rendering: pixelated; }
+svg { width: 100%; height: auto; display: block; font: 11.5px system-ui, sans-serif; }
+svg .grid { stroke: var(--line); } svg .doubt { fill: var(--doubt); }
+svg .tick, svg .label { fill: var(--soft); } svg .title { fill: var(--ink); font-weight: 600; }
+svg g polyline { fill: none; stroke: var(--c); stroke-width: 1.8; } svg g circle { fill: var(--c); }
+svg g.own polyline, svg g.front polyline { stroke-width: 2.6; } svg .name { fill: var(--c); }
+svg .own, svg .name.own { --c: var(--ink); } svg .front { --c: var(--accent); }
+svg .cloud { --c: var(--soft); opacity: .45; } .s1 { --c: var(--s1); } .s2 { --c: var(--s2); }
+.s3 { --c: var(--s3); } .s4 { --c: var(--s4); } .s5 { --c: var(--s5); } .s6 { --c: var(--s6); }
+)";
+
+using Measure = std::optional<double> TradeErrors::*;
+
+std::string plain_words(std::string name) {
+  std::ranges::replace(name, '_', ' ');
+  return name;
+}
+
+// With a capital letter.
+std::string sentence(std::string words) {
+  words.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(words.front())));
+  return words;
+}
+
+std::string samples_words(int samples) {
+  return std::to_string(samples) + (samples == 1 ? " sample" : " samples");
+}
+
+std::string share_or_none(const std::optional<double>& share) {
+  return share ? share_words(*share) : "none there";
+}
+
+std::string setting_words(const TradeReport& report, const TradeFrontPoint& at) {
+  return plain_words(report.methods[at.method].name) + ", " +
+         samples_words(report.point(at).samples);
+}
+
+std::string base64(std::span<const unsigned char> bytes) {
+  constexpr const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const auto byte = [&](std::size_t at) { return at < bytes.size() ? bytes[at] : 0u; };
+    const unsigned group = byte(i) << 16 | byte(i + 1) << 8 | byte(i + 2);
+    for (unsigned place = 0; place < 4; ++place)
+      text += i + place <= bytes.size() ? digits[group >> (18 - 6 * place) & 63] : '=';
+  }
+  return text;
+}
+
+std::string png_uri(const Plate& plate) {
+  cv::Mat3b picture(plate.height, plate.width);
+  std::ranges::transform(plate.samples, picture.ptr<std::uint8_t>(),
+                         [](std::uint16_t sample) { return static_cast<std::uint8_t>(sample); });
+  cv::cvtColor(picture, picture, cv::COLOR_RGB2BGR);  // OpenCV's order
+  std::vector<unsigned char> bytes;
+  cv::imencode(".png", picture, bytes);
+  return "data:image/png;base64," + base64(bytes);
+}
+
+std::string figure(const Plate& picture, const std::string& caption) {
+  return "<figure><img alt=\"\" src=\"" + png_uri(picture) + "\"><figcaption>" + caption +
+         "</figcaption></figure>\n";
+}
+
+std::string cell(const std::string& text, bool number = false) {
+  return (number ? "<td class=\"n\">" : "<td>") + escaped(text) + "</td>";
+}
+
+std::string head_row(std::initializer_list<std::pair<const char*, bool>> columns) {
+  std::string row = "<tr>";
+  for (const auto& [name, number] : columns)
+    row += (number ? "<th class=\"n\">" : "<th>") + std::string(name) + "</th>";
+  return row + "</tr>\n";
+}
+
+std::string opening(const TradeReport& report) {
+  const double share = 1.0 * report.width * report.height / report.full_width / report.full_height;
+  std::string sizes = std::to_string(report.width) + " × " + std::to_string(report.height);
+  if (share < 1)
+    sizes += "; at the full " + std::to_string(report.full_width) + " × " +
+             std::to_string(report.full_height) + " everything takes about " +
+             time_words(1 / share).substr(0, time_words(1 / share).find(' ')) + " times as long";
+  return "<h1>What time buys on “" + escaped(report.set) + "”</h1>\n<p>Frame " +
+         std::to_string(report.frame) +
+         " of the take was rendered with the set's own settings and "
+         "with one of them changed at a time, on " +
+         escaped(report.device) + ", at " + sizes +
+         ". An <b>error</b> is how far a picture is from the converged one: the rms of the "
+         "difference over the rms of the picture, the figure that <code>previzd render "
+         "--error</code> takes.</p>\n";
+}
+
+ChartPoint chart_point(const TradeReport& report, std::size_t method, const TradePoint& point,
+                       Measure measure) {
+  const double error = (point.errors.*measure).value_or(0);
+  return {point.seconds, error, point.pareto,
+          plain_words(report.methods[method].name) + ", " + samples_words(point.samples) + ": " +
+              time_words(point.seconds) + ", error " + share_words(error)};
+}
+
+std::string front_chart(const TradeReport& report) {
+  LogChart chart{"", "time to render", "error of the picture", {}, {}, 940, 430};
+  ChartCurve cloud{"", "cloud", {}}, front{"", "front", {}};
+  for (std::size_t m = 0; m < report.methods.size(); ++m) {
+    if (report.methods[m].changed_pixels) continue;
+    for (const TradePoint& point : report.methods[m].points)
+      cloud.points.push_back(chart_point(report, m, point, &TradeErrors::picture));
+  }
+  for (const auto& [method, index] : front_of(report))
+    front.points.push_back(
+        chart_point(report, method, report.methods[method].points[index], &TradeErrors::picture));
+  chart.curves = {std::move(cloud), std::move(front)};
+  for (const TradeCorner& corner : report.corners)
+    chart.curves.push_back(
+        {corner.name,
+         "front",
+         {chart_point(report, corner.at.method, report.point(corner.at), &TradeErrors::picture)}});
+  if (report.noise.picture) chart.doubtful_below = 10 * *report.noise.picture;
+  return to_svg(chart);
+}
+
+// "4 %", or "≈ 4 %" where the reference's own error is more than a tenth of it.
+std::string error_words(const TradeReport& report, const TradePoint& point, Measure measure) {
+  TradeErrors alone, noise;
+  alone.*measure = point.errors.*measure;
+  noise.*measure = report.noise.*measure;
+  return (within_noise(alone, noise).empty() ? "" : "≈ ") + share_or_none(point.errors.*measure);
+}
+
+std::string corner_name(const TradeReport& report, const TradeFrontPoint& at) {
+  const auto corner = std::ranges::find(report.corners, at, &TradeCorner::at);
+  return corner == report.corners.end() ? "" : corner->name;
+}
+
+std::string front_section(const TradeReport& report) {
+  std::string html =
+      "<h2>The front</h2>\n<p>Every dot is one setting at one number of samples. On the line are "
+      "those that nothing else beats: whatever is faster is further off, whatever is nearer takes "
+      "longer. In the shaded part the reference itself is too noisy to tell.</p>\n" +
+      front_chart(report) + "<table>\n" +
+      head_row({{"time", true},
+                {"what", false},
+                {"error", true},
+                {"of light on the real scene", true},
+                {"of virtual things", true},
+                {"", false}});
+  for (const TradeFrontPoint& at : told_front_of(report)) {
+    const TradePoint& point = report.point(at);
+    const bool bend = corner_name(report, at) == "knee";
+    html += (bend ? "<tr class=\"bend\">" : "<tr>") + cell(time_words(point.seconds), true) +
+            cell(setting_words(report, at)) +
+            cell(error_words(report, point, &TradeErrors::picture), true) +
+            cell(error_words(report, point, &TradeErrors::difference), true) +
+            cell(error_words(report, point, &TradeErrors::virtual_part), true) +
+            cell(corner_name(report, at)) + "</tr>\n";
+  }
+  return html +
+         "</table>\n<p class=\"soft\">Of settings that are within a tenth of each other the "
+         "fastest "
+         "stands here. ≈ marks what the reference is too noisy to tell.</p>\n";
+}
+
+std::string corners_section(const TradeReport& report) {
+  std::string html =
+      "<h2>The pictures at its corners</h2>\n<p>Left what is seen; right five times its difference "
+      "from the converged picture, where grey is none.</p>\n<div class=\"pictures\">\n";
+  for (const TradeCorner& corner : report.corners) {
+    html += figure(corner.picture,
+                   "<b>" + corner.name + "</b> " + escaped(front_words(report, corner.at))) +
+            figure(corner.difference, "five times the difference");
+  }
+  return html +
+         figure(report.reference, "<b>converged</b> the set's own settings, " +
+                                      samples_words(report.reference_samples)) +
+         "</div>\n";
+}
+
+std::string axis_chart(const TradeReport& report, const TradePlan::Axis& axis, const char* title,
+                       Measure measure) {
+  constexpr std::array colours = {"s1", "s2", "s3", "s4", "s5", "s6"};
+  LogChart chart{title, "time to render", "error", {}, {}};
+  std::size_t colour = 0;
+  for (const TradePlan::Entry& entry : axis.entries) {
+    ChartCurve curve{entry.variant + (entry.method == 0 ? " (own)" : ""),
+                     entry.method == 0 ? "own" : colours[colour++ % colours.size()],
+                     {}};
+    for (const TradePoint& point : report.methods[entry.method].points)
+      curve.points.push_back(chart_point(report, entry.method, point, measure));
+    chart.curves.push_back(std::move(curve));
+  }
+  if (const auto& noise = report.noise.*measure) chart.doubtful_below = 10 * *noise;
+  return to_svg(chart);
+}
+
+// Which variants do not show what the set's own settings do, where that is seen.
+std::string bias_sentence(const TradeReport& report, const TradePlan::Axis& axis) {
+  std::string biased;
+  for (const TradePlan::Entry& entry : axis.entries) {
+    const auto& bias = report.methods[entry.method].bias;
+    if (bias && bias->value > 0)
+      biased +=
+          (biased.empty() ? "" : "; ") + escaped(entry.variant) + ", " + share_words(bias->value);
+  }
+  return biased.empty()
+             ? ""
+             : "<p class=\"soft\">Beyond noise, further from the set's own picture by: " + biased +
+                   ".</p>\n";
+}
+
+std::string axis_section(const TradeReport& report, const TradePlan::Axis& axis) {
+  return "<h2>" + sentence(plain_words(axis.name)) + "</h2>\n<p>" + escaped(sentence(axis.what)) +
+         ".</p>\n<div class=\"charts\">\n" +
+         axis_chart(report, axis, "The picture", &TradeErrors::picture) +
+         axis_chart(report, axis, "Light and shadow on the real scene", &TradeErrors::difference) +
+         "</div>\n" + bias_sentence(report, axis);
+}
+
+std::string parts_section(const TradeReport& report, const TradePlan::Axis& axis) {
+  const TradePoint& own = report.methods.front().points.back();
+  std::string html =
+      "<h2>What is left out</h2>\n<p>This set has no need of these parts of the renderer, so they "
+      "are not there. Here they were carried along, to see what that would cost; the picture must "
+      "be the same, bit for bit.</p>\n<table>\n" +
+      head_row(
+          {{"part", false}, {"without it", true}, {"with it", true}, {"pixels changed", true}});
+  for (const TradePlan::Entry& entry : axis.entries) {
+    const TradeMethod& method = report.methods[entry.method];
+    if (!method.changed_pixels) continue;
+    html += "<tr>" + cell(entry.variant) + cell(time_words(own.seconds), true) +
+            cell(time_words(method.points.back().seconds), true) +
+            cell(std::to_string(*method.changed_pixels), true) + "</tr>\n";
+  }
+  return html + "</table>\n<p class=\"soft\">" + samples_words(own.samples) + ".</p>\n";
+}
+
+std::string reading_section(const TradeReport& report) {
+  return "<h2>How to read this</h2>\n<p>The reference is the set's own settings at " +
+         samples_words(report.reference_samples) +
+         ", in two independent halves. Half the difference between them is its own error: " +
+         share_or_none(report.noise.picture) + " of the picture, " +
+         share_or_none(report.noise.difference) + " of the light on the real scene, " +
+         share_or_none(report.noise.virtual_part) +
+         " of the virtual things. An error below ten times that is not to be trusted: it is shaded "
+         "in the charts and marked in the tables.</p>\n<p>Every setting was rendered " +
+         (report.rounds == 1
+              ? std::string("once")
+              : std::to_string(report.rounds) +
+                    " times, with other random numbers and in another order each time") +
+         ". Time is rendering alone, after a warm-up; its median stands here. A setting that "
+         "changes what is meant (fewer "
+         "bounces, no caustics, a pinhole) is compared with the set's own meaning: its curve bends "
+         "to a floor. Radiance is clipped where the sensor clips.</p>\n";
+}
+
+std::string csv_share(const std::optional<double>& share) {
+  if (!share) return "";
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", *share);
+  return text;
+}
+
+// A field with a comma or a quote is quoted (RFC 4180).
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
+}
+
+std::string csv_errors(const TradeErrors& errors) {
+  return csv_share(errors.difference) + "," + csv_share(errors.virtual_part) + "," +
+         csv_share(errors.picture);
+}
+
+}  // namespace
+
+std::string trade_csv(const TradeReport& report) {
+  std::string csv =
+      "axis,variant,samples,seconds,e_diff,e_virtual,e_picture,reference_noise,pareto,within_noise,"
+      "bias\n";
+  const std::string noise = csv_share(report.noise.picture);
+  csv += "reference,own," + std::to_string(report.reference_samples) + ",," +
+         csv_errors(report.noise) + "," + noise + ",0,,\n";
+  for (const TradePlan::Axis& axis : report.plan.axes) {
+    for (const TradePlan::Entry& entry : axis.entries) {
+      const TradeMethod& method = report.methods[entry.method];
+      for (const TradePoint& point : method.points)
+        csv += csv_field(axis.name) + "," + csv_field(entry.variant) + "," +
+               std::to_string(point.samples) + "," + csv_share(point.seconds) + "," +
+               csv_errors(point.errors) + "," + noise + "," + (point.pareto ? "1" : "0") + "," +
+               point.within_noise + "," +
+               (method.bias ? csv_share(method.bias->value) : std::string()) + "\n";
+    }
+  }
+  return csv;
+}
+
+std::string front_words(const TradeReport& report, const TradeFrontPoint& at) {
+  const TradePoint& point = report.point(at);
+  return time_words(point.seconds) + ": " + setting_words(report, at) + ", error " +
+         share_or_none(point.errors.picture);
+}
+
+std::string trade_page(const TradeReport& report) {
+  std::string html =
+      "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta "
+      "name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
+      escaped(report.set) + ": what time buys</title>\n<style>" + style +
+      "</style>\n</head>\n<body>\n" + opening(report) + front_section(report) +
+      corners_section(report);
+  for (const TradePlan::Axis& axis : report.plan.axes)
+    html += axis.name == parts_axis ? parts_section(report, axis) : axis_section(report, axis);
+  return html + reading_section(report) + "</body>\n</html>\n";
+}
+
+}  // namespace previz::trade
