@@ -1,93 +1,121 @@
 #!/usr/bin/env bash
-# Everything a change must pass: installs what is missing, builds, runs every test, once more under
-# AddressSanitizer and UndefinedBehaviorSanitizer, and checks format and lint. Needs no GPU and
-# nothing outside the repository; what lacks its data or device says so and is counted as skipped.
-# Ends with one line that sums up, and with status 0 only if all of it passed.
+# Everything a change must pass. Installs what is missing, builds, runs the tests, runs those that
+# read foreign bytes or run in threads once more under AddressSanitizer and
+# UndefinedBehaviorSanitizer, and checks format and lint. Needs no GPU and nothing outside the
+# repository. Ends with one line that sums up, and with status 0 only if all of it passed.
 #
-#   tests/run.sh              all of it
-#   tests/run.sh release      only the named steps: release asan format lint
-# Two more steps are taken only if they are named, for they need root or user namespaces, and time:
-#   package   builds the .deb, and installs it in a bare Debian (tests/package/run.sh, 3 minutes)
-#   rig_vm    runs the drivers, then that, on a rig in a VM (tests/rig_vm/run.sh, 45 minutes)
+#   tests/run.sh              the gate: release asan format lint
+#   tests/run.sh full         the gate, and then asan-all tsan soak package rig_vm
+#   tests/run.sh STEP...      only the named steps
+#
+#   release    builds everything but the benchmarks, and runs every test
+#   asan       the test programs marked SANITIZED (tests/CMakeLists.txt) under ASan and UBSan
+#   format     clang-format
+#   lint       clang-tidy: of targets that have changed since they last passed on this machine
+#   asan-all   every test program under ASan and UBSan
+#   tsan       the test programs marked THREADS under ThreadSanitizer
+#   soak       half an hour of a whole rig (tests/soak)
+#   package    builds the .deb and installs it in a bare Debian (tests/package/run.sh)
+#   rig_vm     runs the drivers, then the package, on a rig in a VM (tests/rig_vm/run.sh)
+# package and rig_vm need root or user namespaces, and the network.
+#
+# A case may be skipped only if tests/skips.txt says why; any other skip is a failure.
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit
 jobs=$(nproc)
+gate=(release asan format lint)
 steps=("$@")
-[[ ${#steps[@]} -gt 0 ]] || steps=(release asan format lint)
+[[ ${#steps[@]} -gt 0 ]] || steps=("${gate[@]}")
+[[ ${steps[*]} != full ]] || steps=("${gate[@]}" asan-all tsan soak package rig_vm)
 failures=()
 summaries=()
+costs=()
 
-step() { printf '\n== %s ==\n' "$*"; }
+# Processor seconds of all commands that have ended, user and system.
+cpu_seconds() { awk -v hz="$(getconf CLK_TCK)" '{ printf "%d", ($16 + $17) / hz }' "/proc/$$/stat"; }
 
 # Runs a command; a failure is noted, not fatal, so that one run shows everything that is wrong.
 check() {
   local name=$1
   shift
-  step "$name"
-  local begin=$SECONDS
-  if "$@"; then
-    printf '== %s: %d s ==\n' "$name" $((SECONDS - begin))
-  else
-    printf '== %s: FAILED after %d s ==\n' "$name" $((SECONDS - begin))
-    failures+=("$name")
-    return 1
-  fi
+  printf '\n== %s ==\n' "$name"
+  local begin=$SECONDS cpu status=0
+  cpu=$(cpu_seconds)
+  "$@" || status=$?
+  local cost
+  cost=$(printf '%-14s %5d s  %6d CPU s' "$name" $((SECONDS - begin)) $(($(cpu_seconds) - cpu)))
+  costs+=("$cost")
+  printf '== %s%s ==\n' "$cost" "$([[ $status == 0 ]] || echo '  FAILED')"
+  [[ $status == 0 ]] || failures+=("$name")
+  return "$status"
 }
 
-build() { cmake --preset "$1" && cmake --build --preset "$1" --parallel "$jobs"; }
+build() { cmake --preset "$1" --log-level=WARNING && cmake --build --preset "$1" --parallel "$jobs"; }
 
-# CTest counts programs; the cases in them, and which of those were skipped and why, are in its log.
+# Prints the cases that CTest's log says were skipped, and fails if tests/skips.txt lacks one.
+check_skips() {
+  local log=$1 name pattern excused status=0
+  while read -r name; do
+    excused=
+    while read -r pattern _; do
+      # shellcheck disable=SC2053  # the right side is a pattern
+      [[ -n $pattern && $pattern != \#* && $name == $pattern ]] && excused=1 && break
+    done <tests/skips.txt
+    if [[ -n $excused ]]; then
+      printf '  skipped: %s\n' "$name"
+    else
+      printf '  SKIPPED WITHOUT AN EXCUSE in tests/skips.txt: %s\n' "$name"
+      status=1
+    fi
+  done < <(grep '^\[  SKIPPED \] .* ms)$' "$log" | sed 's/^\[  SKIPPED \] //; s/ ([0-9]* ms)$//' | sort -u)
+  return "$status"
+}
+
+# CTest counts programs; the cases in them, and which of those were skipped, are in its log.
 run_tests() {
   local preset=$1 log=build/$1/Testing/Temporary/LastTest.log status=0
   ctest --preset "$preset" --parallel "$jobs" || status=$?
-  local passed skipped failed
-  passed=$(grep -c '^\[       OK \]' "$log")
-  skipped=$(grep -c '^\[  SKIPPED \] .* ms)$' "$log")
-  failed=$(grep -c '^\[  FAILED  \] .* ms)$' "$log")
-  if [[ $skipped -gt 0 ]]; then
-    printf 'Skipped:\n'
-    grep '^\[  SKIPPED \] .* ms)$' "$log" | sed 's/^\[  SKIPPED \]/ /; s/ ([0-9]* ms)$//'
-  fi
-  summaries+=("$preset: $passed passed, $skipped skipped, $failed failed")
+  check_skips "$log" || status=1
+  summaries+=("$preset: $(grep -c '^\[       OK \]' "$log") passed, $(grep -c \
+    '^\[  FAILED  \] .* ms)$' "$log") failed, $(grep -c '^\[  SKIPPED \] .* ms)$' "$log") skipped")
   return "$status"
 }
 
-sources() { git ls-files '*.cpp' '*.hpp'; }
+build_and_test() { check "build $1" build "$1" && check "tests $1" run_tests "$1"; }
 
-format() { sources | xargs clang-format --dry-run -Werror; }
+format() { git ls-files '*.cpp' '*.hpp' | xargs clang-format --dry-run -Werror; }
 
 # clang-tidy on all sources, a target's at once: most of its time goes into the headers of the
-# libraries, which so are read once a target. The longest come first.
+# libraries, which so are read once a target. A target that passed is known by what it reads, and is
+# not looked at again until that changes.
 lint() {
+  local passed=${XDG_CACHE_HOME:-$HOME/.cache}/previzd/lint
+  mkdir -p "$passed"
   rm -rf build/lint
-  cmake --preset lint || return
-  cmake --build build/lint --target previz_render_shaders previz_tracer_shaders || return
+  cmake --preset lint --log-level=WARNING || return
+  cmake --build build/lint --target previz_render_shaders previz_tracer_shaders >/dev/null || return
   find build/lint -name 'unity_*.cxx' -print0 | xargs -0 ls -S |
-    xargs -P "$jobs" -I{} sh -c 'clang-tidy -quiet -p build/lint "$1" >"$1.log" 2>/dev/null' - {}
-  local status=$?
-  find build/lint -name 'unity_*.cxx.log' -exec cat {} + | grep -A5 -E 'error:|warning:'
-  return "$status"
+    xargs -P "$jobs" -I{} tests/lint_target.sh build/lint "$passed" {}
 }
 
 config/install-deps.sh || exit 1
 for name in "${steps[@]}"; do
   case $name in
-    release | asan)
-      check "build $name" build "$name" && check "tests $name" run_tests "$name"
-      ;;
+    release | asan | asan-all | tsan) build_and_test "$name" ;;
     format) check "format" format ;;
     lint) check "lint" lint ;;
+    soak) build release && check "soak" build/release/tests/soak/soak --minutes 30 ;;
     package | rig_vm) check "$name" "tests/$name/run.sh" ;;
     *)
-      echo "tests/run.sh: no step '$name'; release, asan, format, lint, package and rig_vm are" \
-        "allowed" >&2
+      echo "tests/run.sh: no step '$name'; allowed: full, or of release, asan, format, lint," \
+        "asan-all, tsan, soak, package and rig_vm" >&2
       exit 2
       ;;
   esac
 done
 
 printf '\n'
-for summary in "${summaries[@]:-}"; do [[ -n $summary ]] && printf '%s\n' "$summary"; done
+for line in "${costs[@]:-}" "${summaries[@]:-}"; do [[ -n $line ]] && printf '%s\n' "$line"; done
 if [[ ${#failures[@]} -eq 0 ]]; then
   printf 'tests/run.sh: PASSED in %d min (%s)\n' $(((SECONDS + 59) / 60)) "${steps[*]}"
 else

@@ -13,7 +13,7 @@
 #include "drivers/error.hpp"
 #include "tests/devices/devices.hpp"
 #include "tests/devices/private_network.hpp"
-#include "tests/unit/session_fixture.hpp"
+#include "tests/support/session_fixture.hpp"
 
 namespace previz::test {
 namespace {

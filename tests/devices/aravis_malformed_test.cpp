@@ -14,10 +14,10 @@
 #include "drivers/camera_drivers.hpp"
 #include "drivers/error.hpp"
 #include "tests/devices/private_network.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::test {
-namespace {
+namespace aravis_malformed_test {
 
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -179,5 +179,5 @@ TEST_F(AbsurdCamera, StreamCountersHavePlainNames) {
     EXPECT_THAT(name, testing::Not(HasSubstr("_")));
 }
 
-}  // namespace
+}  // namespace aravis_malformed_test
 }  // namespace previz::test

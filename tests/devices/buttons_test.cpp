@@ -23,7 +23,7 @@
 #include "tests/devices/uhid_pad.hpp"
 
 namespace previz {
-namespace {
+namespace buttons_test {
 
 using test::UhidPad;
 using testing::ElementsAre;
@@ -352,5 +352,5 @@ TEST(ButtonDevices, APadOfUhidPressedUnpluggedAndBack) {
   }
 }
 
-}  // namespace
+}  // namespace buttons_test
 }  // namespace previz

@@ -11,7 +11,7 @@
 #include "tests/devices/device_under_test.hpp"
 
 namespace previz::test {
-namespace {
+namespace camera_compliance_test {
 
 using std::chrono::milliseconds;
 using Clock = std::chrono::steady_clock;
@@ -266,5 +266,5 @@ std::string name_of(const testing::TestParamInfo<RegisteredDevice>& instance) {
 INSTANTIATE_TEST_SUITE_P(Drivers, CameraCompliance, testing::ValuesIn(devices(false)), name_of);
 INSTANTIATE_TEST_SUITE_P(Drivers, CameraUnplugged, testing::ValuesIn(devices(true)), name_of);
 
-}  // namespace
+}  // namespace camera_compliance_test
 }  // namespace previz::test

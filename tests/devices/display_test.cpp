@@ -41,7 +41,7 @@ extern "C" int drmSetClientCap(int card, std::uint64_t capability, std::uint64_t
 #endif
 
 namespace previz {
-namespace {
+namespace display_test {
 
 #ifdef PREVIZ_WITH_KMS
 drmModeModeInfo timing(int width, int height, int clock_khz, int total_width, int total_height,
@@ -302,5 +302,5 @@ INSTANTIATE_TEST_SUITE_P(Cards, KmsCable, testing::Values(true),
                          [](const auto&) { return std::string("Atomic"); });
 #endif
 
-}  // namespace
+}  // namespace display_test
 }  // namespace previz

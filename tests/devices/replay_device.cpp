@@ -4,7 +4,7 @@
 #include "drivers/faults.hpp"
 #include "drivers/replay/replay_camera.hpp"
 #include "tests/devices/devices.hpp"
-#include "tests/unit/session_fixture.hpp"
+#include "tests/support/session_fixture.hpp"
 
 namespace previz::test {
 namespace {

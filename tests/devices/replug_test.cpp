@@ -10,7 +10,7 @@
 #include "tests/devices/leftovers.hpp"
 
 namespace previz::test {
-namespace {
+namespace replug_test {
 
 using std::chrono::milliseconds;
 
@@ -88,5 +88,5 @@ std::vector<RegisteredDevice> devices_with_a_cable() {
 INSTANTIATE_TEST_SUITE_P(Drivers, Replugging, testing::ValuesIn(devices_with_a_cable()),
                          [](const auto& instance) { return std::string(instance.param.name); });
 
-}  // namespace
+}  // namespace replug_test
 }  // namespace previz::test

@@ -16,7 +16,7 @@
 #include "drivers/usb/usb.hpp"
 
 namespace previz::test {
-namespace {
+namespace usb_test {
 
 using std::chrono::milliseconds;
 
@@ -112,5 +112,5 @@ std::vector<std::string> drivers_of_usb_cameras() {
 INSTANTIATE_TEST_SUITE_P(Drivers, UsbCamera, testing::ValuesIn(drivers_of_usb_cameras()),
                          [](const auto& instance) { return instance.param; });
 
-}  // namespace
+}  // namespace usb_test
 }  // namespace previz::test

@@ -13,7 +13,7 @@
 #include "tests/devices/v4l2_fake_node.hpp"
 
 namespace previz::v4l2 {
-namespace {
+namespace v4l2_test {
 
 using std::chrono::milliseconds;
 using testing::HasSubstr;
@@ -376,5 +376,5 @@ TEST_F(V4l2Stream, ExposuresAreOnTheFramesThatSurelyHaveThem) {
   EXPECT_FALSE(camera_->set_exposure(-1, 1));
 }
 
-}  // namespace
+}  // namespace v4l2_test
 }  // namespace previz::v4l2

@@ -4,10 +4,10 @@
 #include <random>
 
 #include "shaders/accumulate.spv.h"
-#include "tests/unit/pixels_by_hand.hpp"
+#include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace accumulation_test {
 
 using render::Buffer;
 using render::Device;
@@ -157,7 +157,7 @@ void expect_exact_means(Next next) {
   EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
 }
 
-TEST(Accumulation, of_a_signal_over_eight_decades_is_exact) {
+TEST(Accumulation, OfASignalOverEightDecadesIsExact) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> decade(-4, 4);
   expect_exact_means([&] {
@@ -167,7 +167,7 @@ TEST(Accumulation, of_a_signal_over_eight_decades_is_exact) {
 }
 
 // Where running averages fail first: every sample nearly the same, in worlds nearly the same.
-TEST(Accumulation, of_a_steady_signal_is_exact) {
+TEST(Accumulation, OfASteadySignalIsExact) {
   std::mt19937 random(4);
   std::uniform_real_distribution<float> noise(0, 1e-3f);
   expect_exact_means([&] {
@@ -177,7 +177,7 @@ TEST(Accumulation, of_a_steady_signal_is_exact) {
 }
 
 // Samples that cannot be are counted and are black in both worlds; the others stay.
-TEST(Accumulation, counts_what_cannot_be) {
+TEST(Accumulation, CountsWhatCannotBe) {
   const float nan = std::nanf(""), inf = std::numeric_limits<float>::infinity();
   Accumulator accumulator(*shared_device());
   const auto grey = [](float value) { return gpu::vec4(value, value, value, 0); };
@@ -190,5 +190,5 @@ TEST(Accumulation, counts_what_cannot_be) {
   EXPECT_EQ(layers.diff[0].g, 0);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace accumulation_test
+}  // namespace previz::test

@@ -12,11 +12,11 @@
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/lighting/response.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/lighting_pictures.hpp"
-#include "tests/unit/pixels_by_hand.hpp"
+#include "tests/support/lighting_pictures.hpp"
+#include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::lighting {
-namespace {
+namespace camera_test {
 
 using test::fisheye_camera;
 using test::looking;
@@ -30,8 +30,8 @@ const ResponseCurve curves[] = {
 
 // Every code of 8 bits, and the ends of 16, through radiance and back at any exposure: without a
 // difference and with a covered pixel that shows the very radiance.
-TEST(ExtremeCamera, every_code_comes_back_through_the_composite) {
-  render::Denoiser denoiser(*testing::shared_device());
+TEST(ExtremeCamera, EveryCodeComesBackThroughTheComposite) {
+  render::Denoiser denoiser(*test::shared_device());
   for (const ResponseCurve& curve : curves) {
     for (const int bits : {8, 16}) {
       const int top = (1 << bits) - 1;
@@ -55,7 +55,7 @@ TEST(ExtremeCamera, every_code_comes_back_through_the_composite) {
           covered[i].mixed_low = gpu::vec4(low, low, low, 0);
         }
         const auto shown = [&](const std::vector<gpu::GpuPixel>& pixels, bool denoise) {
-          return testing::present(pixels, plate, response, exposure, denoiser, denoise, 1).samples;
+          return test::present(pixels, plate, response, exposure, denoiser, denoise, 1).samples;
         };
         SCOPED_TRACE(std::to_string(bits) + " bits, exposure " + std::to_string(exposure));
         EXPECT_EQ(shown(untouched, false), plate.samples);
@@ -68,7 +68,7 @@ TEST(ExtremeCamera, every_code_comes_back_through_the_composite) {
 
 // A bracket of two stops, all white or all black: the map is finite and what the least or the most
 // exposed frame can say, the report says over how much of the sky, and a note says it in words.
-TEST(ExtremeCamera, a_clipped_or_black_bracket_is_flagged) {
+TEST(ExtremeCamera, AClippedOrBlackBracketIsFlagged) {
   LightCameraCalibration camera = fisheye_camera();
   camera.world_from_camera = looking(0, 90);
   for (const double signal : {0.0, 1.0}) {
@@ -107,7 +107,7 @@ double cap_sr(double radius_rad) {
 // The disc of the sun, a million times its sky, which no bracket of a camera reaches: its flux is a
 // lower bound of white over the pixels that it touches, told with the solid angle and the exposure
 // that would be needed, and its direction is right.
-TEST(ExtremeCamera, a_sun_in_frame_is_a_told_lower_bound_in_the_right_direction) {
+TEST(ExtremeCamera, ASunInFrameIsAToldLowerBoundInTheRightDirection) {
   LightCameraCalibration camera = fisheye_camera();
   camera.world_from_camera = looking(0, 90);
   set::Lighting settings;
@@ -145,7 +145,7 @@ TEST(ExtremeCamera, a_sun_in_frame_is_a_told_lower_bound_in_the_right_direction)
 
 // A torch held into the lens, or a hand over it: the map is what can be said, the first note says
 // that the camera is blinded.
-TEST(ExtremeCamera, a_blinded_camera_is_told) {
+TEST(ExtremeCamera, ABlindedCameraIsTold) {
   const LightCameraCalibration camera = upward_camera();
   for (const double radiance : {1e5, 0.0}) {
     const test::Sky sky = [&](const glm::dvec3& d) {
@@ -165,7 +165,7 @@ TEST(ExtremeCamera, a_blinded_camera_is_told) {
 
 // Stated two stops off, an exposure contradicts its neighbours all over: the note names both, the
 // newest counts, and the scales are not mixed.
-TEST(ExtremeCamera, an_exposure_stated_two_stops_wrong_is_told) {
+TEST(ExtremeCamera, AnExposureStatedTwoStopsWrongIsTold) {
   const LightCameraCalibration camera = upward_camera();
   const test::Sky sky = [](const glm::dvec3& d) { return glm::dvec3(0.4 + 0.3 * d.z); };
   std::vector<FramePtr> bracket;
@@ -185,7 +185,7 @@ TEST(ExtremeCamera, an_exposure_stated_two_stops_wrong_is_told) {
   EXPECT_NEAR(lighting.environment.radiance[up].g, 0.7, 0.005);
 }
 
-TEST(ExtremeCamera, a_frame_of_another_size_is_refused_by_name) {
+TEST(ExtremeCamera, AFrameOfAnotherSizeIsRefusedByName) {
   const FramePtr frame = make_frame(3, 5, 1, std::vector<glm::dvec3>(15));
   try {
     estimate({&frame, 1}, upward_camera(), {});
@@ -196,5 +196,5 @@ TEST(ExtremeCamera, a_frame_of_another_size_is_refused_by_name) {
   }
 }
 
-}  // namespace
+}  // namespace camera_test
 }  // namespace previz::lighting

@@ -2,10 +2,10 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <numbers>
 
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace contact_test {
 
 constexpr int width = 64, height = 48;
 constexpr double albedo = 0.5;
@@ -67,7 +67,7 @@ void for_table_pixels(const View& view, const glm::dvec2& low, const glm::dvec2&
 }
 
 // The decal lies in the table's plane. Whichever comes first in the scene is seen, everywhere.
-TEST(Contact, of_two_faces_in_one_plane_one_wins_everywhere) {
+TEST(Contact, OfTwoFacesInOnePlaneOneWinsEverywhere) {
   for (const bool table_first : {true, false}) {
     for (const double turn : {0.0, 0.4}) {
       View view = table();
@@ -103,7 +103,7 @@ void expect_dark_before_box(const View& view, double top_m) {
   }
 }
 
-TEST(Contact, a_resting_box_casts_its_shadow_without_a_gap) {
+TEST(Contact, ARestingBoxCastsItsShadowWithoutAGap) {
   for (const double top : {0.4, 0.05}) {
     View view = table();
     add_virtual(view, box_mesh({0.4, 0.4, top}), {0, 0, top / 2});
@@ -111,7 +111,7 @@ TEST(Contact, a_resting_box_casts_its_shadow_without_a_gap) {
   }
 }
 
-TEST(Contact, an_interpenetrating_box_casts_its_shadow_without_a_gap) {
+TEST(Contact, AnInterpenetratingBoxCastsItsShadowWithoutAGap) {
   View view = table();
   add_virtual(view, box_mesh({0.4, 0.4, 0.4}), {0, 0, 0.1});
   expect_dark_before_box(view, 0.3);
@@ -119,7 +119,7 @@ TEST(Contact, an_interpenetrating_box_casts_its_shadow_without_a_gap) {
 
 // Two virtual boxes with all their faces in common, and one that reaches through both: the picture
 // is that of the first.
-TEST(Contact, twins_look_like_one) {
+TEST(Contact, TwinsLookLikeOne) {
   View one = table();
   add_virtual(one, box_mesh({0.4, 0.4, 0.4}), {0, 0, 0.2});
   View twins = one;
@@ -132,7 +132,7 @@ TEST(Contact, twins_look_like_one) {
 }
 
 // The same again and again: nothing depends on the order in which invocations run.
-TEST(Contact, is_deterministic) {
+TEST(Contact, IsDeterministic) {
   View view = table();
   add_virtual(view, box_mesh({0.4, 0.4, 0.4}), {0, 0, 0.1});
   add_virtual(view, uv_sphere_mesh(0.2, 24, 12), {0.15, -0.1, 0.1});
@@ -147,7 +147,7 @@ TEST(Contact, is_deterministic) {
 
 // In a closed virtual box that emits 1 and reflects a half, every pixel is covered and shows 2; in
 // the real world the camera sees past it.
-TEST(Contact, a_box_around_the_camera_covers_everything) {
+TEST(Contact, ABoxAroundTheCameraCoversEverything) {
   for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
     View view = table();
     scene::Material wall = diffuse(glm::vec3(0.5f));
@@ -167,7 +167,7 @@ TEST(Contact, a_box_around_the_camera_covers_everything) {
 }
 
 // Inside a ball of clear glass in a white environment all directions bring 1.
-TEST(Contact, a_glass_ball_around_the_camera_takes_nothing) {
+TEST(Contact, AGlassBallAroundTheCameraTakesNothing) {
   View view;
   view.world_from_camera = look_at({0.3, -0.2, 0.1}, {0, 1, 0.2});
   add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(1, 4)),
@@ -181,5 +181,5 @@ TEST(Contact, a_glass_ball_around_the_camera_takes_nothing) {
   for (const float mask : result.layers.mask) ASSERT_EQ(mask, 1.0f);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace contact_test
+}  // namespace previz::test

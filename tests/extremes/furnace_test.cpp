@@ -1,8 +1,8 @@
 // White furnaces at the ends of the materials' ranges: what goes in comes out, to 1e-3.
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace furnace_test {
 
 constexpr double energy = 1e-3;  // estimator.md's bound
 
@@ -30,12 +30,12 @@ void expect_reflectance(const scene::Material& material, double expected) {
   expect_clean(renderer.counters());
 }
 
-TEST(ExtremeFurnace, lambert_reflects_its_albedo) {
+TEST(ExtremeFurnace, LambertReflectsItsAlbedo) {
   for (const float albedo : {0.0f, 0.5f, 1.0f})
     expect_reflectance(diffuse(glm::vec3(albedo)), albedo);
 }
 
-TEST(ExtremeFurnace, a_white_mirror_takes_nothing) {
+TEST(ExtremeFurnace, AWhiteMirrorTakesNothing) {
   for (const float roughness : {0.0f, 1e-4f}) {
     SCOPED_TRACE(roughness);
     expect_reflectance(metal(glm::vec3(1), roughness), 1);
@@ -44,7 +44,7 @@ TEST(ExtremeFurnace, a_white_mirror_takes_nothing) {
 
 // The coat's Fresnel share and the rest for the white base: together 1. At an index of 1 there is
 // no coat, whatever its roughness.
-TEST(ExtremeFurnace, white_plastic_takes_nothing) {
+TEST(ExtremeFurnace, WhitePlasticTakesNothing) {
   for (const float roughness : {0.0f, 1e-4f}) {
     for (const float ior : {1.0001f, 2.5f}) {
       SCOPED_TRACE("ior " + std::to_string(ior) + ", roughness " + std::to_string(roughness));
@@ -54,7 +54,7 @@ TEST(ExtremeFurnace, white_plastic_takes_nothing) {
   expect_reflectance(plastic(glm::vec3(1), 1, 1), 1);
 }
 
-TEST(ExtremeFurnace, black_plastic_reflects_its_coat_alone) {
+TEST(ExtremeFurnace, BlackPlasticReflectsItsCoatAlone) {
   View view;
   const auto plane = add_mesh(view.scene, rectangle_mesh({2, 2}));
   add_instance(view.scene, plane, add_material(view.scene, plastic(glm::vec3(0), 0, 2.5f)));
@@ -67,7 +67,7 @@ TEST(ExtremeFurnace, black_plastic_reflects_its_coat_alone) {
 }
 
 // A slab and a ball, so that rays enter and leave at every angle.
-TEST(ExtremeFurnace, clear_glass_takes_nothing) {
+TEST(ExtremeFurnace, ClearGlassTakesNothing) {
   for (const float ior : {1.0f, 1.0001f, 1.5f, 2.5f}) {
     for (const bool thin : {false, true}) {
       for (const scene::Mesh& mesh : {box_mesh({4, 4, 0.5}), icosphere_mesh(1, 5)}) {
@@ -87,7 +87,7 @@ TEST(ExtremeFurnace, clear_glass_takes_nothing) {
 }
 
 // Opaque to what enters, so what is left is the outer reflection, at normal incidence f0.
-TEST(ExtremeFurnace, black_glass_reflects_its_surface_alone) {
+TEST(ExtremeFurnace, BlackGlassReflectsItsSurfaceAlone) {
   for (const float ior : {1.0f, 1.0001f, 2.5f}) {
     View view;
     scene::Material material = glass(ior);
@@ -106,7 +106,7 @@ TEST(ExtremeFurnace, black_glass_reflects_its_surface_alone) {
 
 // Inside a closed surface that emits 1 and reflects albedo a, the first hit and 64 bounces bring
 // 1 + a + a^2 + ... + a^64.
-TEST(ExtremeFurnace, sixty_four_bounces_add_up) {
+TEST(ExtremeFurnace, SixtyFourBouncesAddUp) {
   for (const float albedo : {0.0f, 0.5f, 1.0f}) {
     scene::Material wall = diffuse(glm::vec3(albedo));
     wall.emission = glm::vec3(1);
@@ -124,5 +124,5 @@ TEST(ExtremeFurnace, sixty_four_bounces_add_up) {
   }
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace furnace_test
+}  // namespace previz::test

@@ -3,11 +3,11 @@
 #include <numbers>
 
 #include "daemon/scene/bvh.hpp"
-#include "tests/unit/gltf_test.hpp"
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/gltf_test.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace geometry_test {
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
@@ -44,7 +44,7 @@ Rendered show(const View& view, int samples = 16) {
 
 // White slivers down to 1e-7 of their length, under a white sky: 1 everywhere, through no gap and
 // with no shadow of a triangle on itself.
-TEST(ExtremeGeometry, slivers_are_shaded_like_anything_else) {
+TEST(ExtremeGeometry, SliversAreShadedLikeAnythingElse) {
   std::vector<float> heights = {-1, -0.5f, -0.1f};
   for (float y = 1e-7f; y < 0.2f; y *= 2) heights.push_back(y);
   for (int i = 1; i < 400; ++i) heights.push_back(0.2f + 0.8f * static_cast<float>(i) / 400);
@@ -55,7 +55,7 @@ TEST(ExtremeGeometry, slivers_are_shaded_like_anything_else) {
 
 // The renderer's own guard, behind the loader's: triangles of no area, of no number and of no
 // vertex, lit and glowing, change no bit of the picture.
-TEST(ExtremeGeometry, what_cannot_be_traced_changes_no_bit) {
+TEST(ExtremeGeometry, WhatCannotBeTracedChangesNoBit) {
   for (const scene::Material& material :
        {diffuse(glm::vec3(0.5f)), emitter(glm::vec3(2)), glass(1.5f)}) {
     scene::Mesh clean = box_mesh({0.5, 0.5, 0.5});
@@ -93,7 +93,7 @@ TEST(ExtremeGeometry, what_cannot_be_traced_changes_no_bit) {
   }
 }
 
-TEST(ExtremeGeometry, a_scene_of_nothing_shows_the_light_around) {
+TEST(ExtremeGeometry, ASceneOfNothingShowsTheLightAround) {
   View view;
   scene::Mesh empty;
   add_instance(view.scene, add_mesh(view.scene, empty),
@@ -106,7 +106,7 @@ TEST(ExtremeGeometry, a_scene_of_nothing_shows_the_light_around) {
 
 // A million triangles that cover less than one pixel: its mask is the share they cover, and white
 // they show what is around.
-TEST(ExtremeGeometry, a_million_triangles_in_one_pixel) {
+TEST(ExtremeGeometry, AMillionTrianglesInOnePixel) {
   View view;
   const double distance = 5, radius = 0.003;
   view.calibration = pinhole(33, 33, 0.066);  // pixels of 1 cm there
@@ -132,7 +132,7 @@ TEST(ExtremeGeometry, a_million_triangles_in_one_pixel) {
 class GltfGeometry : public GltfTest {};
 
 // From the file to the picture: what is left out is counted in the notes, the rest is shown.
-TEST_F(GltfGeometry, bad_triangles_are_counted_and_the_rest_is_shown) {
+TEST_F(GltfGeometry, BadTrianglesAreCountedAndTheRestIsShown) {
   gltf.root(
       "a", gltf.mesh(
                {{"attributes",
@@ -158,5 +158,5 @@ TEST_F(GltfGeometry, bad_triangles_are_counted_and_the_rest_is_shown) {
   for (const float depth : result.layers.depth) EXPECT_GT(depth, 0);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace geometry_test
+}  // namespace previz::test

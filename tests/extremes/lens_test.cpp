@@ -3,10 +3,10 @@
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session_toml.hpp"
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace lens_test {
 
 // A glowing chequerboard of 8 x 8 fields, `distance` before the camera and as wide as the picture.
 View chequers(double distance) {
@@ -50,20 +50,20 @@ void expect_sharp(View view, const ThinLens& lens) {
       << "f/" << lens.f_number << " at " << lens.focus_distance_m << " m";
 }
 
-TEST(ExtremeLens, is_sharp_at_its_focus_from_a_centimetre_to_infinity) {
+TEST(ExtremeLens, IsSharpAtItsFocusFromACentimetreToInfinity) {
   expect_sharp(chequers(0.01), {0.005, 0.5, 0.01});
   expect_sharp(chequers(0.01), {0.005, 2, 0.01});
   expect_sharp(chequers(1), {0.05, 0.5, 1});
   expect_sharp(chequers(1e6), {0.05, 0.5, 1e6});
 }
 
-TEST(ExtremeLens, closed_down_is_the_pinhole) {
+TEST(ExtremeLens, ClosedDownIsThePinhole) {
   for (const double f_number : {1e6, 1e9, 1e30}) expect_sharp(chequers(1), {0.05, f_number, 0.3});
 }
 
 // Half a metre behind the focus of the widest lens, the circle of confusion covers several fields:
 // the board is grey, no darker and no brighter.
-TEST(ExtremeLens, wide_open_blurs_and_keeps_the_light) {
+TEST(ExtremeLens, WideOpenBlursAndKeepsTheLight) {
   View view = chequers(1);
   view.calibration.lens = ThinLens{0.5, 0.5, 0.6};
   const render::Layers layers = show(view);
@@ -91,7 +91,7 @@ std::string refusal_of_set(const std::string& lens) {
   return "";
 }
 
-TEST(ExtremeLens, impossible_values_are_refused_by_the_keys_name) {
+TEST(ExtremeLens, ImpossibleValuesAreRefusedByTheKeysName) {
   const std::string good = "focal_length_mm=35\nf_number=2.8\nfocus_distance_m=1\n";
   EXPECT_EQ(refusal_of_set(good), "");
   EXPECT_EQ(refusal_of_set("focal_length_mm=5\nf_number=0.5\nfocus_distance_m=0.01\n"), "");
@@ -133,7 +133,7 @@ std::string refusal_of_session(const ThinLens& lens) {
   return "";
 }
 
-TEST(ExtremeLens, a_sessions_impossible_lens_is_refused_too) {
+TEST(ExtremeLens, ASessionsImpossibleLensIsRefusedToo) {
   constexpr double inf = std::numeric_limits<double>::infinity();
   EXPECT_EQ(refusal_of_session({0.035, 2.8, 1}), "");
   EXPECT_EQ(refusal_of_session({0.005, 0.5, 0.01}), "");
@@ -151,5 +151,5 @@ TEST(ExtremeLens, a_sessions_impossible_lens_is_refused_too) {
         << value;
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace lens_test
+}  // namespace previz::test

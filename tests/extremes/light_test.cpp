@@ -1,10 +1,10 @@
 // Lamps of no size, lamps all around, lamps in an object or on it, and lamps drowned by others.
 #include <numbers>
 
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace light_test {
 
 constexpr double pi = std::numbers::pi;
 constexpr double albedo = 0.5;
@@ -23,7 +23,7 @@ void expect_irradiance(const View& view, double irradiance, double bias = 1e-3) 
 }
 
 // From a disc as wide as the hemisphere down to nothing, at the same irradiance.
-TEST(ExtremeLight, a_disc_brings_its_irradiance_at_any_angle) {
+TEST(ExtremeLight, ADiscBringsItsIrradianceAtAnyAngle) {
   for (const double radius : {pi / 2, 0.1, 1e-3, 1e-5, 1e-9, 1e-20, 0.0}) {
     SCOPED_TRACE(radius);
     View view = lit_point(albedo);
@@ -36,7 +36,7 @@ TEST(ExtremeLight, a_disc_brings_its_irradiance_at_any_angle) {
 
 // What a camera sees of a disc, integrated over the picture, is the irradiance the disc brings: its
 // edge is where it should be, however small it is. A camera ray is right to 1e-7.
-TEST(ExtremeLight, a_disc_looks_as_large_as_it_is) {
+TEST(ExtremeLight, ADiscLooksAsLargeAsItIs) {
   for (const double radius : {0.2, 4.65e-3, 1e-3, 1e-4}) {
     View view;
     view.environment = uniform_environment(glm::vec3(0));
@@ -62,7 +62,7 @@ TEST(ExtremeLight, a_disc_looks_as_large_as_it_is) {
   }
 }
 
-TEST(ExtremeLight, a_sphere_of_almost_no_size) {
+TEST(ExtremeLight, ASphereOfAlmostNoSize) {
   for (const double radius : {0.1, 1e-4, 1e-9, 1e-15}) {
     SCOPED_TRACE(radius);
     View view = lit_point(albedo);
@@ -75,7 +75,7 @@ TEST(ExtremeLight, a_sphere_of_almost_no_size) {
   }
 }
 
-TEST(ExtremeLight, a_rectangle_of_almost_no_size) {
+TEST(ExtremeLight, ARectangleOfAlmostNoSize) {
   for (const double side : {1e-2, 1e-6, 1e-12}) {
     SCOPED_TRACE(side);
     View view = lit_point(albedo);
@@ -89,7 +89,7 @@ TEST(ExtremeLight, a_rectangle_of_almost_no_size) {
 }
 
 // An area that single precision rounds to nothing is no light, and not one that fills the view.
-TEST(ExtremeLight, a_rectangle_of_no_size_is_not_seen) {
+TEST(ExtremeLight, ARectangleOfNoSizeIsNotSeen) {
   View view = lit_point(albedo);
   set::Light panel = lamp(set::LightType::rectangle);
   panel.position = {0, -0.1, 0.05};  // between the camera and what it looks at
@@ -101,7 +101,7 @@ TEST(ExtremeLight, a_rectangle_of_no_size_is_not_seen) {
 }
 
 // A closed lamp all around: every direction brings the same radiance.
-TEST(ExtremeLight, a_lamp_that_fills_the_sphere) {
+TEST(ExtremeLight, ALampThatFillsTheSphere) {
   View view = lit_point(albedo, 1);
   add_instance(view.scene, add_mesh(view.scene, inside_out(icosphere_mesh(5, 3))),
                add_material(view.scene, emitter(glm::vec3(2))));
@@ -109,7 +109,7 @@ TEST(ExtremeLight, a_lamp_that_fills_the_sphere) {
 }
 
 // Sphere lamps emit outwards: inside one there is no light, and no division by a negative angle.
-TEST(ExtremeLight, inside_a_sphere_lamp_it_is_dark) {
+TEST(ExtremeLight, InsideASphereLampItIsDark) {
   View view = lit_point(albedo, 1);
   set::Light bulb = lamp(set::LightType::sphere);
   bulb.radius_m = 5;
@@ -118,7 +118,7 @@ TEST(ExtremeLight, inside_a_sphere_lamp_it_is_dark) {
 }
 
 // Every kind of lamp in a closed opaque box: nothing comes out. In a glass ball: finite.
-TEST(ExtremeLight, inside_an_object) {
+TEST(ExtremeLight, InsideAnObject) {
   for (const auto type : {set::LightType::point, set::LightType::spot, set::LightType::rectangle,
                           set::LightType::sphere}) {
     for (const bool opaque : {true, false}) {
@@ -143,7 +143,7 @@ TEST(ExtremeLight, inside_an_object) {
 }
 
 // Exactly on the surface it would light, and exactly where the camera is.
-TEST(ExtremeLight, on_a_surface_and_in_the_lens) {
+TEST(ExtremeLight, OnASurfaceAndInTheLens) {
   for (const auto type : {set::LightType::point, set::LightType::spot, set::LightType::rectangle,
                           set::LightType::sphere}) {
     for (const glm::dvec3& place : {glm::dvec3(0), glm::dvec3(0, -1, 0.5)}) {
@@ -159,7 +159,7 @@ TEST(ExtremeLight, on_a_surface_and_in_the_lens) {
 
 // A faint lamp close by, in a stage whose sun has 1e11 times its power: half of the light here is
 // the lamp's, and it must not be forgotten when lights are chosen.
-TEST(ExtremeLight, a_candle_is_not_drowned_by_a_sun) {
+TEST(ExtremeLight, ACandleIsNotDrownedByASun) {
   View view = lit_point(albedo);
   glm::dmat4 far(1);
   for (const double x : {-1e3, 1e3}) {
@@ -176,7 +176,7 @@ TEST(ExtremeLight, a_candle_is_not_drowned_by_a_sun) {
   expect_irradiance(view, 2);
 }
 
-TEST(ExtremeLight, black_lamps_light_nothing) {
+TEST(ExtremeLight, BlackLampsLightNothing) {
   View view = lit_point(albedo);
   for (const auto type : {set::LightType::point, set::LightType::directional,
                           set::LightType::rectangle, set::LightType::sphere}) {
@@ -189,5 +189,5 @@ TEST(ExtremeLight, black_lamps_light_nothing) {
   EXPECT_EQ(mean(show(view, 4).mixed), glm::dvec3(0));
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace light_test
+}  // namespace previz::test

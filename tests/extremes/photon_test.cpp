@@ -1,10 +1,10 @@
 // Photons after a million passes, photons that never arrive, and radii of nothing.
 #include "daemon/render/device.hpp"
 #include "daemon/render/photon_schedule.hpp"
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace photon_test {
 
 // A diffuse floor with a glass ball over it under a lamp.
 View caustic_set() {
@@ -35,7 +35,7 @@ set::Estimation photons_of_radius(double pixels) {
 
 // The product of the rule's steps is Gamma(n + 5/3) / (Gamma(5/3) Gamma(n + 2)), which a million
 // and ten million multiplications confirm; it neither reaches 0 nor stops shrinking.
-TEST(ExtremePhotons, the_radius_after_a_million_passes_is_the_rules) {
+TEST(ExtremePhotons, TheRadiusAfterAMillionPassesIsTheRules) {
   double squared = 1;
   double last = 1;
   for (std::uint64_t pass = 1; pass <= 10'000'000; ++pass) {
@@ -54,7 +54,7 @@ TEST(ExtremePhotons, the_radius_after_a_million_passes_is_the_rules) {
 
 // What a million passes leave of the radius, and what is left after far more: finite, even where no
 // disc holds a photon any more.
-TEST(ExtremePhotons, a_shrunk_radius_is_finite) {
+TEST(ExtremePhotons, AShrunkRadiusIsFinite) {
   const View view = caustic_set();
   for (const double shrunk : {0.1, 1e-6, 1e-30}) {
     const render::Layers layers = render_clean(view, 8, photons_of_radius(2 * shrunk)).layers;
@@ -65,7 +65,7 @@ TEST(ExtremePhotons, a_shrunk_radius_is_finite) {
 
 // A tenth of the radius finds a hundredth of the photons in each disc, and no less light in all.
 // What is still blurred over the picture's edge is the same by four standard errors over the seeds.
-TEST(ExtremePhotons, a_smaller_radius_loses_no_light) {
+TEST(ExtremePhotons, ASmallerRadiusLosesNoLight) {
   const View view = caustic_set();
   constexpr int seeds = 6;
   double sum = 0, squares = 0;
@@ -87,7 +87,7 @@ TEST(ExtremePhotons, a_smaller_radius_loses_no_light) {
 
 // The lamp shines away from all glass, or is black, or the ball is where no photon can reach it:
 // nothing is stored, nothing is divided by it.
-TEST(ExtremePhotons, none_stored_is_no_caustic) {
+TEST(ExtremePhotons, NoneStoredIsNoCaustic) {
   View away = caustic_set();
   away.scene.lights[0].type = set::LightType::spot;
   away.scene.lights[0].direction = {0, 0, 1};
@@ -109,5 +109,5 @@ TEST(ExtremePhotons, none_stored_is_no_caustic) {
             render_view(hidden, 4, none).layers.mixed);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace photon_test
+}  // namespace previz::test

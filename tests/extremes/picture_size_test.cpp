@@ -2,10 +2,10 @@
 // allocated.
 #include "daemon/render/picture_memory.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace picture_size_test {
 
 constexpr std::uint64_t gib = 1ull << 30;
 
@@ -62,21 +62,21 @@ void expect_shown(int width, int height) {
   EXPECT_GT(covered, 0u);
 }
 
-TEST(PictureSize, of_one_pixel_and_of_odd_sides) {
+TEST(PictureSize, OfOnePixelAndOfOddSides) {
   for (const auto& [width, height] : {std::pair(1, 1), std::pair(1, 17), std::pair(17, 1),
                                       std::pair(7, 5), std::pair(33, 9), std::pair(101, 67)})
     expect_shown(width, height);
 }
 
 // Rows as long as the largest camera's, and columns as high: bands of whole rows still fit.
-TEST(PictureSize, of_eight_thousand_by_a_few) {
+TEST(PictureSize, OfEightThousandByAFew) {
   expect_shown(8192, 5);
   expect_shown(5, 4320);
 }
 
 // 8192x4320 is 35.4 million pixels of 144 bytes and a ray of 8, and 2.1 million of a band of 108:
 // 5.6 GB.
-TEST(PictureSize, of_8192x4320_fits_or_is_refused) {
+TEST(PictureSize, Of8192x4320FitsOrIsRefused) {
   const std::uint64_t texels = 1u << 27;
   EXPECT_EQ(refusal(8192, 4320, {.bytes = 8 * gib, .texels = texels}), "");
   const std::string no_memory = refusal(8192, 4320, {.bytes = 4 * gib, .texels = texels});
@@ -91,7 +91,7 @@ TEST(PictureSize, of_8192x4320_fits_or_is_refused) {
 }
 
 // More than any Vulkan device can address: refused at once, though a set file may ask for it.
-TEST(PictureSize, of_more_than_the_device_holds_is_refused_by_the_renderer) {
+TEST(PictureSize, OfMoreThanTheDeviceHoldsIsRefusedByTheRenderer) {
   for (const auto& [width, height] : {std::pair(65535, 65535), std::pair(0, 10)}) {
     try {
       const render::Renderer renderer(shared_device(), {}, pinhole(width, height, 0.5));
@@ -102,5 +102,5 @@ TEST(PictureSize, of_more_than_the_device_holds_is_refused_by_the_renderer) {
   }
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace picture_size_test
+}  // namespace previz::test

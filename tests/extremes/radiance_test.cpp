@@ -3,10 +3,10 @@
 #include <numbers>
 
 #include "shaders/lib/octahedral.h"
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace radiance_test {
 
 View lit_set() {
   RandomScene options;
@@ -32,7 +32,7 @@ render::Layers show(const View& view) {
   return render_clean(view, 8, up_to_depth(6)).layers;
 }
 
-TEST(Radiance, by_a_power_of_two_scales_every_bit) {
+TEST(Radiance, ByAPowerOfTwoScalesEveryBit) {
   const View view = lit_set();
   const render::Layers plain = show(view);
   for (const float factor : {0x1p-20f, 0x1p20f}) {
@@ -44,7 +44,7 @@ TEST(Radiance, by_a_power_of_two_scales_every_bit) {
   }
 }
 
-TEST(Radiance, by_a_million_and_a_millionth_scales_the_picture) {
+TEST(Radiance, ByAMillionAndAMillionthScalesThePicture) {
   const View view = lit_set();
   const render::Layers plain = show(view);
   for (const float factor : {1e-6f, 1e6f}) {
@@ -57,7 +57,7 @@ TEST(Radiance, by_a_million_and_a_millionth_scales_the_picture) {
 
 // An albedo that is no number, and one below nothing, which no loader lets through: every sample
 // they spoil is counted, none is dropped in silence, and the picture stays finite.
-TEST(Radiance, that_cannot_be_is_counted) {
+TEST(Radiance, ThatCannotBeIsCounted) {
   for (const float albedo : {std::nanf(""), -0.5f}) {
     View view;
     add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({20, 20})),
@@ -96,7 +96,7 @@ double bump_irradiance() {
   return sum * 4 * std::numbers::pi / (sun_map * sun_map) / (steps * steps);
 }
 
-TEST(Radiance, of_a_sun_a_million_times_its_sky_is_unbiased_and_so_is_the_sky) {
+TEST(Radiance, OfASunAMillionTimesItsSkyIsUnbiasedAndSoIsTheSky) {
   for (const float sun : {1.0f, 1e6f}) {
     View view;
     add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({2, 2})),
@@ -113,5 +113,5 @@ TEST(Radiance, of_a_sun_a_million_times_its_sky_is_unbiased_and_so_is_the_sky) {
   }
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace radiance_test
+}  // namespace previz::test

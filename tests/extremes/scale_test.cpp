@@ -4,10 +4,10 @@
 #include <numbers>
 #include <numeric>
 
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace scale_test {
 
 // Every material, a lens, lamps with and without an extent, and glass that casts a caustic.
 View rich_set() {
@@ -75,7 +75,7 @@ void expect_same(const render::Layers& a, const render::Layers& b) {
 
 // Nothing in the renderer may know how large a metre is: times a power of two, every product and
 // every sum rounds as it did, and no bit changes.
-TEST(Scale, by_a_power_of_two_changes_no_bit) {
+TEST(Scale, ByAPowerOfTwoChangesNoBit) {
   const View view = rich_set();
   const render::Layers plain = show(view).layers;
   for (const double factor : {1.0 / 1024, 1024.0}) {
@@ -88,7 +88,7 @@ TEST(Scale, by_a_power_of_two_changes_no_bit) {
   }
 }
 
-TEST(Scale, by_a_thousand_and_a_thousandth_shows_the_same) {
+TEST(Scale, ByAThousandAndAThousandthShowsTheSame) {
   const View view = rich_set();
   const render::Layers plain = show(view).layers;
   for (const double factor : {1e-3, 1e3}) {
@@ -99,13 +99,13 @@ TEST(Scale, by_a_thousand_and_a_thousandth_shows_the_same) {
 
 // GPU space is relative to the camera, subtracted in double precision: 1 km away, what is left of
 // a position is right to 1e-13 m.
-TEST(Scale, a_kilometre_from_the_origin_shows_the_same) {
+TEST(Scale, AKilometreFromTheOriginShowsTheSame) {
   const View view = rich_set();
   expect_same(show(resized(view, 1, {700, -600, 400})).layers, show(view).layers);
 }
 
 // Inside a closed black-lit box with bright light all around it: what is not black has leaked.
-TEST(Scale, nothing_leaks_into_a_closed_box_of_any_size) {
+TEST(Scale, NothingLeaksIntoAClosedBoxOfAnySize) {
   View view;
   view.scene = furnace_box({2, 1.7, 1.3}, diffuse(glm::vec3(0.9f)));
   view.environment = uniform_environment(glm::vec3(1e6f));
@@ -120,7 +120,7 @@ TEST(Scale, nothing_leaks_into_a_closed_box_of_any_size) {
 }
 
 // A sun two degrees above the horizon: where a surface shadows itself, a pixel is dark.
-TEST(Scale, no_surface_of_any_size_shadows_itself) {
+TEST(Scale, NoSurfaceOfAnySizeShadowsItself) {
   View view;
   add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({40, 40})),
                add_material(view.scene, diffuse(glm::vec3(0.5f))),
@@ -146,5 +146,5 @@ TEST(Scale, no_surface_of_any_size_shadows_itself) {
   }
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace scale_test
+}  // namespace previz::test

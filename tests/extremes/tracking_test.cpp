@@ -5,10 +5,10 @@
 #include <cmath>
 #include <cstdio>
 
-#include "tests/unit/tracking_fixture.hpp"
+#include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking {
-namespace {
+namespace tracking_test {
 
 // One small tag seen nearly face on, at many tilts: both poses explain it. Whatever is tracked must
 // be the true one; the rest must say so and hold the truth among their candidates.
@@ -131,5 +131,5 @@ TEST(ExtremeTracking, DetectionLimit) {
   EXPECT_EQ(status, TrackStatus::lost);
 }
 
-}  // namespace
+}  // namespace tracking_test
 }  // namespace previz::tracking

@@ -13,11 +13,11 @@
 
 #include "daemon/scene/scene.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/gltf_writer.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/gltf_writer.hpp"
+#include "tests/support/temporary_directory.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace gltf_mutation_test {
 
 using Json = GltfWriter::Json;
 
@@ -281,5 +281,5 @@ TEST_F(GltfMutations, OfEveryTruncation) {
   EXPECT_EQ(loaded_, 0);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace gltf_mutation_test
+}  // namespace previz::test

@@ -11,7 +11,7 @@
 #include "drivers/error.hpp"
 
 namespace previz::set {
-namespace {
+namespace set_fuzz_test {
 
 const std::string file = "folder/stage.toml";
 
@@ -209,5 +209,5 @@ TEST(SetFuzz, DeepNestingIsAProblem) {
   EXPECT_THROW(parse_set(text, file), Error);
 }
 
-}  // namespace
+}  // namespace set_fuzz_test
 }  // namespace previz::set

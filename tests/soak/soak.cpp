@@ -24,9 +24,9 @@
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
 #include "tests/devices/leftovers.hpp"
-#include "tests/unit/crewed_rig.hpp"
-#include "tests/unit/small_take.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/crewed_rig.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz {
 namespace {

@@ -9,7 +9,7 @@
 #include "tests/truth/cpu_random.hpp"
 
 namespace previz::truth {
-namespace {
+namespace agreement_test {
 
 // Every pixel 1 +- 0.2 (uniform noise), 160x128 = 10x8 blocks; `bias` is added to one channel of
 // the blocks whose index is below `biased_blocks`.
@@ -82,5 +82,5 @@ TEST(Agreement, TailsOfTheDistributions) {
   EXPECT_EQ(binomial_quantile(80, 3.8e-4, 0.999), 1);
 }
 
-}  // namespace
+}  // namespace agreement_test
 }  // namespace previz::truth

@@ -10,7 +10,7 @@
 #include "tests/truth/cpu_random.hpp"
 
 namespace previz::truth {
-namespace {
+namespace compare_test {
 
 // 32x24: 4x3 blocks. The mask covers x >= 20: block columns 0 and 1 are uncovered, 2 is the edge,
 // 3 is covered. Lr = 0.2; where uncovered Lm = 0.1 (D = -0.1), where covered Lm = 0.4.
@@ -215,5 +215,5 @@ TEST(Bounds, AllowTheTruthsNoiseAndNameWhatIsViolated) {
   EXPECT_THROW(bounds_named("loose"), Error);
 }
 
-}  // namespace
+}  // namespace compare_test
 }  // namespace previz::truth

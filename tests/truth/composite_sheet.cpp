@@ -10,12 +10,12 @@
 #include "daemon/set/names.hpp"
 #include "tests/truth/compare.hpp"
 #include "tests/truth/comparison_sheet.hpp"
-#include "tests/unit/scenes.hpp"
+#include "tests/support/scenes.hpp"
 
 namespace previz::truth {
 namespace {
 
-using namespace previz::testing;
+using namespace previz::test;
 
 constexpr int width = 240, height = 160;
 constexpr double white = 2;  // of the sensor

@@ -12,30 +12,30 @@
 #include "tests/truth/cpu_bsdf.hpp"
 #include "tests/truth/cpu_camera.hpp"
 #include "tests/truth/cpu_environment.hpp"
-#include "tests/unit/scenes.hpp"
+#include "tests/support/scenes.hpp"
 
 namespace previz::truth {
-namespace {
+namespace cpu_tracer_test {
 
-using testing::diffuse;
-using testing::emitter;
-using testing::glass;
-using testing::look_at;
-using testing::metal;
-using testing::plastic;
+using test::diffuse;
+using test::emitter;
+using test::glass;
+using test::look_at;
+using test::metal;
+using test::plastic;
 
 constexpr double pi = std::numbers::pi;
 const glm::dvec3 eye(0.3, -1.0, 1.5);
 
 std::uint32_t add(scene::Scene& scene, scene::Mesh mesh, const scene::Material& material) {
-  const std::uint32_t mesh_index = testing::add_mesh(scene, std::move(mesh));
-  return testing::add_instance(scene, mesh_index, testing::add_material(scene, material));
+  const std::uint32_t mesh_index = test::add_mesh(scene, std::move(mesh));
+  return test::add_instance(scene, mesh_index, test::add_material(scene, material));
 }
 
 // A parallelogram around `centre` that faces cross(half_u, half_v).
 std::uint32_t add_quad(scene::Scene& scene, const glm::vec3& centre, const glm::vec3& half_u,
                        const glm::vec3& half_v, const scene::Material& material) {
-  scene::Mesh mesh = testing::rectangle_mesh({2, 2});
+  scene::Mesh mesh = test::rectangle_mesh({2, 2});
   for (glm::vec3& p : mesh.positions) p = centre + p.x * half_u + p.y * half_v;
   mesh.normals.assign(4, glm::normalize(glm::cross(half_u, half_v)));
   return add(scene, std::move(mesh), material);
@@ -44,7 +44,7 @@ std::uint32_t add_quad(scene::Scene& scene, const glm::vec3& centre, const glm::
 // A sphere around the origin of 2 n segments and n rings.
 std::uint32_t add_sphere(scene::Scene& scene, double radius, int n,
                          const scene::Material& material) {
-  return add(scene, testing::uv_sphere_mesh(radius, 2 * n, n), material);
+  return add(scene, test::uv_sphere_mesh(radius, 2 * n, n), material);
 }
 
 lighting::EnvironmentMap constant_environment(const glm::vec3& radiance, int size = 4) {
@@ -52,7 +52,7 @@ lighting::EnvironmentMap constant_environment(const glm::vec3& radiance, int siz
 }
 
 ObserverCalibration pinhole(int width, int height, double focal_px) {
-  return testing::pinhole(width, height, 2 * std::atan(0.5 * width / focal_px));
+  return test::pinhole(width, height, 2 * std::atan(0.5 * width / focal_px));
 }
 
 ObserverCalibration one_pixel() {
@@ -448,5 +448,5 @@ TEST(CpuTracer, ScaleAndPlaceChangeNothing) {
   }
 }
 
-}  // namespace
+}  // namespace cpu_tracer_test
 }  // namespace previz::truth

@@ -10,10 +10,10 @@
 #include "tests/truth/cpu_camera.hpp"
 #include "tests/truth/cpu_tracer.hpp"
 #include "tests/truth/truth_set.hpp"
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace renderer_agreement_test {
 
 constexpr int scrambles = 16;
 
@@ -118,7 +118,7 @@ class RandomSets : public ::testing::TestWithParam<std::uint32_t> {
   }
 };
 
-TEST_P(RandomSets, agree_with_the_cpu_tracer) {
+TEST_P(RandomSets, AgreeWithTheCpuTracer) {
   expect_agreement(view(), 32, true);
 }
 
@@ -141,7 +141,7 @@ View alone(View view, std::uint32_t world) {
 class SeparateRenders : public RandomSets {};
 INSTANTIATE_TEST_SUITE_P(Seeds, SeparateRenders, ::testing::Values(2u, 5u));
 
-TEST_P(SeparateRenders, show_what_one_run_shows) {
+TEST_P(SeparateRenders, ShowWhatOneRunShows) {
   const Worlds pair = gpu_scrambles(view(), 32, true, 1000);
   const Worlds mixed = gpu_scrambles(alone(view(), scene::world_mixed), 32, true, 2000);
   const Worlds real = gpu_scrambles(alone(view(), scene::world_real), 32, true, 3000);
@@ -217,14 +217,14 @@ View rough_materials() {
   return view;
 }
 
-TEST(RoughMaterials, agree_with_the_cpu_tracer) {
+TEST(RoughMaterials, AgreeWithTheCpuTracer) {
   expect_agreement(rough_materials(), 32, true);
 }
 
 // The difference estimator against the paired one: by the difference where nothing covers the
 // picture, and by the composite over black everywhere. Lamps differ between the worlds in every
 // other set, objects are taken away in the rest.
-TEST_P(RandomSets, have_the_same_difference_by_both_estimators) {
+TEST_P(RandomSets, HaveTheSameDifferenceByBothEstimators) {
   expect_same_difference(view(), 16, true);
 }
 
@@ -234,7 +234,7 @@ TEST_P(RandomSets, have_the_same_difference_by_both_estimators) {
 class CameraSets : public RandomSets {};
 INSTANTIATE_TEST_SUITE_P(Seeds, CameraSets, ::testing::Values(2u, 3u));  // lamps; a lens, a removed
 
-TEST_P(CameraSets, have_the_same_composite_by_the_camera) {
+TEST_P(CameraSets, HaveTheSameCompositeByTheCamera) {
   View view = RandomSets::view();
   view.calibration.response.kind = ResponseCurve::Kind::linear;
   for (scene::Instance& instance : view.scene.instances)
@@ -308,14 +308,14 @@ View truth_view(const std::filesystem::path& directory) {
 
 class TruthScenes : public ::testing::TestWithParam<std::string> {};
 
-TEST_P(TruthScenes, agree_with_the_cpu_tracer) {
+TEST_P(TruthScenes, AgreeWithTheCpuTracer) {
   const auto directory = truth_directory(GetParam());
   if (!std::filesystem::exists(directory / "set.json"))
     GTEST_SKIP() << "no ground truth set at " << directory;
   expect_agreement(truth_view(directory), 32, false);
 }
 
-TEST_P(TruthScenes, have_the_same_difference_by_both_estimators) {
+TEST_P(TruthScenes, HaveTheSameDifferenceByBothEstimators) {
   const auto directory = truth_directory(GetParam());
   if (!std::filesystem::exists(directory / "set.json"))
     GTEST_SKIP() << "no ground truth set at " << directory;
@@ -325,5 +325,5 @@ TEST_P(TruthScenes, have_the_same_difference_by_both_estimators) {
 INSTANTIATE_TEST_SUITE_P(Sets, TruthScenes, ::testing::Values("glass", "desk", "statues"),
                          [](const auto& set) { return set.param; });
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace renderer_agreement_test
+}  // namespace previz::test

@@ -13,7 +13,7 @@
 #include "tests/truth/tracking_photographs.hpp"
 
 namespace previz::truth {
-namespace {
+namespace tracking_truth_test {
 
 namespace fs = std::filesystem;
 
@@ -101,5 +101,5 @@ TEST(TrackingPhotographs, Video) {
   EXPECT_EQ(result.tracked, result.frames);
 }
 
-}  // namespace
+}  // namespace tracking_truth_test
 }  // namespace previz::truth

@@ -14,7 +14,7 @@
 #include "tests/truth/truth_take.hpp"
 
 namespace previz::truth {
-namespace {
+namespace truth_set_test {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
@@ -190,5 +190,5 @@ TEST_F(ChangedSet, ItsSetFileIsOneTheParserTakes) {
   }
 }
 
-}  // namespace
+}  // namespace truth_set_test
 }  // namespace previz::truth

@@ -5,7 +5,7 @@
 #include "drivers/error.hpp"
 
 namespace previz {
-namespace {
+namespace bracket_test {
 
 using std::chrono::milliseconds;
 
@@ -66,5 +66,5 @@ TEST(Bracket, AnExposureThatIsRefusedIsToldOnce) {
   EXPECT_EQ(troubles, 1);
 }
 
-}  // namespace
+}  // namespace bracket_test
 }  // namespace previz

@@ -10,10 +10,10 @@
 #include "daemon/scene/bvh_binary.hpp"
 #include "shaders/lib/shared.h"
 #include "tests/bench/tracers/shapes.hpp"
-#include "tests/unit/bvh_decode.hpp"
+#include "tests/support/bvh_decode.hpp"
 
 namespace previz::scene {
-namespace {
+namespace bvh_build_test {
 
 using test::DecodedRecord;
 
@@ -308,5 +308,5 @@ TEST(BvhTop, BoundsOfATurnedBoxHoldItsCorners) {
   EXPECT_NEAR(box.high.z, 31, 1e-5);
 }
 
-}  // namespace
+}  // namespace bvh_build_test
 }  // namespace previz::scene

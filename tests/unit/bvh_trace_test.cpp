@@ -8,10 +8,10 @@
 #include "tests/bench/tracers/embree_tracer.hpp"
 #include "tests/bench/tracers/gpu_tracer.hpp"
 #include "tests/bench/tracers/shapes.hpp"
-#include "tests/unit/bvh_precision.hpp"
+#include "tests/support/bvh_precision.hpp"
 
 namespace previz::test {
-namespace {
+namespace bvh_trace_test {
 
 using bench::Ray;
 using bench::TracedHit;
@@ -375,5 +375,5 @@ TEST_F(BvhTrace, EmptySlotsDoNotMatterHoweverFarTheRay) {
   expect_agreement(device(), bench::scene_of(mesh), rays, scene::world_both, 0.001);
 }
 
-}  // namespace
+}  // namespace bvh_trace_test
 }  // namespace previz::test

@@ -14,10 +14,10 @@
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "tests/truth/truth_take.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::calibrate {
-namespace {
+namespace calibrate_balance_test {
 
 namespace fs = std::filesystem;
 
@@ -164,5 +164,5 @@ TEST_F(TruthBalance, TheAlbedoOfAGuessedSurfaceIsFound) {
     EXPECT_NEAR(estimate.albedo[c], truth[c], 0.05 * truth[c] + 3 * estimate.sigma[c]);
 }
 
-}  // namespace
+}  // namespace calibrate_balance_test
 }  // namespace previz::calibrate

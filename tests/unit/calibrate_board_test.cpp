@@ -8,10 +8,10 @@
 #include "daemon/calibrate/board.hpp"
 #include "daemon/calibrate/board_finder.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/tracking_synthetic.hpp"
+#include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::calibrate {
-namespace {
+namespace calibrate_board_test {
 
 std::string problem(const std::string& text) {
   try {
@@ -161,5 +161,5 @@ TEST(BoardFinder, AprilgridCornersHaveTheirIds) {
   }
 }
 
-}  // namespace
+}  // namespace calibrate_board_test
 }  // namespace previz::calibrate

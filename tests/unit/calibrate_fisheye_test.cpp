@@ -14,11 +14,11 @@
 #include "daemon/lighting/fisheye.hpp"
 #include "daemon/set/print.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/calibrate_pictures.hpp"
-#include "tests/unit/tracking_synthetic.hpp"
+#include "tests/support/calibrate_pictures.hpp"
+#include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::calibrate {
-namespace {
+namespace calibrate_fisheye_test {
 
 using test::degree;
 
@@ -276,5 +276,5 @@ TEST(LightPose, OneTagIsNotEnough) {
   }
 }
 
-}  // namespace
+}  // namespace calibrate_fisheye_test
 }  // namespace previz::calibrate

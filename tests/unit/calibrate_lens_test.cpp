@@ -9,7 +9,7 @@
 #include "drivers/error.hpp"
 
 namespace previz::calibrate {
-namespace {
+namespace calibrate_lens_test {
 
 // A 35 mm lens focused at 1.2 m before a sensor 24 mm wide: its image stands at
 // v = f d / (d - f) = 36.0515... mm.
@@ -95,5 +95,5 @@ TEST(ThinLensFit, WritesTheTableThatASetFileTakes) {
   EXPECT_EQ(set.observer.calibration->lens->focus_distance_m, 1.2);
 }
 
-}  // namespace
+}  // namespace calibrate_lens_test
 }  // namespace previz::calibrate

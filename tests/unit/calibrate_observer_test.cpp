@@ -13,10 +13,10 @@
 #include "daemon/set/set.hpp"
 #include "daemon/tracking/lens.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/calibrate_pictures.hpp"
+#include "tests/support/calibrate_pictures.hpp"
 
 namespace previz::calibrate {
-namespace {
+namespace calibrate_observer_test {
 
 using test::Held;
 
@@ -239,5 +239,5 @@ TEST(ObserverCalibration, PlotsEveryCorner) {
   EXPECT_EQ(count("a<b>"), 0u);
 }
 
-}  // namespace
+}  // namespace calibrate_observer_test
 }  // namespace previz::calibrate

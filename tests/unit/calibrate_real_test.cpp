@@ -16,7 +16,7 @@
 #include "daemon/calibrate/source.hpp"
 
 namespace previz::calibrate {
-namespace {
+namespace calibrate_real_test {
 
 namespace fs = std::filesystem;
 
@@ -166,5 +166,5 @@ TEST(RealFisheye, PlaneSeenBeyond90Degrees) {
   expect_fisheye("ov_plane", 0.60);
 }
 
-}  // namespace
+}  // namespace calibrate_real_test
 }  // namespace previz::calibrate

@@ -14,10 +14,10 @@
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::calibrate {
-namespace {
+namespace calibrate_response_test {
 
 namespace fs = std::filesystem;
 
@@ -234,5 +234,5 @@ TEST(RealResponse, PredictsAnExposureThatWasLeftOut) {
   EXPECT_LT(film.error_codes, 8);
 }
 
-}  // namespace
+}  // namespace calibrate_response_test
 }  // namespace previz::calibrate

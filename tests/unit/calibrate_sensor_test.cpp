@@ -8,12 +8,12 @@
 #include "daemon/calibrate/vignetting_fit.hpp"
 #include "daemon/lighting/fisheye.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/lighting_pictures.hpp"
+#include "tests/support/lighting_pictures.hpp"
 
 namespace previz::calibrate {
-namespace {
+namespace calibrate_sensor_test {
 
-using lighting::test::degree;
+using test::degree;
 
 class Pictures final : public PictureSource {
  public:
@@ -54,7 +54,7 @@ Pictures dark_pictures(double leak, double add = 0) {
       if (p % size < size / 4 && p / size < size / 4) signal += leak;
       signals.push_back(signal);
     }
-    frames.push_back(lighting::test::make_frame(size, size, 1, signals));
+    frames.push_back(test::make_frame(size, size, 1, signals));
   }
   return Pictures(std::move(frames));
 }
@@ -85,7 +85,7 @@ TEST(DarkFit, ALensThatIsNotCoveredIsRefused) {
 const Vignetting lens_loss = {-0.12, 0.015, -0.004};
 
 LightCameraCalibration camera() {
-  LightCameraCalibration camera = lighting::test::fisheye_camera(256);
+  LightCameraCalibration camera = test::fisheye_camera(256);
   camera.dark_level = {0.01, 0.02, 0.015};
   return camera;
 }
@@ -104,7 +104,7 @@ FramePtr flat_picture(double brightness, const glm::dvec2& gradient, const Vigne
                 relative_illumination(loss, std::acos(std::min(ray->z, 1.0)));
       signals.push_back(light * glm::dvec3(1, 0.8, 0.6) + lens_of.dark_level);
     }
-  return lighting::test::make_frame(lens_of.intrinsics.width, lens_of.intrinsics.height, 1,
+  return test::make_frame(lens_of.intrinsics.width, lens_of.intrinsics.height, 1,
                                     signals);
 }
 
@@ -128,7 +128,7 @@ TEST(VignettingFit, TheLensIsToldFromTheLight) {
 
 TEST(VignettingFit, PicturesThatCannotBeUsedAreLeftOutAndTold) {
   std::vector<glm::dvec3> signals(64 * 64, glm::dvec3(0.5));
-  Pictures source({lighting::test::make_frame(64, 64, 1, signals), flat_picture(5, {}, {})});
+  Pictures source({test::make_frame(64, 64, 1, signals), flat_picture(5, {}, {})});
   std::vector<std::string> notes;
   std::vector<FlatPicture> pictures_seen = read_flat_pictures(source, camera(), notes);
   ASSERT_EQ(notes.size(), 2u);
@@ -144,5 +144,5 @@ TEST(VignettingFit, ALensThatLetsNothingThroughIsRefused) {
   EXPECT_THROW(fit_vignetting(pictures_seen, 110 * degree), Error);
 }
 
-}  // namespace
+}  // namespace calibrate_sensor_test
 }  // namespace previz::calibrate

@@ -6,7 +6,7 @@
 #include <CLI/CLI.hpp>
 
 namespace previz {
-namespace {
+namespace command_line_test {
 
 post::RenderOptions render_options(const std::string& arguments) {
   CLI::App app;
@@ -35,5 +35,5 @@ TEST(CommandLine, SaysBothSidesOfAChoice) {
   EXPECT_EQ(render_options("--noisy").denoise, false);
 }
 
-}  // namespace
+}  // namespace command_line_test
 }  // namespace previz

@@ -14,10 +14,10 @@
 #include <thread>
 #include <vector>
 
-#include "tests/unit/private_bus.hpp"
+#include "tests/support/private_bus.hpp"
 
 namespace previz::control {
-namespace {
+namespace control_bus_test {
 
 struct Said {
   std::string out;
@@ -164,5 +164,5 @@ TEST(RigWithoutABus, SaysSo) {
   unsetenv("DBUS_SYSTEM_BUS_ADDRESS");
 }
 
-}  // namespace
+}  // namespace control_bus_test
 }  // namespace previz::control

@@ -13,7 +13,7 @@
 #include "drivers/convert/convert.hpp"
 
 namespace previz::convert {
-namespace {
+namespace convert_jpeg_test {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -128,5 +128,5 @@ TEST(Mjpeg, DamageDoesNoHarm) {
   }
 }
 
-}  // namespace
+}  // namespace convert_jpeg_test
 }  // namespace previz::convert

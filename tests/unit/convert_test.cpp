@@ -11,7 +11,7 @@
 #include "daemon/lighting/response.hpp"
 
 namespace previz::convert {
-namespace {
+namespace convert_test {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -409,5 +409,5 @@ TEST(DeepSamples, KeepTheirBitsUpToTheLinearFloatPicture) {
   }
 }
 
-}  // namespace
+}  // namespace convert_test
 }  // namespace previz::convert

@@ -15,11 +15,11 @@
 
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
-#include "tests/unit/session_fixture.hpp"
-#include "tests/unit/small_take.hpp"
+#include "tests/support/session_fixture.hpp"
+#include "tests/support/small_take.hpp"
 
 namespace previz {
-namespace {
+namespace daemon_death_test {
 
 using session::content_of;
 
@@ -139,5 +139,5 @@ TEST(DaemonDeath, OnAFullDiskTheTakeEndsReadableAndTheDaemonGoesOn) {
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << daemon.log();
 }
 
-}  // namespace
+}  // namespace daemon_death_test
 }  // namespace previz

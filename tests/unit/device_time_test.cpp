@@ -7,7 +7,7 @@
 #include "drivers/exposure_ledger.hpp"
 
 namespace previz {
-namespace {
+namespace device_time_test {
 
 constexpr std::int64_t ms = 1'000'000, second = 1000 * ms;
 
@@ -94,5 +94,5 @@ TEST(ExposureLedger, ADeviceThatSettlesAtOnce) {
   EXPECT_EQ(ledger.of_frame(12), bright);
 }
 
-}  // namespace
+}  // namespace device_time_test
 }  // namespace previz

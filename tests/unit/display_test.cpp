@@ -12,7 +12,7 @@
 #include "drivers/headless/headless_display.hpp"
 
 namespace previz {
-namespace {
+namespace display_test {
 
 using gles::place;
 using gles::Rectangle;
@@ -253,5 +253,5 @@ TEST(DisplayLifeline, OpensWaitsBacksOffAndOpensAgain) {
   EXPECT_EQ(cable.opened, 2);
 }
 
-}  // namespace
+}  // namespace display_test
 }  // namespace previz

@@ -6,10 +6,10 @@
 
 #include "drivers/error.hpp"
 #include "drivers/replay/replay_camera.hpp"
-#include "tests/unit/session_fixture.hpp"
+#include "tests/support/session_fixture.hpp"
 
 namespace previz {
-namespace {
+namespace faults_test {
 
 using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
@@ -159,5 +159,5 @@ TEST(FaultPlan, MistakesAreQuoted) {
   }
 }
 
-}  // namespace
+}  // namespace faults_test
 }  // namespace previz

@@ -8,7 +8,7 @@
 #include "drivers/frame.hpp"
 
 namespace previz {
-namespace {
+namespace frame_conversion_test {
 
 Frame frame_of(PixelFormat format, int width, int height, std::vector<std::uint8_t> bytes) {
   Frame frame;
@@ -117,5 +117,5 @@ TEST(Frame, WrongLengthIsRefused) {
   EXPECT_THROW(to_plate(frame_of(PixelFormat::rgb8, 2, 2, {1, 2, 3})), Error);
 }
 
-}  // namespace
+}  // namespace frame_conversion_test
 }  // namespace previz

@@ -5,10 +5,10 @@
 
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
-#include "tests/unit/import_fixture.hpp"
+#include "tests/support/import_fixture.hpp"
 
 namespace previz::exchange {
-namespace {
+namespace import_description_test {
 
 using namespace std::string_literals;
 
@@ -295,5 +295,5 @@ TEST(ImportDescription, WhatIsNotJsonIsAnError) {
   EXPECT_THROW(import_session({folder.path() / "absent.json", folder.path() / "take"}), Error);
 }
 
-}  // namespace
+}  // namespace import_description_test
 }  // namespace previz::exchange

@@ -5,10 +5,10 @@
 
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
-#include "tests/unit/import_fixture.hpp"
+#include "tests/support/import_fixture.hpp"
 
 namespace previz::exchange {
-namespace {
+namespace import_footage_test {
 
 std::unique_ptr<session::StreamReader> open(const Shoot& shoot, const std::string& source) {
   session::Session opened = session::open_session(shoot.session());
@@ -280,5 +280,5 @@ TEST(Import, TransparencyIsAnErrorUnlessThereIsNone) {
   EXPECT_EQ(shoot.error(), "");
 }
 
-}  // namespace
+}  // namespace import_footage_test
 }  // namespace previz::exchange

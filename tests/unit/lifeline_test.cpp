@@ -7,10 +7,10 @@
 
 #include "drivers/error.hpp"
 #include "drivers/replay/replay_camera.hpp"
-#include "tests/unit/session_fixture.hpp"
+#include "tests/support/session_fixture.hpp"
 
 namespace previz {
-namespace {
+namespace lifeline_test {
 
 using std::chrono::milliseconds;
 using Kind = Fault::Kind;
@@ -256,5 +256,5 @@ TEST_F(LifelineTest, ExposuresAndCountersOutliveAnOpening) {
   EXPECT_EQ(lifeline.counters().at("frames cut short"), 6u);
 }
 
-}  // namespace
+}  // namespace lifeline_test
 }  // namespace previz

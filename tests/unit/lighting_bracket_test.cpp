@@ -9,10 +9,10 @@
 #include <random>
 
 #include "daemon/lighting/hdr.hpp"
-#include "tests/unit/lighting_pictures.hpp"
+#include "tests/support/lighting_pictures.hpp"
 
 namespace previz::lighting {
-namespace {
+namespace lighting_bracket_test {
 
 const ResponseCurve linear_curve{.kind = ResponseCurve::Kind::linear, .inverse_table = {}};
 constexpr double wall_radiance = 0.3, lamp_radiance = 500;
@@ -229,5 +229,5 @@ TEST(Disagreements, AMovingLampIsNone) {
   EXPECT_TRUE(disagreements(Bracket(bracket.frames, linear_curve, {})).empty());
 }
 
-}  // namespace
+}  // namespace lighting_bracket_test
 }  // namespace previz::lighting

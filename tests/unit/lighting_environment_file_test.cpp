@@ -17,11 +17,11 @@
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/lighting/preview.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/lighting_pictures.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/lighting_pictures.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::lighting {
-namespace {
+namespace lighting_environment_file_test {
 
 using std::numbers::pi;
 using test::towards;
@@ -242,5 +242,5 @@ TEST(LoadEnvironment, PrintsItsTime) {
   std::printf("1024x512 to %d x %d: %.0f ms\n", map.size, map.size, time.count());
 }
 
-}  // namespace
+}  // namespace lighting_environment_file_test
 }  // namespace previz::lighting

@@ -8,10 +8,10 @@
 
 #include "daemon/lighting/lighting.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/lighting_pictures.hpp"
+#include "tests/support/lighting_pictures.hpp"
 
 namespace previz::lighting {
-namespace {
+namespace lighting_estimate_test {
 
 using std::numbers::pi;
 using test::degree;
@@ -308,5 +308,5 @@ TEST(Estimate, RefusesFramesAndPosesThatDoNotFit) {
   EXPECT_THROW(estimate({}, camera, {}), Error);  // no frame
 }
 
-}  // namespace
+}  // namespace lighting_estimate_test
 }  // namespace previz::lighting

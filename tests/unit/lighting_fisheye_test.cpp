@@ -7,10 +7,10 @@
 #include <numbers>
 
 #include "drivers/error.hpp"
-#include "tests/unit/lighting_pictures.hpp"
+#include "tests/support/lighting_pictures.hpp"
 
 namespace previz::lighting {
-namespace {
+namespace lighting_fisheye_test {
 
 using std::numbers::pi;
 using test::degree;
@@ -130,5 +130,5 @@ TEST(Fisheye, RefusesImpossibleIntrinsics) {
   EXPECT_THROW(Fisheye{intrinsics}, Error);
 }
 
-}  // namespace
+}  // namespace lighting_fisheye_test
 }  // namespace previz::lighting

@@ -9,10 +9,10 @@
 
 #include "daemon/lighting/response.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/lighting_pictures.hpp"
+#include "tests/support/lighting_pictures.hpp"
 
 namespace previz::lighting {
-namespace {
+namespace lighting_hdr_test {
 
 using test::make_frame;
 
@@ -163,5 +163,5 @@ TEST(MergeExposures, RefusesWhatCannotBeUsed) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace lighting_hdr_test
 }  // namespace previz::lighting

@@ -17,7 +17,7 @@
 #include "daemon/lighting/hdr.hpp"
 
 namespace previz::lighting {
-namespace {
+namespace lighting_memorial_test {
 
 std::filesystem::path memorial_directory() {
   const char* named = std::getenv("PREVIZ_SHARED");
@@ -131,5 +131,5 @@ TEST(MergeExposures, MatchesThePublishedMapOfRealExposures) {
   EXPECT_LT(p90, 0.25);
 }
 
-}  // namespace
+}  // namespace lighting_memorial_test
 }  // namespace previz::lighting

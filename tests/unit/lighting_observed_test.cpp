@@ -11,10 +11,10 @@
 #include "daemon/lighting/response.hpp"
 #include "daemon/tracking/lens.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/lighting_pictures.hpp"
+#include "tests/support/lighting_pictures.hpp"
 
 namespace previz::lighting {
-namespace {
+namespace lighting_observed_test {
 
 using test::degree;
 
@@ -142,5 +142,5 @@ TEST(UnseenObserver, FillsWhatItSawAndContinuesTheEdgeElsewhere) {
       << lighting.report.notes.back();
 }
 
-}  // namespace
+}  // namespace lighting_observed_test
 }  // namespace previz::lighting

@@ -9,7 +9,7 @@
 #include "drivers/error.hpp"
 
 namespace previz::lighting {
-namespace {
+namespace lighting_response_test {
 
 ResponseCurve gamma_curve(double gamma) {
   return {.kind = ResponseCurve::Kind::gamma, .gamma = gamma, .inverse_table = {}};
@@ -98,5 +98,5 @@ TEST(Response, RefusesWhatCannotRoundTrip) {
   EXPECT_NE(message_of({}, 17).find("1 to 16"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace lighting_response_test
 }  // namespace previz::lighting

@@ -9,10 +9,10 @@
 
 #include "daemon/lighting/lighting.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/lighting_pictures.hpp"
+#include "tests/support/lighting_pictures.hpp"
 
 namespace previz::lighting {
-namespace {
+namespace lighting_room_test {
 
 using std::numbers::pi;
 using test::degree;
@@ -153,5 +153,5 @@ TEST(Parallax, AUniformRoomIsUniform) {
   }
 }
 
-}  // namespace
+}  // namespace lighting_room_test
 }  // namespace previz::lighting

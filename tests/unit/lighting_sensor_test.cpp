@@ -7,10 +7,10 @@
 
 #include "daemon/lighting/expansion.hpp"
 #include "daemon/lighting/lighting.hpp"
-#include "tests/unit/lighting_pictures.hpp"
+#include "tests/support/lighting_pictures.hpp"
 
 namespace previz::lighting {
-namespace {
+namespace lighting_sensor_test {
 
 using test::degree;
 
@@ -119,5 +119,5 @@ TEST(Estimate, ExpandsWhatOneExposureClipsAndSaysSo) {
   EXPECT_GT(added, 19 * white * lamp_sr * 0.75);
 }
 
-}  // namespace
+}  // namespace lighting_sensor_test
 }  // namespace previz::lighting

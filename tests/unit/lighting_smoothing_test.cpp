@@ -6,7 +6,7 @@
 #include <random>
 
 namespace previz::lighting {
-namespace {
+namespace lighting_smoothing_test {
 
 constexpr int picture_side = 64, picture_pixels = picture_side * picture_side;
 constexpr float pixel_sigma = 0.01f;
@@ -139,5 +139,5 @@ TEST(Smoothing, APictureOfAnotherSizeStartsAnew) {
   EXPECT_EQ(small.radiance[0], glm::vec3(3));
 }
 
-}  // namespace
+}  // namespace lighting_smoothing_test
 }  // namespace previz::lighting

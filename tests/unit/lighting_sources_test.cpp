@@ -12,10 +12,12 @@
 #include "daemon/lighting/light_mode.hpp"
 #include "daemon/lighting/source_tracker.hpp"
 #include "shaders/lib/octahedral.h"
-#include "tests/unit/lighting_pictures.hpp"
+#include "tests/support/lighting_pictures.hpp"
 
-namespace previz::lighting::test {
-namespace {
+namespace previz::lighting {
+namespace lighting_sources_test {
+
+using namespace previz::test;
 
 constexpr double pi = std::numbers::pi;
 
@@ -373,5 +375,5 @@ TEST(LightMode, HybridAndBlurredKeepTheFluxAndImageChangesNothing) {
   }
 }
 
-}  // namespace
-}  // namespace previz::lighting::test
+}  // namespace lighting_sources_test
+}  // namespace previz::lighting

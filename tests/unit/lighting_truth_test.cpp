@@ -9,7 +9,7 @@
 #include "tests/truth/lighting_measure.hpp"
 
 namespace previz::truth {
-namespace {
+namespace lighting_truth_test {
 
 constexpr double degree = std::numbers::pi / 180;
 
@@ -71,5 +71,5 @@ TEST(CapturedLight, MatchesTheSharedSets) {
     if (std::filesystem::exists(entry.path() / "set.json")) expect_captured(entry.path());
 }
 
-}  // namespace
+}  // namespace lighting_truth_test
 }  // namespace previz::truth

@@ -11,10 +11,10 @@
 #include "daemon/manual/pages.hpp"
 #include "daemon/set/actions.hpp"
 #include "daemon/set/table.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::manual {
-namespace {
+namespace manual_test {
 
 using test::TemporaryDirectory;
 using testing::Contains;
@@ -135,5 +135,5 @@ TEST(BashCompletion, AsksPrevizctlForTheActions) {
   for (const char* action : set::action_names()) EXPECT_THAT(offers, Contains(action));
 }
 
-}  // namespace
+}  // namespace manual_test
 }  // namespace previz::manual

@@ -16,16 +16,16 @@
 #include "daemon/post/render.hpp"
 #include "daemon/rig/live.hpp"
 #include "drivers/session/session.hpp"
-#include "tests/unit/crewed_rig.hpp"
-#include "tests/unit/gltf_writer.hpp"
-#include "tests/unit/temporary_directory.hpp"
-#include "tests/unit/tracking_synthetic.hpp"
+#include "tests/support/crewed_rig.hpp"
+#include "tests/support/gltf_writer.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tests/support/tracking_synthetic.hpp"
 
 namespace previz {
-namespace {
+namespace moving_test {
 
 using pipeline::Shot;
-using Json = testing::GltfWriter::Json;
+using Json = test::GltfWriter::Json;
 
 constexpr int frames = 4;
 constexpr int without_stick = 2;  // the frame in which it is out of the picture
@@ -62,7 +62,7 @@ Frame picture(int index) {
 
 // A square of this side, facing up, of a matt grey; `animated`: going along X and back each second.
 void write_square(const std::filesystem::path& file, float side_m, float height_m, bool animated) {
-  testing::GltfWriter gltf;
+  test::GltfWriter gltf;
   const float s = side_m / 2;
   const int positions =
       gltf.positions({{-s, height_m, s}, {s, height_m, s}, {s, height_m, -s}, {-s, height_m, -s}});
@@ -272,5 +272,5 @@ TEST_F(MovingTake, IsRenderedAsItWasShown) {
   EXPECT_GT(last_s, first_s);
 }
 
-}  // namespace
+}  // namespace moving_test
 }  // namespace previz

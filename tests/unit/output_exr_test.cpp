@@ -16,10 +16,10 @@
 
 #include "daemon/output/file.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::output {
-namespace {
+namespace output_exr_test {
 
 using test::TemporaryDirectory;
 
@@ -184,5 +184,5 @@ TEST(WriteWhole, LeavesNothingWhenTheWriterThrows) {
   EXPECT_FALSE(std::filesystem::exists(unfinished_name(directory / "a.txt")));
 }
 
-}  // namespace
+}  // namespace output_exr_test
 }  // namespace previz::output

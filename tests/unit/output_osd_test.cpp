@@ -9,7 +9,7 @@
 #include "drivers/error.hpp"
 
 namespace previz::output {
-namespace {
+namespace output_osd_test {
 
 OsdPage busy_page() {
   return {
@@ -125,5 +125,5 @@ TEST(Font, WidthGrowsWithTheTextAndAnyBytesAreDrawn) {
   EXPECT_GT(font.draw("\xff\xfe\x80 not UTF-8").width, 0);
 }
 
-}  // namespace
+}  // namespace output_osd_test
 }  // namespace previz::output

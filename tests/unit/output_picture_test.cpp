@@ -8,10 +8,10 @@
 #include "daemon/output/video.hpp"
 #include "drivers/av.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::output {
-namespace {
+namespace output_picture_test {
 
 using test::TemporaryDirectory;
 
@@ -156,5 +156,5 @@ TEST(Video, WrongSizeAndTimeGoingBackAreRefusedAndLeaveNoFile) {
   EXPECT_TRUE(std::filesystem::is_empty(directory.path()));
 }
 
-}  // namespace
+}  // namespace output_picture_test
 }  // namespace previz::output

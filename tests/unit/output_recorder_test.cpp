@@ -12,10 +12,10 @@
 
 #include "drivers/bracket.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/session_fixture.hpp"
+#include "tests/support/session_fixture.hpp"
 
 namespace previz::output {
-namespace {
+namespace output_recorder_test {
 
 using session::is_frame;
 using session::mentions;
@@ -410,5 +410,5 @@ TEST(RecorderDeath, AKilledProcessLosesLessThanASecond) {
   EXPECT_TRUE(mentions(session::open_session(directory / "12A_take001").missing, "not closed"));
 }
 
-}  // namespace
+}  // namespace output_recorder_test
 }  // namespace previz::output

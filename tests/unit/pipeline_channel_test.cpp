@@ -9,7 +9,7 @@
 #include <vector>
 
 namespace previz::pipeline {
-namespace {
+namespace pipeline_channel_test {
 
 TEST(Mailbox, KeepsTheNewestAndCountsTheRest) {
   Mailbox<int> mailbox;
@@ -99,5 +99,5 @@ TEST(Channel, AbandoningWakesAReader) {
   reader.join();
 }
 
-}  // namespace
+}  // namespace pipeline_channel_test
 }  // namespace previz::pipeline

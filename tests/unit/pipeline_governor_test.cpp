@@ -9,7 +9,7 @@
 #include <set>
 
 namespace previz::pipeline {
-namespace {
+namespace pipeline_governor_test {
 
 constexpr double fps = 25, frame_s = 1 / fps;
 
@@ -118,5 +118,5 @@ TEST(Governor, IgnoresTimesThatAreNone) {
   EXPECT_EQ(governor.samples(), samples);
 }
 
-}  // namespace
+}  // namespace pipeline_governor_test
 }  // namespace previz::pipeline

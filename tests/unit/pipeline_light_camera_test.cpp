@@ -13,14 +13,14 @@
 #include "daemon/pipeline/light_stage.hpp"
 #include "drivers/bracket.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/gltf_writer.hpp"
-#include "tests/unit/lighting_pictures.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/gltf_writer.hpp"
+#include "tests/support/lighting_pictures.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::pipeline {
-namespace {
+namespace pipeline_light_camera_test {
 
-using lighting::test::degree;
+using test::degree;
 
 constexpr int picture_size = 64;
 constexpr std::int64_t frame_ns = 40'000'000;
@@ -33,8 +33,8 @@ ObserverCalibration film_camera() {
 }
 
 LightCameraCalibration light_camera() {
-  LightCameraCalibration camera = lighting::test::fisheye_camera(picture_size);
-  camera.world_from_camera = lighting::test::looking(0, 90);
+  LightCameraCalibration camera = test::fisheye_camera(picture_size);
+  camera.world_from_camera = test::looking(0, 90);
   camera.world_from_camera[3] = glm::dvec4(0, 0, 0, 1);
   return camera;
 }
@@ -68,7 +68,7 @@ class Studio {
         signals.push_back(signal);
       }
     }
-    Frame frame = *lighting::test::make_frame(picture_size, picture_size, exposure, signals);
+    Frame frame = *test::make_frame(picture_size, picture_size, exposure, signals);
     frame.sequence = taken_;
     frame.timestamp_ns = static_cast<std::int64_t>(taken_++) * frame_ns;
     return std::make_shared<Frame>(std::move(frame));
@@ -136,7 +136,7 @@ TEST(LightStage, FramesThatCannotBeUsedAreLeftOutAndToldAndTheLightStays) {
   Studio studio;
   LightStage stage(plain_set(), light_camera(), film_camera());
   EXPECT_EQ(stage.light(), nullptr);
-  Frame small = *lighting::test::make_frame(8, 8, 1, std::vector<glm::dvec3>(64));
+  Frame small = *test::make_frame(8, 8, 1, std::vector<glm::dvec3>(64));
   small.sequence = 77;
   const FramePtr wrong = std::make_shared<Frame>(small);
   stage.see(wrong, 0);
@@ -182,17 +182,17 @@ TEST(LightStage, FillsFromTheFilmCamera) {
   view.height = 30;
   view.exposure = 2;
   view.bytes.assign(frame_bytes(view.format, 40, 30), 188);  // sRGB: a signal of 0.503
-  stage.see_observer(view, lighting::test::looking(0, -60));
+  stage.see_observer(view, test::looking(0, -60));
   EXPECT_EQ(stage.light(), nullptr);  // the film camera alone is no light
   stage.see(studio.photograph(1), 0);
   const lighting::EnvironmentMap& map = stage.light()->lighting.environment;
-  const auto below = lighting::texel_index(map.size, glm::vec3(lighting::test::towards(0, -60)));
+  const auto below = lighting::texel_index(map.size, glm::vec3(test::towards(0, -60)));
   EXPECT_NEAR(map.radiance[below].g, 0.503 / 2, 0.001);
 }
 
 TEST(LightStage, TheRoomIsABoxOrAFileAndHoldsTheCamera) {
   const test::TemporaryDirectory folder;
-  testing::GltfWriter gltf;  // a wall at x = 2, facing -x; glTF's Y is the world's Z
+  test::GltfWriter gltf;  // a wall at x = 2, facing -x; glTF's Y is the world's Z
   const int positions = gltf.positions({{2, -9, -9}, {2, -9, 9}, {2, 9, 9}, {2, 9, -9}});
   const int indices = gltf.indices({0, 1, 2, 0, 2, 3});
   gltf.root("wall", gltf.mesh({{"attributes", {{"POSITION", positions}}}, {"indices", indices}}));
@@ -276,5 +276,5 @@ TEST(LightFeed, TheEstimateTakesAllThatWaits) {
   for (std::size_t i = 0; i < taken.size(); ++i) EXPECT_EQ(taken[i], i);
 }
 
-}  // namespace
+}  // namespace pipeline_light_camera_test
 }  // namespace previz::pipeline

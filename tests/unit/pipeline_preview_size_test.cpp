@@ -8,11 +8,11 @@
 
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/take.hpp"
-#include "tests/unit/small_take.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::pipeline {
-namespace {
+namespace pipeline_preview_size_test {
 
 const ResponseCurve srgb{};
 const ResponseCurve linear{ResponseCurve::Kind::linear, 1, {}};
@@ -178,5 +178,5 @@ TEST(PreviewSize, AVirtualObjectStandsWhereItStandsInThePlate) {
   EXPECT_NEAR(in_half.centre.y, in_full.centre.y, 4 * 0.026 / 18);
 }
 
-}  // namespace
+}  // namespace pipeline_preview_size_test
 }  // namespace previz::pipeline

@@ -7,16 +7,16 @@
 #include "daemon/pipeline/light_stage.hpp"
 #include "daemon/pipeline/track_stage.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/lighting_pictures.hpp"
+#include "tests/support/lighting_pictures.hpp"
 
 namespace previz::pipeline {
-namespace {
+namespace pipeline_sources_test {
 
-using lighting::test::degree;
-using lighting::test::towards;
+using test::degree;
+using test::towards;
 
 LightCameraCalibration small_fisheye() {
-  LightCameraCalibration camera = lighting::test::fisheye_camera(128);
+  LightCameraCalibration camera = test::fisheye_camera(128);
   camera.world_from_camera[3] = {0.1, 0.2, 0.3, 1};
   return camera;
 }
@@ -29,7 +29,7 @@ FramePtr light_frame(const std::vector<glm::dvec3>& lamps, std::uint64_t sequenc
       if (glm::dot(direction, lamp) > std::cos(4 * degree)) return glm::dvec3(40, 35, 25);
     return glm::dvec3(0.2);
   };
-  Frame frame = *lighting::test::photograph(small_fisheye(), sky, exposure);
+  Frame frame = *test::photograph(small_fisheye(), sky, exposure);
   frame.sequence = sequence;
   frame.timestamp_ns = 40'000'000 * static_cast<std::int64_t>(sequence);
   return std::make_shared<Frame>(std::move(frame));
@@ -153,5 +153,5 @@ TEST(SourceStage, TheSetsOwnLightNeedsNoCamera) {
   EXPECT_EQ(total_flux(stage.light()->lighting.environment), glm::dvec3(0));
 }
 
-}  // namespace
+}  // namespace pipeline_sources_test
 }  // namespace previz::pipeline

@@ -11,7 +11,7 @@
 #include "daemon/pipeline/metrics.hpp"
 
 namespace previz::pipeline {
-namespace {
+namespace pipeline_stages_test {
 
 // Counts up to `total`; with a move-only value, as shots are moved and never copied.
 auto count_to(int total) {
@@ -164,5 +164,5 @@ TEST(Metrics, OldLatenciesLeaveTheWindow) {
   EXPECT_EQ(metrics.snapshot(1).latency_p99_s, 0.5);
 }
 
-}  // namespace
+}  // namespace pipeline_stages_test
 }  // namespace previz::pipeline

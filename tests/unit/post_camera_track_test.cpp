@@ -10,7 +10,7 @@
 #include "drivers/error.hpp"
 
 namespace previz::exchange {
-namespace {
+namespace post_camera_track_test {
 
 // At (1, 2, 3), level, looking along the world's +Y: right = X, down = -Z, forward = Y.
 const glm::dmat4 along_y{{1, 0, 0, 0}, {0, 0, -1, 0}, {0, 1, 0, 0}, {1, 2, 3, 1}};
@@ -121,5 +121,5 @@ TEST(CameraTrack, FramesThatWereNotTrackedHaveNoKey) {
   EXPECT_THROW(camera_track(session, frames, {}), Error);
 }
 
-}  // namespace
+}  // namespace post_camera_track_test
 }  // namespace previz::exchange

@@ -9,10 +9,10 @@
 #include "daemon/tracking/apriltag_tracker.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::post {
-namespace {
+namespace post_check_test {
 
 // One triangle (0,0,0) (1,0,0) (0,1,0); `material` is a glTF material's body.
 std::string triangle(const std::string& material) {
@@ -192,5 +192,5 @@ TEST_F(Check, LoadsTheRoom) {
             0);
 }
 
-}  // namespace
+}  // namespace post_check_test
 }  // namespace previz::post

@@ -6,7 +6,7 @@
 #include <sstream>
 
 namespace previz::output {
-namespace {
+namespace post_progress_test {
 
 TEST(Progress, DurationsReadLikeAClock) {
   EXPECT_EQ(duration_words(-1), "0 s");
@@ -52,5 +52,5 @@ TEST(ShareProgress, TellsTheShareOfTheWorkAndTheTimeLeft) {
             "\r\x1b[Kreference (25 %, 30 s left)\r\x1b[Kreference (25 %, 30 s left)\n");
 }
 
-}  // namespace
+}  // namespace post_progress_test
 }  // namespace previz::output

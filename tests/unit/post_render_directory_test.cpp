@@ -9,10 +9,10 @@
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::post {
-namespace {
+namespace post_render_directory_test {
 
 constexpr const char* settings =
     R"({"samples": 16, "set": "a text that is too long to be repeated in an error message, as sets are"})";
@@ -161,5 +161,5 @@ TEST(FrameRange, ReadsWhatTheHelpSays) {
     EXPECT_THROW(parse_frame_range(wrong), Error) << wrong;
 }
 
-}  // namespace
+}  // namespace post_render_directory_test
 }  // namespace previz::post

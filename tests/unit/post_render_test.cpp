@@ -15,11 +15,11 @@
 #include "daemon/pipeline/preview_size.hpp"
 #include "daemon/rig/live.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/small_take.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::post {
-namespace {
+namespace post_render_test {
 
 using test::small_take_frame;
 using test::small_take_frames;
@@ -316,5 +316,5 @@ TEST_F(RenderSession, LiveStopsWhenAsked) {
   EXPECT_GT(rig::run_live(options, out_).stages.at("display").frames, 0u);
 }
 
-}  // namespace
+}  // namespace post_render_test
 }  // namespace previz::post

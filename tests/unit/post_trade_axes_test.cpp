@@ -8,7 +8,7 @@
 #include "drivers/error.hpp"
 
 namespace previz::trade {
-namespace {
+namespace post_trade_axes_test {
 
 TradePlan plan_of(const TradeSettings& own, const std::vector<std::string>& wanted = {}) {
   return plan_trade(own, trade_axes(own, {render::Part::textures}), wanted);
@@ -69,5 +69,5 @@ TEST(TradeAxes, OnlyThoseWantedAreSwept) {
   EXPECT_THROW(plan_of({}, {"estimators"}), Error);
 }
 
-}  // namespace
+}  // namespace post_trade_axes_test
 }  // namespace previz::trade

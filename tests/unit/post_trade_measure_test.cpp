@@ -7,7 +7,7 @@
 #include "daemon/trade/measure.hpp"
 
 namespace previz::trade {
-namespace {
+namespace post_trade_measure_test {
 
 // Left half uncovered, right half covered; every channel the same.
 TradePicture made_up(float uncovered_added, float covered_shown, int width = 16, int height = 16) {
@@ -150,5 +150,5 @@ TEST(TradeFront, TheKneeIsFurthestBelowTheLineBetweenTheEnds) {
   EXPECT_EQ(knee(straight), 0u);
 }
 
-}  // namespace
+}  // namespace post_trade_measure_test
 }  // namespace previz::trade

@@ -10,7 +10,7 @@
 #include "drivers/error.hpp"
 
 namespace previz::trade {
-namespace {
+namespace post_trade_page_test {
 
 Plate grey(int width, int height) {
   return {width, height, 8, std::vector<std::uint16_t>(3 * std::size_t(width) * height, 128)};
@@ -124,5 +124,5 @@ TEST(TradeChart, EveryDotIsInside) {
   }
 }
 
-}  // namespace
+}  // namespace post_trade_page_test
 }  // namespace previz::trade

@@ -9,11 +9,11 @@
 
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
-#include "tests/unit/small_take.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::trade {
-namespace {
+namespace post_trade_test {
 
 class Trade : public testing::Test {
  protected:
@@ -153,5 +153,5 @@ TEST_F(Trade, AStopLeavesNothing) {
   EXPECT_FALSE(std::filesystem::exists(directory_ / "out/trade.csv"));
 }
 
-}  // namespace
+}  // namespace post_trade_test
 }  // namespace previz::trade

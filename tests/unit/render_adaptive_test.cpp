@@ -3,10 +3,10 @@
 
 #include "daemon/pipeline/refinement.hpp"
 #include "daemon/render/error_estimate.hpp"
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace render_adaptive_test {
 
 View small_set() {
   RandomScene options;
@@ -36,7 +36,7 @@ set::Quality quality(int samples, double error, double seconds = 0) {
 
 // Two runs with other random numbers differ by sqrt(2) times the error of each; stratification
 // makes the true error the smaller one.
-TEST(Adaptive, the_estimate_is_the_true_error_or_above) {
+TEST(Adaptive, TheEstimateIsTheTrueErrorOrAbove) {
   const View view = small_set();
   SetRenderer renderer(view);
   std::vector<render::Layers> layers;
@@ -51,7 +51,7 @@ TEST(Adaptive, the_estimate_is_the_true_error_or_above) {
   EXPECT_LT(estimate, 3 * truth);
 }
 
-TEST(Adaptive, reaches_the_error_with_fewer_samples_than_even_sampling) {
+TEST(Adaptive, ReachesTheErrorWithFewerSamplesThanEvenSampling) {
   const View view = small_set();
   SetRenderer renderer(view);
   const double target = 0.2;
@@ -70,7 +70,7 @@ TEST(Adaptive, reaches_the_error_with_fewer_samples_than_even_sampling) {
 }
 
 // Without photons, which a part of a picture shares among its samples.
-TEST(Adaptive, leaves_the_samples_of_a_pixel_as_they_are) {
+TEST(Adaptive, LeavesTheSamplesOfAPixelAsTheyAre) {
   const View view = small_set();
   set::Estimation estimation;
   estimation.caustics = set::Caustics::traced;
@@ -95,7 +95,7 @@ TEST(Adaptive, leaves_the_samples_of_a_pixel_as_they_are) {
   }
 }
 
-TEST(Adaptive, ends_when_the_time_is_over) {
+TEST(Adaptive, EndsWhenTheTimeIsOver) {
   const View view = small_set();
   SetRenderer renderer(view);
   renderer.begin({{}, 1.0, view.world_from_camera});
@@ -104,7 +104,7 @@ TEST(Adaptive, ends_when_the_time_is_over) {
   EXPECT_GT(refined.samples, 0);  // at least one, however slow the machine
 }
 
-TEST(Adaptive, a_block_in_need_brings_its_neighbours) {
+TEST(Adaptive, ABlockInNeedBringsItsNeighbours) {
   render::ErrorEstimate estimate;
   estimate.blocks.assign(12, 0.0f);  // 4 x 3 blocks of 8 x 8 pixels
   estimate.blocks[5] = 0.2f;
@@ -114,7 +114,7 @@ TEST(Adaptive, a_block_in_need_brings_its_neighbours) {
 
 // One block of four by one has all the noise: half of a smoothed variance is a block's own, a tenth
 // its only neighbour's, and what has none gets the least.
-TEST(Adaptive, samples_are_spread_as_the_noise_is) {
+TEST(Adaptive, SamplesAreSpreadAsTheNoiseIs) {
   render::ErrorEstimate estimate;
   estimate.blocks = {3.0f, 0.0f, 0.0f, 0.0f};
   const auto limits = render::spread_samples(estimate, 32, 8, 80);
@@ -132,7 +132,7 @@ TEST(Adaptive, samples_are_spread_as_the_noise_is) {
 }
 
 // No block gets more than eight times the average, however little the others need.
-TEST(Adaptive, one_noisy_block_of_many_gets_the_most_there_is) {
+TEST(Adaptive, OneNoisyBlockOfManyGetsTheMostThereIs) {
   render::ErrorEstimate estimate;
   estimate.blocks.assign(32 * 32, 0.0f);
   estimate.blocks[500] = 1;
@@ -141,7 +141,7 @@ TEST(Adaptive, one_noisy_block_of_many_gets_the_most_there_is) {
   EXPECT_EQ(limits[0], 8u);
 }
 
-TEST(Adaptive, noise_above_white_is_not_seen) {
+TEST(Adaptive, NoiseAboveWhiteIsNotSeen) {
   render::Layers layers;
   layers.width = 24;
   layers.height = 8;
@@ -174,7 +174,7 @@ struct Group {  // of pictures that differ in their random numbers
 };
 
 // With the same number of samples; and as a whole the mean of many pictures is that of even ones.
-TEST(Adaptive, a_budget_spent_by_need_makes_the_better_picture_and_no_other) {
+TEST(Adaptive, ABudgetSpentByNeedMakesTheBetterPictureAndNoOther) {
   const View view = small_set();
   SetRenderer renderer(view);
   const auto picture = [&](int samples, bool adaptive, std::uint32_t seed) {
@@ -207,5 +207,5 @@ TEST(Adaptive, a_budget_spent_by_need_makes_the_better_picture_and_no_other) {
   EXPECT_LT(std::abs(adaptive.mean() - even.mean()), 4 * standard_error);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace render_adaptive_test
+}  // namespace previz::test

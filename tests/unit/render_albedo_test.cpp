@@ -9,7 +9,7 @@
 #include "tests/truth/cpu_albedo.hpp"
 
 namespace previz::render {
-namespace {
+namespace render_albedo_test {
 
 // As the shader reads a table.
 double look_up(const AlbedoTable& table, double cosine, double alpha) {
@@ -36,7 +36,7 @@ void expect_close(const AlbedoTable& table, const Share& share) {
 
 // Both quadratures and the reference's own interpolation are well below the bound, which is for the
 // bilinear one.
-TEST(AlbedoTable, interpolates_within_its_bound) {
+TEST(AlbedoTable, InterpolatesWithinItsBound) {
   expect_close(reflection_albedo(), truth::reflected_share);
   for (const double ior : {1.1, 1.5, 2.5}) {
     for (const double eta : {ior, 1 / ior}) {
@@ -48,11 +48,11 @@ TEST(AlbedoTable, interpolates_within_its_bound) {
   }
 }
 
-TEST(AlbedoTable, a_mirror_loses_nothing) {
+TEST(AlbedoTable, AMirrorLosesNothing) {
   const AlbedoTable& table = reflection_albedo();
   for (std::uint32_t column = 4; column < gpu::ALBEDO_SIDE; ++column)
     EXPECT_NEAR(table[column], 1, 1e-3);
 }
 
-}  // namespace
+}  // namespace render_albedo_test
 }  // namespace previz::render

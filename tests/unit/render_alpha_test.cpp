@@ -1,10 +1,10 @@
 // Surfaces that are not there everywhere, against closed forms.
 #include <numbers>
 
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace render_alpha_test {
 
 constexpr double albedo = 0.6;
 constexpr float veil_alpha = 0.25f;
@@ -28,7 +28,7 @@ void add_veils(View& view, int count, double height, std::uint32_t presence) {
 }
 
 // Each veil between the lamp and the point keeps its share, in the world it is in.
-TEST(Alpha, a_veil_keeps_its_share_of_a_lamp) {
+TEST(Alpha, AVeilKeepsItsShareOfALamp) {
   for (const int count : {1, 3}) {
     View view = lit_point(albedo);
     add_veils(view, count, 1, scene::world_mixed);
@@ -41,7 +41,7 @@ TEST(Alpha, a_veil_keeps_its_share_of_a_lamp) {
 }
 
 // Before the camera, by chance: black with the odds of its alpha.
-TEST(Alpha, a_veil_covers_its_share_of_a_view) {
+TEST(Alpha, AVeilCoversItsShareOfAView) {
   View view;
   add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({1, 1})),
                add_material(view.scene, veil(emitter(glm::vec3(0)))), glm::dmat4(1),
@@ -57,7 +57,7 @@ TEST(Alpha, a_veil_covers_its_share_of_a_view) {
 }
 
 // A mask has no chance in it: what is below the cut-off is not there.
-TEST(Alpha, a_mask_is_there_or_not) {
+TEST(Alpha, AMaskIsThereOrNot) {
   for (const float cutoff : {0.2f, 0.3f}) {
     View view = lit_point(albedo);
     add_veils(view, 1, 1, scene::world_both);
@@ -72,7 +72,7 @@ TEST(Alpha, a_mask_is_there_or_not) {
 }
 
 // More layers than a ray follows stop it, and are counted.
-TEST(Alpha, rays_through_too_many_veils_are_counted) {
+TEST(Alpha, RaysThroughTooManyVeilsAreCounted) {
   View view = lit_point(albedo);
   add_veils(view, 300, 0.7, scene::world_both);
   view.scene.materials.back().alpha = 0;
@@ -82,5 +82,5 @@ TEST(Alpha, rays_through_too_many_veils_are_counted) {
   EXPECT_GE(result.counters.stopped_in_layers, 32u * 32u);  // and of the scattered rays, a few
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace render_alpha_test
+}  // namespace previz::test

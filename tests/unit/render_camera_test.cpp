@@ -2,10 +2,10 @@
 // where it may not be taken.
 #include <numbers>
 
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace render_camera_test {
 
 constexpr int width = 48, height = 36;
 constexpr double white = 4;  // of the sensor, whose response is linear with 16 bits
@@ -89,7 +89,7 @@ bool is_inside(const glm::dvec2& pixel) {
 
 // The floor is dark in the model, and bright in the plate, rising from left to right: the mirror
 // shows the plate's floor.
-TEST(CameraRadiance, a_mirror_shows_the_plate) {
+TEST(CameraRadiance, AMirrorShowsThePlate) {
   const View view = floor_and_mirror();
   const auto shade = [](double x) { return 0.2 + x / width; };
   const Plate plate = plate_of([&](int x, int) { return glm::dvec3(1, 0.5, 0.25) * shade(x); });
@@ -114,7 +114,7 @@ TEST(CameraRadiance, a_mirror_shows_the_plate) {
 
 // In the sun, the mirror shows the plate's floor and on it the shadow of a virtual ball, darker
 // than the plate by what the model says the sun brings.
-TEST(CameraRadiance, a_mirror_shows_the_plate_with_virtual_shadows) {
+TEST(CameraRadiance, AMirrorShowsThePlateWithVirtualShadows) {
   View view = floor_and_mirror();
   set::Light sun = lamp(set::LightType::directional, glm::dvec3(3));
   sun.direction = glm::normalize(glm::dvec3(0, 0.5, -1));
@@ -144,7 +144,7 @@ TEST(CameraRadiance, a_mirror_shows_the_plate_with_virtual_shadows) {
 }
 
 // Where the plate is clipped, or the floor not matt, the model's own radiance is traced: here none.
-TEST(CameraRadiance, what_cannot_be_measured_is_traced_and_counted) {
+TEST(CameraRadiance, WhatCannotBeMeasuredIsTracedAndCounted) {
   const auto expect_traced = [](const View& view, const Plate& plate) {
     const Rendered result = render_over(view, plate, by_camera());
     EXPECT_EQ(result.counters.measured, 0u);
@@ -163,7 +163,7 @@ TEST(CameraRadiance, what_cannot_be_measured_is_traced_and_counted) {
 }
 
 // A wall before the floor hides what the mirror shows of it.
-TEST(CameraRadiance, what_is_hidden_is_traced) {
+TEST(CameraRadiance, WhatIsHiddenIsTraced) {
   View view = floor_and_mirror();
   glm::dmat4 pose(1);
   pose[1] = {0, 0, 1, 0};
@@ -183,7 +183,7 @@ TEST(CameraRadiance, what_is_hidden_is_traced) {
   }
 }
 
-TEST(CameraRadiance, with_nothing_virtual_the_plate_is_untouched) {
+TEST(CameraRadiance, WithNothingVirtualThePlateIsUntouched) {
   View view = floor_and_mirror();
   view.scene.instances.pop_back();
   view.environment = uniform_environment(glm::vec3(1));
@@ -201,7 +201,7 @@ TEST(CameraRadiance, with_nothing_virtual_the_plate_is_untouched) {
 }
 
 // Without a plate there is nothing to take: the pictures are those that are traced, bit for bit.
-TEST(CameraRadiance, without_a_plate_all_is_traced) {
+TEST(CameraRadiance, WithoutAPlateAllIsTraced) {
   View view = floor_and_mirror();
   view.environment = uniform_environment(glm::vec3(1));
   set::Estimation traced = by_camera();
@@ -210,5 +210,5 @@ TEST(CameraRadiance, without_a_plate_all_is_traced) {
             render_view(view, 4, traced).layers.mixed);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace render_camera_test
+}  // namespace previz::test

@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "daemon/render/photon_schedule.hpp"
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace render_caustic_test {
 
 constexpr double pi = std::numbers::pi;
 constexpr double albedo = 0.6;
@@ -124,14 +124,14 @@ glm::dvec3 point_irradiance(const set::Light& light, const glm::dvec3& p) {
   return light.emission * (to_light.z / (d2 * std::sqrt(d2)));
 }
 
-TEST(MirrorCaustic, of_a_point) {
+TEST(MirrorCaustic, OfAPoint) {
   View view = mirror_and_floor();
   const set::Light light = lamp(set::LightType::point);
   view.scene.lights.push_back(light);
   expect_image(view, [&](const glm::dvec3& p) { return point_irradiance(light, p); });
 }
 
-TEST(MirrorCaustic, of_a_spot) {
+TEST(MirrorCaustic, OfASpot) {
   View view = mirror_and_floor();
   set::Light light = lamp(set::LightType::spot);
   light.direction = glm::normalize(glm::dvec3(1, -0.2, -1));
@@ -146,7 +146,7 @@ TEST(MirrorCaustic, of_a_spot) {
   });
 }
 
-TEST(MirrorCaustic, of_a_sun_without_and_with_a_disc) {
+TEST(MirrorCaustic, OfASunWithoutAndWithADisc) {
   for (const double radius : {0.0, 0.1}) {
     View view = mirror_and_floor();
     set::Light light = lamp(set::LightType::directional);
@@ -157,7 +157,7 @@ TEST(MirrorCaustic, of_a_sun_without_and_with_a_disc) {
   }
 }
 
-TEST(MirrorCaustic, of_a_sphere) {
+TEST(MirrorCaustic, OfASphere) {
   View view = mirror_and_floor();
   set::Light light = lamp(set::LightType::sphere);
   light.radius_m = 0.2;
@@ -187,7 +187,7 @@ glm::dvec3 rectangle_irradiance(const set::Light& light, const glm::dvec3& p) {
   return light.emission * (light.width_m * light.height_m * sum / (steps * steps));
 }
 
-TEST(MirrorCaustic, of_a_rectangle_and_of_an_emissive_mesh) {
+TEST(MirrorCaustic, OfARectangleAndOfAnEmissiveMesh) {
   set::Light light = lamp(set::LightType::rectangle);
   light.direction = {0, 0, -1};
   light.up = {0, 1, 0};
@@ -208,7 +208,7 @@ TEST(MirrorCaustic, of_a_rectangle_and_of_an_emissive_mesh) {
 
 // In a uniform environment a perfect mirror is invisible: the floor is lit as if it were not there.
 // (It is so small that the mirror shows the floor nothing of itself.)
-TEST(MirrorCaustic, of_a_uniform_environment) {
+TEST(MirrorCaustic, OfAUniformEnvironment) {
   View view = mirror_and_floor(scene::world_both, 0.7);
   view.environment = uniform_environment({1, 2, 3});
   const Measured measured = measure(view, photon_estimation());
@@ -216,7 +216,7 @@ TEST(MirrorCaustic, of_a_uniform_environment) {
     EXPECT_NEAR(measured.mixed[c], albedo * (c + 1), 4 * measured.error[c] + 2e-3 * (c + 1));
 }
 
-TEST(MirrorCaustic, of_a_virtual_mirror_and_of_a_removed_one) {
+TEST(MirrorCaustic, OfAVirtualMirrorAndOfARemovedOne) {
   const set::Light light = lamp(set::LightType::point);
   for (const std::uint32_t presence : {scene::world_mixed, scene::world_real}) {
     View view = mirror_and_floor(presence);
@@ -232,7 +232,7 @@ TEST(MirrorCaustic, of_a_virtual_mirror_and_of_a_removed_one) {
 }
 
 // A lamp that is dimmed in the mixed world throws a dimmer image there, from the same photons.
-TEST(MirrorCaustic, of_a_dimmed_lamp) {
+TEST(MirrorCaustic, OfADimmedLamp) {
   View view = mirror_and_floor();
   set::Light light = lamp(set::LightType::point);
   light.gain_mixed = 0.25;
@@ -244,7 +244,7 @@ TEST(MirrorCaustic, of_a_dimmed_lamp) {
 // A glass ball under a wide lamp: what photons bring is what paths bring that happen to find it, in
 // total over the picture. Gathering moves light over a disc, so what the ball hides of the floor
 // weighs on the total with the radius over the ball's, squared: 0.5 % of the caustic, itself 2 %.
-TEST(GlassCaustic, carries_as_much_light_as_traced_paths) {
+TEST(GlassCaustic, CarriesAsMuchLightAsTracedPaths) {
   View view;
   const auto floor = add_mesh(view.scene, rectangle_mesh({1, 1}));
   add_instance(view.scene, floor, add_material(view.scene, diffuse(glm::vec3(albedo))));
@@ -276,7 +276,7 @@ TEST(GlassCaustic, carries_as_much_light_as_traced_paths) {
   EXPECT_GT(by_paths.mixed.g - without.mixed.g, 20 * error);
 }
 
-TEST(Photons, leave_no_difference_where_the_worlds_are_equal) {
+TEST(Photons, LeaveNoDifferenceWhereTheWorldsAreEqual) {
   View view = mirror_and_floor();
   view.scene.lights.push_back(lamp(set::LightType::sphere));
   view.scene.lights.back().radius_m = 0.2;
@@ -285,7 +285,7 @@ TEST(Photons, leave_no_difference_where_the_worlds_are_equal) {
   for (const glm::vec3& diff : result.layers.diff) EXPECT_EQ(diff, glm::vec3(0));
 }
 
-TEST(Photons, give_the_same_picture_however_the_samples_are_split) {
+TEST(Photons, GiveTheSamePictureHoweverTheSamplesAreSplit) {
   View view = mirror_and_floor();
   view.scene.lights.push_back(lamp(set::LightType::point));
   set::Estimation estimation;
@@ -307,7 +307,7 @@ TEST(Photons, give_the_same_picture_however_the_samples_are_split) {
   EXPECT_EQ(pictures[0], pictures[2]);
 }
 
-TEST(PhotonRadius, shrinks_by_the_rule_of_progressive_photon_mapping) {
+TEST(PhotonRadius, ShrinksByTheRuleOfProgressivePhotonMapping) {
   EXPECT_NEAR(render::photon_radius_factor(0), 1, 1e-12);
   for (const std::uint64_t pass : {1u, 2u, 10u, 1000u}) {
     const double ratio =
@@ -320,11 +320,11 @@ TEST(PhotonRadius, shrinks_by_the_rule_of_progressive_photon_mapping) {
   EXPECT_LT(after_a_million, 0.12);
 }
 
-TEST(PhotonCount, is_kept_within_what_a_pass_can_hold) {
+TEST(PhotonCount, IsKeptWithinWhatAPassCanHold) {
   EXPECT_EQ(render::photon_count(0.1, 640, 480, 131072), 30720u);
   EXPECT_EQ(render::photon_count(0.001, 16, 16, 131072), 1024u);
   EXPECT_EQ(render::photon_count(10, 8192, 4320, 131072), 131072u);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace render_caustic_test
+}  // namespace previz::test

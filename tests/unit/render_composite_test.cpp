@@ -1,9 +1,9 @@
 // The composite: untouched plates bit for bit, samples independent of how they are asked for, and
 // the equation itself.
-#include "tests/unit/pixels_by_hand.hpp"
+#include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace render_composite_test {
 
 Plate show(const View& view, const Plate& plate, int samples) {
   SetRenderer renderer(view);
@@ -21,7 +21,7 @@ View real_set() {
   return random_scene(3, options);
 }
 
-TEST(Composite, without_a_virtual_object_the_plate_comes_back_bit_for_bit) {
+TEST(Composite, WithoutAVirtualObjectThePlateComesBackBitForBit) {
   View view = real_set();
   for (const int bits : {8, 16}) {
     const Plate plate = random_plate(70, 50, bits);
@@ -39,7 +39,7 @@ TEST(Composite, without_a_virtual_object_the_plate_comes_back_bit_for_bit) {
   EXPECT_EQ(show(view, plate, 2).samples, plate.samples) << "defocused";
 }
 
-TEST(Composite, samples_do_not_depend_on_how_they_are_asked_for) {
+TEST(Composite, SamplesDoNotDependOnHowTheyAreAskedFor) {
   RandomScene options;
   options.width = 45;
   options.height = 31;
@@ -58,7 +58,7 @@ TEST(Composite, samples_do_not_depend_on_how_they_are_asked_for) {
 }
 
 // estimator.md: a virtual object over the white half of a black-and-white pixel gives a quarter.
-TEST(Composite, covered_pixels_use_means_not_samples) {
+TEST(Composite, CoveredPixelsUseMeansNotSamples) {
   gpu::GpuPixel pixel{};
   // Two samples: one covered (Lm = 0.5, Lr = 1), one not (Lm = Lr = 0).
   pixel.mixed_high = gpu::vec4(0.5f, 0.5f, 0.5f, 1.0f);
@@ -83,7 +83,7 @@ double composited(double camera, double mixed, double real, const render::Compos
 }
 
 // A shadow halves the light on a surface whose albedo the phantom has wrong by a factor of two.
-TEST(Composite, the_ratio_forgives_a_wrong_albedo_and_the_sum_does_not) {
+TEST(Composite, TheRatioForgivesAWrongAlbedoAndTheSumDoesNot) {
   using enum set::Composite;
   const double camera = 0.4, real = 0.8, mixed = 0.4;
   EXPECT_NEAR(composited(camera, mixed, real, {additive, 0}), 0.0, 1e-7);
@@ -93,20 +93,20 @@ TEST(Composite, the_ratio_forgives_a_wrong_albedo_and_the_sum_does_not) {
 }
 
 // A virtual lamp on a real surface that was black.
-TEST(Composite, the_sum_lights_a_black_surface_and_the_ratio_does_not) {
+TEST(Composite, TheSumLightsABlackSurfaceAndTheRatioDoesNot) {
   using enum set::Composite;
   EXPECT_FLOAT_EQ(composited(0, 0.3, 0, {additive, 0}), 0.3);
   EXPECT_FLOAT_EQ(composited(0, 0.3, 0, {ratio, 0}), 0.0);
   EXPECT_FLOAT_EQ(composited(0, 0.3, 0, {hybrid, 0.01}), 0.3);
 }
 
-TEST(Composite, all_rules_are_one_where_the_model_is_right) {
+TEST(Composite, AllRulesAreOneWhereTheModelIsRight) {
   using enum set::Composite;
   for (const auto kind : {additive, ratio, hybrid})
     EXPECT_FLOAT_EQ(composited(0.5, 0.2, 0.5, {kind, 0.01}), 0.2);
 }
 
-TEST(Composite, two_float_sums_keep_what_one_float_loses) {
+TEST(Composite, TwoFloatSumsKeepWhatOneFloatLoses) {
   gpu::GpuPixel pixel{};
   pixel.mixed_high = gpu::vec4(16777216.0f, 0, 0, 0);
   pixel.mixed_low = gpu::vec4(0.5f, 0, 0, 0);
@@ -115,7 +115,7 @@ TEST(Composite, two_float_sums_keep_what_one_float_loses) {
   EXPECT_EQ(layers.composite[0].r, 0.0f);  // nothing covered, a black plate, no difference
 }
 
-TEST(Composite, a_frame_of_another_size_is_refused) {
+TEST(Composite, AFrameOfAnotherSizeIsRefused) {
   const View view = real_set();
   SetRenderer renderer(view);
   EXPECT_THROW(renderer.begin({random_plate(32, 32, 8), 1.0, view.world_from_camera}),
@@ -124,7 +124,7 @@ TEST(Composite, a_frame_of_another_size_is_refused) {
 
 // An out-of-focus point becomes a uniform disc of radius fx R |1/z - 1/focus|, whose variance along
 // one axis is radius^2 / 4; the pixel's box adds 1/12 and the emitter its own width^2 / 12.
-TEST(Lens, defocus_is_the_circle_of_confusion) {
+TEST(Lens, DefocusIsTheCircleOfConfusion) {
   View view;
   const double depth = 2.0, width = 0.02;
   const auto mesh = add_mesh(view.scene, rectangle_mesh({width, width}));
@@ -162,5 +162,5 @@ TEST(Lens, defocus_is_the_circle_of_confusion) {
   expect_clean(result.counters);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace render_composite_test
+}  // namespace previz::test

@@ -2,10 +2,10 @@
 // noise.
 #include <random>
 
-#include "tests/unit/pixels_by_hand.hpp"
+#include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace render_denoise_test {
 
 constexpr int width = 96, height = 80;
 
@@ -77,7 +77,7 @@ bool everywhere(int, int) {
 // levels see what the ones before have blended, so less than 1 / 50 is left only if most weights
 // are near 1: values of one sigma differ by sqrt(2) of it, and exp(-2 / (4 * 2)) = 0.8 is their
 // mean weight.
-TEST(Denoise, leaves_little_of_noise_and_the_mean_as_it_is) {
+TEST(Denoise, LeavesLittleOfNoiseAndTheMeanAsItIs) {
   const double sigma = 0.05;
   const render::Layers raw = wall(noise_around(0.5, sigma), sigma * sigma);
   const Spread before = spread(raw, everywhere);
@@ -89,7 +89,7 @@ TEST(Denoise, leaves_little_of_noise_and_the_mean_as_it_is) {
 }
 
 // What a single sample is off by shows in its neighbours only.
-TEST(Denoise, of_single_samples_the_neighbours_tell_the_noise) {
+TEST(Denoise, OfSingleSamplesTheNeighboursTellTheNoise) {
   const double sigma = 0.05;
   render::Layers raw = wall(noise_around(0.5, sigma), 0);
   EXPECT_EQ(denoised(raw).composite, raw.composite) << "sixteen equal samples: no noise";
@@ -97,7 +97,7 @@ TEST(Denoise, of_single_samples_the_neighbours_tell_the_noise) {
   EXPECT_LT(spread(denoised(raw), everywhere).variance, sigma * sigma / 50);
 }
 
-TEST(Denoise, leaves_what_differs_by_more_than_its_noise) {
+TEST(Denoise, LeavesWhatDiffersByMoreThanItsNoise) {
   const double sigma = 0.005;
   const auto bright = [](int x, int y) { return (x / 3 + y / 3) % 2 == 0; };
   auto noise = noise_around(0, sigma);
@@ -118,7 +118,7 @@ TEST(Denoise, leaves_what_differs_by_more_than_its_noise) {
 class DenoiseEdges : public ::testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(NormalDepthMask, DenoiseEdges, ::testing::Values(0, 1, 2, 3));
 
-TEST_P(DenoiseEdges, stay_between_surfaces) {
+TEST_P(DenoiseEdges, StayBetweenSurfaces) {
   const double sigma = 0.1;
   const auto left = [](int x, int) { return x < width / 2; };
   auto noise = noise_around(0, sigma);
@@ -143,7 +143,7 @@ TEST_P(DenoiseEdges, stay_between_surfaces) {
 
 // Depth rises towards the camera's horizon; what is foretold of a plane is not an edge. With one
 // sample a pixel's depth is that of a point anywhere in it.
-TEST(Denoise, takes_a_slanted_plane_for_one_surface) {
+TEST(Denoise, TakesASlantedPlaneForOneSurface) {
   const double sigma = 0.05;
   std::mt19937 random(5);
   std::uniform_real_distribution<float> jitter(-0.5f, 0.5f);
@@ -155,7 +155,7 @@ TEST(Denoise, takes_a_slanted_plane_for_one_surface) {
   EXPECT_LT(spread(denoised(raw), everywhere).variance, sigma * sigma / 50);
 }
 
-TEST(Denoise, takes_outliers_beyond_white_away_and_leaves_lights) {
+TEST(Denoise, TakesOutliersBeyondWhiteAwayAndLeavesLights) {
   const double sigma = 0.02;
   auto noise = noise_around(0.4, sigma);
   const auto is_lamp = [](int x, int y) { return x < 20 && y < 20; };
@@ -179,7 +179,7 @@ TEST(Denoise, takes_outliers_beyond_white_away_and_leaves_lights) {
   }
 }
 
-TEST(Denoise, scales_with_radiance) {
+TEST(Denoise, ScalesWithRadiance) {
   const double sigma = 0.05;
   const render::Layers one = denoised(wall(noise_around(0.5, sigma), sigma * sigma));
   for (const double scale : {1e-6, 1e6}) {
@@ -194,7 +194,7 @@ TEST(Denoise, scales_with_radiance) {
 
 // Bands with the rows that they depend on, against the picture at once; the variance of single
 // samples reaches furthest.
-TEST(Denoise, does_not_depend_on_its_bands) {
+TEST(Denoise, DoesNotDependOnItsBands) {
   const double sigma = 0.05;
   for (const int samples : {1, 16}) {
     render::Layers raw = wall(noise_around(0.5, sigma), sigma * sigma);
@@ -211,7 +211,7 @@ TEST(Denoise, does_not_depend_on_its_bands) {
   }
 }
 
-TEST(Denoise, takes_pictures_of_a_single_row_or_column) {
+TEST(Denoise, TakesPicturesOfASingleRowOrColumn) {
   for (const auto& [columns, rows] : {std::pair(1, 1), std::pair(5, 1), std::pair(1, 5)}) {
     render::Layers raw = wall(noise_around(0.5, 0.05), 0.0025);
     raw.width = columns;
@@ -233,7 +233,7 @@ INSTANTIATE_TEST_SUITE_P(All, DenoiseRules,
                          ::testing::Values(set::Composite::additive, set::Composite::ratio,
                                            set::Composite::hybrid));
 
-TEST_P(DenoiseRules, keep_the_plates_texture) {
+TEST_P(DenoiseRules, KeepThePlatesTexture) {
   const auto camera_at = [](int x, int y) { return (x + y) % 3 == 0 ? 0.5f : 1.0f; };
   const bool multiplied = GetParam() != set::Composite::additive;
   std::vector<double> camera;
@@ -266,7 +266,7 @@ TEST_P(DenoiseRules, keep_the_plates_texture) {
 
 // A virtual wall before the left third of a real one on which nothing changes: noise on the one
 // does not reach the other.
-TEST(Denoise, leaves_a_real_surface_beside_a_virtual_one_bit_for_bit) {
+TEST(Denoise, LeavesARealSurfaceBesideAVirtualOneBitForBit) {
   std::vector<double> camera;
   auto noise = noise_around(0.4, 0.1);
   const auto covered = [](int x) { return x < width / 3; };
@@ -293,7 +293,7 @@ TEST(Denoise, leaves_a_real_surface_beside_a_virtual_one_bit_for_bit) {
   EXPECT_LT(spread(clean, [&](int x, int) { return covered(x); }).variance, 0.01 / 20);
 }
 
-TEST(Denoise, changes_no_other_layer_and_no_untouched_plate) {
+TEST(Denoise, ChangesNoOtherLayerAndNoUntouchedPlate) {
   RandomScene options;
   options.width = 70;
   options.height = 50;
@@ -318,7 +318,7 @@ TEST(Denoise, changes_no_other_layer_and_no_untouched_plate) {
 }
 
 // On rendered sets, against many samples: nearer to the truth, and with more samples nearer still.
-TEST(Denoise, brings_a_rendered_picture_nearer_to_its_limit) {
+TEST(Denoise, BringsARenderedPictureNearerToItsLimit) {
   RandomScene options;
   options.width = 96;
   options.height = 72;
@@ -354,5 +354,5 @@ TEST(Denoise, brings_a_rendered_picture_nearer_to_its_limit) {
   }
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace render_denoise_test
+}  // namespace previz::test

@@ -1,10 +1,10 @@
 // Direct light of every kind of lamp on a Lambert plane, against closed forms.
 #include <numbers>
 
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace render_direct_light_test {
 
 constexpr double pi = std::numbers::pi;
 constexpr double albedo = 0.6;
@@ -22,7 +22,7 @@ void expect_radiance(const View& view, const glm::dvec3& expected, double bias =
   EXPECT_EQ(mean(result.layers.diff), glm::dvec3(0));  // the same light in both worlds
 }
 
-TEST(DirectLight, point) {
+TEST(DirectLight, Point) {
   View view = lit_point(albedo);
   set::Light light = lamp(set::LightType::point, colour);
   light.position = {1, 1, 2};
@@ -49,7 +49,7 @@ glm::dvec3 grows(const scene::Mesh& mesh, int coordinate) {
 }
 
 // The cosine at the mapped normal, with the plane facing the camera and turned away from it.
-TEST(DirectLight, on_a_normal_map) {
+TEST(DirectLight, OnANormalMap) {
   const glm::dvec3 tangent = glm::normalize(glm::dvec3(0.3, 0.5, 0.9));
   for (const bool mirrored : {false, true}) {
     View view = lit_point(albedo);
@@ -68,7 +68,7 @@ TEST(DirectLight, on_a_normal_map) {
   }
 }
 
-TEST(DirectLight, spot_inside_and_between_its_cones) {
+TEST(DirectLight, SpotInsideAndBetweenItsCones) {
   View view = lit_point(albedo);
   set::Light light = lamp(set::LightType::spot, colour);
   light.position = {0, 0, 2};
@@ -82,7 +82,7 @@ TEST(DirectLight, spot_inside_and_between_its_cones) {
   expect_radiance(view, albedo / pi * light.emission * falloff / 4.0, 2e-3);
 }
 
-TEST(DirectLight, directional_as_a_point_and_as_a_disc) {
+TEST(DirectLight, DirectionalAsAPointAndAsADisc) {
   for (const double radius : {0.0, 0.00465, 0.2}) {
     View view = lit_point(albedo);
     set::Light light = lamp(set::LightType::directional, colour);
@@ -95,7 +95,7 @@ TEST(DirectLight, directional_as_a_point_and_as_a_disc) {
   }
 }
 
-TEST(DirectLight, sphere) {
+TEST(DirectLight, Sphere) {
   View view = lit_point(albedo);
   set::Light light = lamp(set::LightType::sphere, colour);
   light.position = {1, 0.5, 2};
@@ -113,7 +113,7 @@ double corner_form_factor(double a, double b, double c) {
   return (x / p * std::atan(y / p) + y / q * std::atan(x / q)) / (2 * pi);
 }
 
-TEST(DirectLight, rectangle) {
+TEST(DirectLight, Rectangle) {
   View view = lit_point(albedo);
   set::Light light = lamp(set::LightType::rectangle, colour);
   light.position = {0, 0, 1.5};
@@ -125,7 +125,7 @@ TEST(DirectLight, rectangle) {
   expect_radiance(view, albedo * light.emission * 4.0 * corner_form_factor(0.6, 0.4, 1.5), 1e-3);
 }
 
-TEST(DirectLight, emissive_mesh_is_the_same_as_a_rectangle) {
+TEST(DirectLight, EmissiveMeshIsTheSameAsARectangle) {
   View view = lit_point(albedo);
   const auto mesh = add_mesh(view.scene, rectangle_mesh({1.2, 0.8}));
   glm::dmat4 above(1.0);
@@ -134,7 +134,7 @@ TEST(DirectLight, emissive_mesh_is_the_same_as_a_rectangle) {
   expect_radiance(view, albedo * colour * 4.0 * corner_form_factor(0.6, 0.4, 1.5), 1e-3);
 }
 
-TEST(DirectLight, a_gain_scales_its_world_only) {
+TEST(DirectLight, AGainScalesItsWorldOnly) {
   View view = lit_point(albedo);
   set::Light light = lamp(set::LightType::point, colour);
   light.position = {0, 0, 2};
@@ -148,7 +148,7 @@ TEST(DirectLight, a_gain_scales_its_world_only) {
 }
 
 // A real lamp whose colour is changed: it is taken away, and one of the other colour added.
-TEST(DirectLight, a_recoloured_lamp_is_one_taken_away_and_one_added) {
+TEST(DirectLight, ARecolouredLampIsOneTakenAwayAndOneAdded) {
   View view = lit_point(albedo);
   set::Light light = lamp(set::LightType::rectangle, colour);
   light.position = {0, 0, 1.5};
@@ -167,5 +167,5 @@ TEST(DirectLight, a_recoloured_lamp_is_one_taken_away_and_one_added) {
   }
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace render_direct_light_test
+}  // namespace previz::test

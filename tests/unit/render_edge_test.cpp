@@ -2,10 +2,10 @@
 // converged real world, the composite must be its mixed world, on every pixel.
 #include <algorithm>
 
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace render_edge_test {
 
 constexpr int width = 40, height = 30, scrambles = 16;
 // The sensor's white; its response is linear with 16 bits, so rounding leaves 1e-5 of it.
@@ -105,17 +105,17 @@ void expect_seamless(const View& view, set::Estimator estimator) {
   EXPECT_LT(std::abs(sum), 4 * std::sqrt(square));
 }
 
-TEST(Edges, are_seamless_in_focus) {
+TEST(Edges, AreSeamlessInFocus) {
   expect_seamless(striped_set(), set::Estimator::paired);
   expect_seamless(striped_set(), set::Estimator::difference);
 }
 
-TEST(Edges, are_seamless_out_of_focus) {
+TEST(Edges, AreSeamlessOutOfFocus) {
   View view = striped_set();
   view.calibration.lens = ThinLens{0.05, 0.8, 0.7};  // objects are 0.4 m behind the focus
   expect_seamless(view, set::Estimator::paired);
   expect_seamless(view, set::Estimator::difference);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace render_edge_test
+}  // namespace previz::test

@@ -2,10 +2,10 @@
 // closed form.
 #include <numbers>
 
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace render_furnace_test {
 
 constexpr double pi = std::numbers::pi;
 
@@ -30,7 +30,7 @@ double tolerance(const render::Layers& layers) {
   return 4 * standard_error_of_pixels(layers) + 1e-6;
 }
 
-TEST(Furnace, an_empty_scene_shows_the_environment_exactly) {
+TEST(Furnace, AnEmptySceneShowsTheEnvironmentExactly) {
   View view;
   view.environment = uniform_environment(glm::vec3(0.25f, 0.5f, 2.0f));
   view.calibration = pinhole(33, 17, 0.9);
@@ -76,7 +76,7 @@ double ggx_albedo(double cos_o, double alpha, double f0) {
 constexpr double table_error = 2.5e-3;
 
 // A conductor gets back what single scattering loses, in proportion to its reflectance f0.
-TEST(Furnace, rough_conductors_reflect_their_compensated_albedo) {
+TEST(Furnace, RoughConductorsReflectTheirCompensatedAlbedo) {
   for (const double f0 : {0.3, 1.0}) {
     for (const double roughness : {0.1, 0.4, 0.7, 1.0}) {
       for (const double angle : {0.1, 1.2}) {
@@ -102,7 +102,7 @@ scene::Material rough_glass(float ior, float roughness, bool thin_walled) {
 }
 
 // What a pane does not reflect it lets through, whichever side light comes from.
-TEST(Furnace, a_rough_pane_takes_nothing) {
+TEST(Furnace, ARoughPaneTakesNothing) {
   for (const float roughness : {0.1f, 0.5f, 1.0f}) {
     for (const double angle : {0.1, 1.2}) {
       const View view = tilted_plane(rough_glass(1.5f, roughness, true), angle);
@@ -115,7 +115,7 @@ TEST(Furnace, a_rough_pane_takes_nothing) {
 
 // A solid takes nothing, either, at any of its vertices: each may be off by the table's error, and
 // paths that are still inside when they end are lost.
-TEST(Furnace, a_rough_glass_box_takes_nothing) {
+TEST(Furnace, ARoughGlassBoxTakesNothing) {
   for (const float ior : {1.0f, 1.0001f, 1.5f, 2.5f}) {
     for (const float roughness : {0.1f, 0.5f, 1.0f}) {
       View view;
@@ -136,7 +136,7 @@ TEST(Furnace, a_rough_glass_box_takes_nothing) {
 }
 
 // Glass that says metal, until its texture takes the metal away, is glass.
-TEST(Furnace, glass_below_a_texture_of_no_metal_takes_nothing) {
+TEST(Furnace, GlassBelowATextureOfNoMetalTakesNothing) {
   scene::Material material = rough_glass(1.5f, 0.5f, false);
   material.metallic = 1;
   View view;
@@ -155,7 +155,7 @@ TEST(Furnace, glass_below_a_texture_of_no_metal_takes_nothing) {
   EXPECT_EQ(render_clean(view, 8, up_to_depth(64)).layers.mixed, textured.layers.mixed);
 }
 
-TEST(Furnace, a_smooth_mirror_shows_schlick_and_the_environment_behind_it) {
+TEST(Furnace, ASmoothMirrorShowsSchlickAndTheEnvironmentBehindIt) {
   const double angle = 1.1;
   const Rendered result = render_clean(tilted_plane(metal(glm::vec3(0.5f), 0.0f), angle), 1);
   const double expected = 0.5 + 0.5 * std::pow(1 - std::cos(angle), 5);
@@ -166,7 +166,7 @@ TEST(Furnace, a_smooth_mirror_shows_schlick_and_the_environment_behind_it) {
 
 // An instance that turns orientation around keeps its inside: a box refracts like its mirror image,
 // which is the same box.
-TEST(Furnace, mirrored_glass_is_entered_from_outside) {
+TEST(Furnace, MirroredGlassIsEnteredFromOutside) {
   const auto seen = [](double side) {
     View view;
     const auto box = add_mesh(view.scene, box_mesh({1, 1, 1}));
@@ -186,7 +186,7 @@ TEST(Furnace, mirrored_glass_is_entered_from_outside) {
 
 // Lower plane emits 1 and reflects a, upper reflects b: L_lower = 1 + a b L_lower. The squares are
 // 400 times as wide as their gap, so what escapes at the edges is below (1/400)^2 a bounce.
-TEST(Furnace, two_facing_planes_sum_their_interreflections) {
+TEST(Furnace, TwoFacingPlanesSumTheirInterreflections) {
   scene::Material lower = diffuse(glm::vec3(0.8f));
   lower.emission = glm::vec3(1);
   View view;
@@ -198,5 +198,5 @@ TEST(Furnace, two_facing_planes_sum_their_interreflections) {
   EXPECT_NEAR(mean_mixed(result.layers), 1 / (1 - 0.48), tolerance(result.layers) + 1e-4);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace render_furnace_test
+}  // namespace previz::test

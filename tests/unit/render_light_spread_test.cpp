@@ -8,10 +8,10 @@
 
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/gpu_lights.hpp"
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace render_light_spread_test {
 
 // Texels that `lit` picks by their direction, the others as bright as `rest`.
 lighting::EnvironmentMap map_of(int size, const auto& lit, float rest = 0) {
@@ -169,5 +169,5 @@ TEST(DirectionsTowardsWhatDiffers, AreThoseOfTheFrameHoweverOftenItIsBegun) {
   EXPECT_EQ(pictures[0], pictures[1]);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace render_light_spread_test
+}  // namespace previz::test

@@ -1,10 +1,10 @@
 // How evenly samples are spread: over a pixel, and over pixels next to each other, whose errors are
 // to cancel. All pixels see one point under a sky that is bright on one side, so that a sample
 // brings all or nothing.
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace render_sampling_test {
 
 constexpr int side = 64;
 
@@ -61,7 +61,7 @@ void expect_better_than_independent(double ratio, std::size_t n) {
   EXPECT_LT(ratio, 1 - 3 * std::sqrt(2 / (static_cast<double>(n) - 1)));
 }
 
-TEST(Sampling, spreads_a_pixels_samples) {
+TEST(Sampling, SpreadsAPixelsSamples) {
   const double one = variance(rendered(1));
   for (const int samples : {4, 16, 64}) {
     SCOPED_TRACE(samples);
@@ -69,7 +69,7 @@ TEST(Sampling, spreads_a_pixels_samples) {
   }
 }
 
-TEST(Sampling, spreads_those_of_neighbours) {
+TEST(Sampling, SpreadsThoseOfNeighbours) {
   for (const int samples : {1, 3, 8}) {
     const std::vector<double> pixels = rendered(samples);
     for (const int size : {4, 8}) {
@@ -86,7 +86,7 @@ TEST(Sampling, spreads_those_of_neighbours) {
   }
 }
 
-TEST(Sampling, stays_right_on_average) {
+TEST(Sampling, StaysRightOnAverage) {
   // The cosine-weighted share of the hemisphere's directions with x > 0.2: on the unit disc below
   // them, (acos(0.2) - 0.2 sqrt(1 - 0.2^2)) / pi; the map's texels blur its border.
   const double expected = 0.5 * (std::acos(0.2) - 0.2 * std::sqrt(0.96)) / 3.14159265358979;
@@ -97,5 +97,5 @@ TEST(Sampling, stays_right_on_average) {
   EXPECT_NEAR(sum / (side * side), expected, 4 * error + 0.01 * expected);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace render_sampling_test
+}  // namespace previz::test

@@ -1,10 +1,10 @@
 // The picture made on the device is that of the layers, whatever they are composited by.
 #include <random>
 
-#include "tests/unit/pixels_by_hand.hpp"
+#include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace render_show_test {
 
 // What the device must come to, in double precision.
 Plate reference(const render::Layers& layers, const Plate& plate, int bits, double exposure) {
@@ -45,7 +45,7 @@ INSTANTIATE_TEST_SUITE_P(Composites, ShowOf,
                          ::testing::Values(set::Composite::additive, set::Composite::ratio,
                                            set::Composite::hybrid));
 
-TEST_P(ShowOf, a_set_is_the_picture_of_its_layers) {
+TEST_P(ShowOf, ASetIsThePictureOfItsLayers) {
   RandomScene options;
   options.width = 71;  // an odd number of pixels
   options.height = 49;
@@ -77,7 +77,7 @@ TEST_P(ShowOf, a_set_is_the_picture_of_its_layers) {
     }
 }
 
-TEST(Show, without_a_virtual_object_is_the_plate_bit_for_bit) {
+TEST(Show, WithoutAVirtualObjectIsThePlateBitForBit) {
   RandomScene options;
   options.width = 71;
   options.height = 49;
@@ -98,7 +98,7 @@ TEST(Show, without_a_virtual_object_is_the_plate_bit_for_bit) {
   }
 }
 
-TEST(Show, is_over_black_where_there_is_no_plate) {
+TEST(Show, IsOverBlackWhereThereIsNoPlate) {
   RandomScene options;
   options.width = 40;
   options.height = 30;
@@ -109,7 +109,7 @@ TEST(Show, is_over_black_where_there_is_no_plate) {
   expect_same_but_for_rounding(renderer.show(false), reference(renderer.layers(), {}, 8, 1));
 }
 
-TEST(Show, follows_the_pictures_size) {
+TEST(Show, FollowsThePicturesSize) {
   RandomScene options;
   options.width = 40;
   options.height = 30;
@@ -130,7 +130,7 @@ TEST(Show, follows_the_pictures_size) {
 
 // A lamp in the camera's picture, beside noise that darkens it by less than a code of 8 bits: what
 // was clipped stays white to the last bit, at exposures of which white is not the exact inverse.
-TEST(Show, what_the_sensor_clipped_stays_white) {
+TEST(Show, WhatTheSensorClippedStaysWhite) {
   constexpr int side = 16;
   const Plate plate{side, side, 16, std::vector<std::uint16_t>(3 * side * side, 65535)};
   const lighting::Response response({}, 16);
@@ -167,7 +167,7 @@ gpu::GpuPixel random_pixel(std::mt19937& random) {
 }
 
 // Tiles end where bands do not.
-TEST(Show, does_not_depend_on_tiles_and_bands) {
+TEST(Show, DoesNotDependOnTilesAndBands) {
   constexpr int width = 37, height = 150;
   std::mt19937 random(1);
   std::vector<gpu::GpuPixel> pixels;
@@ -192,5 +192,5 @@ TEST(Show, does_not_depend_on_tiles_and_bands) {
   EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace render_show_test
+}  // namespace previz::test

@@ -1,10 +1,10 @@
 // Light sources taken out of the environment light a scene as they did within it.
 #include "daemon/lighting/light_mode.hpp"
 #include "daemon/lighting/source_tracker.hpp"
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace render_sources_test {
 
 constexpr double degree = 0.017453292519943295;
 
@@ -138,5 +138,5 @@ TEST_F(SourceLight, GoesOutBetweenFramesWithTheSamePipelines) {
   EXPECT_GT(mean(rendered(lit, 2).mixed).g, 0);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace render_sources_test
+}  // namespace previz::test

@@ -4,10 +4,10 @@
 #include <poll.h>
 
 #include "drivers/error.hpp"
-#include "tests/unit/session_fixture.hpp"
+#include "tests/support/session_fixture.hpp"
 
 namespace previz {
-namespace {
+namespace replay_buttons_test {
 
 using std::chrono::hours;
 
@@ -107,5 +107,5 @@ TEST(ReplayButtons, WrongSpeedsAreErrors) {
   EXPECT_THROW(replay_buttons({}, "take", due_at({}, -1)), Error);
 }
 
-}  // namespace
+}  // namespace replay_buttons_test
 }  // namespace previz

@@ -5,10 +5,10 @@
 
 #include "drivers/error.hpp"
 #include "drivers/replay/replay_camera.hpp"
-#include "tests/unit/session_fixture.hpp"
+#include "tests/support/session_fixture.hpp"
 
 namespace previz {
-namespace {
+namespace replay_camera_test {
 
 using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
@@ -248,5 +248,5 @@ TEST_F(Replay, WrongOptionsAreErrors) {
   EXPECT_THROW(open_replay(directory_.path() / "nowhere", "observer"), Error);
 }
 
-}  // namespace
+}  // namespace replay_camera_test
 }  // namespace previz

@@ -10,11 +10,11 @@
 #include "daemon/rig/camera_source.hpp"
 #include "drivers/camera_drivers.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/session_fixture.hpp"
-#include "tests/unit/small_take.hpp"
+#include "tests/support/session_fixture.hpp"
+#include "tests/support/small_take.hpp"
 
 namespace previz::rig {
-namespace {
+namespace rig_cameras_test {
 
 using std::chrono::milliseconds;
 using testing::HasSubstr;
@@ -134,5 +134,5 @@ TEST_F(RigCameras, WhatADeviceCountsIsInTheMetrics) {
   EXPECT_EQ(json["devices"]["observer"]["lost"], 2);
 }
 
-}  // namespace
+}  // namespace rig_cameras_test
 }  // namespace previz::rig

@@ -7,7 +7,7 @@
 #include <set>
 
 namespace previz::rig {
-namespace {
+namespace rig_controls_test {
 
 set::Set stage() {
   set::Set set;
@@ -179,5 +179,5 @@ TEST(Controls, EstimatorAndViewGoAround) {
   EXPECT_EQ(desk("debug_view").said, "view: composite");
 }
 
-}  // namespace
+}  // namespace rig_controls_test
 }  // namespace previz::rig

@@ -10,12 +10,12 @@
 
 #include "daemon/rig/live.hpp"
 #include "drivers/session/session.hpp"
-#include "tests/unit/crewed_rig.hpp"
-#include "tests/unit/small_take.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/crewed_rig.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::rig {
-namespace {
+namespace rig_device_lost_test {
 
 using pipeline::Shot;
 
@@ -97,7 +97,7 @@ TEST(RigDeviceLost, PicturesComeBackAndTheTakeLacksNothing) {
   EXPECT_EQ(shown->read(0)->format, PixelFormat::rgb8);
 }
 
-}  // namespace
+}  // namespace rig_device_lost_test
 }  // namespace previz::rig
 
 // The layer must be known before the first instance is made.

@@ -14,12 +14,12 @@
 #include "daemon/rig/live.hpp"
 #include "daemon/set/actions.hpp"
 #include "drivers/session/session.hpp"
-#include "tests/unit/crewed_rig.hpp"
-#include "tests/unit/small_take.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/crewed_rig.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::rig {
-namespace {
+namespace rig_display_test {
 
 using output::OsdPage;
 using output::OsdText;
@@ -230,5 +230,5 @@ TEST_F(RigDisplay, WithoutAScreenTheRigGoesOnAndSaysSoOnce) {
   EXPECT_GT(metrics_.stages.at("screen").dropped.at("no display"), 0u);
 }
 
-}  // namespace
+}  // namespace rig_display_test
 }  // namespace previz::rig

@@ -24,12 +24,12 @@
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
-#include "tests/unit/crewed_rig.hpp"
-#include "tests/unit/small_take.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/crewed_rig.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::rig {
-namespace {
+namespace rig_live_test {
 
 using pipeline::Shot;
 using test::Hand;
@@ -529,5 +529,5 @@ TEST(Progress, EveryStageWithSomethingToDoMustDoIt) {
                        })));
 }
 
-}  // namespace
+}  // namespace rig_live_test
 }  // namespace previz::rig

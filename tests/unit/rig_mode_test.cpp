@@ -10,7 +10,7 @@
 #include "daemon/set/names.hpp"
 
 namespace previz::rig {
-namespace {
+namespace rig_mode_test {
 
 using enum Mode;
 
@@ -149,5 +149,5 @@ TEST(Modes, RecordingRunsOnThroughEveryChangeOfMode) {
     }
 }
 
-}  // namespace
+}  // namespace rig_mode_test
 }  // namespace previz::rig

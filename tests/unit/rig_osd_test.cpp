@@ -9,7 +9,7 @@
 #include "daemon/rig/news_ticker.hpp"
 
 namespace previz::rig {
-namespace {
+namespace rig_osd_test {
 
 using output::OsdPage;
 using output::OsdText;
@@ -194,5 +194,5 @@ TEST(Faults, StayUntilTheDeviceIsWellAndLongEnoughToBeRead) {
   EXPECT_TRUE(faults.words(begin + std::chrono::hours(1)).empty());
 }
 
-}  // namespace
+}  // namespace rig_osd_test
 }  // namespace previz::rig

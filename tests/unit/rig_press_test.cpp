@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 namespace previz::rig {
-namespace {
+namespace rig_press_test {
 
 using set::PressKind;
 using enum set::PressKind;
@@ -110,5 +110,5 @@ TEST(Presses, TheDeadlineIsTheNextThingThatTimeDecides) {
   EXPECT_FALSE(recognizer.deadline());
 }
 
-}  // namespace
+}  // namespace rig_press_test
 }  // namespace previz::rig

@@ -10,7 +10,7 @@
 #include "daemon/pipeline/stages.hpp"
 
 namespace previz {
-namespace {
+namespace rig_signals_test {
 
 TEST(StopOnSignal, EitherSignalStopsARunningPipeline) {
   for (const int signal : {SIGINT, SIGTERM}) {
@@ -49,5 +49,5 @@ TEST(StopOnSignalDeathTest, ASecondSignalEndsTheProcessAtOnce) {
       testing::ExitedWithCode(128 + SIGINT), "");
 }
 
-}  // namespace
+}  // namespace rig_signals_test
 }  // namespace previz

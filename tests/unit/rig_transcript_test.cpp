@@ -21,13 +21,13 @@
 #include "daemon/set/actions.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/session.hpp"
-#include "tests/unit/crewed_rig.hpp"
-#include "tests/unit/private_bus.hpp"
-#include "tests/unit/small_take.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/crewed_rig.hpp"
+#include "tests/support/private_bus.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::rig {
-namespace {
+namespace rig_transcript_test {
 
 using output::OsdPage;
 using output::OsdText;
@@ -290,5 +290,5 @@ TEST_F(RigTranscript, EveryActionIsSignalledShownAndRecorded) {
   }
 }
 
-}  // namespace
+}  // namespace rig_transcript_test
 }  // namespace previz::rig

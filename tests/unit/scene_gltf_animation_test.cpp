@@ -4,10 +4,10 @@
 #include <numbers>
 
 #include "daemon/scene/animation.hpp"
-#include "tests/unit/gltf_test.hpp"
+#include "tests/support/gltf_test.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace scene_gltf_animation_test {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
@@ -145,5 +145,5 @@ TEST_F(GltfAnimations, AreRefusedWhereTheyMakeNoSense) {
   EXPECT_THAT(error(), HasSubstr("has a matrix"));
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace scene_gltf_animation_test
+}  // namespace previz::test

@@ -1,9 +1,9 @@
 #include <fstream>
 
-#include "tests/unit/gltf_test.hpp"
+#include "tests/support/gltf_test.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace scene_gltf_file_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -117,5 +117,5 @@ TEST_F(GltfFiles, RefusesBinaryFilesThatAreCutShort) {
   EXPECT_THAT(error_of(longer), HasSubstr("runs past the end of the file"));
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace scene_gltf_file_test
+}  // namespace previz::test

@@ -3,10 +3,10 @@
 #include <limits>
 #include <numbers>
 
-#include "tests/unit/gltf_test.hpp"
+#include "tests/support/gltf_test.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace scene_gltf_material_test {
 
 using ::testing::Contains;
 using ::testing::ElementsAre;
@@ -298,5 +298,5 @@ TEST_F(GltfMaterials, LeavesOutTexturesInFormatsOfExtensions) {
                                        HasSubstr("texture 0: has no PNG or JPEG image; left out")));
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace scene_gltf_material_test
+}  // namespace previz::test

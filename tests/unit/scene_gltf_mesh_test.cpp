@@ -1,10 +1,10 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-#include "tests/unit/gltf_test.hpp"
+#include "tests/support/gltf_test.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace scene_gltf_mesh_test {
 
 using ::testing::Contains;
 using ::testing::ElementsAre;
@@ -261,5 +261,5 @@ TEST_F(GltfMesh, RefusesAbsurdSizesBeforeAllocating) {
   EXPECT_THAT(message_of("count", 1u << 30), HasSubstr("more than its data can hold"));
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace scene_gltf_mesh_test
+}  // namespace previz::test

@@ -3,10 +3,10 @@
 #include <glm/matrix.hpp>
 #include <numbers>
 
-#include "tests/unit/gltf_test.hpp"
+#include "tests/support/gltf_test.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace scene_gltf_node_test {
 
 using ::testing::Contains;
 using ::testing::ElementsAre;
@@ -211,5 +211,5 @@ TEST_F(GltfNodes, PutsLightsIntoTheWorld) {
   EXPECT_THAT(error(), HasSubstr("node 0 \"lamp\": there is no light 4"));
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace scene_gltf_node_test
+}  // namespace previz::test

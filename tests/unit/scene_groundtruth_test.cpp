@@ -10,7 +10,7 @@
 #include "daemon/scene/scene.hpp"
 
 namespace previz::scene {
-namespace {
+namespace scene_groundtruth_test {
 
 using Json = nlohmann::json;
 namespace fs = std::filesystem;
@@ -128,5 +128,5 @@ TEST_P(Statues, ShareTheirMeshes) {
 
 INSTANTIATE_TEST_SUITE_P(Set, Statues, ::testing::Values("statues"));
 
-}  // namespace
+}  // namespace scene_groundtruth_test
 }  // namespace previz::scene

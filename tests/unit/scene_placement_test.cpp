@@ -6,7 +6,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 namespace previz::scene {
-namespace {
+namespace scene_placement_test {
 
 // Two objects of the set, the second with a lamp of its own, and one lamp of the set.
 struct Stage {
@@ -156,5 +156,5 @@ TEST(Placement, NamesTheSetHasNotAreTold) {
   EXPECT_NE(placement.unknown[1].find("\"moon\""), std::string::npos);
 }
 
-}  // namespace
+}  // namespace scene_placement_test
 }  // namespace previz::scene

@@ -1,9 +1,9 @@
 #include <gtest/gtest.h>
 
-#include "tests/unit/scenes.hpp"
+#include "tests/support/scenes.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace scene_requirements_test {
 
 class SceneRequirements : public ::testing::Test {
  protected:
@@ -144,5 +144,5 @@ TEST_F(SceneRequirements, ReadsLightsAndLens) {
   EXPECT_TRUE(required().thin_lens);
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace scene_requirements_test
+}  // namespace previz::test

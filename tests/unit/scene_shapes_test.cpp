@@ -6,10 +6,10 @@
 #include <set>
 #include <tuple>
 
-#include "tests/unit/scenes.hpp"
+#include "tests/support/scenes.hpp"
 
-namespace previz::testing {
-namespace {
+namespace previz::test {
+namespace scene_shapes_test {
 
 using Point = std::tuple<float, float, float>;
 
@@ -121,5 +121,5 @@ TEST(SceneShapes, RandomObjectsStandOnTheTableAndDoNotTouch) {
   }
 }
 
-}  // namespace
-}  // namespace previz::testing
+}  // namespace scene_shapes_test
+}  // namespace previz::test

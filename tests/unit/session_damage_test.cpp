@@ -12,10 +12,10 @@ extern "C" {
 
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
-#include "tests/unit/session_fixture.hpp"
+#include "tests/support/session_fixture.hpp"
 
 namespace previz::session {
-namespace {
+namespace session_damage_test {
 
 constexpr int frame_count = 6;
 
@@ -296,5 +296,5 @@ TEST_F(Damage, TrackLinesCutAnywhere) {
   }
 }
 
-}  // namespace
+}  // namespace session_damage_test
 }  // namespace previz::session

@@ -5,10 +5,10 @@
 
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
-#include "tests/unit/session_fixture.hpp"
+#include "tests/support/session_fixture.hpp"
 
 namespace previz::session {
-namespace {
+namespace session_round_trip_test {
 
 struct Picture {
   PixelFormat format;
@@ -274,5 +274,5 @@ TEST(Session, TheSameFramesMakeTheSameFiles) {
     EXPECT_EQ(content_of(directory.path() / "a" / file), content_of(directory.path() / "b" / file));
 }
 
-}  // namespace
+}  // namespace session_round_trip_test
 }  // namespace previz::session

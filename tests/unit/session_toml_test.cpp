@@ -7,7 +7,7 @@
 #include "drivers/session/session_toml.hpp"
 
 namespace previz::session {
-namespace {
+namespace session_toml_test {
 
 SessionFile through_toml(const SessionFile& file) {
   return parse_session_toml(to_toml(file), "session.toml");
@@ -178,5 +178,5 @@ TEST(SessionToml, NamesMustBeText) {
   EXPECT_THROW(to_toml(file), Error);
 }
 
-}  // namespace
+}  // namespace session_toml_test
 }  // namespace previz::session

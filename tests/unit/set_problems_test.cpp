@@ -9,10 +9,10 @@
 
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::set {
-namespace {
+namespace set_problems_test {
 
 std::vector<std::string> problems_of(const std::string& text, const std::filesystem::path& file) {
   std::vector<std::string> lines;
@@ -342,5 +342,5 @@ TEST(SetProblems, NameAFileThatCannotBeRead) {
   }
 }
 
-}  // namespace
+}  // namespace set_problems_test
 }  // namespace previz::set

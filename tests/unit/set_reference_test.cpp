@@ -10,7 +10,7 @@
 #include "drivers/error.hpp"
 
 namespace previz::set {
-namespace {
+namespace set_reference_test {
 
 const std::filesystem::path config = std::filesystem::path(PREVIZ_SOURCE_DIR) / "config";
 
@@ -94,5 +94,5 @@ TEST(SetExample, Parses) {
   EXPECT_TRUE(set.light_camera.calibration);
 }
 
-}  // namespace
+}  // namespace set_reference_test
 }  // namespace previz::set

@@ -7,10 +7,10 @@
 
 #include "daemon/set/pose.hpp"
 #include "daemon/set/set.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::set {
-namespace {
+namespace set_values_test {
 
 // Products of a few double operations on values of order 1.
 constexpr double rounding = 1e-14;
@@ -280,5 +280,5 @@ carrier = "stick"
   EXPECT_EQ(set.lights.at(0).carrier, "stick");
 }
 
-}  // namespace
+}  // namespace set_values_test
 }  // namespace previz::set

@@ -11,7 +11,7 @@
 #include <vector>
 
 namespace previz {
-namespace {
+namespace structure_includes_test {
 
 namespace fs = std::filesystem;
 
@@ -109,5 +109,5 @@ TEST(Includes, TheLiveRigKnowsNothingOfTheOfflineRooms) {
   }
 }
 
-}  // namespace
+}  // namespace structure_includes_test
 }  // namespace previz

@@ -6,10 +6,10 @@
 
 #include "daemon/tracking/carrier_pose.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/tracking_fixture.hpp"
+#include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking {
-namespace {
+namespace tracking_carrier_test {
 
 using Matrix6 = cv::Matx<double, 6, 6>;
 
@@ -148,5 +148,5 @@ TEST(Carriers, ALeverTurnsAngleIntoPlace) {
   for (int i = 0; i < 36; ++i) EXPECT_NEAR(pose.covariance[i], expected.val[i], 1e-20) << i;
 }
 
-}  // namespace
+}  // namespace tracking_carrier_test
 }  // namespace previz::tracking

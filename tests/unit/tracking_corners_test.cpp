@@ -10,10 +10,10 @@
 
 #include "daemon/tracking/edge.hpp"
 #include "daemon/tracking/photometry.hpp"
-#include "tests/unit/tracking_synthetic.hpp"
+#include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::tracking {
-namespace {
+namespace tracking_corners_test {
 
 using test::TagScene;
 
@@ -222,5 +222,5 @@ TEST(TrackingEdge, CoverageDerivatives) {
   }
 }
 
-}  // namespace
+}  // namespace tracking_corners_test
 }  // namespace previz::tracking

@@ -12,10 +12,10 @@
 
 #include "daemon/tracking/joint_pose.hpp"
 #include "daemon/tracking/lens.hpp"
-#include "tests/unit/tracking_synthetic.hpp"
+#include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::tracking {
-namespace {
+namespace tracking_pose_test {
 
 using test::TagScene;
 
@@ -210,5 +210,5 @@ TEST(TrackingPose, ImpossibleCornersAreRefused) {
   for (const FittedPose& fit : solve_joint_pose({tag}, lens, {})) EXPECT_GT(fit.rms_px, 2);
 }
 
-}  // namespace
+}  // namespace tracking_pose_test
 }  // namespace previz::tracking

@@ -7,10 +7,10 @@
 #include <glm/matrix.hpp>
 
 #include "drivers/error.hpp"
-#include "tests/unit/tracking_fixture.hpp"
+#include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking {
-namespace {
+namespace tracking_tracker_test {
 
 TEST(Tracker, FindsTheCameraFromAllTags) {
   const TagScene scene = table();
@@ -234,5 +234,5 @@ TEST(Tracker, NoiseHoldsNoTags) {
   }
 }
 
-}  // namespace
+}  // namespace tracking_tracker_test
 }  // namespace previz::tracking

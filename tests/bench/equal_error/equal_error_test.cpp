@@ -4,17 +4,17 @@
 #include "tests/bench/equal_error/view.hpp"
 
 namespace previz::bench {
-namespace {
+namespace equal_error_test {
 
 // Noise: e = 0.4 / sqrt(t).
-TEST(TimeToError, follows_the_power_law_between_points) {
+TEST(TimeToError, FollowsThePowerLawBetweenPoints) {
   const std::vector<Point> points = {{1, 0.4}, {4, 0.2}, {16, 0.1}};
   const TimeToError time = time_to_error(points, 0.16);
   EXPECT_FALSE(time.is_beyond);
   EXPECT_NEAR(time.cpu_s, 0.4 * 0.4 / (0.16 * 0.16), 1e-9);
 }
 
-TEST(TimeToError, tells_where_it_was_not_measured) {
+TEST(TimeToError, TellsWhereItWasNotMeasured) {
   const std::vector<Point> points = {{1, 0.4}, {4, 0.2}};
   for (const double error : {0.8, 0.05}) {
     const TimeToError time = time_to_error(points, error);
@@ -24,12 +24,12 @@ TEST(TimeToError, tells_where_it_was_not_measured) {
 }
 
 // The first time that the error is reached counts, not a later, luckier one.
-TEST(TimeToError, takes_the_first_crossing) {
+TEST(TimeToError, TakesTheFirstCrossing) {
   const std::vector<Point> points = {{1, 0.4}, {2, 0.1}, {4, 0.3}, {8, 0.05}};
   EXPECT_LE(time_to_error(points, 0.1).cpu_s, 2);
 }
 
-TEST(WorldAlone, has_what_its_world_has) {
+TEST(WorldAlone, HasWhatItsWorldHas) {
   scene::Scene scene;
   for (const std::uint32_t presence :
        {scene::world_both, scene::world_mixed, scene::world_real, scene::world_both}) {
@@ -55,5 +55,5 @@ TEST(WorldAlone, has_what_its_world_has) {
   EXPECT_EQ(real.lights[0].gain_real, 1);
 }
 
-}  // namespace
+}  // namespace equal_error_test
 }  // namespace previz::bench

@@ -3,16 +3,14 @@
 
 #include <functional>
 #include <glm/vec3.hpp>
-#include <numbers>
 #include <vector>
 
 #include "daemon/lighting/environment.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
+#include "tests/support/units.hpp"
 
-namespace previz::lighting::test {
-
-inline constexpr double degree = std::numbers::pi / 180;
+namespace previz::test {
 
 // Radiance from a unit world direction.
 using Sky = std::function<glm::dvec3(const glm::dvec3&)>;
@@ -36,4 +34,4 @@ FramePtr photograph(const LightCameraCalibration& camera, const Sky& sky, double
 // 64 unit vectors spread evenly over the upper hemisphere (a spherical Fibonacci lattice).
 std::vector<glm::dvec3> upper_normals();
 
-}  // namespace previz::lighting::test
+}  // namespace previz::test

@@ -1,10 +1,10 @@
-#include "tests/unit/small_take.hpp"
+#include "tests/support/small_take.hpp"
 
 #include <fstream>
 #include <random>
 
 #include "drivers/session/session.hpp"
-#include "tests/unit/gltf_writer.hpp"
+#include "tests/support/gltf_writer.hpp"
 
 namespace previz::test {
 namespace {
@@ -14,7 +14,7 @@ constexpr std::int64_t start_ns = 1'000'000'000'000;
 
 // A square of this side, facing glTF's +Y, which is the world's +Z.
 void write_square(const std::filesystem::path& file, float side_m, float height_m) {
-  testing::GltfWriter gltf;
+  test::GltfWriter gltf;
   const float s = side_m / 2, y = height_m;
   const int positions = gltf.positions({{-s, y, s}, {s, y, s}, {s, y, -s}, {-s, y, -s}});
   const int indices = gltf.indices({0, 1, 2, 0, 2, 3});

@@ -2,16 +2,14 @@
 #pragma once
 
 #include <functional>
-#include <numbers>
 #include <optional>
 #include <random>
 
 #include "daemon/calibrate/views.hpp"
 #include "daemon/tracking/joint_pose.hpp"
+#include "tests/support/units.hpp"
 
 namespace previz::test {
-
-inline constexpr double degree = std::numbers::pi / 180;
 
 using Lens = std::function<std::optional<glm::dvec2>(const glm::dvec3& point)>;
 

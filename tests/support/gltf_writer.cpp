@@ -1,11 +1,11 @@
-#include "tests/unit/gltf_writer.hpp"
+#include "tests/support/gltf_writer.hpp"
 
 #include <stb_image_write.h>
 
 #include <fstream>
 #include <stdexcept>
 
-namespace previz::testing {
+namespace previz::test {
 namespace {
 
 void append_u32(std::string& bytes, std::size_t value) {
@@ -114,4 +114,4 @@ std::vector<unsigned char> png(int width, int height, const std::vector<unsigned
   return bytes;
 }
 
-}  // namespace previz::testing
+}  // namespace previz::test

@@ -1,4 +1,4 @@
-#include "tests/unit/scenes.hpp"
+#include "tests/support/scenes.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <numbers>
 #include <utility>
 
-namespace previz::testing {
+namespace previz::test {
 
 using std::numbers::pi;
 
@@ -280,4 +280,4 @@ ObserverCalibration pinhole(int width, int height, double horizontal_fov_rad) {
   return calibration;
 }
 
-}  // namespace previz::testing
+}  // namespace previz::test

@@ -1,4 +1,4 @@
-#include "tests/unit/calibrate_pictures.hpp"
+#include "tests/support/calibrate_pictures.hpp"
 
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/matrix.hpp>

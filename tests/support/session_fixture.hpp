@@ -11,7 +11,7 @@
 
 #include "drivers/frame.hpp"
 #include "drivers/session/session.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::session {
 

@@ -1,4 +1,4 @@
-#include "tests/unit/bvh_decode.hpp"
+#include "tests/support/bvh_decode.hpp"
 
 #include <bit>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "tests/unit/import_fixture.hpp"
+#include "tests/support/import_fixture.hpp"
 
 #include <gtest/gtest.h>
 

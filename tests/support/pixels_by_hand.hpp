@@ -6,9 +6,9 @@
 #include <span>
 
 #include "daemon/render/presenter.hpp"
-#include "tests/unit/render_fixture.hpp"
+#include "tests/support/render_fixture.hpp"
 
-namespace previz::testing {
+namespace previz::test {
 
 inline Plate random_plate(int width, int height, int bits) {
   Plate plate{width, height, bits, {}};
@@ -98,4 +98,4 @@ inline void denoise(render::Denoiser& denoiser, render::Layers& layers,
   }
 }
 
-}  // namespace previz::testing
+}  // namespace previz::test

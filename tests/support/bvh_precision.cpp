@@ -1,4 +1,4 @@
-#include "tests/unit/bvh_precision.hpp"
+#include "tests/support/bvh_precision.hpp"
 
 #include <algorithm>
 #include <cmath>

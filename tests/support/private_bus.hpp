@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::test {
 

@@ -9,10 +9,10 @@
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
-#include "tests/unit/gltf_writer.hpp"
-#include "tests/unit/temporary_directory.hpp"
+#include "tests/support/gltf_writer.hpp"
+#include "tests/support/temporary_directory.hpp"
 
-namespace previz::testing {
+namespace previz::test {
 
 class GltfTest : public ::testing::Test {
  protected:
@@ -40,4 +40,4 @@ class GltfTest : public ::testing::Test {
   set::Set a_set;      // its further objects and lights come after
 };
 
-}  // namespace previz::testing
+}  // namespace previz::test

@@ -1,4 +1,4 @@
-#include "tests/unit/tracking_synthetic.hpp"
+#include "tests/support/tracking_synthetic.hpp"
 
 #include <apriltag/apriltag.h>
 #include <apriltag/tag16h5.h>

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-namespace previz::testing {
+namespace previz::test {
 
 class GltfWriter {
  public:
@@ -63,4 +63,4 @@ class GltfWriter {
 std::string base64(const std::vector<unsigned char>& bytes);
 std::vector<unsigned char> png(int width, int height, const std::vector<unsigned char>& rgba);
 
-}  // namespace previz::testing
+}  // namespace previz::test

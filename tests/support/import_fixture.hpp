@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "daemon/exchange/import.hpp"
-#include "tests/unit/session_fixture.hpp"
+#include "tests/support/session_fixture.hpp"
 
 namespace previz::exchange {
 

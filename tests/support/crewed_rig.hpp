@@ -20,7 +20,7 @@
 
 #include "daemon/rig/live.hpp"
 #include "daemon/set/actions.hpp"
-#include "tests/unit/hand.hpp"
+#include "tests/support/hand.hpp"
 
 namespace previz::test {
 

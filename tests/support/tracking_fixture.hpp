@@ -7,7 +7,7 @@
 #include <glm/matrix.hpp>
 
 #include "daemon/tracking/apriltag_tracker.hpp"
-#include "tests/unit/tracking_synthetic.hpp"
+#include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::tracking {
 

@@ -1,4 +1,4 @@
-#include "tests/unit/lighting_pictures.hpp"
+#include "tests/support/lighting_pictures.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "daemon/lighting/fisheye.hpp"
 
-namespace previz::lighting::test {
+namespace previz::test {
 
 using std::numbers::pi;
 
@@ -62,7 +62,7 @@ glm::dmat4 looking(double azimuth_deg, double elevation_deg, double roll_deg) {
 
 FramePtr photograph(const LightCameraCalibration& camera, const Sky& sky, double exposure,
                     Detail detail) {
-  const Fisheye lens(camera.intrinsics);
+  const lighting::Fisheye lens(camera.intrinsics);
   const glm::dmat3 world_from_camera(camera.world_from_camera);
   struct Mean {
     glm::dvec3 radiance{0};
@@ -104,4 +104,4 @@ std::vector<glm::dvec3> upper_normals() {
   return normals;
 }
 
-}  // namespace previz::lighting::test
+}  // namespace previz::test

@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "daemon/render/renderer.hpp"
-#include "tests/unit/scenes.hpp"
+#include "tests/support/scenes.hpp"
 
-namespace previz::testing {
+namespace previz::test {
 
 // One device a test program; every test ends by asking it for validation messages.
 inline const std::shared_ptr<render::Device>& shared_device() {
@@ -92,4 +92,4 @@ inline double standard_error_of_pixels(const render::Layers& layers) {
   return std::sqrt(sum / (n * (n - 1)));
 }
 
-}  // namespace previz::testing
+}  // namespace previz::test

@@ -11,7 +11,7 @@
 #include "daemon/scene/scene.hpp"
 #include "drivers/calibration.hpp"
 
-namespace previz::testing {
+namespace previz::test {
 
 // Shapes around the origin, with uvs; counter-clockwise seen from outside (rectangle: from +Z).
 scene::Mesh rectangle_mesh(const glm::dvec2& size);
@@ -85,4 +85,4 @@ struct RandomScene {
 // consecutive seeds takes each of the six materials in turn.
 View random_scene(std::uint32_t seed, const RandomScene& options = {});
 
-}  // namespace previz::testing
+}  // namespace previz::test

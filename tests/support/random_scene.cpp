@@ -6,9 +6,9 @@
 #include <random>
 
 #include "shaders/lib/octahedral.h"
-#include "tests/unit/scenes.hpp"
+#include "tests/support/scenes.hpp"
 
-namespace previz::testing {
+namespace previz::test {
 namespace {
 
 using std::numbers::pi;
@@ -222,4 +222,4 @@ View random_scene(std::uint32_t seed, const RandomScene& options) {
   return view;
 }
 
-}  // namespace previz::testing
+}  // namespace previz::test
