@@ -24,7 +24,7 @@ TEST(ExtremeTracking, NeverFlipsASingleTag) {
     const double range = 1.4 + 0.8 * unit(random);
     const glm::dvec3 eye = range * glm::dvec3(std::sin(tilt) * std::cos(around),
                                               std::sin(tilt) * std::sin(around), std::cos(tilt));
-    scene.world_from_camera = look_at(eye, {0, 0, 0}, {0.2, 1, 0.1});
+    scene.world_from_camera = camera_looking(eye, {0, 0, 0}, {0.2, 1, 0.1});
     const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
     const Track track = tracker->track(picture(scene, random, 600));
     ASSERT_NE(track.status, TrackStatus::lost) << track.reason;
@@ -57,7 +57,7 @@ TEST(ExtremeTracking, TheLastPoseDecidesWhileItIsRecent) {
   scene.tags = {flat_tag(5, 0.08, {0, 0, 0})};
   const auto place = [&](double tilt) {
     scene.world_from_camera =
-        look_at({2 * std::sin(tilt), 0.1, 2 * std::cos(tilt)}, {0, 0, 0}, {0, 1, 0});
+        camera_looking({2 * std::sin(tilt), 0.1, 2 * std::cos(tilt)}, {0, 0, 0}, {0, 1, 0});
   };
   std::mt19937 random(8);
   const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
@@ -94,7 +94,7 @@ TEST(ExtremeTracking, GrazingAngles) {
   TrackStatus status = TrackStatus::tracked;
   for (double elevation : {45.0, 25.0, 15.0, 10.0, 7.0, 5.0, 3.0, 1.0}) {
     const double e = glm::radians(elevation);
-    scene.world_from_camera = look_at({0, -0.9 * std::cos(e), 0.9 * std::sin(e)}, {0, 0, 0});
+    scene.world_from_camera = camera_looking({0, -0.9 * std::cos(e), 0.9 * std::sin(e)}, {0, 0, 0});
     const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
     const Track track = tracker->track(picture(scene, random));
     status = track.status;
@@ -119,7 +119,7 @@ TEST(ExtremeTracking, DetectionLimit) {
   double last = 0;
   TrackStatus status = TrackStatus::tracked;
   for (double range : {0.6, 1.2, 2.4, 4.8, 9.6}) {
-    scene.world_from_camera = look_at({0.1, -0.8 * range, 0.6 * range}, {0.02, 0.03, 0});
+    scene.world_from_camera = camera_looking({0.1, -0.8 * range, 0.6 * range}, {0.02, 0.03, 0});
     const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
     const Track track = tracker->track(picture(scene, random));
     status = track.status;

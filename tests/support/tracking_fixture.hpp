@@ -12,7 +12,7 @@
 namespace previz::tracking {
 
 using test::flat_tag;
-using test::look_at;
+using test::camera_looking;
 using test::TagScene;
 
 inline constexpr std::int64_t kFrameNs = 40'000'000;
@@ -23,7 +23,7 @@ inline TagScene table() {
   scene.lens.k1 = -0.12, scene.lens.k2 = 0.04, scene.lens.p1 = 0.001, scene.lens.p2 = -0.0007;
   scene.tags = {flat_tag(0, 0.08, {0, 0, 0}), flat_tag(1, 0.08, {0.22, -0.05, 0}, 0.4),
                 flat_tag(2, 0.08, {-0.18, 0.15, 0}, -0.3)};
-  scene.world_from_camera = look_at({0.1, -0.6, 0.45}, {0.02, 0.03, 0});
+  scene.world_from_camera = camera_looking({0.1, -0.6, 0.45}, {0.02, 0.03, 0});
   return scene;
 }
 

@@ -237,7 +237,7 @@ std::array<glm::dvec2, 4> exact_corners(const TagScene& scene, const set::Tag& t
   return corners;
 }
 
-glm::dmat4 look_at(glm::dvec3 eye, glm::dvec3 target, glm::dvec3 up) {
+glm::dmat4 camera_looking(glm::dvec3 eye, glm::dvec3 target, glm::dvec3 up) {
   const glm::dvec3 z = glm::normalize(target - eye);
   const glm::dvec3 x = glm::normalize(glm::cross(z, up));
   const glm::dvec3 y = glm::cross(z, x);

@@ -53,7 +53,7 @@ Frame expose(const LinearPicture& picture, const Sensor& sensor, std::mt19937& r
 std::array<glm::dvec2, 4> exact_corners(const TagScene& scene, const set::Tag& tag);
 
 // A camera at `eye` looking at `target` with `up` upwards in the picture.
-glm::dmat4 look_at(glm::dvec3 eye, glm::dvec3 target, glm::dvec3 up = {0, 0, 1});
+glm::dmat4 camera_looking(glm::dvec3 eye, glm::dvec3 target, glm::dvec3 up = {0, 0, 1});
 
 // A tag lying at `centre`, turned about its normal, normal along the world's Z unless tilted.
 set::Tag flat_tag(int id, double size_m, glm::dvec3 centre, double turn_rad = 0);

@@ -139,7 +139,7 @@ TEST(BoardFinder, AprilgridCornersHaveTheirIds) {
   const Board board = parse_board("aprilgrid:3x2:60mm:20mm:tag36h11:7");
   test::TagScene scene;
   scene.lens = test::plain_lens(width, height, 600);
-  scene.world_from_camera = test::look_at({0.1, -0.2, 0.45}, {0.11, 0.07, 0});
+  scene.world_from_camera = test::camera_looking({0.1, -0.2, 0.45}, {0.11, 0.07, 0});
   for (int i = 0; i < 6; ++i) {
     const int column = i % 3, row = i / 3;
     scene.tags.push_back(test::flat_tag(7 + i, 0.06, {0.03 + 0.08 * column, 0.03 + 0.08 * row, 0}));

@@ -105,7 +105,7 @@ TEST(FisheyeCalibration, WritesTheTableThatASetFileTakes) {
   const FisheyeFit fisheye = fit_fisheye(all_around());
   LightCameraCalibration camera;
   camera.intrinsics = fisheye.intrinsics;
-  const glm::dmat4 pose = test::look_at({0.3, 0.1, 0.2}, {0.4, 0.2, 2});
+  const glm::dmat4 pose = test::camera_looking({0.3, 0.1, 0.2}, {0.4, 0.2, 2});
   const set::Set set =
       set::parse_set(set::intrinsics_toml(camera) + set::light_pose_toml(pose), "printed.toml");
   ASSERT_TRUE(set.light_camera.calibration);
@@ -233,7 +233,7 @@ FisheyeIntrinsics small_lens() {
 }
 
 glm::dmat4 true_pose() {
-  return test::look_at({0.03, -0.02, 0.05}, {0.08, 0.03, 1}, {0, -1, 0});
+  return test::camera_looking({0.03, -0.02, 0.05}, {0.08, 0.03, 1}, {0, -1, 0});
 }
 
 set::Tracking tracking(std::vector<set::Tag> tags) {

@@ -37,7 +37,7 @@ test::TagScene table() {
   scene.lens = test::plain_lens(320, 240, 300);
   scene.tags = {test::flat_tag(0, 0.08, {0, 0.05, 0}), test::flat_tag(1, 0.08, {0.22, -0.05, 0}),
                 test::flat_tag(2, 0.08, {-0.18, 0.15, 0})};
-  scene.world_from_camera = test::look_at({0.1, -0.6, 0.45}, {0.02, 0.03, 0});
+  scene.world_from_camera = test::camera_looking({0.1, -0.6, 0.45}, {0.02, 0.03, 0});
   return scene;
 }
 

@@ -57,7 +57,7 @@ Errors measure(const Case& c, int trials) {
     const double room = std::max(0.0, 0.5 - 0.65 * side / 200) * 200 / side;
     const glm::dvec3 aside(between(-room, room), between(-room, room), 0);
     scene.tags = {test::flat_tag(int(random() % 587), 1, aside, between(0, 6.2832))};
-    scene.world_from_camera = test::look_at(distance * view, {0, 0, 0}, {0.3, 1, 0.1});
+    scene.world_from_camera = test::camera_looking(distance * view, {0, 0, 0}, {0.3, 1, 0.1});
     const CornerPixels exact = test::exact_corners(scene, scene.tags[0]);
     if (narrowest_cell_px(exact, 8) < 1.7) continue;
     bool inside = true;

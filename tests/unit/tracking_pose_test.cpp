@@ -40,7 +40,7 @@ TagScene three_tags() {
   scene.lens.k1 = -0.12, scene.lens.k2 = 0.04, scene.lens.p1 = 0.001, scene.lens.p2 = -0.0007;
   scene.tags = {test::flat_tag(0, 0.08, {0, 0, 0}), test::flat_tag(1, 0.08, {0.25, -0.05, 0}, 0.4),
                 test::flat_tag(2, 0.08, {-0.2, 0.2, 0}, -0.3)};
-  scene.world_from_camera = test::look_at({0.1, -0.7, 0.5}, {0.02, 0.05, 0});
+  scene.world_from_camera = test::camera_looking({0.1, -0.7, 0.5}, {0.02, 0.05, 0});
   return scene;
 }
 
@@ -188,7 +188,7 @@ TEST(TrackingPose, BothPosesOfASingleTagAreKept) {
   TagScene scene;
   scene.lens = test::plain_lens(640, 480, 600);
   scene.tags = {test::flat_tag(0, 0.08, {0, 0, 0})};
-  scene.world_from_camera = test::look_at({0.25, -0.1, 1.0}, {0, 0, 0}, {0, 1, 0});
+  scene.world_from_camera = test::camera_looking({0.25, -0.1, 1.0}, {0, 0, 0}, {0, 1, 0});
   std::mt19937 random(5);
   const auto poses = solve_joint_pose(observe(scene, 0.05, random), scene.lens, {});
   ASSERT_EQ(poses.size(), 2u);

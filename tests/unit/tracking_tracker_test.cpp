@@ -111,7 +111,7 @@ TEST(Tracker, LeavesOutTagsCutByTheBorder) {
   std::mt19937 random(4);
   int seen_cut = 0;
   for (double slide = 0.05; slide < 0.25; slide += 0.006) {
-    scene.world_from_camera = look_at({slide, -0.5, 0.45}, {slide, 0.05, 0});
+    scene.world_from_camera = camera_looking({slide, -0.5, 0.45}, {slide, 0.05, 0});
     const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
     const Track track = tracker->track(picture(scene, random));
     seen_cut += track.reason.find("border") != std::string::npos;
@@ -160,7 +160,7 @@ TEST(Tracker, CovarianceHoldsOnPictures) {
   double sum = 0;
   int counted = 0;
   for (int t = 0; t < trials; ++t) {
-    scene.world_from_camera = look_at({0.1 + 0.1 * unit(random), -0.6, 0.45 + 0.1 * unit(random)},
+    scene.world_from_camera = camera_looking({0.1 + 0.1 * unit(random), -0.6, 0.45 + 0.1 * unit(random)},
                                       {0.02 * unit(random), 0.03, 0});
     const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
     const Track track = tracker->track(picture(scene, random, 200));
@@ -182,7 +182,7 @@ TEST(Tracker, CovarianceHoldsOnPictures) {
 // At decimate 4 these tags are too small to be found: a lost frame must be searched in full.
 TEST(Tracker, SearchesAtFullResolutionWhenLost) {
   TagScene scene = table();
-  scene.world_from_camera = look_at({0.1, -0.9, 0.9}, {0.02, 0.03, 0});
+  scene.world_from_camera = camera_looking({0.1, -0.9, 0.9}, {0.02, 0.03, 0});
   set::Tracking settings = settings_for(scene);
   settings.decimate = 4;
   std::mt19937 random(12);
