@@ -71,7 +71,8 @@ struct Material {
   std::uint32_t emission_texture = no_texture;
   AlphaMode alpha_mode = AlphaMode::opaque;
   float alpha_cutoff = 0.5f;
-  // KHR_materials_volume: white light is attenuation_color after this far inside (Beer-Lambert).
+  // KHR_materials_volume: white light is attenuation_color after this far inside (Beer-Lambert). No
+  // shader reads it yet: the inside of glass is rendered clear, and a note of the scene says so.
   glm::vec3 attenuation_color{1};
   float attenuation_distance_m = std::numeric_limits<float>::infinity();
   std::uint32_t normal_texture = no_texture;  // tangent space, +Y up, along the uvs

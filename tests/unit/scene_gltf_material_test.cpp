@@ -116,6 +116,27 @@ TEST_F(GltfMaterials, OpaqueMeansAlphaOneAndThicknessZeroMeansThin) {
   EXPECT_TRUE(m.thin_walled);
 }
 
+// No shader attenuates light inside of glass, and nobody shall wonder where the colour went.
+TEST_F(GltfMaterials, ColourInsideOfGlassIsNotRenderedAndNoted) {
+  const auto glass = [&](double transmission, double thickness, const Json& color, Json distance) {
+    Json volume = {{"thicknessFactor", thickness}, {"attenuationColor", color}};
+    if (!distance.is_null()) volume["attenuationDistance"] = std::move(distance);
+    use({{"name", "glass"},
+         {"extensions",
+          {{"KHR_materials_transmission", {{"transmissionFactor", transmission}}},
+           {"KHR_materials_volume", volume}}}});
+  };
+  const Json green = {0.1, 0.9, 0.2}, white = {1, 1, 1};
+  glass(0, 0.01, green, 0.5);      // light does not get in
+  glass(1, 0, green, 0.5);         // a thin pane has no inside
+  glass(1, 0.01, white, 0.5);      // takes nothing away
+  glass(1, 0.01, green, nullptr);  // over an infinite distance
+  EXPECT_THAT(load().notes, IsEmpty());
+  glass(1, 0.01, green, 0.5);
+  EXPECT_THAT(load().notes, ElementsAre(HasSubstr("material 4 \"glass\": its attenuationColor is "
+                                                  "not rendered yet; the glass is clear inside")));
+}
+
 TEST_F(GltfMaterials, BringsNumbersIntoRangeWithANote) {
   use({{"name", "odd"},
        {"pbrMetallicRoughness",
