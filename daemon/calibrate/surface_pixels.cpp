@@ -41,7 +41,6 @@ scene::Scene glowing(scene::Scene scene, std::vector<KnownSurface>& surfaces) {
     scene::Material& material = scene.materials[i];
     scene::Material glow;
     glow.name = material.name;
-    glow.double_sided = material.double_sided;
     glow.base_color = glm::vec3(0);
     glow.specular = 0;
     if (used[i] && is_diffuse(material)) {

@@ -70,7 +70,6 @@ UsedMaterial GltfMaterials::read(const tinygltf::Material& given, const std::str
   material.base_color = color_within(pbr.baseColorFactor, 1, what + ": its base colour", notes_);
   material.metallic = within(pbr.metallicFactor, 0, 1, what + ": metallicFactor", notes_);
   material.roughness = within(pbr.roughnessFactor, 0, 1, what + ": roughnessFactor", notes_);
-  material.double_sided = given.doubleSided;
   material.alpha_mode = alpha_mode(given.alphaMode, what, notes_);
   if (material.alpha_mode != AlphaMode::opaque)
     material.alpha = within(pbr.baseColorFactor[3], 0, 1, what + ": its alpha", notes_);

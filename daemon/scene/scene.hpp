@@ -64,7 +64,6 @@ struct Material {
   float ior = 1.5f;         // KHR_materials_ior, >= 1
   float transmission = 0;   // KHR_materials_transmission, 0..1
   bool thin_walled = true;  // false where KHR_materials_volume gives a thickness > 0
-  bool double_sided = false;
   glm::vec3 emission{0};  // radiance: emissiveFactor * emissive_strength
   std::uint32_t base_color_texture = no_texture;
   std::uint32_t metallic_roughness_texture = no_texture;  // G roughness, B metallic

@@ -42,7 +42,6 @@ TEST_F(GltfMaterials, DefaultsAreGltfs) {
     EXPECT_EQ(m.ior, 1.5f);
     EXPECT_EQ(m.transmission, 0);
     EXPECT_TRUE(m.thin_walled);
-    EXPECT_FALSE(m.double_sided);
     EXPECT_EQ(m.emission, glm::vec3(0));
     EXPECT_EQ(m.alpha_mode, scene::AlphaMode::opaque);
     EXPECT_EQ(m.attenuation_distance_m, std::numeric_limits<float>::infinity());
@@ -60,7 +59,6 @@ TEST_F(GltfMaterials, ReadsEveryFactor) {
               {"emissiveFactor", {0.25, 0.5, 1}},
               {"alphaMode", "MASK"},
               {"alphaCutoff", 0.3},
-              {"doubleSided", true},
               {"extensions",
                {{"KHR_materials_emissive_strength", {{"emissiveStrength", 8}}},
                 {"KHR_materials_transmission", {{"transmissionFactor", 0.9}}},
@@ -78,7 +76,6 @@ TEST_F(GltfMaterials, ReadsEveryFactor) {
   EXPECT_EQ(m.metallic, 0.5f);
   EXPECT_EQ(m.roughness, 0.6f);
   EXPECT_EQ(m.emission, glm::vec3(2, 4, 8));
-  EXPECT_TRUE(m.double_sided);
   EXPECT_EQ(m.transmission, 0.9f);
   EXPECT_EQ(m.ior, 1.33f);
   EXPECT_EQ(m.specular, 0.7f);
