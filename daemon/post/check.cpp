@@ -14,6 +14,7 @@
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/pipeline/room_model.hpp"
 #include "daemon/pipeline/take.hpp"
+#include "daemon/render/feature.hpp"
 #include "daemon/render/photon_schedule.hpp"
 #include "daemon/render/picture_memory.hpp"
 #include "daemon/scene/scene.hpp"
@@ -22,6 +23,7 @@
 #include "daemon/tracking/apriltag_tracker.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
+#include "shaders/lib/render_shared.h"
 
 namespace previz::post {
 namespace {
@@ -261,52 +263,27 @@ void print_estimator(const set::Set& set, std::ostream& out) {
       << set::name_of(e.caustics) << ", seed " << e.seed << '\n';
 }
 
-void print_requirements(const scene::Requirements& required, std::ostream& out) {
-  struct Part {
-    bool scene::Requirements::*needed;
-    const char* with;
-    const char* without;
-  };
-  static constexpr Part parts[] = {
-      {&scene::Requirements::differing_objects,
-       "two worlds: an object is in one of them only, paths fork there",
-       "forks: every object is in both worlds"},
-      {&scene::Requirements::removed_objects, "diminished reality: a real object is taken away",
-       "diminished reality: nothing real is taken away"},
-      {&scene::Requirements::thin_lens, "lens sampling: the aperture blurs what is out of focus",
-       "lens sampling: everything is sharp"},
-      {&scene::Requirements::transmission, "refraction: something lets light through",
-       "refraction: nothing lets light through"},
-      {&scene::Requirements::metals, "conductors: something is of metal",
-       "conductors: nothing is of metal"},
-      {&scene::Requirements::rough_specular, "GGX: something is glossy", "GGX: nothing is glossy"},
-      {&scene::Requirements::caustics, "caustics: mirrors or clear glass throw light on",
-       "caustics: nothing throws light on without blurring it"},
-      {&scene::Requirements::textures, "textures: surfaces read pictures",
-       "textures: no surface reads a picture"},
-      {&scene::Requirements::alpha, "alpha: rays pass through parts of a surface",
-       "alpha: every surface is opaque"},
-      {&scene::Requirements::emissive_meshes, "glowing meshes: surfaces that are lights",
-       "glowing meshes: no surface gives light"},
-      {&scene::Requirements::lights,
-       "lamps: the set or a glTF file names some, or they are found in the light around",
-       "lamps: only the light around the set shines"},
-  };
-  out << "\nthe renderer needs\n  rays: " << plural(required.triangles, "triangle") << ", seen as "
-      << grouped(required.instanced_triangles) << '\n';
-  for (const auto& part : parts)
-    if (required.*part.needed) out << "  " << part.with << '\n';
-  out << "\nthe renderer leaves out\n";
-  for (const auto& part : parts)
-    if (!(required.*part.needed)) out << "  " << part.without << '\n';
+void print_features(const render::Demand& demand, const scene::Size& size, std::ostream& out) {
+  Lines used, unused;
+  for (const render::Feature& feature : render::features()) {
+    const bool needed = render::is_needed(feature, demand);
+    (needed ? used : unused)
+        .push_back(words(feature.name, ": ", needed ? feature.used : feature.left_out));
+  }
+  out << "\nthis set uses\n  geometry: " << plural(size.triangles, "triangle") << ", or "
+      << grouped(size.instanced_triangles) << " with every copy of an object counted\n";
+  for (const auto& line : used) out << "  " << line << '\n';
+  out << "\nleft out, because this set does not use it\n";
+  for (const auto& line : unused) out << "  " << line << '\n';
 }
 
 // What a frame asks of the GPU, before anything is measured; `previzd trade` measures.
-void print_costs(const set::Set& set, const scene::Requirements& required, std::ostream& out) {
+void print_costs(const set::Set& set, std::uint32_t needed, const scene::Size& size,
+                 std::ostream& out) {
   // Bytes a vertex, triangle and texel in lib/render_shared.h's buffers; a tree of pairs takes
   // about one record of 64 bytes a triangle.
   const double scene_bytes =
-      32.0 * required.vertices + (16.0 + 64.0) * required.triangles + 8.0 * required.texels;
+      32.0 * size.vertices + (16.0 + 64.0) * size.triangles + 8.0 * size.texels;
   constexpr double mebibyte = 1024.0 * 1024.0;
   constexpr auto any_number = std::numeric_limits<std::uint32_t>::max();
   out << "\na frame costs\n";
@@ -321,11 +298,11 @@ void print_costs(const set::Set& set, const scene::Requirements& required, std::
                          mebibyte),
                " MiB\n");
   // A path and a light sample a bounce, and one more segment; twice, where the worlds part.
-  const double most =
-      samples * (2.0 * set.estimation.max_depth + 1) * (required.differing_objects ? 2.0 : 1.0);
+  const double most = samples * (2.0 * set.estimation.max_depth + 1) *
+                      ((needed & gpu::FEATURE_FORKS) != 0 ? 2.0 : 1.0);
   out << "  rays: " << grouped(static_cast<std::uint64_t>(2 * samples)) << " at least, "
       << grouped(static_cast<std::uint64_t>(most)) << " at most\n";
-  if (required.caustics && set.estimation.caustics == set::Caustics::photons)
+  if ((needed & gpu::FEATURE_PHOTONS) != 0)
     out << "  photons: "
         << grouped(std::uint64_t{render::photon_count(set.estimation.photons, intrinsics.width,
                                                       intrinsics.height, any_number)} *
@@ -363,9 +340,12 @@ int check_set(const fs::path& set_or_session, std::ostream& out) {
   print_objects(checked.set, *scene, out);
   print_lights(checked.set, *scene, out);
   print_estimator(checked.set, out);
-  const scene::Requirements required = scene::requirements(*scene, checked.set);
-  print_requirements(required, out);
-  print_costs(checked.set, required, out);
+  const scene::Size size = scene::size_of(*scene);
+  const render::Demand demand = render::demand_of(
+      checked.set, *scene,
+      render::material_features(*scene, checked.set.estimation.specular_roughness));
+  print_features(demand, size, out);
+  print_costs(checked.set, render::needed_bits(demand), size, out);
   if (!checked.remarks.empty()) out << "\nworth a look\n";
   for (const auto& remark : checked.remarks) out << "  " << remark << '\n';
   return 0;

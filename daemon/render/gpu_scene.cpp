@@ -27,10 +27,6 @@ glm::dmat4 relative_to(const glm::dmat4& world_from_object, const glm::dvec3& ca
   return result;
 }
 
-bool emits(const scene::Material& material) {
-  return material.emission.r > 0 || material.emission.g > 0 || material.emission.b > 0;
-}
-
 // Probability of the environment where either may be sampled: by power, but neither is forgotten.
 double environment_share(double environment_power, double light_power) {
   if (!(light_power > 0)) return 1;
@@ -72,6 +68,7 @@ void append(std::vector<T>& to, const std::vector<T>& from) {
 void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha) {
   scene_ = scene;
   specular_alpha_ = specular_alpha;
+  material_features_ = material_features(scene_, specular_alpha);
   upload_meshes();
   upload_materials(specular_alpha);
   upload_textures();
@@ -124,11 +121,23 @@ void GpuScene::upload_materials(double specular_alpha) {
   std::vector<gpu::GpuMaterial> materials;
   AlbedoTables albedo;
   for (const scene::Material& m : scene_.materials)
-    materials.push_back({m.base_color, m.metallic, m.emission, m.roughness, m.specular, m.ior,
-                         m.transmission, m.thin_walled ? 1u : 0u, m.base_color_texture,
-                         m.metallic_roughness_texture, m.emission_texture, m.normal_texture,
-                         m.normal_scale, static_cast<std::uint32_t>(m.alpha_mode), m.alpha,
-                         m.alpha_cutoff, albedo.first_of(m, specular_alpha)});
+    materials.push_back({.base_color = m.base_color,
+                         .metallic = m.metallic,
+                         .emission = m.emission,
+                         .roughness = m.roughness,
+                         .specular = m.specular,
+                         .ior = m.ior,
+                         .transmission = m.transmission,
+                         .thin_walled = m.thin_walled ? 1u : 0u,
+                         .base_color_texture = m.base_color_texture,
+                         .metallic_roughness_texture = m.metallic_roughness_texture,
+                         .emission_texture = m.emission_texture,
+                         .normal_texture = m.normal_texture,
+                         .normal_scale = m.normal_scale,
+                         .alpha_mode = static_cast<std::uint32_t>(m.alpha_mode),
+                         .alpha = m.alpha,
+                         .alpha_cutoff = m.alpha_cutoff,
+                         .albedo_table = albedo.first_of(m, specular_alpha)});
   upload_storage(device_, materials_, materials);
   upload_texels(device_, albedo_, albedo.values, vk::Format::eR32Sfloat);
 }
@@ -153,7 +162,7 @@ void GpuScene::find_emitters() {
   emitters_.clear();
   first_light_.assign(scene_.instances.size(), gpu::NO_INDEX);
   for (std::uint32_t i = 0; i < scene_.instances.size(); ++i)
-    if (emits(scene_.materials[scene_.instances[i].material])) emitters_.push_back(i);
+    if (scene::emits(scene_.materials[scene_.instances[i].material])) emitters_.push_back(i);
 }
 
 void GpuScene::set_environment(const EncodedEnvironment& encoded, set::LightSampling sampling) {
@@ -258,39 +267,16 @@ void GpuScene::upload_lights(const glm::dvec3& camera_position) {
   upload_storage(device_, lights_, lights);
 }
 
-std::uint32_t GpuScene::features() const {
-  std::uint32_t result = 0;
-  const auto any_material = [&](auto predicate) {
-    return std::any_of(scene_.instances.begin(), scene_.instances.end(), [&](const auto& instance) {
-      return predicate(scene_.materials[instance.material]);
-    });
-  };
-  if (any_material([](const scene::Material& m) {
-        const bool opaque_part = m.metallic < 1 && m.transmission < 1;
-        return m.metallic > 0 || (opaque_part && m.specular > 0 && m.ior > 1);
-      }))
-    result |= gpu::FEATURE_GLOSSY;
-  if (any_material(scene::transmits)) result |= gpu::FEATURE_TRANSMISSION;
-  if (!scene_.textures.empty()) result |= gpu::FEATURE_TEXTURES;
-  if (any_material([](const scene::Material& m) { return m.normal_texture != scene::no_texture; }))
-    result |= gpu::FEATURE_NORMAL_MAPS;
-  if (any_material(
-          [](const scene::Material& m) { return m.alpha_mode != scene::AlphaMode::opaque; }))
-    result |= gpu::FEATURE_ALPHA;
-  if (!scene_.lights.empty() || !emitters_.empty() || sources_) result |= gpu::FEATURE_LIGHTS;
-  if (std::any_of(scene_.lights.begin(), scene_.lights.end(), can_be_seen) || sources_)
-    result |= gpu::FEATURE_VISIBLE_LIGHTS;
-  if (std::any_of(scene_.instances.begin(), scene_.instances.end(),
-                  [](const auto& instance) { return instance.presence != scene::world_both; }))
-    result |= gpu::FEATURE_FORKS;
-  if (!specular_bounds_.empty() && (environment_mean_ > 0 || light_power_ > 0 || sources_))
-    result |= gpu::FEATURE_PHOTONS;
-  if (sampling_ == set::LightSampling::importance && (environment_mean_ > 0 || sources_))
-    result |= gpu::FEATURE_ENVIRONMENT_SAMPLING;
-  return result;
+Demand GpuScene::demand(const set::Estimation& estimation) const {
+  Demand demand{.scene = scene_, .materials = material_features_, .estimation = estimation};
+  demand.light_sampling = sampling_;
+  demand.shines_around = environment_mean_ > 0;
+  demand.finds_lamps = sources_.has_value();
+  demand.lamps_shine = light_power_ > 0;
+  return demand;
 }
 
-void GpuScene::describe(gpu::GpuFrame& frame) const {
+void GpuScene::describe(gpu::GpuFrame& frame, std::uint32_t features) const {
   frame.environment_size = environment_size_;
   frame.environment_levels = environment_levels_;
   frame.light_count = light_count_;
@@ -306,7 +292,7 @@ void GpuScene::describe(gpu::GpuFrame& frame) const {
   // lamp of the environment is sampled as often as the same lamp taken out of it.
   const double disc = std::numbers::pi * scene_radius_ * scene_radius_;
   const double environment_power = 4 * std::numbers::pi * environment_mean_ * disc;
-  const bool sampled = (features() & gpu::FEATURE_ENVIRONMENT_SAMPLING) != 0;
+  const bool sampled = (features & gpu::FEATURE_ENVIRONMENT_SAMPLING) != 0;
   const double share = environment_share(environment_power, light_power_);
   frame.environment_selection = sampled ? static_cast<float>(share) : 0.0f;
   frame.photon_environment = static_cast<float>(share);

@@ -9,6 +9,7 @@
 
 #include "daemon/render/bounds.hpp"
 #include "daemon/render/device.hpp"
+#include "daemon/render/feature.hpp"
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/scene/bvh.hpp"
 #include "daemon/scene/scene.hpp"
@@ -32,14 +33,14 @@ class GpuScene {
   // Uploads instances, top level and lights relative to `camera_position` (world, metres).
   void place(const glm::dvec3& camera_position);
 
-  // FEATURE_* that the scene and the environment require, once placed. FEATURE_PHOTONS: where they
-  // are wanted.
-  std::uint32_t features() const;
+  // What the scene and the environment ask for, once placed. The result refers to this scene and to
+  // `estimation`, so it must not outlive them.
+  Demand demand(const set::Estimation& estimation) const;
   // From the camera to the centre of the nearest object that can throw a caustic, but at least its
   // radius, metres; infinite where there is none.
   double nearest_specular_distance(const glm::dvec3& camera_position) const;
-  // Fills the fields of the frame that describe environment and lights.
-  void describe(gpu::GpuFrame& frame) const;
+  // Fills the fields of the frame that describe environment and lights. `features`: FEATURE_* bits.
+  void describe(gpu::GpuFrame& frame, std::uint32_t features) const;
   // Buffers of set 0 by binding, without RAYS and FRAME, which are the renderer's (null there).
   std::vector<const Buffer*> bindings() const;
 
@@ -66,6 +67,7 @@ class GpuScene {
   Device& device_;
   scene::Scene scene_;
   double specular_alpha_ = 0;
+  MaterialFeatures material_features_;
   std::vector<scene::Instance> instances_as_set_;   // by set_scene()
   Spheres spheres_;                                 // of those
   std::optional<std::vector<set::Light>> sources_;  // absent: there never are any

@@ -7,6 +7,7 @@
 #include "daemon/lighting/response.hpp"
 #include "daemon/render/composite.hpp"
 #include "daemon/render/denoiser.hpp"
+#include "daemon/render/feature.hpp"
 #include "daemon/render/gpu_scene.hpp"
 #include "daemon/render/photon_schedule.hpp"
 #include "daemon/render/picture_memory.hpp"
@@ -18,22 +19,6 @@
 namespace previz::render {
 namespace {
 
-struct PartEntry {
-  Part part;
-  const char* name;
-  std::uint32_t feature;
-};
-constexpr std::array part_table = {
-    PartEntry{Part::gloss, "gloss", gpu::FEATURE_GLOSSY},
-    PartEntry{Part::refraction, "refraction", gpu::FEATURE_TRANSMISSION},
-    PartEntry{Part::textures, "textures", gpu::FEATURE_TEXTURES},
-    PartEntry{Part::normal_maps, "normal maps", gpu::FEATURE_NORMAL_MAPS},
-    PartEntry{Part::alpha, "alpha", gpu::FEATURE_ALPHA},
-    PartEntry{Part::lamps, "lamps", gpu::FEATURE_LIGHTS},
-    PartEntry{Part::visible_lamps, "lamps in view", gpu::FEATURE_VISIBLE_LIGHTS},
-    PartEntry{Part::lens, "lens", gpu::FEATURE_LENS},
-    PartEntry{Part::forks, "two worlds", gpu::FEATURE_FORKS}};
-
 void check_size(const Device& device, const PinholeIntrinsics& picture) {
   refuse_too_large(picture.width, picture.height,
                    {.bytes = device.memory_bytes(),
@@ -41,15 +26,7 @@ void check_size(const Device& device, const PinholeIntrinsics& picture) {
                     .read_back = device.is_cpu()});
 }
 
-const PartEntry& entry_of(Part part) {
-  return *std::ranges::find(part_table, part, &PartEntry::part);
-}
-
 }  // namespace
-
-const char* name_of(Part part) {
-  return entry_of(part).name;
-}
 
 struct Renderer::Impl {
   Impl(std::shared_ptr<Device> the_device, const set::Estimation& the_estimation,
@@ -65,7 +42,7 @@ struct Renderer::Impl {
 
   void upload_frame();
   std::uint32_t photons() const;  // a pass
-  std::uint32_t features() const;
+  std::uint32_t needed() const;   // FEATURE_* bits of this frame
   CompositeRule rule() const {
     return {estimation.composite, estimation.composite_floor / frame.exposure};
   }
@@ -122,7 +99,7 @@ void Renderer::Impl::upload_frame() {
   gpu_frame.specular_alpha = static_cast<float>(estimation.specular_roughness);
   gpu_frame.bound_share = static_cast<float>(estimation.difference_sampling);
   gpu_frame.photon_count = photons();
-  scene.describe(gpu_frame);
+  scene.describe(gpu_frame, needed());
   upload_storage(*device, frame_buffer, std::vector{gpu_frame});
 }
 
@@ -131,19 +108,11 @@ std::uint32_t Renderer::Impl::photons() const {
                       calibration.intrinsics.height, wavefront->most_photons());
 }
 
-// FEATURE_* of this frame: what the scene requires and the set asks for.
-std::uint32_t Renderer::Impl::features() const {
-  std::uint32_t result = scene.features();
-  if (calibration.lens) result |= gpu::FEATURE_LENS;
-  // The other composites need the real world's own radiance in every pixel.
-  if (estimation.estimator == set::Estimator::difference &&
-      estimation.composite == set::Composite::additive)
-    result |= gpu::FEATURE_DIFFERENCE;
-  if (estimation.caustics == set::Caustics::traced) result |= gpu::FEATURE_CAUSTICS;
-  if (estimation.real_radiance == set::RealRadiance::camera && !frame.plate.samples.empty())
-    result |= gpu::FEATURE_CAMERA;
-  if (estimation.caustics != set::Caustics::photons) result &= ~gpu::FEATURE_PHOTONS;
-  return result;
+std::uint32_t Renderer::Impl::needed() const {
+  Demand demand = scene.demand(estimation);
+  demand.has_aperture = calibration.lens.has_value();
+  demand.has_plate = !frame.plate.samples.empty();
+  return needed_bits(demand);
 }
 
 std::vector<glm::vec4> Renderer::Impl::measured() const {
@@ -201,12 +170,12 @@ void Renderer::set_sources(std::vector<set::Light> sources) {
   impl_->scene.set_sources(std::move(sources));
 }
 
-void Renderer::carry(Part part) {
-  impl_->carried |= entry_of(part).feature;
+void Renderer::carry(std::uint32_t features) {
+  impl_->carried |= features;
 }
 
-bool Renderer::needs(Part part) const {
-  return (impl_->features() & entry_of(part).feature) != 0;
+std::uint32_t Renderer::needed() const {
+  return impl_->needed();
 }
 
 void Renderer::begin(FrameInput frame) {
@@ -232,7 +201,7 @@ void Renderer::begin(FrameInput frame) {
   std::vector<const Buffer*> bindings = r.scene.bindings();
   bindings[gpu::BINDING_RAYS] = &r.rays;
   bindings[gpu::BINDING_FRAME] = &r.frame_buffer;
-  const std::uint32_t features = r.features() | r.carried;
+  const std::uint32_t features = r.needed() | r.carried;
   if ((features & gpu::FEATURE_PHOTONS) != 0) {
     const double distance =
         r.scene.nearest_specular_distance(glm::dvec3(r.frame.world_from_camera[3]));

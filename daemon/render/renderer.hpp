@@ -1,7 +1,6 @@
 // Renders the two worlds of a scene and composites them with the plate, progressively.
 #pragma once
 
-#include <array>
 #include <functional>
 #include <glm/mat4x4.hpp>
 #include <memory>
@@ -50,24 +49,6 @@ struct FrameInput {
   std::optional<std::uint32_t> seed = {};  // absent: the set's, the same in every frame (P8)
 };
 
-// A part of the pipelines that is left out of a frame which has no need of it. No pixel depends on
-// that.
-enum class Part {
-  gloss,
-  refraction,
-  textures,
-  normal_maps,
-  alpha,
-  lamps,
-  visible_lamps,
-  lens,
-  forks
-};
-inline constexpr std::array all_parts = {Part::gloss,         Part::refraction, Part::textures,
-                                         Part::normal_maps,   Part::alpha,      Part::lamps,
-                                         Part::visible_lamps, Part::lens,       Part::forks};
-const char* name_of(Part part);
-
 class Renderer {
  public:
   Renderer(std::shared_ptr<Device> device, const set::Estimation& estimation,
@@ -90,11 +71,12 @@ class Renderer {
   // go between frames without new pipelines.
   void set_sources(std::vector<set::Light> sources);
 
-  // From the next begin() on this part is in the pipelines, needed or not: what leaving it out
-  // saves can then be measured.
-  void carry(Part part);
-  // Whether the frame begun, and not only carry(), asks for the part.
-  bool needs(Part part) const;
+  // From the next begin() on these features (FEATURE_* bits of rows of features() that can be
+  // carried) are in the pipelines, needed or not: what leaving them out saves can then be measured.
+  // No pixel depends on them.
+  void carry(std::uint32_t features);
+  // FEATURE_* bits that the frame begun needs, without those that are only carried.
+  std::uint32_t needed() const;
 
   // Starts a frame: clears what was accumulated.
   void begin(FrameInput frame);

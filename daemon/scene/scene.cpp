@@ -14,47 +14,12 @@
 namespace previz::scene {
 namespace {
 
-float largest(const glm::vec3& color) {
-  return std::max({color.r, color.g, color.b});
-}
-
 // The smallest factor that a texture puts on the roughness.
 float least_roughness_factor(const Scene& scene, std::uint32_t texture) {
   if (texture == no_texture) return 1.0f;
   float least = 1.0f;
   for (const glm::vec4& texel : scene.textures[texture].texels) least = std::min(least, texel.g);
   return least;
-}
-
-// What one material, somewhere in the scene, asks of the renderer.
-void require(const Material& material, const Scene& scene, double specular_alpha,
-             Requirements& required) {
-  const auto has_texture = [](std::uint32_t texture) { return texture != no_texture; };
-  const bool is_metal = material.metallic > 0;
-  const bool is_glass = transmits(material);
-  const bool reflects = is_metal || is_glass || (material.specular > 0 && material.ior > 1);
-  // A texture can only lower the roughness.
-  const double alpha = static_cast<double>(material.roughness) * material.roughness;
-  required.caustics |= can_be_dirac(scene, material, specular_alpha);
-  required.metals |= is_metal;
-  required.transmission |= is_glass;
-  required.rough_specular |= reflects && alpha > specular_alpha;
-  required.textures |= has_texture(material.base_color_texture) ||
-                       has_texture(material.metallic_roughness_texture) ||
-                       has_texture(material.emission_texture) ||
-                       has_texture(material.normal_texture);
-  required.emissive_meshes |= largest(material.emission) > 0;
-
-  if (material.alpha_mode == AlphaMode::opaque) return;
-  float least_alpha = material.alpha;
-  if (has_texture(material.base_color_texture)) {
-    const Texture& texture = scene.textures[material.base_color_texture];
-    float least = 1;
-    for (const glm::vec4& texel : texture.texels) least = std::min(least, texel.a);
-    least_alpha *= least;
-  }
-  required.alpha |= material.alpha_mode == AlphaMode::mask ? least_alpha < material.alpha_cutoff
-                                                           : least_alpha < 1;
 }
 
 // Only real objects take the colours that the set knows better: a virtual object of the same file
@@ -108,6 +73,10 @@ Scene load_scene(const set::Set& set) {
   return scene;
 }
 
+bool emits(const Material& m) {
+  return m.emission.r > 0 || m.emission.g > 0 || m.emission.b > 0;
+}
+
 bool transmits(const Material& m) {
   return m.transmission > 0 && (m.metallic < 1 || m.metallic_roughness_texture != no_texture);
 }
@@ -121,32 +90,20 @@ bool can_be_dirac(const Scene& scene, const Material& m, double specular_alpha) 
   return roughness * roughness <= specular_alpha * (1 + 1e-5);  // the shader's sum is in floats
 }
 
-Requirements requirements(const Scene& scene, const set::Set& set) {
-  Requirements required;
-  std::vector<bool> mesh_counted(scene.meshes.size()), material_seen(scene.materials.size());
+Size size_of(const Scene& scene) {
+  Size size;
+  std::vector<bool> is_counted(scene.meshes.size());
   for (const Instance& instance : scene.instances) {
     if (instance.presence == 0) continue;
-    const std::uint64_t triangles = scene.meshes[instance.mesh].triangles.size();
-    if (!mesh_counted[instance.mesh]) {
-      required.triangles += triangles;
-      required.vertices += scene.meshes[instance.mesh].positions.size();
-    }
-    mesh_counted[instance.mesh] = true;
-    required.instanced_triangles += triangles;
-    required.differing_objects |= instance.presence != world_both;
-    required.removed_objects |= instance.presence == world_real;
-    if (material_seen[instance.material]) continue;
-    material_seen[instance.material] = true;
-    require(scene.materials[instance.material], scene, set.estimation.specular_roughness, required);
+    const Mesh& mesh = scene.meshes[instance.mesh];
+    size.instanced_triangles += mesh.triangles.size();
+    if (is_counted[instance.mesh]) continue;
+    is_counted[instance.mesh] = true;
+    size.triangles += mesh.triangles.size();
+    size.vertices += mesh.positions.size();
   }
-  for (const Texture& texture : scene.textures) required.texels += texture.texels.size();
-  for (const set::Light& light : scene.lights) {
-    const bool shines = light.gain_mixed > 0 || light.gain_real > 0;
-    required.lights |= shines && largest(glm::vec3(light.emission)) > 0;
-  }
-  required.lights |= set.lighting.mode != set::LightMode::image;
-  required.thin_lens = set.observer.calibration && set.observer.calibration->lens;
-  return required;
+  for (const Texture& texture : scene.textures) size.texels += texture.texels.size();
+  return size;
 }
 
 }  // namespace previz::scene

@@ -64,7 +64,7 @@ struct Material {
   float ior = 1.5f;         // KHR_materials_ior, >= 1
   float transmission = 0;   // KHR_materials_transmission, 0..1
   bool thin_walled = true;  // false where KHR_materials_volume gives a thickness > 0
-  glm::vec3 emission{0};  // radiance: emissiveFactor * emissive_strength
+  glm::vec3 emission{0};    // radiance: emissiveFactor * emissive_strength
   std::uint32_t base_color_texture = no_texture;
   std::uint32_t metallic_roughness_texture = no_texture;  // G roughness, B metallic
   std::uint32_t emission_texture = no_texture;
@@ -107,23 +107,13 @@ struct Scene {
   std::vector<std::string> notes;
 };
 
-// What the scene needs of the renderer; what it does not need is left out of the pipelines.
-struct Requirements {
-  bool transmission = false;
-  bool metals = false;          // any conductor
-  bool rough_specular = false;  // any GGX lobe above the specular threshold
-  bool textures = false;
-  bool caustics = false;  // anything that can throw light on by mirrors or clear glass, and light
-  bool alpha = false;     // any surface that can let rays through by alpha
-  bool emissive_meshes = false;
-  bool lights = false;  // any light that shines in one of the worlds, or may be found in the image
-  bool differing_objects = false;  // any instance present in one world only
-  bool removed_objects = false;
-  bool thin_lens = false;
-  std::uint64_t triangles = 0;            // unique
-  std::uint64_t vertices = 0;             // unique
+// How much there is in a scene. Meshes count once, however many instances they have; those that no
+// instance shows do not count.
+struct Size {
+  std::uint64_t triangles = 0;
+  std::uint64_t vertices = 0;
   std::uint64_t texels = 0;               // of all textures
-  std::uint64_t instanced_triangles = 0;  // as seen by rays
+  std::uint64_t instanced_triangles = 0;  // every copy counted
 };
 
 // At most this much is loaded; anything larger is refused before it is allocated.
@@ -140,6 +130,8 @@ inline constexpr std::uint64_t max_file_bytes = 0xffffffffull;  // glTF binary's
 // objects their colour; a surface that none has is an error too.
 Scene load_scene(const set::Set& set);
 
+bool emits(const Material& material);
+
 // Whether anything of this material lets light through: a texture can take metal away.
 bool transmits(const Material& material);
 
@@ -147,8 +139,6 @@ bool transmits(const Material& material);
 // a coat whose GGX alpha is somewhere at or below `specular_alpha`.
 bool can_be_dirac(const Scene& scene, const Material& material, double specular_alpha);
 
-// What the scene, with the set's lens and specular threshold, needs: only materials and textures
-// of instances count.
-Requirements requirements(const Scene& scene, const set::Set& set);
+Size size_of(const Scene& scene);
 
 }  // namespace previz::scene

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "daemon/render/feature.hpp"
 #include "daemon/set/names.hpp"
 #include "drivers/error.hpp"
 
@@ -44,14 +45,15 @@ TradeAxis light_modes(const set::Lighting& own) {
       [](TradeSettings & s) -> auto& { return s.lighting.mode; });
 }
 
-TradeAxis left_out(const std::vector<render::Part>& unneeded) {
+TradeAxis left_out(std::uint32_t needed) {
   TradeAxis axis{parts_axis,
-                 "parts that this scene has no need of: left out, and carried along",
+                 "features that this set does not need: left out, or carried along",
                  {},
                  "left out"};
-  for (const render::Part part : unneeded)
-    axis.variants.push_back(
-        {render::name_of(part), [=](TradeSettings& s) { s.carried.push_back(part); }});
+  for (const render::Feature& feature : render::features())
+    if (feature.can_be_carried && (feature.bit & needed) == 0)
+      axis.variants.push_back(
+          {feature.name, [bit = feature.bit](TradeSettings& s) { s.carried |= bit; }});
   return axis;
 }
 
@@ -70,8 +72,7 @@ void keep_wanted(std::vector<TradeAxis>& axes, const std::vector<std::string>& w
 
 }  // namespace
 
-std::vector<TradeAxis> trade_axes(const TradeSettings& own,
-                                  const std::vector<render::Part>& unneeded) {
+std::vector<TradeAxis> trade_axes(const TradeSettings& own, std::uint32_t needed) {
   return {
       spelled(
           "estimator", "both worlds in full, or what differs between them",
@@ -121,7 +122,7 @@ std::vector<TradeAxis> trade_axes(const TradeSettings& own,
        "the lens's aperture, or a pinhole that keeps everything sharp",
        {{"pinhole", [](TradeSettings& s) { s.lens.reset(); }}},
        "aperture"},
-      left_out(unneeded),
+      left_out(needed),
   };
 }
 

@@ -2,12 +2,12 @@
 // settings.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "daemon/render/renderer.hpp"
 #include "daemon/set/set.hpp"
 
 namespace previz::trade {
@@ -17,10 +17,10 @@ struct TradeSettings {
   set::Estimation estimation;
   set::Lighting lighting;
   std::optional<ThinLens> lens;
-  bool adaptive = false;              // quality.adaptive
-  bool denoise = false;               // quality.denoise
-  double scale = 1;                   // of the sweep's own picture size
-  std::vector<render::Part> carried;  // parts the frame has no need of
+  bool adaptive = false;      // quality.adaptive
+  bool denoise = false;       // quality.denoise
+  double scale = 1;           // of the sweep's own picture size
+  std::uint32_t carried = 0;  // FEATURE_* bits of features that the frame does not need
 
   friend bool operator==(const TradeSettings&, const TradeSettings&) = default;
 };
@@ -37,12 +37,12 @@ struct TradeAxis {
   std::string own;  // how the set's own variant is called where it is none of the list
 };
 
-// The axes that have something to trade on this set. `unneeded`: the parts that its pipelines are
-// made without.
-std::vector<TradeAxis> trade_axes(const TradeSettings& own,
-                                  const std::vector<render::Part>& unneeded);
+// The axes that have something to trade on this set. `needed`: the FEATURE_* bits that its
+// pipelines are made with.
+std::vector<TradeAxis> trade_axes(const TradeSettings& own, std::uint32_t needed);
 
-// The name of the axis of `unneeded`: its variants must show the set's own picture, bit for bit.
+// The name of the axis of features that are not needed but carried: its variants must show the
+// set's own picture, bit for bit.
 inline constexpr const char* parts_axis = "parts";
 
 // Different settings to measure, each once, however many axes they are on; the first are the set's

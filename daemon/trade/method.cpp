@@ -33,7 +33,7 @@ MethodRenderer::MethodRenderer(const std::shared_ptr<render::Device>& device, Tr
   const pipeline::LightPtr light = frame.light(settings.lighting);
   renderer_.set_environment(light->encoded, settings.lighting.sampling);
   if (settings.lighting.mode != set::LightMode::image) renderer_.set_sources(light->lamps);
-  for (const render::Part part : settings.carried) renderer_.carry(part);
+  renderer_.carry(settings.carried);
 }
 
 void MethodRenderer::warm_up() {

@@ -29,7 +29,8 @@ class MethodRenderer {
   // Some more for every pixel, of which layers() and picture() then are as they came.
   void add(int samples);
 
-  bool needs(render::Part part) const { return renderer_.needs(part); }
+  // FEATURE_* bits of the frame begun.
+  std::uint32_t needed() const { return renderer_.needed(); }
   const render::Layers& layers() const { return layers_; }
   TradePicture picture() const;
 

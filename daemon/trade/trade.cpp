@@ -107,10 +107,7 @@ void Sweep::plan() {
   own.denoise = frame_.set().quality.denoise;
   MethodRenderer renderer(device_, frame_, scene_, own, options_.scale);
   renderer.begin(own.estimation.seed);
-  std::vector<render::Part> unneeded;
-  for (const render::Part part : render::all_parts)
-    if (!renderer.needs(part)) unneeded.push_back(part);
-  report_.plan = plan_trade(own, trade_axes(own, unneeded), options_.axes);
+  report_.plan = plan_trade(own, trade_axes(own, renderer.needed()), options_.axes);
 
   for (const TradePlan::Method& method : report_.plan.methods) {
     TradeMethod& measured = report_.methods.emplace_back();
@@ -193,7 +190,7 @@ void Sweep::measure(std::size_t method, int round, output::ShareProgress& progre
 // The set's own settings are the first method of the first round.
 void Sweep::compare_parts(std::size_t method, const render::Layers& layers) {
   if (method == 0) own_ = layers;
-  if (report_.plan.methods[method].settings.carried.empty()) return;
+  if (report_.plan.methods[method].settings.carried == 0) return;
   std::size_t changed = 0;
   for (std::size_t i = 0; i < layers.composite.size(); ++i)
     changed += layers.composite[i] != own_.composite[i] || layers.diff[i] != own_.diff[i] ||

@@ -48,8 +48,21 @@ class Check : public testing::Test {
     EXPECT_NE(said_.find(words), std::string::npos) << words << "\nis not in\n" << said_;
   }
 
+  void expect_used(const std::string& words) { expect_in_list(words, false); }
+  void expect_left_out(const std::string& words) { expect_in_list(words, true); }
+
   test::TemporaryDirectory directory_;
   std::string said_;
+
+ private:
+  // The list of what is left out comes after that of what is used.
+  void expect_in_list(const std::string& words, bool is_left_out) {
+    const auto at = said_.find(words);
+    const auto left_out = said_.find("left out, because this set does not use it");
+    ASSERT_NE(left_out, std::string::npos) << said_;
+    ASSERT_NE(at, std::string::npos) << words << "\nis not in\n" << said_;
+    EXPECT_EQ(at > left_out, is_left_out) << words;
+  }
 };
 
 TEST_F(Check, DescribesWhatASetAsksFor) {
@@ -88,16 +101,43 @@ samples = 1500
   expect_said("ring: virtual, 1 triangle in 1 instance, from ring.gltf");
   expect_said("spot: point, dimmed, gain 0.5 in the picture, 1 in the real scene");
   expect_said("1 500 samples per pixel");
-  const auto left_out = said_.find("the renderer leaves out");
-  ASSERT_NE(left_out, std::string::npos);
-  EXPECT_LT(said_.find("conductors: something is of metal"), left_out);
-  EXPECT_LT(said_.find("two worlds: an object is in one of them only"), left_out);
-  EXPECT_LT(said_.find("lamps: the set or a glTF file names some"), left_out);
-  EXPECT_GT(said_.find("refraction: nothing lets light through"), left_out);
-  EXPECT_GT(said_.find("lens sampling: everything is sharp"), left_out);
-  EXPECT_GT(said_.find("caustics: nothing throws light on"), left_out);
+  expect_said("geometry: 2 triangles, or 2 with every copy of an object counted");
+  expect_used("metal: an object is metal");
+  expect_used("two worlds: an object is virtual or removed");
+  expect_used("lamps: the set or a model has lamps");
+  expect_used("relighting: a lamp is added, taken away, dimmed");
+  expect_used("denoiser: noise is taken out");
+  expect_left_out("refraction: nothing is made of glass");
+  expect_left_out("removed objects: no real object is taken out of the picture");
+  expect_left_out("lens: everything is in focus");
+  expect_left_out("photons: no mirror or clear glass throws patterns of light");
   expect_said("scene in the GPU's memory: about 1 MiB");
   expect_said("the observer has no calibration here");
+}
+
+// A material may be of a kind that lets light through and let none through: the renderer then
+// leaves alpha out (`Alpha.is_left_out_where_every_texel_is_opaque`), and that is what is said.
+TEST_F(Check, AgreesWithTheRendererThatSolidBlendingNeedsNoAlpha) {
+  const std::string object = "[[object]]\nname='a'\nfile='a.gltf'\npresence='virtual'\n";
+  const auto material = [](const char* alpha) {
+    return std::string(R"("alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": )") +
+           "[1, 1, 1, " + alpha + "]}";
+  };
+  write("a.gltf", triangle(material("1")));
+  ASSERT_EQ(check(object), 0) << said_;
+  expect_left_out("alpha: no surface has holes or is a veil");
+  write("a.gltf", triangle(material("0.5")));
+  ASSERT_EQ(check(object), 0) << said_;
+  expect_used("alpha: a surface has holes or is a veil");
+}
+
+TEST_F(Check, SaysThatColouredGlassIsRenderedClear) {
+  write("a.gltf", triangle(R"("name": "bottle", "extensions": {
+    "KHR_materials_transmission": {"transmissionFactor": 1},
+    "KHR_materials_volume": {"thicknessFactor": 0.01, "attenuationColor": [0, 1, 0],
+                             "attenuationDistance": 0.1}})"));
+  ASSERT_EQ(check("[[object]]\nname='a'\nfile='a.gltf'\npresence='virtual'\n"), 0) << said_;
+  expect_said("\"bottle\": its attenuationColor is not rendered yet; the glass is clear inside");
 }
 
 TEST_F(Check, TakesSetAndCalibrationOfASession) {
@@ -121,9 +161,10 @@ TEST_F(Check, TakesSetAndCalibrationOfASession) {
   said_ = out.str();
   expect_said("recorded (");
   expect_said("its lamps light the set; the rest is blurred");
-  expect_said("lamps: the set or a glTF file names some, or they are found in the light around");
+  expect_used(
+      "lamps: the set or a model has lamps, a surface glows, or lamps are found in the light");
   expect_said("16x8, 35 mm lens at f/2.8, focus at 1.5 m");
-  expect_said("lens sampling: the aperture blurs what is out of focus");
+  expect_used("lens: the aperture blurs what is out of focus");
   expect_said("tracking is off: only a session that recorded poses can be used");
 }
 

@@ -5,13 +5,15 @@
 
 #include <algorithm>
 
+#include "daemon/render/feature.hpp"
 #include "drivers/error.hpp"
+#include "shaders/lib/render_shared.h"
 
 namespace previz::trade {
 namespace post_trade_axes_test {
 
 TradePlan plan_of(const TradeSettings& own, const std::vector<std::string>& wanted = {}) {
-  return plan_trade(own, trade_axes(own, {render::Part::textures}), wanted);
+  return plan_trade(own, trade_axes(own, ~gpu::FEATURE_TEXTURES), wanted);
 }
 
 // Points into the plan.
@@ -60,6 +62,23 @@ TEST(TradeAxes, WhereThereIsNothingToTradeThereIsNoAxis) {
   own.lens = ThinLens{0.05, 2.8, 1.0};
   const TradePlan with_lens = plan_of(own);
   EXPECT_TRUE(axis_named(with_lens, "lens"));
+}
+
+TEST(TradeAxes, CarriesEachFeatureThatIsNotNeededAndChangesNoPicture) {
+  const std::uint32_t needed = gpu::FEATURE_GLOSSY | gpu::FEATURE_PHOTONS;
+  const TradePlan plan = plan_trade({}, trade_axes({}, needed), {parts_axis});
+  const auto& entries = plan.axes.at(0).entries;
+  EXPECT_EQ(entries.front().variant, "left out");
+  std::size_t carried = 0;
+  for (const render::Feature& feature : render::features()) {
+    const auto entry = std::ranges::find(entries, feature.name, &TradePlan::Entry::variant);
+    const bool expected = feature.can_be_carried && feature.bit != gpu::FEATURE_GLOSSY;
+    EXPECT_EQ(entry != entries.end(), expected) << feature.name;
+    if (!expected || entry == entries.end()) continue;
+    ++carried;
+    EXPECT_EQ(plan.methods[entry->method].settings.carried, feature.bit) << feature.name;
+  }
+  EXPECT_EQ(entries.size(), carried + 1);
 }
 
 TEST(TradeAxes, OnlyThoseWantedAreSwept) {

@@ -1,6 +1,7 @@
 // Surfaces that are not there everywhere, against closed forms.
 #include <numbers>
 
+#include "shaders/lib/render_shared.h"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test {
@@ -68,6 +69,26 @@ TEST(Alpha, AMaskIsThereOrNot) {
     const render::Layers layers = render_clean(view, 1, up_to_depth(1)).layers;
     const double expected = veil_alpha >= cutoff ? 0 : albedo / std::numbers::pi;
     EXPECT_NEAR(mean(layers.mixed).g, expected, 1e-5) << cutoff;
+  }
+}
+
+// A material may say that it blends and have no texel that lets anything through: its rays are then
+// traced as those of any opaque surface.
+TEST(Alpha, IsLeftOutWhereEveryTexelIsOpaque) {
+  for (const float alpha : {1.0f, 0.5f}) {
+    View view = lit_point(albedo);
+    scene::Texture texture;
+    texture.width = 2;
+    texture.height = 1;
+    texture.texels = {{1, 1, 1, 1}, {1, 1, 1, alpha}};
+    scene::Material& material = view.scene.materials.back();
+    material.alpha_mode = scene::AlphaMode::blend;
+    material.base_color_texture = add_texture(view.scene, texture);
+    SetRenderer renderer(view);
+    render::FrameInput frame;
+    frame.world_from_camera = view.world_from_camera;
+    renderer.begin(frame);
+    EXPECT_EQ((renderer.needed() & gpu::FEATURE_ALPHA) != 0, alpha < 1);
   }
 }
 

@@ -1,12 +1,14 @@
 // The scenes of the ground truth sets as set.json states them. The sets lie outside the repository.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "daemon/render/feature.hpp"
 #include "daemon/scene/scene.hpp"
 
 namespace previz::scene {
@@ -96,13 +98,19 @@ TEST_P(GroundTruthScene, HasTheObjectsOfSetJson) {
     }
   }
   EXPECT_EQ(scene.instances.size(), count);
-  const Requirements required = requirements(scene, set);
-  EXPECT_EQ(required.instanced_triangles, triangles);
-  EXPECT_TRUE(required.differing_objects);
-  EXPECT_TRUE(required.textures);  // the tags
-  EXPECT_FALSE(required.alpha || required.lights || required.removed_objects);
-  EXPECT_EQ(required.transmission, std::string(GetParam()) == "glass");
-  EXPECT_EQ(required.metals, std::string(GetParam()) != "statues");
+  EXPECT_EQ(size_of(scene).instanced_triangles, triangles);
+  const auto materials = render::material_features(scene, set.estimation.specular_roughness);
+  const render::Demand demand = render::demand_of(set, scene, materials);
+  const auto expect_needed = [&](const std::string& name, bool expected) {
+    const auto feature = std::ranges::find(render::features(), name, &render::Feature::name);
+    ASSERT_NE(feature, render::features().end()) << name;
+    EXPECT_EQ(render::is_needed(*feature, demand), expected) << name;
+  };
+  expect_needed("two worlds", true);
+  expect_needed("textures", true);  // the tags
+  for (const char* name : {"alpha", "lamps", "removed objects"}) expect_needed(name, false);
+  expect_needed("refraction", std::string(GetParam()) == "glass");
+  expect_needed("metal", std::string(GetParam()) != "statues");
 }
 
 INSTANTIATE_TEST_SUITE_P(Sets, GroundTruthScene, ::testing::Values("desk", "glass", "statues"),
@@ -121,9 +129,9 @@ TEST_P(Statues, ShareTheirMeshes) {
   }
   EXPECT_EQ(statues, 6);
   EXPECT_EQ(meshes.size(), 4u);  // dragon, bunny, cow, teapot
-  const Requirements required = requirements(scene, set);
-  EXPECT_EQ(required.instanced_triangles, 2u * 201031 + 35136 + 2 * 69451 + 6320 + 4 * 12 + 2 * 2);
-  EXPECT_EQ(required.triangles, 201031u + 35136 + 69451 + 6320 + 4 * 12 + 2 * 2);
+  const Size size = size_of(scene);
+  EXPECT_EQ(size.instanced_triangles, 2u * 201031 + 35136 + 2 * 69451 + 6320 + 4 * 12 + 2 * 2);
+  EXPECT_EQ(size.triangles, 201031u + 35136 + 69451 + 6320 + 4 * 12 + 2 * 2);
 }
 
 INSTANTIATE_TEST_SUITE_P(Set, Statues, ::testing::Values("statues"));

@@ -1,0 +1,265 @@
+#include "daemon/render/feature.hpp"
+
+#include <algorithm>
+#include <array>
+#include <glm/gtc/packing.hpp>
+#include <vector>
+
+#include "daemon/render/gpu_lights.hpp"
+#include "shaders/lib/render_shared.h"
+
+namespace previz::render {
+namespace {
+
+using scene::Material;
+using scene::Scene;
+
+bool is_textured(std::uint32_t texture) {
+  return texture != scene::no_texture;
+}
+
+bool reflects(const Material& m, const Scene&, double) {
+  const bool opaque_part = m.metallic < 1 && m.transmission < 1;
+  return m.metallic > 0 || (opaque_part && m.specular > 0 && m.ior > 1);
+}
+
+bool glows(const Material& m, const Scene&, double) {
+  return scene::emits(m);
+}
+
+// Alpha as the shaders see it: texels are halves, and what lies between two texels may be rounded
+// below both.
+bool lets_through(const Material& m, const Scene& scene, double) {
+  if (m.alpha_mode == scene::AlphaMode::opaque) return false;
+  float least = m.alpha, rounding = 0;
+  if (is_textured(m.base_color_texture)) {
+    float least_texel = 1;
+    for (const glm::vec4& texel : scene.textures[m.base_color_texture].texels)
+      least_texel = std::min(least_texel, texel.a);
+    least_texel = glm::unpackHalf1x16(glm::packHalf1x16(least_texel));
+    if (least_texel < 1) rounding = 1e-6f;
+    least *= least_texel;
+  }
+  return least * (1 - rounding) < (m.alpha_mode == scene::AlphaMode::mask ? m.alpha_cutoff : 1.0f);
+}
+
+// No ray hits a triangle with a corner that is not finite.
+bool can_be_hit(const scene::Mesh& mesh) {
+  return std::ranges::any_of(mesh.triangles, [&](const glm::uvec3& triangle) {
+    glm::vec3 sum(0);
+    for (int i = 0; i < 3; ++i) sum += 0.0f * mesh.positions[triangle[i]];
+    return sum == glm::vec3(0);  // 0 times what is not finite is NaN
+  });
+}
+
+// An object that is in neither world for now, because its carrier is lost, counts too: no pipeline
+// is compiled anew when it comes back.
+bool is_not_in_both(const scene::Instance& instance) {
+  return instance.presence != scene::world_both;
+}
+
+bool lamps_shine(const Scene& scene) {
+  const auto shines = [](const set::Light& light) {
+    const glm::dvec3& e = light.emission;
+    return (light.gain_mixed > 0 || light.gain_real > 0) && std::max({e.r, e.g, e.b}) > 0;
+  };
+  return std::ranges::any_of(scene.lights, shines) ||
+         std::ranges::any_of(scene.instances, [&](const scene::Instance& instance) {
+           return scene::emits(scene.materials[instance.material]);
+         });
+}
+
+constexpr std::array<Feature, 19> feature_table = {{
+    {.name = "two worlds",
+     .bit = gpu::FEATURE_FORKS,
+     .can_be_carried = true,
+     .in_frame =
+         [](bool, const Demand& d) {
+           return std::ranges::any_of(d.scene.instances, is_not_in_both);
+         },
+     .used = "an object is virtual or removed, so light is followed with it and without it",
+     .left_out = "no object is virtual or removed, so light takes the same way with or without"},
+    {.name = "removed objects",
+     .in_frame =
+         [](bool, const Demand& d) {
+           return std::ranges::find(d.scene.instances, scene::world_real,
+                                    &scene::Instance::presence) != d.scene.instances.end();
+         },
+     .used = "a real object is taken out of the picture",
+     .left_out = "no real object is taken out of the picture"},
+    {.name = "relighting",
+     .in_frame =
+         [](bool, const Demand& d) {
+           return std::ranges::any_of(d.scene.lights, [](const set::Light& light) {
+             return light.gain_mixed != light.gain_real;
+           });
+         },
+     .used = "a lamp is added, taken away, dimmed, brightened or tinted",
+     .left_out = "every lamp shines in the picture as it does on the stage"},
+    {.name = "lens",
+     .bit = gpu::FEATURE_LENS,
+     .can_be_carried = true,
+     .in_frame = [](bool, const Demand& d) { return d.has_aperture; },
+     .used = "the aperture blurs what is out of focus",
+     .left_out = "everything is in focus"},
+    {.name = "gloss",
+     .bit = gpu::FEATURE_GLOSSY,
+     .can_be_carried = true,
+     .in_material = reflects,
+     .used = "a surface reflects: metal, or the sheen of paint or plastic",
+     .left_out = "every surface is matt"},
+    {.name = "metal",
+     .in_material = [](const Material& m, const Scene&, double) { return m.metallic > 0; },
+     .used = "an object is metal",
+     .left_out = "no object in this set is metal"},
+    {.name = "refraction",
+     .bit = gpu::FEATURE_TRANSMISSION,
+     .can_be_carried = true,
+     .in_material = [](const Material& m, const Scene&, double) { return scene::transmits(m); },
+     .used = "light goes through glass or another clear material",
+     .left_out = "nothing is made of glass or another clear material"},
+    {.name = "photons",
+     .bit = gpu::FEATURE_PHOTONS,
+     .in_material = [](const Material& m, const Scene& scene,
+                       double alpha) { return scene::can_be_dirac(scene, m, alpha); },
+     .in_frame =
+         [](bool throws_light_on, const Demand& d) {
+           return throws_light_on && d.estimation.caustics == set::Caustics::photons &&
+                  (d.shines_around || d.finds_lamps || d.lamps_shine);
+         },
+     .used = "a mirror or clear glass throws patterns of light (caustics) onto other objects",
+     .left_out = "no mirror or clear glass throws patterns of light, or caustics are not set to "
+                 "\"photons\""},
+    {.name = "traced caustics",
+     .bit = gpu::FEATURE_CAUSTICS,
+     .in_frame = [](bool,
+                    const Demand& d) { return d.estimation.caustics == set::Caustics::traced; },
+     .used = "light by way of mirrors and clear glass is found by chance, as the set asks",
+     .left_out = "the set does not ask for them"},
+    {.name = "textures",
+     .bit = gpu::FEATURE_TEXTURES,
+     .can_be_carried = true,
+     .in_material =
+         [](const Material& m, const Scene&, double) {
+           return is_textured(m.base_color_texture) || is_textured(m.metallic_roughness_texture) ||
+                  is_textured(m.emission_texture) || is_textured(m.normal_texture);
+         },
+     .used = "a surface has its colour or detail from an image",
+     .left_out = "no surface has its colour or detail from an image"},
+    {.name = "normal maps",
+     .bit = gpu::FEATURE_NORMAL_MAPS,
+     .can_be_carried = true,
+     .in_material = [](const Material& m, const Scene&,
+                       double) { return is_textured(m.normal_texture); },
+     .used = "a surface has its bumps from an image",
+     .left_out = "no surface has its bumps from an image"},
+    {.name = "alpha",
+     .bit = gpu::FEATURE_ALPHA,
+     .can_be_carried = true,
+     .in_material = lets_through,
+     .used = "a surface has holes or is a veil, by its material's alpha",
+     .left_out = "no surface has holes or is a veil"},
+    {.name = "lamps",
+     .bit = gpu::FEATURE_LIGHTS,
+     .can_be_carried = true,
+     .in_material = glows,
+     .in_frame = [](bool glow,
+                    const Demand& d) { return glow || d.finds_lamps || !d.scene.lights.empty(); },
+     .used = "the set or a model has lamps, a surface glows, or lamps are found in the light "
+             "around the set",
+     .left_out = "only the light around the set shines"},
+    {.name = "lamps in view",
+     .bit = gpu::FEATURE_VISIBLE_LIGHTS,
+     .can_be_carried = true,
+     .in_frame =
+         [](bool, const Demand& d) {
+           return d.finds_lamps || std::ranges::any_of(d.scene.lights, can_be_seen);
+         },
+     .used = "a lamp has a size, so it can be seen and reflected",
+     .left_out = "no lamp has a size, so none can be seen or reflected"},
+    {.name = "glowing surfaces",
+     .in_material = glows,
+     .used = "a surface gives off light",
+     .left_out = "no surface gives off light"},
+    {.name = "light around the set",
+     .bit = gpu::FEATURE_ENVIRONMENT_SAMPLING,
+     .in_frame =
+         [](bool, const Demand& d) {
+           return d.light_sampling == set::LightSampling::importance &&
+                  (d.shines_around || d.finds_lamps);
+         },
+     .used = "rays are aimed at its brightest parts",
+     .left_out = "there is none, or the set asks for no rays aimed at its brightest parts"},
+    {.name = "difference only",
+     .bit = gpu::FEATURE_DIFFERENCE,
+     // The other composites need the real world's own radiance in every pixel.
+     .in_frame =
+         [](bool, const Demand& d) {
+           return d.estimation.estimator == set::Estimator::difference &&
+                  d.estimation.composite == set::Composite::additive;
+         },
+     .used = "pixels that nothing virtual covers are rendered only for what changes in them",
+     .left_out = "every pixel is rendered in full, with and without what is virtual"},
+    {.name = "camera's light",
+     .bit = gpu::FEATURE_CAMERA,
+     .in_frame =
+         [](bool, const Demand& d) {
+           return d.has_plate && d.estimation.real_radiance == set::RealRadiance::camera;
+         },
+     .used = "what the camera sees of the real set lights the virtual objects",
+     .left_out = "the light that real surfaces pass on is simulated"},
+    {.name = "denoiser",
+     .in_frame = [](bool, const Demand& d) { return d.denoises; },
+     .used = "noise is taken out of the picture that is shown",
+     .left_out = "noise is left in the picture that is shown"},
+}};
+static_assert(feature_table.size() <= max_features);
+
+}  // namespace
+
+std::span<const Feature> features() {
+  return feature_table;
+}
+
+MaterialFeatures material_features(const Scene& scene, double specular_alpha) {
+  MaterialFeatures result;
+  std::vector<bool> seen(scene.materials.size());
+  for (const scene::Instance& instance : scene.instances) {
+    if (seen[instance.material] || !can_be_hit(scene.meshes[instance.mesh])) continue;
+    seen[instance.material] = true;
+    const Material& material = scene.materials[instance.material];
+    for (std::size_t row = 0; row < feature_table.size(); ++row)
+      if (!result[row] && feature_table[row].in_material)
+        result[row] = feature_table[row].in_material(material, scene, specular_alpha);
+  }
+  return result;
+}
+
+bool is_needed(const Feature& feature, const Demand& demand) {
+  const bool in_material =
+      demand.materials[static_cast<std::size_t>(&feature - feature_table.data())];
+  return feature.in_frame ? feature.in_frame(in_material, demand) : in_material;
+}
+
+std::uint32_t needed_bits(const Demand& demand) {
+  std::uint32_t bits = 0;
+  for (const Feature& feature : feature_table)
+    if (feature.bit != 0 && is_needed(feature, demand)) bits |= feature.bit;
+  return bits;
+}
+
+Demand demand_of(const set::Set& set, const Scene& scene, const MaterialFeatures& materials) {
+  const set::Lighting& lighting = set.lighting;
+  const auto& observer = set.observer.calibration;
+  Demand demand{.scene = scene, .materials = materials, .estimation = set.estimation};
+  demand.light_sampling = lighting.sampling;
+  demand.shines_around = lighting.from != set::LightFrom::set || lighting.environment.has_value();
+  demand.finds_lamps = lighting.mode != set::LightMode::image;
+  demand.lamps_shine = lamps_shine(scene);
+  demand.has_aperture = observer && observer->lens;
+  demand.has_plate = true;
+  demand.denoises = set.quality.denoise;
+  return demand;
+}
+
+}  // namespace previz::render
