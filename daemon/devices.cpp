@@ -8,11 +8,11 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/set/value.hpp"
 #include "drivers/button_drivers.hpp"
 #include "drivers/camera_drivers.hpp"
 #include "drivers/display_drivers.hpp"
 #include "drivers/error.hpp"
+#include "drivers/keys/value.hpp"
 
 namespace previz {
 namespace {
@@ -26,7 +26,7 @@ void list_cameras(std::ostream& out) {
   std::size_t count = 0;
   for (const CameraDriver& driver : camera_drivers()) {
     for (const FoundCamera& camera : driver.find()) {
-      print(out, "driver = \"" + camera.driver + "\", device = " + set::codec::quote(camera.device),
+      print(out, "driver = \"" + camera.driver + "\", device = " + codec::quote(camera.device),
             camera.description);
       ++count;
     }

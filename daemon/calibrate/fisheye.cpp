@@ -19,7 +19,7 @@ constexpr double trusted_sigma_px = 1;
 constexpr std::size_t trusted_sectors = 3;
 
 std::optional<glm::dvec2> project_fisheye(std::span<const double> lens, const glm::dvec3& point) {
-  return lighting::fisheye_pixel(fisheye(lens, 0, 0), point);
+  return fisheye_pixel(fisheye(lens, 0, 0), point);
 }
 
 // Median distance of a view's corners from where lens and pose put them.
@@ -28,8 +28,7 @@ double median_error_px(const View& view, const FisheyeIntrinsics& lens,
   std::vector<double> errors;
   for (std::size_t i = 0; i < view.points.size(); ++i)
     errors.push_back(glm::distance(
-        view.pixels[i],
-        lighting::fisheye_pixel(lens, pose.rotation * view.points[i] + pose.translation)));
+        view.pixels[i], fisheye_pixel(lens, pose.rotation * view.points[i] + pose.translation)));
   std::ranges::nth_element(errors, errors.begin() + std::ptrdiff_t(errors.size() / 2));
   return errors[errors.size() / 2];
 }
@@ -49,7 +48,7 @@ Start equidistant(const Views& views, double focal_px) {
                                .k = {},
                                .max_angle_rad = pi};
   Start start{{{focal_px, focal_px, lens.cx, lens.cy, 0, 0, 0, 0}, {}}, 0};
-  const lighting::Fisheye rays(lens);
+  const Fisheye rays(lens);
   for (const View& view : views.views) {
     const auto pose = pose_by_rays(view, rays);
     if (!pose) return {};
@@ -93,7 +92,7 @@ void measure_reach(const Views& views, FisheyeFit& fisheye_fit) {
 
 // Rings around the axis, a degree apart, as far as the polynomial grows.
 void measure_certainty(FisheyeFit& fisheye_fit) {
-  const double limit = lighting::monotonic_limit_rad(fisheye_fit.intrinsics.k);
+  const double limit = monotonic_limit_rad(fisheye_fit.intrinsics.k);
   std::vector<glm::dvec3> rays;
   std::vector<double> angles;
   // The turn of the camera is told from what the corners have reached.
@@ -119,8 +118,7 @@ double trusted_angle(const FisheyeFit& fisheye_fit) {
 
 }  // namespace
 
-std::optional<tracking::CameraFromWorld> pose_by_rays(const View& view,
-                                                      const lighting::Fisheye& lens) {
+std::optional<tracking::CameraFromWorld> pose_by_rays(const View& view, const Fisheye& lens) {
   std::vector<glm::dvec3> rays;
   glm::dvec3 middle(0);
   for (const glm::dvec2& pixel : view.pixels) {

@@ -7,8 +7,8 @@
 #include "daemon/calibrate/bundle.hpp"
 #include "daemon/calibrate/uncertainty.hpp"
 #include "daemon/calibrate/views.hpp"
-#include "daemon/lighting/fisheye.hpp"
 #include "drivers/calibration.hpp"
+#include "drivers/calibration/fisheye.hpp"
 
 namespace previz::calibrate {
 
@@ -38,8 +38,7 @@ FisheyeFit fit_fisheye(const Views& views);
 // The pose that explains where the rays of a view's corners point, to start from: SQPnP (Terzakis
 // and Lourakis 2020) in a pinhole camera turned towards their middle. Corners more than 80 degrees
 // off that middle are left to a refinement. Nothing where the lens does not reach a corner.
-std::optional<tracking::CameraFromWorld> pose_by_rays(const View& view,
-                                                      const lighting::Fisheye& lens);
+std::optional<tracking::CameraFromWorld> pose_by_rays(const View& view, const Fisheye& lens);
 
 FisheyeIntrinsics fisheye(std::span<const double> lens, int width, int height);
 

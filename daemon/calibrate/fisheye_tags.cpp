@@ -7,9 +7,9 @@
 #include <map>
 #include <numbers>
 
-#include "daemon/lighting/fisheye.hpp"
-#include "daemon/tracking/lens.hpp"
 #include "daemon/tracking/photometry.hpp"
+#include "drivers/calibration/fisheye.hpp"
+#include "drivers/calibration/pinhole.hpp"
 
 namespace previz::calibrate {
 namespace {
@@ -55,7 +55,7 @@ glm::dvec3 ray_of(const PinholeIntrinsics& lens, const glm::dvec2& pixel) {
 }
 
 // A linear 16-bit picture of what the pinhole camera sees.
-Frame resampled(const LuminancePicture& picture, const lighting::Fisheye& fisheye,
+Frame resampled(const LuminancePicture& picture, const Fisheye& fisheye,
                 const PinholeIntrinsics& lens, const glm::dmat3& fisheye_from_view) {
   Frame frame;
   frame.format = PixelFormat::gray16;
@@ -99,7 +99,7 @@ std::vector<tracking::TagDetection> detect_in_fisheye(const Frame& frame,
                                                       const FisheyeIntrinsics& intrinsics,
                                                       const ResponseCurve& response,
                                                       const tracking::DetectorSettings& settings) {
-  const lighting::Fisheye fisheye(intrinsics);
+  const Fisheye fisheye(intrinsics);
   const LuminancePicture picture(frame, response);
   const PinholeIntrinsics lens = view_lens(std::max(intrinsics.fx, intrinsics.fy));
   ResponseCurve linear;

@@ -10,8 +10,8 @@
 #include "daemon/calibrate/bundle.hpp"
 #include "daemon/calibrate/fisheye.hpp"
 #include "daemon/calibrate/fisheye_tags.hpp"
-#include "daemon/lighting/fisheye.hpp"
 #include "daemon/tracking/pose_starts.hpp"
+#include "drivers/calibration/fisheye.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::calibrate {
@@ -99,10 +99,10 @@ View corners_of(const Sighting& sighting, const std::vector<int>& ids) {
 std::optional<BundleFit> fit_to(const Sighting& sighting, const std::vector<int>& ids,
                                 const FisheyeIntrinsics& intrinsics) {
   const View view = corners_of(sighting, ids);
-  const auto start = pose_by_rays(view, lighting::Fisheye(intrinsics));
+  const auto start = pose_by_rays(view, Fisheye(intrinsics));
   if (!start) return std::nullopt;
   const Projection known = [&](std::span<const double>, const glm::dvec3& point) {
-    return std::optional(lighting::fisheye_pixel(intrinsics, point));
+    return std::optional(fisheye_pixel(intrinsics, point));
   };
   return fit_bundle({view}, {{}, {*start}}, known);
 }
@@ -117,8 +117,7 @@ std::vector<int> explained(const Sighting& sighting, const tracking::CameraFromW
   for (std::size_t i = 0; i < sighting.ids.size(); ++i) {
     const glm::dvec2 e =
         sighting.view.pixels[i] -
-        lighting::fisheye_pixel(intrinsics,
-                                pose.rotation * sighting.view.points[i] + pose.translation);
+        fisheye_pixel(intrinsics, pose.rotation * sighting.view.points[i] + pose.translation);
     Error& error = errors[sighting.ids[i]];
     error.squares += glm::dot(e, e);
     ++error.corners;

@@ -6,7 +6,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "daemon/calibrate/opencv_pose.hpp"
-#include "daemon/tracking/lens.hpp"
+#include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::calibrate {
@@ -72,8 +72,7 @@ std::vector<glm::dvec3> picture_rays(const PinholeIntrinsics& lens) {
     for (int column = 0; column < grid_columns; ++column) {
       const glm::dvec2 pixel((lens.width - 1) * (column + 0.5) / grid_columns,
                              (lens.height - 1) * (row + 0.5) / rows);
-      if (const auto x = tracking::undistort(lens, pixel))
-        rays.push_back(glm::normalize(glm::dvec3(*x, 1)));
+      if (const auto x = undistort(lens, pixel)) rays.push_back(glm::normalize(glm::dvec3(*x, 1)));
     }
   return rays;
 }
@@ -96,7 +95,7 @@ PinholeIntrinsics pinhole(std::span<const double> lens, int width, int height) {
 
 std::optional<glm::dvec2> project_pinhole(std::span<const double> lens, const glm::dvec3& point) {
   if (!(point.z > 0)) return std::nullopt;
-  return tracking::distort(pinhole(lens, 0, 0), {point.x / point.z, point.y / point.z});
+  return distort(pinhole(lens, 0, 0), {point.x / point.z, point.y / point.z});
 }
 
 ObserverFit fit_observer(const Views& views) {

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "daemon/calibrate/signals.hpp"
-#include "daemon/lighting/fisheye.hpp"
+#include "drivers/calibration/fisheye.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::calibrate {
@@ -88,7 +88,7 @@ bool usable(const glm::dvec3& signal) {
 std::vector<FlatPicture> read_flat_pictures(PictureSource& source,
                                             const LightCameraCalibration& camera,
                                             std::vector<std::string>& notes) {
-  const lighting::Fisheye lens(camera.intrinsics);
+  const Fisheye lens(camera.intrinsics);
   std::vector<FlatPicture> pictures;
   while (const std::optional<NamedFrame> next = source.next()) {
     const SignalPicture seen = read_signals(next->frame, camera.response);

@@ -2,22 +2,19 @@
 // what is allowed.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <vector>
+
+#include "drivers/keys/value.hpp"
 
 namespace previz::exchange {
 
 using Json = nlohmann::json;
 
-struct Bounds {
-  double low, high;    // both allowed, unless `above`
-  bool above = false;  // low itself is not allowed
-  std::string text() const;
-};
+// A list becomes a list of Values; null and an object, which no key takes, become a monostate.
+Value value_of(const Json& json);
 
 class Members {
  public:
@@ -30,18 +27,22 @@ class Members {
   std::string path(const std::string& key) const;
   [[noreturn]] void fail(const std::string& key, const std::string& what) const;
 
-  // Required; the forms with a fallback are not.
-  std::string text(const std::string& key) const;
-  double number(const std::string& key, const Bounds& bounds) const;
-  double number(const std::string& key, const Bounds& bounds, double fallback) const;
-  std::int64_t integer(const std::string& key, std::int64_t low, std::int64_t high) const;
-  bool flag(const std::string& key, bool fallback) const;
-  // `count` numbers, or any number of them if 0.
-  std::vector<double> numbers(const std::string& key, std::size_t count,
-                              const Bounds& bounds) const;
-  std::vector<std::int64_t> integers(const std::string& key, std::int64_t low,
-                                     std::int64_t high) const;
-  std::vector<std::string> texts(const std::string& key) const;
+  // Fails over a value: the key's own rule is broken, in the words of the set file.
+  [[noreturn]] void fault(const std::string& key, const std::string& what) const;
+
+  // The value of a member that must be there.
+  template <typename T>
+  T read(const std::string& key, const Rule& rule = {}) const {
+    return read_value<T>(key, value(key), rule);
+  }
+  // The entries of a list that must be there; an error names the entry.
+  template <typename T>
+  std::vector<T> read_list(const std::string& key, const Rule& rule = {}) const {
+    std::vector<T> values;
+    for (const Json& entry : list(key, Codec<T>::describe(rule)))
+      values.push_back(read_value<T>(key + "[" + std::to_string(values.size()) + "]", entry, rule));
+    return values;
+  }
   // The object under `key`.
   Members object(const std::string& key, std::vector<std::string> allowed) const;
   // The objects of the list under `key`.
@@ -51,6 +52,14 @@ class Members {
   const Json& value(const std::string& key) const;
 
  private:
+  template <typename T>
+  T read_value(const std::string& key, const Json& json, const Rule& rule) const {
+    try {
+      return Codec<T>::read(value_of(json), rule);
+    } catch (const Misread& misread) {
+      fault(key, misread.what);
+    }
+  }
   const Json& list(const std::string& key, const std::string& of_what) const;
 
   std::filesystem::path file_;

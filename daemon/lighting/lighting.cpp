@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <glm/mat3x3.hpp>
-#include <glm/matrix.hpp>
 #include <numbers>
 #include <optional>
 
@@ -30,16 +28,6 @@ void check_size(std::span<const FramePtr> frames, const FisheyeIntrinsics& intri
           "light frame {} has {}x{} pixels, the light camera's calibration {}x{}", frame->sequence,
           frame->width, frame->height, intrinsics.width, intrinsics.height));
   }
-}
-
-const glm::dmat4& rigid(const glm::dmat4& world_from_camera) {
-  const glm::dmat3 rotation(world_from_camera);
-  const glm::dmat3 residual = glm::transpose(rotation) * rotation - glm::dmat3(1);
-  for (int c = 0; c < 3; ++c)
-    for (int r = 0; r < 3; ++r)
-      if (!(std::abs(residual[c][r]) < 1e-4) || !(glm::determinant(rotation) > 0))
-        throw Error("light camera: world_from_camera is not a rotation and a translation");
-  return world_from_camera;
 }
 
 // Share of what the camera sees, from which on it sees nothing that matters.
@@ -110,7 +98,7 @@ struct Estimator::Impl {
       : calibration(its_calibration),
         settings(its_settings),
         lens(calibration.intrinsics),
-        viewpoint(rigid(calibration.world_from_camera), std::move(room)),
+        viewpoint(calibration.world_from_camera, std::move(room)),
         size(chosen_resolution(settings.resolution, lens.axis_pixel_sr())),
         gains(vignetting_gains(lens, calibration.vignetting)),
         resampling(make_resampling(lens, viewpoint, size)),

@@ -24,8 +24,7 @@ namespace previz::lighting {
 class Estimator {
  public:
   // Resolution 0 gives the smallest power of two whose texels are not larger than a pixel on the
-  // optical axis, at most 2048. `room`, which stands for settings.room, may be null. Throws
-  // previz::Error if the calibration is not one of a fisheye or its pose not rigid.
+  // optical axis, at most 2048. `room`, which stands for settings.room, may be null.
   Estimator(const LightCameraCalibration& calibration, const set::Lighting& settings,
             std::shared_ptr<const Room> room = nullptr);
   ~Estimator();

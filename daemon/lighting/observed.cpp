@@ -10,7 +10,7 @@
 
 #include "daemon/lighting/environment.hpp"
 #include "daemon/lighting/response.hpp"
-#include "daemon/tracking/lens.hpp"
+#include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 #include "shaders/lib/octahedral.h"
 
@@ -24,7 +24,7 @@ double corner_radius(const PinholeIntrinsics& lens) {
   double radius = 0;
   for (const double x : {-0.5, lens.width - 0.5}) {
     for (const double y : {-0.5, lens.height - 0.5}) {
-      const auto corner = tracking::undistort(lens, {x, y});
+      const auto corner = undistort(lens, {x, y});
       if (!corner)
         throw Error(
             "observer.intrinsics: the distortion cannot be inverted at the picture's corners");
@@ -74,7 +74,7 @@ std::optional<std::size_t> ObservedLight::pixel_of(const glm::dvec3& direction, 
   const glm::dvec2 normalised = glm::dvec2(in_camera) / in_camera.z;
   if (glm::length(normalised) > max_radius_) return std::nullopt;  // the polynomial may fold back
   const PinholeIntrinsics& lens = calibration_.intrinsics;
-  const glm::dvec2 place = glm::floor(tracking::distort(lens, normalised) + 0.5);
+  const glm::dvec2 place = glm::floor(distort(lens, normalised) + 0.5);
   if (place.x < 0 || place.y < 0 || place.x >= lens.width || place.y >= lens.height)
     return std::nullopt;
   return static_cast<std::size_t>(place.y) * static_cast<std::size_t>(lens.width) +

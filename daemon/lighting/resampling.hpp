@@ -5,9 +5,9 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "daemon/lighting/fisheye.hpp"
 #include "daemon/lighting/hdr.hpp"
 #include "daemon/lighting/viewpoint.hpp"
+#include "drivers/calibration/fisheye.hpp"
 
 namespace previz::lighting {
 

@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "daemon/lighting/fisheye.hpp"
 #include "daemon/lighting/hdr.hpp"
 #include "daemon/lighting/resampling.hpp"
 #include "daemon/lighting/viewpoint.hpp"
 #include "daemon/set/set.hpp"
+#include "drivers/calibration/fisheye.hpp"
 
 namespace previz::lighting {
 

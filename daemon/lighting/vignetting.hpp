@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "daemon/lighting/fisheye.hpp"
 #include "daemon/lighting/hdr.hpp"
+#include "drivers/calibration/fisheye.hpp"
 
 namespace previz::lighting {
 

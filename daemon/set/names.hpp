@@ -2,15 +2,27 @@
 #pragma once
 
 #include <array>
-#include <utility>
 
 #include "daemon/set/actions.hpp"
 #include "daemon/set/set.hpp"
+#include "drivers/keys/value.hpp"
 
-namespace previz::set {
+namespace previz {
 
-template <class E>
-using Name = std::pair<const char*, E>;
+constexpr auto names(DisplayScale) {
+  return std::to_array<Name<DisplayScale>>(
+      {{"letterbox", DisplayScale::letterbox}, {"1:1", DisplayScale::one_to_one}});
+}
+constexpr auto names(ContactWiring::Bias) {
+  return std::to_array<Name<ContactWiring::Bias>>({{"as_is", ContactWiring::Bias::as_is},
+                                                   {"none", ContactWiring::Bias::none},
+                                                   {"pull_up", ContactWiring::Bias::pull_up},
+                                                   {"pull_down", ContactWiring::Bias::pull_down}});
+}
+
+namespace set {
+
+using previz::name_of;
 
 // A driver is listed once it exists.
 constexpr auto names(Driver) {
@@ -24,10 +36,6 @@ constexpr auto names(DisplayDriver) {
   return std::to_array<Name<DisplayDriver>>({{"kms", DisplayDriver::kms},
                                              {"headless", DisplayDriver::headless},
                                              {"none", DisplayDriver::none}});
-}
-constexpr auto names(DisplayScale) {
-  return std::to_array<Name<DisplayScale>>(
-      {{"letterbox", DisplayScale::letterbox}, {"1:1", DisplayScale::one_to_one}});
 }
 constexpr auto names(Presence) {
   return std::to_array<Name<Presence>>({{"phantom", Presence::phantom},
@@ -87,31 +95,12 @@ constexpr auto names(PressKind) {
                                          {"long", PressKind::long_press},
                                          {"double", PressKind::double_press}});
 }
-constexpr auto names(ContactWiring::Bias) {
-  return std::to_array<Name<ContactWiring::Bias>>({{"as_is", ContactWiring::Bias::as_is},
-                                                   {"none", ContactWiring::Bias::none},
-                                                   {"pull_up", ContactWiring::Bias::pull_up},
-                                                   {"pull_down", ContactWiring::Bias::pull_down}});
-}
 constexpr auto names(Mode) {
   return std::to_array<Name<Mode>>({{"standby", Mode::standby},
                                     {"live", Mode::live},
                                     {"refine", Mode::refine},
                                     {"review", Mode::review}});
 }
-constexpr auto names(ResponseCurve::Kind) {
-  return std::to_array<Name<ResponseCurve::Kind>>({{"srgb", ResponseCurve::Kind::srgb},
-                                                   {"linear", ResponseCurve::Kind::linear},
-                                                   {"gamma", ResponseCurve::Kind::gamma},
-                                                   {"table", ResponseCurve::Kind::table}});
-}
 
-// The value as a set file writes it.
-template <class E>
-constexpr const char* name_of(E value) {
-  for (const auto& [name, known] : names(value))
-    if (known == value) return name;
-  return "(no name)";
-}
-
-}  // namespace previz::set
+}  // namespace set
+}  // namespace previz

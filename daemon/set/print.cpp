@@ -41,38 +41,38 @@ std::vector<std::string> keys_of_other_kinds(const ResponseCurve& curve) {
 
 std::string intrinsics_toml(const ObserverCalibration& calibration) {
   Draft draft;
-  draft.observer = calibration;
+  draft.observer.calibration = calibration;
   return table_toml(std::move(draft), "observer.intrinsics");
 }
 
 std::string intrinsics_toml(const LightCameraCalibration& calibration) {
   Draft draft;
-  draft.light = calibration;
+  draft.light_camera.calibration = calibration;
   return table_toml(std::move(draft), "light_camera.intrinsics");
 }
 
 std::string lens_toml(const ThinLens& lens) {
   Draft draft;
-  draft.lens = lens;
+  draft.observer.lens = lens;
   return table_toml(std::move(draft), "observer.lens");
 }
 
 std::string light_pose_toml(const glm::dmat4& world_from_camera) {
   Draft draft;
-  draft.light_pose.matrix = world_from_camera;
+  draft.light_camera.pose.matrix = world_from_camera;
   return table_toml(std::move(draft), "light_camera.pose");
 }
 
 std::string response_toml(const ObserverCalibration& calibration) {
   Draft draft;
-  draft.observer = calibration;
+  draft.observer.calibration = calibration;
   return table_toml(std::move(draft), "observer.response",
                     keys_of_other_kinds(calibration.response));
 }
 
 std::string response_toml(const LightCameraCalibration& calibration) {
   Draft draft;
-  draft.light = calibration;
+  draft.light_camera.calibration = calibration;
   return table_toml(std::move(draft), "light_camera.response",
                     keys_of_other_kinds(calibration.response));
 }

@@ -63,21 +63,4 @@ std::string nearest(const std::string& word, const std::vector<std::string>& kno
   return best;
 }
 
-std::string printable(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (c == '\n')
-      out += "\\n";
-    else if (c == '\t')
-      out += "\\t";
-    else if (byte < 0x20 || byte == 0x7f) {
-      constexpr const char* hex = "0123456789abcdef";
-      out += std::string("\\u00") + hex[byte >> 4] + hex[byte & 15];
-    } else
-      out += c;
-  }
-  return out;
-}
-
 }  // namespace previz::set

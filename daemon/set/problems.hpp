@@ -1,19 +1,14 @@
 // Every problem of one file, gathered while reading and told together in the order of its lines.
 #pragma once
 
-#include <compare>
-#include <cstdint>
 #include <string>
 #include <vector>
 
+#include "drivers/keys/value.hpp"
+
 namespace previz::set {
 
-// From 1, as editors count; columns in code points.
-struct Position {
-  std::uint32_t line = 1;
-  std::uint32_t column = 1;
-  auto operator<=>(const Position&) const = default;
-};
+using previz::printable;
 
 class Problems {
  public:
@@ -38,8 +33,5 @@ class Problems {
 
 // The word of `known` that `word` was most likely meant to be, or "" where none is near.
 std::string nearest(const std::string& word, const std::vector<std::string>& known);
-
-// `text` with control characters as \n, \t or \u00XX.
-std::string printable(const std::string& text);
 
 }  // namespace previz::set

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "daemon/set/pose.hpp"
+#include "drivers/calibration/read.hpp"
 
 namespace previz::set {
 namespace {
@@ -113,95 +114,50 @@ class Resolver {
       problem(camera, "exposure_s", "does not go with bracket_s; leave one of the two out");
   }
 
-  void response(const std::string& path, const ResponseCurve& curve) {
-    using Kind = ResponseCurve::Kind;
-    const auto& table = given(path);
-    if (table.has("kind") && !table.good("kind")) return;
-    const std::string kind = name_of(curve.kind);
-    if (curve.kind != Kind::gamma)
-      exclude(table, {"gamma"}, "does not go with kind \"" + kind + "\"; allowed with \"gamma\"");
-    if (curve.kind != Kind::table) {
-      exclude(table, {"table"}, "does not go with kind \"" + kind + "\"; allowed with \"table\"");
-      return;
+  // Reports what is wrong with a calibration, and completes it.
+  template <class CalibrationDraft>
+  void check(const std::string& camera, CalibrationDraft& draft) {
+    std::map<std::string, const Given*> tables;  // by key
+    GivenKeys keys;
+    for (const calibration::Key& key : calibration::keys(draft)) {
+      const Given& table = *(tables[key.name] = &given(camera + '.' + key.table));
+      if (table.has(key.name)) keys[key.name] = table.good(key.name);
     }
-    constexpr auto wanted = "allowed: at least 2 numbers, strictly increasing from 0 to 1";
-    const auto& t = curve.inverse_table;
-    if (!table.has("table"))
-      problem(table, "table", std::string("is missing with kind \"table\"; ") + wanted);
-    if (!table.good("table")) return;
-    if (t.size() < 2 || t.front() != 0 || t.back() != 1)
-      problem(table, "table", std::string("does not run from 0 to 1; ") + wanted);
-    for (std::size_t i = 1; i < t.size(); ++i)
-      if (!(t[i] > t[i - 1])) {
-        problem(table, "table",
-                "number " + std::to_string(i + 1) + " is not above the one before it; " + wanted);
-        return;
-      }
+    for (const auto& [key, what] : calibration::check(draft, keys, calibration::Format::authored)) {
+      const Given& table = *tables[key];
+      if (table.at || table.path != "light_camera.pose") problem(table, key, what);
+    }
   }
 
   void observer() {
     device("observer", set_.observer.driver, set_.observer.device);
     needs_intrinsics("observer", "lens");
     needs_intrinsics("observer", "response");
-    response("observer.response", draft_.observer.response);
-    const auto& lens = given("observer.lens");
-    if (lens.good("focus_distance_m") && lens.good("focal_length_mm") &&
-        draft_.lens.focus_distance_m <= draft_.lens.focal_length_m)
-      problem(lens, "focus_distance_m",
-              "the focus is not beyond the focal length; allowed: above " +
-                  codec::print_number(draft_.lens.focal_length_m) + " m");
-    if (lens.at) draft_.observer.lens = draft_.lens;
-    if (given("observer.intrinsics").at) set_.observer.calibration = draft_.observer;
+    check("observer", draft_.observer);
+    if (given("observer.intrinsics").at) set_.observer.calibration = draft_.observer.calibration;
   }
 
   void light_camera() {
     device("light_camera", set_.light_camera.driver, set_.light_camera.device);
     needs_intrinsics("light_camera", "response");
     needs_intrinsics("light_camera", "pose");
-    response("light_camera.response", draft_.light.response);
+    check("light_camera", draft_.light_camera);
     const auto& intrinsics = given("light_camera.intrinsics");
     if (!intrinsics.at) return;
-
-    if (intrinsics.good("max_angle_deg") && intrinsics.good("k") == intrinsics.has("k"))
-      if (const auto fold = fold_angle(draft_.light.intrinsics))
-        problem(intrinsics, "k",
-                "the picture folds back at " +
-                    codec::print_number(std::floor(*fold * 1800 / std::numbers::pi) / 10) +
-                    " degrees off axis; allowed: a radius that grows up to max_angle_deg");
-    const auto& light = draft_.light;
-    if (intrinsics.good("max_angle_deg") && intrinsics.good("vignetting") &&
-        !(least_illumination(light.vignetting, light.intrinsics.max_angle_rad) >= min_illumination))
-      problem(intrinsics, "vignetting",
-              "leaves no light at some angle; allowed: at least 0.01 of it up to max_angle_deg");
-    const auto& pose = given("light_camera.pose");
-    if (!pose.at)
+    if (!given("light_camera.pose").at)
       problems_.add(*intrinsics.at, "light_camera.pose",
                     "is missing; a calibrated light camera needs to say where it stands: "
                     "[light_camera.pose] with position_m, rotation_deg or world_from_camera");
-    else
-      draft_.light.world_from_camera = rigid(pose, draft_.light_pose, "world_from_camera");
-    set_.light_camera.calibration = draft_.light;
+    set_.light_camera.calibration = draft_.light_camera.calibration;
   }
 
-  // A pose that must be given in one of the two forms every pose has.
-  glm::dmat4 rigid(const Given& table, const PoseDraft& draft, const std::string& matrix_key) {
-    if (table.has(matrix_key)) {
-      exclude(table, {"position_m", "rotation_deg"},
-              "contradicts " + matrix_key + "; allowed: one of the two forms");
-      if (!table.good(matrix_key)) return glm::dmat4{1};
-      const double error = rigidity_error(*draft.matrix);
-      if (error <= rigid_tolerance) return nearest_rigid(*draft.matrix);
-      problem(table, matrix_key,
-              std::isinf(error)
-                  ? "is a mirroring or singular transform; allowed: a rotation and a shift"
-                  : "is not rigid, its axes are off by " + codec::print_number(error) +
-                        "; allowed: unit axes at right angles to within 1e-4");
-      return glm::dmat4{1};
-    }
-    if (!table.has("position_m"))
-      problem(table, "position_m",
-              "is missing; allowed: position_m (with rotation_deg), or " + matrix_key);
-    return pose(draft.position.value_or(glm::dvec3{0}), draft.rotation.value_or(glm::dvec3{0}));
+  // A tag's pose, which must be given in one of the two forms that every pose has.
+  glm::dmat4 rigid(const TagDraft& draft) {
+    GivenKeys keys;
+    for (const auto& [name, key] : draft.given.keys) keys[name] = key.good;
+    const auto all = faults(draft.pose, keys, "world_from_tag");
+    for (const auto& [key, what] : all) problem(draft.given, key, what);
+    return all.empty() ? rigid_transform(draft.pose) : glm::dmat4{1};
   }
 
   void tags() {
@@ -228,7 +184,7 @@ class Resolver {
           problem(table, "carrier",
                   "another tag of " + codec::quote(draft.carrier) +
                       " is its frame already; allowed: position_m, where it is from there");
-        tag.world_from_tag = is_frame ? glm::dmat4{1} : rigid(table, draft.pose, "world_from_tag");
+        tag.world_from_tag = is_frame ? glm::dmat4{1} : rigid(draft);
       }
       (draft.carrier.empty() ? set_.tracking.tags : carrier(draft.carrier).tags).push_back(tag);
     }
@@ -326,9 +282,7 @@ class Resolver {
   glm::dmat4 placed(const ObjectDraft& draft) {
     const auto& table = draft.given;
     if (!table.has("world_from_file"))
-      return glm::scale(pose(draft.pose.position.value_or(glm::dvec3{0}),
-                             draft.pose.rotation.value_or(glm::dvec3{0})),
-                        glm::dvec3{draft.scale});
+      return glm::scale(rigid_transform(draft.pose), glm::dvec3{draft.scale});
     exclude(table, {"position_m", "rotation_deg", "scale"},
             "contradicts world_from_file; allowed: one of the two forms");
     if (!table.good("world_from_file")) return glm::dmat4{1};
@@ -506,8 +460,7 @@ class Resolver {
     } else if (!table.has("size_m")) {
       problem(table, "size_m", "is missing; allowed: 3 numbers in m, or a file");
     }
-    room.world_from_room = pose(draft_.room_pose.position.value_or(glm::dvec3{0}),
-                                draft_.room_pose.rotation.value_or(glm::dvec3{0}));
+    room.world_from_room = rigid_transform(draft_.room_pose);
     if (set_.lighting.environment)
       problems_.add(*table.at, table.path,
                     "does not go with lighting.environment, which is light from far away");

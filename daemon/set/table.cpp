@@ -1,19 +1,31 @@
 #include "daemon/set/table.hpp"
 
-#include <numbers>
+#include <string_view>
+#include <variant>
 
 #include "daemon/set/actions.hpp"
 
-namespace previz::set {
+namespace previz {
+
+template <>
+struct Codec<DisplayMode> {
+  static DisplayMode read(const Value& value, const Rule& rule) {
+    if (const auto mode = parse_display_mode(codec::text(value))) return *mode;
+    codec::misread(value, describe(rule));
+  }
+  static std::string print(const DisplayMode& mode, const Rule&) {
+    return codec::quote(to_string(mode));
+  }
+  static std::string describe(const Rule&) { return "text, WIDTHxHEIGHT or WIDTHxHEIGHT@RATE"; }
+};
+
+namespace set {
 namespace {
 
-// Units of the file; struct units are metres, radians and pixels.
-constexpr Unit plain{"", 1}, px{"px", 1}, m{"m", 1}, mm{"mm", 1e-3}, seconds{"s", 1},
-    deg{"degrees", std::numbers::pi / 180}, stops{"stops", 1}, megabytes{"MB", 1};
+using namespace units;
+using calibration::far_m, calibration::max_picture_side_px;
 
-constexpr int max_picture_side_px = 16384;
-// A distance beyond which a lens cannot tell the difference, and a float still can.
-constexpr double far_m = 1e6;
+constexpr Unit seconds{"s", 1}, stops{"stops", 1}, megabytes{"MB", 1};
 
 constexpr const char* tag_families[] = {"tag36h11",      "tag25h9",          "tag16h5",
                                         "tag36h10",      "tagStandard41h12", "tagStandard52h13",
@@ -27,6 +39,20 @@ Need optional(const char* example) {
 }
 
 using Keys = std::vector<Key>;
+
+// The keys of a calibration that stand in one table.
+template <class Draft>
+Keys calibration_keys(Draft& draft, std::string_view table) {
+  Keys rows;
+  for (const calibration::Key& key : calibration::keys(draft))
+    if (key.table == table)
+      std::visit(
+          [&](auto* to) {
+            rows.push_back({key.name, to, key.rule, key.about, key.need});
+          },
+          key.to);
+  return rows;
+}
 
 // One row, one line: name, where its value goes, unit and range, what it means, what if left out.
 // clang-format off
@@ -70,74 +96,12 @@ Keys light_camera_driving_keys(CameraWish& wish) {
   return keys;
 }
 
-Keys pinhole_keys(PinholeIntrinsics& i) {
-  return {
-      {"width", &i.width, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1920")},
-      {"height", &i.height, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1080")},
-      {"fx", &i.fx, px.above(0), "Focal length along the rows.", required("1850.0")},
-      {"fy", &i.fy, px.above(0), "Focal length along the columns.", required("1850.0")},
-      {"cx", &i.cx, px, "Principal point; 0 is the centre of the leftmost pixels.", required("959.5")},
-      {"cy", &i.cy, px, "Principal point; 0 is the centre of the topmost pixels.", required("539.5")},
-      {"k1", &i.k1, plain, "Radial distortion (Brown-Conrady, OpenCV's order)."},
-      {"k2", &i.k2, plain, "Radial distortion."},
-      {"p1", &i.p1, plain, "Tangential distortion."},
-      {"p2", &i.p2, plain, "Tangential distortion."},
-      {"k3", &i.k3, plain, "Radial distortion."},
-  };
-}
-
-Keys lens_keys(ThinLens& l) {
-  return {
-      {"focal_length_mm", &l.focal_length_m, mm.above(0, 1e4), "Focal length as engraved on the lens.", required("35.0")},
-      {"f_number", &l.f_number, plain.within(0.5, 1e6), "The f-stop; no lens in air is faster than 0.5.", required("2.8")},
-      {"focus_distance_m", &l.focus_distance_m, m.above(0, far_m), "What is sharp, measured along the optical axis; beyond the focal length. 1e6 for infinity.", required("1.2")},
-  };
-}
-
-Keys response_keys(ResponseCurve& r, double& responsivity) {
-  return {
-      {"kind", &r.kind, plain, "Curve from signal (exposure * radiance) to picture value."},
-      {"gamma", &r.gamma, plain.within(0.1, 10), "With kind \"gamma\" only: value = signal^(1/gamma).", optional("2.2")},
-      {"table", &r.inverse_table, plain.within(0, 1), "With kind \"table\" only: signal at value i/(n-1), strictly increasing from 0 to 1.", optional("[0.0, 0.05, 0.22, 0.52, 1.0]")},
-      {"responsivity", &responsivity, plain.above(0), "exposure = shutter time in s * gain * responsivity."},
-  };
-}
-
 Keys light_camera_keys(LightCamera& c) {
   return {
       {"driver", &c.driver, plain, "How the light camera (the fisheye that looks at the lamps) is reached."},
       {"device", &c.device, plain, "As in [observer].", optional("\"sessions/take1\"")},
       {"faults", &c.faults, plain, "As in [observer].", optional("[\"drop@30+5\"]")},
       {"exposure", &c.exposure, plain.above(0), "Absolute exposure, in place of what the frames say.", optional("0.35")},
-  };
-}
-
-Keys light_response_keys(LightCameraCalibration& c) {
-  auto keys = response_keys(c.response, c.responsivity);
-  keys.push_back({"dark_level", &c.dark_level, plain.within(0, max_dark_level), "Signal that a covered lens shows, red, green and blue, as a share of white (previzd calibrate dark)."});
-  return keys;
-}
-
-Keys fisheye_keys(LightCameraCalibration& c) {
-  auto& i = c.intrinsics;
-  return {
-      {"width", &i.width, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1024")},
-      {"height", &i.height, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1024")},
-      {"fx", &i.fx, px.above(0), "Focal length along the rows (Kannala-Brandt, OpenCV's fisheye).", required("290.0")},
-      {"fy", &i.fy, px.above(0), "Focal length along the columns.", required("290.0")},
-      {"cx", &i.cx, px, "Principal point; 0 is the centre of the leftmost pixels.", required("511.5")},
-      {"cy", &i.cy, px, "Principal point; 0 is the centre of the topmost pixels.", required("511.5")},
-      {"k", &i.k, plain, "k1 to k4 of r = t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9, t the angle off axis."},
-      {"max_angle_deg", &i.max_angle_rad, deg.above(0, 180), "Angle off axis up to which the calibration holds; nothing is read beyond it.", required("100.0")},
-      {"vignetting", &c.vignetting, plain, "v1 to v3 of the light that comes through, 1 + v1 t^2 + v2 t^4 + v3 t^6, t the angle off axis in radians (previzd calibrate vignetting)."},
-  };
-}
-
-Keys light_pose_keys(PoseDraft& p) {
-  return {
-      {"position_m", &p.position, m, "Where it stands in the world (Z up). Required unless world_from_camera is given.", optional("[0.5, 0.0, 1.6]")},
-      {"rotation_deg", &p.rotation, deg, "Turns about world X, then Y, then Z. Unturned it looks straight up, picture right = X, picture down = Y.", optional("[0.0, 0.0, 0.0]")},
-      {"world_from_camera", &p.matrix, plain, "In place of both: the rigid transform, OpenCV axes (right, down, forward).", optional("[[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, 1.6], [0, 0, 0, 1]]")},
   };
 }
 
@@ -359,14 +323,14 @@ std::vector<Section> sections(Draft& d) {
       once("set", always, "The set as a whole.", [&d] { return set_keys(d.set); }),
       once("observer", always, "The film camera.", [&d] { return observer_keys(d.set.observer); }),
       once("observer.camera", optional, "How a camera that is no recording is driven; what is left out stays as the camera has it.", [&d] { return camera_keys(d.set.observer.camera); }),
-      once("observer.intrinsics", optional, "Its lens as calibrated. A calibration given here replaces the session's as a whole.", [&d] { return pinhole_keys(d.observer.intrinsics); }),
-      once("observer.lens", optional, "Depth of field; left out: everything is sharp.", [&d] { return lens_keys(d.lens); }),
-      once("observer.response", optional, "How its sensor turns light into picture values.", [&d] { return response_keys(d.observer.response, d.observer.responsivity); }),
+      once("observer.intrinsics", optional, "Its lens as calibrated. A calibration given here replaces the session's as a whole.", [&d] { return calibration_keys(d.observer, "intrinsics"); }),
+      once("observer.lens", optional, "Depth of field; left out: everything is sharp.", [&d] { return calibration_keys(d.observer, "lens"); }),
+      once("observer.response", optional, "How its sensor turns light into picture values.", [&d] { return calibration_keys(d.observer, "response"); }),
       once("light_camera", always, "The light camera.", [&d] { return light_camera_keys(d.set.light_camera); }),
       once("light_camera.camera", optional, "As [observer.camera].", [&d] { return light_camera_driving_keys(d.set.light_camera.camera); }),
-      once("light_camera.intrinsics", optional, "Its fisheye as calibrated.", [&d] { return fisheye_keys(d.light); }),
-      once("light_camera.response", optional, "How its sensor turns light into picture values.", [&d] { return light_response_keys(d.light); }),
-      once("light_camera.pose", optional, "Where it stands.", [&d] { return light_pose_keys(d.light_pose); }),
+      once("light_camera.intrinsics", optional, "Its fisheye as calibrated.", [&d] { return calibration_keys(d.light_camera, "intrinsics"); }),
+      once("light_camera.response", optional, "How its sensor turns light into picture values.", [&d] { return calibration_keys(d.light_camera, "response"); }),
+      once("light_camera.pose", optional, "Where it stands.", [&d] { return calibration_keys(d.light_camera, "pose"); }),
       once("tracking", always, "Where the film camera is, found by printed AprilTags.", [&d] { return tracking_keys(d.set.tracking); }),
       many("tag", "A printed tag; one table each. Give its pose in one of three forms.", d.tags, tag_keys),
       many("object", "A piece of geometry, real or virtual; one table each.", d.objects, object_keys),
@@ -387,4 +351,5 @@ std::vector<Section> sections(Draft& d) {
   // clang-format on
 }
 
-}  // namespace previz::set
+}  // namespace set
+}  // namespace previz

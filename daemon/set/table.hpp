@@ -8,8 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "daemon/set/names.hpp"
 #include "daemon/set/set.hpp"
-#include "daemon/set/value.hpp"
+#include "drivers/calibration/keys.hpp"
+#include "drivers/keys/value.hpp"
 
 namespace previz::set {
 
@@ -29,13 +31,6 @@ struct Given {
   Position where(const std::string& key) const {
     return has(key) ? keys.at(key).at : at.value_or(Position{});
   }
-};
-
-// A pose as the file gives it, before it is known which of its forms was meant.
-struct PoseDraft {
-  std::optional<glm::dvec3> position;
-  std::optional<glm::dvec3> rotation;
-  std::optional<glm::dmat4> matrix;
 };
 
 struct TagDraft {
@@ -80,10 +75,8 @@ struct GpioDraft {
 struct Draft {
   Set set;
   std::map<std::string, Given> given;  // every table that stands once, by its path
-  ObserverCalibration observer;
-  ThinLens lens;
-  LightCameraCalibration light;
-  PoseDraft light_pose;
+  calibration::ObserverDraft observer;
+  calibration::LightCameraDraft light_camera;
   std::optional<std::filesystem::path> environment;
   std::optional<glm::dvec3> unseen_radiance;
   Room room;
@@ -95,12 +88,6 @@ struct Draft {
   std::vector<LightDraft> lights;
   std::vector<ButtonDraft> buttons;
   std::vector<GpioDraft> contacts;
-};
-
-// What becomes of a key that is not written. `example` is shown in the reference.
-struct Need {
-  enum class Kind { defaulted, required, optional } kind = Kind::defaulted;
-  std::string example;
 };
 
 // A row of the table, bound to the place its value goes to.

@@ -1,6 +1,7 @@
 #include "daemon/tracking/apriltag_tracker.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <set>
 
 #include "daemon/tracking/carrier_pose.hpp"
@@ -21,8 +22,7 @@ class AprilTagTracker final : public Tracker {
         lens_(lens),
         detector_({settings.family, settings.min_margin, settings.max_hamming}, lens, response),
         stage_(settings.tags, lens, settings.ambiguity_ratio) {
-    if (lens.width < 1 || lens.height < 1 || !(lens.fx > 0) || !(lens.fy > 0))
-      throw Error("observer.intrinsics: width, height, fx and fy must be above 0 to track with");
+    assert(lens.width > 0 && lens.height > 0 && lens.fx > 0 && lens.fy > 0);
     std::set<int> taken;
     for (const set::Tag& tag : settings.tags) taken.insert(tag.id);
     for (const set::Carrier& carrier : settings.carriers) {

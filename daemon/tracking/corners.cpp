@@ -8,7 +8,7 @@
 #include <glm/matrix.hpp>
 #include <opencv2/core.hpp>
 
-#include "daemon/tracking/lens.hpp"
+#include "drivers/calibration/pinhole.hpp"
 
 namespace previz::tracking {
 namespace {

@@ -9,8 +9,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "daemon/tracking/lens.hpp"
 #include "daemon/tracking/photometry.hpp"
+#include "drivers/calibration/pinhole.hpp"
 
 namespace previz::tracking {
 namespace {

@@ -6,8 +6,8 @@
 #include <glm/gtc/quaternion.hpp>
 #include <opencv2/core.hpp>
 
-#include "daemon/tracking/lens.hpp"
 #include "daemon/tracking/pose_starts.hpp"
+#include "drivers/calibration/pinhole.hpp"
 
 namespace previz::tracking {
 namespace {

@@ -1,6 +1,7 @@
 #include "daemon/tracking/photometry.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 
@@ -27,7 +28,7 @@ double inverse_response(const ResponseCurve& curve, double value) {
       break;
   }
   const std::vector<double>& table = curve.inverse_table;
-  if (table.size() < 2) return value;
+  assert(table.size() >= 2);
   const double at = value * double(table.size() - 1);
   const std::size_t i = std::min(std::size_t(at), table.size() - 2);
   return table[i] + (at - double(i)) * (table[i + 1] - table[i]);

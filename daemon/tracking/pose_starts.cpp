@@ -6,7 +6,7 @@
 #include <glm/matrix.hpp>
 #include <opencv2/calib3d.hpp>
 
-#include "daemon/tracking/lens.hpp"
+#include "drivers/calibration/pinhole.hpp"
 
 namespace previz::tracking {
 namespace {

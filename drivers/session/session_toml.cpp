@@ -3,15 +3,15 @@
 #include <openssl/evp.h>
 
 #include <toml++/toml.h>
-#include <algorithm>
 #include <array>
 #include <charconv>
-#include <cmath>
 #include <stdexcept>
 #include <string_view>
-#include <vector>
+#include <utility>
 
+#include "drivers/calibration/read.hpp"
 #include "drivers/error.hpp"
+#include "drivers/keys/toml_value.hpp"
 
 namespace previz::session {
 namespace {
@@ -88,29 +88,6 @@ std::string text_assignment(const std::string& text) {
   return "text_base64 = \"" + base64(text) + "\"  # the set file is not UTF-8\n";
 }
 
-const char* to_string(ResponseCurve::Kind kind) {
-  switch (kind) {
-    case ResponseCurve::Kind::srgb:
-      return "srgb";
-    case ResponseCurve::Kind::linear:
-      return "linear";
-    case ResponseCurve::Kind::gamma:
-      return "gamma";
-    case ResponseCurve::Kind::table:
-      return "table";
-  }
-  throw std::invalid_argument("unknown response curve");
-}
-
-std::string response_toml(const ResponseCurve& response, const std::string& table) {
-  std::string text = "\n[" + table + "]\nkind = \"" + to_string(response.kind) + "\"\n";
-  if (response.kind == ResponseCurve::Kind::gamma)
-    text += "gamma = " + to_text(response.gamma) + "\n";
-  if (response.kind == ResponseCurve::Kind::table)
-    text += "inverse_table = " + to_list(response.inverse_table) + "\n";
-  return text;
-}
-
 std::string line(const char* key, double value) {
   return std::string(key) + " = " + to_text(value) + "\n";
 }
@@ -119,37 +96,62 @@ std::string line(const char* key, int value) {
   return std::string(key) + " = " + std::to_string(value) + "\n";
 }
 
-std::string observer_toml(const ObserverCalibration& calibration) {
-  const PinholeIntrinsics& lens = calibration.intrinsics;
-  std::string text = "\n[observer.calibration]  # pixels; Brown-Conrady in OpenCV's order\n";
-  text += line("width", lens.width) + line("height", lens.height);
-  text += line("fx", lens.fx) + line("fy", lens.fy) + line("cx", lens.cx) + line("cy", lens.cy);
-  text += line("k1", lens.k1) + line("k2", lens.k2) + line("p1", lens.p1) + line("p2", lens.p2) +
-          line("k3", lens.k3);
-  text += line("responsivity", calibration.responsivity);
-  text += response_toml(calibration.response, "observer.calibration.response");
-  if (calibration.lens)
-    text += "\n[observer.calibration.lens]\n" +
-            line("focal_length_m", calibration.lens->focal_length_m) +
-            line("f_number", calibration.lens->f_number) +
-            line("focus_distance_m", calibration.lens->focus_distance_m);
+// A calibration's values, to the last bit.
+struct ValueText {
+  std::string operator()(const int* value) const { return std::to_string(*value); }
+  std::string operator()(const double* value) const { return to_text(*value); }
+  std::string operator()(const ResponseCurve::Kind* kind) const { return quote(name_of(*kind)); }
+  std::string operator()(const glm::dvec3* v) const {
+    return to_list(std::array{v->x, v->y, v->z});
+  }
+  std::string operator()(const std::optional<glm::dvec3>*) const { return ""; }  // is not recorded
+  std::string operator()(const std::optional<glm::dmat4>* matrix) const {
+    std::array<double, 16> rows{};
+    for (int i = 0; i < 16; ++i) rows[i] = (**matrix)[i % 4][i / 4];
+    return to_list(rows) + "  # row-major, metres";
+  }
+  template <typename List>
+  std::string operator()(const List* values) const {
+    return to_list(*values);
+  }
+};
+
+// The table and the key of a path such as "lens.f_number"; the table of "fx" is "".
+std::pair<std::string, std::string> table_and_key(const std::string& path) {
+  const auto dot = path.find('.');
+  return dot == std::string::npos ? std::pair{std::string(), path}
+                                  : std::pair{path.substr(0, dot), path.substr(dot + 1)};
+}
+
+template <typename Draft>
+std::string calibration_toml(const std::string& table, const std::string& comment, bool has_lens,
+                             Draft draft) {
+  std::string text;
+  for (const std::string part : {"", "response", "lens"}) {
+    if (part == "lens" && !has_lens) continue;
+    text += "\n[" + table + (part.empty() ? "]" + comment : "." + part + "]") + "\n";
+    for (const calibration::Key& row : keys(draft)) {
+      const auto [home, key] = table_and_key(row.recorded);
+      if (key.empty() || home != part) continue;
+      if (row.only_with.value_or(draft.calibration.response.kind) ==
+          draft.calibration.response.kind)
+        text += key + " = " + std::visit(ValueText{}, row.to) + "\n";
+    }
+  }
   return text;
 }
 
+std::string observer_toml(const ObserverCalibration& calibration) {
+  return calibration_toml(
+      "observer.calibration", "  # pixels; Brown-Conrady in OpenCV's order",
+      calibration.lens.has_value(),
+      calibration::ObserverDraft{calibration, calibration.lens.value_or(ThinLens{})});
+}
+
 std::string light_toml(const LightCameraCalibration& calibration) {
-  const FisheyeIntrinsics& lens = calibration.intrinsics;
-  std::array<double, 16> rows{};
-  for (int i = 0; i < 16; ++i) rows[i] = calibration.world_from_camera[i % 4][i / 4];
-  std::string text = "\n[light.calibration]  # pixels; Kannala-Brandt\n";
-  text += line("width", lens.width) + line("height", lens.height);
-  text += line("fx", lens.fx) + line("fy", lens.fy) + line("cx", lens.cx) + line("cy", lens.cy);
-  text += "k = " + to_list(lens.k) + "\n" + line("max_angle_rad", lens.max_angle_rad);
-  text += "world_from_camera = " + to_list(rows) + "  # row-major, metres\n";
-  text += line("responsivity", calibration.responsivity);
-  const glm::dvec3& dark = calibration.dark_level;
-  text += "vignetting = " + to_list(calibration.vignetting) + "\n";
-  text += "dark_level = " + to_list(std::array{dark.x, dark.y, dark.z}) + "\n";
-  return text + response_toml(calibration.response, "light.calibration.response");
+  return calibration_toml(
+      "light.calibration", "  # pixels; Kannala-Brandt", false,
+      calibration::LightCameraDraft{calibration, {{}, {}, calibration.world_from_camera}});
 }
 
 std::string stream_toml(const std::string& source, const StreamFormat& stream) {
@@ -198,17 +200,6 @@ struct Place {
     return static_cast<int>(value);
   }
   std::string text(const char* k) const { return get<std::string>(k, "a string"); }
-  std::vector<double> numbers(const char* k, std::size_t count) const {
-    const toml::array* list = table[k].as_array();
-    std::vector<double> values;
-    if (list)
-      for (const toml::node& item : *list)
-        if (const auto value = item.value<double>()) values.push_back(*value);
-    if (!list || values.size() != list->size() || (count && values.size() != count))
-      fail(k, count ? "must be a list of " + std::to_string(count) + " numbers"
-                    : "must be a list of numbers");
-    return values;
-  }
   const toml::table* find(const char* k) const {
     if (table.contains(k) && !table[k].is_table()) fail(k, "must be a table");
     return table[k].as_table();
@@ -220,86 +211,27 @@ struct Place {
   }
 };
 
-ResponseCurve parse_response(const Place& place) {
-  ResponseCurve response;
-  const std::string kind = place.text("kind");
-  if (kind == "srgb") {
-    response.kind = ResponseCurve::Kind::srgb;
-  } else if (kind == "linear") {
-    response.kind = ResponseCurve::Kind::linear;
-  } else if (kind == "gamma") {
-    response.kind = ResponseCurve::Kind::gamma;
-    response.gamma = place.number("gamma");
-  } else if (kind == "table") {
-    response.kind = ResponseCurve::Kind::table;
-    response.inverse_table = place.numbers("inverse_table", 0);
-  } else {
-    place.fail("kind", "must be \"srgb\", \"linear\", \"gamma\" or \"table\"");
-  }
-  return response;
-}
-
-// What no lens can be would become rays that are no direction.
-ThinLens parse_lens(const Place& place) {
-  const ThinLens lens{place.number("focal_length_m"), place.number("f_number"),
-                      place.number("focus_distance_m")};
-  if (!(lens.focal_length_m > 0 && std::isfinite(lens.focal_length_m)))
-    place.fail("focal_length_m", "must be above 0");
-  if (!(lens.f_number >= 0.5 && std::isfinite(lens.f_number)))
-    place.fail("f_number", "must be at least 0.5");
-  if (!(lens.focus_distance_m > lens.focal_length_m && lens.focus_distance_m <= 1e9))
-    place.fail("focus_distance_m", "must be more than the focal length and at most 1e9");
-  return lens;
-}
-
-ObserverCalibration parse_observer(const Place& place) {
-  ObserverCalibration calibration;
-  calibration.intrinsics = {place.pixels("width"), place.pixels("height"), place.number("fx"),
-                            place.number("fy"),    place.number("cx"),     place.number("cy"),
-                            place.number("k1"),    place.number("k2"),     place.number("p1"),
-                            place.number("p2"),    place.number("k3")};
-  calibration.responsivity = place.number("responsivity");
-  calibration.response = parse_response(place.inner("response"));
-  if (place.find("lens")) calibration.lens = parse_lens(place.inner("lens"));
-  return calibration;
-}
-
-// Sessions of before these were known lack them: a lens and a sensor without fault.
-void parse_shading(const Place& place, LightCameraCalibration& calibration) {
-  if (place.table.contains("vignetting")) {
-    const std::vector<double> v = place.numbers("vignetting", 3);
-    std::copy(v.begin(), v.end(), calibration.vignetting.begin());
-    if (!(least_illumination(calibration.vignetting, calibration.intrinsics.max_angle_rad) >=
-          min_illumination))
-      place.fail("vignetting", "must leave at least 0.01 of the light up to max_angle_rad");
-  }
-  if (place.table.contains("dark_level")) {
-    const std::vector<double> dark = place.numbers("dark_level", 3);
-    for (const double level : dark)
-      if (!(level >= 0 && level <= max_dark_level))
-        place.fail("dark_level", "must be between 0 and 0.5");
-    calibration.dark_level = {dark[0], dark[1], dark[2]};
-  }
-}
-
-LightCameraCalibration parse_light(const Place& place) {
-  LightCameraCalibration calibration;
-  FisheyeIntrinsics& lens = calibration.intrinsics;
-  lens.width = place.pixels("width");
-  lens.height = place.pixels("height");
-  lens.fx = place.number("fx");
-  lens.fy = place.number("fy");
-  lens.cx = place.number("cx");
-  lens.cy = place.number("cy");
-  const std::vector<double> k = place.numbers("k", 4),
-                            rows = place.numbers("world_from_camera", 16);
-  std::copy(k.begin(), k.end(), lens.k.begin());
-  lens.max_angle_rad = place.number("max_angle_rad");
-  for (int i = 0; i < 16; ++i) calibration.world_from_camera[i % 4][i / 4] = rows[i];
-  calibration.responsivity = place.number("responsivity");
-  calibration.response = parse_response(place.inner("response"));
-  parse_shading(place, calibration);
-  return calibration;
+calibration::Source calibration_source(const Place& place) {
+  const auto node =
+      [&place](const calibration::Key& key) -> std::pair<const toml::table*, std::string> {
+    const auto [part, name] = table_and_key(key.recorded);
+    return {part.empty() ? &place.table : place.find(part.c_str()), name};
+  };
+  return {calibration::Format::recorded, place.find("lens") != nullptr,
+          [node](const calibration::Key& key) -> std::optional<Value> {
+            const auto [table, name] = node(key);
+            const toml::node* found = table ? table->get(name) : nullptr;
+            return found ? std::optional(value_of(*found)) : std::nullopt;
+          },
+          [node, &place](const calibration::Key& key, std::optional<Position> at,
+                         const std::string& what) {
+            const auto [table, name] = node(key);
+            const toml::table& home = table ? *table : place.table;
+            const toml::node* found = home.get(name);
+            if (!at) at = position((found ? *found : home).source());
+            throw Error(place.file.string() + ":" + std::to_string(at->line) + ": " +
+                        place.key(key.recorded) + ": " + what);
+          }};
 }
 
 StreamFormat parse_stream(const Place& place) {
@@ -403,9 +335,9 @@ SessionFile parse_session_toml(const std::string& text, const std::filesystem::p
     if (place.find("video")) file.streams[source] = parse_stream(place.inner("video"));
     if (source == std::string_view("composite") || !place.find("calibration")) continue;
     if (source == std::string_view("observer"))
-      file.info.observer = parse_observer(place.inner("calibration"));
+      file.info.observer = read_observer(calibration_source(place.inner("calibration")));
     else
-      file.info.light = parse_light(place.inner("calibration"));
+      file.info.light = read_light_camera(calibration_source(place.inner("calibration")));
   }
   for (const auto& [key, value] : top.inner("assets").table) {
     if (!value.is_string())

@@ -5,7 +5,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "daemon/lighting/fisheye.hpp"
+#include "drivers/calibration/fisheye.hpp"
 
 namespace previz::test {
 

@@ -20,8 +20,8 @@
 #include <map>
 #include <stdexcept>
 
-#include "daemon/tracking/lens.hpp"
 #include "daemon/tracking/photometry.hpp"
+#include "drivers/calibration/pinhole.hpp"
 
 namespace previz::test {
 namespace {
@@ -63,7 +63,7 @@ Layout layout(const std::string& name, int id) {
 glm::dvec2 project(const TagScene& scene, glm::dvec3 world) {
   const glm::dvec4 x = glm::inverse(scene.world_from_camera) * glm::dvec4(world, 1);
   if (!(x.z > 0)) throw std::logic_error("the test's tag is behind its camera");
-  return tracking::distort(scene.lens, {x.x / x.z, x.y / x.z});
+  return distort(scene.lens, {x.x / x.z, x.y / x.z});
 }
 
 constexpr int kSegments = 6;  // a side, so that the lens may bend it

@@ -171,7 +171,7 @@ std::optional<IrradianceError> measure_resampling(const TruthSet& set, const Env
   lighting::HdrPicture hdr{picture.width, picture.height, std::move(picture.radiance), {}};
   hdr.flags.resize(hdr.radiance.size());
   const LightCameraCalibration& camera = *set.light_camera;
-  const lighting::Fisheye lens(camera.intrinsics);
+  const Fisheye lens(camera.intrinsics);
   lighting::Resampled map = lighting::resample(
       lighting::make_resampling(lens, lighting::Viewpoint(glm::dmat3(camera.world_from_camera)),
                                 truth.size),

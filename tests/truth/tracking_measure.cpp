@@ -12,9 +12,9 @@
 #include "daemon/scene/scene.hpp"
 #include "daemon/tracking/apriltag_tracker.hpp"
 #include "daemon/tracking/joint_pose.hpp"
-#include "daemon/tracking/lens.hpp"
 #include "daemon/tracking/pose_starts.hpp"
 #include "daemon/tracking/tag_detector.hpp"
+#include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::truth {
@@ -39,7 +39,7 @@ std::optional<glm::dvec2> project(const PinholeIntrinsics& lens,
                                   const tracking::CameraFromWorld& pose, glm::dvec3 world) {
   const glm::dvec3 x = pose.rotation * world + pose.translation;
   if (!(x.z > 0)) return std::nullopt;
-  const glm::dvec2 p = tracking::distort(lens, {x.x / x.z, x.y / x.z});
+  const glm::dvec2 p = distort(lens, {x.x / x.z, x.y / x.z});
   if (!(p.x >= -0.5 && p.y >= -0.5 && p.x < lens.width - 0.5 && p.y < lens.height - 0.5))
     return std::nullopt;
   return p;

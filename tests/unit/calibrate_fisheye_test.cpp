@@ -11,8 +11,8 @@
 #include "daemon/calibrate/coverage.hpp"
 #include "daemon/calibrate/fisheye.hpp"
 #include "daemon/calibrate/light_pose.hpp"
-#include "daemon/lighting/fisheye.hpp"
 #include "daemon/set/print.hpp"
+#include "drivers/calibration/fisheye.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/calibrate_pictures.hpp"
 #include "tests/support/tracking_synthetic.hpp"
@@ -38,7 +38,7 @@ FisheyeIntrinsics wide_lens() {
 // A board held in a ring around the lens, its middle at this angle off axis.
 Views ring(const std::vector<double>& off_axis_deg, int around, unsigned seed = 1) {
   const Board board = parse_board("chessboard:9x6:25mm");
-  const lighting::Fisheye lens(wide_lens());
+  const Fisheye lens(wide_lens());
   std::mt19937 random(seed);
   Views views{lens.intrinsics().width, lens.intrinsics().height, {}};
   for (const double angle : off_axis_deg)
@@ -90,7 +90,7 @@ TEST(FisheyeCalibration, RaysAreRightAsFarAsItIsTrusted) {
   const FisheyeFit fisheye = fit_fisheye(all_around());
   EXPECT_GT(fisheye.intrinsics.max_angle_rad, 90 * degree);
   EXPECT_LE(fisheye.intrinsics.max_angle_rad, fisheye.widest_corner_rad);
-  const lighting::Fisheye truth(wide_lens()), found(fisheye.intrinsics);
+  const Fisheye truth(wide_lens()), found(fisheye.intrinsics);
   for (double angle = 0; angle < found.max_angle_rad(); angle += 5 * degree)
     for (double around = 0; around < 6; around += 0.7) {
       const glm::dvec3 ray(std::sin(angle) * std::cos(around), std::sin(angle) * std::sin(around),
@@ -151,7 +151,7 @@ class TagRoom {
 
   FramePtr photograph(const FisheyeIntrinsics& intrinsics, const glm::dmat4& world_from_camera,
                       unsigned seed) const {
-    const lighting::Fisheye lens(intrinsics);
+    const Fisheye lens(intrinsics);
     test::LinearPicture picture{intrinsics.width, intrinsics.height, {}};
     for (int y = 0; y < picture.height; ++y)
       for (int x = 0; x < picture.width; ++x) {

@@ -11,7 +11,7 @@
 #include "daemon/calibrate/residual_plot.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"
-#include "daemon/tracking/lens.hpp"
+#include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/calibrate_pictures.hpp"
 
@@ -133,7 +133,7 @@ TEST(ObserverCalibration, ProjectionIsAsCertainAsStated) {
     const ObserverFit observer = fit_observer(captured(test::careful_capture(), seed));
     std::vector<glm::dvec3> rays;
     for (const UncertainPixel& at : observer.picture) {
-      const auto x = tracking::undistort(film_lens(), at.pixel);
+      const auto x = undistort(film_lens(), at.pixel);
       ASSERT_TRUE(x);
       rays.emplace_back(*x, 1);
     }

@@ -6,7 +6,7 @@
 
 #include "daemon/calibrate/dark_fit.hpp"
 #include "daemon/calibrate/vignetting_fit.hpp"
-#include "daemon/lighting/fisheye.hpp"
+#include "drivers/calibration/fisheye.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/lighting_pictures.hpp"
 
@@ -93,7 +93,7 @@ LightCameraCalibration camera() {
 // Something evenly lit but for a gradient across the picture, seen through the lens.
 FramePtr flat_picture(double brightness, const glm::dvec2& gradient, const Vignetting& loss) {
   const LightCameraCalibration lens_of = camera();
-  const lighting::Fisheye lens(lens_of.intrinsics);
+  const Fisheye lens(lens_of.intrinsics);
   std::vector<glm::dvec3> signals;
   for (int y = 0; y < lens_of.intrinsics.height; ++y)
     for (int x = 0; x < lens_of.intrinsics.width; ++x) {

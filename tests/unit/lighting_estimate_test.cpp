@@ -289,7 +289,7 @@ TEST(Estimate, ResolutionFollowsTheSourceOrTheSet) {
   for (int refused : {-1, 100, 8192}) EXPECT_THROW(chosen_resolution(refused, 1), Error);
 }
 
-TEST(Estimate, RefusesFramesAndPosesThatDoNotFit) {
+TEST(Estimate, RefusesFramesThatDoNotFit) {
   const LightCameraCalibration camera = fisheye_camera();
   const FramePtr frame = make_frame(2, 2, 1, std::vector<glm::dvec3>(4));
   try {
@@ -299,12 +299,6 @@ TEST(Estimate, RefusesFramesAndPosesThatDoNotFit) {
     EXPECT_STREQ(error.what(),
                  "light frame 0 has 2x2 pixels, the light camera's calibration 512x512");
   }
-  LightCameraCalibration mirrored = camera;
-  mirrored.world_from_camera[0][0] = -1;
-  EXPECT_THROW(estimate({}, mirrored, {}), Error);
-  LightCameraCalibration scaled = camera;
-  scaled.world_from_camera *= 2;
-  EXPECT_THROW(estimate({}, scaled, {}), Error);
   EXPECT_THROW(estimate({}, camera, {}), Error);  // no frame
 }
 

@@ -9,7 +9,7 @@
 
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/lighting/response.hpp"
-#include "daemon/tracking/lens.hpp"
+#include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/lighting_pictures.hpp"
 
@@ -32,7 +32,7 @@ Plate film(const ObserverCalibration& camera, const glm::dmat4& pose, double exp
   Plate plate{lens.width, lens.height, 8, {}};
   for (int y = 0; y < lens.height; ++y) {
     for (int x = 0; x < lens.width; ++x) {
-      const glm::dvec2 n = tracking::undistort(lens, {x, y}).value();
+      const glm::dvec2 n = undistort(lens, {x, y}).value();
       const glm::dvec3 direction = glm::normalize(glm::dmat3(pose) * glm::dvec3(n, 1));
       for (int c = 0; c < 3; ++c)
         plate.samples.push_back(response.forward(exposure * sky(direction)[c]));

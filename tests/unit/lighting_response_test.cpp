@@ -90,11 +90,9 @@ std::string message_of(const ResponseCurve& curve, int bits) {
 TEST(Response, RefusesWhatCannotRoundTrip) {
   // (1/65535)^70 is below the smallest double.
   EXPECT_NE(message_of(gamma_curve(70), 16).find("code 1"), std::string::npos);
-  EXPECT_NE(message_of(gamma_curve(0), 8).find("gamma"), std::string::npos);
-  EXPECT_NE(message_of(gamma_curve(std::nan("")), 8).find("gamma"), std::string::npos);
-  EXPECT_NE(message_of(table_curve({0, 0.5, 0.5, 1}), 8).find("entry 2"), std::string::npos);
-  EXPECT_NE(message_of(table_curve({0, 0.5}), 8).find("the last 1"), std::string::npos);
-  EXPECT_NE(message_of(table_curve({}), 8).find("at least 2"), std::string::npos);
+  for (const ResponseCurve& curve : {gamma_curve(0), gamma_curve(std::nan("")),
+                                     table_curve({0, 0.5, 0.5, 1}), table_curve({0, 0.5})})
+    EXPECT_NE(message_of(curve, 8).find("does not come back"), std::string::npos);
   EXPECT_NE(message_of({}, 17).find("1 to 16"), std::string::npos);
 }
 

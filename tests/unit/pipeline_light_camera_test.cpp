@@ -51,7 +51,7 @@ class Studio {
   bool lit = true;
 
   FramePtr photograph(double exposure) {
-    const lighting::Fisheye lens(light_camera().intrinsics);
+    const Fisheye lens(light_camera().intrinsics);
     const lighting::SensorNoise noise;
     std::normal_distribution<double> normal;
     std::vector<glm::dvec3> signals;

@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <random>
 
+#include "drivers/calibration/pose.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session_toml.hpp"
 
@@ -100,7 +102,7 @@ TEST(SessionToml, EveryNumberComesBackBitForBit) {
   light.response.inverse_table = {0, 0.1, 0.30000000000000004, 1};
   light.vignetting = {-0.1, 0.05, -0.02};
   light.dark_level = {0.01, 1.0 / 3, 0};
-  for (int i = 0; i < 16; ++i) light.world_from_camera[i % 4][i / 4] = std::sqrt(i) / 3;
+  light.world_from_camera = pose({1.0 / 3, std::sqrt(2), -0.1}, {0.3, -1.2, 2.5});
   file.info.light = light;
   file.info.assets = {{"a.glb", "assets/1.glb"}, {"dir \"q\"/b.glb", "assets/2.glb"}};
 
@@ -136,9 +138,13 @@ TEST(SessionToml, ErrorsNameFileLineAndKey) {
   SessionFile file;
   file.streams["observer"] = {PixelFormat::rgb8, 640, 480, {}};
   file.info.observer = ObserverCalibration{};
-  file.info.observer->intrinsics.width = file.info.observer->intrinsics.height = 9;
+  PinholeIntrinsics& film = file.info.observer->intrinsics;
+  film.width = film.height = 9;
+  film.fx = film.fy = 5;
   file.info.light = LightCameraCalibration{};
-  file.info.light->intrinsics.width = file.info.light->intrinsics.height = 9;
+  FisheyeIntrinsics& fisheye = file.info.light->intrinsics;
+  fisheye.width = fisheye.height = 9;
+  fisheye.fx = fisheye.fy = 5;
   const std::string good = to_toml(file);
   EXPECT_EQ(error_of(good), "");
   const auto with = [&](const std::string& from, const std::string& to) {
@@ -150,17 +156,17 @@ TEST(SessionToml, ErrorsNameFileLineAndKey) {
             std::string::npos);
   EXPECT_NE(with("format = \"rgb8\"", "format = \"nv12\"").find("observer.video.format"),
             std::string::npos);
-  EXPECT_NE(with("fx = 0.0", "fx = \"wide\"").find("observer.calibration.fx must be a number"),
+  EXPECT_NE(with("fx = 5.0", "fx = \"wide\"").find("observer.calibration.fx: \"wide\" is not"),
             std::string::npos);
-  EXPECT_NE(with("fx = 0.0\n", "").find("observer.calibration.fx is missing"), std::string::npos);
+  EXPECT_NE(with("fx = 5.0\n", "").find("observer.calibration.fx: is missing"), std::string::npos);
   EXPECT_NE(with("width = 640", "width = -640").find("observer.video.width"), std::string::npos);
   EXPECT_NE(with("kind = \"srgb\"", "kind = \"log\"").find("observer.calibration.response.kind"),
             std::string::npos);
   EXPECT_NE(with("vignetting = [0.0, 0.0, 0.0]", "vignetting = [-0.5, 0.0, 0.0]")
-                .find("light.calibration.vignetting must leave"),
+                .find("light.calibration.vignetting: leaves no"),
             std::string::npos);
   EXPECT_NE(with("dark_level = [0.0, 0.0, 0.0]", "dark_level = [0.0, 0.6, 0.0]")
-                .find("light.calibration.dark_level must be"),
+                .find("light.calibration.dark_level: 0.6 is not"),
             std::string::npos);
   // Sessions of before these were known.
   EXPECT_EQ(with("vignetting = [0.0, 0.0, 0.0]\n", ""), "");
@@ -170,6 +176,70 @@ TEST(SessionToml, ErrorsNameFileLineAndKey) {
   EXPECT_NE(error_of("").find("format_version is missing"), std::string::npos);
   for (std::size_t length = 0; length + 1 < good.size(); ++length)  // never anything but an Error
     static_cast<void>(error_of(good.substr(0, length)));
+}
+
+// Sessions are read for ever, and by other programs: what is written must not change by a byte.
+TEST(SessionToml, CalibrationsAreWrittenAsEver) {
+  SessionFile file;
+  ObserverCalibration observer;
+  observer.intrinsics = {64, 48, 60.1, 1.0 / 3, 31.5, 23, -0.1, 0.03, 1e-3, -2e-22, 0};
+  observer.lens = ThinLens{0.0353, 2.8, 1e6};
+  observer.response = {ResponseCurve::Kind::gamma, 2.4, {}};
+  observer.responsivity = 3.5;
+  file.info.observer = observer;
+  LightCameraCalibration light;
+  light.intrinsics = {64, 60, 20.1, 20, 31.5, 29.5, {-0.01, 0, -0.0, 0}, 100 * (M_PI / 180)};
+  light.response = {ResponseCurve::Kind::table, 2.2, {0, 0.25, 1}};
+  light.vignetting = {-0.05, 0, 0.001};
+  light.dark_level = {0.01, 0.02, 0};
+  light.world_from_camera = glm::dmat4(0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 0.5, 0, 1.6, 1);
+  file.info.light = light;
+  const std::string text = to_toml(file);
+  EXPECT_NE(text.find(R"(
+[observer.calibration]  # pixels; Brown-Conrady in OpenCV's order
+width = 64
+height = 48
+fx = 60.1
+fy = 0.3333333333333333
+cx = 31.5
+cy = 23.0
+k1 = -0.1
+k2 = 0.03
+p1 = 0.001
+p2 = -2e-22
+k3 = 0.0
+responsivity = 3.5
+
+[observer.calibration.response]
+kind = "gamma"
+gamma = 2.4
+
+[observer.calibration.lens]
+focal_length_m = 0.0353
+f_number = 2.8
+focus_distance_m = 1e+06
+
+[light.calibration]  # pixels; Kannala-Brandt
+width = 64
+height = 60
+fx = 20.1
+fy = 20.0
+cx = 31.5
+cy = 29.5
+k = [-0.01, 0.0, -0.0, 0.0]
+max_angle_rad = 1.7453292519943295
+world_from_camera = [0.0, -1.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.6, 0.0, 0.0, 0.0, 1.0]  # row-major, metres
+responsivity = 1.0
+vignetting = [-0.05, 0.0, 0.001]
+dark_level = [0.01, 0.02, 0.0]
+
+[light.calibration.response]
+kind = "table"
+inverse_table = [0.0, 0.25, 1.0]
+
+[assets])"),
+            std::string::npos)
+      << text;
 }
 
 TEST(SessionToml, NamesMustBeText) {

@@ -231,17 +231,6 @@ TEST(SetValues, RectangleGetsAnUpAcrossItsDirection) {
   EXPECT_EQ(set.lights.at(1).up, glm::dvec3(1, 0, 0));
 }
 
-TEST(SetPose, FoldAngleIsWhereTheRadiusStopsGrowing) {
-  FisheyeIntrinsics fisheye;
-  fisheye.max_angle_rad = std::numbers::pi;
-  EXPECT_FALSE(fold_angle(fisheye));
-  // r = t - t^5 / 20: slope 1 - t^4 / 4, zero at sqrt(2). Bisected to the last bits.
-  fisheye.k = {0, -0.05, 0, 0};
-  EXPECT_NEAR(fold_angle(fisheye).value(), std::numbers::sqrt2, rounding);
-  fisheye.max_angle_rad = 1.41;
-  EXPECT_FALSE(fold_angle(fisheye));
-}
-
 // A stick with one tag, which is its frame, and a tray with two.
 TEST(SetValues, CarriersAreWhatTagsAreStuckTo) {
   const auto set = parse(R"(

@@ -11,7 +11,7 @@
 #include <random>
 
 #include "daemon/tracking/joint_pose.hpp"
-#include "daemon/tracking/lens.hpp"
+#include "drivers/calibration/pinhole.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::tracking {

@@ -1,10 +1,10 @@
-#include "daemon/tracking/lens.hpp"
+#include "drivers/calibration/pinhole.hpp"
 
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 
-namespace previz::tracking {
+namespace previz {
 
 glm::dvec2 distort(const PinholeIntrinsics& lens, glm::dvec2 normalised, glm::dmat2* jacobian) {
   const double x = normalised.x, y = normalised.y;
@@ -35,4 +35,4 @@ std::optional<glm::dvec2> undistort(const PinholeIntrinsics& lens, glm::dvec2 pi
   return std::nullopt;
 }
 
-}  // namespace previz::tracking
+}  // namespace previz

@@ -1,10 +1,28 @@
-#include "daemon/set/value.hpp"
+#include "drivers/keys/value.hpp"
 
 #include <charconv>
 #include <cmath>
 #include <glm/matrix.hpp>
 
-namespace previz::set {
+namespace previz {
+
+std::string printable(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '\n')
+      out += "\\n";
+    else if (c == '\t')
+      out += "\\t";
+    else if (byte < 0x20 || byte == 0x7f) {
+      constexpr const char* hex = "0123456789abcdef";
+      out += std::string("\\u00") + hex[byte >> 4] + hex[byte & 15];
+    } else
+      out += c;
+  }
+  return out;
+}
+
 namespace codec {
 namespace {
 
@@ -197,4 +215,4 @@ std::string Codec<std::vector<std::string>>::print(const std::vector<std::string
   return out + "]";
 }
 
-}  // namespace previz::set
+}  // namespace previz

@@ -1,13 +1,12 @@
-#include "daemon/lighting/fisheye.hpp"
+#include "drivers/calibration/fisheye.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <numbers>
 #include <vector>
 
-#include "drivers/error.hpp"
-
-namespace previz::lighting {
+namespace previz {
 namespace {
 
 using std::numbers::pi;
@@ -70,12 +69,8 @@ glm::dvec2 fisheye_pixel(const FisheyeIntrinsics& intrinsics, const glm::dvec3& 
 }
 
 Fisheye::Fisheye(const FisheyeIntrinsics& intrinsics) : intrinsics_(intrinsics) {
-  if (intrinsics.width <= 0 || intrinsics.height <= 0)
-    throw Error("light camera: width and height must be above 0 pixels");
-  if (!(intrinsics.fx > 0) || !(intrinsics.fy > 0))
-    throw Error("light camera: fx and fy must be above 0 pixels");
-  if (!(intrinsics.max_angle_rad > 0) || !(intrinsics.max_angle_rad <= pi))
-    throw Error("light camera: the calibrated angle must be above 0 and at most 180 degrees");
+  assert(intrinsics.width > 0 && intrinsics.height > 0 && intrinsics.fx > 0 && intrinsics.fy > 0);
+  assert(intrinsics.max_angle_rad > 0 && intrinsics.max_angle_rad <= pi);
   max_angle_rad_ = std::min(intrinsics.max_angle_rad, monotonic_limit_rad(intrinsics.k));
   max_radius_ = radius(intrinsics.k, max_angle_rad_);
 }
@@ -123,4 +118,4 @@ std::optional<std::uint32_t> Fisheye::pixel_at(const glm::dvec2& position) const
   return y * static_cast<std::uint32_t>(intrinsics_.width) + x;
 }
 
-}  // namespace previz::lighting
+}  // namespace previz

@@ -7,7 +7,7 @@
 
 #include "drivers/calibration.hpp"
 
-namespace previz::tracking {
+namespace previz {
 
 // Normalised image plane (x/z, y/z) to pixels, as cv::projectPoints. `jacobian`, where given,
 // becomes d(pixel)/d(normalised), column-major as glm has it.
@@ -18,4 +18,4 @@ glm::dvec2 distort(const PinholeIntrinsics& lens, glm::dvec2 normalised,
 // polynomial has no inverse there (beyond the radius at which it turns back).
 std::optional<glm::dvec2> undistort(const PinholeIntrinsics& lens, glm::dvec2 pixel);
 
-}  // namespace previz::tracking
+}  // namespace previz

@@ -9,14 +9,14 @@
 
 #include "drivers/calibration.hpp"
 
-namespace previz::lighting {
+namespace previz {
 
 // Camera axes as OpenCV's (x right, y down, z forward); (0,0) is the centre of the top-left pixel.
 // Source of the model: Kannala and Brandt 2006, "A Generic Camera Model and Calibration Method for
 // Conventional, Wide-Angle, and Fish-Eye Lenses", in the parametrisation of OpenCV's fisheye.
 class Fisheye {
  public:
-  // Throws previz::Error if the size or focal length is not positive or the angle not in (0, pi].
+  // The intrinsics are within the bounds of their keys (calibration/keys.hpp).
   explicit Fisheye(const FisheyeIntrinsics& intrinsics);
 
   const FisheyeIntrinsics& intrinsics() const { return intrinsics_; }
@@ -48,4 +48,4 @@ glm::dvec2 fisheye_pixel(const FisheyeIntrinsics& intrinsics, const glm::dvec3& 
 // The angle at which r(t) = t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9 stops growing, at most pi.
 double monotonic_limit_rad(const std::array<double, 4>& k);
 
-}  // namespace previz::lighting
+}  // namespace previz

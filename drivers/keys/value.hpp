@@ -1,32 +1,43 @@
-// Between TOML values and C++ values: how each type is read, checked, described and printed.
-// Knows no TOML library and no key.
+// How a value of each C++ type is read from a file, checked, described and printed. Nothing here
+// knows the syntax of a file or the name of a key.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <compare>
 #include <concepts>
 #include <cstdint>
 #include <filesystem>
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <variant>
 #include <vector>
 
-#include "daemon/set/names.hpp"
-#include "daemon/set/problems.hpp"
+namespace previz {
 
-namespace previz::set {
+// A place in a text file. Both count from 1, as editors do; columns are code points.
+struct Position {
+  std::uint32_t line = 1;
+  std::uint32_t column = 1;
+  auto operator<=>(const Position&) const = default;
+};
 
-// What stands behind the = of a key. monostate: a date, a time or a table, which no key takes.
+// The value that a file gives for a key. A date, a time or a table, which no key takes, is a
+// monostate.
 struct Value {
   Position at;
   std::variant<std::monostate, bool, std::int64_t, double, std::string, std::vector<Value>> data;
 };
+
+// `text` with control characters as \n, \t or \u00XX.
+std::string printable(const std::string& text);
 
 // Thrown by Codec::read, caught where the key is known.
 struct Misread {
@@ -34,28 +45,61 @@ struct Misread {
   std::string what;
 };
 
-// What a number may be, in the unit of the file. value_in_struct = value_in_file * si.
+// The bounds of a number, in the unit of the file. value_in_struct = value_in_file * si.
 struct Rule {
   const char* unit = "";
   double si = 1;
   double low = -std::numeric_limits<double>::infinity();
   double high = std::numeric_limits<double>::infinity();
   bool low_excluded = false;
-  std::span<const char* const> words{};  // of a text; empty: any text
+  std::span<const char* const> words{};  // the texts that are allowed; empty: any text
+  const char* si_unit = unit;            // the unit of the struct
+
+  // The same bounds for a file in the unit of the struct.
+  constexpr Rule in_si() const {
+    return {si_unit, 1, low * si, high * si, low_excluded, words, si_unit};
+  }
 };
 
-// The units of the table; a unit alone allows every finite number.
+// A unit that a file uses; a unit alone allows every finite number.
 struct Unit : Rule {
-  constexpr Unit(const char* name, double si_of_one) : Rule{.unit = name, .si = si_of_one} {}
+  constexpr Unit(const char* name, double si_of_one, const char* si_name)
+      : Rule{.unit = name, .si = si_of_one, .si_unit = si_name} {}
+  constexpr Unit(const char* name, double si_of_one) : Unit(name, si_of_one, name) {}
   constexpr Rule within(double lowest, double highest) const {
-    return {.unit = unit, .si = si, .low = lowest, .high = highest};
+    return {unit, si, lowest, highest, false, {}, si_unit};
   }
-  constexpr Rule at_least(double lowest) const { return {.unit = unit, .si = si, .low = lowest}; }
+  constexpr Rule at_least(double lowest) const {
+    return within(lowest, std::numeric_limits<double>::infinity());
+  }
   constexpr Rule above(double bound,
                        double highest = std::numeric_limits<double>::infinity()) const {
-    return {.unit = unit, .si = si, .low = bound, .high = highest, .low_excluded = true};
+    return {unit, si, bound, highest, true, {}, si_unit};
   }
 };
+
+// Structs are in metres, radians and pixels.
+namespace units {
+inline constexpr Unit plain{"", 1}, px{"px", 1}, m{"m", 1}, mm{"mm", 1e-3, "m"},
+    deg{"degrees", std::numbers::pi / 180, "rad"};
+}
+
+// What a missing key means. `example` is shown in the reference.
+struct Need {
+  enum class Kind { defaulted, required, optional } kind = Kind::defaulted;
+  std::string example;
+};
+
+// How files spell the values of an enumeration: `names(E)` lists them beside each E.
+template <class E>
+using Name = std::pair<const char*, E>;
+
+template <class E>
+constexpr const char* name_of(E value) {
+  for (const auto& [name, known] : names(value))
+    if (known == value) return name;
+  return "(no name)";
+}
 
 // One specialisation a type:
 //   read      the value, checked and in the struct's unit; throws Misread
@@ -179,18 +223,6 @@ struct Codec<glm::dvec3> {
   static std::string describe(const Rule& rule) { return Array::describe(rule); }
 };
 
-template <>
-struct Codec<DisplayMode> {
-  static DisplayMode read(const Value& value, const Rule& rule) {
-    if (const auto mode = parse_display_mode(codec::text(value))) return *mode;
-    codec::misread(value, describe(rule));
-  }
-  static std::string print(const DisplayMode& mode, const Rule&) {
-    return codec::quote(to_string(mode));
-  }
-  static std::string describe(const Rule&) { return "text, WIDTHxHEIGHT or WIDTHxHEIGHT@RATE"; }
-};
-
 // Four points, each of three numbers.
 template <>
 struct Codec<std::array<glm::dvec3, 4>> {
@@ -240,4 +272,4 @@ struct Codec<std::optional<T>> {
   static std::string describe(const Rule& rule) { return Codec<T>::describe(rule); }
 };
 
-}  // namespace previz::set
+}  // namespace previz

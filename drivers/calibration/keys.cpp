@@ -1,0 +1,111 @@
+#include "drivers/calibration/keys.hpp"
+
+#include <type_traits>
+#include <utility>
+
+namespace previz::calibration {
+namespace {
+
+using namespace units;
+using Keys = std::vector<Key>;
+
+Need required(const char* example) {
+  return {Need::Kind::required, example};
+}
+Need optional(const char* example) {
+  return {Need::Kind::optional, example};
+}
+
+// One row, one line.
+// clang-format off
+
+Keys pinhole_keys(PinholeIntrinsics& i) {
+  return {
+      {"intrinsics", "width", &i.width, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1920")},
+      {"intrinsics", "height", &i.height, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1080")},
+      {"intrinsics", "fx", &i.fx, px.above(0), "Focal length along the rows.", required("1850.0")},
+      {"intrinsics", "fy", &i.fy, px.above(0), "Focal length along the columns.", required("1850.0")},
+      {"intrinsics", "cx", &i.cx, px, "Principal point; 0 is the centre of the leftmost pixels.", required("959.5")},
+      {"intrinsics", "cy", &i.cy, px, "Principal point; 0 is the centre of the topmost pixels.", required("539.5")},
+      {"intrinsics", "k1", &i.k1, plain, "Radial distortion (Brown-Conrady, OpenCV's order)."},
+      {"intrinsics", "k2", &i.k2, plain, "Radial distortion."},
+      {"intrinsics", "p1", &i.p1, plain, "Tangential distortion."},
+      {"intrinsics", "p2", &i.p2, plain, "Tangential distortion."},
+      {"intrinsics", "k3", &i.k3, plain, "Radial distortion."},
+  };
+}
+
+Keys fisheye_keys(FisheyeIntrinsics& i) {
+  return {
+      {"intrinsics", "width", &i.width, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1024")},
+      {"intrinsics", "height", &i.height, px.within(1, max_picture_side_px), "Size of the calibrated picture.", required("1024")},
+      {"intrinsics", "fx", &i.fx, px.above(0), "Focal length along the rows (Kannala-Brandt, OpenCV's fisheye).", required("290.0")},
+      {"intrinsics", "fy", &i.fy, px.above(0), "Focal length along the columns.", required("290.0")},
+      {"intrinsics", "cx", &i.cx, px, "Principal point; 0 is the centre of the leftmost pixels.", required("511.5")},
+      {"intrinsics", "cy", &i.cy, px, "Principal point; 0 is the centre of the topmost pixels.", required("511.5")},
+      {"intrinsics", "k", &i.k, plain, "k1 to k4 of r = t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9, t the angle off axis."},
+      {"intrinsics", "max_angle_deg", &i.max_angle_rad, deg.above(0, 180), "Angle off axis up to which the calibration holds; nothing is read beyond it.", required("100.0"), "max_angle_rad"},
+  };
+}
+
+Keys lens_keys(ThinLens& l) {
+  return {
+      {"lens", "focal_length_mm", &l.focal_length_m, mm.above(0, 1e4), "Focal length as engraved on the lens.", required("35.0"), "lens.focal_length_m"},
+      {"lens", "f_number", &l.f_number, plain.within(0.5, 1e6), "The f-stop; no lens in air is faster than 0.5.", required("2.8"), "lens.f_number"},
+      {"lens", "focus_distance_m", &l.focus_distance_m, m.above(0, far_m), "What is sharp, measured along the optical axis; beyond the focal length. 1e6 for infinity.", required("1.2"), "lens.focus_distance_m"},
+  };
+}
+
+Keys pose_keys(PoseDraft& p) {
+  return {
+      {"pose", "position_m", &p.position, m, "Where it stands in the world (Z up). Required unless world_from_camera is given.", optional("[0.5, 0.0, 1.6]"), ""},
+      {"pose", "rotation_deg", &p.rotation, deg, "Turns about world X, then Y, then Z. Unturned it looks straight up, picture right = X, picture down = Y.", optional("[0.0, 0.0, 0.0]"), ""},
+      {"pose", "world_from_camera", &p.matrix, plain, "In place of both: the rigid transform, OpenCV axes (right, down, forward).", optional("[[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, 1.6], [0, 0, 0, 1]]")},
+  };
+}
+
+Keys response_keys(ResponseCurve& r, double& responsivity) {
+  using enum ResponseCurve::Kind;
+  return {
+      {"response", "kind", &r.kind, plain, "Curve from signal (exposure * radiance) to picture value.", {}, "response.kind"},
+      {"response", "gamma", &r.gamma, plain.within(0.1, 10), "With kind \"gamma\" only: value = signal^(1/gamma).", optional("2.2"), "response.gamma", gamma},
+      {"response", "table", &r.inverse_table, plain.within(0, 1), "With kind \"table\" only: signal at value i/(n-1), strictly increasing from 0 to 1.", optional("[0.0, 0.05, 0.22, 0.52, 1.0]"), "response.inverse_table", table},
+      {"response", "responsivity", &responsivity, plain.above(0), "exposure = shutter time in s * gain * responsivity."},
+  };
+}
+
+Keys shading_keys(LightCameraCalibration& c) {
+  return {
+      {"intrinsics", "vignetting", &c.vignetting, plain, "v1 to v3 of the light that comes through, 1 + v1 t^2 + v2 t^4 + v3 t^6, t the angle off axis in radians (previzd calibrate vignetting).", {}, "vignetting", {}, true},
+      {"response", "dark_level", &c.dark_level, plain.within(0, max_dark_level), "Signal that a covered lens shows, red, green and blue, as a share of white (previzd calibrate dark).", {}, "dark_level", {}, true},
+  };
+}
+
+// clang-format on
+
+Keys joined(std::initializer_list<Keys> parts) {
+  Keys all;
+  for (const Keys& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+}  // namespace
+
+std::string Key::allowed(Format format) const {
+  return std::visit(
+      [&]<class T>(T*) { return Codec<std::remove_cv_t<T>>::describe(bounds(format)); }, to);
+}
+
+std::vector<Key> keys(ObserverDraft& draft) {
+  ObserverCalibration& c = draft.calibration;
+  return joined({pinhole_keys(c.intrinsics), response_keys(c.response, c.responsivity),
+                 lens_keys(draft.lens)});
+}
+
+std::vector<Key> keys(LightCameraDraft& draft) {
+  LightCameraCalibration& c = draft.calibration;
+  return joined({fisheye_keys(c.intrinsics), pose_keys(draft.pose),
+                 response_keys(c.response, c.responsivity), shading_keys(c)});
+}
+
+}  // namespace previz::calibration
