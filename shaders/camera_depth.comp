@@ -7,11 +7,11 @@
 #include "shaders/lib/calibrated_ray.glsl"
 #include "shaders/lib/trace.glsl"
 
-layout(scalar, set = 3, binding = BINDING_SEEN) writeonly buffer SeenBuffer { GpuSeen seen[]; };
+layout(scalar) writeonly buffer SeenBuffer { GpuSeen seen[]; };
 
 void main() {
-  const uint index = gl_GlobalInvocationID.x;
-  if (index >= frame.width * frame.height) return;
+  if (gl_GlobalInvocationID.x >= batch.width * batch.height) return;
+  const uint index = batch.y * frame.width + gl_GlobalInvocationID.x;
   const uvec2 pixel = uvec2(index % frame.width, index / frame.width);
   const vec3 ray = vec3(calibrated_ray(pixel, vec2(0.5)), 1.0);
   const float depth_of_unit = inversesqrt(dot(ray, ray));

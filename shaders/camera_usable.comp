@@ -7,8 +7,10 @@
 #include "shaders/lib/batch.glsl"
 #include "shaders/lib/scene.glsl"
 
-layout(scalar, set = 3, binding = BINDING_PLATE) buffer PlateBuffer { vec4 plate[]; };
-layout(scalar, set = 3, binding = BINDING_SEEN) readonly buffer SeenBuffer { GpuSeen seen[]; };
+// The fourth component says on the way in whether the pixel may be used, and on the way out how far
+// its surface is (seen_radiance of camera.glsl).
+layout(scalar) buffer PlateBuffer { vec4 plate[]; };
+layout(scalar) readonly buffer SeenBuffer { GpuSeen seen[]; };
 
 // Pixels blurred by more than this are not used.
 const int MOST_BLUR = 6;
@@ -50,8 +52,9 @@ bool is_usable(ivec2 pixel, GpuSeen middle) {
 }
 
 void main() {
-  const uint index = gl_GlobalInvocationID.x;
-  if (index >= frame.width * frame.height || plate[index].w == 0.0) return;
+  if (gl_GlobalInvocationID.x >= batch.width * batch.height) return;
+  const uint index = batch.y * frame.width + gl_GlobalInvocationID.x;
+  if (plate[index].w == 0.0) return;
   const ivec2 pixel = ivec2(index % frame.width, index / frame.width);
   plate[index].w = is_usable(pixel, seen[index]) ? seen[index].inverse_depth : 0.0;
 }

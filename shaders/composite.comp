@@ -6,15 +6,12 @@
 
 #include "shaders/lib/show.glsl"
 
-layout(scalar, set = 0, binding = BINDING_SHOW_PIXELS) readonly buffer Pixels { GpuPixel pixels[]; };
-layout(scalar, set = 0, binding = BINDING_SHOW_COMPOSITE) writeonly buffer Composites {
-  vec4 composites[];
-};
-layout(scalar, set = 0, binding = BINDING_SHOW_SIGNAL) writeonly buffer Signals { vec4 signals[]; };
-layout(scalar, set = 0, binding = BINDING_SHOW_VARIANCE) writeonly buffer Variances {
-  vec4 variances[];
-};
-layout(scalar, set = 0, binding = BINDING_SHOW_SURFACE) writeonly buffer Surfaces { vec4 surfaces[]; };
+layout(scalar) readonly buffer Pixels { GpuPixel pixels[]; };       // of a tile
+layout(scalar) writeonly buffer Composites { vec4 composites[]; };  // of the band: composite, mean(M)
+// The denoiser's, as lib/denoise.glsl reads them.
+layout(scalar) writeonly buffer Signals { vec4 signals[]; };
+layout(scalar) writeonly buffer Variances { vec4 variances[]; };
+layout(scalar) writeonly buffer Surfaces { vec4 surfaces[]; };
 
 // Past it a ratio says nothing, and its square would overflow.
 const float MOST_GAIN = 1e15;

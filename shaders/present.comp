@@ -6,12 +6,11 @@
 
 #include "shaders/lib/show.glsl"
 
-layout(scalar, set = 0, binding = BINDING_SHOW_LEAST_OF) readonly buffer LeastOf { float least_of[]; };
-layout(scalar, set = 0, binding = BINDING_SHOW_COMPOSITE) readonly buffer Composites {
-  vec4 composites[];
-};
-layout(scalar, set = 0, binding = BINDING_SHOW_DENOISED) readonly buffer Signals { vec4 signals[]; };
-layout(scalar, set = 0, binding = BINDING_SHOW_PICTURE) writeonly buffer Picture { uint picture[]; };
+// The least signal that becomes each code.
+layout(scalar) readonly buffer LeastOf { float least_of[]; };
+layout(scalar) readonly buffer Composites { vec4 composites[]; };  // as composite.comp writes them
+layout(scalar) readonly buffer Signals { vec4 signals[]; };        // denoised, or as composited
+layout(scalar) writeonly buffer Picture { uint picture[]; };       // samples, as the plate's
 
 // A channel that comes out at NEARLY_WHITE of the sensor's white was white, and stays it.
 vec3 without_noise(vec3 composite, vec3 camera, float mask, vec3 signal) {

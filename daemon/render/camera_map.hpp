@@ -7,30 +7,31 @@
 #include <glm/vec4.hpp>
 #include <vector>
 
-#include "daemon/render/device.hpp"
+#include "daemon/render/kernel.hpp"
+#include "shaders/lib/render_shared.h"
 
 namespace previz::render {
 
 class CameraMap {
  public:
-  // Pipeline layouts of the passes have this at set 3. Without a resize() the map is empty.
-  explicit CameraMap(Device& device);
-  const vk::raii::DescriptorSetLayout& set_layout() const { return set_layout_; }
-  vk::DescriptorSet set() const { return *set_; }
+  // The map is empty before the first upload().
+  explicit CameraMap(Device& device) : device_(device) { resize(1); }
 
-  void resize(std::uint32_t pixels);
-  void create_pipelines(const vk::raii::PipelineLayout& layout, std::uint32_t features);
+  void create_kernels(std::uint32_t features);
+  // The map, for the passes that read it and those below.
+  void add_to(Buffers& buffers) const;
   // Row-major, linear radiance; w: 1 where a pixel may be used, 0 where it is clipped.
   void upload(const std::vector<glm::vec4>& plate);
-  // Makes the map from the plate uploaded. All sets must be bound.
-  void record(const vk::raii::CommandBuffer& commands) const;
+  // Makes the map from the plate uploaded. `parts`: whole rows, which make up the picture;
+  // `buffers`: the scene's and the map's.
+  void record(const vk::raii::CommandBuffer& commands, const std::vector<gpu::GpuBatch>& parts,
+              const Buffers& buffers);
 
  private:
+  void resize(std::uint32_t pixels);
+
   Device& device_;
-  vk::raii::DescriptorSetLayout set_layout_{nullptr};
-  vk::raii::DescriptorPool descriptors_{nullptr};
-  vk::raii::DescriptorSet set_{nullptr};
-  Pipeline depth_, usable_;
+  Kernel depth_, usable_;
   std::uint32_t pixels_ = 0;
   Buffer plate_, seen_;
 };

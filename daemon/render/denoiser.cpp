@@ -18,10 +18,6 @@ constexpr int reach =
     2 * ((1 << wavelet_levels) - 1) + static_cast<int>(gpu::DENOISE_VARIANCE_REACH);
 static_assert(gpu::DENOISE_VARIANCE_REACH >= 2);
 
-bool is_read_as_texels(std::uint32_t binding) {
-  return binding <= gpu::BINDING_DENOISE_SURFACE;
-}
-
 glm::vec3 camera_pixel(const std::vector<double>& camera, std::size_t i) {
   if (camera.empty()) return glm::vec3(0);
   return {camera[3 * i], camera[3 * i + 1], camera[3 * i + 2]};
@@ -59,23 +55,10 @@ float most_sure_variance(float white, std::int64_t samples) {
 }
 
 Denoiser::Denoiser(Device& device, std::size_t most_pixels)
-    : device_(device), most_pixels_(most_pixels) {
-  using Type = vk::DescriptorType;
-  set_layout_ = create_set_layout(device, gpu::DENOISE_BINDINGS, [](std::uint32_t binding) {
-    return is_read_as_texels(binding) ? Type::eUniformTexelBuffer : Type::eStorageBuffer;
-  });
-  const vk::PushConstantRange constants(vk::ShaderStageFlagBits::eCompute, 0,
-                                        sizeof(gpu::GpuDenoise));
-  layout_ = vk::raii::PipelineLayout(device.vk(), {{}, *set_layout_, constants});
-  const vk::DescriptorPoolSize sizes[] = {{Type::eUniformTexelBuffer, 2 * gpu::DENOISE_BINDINGS},
-                                          {Type::eStorageBuffer, 2 * gpu::DENOISE_BINDINGS}};
-  descriptors_ = vk::raii::DescriptorPool(
-      device.vk(), {vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet, 2, sizes});
-  const vk::DescriptorSetLayout layouts[] = {*set_layout_, *set_layout_};
-  sets_ = vk::raii::DescriptorSets(device.vk(), {*descriptors_, layouts});
-  variance_pass_ = create_pipeline(device, denoise_variance_spv, layout_, {});
-  level_pass_ = create_pipeline(device, denoise_spv, layout_, {});
-}
+    : device_(device),
+      most_pixels_(most_pixels),
+      variance_pass_(device, "denoise_variance", denoise_variance_spv),
+      level_pass_(device, "denoise", denoise_spv) {}
 
 void Denoiser::reserve(std::size_t pixels) {
   if (pixels <= pixels_) return;
@@ -89,17 +72,6 @@ void Denoiser::reserve(std::size_t pixels) {
     variance_[side] = texels();
   }
   surface_ = texels();
-  for (int side : {0, 1}) {
-    const Buffer* buffers[gpu::DENOISE_BINDINGS];
-    buffers[gpu::BINDING_DENOISE_SIGNAL] = &signal_[side];
-    buffers[gpu::BINDING_DENOISE_VARIANCE] = &variance_[side];
-    buffers[gpu::BINDING_DENOISE_SURFACE] = &surface_;
-    buffers[gpu::BINDING_DENOISED_SIGNAL] = &signal_[1 - side];
-    buffers[gpu::BINDING_DENOISED_VARIANCE] = &variance_[1 - side];
-    for (std::uint32_t i = 0; i < gpu::DENOISE_BINDINGS; ++i)
-      write_descriptor(device_, sets_[static_cast<std::size_t>(side)], i, *buffers[i],
-                       is_read_as_texels(i));
-  }
   pixels_ = pixels;
 }
 
@@ -111,23 +83,23 @@ const Buffer& Denoiser::denoised_signal() const {
 }
 
 void Denoiser::record(const vk::raii::CommandBuffer& commands, int width, int rows,
-                      bool single_sample) const {
+                      bool single_sample) {
   gpu::GpuDenoise constants{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(rows), 0,
                             single_sample ? 1u : 0u};
-  std::size_t side = 0;
-  const auto pass = [&](const Pipeline& pipeline) {
-    commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipeline.pipeline);
-    commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *layout_, 0, *sets_[side], {});
-    commands.pushConstants<gpu::GpuDenoise>(*layout_, vk::ShaderStageFlagBits::eCompute, 0,
-                                            constants);
-    commands.dispatch(work_groups(constants.width * constants.height), 1, 1);
-    barrier(commands);
+  int side = 0;
+  const auto run = [&](Kernel& pass) {
+    const Buffers buffers{{"signals", &signal_[side]},
+                          {"variances", &variance_[side]},
+                          {"surfaces", &surface_},
+                          {"denoised_signals", &signal_[1 - side]},
+                          {"denoised_variances", &variance_[1 - side]}};
+    pass.dispatch({commands, constants, buffers}, constants.width * constants.height);
     side = 1 - side;
   };
-  pass(variance_pass_);
+  run(variance_pass_);
   for (int level = 0; level < wavelet_levels; ++level) {
     constants.step = 1u << level;
-    pass(level_pass_);
+    run(level_pass_);
   }
 }
 

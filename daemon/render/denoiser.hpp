@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "daemon/render/composite.hpp"
-#include "daemon/render/device.hpp"
+#include "daemon/render/kernel.hpp"
 #include "daemon/render/layers.hpp"
 #include "daemon/render/picture_memory.hpp"
 
@@ -33,8 +33,8 @@ class Denoiser {
   // Makes the buffers large enough for so many pixels; they may then be others.
   void reserve(std::size_t pixels);
 
-  // What goes in, a vec4 a pixel: DENOISE_SIGNAL, _VARIANCE and _SURFACE of
-  // shaders/lib/render_shared.h. shaders/composite.comp makes it of what was sampled.
+  // What goes in, a vec4 a pixel, as shaders/lib/denoise.glsl has it. shaders/composite.comp makes
+  // it of what was sampled.
   //
   // What is brighter than the sensor's white counts as white, and as no surer than a few samples
   // would be (most_sure_variance()): a lamp in a mirror, met by one sample of many, would else
@@ -44,8 +44,7 @@ class Denoiser {
   Buffer& variance() { return variance_[0]; }
   Buffer& surface() { return surface_; }
   // The passes over so many rows. `single_sample`: pixels do not know their variance.
-  void record(const vk::raii::CommandBuffer& commands, int width, int rows,
-              bool single_sample) const;
+  void record(const vk::raii::CommandBuffer& commands, int width, int rows, bool single_sample);
   // Where the signal is then.
   const Buffer& denoised_signal() const;
 
@@ -61,12 +60,8 @@ class Denoiser {
   Device& device_;
   std::size_t most_pixels_;
   std::size_t pixels_ = 0;
-  vk::raii::DescriptorSetLayout set_layout_{nullptr};
-  vk::raii::PipelineLayout layout_{nullptr};
-  vk::raii::DescriptorPool descriptors_{nullptr};
-  vk::raii::DescriptorSets sets_{nullptr};  // set i reads signal and variance i, writes the others
-  Pipeline variance_pass_, level_pass_;
-  Buffer signal_[2], variance_[2], surface_;
+  Kernel variance_pass_, level_pass_;
+  Buffer signal_[2], variance_[2], surface_;  // a pass reads one side and writes the other
 };
 
 }  // namespace previz::render

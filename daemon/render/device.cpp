@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "drivers/error.hpp"
-#include "shaders/lib/render_shared.h"
 
 namespace previz::render {
 namespace {
@@ -26,6 +25,13 @@ VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT
     spdlog::error("vulkan validation: {}", data->pMessage);
   }
   return VK_FALSE;
+}
+
+bool has_extension(const vk::raii::Context& context, const char* name) {
+  const auto extensions = context.enumerateInstanceExtensionProperties();
+  return std::any_of(extensions.begin(), extensions.end(), [&](const auto& extension) {
+    return std::strcmp(extension.extensionName, name) == 0;
+  });
 }
 
 bool has_layer(const vk::raii::Context& context, const char* name) {
@@ -112,8 +118,9 @@ void Device::create_instance(bool validation) {
       throw Error("Vulkan: validation was asked for, but the layer " + std::string(layer) +
                   " is not installed (package vulkan-validationlayers)");
     layers.push_back(layer);
-    extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
   }
+  has_labels_ = validation || has_extension(context_, VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
+  if (has_labels_) extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
   const vk::ApplicationInfo application("previzd", 1, "previzd", 1, VK_API_VERSION_1_3);
   instance_ = vk::raii::Instance(context_, {{}, &application, layers, extensions});
   if (!validation) return;
@@ -201,6 +208,8 @@ std::uint64_t Device::memory_bytes() const {
 
 void Device::submit(const std::function<void(const vk::raii::CommandBuffer&)>& record) {
   try {
+    ++submissions_;
+    commands_.reset();  // a recording that threw is still in it
     commands_.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
     record(commands_);
     commands_.end();
@@ -347,46 +356,6 @@ void download_bytes(Device& device, const Buffer& buffer, std::span<std::byte> b
              [&](const std::byte* from) { std::memcpy(bytes.data(), from, bytes.size()); });
 }
 
-Pipeline create_pipeline(Device& device, std::span<const std::uint32_t> spirv,
-                         const vk::raii::PipelineLayout& layout,
-                         std::span<const std::uint32_t> constants) {
-  const vk::raii::ShaderModule module(device.vk(), {{}, spirv.size_bytes(), spirv.data()});
-  std::vector<vk::SpecializationMapEntry> entries;
-  for (std::uint32_t i = 0; i < constants.size(); ++i) entries.emplace_back(i, 4 * i, 4);
-  const vk::SpecializationInfo specialization(static_cast<std::uint32_t>(entries.size()),
-                                              entries.data(), constants.size_bytes(),
-                                              constants.data());
-  const vk::PipelineShaderStageCreateInfo stage({}, vk::ShaderStageFlagBits::eCompute, *module,
-                                                "main", &specialization);
-  const vk::ComputePipelineCreateInfo info({}, stage, *layout);
-  return {vk::raii::Pipeline(device.vk(), nullptr, info)};
-}
-
-vk::raii::DescriptorSetLayout create_set_layout(
-    Device& device, std::uint32_t bindings,
-    const std::function<vk::DescriptorType(std::uint32_t)>& type) {
-  std::vector<vk::DescriptorSetLayoutBinding> entries;
-  for (std::uint32_t i = 0; i < bindings; ++i)
-    entries.emplace_back(i, type(i), 1, vk::ShaderStageFlagBits::eCompute);
-  return {device.vk(), vk::DescriptorSetLayoutCreateInfo({}, entries)};
-}
-
-void write_descriptor(Device& device, const vk::raii::DescriptorSet& set, std::uint32_t binding,
-                      const Buffer& buffer, bool as_texels) {
-  const vk::BufferView view = *buffer.view;
-  const vk::DescriptorBufferInfo info(*buffer.buffer, 0, buffer.size);
-  vk::WriteDescriptorSet write(*set, binding, 0, 1, vk::DescriptorType::eStorageBuffer);
-  if (as_texels)
-    write.setDescriptorType(vk::DescriptorType::eUniformTexelBuffer).setTexelBufferView(view);
-  else
-    write.setBufferInfo(info);
-  device.vk().updateDescriptorSets(write, {});
-}
-
-std::uint32_t work_groups(std::uint32_t invocations) {
-  return (invocations + gpu::WORKGROUP_SIZE - 1) / gpu::WORKGROUP_SIZE;
-}
-
 void barrier(const vk::raii::CommandBuffer& commands) {
   using Stage = vk::PipelineStageFlagBits2;
   using Access = vk::AccessFlagBits2;
@@ -397,6 +366,12 @@ void barrier(const vk::raii::CommandBuffer& commands) {
       Access::eShaderRead | Access::eShaderWrite | Access::eIndirectCommandRead |
           Access::eTransferRead | Access::eTransferWrite);
   commands.pipelineBarrier2(vk::DependencyInfo({}, everything));
+}
+
+void record_clear(const vk::raii::CommandBuffer& commands,
+                  std::initializer_list<const Buffer*> buffers) {
+  for (const Buffer* buffer : buffers) commands.fillBuffer(*buffer->buffer, 0, VK_WHOLE_SIZE, 0);
+  barrier(commands);
 }
 
 std::shared_ptr<Device> open_device(const DeviceOptions& options) {

@@ -1,16 +1,17 @@
-// The Vulkan device: one compute queue, buffers, texel views and compute pipelines. Internal to the
-// render room: includes Vulkan-Hpp, so nothing outside daemon/render/ may include it.
+// The Vulkan device: one compute queue, buffers and texel views. Internal to the render room: it
+// includes Vulkan-Hpp, so nothing outside daemon/render/ may include it.
 #pragma once
 
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <initializer_list>
 #include <span>
 #include <string>
 #include <vector>
 #include <vulkan/vulkan_raii.hpp>
 
-#include "daemon/render/renderer.hpp"
+#include "daemon/render/gpu.hpp"
 
 namespace previz::render {
 
@@ -29,13 +30,18 @@ class Device {
   // Bytes that all buffers may take: the device's own memory, or the computer's for a CPU device.
   std::uint64_t memory_bytes() const;
   std::uint64_t validation_messages() const { return validation_messages_; }
+  // Whether debug labels can be recorded, which GPU debuggers show.
+  bool has_labels() const { return has_labels_; }
 
   // Index of a memory type of `allowed_bits` with all of `wanted`, preferring `preferred` too.
   std::uint32_t memory_type(std::uint32_t allowed_bits, vk::MemoryPropertyFlags wanted,
                             vk::MemoryPropertyFlags preferred) const;
 
-  // Records, submits and waits. Throws DeviceLost naming the device if it is lost.
+  // Records, submits and waits. Throws DeviceLost naming the device if it is lost. What `record`
+  // throws is passed on, and nothing of it is submitted.
   void submit(const std::function<void(const vk::raii::CommandBuffer&)>& record);
+  // The number of submissions so far, with the one that is being recorded.
+  std::uint64_t submissions() const { return submissions_; }
 
  private:
   void open();
@@ -47,6 +53,8 @@ class Device {
   const DeviceOptions options_;
   vk::raii::Context context_;
   std::atomic<std::uint64_t> validation_messages_ = 0;
+  bool has_labels_ = false;
+  std::uint64_t submissions_ = 0;
   vk::raii::Instance instance_{nullptr};
   vk::raii::DebugUtilsMessengerEXT messenger_{nullptr};
   vk::raii::PhysicalDevice physical_{nullptr};
@@ -115,25 +123,9 @@ std::vector<T> download(Device& device, const Buffer& buffer, std::size_t count)
   return data;
 }
 
-struct Pipeline {
-  vk::raii::Pipeline pipeline{nullptr};
-};
-// A compute pipeline from SPIR-V. `constants[i]` is specialisation constant i (32 bits each).
-Pipeline create_pipeline(Device& device, std::span<const std::uint32_t> spirv,
-                         const vk::raii::PipelineLayout& layout,
-                         std::span<const std::uint32_t> constants);
-
-// Bindings 0 .. count - 1, each of the type that `type` says, for compute shaders.
-vk::raii::DescriptorSetLayout create_set_layout(
-    Device& device, std::uint32_t bindings,
-    const std::function<vk::DescriptorType(std::uint32_t)>& type);
-
-// Binds a buffer, as texels or as a storage buffer.
-void write_descriptor(Device& device, const vk::raii::DescriptorSet& set, std::uint32_t binding,
-                      const Buffer& buffer, bool as_texels);
-
-// Work groups of WORKGROUP_SIZE that hold so many invocations.
-std::uint32_t work_groups(std::uint32_t invocations);
+// Records that the buffers are filled with zeros, and a barrier() after it.
+void record_clear(const vk::raii::CommandBuffer& commands,
+                  std::initializer_list<const Buffer*> buffers);
 
 // Makes what earlier dispatches and transfers wrote visible to later dispatches (and their indirect
 // arguments) and transfers.

@@ -311,21 +311,11 @@ double GpuScene::nearest_specular_distance(const glm::dvec3& camera_position) co
   return nearest;
 }
 
-std::vector<const Buffer*> GpuScene::bindings() const {
-  std::vector<const Buffer*> result(gpu::SCENE_BINDINGS, nullptr);
-  result[gpu::BINDING_BVH] = &bvh_;
-  result[gpu::BINDING_VERTICES] = &vertices_;
-  result[gpu::BINDING_TRIANGLES] = &triangles_;
-  result[gpu::BINDING_TEXELS] = &texels_;
-  result[gpu::BINDING_ENVIRONMENT] = &environment_;
-  result[gpu::BINDING_IMPORTANCE] = &importance_;
-  result[gpu::BINDING_ALBEDO] = &albedo_;
-  result[gpu::BINDING_INSTANCES] = &instances_;
-  result[gpu::BINDING_MATERIALS] = &materials_;
-  result[gpu::BINDING_TEXTURES] = &textures_;
-  result[gpu::BINDING_LIGHTS] = &lights_;
-  result[gpu::BINDING_BOUNDS] = &bounds_buffer_;
-  return result;
+Buffers GpuScene::buffers() const {
+  return {{"bvh", &bvh_},           {"vertices", &vertices_},       {"triangles", &triangles_},
+          {"texels", &texels_},     {"environment", &environment_}, {"importance", &importance_},
+          {"albedo", &albedo_},     {"instances", &instances_},     {"materials", &materials_},
+          {"textures", &textures_}, {"lights", &lights_},           {"bounds", &bounds_buffer_}};
 }
 
 }  // namespace previz::render

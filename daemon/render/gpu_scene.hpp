@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "daemon/render/bounds.hpp"
-#include "daemon/render/device.hpp"
 #include "daemon/render/feature.hpp"
 #include "daemon/render/gpu_environment.hpp"
+#include "daemon/render/kernel.hpp"
 #include "daemon/scene/bvh.hpp"
 #include "daemon/scene/scene.hpp"
 #include "shaders/lib/render_shared.h"
@@ -41,8 +41,8 @@ class GpuScene {
   double nearest_specular_distance(const glm::dvec3& camera_position) const;
   // Fills the fields of the frame that describe environment and lights. `features`: FEATURE_* bits.
   void describe(gpu::GpuFrame& frame, std::uint32_t features) const;
-  // Buffers of set 0 by binding, without RAYS and FRAME, which are the renderer's (null there).
-  std::vector<const Buffer*> bindings() const;
+  // What the shaders read of the scene, but for the frame and its rays, which are the renderer's.
+  Buffers buffers() const;
 
  private:
   struct MeshPlace {     // where a mesh lies in the shared buffers

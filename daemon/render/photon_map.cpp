@@ -1,6 +1,5 @@
 #include "daemon/render/photon_map.hpp"
 
-#include <array>
 #include <bit>
 
 #include "shaders/lib/render_shared.h"
@@ -11,27 +10,6 @@
 #include "shaders/photon_sort.spv.h"
 
 namespace previz::render {
-namespace {
-
-bool is_texel_view(std::uint32_t binding) {
-  return binding < gpu::BINDING_PHOTONS;
-}
-
-}  // namespace
-
-PhotonMap::PhotonMap(Device& device) : device_(device) {
-  using Type = vk::DescriptorType;
-  set_layout_ = create_set_layout(device, gpu::PHOTON_BINDINGS, [](std::uint32_t binding) {
-    return is_texel_view(binding) ? Type::eUniformTexelBuffer : Type::eStorageBuffer;
-  });
-  const vk::DescriptorPoolSize sizes[] = {{Type::eUniformTexelBuffer, gpu::PHOTON_BINDINGS},
-                                          {Type::eStorageBuffer, gpu::PHOTON_BINDINGS}};
-  descriptors_ = vk::raii::DescriptorPool(
-      device.vk(), {vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet, 1, sizes});
-  const vk::DescriptorSetLayout raw = *set_layout_;
-  set_ = std::move(vk::raii::DescriptorSets(device.vk(), {*descriptors_, raw}).front());
-  resize(1);
-}
 
 void PhotonMap::resize(std::uint32_t photons) {
   if (photons == photons_) return;
@@ -47,54 +25,41 @@ void PhotonMap::resize(std::uint32_t photons) {
                                 vk::Format::eR32G32B32A32Sfloat);
   buckets_ = create_texel_buffer(device_, bucket_count_ * sizeof(gpu::GpuPhotonBucket),
                                  vk::Format::eR32G32Uint);
-  write_set();
 }
 
-void PhotonMap::write_set() const {
-  std::array<const Buffer*, gpu::PHOTON_BINDINGS> buffers{};
-  buffers[gpu::BINDING_FOUND_PHOTONS] = &sorted_;
-  buffers[gpu::BINDING_FOUND_BUCKETS] = &buckets_;
-  buffers[gpu::BINDING_PHOTONS] = &photon_buffer_;
-  buffers[gpu::BINDING_PHOTON_ORDER] = &order_;
-  buffers[gpu::BINDING_PHOTON_FILLED] = &filled_;
-  buffers[gpu::BINDING_PHOTON_CONTROL] = &control_;
-  buffers[gpu::BINDING_PHOTON_SORTED] = &sorted_;
-  buffers[gpu::BINDING_PHOTON_BUCKETS] = &buckets_;
-  for (std::uint32_t binding = 0; binding < gpu::PHOTON_BINDINGS; ++binding)
-    write_descriptor(device_, set_, binding, *buffers[binding], is_texel_view(binding));
+void PhotonMap::create_kernels(std::uint32_t features) {
+  emit_ = Kernel(device_, "photon_emit", photon_emit_spv, {features});
+  bounce_ = Kernel(device_, "photon_bounce", photon_bounce_spv, {features});
+  share_out_ = Kernel(device_, "photon_buckets", photon_buckets_spv, {features});
+  scatter_ = Kernel(device_, "photon_scatter", photon_scatter_spv, {features});
+  sort_ = Kernel(device_, "photon_sort", photon_sort_spv, {features});
 }
 
-void PhotonMap::create_pipelines(const vk::raii::PipelineLayout& layout, std::uint32_t features) {
-  const std::uint32_t constants[] = {features};
-  emit_ = create_pipeline(device_, photon_emit_spv, layout, constants);
-  bounce_ = create_pipeline(device_, photon_bounce_spv, layout, constants);
-  share_out_ = create_pipeline(device_, photon_buckets_spv, layout, constants);
-  scatter_ = create_pipeline(device_, photon_scatter_spv, layout, constants);
-  sort_ = create_pipeline(device_, photon_sort_spv, layout, constants);
+void PhotonMap::add_to(Buffers& buffers) const {
+  buffers.insert({{"found_photons", &sorted_},
+                  {"found_buckets", &buckets_},
+                  {"photons", &photon_buffer_},
+                  {"photon_order", &order_},
+                  {"filled", &filled_},
+                  {"photon_control", &control_},
+                  {"sorted_photons", &sorted_},
+                  {"buckets", &buckets_}});
 }
 
-void PhotonMap::dispatch(const vk::raii::CommandBuffer& commands, const Pipeline& pipeline,
-                         std::uint32_t invocations) {
-  commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipeline.pipeline);
-  commands.dispatch(work_groups(invocations), 1, 1);
-  barrier(commands);
+void PhotonMap::record_emission(const Recording& recording) {
+  record_clear(recording.commands, {&buckets_, &filled_, &control_});
+  emit_.dispatch(recording, photons_);
 }
 
-void PhotonMap::record_emission(const vk::raii::CommandBuffer& commands) const {
-  for (const Buffer* emptied : {&buckets_, &filled_, &control_})
-    commands.fillBuffer(*emptied->buffer, 0, VK_WHOLE_SIZE, 0);
-  barrier(commands);
-  dispatch(commands, emit_, photons_);
+void PhotonMap::record_bounce(const Recording& recording, const Buffer& groups,
+                              vk::DeviceSize offset) {
+  bounce_.dispatch_indirect(recording, groups, offset);
 }
 
-void PhotonMap::bind_bounce(const vk::raii::CommandBuffer& commands) const {
-  commands.bindPipeline(vk::PipelineBindPoint::eCompute, *bounce_.pipeline);
-}
-
-void PhotonMap::record_sorting(const vk::raii::CommandBuffer& commands) const {
-  dispatch(commands, share_out_, bucket_count_);
-  dispatch(commands, scatter_, 2 * photons_);
-  dispatch(commands, sort_, bucket_count_);
+void PhotonMap::record_sorting(const Recording& recording) {
+  share_out_.dispatch(recording, bucket_count_);
+  scatter_.dispatch(recording, 2 * photons_);
+  sort_.dispatch(recording, bucket_count_);
 }
 
 }  // namespace previz::render

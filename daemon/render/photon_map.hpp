@@ -4,37 +4,30 @@
 
 #include <cstdint>
 
-#include "daemon/render/device.hpp"
+#include "daemon/render/kernel.hpp"
 
 namespace previz::render {
 
 class PhotonMap {
  public:
-  // Pipeline layouts of the passes have this at set 2.
-  explicit PhotonMap(Device& device);
-  const vk::raii::DescriptorSetLayout& set_layout() const { return set_layout_; }
-  vk::DescriptorSet set() const { return *set_; }
+  explicit PhotonMap(Device& device) : device_(device) { resize(1); }
 
   // (Re)creates the buffers where `photons` a pass differs. At least 1, also where none are used.
   void resize(std::uint32_t photons);
-  void create_pipelines(const vk::raii::PipelineLayout& layout, std::uint32_t features);
-  // A pass, in this order: emission fills the queue of paths; a bounce after each extension works
-  // on it; sorting makes the map. All sets and the push constants (GpuBatch: first_sample is the
-  // pass, photon_radius) must be bound.
-  void record_emission(const vk::raii::CommandBuffer& commands) const;
-  void bind_bounce(const vk::raii::CommandBuffer& commands) const;
-  void record_sorting(const vk::raii::CommandBuffer& commands) const;
+  void create_kernels(std::uint32_t features);
+  // The map, for the passes that read it and those below.
+  void add_to(Buffers& buffers) const;
+  // A pass of photons, in this order: emission fills the queue of paths; after each extension, as
+  // many work groups as `groups` has at `offset` bounce off what they met; sorting makes the map.
+  // All take the buffers of the scene and of the paths, and a GpuBatch: first_sample is the pass,
+  // photon_radius.
+  void record_emission(const Recording& recording);
+  void record_bounce(const Recording& recording, const Buffer& groups, vk::DeviceSize offset);
+  void record_sorting(const Recording& recording);
 
  private:
-  void write_set() const;
-  static void dispatch(const vk::raii::CommandBuffer& commands, const Pipeline& pipeline,
-                       std::uint32_t invocations);
-
   Device& device_;
-  vk::raii::DescriptorSetLayout set_layout_{nullptr};
-  vk::raii::DescriptorPool descriptors_{nullptr};
-  vk::raii::DescriptorSet set_{nullptr};
-  Pipeline emit_, bounce_, share_out_, scatter_, sort_;
+  Kernel emit_, bounce_, share_out_, scatter_, sort_;
   std::uint32_t photons_ = 0, bucket_count_ = 0;
   Buffer photon_buffer_, order_, filled_, control_, sorted_, buckets_;
 };

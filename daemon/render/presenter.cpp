@@ -42,20 +42,10 @@ gpu::GpuShow constants_of(const ToPresent& what, int bits) {
 }  // namespace
 
 Presenter::Presenter(Device& device, const lighting::Response& response)
-    : device_(device), bits_(response.bits()) {
-  using Type = vk::DescriptorType;
-  set_layout_ = create_set_layout(device, gpu::SHOW_BINDINGS,
-                                  [](std::uint32_t) { return Type::eStorageBuffer; });
-  const vk::PushConstantRange constants(vk::ShaderStageFlagBits::eCompute, 0, sizeof(gpu::GpuShow));
-  layout_ = vk::raii::PipelineLayout(device.vk(), {{}, *set_layout_, constants});
-  const vk::DescriptorPoolSize size(Type::eStorageBuffer, gpu::SHOW_BINDINGS);
-  descriptors_ = vk::raii::DescriptorPool(
-      device.vk(), {vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet, 1, size});
-  const vk::DescriptorSetLayout raw = *set_layout_;
-  set_ = std::move(vk::raii::DescriptorSets(device.vk(), {*descriptors_, raw}).front());
-  composite_ = create_pipeline(device, composite_spv, layout_, {});
-  present_ = create_pipeline(device, present_spv, layout_, {});
-
+    : device_(device),
+      bits_(response.bits()),
+      composite_(device, "composite", composite_spv),
+      present_(device, "present", present_spv) {
   const std::vector<double>& inverse = response.inverse();
   upload_storage(device, signal_of_, std::vector<float>(inverse.begin(), inverse.end()));
   std::vector<float> least;
@@ -73,33 +63,9 @@ void Presenter::reserve(std::size_t pixels) {
   pixels_ = pixels;
 }
 
-void Presenter::bind(Denoiser& denoiser, bool denoise) {
-  const std::pair<std::uint32_t, const Buffer*> buffers[] = {
-      {gpu::BINDING_SHOW_PLATE, &plate_},
-      {gpu::BINDING_SHOW_SIGNAL_OF, &signal_of_},
-      {gpu::BINDING_SHOW_LEAST_OF, &least_of_},
-      {gpu::BINDING_SHOW_COMPOSITE, &composites_},
-      {gpu::BINDING_SHOW_SIGNAL, &denoiser.signal()},
-      {gpu::BINDING_SHOW_VARIANCE, &denoiser.variance()},
-      {gpu::BINDING_SHOW_SURFACE, &denoiser.surface()},
-      {gpu::BINDING_SHOW_DENOISED, denoise ? &denoiser.denoised_signal() : &denoiser.signal()},
-      {gpu::BINDING_SHOW_PICTURE, &picture_}};
-  for (const auto& [binding, buffer] : buffers)
-    write_descriptor(device_, set_, binding, *buffer, false);
-}
-
-void Presenter::record(const vk::raii::CommandBuffer& commands, const Pipeline& pipeline,
-                       const gpu::GpuShow& constants, std::uint32_t invocations) const {
-  commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipeline.pipeline);
-  commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *layout_, 0, *set_, {});
-  commands.pushConstants<gpu::GpuShow>(*layout_, vk::ShaderStageFlagBits::eCompute, 0, constants);
-  commands.dispatch(work_groups(invocations), 1, 1);
-  barrier(commands);
-}
-
 // From each tile the rows that the band has of it.
-void Presenter::composite(const ToPresent& what, const Denoiser::Band& band,
-                          gpu::GpuShow constants) {
+void Presenter::composite(const ToPresent& what, const Denoiser::Band& band, gpu::GpuShow constants,
+                          Denoiser& denoiser) {
   const auto width = static_cast<std::uint32_t>(what.width);
   for (const Wavefront::Sums& tile : what.tiles) {
     const int first = std::max(tile.first_row, band.top);
@@ -108,9 +74,12 @@ void Presenter::composite(const ToPresent& what, const Denoiser::Band& band,
     constants.count = static_cast<std::uint32_t>(last - first) * width;
     constants.in_tile = static_cast<std::uint32_t>(first - tile.first_row) * width;
     constants.in_band = static_cast<std::uint32_t>(first - band.top) * width;
-    write_descriptor(device_, set_, gpu::BINDING_SHOW_PIXELS, tile.pixels, false);
+    const Buffers buffers{{"pixels", &tile.pixels},         {"plate", &plate_},
+                          {"signal_of", &signal_of_},       {"composites", &composites_},
+                          {"signals", &denoiser.signal()},  {"variances", &denoiser.variance()},
+                          {"surfaces", &denoiser.surface()}};
     device_.submit([&](const vk::raii::CommandBuffer& commands) {
-      record(commands, composite_, constants, constants.count);
+      composite_.dispatch({commands, constants, buffers}, constants.count);
     });
   }
 }
@@ -127,18 +96,24 @@ Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
     const std::size_t pixels = static_cast<std::size_t>(band.bottom - band.top) * width;
     denoiser.reserve(pixels);
     reserve(pixels);
-    bind(denoiser, what.denoise);
     gpu::GpuShow constants = constants_of(what, bits_);
     if (constants.has_plate != 0)
       upload_bytes(device_, plate_,
                    std::as_bytes(std::span(what.plate.samples).subspan(3 * top, 3 * pixels)));
-    composite(what, band, constants);
+    composite(what, band, constants, denoiser);
     constants.count = static_cast<std::uint32_t>(count);
     constants.in_band = static_cast<std::uint32_t>(first - top);
+    const Buffers buffers{
+        {"plate", &plate_},
+        {"signal_of", &signal_of_},
+        {"least_of", &least_of_},
+        {"composites", &composites_},
+        {"signals", what.denoise ? &denoiser.denoised_signal() : &denoiser.signal()},
+        {"picture", &picture_}};
     device_.submit([&](const vk::raii::CommandBuffer& commands) {
       if (what.denoise)
         denoiser.record(commands, what.width, band.bottom - band.top, what.samples < 2);
-      record(commands, present_, constants, (constants.count + 1) / 2);
+      present_.dispatch({commands, constants, buffers}, (constants.count + 1) / 2);
     });
     download_bytes(
         device_, picture_,

@@ -10,7 +10,7 @@
 
 #include "daemon/render/composite.hpp"
 #include "daemon/render/denoiser.hpp"
-#include "daemon/render/device.hpp"
+#include "daemon/render/kernel.hpp"
 #include "daemon/render/wavefront.hpp"
 
 namespace previz::render {
@@ -39,18 +39,12 @@ class Presenter {
 
  private:
   void reserve(std::size_t pixels);
-  void bind(Denoiser& denoiser, bool denoise);
-  void composite(const ToPresent& what, const Denoiser::Band& band, gpu::GpuShow constants);
-  void record(const vk::raii::CommandBuffer& commands, const Pipeline& pipeline,
-              const gpu::GpuShow& constants, std::uint32_t invocations) const;
+  void composite(const ToPresent& what, const Denoiser::Band& band, gpu::GpuShow constants,
+                 Denoiser& denoiser);
 
   Device& device_;
   int bits_;
-  vk::raii::DescriptorSetLayout set_layout_{nullptr};
-  vk::raii::PipelineLayout layout_{nullptr};
-  vk::raii::DescriptorPool descriptors_{nullptr};
-  vk::raii::DescriptorSet set_{nullptr};
-  Pipeline composite_, present_;
+  Kernel composite_, present_;
   std::size_t pixels_ = 0;
   Buffer signal_of_, least_of_, plate_, composites_, picture_;
 };

@@ -198,16 +198,16 @@ void Renderer::begin(FrameInput frame) {
   r.scene.place(glm::dvec3(r.frame.world_from_camera[3]));
   r.upload_frame();
 
-  std::vector<const Buffer*> bindings = r.scene.bindings();
-  bindings[gpu::BINDING_RAYS] = &r.rays;
-  bindings[gpu::BINDING_FRAME] = &r.frame_buffer;
+  Buffers buffers = r.scene.buffers();
+  buffers["corner_rays"] = &r.rays;
+  buffers["frame"] = &r.frame_buffer;
   const std::uint32_t features = r.needed() | r.carried;
   if ((features & gpu::FEATURE_PHOTONS) != 0) {
     const double distance =
         r.scene.nearest_specular_distance(glm::dvec3(r.frame.world_from_camera[3]));
     r.wavefront->use_photons(r.photons(), r.estimation.photon_radius_px * distance / lens.fx);
   }
-  r.wavefront->bind(bindings, features);
+  r.wavefront->use_scene(std::move(buffers), features);
   if ((features & gpu::FEATURE_CAMERA) != 0) r.wavefront->use_camera(r.measured());
   r.wavefront->clear();
 }

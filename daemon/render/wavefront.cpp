@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "daemon/render/photon_schedule.hpp"
 #include "shaders/accumulate.spv.h"
@@ -38,10 +39,6 @@ std::uint32_t sampled_blocks(int pixels) {
   return (static_cast<std::uint32_t>(pixels) + gpu::SAMPLED_BLOCK - 1) / gpu::SAMPLED_BLOCK;
 }
 
-bool is_texel_buffer(std::uint32_t binding) {
-  return binding < gpu::BINDING_INSTANCES;
-}
-
 }  // namespace
 
 Wavefront::Wavefront(Device& device, int width, int height, std::uint32_t paths_a_slot)
@@ -52,23 +49,8 @@ Wavefront::Wavefront(Device& device, int width, int height, std::uint32_t paths_
       height_(height),
       photons_(device),
       camera_(device) {
-  create_layouts();
   create_tiles(width, height);
   create_paths();
-  for (const Tile& tile : tiles_) write_path_set(tile);
-}
-
-void Wavefront::create_layouts() {
-  using Type = vk::DescriptorType;
-  scene_layout_ = create_set_layout(device_, gpu::SCENE_BINDINGS, [](std::uint32_t binding) {
-    return is_texel_buffer(binding) ? Type::eUniformTexelBuffer : Type::eStorageBuffer;
-  });
-  path_layout_ = create_set_layout(device_, gpu::PATH_BINDINGS,
-                                   [](std::uint32_t) { return Type::eStorageBuffer; });
-  const vk::DescriptorSetLayout layouts[] = {*scene_layout_, *path_layout_, *photons_.set_layout(),
-                                             *camera_.set_layout()};
-  const vk::PushConstantRange batch(vk::ShaderStageFlagBits::eCompute, 0, sizeof(gpu::GpuBatch));
-  layout_ = vk::raii::PipelineLayout(device_.vk(), {{}, layouts, batch});
 }
 
 void Wavefront::create_tiles(int width, int height) {
@@ -86,18 +68,6 @@ void Wavefront::create_tiles(int width, int height) {
         device_, sizeof(gpu::GpuPixel) * tile.batch.width * tile.batch.height);
     tiles_.push_back(std::move(tile));
   }
-  const auto sets = static_cast<std::uint32_t>(tiles_.size());
-  const vk::DescriptorPoolSize sizes[] = {
-      {vk::DescriptorType::eUniformTexelBuffer, gpu::SCENE_BINDINGS},
-      {vk::DescriptorType::eStorageBuffer, gpu::SCENE_BINDINGS + sets * gpu::PATH_BINDINGS}};
-  descriptors_ = vk::raii::DescriptorPool(
-      device_.vk(), {vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet, sets + 1, sizes});
-  const auto allocate = [&](const vk::raii::DescriptorSetLayout& layout) {
-    const vk::DescriptorSetLayout raw = *layout;
-    return std::move(vk::raii::DescriptorSets(device_.vk(), {*descriptors_, raw}).front());
-  };
-  scene_set_ = allocate(scene_layout_);
-  for (Tile& tile : tiles_) tile.set = allocate(path_layout_);
 }
 
 void Wavefront::create_paths() {
@@ -120,42 +90,42 @@ void Wavefront::create_paths() {
   control_ = create_indirect_buffer(device_, sizeof(gpu::GpuControl));
 }
 
-void Wavefront::write_path_set(const Tile& tile) {
-  std::vector<const Buffer*> buffers(gpu::PATH_BINDINGS);
-  buffers[gpu::BINDING_RAY_ORIGIN] = &ray_origin_;
-  buffers[gpu::BINDING_RAY_DIRECTION] = &ray_direction_;
-  buffers[gpu::BINDING_THROUGHPUT] = &throughput_;
-  buffers[gpu::BINDING_HIT] = &hits_;
-  buffers[gpu::BINDING_QUEUE] = &queue_;
-  buffers[gpu::BINDING_SHADOW] = &shadow_rays_;
-  buffers[gpu::BINDING_SAMPLE_MIXED] = &sample_mixed_;
-  buffers[gpu::BINDING_SAMPLE_REAL] = &sample_real_;
-  buffers[gpu::BINDING_SAMPLE_AOV] = &sample_aov_;
-  buffers[gpu::BINDING_SAMPLE_LANDED] = &sample_landed_;
-  buffers[gpu::BINDING_CONTROL] = &control_;
-  buffers[gpu::BINDING_PIXELS] = &tile.pixels;
-  buffers[gpu::BINDING_LIMITS] = &limits_;
-  for (std::uint32_t i = 0; i < gpu::PATH_BINDINGS; ++i)
-    write_descriptor(device_, tile.set, i, *buffers[i], false);
+Buffers Wavefront::buffers_of(const Tile& tile) const {
+  Buffers buffers = scene_;
+  buffers.insert({{"ray_origin", &ray_origin_},
+                  {"ray_direction", &ray_direction_},
+                  {"path_throughput", &throughput_},
+                  {"hits", &hits_},
+                  {"queue", &queue_},
+                  {"shadow_rays", &shadow_rays_},
+                  {"sample_mixed", &sample_mixed_},
+                  {"sample_real", &sample_real_},
+                  {"sample_landed", &sample_landed_},
+                  {"sample_aov", &sample_aov_},
+                  {"control", &control_},
+                  {"limits", &limits_},
+                  {"pixels", &tile.pixels}});
+  photons_.add_to(buffers);
+  camera_.add_to(buffers);
+  return buffers;
 }
 
-void Wavefront::bind(const std::vector<const Buffer*>& scene, std::uint32_t features) {
-  for (std::uint32_t i = 0; i < gpu::SCENE_BINDINGS; ++i)
-    write_descriptor(device_, scene_set_, i, *scene[i], is_texel_buffer(i));
-  if (!*generate_.pipeline || features != features_) create_pipelines(features);
+void Wavefront::use_scene(Buffers scene, std::uint32_t features) {
+  scene_ = std::move(scene);
+  if (features != features_) create_kernels(features);
 }
 
-void Wavefront::create_pipelines(std::uint32_t features) {
-  const std::uint32_t constants[] = {features};
-  generate_ = create_pipeline(device_, generate_spv, layout_, constants);
-  advance_ = create_pipeline(device_, advance_spv, layout_, constants);
-  extend_ = create_pipeline(device_, extend_spv, layout_, constants);
-  shade_ = create_pipeline(device_, shade_spv, layout_, constants);
-  prepare_shadow_ = create_pipeline(device_, prepare_shadow_spv, layout_, constants);
-  shadow_ = create_pipeline(device_, shadow_spv, layout_, constants);
-  accumulate_ = create_pipeline(device_, accumulate_spv, layout_, constants);
-  if ((features & gpu::FEATURE_PHOTONS) != 0) photons_.create_pipelines(layout_, features);
-  if ((features & gpu::FEATURE_CAMERA) != 0) camera_.create_pipelines(layout_, features);
+void Wavefront::create_kernels(std::uint32_t features) {
+  features_.reset();  // until all are there, whatever is thrown on the way
+  generate_ = Kernel(device_, "generate", generate_spv, {features});
+  advance_ = Kernel(device_, "advance", advance_spv, {features});
+  extend_ = Kernel(device_, "extend", extend_spv, {features});
+  shade_ = Kernel(device_, "shade", shade_spv, {features});
+  prepare_shadow_ = Kernel(device_, "prepare_shadow", prepare_shadow_spv, {features});
+  shadow_ = Kernel(device_, "shadow", shadow_spv, {features});
+  accumulate_ = Kernel(device_, "accumulate", accumulate_spv, {features});
+  if ((features & gpu::FEATURE_PHOTONS) != 0) photons_.create_kernels(features);
+  if ((features & gpu::FEATURE_CAMERA) != 0) camera_.create_kernels(features);
   features_ = features;
 }
 
@@ -182,74 +152,46 @@ void Wavefront::clear() {
   control.shadow_groups[1] = control.shadow_groups[2] = 1;
   upload_bytes(device_, control_, std::as_bytes(std::span(&control, 1)));
   device_.submit([&](const vk::raii::CommandBuffer& commands) {
-    for (const Tile& tile : tiles_) commands.fillBuffer(*tile.pixels.buffer, 0, VK_WHOLE_SIZE, 0);
-    barrier(commands);
+    for (const Tile& tile : tiles_) record_clear(commands, {&tile.pixels});
   });
 }
 
-void Wavefront::bind_sets(const vk::raii::CommandBuffer& commands, const Tile& tile,
-                          const gpu::GpuBatch& batch) const {
-  const vk::DescriptorSet sets[] = {*scene_set_, *tile.set, photons_.set(), camera_.set()};
-  commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *layout_, 0, sets, {});
-  commands.pushConstants<gpu::GpuBatch>(*layout_, vk::ShaderStageFlagBits::eCompute, 0, batch);
-}
-
 // The queue that was filled becomes the active one, and each of its paths finds its next hit.
-void Wavefront::record_extension(const vk::raii::CommandBuffer& commands) const {
-  commands.bindPipeline(vk::PipelineBindPoint::eCompute, *advance_.pipeline);
-  commands.dispatch(1, 1, 1);
-  barrier(commands);
-  commands.bindPipeline(vk::PipelineBindPoint::eCompute, *extend_.pipeline);
-  commands.dispatchIndirect(*control_.buffer, offsetof(gpu::GpuControl, extend_groups));
-  barrier(commands);
+void Wavefront::record_extension(const Recording& recording) {
+  advance_.dispatch(recording, 1);
+  extend_.dispatch_indirect(recording, control_, offsetof(gpu::GpuControl, extend_groups));
 }
 
-void Wavefront::record_batch(const vk::raii::CommandBuffer& commands, const Tile& tile,
-                             const gpu::GpuBatch& batch, std::uint32_t max_depth) const {
-  const auto use = [&](const Pipeline& pipeline) {
-    commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipeline.pipeline);
-  };
-  bind_sets(commands, tile, batch);
-  use(generate_);
-  commands.dispatch(work_groups(slots_of(batch) * batch.samples), 1, 1);
-  barrier(commands);
+void Wavefront::record_batch(const Recording& recording, const gpu::GpuBatch& batch,
+                             std::uint32_t max_depth) {
+  generate_.dispatch(recording, slots_of(batch) * batch.samples);
   // One segment a vertex, one more to meet light after the last vertex, and one because a fork
   // goes on a round later than the path it parted from.
   for (std::uint32_t segment = 0; segment < max_depth + 2; ++segment) {
-    record_extension(commands);
-    use(shade_);
-    commands.dispatchIndirect(*control_.buffer, offsetof(gpu::GpuControl, extend_groups));
-    barrier(commands);
-    use(prepare_shadow_);
-    commands.dispatch(1, 1, 1);
-    barrier(commands);
-    use(shadow_);
-    commands.dispatchIndirect(*control_.buffer, offsetof(gpu::GpuControl, shadow_groups));
-    barrier(commands);
+    record_extension(recording);
+    shade_.dispatch_indirect(recording, control_, offsetof(gpu::GpuControl, extend_groups));
+    prepare_shadow_.dispatch(recording, 1);
+    shadow_.dispatch_indirect(recording, control_, offsetof(gpu::GpuControl, shadow_groups));
   }
-  use(accumulate_);
-  commands.dispatch(work_groups(batch.width * batch.height), 1, 1);
-  barrier(commands);
+  accumulate_.dispatch(recording, batch.width * batch.height);
 }
 
 // Photons are paths of their own, before those of the sample. A fork goes on a round later.
-void Wavefront::record_photons(const vk::raii::CommandBuffer& commands,
-                               std::uint32_t max_depth) const {
-  photons_.record_emission(commands);
+void Wavefront::record_photons(const Recording& recording, std::uint32_t max_depth) {
+  photons_.record_emission(recording);
   for (std::uint32_t segment = 0; segment < max_depth + 1; ++segment) {
-    record_extension(commands);
-    photons_.bind_bounce(commands);
-    commands.dispatchIndirect(*control_.buffer, offsetof(gpu::GpuControl, extend_groups));
-    barrier(commands);
+    record_extension(recording);
+    photons_.record_bounce(recording, control_, offsetof(gpu::GpuControl, extend_groups));
   }
-  photons_.record_sorting(commands);
+  photons_.record_sorting(recording);
 }
 
 bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::uint32_t max_depth,
                        const std::function<bool()>& cancelled) {
-  if ((features_ & gpu::FEATURE_PHOTONS) != 0)
+  if ((features_.value() & gpu::FEATURE_PHOTONS) != 0)
     return render_with_photons(first_sample, samples, max_depth, cancelled);
   for (const Tile& tile : tiles_) {
+    const Buffers buffers = buffers_of(tile);
     const std::uint32_t at_once = std::max(slots_ / slots_of(tile.batch), 1u);
     const std::uint32_t end = std::min(first_sample + samples, tile.limit);
     for (std::uint32_t sample = first_sample; sample < end; sample += at_once) {
@@ -258,7 +200,7 @@ bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::u
       batch.first_sample = sample;
       batch.samples = std::min(at_once, end - sample);
       device_.submit([&](const vk::raii::CommandBuffer& commands) {
-        record_batch(commands, tile, batch, max_depth);
+        record_batch({commands, batch, buffers}, batch, max_depth);
       });
     }
   }
@@ -292,12 +234,11 @@ bool Wavefront::render_with_photons(std::uint32_t first_sample, std::uint32_t sa
       batch.first_sample = sample;
       batch.samples = 1;
       batch.photon_radius = static_cast<float>(traced_radius_);
+      const Buffers buffers = buffers_of(tile);
       device_.submit([&](const vk::raii::CommandBuffer& commands) {
-        if (trace_photons) {
-          bind_sets(commands, tile, batch);
-          record_photons(commands, max_depth);
-        }
-        record_batch(commands, tile, batch, max_depth);
+        const Recording recording{commands, batch, buffers};
+        if (trace_photons) record_photons(recording, max_depth);
+        record_batch(recording, batch, max_depth);
       });
       trace_photons = false;
     }
@@ -312,10 +253,11 @@ void Wavefront::use_photons(std::uint32_t count, double radius) {
 
 void Wavefront::use_camera(const std::vector<glm::vec4>& plate) {
   camera_.upload(plate);
-  device_.submit([&](const vk::raii::CommandBuffer& commands) {
-    bind_sets(commands, tiles_.front(), tiles_.front().batch);
-    camera_.record(commands);
-  });
+  const Buffers buffers = buffers_of(tiles_.front());
+  std::vector<gpu::GpuBatch> parts;
+  for (const Tile& tile : tiles_) parts.push_back(tile.batch);
+  device_.submit(
+      [&](const vk::raii::CommandBuffer& commands) { camera_.record(commands, parts, buffers); });
 }
 
 std::vector<Wavefront::Sums> Wavefront::sums() const {

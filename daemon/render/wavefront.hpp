@@ -4,10 +4,11 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "daemon/render/camera_map.hpp"
-#include "daemon/render/device.hpp"
+#include "daemon/render/kernel.hpp"
 #include "daemon/render/photon_map.hpp"
 #include "shaders/lib/render_shared.h"
 
@@ -18,9 +19,9 @@ class Wavefront {
   // `paths_a_slot`: 2, or 3 where FEATURE_CAMERA may be asked for.
   Wavefront(Device& device, int width, int height, std::uint32_t paths_a_slot);
 
-  // Binds the scene's buffers (set 0, by binding) and makes sure that the pipelines are those for
-  // `features`. Must be called whenever a buffer was recreated.
-  void bind(const std::vector<const Buffer*>& scene, std::uint32_t features);
+  // Traces in the scene that these buffers hold, which must stay where they are, with the pipelines
+  // for `features`.
+  void use_scene(Buffers scene, std::uint32_t features);
   // Photons a pass and the radius (metres) of the first, where `features` has FEATURE_PHOTONS.
   void use_photons(std::uint32_t count, double radius);
   std::uint32_t most_photons() const { return slots_; }
@@ -49,23 +50,19 @@ class Wavefront {
     gpu::GpuBatch batch;      // its rectangle
     std::uint32_t limit = 0;  // the largest of its blocks'
     Buffer pixels;
-    vk::raii::DescriptorSet set{nullptr};
   };
 
-  void create_layouts();
   void create_tiles(int width, int height);
   void create_paths();
-  void create_pipelines(std::uint32_t features);
-  void write_path_set(const Tile& tile);
-  void bind_sets(const vk::raii::CommandBuffer& commands, const Tile& tile,
-                 const gpu::GpuBatch& batch) const;
+  void create_kernels(std::uint32_t features);
+  Buffers buffers_of(const Tile& tile) const;  // of the scene and the maps, too
   double share_of(std::uint32_t sample) const;
   bool render_with_photons(std::uint32_t first_sample, std::uint32_t samples,
                            std::uint32_t max_depth, const std::function<bool()>& cancelled);
-  void record_extension(const vk::raii::CommandBuffer& commands) const;
-  void record_photons(const vk::raii::CommandBuffer& commands, std::uint32_t max_depth) const;
-  void record_batch(const vk::raii::CommandBuffer& commands, const Tile& tile,
-                    const gpu::GpuBatch& batch, std::uint32_t max_depth) const;
+  void record_extension(const Recording& recording);
+  void record_photons(const Recording& recording, std::uint32_t max_depth);
+  void record_batch(const Recording& recording, const gpu::GpuBatch& batch,
+                    std::uint32_t max_depth);
 
   Device& device_;
   std::uint32_t max_slots_, paths_a_slot_;
@@ -77,13 +74,10 @@ class Wavefront {
   double photon_radius_ = 0;                  // metres, of the first sample
   double traced_radius_ = 0;                  // and of the photons that there are
   double photons_owed_ = 0;                   // passes: at 1 they are traced anew
-  vk::raii::DescriptorSetLayout scene_layout_{nullptr}, path_layout_{nullptr};
-  vk::raii::PipelineLayout layout_{nullptr};
-  vk::raii::DescriptorPool descriptors_{nullptr};
-  vk::raii::DescriptorSet scene_set_{nullptr};
+  Buffers scene_;
   std::vector<Tile> tiles_;
-  std::uint32_t features_ = 0;
-  Pipeline generate_, advance_, extend_, shade_, prepare_shadow_, shadow_, accumulate_;
+  std::optional<std::uint32_t> features_;  // of the kernels, once they are made
+  Kernel generate_, advance_, extend_, shade_, prepare_shadow_, shadow_, accumulate_;
   Buffer ray_origin_, ray_direction_, throughput_, hits_, queue_, shadow_rays_, sample_mixed_,
       sample_real_, sample_landed_, sample_aov_, limits_, control_;
 };

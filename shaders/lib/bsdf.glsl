@@ -6,7 +6,9 @@
 #include "shaders/lib/sampler.glsl"
 #include "shaders/lib/scene.glsl"
 
-layout(set = 0, binding = BINDING_ALBEDO) uniform textureBuffer albedo;
+// R32F, tables of ALBEDO_SIDE^2 (daemon/render/albedo_table.hpp): the reflection's, then for each
+// rough glass one seen from outside and one from inside.
+uniform textureBuffer albedo;
 
 float luminance(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
 

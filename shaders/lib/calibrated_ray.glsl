@@ -4,7 +4,8 @@
 
 #include "shaders/lib/scene.glsl"
 
-layout(set = 0, binding = BINDING_RAYS) uniform textureBuffer corner_rays;
+// RG32F, (width + 1)(height + 1): x/z and y/z of the rays through the pixels' corners.
+uniform textureBuffer corner_rays;
 
 // x/z and y/z of the undistorted ray through a point of the picture; pixel (0, 0) covers [0, 1]^2.
 vec2 calibrated_ray(uvec2 pixel, vec2 inside) {

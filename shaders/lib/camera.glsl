@@ -5,7 +5,9 @@
 
 #include "shaders/lib/calibrated_ray.glsl"
 
-layout(set = 3, binding = BINDING_SEEN_RADIANCE) uniform textureBuffer seen_radiance;
+// RGBA32F, width * height: radiance, 1 / depth of the surface (0: not to be used). This is a view of
+// camera_usable.comp's plate.
+uniform textureBuffer seen_radiance;
 
 // How far a point may be from the surface that the plate shows, over its depth.
 const float SEEN_DEPTH_TOLERANCE = 2e-3;

@@ -10,15 +10,14 @@
 layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(scalar, push_constant) uniform Denoise { GpuDenoise denoise; };
-layout(set = 0, binding = BINDING_DENOISE_SIGNAL) uniform textureBuffer signals;
-layout(set = 0, binding = BINDING_DENOISE_VARIANCE) uniform textureBuffer variances;
-layout(set = 0, binding = BINDING_DENOISE_SURFACE) uniform textureBuffer surfaces;
-layout(scalar, set = 0, binding = BINDING_DENOISED_SIGNAL) writeonly buffer DenoisedSignals {
-  vec4 denoised_signals[];
-};
-layout(scalar, set = 0, binding = BINDING_DENOISED_VARIANCE) writeonly buffer DenoisedVariances {
-  vec4 denoised_variances[];
-};
+// RGBA32F, width * height: the signal over the sensor's white (ratio, hybrid: over the camera's picture
+// where nothing covers it), 1 / depth (0: none).
+uniform textureBuffer signals;
+uniform textureBuffer variances;  // of the signal, to be multiplied by the fourth component
+uniform textureBuffer surfaces;   // normal, mean(M)
+// The signal and its variance to write, which the next pass reads.
+layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
+layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
 
 // Differences at which a neighbour's weight has fallen to 1 / e: of the mask; of the normals' chord,
 // squared; of the inverse depth from what the surface's slope foretells, over the depth.

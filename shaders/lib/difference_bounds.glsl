@@ -7,7 +7,9 @@
 
 #include "shaders/lib/light.glsl"
 
-layout(scalar, set = 0, binding = BINDING_BOUNDS) readonly buffer Bounds { vec4 bounds[]; };
+// The centre and the radius of each object that is not in both worlds, then of each object that can
+// reflect without blur.
+layout(scalar) readonly buffer Bounds { vec4 bounds[]; };
 
 // 1 - cos of the cone's half angle; 0 from inside.
 float bound_cap(vec4 bound, vec3 point) {

@@ -6,8 +6,11 @@
 #include "shaders/lib/octahedral.h"
 #include "shaders/lib/scene.glsl"
 
-layout(set = 0, binding = BINDING_ENVIRONMENT) uniform textureBuffer environment;
-layout(set = 0, binding = BINDING_IMPORTANCE) uniform textureBuffer importance;
+// RGBA32F, (size + 2)^2: the map with a border that is wrapped by the octahedral rule.
+uniform textureBuffer environment;
+// RGBA32F, a quadtree of sampling density: level l has 4^l texels, each with the densities of its
+// four children; the mean density is 1 on every level.
+uniform textureBuffer importance;
 
 // Bilinear between texel centres; the border carries the wrap.
 vec3 environment_radiance(vec3 direction) {

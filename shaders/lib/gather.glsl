@@ -6,8 +6,13 @@
 #include "shaders/lib/bsdf.glsl"
 #include "shaders/lib/photon_grid.glsl"
 
-layout(set = 2, binding = BINDING_FOUND_PHOTONS) uniform textureBuffer found_photons;
-layout(set = 2, binding = BINDING_FOUND_BUCKETS) uniform utextureBuffer found_buckets;
+// The photons of one pass, in a hash grid of cells twice as wide as the radius. These are views of
+// sorted_photons and buckets, because texel buffers are read faster on lavapipe.
+//
+// RGBA32F, TEXELS_PER_PHOTON texels a photon, those of a bucket together: position, Dirac vertices;
+// direction, gain in the mixed world; normal, gain in the real world; flux.
+uniform textureBuffer found_photons;
+uniform utextureBuffer found_buckets;  // RG32UI: first photon, number of photons
 
 // Photons of a surface that bends away by more than 60 degrees, or that lies above or beneath this
 // one, are another surface's.

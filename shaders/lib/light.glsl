@@ -4,7 +4,7 @@
 
 #include "shaders/lib/bsdf.glsl"
 
-layout(scalar, set = 0, binding = BINDING_LIGHTS) readonly buffer Lights { GpuLight lights[]; };
+layout(scalar) readonly buffer Lights { GpuLight lights[]; };
 
 struct LightSample {
   vec3 direction;  // unit, from the point towards the light

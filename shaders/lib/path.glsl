@@ -1,23 +1,27 @@
-// Paths in flight: set 1's buffers, the batch, and compacted queues.
+// Paths in flight and what they bring back: their buffers, the batch, and compacted queues.
 #ifndef PREVIZ_PATH_GLSL
 #define PREVIZ_PATH_GLSL
 
 #include "shaders/lib/batch.glsl"
 #include "shaders/lib/scene.glsl"
 
-layout(scalar, set = 1, binding = BINDING_RAY_ORIGIN) buffer RayOrigin { vec4 ray_origin[]; };
-layout(scalar, set = 1, binding = BINDING_RAY_DIRECTION) buffer RayDirection { vec4 ray_direction[]; };
-layout(scalar, set = 1, binding = BINDING_THROUGHPUT) buffer Throughput { vec4 path_throughput[]; };
-layout(scalar, set = 1, binding = BINDING_HIT) buffer Hits { GpuHit hits[]; };
-layout(scalar, set = 1, binding = BINDING_QUEUE) buffer Queue { uint queue[]; };
-layout(scalar, set = 1, binding = BINDING_SHADOW) buffer Shadow { GpuShadowRay shadow_rays[]; };
-layout(scalar, set = 1, binding = BINDING_SAMPLE_MIXED) buffer Mixed { vec4 sample_mixed[]; };
-layout(scalar, set = 1, binding = BINDING_SAMPLE_REAL) buffer Real { vec4 sample_real[]; };
-layout(scalar, set = 1, binding = BINDING_SAMPLE_LANDED) buffer Landed { vec4 sample_landed[]; };
-layout(scalar, set = 1, binding = BINDING_SAMPLE_AOV) buffer Aov { vec4 sample_aov[]; };
-layout(scalar, set = 1, binding = BINDING_CONTROL) buffer Control { GpuControl control; };
-layout(scalar, set = 1, binding = BINDING_LIMITS) readonly buffer Limits { uint limits[]; };
-layout(scalar, set = 1, binding = BINDING_PIXELS) buffer Pixels { GpuPixel pixels[]; };
+// A slot is one sample of one pixel. It has two paths, because a path can fork once: path 2 slot, and
+// path 2 slot + 1 for the world that parted. With FEATURE_CAMERA a path that landed can fork once
+// more: path 2 slots + slot.
+layout(scalar) buffer RayOrigin { vec4 ray_origin[]; };         // of a path: origin, t_min
+layout(scalar) buffer RayDirection { vec4 ray_direction[]; };   // of a path: unit direction, pdf (0: no MIS)
+layout(scalar) buffer Throughput { vec4 path_throughput[]; };   // of a path: throughput, bits of PATH_*
+layout(scalar) buffer Hits { GpuHit hits[]; };                  // of a path
+layout(scalar) buffer Queue { uint queue[]; };                  // [2][paths]: paths to extend, ping-pong
+layout(scalar) buffer Shadow { GpuShadowRay shadow_rays[]; };   // as many as there are paths
+layout(scalar) buffer Mixed { vec4 sample_mixed[]; };           // of a slot: Lm, M
+layout(scalar) buffer Real { vec4 sample_real[]; };             // of a slot: Lr, one of SAMPLE_*
+layout(scalar) buffer Landed { vec4 sample_landed[]; };         // of a slot: the real part of PATH_LANDED
+layout(scalar) buffer Aov { vec4 sample_aov[]; };               // of a slot: normal, depth (0: no hit)
+layout(scalar) buffer Control { GpuControl control; };
+layout(scalar) readonly buffer Limits { uint limits[]; };       // of a block of the picture, row-major:
+                                                                // how many samples its pixels get
+layout(scalar) buffer Pixels { GpuPixel pixels[]; };            // of the tile, row-major
 
 // Slots of a tile: pixels in blocks of 8x4 for coherent rays, rounded up; then sample by sample.
 const uvec2 BLOCK = uvec2(8u, 4u);
@@ -59,7 +63,7 @@ uint next_queue_index(uint i) { return (1u - control.queue_side) * (queue.length
 uint path_worlds(uint bits) { return bits & PATH_WORLDS_MASK; }
 uint path_depth(uint bits) { return (bits >> PATH_DEPTH_SHIFT) & 0xffu; }
 
-// Slots whose paths there is room for; see set 1.
+// Slots whose paths there is room for.
 uint slot_count() {
   return uint(ray_origin.length()) / (has_feature(FEATURE_CAMERA) ? 3u : 2u);
 }

@@ -4,16 +4,12 @@
 
 #include "shaders/lib/photon_grid.glsl"
 
-layout(scalar, set = 2, binding = BINDING_PHOTONS) buffer Photons { GpuPhoton photons[]; };
-layout(scalar, set = 2, binding = BINDING_PHOTON_ORDER) buffer Order { uint photon_order[]; };
-layout(scalar, set = 2, binding = BINDING_PHOTON_FILLED) buffer Filled { uint filled[]; };
-layout(scalar, set = 2, binding = BINDING_PHOTON_CONTROL) buffer PhotonControl {
-  GpuPhotonControl photon_control;
-};
-layout(scalar, set = 2, binding = BINDING_PHOTON_SORTED) buffer Sorted { vec4 sorted_photons[]; };
-layout(scalar, set = 2, binding = BINDING_PHOTON_BUCKETS) buffer Buckets {
-  GpuPhotonBucket buckets[];
-};
+layout(scalar) buffer Photons { GpuPhoton photons[]; };  // 2 * photon_count; two, for a fork
+layout(scalar) buffer Order { uint photon_order[]; };    // photons, those of a bucket together
+layout(scalar) buffer Filled { uint filled[]; };         // of a bucket, while the order is made
+layout(scalar) buffer PhotonControl { GpuPhotonControl photon_control; };
+layout(scalar) buffer Sorted { vec4 sorted_photons[]; };  // found_photons, to write
+layout(scalar) buffer Buckets { GpuPhotonBucket buckets[]; };  // a power of two; found_buckets
 
 // All photons of many passes are one sequence; both worlds' parts of a photon share its numbers.
 Sampler photon_sampler(uint photon) {

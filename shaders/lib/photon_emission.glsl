@@ -7,7 +7,9 @@
 #include "shaders/lib/light.glsl"
 #include "shaders/lib/photon.glsl"
 
-layout(scalar, set = 0, binding = BINDING_BOUNDS) readonly buffer Bounds { vec4 bounds[]; };
+// The centre and the radius of each object that is not in both worlds, then of each object that can
+// reflect without blur.
+layout(scalar) readonly buffer Bounds { vec4 bounds[]; };
 
 struct Emission {
   vec3 origin;

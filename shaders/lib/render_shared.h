@@ -10,117 +10,24 @@
 namespace previz::gpu {
 #endif
 
-// Set 0, the scene. Texel buffers come first; BINDING_BVH (0) is shared.h's.
-//   VERTICES    RGBA32F, 2 texels a vertex: position, u; normal, v (object space)
-//   TRIANGLES   RGBA32UI, 1 texel a triangle: three indices into VERTICES
-//   TEXELS      RG32UI, all textures one after the other: four halves a texel, linear
-//   ENVIRONMENT RGBA32F, (size + 2)^2: the map with a border wrapped by the octahedral rule
-//   ALBEDO      R32F, tables of ALBEDO_SIDE^2 (daemon/render/albedo_table.hpp): the reflection's,
-//               then for each rough glass one seen from outside and one from inside
-//   IMPORTANCE  RGBA32F, quadtree of sampling density: level l has 4^l texels, each the density
-//               of its four children; mean density 1 on every level
-PREVIZ_CONST uint BINDING_VERTICES = 1u;
-PREVIZ_CONST uint BINDING_TRIANGLES = 2u;
-PREVIZ_CONST uint BINDING_TEXELS = 3u;
-PREVIZ_CONST uint BINDING_ENVIRONMENT = 4u;
-PREVIZ_CONST uint BINDING_IMPORTANCE = 5u;
-PREVIZ_CONST uint BINDING_RAYS = 6u;        // RG32F, (width + 1)(height + 1): x/z, y/z of pixel corners
-PREVIZ_CONST uint BINDING_ALBEDO = 7u;
-PREVIZ_CONST uint BINDING_INSTANCES = 8u;   // GpuInstance[]
-PREVIZ_CONST uint BINDING_MATERIALS = 9u;  // GpuMaterial[]
-PREVIZ_CONST uint BINDING_TEXTURES = 10u;  // GpuTexture[]
-PREVIZ_CONST uint BINDING_LIGHTS = 11u;     // GpuLight[]
-PREVIZ_CONST uint BINDING_FRAME = 12u;      // GpuFrame
-PREVIZ_CONST uint BINDING_BOUNDS = 13u;     // vec4[]: centre and radius of each differing object,
-                                            // then of each object that can reflect without blur
-PREVIZ_CONST uint SCENE_BINDINGS = 14u;
-
+// A table of daemon/render/albedo_table.hpp has this many texels on each side.
 PREVIZ_CONST uint ALBEDO_SIDE = 32u;
 // Glass below this index bends light too little for its roughness to show; it is taken as smooth.
 PREVIZ_CONST float LEAST_ROUGH_IOR = 1.001f;
 
-// Set 1, paths in flight and what they bring back. A slot is one sample of one pixel; it has two
-// paths, because it can fork once: path 2 slot, and path 2 slot + 1 for the world that parted. With
-// FEATURE_CAMERA a path that landed can fork once more: path 2 slots + slot.
-PREVIZ_CONST uint BINDING_RAY_ORIGIN = 0u;     // vec4[path]: origin, t_min
-PREVIZ_CONST uint BINDING_RAY_DIRECTION = 1u;  // vec4[path]: unit direction, pdf (0: no MIS)
-PREVIZ_CONST uint BINDING_THROUGHPUT = 2u;     // vec4[path]: throughput, bits of PATH_*
-PREVIZ_CONST uint BINDING_HIT = 3u;            // GpuHit[path]
-PREVIZ_CONST uint BINDING_QUEUE = 4u;          // uint[2][paths]: paths to extend, ping-pong
-PREVIZ_CONST uint BINDING_SHADOW = 5u;         // GpuShadowRay[paths]
-PREVIZ_CONST uint BINDING_SAMPLE_MIXED = 6u;   // vec4[slot]: Lm, M
-PREVIZ_CONST uint BINDING_SAMPLE_REAL = 7u;    // vec4[slot]: Lr, one of SAMPLE_*
-PREVIZ_CONST uint BINDING_SAMPLE_AOV = 8u;     // vec4[slot]: normal, depth (0: no hit)
-PREVIZ_CONST uint BINDING_CONTROL = 9u;        // GpuControl
-PREVIZ_CONST uint BINDING_PIXELS = 10u;        // GpuPixel[width * height]
-PREVIZ_CONST uint BINDING_LIMITS = 11u;        // uint[]: of each block of the picture, row-major,
-                                               // how many samples its pixels get
-PREVIZ_CONST uint BINDING_SAMPLE_LANDED = 12u; // vec4[slot]: the real part of PATH_LANDED
-PREVIZ_CONST uint PATH_BINDINGS = 13u;
-
-// Set 2, the photons of one pass, in a hash grid of cells twice as wide as the radius. What is
-// gathered from comes as texel buffers, faster on lavapipe, which are views of the last two.
-//   FOUND_PHOTONS RGBA32F, 4 texels a photon, those of a bucket together: position, Dirac vertices;
-//                 direction, gain in the mixed world; normal, gain in the real world; flux
-//   FOUND_BUCKETS RG32UI: first photon, number of photons
-PREVIZ_CONST uint BINDING_FOUND_PHOTONS = 0u;
-PREVIZ_CONST uint BINDING_FOUND_BUCKETS = 1u;
-PREVIZ_CONST uint BINDING_PHOTONS = 2u;         // GpuPhoton[2 * photon_count]; two, for a fork
-PREVIZ_CONST uint BINDING_PHOTON_ORDER = 3u;    // uint[]: photons, those of a bucket together
-PREVIZ_CONST uint BINDING_PHOTON_FILLED = 4u;   // uint[]: of a bucket, while ORDER is made
-PREVIZ_CONST uint BINDING_PHOTON_CONTROL = 5u;  // GpuPhotonControl
-PREVIZ_CONST uint BINDING_PHOTON_SORTED = 6u;   // vec4[]: FOUND_PHOTONS, to write
-PREVIZ_CONST uint BINDING_PHOTON_BUCKETS = 7u;  // GpuPhotonBucket[], a power of two; FOUND_BUCKETS
-PREVIZ_CONST uint PHOTON_BINDINGS = 8u;
 PREVIZ_CONST uint TEXELS_PER_PHOTON = 4u;
-
-// Set 3, what the camera has measured of the real world: the plate and how far its surfaces are.
-//   SEEN_RADIANCE RGBA32F, width * height: radiance, 1 / depth of the surface (0: not to be used).
-//                 A view of PLATE, in which the fourth component says before SEEN whether it may be.
-PREVIZ_CONST uint BINDING_SEEN_RADIANCE = 0u;
-PREVIZ_CONST uint BINDING_PLATE = 1u;  // vec4[], to write
-PREVIZ_CONST uint BINDING_SEEN = 2u;   // GpuSeen[]
-PREVIZ_CONST uint CAMERA_BINDINGS = 3u;
-
-// Set 0 of the passes that take noise out of a picture (daemon/render/denoiser.hpp); texel buffers
-// RGBA32F, width * height, and those to write, which the next pass reads.
-//   DENOISE_SIGNAL    signal over the sensor's white (ratio, hybrid: over the camera's picture where
-//                     nothing covers it), 1 / depth (0: none)
-//   DENOISE_VARIANCE  the signal's, to be multiplied by the fourth component
-//   DENOISE_SURFACE   normal, mean(M)
-PREVIZ_CONST uint BINDING_DENOISE_SIGNAL = 0u;
-PREVIZ_CONST uint BINDING_DENOISE_VARIANCE = 1u;
-PREVIZ_CONST uint BINDING_DENOISE_SURFACE = 2u;
-PREVIZ_CONST uint BINDING_DENOISED_SIGNAL = 3u;    // vec4[]
-PREVIZ_CONST uint BINDING_DENOISED_VARIANCE = 4u;  // vec4[]
-PREVIZ_CONST uint DENOISE_BINDINGS = 5u;
 
 // Pixels from which the variance of a single sample is taken, to each side.
 PREVIZ_CONST uint DENOISE_VARIANCE_REACH = 3u;
 // A channel that comes out at this share of the sensor's white is white: a step of 8 bits below it.
 PREVIZ_CONST float NEARLY_WHITE = 0.99f;
 
-// Set 0 of the passes that make the picture that is shown (daemon/render/presenter.hpp), a band of
-// rows at a time.
-PREVIZ_CONST uint BINDING_SHOW_PIXELS = 0u;      // GpuPixel[], a tile's
-PREVIZ_CONST uint BINDING_SHOW_PLATE = 1u;       // uint[], the band's: samples, interleaved RGB, two
-                                                 // in each
-PREVIZ_CONST uint BINDING_SHOW_SIGNAL_OF = 2u;   // float[]: the linear signal of each code
-PREVIZ_CONST uint BINDING_SHOW_LEAST_OF = 3u;    // float[]: the least signal that becomes the code
-PREVIZ_CONST uint BINDING_SHOW_COMPOSITE = 4u;   // vec4[], the band's: composite, mean(M)
-PREVIZ_CONST uint BINDING_SHOW_SIGNAL = 5u;      // vec4[]: DENOISE_SIGNAL, to write
-PREVIZ_CONST uint BINDING_SHOW_VARIANCE = 6u;    // vec4[]: DENOISE_VARIANCE, to write
-PREVIZ_CONST uint BINDING_SHOW_SURFACE = 7u;     // vec4[]: DENOISE_SURFACE, to write
-PREVIZ_CONST uint BINDING_SHOW_DENOISED = 8u;    // vec4[]: SIGNAL to read, denoised or as it was
-PREVIZ_CONST uint BINDING_SHOW_PICTURE = 9u;     // uint[], to write: as PLATE, of what is shown
-PREVIZ_CONST uint SHOW_BINDINGS = 10u;
-
 // How the difference is put onto the camera's picture: set::Composite.
 PREVIZ_CONST uint COMPOSITE_ADDITIVE = 0u;
 PREVIZ_CONST uint COMPOSITE_RATIO = 1u;
 PREVIZ_CONST uint COMPOSITE_HYBRID = 2u;
 
-// What a slot holds, in the fourth component of its SAMPLE_REAL.
+// What a slot holds, in the fourth component of its sample_real.
 PREVIZ_CONST float SAMPLE_FULL = 0.0f;        // both radiances
 PREVIZ_CONST float SAMPLE_DIFFERENCE = 1.0f;  // only what differs between them
 
@@ -183,7 +90,7 @@ struct GpuPhoton {
 };
 
 struct GpuPhotonBucket {
-  uint first;  // in ORDER
+  uint first;  // in photon_order
   uint count;
 };
 
@@ -216,7 +123,7 @@ struct GpuControl {
   uint active_count;      // paths in the queue being worked on
   uint next_count;        // paths appended for the next segment
   uint shadow_count;
-  uint queue_side;        // which half of QUEUE is active
+  uint queue_side;        // which half of the queue is active
   uint rays_low, rays_high;
   uint shadow_rays_low, shadow_rays_high;
   uint dropped_not_finite;
@@ -230,7 +137,7 @@ struct GpuInstance {
   vec4 world_from_object[3];  // rows; camera-relative world
   vec4 object_from_world[3];
   uint material;
-  uint first_triangle;  // in TRIANGLES
+  uint first_triangle;  // in triangles
   uint first_light;     // of its emissive triangles; NO_INDEX: emits nothing
   uint presence;
 };
@@ -252,7 +159,7 @@ struct GpuMaterial {
   uint alpha_mode;    // ALPHA_*
   float alpha;
   float alpha_cutoff;
-  uint albedo_table;  // rough glass: of ALBEDO, seen from outside; the next one is from inside
+  uint albedo_table;  // rough glass: of albedo, seen from outside; the next one is from inside
 };
 
 // glTF's alpha modes: all there; there where alpha reaches the cutoff; there by a share of alpha.
@@ -308,17 +215,17 @@ struct GpuFrame {
   uint roulette_depth;
   float specular_alpha;       // alpha at or below which a lobe is a Dirac delta
   uint environment_size;
-  uint environment_levels;    // of IMPORTANCE
+  uint environment_levels;    // of importance
   float environment_selection;  // probability that a light sample picks the environment
   uint light_count;
   uint visible_light_count;   // the first lights, those with an extent that are not triangles
   uint bound_count;
-  float bound_share;          // of a shared path's directions, at most, towards those BOUNDS
+  float bound_share;          // of a shared path's directions, at most, towards those bounds
   float environment_spread;   // solid angle over 2 pi that light samples find its light in
   float lamp_spread;          // the same of the lights
   float lamp_part;            // of all light, that of the lights
   float difference_roulette;  // survival of a path of the difference over the bounds' solid angle
-  uint specular_bound_count;  // the BOUNDS after them
+  uint specular_bound_count;  // the bounds after them
   uint photon_count;          // emitted a pass
   float photon_environment;   // probability that a photon starts from the environment
   vec3 scene_center;

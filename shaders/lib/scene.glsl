@@ -1,4 +1,4 @@
-// The scene as the shaders see it: set 0's buffers, and a hit made into a surface.
+// The scene as the shaders see it: its buffers, and a hit made into a surface.
 #ifndef PREVIZ_SCENE_GLSL
 #define PREVIZ_SCENE_GLSL
 
@@ -7,19 +7,14 @@
 layout(constant_id = 0) const uint FEATURES = 0xffffffffu;
 bool has_feature(uint feature) { return (FEATURES & feature) != 0u; }
 
-layout(set = 0, binding = BINDING_VERTICES) uniform textureBuffer vertices;
-layout(set = 0, binding = BINDING_TRIANGLES) uniform utextureBuffer triangles;
-layout(set = 0, binding = BINDING_TEXELS) uniform utextureBuffer texels;
-layout(scalar, set = 0, binding = BINDING_INSTANCES) readonly buffer Instances {
-  GpuInstance instances[];
-};
-layout(scalar, set = 0, binding = BINDING_MATERIALS) readonly buffer Materials {
-  GpuMaterial materials[];
-};
-layout(scalar, set = 0, binding = BINDING_TEXTURES) readonly buffer Textures {
-  GpuTexture textures[];
-};
-layout(scalar, set = 0, binding = BINDING_FRAME) readonly buffer Frame { GpuFrame frame; };
+// What many invocations read at random comes as texel buffers, which are faster on lavapipe.
+uniform textureBuffer vertices;    // RGBA32F, 2 texels a vertex: position, u; normal, v (object space)
+uniform utextureBuffer triangles;  // RGBA32UI, 1 texel a triangle: three indices into the vertices
+uniform utextureBuffer texels;     // RG32UI, all textures one after the other: four halves a texel, linear
+layout(scalar) readonly buffer Instances { GpuInstance instances[]; };
+layout(scalar) readonly buffer Materials { GpuMaterial materials[]; };
+layout(scalar) readonly buffer Textures { GpuTexture textures[]; };
+layout(scalar) readonly buffer Frame { GpuFrame frame; };
 
 const float PI = 3.14159265358979;
 

@@ -25,7 +25,7 @@ PREVIZ_CONST uint WORLD_MIXED = 1u;
 PREVIZ_CONST uint WORLD_REAL = 2u;
 PREVIZ_CONST uint WORLD_BOTH = 3u;
 
-// The scene as lib/trace.glsl reads it: set 0, one texel buffer (on lavapipe 1.4 to 1.7 times as
+// The scene as lib/trace.glsl reads it: `bvh`, one texel buffer (on lavapipe 1.4 to 1.7 times as
 // fast as a storage buffer) of RGBA32UI, made by daemon/scene/bvh.hpp. It consists of records of
 // four texels, one cache line, in blocks of eight; a node's children are one block. Record 0 is the
 // space in which a ray starts: the top level's, or the only instance's.
@@ -48,8 +48,6 @@ PREVIZ_CONST uint WORLD_BOTH = 3u;
 // The lanes of a subgroup test every record as a node and as a pair, whatever it is. RECORD_FILL
 // and the numbers of the kinds make what is no node's exponent a harmless one: with denormal
 // numbers there, lavapipe traced at a third of the speed.
-PREVIZ_CONST uint BINDING_BVH = 0u;
-
 PREVIZ_CONST uint RECORD_NOTHING = 0u;
 PREVIZ_CONST uint RECORD_SPACE = 125u;
 PREVIZ_CONST uint RECORD_PAIR = 126u;

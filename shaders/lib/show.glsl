@@ -7,10 +7,10 @@
 layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(scalar, push_constant) uniform Show { GpuShow show; };
-layout(scalar, set = 0, binding = BINDING_SHOW_PLATE) readonly buffer PlateSamples { uint plate[]; };
-layout(scalar, set = 0, binding = BINDING_SHOW_SIGNAL_OF) readonly buffer SignalOf {
-  float signal_of[];
-};
+// Samples of the band, interleaved RGB, two in each word.
+layout(scalar) readonly buffer PlateSamples { uint plate[]; };
+// The linear signal of each code.
+layout(scalar) readonly buffer SignalOf { float signal_of[]; };
 
 uvec3 plate_codes(uint pixel) {
   uvec3 codes;

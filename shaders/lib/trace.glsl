@@ -9,7 +9,7 @@
 
 #include "shaders/lib/shared.h"
 
-layout(set = 0, binding = BINDING_BVH) uniform utextureBuffer bvh;
+uniform utextureBuffer bvh;
 
 struct Hit {
   float t;            // in units of the ray's direction, as given

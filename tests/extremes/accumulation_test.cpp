@@ -3,6 +3,7 @@
 #include <cmath>
 #include <random>
 
+#include "daemon/render/kernel.hpp"
 #include "shaders/accumulate.spv.h"
 #include "tests/support/pixels_by_hand.hpp"
 
@@ -15,17 +16,8 @@ using render::Device;
 // One pixel's sums on the device, and the sample buffers that the shader reads.
 class Accumulator {
  public:
-  explicit Accumulator(Device& device) : device_(device) {
-    const auto storage = [](std::uint32_t) { return vk::DescriptorType::eStorageBuffer; };
-    scene_layout_ = render::create_set_layout(device, gpu::SCENE_BINDINGS, storage);
-    path_layout_ = render::create_set_layout(device, gpu::PATH_BINDINGS, storage);
-    const vk::DescriptorSetLayout layouts[] = {*scene_layout_, *path_layout_};
-    const vk::PushConstantRange constants(vk::ShaderStageFlagBits::eCompute, 0,
-                                          sizeof(gpu::GpuBatch));
-    layout_ = vk::raii::PipelineLayout(device.vk(), {{}, layouts, constants});
-    const std::uint32_t features[] = {0};
-    pipeline_ = render::create_pipeline(device, accumulate_spv, layout_, features);
-
+  explicit Accumulator(Device& device)
+      : device_(device), kernel_(device, "accumulate", accumulate_spv, {0}) {
     const vk::DeviceSize samples = slots * sizeof(gpu::vec4);
     for (Buffer* buffer : {&mixed_, &real_, &landed_, &aov_})
       *buffer = render::create_storage_buffer(device, samples);
@@ -35,7 +27,6 @@ class Accumulator {
     gpu::GpuFrame frame{};
     frame.width = frame.height = 1;
     render::upload_storage(device, frame_, std::vector{frame});
-    bind();
   }
 
   static constexpr std::uint32_t batch_samples = 4096;
@@ -45,13 +36,12 @@ class Accumulator {
     render::upload_bytes(device_, mixed_, std::as_bytes(std::span(spread(mixed))));
     render::upload_bytes(device_, real_, std::as_bytes(std::span(spread(real))));
     const gpu::GpuBatch batch{0, 0, 1, 1, 0, static_cast<std::uint32_t>(mixed.size()), 0};
+    const render::Buffers buffers{{"frame", &frame_},      {"sample_mixed", &mixed_},
+                                  {"sample_real", &real_}, {"sample_landed", &landed_},
+                                  {"sample_aov", &aov_},   {"control", &control_},
+                                  {"pixels", &pixels_},    {"limits", &limits_}};
     device_.submit([&](const vk::raii::CommandBuffer& commands) {
-      commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipeline_.pipeline);
-      const vk::DescriptorSet sets[] = {*scene_set_, *path_set_};
-      commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *layout_, 0, sets, {});
-      commands.pushConstants<gpu::GpuBatch>(*layout_, vk::ShaderStageFlagBits::eCompute, 0, batch);
-      commands.dispatch(1, 1, 1);
-      render::barrier(commands);
+      kernel_.dispatch({commands, batch, buffers}, 1);
     });
   }
 
@@ -77,34 +67,9 @@ class Accumulator {
     return staging_;
   }
 
-  void bind() {
-    const vk::DescriptorPoolSize size(vk::DescriptorType::eStorageBuffer,
-                                      gpu::SCENE_BINDINGS + gpu::PATH_BINDINGS);
-    pool_ = vk::raii::DescriptorPool(
-        device_.vk(), {vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet, 2, size});
-    const auto allocate = [&](const vk::raii::DescriptorSetLayout& layout) {
-      const vk::DescriptorSetLayout raw = *layout;
-      return std::move(vk::raii::DescriptorSets(device_.vk(), {*pool_, raw}).front());
-    };
-    scene_set_ = allocate(scene_layout_);
-    path_set_ = allocate(path_layout_);
-    render::write_descriptor(device_, scene_set_, gpu::BINDING_FRAME, frame_, false);
-    for (const auto& [binding, buffer] :
-         {std::pair(gpu::BINDING_SAMPLE_MIXED, &mixed_),
-          std::pair(gpu::BINDING_SAMPLE_REAL, &real_),
-          std::pair(gpu::BINDING_SAMPLE_LANDED, &landed_),
-          std::pair(gpu::BINDING_SAMPLE_AOV, &aov_), std::pair(gpu::BINDING_CONTROL, &control_),
-          std::pair(gpu::BINDING_PIXELS, &pixels_), std::pair(gpu::BINDING_LIMITS, &limits_)})
-      render::write_descriptor(device_, path_set_, binding, *buffer, false);
-  }
-
   Device& device_;
-  vk::raii::DescriptorSetLayout scene_layout_{nullptr}, path_layout_{nullptr};
-  vk::raii::PipelineLayout layout_{nullptr};
-  render::Pipeline pipeline_;
+  render::Kernel kernel_;
   Buffer mixed_, real_, landed_, aov_, pixels_, control_, limits_, frame_;
-  vk::raii::DescriptorPool pool_{nullptr};
-  vk::raii::DescriptorSet scene_set_{nullptr}, path_set_{nullptr};
   std::vector<gpu::vec4> staging_;
 };
 

@@ -1,18 +1,13 @@
 #include "tests/bench/tracers/gpu_tracer.hpp"
 
 #include <algorithm>
-#include <array>
 
 #include "shaders/blocked_worlds.spv.h"
 #include "shaders/closest_distances.spv.h"
 #include "shaders/closest_hits.spv.h"
-#include "shaders/lib/shared.h"
 
 namespace previz::bench {
 namespace {
-
-constexpr std::uint32_t group_size = 64;
-constexpr std::uint32_t binding_rays = 1, binding_results = 2;
 
 struct Batch {
   std::uint32_t count, worlds;
@@ -48,24 +43,10 @@ std::vector<glm::uvec4> scene_texels(const scene::Scene& scene, scene::BvhQualit
 }
 
 GpuTracer::GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texels)
-    : device_(device) {
-  using Type = vk::DescriptorType;
-  const auto compute = vk::ShaderStageFlagBits::eCompute;
-  const std::array bindings{
-      vk::DescriptorSetLayoutBinding(gpu::BINDING_BVH, Type::eUniformTexelBuffer, 1, compute),
-      vk::DescriptorSetLayoutBinding(binding_rays, Type::eUniformTexelBuffer, 1, compute),
-      vk::DescriptorSetLayoutBinding(binding_results, Type::eStorageBuffer, 1, compute)};
-  set_layout_ = vk::raii::DescriptorSetLayout(device.vk(), {{}, bindings});
-  const vk::PushConstantRange push(compute, 0, sizeof(Batch));
-  layout_ = vk::raii::PipelineLayout(device.vk(), {{}, *set_layout_, push});
-  const std::array sizes{vk::DescriptorPoolSize(Type::eUniformTexelBuffer, 2),
-                         vk::DescriptorPoolSize(Type::eStorageBuffer, 1)};
-  pool_ = vk::raii::DescriptorPool(
-      device.vk(), {vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet, 1, sizes});
-  set_ = std::move(vk::raii::DescriptorSets(device.vk(), {*pool_, *set_layout_}).front());
-  hits_pipeline_ = render::create_pipeline(device, closest_hits_spv, layout_, {});
-  distances_pipeline_ = render::create_pipeline(device, closest_distances_spv, layout_, {});
-  blocked_pipeline_ = render::create_pipeline(device, blocked_worlds_spv, layout_, {});
+    : device_(device),
+      hits_pass_(device, "closest_hits", closest_hits_spv),
+      distances_pass_(device, "closest_distances", closest_distances_spv),
+      blocked_pass_(device, "blocked_worlds", blocked_worlds_spv) {
   render::upload_texels(device, bvh_, texels, vk::Format::eR32G32B32A32Uint);
 }
 
@@ -76,40 +57,25 @@ void GpuTracer::set_rays(std::span<const Ray> rays) {
   const vk::DeviceSize size = rays.size() * sizeof(TracedHit);
   if (!*results_.buffer || results_.size < size)
     results_ = render::create_storage_buffer(device_, size);
-  bind();
 }
 
-void GpuTracer::bind() {
-  const vk::DescriptorBufferInfo results(*results_.buffer, 0, VK_WHOLE_SIZE);
-  const vk::BufferView bvh = *bvh_.view;
-  const vk::BufferView rays = *rays_.view;
-  using Type = vk::DescriptorType;
-  const std::array writes{
-      vk::WriteDescriptorSet(*set_, gpu::BINDING_BVH, 0, 1, Type::eUniformTexelBuffer, nullptr,
-                             nullptr, &bvh),
-      vk::WriteDescriptorSet(*set_, binding_rays, 0, 1, Type::eUniformTexelBuffer, nullptr, nullptr,
-                             &rays),
-      vk::WriteDescriptorSet(*set_, binding_results, 0, 1, Type::eStorageBuffer, nullptr,
-                             &results)};
-  device_.vk().updateDescriptorSets(writes, nullptr);
-}
-
-void GpuTracer::dispatch(const render::Pipeline& pipeline, std::uint32_t worlds) {
+void GpuTracer::dispatch(render::Kernel& pass, std::uint32_t worlds) {
+  const render::Buffers buffers{{"bvh", &bvh_},
+                                {"rays", &rays_},
+                                {"hits", &results_},
+                                {"distances", &results_},
+                                {"blocked", &results_}};
+  const Batch batch{count_, worlds};
   device_.submit([&](const vk::raii::CommandBuffer& commands) {
-    commands.bindPipeline(vk::PipelineBindPoint::eCompute, *pipeline.pipeline);
-    commands.bindDescriptorSets(vk::PipelineBindPoint::eCompute, *layout_, 0, *set_, nullptr);
-    commands.pushConstants<Batch>(*layout_, vk::ShaderStageFlagBits::eCompute, 0,
-                                  Batch{count_, worlds});
-    commands.dispatch((count_ + group_size - 1) / group_size, 1, 1);
-    render::barrier(commands);
+    pass.dispatch({commands, batch, buffers}, count_);
   });
 }
 
 void GpuTracer::dispatch_distances(std::uint32_t worlds) {
-  dispatch(distances_pipeline_, worlds);
+  dispatch(distances_pass_, worlds);
 }
 void GpuTracer::dispatch_blocked(std::uint32_t worlds) {
-  dispatch(blocked_pipeline_, worlds);
+  dispatch(blocked_pass_, worlds);
 }
 
 std::vector<float> GpuTracer::distances() {
@@ -126,7 +92,7 @@ std::vector<std::uint32_t> GpuTracer::blocked_worlds() {
 std::vector<TracedHit> GpuTracer::closest(std::span<const Ray> rays, std::uint32_t worlds) {
   if (rays.empty()) return {};
   set_rays(rays);
-  dispatch(hits_pipeline_, worlds);
+  dispatch(hits_pass_, worlds);
   return render::download<TracedHit>(device_, results_, rays.size());
 }
 

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "daemon/render/device.hpp"
+#include "daemon/render/kernel.hpp"
 #include "daemon/scene/bvh.hpp"
 #include "daemon/scene/scene.hpp"
 
@@ -46,15 +46,10 @@ class GpuTracer {
   std::vector<std::uint32_t> blocked_worlds();  // of the last dispatch_blocked
 
  private:
-  void bind();
-  void dispatch(const render::Pipeline& pipeline, std::uint32_t worlds);
+  void dispatch(render::Kernel& pass, std::uint32_t worlds);
 
   render::Device& device_;
-  vk::raii::DescriptorSetLayout set_layout_{nullptr};
-  vk::raii::PipelineLayout layout_{nullptr};
-  vk::raii::DescriptorPool pool_{nullptr};
-  vk::raii::DescriptorSet set_{nullptr};
-  render::Pipeline hits_pipeline_, distances_pipeline_, blocked_pipeline_;
+  render::Kernel hits_pass_, distances_pass_, blocked_pass_;
   render::Buffer bvh_, rays_, results_;
   std::uint32_t count_ = 0;
 };

@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "tests/bench/tracers/shaders/ray.glsl"
 
-layout(set = 0, binding = 2) writeonly buffer Blocked { uint blocked[]; };
+writeonly buffer Blocked { uint blocked[]; };
 
 void main() {
   const uint i = gl_GlobalInvocationID.x;

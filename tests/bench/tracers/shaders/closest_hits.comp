@@ -8,7 +8,7 @@ struct FoundHit {
   float u, v;
   uint instance, primitive, presence;
 };
-layout(set = 0, binding = 2) writeonly buffer Hits { FoundHit hits[]; };
+writeonly buffer Hits { FoundHit hits[]; };
 
 void main() {
   const uint i = gl_GlobalInvocationID.x;

@@ -3,7 +3,7 @@
 #include "shaders/lib/trace.glsl"
 
 layout(local_size_x = 64) in;
-layout(set = 0, binding = 1) uniform textureBuffer rays;  // origin, t_min; direction, t_max
+uniform textureBuffer rays;  // origin, t_min; direction, t_max
 layout(push_constant) uniform Batch {
   uint count;
   uint worlds;

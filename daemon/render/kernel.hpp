@@ -1,0 +1,86 @@
+// One description of a compute pass: its name and its SPIR-V. The bindings, the pipeline and the
+// size of a work group are read out of the SPIR-V, and a dispatch takes its buffers by the names
+// that the shader gives them.
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "daemon/render/device.hpp"
+
+namespace previz::render {
+
+// Buffers by the names of the shaders' variables. A pass takes those that it declares and uses.
+using Buffers = std::map<std::string_view, const Buffer*>;
+
+// The push constants of a dispatch: a structure of shaders/lib/render_shared.h.
+struct Push {
+  static constexpr std::uint32_t most_bytes = 128;  // every Vulkan device has so many
+  template <typename T>
+  Push(const T& values) : bytes(std::as_bytes(std::span(&values, 1))) {
+    static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= most_bytes);
+  }
+  std::span<const std::byte> bytes;
+};
+
+// A command buffer, and what the dispatches that are recorded into it have in common.
+struct Recording {
+  const vk::raii::CommandBuffer& commands;
+  Push push;
+  const Buffers& buffers;
+};
+
+class Kernel {
+ public:
+  Kernel() = default;  // nothing that could be dispatched
+  // `constants[i]` is specialisation constant i (32 bits each).
+  Kernel(Device& device, const char* name, std::span<const std::uint32_t> spirv,
+         std::initializer_list<std::uint32_t> constants = {});
+
+  // Record the pass, under a debug label with its name, and a barrier() after it: with as many work
+  // groups as hold so many invocations, or with the number of groups that lies at a place of an
+  // indirect buffer. Both throw previz::Error naming the pass where a buffer that it uses is
+  // missing; the first also where the device does not allow so many groups. The buffers must stay
+  // until the submission is done.
+  void dispatch(const Recording& recording, std::uint32_t invocations);
+  void dispatch_indirect(const Recording& recording, const Buffer& groups, vk::DeviceSize offset);
+
+ private:
+  struct Binding {
+    std::string name;
+    std::uint32_t number;
+    vk::DescriptorType type;
+  };
+  struct BoundSet {
+    std::vector<const Buffer*> buffers;  // as bindings_
+    vk::raii::DescriptorPool pool{nullptr};
+    vk::raii::DescriptorSet set{nullptr};
+  };
+
+  void reflect(std::span<const std::uint32_t> spirv);
+  void bind(const Recording& recording);
+  void finish(const Recording& recording) const;
+  const BoundSet& bound(const Buffers& buffers);
+  BoundSet create_set() const;
+  void write(const BoundSet& bound) const;
+
+  Device* device_ = nullptr;
+  std::string name_;
+  std::vector<Binding> bindings_;
+  std::uint32_t group_size_ = 1;
+  vk::raii::DescriptorSetLayout set_layout_{nullptr};
+  vk::raii::PipelineLayout layout_{nullptr};
+  vk::raii::Pipeline pipeline_{nullptr};
+  // The sets of the submission that is being recorded come first; a later one writes them anew.
+  std::vector<BoundSet> sets_;
+  std::size_t sets_in_use_ = 0;
+  std::uint64_t submission_ = 0;
+};
+
+}  // namespace previz::render
