@@ -45,7 +45,7 @@ FisheyeFit calibrate_fisheye(const LightOptions& options, std::ostream& out) {
     views = gather(options, "light", fisheye.intrinsics, out);
     fisheye = fit_fisheye(views);
   }
-  tell_fit(views, fisheye.fit, fisheye_parameters, fisheye.picture, out);
+  print_fit(views, fisheye.fit, fisheye_parameters, fisheye.picture, out);
   fmt::print(out, "widest corner {:.1f} degrees off axis; trusted to {:.1f} degrees\n",
              fisheye.widest_corner_rad / degree, fisheye.intrinsics.max_angle_rad / degree);
   plot(options, views, fisheye.fit, fisheye.picture, out);
@@ -84,12 +84,12 @@ void calibrate_observer(const LensOptions& options, std::ostream& out) {
     views = gather(options, "observer", observer.intrinsics, out);
     observer = fit_observer(views);
   }
-  tell_fit(views, observer.fit, observer_parameters, observer.picture, out);
+  print_fit(views, observer.fit, observer_parameters, observer.picture, out);
   plot(options, views, observer.fit, observer.picture, out);
   insist(missing_views(views, observer), options.force, out);
   ObserverCalibration calibration;
   calibration.intrinsics = observer.intrinsics;
-  tell_tables(set::intrinsics_toml(calibration), options.table_file, out);
+  write_tables(set::intrinsics_toml(calibration), options.table_file, out);
 }
 
 void calibrate_light(const LightOptions& options, std::ostream& out) {
@@ -107,7 +107,7 @@ void calibrate_light(const LightOptions& options, std::ostream& out) {
     tables = set::intrinsics_toml(camera) + "\n";
   }
   tables += set ? pose_by_tags(options, *set, camera, out) : pose_by_hand;
-  tell_tables(tables, options.table_file, out);
+  write_tables(tables, options.table_file, out);
 }
 
 }  // namespace previz::calibrate

@@ -20,7 +20,7 @@ std::string percent(const glm::dvec3& v) {
   return fmt::format("{:.1f} {:.1f} {:.1f} %", 100 * v.r, 100 * v.g, 100 * v.b);
 }
 
-void tell_exposure(const Balance& balance, std::ostream& out) {
+void print_exposure(const Balance& balance, std::ostream& out) {
   const double stops = exposure_error_stops(balance), sigma = exposure_error_sigma_stops(balance);
   if (std::abs(stops) < stated_well_stops || std::abs(stops) < 3 * sigma) {
     fmt::print(out, "the exposures that the cameras state agree to {:+.2f} +- {:.2f} stops\n",
@@ -50,7 +50,7 @@ std::string suggestion(const SurfaceRatio& surface, const KnownSurface& known,
   return words + set::surface_toml({known.material, estimate.albedo});
 }
 
-void tell(const SurfacePixels& seen, const Balance& balance, std::ostream& out) {
+void print_balance(const SurfacePixels& seen, const Balance& balance, std::ostream& out) {
   fmt::print(out, "{} frames, {} pixels of diffuse real surfaces\n", seen.frames,
              seen.pixels.size());
   for (const SurfaceRatio& surface : balance.surfaces)
@@ -74,12 +74,12 @@ void calibrate_balance(const BalanceOptions& options, std::ostream& out) {
   const SurfacePixels seen =
       probe_surfaces(take, scene, render::open_device(options.device), probe);
   const Balance balance = fit_balance(seen, options.references);
-  tell(seen, balance, out);
-  tell_exposure(balance, out);
+  print_balance(seen, balance, out);
+  print_exposure(balance, out);
   std::string tables = set::balance_toml(take.set.lighting.balance * balance.scale);
   for (const SurfaceRatio& surface : balance.surfaces)
     tables += fmt::format("\n{}", suggestion(surface, seen.surfaces[surface.surface], balance));
-  tell_tables(tables, options.table_file, out);
+  write_tables(tables, options.table_file, out);
 }
 
 }  // namespace previz::calibrate

@@ -34,7 +34,7 @@ void calibrate_lens(const ThinLensOptions& options, std::ostream& out) {
     const SharpRange sharp = sharp_range(found.lens, facts.intrinsics->fx, 1);
     fmt::print(out, "sharp to a pixel from {:.3f} m to {:.3f} m\n", sharp.near_m, sharp.far_m);
   }
-  tell_tables(set::lens_toml(found.lens), options.table_file, out);
+  write_tables(set::lens_toml(found.lens), options.table_file, out);
 }
 
 }  // namespace previz::calibrate

@@ -16,7 +16,7 @@ std::string codes(double error) {
   return error < 0 ? "-" : fmt::format("{:g}", error);
 }
 
-void tell(const ResponseFit& fit, std::ostream& out) {
+void print_response(const ResponseFit& fit, std::ostream& out) {
   fmt::print(out,
              "{}: an exposure left out is predicted to {:.2f} codes of 255 (mean of medians)\n",
              to_string(fit.method), fit.error_codes);
@@ -45,12 +45,12 @@ void calibrate_response(const ResponseOptions& options, std::ostream& out) {
   for (const ResponseMethod method : {ResponseMethod::debevec, ResponseMethod::robertson})
     if (!options.method || *options.method == method) {
       fits.push_back(fit_response(bracket, method));
-      tell(fits.back(), out);
+      print_response(fits.back(), out);
     }
   const ResponseFit& best = *std::ranges::min_element(fits, {}, &ResponseFit::error_codes);
   fmt::print(out, "taken: {}; codes {} to {} were seen\n", to_string(best.method), best.darkest,
              best.brightest);
-  tell_tables(
+  write_tables(
       of_light ? table<LightCameraCalibration>(best.curve) : table<ObserverCalibration>(best.curve),
       options.table_file, out);
 }

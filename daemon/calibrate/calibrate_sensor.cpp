@@ -13,7 +13,7 @@ namespace {
 // What is left where the light is even is noise; more than this is light that is not.
 constexpr double most_uneven = 0.03;
 
-void tell(const VignettingFit& fit, double max_angle_rad, std::ostream& out) {
+void print_vignetting(const VignettingFit& fit, double max_angle_rad, std::ostream& out) {
   out << "light that comes through, by angle off axis:";
   for (int angle = 0; angle * degree <= max_angle_rad; angle += 15)
     fmt::print(out, " {} deg {:.3f}", angle, relative_illumination(fit.vignetting, angle * degree));
@@ -48,7 +48,7 @@ void calibrate_dark(const DarkOptions& options, std::ostream& out) {
              fit.pictures, fit.level.r, fit.level.g, fit.level.b, fit.noise.r, fit.noise.g,
              fit.noise.b, fit.hot_pixels);
   camera.dark_level = fit.level;
-  tell_tables(set::response_toml(camera), options.table_file, out);
+  write_tables(set::response_toml(camera), options.table_file, out);
 }
 
 void calibrate_vignetting(const VignettingOptions& options, std::ostream& out) {
@@ -64,10 +64,10 @@ void calibrate_vignetting(const VignettingOptions& options, std::ostream& out) {
   for (const FlatPicture& picture : pictures)
     fmt::print(out, "{}: {} pixels, {:.2f} % unexplained\n", picture.name, picture.samples.size(),
                100 * picture.rms);
-  tell(fit, widest, out);
+  print_vignetting(fit, widest, out);
   insist(missing_light(fit, widest), options.force, out);
   camera.vignetting = fit.vignetting;
-  tell_tables(set::intrinsics_toml(camera), options.table_file, out);
+  write_tables(set::intrinsics_toml(camera), options.table_file, out);
 }
 
 }  // namespace previz::calibrate

@@ -11,7 +11,7 @@
 namespace previz::calibrate {
 namespace {
 
-void tell_views(const Views& views, const BundleFit& fit, std::ostream& out) {
+void print_views(const Views& views, const BundleFit& fit, std::ostream& out) {
   for (std::size_t v = 0; v < views.views.size(); ++v) {
     const auto left_out = std::ranges::count(fit.used[v], false);
     if (std::ranges::find(fit.views_left_out, v) != fit.views_left_out.end())
@@ -23,7 +23,7 @@ void tell_views(const Views& views, const BundleFit& fit, std::ostream& out) {
   }
 }
 
-void tell_certainty(std::vector<UncertainPixel> picture, std::ostream& out) {
+void print_certainty(std::vector<UncertainPixel> picture, std::ostream& out) {
   if (picture.empty()) return;
   std::ranges::sort(picture, {}, &UncertainPixel::sigma_px);
   const UncertainPixel& worst = picture.back();
@@ -35,9 +35,9 @@ void tell_certainty(std::vector<UncertainPixel> picture, std::ostream& out) {
 
 }  // namespace
 
-void tell_fit(const Views& views, const BundleFit& fit, std::span<const char* const> names,
-              std::vector<UncertainPixel> picture, std::ostream& out) {
-  tell_views(views, fit, out);
+void print_fit(const Views& views, const BundleFit& fit, std::span<const char* const> names,
+               std::vector<UncertainPixel> picture, std::ostream& out) {
+  print_views(views, fit, out);
   fmt::print(out,
              "rms {:.3f} px over {} corners of {} views; {} of {} corners left out (farther off "
              "than 4.5 robust standard deviations and 1 px)\n",
@@ -46,7 +46,7 @@ void tell_fit(const Views& views, const BundleFit& fit, std::span<const char* co
   const std::vector<double> sigma = lens_sigma(fit);
   for (std::size_t p = 0; p < sigma.size(); ++p)
     fmt::print(out, "  {:<3} {:12.5f} +- {:.5f}\n", names[p], fit.bundle.lens[p], sigma[p]);
-  tell_certainty(std::move(picture), out);
+  print_certainty(std::move(picture), out);
 }
 
 void insist(const std::vector<std::string>& missing, bool force, std::ostream& out) {
@@ -57,8 +57,8 @@ void insist(const std::vector<std::string>& missing, bool force, std::ostream& o
   fmt::print(out, "{}\n", text);
 }
 
-void tell_tables(const std::string& tables, const std::optional<std::filesystem::path>& file,
-                 std::ostream& out) {
+void write_tables(const std::string& tables, const std::optional<std::filesystem::path>& file,
+                  std::ostream& out) {
   if (file) session::replace_file(*file, tables);
   fmt::print(out, "\n{}", tables);
 }

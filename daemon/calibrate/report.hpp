@@ -19,14 +19,14 @@ inline constexpr double degree = std::numbers::pi / 180;
 
 // Views with their rms, what was left out, the parameters with their standard deviations, and how
 // certain the projection is.
-void tell_fit(const Views& views, const BundleFit& fit, std::span<const char* const> names,
-              std::vector<UncertainPixel> picture, std::ostream& out);
+void print_fit(const Views& views, const BundleFit& fit, std::span<const char* const> names,
+               std::vector<UncertainPixel> picture, std::ostream& out);
 
 // Throws previz::Error naming what is missing; with `force` that is a note on `out`.
 void insist(const std::vector<std::string>& missing, bool force, std::ostream& out);
 
 // The set file's tables on `out`, and in `file` if there is one.
-void tell_tables(const std::string& tables, const std::optional<std::filesystem::path>& file,
-                 std::ostream& out);
+void write_tables(const std::string& tables, const std::optional<std::filesystem::path>& file,
+                  std::ostream& out);
 
 }  // namespace previz::calibrate

@@ -51,7 +51,7 @@ std::vector<View> thinned(std::vector<View> views, std::size_t count) {
 
 Views gather_views(PictureSource& source, BoardFinder& finder, const Board& board,
                    const GatherOptions& options,
-                   const std::function<void(const std::string&)>& tell) {
+                   const std::function<void(const std::string&)>& report) {
   Views gathered;
   std::vector<BoardCorners> taken;
   std::size_t index = 0, looked_at = 0, alike = 0;
@@ -73,14 +73,15 @@ Views gather_views(PictureSource& source, BoardFinder& finder, const Board& boar
     const bool is_new = std::ranges::none_of(
         taken, [&](const BoardCorners& other) { return largest_move(corners, other) < same; });
     if (corners.ids.size() < least_corners) {
-      tell(picture->name + ": " +
-           (corners.ids.empty() ? "no board"
-                                : std::to_string(corners.ids.size()) + " corners only, left out"));
+      report(picture->name + ": " +
+             (corners.ids.empty()
+                  ? "no board"
+                  : std::to_string(corners.ids.size()) + " corners only, left out"));
     } else if (!is_new) {
       ++alike;
-      tell(picture->name + ": as a view before it, left out");
+      report(picture->name + ": as a view before it, left out");
     } else {
-      tell(picture->name + ": " + std::to_string(corners.ids.size()) + " corners");
+      report(picture->name + ": " + std::to_string(corners.ids.size()) + " corners");
       gathered.views.push_back(view_of(corners, board, picture->name));
       taken.push_back(std::move(corners));
     }
@@ -95,7 +96,7 @@ Views gather_views(PictureSource& source, BoardFinder& finder, const Board& boar
   if (alike) said += ", " + std::to_string(alike) + " like another";
   if (gathered.views.size() < found)
     said += ", " + std::to_string(gathered.views.size()) + " taken";
-  tell(said);
+  report(said);
   return gathered;
 }
 

@@ -32,10 +32,10 @@ struct GatherOptions {
 
 // Looks for the board in the pictures of a source. A picture in which every corner is within 2 % of
 // the picture's diagonal of where a view already taken has it says nothing new and is left out; so
-// are pictures with fewer than 6 corners. `tell` gets one line for every picture looked at.
+// are pictures with fewer than 6 corners. `report` gets one line for every picture looked at.
 // Throws previz::Error if the pictures differ in size or the board is nowhere.
 Views gather_views(PictureSource& source, BoardFinder& finder, const Board& board,
                    const GatherOptions& options,
-                   const std::function<void(const std::string&)>& tell);
+                   const std::function<void(const std::string&)>& report);
 
 }  // namespace previz::calibrate

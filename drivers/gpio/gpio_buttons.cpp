@@ -96,7 +96,7 @@ class GpioButtons final : public Buttons {
   std::optional<ButtonsEvent> next() override {
     if (!chip_ && monotonic_ns() >= retry_ns_) open();
     for (Line& line : lines_) {
-      if (line.debouncer.settle(monotonic_ns())) tell(line);
+      if (line.debouncer.settle(monotonic_ns())) push_edge(line);
       read(line);
     }
     arm();
@@ -149,7 +149,7 @@ class GpioButtons final : public Buttons {
   // Held while the rig starts: pressed from now on.
   void see_held(Line& line) {
     if (gpiod_line_get_value(line.line) == 1 && line.debouncer.edge(true, monotonic_ns()))
-      tell(line);
+      push_edge(line);
   }
 
   void read(Line& line) {
@@ -158,7 +158,7 @@ class GpioButtons final : public Buttons {
       gpiod_line_event edge{};
       if (gpiod_line_event_read(line.line, &edge) != 0) return lose(std::strerror(errno));
       if (line.debouncer.edge(edge.event_type == GPIOD_LINE_EVENT_RISING_EDGE, edge_ns(edge.ts)))
-        tell(line);
+        push_edge(line);
     }
   }
 
@@ -175,7 +175,7 @@ class GpioButtons final : public Buttons {
     events_.emplace_back(DeviceTrouble{device_, "is lost: " + why + "; tried again"});
   }
 
-  void tell(const Line& line) {
+  void push_edge(const Line& line) {
     events_.emplace_back(
         ButtonEvent{line.name, line.debouncer.pressed(), line.debouncer.told_ns()});
   }

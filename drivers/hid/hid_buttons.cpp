@@ -119,10 +119,10 @@ class HidButtons final : public Buttons {
         read(device, stop);
         if (stop.stop_requested()) return;
         count("lost");
-        for (ButtonEvent& event : reader_.release_all(monotonic_ns())) tell(std::move(event));
+        for (ButtonEvent& event : reader_.release_all(monotonic_ns())) push(std::move(event));
       }
       if (!std::exchange(told, true))
-        tell(DeviceTrouble{device_, device ? "was unplugged; looked for until it is back"
+        push(DeviceTrouble{device_, device ? "was unplugged; looked for until it is back"
                                            : "is not there, or may not be opened; looked for until "
                                              "it is there"});
       std::unique_lock lock(mutex_);
@@ -140,11 +140,11 @@ class HidButtons final : public Buttons {
       count("reports");
       for (ButtonEvent& event :
            reader_.read({report.data(), static_cast<std::size_t>(size)}, monotonic_ns()))
-        tell(std::move(event));
+        push(std::move(event));
       if (reader_.reports_cut_short() == short_before) continue;
       count(cut_short);
       if (short_before == 0)
-        tell(DeviceTrouble{device_, "sends reports of " + std::to_string(size) +
+        push(DeviceTrouble{device_, "sends reports of " + std::to_string(size) +
                                         " bytes, too short for a button of the set"});
     }
   }
@@ -154,7 +154,7 @@ class HidButtons final : public Buttons {
     ++counters_[what];
   }
 
-  void tell(ButtonsEvent event) {
+  void push(ButtonsEvent event) {
     const std::lock_guard lock(mutex_);
     events_.push_back(std::move(event));
     eventfd_write(signal_.get(), 1);

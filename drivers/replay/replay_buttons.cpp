@@ -46,7 +46,7 @@ class ReplayButtons final : public Buttons {
     return event;
   }
 
-  void tell_first(const std::string& what) {
+  void put_first(const std::string& what) {
     waiting_.emplace_front(DeviceTrouble{name_, what});
     arm();
   }
@@ -94,7 +94,7 @@ std::unique_ptr<Buttons> open_replay_buttons(const std::filesystem::path& sessio
   session::Lines<ButtonEvent> lines = session::read_button_lines(file);
   auto buttons = std::make_unique<ReplayButtons>(std::move(lines.records), file.string(), options);
   if (!lines.bad_lines.empty())
-    buttons->tell_first(session::list_of("line", lines.bad_lines) +
+    buttons->put_first(session::list_of("line", lines.bad_lines) +
                         " cannot be understood and are left out");
   return buttons;
 }

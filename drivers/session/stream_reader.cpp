@@ -95,7 +95,8 @@ Leftovers join(const std::vector<FrameLine>& lines,
   return left;
 }
 
-void tell(const Leftovers& left, const std::string& source, std::vector<std::string>& missing) {
+void list_missing(const Leftovers& left, const std::string& source,
+                  std::vector<std::string>& missing) {
   const std::string video = source + ".mkv", lines = source + ".jsonl";
   if (!left.damaged.empty())
     missing.push_back(video + ": the pictures of " + list_of("frame", left.damaged) +
@@ -149,7 +150,7 @@ std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& s
                               " cannot be understood and are left out");
 
   auto stream = std::make_unique<RecordedStream>(source, declared->second, std::move(video));
-  tell(join(lines.records, packets, *stream), source, session.missing);
+  list_missing(join(lines.records, packets, *stream), source, session.missing);
   const std::uint64_t whole = stream->records().size();
   if (const auto recorded = declared->second.frames; recorded && whole < *recorded)
     session.missing.push_back(source + ": " + std::to_string(whole) + " of " +
