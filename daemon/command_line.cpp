@@ -122,8 +122,8 @@ void add_trade(CLI::App& app, trade::TradeOptions& options) {
 void add_commands(CLI::App& app, CommandLine& said) {
   app.set_version_flag("--version", "previzd " PREVIZ_VERSION, "The version, and nothing else");
   app.require_subcommand(1);
-  app.add_option("--log-level", said.log_level, "What goes to the log")
-      ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}))
+  app.add_option("--log-level", said.log_level, "The least severe of what goes to the log")
+      ->check(CLI::IsMember({"info", "warning", "error"}))
       ->capture_default_str();
   add_render(app, said.render);
   add_run(app, said.run);

@@ -3,18 +3,16 @@
 // Exit status: 0 done; 1 an error, one line on standard error says which; 2 the command line cannot
 // be understood; 128 + N stopped by signal N (what was finished is on disk, and a render goes on
 // there when it is called again).
-#include <spdlog/pattern_formatter.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <cstdlib>
 #include <iostream>
 
 #include "daemon/command_line.hpp"
 #include "daemon/devices.hpp"
 #include "daemon/post/check.hpp"
+#include "daemon/report/log.hpp"
+#include "daemon/report/reports.hpp"
 #include "daemon/signals.hpp"
 #include "daemon/trade/page.hpp"
 #include "drivers/error.hpp"
@@ -23,29 +21,12 @@ namespace {
 
 using namespace previz;
 
-// Under systemd the journal adds the time and reads the level from the <N> prefix (sd-daemon(3)).
-void start_log(const std::string& level) {
-  auto log = spdlog::stderr_color_mt("previzd");
-  log->set_level(spdlog::level::from_str(level));
-  if (std::getenv("JOURNAL_STREAM")) {
-    class Priority final : public spdlog::custom_flag_formatter {
-      void format(const spdlog::details::log_msg& message, const std::tm&,
-                  spdlog::memory_buf_t& out) override {
-        constexpr std::string_view of_level[] = {"<7>", "<7>", "<6>", "<4>", "<3>", "<2>", "<6>"};
-        const std::string_view text = of_level[message.level];
-        out.append(text.data(), text.data() + text.size());
-      }
-      std::unique_ptr<custom_flag_formatter> clone() const override {
-        return std::make_unique<Priority>();
-      }
-    };
-    auto formatter = std::make_unique<spdlog::pattern_formatter>();
-    formatter->add_flag<Priority>('*').set_pattern("%*%v");
-    log->set_formatter(std::move(formatter));
-  } else {
-    log->set_pattern("%H:%M:%S.%e %^%l%$ %v");
-  }
-  spdlog::set_default_logger(std::move(log));
+// The journal gets the priority of an error; on a terminal the line looks like any command's.
+void report_end(const std::exception& error) {
+  if (report::destination() == report::Destination::journal)
+    report::log({report::Severity::error, "", error.what()});
+  else
+    std::cerr << "previzd: " << error.what() << std::endl;
 }
 
 int do_devices(bool learn, const StopOnSignal& stop) {
@@ -55,7 +36,7 @@ int do_devices(bool learn, const StopOnSignal& stop) {
 
 int do_import(const exchange::ImportOptions& options) {
   const exchange::ImportReport report = exchange::import_session(options);
-  for (const std::string& note : report.notes) std::cout << note << "\n";
+  for (const std::string& note : report.notes) report::log({report::Severity::info, "", note});
   std::cout << options.session.string() << ": " << report.observer_frames << " observer frames, "
             << report.light_frames << " light frames, " << report.poses << " poses, "
             << report.assets << " assets, " << report.bytes / 1'000'000.0 << " MB" << std::endl;
@@ -86,9 +67,10 @@ int do_trade(trade::TradeOptions& options, const StopOnSignal& stop) {
 
 int do_run(rig::LiveOptions& options, const StopOnSignal& stop) {
   options.stop = stop.token();
-  const std::string metrics = to_json(rig::run_live(options, std::cout));
-  if (!options.bus) std::cout << metrics;  // as a service it is asked for them
-  return 0;                                // a rig runs until it is told to stop
+  report::Reports reports(report::log);
+  const std::string metrics = to_json(rig::run_live(options, reports));
+  if (!options.bus) std::cout << metrics;  // a service is asked for them on the bus
+  return 0;                                // a rig runs until it is stopped
 }
 
 }  // namespace
@@ -99,7 +81,7 @@ int main(int argc, char** argv) {
   try {
     add_commands(app, said);
     app.parse(argc, argv);
-    start_log(said.log_level);
+    report::start_log(report::severity_named(said.log_level));
     const StopOnSignal stop;
     if (app.got_subcommand("check")) return post::check_set(said.check, std::cout);
     if (app.got_subcommand("calibrate"))
@@ -113,7 +95,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   } catch (const std::exception& error) {
-    std::cerr << "previzd: " << error.what() << std::endl;
+    report_end(error);
     return 1;
   }
 }

@@ -35,6 +35,7 @@ std::string actions_text() {
 
 const Chapter service_chapter{"THE SERVICE", R"(
 previzd.service runs `previzd run --bus --loop /etc/previzd/set.toml` as the user previz. A set file that is changed is read again, at the latest on `systemctl reload previzd`; one with a mistake leaves the old one running and says why, in the journal and in `previzctl status`.
+`journalctl -u previzd` shows what it reports, each line with the priority of its severity: `-p err` leaves the errors.
 Members of the group previz may operate the rig with previzctl.
 )"};
 

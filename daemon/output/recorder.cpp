@@ -8,6 +8,9 @@
 #include "drivers/error.hpp"
 
 namespace previz::output {
+
+using report::Severity;
+
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -59,7 +62,7 @@ void Recorder::offer(const FramePtr& frame) {
     }
     if (++status_.dropped > 1) return;
   }
-  note("recording: the disk is too slow; frames are left out");
+  note(Severity::warning, "the disk is too slow; frames are left out");
 }
 
 void Recorder::offer_shown(const FramePtr& frame) {
@@ -70,7 +73,7 @@ void Recorder::offer_shown(const FramePtr& frame) {
     if (queued_bytes_ + bytes_of(captured) <= options_.queue_bytes / 2) return enqueue(captured);
     if (++status_.dropped_shown > 1) return;
   }
-  note("recording: the disk is too slow; pictures that were shown are left out");
+  note(Severity::warning, "the disk is too slow; pictures that were shown are left out");
 }
 
 void Recorder::remember_light(const Captured& captured) {
@@ -189,8 +192,8 @@ RecorderStatus Recorder::status() const {
   return status_;
 }
 
-void Recorder::note(const std::string& what) const {
-  if (options_.note) options_.note(what);
+void Recorder::note(Severity severity, const std::string& what) const {
+  if (options_.note) options_.note({severity, "recording", what});
 }
 
 void Recorder::run() {
@@ -233,8 +236,8 @@ void Recorder::handle(Entry& entry) {
       take_->mark_good();
     else if (!last.empty())
       session::change_take(last, [](session::TakeInfo& take) { take.good = true; });
-    note(last.empty() ? "recording: there is no take to mark"
-                      : "recording: " + last.filename().string() + " is marked good");
+    note(Severity::info,
+         last.empty() ? "there is no take to mark" : last.filename().string() + " is marked good");
   } else if (!take_) {
     return;  // it has failed meanwhile
   } else if (std::holds_alternative<Stop>(entry)) {
@@ -257,8 +260,9 @@ void Recorder::write(const Captured& captured) {
     return;
   }
   if (!take_->fits(*captured.frame)) {
-    note("recording: the " + captured.frame->source + " camera changed its format; " +
-         take_->directory().filename().string() + " ends and the next take begins");
+    note(Severity::warning, "the " + captured.frame->source + " camera changed its format; " +
+                                take_->directory().filename().string() +
+                                " ends and the next take begins");
     end_take();
     begin_take();
   }
@@ -288,8 +292,8 @@ void Recorder::end_take() {
     if (take->observer_frames() > 0) ++status_.finished_takes;
     if (!status_.recording) late_tracks_ = false;
   }
-  note("recording: " + take->directory().filename().string() + " has " +
-       std::to_string(take->observer_frames()) + " frames");
+  note(Severity::info, take->directory().filename().string() + " has " +
+                           std::to_string(take->observer_frames()) + " frames");
 }
 
 // What is on disk stays as it is: a session that was not closed opens up to its last whole frame.
@@ -308,7 +312,7 @@ void Recorder::fail(const std::string& why) {
     ++status_.failures;
     if (any) ++status_.finished_takes;
   }
-  note("recording ended: " + why);
+  if (options_.note) options_.note({Severity::error, "recording ended", why});
 }
 
 // Ends the take in order while there is still room to do so.

@@ -17,6 +17,7 @@
 #include <variant>
 
 #include "daemon/output/take_writer.hpp"
+#include "daemon/report/report.hpp"
 #include "drivers/buttons.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/session/session.hpp"
@@ -26,10 +27,10 @@ namespace previz::output {
 struct RecorderOptions {
   TakeTemplate take;
   double preroll_s = 2;
-  std::uint64_t queue_bytes = 1'000'000'000;     // of frames; the ring has at most half of it
-  std::uint64_t reserve_bytes = 500'000'000;     // a take ends before the disk has less
-  std::function<void(const std::string&)> note;  // in words for the display; from any thread
-  std::function<std::uint64_t()> free_bytes;     // of the disk; left out: asks the file system
+  std::uint64_t queue_bytes = 1'000'000'000;        // of frames; the ring has at most half of it
+  std::uint64_t reserve_bytes = 500'000'000;        // a take ends before the disk has less
+  std::function<void(const report::Report&)> note;  // called from any thread
+  std::function<std::uint64_t()> free_bytes;        // of the disk; left out: asks the file system
 };
 
 struct RecorderStatus {
@@ -108,7 +109,7 @@ class Recorder {
   void fail(const std::string& why);
   void check_disk();
   std::uint64_t free_on_disk() const;
-  void note(const std::string& what) const;
+  void note(report::Severity severity, const std::string& what) const;
 
   const RecorderOptions options_;
 

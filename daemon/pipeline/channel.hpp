@@ -1,4 +1,5 @@
-// What stands between two stages: a mailbox (newest value only) or a bounded queue (never drops).
+// What stands between two threads: a mailbox (newest value only), a bounded queue (never drops), or
+// a value that is published and stays.
 #pragma once
 
 #include <chrono>
@@ -6,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -59,7 +61,7 @@ class Mailbox final : public Channel<T> {
     return std::exchange(value_, std::nullopt);
   }
 
-  // For readers with something else to look after: empty also once the time is over.
+  // Like pop(), for readers with something else to look after: empty also once the time is over.
   std::optional<T> pop_for(std::chrono::milliseconds timeout) {
     std::unique_lock lock(mutex_);
     filled_.wait_for(lock, timeout, [this] { return value_ || closed_; });
@@ -154,6 +156,27 @@ class BoundedQueue final : public Channel<T> {
   std::condition_variable filled_, room_;
   std::deque<T> values_;
   bool closed_ = false;
+};
+
+// One immutable value that a thread publishes and any other looks at.
+template <class T>
+class Newest {
+ public:
+  explicit Newest(T value) : value_(std::make_shared<const T>(std::move(value))) {}
+
+  void set(T value) {
+    auto next = std::make_shared<const T>(std::move(value));
+    const std::lock_guard lock(mutex_);
+    value_ = std::move(next);
+  }
+  std::shared_ptr<const T> get() const {
+    const std::lock_guard lock(mutex_);
+    return value_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::shared_ptr<const T> value_;
 };
 
 }  // namespace previz::pipeline

@@ -1,4 +1,5 @@
-// What the pipeline did: frames and time per stage, every drop with its cause, latency to display.
+// What the pipeline did: frames and time per stage, every drop with its cause, latency to display;
+// and who brings the totals of channels and devices into it.
 #pragma once
 
 #include <cstddef>
@@ -6,8 +7,10 @@
 #include <map>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "daemon/pipeline/channel.hpp"
 #include "drivers/device.hpp"
 
 namespace previz::pipeline {
@@ -31,10 +34,11 @@ struct MetricsSnapshot {
 class Metrics {
  public:
   void worked(const std::string& stage, double seconds);
-  void busy(const std::string& stage, double seconds);  // of a frame that worked() counts
+  // Adds time to a stage whose frames worked() counts.
+  void busy(const std::string& stage, double seconds);
   void dropped(const std::string& stage, const std::string& cause, std::uint64_t frames = 1);
   void count(const std::string& event, std::uint64_t times = 1);
-  // What a device has counted since this was last called for it.
+  // Adds what a device has counted since the last call for it.
   void device_counted(const std::string& device, const DeviceCounters& more);
   void shown(double latency_s);
 
@@ -50,6 +54,47 @@ class Metrics {
   std::map<std::string, DeviceCounters> devices_;
   std::vector<double> latencies_s_;  // a ring once full
   std::size_t next_latency_ = 0;
+};
+
+// What a channel dropped, for the metrics of the stage that reads it.
+template <class T>
+class DropCount {
+ public:
+  // All three outlive this.
+  DropCount(Metrics& metrics, std::string stage, const Channel<T>& channel)
+      : metrics_(metrics), stage_(std::move(stage)), channel_(channel) {}
+
+  // Counts what was dropped since the last call.
+  void update() {
+    const std::uint64_t dropped = channel_.dropped();
+    metrics_.dropped(stage_, "newer frame", dropped - std::exchange(counted_, dropped));
+  }
+
+ private:
+  Metrics& metrics_;
+  const std::string stage_;
+  const Channel<T>& channel_;
+  std::uint64_t counted_ = 0;
+};
+
+// A device's own counters. The metrics outlive the device, which is opened anew with every set that
+// is loaded and then counts from 0; only the increase since the last call is added.
+class DeviceCounts {
+ public:
+  DeviceCounts(Metrics& metrics, std::string device)
+      : metrics_(metrics), device_(std::move(device)) {}
+
+  void update(const DeviceCounters& totals) {
+    DeviceCounters more;
+    for (const auto& [what, total] : totals) more[what] = total - counted_[what];
+    metrics_.device_counted(device_, more);
+    counted_ = totals;
+  }
+
+ private:
+  Metrics& metrics_;
+  std::string device_;
+  DeviceCounters counted_;
 };
 
 // {"seconds": ..., "stages": {"render": {"frames": ..., "frames_per_second": ...,

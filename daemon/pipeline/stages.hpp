@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "daemon/pipeline/channel.hpp"
-#include "daemon/pipeline/drop_count.hpp"
 #include "daemon/pipeline/metrics.hpp"
 
 namespace previz::pipeline {
@@ -36,13 +35,21 @@ class StageThreads {
   // `produce`: () -> std::optional<Out>; empty ends the stream. Its waiting is not counted as work.
   template <class Out, class Produce>
   void source(std::string name, Channel<Out>& output, Produce produce) {
+    source(output, [this, name = std::move(name), produce = std::move(produce)]() mutable {
+      std::optional<Out> value = produce();
+      if (value) metrics_.worked(name, 0);
+      return value;
+    });
+  }
+
+  // The same where `produce` counts by itself.
+  template <class Out, class Produce>
+  void source(Channel<Out>& output, Produce produce) {
     know(output);
-    start([this, name = std::move(name), &output, produce = std::move(produce)]() mutable {
+    start([this, &output, produce = std::move(produce)]() mutable {
       while (!stop_.stop_requested()) {
         std::optional<Out> value = produce();
-        if (!value) break;
-        metrics_.worked(name, 0);
-        if (!output.push(std::move(*value))) break;
+        if (!value || !output.push(std::move(*value))) break;
       }
       output.close();
     });
@@ -56,13 +63,13 @@ class StageThreads {
     start([this, name = std::move(name), &input, &output, work = std::move(work)]() mutable {
       DropCount drops(metrics_, name, input);
       while (std::optional<In> value = input.pop()) {
-        drops.tell();
+        drops.update();
         const auto begin = std::chrono::steady_clock::now();
         Out result = work(std::move(*value));
         metrics_.worked(name, seconds_since(begin));
         if (!output.push(std::move(result))) break;
       }
-      drops.tell();
+      drops.update();
       output.close();
     });
   }
@@ -74,12 +81,12 @@ class StageThreads {
     start([this, name = std::move(name), &input, consume = std::move(consume)]() mutable {
       DropCount drops(metrics_, name, input);
       while (std::optional<In> value = input.pop()) {
-        drops.tell();
+        drops.update();
         const auto begin = std::chrono::steady_clock::now();
         consume(std::move(*value));
         metrics_.worked(name, seconds_since(begin));
       }
-      drops.tell();
+      drops.update();
     });
   }
 

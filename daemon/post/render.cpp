@@ -12,7 +12,6 @@
 #include <variant>
 
 #include "daemon/output/progress.hpp"
-#include "daemon/pipeline/news.hpp"
 #include "daemon/pipeline/recorded_light.hpp"
 #include "daemon/pipeline/refinement.hpp"
 #include "daemon/pipeline/render_stage.hpp"
@@ -20,6 +19,7 @@
 #include "daemon/pipeline/take.hpp"
 #include "daemon/pipeline/track_stage.hpp"
 #include "daemon/post/render_directory.hpp"
+#include "daemon/report/report.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/names.hpp"
 #include "drivers/error.hpp"
@@ -131,7 +131,7 @@ class ObserverSource {
   pipeline::Metrics& metrics_;
 };
 
-// Gives each shot its recorded light, and tells what the estimate has to say once.
+// Gives each shot its recorded light, and reports once what the estimate has to say.
 class LightSource {
  public:
   LightSource(pipeline::Take& take, output::Progress& progress, pipeline::Metrics& metrics)
@@ -154,16 +154,16 @@ class LightSource {
 
  private:
   void note(const std::string& what) {
-    if (news_.is_new(what)) progress_.note("light: " + what);
+    if (noted_.is_first(report::wording(what))) progress_.note("light: " + what);
   }
 
   pipeline::RecordedLight light_;
-  pipeline::News news_;
+  report::Once noted_;
   output::Progress& progress_;
   pipeline::Metrics& metrics_;
 };
 
-// Gives each shot its poses, and tells what is not found.
+// Gives each shot its poses, and reports what is not found.
 class TrackSource {
  public:
   TrackSource(const pipeline::Take& take, output::Progress& progress, pipeline::Metrics& metrics)
@@ -177,13 +177,13 @@ class TrackSource {
     track_(shot);
     for (const std::string& trouble : track_.troubles()) {
       metrics_.count("carrier not found");
-      if (news_.is_new(trouble)) progress_.note(trouble);
+      if (noted_.is_first(report::wording(trouble))) progress_.note(trouble);
     }
   }
 
  private:
   pipeline::TrackStage track_;
-  pipeline::News news_;
+  report::Once noted_;
   output::Progress& progress_;
   pipeline::Metrics& metrics_;
 };

@@ -1,6 +1,5 @@
 #include "daemon/render/device.hpp"
 
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -8,6 +7,7 @@
 #include <cstring>
 #include <utility>
 
+#include "daemon/report/log.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::render {
@@ -22,7 +22,7 @@ VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT
                                           void* user) {
   if (severity >= VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT) {
     static_cast<std::atomic<std::uint64_t>*>(user)->fetch_add(1);
-    spdlog::error("vulkan validation: {}", data->pMessage);
+    report::log({report::Severity::error, "vulkan validation", data->pMessage});
   }
   return VK_FALSE;
 }

@@ -6,18 +6,18 @@
 
 namespace previz::rig {
 
-CameraSource::CameraSource(Camera& camera, std::string stage, std::string crews_name, Told told)
+CameraSource::CameraSource(Camera& camera, std::string stage, std::string crews_name, Parts parts)
     : camera_(camera),
       stage_(std::move(stage)),
       crews_name_(std::move(crews_name)),
-      told_(std::move(told)),
-      counts_(told_.metrics, stage_) {}
+      parts_(std::move(parts)),
+      counts_(parts_.metrics, stage_) {}
 
 FramePtr CameraSource::next() {
-  const std::chrono::duration<double> silence(told_.silence_s);
-  while (!told_.stop.stop_requested()) {
+  const std::chrono::duration<double> silence(parts_.silence_s);
+  while (!parts_.stop.stop_requested()) {
     CameraEvent event = camera_.next(std::chrono::milliseconds(100));
-    counts_.tell(camera_.counters());
+    counts_.update(camera_.counters());
     if (std::holds_alternative<EndOfStream>(event)) return nullptr;
     if (const auto* what = std::get_if<DeviceTrouble>(&event)) {
       trouble(*what);
@@ -31,22 +31,24 @@ FramePtr CameraSource::next() {
 }
 
 void CameraSource::trouble(const DeviceTrouble& trouble) {
-  told_.note(trouble.device + ": " + trouble.what);
-  told_.metrics.count(stage_ + ": device trouble");
-  told_.faults.tell(crews_name_, trouble.what);
+  parts_.reports(report::once({.severity = report::Severity::error,
+                               .source = trouble.device,
+                               .text = trouble.what,
+                               .notice = report::lasting(crews_name_, trouble.what)}));
+  parts_.metrics.count(stage_ + ": device trouble");
   if (trouble.lost) lose();
 }
 
 void CameraSource::lose() {
   if (std::exchange(lost_, true)) return;
-  if (told_.presence) told_.presence(true);
+  if (parts_.presence) parts_.presence(true);
 }
 
 void CameraSource::arrived(const Frame& frame) {
-  told_.faults.well(crews_name_);
-  if (std::exchange(lost_, false) && told_.presence) told_.presence(false);
+  parts_.reports.settle(crews_name_);
+  if (std::exchange(lost_, false) && parts_.presence) parts_.presence(false);
   if (last_sequence_ && frame.sequence > *last_sequence_ + 1)
-    told_.metrics.dropped(stage_, "by the device", frame.sequence - *last_sequence_ - 1);
+    parts_.metrics.dropped(stage_, "by the device", frame.sequence - *last_sequence_ - 1);
   last_sequence_ = frame.sequence;
   last_ = std::chrono::steady_clock::now();
   exposure_s_ = frame.exposure_s;
@@ -55,7 +57,8 @@ void CameraSource::arrived(const Frame& frame) {
 
 void CameraSource::change_exposure(double stops) {
   if (!(exposure_s_ > 0) || !camera_.set_exposure(exposure_s_ * std::exp2(stops), gain_))
-    told_.note(camera_.name() + ": its exposure cannot be driven from here");
+    parts_.reports(report::once(
+        {report::Severity::warning, camera_.name(), "its exposure cannot be driven from here"}));
 }
 
 }  // namespace previz::rig

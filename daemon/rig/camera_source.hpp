@@ -1,4 +1,4 @@
-// Frames of a camera for the pipeline; trouble is noted, counted and told to the desk.
+// Frames of a camera for the pipeline; its troubles are counted, and reported to the crew.
 #pragma once
 
 #include <chrono>
@@ -9,30 +9,27 @@
 #include <string>
 
 #include "daemon/pipeline/metrics.hpp"
-#include "daemon/rig/device_counts.hpp"
-#include "daemon/rig/faults.hpp"
-#include "daemon/rig/notes.hpp"
+#include "daemon/report/reports.hpp"
 #include "drivers/camera.hpp"
 
 namespace previz::rig {
 
 class CameraSource {
  public:
-  struct Told {
+  struct Parts {  // references outlive the source
     std::stop_token stop;
-    Notes& note;
+    report::Reports& reports;
     pipeline::Metrics& metrics;
-    Faults& faults;
     double silence_s;  // a camera counts as lost once it has said so, or said nothing for so long
-    std::function<void(bool lost)> presence;  // told when it changes
+    std::function<void(bool lost)> presence;  // called when that changes; or empty
   };
-  // Metrics are counted under the stage's name; the crew is told of trouble under its own.
-  CameraSource(Camera& camera, std::string stage, std::string crews_name, Told told);
+  // Metrics are counted under the stage's name; the display calls the camera by the crew's name.
+  CameraSource(Camera& camera, std::string stage, std::string crews_name, Parts parts);
 
   // The next frame; null at the end of the stream, or once a stop is requested.
   FramePtr next();
 
-  // By so many stops from what the last frame had.
+  // Exposes longer or shorter than the last frame by so many stops.
   void change_exposure(double stops);
 
  private:
@@ -42,12 +39,12 @@ class CameraSource {
 
   Camera& camera_;
   const std::string stage_, crews_name_;
-  Told told_;
-  DeviceCounts counts_;
+  Parts parts_;
+  pipeline::DeviceCounts counts_;
   bool lost_ = false;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   std::optional<std::uint64_t> last_sequence_;
-  double exposure_s_ = 0, gain_ = 1;  // of the last frame
+  double exposure_s_ = 0, gain_ = 1;  // the last frame's
 };
 
 }  // namespace previz::rig

@@ -32,7 +32,7 @@ struct Look {
   std::uint64_t refinements = 0;        // begun so far
 };
 
-// What only somebody with devices and files can do.
+// Only somebody with devices and files can do these.
 enum class Request { start_take, stop_take, mark_good, reload_set, next_set, previous_set };
 
 struct Outcome {
@@ -53,11 +53,11 @@ class Controls {
   std::string selected_object() const;
   std::string selected_light() const;
 
-  // Of D-Bus or previzctl, or of a press once its kind is known: what it was pressed at may be a
-  // refinement that it ended itself.
+  // Performs what D-Bus or previzctl asks for, or a press once its kind is known.
+  // `ended_refinement`: the press has ended a refinement itself, and was meant for it.
   Outcome perform(const set::Action& action, bool ended_refinement = false);
-  // A button went down: a refinement ends at once, before it is known what was pressed.
-  // True if one did: a mode that the same press asks for is then not wanted.
+  // A button went down: a refinement ends at once, before it is known what was pressed. Returns
+  // true if one did; a mode that the same press asks for is then not wanted.
   bool pushed();
   static bool is_mode(const set::Action& action);
 

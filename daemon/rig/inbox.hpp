@@ -1,4 +1,5 @@
-// What the stages' threads tell the rig's main thread: events, in order, behind one descriptor.
+// Carries events from the stages' threads to the rig's main thread, in order, behind one
+// descriptor.
 #pragma once
 
 #include <sys/eventfd.h>

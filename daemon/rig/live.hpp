@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <functional>
-#include <iosfwd>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -13,6 +12,7 @@
 #include "daemon/pipeline/metrics.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/render/renderer.hpp"
+#include "daemon/report/reports.hpp"
 #include "daemon/rig/controls.hpp"
 #include "drivers/buttons.hpp"
 
@@ -26,19 +26,20 @@ struct LiveOptions {
   bool bus = false;                                // org.previz.Rig1 on the system bus
   render::DeviceOptions device;
   std::stop_token stop;
-  // Devices besides those the set names: a test's own.
+  // Opens devices besides those the set names, for tests.
   std::function<std::vector<std::unique_ptr<Buttons>>()> buttons;
   // Called with every picture as it goes to the display, on the pipeline's last thread.
   std::function<void(const pipeline::Shot&, const Look&)> on_shown;
-  // Called with all that the display shows, read back, and the overlay's words; on its thread.
+  // Called with every screenful, as it is read back, and the overlay's words; on the display's
+  // thread.
   std::function<void(const Plate&, const output::OsdPage&)> on_screen;
 };
 
 // Runs until the observer's stream ends or a stop is requested; buttons, and changes of the set
 // file, act as the set says. About once a second, and at the end, writes the newest picture to
 // DIR/picture.png and what the pipeline did to DIR/metrics.json. A frame whose pose is lost, or
-// that comes before the first light, shows its plate untouched. Notes go to `out`. Throws
-// previz::Error on anything that keeps the rig from running.
-pipeline::MetricsSnapshot run_live(const LiveOptions& options, std::ostream& out);
+// that comes before the first light, shows its plate untouched. Throws previz::Error on anything
+// that keeps the rig from running.
+pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& reports);
 
 }  // namespace previz::rig

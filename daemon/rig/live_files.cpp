@@ -9,8 +9,8 @@
 namespace previz::rig {
 
 LiveFiles::LiveFiles(std::filesystem::path directory, std::function<std::string()> metrics,
-                     Notes& note)
-    : directory_(std::move(directory)), metrics_(std::move(metrics)), note_(note) {
+                     report::Reports& reports)
+    : directory_(std::move(directory)), metrics_(std::move(metrics)), reports_(reports) {
   std::error_code code;
   std::filesystem::create_directories(directory_, code);
   if (!std::filesystem::is_directory(directory_))
@@ -40,7 +40,7 @@ void LiveFiles::write(const Plate* picture) const {
     if (picture) output::write_png(directory_ / "picture.png", *picture);
     session::replace_file(directory_ / "metrics.json", metrics_());
   } catch (const Error& error) {
-    note_(error.what());
+    reports_(report::once({report::Severity::error, "", error.what()}));
   }
 }
 

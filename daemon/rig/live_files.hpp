@@ -1,4 +1,4 @@
-// What the rig does, as files: the newest picture and the metrics.
+// The newest picture and the metrics as files, for whoever looks on.
 #pragma once
 
 #include <filesystem>
@@ -9,21 +9,22 @@
 #include <utility>
 
 #include "daemon/pipeline/channel.hpp"
-#include "daemon/rig/notes.hpp"
+#include "daemon/report/reports.hpp"
 #include "drivers/frame.hpp"
 
 namespace previz::rig {
 
-// For whoever looks on; a disk that does not take them is told, and no reason to stop.
+// A disk that does not take the files is reported, and no reason to stop.
 class LiveFiles {
  public:
   // Makes the directory; throws previz::Error if it cannot. `metrics` gives metrics.json.
-  LiveFiles(std::filesystem::path directory, std::function<std::string()> metrics, Notes& note);
+  LiveFiles(std::filesystem::path directory, std::function<std::string()> metrics,
+            report::Reports& reports);
   ~LiveFiles();  // writes the last ones
   LiveFiles(const LiveFiles&) = delete;
   LiveFiles& operator=(const LiveFiles&) = delete;
 
-  // Written about once a second, on a thread that waits for the disk. Never waits.
+  // Returns at once; a thread that waits for the disk writes the newest about once a second.
   void take(std::shared_ptr<const Plate> picture) { pictures_.push(std::move(picture)); }
 
  private:
@@ -32,7 +33,7 @@ class LiveFiles {
 
   const std::filesystem::path directory_;
   const std::function<std::string()> metrics_;
-  Notes& note_;
+  report::Reports& reports_;
   pipeline::Mailbox<std::shared_ptr<const Plate>> pictures_;
   std::jthread thread_;
 };

@@ -8,29 +8,25 @@
 #include "daemon/output/shown_frame.hpp"
 #include "daemon/pipeline/animation_clock.hpp"
 #include "daemon/pipeline/edits.hpp"
-#include "daemon/pipeline/light_feed.hpp"
-#include "daemon/pipeline/light_stage.hpp"
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/stages.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/pipeline/track_stage.hpp"
 #include "daemon/rig/camera_source.hpp"
+#include "daemon/rig/gpu_keeper.hpp"
+#include "daemon/rig/live_light.hpp"
 #include "daemon/rig/live_render.hpp"
 #include "daemon/rig/snapshots.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::rig {
 
-using pipeline::LightPtr;
 using pipeline::Shot;
+using report::Severity;
 
 namespace {
 
-// From one attempt to open a lost device to the next.
-constexpr std::chrono::milliseconds device_patience{500};
-constexpr const char* crews_device = "graphics device";
-
-session::TrackRecord record_of(const Shot& shot) {
+session::TrackRecord track_record_of(const Shot& shot) {
   session::TrackRecord record;
   record.timestamp_ns = shot.frame->timestamp_ns;
   record.tracked = shot.track.pose.has_value();
@@ -45,12 +41,6 @@ session::TrackRecord record_of(const Shot& shot) {
   return record;
 }
 
-// Refining and standby let tracking and light estimation rest (P7), except that a take gets its
-// poses whatever is shown.
-bool tracks(const State& state) {
-  return state.recording || state.mode == Mode::live;
-}
-
 }  // namespace
 
 struct LivePipeline::Impl {
@@ -59,20 +49,17 @@ struct LivePipeline::Impl {
   void light_stages();
   void observer_stages();
   void output_stages();
+  GpuKeeper::Gpu gpu();
   void make_render_stage();
-  void make_render_stage_anyhow();
-  bool renew_device(const render::DeviceLost& lost);
-  LightPtr estimate(std::vector<pipeline::LightFrame> frames,
-                    const std::optional<pipeline::ObserverView>& view);
-  LightPtr light_of(const Shot& shot, set::LightMode mode);
   std::optional<Shot> capture();
   Shot track(Shot shot);
-  void tell_of_carriers(const Shot& shot);
+  void report_carriers(const Shot& shot);
   void show(Shot shot);
   void record_shown(const Shot& shot);
   CameraSource source(std::stop_token stop, Camera& camera, const set::CameraWish& wish,
                       const char* stage, const char* crews_name,
                       std::function<void(bool)> presence);
+  void record_captured(const FramePtr& frame);
 
   Parts parts;
   std::stop_source stop_source, light_stop;
@@ -82,11 +69,10 @@ struct LivePipeline::Impl {
   const ObserverCalibration calibration;
   pipeline::TrackStage track_stage;
   pipeline::AnimationClock animation_clock;
-  pipeline::LightStage lighting;
-  pipeline::LightFeed light_feed;
-  LightPtr light;  // the last estimate
+  LiveLight light;
   LiveRender live_render;
   std::optional<pipeline::RenderStage> render_stage;
+  GpuKeeper gpu_keeper;
   std::optional<CameraSource> observer;
   std::uint64_t next_index = 0;
   std::uint64_t shown_frames = 0;
@@ -106,14 +92,15 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
       stop_from_outside(std::move(stop), [this] { stop_source.request_stop(); }),
       calibration(pipeline::observer_calibration(parts.set, parts.cameras.recorded.info)),
       track_stage(parts.set, calibration, parts.cameras.recorded.track, 0, parts.cameras.lap_ns),
-      lighting(parts.set, pipeline::light_calibration(parts.set, parts.cameras.recorded.info),
-               calibration),
+      light({parts.set, parts.look, parts.reports, parts.metrics},
+            pipeline::light_calibration(parts.set, parts.cameras.recorded.info), calibration),
       live_render(parts.set, parts.look, parts.inbox, parts.metrics, {tracked, reviewed, snapshots},
-                  stop_source.get_token()) {
-  if (lighting.needs_frames() && !parts.cameras.light)
+                  stop_source.get_token()),
+      gpu_keeper(gpu(), {parts.reports, parts.metrics, stop_source.get_token()}) {
+  if (light.needs_frames() && !parts.cameras.light)
     throw Error(parts.set.file.string() +
                 ": lighting: the set has neither a light camera nor lighting.environment");
-  make_render_stage_anyhow();
+  gpu_keeper.start();
   stages.emplace(parts.metrics, stop_source.get_token(), [this] { stop_source.request_stop(); });
   if (parts.cameras.light) light_stages();
   observer_stages();
@@ -124,7 +111,7 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
     } catch (...) {
       failure = std::current_exception();
     }
-    live_render.tell_dropped();
+    live_render.count_dropped();
     if (tracked.try_pop()) parts.metrics.dropped("render", "stopped");
     parts.inbox.finish();
   });
@@ -136,90 +123,44 @@ void LivePipeline::Impl::make_render_stage() {
       pipeline::RenderStageOptions{.scale = parts.set.quality.scale,
                                    .cancelled = [this] { return live_render.interrupted(); },
                                    .progress = {},
-                                   .note = [this](const std::string& what) { parts.note(what); }});
+                                   .note =
+                                       [this](const std::string& what) {
+                                         parts.reports(report::once({Severity::warning, "", what}));
+                                       }});
   live_render.use(*render_stage);
 }
 
-// A set may be read again while the device is lost.
-void LivePipeline::Impl::make_render_stage_anyhow() {
-  try {
-    if (!render::is_open(*parts.device)) render::reopen_device(*parts.device);
-    make_render_stage();
-  } catch (const render::DeviceLost& lost) {
-    if (!renew_device(lost)) throw;
-  }
-}
-
-// On the render thread: nobody else waits for it, and frames go on into the recorder.
-bool LivePipeline::Impl::renew_device(const render::DeviceLost& lost) {
-  parts.note.again(std::string(lost.what()) + "; it is opened again");
-  parts.faults.tell(crews_device, "is lost; it is opened again");
-  parts.metrics.count("device lost");
-  render_stage.reset();
-  while (!stop_source.stop_requested()) {
-    try {
-      render::reopen_device(*parts.device);
-      make_render_stage();
-      parts.faults.well(crews_device);
-      parts.metrics.count("device opened again");
-      parts.note.again("pictures again, on " + render::device_name(*parts.device));
-      return true;
-    } catch (const std::exception& error) {
-      parts.note(error.what());
-      render_stage.reset();
-      std::this_thread::sleep_for(device_patience);
-    }
-  }
-  return false;
+GpuKeeper::Gpu LivePipeline::Impl::gpu() {
+  return {.is_open = [this] { return render::is_open(*parts.device); },
+          .open = [this] { render::reopen_device(*parts.device); },
+          .name = [this] { return render::device_name(*parts.device); },
+          .build = [this] { make_render_stage(); },
+          .drop = [this] { render_stage.reset(); }};
 }
 
 CameraSource LivePipeline::Impl::source(std::stop_token stop, Camera& camera,
                                         const set::CameraWish& wish, const char* stage,
                                         const char* crews_name,
                                         std::function<void(bool)> presence) {
-  return {camera,
-          stage,
-          crews_name,
-          {std::move(stop), parts.note, parts.metrics, parts.faults, wish.stall_timeout_s,
-           std::move(presence)}};
+  return {
+      camera,
+      stage,
+      crews_name,
+      {std::move(stop), parts.reports, parts.metrics, wish.stall_timeout_s, std::move(presence)}};
+}
+
+void LivePipeline::Impl::record_captured(const FramePtr& frame) {
+  if (parts.look.get()->state.mode != Mode::standby) parts.recorder.offer(frame);
 }
 
 void LivePipeline::Impl::light_stages() {
-  light_feed.start(
-      *stages,
-      [this,
-       camera = source(light_stop.get_token(), *parts.cameras.light, parts.set.light_camera.camera,
-                       "light camera", "light camera", {}),
-       index = std::uint64_t{0}]() mutable -> std::optional<pipeline::LightFrame> {
-        FramePtr frame = camera.next();
-        if (!frame) return std::nullopt;
-        if (parts.look.get()->state.mode != Mode::standby) parts.recorder.offer(frame);
-        return pipeline::LightFrame{demosaiced(frame), index++};
-      },
-      [this](std::vector<pipeline::LightFrame> frames,
-             const std::optional<pipeline::ObserverView>& view) {
-        return estimate(std::move(frames), view);
-      });
-}
-
-// While tracking rests, the light stays as it was.
-LightPtr LivePipeline::Impl::estimate(std::vector<pipeline::LightFrame> frames,
-                                      const std::optional<pipeline::ObserverView>& view) {
-  if (!lighting.needs_frames()) return nullptr;  // they are there to be recorded
-  if (view) lighting.see_observer(*view->frame, view->world_from_camera);
-  for (pipeline::LightFrame& waited : frames) lighting.see(std::move(waited.frame), waited.index);
-  for (const std::string& trouble : lighting.troubles()) {
-    parts.note("light: " + trouble);
-    parts.metrics.dropped("lighting", "not usable");
-    parts.faults.pass("light", trouble);
-  }
-  const std::shared_ptr<const Look> look = parts.look.get();
-  if (!tracks(look->state)) return light;
-  lighting.use(look->light_mode);
-  light = lighting.light();
-  if (light)
-    for (const std::string& what : light->lighting.report.notes) parts.note("light: " + what);
-  return light;
+  light.start(*stages, [this, camera = source(light_stop.get_token(), *parts.cameras.light,
+                                              parts.set.light_camera.camera, "light camera",
+                                              "light camera", {})]() mutable {
+    FramePtr frame = camera.next();
+    if (frame) record_captured(frame);
+    return frame;
+  });
 }
 
 void LivePipeline::Impl::observer_stages() {
@@ -229,9 +170,9 @@ void LivePipeline::Impl::observer_stages() {
                           }));
   stages->source("observer", seen, [this] { return capture(); });
   stages->stage("tracking", seen, tracked, [this](Shot shot) { return track(std::move(shot)); });
-  stages->source("picture", rendered, [this] {
+  stages->source(rendered, [this] {  // LiveRender counts what it renders
     std::optional<Shot> shot =
-        live_render.next([this](const render::DeviceLost& lost) { return renew_device(lost); });
+        live_render.next([this](const render::DeviceLost& lost) { return gpu_keeper.renew(lost); });
     if (!shot) snapshots.close();
     return shot;
   });
@@ -251,30 +192,23 @@ std::optional<Shot> LivePipeline::Impl::capture() {
   }
   shot.index = next_index++;
   shot.arrived = std::chrono::steady_clock::now();
-  if (parts.look.get()->state.mode != Mode::standby) parts.recorder.offer(shot.frame);
+  record_captured(shot.frame);
   shot.frame = demosaiced(shot.frame);  // once, for all that follow
   return shot;
 }
 
-void LivePipeline::Impl::tell_of_carriers(const Shot& shot) {
+void LivePipeline::Impl::report_carriers(const Shot& shot) {
   for (const std::string& trouble : track_stage.troubles()) {
-    parts.note(trouble);
+    parts.reports(report::once({Severity::warning, "", trouble}));
     parts.metrics.count("carrier not found");
   }
   for (const set::Carrier& carrier : parts.set.tracking.carriers) {
     const auto where = shot.motion.carriers.find(carrier.name);
     if (where != shot.motion.carriers.end() && !where->second.tags.empty())
-      parts.faults.well(carrier.name);
+      parts.reports.settle(carrier.name);
     else
-      parts.faults.tell(carrier.name, "is not in the picture");
+      parts.reports.show(report::lasting(carrier.name, "is not in the picture"));
   }
-}
-
-LightPtr LivePipeline::Impl::light_of(const Shot& shot, set::LightMode mode) {
-  if (lighting.needs_frames()) return light_feed.newest();
-  lighting.use(mode);
-  for (const std::string& trouble : lighting.troubles()) parts.note("light: " + trouble);
-  return lighting.light_for(shot);
 }
 
 Shot LivePipeline::Impl::track(Shot shot) {
@@ -284,12 +218,11 @@ Shot LivePipeline::Impl::track(Shot shot) {
   if (!tracks(look->state)) return shot;
   track_stage(shot);
   shot.motion.animation_s = animation_s;
-  tell_of_carriers(shot);
-  shot.light = light_of(shot, look->light_mode);
-  if (lighting.needs_observer() && shot.track.pose)
-    light_feed.see_observer({shot.frame, shot.track.pose->world_from_camera});
+  report_carriers(shot);
+  shot.light = light.light_for(shot, look->light_mode);
+  light.see_observer(shot);
   shot.scene = pipeline::scene_state(parts.set, look->edits, shot.motion);
-  parts.recorder.offer(record_of(shot));
+  parts.recorder.offer(track_record_of(shot));
   return shot;
 }
 
@@ -299,37 +232,42 @@ void LivePipeline::Impl::output_stages() {
   set.observer.calibration = calibration;
   stages->sink("snapshot", snapshots, [this, set = std::move(set)](const Shot& shot) {
     try {
-      parts.note.again("snapshot: " + write_snapshot(shot, set).string());
+      parts.reports({Severity::info, "snapshot", write_snapshot(shot, set).string()});
     } catch (const Error& error) {
-      parts.note.again(std::string("snapshot: ") + error.what());
+      parts.reports({Severity::error, "snapshot", error.what()});
     }
   });
 }
 
+// This thread makes the recorder's frame of each picture, so that the render thread need not.
 void LivePipeline::Impl::show(Shot shot) {
   if (!shot.whole) return parts.metrics.dropped("display", "stopped while rendering");
-  if (!shot.untouched.empty()) {
-    parts.metrics.count("plate untouched: " + shot.untouched);
-    parts.note("plate untouched: " + shot.untouched);
-  }
-  const render::Counters& counters = shot.counters;
-  if (counters.dropped_not_finite + counters.dropped_negative + counters.stopped_in_layers > 0) {
-    parts.metrics.count("samples not finite", counters.dropped_not_finite);
-    parts.metrics.count("samples negative", counters.dropped_negative);
-    parts.metrics.count("rays stopped by the last of too many transparent surfaces",
-                        counters.stopped_in_layers);
-  }
+  count_picture(shot, parts.metrics, parts.reports);
   record_shown(shot);
   parts.show(std::move(shot));
 }
 
-// A review shows another take.
+// A review shows another take than the one that is being recorded.
 void LivePipeline::Impl::record_shown(const Shot& shot) {
   const State state = parts.look.get()->state;
   if (!parts.set.recording.composite || !state.recording || state.mode == Mode::review) return;
   const PinholeIntrinsics& whole = calibration.intrinsics;
   parts.recorder.offer_shown(std::make_shared<Frame>(output::shown_frame(
       shot.picture, whole.width, whole.height, shown_frames++, shot.frame->timestamp_ns)));
+}
+
+void count_picture(const Shot& shot, pipeline::Metrics& metrics, report::Reports& reports) {
+  if (!shot.untouched.empty()) {
+    metrics.count("plate untouched: " + shot.untouched);
+    reports(report::once({Severity::warning, "plate untouched", shot.untouched}));
+  }
+  const render::Counters& counters = shot.counters;
+  if (counters.dropped_not_finite + counters.dropped_negative + counters.stopped_in_layers == 0)
+    return;
+  metrics.count("samples not finite", counters.dropped_not_finite);
+  metrics.count("samples negative", counters.dropped_negative);
+  metrics.count("rays stopped by the last of too many transparent surfaces",
+                counters.stopped_in_layers);
 }
 
 LivePipeline::LivePipeline(Parts parts, std::stop_token stop)

@@ -10,22 +10,23 @@
 #include "daemon/output/recorder.hpp"
 #include "daemon/pipeline/channel.hpp"
 #include "daemon/pipeline/metrics.hpp"
-#include "daemon/pipeline/newest.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/render/renderer.hpp"
+#include "daemon/report/reports.hpp"
 #include "daemon/rig/cameras.hpp"
 #include "daemon/rig/controls.hpp"
-#include "daemon/rig/faults.hpp"
 #include "daemon/rig/inbox.hpp"
-#include "daemon/rig/notes.hpp"
 #include "daemon/scene/scene.hpp"
 
 namespace previz::rig {
 
+// Counts and reports what is odd about a picture that is to be shown.
+void count_picture(const pipeline::Shot& shot, pipeline::Metrics& metrics,
+                   report::Reports& reports);
+
 class LivePipeline {
  public:
-  // Everything outlives the pipeline.
-  struct Parts {
+  struct Parts {  // all of them outlive the pipeline
     const set::Set& set;
     Cameras& cameras;
     const scene::Scene& scene;
@@ -33,8 +34,7 @@ class LivePipeline {
     output::Recorder& recorder;
     const pipeline::Newest<Look>& look;
     Inbox& inbox;
-    Notes& note;
-    Faults& faults;
+    report::Reports& reports;
     pipeline::Metrics& metrics;
     std::function<void(pipeline::Shot)> show;  // on the display's thread
   };
@@ -45,7 +45,8 @@ class LivePipeline {
   LivePipeline(const LivePipeline&) = delete;
   LivePipeline& operator=(const LivePipeline&) = delete;
 
-  // The end of every stage, after Inbox::finish; throws what the first failing stage threw.
+  // Waits for the end of every stage, after Inbox::finish; throws what the first failing stage
+  // threw.
   void wait();
 
   pipeline::Mailbox<pipeline::Shot>& reviewed();  // where a review puts its frames

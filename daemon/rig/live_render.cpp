@@ -53,19 +53,19 @@ std::optional<Shot> LiveRender::next(const std::function<bool(const render::Devi
 
 std::optional<Shot> LiveRender::next_picture() {
   for (;;) {
-    tell_dropped();
+    count_dropped();
     const std::shared_ptr<const Look> look = look_.get();
     save_refined(*look);
     if (look->state.mode != Mode::refine || look->refinements != refinements_) refining_ = false;
     refinements_ = look->refinements;
     std::optional<Shot> shot =
-        look->state.mode == Mode::refine ? refine(*look) : wait_for_frame(*look);
+        look->state.mode == Mode::refine ? refine_round(*look) : wait_for_frame(*look);
     if (shot) return shot;
     if (channels_.tracked.finished()) return std::nullopt;
   }
 }
 
-std::optional<Shot> LiveRender::refine(const Look& look) {
+std::optional<Shot> LiveRender::refine_round(const Look& look) {
   while (channels_.tracked.try_pop()) metrics_.dropped("render", "refining");
   if (refining_ && refined_edits_ != look.edits) {  // P14: moved while it is refined
     good_->scene = pipeline::scene_state(set_, look.edits, good_->motion);

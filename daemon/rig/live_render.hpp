@@ -9,10 +9,8 @@
 #include <stop_token>
 
 #include "daemon/pipeline/channel.hpp"
-#include "daemon/pipeline/drop_count.hpp"
 #include "daemon/pipeline/governor.hpp"
 #include "daemon/pipeline/metrics.hpp"
-#include "daemon/pipeline/newest.hpp"
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/rig/controls.hpp"
@@ -34,24 +32,23 @@ class LiveRender {
 
   void use(pipeline::RenderStage& stage) { stage_ = &stage; }
 
-  // The next picture to show; nothing once the camera's frames have ended. Where the device is lost
-  // while it is made, `renew` is called until there is another stage to use(); false: there will be
-  // none, because of a stop. A refinement's rounds grow: first the preview's samples, then as many
-  // again as there are, at most 64 and what takes about a second.
+  // Returns the next picture to show; nothing once the camera's frames have ended. If the device is
+  // lost meanwhile, `renew` is called; it returns true once there is another stage to use(), and
+  // false if a stop came first. A refinement's rounds grow: first the preview's samples, then as
+  // many again as there are, at most 64 and what takes about a second.
   std::optional<pipeline::Shot> next(const std::function<bool(const render::DeviceLost&)>& renew);
 
-  // Frames that a newer one took the place of, to the metrics: those since the last call. next()
-  // does it too.
-  void tell_dropped() { drops_.tell(); }
+  // Counts the frames that a newer one took the place of since the last call; next() does it too.
+  void count_dropped() { drops_.update(); }
 
-  // Whether what is being rendered is no longer wanted; from the render thread.
+  // True if what is being rendered is no longer wanted; from the render thread.
   bool interrupted() const;
 
  private:
   std::optional<pipeline::Shot> next_picture();
   void save_refined(const Look& look);
   void save(const pipeline::Shot& shot);
-  std::optional<pipeline::Shot> refine(const Look& look);
+  std::optional<pipeline::Shot> refine_round(const Look& look);
   int next_round(const Look& look) const;
   bool begin_refinement(const Look& look);
   std::optional<pipeline::Shot> wait_for_frame(const Look& look);

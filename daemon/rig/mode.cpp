@@ -32,6 +32,24 @@ Step with(State state, bool State::*flag, bool value) {
 
 }  // namespace
 
+bool tracks(const State& state) {
+  return state.recording || state.mode == Mode::live;
+}
+
+Event wish_for(Mode mode) {
+  switch (mode) {
+    case Mode::standby:
+      return Event::wish_standby;
+    case Mode::live:
+      return Event::wish_live;
+    case Mode::refine:
+      return Event::wish_refine;
+    case Mode::review:
+      return Event::wish_review;
+  }
+  return Event::wish_live;
+}
+
 Step step(const State& state, Event event) {
   switch (event) {
     case Event::wish_standby:

@@ -19,6 +19,10 @@ struct State {
   friend bool operator==(const State&, const State&) = default;
 };
 
+// Refining and standby let tracking and light estimation rest (P7), except that a take gets its
+// poses whatever is shown.
+bool tracks(const State& state);
+
 // What happens to the rig. A mode that is wished for twice stays; one that is toggled goes back to
 // live.
 enum class Event {
@@ -46,6 +50,9 @@ inline constexpr std::array all_events = {
     Event::record_on,      Event::record_off,    Event::record_toggle, Event::recorder_failed,
     Event::take_finished,  Event::review_ended,  Event::good_frame,    Event::camera_lost,
     Event::camera_back};
+
+// The event by which somebody asks for this mode.
+Event wish_for(Mode mode);
 
 struct Step {
   State state;

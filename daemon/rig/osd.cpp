@@ -41,6 +41,18 @@ OsdText mode(const Look& look) {
   return {};
 }
 
+OsdTone tone_of(report::Severity severity) {
+  switch (severity) {
+    case report::Severity::info:
+      return OsdTone::plain;
+    case report::Severity::warning:
+      return OsdTone::warning;
+    case report::Severity::error:
+      return OsdTone::alarm;
+  }
+  return OsdTone::alarm;
+}
+
 OsdText space(std::uint64_t bytes) {
   const double gigabytes = 1e-9 * static_cast<double>(bytes);
   return {fmt::format("{:.{}f} GB free", gigabytes, gigabytes < 100 ? 1 : 0),
@@ -72,8 +84,9 @@ OsdText tracking_words(const PictureFacts& picture) {
 }
 
 void add_notices(const RigFacts& rig, const PictureFacts* picture, OsdPage& page) {
-  for (const std::string& fault : rig.faults) page.notices.push_back({fault, OsdTone::alarm});
-  if (rig.look.state.camera_lost && rig.faults.empty())
+  for (const report::Notice& trouble : rig.troubles)
+    page.notices.push_back({line_of(trouble), tone_of(trouble.severity)});
+  if (rig.look.state.camera_lost && rig.troubles.empty())
     page.notices.push_back({"film camera: no pictures come", OsdTone::alarm});
   if (!rig.recorder_fault.empty())
     page.notices.push_back({"recording ended: " + rig.recorder_fault, OsdTone::alarm});
@@ -87,8 +100,8 @@ void add_notices(const RigFacts& rig, const PictureFacts* picture, OsdPage& page
     page.notices.push_back({"camera only: " + picture->untouched, OsdTone::warning});
   else if (picture && !picture->tracking_trouble.empty())
     page.notices.push_back({"tracking: " + picture->tracking_trouble, OsdTone::warning});
-  for (const News& news : rig.news)
-    page.notices.push_back({news.what, news.refused ? OsdTone::warning : OsdTone::plain});
+  for (const report::Notice& news : rig.news)
+    page.notices.push_back({line_of(news), tone_of(news.severity)});
 }
 
 }  // namespace

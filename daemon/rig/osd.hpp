@@ -1,4 +1,4 @@
-// What the overlay says: from the rig's state to a crew's words. Pure; when is the caller's matter.
+// What the overlay says: from the rig's state to a crew's words. No clock: the caller decides when.
 #pragma once
 
 #include <cstdint>
@@ -8,11 +8,12 @@
 
 #include "daemon/output/osd_page.hpp"
 #include "daemon/pipeline/shot.hpp"
+#include "daemon/report/report.hpp"
 #include "daemon/rig/controls.hpp"
 
 namespace previz::rig {
 
-// Of the picture on the screen.
+// What the overlay says of the picture on the screen.
 struct PictureFacts {
   int samples = 0;        // per pixel; 0: the camera's picture as it is
   double error = 0;       // over the picture's mean radiance; 0: not estimated
@@ -24,20 +25,13 @@ struct PictureFacts {
 };
 PictureFacts facts_of(const pipeline::Shot& shot);
 
-// Of the pictures shown lately.
+// How the pictures shown lately came.
 struct Pace {
   double fps = 0;        // 0: none
   double latency_s = 0;  // capture to display
 };
 
-// What a button or the rig itself did.
-struct News {
-  std::string what;
-  bool refused = false;
-  bool operator==(const News&) const = default;
-};
-
-// Of everything else.
+// What the overlay says of everything else.
 struct RigFacts {
   Look look;
   std::string take;       // of the running recording
@@ -45,8 +39,8 @@ struct RigFacts {
   std::uint64_t frames_lost = 0;
   std::string recorder_fault;
   std::optional<std::uint64_t> free_bytes;  // for takes, before the reserve; none: not known
-  std::vector<News> news;                   // the last few, oldest first
-  std::vector<std::string> faults;          // of devices
+  std::vector<report::Notice> news;         // what buttons and the rig itself did, oldest first
+  std::vector<report::Notice> troubles;     // of devices
 };
 
 // `picture` is null before the first one.

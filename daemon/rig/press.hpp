@@ -20,25 +20,26 @@ struct Press {
   friend bool operator==(const Press&, const Press&) = default;
 };
 
-// A press is told as soon as it is certain, so a button that only has a short press answers at
-// once. With a long press: short at its release, long while it is still held. With a double press:
-// short only once the time for a second has passed. Time comes from the caller.
+// A press is returned as soon as its kind is certain, so a button that only has a short press
+// answers at once. If it has a long press too, a short one is certain at its release, and a long
+// one while the button is still held. If it has a double press, a short one is certain only once
+// the time for a second push has passed. Time comes from the caller.
 class PressRecognizer {
  public:
   static constexpr std::int64_t long_ns = 600'000'000;    // held so long: long
   static constexpr std::int64_t double_ns = 300'000'000;  // from release to the second push
 
-  // Which presses have an action. A button that has none is not told of.
+  // `buttons` says which presses have an action. A button that has none is never returned.
   explicit PressRecognizer(const std::vector<set::Button>& buttons);
 
-  // Edges of a button come in order; what is told never is.
+  // Edges of one button must come in the order of time; those of different buttons need not.
   std::vector<Press> edge(const ButtonEvent& event);
-  // What became certain by the passing of time; to be called at deadline().
+  // The presses that became certain by the passing of time; call it at deadline(), or often.
   std::vector<Press> tick(std::int64_t now_ns);
   std::optional<std::int64_t> deadline() const;
 
  private:
-  enum class Phase { idle, down, told, released };
+  enum class Phase { idle, down, certain, released };
   struct Button {
     bool has_short = false, has_long = false, has_double = false;
     Phase phase = Phase::idle;
@@ -47,9 +48,9 @@ class PressRecognizer {
 
   static std::optional<std::int64_t> due(const Button& button);
   static void push(const std::string& name, Button& button, std::int64_t now_ns,
-                   std::vector<Press>& told);
+                   std::vector<Press>& presses);
   static void release(const std::string& name, Button& button, std::int64_t now_ns,
-                      std::vector<Press>& told);
+                      std::vector<Press>& presses);
 
   std::map<std::string, Button> buttons_;
 };

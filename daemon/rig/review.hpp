@@ -9,18 +9,18 @@
 
 #include "daemon/pipeline/channel.hpp"
 #include "daemon/pipeline/shot.hpp"
+#include "daemon/report/reports.hpp"
 #include "daemon/rig/inbox.hpp"
-#include "daemon/rig/notes.hpp"
 #include "daemon/set/set.hpp"
 
 namespace previz::rig {
 
 class Review {
  public:
-  // Posts Event::review_ended at the take's end, or with a note if it cannot be played: for one
+  // Posts Event::review_ended at the take's end, or with a report if it cannot be played: for one
   // thing because it was recorded with another set than the one that runs. `out` outlives this.
   Review(std::filesystem::path take, std::string set_text, pipeline::Mailbox<pipeline::Shot>& out,
-         Inbox& inbox, Notes& note);
+         Inbox& inbox, report::Reports& reports);
 
   void stop() { thread_.request_stop(); }
   bool done() const { return done_; }  // its destructor would not wait

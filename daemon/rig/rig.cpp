@@ -1,22 +1,26 @@
 #include "daemon/rig/rig.hpp"
 
-#include <algorithm>
-#include <variant>
+#include <chrono>
+#include <utility>
 
 #include "daemon/pipeline/take.hpp"
 #include "daemon/scene/assets.hpp"
 #include "daemon/set/names.hpp"
-#include "drivers/button_drivers.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::rig {
+
+using report::Reports;
+using report::Severity;
+
 namespace {
 
 constexpr std::chrono::milliseconds tick_interval{20};
 constexpr int ticks_a_second = 50;
 constexpr int ticks_a_page = 5;  // the overlay's clock and faults
 
-output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& cameras, Notes& note) {
+output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& cameras,
+                                   Reports& reports) {
   const set::Set& set = loaded.set;
   output::TakeTemplate take;
   take.directory = set.recording.directory;
@@ -33,92 +37,91 @@ output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& camer
   try {
     take.assets = scene::assets_of(set);
   } catch (const Error& error) {
-    note(std::string("takes will lack the scene: ") + error.what());
+    reports(report::once({Severity::warning, "takes will lack the scene", error.what()}));
   }
   return take;
 }
 
 output::RecorderOptions recorder_options(const LoadedSet& loaded, const Cameras& cameras,
-                                         Notes& note) {
+                                         Reports& reports) {
   const set::Recording& recording = loaded.set.recording;
   output::RecorderOptions options;
-  options.take = take_template(loaded, cameras, note);
+  options.take = take_template(loaded, cameras, reports);
   options.preroll_s = recording.preroll_s;
   options.queue_bytes = static_cast<std::uint64_t>(recording.queue_mb * 1e6);
   options.reserve_bytes = static_cast<std::uint64_t>(recording.reserve_mb * 1e6);
-  options.note = [&note](const std::string& what) { note.again(what); };
+  options.note = [&reports](const report::Report& report) { reports(report); };
   return options;
 }
 
-// Without it cameras are found too, but only when the next attempt is due.
-Usb watch_usb(Notes& note) {
+// Without a watch cameras are found too, but only when the next attempt is due.
+Usb watch_usb(Reports& reports) {
   try {
     return std::make_shared<const usb::Hotplug>();
   } catch (const Error& error) {
-    note(error.what());
+    reports(report::once({Severity::warning, "", error.what()}));
     return nullptr;
   }
 }
 
 }  // namespace
 
-Rig::Rig(const LoadedSet& loaded, Parts parts)
-    : loaded_(loaded),
-      parts_(std::move(parts)),
-      cameras_(open_cameras(loaded.set, parts_.loop_cameras, watch_usb(parts_.note))),
-      controls_(loaded.set),
+Rig::Rig(Parts parts)
+    : parts_(std::move(parts)),
+      loaded_(parts_.sets.running()),
+      cameras_(open_cameras(loaded_.set, parts_.loop_cameras, watch_usb(parts_.reports))),
+      controls_(loaded_.set),
       look_(controls_.look()),
-      recorder_(recorder_options(loaded, cameras_, parts_.note)),
-      presses_(loaded.set.buttons),
-      set_file_(loaded.changed),
+      recorder_(recorder_options(loaded_, cameras_, parts_.reports)),
       pipeline_(
-          {.set = loaded.set,
+          {.set = loaded_.set,
            .cameras = cameras_,
-           .scene = loaded.scene,
+           .scene = loaded_.scene,
            .device = parts_.device,
            .recorder = recorder_,
            .look = look_,
            .inbox = inbox_,
-           .note = parts_.note,
-           .faults = faults_,
+           .reports = parts_.reports,
            .metrics = parts_.metrics,
            .show = [this](pipeline::Shot shot) { parts_.show(std::move(shot), *look_.get()); }},
           parts_.stop) {
-  for (const std::string& what : loaded.scene.notes) parts_.note("scene: " + what);
-  open_buttons();
+  for (const std::string& what : loaded_.scene.notes)
+    parts_.reports(report::once({Severity::warning, "scene", what}));
+  desk_.emplace(loaded_.set.buttons,
+                open_button_devices(loaded_.set, cameras_, parts_.more_buttons),
+                ButtonDesk::Parts{parts_.loop, parts_.reports, parts_.metrics}, asks_of_buttons());
   free_bytes_ = recorder_.free_bytes();
-  tell_screen();
+  show_facts();
 }
 
-// Reviews hand what they play to the pipeline.
+// Reviews must end before the pipeline, to which they hand what they play.
 Rig::~Rig() {
   review_.reset();
   ended_reviews_.clear();
 }
 
-void Rig::open_buttons() {
-  const auto add = [this](std::vector<std::unique_ptr<Buttons>> opened, std::int64_t offset_ns) {
-    for (std::unique_ptr<Buttons>& buttons : opened) {
-      DeviceCounts counts(parts_.metrics, buttons->name());
-      devices_.push_back({std::move(buttons), std::move(counts), nullptr, offset_ns});
-    }
+ButtonDesk::Asks Rig::asks_of_buttons() {
+  ButtonDesk::Asks asks;
+  // A frame that came before the press is known before it. What was pressed after a set was read
+  // again is the next rig's.
+  asks.listens = [this] {
+    take_inbox();
+    return !parts_.sets.has_next();
   };
-  add(rig::open_buttons(loaded_.set, cameras_), 0);
-  std::vector<std::string> plugged;
-  for (const set::Button& button : loaded_.set.buttons)
-    if (is_button_name(button.name) && std::ranges::find(plugged, button.name) == plugged.end())
-      plugged.push_back(button.name);
-  ButtonSettings settings;
-  for (const set::GpioContact& contact : loaded_.set.contacts)
-    settings.wiring[contact.name] = contact.wiring;
-  add(previz::open_buttons(plugged, settings), cameras_.clock_offset_ns);
-  if (parts_.more_buttons) add(parts_.more_buttons(), 0);
-  for (Device& device : devices_)
-    device.watch = parts_.loop.on_readable(device.buttons->fd(), [this, &device] { read(device); });
+  asks.edge = [this](const ButtonEvent& event) {
+    recorder_.offer(event);
+    if (!event.pressed || !controls_.pushed()) return false;
+    apply({"live", false, {}}, "button " + event.button);
+    return true;
+  };
+  asks.act = [this](const set::Action& action, const std::string& button, bool ended_refinement) {
+    apply(controls_.perform(action, ended_refinement), "button " + button);
+  };
+  return asks;
 }
 
-std::optional<LoadedSet> Rig::run() {
-  const auto inbox_watch = parts_.loop.on_readable(inbox_.fd(), [this] { inbox(); });
+void Rig::run() {
+  const auto inbox_watch = parts_.loop.on_readable(inbox_.fd(), [this] { take_inbox(); });
   const auto timer = parts_.loop.every(tick_interval, [this] { tick(); });
   std::unique_ptr<EventLoop::Watch> watchdog;
   if (const auto interval = service::watchdog_interval())
@@ -126,90 +129,44 @@ std::optional<LoadedSet> Rig::run() {
   service::ready("set \"" + loaded_.set.name + "\"");
   service::feed_watchdog();  // a set that was read again took its time
   parts_.loop.run();
-  if (next_) return std::move(next_);
-  pipeline_.wait();
-  return std::nullopt;
-}
-
-// What was pressed after a set was read again is the next rig's.
-void Rig::read(Device& device) {
-  inbox();  // a frame that came before the press
-  while (!next_) {
-    std::optional<ButtonsEvent> event = device.buttons->next();
-    if (!event) return;
-    bool over = std::holds_alternative<EndOfStream>(*event);
-    if (auto* pushed = std::get_if<ButtonEvent>(&*event)) {
-      faults_.well(device.buttons->name());
-      pushed->timestamp_ns += device.clock_offset_ns;
-      edge(*pushed);
-    }
-    if (const auto* trouble = std::get_if<DeviceTrouble>(&*event)) {
-      parts_.note(trouble->device + ": " + trouble->what);
-      faults_.tell(device.buttons->name(), trouble->what);
-      over = trouble->lost;
-    }
-    if (over) return device.watch.reset();
-  }
-}
-
-void Rig::edge(const ButtonEvent& event) {
-  recorder_.offer(event);
-  if (event.pressed) {
-    ended_refinement_.erase(event.button);
-    if (controls_.pushed()) {
-      ended_refinement_.insert(event.button);
-      tell({"live", false, {}}, "button " + event.button);
-    }
-  }
-  for (const Press& press : presses_.edge(event)) act(press);
-}
-
-void Rig::act(const Press& press) {
-  const auto mapped = std::ranges::find_if(loaded_.set.buttons, [&](const set::Button& button) {
-    return button.name == press.button && button.press == press.kind;
-  });
-  if (mapped == loaded_.set.buttons.end()) return;
-  const set::Action& action = *set::find_action(mapped->action);
-  // A press that ended the refinement has gone where a mode button goes: to live.
-  const bool ended_refinement = ended_refinement_.erase(press.button) > 0;
-  if (ended_refinement && Controls::is_mode(action)) return;
-  tell(controls_.perform(action, ended_refinement), "button " + press.button);
+  if (!parts_.sets.has_next()) pipeline_.wait();
 }
 
 Outcome Rig::perform(const set::Action& action, const std::string& by) {
-  return tell(controls_.perform(action), by);
+  return apply(controls_.perform(action), by);
 }
 
 Outcome Rig::wish(Event event, const std::string& by) {
-  return tell(controls_.happened(event), by);
+  return apply(controls_.happened(event), by);
 }
 
-Outcome Rig::tell(Outcome outcome, const std::string& by) {
+Outcome Rig::apply(Outcome outcome, const std::string& by, Severity severity) {
   if (outcome.request) {
     if (std::optional<std::string> why_not = carry_out(*outcome.request))
       outcome = {*std::move(why_not), true, {}};
   }
-  publish();  // after it: there is a take before what is shown is to be in it
-  const std::string line = by + ": " + outcome.said + (outcome.refused ? " (refused)" : "");
-  parts_.note.again(line);
-  recorder_.offer_event(now_ns(), line);
-  service::status(line);
-  last_said_ = line;
+  publish_look();  // after the request: there is a take before what is shown is to be in it
+  if (outcome.refused) severity = Severity::warning;
+  report::Report report{severity, by, outcome.said + (outcome.refused ? " (refused)" : "")};
   // The mode has its own place on the display.
   if (outcome.said != set::name_of(controls_.look().state.mode))
-    news_.tell({outcome.said, outcome.refused});
-  tell_screen();
+    report.notice = {outcome.refused ? Severity::warning : Severity::info, "", outcome.said};
+  parts_.reports.announce(report);
+  const std::string line = line_of(report);
+  recorder_.offer_event(now_ns(), line);
+  service::status(line);
+  show_facts();
   if (changed_) changed_();
   return outcome;
 }
 
-void Rig::publish() {
+void Rig::publish_look() {
   look_.set(controls_.look());
   const bool review = controls_.look().state.mode == Mode::review;
   if (review && !review_) {
     pipeline_.reviewed().try_pop();
     review_ = std::make_unique<Review>(recorder_.status().directory, loaded_.text,
-                                       pipeline_.reviewed(), inbox_, parts_.note);
+                                       pipeline_.reviewed(), inbox_, parts_.reports);
   } else if (!review && review_) {
     review_->stop();
     ended_reviews_.push_back(std::move(review_));
@@ -237,67 +194,59 @@ std::optional<std::string> Rig::carry_out(Request request) {
   return std::nullopt;
 }
 
-// All or nothing: a set with a fault leaves this one running.
 std::optional<std::string> Rig::change_set(int next) {
-  service::feed_watchdog();
-  try {
-    const std::filesystem::path& file = loaded_.set.file;
-    next_ = load_whole_set(next == 0 ? file : neighbour(file, next));
-    parts_.loop.exit();
-    return std::nullopt;
-  } catch (const std::exception& error) {
-    parts_.note.again(std::string(error.what()) + "\nthe set stays as it was");
-    const std::string what = error.what();
-    const std::string first = what.substr(0, what.find('\n'));
-    faults_.pass("the set stays as it was", first);
-    return "the set stays as it was: " + first;
-  }
+  std::optional<std::string> why_not = parts_.sets.change(next);
+  if (!why_not) parts_.loop.exit();
+  return why_not;
 }
 
-void Rig::inbox() {
+void Rig::take_inbox() {
   for (const Event event : inbox_.take()) {
     const State before = controls_.look().state;
     const Outcome outcome = controls_.happened(event);
     if (controls_.look().state == before) continue;
     if (event == Event::good_frame)
-      publish();
+      publish_look();
+    else if (event == Event::camera_lost)
+      apply({"camera lost", false, {}}, "rig", Severity::error);
+    else if (event == Event::camera_back)
+      apply({"camera is back", false, {}}, "rig");
     else
-      tell(event == Event::camera_lost   ? Outcome{"camera lost", false, {}}
-           : event == Event::camera_back ? Outcome{"camera is back", false, {}}
-                                         : outcome,
-           "rig");
+      apply(outcome, "rig");
   }
   if (inbox_.finished()) parts_.loop.exit();
 }
 
 void Rig::tick() {
-  for (const Press& press : presses_.tick(now_ns())) act(press);
+  desk_->tick(now_ns());
   look_at_recorder();
   std::erase_if(ended_reviews_, [](const auto& review) { return review->done(); });
   if (++ticks_ % ticks_a_second == 0) {
-    for (Device& device : devices_) device.counts.tell(device.buttons->counters());
-    look_at_set_file();
+    desk_->count();
+    if (!controls_.look().state.recording) parts_.sets.look_at_file();
+    if (parts_.sets.has_next()) parts_.loop.exit();
     free_bytes_ = recorder_.free_bytes();
   }
-  if (ticks_ % ticks_a_page == 0) tell_screen();
+  if (ticks_ % ticks_a_page == 0) show_facts();
 }
 
 void Rig::look_at_recorder() {
   const output::RecorderStatus status = recorder_.status();
-  const auto tell_of = [&](std::uint64_t& known, std::uint64_t now, Event event,
-                           const std::string& said) {
+  const auto announce = [&](std::uint64_t& known, std::uint64_t now, Event event,
+                            const std::string& said, Severity severity) {
     if (now == known) return;
     known = now;
     controls_.happened(event);
-    tell({said, false, {}}, "recorder");
+    apply({said, false, {}}, "recorder", severity);
   };
-  tell_of(failures_, status.failures, Event::recorder_failed, "take ended, " + status.fault);
-  tell_of(finished_takes_, status.finished_takes, Event::take_finished,
-          "take " + status.directory.filename().string() + " is finished");
+  announce(failures_, status.failures, Event::recorder_failed, "take ended, " + status.fault,
+           Severity::error);
+  announce(finished_takes_, status.finished_takes, Event::take_finished,
+           "take " + status.directory.filename().string() + " is finished", Severity::info);
 }
 
-void Rig::tell_screen() {
-  if (!parts_.tell) return;
+void Rig::show_facts() {
+  if (!parts_.show_facts) return;
   const output::RecorderStatus recorder = recorder_.status();
   RigFacts facts;
   facts.look = controls_.look();
@@ -306,17 +255,9 @@ void Rig::tell_screen() {
   facts.frames_lost = recorder.dropped;
   facts.recorder_fault = recorder.fault;
   facts.free_bytes = free_bytes_;
-  facts.news = news_.fresh();
-  facts.faults = faults_.words();
-  parts_.tell(std::move(facts));
-}
-
-void Rig::look_at_set_file() {
-  std::error_code gone;
-  const auto time = std::filesystem::last_write_time(loaded_.set.file, gone);
-  if (gone || controls_.look().state.recording || !set_file_.is_changed(time)) return;
-  parts_.note.again(loaded_.set.file.string() + ": the file has changed");
-  change_set(0);
+  facts.news = parts_.reports.news();
+  facts.troubles = parts_.reports.troubles();
+  parts_.show_facts(std::move(facts));
 }
 
 void Rig::feed_watchdog() {

@@ -11,8 +11,6 @@
 #include "daemon/output/osd_painter.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/pipeline/channel.hpp"
-#include "daemon/pipeline/drop_count.hpp"
-#include "daemon/pipeline/newest.hpp"
 #include "daemon/set/names.hpp"
 #include "drivers/display_drivers.hpp"
 #include "drivers/display_lifeline.hpp"
@@ -41,8 +39,8 @@ struct Picture {
   }
 };
 
-// Rate and median latency of what was shown in the last second, or of the last two pictures, read
-// off twice a second: figures that change with every picture cannot be read.
+// Measures rate and median latency over the last second, or over the last two pictures. The figures
+// change twice a second: nobody can read figures that change with every picture.
 class PaceMeter {
  public:
   void shown(std::int64_t now_ns, double latency_s) {
@@ -101,7 +99,7 @@ struct Screen::Impl {
   pipeline::Mailbox<Picture> pictures;
   pipeline::Newest<RigFacts> rig{{}};
 
-  // The thread's own.
+  // Only the thread uses these.
   DisplayLifeline life;
   std::optional<output::OsdPainter> painter;
   DisplayMode painted_for;
@@ -129,7 +127,7 @@ void Screen::Impl::run() {
   pipeline::DropCount drops(parts.metrics, "screen", pictures);
   while (!pictures.finished()) {
     look_after(pictures.pop_for(words_interval));
-    drops.tell();
+    drops.update();
   }
   life.close();
 }
@@ -166,7 +164,7 @@ void Screen::Impl::put(const output::OsdPage& next, bool fresh) {
   if (!event) return;
   const DeviceTrouble& trouble = std::get<DeviceTrouble>(*event);
   parts.metrics.count("screen: device trouble");
-  parts.note.again(trouble.device + ": " + trouble.what);
+  parts.reports({report::Severity::error, trouble.device, trouble.what});
 }
 
 Screenful Screen::Impl::compose(const DisplayMode& mode, const output::OsdPage& next) {
@@ -195,7 +193,7 @@ void Screen::Impl::read_back() {
   try {
     output::write_png(parts.directory / "screen.png", life.display()->read_back());
   } catch (const Error& error) {
-    parts.note(error.what());
+    parts.reports(report::once({report::Severity::error, "", error.what()}));
   }
 }
 
@@ -217,7 +215,7 @@ void Screen::show(const pipeline::Shot& shot, std::shared_ptr<const Plate> pictu
     metrics_.shown(shown.latency_s(monotonic_ns()));
 }
 
-void Screen::tell(RigFacts facts) {
+void Screen::show(RigFacts facts) {
   if (impl_) impl_->rig.set(std::move(facts));
 }
 

@@ -9,7 +9,7 @@
 #include "daemon/output/osd_page.hpp"
 #include "daemon/pipeline/metrics.hpp"
 #include "daemon/pipeline/shot.hpp"
-#include "daemon/rig/notes.hpp"
+#include "daemon/report/reports.hpp"
 #include "daemon/rig/osd.hpp"
 #include "daemon/set/set.hpp"
 
@@ -22,10 +22,10 @@ namespace previz::rig {
 class Screen {
  public:
   struct Parts {  // outlive the screen
-    Notes& note;
+    report::Reports& reports;
     pipeline::Metrics& metrics;
     std::filesystem::path directory;
-    // Called with every screenful as it is shown, read back, and the words in it; or empty.
+    // Called with every screenful that is shown, as it is read back, and the words in it; or empty.
     std::function<void(const Plate&, const output::OsdPage&)> on_screen;
   };
 
@@ -35,9 +35,9 @@ class Screen {
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
 
-  // Neither waits; from any thread. The latest of each is what is seen.
+  // Both return at once and may be called from any thread. The latest of each is shown.
   void show(const pipeline::Shot& shot, std::shared_ptr<const Plate> picture);
-  void tell(RigFacts facts);
+  void show(RigFacts facts);
 
  private:
   struct Impl;

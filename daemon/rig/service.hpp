@@ -1,4 +1,4 @@
-// What systemd is told of the rig: ready, reloading, stopping, and that frames advance.
+// Reports to systemd: that the rig is ready, that it stops, and that frames advance.
 #pragma once
 
 #include <chrono>
@@ -21,10 +21,9 @@ struct Progress {
 };
 Progress progress_of(const pipeline::MetricsSnapshot& metrics, const State& state, bool has_screen);
 
-// Whether everything that has something to do has done something: cameras that are there deliver,
-// what they deliver is shown (but not in standby), on the screen too if there is one, and lights
-// the scene. A rig without a camera waits for it, and is well; so does one that opens its GPU
-// again.
+// True if everything that has something to do has done something: cameras that are there deliver
+// frames, the frames are shown (but not in standby), on the screen too if there is one, and light
+// frames light the scene. A rig that waits for its camera, or opens its GPU again, is well.
 bool advances(const Progress& before, const Progress& now);
 
 // The other end of systemd's notification socket; outside systemd every call does nothing.

@@ -193,7 +193,8 @@ bool soak(double minutes) {
     stop.request_stop();
   });
   std::ostringstream log;
-  const pipeline::MetricsSnapshot metrics = rig::run_live(options, log);
+  report::Reports reports(report::lines_to(log));
+  const pipeline::MetricsSnapshot metrics = rig::run_live(options, reports);
   watch.join();
 
   std::printf("%.1f minutes, %.1f frames a second captured, %.1f rendered\n", metrics.seconds / 60,

@@ -40,7 +40,7 @@ struct WaitedInVain : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-// Until the condition, whose change `news` announces, holds. `seen` tells what there was instead.
+// Until the condition, whose change `news` announces, holds. `seen` says what there was instead.
 template <typename Condition, typename Seen>
 void await(std::condition_variable& news, std::unique_lock<std::mutex>& lock, Condition condition,
            Seen seen) {
@@ -72,10 +72,11 @@ inline pipeline::MetricsSnapshot run_crewed(rig::LiveOptions options,
     }
     stop.request_stop();
   });
-  return rig::run_live(options, out);
+  report::Reports reports(report::lines_to(out));
+  return rig::run_live(options, reports);
 }
 
-// Frames that were rendered, or dropped on the way there by a cause that is told: of those
+// Frames that were rendered, or dropped on the way there by a cause that is counted: of those
 // captured, all.
 inline std::uint64_t accounted_for(const pipeline::MetricsSnapshot& metrics) {
   std::uint64_t frames = metrics.stages.at("render").frames;

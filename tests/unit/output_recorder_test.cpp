@@ -284,7 +284,7 @@ TEST(Recorder, ASlowDiskCostsFramesThatAreCounted) {
   RecorderOptions options = options_in(directory.path());
   options.queue_bytes = 3 * picture(0)->bytes.size();
   std::vector<std::string> notes;
-  options.note = [&](const std::string& what) { notes.push_back(what); };
+  options.note = [&](const report::Report& what) { notes.push_back(line_of(what)); };
   constexpr std::uint64_t offered = 400;
   std::vector<FramePtr> pictures;
   for (std::uint64_t i = 0; i < offered; ++i) pictures.push_back(picture(i));

@@ -45,6 +45,7 @@ class RenderSession : public testing::Test {
   }
   test::TemporaryDirectory directory_;
   std::ostringstream out_;
+  report::Reports reports_{report::lines_to(out_)};
 };
 
 TEST_F(RenderSession, EveryFrameHasItsFilesAndItsRecord) {
@@ -260,7 +261,7 @@ TEST_F(RenderSession, ARangeBehindTheEndIsRefused) {
 // Live: nothing vanishes. Every frame of the camera was shown or is counted as dropped, with cause.
 TEST_F(RenderSession, LiveAccountsForEveryFrame) {
   test::write_small_take(directory_.path());
-  const pipeline::MetricsSnapshot snapshot = rig::run_live(live_options(), out_);
+  const pipeline::MetricsSnapshot snapshot = rig::run_live(live_options(), reports_);
   std::uint64_t accounted = snapshot.stages.at("display").frames;
   for (const auto& [name, stage] : snapshot.stages)
     for (const auto& [cause, frames] : stage.dropped) accounted += frames;
@@ -275,7 +276,7 @@ TEST_F(RenderSession, LiveAccountsForEveryFrame) {
 // quality.scale is of the preview only.
 TEST_F(RenderSession, LiveShowsThePreviewAtTheSetsScaleAndOfflineIsFullSize) {
   test::write_small_take(directory_.path(), false, "scale = 0.5\n");
-  rig::run_live(live_options(), out_);
+  rig::run_live(live_options(), reports_);
   const Plate last = to_plate(small_take_frame(small_take_frames - 1));
   const Plate half = pipeline::scaled(last, 0.5, lighting::Response(ResponseCurve{}, 8));
   const Plate shown = output::read_png(directory_ / "live/picture.png");
@@ -297,7 +298,7 @@ TEST_F(RenderSession, LiveFillsTheLightFromTheFilmCamera) {
   options.on_shown = [&](const pipeline::Shot& shot, const rig::Look&) {
     if (shot.light) stop.request_stop();
   };
-  const pipeline::MetricsSnapshot metrics = rig::run_live(options, out_);
+  const pipeline::MetricsSnapshot metrics = rig::run_live(options, reports_);
   EXPECT_GT(metrics.stages.at("lighting").frames, 0u);
   EXPECT_NE(out_.str().find("filled by the rule \"observer\""), std::string::npos) << out_.str();
 }
@@ -313,7 +314,7 @@ TEST_F(RenderSession, LiveStopsWhenAsked) {
       std::this_thread::sleep_for(std::chrono::milliseconds(20));  // until something was shown
     stop.request_stop();
   });
-  EXPECT_GT(rig::run_live(options, out_).stages.at("display").frames, 0u);
+  EXPECT_GT(rig::run_live(options, reports_).stages.at("display").frames, 0u);
 }
 
 }  // namespace post_render_test

@@ -115,13 +115,12 @@ TEST_F(RigCameras, WhatADeviceCountsIsInTheMetrics) {
   set::Set set = replayed();
   set.observer.faults = {"disconnect@2+0s"};
   std::ostringstream out;
-  Notes note(out);
+  report::Reports reports(report::lines_to(out));
   pipeline::Metrics metrics;
-  Faults faults;
   for (int loaded = 1; loaded <= 2; ++loaded) {
     const Cameras cameras = open_cameras(set, /*loop=*/true);
     CameraSource source(*cameras.observer, "observer", "film camera",
-                        {{}, note, metrics, faults, 1.0, {}});
+                        {{}, reports, metrics, 1.0, {}});
     for (int i = 0; i < 4; ++i) ASSERT_TRUE(source.next());
     const pipeline::MetricsSnapshot snapshot = metrics.snapshot(1);
     const DeviceCounters& counted = snapshot.devices.at("observer");

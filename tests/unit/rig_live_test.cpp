@@ -19,7 +19,6 @@
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/post/render.hpp"
-#include "daemon/rig/loaded_set.hpp"
 #include "daemon/rig/service.hpp"
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
@@ -412,19 +411,6 @@ TEST_F(RigLive, ASetThatCannotStartIsTriedOnce) {
     std::ofstream(directory_ / "set.toml") << other("samples = 2", "samples = 4");
     until([](const Shown& s) { return s.shot.samples == 4; });
   });
-}
-
-TEST(SetFileWatch, WaitsUntilAFileIsWritten) {
-  const rig::SetFileWatch::Time start{};
-  const auto at = [&](int second) { return start + std::chrono::seconds(second); };
-  rig::SetFileWatch watch(start);
-  EXPECT_FALSE(watch.is_changed(start));
-  EXPECT_FALSE(watch.is_changed(at(1)));  // just changed
-  EXPECT_FALSE(watch.is_changed(at(2)));  // and once more
-  EXPECT_TRUE(watch.is_changed(at(2)));
-  EXPECT_FALSE(watch.is_changed(at(2)));  // told once
-  EXPECT_FALSE(watch.is_changed(start));  // an older file put in its place
-  EXPECT_TRUE(watch.is_changed(start));
 }
 
 // The buttons of a replayed take are pressed again, at its own times.

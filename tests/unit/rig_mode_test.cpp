@@ -149,5 +149,12 @@ TEST(Modes, RecordingRunsOnThroughEveryChangeOfMode) {
     }
 }
 
+TEST(ModeTable, EveryModeCanBeWishedFor) {
+  State anything;
+  anything.has_good = anything.has_take = true;
+  for (const auto& [name, mode] : set::names(Mode{}))
+    EXPECT_EQ(step(anything, wish_for(mode)).state.mode, mode) << name;
+}
+
 }  // namespace rig_mode_test
 }  // namespace previz::rig

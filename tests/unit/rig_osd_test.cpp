@@ -5,9 +5,6 @@
 
 #include <algorithm>
 
-#include "daemon/rig/faults.hpp"
-#include "daemon/rig/news_ticker.hpp"
-
 namespace previz::rig {
 namespace rig_osd_test {
 
@@ -123,20 +120,21 @@ TEST(OsdWords, FaultsInPlainWordsAndWhatAButtonDid) {
   RigFacts rig = in(Mode::live);
   rig.look.state.camera_lost = true;
   const std::string moved = "card moved to +0.010 +0.000 +0.000 m";
-  rig.news = {{moved}};
+  rig.news = {{report::Severity::info, "", moved}};
   EXPECT_EQ(osd_page(rig, &picture, pace).notices,
             (Texts{{"film camera: no pictures come", OsdTone::alarm}, {moved}}));
-  rig.faults = {"film camera: was unplugged; it is opened anew", "light camera: is stalled"};
+  rig.troubles = {report::lasting("film camera", "was unplugged; it is opened anew"),
+                  report::passing("light camera", "is stalled")};
   rig.recorder_fault = "the disk is almost full";
   rig.frames_lost = 12;
-  rig.news.push_back({"recording goes on; stop it first", true});
+  rig.news.push_back({report::Severity::warning, "", "recording goes on; stop it first"});
   EXPECT_EQ(osd_page(rig, &picture, pace).notices,
-            (Texts{{rig.faults[0], OsdTone::alarm},
-                   {rig.faults[1], OsdTone::alarm},
+            (Texts{{"film camera: was unplugged; it is opened anew", OsdTone::alarm},
+                   {"light camera: is stalled", OsdTone::alarm},
                    {"recording ended: the disk is almost full", OsdTone::alarm},
                    {"12 frames are missing in the take: the disk is too slow", OsdTone::alarm},
                    {moved},
-                   {rig.news[1].what, OsdTone::warning}}));
+                   {"recording goes on; stop it first", OsdTone::warning}}));
 }
 
 TEST(OsdWords, BeforeTheFirstPicture) {
@@ -158,40 +156,6 @@ TEST(OsdWords, FactsOfAShot) {
   const PictureFacts facts = facts_of(shot);
   EXPECT_EQ(facts.tags, 3);
   EXPECT_NEAR(facts.deviation_mm, 0.3, 1e-12);
-}
-
-TEST(NewsTicker, EachStaysLongEnoughToBeReadAlsoWhereTheNextFollowsAtOnce) {
-  NewsTicker ticker;
-  const NewsTicker::Clock::time_point begin{};
-  const auto later = [&](int milliseconds) {
-    return begin + std::chrono::milliseconds(milliseconds);
-  };
-  ticker.tell({"recording ended"}, begin);
-  ticker.tell({"snapshot"}, later(1000));
-  ticker.tell({"recording goes on", true}, later(1001));
-  const std::vector<News> all = {{"recording ended"}, {"snapshot"}, {"recording goes on", true}};
-  EXPECT_EQ(ticker.fresh(later(1001)), all);
-  ticker.tell({"snapshot"}, later(2000));  // again: it stands once, at the end
-  EXPECT_EQ(ticker.fresh(later(2000)), (std::vector<News>{all[0], all[2], all[1]}));
-  ticker.tell({"3 samples"}, later(2000));
-  EXPECT_EQ(ticker.fresh(later(2000)), (std::vector<News>{all[2], all[1], {"3 samples"}}));
-  EXPECT_EQ(ticker.fresh(later(4500)), (std::vector<News>{all[1], {"3 samples"}}));
-  EXPECT_TRUE(ticker.fresh(later(5000)).empty());
-}
-
-TEST(Faults, StayUntilTheDeviceIsWellAndLongEnoughToBeRead) {
-  Faults faults;
-  const Faults::Clock::time_point begin{};
-  faults.tell("film camera", "was unplugged", begin);
-  faults.tell("pedal", "sends nonsense", begin);
-  faults.well("pedal");
-  const std::vector<std::string> both = {"film camera: was unplugged", "pedal: sends nonsense"};
-  EXPECT_EQ(faults.words(begin + std::chrono::seconds(3)), both);
-  EXPECT_EQ(faults.words(begin + Faults::reading_time),
-            (std::vector<std::string>{"film camera: was unplugged"}));
-  EXPECT_EQ(faults.words(begin + std::chrono::hours(1)).size(), 1u);
-  faults.well("film camera");
-  EXPECT_TRUE(faults.words(begin + std::chrono::hours(1)).empty());
 }
 
 }  // namespace rig_osd_test

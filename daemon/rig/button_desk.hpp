@@ -1,0 +1,80 @@
+// The buttons of a set: their devices are read, presses are recognised, and what the set maps to a
+// press is asked for.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "daemon/pipeline/metrics.hpp"
+#include "daemon/report/reports.hpp"
+#include "daemon/rig/cameras.hpp"
+#include "daemon/rig/event_loop.hpp"
+#include "daemon/rig/press.hpp"
+#include "daemon/set/actions.hpp"
+#include "daemon/set/set.hpp"
+#include "drivers/buttons.hpp"
+
+namespace previz::rig {
+
+class ButtonDesk {
+ public:
+  struct Device {
+    std::unique_ptr<Buttons> buttons;
+    std::int64_t clock_offset_ns = 0;  // added to its timestamps: the cameras' clock less its own
+  };
+  struct Parts {  // outlive the desk
+    EventLoop& loop;
+    report::Reports& reports;
+    pipeline::Metrics& metrics;
+  };
+  // All are called on the loop's thread.
+  struct Asks {
+    // Comes before every event that is read; false leaves the event for another desk.
+    std::function<bool()> listens;
+    // A button went down or up; true if that ended a refinement.
+    std::function<bool(const ButtonEvent&)> edge;
+    // `ended_refinement`: the same press did.
+    std::function<void(const set::Action&, const std::string& button, bool ended_refinement)> act;
+  };
+
+  // `mapped`: what the set maps to presses. Devices are read from now on while the loop runs.
+  ButtonDesk(const std::vector<set::Button>& mapped, std::vector<Device> devices, Parts parts,
+             Asks asks);
+  ButtonDesk(const ButtonDesk&) = delete;
+  ButtonDesk& operator=(const ButtonDesk&) = delete;
+
+  // Acts on the presses that became certain by the passing of time (PressRecognizer::tick).
+  void tick(std::int64_t now_ns);
+  // Brings the devices' counters into the metrics.
+  void count();
+
+ private:
+  struct Watched {
+    Device device;
+    pipeline::DeviceCounts counts;
+    std::unique_ptr<EventLoop::Watch> watch;
+  };
+
+  void read(Watched& watched);
+  void edge(const ButtonEvent& event);
+  void act(const Press& press);
+
+  const std::vector<set::Button> mapped_;
+  const Parts parts_;
+  const Asks asks_;
+  PressRecognizer presses_;
+  std::set<std::string> ended_refinement_;  // buttons whose running press did
+  std::vector<Watched> devices_;
+};
+
+// The devices of every button that the set maps: those of the replayed session, those that are
+// plugged in, and `more`, or empty. Throws previz::Error naming a button that cannot be understood.
+std::vector<ButtonDesk::Device> open_button_devices(
+    const set::Set& set, const Cameras& cameras,
+    const std::function<std::vector<std::unique_ptr<Buttons>>()>& more);
+
+}  // namespace previz::rig

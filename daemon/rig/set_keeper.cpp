@@ -1,0 +1,90 @@
+#include "daemon/rig/set_keeper.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include "daemon/rig/service.hpp"
+#include "drivers/session/files.hpp"
+
+namespace previz::rig {
+
+using report::Severity;
+
+LoadedSet load_whole_set(const std::filesystem::path& file) {
+  LoadedSet loaded;
+  std::error_code missing;  // reading the file reports that in better words
+  loaded.changed = std::filesystem::last_write_time(file, missing);
+  loaded.text = session::read_file(file);
+  loaded.set = set::parse_set(loaded.text, file);
+  loaded.scene = scene::load_scene(loaded.set);
+  return loaded;
+}
+
+std::filesystem::path neighbour(const std::filesystem::path& file, int next) {
+  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (entry.path().extension() == ".toml" && entry.is_regular_file())
+      files.push_back(entry.path().filename());
+  std::ranges::sort(files);
+  const auto at = std::ranges::lower_bound(files, file.filename()) - files.begin();
+  const auto count = static_cast<std::ptrdiff_t>(files.size());
+  return count == 0
+             ? file
+             : file.parent_path() / files[static_cast<std::size_t>((at + next + count) % count)];
+}
+
+SetKeeper::SetKeeper(const std::filesystem::path& file, std::function<void(set::Set&)> override_set,
+                     report::Reports& reports)
+    : override_set_(std::move(override_set)),
+      reports_(reports),
+      running_(load_whole_set(file)),
+      file_(running_.changed) {
+  override_set_(running_.set);
+}
+
+std::optional<std::string> SetKeeper::change(int next) {
+  service::feed_watchdog();  // reading a large scene takes its time
+  try {
+    const std::filesystem::path& file = running_.set.file;
+    next_ = load_whole_set(next == 0 ? file : neighbour(file, next));
+    override_set_(next_->set);
+    return std::nullopt;
+  } catch (const std::exception& error) {
+    const std::string what = error.what();
+    const std::string first = what.substr(0, what.find('\n'));
+    reports_({Severity::error, "", what + "\nthe set stays as it was", "",
+              report::passing("the set stays as it was", first)});
+    return "the set stays as it was: " + first;
+  }
+}
+
+void SetKeeper::look_at_file() {
+  std::error_code gone;
+  const auto time = std::filesystem::last_write_time(running_.set.file, gone);
+  if (gone || !file_.is_changed(time)) return;
+  reports_({Severity::info, running_.set.file.string(), "the file has changed"});
+  change(0);
+}
+
+void SetKeeper::run(LoadedSet set) {
+  running_ = std::move(set);
+  file_ = SetFileWatch(running_.changed);
+}
+
+void SetKeeper::begin_next() {
+  before_ = std::move(running_);
+  run(*std::exchange(next_, std::nullopt));
+}
+
+bool SetKeeper::go_back(const std::string& why) {
+  if (!before_) return false;
+  reports_(
+      {Severity::error, "", why + "\nback to the set as it was: " + before_->set.file.string()});
+  // The same file is not tried again until it is changed again.
+  if (before_->set.file == running_.set.file) before_->changed = running_.changed;
+  run(*std::exchange(before_, std::nullopt));
+  return true;
+}
+
+}  // namespace previz::rig

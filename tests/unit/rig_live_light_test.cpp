@@ -1,0 +1,103 @@
+// The light beside the live pictures, and what is odd about a picture, without a rig.
+#include "daemon/rig/live_light.hpp"
+
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "daemon/rig/live_pipeline.hpp"
+#include "tests/support/lighting_pictures.hpp"
+
+namespace previz::rig {
+namespace rig_live_light_test {
+
+class LiveLightTest : public testing::Test {
+ protected:
+  LiveLightTest() { set_.file = "stage.toml"; }
+
+  LiveLight::Parts parts() { return {set_, look_, reports_, metrics_}; }
+  static LightCameraCalibration camera() {
+    LightCameraCalibration camera = test::fisheye_camera(32);
+    camera.world_from_camera = test::looking(0, 90);
+    return camera;
+  }
+  static FramePtr grey(int size, std::uint64_t sequence) {
+    Frame frame = *test::make_frame(
+        size, size, 1,
+        std::vector<glm::dvec3>(std::size_t(size) * std::size_t(size), glm::dvec3(0.5)));
+    frame.sequence = sequence;
+    return std::make_shared<Frame>(std::move(frame));
+  }
+  // Runs the light camera's stages over these frames to their end; returns the light there is then.
+  pipeline::LightPtr run(LiveLight& light, std::vector<FramePtr> frames) {
+    pipeline::StageThreads stages(metrics_, {});
+    light.start(stages, [frames = std::move(frames), next = std::size_t{0}]() mutable -> FramePtr {
+      return next < frames.size() ? frames[next++] : nullptr;
+    });
+    stages.wait();
+    return light.light_for({}, set::LightMode::image);
+  }
+
+  set::Set set_;
+  pipeline::Newest<Look> look_{Look{}};
+  std::ostringstream log_;
+  report::Reports reports_{report::lines_to(log_)};
+  pipeline::Metrics metrics_;
+};
+
+TEST_F(LiveLightTest, IsMadeOfTheLightCamerasFrames) {
+  LiveLight light(parts(), camera(), ObserverCalibration{});
+  EXPECT_TRUE(light.needs_frames());
+  EXPECT_EQ(light.light_for({}, set::LightMode::image), nullptr);  // none was seen yet
+  const pipeline::LightPtr seen = run(light, {grey(32, 3)});
+  ASSERT_TRUE(seen);
+  EXPECT_EQ(seen->sequences, std::vector<std::uint64_t>{3});
+  EXPECT_TRUE(reports_.troubles().empty());
+}
+
+TEST_F(LiveLightTest, AFrameThatCannotBeUsedIsReportedShownAndCounted) {
+  LiveLight light(parts(), camera(), ObserverCalibration{});
+  EXPECT_EQ(run(light, {grey(8, 1), grey(8, 2)}), nullptr);
+  EXPECT_EQ(log_.str().find("light: light frame 1 is left out"), 0u) << log_.str();
+  EXPECT_EQ(log_.str().find("light frame 2"), std::string::npos) << "said twice";
+  EXPECT_EQ(metrics_.snapshot(1).stages.at("lighting").dropped.at("not usable"), 2u);
+  ASSERT_EQ(reports_.troubles().size(), 1u);
+  EXPECT_EQ(reports_.troubles()[0].source, "light");
+  EXPECT_FALSE(reports_.troubles()[0].lasts);
+}
+
+TEST_F(LiveLightTest, RestsWithTracking) {
+  Look refining;
+  refining.state.mode = Mode::refine;
+  look_.set(refining);
+  LiveLight light(parts(), camera(), ObserverCalibration{});
+  EXPECT_EQ(run(light, {grey(32, 1)}), nullptr);
+}
+
+TEST_F(LiveLightTest, ASetsOwnLightNeedsNoFrames) {
+  set_.lighting.from = set::LightFrom::set;
+  LiveLight light(parts(), {}, ObserverCalibration{});
+  EXPECT_FALSE(light.needs_frames());
+  EXPECT_TRUE(light.light_for({}, set::LightMode::image));
+  run(light, {grey(32, 1)});  // there to be recorded
+  EXPECT_EQ(metrics_.snapshot(1).stages.at("light camera").frames, 1u);
+}
+
+TEST(CountPicture, WhatIsOddIsCountedAndReportedOnce) {
+  std::ostringstream log;
+  report::Reports reports(report::lines_to(log));
+  pipeline::Metrics metrics;
+  pipeline::Shot shot;
+  count_picture(shot, metrics, reports);
+  EXPECT_TRUE(metrics.snapshot(1).counts.empty());
+  shot.untouched = "pose lost: no tag in the picture";
+  shot.counters.dropped_negative = 3;
+  for (int times = 0; times < 2; ++times) count_picture(shot, metrics, reports);
+  EXPECT_EQ(metrics.snapshot(1).counts.at("plate untouched: " + shot.untouched), 2u);
+  EXPECT_EQ(metrics.snapshot(1).counts.at("samples negative"), 6u);
+  EXPECT_EQ(metrics.snapshot(1).counts.at("samples not finite"), 0u);
+  EXPECT_EQ(log.str(), "plate untouched: pose lost: no tag in the picture\n");
+}
+
+}  // namespace rig_live_light_test
+}  // namespace previz::rig

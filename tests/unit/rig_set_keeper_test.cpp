@@ -1,0 +1,115 @@
+// Which set runs, from files alone, without a rig.
+#include "daemon/rig/set_keeper.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "drivers/error.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace previz::rig {
+namespace rig_set_keeper_test {
+
+class SetKeeperTest : public testing::Test {
+ protected:
+  void write(const std::string& file, const std::string& text) {
+    std::ofstream(folder_ / file) << text;
+    const auto time = std::filesystem::last_write_time(folder_ / file);
+    std::filesystem::last_write_time(folder_ / file, time + std::chrono::seconds(++writes_));
+  }
+  SetKeeper keeper() {
+    return {folder_ / "b.toml", [](set::Set& set) { set.quality.samples = 7; }, reports_};
+  }
+  bool says(const std::string& words) const { return log_.str().find(words) != std::string::npos; }
+
+  test::TemporaryDirectory folder_;
+  std::ostringstream log_;
+  report::Reports reports_{report::lines_to(log_)};
+  int writes_ = 0;
+};
+
+TEST_F(SetKeeperTest, ChangesToTheNeighbourAndRoundTheEndWithTheSameOverrides) {
+  for (const char* name : {"a", "b", "c"})
+    write(name + std::string(".toml"), "set.name = \"" + std::string(name) + "\"\n");
+  SetKeeper sets = keeper();
+  EXPECT_EQ(sets.running().set.name, "b");
+  for (const char* expected : {"c", "a", "b"}) {
+    EXPECT_EQ(sets.change(1), std::nullopt);
+    ASSERT_TRUE(sets.has_next());
+    sets.begin_next();
+    EXPECT_FALSE(sets.has_next());
+    EXPECT_EQ(sets.running().set.name, expected);
+    EXPECT_EQ(sets.running().set.quality.samples, 7);
+  }
+  sets.change(-1);
+  sets.begin_next();
+  EXPECT_EQ(sets.running().set.name, "a");
+}
+
+TEST_F(SetKeeperTest, ASetWithAFaultLeavesTheOldOneAndSaysWhy) {
+  write("b.toml", "set.name = \"good\"\n");
+  SetKeeper sets = keeper();
+  write("b.toml", "set.name = 3\n");
+  const std::optional<std::string> why_not = sets.change(0);
+  ASSERT_TRUE(why_not);
+  EXPECT_EQ(why_not->find("the set stays as it was: "), 0u);
+  EXPECT_NE(why_not->find("b.toml:1:12: set.name: "), std::string::npos) << *why_not;
+  EXPECT_EQ(why_not->find('\n'), std::string::npos);
+  EXPECT_FALSE(sets.has_next());
+  EXPECT_EQ(sets.running().set.name, "good");
+  EXPECT_TRUE(says("\nthe set stays as it was\n")) << log_.str();
+  ASSERT_EQ(reports_.troubles().size(), 1u);
+  EXPECT_EQ(line_of(reports_.troubles()[0]), *why_not);
+  EXPECT_THROW(keeper(), Error);
+}
+
+TEST_F(SetKeeperTest, AFileThatHasChangedAndRestsIsReadAgain) {
+  write("b.toml", "set.name = \"old\"\n");
+  SetKeeper sets = keeper();
+  sets.look_at_file();
+  write("b.toml", "set.name = \"new\"\n");
+  sets.look_at_file();
+  EXPECT_FALSE(sets.has_next());  // it may still be being written
+  sets.look_at_file();
+  ASSERT_TRUE(sets.has_next());
+  EXPECT_TRUE(says("b.toml: the file has changed")) << log_.str();
+  sets.begin_next();
+  EXPECT_EQ(sets.running().set.name, "new");
+  sets.look_at_file();
+  sets.look_at_file();
+  EXPECT_FALSE(sets.has_next());
+}
+
+TEST_F(SetKeeperTest, ASetThatDoesNotStartIsTriedOnce) {
+  write("b.toml", "set.name = \"old\"\n");
+  SetKeeper sets = keeper();
+  EXPECT_FALSE(sets.go_back("there is no camera"));  // nothing ran before the first one
+  write("b.toml", "set.name = \"new\"\n");
+  sets.change(0);
+  sets.begin_next();
+  EXPECT_TRUE(sets.go_back("there is no camera"));
+  EXPECT_EQ(sets.running().set.name, "old");
+  EXPECT_TRUE(says("there is no camera\nback to the set as it was: ")) << log_.str();
+  sets.look_at_file();
+  sets.look_at_file();
+  EXPECT_FALSE(sets.has_next());
+  EXPECT_FALSE(sets.go_back("nor is there one now"));
+}
+
+TEST(SetFileWatch, WaitsUntilAFileIsWritten) {
+  const SetFileWatch::Time start{};
+  const auto at = [&](int second) { return start + std::chrono::seconds(second); };
+  SetFileWatch watch(start);
+  EXPECT_FALSE(watch.is_changed(start));
+  EXPECT_FALSE(watch.is_changed(at(1)));  // just changed
+  EXPECT_FALSE(watch.is_changed(at(2)));  // and once more
+  EXPECT_TRUE(watch.is_changed(at(2)));
+  EXPECT_FALSE(watch.is_changed(at(2)));  // reported once
+  EXPECT_FALSE(watch.is_changed(start));  // an older file put in its place
+  EXPECT_TRUE(watch.is_changed(start));
+}
+
+}  // namespace rig_set_keeper_test
+}  // namespace previz::rig
