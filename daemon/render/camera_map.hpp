@@ -1,6 +1,6 @@
-// The camera as a measurement: which pixels of the plate show one real surface alone, and how far
-// it is, so that paths may take that surface's radiance from them (estimator.md, "What makes it
-// fast").
+// The camera as a measurement. The map says which pixels of the plate show a single real surface,
+// and how far away it is, so that paths may take the surface's radiance from them
+// (shaders/README.md, "Camera radiance").
 #pragma once
 
 #include <cstdint>

@@ -20,8 +20,9 @@ struct PlateRadiance {
 PlateRadiance plate_radiance(const Plate& plate, const lighting::Response& response,
                              double exposure);
 
-// How the difference D of the worlds is put onto the camera's Lc where nothing virtual covers it
-// (estimator.md), per channel and on means over the pixel's samples, never sample by sample:
+// The rule by which the difference D of the worlds is put onto the camera's Lc where nothing
+// virtual covers it (shaders/README.md, "The composite"), per channel and on means over the pixel's
+// samples, never sample by sample:
 //   additive  Lc + D                             the paper's; keeps an error in the assumed albedo
 //   ratio     Lc Lm / Lr, Lc where Lr = 0        cancels it, but lights no black surface
 //   hybrid    Lc + D (Lr Lc + s^2) / (Lr^2 + s^2), s^2 the plate's variance plus floor^2
@@ -35,8 +36,8 @@ Layers make_layers(int width, int height, std::int64_t samples);
 
 // Fills in all layers of the pixels from `first` on, row-major, from their sums and the plate (of
 // the whole picture; empty: black). composite = mean(M) mean(Lm) + (1 - mean(M)) U with U by
-// `rule`; with additive that is estimator.md's mean(Lm) + (1 - mean(M)) (Lc - mean(Lr)) without
-// subtracting two large sums.
+// `rule`; with additive that is mean(Lm) + (1 - mean(M)) (Lc - mean(Lr)), but no two large sums are
+// subtracted (shaders/README.md, "The composite").
 void composite(Layers& layers, std::size_t first, std::span<const gpu::GpuPixel> pixels,
                const PlateRadiance& plate, const CompositeRule& rule = {});
 

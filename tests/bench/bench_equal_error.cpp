@@ -1,6 +1,6 @@
-// How much CPU time forms of the difference estimator, and what lacks one of its techniques, need
-// to the same error of the difference image (accuracy.md, "Equal-error time"). Methods take turns
-// within a round; rounds have random numbers of their own.
+// Measures how much CPU time the forms of the difference estimator need to reach the same error of
+// the difference image, complete and with one technique left out (tests/truth/README.md,
+// "Equal-error time"). Methods take turns within a round; rounds have random numbers of their own.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>

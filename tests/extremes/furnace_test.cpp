@@ -4,7 +4,7 @@
 namespace previz::test {
 namespace furnace_test {
 
-constexpr double energy = 1e-3;  // estimator.md's bound
+constexpr double energy = 1e-3;  // the bound of shaders/README.md, "Numerical extremes"
 
 // A plane seen from three angles in an environment of radiance 1. Where directions are chosen by
 // the BSDF alone, there is little chance in it; with light samples, four standard errors.

@@ -36,7 +36,7 @@ struct Measures {
   double psnr = 0;  // dB; identical_psnr where the pictures are the same
   double ssim = 0;
   std::optional<double> noise_diff, noise_virtual;
-  // Not in accuracy.md: the real solution alone, and signed errors of the means, relative.
+  // These have no bound: the real solution alone, and signed errors of the means, relative.
   double e_real = 0;
   double bias_diff = 0, bias_virtual = 0, bias_real = 0;
   // Blocks each rms was taken over; a measure over none is 0.
@@ -68,7 +68,7 @@ double psnr(const Plate& a, const Plate& b);
 // picture; the mean over R, G and B.
 double ssim(const Plate& a, const Plate& b);
 
-// A row of accuracy.md's table of bounds.
+// A row of the table in README.md, "Bounds".
 struct Bounds {
   std::string name;
   double e_diff, e_virtual, e_mask, psnr, ssim;

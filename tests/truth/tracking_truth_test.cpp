@@ -1,6 +1,6 @@
-// The tracker's bounds (accuracy.md, "Pose"): ground truth sets with exact poses and corners, and
-// real photographs and video. All but the committed set live outside the repository: PREVIZ_SHARED,
-// or ../shared beside the sources.
+// The tracker is held to its bounds (README.md, "Pose") by ground truth sets with exact poses and
+// corners, and by real photographs and video. All but the committed set live outside the
+// repository: PREVIZ_SHARED, or ../shared beside the sources.
 #include <gtest/gtest.h>
 
 #include <cmath>

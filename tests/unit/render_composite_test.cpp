@@ -57,7 +57,9 @@ TEST(Composite, SamplesDoNotDependOnHowTheyAreAskedFor) {
   EXPECT_EQ(whole.variance, parts.variance);
 }
 
-// estimator.md: a virtual object over the white half of a black-and-white pixel gives a quarter.
+// A virtual object of radiance 0.5 covers the white half of a black-and-white pixel: the composite
+// is 0.25, where composites of single samples would average to 0.5 (shaders/README.md, "The
+// composite").
 TEST(Composite, CoveredPixelsUseMeansNotSamples) {
   gpu::GpuPixel pixel{};
   // Two samples: one covered (Lm = 0.5, Lr = 1), one not (Lm = Lr = 0).
