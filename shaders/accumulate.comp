@@ -1,12 +1,13 @@
-// Adds the batch's samples to their pixels, in the order of the samples, as two-float sums (P4).
+// Adds the samples of a batch to their pixels, in the order of the samples, as two-float sums
+// (shaders/README.md, "Accumulation").
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shaders/lib/path.glsl"
 
-// high + low += x, exactly up to the rounding of low (Knuth's TwoSum, then renormalised).
-// precise: no reassociation may touch it.
+// Adds x to high + low; only the addition to low rounds (Knuth's TwoSum, then renormalised).
+// `precise` forbids the compiler to reassociate.
 void add_exactly(inout vec4 high, inout vec4 low, vec4 x) {
   precise const vec4 sum = high + x;
   precise const vec4 part = sum - high;
@@ -22,7 +23,7 @@ bool is_finite(vec3 v) {
   return !any(isnan(v)) && !any(isinf(v));
 }
 
-// What cannot be is counted, and the sample is then black in both worlds.
+// Counts a sample that is not finite or is negative, and makes it black in both worlds.
 void reject_impossible(inout vec4 mixed, inout vec4 real, inout vec3 landed) {
   const bool finite = is_finite(mixed.rgb) && is_finite(real.rgb) && is_finite(landed);
   const bool negative = any(lessThan(min(min(mixed.rgb, real.rgb), landed), vec3(0.0)));
@@ -48,7 +49,7 @@ void main() {
     const vec4 aov = sample_aov[slot];
     vec3 landed = has_feature(FEATURE_CAMERA) ? sample_landed[slot].rgb : vec3(0.0);
     reject_impossible(mixed, real, landed);
-    mixed.rgb -= landed;  // a difference by now, which may be below zero
+    mixed.rgb -= landed;  // from here on it may be negative: it holds Lm - Lr of landed paths
     const vec3 diff = mixed.rgb - real.rgb;
     add_exactly(sums.mixed_high, sums.mixed_low, mixed);
     add_exactly(sums.diff_high, sums.diff_low, vec4(diff, aov.w));

@@ -1,4 +1,4 @@
-// One invocation between two segments: the filled queue becomes the active one.
+// Runs between two segments, as one invocation: the queue that was filled becomes the active one.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,4 +1,5 @@
-// What the camera sees of the real world: the first surface at the middle of each pixel.
+// Finds what the camera sees of the real world: the first surface at the middle of each pixel
+// (shaders/README.md, "Camera radiance").
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,5 +1,5 @@
-// Which pixels of the plate show one surface only: no edge of depth is within a pixel of them, nor
-// within a circle of confusion, theirs or that of what is beyond the edge.
+// Finds the pixels of the plate that show a single surface: no depth edge lies within a pixel of
+// them, nor within a circle of confusion, that of the pixel or that of the surface beyond the edge.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -12,19 +12,20 @@
 layout(scalar) buffer PlateBuffer { vec4 plate[]; };
 layout(scalar) readonly buffer SeenBuffer { GpuSeen seen[]; };
 
-// Pixels blurred by more than this are not used.
+// A pixel that is blurred by a larger radius than this, in pixels, is not used.
 const int MOST_BLUR = 6;
-// The inverse depth of a plane is linear over the picture: what a bend adds to it between two
-// neighbours, over the depth.
+// The inverse depth of a plane is linear over the picture. On a smooth surface it departs from
+// linear between two neighbours by no more than this share.
 const float FLATNESS = 1e-2;
 
-// Radius of the circle of confusion, in pixels.
+// Returns the radius of the circle of confusion, in pixels.
 float blur_of(float inverse_depth) {
   if (!has_feature(FEATURE_LENS)) return 0.0;
   return frame.lens_radius * abs(inverse_depth - 1.0 / frame.focus_distance) * frame.focal_px.x;
 }
 
-// Whether the pixels at both sides show the same smooth surface, as far as their blur matters.
+// Returns whether the pixels on both sides show the same smooth surface. Pixels further away than
+// the blur reaches do not matter.
 bool is_smooth(ivec2 pixel, GpuSeen middle, ivec2 off) {
   const ivec2 size = ivec2(frame.width, frame.height);
   const ivec2 before = pixel - off;

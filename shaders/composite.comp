@@ -1,5 +1,6 @@
-// From a pixel's sums and the plate to its composite, in single precision, and to what the denoiser
-// wants. The rule is daemon/render/composite.hpp's.
+// Makes the composite of each pixel from its sums and the plate, in single precision, and the input
+// of the denoiser. The rule is that of daemon/render/composite.hpp (shaders/README.md, "The
+// composite").
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -13,10 +14,11 @@ layout(scalar) writeonly buffer Signals { vec4 signals[]; };
 layout(scalar) writeonly buffer Variances { vec4 variances[]; };
 layout(scalar) writeonly buffer Surfaces { vec4 surfaces[]; };
 
-// Past it a ratio says nothing, and its square would overflow.
+// Gains are limited to this: a larger ratio means nothing, and its square would overflow.
 const float MOST_GAIN = 1e15;
 
-// Of rounding to codes: the step between the neighbours, squared, over 12.
+// Returns the variance that rounding to codes leaves in the plate: step^2 / 12, the variance of a
+// uniform distribution, with the mean step to the two neighbouring codes.
 vec3 plate_variance(uvec3 codes) {
   const uvec3 low = max(codes, 1u) - 1u;
   const uvec3 high = min(codes + 1u, show.most);
@@ -24,8 +26,9 @@ vec3 plate_variance(uvec3 codes) {
   return step * step / 12.0;
 }
 
-// By how much a difference of one is added to the camera's radiance. Hybrid is counted in the larger
-// of both, whose squares would overflow.
+// Returns the factor by which the difference is multiplied before it is added to the camera's
+// radiance. For hybrid, both terms are first divided by the larger one, because their squares could
+// overflow.
 float gain(float camera, float real, float variance) {
   if (show.composite == COMPOSITE_RATIO) return real > 0.0 ? min(camera / real, MOST_GAIN) : 0.0;
   if (show.composite == COMPOSITE_HYBRID) {
@@ -64,7 +67,7 @@ void main() {
   }
   vec3 real = ((sums.mixed_high.rgb - sums.diff_high.rgb) +
                (sums.mixed_low.rgb - sums.diff_low.rgb)) / samples;
-  // Where only the difference was traced, the camera has measured the real world.
+  // Where only the difference was traced, the camera's measurement stands for the real world.
   if (square_mixed.w > 0.0) {
     real = camera;
     mixed.rgb = camera + diff.rgb;

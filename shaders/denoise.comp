@@ -1,29 +1,33 @@
-// One level of an edge-avoiding wavelet transform, guided by variance: a B3 spline of 5x5 pixels
-// `step` apart, in which neighbours count as far as they show the same surface and differ by no
-// more than their noise (Dammertz et al. 2010, "Edge-Avoiding A-Trous Wavelet Transform"; Schied et
-// al. 2017, "Spatiotemporal Variance-Guided Filtering").
+// One level of an edge-avoiding wavelet transform that is guided by variance. The kernel is a B3
+// spline over 5x5 pixels that are `step` apart. A neighbour's weight falls the less it shows the
+// same surface, and the more it differs than its noise explains (Dammertz et al. 2010,
+// "Edge-Avoiding A-Trous Wavelet Transform"; Schied et al. 2017, "Spatiotemporal Variance-Guided
+// Filtering").
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shaders/lib/denoise.glsl"
 
-// Standard deviations of a difference at which a neighbour's weight has fallen to 1 / e. More blurs
-// what is there, fewer leave noise; 1.5 to 3 differ little. They are those of independent neighbours:
-// with the overlap, coarse levels blend more, and what noise they take away they lose in blur
-// (tests/truth/RESULTS.md).
+// A neighbour's weight has fallen to 1 / e at a difference of so many standard deviations. A larger
+// number blurs detail, a smaller one leaves noise; 1.5 to 3 differ little. The standard deviations
+// are those of independent neighbours. If the overlap were included, coarse levels would blend
+// more, and lose by blur what they gain in noise (tests/truth/RESULTS.md).
 const float NOISE_SCALE = 2.0;
-// Variance, over the sensor's white, squared: far below what 16 bits show.
+// The least variance of a signal, in units of the sensor's white squared: far below what 16 bits
+// show.
 const float LEAST_VARIANCE = 1e-12;
 
-// Neighbours that earlier levels have blended share pixels: with full weights a level leaves a quarter
-// of their variance, where of 13.4 independent ones, as many as the weights are worth, it would leave
-// 1 / 13.4. So the variance falls with this power of the number that the weights are worth.
+// Neighbours that earlier levels have blended share pixels. With full weights, the spline is worth
+// 13.4 neighbours, (sum w)^2 / sum w^2. Of so many independent neighbours a level would leave 1 /
+// 13.4 of the variance, but of overlapping ones it leaves a quarter. So the variance is taken to
+// fall with this power of the number: 13.4^0.535 = 4.
 const float OVERLAP_POWER = 0.535;
 
 const float SPLINE[3] = float[3](0.375, 0.25, 0.0625);
 
-// Squared distance of two pixels' signals over what noise makes of equal ones, mean over channels.
+// Returns the squared difference of two signals over the one that noise alone would cause, as a
+// mean over the channels.
 float signal_distance(Pixel a, Pixel b) {
   const vec3 off = a.signal - b.signal;
   const vec3 expected = NOISE_SCALE * NOISE_SCALE * (a.variance + b.variance) + LEAST_VARIANCE;

@@ -1,5 +1,6 @@
-// Before noise is taken out: a few samples do not know their variance well, so it is at least the mean
-// over a pixel's neighbours; a single sample does not know it at all, so it is that of the neighbours.
+// Prepares the variance for the denoiser. A few samples give a poor estimate of their variance, so
+// it is raised to the mean over the pixel's neighbours. A single sample gives none, so it is
+// estimated from how the neighbours' signals scatter.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,12 +1,13 @@
-// The closest hit of every active path among what its worlds contain. A path in both worlds traces
-// one union ray (estimator.md).
+// Finds the closest hit of every active path among the objects of its worlds. A path in both worlds
+// traces one union ray (shaders/README.md, "Shared paths and forks").
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shaders/lib/alpha.glsl"
 
-// A resumed ray starts just before where its path parted: what is there is not in its world.
+// After a fork, a ray resumes just before the hit at which the worlds parted. It cannot meet that
+// surface again, since the surface is not in its world.
 const float RESUME_BEFORE = 0.9999;
 
 void main() {

@@ -1,4 +1,4 @@
-// Camera rays: one path a slot, through a sub-pixel point and a point of the lens.
+// Makes the camera rays: one path per slot, through a point of the pixel and a point of the lens.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -8,12 +8,13 @@
 #include "shaders/lib/difference_bounds.glsl"
 #include "shaders/lib/sampler.glsl"
 
-// Whether a differing object may cover a part of the pixel: its bound, widened by the pixel's own
-// extent and by the lens, meets the ray through the pixel's centre.
+// Returns whether an object that is in one world only may cover a part of the pixel. Its bound is
+// widened by the extent of the pixel and by the lens, and tested against the ray through the
+// pixel's centre.
 bool may_be_covered(uvec2 pixel) {
   const vec3 corner = vec3(calibrated_ray(pixel, vec2(0.0)), 1.0);
   const vec3 ray = vec3(calibrated_ray(pixel, vec2(0.5)), 1.0);
-  const float pixel_angle = 1.5 * length(corner - ray);  // of half the diagonal, and some more
+  const float pixel_angle = 1.5 * length(corner - ray);  // that of half the diagonal, with a margin
   const vec3 direction = normalize(transform_vector(frame.world_from_camera, ray));
   for (uint i = 0u; i < frame.bound_count; ++i) {
     const float far = length(bounds[i].xyz) + bounds[i].w;

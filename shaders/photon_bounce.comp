@@ -1,5 +1,6 @@
-// A photon arrives: it forks where the worlds part, goes on by mirrors and glass only, and stays on
-// the first other surface after them.
+// Continues photons that have arrived at a surface. A photon forks where the worlds part, continues
+// by Dirac lobes only, and after at least one of them may stay on a surface with another lobe
+// (shaders/README.md, "Caustics").
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -12,7 +13,7 @@ struct Flight {
   vec3 origin;
   float t_min;
   vec3 direction;
-  float survival;  // product of the Dirac lobes' weights so far, for the roulette
+  float survival;  // product of the Dirac lobes' weights so far, for Russian roulette
   vec3 flux;
   uint worlds;
   uint vertices;
@@ -34,9 +35,9 @@ void store_flight(Flight f, uint path) {
       vec4(f.flux, uintBitsToFloat(f.worlds | (f.vertices << PATH_DEPTH_SHIFT)));
 }
 
-// The Dirac lobes of a surface as light meets them: the reverse of what bsdf_sample does from the
-// camera, so a solid's colour tints on leaving, and flux that enters it is divided by ior^2 as
-// radiance is left unscaled there.
+// Samples the Dirac lobes of a surface in the direction of light. It is the adjoint of
+// bsdf_sample(), which follows paths from the camera: the colour of a solid tints on leaving, and
+// flux that enters is divided by ior^2, because bsdf_sample() leaves radiance unscaled.
 bool sample_dirac(Surface s, Lobes l, float p_mirror, float choice, out vec3 wi, out vec3 weight) {
   const float cos_o = dot(s.normal, s.wo);
   wi = vec3(0.0);
@@ -53,8 +54,9 @@ bool sample_dirac(Surface s, Lobes l, float p_mirror, float choice, out vec3 wi,
       weight = s.entering ? vec3(1.0 / (s.ior * s.ior)) : s.base_color * (s.ior * s.ior);
     weight *= l.glass / (1.0 - p_mirror);
   }
-  // Light is spread by the geometric normal, lobes are defined by the interpolated one (Veach 1997,
-  // "Robust Monte Carlo methods", 5.3).
+  // The geometric normal decides how light spreads over a surface, but the interpolated one defines
+  // the lobes (Veach 1997, "Robust Monte Carlo Methods for Light Transport Simulation", section
+  // 5.3).
   weight *= abs(dot(wi, s.geometric_normal)) * cos_o /
             (dot(s.wo, s.geometric_normal) * abs(dot(wi, s.normal)));
   return true;
@@ -64,7 +66,7 @@ const uint FLIGHT_OVER = 0u;
 const uint FLIGHT_STAYS = 1u;
 const uint FLIGHT_GOES_ON = 2u;
 
-// What a photon does at a surface; its flux pays for the choice.
+// Decides what a photon does at a surface, and divides its flux by the probability of the decision.
 uint meet_surface(inout Flight f, Surface s, vec2 random) {
   const Lobes l = make_lobes(s);
   const float mirror = l.smooth_reflection ? l.p_reflection : 0.0;
@@ -90,10 +92,12 @@ uint meet_surface(inout Flight f, Surface s, vec2 random) {
   f.origin = offset_origin(s, wi);
   f.t_min = 0.0;
   f.direction = wi;
-  // A photon that stays after the last vertex allowed would never be gathered.
+  // After the last allowed vertex a photon ends, because one that stayed later would never be
+  // gathered.
   return f.vertices < frame.max_depth ? FLIGHT_GOES_ON : FLIGHT_OVER;
 }
 
+// Stores a photon, with the gains of the worlds that it is in, and counts it in its bucket.
 void store_photon(uint path, Flight f, Surface s) {
   photons[path].position = s.position;
   photons[path].vertices = f.vertices;

@@ -1,4 +1,4 @@
-// Gives every bucket its part of the order.
+// Assigns each bucket its range of the order.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,4 +1,4 @@
-// Photons of one pass leave the lights, as paths 2 i; 2 i + 1 is for the world that parts.
+// Emits the photons of one pass. Photon i is path 2 i; path 2 i + 1 is for the world that may part.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,4 +1,4 @@
-// Puts every photon into its bucket's part of the order, as they come.
+// Writes every stored photon into the range of its bucket, in no particular order.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

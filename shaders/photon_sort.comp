@@ -1,12 +1,13 @@
-// Sorts the photons of each bucket by index, so that sums over them round the same in every run, and
-// lays them out as they are gathered.
+// Sorts the photons of each bucket by index, so that sums over them round alike in every run and in
+// both worlds, and writes them in the layout that gathering reads.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shaders/lib/photon.glsl"
 
-// Heap sort: no memory of its own, and no bad case.
+// Heap sort needs no memory of its own and has no bad case. This moves the root of a heap to its
+// place.
 void sift_down(uint first, uint root, uint count) {
   const uint value = photon_order[first + root];
   for (uint child = 2u * root + 1u; child < count; child = 2u * root + 1u) {
@@ -22,9 +23,9 @@ void sort_bucket(uint first, uint count) {
   const uint steps = count / 2u + count - 1u;
   for (uint chunk = 0u; chunk < steps; chunk += LOOP_CHUNK) {
     for (uint step = chunk; step < min(chunk + LOOP_CHUNK, steps); ++step) {
-      if (step < count / 2u) {  // make the heap
+      if (step < count / 2u) {  // builds the heap
         sift_down(first, count / 2u - 1u - step, count);
-      } else {  // take the largest out, again and again
+      } else {  // removes the largest, again and again
         const uint last = count - 1u - (step - count / 2u);
         const uint largest = photon_order[first];
         photon_order[first] = photon_order[first + last];

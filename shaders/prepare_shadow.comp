@@ -1,4 +1,5 @@
-// One invocation between shading and shadow rays: how many there are.
+// Runs between shading and shadow rays, as one invocation: it prepares the dispatch of the shadow
+// rays and counts them.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

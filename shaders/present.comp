@@ -1,5 +1,6 @@
-// The composite through exposure and response: codes as the display shows them, two pixels at once,
-// whose six samples are three words. Where nothing virtual touches a pixel they are the plate's own.
+// Turns the composite into codes as the display shows them, by exposure and response. An invocation
+// works on two pixels, whose six codes are three words. Where nothing virtual touches a pixel, it
+// keeps the codes of the plate.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -12,7 +13,8 @@ layout(scalar) readonly buffer Composites { vec4 composites[]; };  // as composi
 layout(scalar) readonly buffer Signals { vec4 signals[]; };        // denoised, or as composited
 layout(scalar) writeonly buffer Picture { uint picture[]; };       // samples, as the plate's
 
-// A channel that comes out at NEARLY_WHITE of the sensor's white was white, and stays it.
+// Replaces the composite by its denoised signal. A channel that was white and comes out above
+// NEARLY_WHITE stays as it was.
 vec3 without_noise(vec3 composite, vec3 camera, float mask, vec3 signal) {
   const vec3 clean = (1.0 - mask) * camera + denoise_unit(camera, mask) * signal;
   for (uint c = 0u; c < 3u; ++c)
@@ -20,7 +22,7 @@ vec3 without_noise(vec3 composite, vec3 camera, float mask, vec3 signal) {
   return composite;
 }
 
-// The largest code whose least signal is not above this; 0 for NaN.
+// Returns the largest code whose least signal is not above `signal`, and 0 for NaN.
 uint code_of(float signal) {
   if (!(signal > 0.0)) return 0u;
   uint code = 0u;

@@ -1,4 +1,5 @@
-// A path arrives: forks where the worlds part, takes emission, samples a light, scatters on.
+// Continues paths that have arrived at a surface or in the environment. A path forks where the
+// worlds part, takes emission, samples a light and scatters (shaders/README.md).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -9,7 +10,8 @@
 #include "shaders/lib/environment.glsl"
 #include "shaders/lib/gather.glsl"
 
-// Of a path of the difference, at one vertex: bounds its weight.
+// A path of the difference survives each vertex with at least this probability, which bounds its
+// weight.
 const float LEAST_SURVIVAL = 0.1;
 
 struct Path {
@@ -18,12 +20,12 @@ struct Path {
   vec3 origin;
   float t_min;
   vec3 direction;
-  float pdf;  // density of the direction where a light sample could have found it too; 0: none could
+  float pdf;  // density of the direction; 0 if a light sample could not find it
   vec3 throughput;
   uint worlds;
   uint depth;
   bool rough;  // some vertex so far scattered by a lobe that is not Dirac
-  bool difference;  // what is the same in both worlds need not be traced
+  bool difference;  // light that is equal in both worlds need not be traced
   bool landed;      // see PATH_LANDED
 };
 
@@ -48,10 +50,11 @@ void store_path(Path p, uint index) {
   path_throughput[index] = vec4(p.throughput, uintBitsToFloat(bits));
 }
 
-// The light at the end of this path is a caustic's: rough, then Dirac lobes only.
+// Returns whether light at the end of this path is a caustic: a lobe that is not Dirac has
+// scattered the path, and then a Dirac lobe.
 bool is_caustic(Path p) { return p.rough && p.pdf <= 0.0; }
 
-// Whether light with this gain is the same in all worlds of the path, and cancels.
+// Returns whether light with this gain is equal in both worlds of the path and so cancels.
 bool cancels(Path p, vec2 gain) {
   return p.difference && p.worlds == WORLD_BOTH && gain.x == gain.y;
 }
@@ -60,14 +63,15 @@ void receive(Path p, vec3 radiance, vec2 gain) {
   add_radiance(p.slot, p.worlds, p.landed, radiance, gain);
 }
 
-// Power heuristic; pdf = 0 stands for a Dirac direction, which a light sample cannot find.
+// Returns the weight of the power heuristic with exponent 2 (Veach 1997, section 9.2). pdf = 0
+// stands for a direction that a light sample cannot find, whose weight is 1.
 float mis_weight(float pdf, float other) {
   if (pdf <= 0.0) return 1.0;
   const float ratio = other / pdf;
   return 1.0 / (1.0 + ratio * ratio);
 }
 
-// Lights without a surface of their own, met before the hit. They block nothing.
+// Adds the lights without a mesh that the ray crosses before its hit. They block nothing.
 void meet_lights(Path p, float t_hit) {
   for (uint i = 0u; i < frame.visible_light_count; ++i) {
     if (cancels(p, lights[i].gain)) continue;
@@ -99,18 +103,23 @@ void meet_emission(Path p, Surface s, GpuHit hit) {
   receive(p, p.throughput * s.emission * weight, vec2(1.0));
 }
 
-// Of bound_share. Where less would do, the objects are left to the BSDF, at no cost.
+// If less than this part of bound_share would suffice, the objects are left to the BSDF, which
+// saves evaluating the bounds.
 const float least_bound_part = 0.04;
 
-// How directions are sampled at a vertex: by the BSDF, and for `share` of them towards the objects
-// that differ. Depends on shared data alone, so it is the same in both worlds.
+// A technique says how directions are sampled at a vertex: a share of them is aimed at the objects
+// that are in one world only, the others follow the BSDF. It depends on shared data alone, so it is
+// equal in both worlds.
 struct Technique {
-  float share;
-  float total;
+  float share;  // of directions that are aimed, 0 to 1
+  float total;  // bounds_total() of the vertex
 };
 
-// The part of the light that light samples do not find behind the objects by themselves: what comes
-// from a narrower solid angle than theirs they do.
+// Returns the part of bound_share that is worth spending (shaders/README.md, "Difference bounds"):
+// (1 - l) max(0, 1 - T/E) + l max(0, 1 - T/L), with T the solid angle of the objects, E and L those
+// from which the light of the environment and of the lamps comes, and l the lamps' part of all
+// power. Light samples by themselves find a difference whose light comes from a narrower solid
+// angle than T, such as the shadow of a large object under a small lamp.
 float part_for_bounds(float total) {
   const float environment = max(1.0 - total / frame.environment_spread, 0.0);
   const float lamps = max(1.0 - total / frame.lamp_spread, 0.0);
@@ -124,13 +133,13 @@ Technique make_technique(Path p, Surface s, Lobes l) {
   return Technique(part >= least_bound_part ? part * frame.bound_share : 0.0, total);
 }
 
-// Density over both techniques of a direction that the BSDF alone has with bsdf_pdf.
+// Returns the density of a direction over both techniques, given that of the BSDF alone.
 float combined_pdf(Technique t, Surface s, vec3 direction, float bsdf_pdf) {
   if (t.share <= 0.0) return bsdf_pdf;
   return mix(bsdf_pdf, bounds_pdf(s.position, t.total, direction), t.share);
 }
 
-// A direction by either technique; see bsdf_sample for what comes back.
+// Samples a direction by either technique, with the results of bsdf_sample().
 bool sample_direction(Technique t, Surface s, Lobes l, vec2 u, float choice, out vec3 direction,
                       out vec3 weight, out float pdf) {
   if (!choose(u.x, t.share)) {
@@ -150,8 +159,8 @@ bool sample_direction(Technique t, Surface s, Lobes l, vec2 u, float choice, out
   return true;
 }
 
-// A sample of the environment or of a light, seen from a point; `selection` is the probability of
-// having picked it.
+// Samples the environment or a light as seen from a point; `selection` is the probability with
+// which it was picked.
 bool choose_light(vec3 point, vec2 u, out LightSample light, out float selection) {
   light = LightSample(vec3(0.0), 3.4e38, vec3(0.0), 0.0, vec2(1.0));
   selection = frame.environment_selection;
@@ -167,13 +176,15 @@ bool choose_light(vec3 point, vec2 u, out LightSample light, out float selection
   return true;
 }
 
-// One light sample: the pair of what it would bring to each world, to be tested for blockers.
+// Makes the shadow ray of one light sample, which carries the pair of radiances that the sample
+// brings to the worlds if nothing blocks it. Returns false if there is nothing to trace.
 bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, out GpuShadowRay ray) {
   const vec2 u = sample_2d(random, vertex_pair(PAIR_LIGHT, p.depth));
   LightSample light;
   float selection;
-  // The sample is made for the very point from which the shadow ray starts, or the ray would end
-  // behind the light. Only rough glass also gathers on the side away from the viewer.
+  // The light is sampled from the very point at which the shadow ray starts; otherwise the ray
+  // could end behind the light. Only rough glass also receives light on the side away from the
+  // viewer.
   ray.origin = offset_origin(s, s.geometric_normal);
   if (!choose_light(ray.origin, u, light, selection)) return false;
   if (has_feature(FEATURE_TRANSMISSION) && has_rough_glass(l) &&
@@ -194,11 +205,11 @@ bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, out GpuS
   ray.contribution = p.throughput * value * light.radiance * (weight / pdf);
   ray.gain = light.gain;
   if (cancels(p, light.gain) && !meets_bounds(ray.origin, ray.direction, ray.t_max)) return false;
-  return any(notEqual(ray.contribution, vec3(0.0)));  // what is no number goes on, to be counted
+  return any(notEqual(ray.contribution, vec3(0.0)));  // NaN is kept, to be counted
 }
 
-// Light that comes by mirrors and glass only (P16), by photons. Each world sums the same photons in
-// the same order, so that the two are equal where the photons are.
+// Adds caustics by photons. Both worlds sum the same photons in the same order, so that the sums
+// are equal wherever the photons are.
 void meet_photons(Path p, Surface s, Lobes l) {
   if (!is_rough(l)) return;
   const bool differing = cancels(p, vec2(1.0));
@@ -206,7 +217,8 @@ void meet_photons(Path p, Surface s, Lobes l) {
   add_pair(p.slot, p.worlds, p.landed, p.throughput * gathered.mixed, p.throughput * gathered.real);
 }
 
-// Ends a path of the difference that is far from all that differs: what can still come is little.
+// Plays Russian roulette with a path of the difference; the farther it is from all objects that are
+// in one world only, the less it can still bring. Returns true if the path ends.
 bool ends_far_off(inout Path p, Surface s, inout float chance) {
   if (!p.difference || p.worlds != WORLD_BOTH || p.depth == 0u || frame.difference_roulette <= 0.0)
     return false;
@@ -218,7 +230,7 @@ bool ends_far_off(inout Path p, Surface s, inout float chance) {
   return false;
 }
 
-// The next direction; false where the path ends.
+// Samples the next direction and prepares the path for it. Returns false if the path ends.
 bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, vec2 chance) {
   vec3 direction;
   vec3 weight;
@@ -241,7 +253,8 @@ bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, vec2
   return true;
 }
 
-// The world that does not contain the hit goes on along the same ray, as a path of its own.
+// Forks the path: in the worlds that do not contain the hit it continues along the same ray, as a
+// path of its own.
 void fork(Path p, uint other_worlds, float t_hit, out uint forked) {
   forked = p.landed ? 2u * slot_count() + p.slot : p.index ^ 1u;
   p.worlds = other_worlds;
@@ -249,7 +262,7 @@ void fork(Path p, uint other_worlds, float t_hit, out uint forked) {
   store_path(p, forked);
 }
 
-// Counts of 64 bits.
+// These count in 64 bits.
 void count_measured() {
   if (atomicAdd(control.measured_low, 1u) == 0xffffffffu) atomicAdd(control.measured_high, 1u);
 }
@@ -257,9 +270,10 @@ void count_unmeasured() {
   if (atomicAdd(control.unmeasured_low, 1u) == 0xffffffffu) atomicAdd(control.unmeasured_high, 1u);
 }
 
-// At a diffuse real surface that the camera sees, its radiance in the real world has been measured. A
-// path of the real world ends there: true. One of the mixed world takes it, too, and goes on, once,
-// for what the worlds differ by at that point.
+// Uses the camera's measurement at a diffuse real surface that the plate shows (shaders/README.md,
+// "Camera radiance"). A path of the real world takes it and ends, for which the result is true. A
+// path that is in the mixed world takes it as well and continues, once, for the difference of the
+// worlds at that point.
 bool meet_measured(inout Path p, Surface s, GpuHit hit) {
   const bool is_needed = p.worlds == WORLD_REAL || !(p.landed || cancels(p, vec2(1.0)));
   if (p.depth == 0u || !is_needed || (instances[hit.instance].presence & WORLD_REAL) == 0u)
@@ -279,6 +293,7 @@ bool meet_measured(inout Path p, Surface s, GpuHit hit) {
   return false;
 }
 
+// Stores normal and depth of the mixed world's first surface.
 void write_aov(Path p, Surface s, float t) {
   const vec3 axis = vec3(frame.world_from_camera[0].z, frame.world_from_camera[1].z,
                          frame.world_from_camera[2].z);
@@ -286,8 +301,8 @@ void write_aov(Path p, Surface s, float t) {
   sample_aov[p.slot] = vec4(s.normal, dot(position, axis));
 }
 
-// At a vertex: light by photons and by a light sample, for which a ray comes back where `lit`, then
-// the next direction, for which the path is made ready where `scattered`.
+// Adds the light of photons at a vertex, samples a light and the next direction. With `lit`, `ray`
+// is a shadow ray to trace; with `scattered`, the path is ready for its next segment.
 void shade_vertex(inout Path p, Surface s, out GpuShadowRay ray, out bool lit, out bool scattered) {
   lit = false;
   scattered = false;

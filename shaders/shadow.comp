@@ -1,5 +1,5 @@
-// Shadow rays: how much of the light comes through in each of a sample's worlds, by one traversal
-// where every surface is opaque.
+// Traces shadow rays and adds the light that passes in each of their worlds. If every surface is
+// opaque, one traversal serves both worlds.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -1,5 +1,6 @@
-// Rays among surfaces that are not there everywhere: a closest hit that is missed where alpha says
-// so, and light that is weakened by what it passes. Without FEATURE_ALPHA they are lib/trace.glsl's.
+// Rays among surfaces with transparent parts. The closest hit may pass through a surface, as its
+// alpha says, and shadow rays are weakened by the surfaces that they cross. Without FEATURE_ALPHA
+// these functions do what those of lib/trace.glsl do.
 #ifndef PREVIZ_ALPHA_GLSL
 #define PREVIZ_ALPHA_GLSL
 
@@ -7,17 +8,20 @@
 #include "shaders/lib/sampler.glsl"
 #include "shaders/lib/trace.glsl"
 
-// Surfaces of a ray that may be transparent; the next one counts as there, and is counted.
+// A ray passes at most so many transparent surfaces. The next one stops it, which is counted in
+// control.stopped_in_layers.
 const uint MAX_LAYERS = 256u;
 
+// Returns the alpha of the surface at the hit, 1 where the surface is opaque.
 float hit_coverage(Hit hit) {
   const uint material = instances[hit.instance].material;
   if (materials[material].alpha_mode == ALPHA_OPAQUE) return 1.0;
   return coverage(material, hit_uv(hit.instance, hit.primitive, hit.barycentrics));
 }
 
-// Whether the ray meets the surface, with a probability of its coverage. All worlds of a ray decide
-// alike; rays differ, so a hash of the ray is as good as a random number.
+// Decides whether the ray meets the surface; the probability is the surface's coverage. A hash of
+// the ray and the surface is as good as a random number, because no two rays are alike, and it
+// gives both worlds of a ray the same decision.
 bool is_met(Hit hit, vec3 origin, vec3 direction) {
   const float share = hit_coverage(hit);
   if (share >= 1.0) return true;
@@ -28,6 +32,7 @@ bool is_met(Hit hit, vec3 origin, vec3 direction) {
   return unit_float(key) < share;
 }
 
+// Finds the closest surface that the ray meets, as trace_closest() does.
 bool closest_met(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds, out Hit hit) {
   if (!has_feature(FEATURE_ALPHA))
     return trace_closest(origin, direction, t_min, t_max, worlds, hit);
@@ -40,7 +45,8 @@ bool closest_met(vec3 origin, vec3 direction, float t_min, float t_max, uint wor
   return trace_closest(origin, direction, t_min, t_max, worlds, hit);
 }
 
-// The share of light that comes through, in the (mixed, real) world; 0 in a world not asked for.
+// Returns the share of light that passes along the ray in the (mixed, real) world; it is 0 in a
+// world that is not in `worlds`.
 vec2 light_through(vec3 origin, vec3 direction, float t_max, uint worlds) {
   vec2 share = vec2((worlds & WORLD_MIXED) != 0u, (worlds & WORLD_REAL) != 0u);
   if (!has_feature(FEATURE_ALPHA)) {

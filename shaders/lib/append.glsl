@@ -1,4 +1,4 @@
-// Compacted appends: one atomic a subgroup.
+// Appends to the compacted queues; a subgroup needs a single atomic operation for all its lanes.
 #ifndef PREVIZ_APPEND_GLSL
 #define PREVIZ_APPEND_GLSL
 
@@ -7,7 +7,7 @@
 
 #include "shaders/lib/path.glsl"
 
-// Must be reached by the whole subgroup; `wanted` says who appends.
+// Both functions must be called by all lanes of a subgroup; the lanes with `wanted` append.
 void append_next(bool wanted, uint path) {
   const uvec4 ballot = subgroupBallot(wanted);
   const uint count = subgroupBallotBitCount(ballot);

@@ -1,4 +1,4 @@
-// The part of the picture, and the samples, that a dispatch works on.
+// The batch says which part of the picture and which samples a dispatch works on.
 #ifndef PREVIZ_BATCH_GLSL
 #define PREVIZ_BATCH_GLSL
 

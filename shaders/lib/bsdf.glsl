@@ -1,5 +1,6 @@
-// Scattering at a surface: Lambert, GGX reflection (dielectric coat and conductor), glass.
-// Definitions are those of tests/truth/README.md, which an independent CPU tracer follows too.
+// Scattering at a surface: Lambert, GGX reflection (dielectric coat and conductor) and glass. The
+// definitions are in tests/truth/README.md, "The model of the reference tracer", which an
+// independent CPU tracer follows as well.
 #ifndef PREVIZ_BSDF_GLSL
 #define PREVIZ_BSDF_GLSL
 
@@ -12,7 +13,8 @@ uniform textureBuffer albedo;
 
 float luminance(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
 
-// Unpolarised reflectance of a smooth interface; eta = ior of the far side over the near side.
+// Returns the unpolarised Fresnel reflectance of a smooth interface; eta is the index of refraction
+// of the far side over that of the near side.
 float fresnel_dielectric(float cos_i, float eta) {
   const float sin2_t = (1.0 - cos_i * cos_i) / (eta * eta);
   if (sin2_t >= 1.0) return 1.0;
@@ -22,13 +24,15 @@ float fresnel_dielectric(float cos_i, float eta) {
   return 0.5 * (parallel * parallel + perpendicular * perpendicular);
 }
 
+// Returns Schlick's approximation (1994) of the Fresnel reflectance.
 vec3 fresnel_schlick(vec3 f0, float cos_i) {
   const float m = clamp(1.0 - cos_i, 0.0, 1.0);
   const float m2 = m * m;
   return f0 + (vec3(1.0) - f0) * (m2 * m2 * m);
 }
 
-// Orthonormal basis around n (Duff et al. 2017).
+// Returns an orthonormal basis whose third vector is n (Duff et al. 2017, "Building an Orthonormal
+// Basis, Revisited").
 mat3 make_frame(vec3 n) {
   const float side = n.z >= 0.0 ? 1.0 : -1.0;
   const float a = -1.0 / (side + n.z);
@@ -37,30 +41,34 @@ mat3 make_frame(vec3 n) {
               vec3(b, side + n.y * n.y * a, -n.y), n);
 }
 
+// Returns a uniformly distributed point of the unit disc.
 vec2 sample_disc(vec2 u) {
   const float r = sqrt(u.x);
   const float phi = 2.0 * PI * u.y;
   return r * vec2(cos(phi), sin(phi));
 }
 
+// Returns a direction around +z with the density cos / pi.
 vec3 sample_cosine(vec2 u) {
   const vec2 d = sample_disc(u);
   return vec3(d, sqrt(max(0.0, 1.0 - u.x)));
 }
 
-// GGX in the local frame (z the normal). Written in the half vector's x and y, which stay accurate
-// where 1 - z^2 would cancel.
+// The GGX density of half vectors (Walter et al. 2007), in the local frame whose z is the normal.
+// It is written in the half vector's x and y, because 1 - z^2 would cancel close to the normal.
 float ggx_density(vec3 h, float alpha) {
   const float a2 = alpha * alpha;
   const float d = (h.x * h.x + h.y * h.y) / a2 + h.z * h.z;
   return 1.0 / (PI * a2 * d * d);
 }
+// Smith's lambda of GGX for a direction in the local frame (Heitz 2014).
 float ggx_lambda(vec3 w, float alpha) {
   const float tan2 = (w.x * w.x + w.y * w.y) / (w.z * w.z);
   return 0.5 * (sqrt(1.0 + alpha * alpha * tan2) - 1.0);
 }
 
-// Half vector by the distribution of visible normals (Dupuy and Benyoub 2023, spherical caps).
+// Returns a half vector distributed as the visible normals are (Dupuy and Benyoub 2023, "Sampling
+// Visible GGX Normals with Spherical Caps").
 vec3 sample_ggx(vec3 wo, float alpha, vec2 u) {
   const vec3 stretched = normalize(vec3(wo.xy * alpha, wo.z));
   const float phi = 2.0 * PI * u.x;
@@ -70,7 +78,8 @@ vec3 sample_ggx(vec3 wo, float alpha, vec2 u) {
   return normalize(vec3(cap.xy * alpha, cap.z));
 }
 
-// What single scattering keeps of all light, seen under this cosine; bilinear between the nodes.
+// Returns the share of light that single scattering reflects, seen under this cosine. The table is
+// interpolated bilinearly (daemon/render/albedo_table.hpp).
 float single_scatter_albedo(uint table, float cos_o, float alpha) {
   const float last = float(ALBEDO_SIDE - 1u);
   const vec2 at = sqrt(clamp(vec2(cos_o, alpha), vec2(0.0), vec2(1.0))) * last;
@@ -85,13 +94,13 @@ float single_scatter_albedo(uint table, float cos_o, float alpha) {
   return mix(below, above, f.y);
 }
 
-// The lobes of a surface seen from wo: their weights, and the odds of sampling each.
+// The lobes of a surface seen from wo: their weights, and the probability of sampling each.
 struct Lobes {
   vec3 diffuse;         // albedo
   float coat;           // weight of the white dielectric reflection
   vec3 conductor;       // reflectance at normal incidence times its weight
   float conductor_weight;
-  vec3 conductor_gain;  // gives back what single scattering loses
+  vec3 conductor_gain;  // returns the energy that single scattering loses
   float glass;
   float glass_gain;
   float p_diffuse, p_reflection, p_glass;
@@ -99,11 +108,12 @@ struct Lobes {
   bool smooth_glass;
 };
 
+// A lobe is rough here if it is not a Dirac delta.
 bool has_rough_reflection(Lobes l) { return l.p_reflection > 0.0 && !l.smooth_reflection; }
 bool has_rough_glass(Lobes l) { return l.p_glass > 0.0 && !l.smooth_glass; }
-// Whether any lobe is not a Dirac delta.
 bool is_rough(Lobes l) { return l.p_diffuse > 0.0 || has_rough_reflection(l) || has_rough_glass(l); }
 
+// The p_* sum to 1, in proportion to the lobes' luminance, or are all 0 on a black surface.
 Lobes make_lobes(Surface s) {
   Lobes l;
   const float nv = abs(dot(s.normal, s.wo));
@@ -145,30 +155,36 @@ Lobes make_lobes(Surface s) {
   return l;
 }
 
+// Returns the colour of the reflection, coat and conductor together, for this cosine between the
+// half vector and the light.
 vec3 reflection_color(Lobes l, float cos_half) {
   return vec3(l.coat) +
          l.conductor_weight * l.conductor_gain * fresnel_schlick(l.conductor, cos_half);
 }
 
-// A reflected direction counts only if it is above both the surface and the shading normal.
+// A reflected direction counts only if it is above both the surface and the plane of the shading
+// normal.
 bool reflects_to(Surface s, vec3 wi) {
   return dot(wi, s.geometric_normal) > 0.0 && dot(wi, s.normal) > 0.0;
 }
 
-// Index behind the surface over the index before it.
+// Returns the index of refraction behind the surface over the one in front of it.
 float relative_ior(Surface s) { return s.entering || s.thin_walled ? s.ior : 1.0 / s.ior; }
 
-// What glass reflects; the rest goes through. A thin pane reflects between its two sides, too.
+// Returns the share that glass reflects; the rest passes. In a thin pane light is also reflected
+// back and forth between its two sides: R' = 2 R / (1 + R).
 float glass_reflectance(Surface s, float cos_o) {
   const float once = fresnel_dielectric(cos_o, relative_ior(s));
   return s.thin_walled ? 2.0 * once / (1.0 + once) : once;
 }
 
-// A solid's colour tints on entering only.
+// The colour of a solid tints light on entering only, so that crossing it tints once, as a pane
+// does.
 vec3 glass_tint(Surface s) { return s.thin_walled || s.entering ? s.base_color : vec3(1.0); }
 
-// Rough glass towards a direction i behind the surface, both in the local frame: adds f * cos and
-// the density (Walter et al. 2007). A thin pane sends on what it would reflect, mirrored.
+// Adds f * cos and the density of rough glass for a direction i behind the surface (Walter et al.
+// 2007, equation 21); o and i are in the local frame. A thin pane transmits the mirror image of
+// what it would reflect.
 void add_transmission(Surface s, Lobes l, vec3 o, vec3 i, inout vec3 value, inout float pdf) {
   const float eta = relative_ior(s);
   vec3 h = s.thin_walled ? normalize(o + vec3(i.xy, -i.z)) : normalize(o + eta * i);
@@ -176,7 +192,7 @@ void add_transmission(Surface s, Lobes l, vec3 o, vec3 i, inout vec3 value, inou
   const float oh = dot(o, h);
   const float ih = dot(i, h);
   if (oh <= 0.0 || (!s.thin_walled && ih >= 0.0)) return;
-  // Solid angle of half vectors over that of directions.
+  // The spread is the solid angle of half vectors over that of directions (ibid., equation 17).
   const float bend = oh + eta * ih;
   const float spread = s.thin_walled ? 1.0 / (4.0 * oh) : eta * eta * -ih / (bend * bend);
   const float through = 1.0 - glass_reflectance(s, oh);
@@ -187,7 +203,7 @@ void add_transmission(Surface s, Lobes l, vec3 o, vec3 i, inout vec3 value, inou
   pdf += l.p_glass * density / (1.0 + lambda_o);
 }
 
-// Reflection of rough coat, conductor and glass alike: adds f * cos and the density.
+// Adds f * cos and the density of the rough reflection of coat, conductor and glass together.
 void add_reflection(Surface s, Lobes l, vec3 o, vec3 i, inout vec3 value, inout float pdf) {
   const vec3 h = normalize(o + i);
   const float oh = dot(o, h);
@@ -208,7 +224,8 @@ void add_reflection(Surface s, Lobes l, vec3 o, vec3 i, inout vec3 value, inout 
   pdf += probability * density / (1.0 + lambda_o);
 }
 
-// f * cos of the lobes that are not Dirac deltas, and the density bsdf_sample has for wi, 1/sr.
+// Returns f * cos of all lobes that are not Dirac deltas, and in `pdf` the density per steradian
+// with which bsdf_sample() chooses wi among them.
 vec3 bsdf_evaluate(Surface s, Lobes l, vec3 wi, out float pdf) {
   pdf = 0.0;
   vec3 value = vec3(0.0);
@@ -230,8 +247,8 @@ vec3 bsdf_evaluate(Surface s, Lobes l, vec3 wi, out float pdf) {
   return value;
 }
 
-// Where light from wo goes that meets a facet of glass with normal m: reflected, or refracted
-// (solid) or straight on (thin-walled).
+// Returns the direction in which light from wo leaves a facet of glass with the normal m: it is
+// reflected, or refracted by a solid, or continues straight through a thin wall.
 vec3 glass_direction(Surface s, vec3 wo, vec3 m, bool reflected) {
   const float cos_o = dot(m, wo);
   if (reflected) return 2.0 * cos_o * m - wo;
@@ -241,9 +258,9 @@ vec3 glass_direction(Surface s, vec3 wo, vec3 m, bool reflected) {
   return normalize(-wo / eta + (cos_o / eta - cos_t) * m);
 }
 
-// Smooth interface, both lobes Dirac: reflects with the Fresnel reflectance, else lets through.
-// Radiance is not scaled by the squared ratio of indices: light and camera are outside, where the
-// factors of entering and leaving cancel.
+// Samples a smooth interface, whose two lobes are Dirac deltas: it reflects with a probability of
+// the Fresnel reflectance and transmits otherwise. Radiance is not scaled by the squared ratio of
+// indices: light and camera are outside, where the factors of entering and leaving cancel.
 bool sample_glass(Surface s, float choice, out vec3 wi, out vec3 weight) {
   const float cos_o = dot(s.normal, s.wo);
   weight = vec3(1.0);
@@ -255,8 +272,9 @@ bool sample_glass(Surface s, float choice, out vec3 wi, out vec3 weight) {
   return reflected == (dot(wi, s.geometric_normal) > 0.0);
 }
 
-// A direction of rough glass, by a visible facet; `choice` reflects or lets through. False: it ends
-// on the wrong side, in another facet.
+// Samples a direction of rough glass by a visible facet; `choice` decides between reflection and
+// transmission. It returns false if the direction ends on the wrong side, where another facet
+// blocks it.
 bool sample_rough_glass(Surface s, float choice, vec2 u, out vec3 wi) {
   const mat3 local = make_frame(s.normal);
   const vec3 o = s.wo * local;
@@ -271,9 +289,9 @@ bool sample_rough_glass(Surface s, float choice, vec2 u, out vec3 wi) {
   return reflected == (i.z > 0.0);
 }
 
-// A direction, the throughput it brings (f * cos / pdf over all non-Dirac lobes, or the Dirac
-// lobe's weight), and its density; pdf = 0 says Dirac. False: absorbed. `choice` is whether rough
-// glass reflects.
+// Samples a direction. `weight` is its throughput: f * cos / pdf over all lobes that are not Dirac
+// deltas, or the weight of the Dirac lobe. `pdf` is the density per steradian, 0 for a Dirac lobe.
+// `choice` decides whether rough glass reflects. The result is false where the light is absorbed.
 bool bsdf_sample(Surface s, Lobes l, vec2 u, float choice, out vec3 wi, out vec3 weight,
                  out float pdf) {
   pdf = 0.0;

@@ -1,4 +1,4 @@
-// The camera's lens as calibrated: the ray through a point of the picture.
+// The calibrated lens: rays through points of the picture, by a table of the pixels' corners.
 #ifndef PREVIZ_CALIBRATED_RAY_GLSL
 #define PREVIZ_CALIBRATED_RAY_GLSL
 
@@ -7,7 +7,8 @@
 // RG32F, (width + 1)(height + 1): x/z and y/z of the rays through the pixels' corners.
 uniform textureBuffer corner_rays;
 
-// x/z and y/z of the undistorted ray through a point of the picture; pixel (0, 0) covers [0, 1]^2.
+// Returns x/z and y/z of the undistorted ray through the point `inside` a pixel, which ranges over
+// [0, 1]^2 of the pixel's area.
 vec2 calibrated_ray(uvec2 pixel, vec2 inside) {
   const int stride = int(frame.width) + 1;
   const int corner = int(pixel.y) * stride + int(pixel.x);

@@ -1,5 +1,5 @@
-// The camera as a measurement of the real world: the radiance of points that the plate shows
-// (estimator.md, "What makes it fast", 3).
+// The camera as a measurement: the radiance of real points that the plate shows (shaders/README.md,
+// "Camera radiance").
 #ifndef PREVIZ_CAMERA_GLSL
 #define PREVIZ_CAMERA_GLSL
 
@@ -9,14 +9,15 @@
 // camera_usable.comp's plate.
 uniform textureBuffer seen_radiance;
 
-// How far a point may be from the surface that the plate shows, over its depth.
+// A point is taken for the surface that the plate shows if its depth differs from that surface's by
+// no more than this share.
 const float SEEN_DEPTH_TOLERANCE = 2e-3;
-// How far off the calibrated ray its projection may be, in pixels: beyond, the lens's polynomial has
-// folded back into the picture.
+// The ray through a point's projection must pass the point this closely, in pixels. Otherwise the
+// polynomial of the distortion has folded the point back into the picture.
 const float SEEN_RAY_TOLERANCE = 0.5;
 
-// Where x/z and y/z appear in the picture, pixel centres at whole numbers (Brown 1966, Conrady 1919;
-// OpenCV's order).
+// Returns the place in the picture of a ray given by x/z and y/z; pixel centres are at whole
+// numbers (Brown 1966, Conrady 1919; coefficients in OpenCV's order).
 vec2 project(vec2 ray) {
   const float r2 = dot(ray, ray);
   const float radial = 1.0 + r2 * (frame.radial.x + r2 * (frame.radial.y + r2 * frame.radial.z));
@@ -25,8 +26,9 @@ vec2 project(vec2 ray) {
   return frame.focal_px * bent + frame.principal_px;
 }
 
-// The radiance that the plate shows of a surface point, between the four pixels around it. False:
-// the point is not in the picture, is hidden, or any of the four is not to be used.
+// Looks up the radiance that the plate shows of a surface point, interpolated between the four
+// pixels around it. It returns false if the point is outside the picture or hidden, or if any of
+// the four pixels must not be used.
 bool measured_radiance(vec3 position, out vec3 radiance) {
   radiance = vec3(0.0);
   const vec3 camera = frame.world_from_camera[0].xyz * position.x +
@@ -48,7 +50,7 @@ bool measured_radiance(vec3 position, out vec3 radiance) {
   if (min(min(p00.w, p10.w), min(p01.w, p11.w)) <= 0.0) return false;
   const vec2 f = at - low;
   const vec4 seen = mix(mix(p00, p10, f.x), mix(p01, p11, f.x), f.y);
-  // The inverse depth of a plane is linear over the picture.
+  // Inverse depths may be interpolated, since that of a plane is linear over the picture.
   if (abs(seen.w * camera.z - 1.0) > SEEN_DEPTH_TOLERANCE) return false;
   radiance = seen.rgb;
   return true;

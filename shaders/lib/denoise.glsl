@@ -1,5 +1,6 @@
-// A picture while noise is taken out of it, in passes from one pair of buffers into the other, and
-// how much two of its pixels show of the same surface.
+// The denoiser's passes share these buffers, which each pass reads from one side and writes to
+// the other, and a distance that says how far two pixels show the same surface (shaders/README.md,
+// "Denoising").
 #ifndef PREVIZ_DENOISE_GLSL
 #define PREVIZ_DENOISE_GLSL
 
@@ -19,17 +20,18 @@ uniform textureBuffer surfaces;   // normal, mean(M)
 layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
 layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
 
-// Differences at which a neighbour's weight has fallen to 1 / e: of the mask; of the normals' chord,
-// squared; of the inverse depth from what the surface's slope foretells, over the depth.
+// A neighbour's weight has fallen to 1 / e at a difference of the mask of MASK_SCALE, at a squared
+// chord between the normals of NORMAL_SCALE, or where the inverse depth is off what the surface's
+// slope predicts by a share of DEPTH_SCALE.
 const float MASK_SCALE = 0.05;
 const float NORMAL_SCALE = 0.03;
 const float DEPTH_SCALE = 0.01;
 
 struct Pixel {
   vec3 signal;
-  float inverse_depth;  // 0: the ray met nothing
-  vec3 variance;        // as of independent neighbours
-  float overlap;        // the true one over that: neighbours were made of the same pixels
+  float inverse_depth;  // 0 where the ray met nothing
+  vec3 variance;        // as if neighbours were independent
+  float overlap;        // true variance over `variance`: blended neighbours share pixels
   vec3 normal;
   float cover;          // mean(M)
 };
@@ -49,14 +51,16 @@ Pixel load_pixel(ivec2 at) {
   return Pixel(signal.rgb, signal.w, variance.rgb, variance.w, surface.xyz, surface.w);
 }
 
-// The difference Lm - Lr is not blended with what covers it, nor a hit with a miss.
+// The difference Lm - Lr is never blended with a virtual object that covers it, nor a hit with a
+// miss.
 bool are_alike(Pixel a, Pixel b) {
   return (a.cover > 0.0) == (b.cover > 0.0) && (a.inverse_depth > 0.0) == (b.inverse_depth > 0.0);
 }
 
-// Change of the inverse depth from pixel to pixel, which on a plane is the same all over the picture:
-// the mean of both sides, or, where an edge is between them, the flatter side's. Over two pixels,
-// because with few samples a pixel's depth is that of some point in it.
+// Returns the change of the inverse depth from pixel to pixel, which is constant over a plane. It
+// is the mean of the slopes on both sides, or the flatter one where the two differ, since an edge
+// is between them. The slopes are taken over two pixels, because with few samples the depth of a
+// pixel is that of some point in it.
 float inverse_depth_slope(ivec2 at, ivec2 off, float here) {
   const int reach = 2;
   const ivec2 before = at - reach * off;
@@ -71,8 +75,8 @@ float inverse_depth_slope(ivec2 at, ivec2 off, float here) {
   return abs(rising) < abs(falling) ? rising : falling;
 }
 
-// Squared distance of two pixels as parts of one surface; `foretold`: what the first one's slope
-// says of the other's inverse depth.
+// Returns the squared distance of two pixels as parts of one surface, in units of the scales above.
+// `foretold` is the inverse depth of b by the slope at a.
 float surface_distance(Pixel a, Pixel b, float foretold) {
   const float mask = (a.cover - b.cover) / MASK_SCALE;
   const vec3 chord = a.normal - b.normal;

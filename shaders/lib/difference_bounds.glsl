@@ -1,7 +1,7 @@
-// Directions towards the objects that are not in both worlds: only there can the two differ, so a
-// shared path spends a share of its directions on them (estimator.md, "difference bounds"). Each
-// object stands for its bounding sphere, a cone from any point outside; a sphere that contains the
-// point takes no part, since the BSDF meets it often enough.
+// Directions towards the objects that are in one world only. The worlds can differ only there, so a
+// shared path spends a share of its directions on them (shaders/README.md, "Difference bounds").
+// Each object is represented by its bounding sphere, which is seen under a cone from any point
+// outside; a sphere that contains the point takes no part, since the BSDF meets it often enough.
 #ifndef PREVIZ_DIFFERENCE_BOUNDS_GLSL
 #define PREVIZ_DIFFERENCE_BOUNDS_GLSL
 
@@ -11,14 +11,14 @@
 // reflect without blur.
 layout(scalar) readonly buffer Bounds { vec4 bounds[]; };
 
-// 1 - cos of the cone's half angle; 0 from inside.
+// Returns 1 - cos of the half angle under which the bound is seen, or 0 from inside it.
 float bound_cap(vec4 bound, vec3 point) {
   const vec3 to_center = bound.xyz - point;
   const float distance_squared = dot(to_center, to_center);
   return distance_squared > bound.w * bound.w ? sphere_cap(bound.w, distance_squared) : 0.0;
 }
 
-// Whether a segment from a point can meet a bound.
+// Returns whether the segment from the point can meet any bound.
 bool meets_bounds(vec3 point, vec3 direction, float t_max) {
   for (uint i = 0u; i < frame.bound_count; ++i) {
     const vec3 to_center = bounds[i].xyz - point;
@@ -29,7 +29,8 @@ bool meets_bounds(vec3 point, vec3 direction, float t_max) {
   return false;
 }
 
-// Solid angle of the bounds over 2 pi, all around from inside one: how much can differ at a point.
+// Returns the sum of the bounds' solid angles over 2 pi, a measure of how much can differ at a
+// point. A bound that contains the point counts with the whole sphere, 2.
 float bounds_reach(vec3 point) {
   float total = 0.0;
   for (uint i = 0u; i < frame.bound_count; ++i) {
@@ -39,13 +40,15 @@ float bounds_reach(vec3 point) {
   return total;
 }
 
-// Sum of all caps: the cones are chosen by their solid angle.
+// Returns the sum of all caps, by which bounds_sample() chooses a cone in proportion to its solid
+// angle.
 float bounds_total(vec3 point) {
   float total = 0.0;
   for (uint i = 0u; i < frame.bound_count; ++i) total += bound_cap(bounds[i], point);
   return total;
 }
 
+// `total` is bounds_total(point), above 0.
 vec3 bounds_sample(vec3 point, float total, vec2 u) {
   float rest = u.x * total;
   uint chosen = 0u;
@@ -62,8 +65,8 @@ vec3 bounds_sample(vec3 point, float total, vec2 u) {
   return sample_cone(normalize(bounds[chosen].xyz - point), cap, u);
 }
 
-// Density of bounds_sample, per steradian: every cone that holds the direction adds cap / total
-// times 1 / (2 pi cap).
+// Returns the density of bounds_sample() per steradian: every cone that contains the direction adds
+// its probability, cap / total, times its density, 1 / (2 pi cap).
 float bounds_pdf(vec3 point, float total, vec3 direction) {
   if (total <= 0.0) return 0.0;
   float cones = 0.0;

@@ -1,5 +1,5 @@
-// The environment: radiance from a direction, and directions by importance (hierarchical warping
-// down the quadtree of densities; Clarberg et al. 2005, "Wavelet Importance Sampling").
+// The environment: its radiance in a direction, and sampling of directions by importance. Samples
+// are warped down a quadtree of densities (Clarberg et al. 2005, "Wavelet Importance Sampling").
 #ifndef PREVIZ_ENVIRONMENT_GLSL
 #define PREVIZ_ENVIRONMENT_GLSL
 
@@ -12,7 +12,8 @@ uniform textureBuffer environment;
 // four children; the mean density is 1 on every level.
 uniform textureBuffer importance;
 
-// Bilinear between texel centres; the border carries the wrap.
+// Interpolates bilinearly between texel centres; a border of one texel holds what lies over the
+// edge.
 vec3 environment_radiance(vec3 direction) {
   const int size = int(frame.environment_size);
   const int stride = size + 2;
@@ -26,12 +27,13 @@ vec3 environment_radiance(vec3 direction) {
   return mix(top, bottom, f.y);
 }
 
+// Returns the texel of IMPORTANCE that holds the densities of the four children of a node.
 int importance_texel(uint level, uvec2 at) {
-  // (4^level - 1) / 3 texels stand before this level.
+  // (4^level - 1) / 3 texels precede this level.
   return int(((1u << (2u * level)) - 1u) / 3u + (at.y << level) + at.x);
 }
 
-// Density of environment_sample at a direction, per steradian.
+// Returns the density of environment_sample() in a direction, per steradian.
 float environment_pdf(vec3 direction) {
   if (frame.environment_levels == 0u) return 1.0 / (4.0 * PI);
   const float size = float(frame.environment_size);
@@ -42,7 +44,8 @@ float environment_pdf(vec3 direction) {
   return densities[(texel.x & 1u) + 2u * (texel.y & 1u)] / (4.0 * PI);
 }
 
-// Picks the lower (false) or upper (true) half with the given weights and makes u fresh again.
+// Picks the lower (false) or upper (true) half by the weights, and stretches the rest of u to [0,
+// 1).
 bool pick_half(float lower, float upper, inout float u) {
   const float p = lower / (lower + upper);
   const bool second = u >= p;
@@ -51,6 +54,7 @@ bool pick_half(float lower, float upper, inout float u) {
   return second;
 }
 
+// Returns a direction, and in `pdf` its density per steradian.
 vec3 environment_sample(vec2 u, out float pdf) {
   uvec2 texel = uvec2(0u);
   float density = 1.0;

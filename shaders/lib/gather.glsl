@@ -1,5 +1,6 @@
-// What photons bring to a vertex: density estimation over a disc (Jensen 1996), whose radius shrinks
-// from pass to pass so that the mean over passes converges (Knaus and Zwicker 2011).
+// The light that photons bring to a vertex, by density estimation over a disc (Jensen 1996). Its
+// radius shrinks from pass to pass so that the mean over the passes converges (Knaus and Zwicker
+// 2011).
 #ifndef PREVIZ_GATHER_GLSL
 #define PREVIZ_GATHER_GLSL
 
@@ -14,17 +15,18 @@
 uniform textureBuffer found_photons;
 uniform utextureBuffer found_buckets;  // RG32UI: first photon, number of photons
 
-// Photons of a surface that bends away by more than 60 degrees, or that lies above or beneath this
-// one, are another surface's.
+// A photon belongs to another surface if the normal of its surface is more than 60 degrees off, or
+// if it lies further above or below this one than SAME_SURFACE_HEIGHT.
 const float SAME_SURFACE_COS = 0.5;
-const float SAME_SURFACE_HEIGHT = 0.25;  // over the radius
+const float SAME_SURFACE_HEIGHT = 0.25;  // in radii
 
 struct GatheredPair {
   vec3 mixed;
   vec3 real;
 };
 
-// f / cos times the flux of one photon, weighed by its distance. Texel 0 is `position`.
+// Adds f times the flux of one photon, weighted by its distance, without the kernel's constant.
+// bsdf_evaluate() returns f * cos, hence the division. `position` is texel 0 of the photon.
 void gather_photon(uint photon, vec4 position, Surface s, Lobes l, uint most_vertices,
                    bool differing, inout GatheredPair sum) {
   const vec3 off = position.xyz - s.position;
@@ -33,7 +35,7 @@ void gather_photon(uint photon, vec4 position, Surface s, Lobes l, uint most_ver
   if (abs(dot(off, s.geometric_normal)) > SAME_SURFACE_HEIGHT * batch.photon_radius) return;
   const int first = int(photon * TEXELS_PER_PHOTON);
   const vec4 normal = texelFetch(found_photons, first + 2);
-  // Which side it came from is the BSDF's concern: rough glass takes both.
+  // The side from which the photon came is left to the BSDF: rough glass accepts both.
   if (abs(dot(normal.xyz, s.geometric_normal)) < SAME_SURFACE_COS) return;
   const vec4 direction = texelFetch(found_photons, first + 1);
   if (differing && direction.w == normal.w) return;
@@ -47,8 +49,8 @@ void gather_photon(uint photon, vec4 position, Surface s, Lobes l, uint most_ver
   sum.real += radiance * normal.w;
 }
 
-// Whether the disc of photons can reach into a cell: its plane's distance from the cell's centre
-// against the half diagonal along the normal.
+// Returns whether the disc can reach into a cell, by comparing the distance of the disc's plane
+// from the cell's centre with half the cell's extent along the normal.
 bool reaches_cell(Surface s, ivec3 cell) {
   const float half_width = batch.photon_radius;
   const vec3 center = (vec3(cell) + 0.5) * (2.0 * half_width);
@@ -57,17 +59,20 @@ bool reaches_cell(Surface s, ivec3 cell) {
   return abs(dot(center - s.position, n)) <= reach * half_width;
 }
 
+// Returns one of the eight cells whose lowest is `first`.
 ivec3 neighbour_cell(ivec3 first, uint corner) {
   return first + ivec3(corner & 1u, (corner >> 1) & 1u, corner >> 2);
 }
 
-// Radiance of both worlds towards the viewer, by the lobes that are not Dirac. Photons that met more
-// than `most_vertices` Dirac vertices are left out: their paths would be longer than allowed. So are,
-// if only `differing` ones are wanted, those that are the same in both worlds.
+// Returns the radiance of both worlds towards the viewer that photons bring by way of the lobes
+// that are not Dirac deltas. Photons that met more than `most_vertices` Dirac vertices are left
+// out, because their paths would be longer than allowed. With `differing`, so are those that are
+// equal in both worlds.
 GatheredPair gather_photons(Surface s, Lobes l, uint most_vertices, bool differing) {
   GatheredPair sum = GatheredPair(vec3(0.0), vec3(0.0));
   const ivec3 first_cell = photon_cell(s.position - batch.photon_radius);
-  // First which of the eight, then only those: lavapipe pays for what a round leaves out.
+  // First the cells are selected, then only those are searched: on lavapipe, lanes that skip a
+  // round of a loop cost as much as those that do not.
   uint reached = 0u;
   for (uint corner = 0u; corner < 8u; ++corner)
     if (reaches_cell(s, neighbour_cell(first_cell, corner))) reached |= 1u << corner;
@@ -78,13 +83,13 @@ GatheredPair gather_photons(Surface s, Lobes l, uint most_vertices, bool differi
     for (uint chunk = bucket.x; chunk < end; chunk += LOOP_CHUNK) {
       for (uint i = chunk; i < min(chunk + LOOP_CHUNK, end); ++i) {
         const vec4 position = texelFetch(found_photons, int(i * TEXELS_PER_PHOTON));
-        // Other cells share the bucket; two of the eight may, too.
+        // Other cells, even two of these eight, may share the bucket.
         if (photon_cell(position.xyz) != cell) continue;
         gather_photon(i, position, s, l, most_vertices, differing, sum);
       }
     }
   }
-  // Epanechnikov's kernel on a disc: 2 / (pi r^2) (1 - d^2 / r^2).
+  // The kernel is Epanechnikov's on a disc, 2 / (pi r^2) (1 - d^2 / r^2).
   const float scale = 2.0 / (PI * batch.photon_radius * batch.photon_radius * float(frame.photon_count));
   sum.mixed *= scale;
   sum.real *= scale;

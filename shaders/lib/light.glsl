@@ -1,4 +1,4 @@
-// Lights with a place or a direction of their own: set lights and emissive triangles.
+// Lights with a place or a direction of their own: the lamps of the set and emissive triangles.
 #ifndef PREVIZ_LIGHT_GLSL
 #define PREVIZ_LIGHT_GLSL
 
@@ -8,16 +8,17 @@ layout(scalar) readonly buffer Lights { GpuLight lights[]; };
 
 struct LightSample {
   vec3 direction;  // unit, from the point towards the light
-  float t_max;     // a blocker must be nearer than this
-  vec3 radiance;   // Le, or for a delta light the irradiance it brings on a facing plane
-  float pdf;       // per steradian; 0: a delta light
+  float t_max;     // only a nearer surface blocks the light
+  vec3 radiance;   // Le; for a delta light its irradiance on a plane that faces it
+  float pdf;       // per steradian; 0 for a delta light
   vec2 gain;
 };
 
-// Keeps the end of a shadow ray clear of the light's own surface.
+// A shadow ray ends at this share of the distance, so that it does not meet the light's own
+// surface.
 const float SHADOW_END = 0.9999;
 
-// Picks a light by its selection probability; what remains of u is stretched to [0, 1).
+// Picks a light by its selection probability; the rest of u is stretched to [0, 1).
 uint pick_light(inout float u) {
   uint low = 0u;
   uint high = frame.light_count - 1u;
@@ -31,20 +32,23 @@ uint pick_light(inout float u) {
   return low;
 }
 
-// 1 - cos of the half angle under which a sphere is seen, without cancellation.
+// Returns 1 - cos of the half angle under which a sphere is seen, without cancellation.
 float sphere_cap(float radius, float distance_squared) {
   const float sin2 = radius * radius / distance_squared;
   return sin2 / (1.0 + sqrt(max(0.0, 1.0 - sin2)));
 }
 
+// Returns a uniformly distributed direction of the cone around `axis`; cap is 1 - cos of its half
+// angle.
 vec3 sample_cone(vec3 axis, float cap, vec2 u) {
-  const float depth = u.x * cap;  // 1 - cos, which small cones do not survive being taken from 1
+  const float depth = u.x * cap;  // 1 - cos, which for small cones would be lost in cos
   const float sin_theta = sqrt(depth * (2.0 - depth));
   const float phi = 2.0 * PI * u.y;
   return make_frame(axis) * vec3(sin_theta * cos(phi), sin_theta * sin(phi), 1.0 - depth);
 }
 
-// Nearest crossing of a unit ray with a sphere from outside; < 0: none.
+// Returns the distance along a unit ray to a sphere that is seen from outside, below 0 if it is
+// missed.
 float intersect_sphere(vec3 origin, vec3 direction, vec3 center, float radius) {
   const vec3 to_center = center - origin;
   const float along = dot(to_center, direction);
@@ -54,6 +58,7 @@ float intersect_sphere(vec3 origin, vec3 direction, vec3 center, float radius) {
   return along - sqrt(under);
 }
 
+// Returns the share of a spot's intensity at this angle: a smoothstep between its two cones.
 float spot_falloff(GpuLight light, float cos_angle) {
   if (light.type != LIGHT_SPOT) return 1.0;
   const float x = clamp((cos_angle - light.cos_outer) / max(light.cos_inner - light.cos_outer, 1e-6),
@@ -61,6 +66,7 @@ float spot_falloff(GpuLight light, float cos_angle) {
   return x * x * (3.0 - 2.0 * x);
 }
 
+// Returns the radiance at a point of an emissive triangle, textured and weakened by its alpha.
 vec3 triangle_emission(GpuLight light, vec2 b) {
   const vec2 uv = light.uv0 * (1.0 - b.x - b.y) + light.uv1 * b.x + light.uv2 * b.y;
   vec3 emission = light.emission;
@@ -71,6 +77,8 @@ vec3 triangle_emission(GpuLight light, vec2 b) {
   return emission;
 }
 
+// Completes `result` for a uniformly chosen point of a light's surface; false if its front faces
+// away.
 bool sample_area(GpuLight light, vec3 point, vec3 on_light, vec3 normal, float area,
                  bool two_sided, inout LightSample result) {
   const vec3 to_light = on_light - point;
@@ -86,6 +94,7 @@ bool sample_area(GpuLight light, vec3 point, vec3 on_light, vec3 normal, float a
   return true;
 }
 
+// Samples a light as it is seen from a point; false if it does not shine there.
 bool sample_light(GpuLight light, vec3 point, vec2 u, out LightSample result) {
   result = LightSample(vec3(0.0), 3.4e38, light.emission, 0.0, light.gain);
   switch (light.type) {
@@ -109,11 +118,11 @@ bool sample_light(GpuLight light, vec3 point, vec2 u, out LightSample result) {
     case LIGHT_SPHERE: {
       const vec3 to_center = light.position - point;
       const float distance_squared = dot(to_center, to_center);
-      if (distance_squared <= light.radius * light.radius) return false;  // it emits outwards
+      if (distance_squared <= light.radius * light.radius) return false;  // it emits outwards only
       const float cap = sphere_cap(light.radius, distance_squared);
       result.direction = sample_cone(to_center / sqrt(distance_squared), cap, u);
       const float t = intersect_sphere(point, result.direction, light.position, light.radius);
-      // A grazing sample may miss by rounding; it then ends where the tangent touches.
+      // Rounding may let a grazing sample miss; its ray then ends at the point of tangency.
       result.t_max = (t > 0.0 ? t : sqrt(distance_squared - light.radius * light.radius)) * SHADOW_END;
       result.pdf = 1.0 / (2.0 * PI * cap);
       return cap > 0.0;
@@ -132,19 +141,22 @@ bool sample_light(GpuLight light, vec3 point, vec2 u, out LightSample result) {
   }
 }
 
-// Density with which sample_light finds this point of an emissive triangle, per steradian.
+// Returns the density per steradian with which sample_light() chooses this point of an emissive
+// triangle.
 float triangle_pdf(GpuLight light, vec3 direction, float t) {
   const float area = 0.5 * length(cross(light.edge_u, light.edge_v));
   return t * t / max(area * abs(dot(direction, light.direction)), 1e-30);
 }
 
-// A ray meets a light that is not a mesh: t of the crossing (< 0: none) and the density with which
-// sample_light would have chosen the direction. Directional discs are met at infinity.
+// Intersects a ray with a light that is not a mesh. It returns the distance, below 0 for a miss,
+// and in `pdf` the density with which sample_light() would have chosen the direction. Directional
+// discs are at infinity.
 float meet_light(GpuLight light, vec3 origin, vec3 direction, out float pdf) {
   pdf = 0.0;
   if (light.type == LIGHT_DIRECTIONAL) {
-    // The chord between the directions against the disc's: 2 sin(r / 2), cone = 4 pi sin^2(r / 2). The
-    // cosines of small angles are all the same.
+    // The chord between the directions is compared with that of the disc's radius r, 2 sin(r / 2),
+    // whose solid angle is 4 pi sin^2(r / 2). Cosines would not do: those of small angles are all
+    // equal.
     const vec3 chord = direction + light.direction;
     if (light.cone_sr <= 0.0 || dot(chord, chord) > light.cone_sr / PI) return -1.0;
     pdf = 1.0 / light.cone_sr;
@@ -165,7 +177,7 @@ float meet_light(GpuLight light, vec3 origin, vec3 direction, out float pdf) {
   const vec3 off = t * direction - to_plane;
   const float a = dot(off, light.edge_u) / dot(light.edge_u, light.edge_u);
   const float b = dot(off, light.edge_v) / dot(light.edge_v, light.edge_v);
-  if (!(abs(a) <= 0.5 && abs(b) <= 0.5)) return -1.0;  // nor is one met whose sides round to nothing
+  if (!(abs(a) <= 0.5 && abs(b) <= 0.5)) return -1.0;  // NaN where a side rounds to 0
   pdf = t * t / (length(light.edge_u) * length(light.edge_v) * cos_light);
   return t;
 }

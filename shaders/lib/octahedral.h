@@ -1,5 +1,6 @@
-// Equal-area octahedral map between the square [-1,1]^2 and the sphere (Clarberg 2008, "Fast
-// Equal-Area Mapping of the (Hemi)Sphere using SIMD"). Compiled by the shaders and by C++ (GLM).
+// The equal-area octahedral map between the square [-1,1]^2 and the sphere (Clarberg 2008, "Fast
+// Equal-Area Mapping of the (Hemi)Sphere using SIMD"). Both the shaders and C++ (by GLM) compile
+// this file.
 #ifndef PREVIZ_OCTAHEDRAL_H
 #define PREVIZ_OCTAHEDRAL_H
 
@@ -23,7 +24,7 @@ using glm::vec3;
 #define PREVIZ_INLINE
 #endif
 
-// Point of the square to unit direction; the centre is +Z, the corners are -Z.
+// Maps a point of the square to a unit direction; the centre is +Z, the corners are -Z.
 PREVIZ_INLINE vec3 octahedral_direction(vec2 p) {
   const float u = abs(p.x);
   const float v = abs(p.y);
@@ -37,12 +38,12 @@ PREVIZ_INLINE vec3 octahedral_direction(vec2 p) {
   return vec3(p.x < 0.0f ? -x : x, p.y < 0.0f ? -y : y, distance < 0.0f ? -z : z);
 }
 
-// Unit direction to point of the square; the inverse of octahedral_direction.
+// Maps a unit direction to its point of the square; it is the inverse of octahedral_direction().
 PREVIZ_INLINE vec2 octahedral_point(vec3 d) {
   const float x = abs(d.x);
   const float y = abs(d.y);
   const float z = abs(d.z);
-  // sqrt(1 - z) without cancellation near the poles.
+  // r is sqrt(1 - z), written so that nothing cancels near the poles.
   const float r = sqrt((x * x + y * y) / (1.0f + z));
   const float phi = x == 0.0f && y == 0.0f ? 0.0f : atan(y, x) * 0.63661977237f;  // [0, 1]
   float v = phi * r;

@@ -1,4 +1,5 @@
-// Paths in flight and what they bring back: their buffers, the batch, and compacted queues.
+// Paths in flight: their buffers, the numbering of samples and paths, and the compacted
+// queues.
 #ifndef PREVIZ_PATH_GLSL
 #define PREVIZ_PATH_GLSL
 
@@ -23,15 +24,18 @@ layout(scalar) readonly buffer Limits { uint limits[]; };       // of a block of
                                                                 // how many samples its pixels get
 layout(scalar) buffer Pixels { GpuPixel pixels[]; };            // of the tile, row-major
 
-// Slots of a tile: pixels in blocks of 8x4 for coherent rays, rounded up; then sample by sample.
+// A slot is one sample of one pixel. A tile's slots run through its pixels in blocks of 8x4, so
+// that the rays of a subgroup are coherent, and then through its samples. Blocks at the edge are
+// padded.
 const uvec2 BLOCK = uvec2(8u, 4u);
 
+// Returns the number of slots of one sample of the tile.
 uint tile_slots() {
   const uvec2 blocks = (uvec2(batch.width, batch.height) + BLOCK - 1u) / BLOCK;
   return blocks.x * blocks.y * BLOCK.x * BLOCK.y;
 }
 
-// The pixel of a slot within its tile; outside the tile for the padding of the last blocks.
+// Returns the pixel of a slot within its tile; padding of the last blocks lies outside the tile.
 uvec2 slot_pixel(uint slot) {
   const uint in_tile = slot % tile_slots();
   const uint block = in_tile / (BLOCK.x * BLOCK.y);
@@ -41,6 +45,7 @@ uvec2 slot_pixel(uint slot) {
          uvec2(in_block % BLOCK.x, in_block / BLOCK.x);
 }
 
+// Returns the slot of a pixel's first sample; it is the inverse of slot_pixel().
 uint pixel_slot(uvec2 pixel) {
   const uint blocks_x = (batch.width + BLOCK.x - 1u) / BLOCK.x;
   const uvec2 block = pixel / BLOCK;
@@ -48,7 +53,7 @@ uint pixel_slot(uvec2 pixel) {
   return (block.y * blocks_x + block.x) * BLOCK.x * BLOCK.y + in_block.y * BLOCK.x + in_block.x;
 }
 
-// How many samples a pixel of the picture gets at most.
+// Returns the largest number of samples that a pixel of the picture may get.
 uint sample_limit(uvec2 pixel) {
   const uint blocks_x = (frame.width + SAMPLED_BLOCK - 1u) / SAMPLED_BLOCK;
   return limits[pixel.y / SAMPLED_BLOCK * blocks_x + pixel.x / SAMPLED_BLOCK];
@@ -56,14 +61,14 @@ uint sample_limit(uvec2 pixel) {
 
 uint slot_sample(uint slot) { return batch.first_sample + slot / tile_slots(); }
 
-// Half of the queue buffer that is being worked on, and the half that is being filled.
+// The queue buffer has two halves: the active one is being worked on, the next one is being filled.
 uint active_queue_index(uint i) { return control.queue_side * (queue.length() / 2u) + i; }
 uint next_queue_index(uint i) { return (1u - control.queue_side) * (queue.length() / 2u) + i; }
 
 uint path_worlds(uint bits) { return bits & PATH_WORLDS_MASK; }
 uint path_depth(uint bits) { return (bits >> PATH_DEPTH_SHIFT) & 0xffu; }
 
-// Slots whose paths there is room for.
+// Returns the number of slots for whose paths there is room.
 uint slot_count() {
   return uint(ray_origin.length()) / (has_feature(FEATURE_CAMERA) ? 3u : 2u);
 }
@@ -72,8 +77,9 @@ uint path_slot(uint path) {
                                                                   : path >> 1;
 }
 
-// Adds light to what the worlds of a path have received. Only one path of a slot is in each world,
-// and one is the real part of a landed one, so no two invocations write the same value.
+// Adds light to the radiance of the worlds that a path is in. Of a slot's paths only one is in each
+// world, and the real part of a landed path has a sum of its own, so no two invocations write the
+// same value.
 void add_pair(uint slot, uint worlds, bool landed, vec3 mixed, vec3 real) {
   if ((worlds & WORLD_MIXED) != 0u) sample_mixed[slot].rgb += mixed;
   if ((worlds & WORLD_REAL) == 0u) return;

@@ -1,4 +1,5 @@
-// The photons of a pass while they are made and sorted.
+// The buffers of a pass of photons while they are traced and sorted, and the photons' random
+// numbers.
 #ifndef PREVIZ_PHOTON_GLSL
 #define PREVIZ_PHOTON_GLSL
 
@@ -11,17 +12,18 @@ layout(scalar) buffer PhotonControl { GpuPhotonControl photon_control; };
 layout(scalar) buffer Sorted { vec4 sorted_photons[]; };  // found_photons, to write
 layout(scalar) buffer Buckets { GpuPhotonBucket buckets[]; };  // a power of two; found_buckets
 
-// All photons of many passes are one sequence; both worlds' parts of a photon share its numbers.
+// The photons of 4096 passes are one sequence of samples, so that they spread evenly over the
+// passes as well. Both halves of a photon that forked share its numbers.
 Sampler photon_sampler(uint photon) {
   const uint passes = 4096u;
   return make_sampler(frame.seed, uvec2(NO_INDEX, batch.first_sample / passes),
                       (batch.first_sample % passes) * frame.photon_count + photon);
 }
 
-// Dimension pairs of a photon.
+// These are the dimension pairs of a photon.
 const uint PAIR_EMITTER = 0u;  // x: which light, y: which bound
 const uint PAIR_ON_LIGHT = 1u;
 const uint PAIR_AIM = 2u;
-const uint PAIR_BOUNCE = 3u;   // plus the vertex; x: stay or go on, and how; y: roulette
+const uint PAIR_BOUNCE = 3u;   // plus the vertex; x: whether to stay, and the lobe; y: roulette
 
 #endif

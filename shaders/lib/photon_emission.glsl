@@ -1,5 +1,5 @@
 // Photons leave the lights towards the bounds of the objects that can reflect or refract without
-// blur: no other photon makes a caustic.
+// blur; others could not make a caustic (shaders/README.md, "Caustics").
 #ifndef PREVIZ_PHOTON_EMISSION_GLSL
 #define PREVIZ_PHOTON_EMISSION_GLSL
 
@@ -14,21 +14,23 @@ layout(scalar) readonly buffer Bounds { vec4 bounds[]; };
 struct Emission {
   vec3 origin;
   vec3 direction;
-  vec3 flux;  // radiance, intensity or irradiance over the density of the sample; watts
+  vec3 flux;  // watts: radiance, intensity or irradiance over the sample's density
   vec2 gain;
 };
 
 vec4 specular_bound(uint i) { return bounds[frame.bound_count + i]; }
 
-// 1 - cos of the half angle under which a bound is seen; all around from inside.
+// Returns 1 - cos of the half angle under which a bound is seen; from inside it is the whole
+// sphere's, 2.
 float aim_cap(vec4 bound, vec3 origin) {
   const vec3 to_center = bound.xyz - origin;
   const float distance_squared = dot(to_center, to_center);
   return distance_squared > bound.w * bound.w ? sphere_cap(bound.w, distance_squared) : 2.0;
 }
 
-// A direction from a place towards the bounds, chosen by solid angle, and its density per
-// steradian: each of the cones that hold it adds 1 / (2 pi sum of the caps).
+// Returns a direction from a place towards the bounds, which are chosen in proportion to their
+// solid angle. Each cone that contains the direction adds 1 / (2 pi times the sum of the caps) to
+// its density per steradian.
 vec3 aim_from(vec3 origin, float choice, vec2 u, out float pdf) {
   float total = 0.0;
   for (uint i = 0u; i < frame.specular_bound_count; ++i) total += aim_cap(specular_bound(i), origin);
@@ -55,8 +57,9 @@ vec3 aim_from(vec3 origin, float choice, vec2 u, out float pdf) {
   return direction;
 }
 
-// A point before the scene from which light that comes from afar reaches the bounds, and the area
-// over which the photon stands: each disc that holds the point adds 1 / (sum of the areas).
+// Returns a point in front of the scene from which distant light reaches the bounds, and in `area`
+// the inverse of the point's density: each bound's disc that contains the point adds 1 / (sum of
+// the areas) to it.
 vec3 aim_along(vec3 to_light, float choice, vec2 u, out float area) {
   float total = 0.0;
   for (uint i = 0u; i < frame.specular_bound_count; ++i)
@@ -101,7 +104,7 @@ Emission emit_directional(GpuLight light, Sampler random, vec2 choice) {
   return Emission(origin, -to_light, flux * area, light.gain);
 }
 
-// From a point of a light's surface; a two-sided one is left on the side of the direction.
+// Emits from a point of a light's surface; a two-sided light emits on the side of the direction.
 Emission emit_surface(GpuLight light, Sampler random, vec2 choice, vec3 at, vec3 normal, float area,
                       bool two_sided, vec3 radiance) {
   float pdf;
@@ -147,6 +150,7 @@ Emission emit_light(GpuLight light, Sampler random, vec2 choice) {
   }
 }
 
+// Emits from the environment or from a light; they are chosen in proportion to their power.
 Emission emit_photon(Sampler random) {
   vec2 choice = sample_2d(random, PAIR_EMITTER);
   const float environment = frame.photon_environment;

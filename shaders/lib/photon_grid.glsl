@@ -1,5 +1,5 @@
-// The hash grid in which photons are found. A cell is twice as wide as the radius, so that a disc
-// touches at most two cells an axis.
+// The hash grid by which photons are found. A cell is twice as wide as the radius, so that a disc
+// touches at most two cells along each axis.
 #ifndef PREVIZ_PHOTON_GRID_GLSL
 #define PREVIZ_PHOTON_GRID_GLSL
 
@@ -7,15 +7,16 @@
 #include "shaders/lib/sampler.glsl"
 #include "shaders/lib/scene.glsl"
 
-// Lavapipe of Mesa 22.3 silently ends a loop after 65535 rounds; longer ones are cut into these.
+// Lavapipe of Mesa 22.3 silently ends a loop after 65535 rounds, so longer loops run in chunks.
 const uint LOOP_CHUNK = 32768u;
 
 ivec3 photon_cell(vec3 position) { return ivec3(floor(position / (2.0 * batch.photon_radius))); }
 
-// Twice the photons, rounded up to a power of two; daemon/render/photon_map.cpp makes as many.
+// Returns twice the number of photons, rounded up to a power of two; daemon/render/photon_map.cpp
+// allocates as many buckets.
 uint photon_bucket_count() { return 2u << findMSB(2u * frame.photon_count - 1u); }
 
-// Cells share buckets.
+// Returns the bucket of a cell; several cells may share it.
 uint photon_bucket(ivec3 cell) {
   const uvec3 c = uvec3(cell);
   return hash_bits(hash_pair(c.x, c.y) ^ (c.z * 0x9e3779b9u)) & (photon_bucket_count() - 1u);

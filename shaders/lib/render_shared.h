@@ -1,5 +1,5 @@
-// Structures of the renderer that cross between C++ and the shaders, with their layout (scalar).
-// What tracing needs is in shared.h.
+// Structures and constants of the renderer that cross between C++ and the shaders, in scalar
+// layout. Those that tracing needs are in shared.h.
 #ifndef PREVIZ_RENDER_SHARED_H
 #define PREVIZ_RENDER_SHARED_H
 
@@ -12,14 +12,15 @@ namespace previz::gpu {
 
 // A table of daemon/render/albedo_table.hpp has this many texels on each side.
 PREVIZ_CONST uint ALBEDO_SIDE = 32u;
-// Glass below this index bends light too little for its roughness to show; it is taken as smooth.
+// Glass below this index of refraction is treated as smooth, since it bends light too little for
+// its roughness to show.
 PREVIZ_CONST float LEAST_ROUGH_IOR = 1.001f;
 
 PREVIZ_CONST uint TEXELS_PER_PHOTON = 4u;
 
 // Pixels from which the variance of a single sample is taken, to each side.
 PREVIZ_CONST uint DENOISE_VARIANCE_REACH = 3u;
-// A channel that comes out at this share of the sensor's white is white: a step of 8 bits below it.
+// A channel counts as white from this share of the sensor's white on, a step of 8 bits below it.
 PREVIZ_CONST float NEARLY_WHITE = 0.99f;
 
 // How the difference is put onto the camera's picture: set::Composite.
@@ -27,11 +28,11 @@ PREVIZ_CONST uint COMPOSITE_ADDITIVE = 0u;
 PREVIZ_CONST uint COMPOSITE_RATIO = 1u;
 PREVIZ_CONST uint COMPOSITE_HYBRID = 2u;
 
-// What a slot holds, in the fourth component of its sample_real.
+// The fourth component of SAMPLE_REAL says what was traced for the slot.
 PREVIZ_CONST float SAMPLE_FULL = 0.0f;        // both radiances
-PREVIZ_CONST float SAMPLE_DIFFERENCE = 1.0f;  // only what differs between them
+PREVIZ_CONST float SAMPLE_DIFFERENCE = 1.0f;  // only the difference of the two
 
-// Sides of the blocks of pixels that get the same number of samples.
+// Blocks of so many pixels a side get the same number of samples.
 PREVIZ_CONST uint SAMPLED_BLOCK = 8u;
 PREVIZ_CONST uint UNLIMITED = 0xffffffffu;
 
@@ -39,32 +40,33 @@ PREVIZ_CONST uint WORKGROUP_SIZE = 64u;
 PREVIZ_CONST uint NO_INDEX = 0xffffffffu;
 PREVIZ_CONST uint MAX_DEPTH = 64u;
 
-// What the scene requires; specialisation constant 0. A feature left out changes no pixel.
+// Features that a scene may require. Specialisation constant 0 is their union; a feature that is
+// left out changes no pixel.
 PREVIZ_CONST uint FEATURE_GLOSSY = 1u;        // any specular reflection of opaque surfaces
 PREVIZ_CONST uint FEATURE_TRANSMISSION = 2u;
 PREVIZ_CONST uint FEATURE_TEXTURES = 4u;
 PREVIZ_CONST uint FEATURE_LIGHTS = 8u;        // set lights or emissive triangles
 PREVIZ_CONST uint FEATURE_VISIBLE_LIGHTS = 16u;  // lights with an extent that rays can see
 PREVIZ_CONST uint FEATURE_LENS = 32u;
-PREVIZ_CONST uint FEATURE_FORKS = 64u;        // any object present in one world only
+PREVIZ_CONST uint FEATURE_FORKS = 64u;        // any object that is in one world only
 PREVIZ_CONST uint FEATURE_ENVIRONMENT_SAMPLING = 128u;  // next-event estimation of the environment
-PREVIZ_CONST uint FEATURE_CAUSTICS = 256u;  // paths bring light to rough vertices by Dirac lobes only
-PREVIZ_CONST uint FEATURE_PHOTONS = 512u;   // photons bring it
+PREVIZ_CONST uint FEATURE_CAUSTICS = 256u;  // paths bring caustics
+PREVIZ_CONST uint FEATURE_PHOTONS = 512u;   // photons bring caustics
 PREVIZ_CONST uint FEATURE_NORMAL_MAPS = 2048u;
-PREVIZ_CONST uint FEATURE_ALPHA = 4096u;  // any surface that is not there everywhere
-PREVIZ_CONST uint FEATURE_DIFFERENCE = 1024u;  // only what differs is traced, where that is enough
-PREVIZ_CONST uint FEATURE_CAMERA = 8192u;  // the plate is the real radiance of points it shows
+PREVIZ_CONST uint FEATURE_ALPHA = 4096u;  // any surface that may be transparent by its alpha
+PREVIZ_CONST uint FEATURE_DIFFERENCE = 1024u;  // where possible, only the difference is traced
+PREVIZ_CONST uint FEATURE_CAMERA = 8192u;  // the plate gives the radiance of points that it shows
 
-// Bits of a path's state.
+// These bits are a path's state.
 PREVIZ_CONST uint PATH_WORLDS_MASK = 3u;      // WORLD_*
 PREVIZ_CONST uint PATH_DEPTH_SHIFT = 8u;      // number of surface vertices so far
-PREVIZ_CONST uint PATH_ROUGH = 4u;            // some vertex so far scattered by a non-Dirac lobe
-PREVIZ_CONST uint PATH_DIFFERENCE = 8u;       // while in both worlds, only what differs counts
-PREVIZ_CONST uint PATH_LANDED = 16u;          // was in the mixed world, took the plate's radiance and
-                                              // goes on for Lm - Lr there
+PREVIZ_CONST uint PATH_ROUGH = 4u;            // some lobe so far was not Dirac
+PREVIZ_CONST uint PATH_DIFFERENCE = 8u;       // while in both worlds, only the difference is traced
+PREVIZ_CONST uint PATH_LANDED = 16u;          // took the plate's radiance at a vertex and
+                                              // continues for Lm - Lr of that vertex
 
 struct GpuHit {
-  float t;  // < 0: nothing hit
+  float t;  // below 0: nothing was hit
   vec2 barycentrics;
   uint instance;
   uint primitive;
@@ -79,13 +81,13 @@ struct GpuShadowRay {
   vec2 gain;             // emission gain in the (mixed, real) world
 };
 
-// Light that arrived at a surface with a non-Dirac lobe by way of Dirac lobes only.
+// A photon that arrived, by way of Dirac lobes only, at a surface with a lobe that is not Dirac.
 struct GpuPhoton {
   vec3 position;
-  uint vertices;   // Dirac vertices on its way; 0: it did not stay anywhere
-  vec3 direction;  // in which it travelled, unit
-  vec3 normal;     // geometric, on the side on which it arrived
-  vec3 flux;       // watts; divided by the number of photons of the pass
+  uint vertices;   // Dirac vertices on its way; 0: it was not stored
+  vec3 direction;  // unit, in which it travelled
+  vec3 normal;     // geometric, on the side from which it arrived
+  vec3 flux;       // watts, not yet divided by the number of photons of the pass
   vec2 gain;       // in the (mixed, real) world
 };
 
@@ -98,22 +100,23 @@ struct GpuPhotonControl {
   uint stored;
 };
 
-// What one pixel has gathered: two-float sums (value = high + low), so that 1e7 samples stay exact.
+// The sums of a pixel's samples. They are two-float sums (value = high + low), so that 1e7 samples
+// lose nothing (shaders/README.md, "Accumulation").
 struct GpuPixel {
   vec4 mixed_high;  // Lm, M
   vec4 mixed_low;
   vec4 diff_high;   // Lm - Lr, depth
   vec4 diff_low;
-  vec4 normal;      // sum of normals, number of samples that hit something
-  vec4 square_mixed_high;  // sums of squares, for the variance; w: samples of the difference only
+  vec4 normal;      // sum of normals; w: number of samples that hit a surface
+  vec4 square_mixed_high;  // sums of squares, for the variance; w: number of SAMPLE_DIFFERENCE
   vec4 square_mixed_low;
   vec4 square_diff_high;   // w: number of samples
   vec4 square_diff_low;
 };
 
-// The real world's first surface at the middle of a pixel.
+// The first surface of the real world at the middle of a pixel.
 struct GpuSeen {
-  float inverse_depth;  // 1/m, along the optical axis; 0: none, or one that alpha lets through
+  float inverse_depth;  // 1/m, along the optical axis; 0: none, or it may be transparent
   uint instance;
 };
 
@@ -121,7 +124,7 @@ struct GpuControl {
   uint extend_groups[4];  // indirect dispatch arguments (x, y, z), padding
   uint shadow_groups[4];
   uint active_count;      // paths in the queue being worked on
-  uint next_count;        // paths appended for the next segment
+  uint next_count;        // paths appended to the next queue
   uint shadow_count;
   uint queue_side;        // which half of the queue is active
   uint rays_low, rays_high;
@@ -130,15 +133,15 @@ struct GpuControl {
   uint dropped_negative;
   uint stopped_in_layers;
   uint measured_low, measured_high;      // vertices whose radiance the plate gave
-  uint unmeasured_low, unmeasured_high;  // and those of the real world for which it could not
+  uint unmeasured_low, unmeasured_high;  // real vertices for which it could not
 };
 
 struct GpuInstance {
   vec4 world_from_object[3];  // rows; camera-relative world
   vec4 object_from_world[3];
   uint material;
-  uint first_triangle;  // in triangles
-  uint first_light;     // of its emissive triangles; NO_INDEX: emits nothing
+  uint first_triangle;  // in TRIANGLES
+  uint first_light;     // of its emissive triangles; NO_INDEX if it emits nothing
   uint presence;
 };
 
@@ -159,10 +162,11 @@ struct GpuMaterial {
   uint alpha_mode;    // ALPHA_*
   float alpha;
   float alpha_cutoff;
-  uint albedo_table;  // rough glass: of albedo, seen from outside; the next one is from inside
+  uint albedo_table;  // rough glass: its table seen from outside; the next is from inside
 };
 
-// glTF's alpha modes: all there; there where alpha reaches the cutoff; there by a share of alpha.
+// glTF's alpha modes: the surface is all there, or there where its alpha reaches the cutoff, or its
+// alpha is the share that is there.
 PREVIZ_CONST uint ALPHA_OPAQUE = 0u;
 PREVIZ_CONST uint ALPHA_MASK = 1u;
 PREVIZ_CONST uint ALPHA_BLEND = 2u;
@@ -185,11 +189,11 @@ PREVIZ_CONST uint LIGHT_RECTANGLE = 3u;
 PREVIZ_CONST uint LIGHT_SPHERE = 4u;
 PREVIZ_CONST uint LIGHT_TRIANGLE = 5u;
 
-// Camera-relative world space.
+// A light in camera-relative world space.
 struct GpuLight {
   vec3 position;   // point, spot, sphere centre, rectangle centre, triangle's first vertex
   uint type;
-  vec3 direction;  // the way light travels; triangle: unit normal
+  vec3 direction;  // in which light travels; triangle: unit normal
   float radius;    // sphere
   vec3 edge_u;     // rectangle: whole width; triangle: v1 - v0
   float cos_inner; // spot
@@ -202,7 +206,7 @@ struct GpuLight {
   float cdf;       // sum of selection up to and including this light
   vec2 uv0, uv1, uv2;  // triangle: texture coordinates
   uint emission_texture;
-  uint alpha_material;  // triangle: whose alpha weakens it; NO_INDEX: it is all there
+  uint alpha_material;  // triangle: its alpha weakens the light; NO_INDEX if opaque
 };
 
 struct GpuFrame {
@@ -215,53 +219,53 @@ struct GpuFrame {
   uint roulette_depth;
   float specular_alpha;       // alpha at or below which a lobe is a Dirac delta
   uint environment_size;
-  uint environment_levels;    // of importance
+  uint environment_levels;    // levels of IMPORTANCE
   float environment_selection;  // probability that a light sample picks the environment
   uint light_count;
-  uint visible_light_count;   // the first lights, those with an extent that are not triangles
-  uint bound_count;
-  float bound_share;          // of a shared path's directions, at most, towards those bounds
-  float environment_spread;   // solid angle over 2 pi that light samples find its light in
-  float lamp_spread;          // the same of the lights
-  float lamp_part;            // of all light, that of the lights
-  float difference_roulette;  // survival of a path of the difference over the bounds' solid angle
-  uint specular_bound_count;  // the bounds after them
-  uint photon_count;          // emitted a pass
+  uint visible_light_count;   // the first lights: those with an extent, without triangles
+  uint bound_count;           // BOUNDS of objects that are in one world only
+  float bound_share;          // largest share of a shared path's directions towards those BOUNDS
+  float environment_spread;   // solid angle over 2 pi from which the environment's light comes
+  float lamp_spread;          // the same for the lights
+  float lamp_part;            // share of the lights in all power
+  float difference_roulette;  // survival of a path of the difference over bounds_reach()
+  uint specular_bound_count;  // BOUNDS that follow, at which photons are aimed
+  uint photon_count;          // emitted per pass
   float photon_environment;   // probability that a photon starts from the environment
   vec3 scene_center;
-  float scene_radius;         // of a sphere that holds everything
+  float scene_radius;         // of a sphere that contains everything
   vec2 focal_px, principal_px;  // of the observer's lens, OpenCV's convention
   vec3 radial;                  // k1, k2, k3
   vec2 tangential;              // p1, p2
 };
 
-// Push constants: the part of the picture and the samples of this batch.
+// Push constants of a batch: a part of the picture and a range of samples.
 struct GpuBatch {
   uint x, y, width, height;   // tile
   uint first_sample, samples;
-  float photon_radius;        // metres; photons of a pass serve the sample of the same index
+  float photon_radius;        // metres; the photons of a pass serve the sample of the same index
 };
 
-// Push constants of the passes that take noise out.
+// Push constants of the denoiser's passes.
 struct GpuDenoise {
   uint width, height;
   uint step;           // pixels between neighbours
-  uint single_sample;  // 1: what a pixel has is one sample, and its variance is not known
+  uint single_sample;  // 1: pixels have one sample, and so no variance of their own
 };
 
-// Push constants of the passes that make what is shown: pixels of a band.
+// Push constants of the passes that make the shown picture.
 struct GpuShow {
-  uint count;
-  uint in_tile;        // the first of them among the tile's
-  uint in_band;        // and among the band's
-  uint has_plate;      // 0: over black
+  uint count;          // pixels to work on
+  uint in_tile;        // index of the first one in the tile
+  uint in_band;        // and in the band
+  uint has_plate;      // 0: the composite is over black
   uint most;           // the largest code
   uint composite;      // COMPOSITE_*
-  float floor;         // of COMPOSITE_HYBRID, radiance
+  float floor;         // radiance, of COMPOSITE_HYBRID
   float exposure;      // signal over radiance
   float white;         // radiance at which the sensor clips, 1 / exposure
   float most_variance; // radiance squared
-  uint is_denoised;    // the signals are: the composite's place is theirs
+  uint is_denoised;    // 1: signals are denoised and replace the composite
 };
 
 #ifdef __cplusplus

@@ -1,24 +1,25 @@
-// Random numbers: padded two-dimensional Owen-scrambled Sobol points, hash-seeded, without tables
-// (Burley 2020, "Practical Hash-based Owen Scrambling"). A sample is a pure function of
+// Random numbers are padded two-dimensional Owen-scrambled Sobol points, seeded by hashes, without
+// tables (Burley 2020, "Practical Hash-based Owen Scrambling"). A sample is a pure function of
 // (seed, pixel, sample index, dimension).
 //
-// The pixels of a tile share a scramble, and each shifts its points, digit by digit, by a point of
-// another net, taken in Morton order. So each pixel has a scrambled Sobol sequence, and each sample
-// of the tile's 64 pixels is a net: errors over a tile cancel, which the eye and every mean over
-// many pixels see (as Ahmed and Wonka 2020, "Screen-Space Blue-Noise Diffusion of Monte Carlo
-// Sampling Error via Hierarchical Ordering of Pixels", but for any number of samples).
+// The pixels of a tile share a scramble, and each pixel shifts the points, digit by digit, by a
+// point of another net, taken in Morton order. So each pixel has a scrambled Sobol sequence, and
+// one sample of each of the tile's 64 pixels is a net as well: errors cancel over a tile, which the
+// eye and every mean over many pixels see. The idea is that of Ahmed and Wonka 2020, "Screen-Space
+// Blue-Noise Diffusion of Monte Carlo Sampling Error via Hierarchical Ordering of Pixels", but
+// works for any number of samples.
 #ifndef PREVIZ_SAMPLER_GLSL
 #define PREVIZ_SAMPLER_GLSL
 
 struct Sampler {
-  uint key;    // of this pixel's tile
-  uint index;  // of this sample
-  uint place;  // of the pixel in its tile
+  uint key;    // seeds the scramble of the pixel's tile
+  uint index;  // of the sample
+  uint place;  // of the pixel in its tile, in Morton order
 };
 
 const uint TILE_BITS = 3u;  // tiles of 8x8 pixels
 
-// Finaliser of a 32-bit hash with low bias (Wellons 2018, lowbias32).
+// A finaliser of a 32-bit hash with low bias (Wellons 2018, lowbias32).
 uint hash_bits(uint x) {
   x ^= x >> 16;
   x *= 0x7feb352du;
@@ -30,7 +31,7 @@ uint hash_bits(uint x) {
 
 uint hash_pair(uint a, uint b) { return hash_bits(a ^ (hash_bits(b) + 0x9e3779b9u + (a << 6) + (a >> 2))); }
 
-// Bit i goes to bit 2 i.
+// Moves bit i to bit 2 i.
 uvec2 spread_bits(uvec2 x) {
   x = (x | (x << 2)) & 0x33u;
   return (x | (x << 1)) & 0x55u;
@@ -42,7 +43,8 @@ Sampler make_sampler(uint seed, uvec2 pixel, uint index) {
   return Sampler(hash_pair(hash_pair(seed, tile.x), tile.y), index, in_tile.x | (in_tile.y << 1));
 }
 
-// Laine-Karras permutation: an Owen scramble of the reversed bits (constants of Vegdahl 2021).
+// The Laine-Karras permutation, which is an Owen scramble of reversed bits (constants by Vegdahl
+// 2021).
 uint scramble_reversed(uint x, uint seed) {
   x ^= x * 0x3d20adeau;
   x += seed;
@@ -52,8 +54,8 @@ uint scramble_reversed(uint x, uint seed) {
   return x;
 }
 
-// The second Sobol dimension of `index`, bits not yet reversed: multiplication by Pascal's triangle
-// modulo 2, which is a Kronecker power and so takes one step a bit of the bit position.
+// Returns the second Sobol dimension of `index`, its bits not yet reversed. The generator matrix is
+// Pascal's triangle modulo 2, a Kronecker power of a 2x2 matrix, so that five steps multiply by it.
 uint sobol_second_reversed(uint index) {
   index ^= (index >> 1) & 0x55555555u;
   index ^= (index >> 2) & 0x33333333u;
@@ -63,36 +65,36 @@ uint sobol_second_reversed(uint index) {
   return index;
 }
 
-// 24 bits, so that the result is below 1 and exact.
+// Uses 24 bits, so that the result is exact and below 1.
 float unit_float(uint bits) { return float(bits >> 8) * 5.9604644775390625e-8; }
 
-// A scrambled Sobol point, as binary fractions.
+// Returns a scrambled Sobol point as binary fractions.
 uvec2 sobol_bits(uint index, uint key) {
   index = bitfieldReverse(scramble_reversed(bitfieldReverse(index), key));
-  // Sobol's first dimension is the reversed index; scrambling wants reversed bits, so the two
+  // The first Sobol dimension is the reversed index; scrambling takes reversed bits, so the two
   // reversals cancel.
   return uvec2(bitfieldReverse(scramble_reversed(index, hash_bits(key ^ 0xa511e9b3u))),
                bitfieldReverse(scramble_reversed(sobol_second_reversed(index),
                                                  hash_bits(key ^ 0x63d83595u))));
 }
 
-// Point of dimension pair `pair`, in [0, 1)^2.
+// Returns the point of the dimension pair `pair`, in [0, 1)^2.
 vec2 sample_2d(Sampler s, uint pair) {
   const uint key = hash_pair(s.key, pair);
   const uvec2 bits = sobol_bits(s.index, key) ^ sobol_bits(s.place, hash_bits(key + 0x9e3779b9u));
   return vec2(unit_float(bits.x), unit_float(bits.y));
 }
 
-// Whether u falls into the first `share` of [0, 1). What remains of u is stretched to [0, 1) again and
-// decides what comes next: so the points of each branch stay as evenly spread as those of the pair,
-// which a choice by a number of its own would thin at random.
+// Returns whether u falls into the first `share` of [0, 1), and stretches the rest of u to [0, 1)
+// for the next decision. So the points of each branch stay as evenly spread as those of the pair,
+// which a choice by a separate number would thin out at random.
 bool choose(inout float u, float share) {
   const bool first = u < share;
   u = min(first ? u / share : (u - share) / (1.0 - share), 0.99999994);
   return first;
 }
 
-// Dimension pairs: two for the camera, then three a vertex.
+// The camera has two dimension pairs, and then each vertex has three.
 const uint PAIR_PIXEL = 0u;
 const uint PAIR_LENS = 1u;
 const uint PAIR_LIGHT = 2u;     // which light, and where on it

@@ -1,4 +1,4 @@
-// The scene as the shaders see it: its buffers, and a hit made into a surface.
+// The scene as the shaders see it: its buffers, and how a hit becomes a surface.
 #ifndef PREVIZ_SCENE_GLSL
 #define PREVIZ_SCENE_GLSL
 
@@ -18,14 +18,15 @@ layout(scalar) readonly buffer Frame { GpuFrame frame; };
 
 const float PI = 3.14159265358979;
 
-// A point of a surface, seen from `wo`. Normals are turned towards the viewer's side.
+// A point of a surface that is seen from the direction `wo`. Normals are turned to the viewer's
+// side.
 struct Surface {
   vec3 position;
   float error;            // bound on the position's error along the geometric normal, metres
   vec3 geometric_normal;  // unit, dot(geometric_normal, wo) >= 0
-  vec3 normal;            // unit, interpolated, on the geometric normal's side
+  vec3 normal;            // unit, interpolated, on the side of the geometric normal
   vec3 wo;                // unit, towards where the ray came from
-  bool entering;          // the ray came from outside (the side of counter-clockwise winding)
+  bool entering;          // the ray came from outside, where the winding is counter-clockwise
   vec3 base_color;
   float metallic;
   float alpha;            // GGX width, roughness^2
@@ -33,7 +34,7 @@ struct Surface {
   float ior;
   float transmission;
   bool thin_walled;
-  uint albedo_table;      // of ALBEDO, for rough glass
+  uint albedo_table;      // rough glass: its first table of ALBEDO
   vec3 emission;
 };
 
@@ -42,18 +43,21 @@ vec4 fetch_texel(GpuTexture t, ivec2 at) {
   return vec4(unpackHalf2x16(bits.x), unpackHalf2x16(bits.y));
 }
 
+// Returns the texel that stands for texel i beyond the edges, by the wrap mode.
 int wrap_texel(int i, int size, uint mode) {
   if (mode == TEXTURE_CLAMP) return clamp(i, 0, size - 1);
   const int period = mode == TEXTURE_MIRROR ? 2 * size : size;
   i = i - period * int(floor(float(i) / float(period)));
-  i = clamp(i, 0, period - 1);  // float division may be one off far out
+  i = clamp(i, 0, period - 1);  // far out, float division may be off by one
   return i < size ? i : period - 1 - i;
 }
 
+// Looks up a texture, bilinearly or at the nearest texel.
 vec4 sample_texture(uint index, vec2 uv) {
   const GpuTexture t = textures[index];
   const ivec2 size = ivec2(t.width, t.height);
-  // Beyond this a float no longer tells texels apart; it also keeps NaN out of the addressing.
+  // Beyond this range a float cannot resolve texels; the clamp also keeps NaN out of the
+  // addressing.
   uv = clamp(uv, vec2(-65536.0), vec2(65536.0));
   const vec2 at = uv * vec2(size);
   if (t.nearest != 0u) {
@@ -77,20 +81,20 @@ vec3 transform_point(vec4 rows[3], vec3 p) {
 vec3 transform_vector(vec4 rows[3], vec3 v) {
   return vec3(dot(rows[0].xyz, v), dot(rows[1].xyz, v), dot(rows[2].xyz, v));
 }
-// |rows| applied to non-negative v: a bound on transform_vector's summands.
+// Applies |rows| to a non-negative v, which bounds the summands of transform_vector().
 vec3 transform_bound(vec4 rows[3], vec3 v) {
   return vec3(dot(abs(rows[0].xyz), v), dot(abs(rows[1].xyz), v), dot(abs(rows[2].xyz), v));
 }
 vec3 transform_translation(vec4 rows[3]) { return vec3(rows[0].w, rows[1].w, rows[2].w); }
 
-// Normals transform by the transposed inverse.
+// Transforms a normal, for which the transposed inverse is needed.
 vec3 transform_normal(vec4 inverse_rows[3], vec3 n) {
   return inverse_rows[0].xyz * n.x + inverse_rows[1].xyz * n.y + inverse_rows[2].xyz * n.z;
 }
 
-// Bound on the error of a hit point, in world space, per axis: rounding of the interpolation and of
-// the transform (Pharr, Jakob, Humphreys, "Managing Rounding Error"), and of the ray that was taken
-// into object space to be tested.
+// Returns a bound on the error of a hit point in world space, per axis. It covers rounding of the
+// interpolation and of the transform (Pharr, Jakob, Humphreys, *Physically Based Rendering*,
+// "Managing Rounding Error") and of the ray that was taken into object space for the test.
 vec3 position_error(GpuInstance instance, vec3 object_bound, vec3 position) {
   const float gamma = 8.0 * 5.9604645e-8;
   const vec3 ray_bound = transform_bound(instance.object_from_world, abs(position)) +
@@ -99,9 +103,10 @@ vec3 position_error(GpuInstance instance, vec3 object_bound, vec3 position) {
                   abs(transform_translation(instance.world_from_object)));
 }
 
-// Bound on how far off its triangle's plane rounding in lib/trace.glsl may see a ray's origin: its
-// distances are combined from the corners', so the error grows with the triangle's size, and for
-// slivers with their aspect, because that is how the weights' own error grows (kept below 256).
+// Returns a bound on the distance from a triangle's plane at which rounding in lib/trace.glsl may
+// see the origin of a ray that starts on the plane. Distances are combined from those of the
+// corners, so the error grows with the triangle's size. For slivers it also grows with their
+// aspect, as the error of the weights does; that factor is kept below 256.
 float plane_error(GpuInstance instance, vec3 edge1, vec3 edge2) {
   const vec3 e1 = transform_vector(instance.world_from_object, edge1);
   const vec3 e2 = transform_vector(instance.world_from_object, edge2);
@@ -119,10 +124,11 @@ struct Triangle {
   vec4 n0, n1, n2;  // normal, v
 };
 
-// Texture coordinates' directions are the triangle's own, as glTF has it where no tangents are given
-// but for their smoothing over a vertex. A normal that dips below the surface is lifted onto it.
+// A mapped normal that dips below the surface is lifted above it by this much.
 const float LEAST_NORMAL_LIFT = 1e-3;
 
+// Applies the normal texture. The tangent frame follows the triangle's own texture coordinates, as
+// glTF prescribes where no tangents are given, but is not smoothed over the vertices.
 vec3 map_normal(GpuInstance instance, GpuMaterial m, Triangle t, vec2 uv, vec3 normal, vec3 outward) {
   const vec2 along1 = vec2(t.p1.w, t.n1.w) - vec2(t.p0.w, t.n0.w);
   const vec2 along2 = vec2(t.p2.w, t.n2.w) - vec2(t.p0.w, t.n0.w);
@@ -137,7 +143,7 @@ vec3 map_normal(GpuInstance instance, GpuMaterial m, Triangle t, vec2 uv, vec3 n
   if (area == 0.0 || !(across_squared > 0.0)) return normal;
   const vec3 tangent = across * inversesqrt(across_squared);
   const vec3 turned = cross(normal, tangent);
-  // v runs down the picture, +Y up.
+  // v runs down the texture, while +Y of a normal map points up.
   const vec3 bitangent = dot(turned, along_v) < 0.0 ? turned : -turned;
   vec3 mapped = sample_texture(m.normal_texture, uv).xyz * 2.0 - 1.0;
   mapped.xy *= m.normal_scale;
@@ -149,7 +155,7 @@ vec3 map_normal(GpuInstance instance, GpuMaterial m, Triangle t, vec2 uv, vec3 n
   return normalize(mapped);
 }
 
-// How much of a surface is there, by its material's alpha.
+// Returns the share of a surface that is there, by the alpha of its material.
 float coverage(uint material, vec2 uv) {
   const GpuMaterial m = materials[material];
   if (m.alpha_mode == ALPHA_OPAQUE) return 1.0;
@@ -193,13 +199,15 @@ void apply_material(inout Surface s, uint material, vec2 uv) {
   s.alpha = roughness * roughness;
 }
 
+// Returns whether the surface has any reflecting or refracting lobe, rough or smooth.
 bool is_specular(Surface s) {
   return s.metallic > 0.0 || s.transmission > 0.0 || (s.specular > 0.0 && s.ior > 1.0);
 }
 
-// At the silhouette of a smooth mesh, or by a normal map, a mirror direction may dip below the
-// surface, where its light would be lost. The normal is turned until that direction grazes the
-// surface: above it by MIRROR_LIFT, or by most of what the viewer is.
+// At the silhouette of a smooth mesh, or under a normal map, a mirror direction may dip below the
+// surface, where its light would be lost. The normal is then turned until that direction grazes the
+// surface. Its height above the surface, a cosine, is MIRROR_LIFT, or nine tenths of the viewer's
+// if that is less.
 const float MIRROR_LIFT = 0.01;
 
 vec3 mirroring_normal(vec3 normal, vec3 geometric_normal, vec3 wo) {
@@ -212,7 +220,8 @@ vec3 mirroring_normal(vec3 normal, vec3 geometric_normal, vec3 wo) {
   return length_squared > 0.0 ? half_way * inversesqrt(length_squared) : geometric_normal;
 }
 
-// `direction` is the ray's; the barycentrics weigh the triangle's second and third vertex.
+// Makes the surface at a hit of a ray with this direction. The hit's barycentrics are the weights
+// of the triangle's second and third vertex.
 Surface make_surface(GpuHit hit, vec3 direction) {
   const GpuInstance instance = instances[hit.instance];
   const uvec3 index = texelFetch(triangles, int(instance.first_triangle + hit.primitive)).xyz;
@@ -230,7 +239,8 @@ Surface make_surface(GpuHit hit, vec3 direction) {
   const vec3 object_bound = abs(p0.xyz) * b.x + abs(p1.xyz) * b.y + abs(p2.xyz) * b.z;
   s.position = transform_point(instance.world_from_object, object_position);
   const vec3 face = cross(p1.xyz - p0.xyz, p2.xyz - p0.xyz);
-  // The face is scaled first: its length is an area and underflows for small triangles.
+  // The face normal is scaled first, because its length is an area, which underflows for small
+  // triangles.
   const float face_scale = max(max(abs(face.x), abs(face.y)), abs(face.z));
   const vec3 outward = normalize(transform_normal(instance.object_from_world, face / face_scale));
   s.entering = dot(outward, s.wo) >= 0.0;
@@ -252,7 +262,8 @@ Surface make_surface(GpuHit hit, vec3 direction) {
   return s;
 }
 
-// Where a ray that leaves the surface towards `direction` starts, clear of the surface itself.
+// Returns the origin of a ray that leaves the surface towards `direction`, clear of the surface
+// itself.
 vec3 offset_origin(Surface s, vec3 direction) {
   const float side = dot(direction, s.geometric_normal) >= 0.0 ? s.error : -s.error;
   return s.position + s.geometric_normal * side;

@@ -1,4 +1,5 @@
-// Every structure and constant that crosses between C++ and the shaders, with its layout.
+// Structures and constants of ray tracing that cross between C++ and the shaders, with their
+// layout. Those of the renderer are in render_shared.h.
 #ifndef PREVIZ_SHARED_H
 #define PREVIZ_SHARED_H
 
@@ -20,15 +21,16 @@ using uint = std::uint32_t;
 #define PREVIZ_CONST const
 #endif
 
-// Presence bits of an instance, world bits of a path, ray mask.
+// The worlds, as bits: the presence of an instance, the worlds of a path, the mask of a ray.
 PREVIZ_CONST uint WORLD_MIXED = 1u;
 PREVIZ_CONST uint WORLD_REAL = 2u;
 PREVIZ_CONST uint WORLD_BOTH = 3u;
 
-// The scene as lib/trace.glsl reads it: `bvh`, one texel buffer (on lavapipe 1.4 to 1.7 times as
-// fast as a storage buffer) of RGBA32UI, made by daemon/scene/bvh.hpp. It consists of records of
-// four texels, one cache line, in blocks of eight; a node's children are one block. Record 0 is the
-// space in which a ray starts: the top level's, or the only instance's.
+// The scene as lib/trace.glsl reads it is one texel buffer of RGBA32UI in set 0, made by
+// daemon/scene/bvh.hpp (on lavapipe a texel buffer is 1.4 to 1.7 times as fast as a storage
+// buffer). It consists of records of four texels, one cache line, in blocks of eight; the children
+// of a node are one block. Record 0 is the space in which a ray starts: that of the top level, or
+// of the only instance.
 //
 //   any      Texel 0: z, bits 0..7: the kind, RECORD_*.
 //   nothing  All zero: an empty slot. Meeting it has no effect.
@@ -54,7 +56,7 @@ PREVIZ_CONST uint RECORD_PAIR = 126u;
 PREVIZ_CONST uint RECORD_NODE = 127u;  // and above: the biased exponent of a node's z cell
 PREVIZ_CONST uint RECORD_FILL = 124u;  // a multiple of four
 
-// Levels of nodes that the builders guarantee; the sum bounds the traversal's stack.
+// The builders make no more levels of nodes than these; their sum bounds the traversal's stack.
 PREVIZ_CONST uint TOP_BVH_DEPTH = 8u;
 PREVIZ_CONST uint MESH_BVH_DEPTH = 16u;
 

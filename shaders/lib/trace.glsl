@@ -1,8 +1,9 @@
-// Closest hit and shadow rays through the two-level tree of daemon/scene/bvh.hpp, in compute.
+// Closest hits and shadow rays through the two-level tree of daemon/scene/bvh.hpp, in compute.
 //
-// The loop visits one record a turn, whatever its kind, and a subgroup's lanes all fetch, test eight
-// boxes and test two triangles side by side: on a CPU device there are no branches to save, and on
-// a GPU the same two tests diverge only where the rays do. Needs GL_GOOGLE_include_directive.
+// The loop visits one record per turn, whatever its kind, and all lanes of a subgroup fetch it,
+// test eight boxes and test two triangles side by side. A CPU device gains nothing from branches,
+// and on a GPU the two tests diverge only where the rays do. The includer must enable
+// GL_GOOGLE_include_directive.
 #ifndef PREVIZ_TRACE_GLSL
 #define PREVIZ_TRACE_GLSL
 #extension GL_EXT_samplerless_texture_functions : require
@@ -19,28 +20,31 @@ struct Hit {
   uint presence;      // WORLD_* bits of the instance
 };
 
-// Every level of nodes leaves at most one group of children behind, and entering an instance one.
+// Each level of nodes leaves at most one group of children on the stack, and so does entering an
+// instance.
 const uint TRACE_STACK_SIZE = TOP_BVH_DEPTH + MESH_BVH_DEPTH;
 
-// How far rounding may move a ray sideways, as a share of the largest coordinate: 16 half ulps,
-// where the projection of a vertex takes 5 and the planes of a box take 4.
+// Rounding may move a ray sideways by this share of the largest coordinate. It is 16 half ulps; the
+// projection of a vertex needs 5 of them and the planes of a box need 4.
 const float TRACE_SLACK = 9.5367432e-7;  // 2^-20
 
-// Hits of two instances closer than this share of the distances involved are at the same place:
-// the lower instance wins, so that faces laid upon each other do not speckle.
+// Hits of two instances count as being at the same place if they are closer than this share of the
+// distances involved. The lower instance then wins, so that faces laid upon each other do not
+// speckle.
 const float TRACE_TIE = 9.5367432e-7;
 
-// The ray in the space of a tree.
+// A ray in the space of a tree.
 struct TraceSpace {
   vec3 origin;
   vec3 x, y, z;      // rows: x and y across the ray, z along it, so that dot(p - origin, z) is t
-  vec3 inverse;      // of the direction, finite
+  vec3 inverse;      // 1 / direction, finite
   vec3 near, far;    // origin moved back and forth by the slack, for near and far planes
-  uint octant;       // bit i: the direction's component i is negative
+  uint octant;       // bit i is set if component i of the direction is negative
   uint first_texel;  // of the tree
   uint presence, instance;
 };
 
+// Takes the ray into the space of the tree that a space record names.
 TraceSpace trace_enter(uint record, vec3 world_origin, vec3 world_direction) {
   const int texel = int(record * 4u);
   const uvec4 head = texelFetch(bvh, texel);
@@ -55,8 +59,8 @@ TraceSpace trace_enter(uint record, vec3 world_origin, vec3 world_direction) {
                   dot(row2.xyz, world_origin) + row2.w);
   const vec3 d = vec3(dot(row0.xyz, world_direction), dot(row1.xyz, world_direction),
                       dot(row2.xyz, world_direction));
-  // Axes across the ray after Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection" (JCGT
-  // 2013), but as rows, without permuting every vertex.
+  // The axes across the ray are those of Woop, Benthin, Wald, "Watertight Ray/Triangle
+  // Intersection" (JCGT 2013), but written as rows, so that vertices need not be permuted.
   const vec3 size = abs(d);
   const float largest = max(size.x, max(size.y, size.z));
   const bool along_z = size.z == largest;
@@ -69,7 +73,7 @@ TraceSpace trace_enter(uint record, vec3 world_origin, vec3 world_direction) {
         : along_y ? vec3(0.0, -slope.z, 1.0)
                   : vec3(-slope.z, 0.0, 1.0);
   s.z = d / dot(d, d);
-  // A ray along an axis: so small a slope moves it by less than the slack.
+  // Components of 0 are replaced; so small a slope moves the ray by less than the slack.
   const float least = largest * 1e-12;
   const vec3 steep = mix(d, vec3(least), lessThan(size, vec3(least)));
   s.inverse = 1.0 / steep;
@@ -82,15 +86,16 @@ TraceSpace trace_enter(uint record, vec3 world_origin, vec3 world_direction) {
   return s;
 }
 
-// Bit `bit` if the ray is in the box between the distances. Compared as integers, which for floats
-// gives the right answer wherever t_min >= 0, and has no case for NaN.
+// Returns `bit` if the ray is in the box between the two distances, else 0. Floats are compared as
+// integers, which gives the right answer because t_min >= 0, and needs no case for NaN.
 uint trace_box(vec3 near, vec3 far, int t_min, int t_max, uint bit) {
   const ivec3 n = floatBitsToInt(near);
   const ivec3 f = floatBitsToInt(far);
   return max(max(n.x, n.y), max(n.z, t_min)) <= min(min(f.x, f.y), min(f.z, t_max)) ? bit : 0u;
 }
 
-// Bytes 0 and 3 come at their value, 1 and 2 times 2^8 and 2^16; the scales make up for it.
+// These return one byte of each component. Bytes 0 and 3 have their own value, bytes 1 and 2 are
+// multiplied by 2^8 and 2^16, which the callers' scales make up for.
 vec3 trace_byte0(uvec3 planes) { return vec3(ivec3(planes & 0xffu)); }
 vec3 trace_byte1(uvec3 planes) { return vec3(ivec3(planes & 0xff00u)); }
 vec3 trace_byte2(uvec3 planes) { return vec3(ivec3(planes & 0xff0000u)); }
@@ -98,12 +103,12 @@ vec3 trace_byte3(uvec3 planes) { return vec3(ivec3(planes >> 24)); }
 
 struct TraceTriangle {
   float t;
-  vec3 weights;  // of its vertices
+  vec3 weights;  // barycentric, of its vertices
   bool hit;
 };
 
-// a, b, c: the vertices across and along the ray. Both sides of an edge compute the same two
-// products, so no ray passes between two triangles.
+// Intersects a triangle whose vertices a, b, c are given across and along the ray. Both triangles
+// at an edge compute the same two products for it, so no ray passes between them.
 TraceTriangle trace_triangle(vec3 a, vec3 b, vec3 c, float t_min, float t_max) {
   TraceTriangle r;
   precise const float u = c.x * b.y - c.y * b.x;
@@ -118,6 +123,7 @@ TraceTriangle trace_triangle(vec3 a, vec3 b, vec3 c, float t_min, float t_max) {
   return r;
 }
 
+// Returns a vertex across (x, y) and along (z) the ray.
 vec3 trace_project(vec3 vertex, const TraceSpace s) {
   precise const vec3 p = vertex - s.origin;
   precise const float x = p.x * s.x.x + p.y * s.x.y + p.z * s.x.z;
@@ -125,13 +131,14 @@ vec3 trace_project(vec3 vertex, const TraceSpace s) {
   return vec3(x, y, dot(p, s.z));
 }
 
-// One traversal for both kinds of ray. `shadow`, a constant, asks only which of `worlds` are
-// blocked, and returns them; otherwise `hit` is the closest and the result is 0 or 1.
+// Traverses the tree for both kinds of ray. With `shadow`, which is a constant, it returns those of
+// `worlds` in which the ray is blocked. Otherwise it returns 1 and sets `hit` to the closest hit,
+// or returns 0.
 uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, float t_max,
                 uint worlds, inout Hit hit) {
-  uint stack[TRACE_STACK_SIZE + 1u];  // groups: block of children << 8 | those still to visit
+  uint stack[TRACE_STACK_SIZE + 1u];  // groups: block of children << 8 | children still to visit
   uint top = 0u;
-  uint bottom = 0u;  // of the stack that belongs to the tree being traversed
+  uint bottom = 0u;  // where the stack of the tree that is being traversed begins
   uint record = 0u;
   bool fresh = true;
   uint blocked = 0u;
@@ -143,7 +150,7 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
   const float tie = TRACE_TIE * max(reach.x, max(reach.y, reach.z)) /
                     max(pace.x, max(pace.y, pace.z));
 
-  for (;;) {  // a tree a turn: the top level, an instance, back to the top level
+  for (;;) {  // one tree per turn: the top level, an instance, the top level again
     const TraceSpace s = trace_enter(record, origin, direction);
     const uint b0 = 1u << s.octant;
     const uint b1 = 1u << (s.octant ^ 1u);
@@ -157,13 +164,13 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
     uint group = fresh && (s.presence & worlds & ~blocked) != 0u ? b0 : 0u;
     uint entered = 0u;
 
-    for (;;) {  // a record a turn
+    for (;;) {  // one record per turn
       if ((group & 0xffu) == 0u) {
         if (top == bottom) break;
         top--;
         group = stack[top];
       }
-      // The lowest bit is the nearest child: bit i is slot i ^ octant.
+      // The lowest bit belongs to the nearest child; bit i stands for slot i ^ octant.
       const uint bit = group & (~group + 1u);
       group ^= bit;
       const uint slot = ((floatBitsToUint(float(int(bit))) >> 23) - 127u) ^ s.octant;
@@ -174,7 +181,7 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
       const uvec4 w3 = texelFetch(bvh, int(texel) + 3);
       const uint kind = head.z & 0xffu;
 
-      // As a node.
+      // The record is tested as a node.
       {
         const vec3 corner = vec3(ivec3(head.xyz) >> 8);
         const vec3 scale = uintBitsToFloat((head.xyz << 23) & 0x7f800000u) * s.inverse;
@@ -205,7 +212,7 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
         group = descend ? head.w << 8 | hits : group;
       }
 
-      // As a pair of triangles.
+      // The record is tested as a pair of triangles.
       {
         const vec3 p0 = trace_project(uintBitsToFloat(w1.xyz), s);
         const vec3 p1 = trace_project(uintBitsToFloat(uvec3(w1.w, w2.xy)), s);
@@ -265,15 +272,16 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
   return shadow ? blocked : found;
 }
 
-// The closest hit with t_min < t < t_max, t_min >= 0, among the instances present in any of
-// `worlds`. `direction` has any length but zero; t counts in its units. Where two instances' surfaces
-// coincide, the lower instance is hit, where two triangles of one do, the lower primitive.
+// Finds the closest hit with t_min < t < t_max, t_min >= 0, among the instances that are present in
+// any of `worlds`. `direction` may have any length but zero; t is in units of it. Where surfaces of
+// two instances coincide, the lower instance is hit; where two triangles of an instance do, the
+// lower primitive.
 bool trace_closest(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds,
                    out Hit hit) {
   hit = Hit(t_max, vec2(0.0), 0xffffffffu, 0xffffffffu, 0u);
   const bool found =
       trace_rays(false, origin, direction, t_min, t_max, worlds, hit) != 0u;
-  // The stored vertices are the primitive's turned left: turn the weights back.
+  // The stored vertices are those of the primitive, rotated left; the weights are rotated back.
   const uint rotation = hit.primitive & 3u;
   const vec3 stored = vec3(1.0 - hit.barycentrics.x - hit.barycentrics.y, hit.barycentrics);
   hit.barycentrics = rotation == 0u ? stored.yz : rotation == 1u ? stored.xy : stored.zx;
@@ -281,8 +289,8 @@ bool trace_closest(vec3 origin, vec3 direction, float t_min, float t_max, uint w
   return found;
 }
 
-// The subset of `worlds` in which something lies between t_min and t_max; stops as soon as that is
-// all of them.
+// Returns the subset of `worlds` in which something lies between t_min and t_max. The search stops
+// as soon as that is all of them.
 uint trace_blocked(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds) {
   Hit unused;
   return trace_rays(true, origin, direction, t_min, t_max, worlds, unused);
