@@ -58,8 +58,8 @@ Keys lens_keys(ThinLens& l) {
 
 Keys pose_keys(PoseDraft& p) {
   return {
-      {"pose", "position_m", &p.position, m, "Where it stands in the world (Z up). Required unless world_from_camera is given.", optional("[0.5, 0.0, 1.6]"), ""},
-      {"pose", "rotation_deg", &p.rotation, deg, "Turns about world X, then Y, then Z. Unturned it looks straight up, picture right = X, picture down = Y.", optional("[0.0, 0.0, 0.0]"), ""},
+      {"pose", "position_m", &p.position, m, "Position in the world (Z up). Required unless world_from_camera is given.", optional("[0.5, 0.0, 1.6]"), ""},
+      {"pose", "rotation_deg", &p.rotation, deg, "Rotation about world X, then Y, then Z. Without it the camera looks straight up, the right of the picture is X and its bottom is Y.", optional("[0.0, 0.0, 0.0]"), ""},
       {"pose", "world_from_camera", &p.matrix, plain, "In place of both: the rigid transform, OpenCV axes (right, down, forward).", optional("[[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, 1.6], [0, 0, 0, 1]]")},
   };
 }
@@ -76,8 +76,8 @@ Keys response_keys(ResponseCurve& r, double& responsivity) {
 
 Keys shading_keys(LightCameraCalibration& c) {
   return {
-      {"intrinsics", "vignetting", &c.vignetting, plain, "v1 to v3 of the light that comes through, 1 + v1 t^2 + v2 t^4 + v3 t^6, t the angle off axis in radians (previzd calibrate vignetting).", {}, "vignetting", {}, true},
-      {"response", "dark_level", &c.dark_level, plain.within(0, max_dark_level), "Signal that a covered lens shows, red, green and blue, as a share of white (previzd calibrate dark).", {}, "dark_level", {}, true},
+      {"intrinsics", "vignetting", &c.vignetting, plain, "v1 to v3 of the share of light that the lens passes, 1 + v1 t^2 + v2 t^4 + v3 t^6, where t is the angle off axis in radians (previzd calibrate vignetting).", {}, "vignetting", {}, true},
+      {"response", "dark_level", &c.dark_level, plain.within(0, max_dark_level), "Signal of red, green and blue when the lens is covered, as a share of white (previzd calibrate dark).", {}, "dark_level", {}, true},
   };
 }
 

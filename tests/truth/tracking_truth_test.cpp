@@ -1,6 +1,6 @@
 // The tracker is held to its bounds (README.md, "Pose") by ground truth sets with exact poses and
 // corners, and by real photographs and video. All but the committed set live outside the
-// repository: PREVIZ_SHARED, or ../shared beside the sources.
+// repository, in the folder that PREVIZ_SHARED names.
 #include <gtest/gtest.h>
 
 #include <cmath>
