@@ -7,7 +7,8 @@
 namespace previz {
 namespace {
 
-// A pair of flags, "--yes,!--no". CLI11's own for an optional says no where neither was given.
+// Adds a pair of flags, "--yes,!--no". CLI11's own for an optional would say no if neither was
+// given.
 void add_choice(CLI::App& command, const std::string& flags, std::optional<bool>& choice,
                 const std::string& what) {
   command.add_flag_function(
@@ -16,7 +17,8 @@ void add_choice(CLI::App& command, const std::string& flags, std::optional<bool>
 
 void add_device_options(CLI::App& command, render::DeviceOptions& device) {
   command.add_option("--device", device.name, "Vulkan device whose name contains this");
-  command.add_flag("--validation", device.validation, "Vulkan's validation layer, into the log");
+  command.add_flag("--validation", device.validation,
+                   "Log the messages of Vulkan's validation layer");
 }
 
 void add_render(CLI::App& app, post::RenderOptions& options) {
@@ -29,17 +31,19 @@ void add_render(CLI::App& app, post::RenderOptions& options) {
   command.add_option("--spp", options.samples, "Samples per pixel (default: quality.samples)")
       ->check(CLI::Range(1, 1'000'000));
   add_choice(command, "--adaptive,!--even", options.adaptive,
-             "The samples on average, spent where they bring most, or the same number for "
-             "every pixel (default: quality.adaptive)");
+             "Spend more samples where the picture is noisy, or the same number in every "
+             "pixel (default: quality.adaptive)");
   add_choice(command, "--denoise,!--noisy", options.denoise,
-             "Take noise out of the composite, or leave it (default: quality.denoise)");
+             "Remove noise from the composite, or leave it (default: quality.denoise)");
   command
-      .add_option("--error", options.error,
-                  "Go on to this error, over the picture's mean radiance (default: quality.error)")
+      .add_option(
+          "--error", options.error,
+          "Add samples down to this error, as a share of the picture's brightness (default: "
+          "quality.error)")
       ->check(CLI::Range(0.0, 1.0));
   command
       .add_option("--seconds", options.seconds,
-                  "Go on for so long a frame (default: quality.seconds)")
+                  "Add samples for this long in each frame (default: quality.seconds)")
       ->check(CLI::Range(0.0, 86400.0));
   command.add_option("--seed", options.seed, "Seed of the random numbers (default: the set's)");
   command
@@ -55,39 +59,40 @@ void add_render(CLI::App& app, post::RenderOptions& options) {
   command.add_flag_callback(
       "--no-exr", [&] { options.exr = false; }, "No EXR files");
   command.add_flag_callback(
-      "--no-png", [&] { options.png = false; }, "No PNG files (the video still needs them)");
+      "--no-png", [&] { options.png = false; }, "No PNG files (they are still made for the video)");
   command.add_flag_callback(
       "--no-video", [&] { options.video = false; }, "No review video");
-  command.add_flag("--force", options.force, "Render frames again that are there already");
+  command.add_flag("--force", options.force, "Render frames again that exist already");
   add_device_options(command, options.device);
 }
 
 void add_run(CLI::App& app, rig::LiveOptions& options) {
-  CLI::App& command = *app.add_subcommand("run", "Composite live, until the cameras end or Ctrl-C");
+  CLI::App& command =
+      *app.add_subcommand("run", "Composite live, until the cameras stop or Ctrl-C is pressed");
   command.add_option("set", options.set_file, "Set file")->required();
   command.add_option("--spp", options.samples, "Samples per pixel (default: quality.samples)")
       ->check(CLI::Range(1, 1'000'000));
   command.add_option("--out", options.directory, "Directory for picture.png and metrics.json");
   command.add_flag("--bus", options.bus, "Serve org.previz.Rig1 on the system bus (previzctl)");
-  command.add_flag("--loop", options.loop, "Replayed cameras start again at their end, for ever");
+  command.add_flag("--loop", options.loop, "Replayed cameras start again at their end, forever");
   add_device_options(command, options.device);
 }
 
 void add_check(CLI::App& app, std::filesystem::path& set_or_session) {
   CLI::App& command =
-      *app.add_subcommand("check", "Say what is wrong with a set, or what it needs");
+      *app.add_subcommand("check", "List the mistakes in a set file, or what the set needs");
   command.add_option("set", set_or_session, "Set file or session directory")->required();
 }
 
 void add_devices(CLI::App& app, bool& learn) {
   CLI::App& command = *app.add_subcommand(
-      "devices", "List cameras, buttons and displays by the names a set file takes");
+      "devices", "List cameras, buttons and screens by the names that a set file uses");
   command.add_flag("--learn", learn,
                    "Print the name of every button that is pressed, until Ctrl-C");
 }
 
 void add_import(CLI::App& app, exchange::ImportOptions& options) {
-  CLI::App& command = *app.add_subcommand("import", "Make a session of footage");
+  CLI::App& command = *app.add_subcommand("import", "Make a take of your own footage");
   command.add_option("description", options.description, "FRAMES.json")->required();
   command.add_option("session", options.session, "Session directory to make")->required();
 }
@@ -106,12 +111,15 @@ void add_trade(CLI::App& app, trade::TradeOptions& options) {
   command.add_option("--frame", options.frame, "Observer frame (default: the first tracked)");
   command.add_option("--out", options.directory, "Directory for trade.csv and trade.html");
   command.add_option("--axes", options.axes, "What to vary (default: everything)")->delimiter(',');
-  command.add_option("--scale", options.scale, "Of the observer's size")->capture_default_str();
+  command
+      .add_option("--scale", options.scale, "Size of the pictures, relative to the film camera's")
+      ->capture_default_str();
   command.add_option("--samples", options.samples, "Samples per pixel to try")
       ->delimiter(',')
       ->capture_default_str();
-  command.add_option("--reference-samples", options.reference_samples,
-                     "Of the converged picture (default: 256 times the most of --samples)");
+  command.add_option(
+      "--reference-samples", options.reference_samples,
+      "Samples per pixel of the converged picture (default: 256 times the largest of --samples)");
   command.add_option("--rounds", options.rounds, "How often each is measured")
       ->capture_default_str();
   add_device_options(command, options.device);
@@ -120,7 +128,7 @@ void add_trade(CLI::App& app, trade::TradeOptions& options) {
 }  // namespace
 
 void add_commands(CLI::App& app, CommandLine& said) {
-  app.set_version_flag("--version", "previzd " PREVIZ_VERSION, "The version, and nothing else");
+  app.set_version_flag("--version", "previzd " PREVIZ_VERSION, "Print the version");
   app.require_subcommand(1);
   app.add_option("--log-level", said.log_level, "The least severe of what goes to the log")
       ->check(CLI::IsMember({"info", "warning", "error"}))

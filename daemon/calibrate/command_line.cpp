@@ -16,7 +16,7 @@ void add_lens_options(CLI::App& command, LensOptions& options) {
       ->check(CLI::Range(1, 1'000'000));
   command.add_option("--out", options.table_file, "File for the set file's tables");
   command.add_option("--plot", options.residual_plot, "SVG file for the residuals");
-  command.add_flag("--force", options.force, "Take the calibration although views are missing");
+  command.add_flag("--force", options.force, "Accept the calibration although views are missing");
 }
 
 void add_observer(CLI::App& calibrate, LensOptions& options) {
@@ -29,15 +29,15 @@ void add_light(CLI::App& calibrate, LightOptions& options) {
   CLI::App& command =
       *calibrate.add_subcommand("light", "The light camera's fisheye, and where it stands");
   add_lens_options(command, options);
-  command.add_option("--tags", options.tags_set, "Set file whose tags it sees: finds its pose");
+  command.add_option("--tags", options.tags_set,
+                     "Set file with the tags that it sees, to find where it stands");
 }
 
 void add_response(CLI::App& calibrate, ResponseOptions& options) {
   CLI::App& command =
       *calibrate.add_subcommand("response", "A camera's response curve, from a bracket");
   command.add_option("footage", options.footage, "Session or folder of pictures")->required();
-  command
-      .add_option("--camera", options.camera, "Whose table is printed, and whose stream is read")
+  command.add_option("--camera", options.camera, "Camera to calibrate")
       ->transform(CLI::CheckedTransformer(std::map<std::string, CameraRole>{
           {"observer", CameraRole::observer}, {"light", CameraRole::light}}));
   command.add_option("--exposures", options.exposures,
@@ -53,30 +53,33 @@ void add_dark(CLI::App& calibrate, DarkOptions& options) {
       "dark", "The light camera's dark level, from pictures of the covered lens");
   command.add_option("footage", options.footage, "Session, folder of pictures, or video")
       ->required();
-  command.add_option("--set", options.set_file, "Set file with its response (default: session's)");
+  command.add_option("--set", options.set_file,
+                     "Set file with the camera's response (default: the session's)");
   command.add_option("--out", options.table_file, "File for the set file's table");
 }
 
 void add_vignetting(CLI::App& calibrate, VignettingOptions& options) {
   CLI::App& command = *calibrate.add_subcommand(
       "vignetting",
-      "What the fisheye loses towards its edge, from pictures of something evenly lit");
+      "How much light the fisheye loses towards its edge, from pictures of something evenly lit");
   command.add_option("footage", options.footage, "Session, folder of pictures, or video")
       ->required();
   command.add_option("--set", options.set_file, "Set file with its lens, response and dark level")
       ->required();
   command.add_option("--out", options.table_file, "File for the set file's table");
-  command.add_flag("--force", options.force, "Take it although the light was not even");
+  command.add_flag("--force", options.force, "Accept the result although the light was not even");
 }
 
 void add_lens(CLI::App& calibrate, ThinLensOptions& options) {
-  CLI::App& command = *calibrate.add_subcommand("lens", "What depth of field needs of the lens");
-  command.add_option("--focal-length", options.focal_length_mm, "As engraved, mm");
-  command.add_option("--f-number", options.f_number, "As the ring says");
+  CLI::App& command =
+      *calibrate.add_subcommand("lens", "The film camera's lens, for depth of field");
+  command.add_option("--focal-length", options.focal_length_mm, "Focal length as engraved, mm");
+  command.add_option("--f-number", options.f_number, "The f-stop, as on the ring");
   command.add_option("--focus", options.focus_distance_m, "Focus distance, m");
   command.add_option("--sensor-width", options.sensor_width_mm,
                      "Width of the sensor that the picture shows, mm");
-  command.add_option("--photo", options.photo, "Photograph whose EXIF says what is not given here");
+  command.add_option("--photo", options.photo,
+                     "Photograph whose EXIF data has what is not given here");
   command.add_option("--set", options.set_file, "Set file with the observer's intrinsics");
   command.add_option("--out", options.table_file, "File for the set file's table");
 }
@@ -88,7 +91,7 @@ void add_balance(CLI::App& calibrate, BalanceOptions& options) {
   command.add_option("--set", options.set_file, "Set file, instead of the session's own");
   command
       .add_option("--reference", options.references,
-                  "Materials of real objects whose albedo is known (default: all count alike)")
+                  "Materials of real objects whose colour is known (default: all count alike)")
       ->delimiter(',');
   command.add_option("--frames", options.frames, "Pictures to compare")
       ->check(CLI::Range(1, 100))

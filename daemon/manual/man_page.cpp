@@ -11,7 +11,8 @@
 namespace previz::manual {
 namespace {
 
-// Text as roff would have it: a minus that can be copied, no escapes, no line that is a request.
+// Returns text in the form that roff wants: with a minus that can be copied, without escapes, and
+// with no line that is a request.
 std::string escaped(const std::string& text) {
   std::string out;
   for (const char c : text) {
@@ -91,14 +92,16 @@ void print(std::ostream& out, const Chapter& chapter) {
   for (std::string line; std::getline(lines, line);) {
     if (line.empty()) continue;
     const std::size_t colon = line.find(": ");
-    if (colon == std::string::npos || line.find(' ') < colon)
+    const bool is_entry =
+        colon != std::string::npos && (chapter.is_list || line.find(' ') >= colon);
+    if (!is_entry)
       out << ".PP\n" << escaped(line) << '\n';
     else
       entry(out, bold(line.substr(0, colon)), line.substr(colon + 2));
   }
 }
 
-// "key = default", or an example where there is none.
+// Returns "key = default", or "key = example" if there is no default.
 std::string assignment(const set::Key& key) {
   const bool has_default = key.need.kind == set::Need::Kind::defaulted;
   return bold(key.name) + " = " + escaped(has_default ? key.initial : key.need.example);

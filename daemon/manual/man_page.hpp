@@ -1,4 +1,4 @@
-// Manual pages, man(7).
+// Manual pages in the format of man(7).
 #pragma once
 
 #include <string>
@@ -8,18 +8,20 @@
 
 namespace previz::manual {
 
-// A section whose text is not to be had from the program: a paragraph a line; one of the form
-// "term: text", whose term is one word, is an entry of a list.
+// A section of a manual page whose text was written by hand. Every line is a paragraph, except that
+// a line of the form "term: text" is an entry of a list if the term is a single word, or if
+// `is_list`.
 struct Chapter {
   std::string title;
   std::string text;
+  bool is_list = false;
 };
 
-// Of a program: what it does, its commands with their options, and `chapters`.
+// Returns the page of a program: what it does, its commands with their options, and `chapters`.
 std::string man_page(const std::vector<Command>& commands, int section,
                      const std::vector<Chapter>& chapters);
 
-// previz-set(5): every table and key of a set file, from the parser's own table.
+// Returns previz-set(5), which has every table and key of a set file, from the parser's own table.
 std::string set_man_page(const Chapter& description, const Chapter& see_also);
 
 }  // namespace previz::manual

@@ -34,34 +34,80 @@ std::string actions_text() {
 }
 
 const Chapter service_chapter{"THE SERVICE", R"(
-previzd.service runs `previzd run --bus --loop /etc/previzd/set.toml` as the user previz. A set file that is changed is read again, at the latest on `systemctl reload previzd`; one with a mistake leaves the old one running and says why, in the journal and in `previzctl status`.
-`journalctl -u previzd` shows what it reports, each line with the priority of its severity: `-p err` leaves the errors.
+previzd.service runs `previzd run --bus --loop /etc/previzd/set.toml` as the user previz. When the set file is saved, it is loaded again, at the latest on `systemctl reload previzd`. If it has a mistake, the old one keeps running, and the journal and `previzctl status` say what is wrong.
+`journalctl -u previzd` shows what it reports, each line with the priority of its severity: with `-p err` only the errors.
 Members of the group previz may operate the rig with previzctl.
 )"};
+
+const Chapter examples_chapter{"EXAMPLES",
+                               R"(
+previzd devices: Lists the cameras, buttons and screens that are plugged in, by the names that a set file uses.
+previzd devices --learn: Prints the name of every button that is pressed.
+previzd calibrate observer views --board charuco:7x5:30mm:22mm:5x5_100 --out lens.toml: Measures the film camera's lens from a folder of pictures of a board, and writes the tables for the set file.
+previzd calibrate light views --board charuco:7x5:30mm:22mm:5x5_100 --tags desk.toml: Measures the fisheye's lens, and finds where it stands by the set's tags.
+previzd check desk.toml: Lists every mistake in a set file, or what its scene asks of the renderer.
+previzd run desk.toml: Composites live. The rig's buttons, or previzctl, do the rest.
+previzd render takes/12A_take003 --out renders/12A_take003: Renders a take with the settings that it was recorded with. Called again, it continues where it stopped.
+previzd render takes/12A_take003 --set relit.toml --spp 512 --frames 100-150 --out renders/relit: Renders a part of a take with other settings: other lamps, other objects, more samples.
+previzd trade desk.toml --axes estimator,depth: Measures what the estimator and the number of bounces cost and bring on this set.
+previzd import frames.json sessions/desk: Makes a take of your own pictures or video.
+previzd export takes/12A_take003 camera: Writes the take's camera for USD and Nuke.
+)",
+                               true};
+
+const Chapter glossary_chapter{"GLOSSARY", R"(
+bracket: Several exposures of the same view, from dark to bright, which together hold both the lamps and the room.
+carrier: A thing that is moved by hand, such as a stick or a tray, with a tag on it. Objects and lamps can be attached to it.
+composite: The finished picture: the plate with the virtual objects, their shadows and their light.
+difference: The light that the virtual objects add to the real set or take from it.
+film camera: The camera whose picture is composited; the table [observer] of a set file.
+lamp: A light source: one that was found in the light camera's picture, or one that the set file declares.
+layer: One of the pictures that an EXR file consists of, such as mask or depth.
+light camera: The fisheye that looks at the lamps and measures the light on the set.
+live: The mode in which every frame is composited as it comes.
+mixed world: The set as the composite shows it, with the virtual objects and lamps.
+phantom: The model of a real thing. It is not seen, but virtual objects are hidden behind it, cast shadows on it and are reflected in it.
+plate: The film camera's own picture, to which the virtual objects are added.
+pose: Position and orientation, usually those of the film camera.
+real world: The set as it stands there, by its phantoms and its real lamps.
+refine: To freeze a frame and add samples to it until the noise is gone.
+removed object: A real thing that is taken out of the picture.
+review: To play the last take.
+rig: The cameras, buttons and screen together with the computer that previzd runs on.
+sample: One path of light that is followed for a pixel. More samples mean less noise and more time.
+session: The folder that holds a recorded or imported take.
+set file: The description of one stage: cameras, tags, objects, lamps and settings; see previz-set(5).
+slate: The name of scene and shot, from which the names of takes are made.
+standby: The mode in which the screen is dark and nothing is rendered; the cameras stay open.
+tag: A printed AprilTag by which the film camera is located.
+take: A recording, from two seconds before the button was pressed until it was pressed again.
+virtual object: A thing that exists only in the composite.
+)",
+                               true};
 
 const Chapter previzd_status{"EXIT STATUS", R"(
 0: Done.
 1: An error; one line on standard error says which.
 2: The command line cannot be understood.
-128+N: Stopped by signal N. What was finished is on disk, and a render goes on there when it is called again. (A rig that is stopped has done its work: 0.)
+128+N: Stopped by signal N. Finished frames are on disk, and a render that is called again continues there. (A rig that is stopped has done its work: 0.)
 )"};
 
 const Chapter previzd_files{"FILES", R"(
-/etc/previzd/set.toml: The set that the service runs; as installed, a demonstration that needs no camera.
-/usr/share/previzd/demo: What that demonstration shows.
-/usr/share/doc/previzd/examples: A set file to start from, and the reference of every key.
-/var/lib/previzd: Takes and pictures, where the set does not say otherwise.
+/etc/previzd/set.toml: The set file that the service runs; as installed, a demonstration that needs no camera.
+/usr/share/previzd/demo: The take that the demonstration plays.
+/usr/share/doc/previzd/examples: A set file to start from, and a reference of every key.
+/var/lib/previzd: Takes and pictures, unless the set file says otherwise.
 )"};
 
 const Chapter previzctl_status{"EXIT STATUS", R"(
 0: Done.
-1: Refused, or no rig answers; one line on standard error says why.
+1: The rig refused, or no rig answers; one line on standard error says why.
 2: The command line cannot be understood.
 )"};
 
 const Chapter set_description{"DESCRIPTION", R"(
-A set file tells previzd everything about one stage: which cameras there are, where the tags hang, what is real and what is not, and how the light is to be. It is TOML. `previzd check FILE` tells every mistake in it with its line.
-Lengths are in the unit that a key's name ends in; the world is right-handed, Z up; colours are linear Rec. 709. A table in double brackets stands once for each thing it describes. Below, a key stands with its default.
+A set file describes one stage: which cameras there are, where the tags hang, what is real and what is not, and how the set is lit. It is TOML. `previzd check FILE` lists every mistake in it, with its line. The terms are explained in previzd(8), GLOSSARY.
+Lengths are in the unit in which the key's name ends; the world is right-handed, Z up; colours are linear Rec. 709. A table in double brackets appears once for each thing that it describes. Each key is shown with its default.
 )"};
 
 Chapter see_also(const std::string& pages) {
@@ -71,14 +117,15 @@ Chapter see_also(const std::string& pages) {
 }  // namespace
 
 std::vector<Page> man_pages() {
-  return {{"previzd.8", man_page(previzd_commands(), 8,
-                                 {service_chapter, previzd_files, previzd_status,
-                                  see_also("previzctl(1), previz-set(5)")})},
-          {"previzctl.1", man_page(previzctl_commands(), 1,
-                                   {{"ACTIONS", actions_text()},
-                                    previzctl_status,
-                                    see_also("previzd(8), previz-set(5)")})},
-          {"previz-set.5", set_man_page(set_description, see_also("previzd(8), previzctl(1)"))}};
+  return {
+      {"previzd.8", man_page(previzd_commands(), 8,
+                             {service_chapter, examples_chapter, glossary_chapter, previzd_files,
+                              previzd_status, see_also("previzctl(1), previz-set(5)")})},
+      {"previzctl.1",
+       man_page(
+           previzctl_commands(), 1,
+           {{"ACTIONS", actions_text()}, previzctl_status, see_also("previzd(8), previz-set(5)")})},
+      {"previz-set.5", set_man_page(set_description, see_also("previzd(8), previzctl(1)"))}};
 }
 
 std::vector<Page> bash_completions() {

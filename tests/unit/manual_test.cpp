@@ -3,10 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <memory>
+#include <sstream>
 
+#include "daemon/calibrate/board.hpp"
+#include "daemon/command_line.hpp"
 #include "daemon/manual/command.hpp"
 #include "daemon/manual/pages.hpp"
 #include "daemon/set/actions.hpp"
@@ -78,6 +82,46 @@ TEST(ManualPages, ShowHowEachCommandIsCalled) {
   EXPECT_THAT(text, HasSubstr(".SS \\fBprevizd render\\fR [\\fIOPTION\\fR...] \\fIsession\\fR\n"));
   EXPECT_THAT(text, HasSubstr(".SS \\fBprevizd calibrate lens\\fR"));
   EXPECT_THAT(text, HasSubstr("\\fB\\-\\-estimator\\fR \\fBpaired\\fR|\\fBdifference\\fR\n"));
+}
+
+// Returns the terms of the list in a section of a page, without roff's escapes.
+std::vector<std::string> terms_of(const std::string& text, const std::string& section) {
+  std::istringstream lines(text);
+  std::vector<std::string> terms;
+  bool inside = false;
+  std::string before;
+  for (std::string line; std::getline(lines, line); before = line) {
+    if (line.starts_with(".SH ")) inside = line == ".SH " + section;
+    if (!inside || before != ".TP") continue;
+    for (const std::string mark : {"\\fB", "\\fR"})
+      if (const std::size_t at = line.find(mark); at != std::string::npos) line.erase(at, 3);
+    std::erase(line, '\\');
+    terms.push_back(line);
+  }
+  return terms;
+}
+
+TEST(ManualPages, HaveExamplesThatTheCommandLineUnderstands) {
+  const std::vector<std::string> examples = terms_of(page(man_pages(), "previzd.8"), "EXAMPLES");
+  EXPECT_GE(examples.size(), 8u);
+  for (const std::string& example : examples) {
+    SCOPED_TRACE(example);
+    CLI::App app{"", "previzd"};
+    CommandLine said;
+    add_commands(app, said);
+    EXPECT_NO_THROW(app.parse(example, true));
+    for (const std::string& board : {said.calibrate.observer.board, said.calibrate.light.board})
+      if (!board.empty()) {
+        EXPECT_NO_THROW(calibrate::parse_board(board));
+      }
+  }
+}
+
+TEST(ManualPages, HaveAGlossaryInOrder) {
+  const std::vector<std::string> terms = terms_of(page(man_pages(), "previzd.8"), "GLOSSARY");
+  EXPECT_THAT(terms, IsSupersetOf({"bracket", "carrier", "lamp", "phantom", "plate", "refine",
+                                   "review", "take", "virtual object"}));
+  EXPECT_TRUE(std::ranges::is_sorted(terms));
 }
 
 // What a shell command says, a line each.
