@@ -28,7 +28,7 @@ std::optional<DisplayEvent> DisplayLifeline::show(const Composer& compose) {
     display_.reset();
     state_ = DeviceState::lost;
     backoff_.failed(clock_.now());
-    return trouble(what->what + "; it is opened anew");
+    return trouble(what->what + "; reopening it");
   }
   state_ = DeviceState::streaming;
   backoff_.reset();

@@ -148,7 +148,7 @@ CameraEvent Lifeline::lose(const std::string& why) {
   state_ = DeviceState::lost;
   backoff_.failed(clock_.now());
   ++counters_["back-offs"];
-  return DeviceTrouble{name_, why + "; it is opened anew"};
+  return DeviceTrouble{name_, why + "; reopening it"};
 }
 
 // A device that was pulled says so; one that only says nothing may be wedged.

@@ -1,5 +1,6 @@
 #include "daemon/lighting/environment.hpp"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -28,6 +29,15 @@ int chosen_resolution(int setting, double pixel_sr) {
 
 double texel_sr(int size) {
   return 4 * std::numbers::pi / (static_cast<double>(size) * size);
+}
+
+std::string area_words(double solid_angle_sr) {
+  constexpr double degree = std::numbers::pi / 180;
+  const double cosine = 1 - solid_angle_sr / (2 * std::numbers::pi);
+  const double radius = std::acos(std::clamp(cosine, -1.0, 1.0));
+  if (radius <= 45 * degree) return fmt::format("an area {:.1f} degrees wide", 2 * radius / degree);
+  return fmt::format("an area of {:.0f} % of all directions",
+                     100 * solid_angle_sr / (4 * std::numbers::pi));
 }
 
 glm::vec3 texel_direction(int size, int i, int j) {

@@ -58,6 +58,9 @@ int resolution_for(double pixel_sr);
 int chosen_resolution(int setting, double pixel_sr);
 
 double texel_sr(int size);
+// Words for a solid angle: "an area 4.0 degrees wide", the width of a disc of that size, or "an
+// area of 31 % of all directions" if the disc were wider than 90 degrees.
+std::string area_words(double solid_angle_sr);
 // Unit direction of a texel's centre.
 glm::vec3 texel_direction(int size, int i, int j);
 // Index into `radiance` of the texel that a unit direction lies in.

@@ -23,10 +23,11 @@ void apply_mode(Lighting& lighting, const set::Lighting& settings, SourceTracker
   Extraction extraction = extract_sources(lighting.environment, settings.sources, tracker.known());
   tracker.follow(extraction.sources, timestamp_ns);
   lighting.sources = std::move(extraction.sources);
-  std::string note = counted(lighting.sources.size(), "light source");
+  std::string note =
+      counted(lighting.sources.size(), "lamp") + " found in the light camera's picture";
   if (extraction.left > 0)
     note += ", " + counted(static_cast<std::size_t>(extraction.left), "bright region") +
-            " left in the picture (too faint, too wide or too many)";
+            " not taken for lamps (too faint, too wide or too many)";
   if (settings.mode == set::LightMode::hybrid) {
     lighting.environment = std::move(extraction.residual);
   } else if (settings.sources.residual == set::Residual::blurred) {
@@ -35,7 +36,7 @@ void apply_mode(Lighting& lighting, const set::Lighting& settings, SourceTracker
     const double all = luminance(total_flux(lighting.environment));
     const double residual = luminance(total_flux(extraction.residual));
     lighting.report.dropped_share = all > 0 ? residual / all : 0;
-    note += fmt::format("; {:.0f} % of the light is no source and dropped",
+    note += fmt::format("; the other {:.0f} % of the light is dropped",
                         100 * lighting.report.dropped_share);
     lighting.environment = {1, {glm::vec3(0)}};
   }

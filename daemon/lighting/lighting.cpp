@@ -43,38 +43,42 @@ std::vector<std::string> describe(std::span<const FramePtr> frames, const Bracke
       [](const FramePtr& a, const FramePtr& b) { return a->exposure < b->exposure; });
   if (lens.max_angle_rad() < lens.intrinsics().max_angle_rad)
     notes.push_back(fmt::format(
-        "the lens polynomial turns back at {:.1f} degrees off axis and is used up to there only",
+        "the lens polynomial folds back at {:.1f} degrees off axis and is used only up to there",
         lens.max_angle_rad() * 180 / std::numbers::pi));
   const auto begin = [&](double sr) {
-    return fmt::format("{}{:.4f} sr are",
-                       sr > blinded * report.seen_sr ? "the light camera is blinded: " : "", sr);
+    if (sr > blinded * report.seen_sr)
+      return fmt::format("the light camera is blinded: {:.0f} % of its view is",
+                         100 * sr / report.seen_sr);
+    return area_words(sr) + " is";
   };
   if (report.overexposed_sr > 0)
     notes.push_back(
-        fmt::format("{} clipped in every exposure, the light there is {}; an exposure below {:.3g} "
-                    "is needed",
+        fmt::format("{} clipped in every exposure; the light there is {}; an exposure below {:.3g} "
+                    "is needed to see it",
                     begin(report.overexposed_sr),
                     settings.clipped_gain > 1
-                        ? fmt::format("taken as up to {:g} times white", settings.clipped_gain)
+                        ? fmt::format("assumed to be up to {:g} times white", settings.clipped_gain)
                         : "a lower bound",
                     (*shortest)->exposure));
   if (report.underexposed_sr > 0)
     notes.push_back(
-        fmt::format("{} black in every exposure; an exposure above {:.3g} would see there",
+        fmt::format("{} black in every exposure; an exposure above {:.3g} is needed to see it",
                     begin(report.underexposed_sr), (*longest)->exposure));
   for (const Disagreement& d : disagreements(bracket))
-    notes.push_back(fmt::format(
-        "light frames {} and {} disagree by {:.1f} stops all over: an exposure is stated wrongly, "
-        "or nearly all of the light changed between them; the newer one counts",
-        d.shorter, d.longer, std::abs(d.stops)));
+    notes.push_back(
+        fmt::format("light frames {} and {} disagree by {:.1f} stops everywhere: an exposure is "
+                    "stated wrongly, "
+                    "or nearly all of the light changed between them; the newer one is used",
+                    d.shorter, d.longer, std::abs(d.stops)));
   if (report.moved_sr > 0)
     notes.push_back(fmt::format(
-        "{:.4f} sr changed between the exposures of the bracket; the newest ones count there",
-        report.moved_sr));
+        "{} changed between the exposures of the bracket; the newest exposure is used there",
+        area_words(report.moved_sr)));
   if (report.filled_sr > 0)
-    notes.push_back(fmt::format("{:.3f} sr ({:.1f} %) are unseen and filled by the rule \"{}\"",
-                                report.filled_sr, 100 * report.filled_sr / sphere_sr,
-                                set::name_of(settings.unseen)));
+    notes.push_back(
+        fmt::format("the light camera cannot see {:.1f} % of all directions; they are filled by "
+                    "the rule \"{}\"",
+                    100 * report.filled_sr / sphere_sr, set::name_of(settings.unseen)));
   return notes;
 }
 

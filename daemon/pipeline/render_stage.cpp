@@ -78,7 +78,7 @@ bool RenderStage::begin(Shot& shot) {
     return false;
   };
   if (!shot.track.pose) return untouched(why_no_pose(shot.track));
-  if (!shot.light) return untouched("no light frame was seen yet");
+  if (!shot.light) return untouched("no light frame yet");
 
   if (light_ != shot.light) {
     renderer_.set_environment(shot.light->encoded, set_.lighting.sampling);

@@ -38,7 +38,7 @@ struct Shot {
   // From tracking and lighting.
   tracking::Track track;
   bool tracking_done = false;  // false: tracking was paused, and the track says nothing
-  LightPtr light;              // null: no light frame was seen yet
+  LightPtr light;              // null: no light frame yet
   std::shared_ptr<const session::CapturedLight> recorded_light;  // null: none came with the frame
   Motion motion;              // what is moved by hand, and by itself
   session::SceneState scene;  // what was moved or relit; empty: as in the set

@@ -122,12 +122,12 @@ Outcome Controls::snapshot(std::uint64_t Look::*of) {
 }
 
 Outcome Controls::apply(const set::ReloadSet&) {
-  if (look_.state.recording) return {"recording goes on; stop it first", true, {}};
-  return {"reading the set again", false, Request::reload_set};
+  if (look_.state.recording) return {"still recording; end the take first", true, {}};
+  return {"loading the set file again", false, Request::reload_set};
 }
 
 Outcome Controls::apply(const set::OtherSet& effect) {
-  if (look_.state.recording) return {"recording goes on; stop it first", true, {}};
+  if (look_.state.recording) return {"still recording; end the take first", true, {}};
   return {effect.next > 0 ? "next set" : "previous set", false,
           effect.next > 0 ? Request::next_set : Request::previous_set};
 }
@@ -201,7 +201,7 @@ Outcome Controls::apply(const set::ScaleObject& effect) {
 Outcome Controls::apply(const set::ResetObject&) {
   if (objects_.empty()) return none_of("virtual object");
   look_.edits.objects.erase(selected_object());
-  return {selected_object() + " is where the set has it", false, {}};
+  return {selected_object() + " is back where the set file has it", false, {}};
 }
 
 Outcome Controls::apply(const set::PlayAnimations&) {
@@ -214,7 +214,7 @@ Outcome Controls::apply(const set::PlayAnimations&) {
 Outcome Controls::apply(const set::HoldAnimations&) {
   if (!is_animated_) return none_of("animation");
   look_.animations_held = !look_.animations_held;
-  return {look_.animations_held ? "animations held" : "animations go on", false, {}};
+  return {look_.animations_held ? "animations held" : "animations continue", false, {}};
 }
 
 Outcome Controls::apply(const set::SelectLight& effect) {
@@ -244,7 +244,7 @@ Outcome Controls::apply(const set::TintLight& effect) {
 Outcome Controls::apply(const set::ResetLight&) {
   if (lights_.empty()) return none_of("lamp");
   look_.edits.lights.erase(selected_light());
-  return {selected_light() + " is as the set has it", false, {}};
+  return {selected_light() + " is back as in the set file", false, {}};
 }
 
 Outcome Controls::apply(const set::ChangeExposure& effect) {

@@ -6,7 +6,7 @@ namespace {
 Step go(State state, Mode mode) {
   if (mode == state.mode) return {state};
   if (state.recording && (mode == Mode::standby || mode == Mode::review))
-    return {state, "recording goes on; stop it first"};
+    return {state, "still recording; end the take first"};
   if (mode == Mode::refine && !state.has_good)
     return {state, "no frame with a pose and light was seen yet; there is nothing to refine"};
   if (mode == Mode::review && !state.has_take)

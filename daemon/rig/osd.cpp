@@ -14,7 +14,7 @@ using output::OsdText;
 using output::OsdTone;
 using tracking::TrackStatus;
 
-constexpr std::uint64_t little_space = 10'000'000'000;  // bytes, beside the reserve
+constexpr std::uint64_t little_space = 10'000'000'000;  // bytes, besides the reserve
 
 // "1 tag", "2 tags"
 std::string counted(int number, const char* noun) {
@@ -62,7 +62,7 @@ OsdText space(std::uint64_t bytes) {
 }
 
 std::string samples(const PictureFacts& picture, const Look& look) {
-  if (picture.samples == 0) return "camera only";
+  if (picture.samples == 0) return "plate only";
   std::string text = counted(picture.samples, "sample");
   if (look.state.mode == Mode::refine && picture.error > 0)
     text += fmt::format(" · error {:.2g} %", 100 * picture.error);
@@ -87,17 +87,17 @@ void add_notices(const RigFacts& rig, const PictureFacts* picture, OsdPage& page
   for (const report::Notice& trouble : rig.troubles)
     page.notices.push_back({line_of(trouble), tone_of(trouble.severity)});
   if (rig.look.state.camera_lost && rig.troubles.empty())
-    page.notices.push_back({"film camera: no pictures come", OsdTone::alarm});
+    page.notices.push_back({"film camera: no picture", OsdTone::alarm});
   if (!rig.recorder_fault.empty())
     page.notices.push_back({"recording ended: " + rig.recorder_fault, OsdTone::alarm});
   if (rig.frames_lost > 0)
     page.notices.push_back(
-        {fmt::format("{} frames are missing in the take: the disk is too slow", rig.frames_lost),
+        {fmt::format("{} frames missing from the take: the disk is too slow", rig.frames_lost),
          OsdTone::alarm});
   if (!picture && !rig.look.state.camera_lost)
     page.notices.push_back({"waiting for the film camera", OsdTone::warning});
   if (picture && !picture->untouched.empty())
-    page.notices.push_back({"camera only: " + picture->untouched, OsdTone::warning});
+    page.notices.push_back({"plate only: " + picture->untouched, OsdTone::warning});
   else if (picture && !picture->tracking_trouble.empty())
     page.notices.push_back({"tracking: " + picture->tracking_trouble, OsdTone::warning});
   for (const report::Notice& news : rig.news)
@@ -115,7 +115,7 @@ PictureFacts facts_of(const pipeline::Shot& shot) {
   facts.tracking_trouble = shot.track.reason;
   if (shot.track.pose) {
     facts.tags = static_cast<int>(shot.track.pose->tags.size());
-    double variance_m2 = 0;  // of the place: the lower half of the 6x6's diagonal
+    double variance_m2 = 0;  // of the position: the lower half of the 6x6 matrix's diagonal
     for (const std::size_t axis : {3, 4, 5}) variance_m2 += shot.track.pose->covariance[7 * axis];
     facts.deviation_mm = 1e3 * std::sqrt(variance_m2);
   }

@@ -1,4 +1,5 @@
-// What the overlay says: from the rig's state to a crew's words. No clock: the caller decides when.
+// Turns the state of the rig into the words of the overlay. The functions are pure; the caller
+// decides when to show the words.
 #pragma once
 
 #include <cstdint>
@@ -13,32 +14,32 @@
 
 namespace previz::rig {
 
-// What the overlay says of the picture on the screen.
+// Facts about the picture on the screen.
 struct PictureFacts {
-  int samples = 0;        // per pixel; 0: the camera's picture as it is
+  int samples = 0;        // per pixel; 0: the plate alone is shown
   double error = 0;       // over the picture's mean radiance; 0: not estimated
-  std::string untouched;  // why it is the camera's own; empty: it was rendered
+  std::string untouched;  // why the plate alone is shown; empty: it was rendered
   tracking::TrackStatus tracking = tracking::TrackStatus::lost;
-  int tags = 0;             // that the pose is made of
-  double deviation_mm = 0;  // of the camera's place, a standard deviation; 0: not known
+  int tags = 0;             // used for the pose
+  double deviation_mm = 0;  // standard deviation of the camera's position; 0: not known
   std::string tracking_trouble;
 };
 PictureFacts facts_of(const pipeline::Shot& shot);
 
-// How the pictures shown lately came.
+// Frame rate and delay of the last pictures.
 struct Pace {
   double fps = 0;        // 0: none
   double latency_s = 0;  // capture to display
 };
 
-// What the overlay says of everything else.
+// Facts about everything else.
 struct RigFacts {
   Look look;
-  std::string take;       // of the running recording
-  double recorded_s = 0;  // of it
+  std::string take;       // name of the take that is being recorded
+  double recorded_s = 0;  // its length so far
   std::uint64_t frames_lost = 0;
   std::string recorder_fault;
-  std::optional<std::uint64_t> free_bytes;  // for takes, before the reserve; none: not known
+  std::optional<std::uint64_t> free_bytes;  // for takes, without the reserve; none: not known
   std::vector<report::Notice> news;         // what buttons and the rig itself did, oldest first
   std::vector<report::Notice> troubles;     // of devices
 };

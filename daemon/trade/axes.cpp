@@ -41,13 +41,13 @@ TradeAxis numbered(std::string name, std::string what, TradeSettings own,
 TradeAxis light_modes(const set::Lighting& own) {
   if (own.from == set::LightFrom::recording) return {"light_mode", "", {}, set::name_of(own.mode)};
   return spelled(
-      "light_mode", "what the light around the set is made into",
+      "light_mode", "how the light camera's picture lights the set",
       [](TradeSettings & s) -> auto& { return s.lighting.mode; });
 }
 
 TradeAxis left_out(std::uint32_t needed) {
   TradeAxis axis{parts_axis,
-                 "features that this set does not need: left out, or carried along",
+                 "features that this set does not need: left out, or switched on",
                  {},
                  "left out"};
   for (const render::Feature& feature : render::features())
@@ -75,51 +75,50 @@ void keep_wanted(std::vector<TradeAxis>& axes, const std::vector<std::string>& w
 std::vector<TradeAxis> trade_axes(const TradeSettings& own, std::uint32_t needed) {
   return {
       spelled(
-          "estimator", "both worlds in full, or what differs between them",
+          "estimator", "tracing both worlds in full, or only how they differ",
           [](TradeSettings & s) -> auto& { return s.estimation.estimator; }),
       numbered(
-          "difference_sampling",
-          "largest share of directions sent towards what is in one world only", own,
-          {0.0, 0.25, 0.5, 0.75},
+          "difference_sampling", "largest share of directions aimed at virtual and removed objects",
+          own, {0.0, 0.25, 0.5, 0.75},
           [](TradeSettings & s) -> auto& { return s.estimation.difference_sampling; }),
       numbered(
-          "depth", "bounces that a path may have", own, {1, 2, 4, 8},
+          "depth", "largest number of bounces", own, {1, 2, 4, 8},
           [](TradeSettings & s) -> auto& { return s.estimation.max_depth; }),
       spelled(
-          "caustics", "how light comes through glass and by mirrors",
+          "caustics", "how light that mirrors and glass throw onto surfaces is found",
           [](TradeSettings & s) -> auto& { return s.estimation.caustics; }),
       spelled(
-          "composite", "how the difference is put onto the camera's picture",
+          "composite", "how shadows and light are put onto the plate",
           [](TradeSettings & s) -> auto& { return s.estimation.composite; }),
       spelled(
-          "real_radiance", "real surfaces seen after a bounce: simulated, or from the camera",
+          "real_radiance", "real surfaces in reflections: simulated, or taken from the plate",
           [](TradeSettings & s) -> auto& { return s.estimation.real_radiance; }),
       light_modes(own.lighting),
       spelled(
-          "light_sampling", "whether paths look for the light around the set",
+          "light_sampling", "how directions towards the light are chosen",
           [](TradeSettings & s) -> auto& { return s.lighting.sampling; }),
       {"light_resolution",
-       "how fine the light around the set is, texels a side",
+       "resolution of the light map, texels a side",
        {{"16", [](TradeSettings& s) { s.lighting.resolution = 16; }},
         {"64", [](TradeSettings& s) { s.lighting.resolution = 64; }}},
-       own.lighting.resolution > 0 ? number_words(own.lighting.resolution) : "as it was seen"},
+       own.lighting.resolution > 0 ? number_words(own.lighting.resolution) : "as captured"},
       {"resolution",
-       "picture size, then enlarged (the camera's picture with it, as in a preview)",
+       "size of the picture, which is then enlarged (the plate as well, as in a preview)",
        {{"half", [](TradeSettings& s) { s.scale = 0.5; }},
         {"quarter", [](TradeSettings& s) { s.scale = 0.25; }}},
        "full"},
       {"spread",
-       "the same number of samples for every pixel, or (32 and more) most where it is noisy",
+       "the same number of samples for every pixel, or, from 32 on, more where it is noisy",
        {{"even", [](TradeSettings& s) { s.adaptive = false; }},
         {"adaptive", [](TradeSettings& s) { s.adaptive = true; }}},
        ""},
       {"noise",
-       "left in the picture, or taken out of it by what its variance says",
+       "noise left in the picture, or removed where the variance shows it",
        {{"left", [](TradeSettings& s) { s.denoise = false; }},
         {"denoised", [](TradeSettings& s) { s.denoise = true; }}},
        ""},
       {"lens",
-       "the lens's aperture, or a pinhole that keeps everything sharp",
+       "the lens with its aperture, or a pinhole that keeps everything in focus",
        {{"pinhole", [](TradeSettings& s) { s.lens.reset(); }}},
        "aperture"},
       left_out(needed),

@@ -116,16 +116,16 @@ std::string opening(const TradeReport& report) {
   std::string sizes = std::to_string(report.width) + " × " + std::to_string(report.height);
   if (share < 1)
     sizes += "; at the full " + std::to_string(report.full_width) + " × " +
-             std::to_string(report.full_height) + " everything takes about " +
+             std::to_string(report.full_height) + " everything would take about " +
              time_words(1 / share).substr(0, time_words(1 / share).find(' ')) + " times as long";
   return "<h1>What time buys on “" + escaped(report.set) + "”</h1>\n<p>Frame " +
          std::to_string(report.frame) +
-         " of the take was rendered with the set's own settings and "
-         "with one of them changed at a time, on " +
+         " of the take was rendered with the set's own settings, and then "
+         "with one setting changed at a time, on " +
          escaped(report.device) + ", at " + sizes +
-         ". An <b>error</b> is how far a picture is from the converged one: the rms of the "
-         "difference over the rms of the picture, the figure that <code>previzd render "
-         "--error</code> takes.</p>\n";
+         ". An <b>error</b> says how far a picture is from the converged one: the rms of the "
+         "difference over the rms of the picture, as for <code>previzd render "
+         "--error</code>.</p>\n";
 }
 
 ChartPoint chart_point(const TradeReport& report, std::size_t method, const TradePoint& point,
@@ -172,15 +172,16 @@ std::string corner_name(const TradeReport& report, const TradeFrontPoint& at) {
 
 std::string front_section(const TradeReport& report) {
   std::string html =
-      "<h2>The front</h2>\n<p>Every dot is one setting at one number of samples. On the line are "
-      "those that nothing else beats: whatever is faster is further off, whatever is nearer takes "
-      "longer. In the shaded part the reference itself is too noisy to tell.</p>\n" +
+      "<h2>The best choices</h2>\n<p>Every dot is one setting at one number of samples. The dots "
+      "on "
+      "the line are the best choices: every other setting is slower or has a larger error. In the "
+      "shaded part the reference itself is too noisy to decide.</p>\n" +
       front_chart(report) + "<table>\n" +
       head_row({{"time", true},
                 {"what", false},
                 {"error", true},
-                {"of light on the real scene", true},
-                {"of virtual things", true},
+                {"of light on the real set", true},
+                {"of virtual objects", true},
                 {"", false}});
   for (const TradeFrontPoint& at : told_front_of(report)) {
     const TradePoint& point = report.point(at);
@@ -193,15 +194,18 @@ std::string front_section(const TradeReport& report) {
             cell(corner_name(report, at)) + "</tr>\n";
   }
   return html +
-         "</table>\n<p class=\"soft\">Of settings that are within a tenth of each other the "
-         "fastest "
-         "stands here. ≈ marks what the reference is too noisy to tell.</p>\n";
+         "</table>\n<p class=\"soft\">Among settings whose errors differ by less than a tenth, "
+         "only "
+         "the fastest is listed. ≈ marks errors that are too close to the noise of the "
+         "reference.</p>\n";
 }
 
 std::string corners_section(const TradeReport& report) {
   std::string html =
-      "<h2>The pictures at its corners</h2>\n<p>Left what is seen; right five times its difference "
-      "from the converged picture, where grey is none.</p>\n<div class=\"pictures\">\n";
+      "<h2>The fastest, the best, and the knee between them</h2>\n<p>Left: the picture. Right: "
+      "five "
+      "times its difference from the converged picture; grey means none.</p>\n<div "
+      "class=\"pictures\">\n";
   for (const TradeCorner& corner : report.corners) {
     html += figure(corner.picture,
                    "<b>" + corner.name + "</b> " + escaped(front_words(report, corner.at))) +
@@ -239,26 +243,27 @@ std::string bias_sentence(const TradeReport& report, const TradePlan::Axis& axis
       biased +=
           (biased.empty() ? "" : "; ") + escaped(entry.variant) + ", " + share_words(bias->value);
   }
-  return biased.empty()
-             ? ""
-             : "<p class=\"soft\">Beyond noise, further from the set's own picture by: " + biased +
-                   ".</p>\n";
+  return biased.empty() ? ""
+                        : "<p class=\"soft\">However many samples, these differ from the set's own "
+                          "picture by: " +
+                              biased + ".</p>\n";
 }
 
 std::string axis_section(const TradeReport& report, const TradePlan::Axis& axis) {
   return "<h2>" + sentence(plain_words(axis.name)) + "</h2>\n<p>" + escaped(sentence(axis.what)) +
          ".</p>\n<div class=\"charts\">\n" +
          axis_chart(report, axis, "The picture", &TradeErrors::picture) +
-         axis_chart(report, axis, "Light and shadow on the real scene", &TradeErrors::difference) +
+         axis_chart(report, axis, "Light and shadow on the real set", &TradeErrors::difference) +
          "</div>\n" + bias_sentence(report, axis);
 }
 
 std::string parts_section(const TradeReport& report, const TradePlan::Axis& axis) {
   const TradePoint& own = report.methods.front().points.back();
   std::string html =
-      "<h2>What is left out</h2>\n<p>This set has no need of these parts of the renderer, so they "
-      "are not there. Here they were carried along, to see what that would cost; the picture must "
-      "be the same, bit for bit.</p>\n<table>\n" +
+      "<h2>What is left out</h2>\n<p>This set does not need these parts of the renderer, so they "
+      "are "
+      "left out. For this table they were switched on, to see what that would cost; the picture "
+      "must stay the same, bit for bit.</p>\n<table>\n" +
       head_row(
           {{"part", false}, {"without it", true}, {"with it", true}, {"pixels changed", true}});
   for (const TradePlan::Entry& entry : axis.entries) {
@@ -272,22 +277,24 @@ std::string parts_section(const TradeReport& report, const TradePlan::Axis& axis
 }
 
 std::string reading_section(const TradeReport& report) {
-  return "<h2>How to read this</h2>\n<p>The reference is the set's own settings at " +
+  return "<h2>How to read this</h2>\n<p>The reference was rendered with the set's own settings "
+         "at " +
          samples_words(report.reference_samples) +
          ", in two independent halves. Half the difference between them is its own error: " +
          share_or_none(report.noise.picture) + " of the picture, " +
-         share_or_none(report.noise.difference) + " of the light on the real scene, " +
+         share_or_none(report.noise.difference) + " of the light on the real set, " +
          share_or_none(report.noise.virtual_part) +
-         " of the virtual things. An error below ten times that is not to be trusted: it is shaded "
-         "in the charts and marked in the tables.</p>\n<p>Every setting was rendered " +
+         " of the virtual objects. Do not trust an error below ten times that: it is shaded in the "
+         "charts and marked in the tables.</p>\n<p>Every setting was rendered " +
          (report.rounds == 1
               ? std::string("once")
               : std::to_string(report.rounds) +
                     " times, with other random numbers and in another order each time") +
-         ". Time is rendering alone, after a warm-up; its median stands here. A setting that "
-         "changes what is meant (fewer "
-         "bounces, no caustics, a pinhole) is compared with the set's own meaning: its curve bends "
-         "to a floor. Radiance is clipped where the sensor clips.</p>\n";
+         ". The time is that of rendering alone, after a warm-up, as a median. A setting that "
+         "leaves "
+         "something out (fewer bounces, no caustics, a pinhole lens) never reaches the picture of "
+         "the set's own settings: its curve levels out. Radiance is clipped where the sensor "
+         "clips.</p>\n";
 }
 
 std::string csv_share(const std::optional<double>& share) {

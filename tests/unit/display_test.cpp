@@ -240,7 +240,7 @@ TEST(DisplayLifeline, OpensWaitsBacksOffAndOpensAgain) {
   EXPECT_EQ(told(), "shown");
 
   cable.plugged = false;
-  EXPECT_EQ(told(), "HDMI-A-1: was unplugged; it is opened anew");
+  EXPECT_EQ(told(), "HDMI-A-1: was unplugged; reopening it");
   EXPECT_EQ(life.state(), DeviceState::lost);
   EXPECT_EQ(life.display(), nullptr);
   now += 100ms;

@@ -101,7 +101,7 @@ TEST_F(LifelineTest, AnAbsentDeviceIsTriedEverLessOftenAndToldOnce) {
 TEST_F(LifelineTest, ADeviceThatNeverStartsIsOpenedAnew) {
   Lifeline lifeline = started(with_faults(take(), {{Kind::stall, 0}}, clock()));
   EXPECT_EQ(story(lifeline, milliseconds(6000)),
-            " [sends no frame within 5000 ms of its start; it is opened anew] f");
+            " [sends no frame within 5000 ms of its start; reopening it] f");
   EXPECT_EQ(lifeline.counters().at("opened"), 2u);
   EXPECT_EQ(lifeline.counters().at("lost"), 1u);
 }
@@ -131,7 +131,7 @@ TEST_F(LifelineTest, ALostDeviceIsPickedUpWhenItIsBack) {
   Lifeline lifeline =
       started(with_faults(take(), {{Kind::disconnect, 20, 1, std::chrono::seconds(3)}}, clock()));
   EXPECT_EQ(story(lifeline, milliseconds(9000)),
-            "f [was unplugged; it is opened anew] "
+            "f [was unplugged; reopening it] "
             " [the device is unplugged; tried again until it is there] f");
   EXPECT_EQ(lifeline.state(), DeviceState::streaming);
 }
@@ -210,9 +210,9 @@ TEST_F(LifelineTest, ADeviceThatIsSilentIsResetBeforeItIsOpenedAnew) {
     Lifeline lifeline("observer", with_faults(take(), {{Kind::stall, 5}}, clock()), options,
                       clock(), {{}, [&] { return std::optional<std::string>(why_not); }});
     lifeline.start();
-    const std::string said =
-        *why_not ? "is stalled; it cannot be reset (Access denied); it is opened anew"
-                 : "is stalled; it was reset; it is opened anew";
+    const std::string said = *why_not
+                                 ? "is stalled; it cannot be reset (Access denied); reopening it"
+                                 : "is stalled; it was reset; reopening it";
     EXPECT_EQ(story(lifeline, milliseconds(5000)),
               "f [has sent nothing for 2000 ms]  [" + said + "] f");
     EXPECT_EQ(lifeline.counters().at("reset"), *why_not ? 0u : 1u);
@@ -224,7 +224,7 @@ TEST_F(LifelineTest, ADeviceThatIsPulledIsNotReset) {
   Lifeline lifeline("observer", with_faults(take(), {{Kind::disconnect, 5}}, clock()), options,
                     clock(), {{}, [] { return std::optional<std::string>(""); }});
   lifeline.start();
-  EXPECT_EQ(story(lifeline, milliseconds(2000)), "f [was unplugged; it is opened anew] f");
+  EXPECT_EQ(story(lifeline, milliseconds(2000)), "f [was unplugged; reopening it] f");
   EXPECT_EQ(lifeline.counters().at("reset"), 0u);
 }
 

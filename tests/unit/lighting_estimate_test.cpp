@@ -189,6 +189,13 @@ TEST(Estimate, ReportsClippedAndBlackSolidAngles) {
   EXPECT_NE(report.notes[2].find("\"constant\""), std::string::npos);
 }
 
+// A cap of half angle r has a solid angle of 2 pi (1 - cos r).
+TEST(AreaWords, AreDegreesOrAShareOfAllDirections) {
+  EXPECT_EQ(area_words(2 * pi * (1 - std::cos(2 * degree))), "an area 4.0 degrees wide");
+  EXPECT_EQ(area_words(pi), "an area of 25 % of all directions");
+  EXPECT_EQ(area_words(4 * pi), "an area of 100 % of all directions");
+}
+
 TEST(UnseenHorizon, ContinuesAUniformSky) {
   for (const glm::dmat4& pose : {looking(0, 90), looking(50, 10)}) {
     LightCameraCalibration camera = fisheye_camera();
@@ -264,7 +271,8 @@ TEST(UnseenMirror, FallsBackToTheHorizonWhereTheMirrorIsUnseenToo) {
   const Lighting lighting = estimate_one(camera, uniform, 0.25, with_rule(set::UnseenRule::mirror));
   for (const glm::vec3& radiance : lighting.environment.radiance)
     ASSERT_LT(glm::length(radiance - glm::vec3(1, 2, 3)), 2e-4f);
-  EXPECT_NE(lighting.report.notes.back().find("unseen in the mirror too"), std::string::npos);
+  EXPECT_NE(lighting.report.notes.back().find("not in the mirrored picture either"),
+            std::string::npos);
 }
 
 // A lens whose circle is wider than the picture: the edge is where the picture ends.

@@ -156,7 +156,7 @@ TEST_F(RigDisplay, ShowsThePictureAndTheWordsOfEveryMode) {
       "text_height = 0.05\n");
   run([&] {
     until([](const OsdPage& page) { return says(page.bottom_left, "2 samples"); });
-    until([](const OsdPage& page) { return says(page.notices, "camera only: pose lost"); });
+    until([](const OsdPage& page) { return says(page.notices, "plate only: pose lost"); });
     press("debug_view");
     until_mode("view: mixed");
     for (std::size_t i = 1; i < render::all_views.size(); ++i) press("debug_view");

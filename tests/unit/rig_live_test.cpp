@@ -333,7 +333,7 @@ TEST_F(RigLive, MayEndOrChangeItsSetInAReview) {
     };
     review("12A_take001");
     press("reload_set");
-    until_said("reading the set again");
+    until_said("loading the set file again");
     review("12A_take002");
   });
 }

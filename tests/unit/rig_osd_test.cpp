@@ -109,10 +109,10 @@ TEST(OsdWords, TrackingInTrouble) {
   picture.tracking_trouble = "no tag in the picture";
   picture.untouched = "pose lost: no tag in the picture";
   page = osd_page(in(Mode::live), &picture, pace);
-  EXPECT_EQ(page.bottom_left.front(), OsdText{"camera only"});
+  EXPECT_EQ(page.bottom_left.front(), OsdText{"plate only"});
   EXPECT_EQ(page.bottom_right.front(), (OsdText{"tracking lost", OsdTone::alarm}));
   EXPECT_EQ(page.notices,
-            (Texts{{"camera only: pose lost: no tag in the picture", OsdTone::warning}}));
+            (Texts{{"plate only: pose lost: no tag in the picture", OsdTone::warning}}));
 }
 
 TEST(OsdWords, FaultsInPlainWordsAndWhatAButtonDid) {
@@ -122,19 +122,19 @@ TEST(OsdWords, FaultsInPlainWordsAndWhatAButtonDid) {
   const std::string moved = "card moved to +0.010 +0.000 +0.000 m";
   rig.news = {{report::Severity::info, "", moved}};
   EXPECT_EQ(osd_page(rig, &picture, pace).notices,
-            (Texts{{"film camera: no pictures come", OsdTone::alarm}, {moved}}));
+            (Texts{{"film camera: no picture", OsdTone::alarm}, {moved}}));
   rig.troubles = {report::lasting("film camera", "was unplugged; it is opened anew"),
                   report::passing("light camera", "is stalled")};
   rig.recorder_fault = "the disk is almost full";
   rig.frames_lost = 12;
-  rig.news.push_back({report::Severity::warning, "", "recording goes on; stop it first"});
+  rig.news.push_back({report::Severity::warning, "", "still recording; end the take first"});
   EXPECT_EQ(osd_page(rig, &picture, pace).notices,
             (Texts{{"film camera: was unplugged; it is opened anew", OsdTone::alarm},
                    {"light camera: is stalled", OsdTone::alarm},
                    {"recording ended: the disk is almost full", OsdTone::alarm},
-                   {"12 frames are missing in the take: the disk is too slow", OsdTone::alarm},
+                   {"12 frames missing from the take: the disk is too slow", OsdTone::alarm},
                    {moved},
-                   {"recording goes on; stop it first", OsdTone::warning}}));
+                   {"still recording; end the take first", OsdTone::warning}}));
 }
 
 TEST(OsdWords, BeforeTheFirstPicture) {
