@@ -5,11 +5,11 @@
 namespace previz::control {
 
 void add_requests(CLI::App& app, Request& asked) {
-  app.set_version_flag("--version", "previzctl " PREVIZ_VERSION, "The version, and nothing else");
+  app.set_version_flag("--version", "previzctl " PREVIZ_VERSION, "Print the version");
   app.require_subcommand(1);
   app.add_subcommand("status", "What the rig is doing");
-  app.add_subcommand("watch", "The same, and every change of it");
-  app.add_subcommand("metrics", "Rates, drops and latency, as JSON");
+  app.add_subcommand("watch", "The same, and every change as it happens");
+  app.add_subcommand("metrics", "Frame rates, drops and latency, as JSON");
   app.add_subcommand("mode", "Go to a mode")
       ->add_option("mode", asked.mode)
       ->required()
