@@ -238,7 +238,7 @@ TEST_P(KmsScreen, IsGivenUpWhenItIsUnpluggedAndBackAfterIt) {
   Life life(settings_);
   EXPECT_EQ(life.next(), "shown");
   cable.pull();
-  EXPECT_EQ(life.until("unplugged"), "the screen was unplugged; it is opened anew");
+  EXPECT_EQ(life.until("unplugged"), "the screen was unplugged; reopening it");
   EXPECT_EQ(life.until("no screen"),
             settings_.connector + ": no screen is plugged in; tried again until it is there");
   EXPECT_FALSE(life.has_display());
