@@ -6,6 +6,7 @@
 #include <ImfDoubleAttribute.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfIO.h>
 #include <ImfInputFile.h>
 #include <ImfIntAttribute.h>
 #include <ImfMatrixAttribute.h>
@@ -15,6 +16,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
 #include <glm/matrix.hpp>
 #include <limits>
 
@@ -120,6 +124,47 @@ Imf::Header header(const render::Layers& layers, const ExrMetadata& metadata) {
   return header;
 }
 
+// A file that remembers what went wrong: OpenEXR writes the end of a picture in a destructor, which
+// cannot report it.
+class WrittenFile final : public Imf::OStream {
+ public:
+  explicit WrittenFile(const std::filesystem::path& file)
+      : OStream(file.c_str()), stream_(file, std::ios::binary | std::ios::trunc) {
+    remember();
+  }
+
+  void write(const char bytes[], int count) override {
+    stream_.write(bytes, count);
+    remember();
+    if (error_ != 0) fail();
+  }
+  std::uint64_t tellp() override {
+    return static_cast<std::uint64_t>(std::streamoff(stream_.tellp()));
+  }
+  void seekp(std::uint64_t position) override {
+    stream_.seekp(static_cast<std::streamoff>(position));
+    remember();
+  }
+
+  // Throws previz::Error where anything of it could not be written.
+  void close() {
+    stream_.close();
+    remember();
+    if (error_ != 0) fail();
+  }
+
+ private:
+  void remember() {
+    if (!stream_ && error_ == 0) error_ = errno != 0 ? errno : EIO;
+  }
+  [[noreturn]] void fail() const {
+    throw Error(std::string(fileName()) + ": cannot be written: " + std::strerror(error_));
+  }
+
+  std::ofstream stream_;
+  int error_ = 0;
+};
+
 void require_whole(const std::filesystem::path& path, const render::Layers& layers) {
   const std::size_t pixels = std::size_t(layers.width) * std::size_t(layers.height);
   for (const ColorLayer& layer : color_layers)
@@ -157,9 +202,13 @@ void write_exr(const std::filesystem::path& path, const render::Layers& layers,
   for (std::size_t i = 0; i < written.diff.size(); ++i) written.diff[i] *= 1.0f - written.mask[i];
   try {
     write_whole(path, [&](const std::filesystem::path& unfinished) {
-      Imf::OutputFile file(unfinished.c_str(), header(written, metadata));
-      file.setFrameBuffer(frame_buffer(written));
-      file.writePixels(written.height);
+      WrittenFile stream(unfinished);
+      {
+        Imf::OutputFile file(stream, header(written, metadata));
+        file.setFrameBuffer(frame_buffer(written));
+        file.writePixels(written.height);
+      }
+      stream.close();
     });
   } catch (const Error&) {
     throw;

@@ -16,6 +16,7 @@
 
 #include "daemon/output/file.hpp"
 #include "drivers/error.hpp"
+#include "tests/support/full_disk.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace previz::output {
@@ -171,13 +172,42 @@ TEST(Exr, UnwritablePlaceIsNamed) {
   }
 }
 
+// The disk runs full at every place of the file, the end that OpenEXR writes as it closes it among
+// them. A black picture compresses to little: then most of the file is in those last writes.
+TEST(Exr, OnAFullDiskThereIsTheWholeFileOrNone) {
+  const TemporaryDirectory directory;
+  render::Layers layers = sample_layers(64, 48);
+  for (auto* layer : {&layers.composite, &layers.mixed, &layers.real, &layers.diff, &layers.normal,
+                      &layers.variance})
+    layer->assign(layer->size(), glm::vec3(0));
+  write_exr(directory / "whole.exr", layers, {});
+  const auto whole = std::filesystem::file_size(directory / "whole.exr");
+  for (std::uintmax_t room = 0; room < whole + 16; room += 16) {
+    const auto file = directory / "frame.exr";
+    bool written = true;
+    {
+      const test::FileSizeLimit limit(room);
+      try {
+        write_exr(file, layers, {});
+      } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find(file.string()), std::string::npos) << error.what();
+        written = false;
+      }
+    }
+    EXPECT_EQ(written, room >= whole) << room << " of " << whole << " bytes";
+    EXPECT_EQ(std::filesystem::exists(file), written) << room << " of " << whole << " bytes";
+    EXPECT_FALSE(std::filesystem::exists(unfinished_name(file)));
+  }
+  EXPECT_EQ(read_exr(directory / "frame.exr").depth, layers.depth);
+}
+
 TEST(WriteWhole, LeavesNothingWhenTheWriterThrows) {
   const TemporaryDirectory directory;
   std::ofstream(directory / "a.txt") << "old";
   EXPECT_THROW(write_whole(directory / "a.txt",
                            [](const std::filesystem::path& unfinished) {
                              std::ofstream(unfinished) << "half of it";
-                             throw Error("power cut");
+                             throw Error("the writer gave up");
                            }),
                Error);
   EXPECT_EQ(std::filesystem::file_size(directory / "a.txt"), 3u);  // still "old"
