@@ -82,6 +82,7 @@ class V4l2Camera final : public Camera {
     if (!lost_.empty()) return DeviceTrouble{name(), lost_, true};
     if (!streaming_) return NoFrame{};
     const auto deadline = std::chrono::steady_clock::now() + timeout;
+    std::size_t late = 0;  // buffers without a frame after the deadline; those that wait are taken
     for (;;) {
       const auto left =
           std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
@@ -91,13 +92,14 @@ class V4l2Camera final : public Camera {
       if (error == 0) {
         errors_ = 0;
         if (FramePtr frame = take(buffer)) return frame;
-      } else if (error == EAGAIN) {
-        if (std::chrono::steady_clock::now() >= deadline) return NoFrame{};
-      } else {
+      } else if (error != EAGAIN) {
         ++counters_["read errors"];
         if (error != EIO || ++errors_ >= errors_until_lost) lost_ = lost_text(error);
       }
       if (!lost_.empty()) return DeviceTrouble{name(), lost_, true};
+      if (std::chrono::steady_clock::now() >= deadline &&
+          (error == EAGAIN || ++late >= memory_.size()))
+        return NoFrame{};
     }
   }
 

@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <deque>
 #include <map>
+#include <thread>
 #include <vector>
 
 #include "drivers/v4l2/node.hpp"
@@ -38,6 +40,12 @@ struct FakeDevice {
   std::uint32_t sequence = 0;
   std::deque<int> dequeue_errors;  // given first
   bool unplugged = false;
+  int damaged_frames = 0;  // so many come, one each time that somebody waits, after frame_interval
+  static constexpr std::chrono::milliseconds frame_interval{5};
+
+  // What was asked of it.
+  int dequeued = 0;
+  std::chrono::milliseconds waited_in_vain{0};  // in all
 
   FakeDevice() {
     picture.pixelformat = V4L2_PIX_FMT_YUYV;
@@ -81,8 +89,17 @@ class FakeNode final : public Node {
  public:
   explicit FakeNode(FakeDevice& device) : device_(device) {}
 
-  bool wait(std::chrono::milliseconds) override {
-    return device_.unplugged || !device_.done.empty() || !device_.dequeue_errors.empty();
+  bool wait(std::chrono::milliseconds timeout) override {
+    if (device_.unplugged || !device_.done.empty() || !device_.dequeue_errors.empty()) return true;
+    if (device_.damaged_frames > 0) {
+      --device_.damaged_frames;
+      std::this_thread::sleep_for(FakeDevice::frame_interval);
+      device_.send(0, 1, [](v4l2_buffer& buffer) { buffer.flags |= V4L2_BUF_FLAG_ERROR; });
+      return true;
+    }
+    device_.waited_in_vain += timeout;
+    std::this_thread::sleep_for(timeout);
+    return false;
   }
 
   std::span<const std::uint8_t> map(std::size_t offset, std::size_t) override {
@@ -213,6 +230,7 @@ class FakeNode final : public Node {
   }
 
   int dequeue(v4l2_buffer& buffer) {
+    ++device_.dequeued;
     if (!device_.dequeue_errors.empty()) {
       const int error = device_.dequeue_errors.front();
       device_.dequeue_errors.pop_front();

@@ -353,6 +353,26 @@ TEST_F(V4l2Stream, ErrorsInARowAreALoss) {
   EXPECT_EQ(std::get<DeviceTrouble>(event).what, "cannot be read: Input/output error");
 }
 
+TEST_F(V4l2Stream, WaitsAsLongAsItIsAskedTo) {
+  start();
+  for (const milliseconds asked : {milliseconds(30), milliseconds(0)}) {
+    device_.waited_in_vain = milliseconds(0);
+    EXPECT_TRUE(std::holds_alternative<NoFrame>(camera_->next(asked)));
+    EXPECT_EQ(device_.waited_in_vain, asked);
+  }
+}
+
+// A damaged frame every 5 ms: at the deadline at most 30 / 5 and one that is just due were taken,
+// and as many more as there are buffers. (A thousand are enough for a wait without an end to show.)
+TEST_F(V4l2Stream, DamagedFramesWithoutEndDoNotMakeItWaitLonger) {
+  start();
+  device_.damaged_frames = 1000;
+  EXPECT_TRUE(std::holds_alternative<NoFrame>(camera_->next(milliseconds(30))));
+  EXPECT_LE(device_.dequeued, 30 / 5 + 1 + static_cast<int>(device_.memory.size()));
+  EXPECT_EQ(counted("frames the device says are damaged"),
+            static_cast<std::uint64_t>(device_.dequeued));
+}
+
 TEST_F(V4l2Stream, ExposuresAreOnTheFramesThatSurelyHaveThem) {
   device_.add_control(V4L2_CID_EXPOSURE_ABSOLUTE, 1, 5000, 100);
   device_.add_control(V4L2_CID_EXPOSURE_AUTO, 0, 3, 1);
