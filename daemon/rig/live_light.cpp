@@ -40,7 +40,10 @@ LightPtr LiveLight::estimate(std::vector<pipeline::LightFrame> frames,
     parts_.metrics.dropped("lighting", "not usable");
   }
   const std::shared_ptr<const Look> look = parts_.look.get();
-  if (!tracks(look->state)) return last_;
+  if (!tracks(look->state)) {
+    parts_.metrics.count("light frames that estimation rested", frames.size());
+    return last_;
+  }
   stage_.use(look->light_mode);
   last_ = stage_.light();
   if (last_)

@@ -215,7 +215,10 @@ Shot LivePipeline::Impl::track(Shot shot) {
   const std::shared_ptr<const Look> look = parts.look.get();
   const double animation_s =
       animation_clock.at(shot.frame->timestamp_ns, look->plays, look->animations_held);
-  if (!tracks(look->state)) return shot;
+  if (!tracks(look->state)) {
+    parts.metrics.count("frames that tracking rested");
+    return shot;
+  }
   track_stage(shot);
   shot.motion.animation_s = animation_s;
   report_carriers(shot);

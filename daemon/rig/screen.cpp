@@ -138,7 +138,10 @@ void Screen::Impl::look_after(std::optional<Picture> newest) {
   if (fresh) picture = std::move(newest);
   if (facts->look.state.mode == Mode::standby) {
     if (fresh) parts.metrics.dropped("screen", "standby");
-    if (!std::exchange(dark, true)) life.release();
+    if (!std::exchange(dark, true)) {
+      life.release();
+      parts.metrics.count("screen: released");
+    }
     up_to_date = false;
     return;
   }

@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <filesystem>
@@ -11,7 +10,6 @@
 #include <memory>
 #include <mutex>
 #include <ostream>
-#include <stdexcept>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -20,6 +18,8 @@
 
 #include "daemon/rig/live.hpp"
 #include "daemon/set/actions.hpp"
+#include "drivers/session/files.hpp"
+#include "tests/support/wait_until.hpp"
 #include "tests/support/hand.hpp"
 
 namespace previz::test {
@@ -33,18 +33,12 @@ inline std::string button_for_every_action() {
   return text;
 }
 
-// What a crew waits for comes within this even under sanitizers on a busy machine, or never.
-inline constexpr std::chrono::minutes crew_patience{2};
-
-struct WaitedInVain : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-// Until the condition, whose change `news` announces, holds. `seen` says what there was instead.
+// Waits until the condition, whose change `news` announces, holds. `seen` says what there was
+// instead.
 template <typename Condition, typename Seen>
 void await(std::condition_variable& news, std::unique_lock<std::mutex>& lock, Condition condition,
            Seen seen) {
-  if (!news.wait_for(lock, crew_patience, condition))
+  if (!news.wait_for(lock, longest_wait, condition))
     throw WaitedInVain("the crew waited in vain; seen last: " + seen());
 }
 
@@ -74,6 +68,16 @@ inline pipeline::MetricsSnapshot run_crewed(rig::LiveOptions options,
   });
   report::Reports reports(report::lines_to(out));
   return rig::run_live(options, reports);
+}
+
+// Waits until metrics.json, which is written once a second, has counted `what`.
+inline void must_be_counted(const std::filesystem::path& directory, const std::string& what) {
+  const auto text = [file = directory / "live/metrics.json"] {
+    return std::filesystem::exists(file) ? session::read_file(file) : std::string();
+  };
+  must_come(
+      "\"" + what + "\" is counted",
+      [&] { return text().find("\"" + what + "\"") != std::string::npos; }, text);
 }
 
 // Frames that were rendered, or dropped on the way there by a cause that is counted: of those

@@ -14,6 +14,7 @@
 #include "daemon/rig/live.hpp"
 #include "daemon/set/actions.hpp"
 #include "drivers/session/session.hpp"
+#include "tests/support/wait_until.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -178,10 +179,8 @@ TEST_F(RigDisplay, ShowsThePictureAndTheWordsOfEveryMode) {
     press("osd");
     until_mode("LIVE");
     // It is written by a thread of its own, which tells no page; an end would leave it out.
-    const auto saved = directory_ / "live/snapshot_0001.exr";
-    const auto end = std::chrono::steady_clock::now() + test::crew_patience;
-    while (!std::filesystem::exists(saved) && std::chrono::steady_clock::now() < end)
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    test::must_come("the snapshot is there",
+                    [&] { return std::filesystem::exists(directory_ / "live/snapshot_0001.exr"); });
   });
   // The words lay over the pictures and changed nothing else, from the first screenful to the last.
   EXPECT_GT(count_, 0);
@@ -200,20 +199,27 @@ TEST_F(RigDisplay, ShowsThePictureAndTheWordsOfEveryMode) {
   EXPECT_EQ(output::read_png(directory_ / "live/screen.png").width, screen_width);
 }
 
-TEST_F(RigDisplay, IsFreeForOthersInStandbyAndBackAfterIt) {
+// What a driver's release() does is seen on a real screen (KmsScreen): here that it comes, once,
+// and that nothing is shown between it and the next picture.
+TEST_F(RigDisplay, IsReleasedInStandbyAndBackAfterIt) {
   write_set("[display]\ndriver = \"headless\"\nmode = \"480x270\"\n");
+  const auto shown = [this] {
+    const std::lock_guard lock(mutex_);
+    return count_;
+  };
   run([&] {
     until_mode("LIVE");
     press("standby");
-    std::unique_lock lock(mutex_);  // nothing more is shown
-    for (int before = -1; before != count_;) {
-      before = count_;
-      news_.wait_for(lock, std::chrono::milliseconds(400));
-    }
-    lock.unlock();
+    test::must_be_counted(directory_.path(), "screen: released");
+    const int before = shown();
+    // What must not happen cannot be waited for: five of the screen's looks at its words.
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    EXPECT_EQ(shown(), before);
     press("standby");
     until_mode("LIVE");
+    EXPECT_GT(shown(), before);
   });
+  EXPECT_EQ(metrics_.counts.at("screen: released"), 1u);
 }
 
 TEST_F(RigDisplay, WithoutAScreenTheRigGoesOnAndSaysSoOnce) {

@@ -23,6 +23,7 @@
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
+#include "tests/support/wait_until.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -101,12 +102,17 @@ class RigLive : public testing::Test {
     });
   }
   void until_said(const std::string& words) {
-    for (int waited_ms = 0; log_.text().find(words) == std::string::npos; waited_ms += 2) {
-      if (std::chrono::milliseconds(waited_ms) > test::crew_patience)
-        throw test::WaitedInVain("\"" + words + "\" is not said in\n" + log_.text());
-      std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    }
+    test::must_come(
+        "\"" + words + "\" is said", [&] { return count_said(words) > 0; },
+        [&] { return log_.text(); });
   }
+  int count_said(const std::string& words) const {
+    const std::string text = log_.text();
+    int count = 0;
+    for (std::size_t at = 0; (at = text.find(words, at)) != std::string::npos; ++at) ++count;
+    return count;
+  }
+  void until_counted(const std::string& what) { test::must_be_counted(directory_.path(), what); }
   void press(const std::string& button) { hand_.press(button); }
 
   // The layers of the frame as `previzd render` makes them.
@@ -257,8 +263,8 @@ TEST_F(RigLive, ThroughEveryModeByButtons) {
   EXPECT_TRUE(session.track.back().captured_light);
 
   // Both refinements were saved as they were shown; that of the take's frame is bit for bit what
-  // `previzd render` makes of it. (What light a live frame had depends on when its thread was
-  // done.)
+  // `previzd render` makes of it. (Which captured light a live frame had depends on when its thread
+  // was done; ALiveRefinementIsWhatRenderMakesOfItsFrame has light that does not.)
   const auto saved = [&](const char* number) {
     return output::read_exr(directory_ / (std::string("live/snapshot_") + number + ".exr"));
   };
@@ -268,6 +274,61 @@ TEST_F(RigLive, ThroughEveryModeByButtons) {
   expect_same(from_take, rendered(take, reviewed.shot.frame->timestamp_ns, from_take.samples));
   EXPECT_EQ(output::read_png(directory_ / "live/snapshot_0002.png").width, 48);
   EXPECT_GT(metrics_.counts.at("refine rounds"), 0u);
+}
+
+// Bit for bit, where the light is the set's and depends on no thread's pace.
+TEST_F(RigLive, ALiveRefinementIsWhatRenderMakesOfItsFrame) {
+  write_set("[lighting]\nfrom = \"set\"\n");
+  Shown refined;
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    press("record");
+    const Shown first = until([](const Shown& s) { return s.look.state.recording; });
+    until([&](const Shown& s) {  // the frame that is frozen then was captured after the press
+      return s.shot.frame->timestamp_ns > first.shot.frame->timestamp_ns + 1'000'000'000 &&
+             s.shot.samples == 2;
+    });
+    press("refine");
+    refined = until([](const Shown& s) { return s.shot.frozen && s.shot.samples >= 6; });
+    press("snapshot");
+    until_said("snapshot_0001");
+    press("record");
+    until_said("12A_take001 is finished");
+  });
+  const render::Layers live = output::read_exr(directory_ / "live/snapshot_0001.exr");
+  EXPECT_GE(live.samples, refined.shot.samples);
+  EXPECT_GT(std::ranges::max(live.mask), 0.0f);  // there is something to compare
+  expect_same(live, rendered(directory_ / "takes/12A_take001", refined.shot.frame->timestamp_ns,
+                             live.samples));
+}
+
+// Without a take nobody needs the poses and the light of the frames that come while one is refined.
+TEST_F(RigLive, TrackingAndLightEstimationRestInARefinement) {
+  write_set();
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    press("refine");
+    until_mode(Mode::refine);
+    until_counted("frames that tracking rested");
+    until_counted("light frames that estimation rested");
+  });
+}
+
+// A take gets the pose and the light of every frame, whatever is shown.
+TEST_F(RigLive, TrackingDoesNotRestInATake) {
+  write_set();
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    press("record");
+    until([](const Shown& s) { return s.look.state.recording; });
+    press("refine");
+    const Shown begun = until([](const Shown& s) { return s.shot.frozen; });
+    until([&](const Shown& s) { return s.shot.frozen && s.count > begun.count + 8; });
+    press("live");
+    until_mode(Mode::live);
+  });
+  EXPECT_FALSE(metrics_.counts.contains("frames that tracking rested"));
+  EXPECT_FALSE(metrics_.counts.contains("light frames that estimation rested"));
 }
 
 // The press ends the refinement at once, but what it asks for is known only once it cannot become
@@ -296,8 +357,11 @@ TEST_F(RigLive, AButtonThatIsNotThereIsToldOfAndHoldsUpNobody) {
   write_set("[[button]]\nname = \"gpio:absent:3\"\naction = \"record\"\n");
   run([&] {
     until_said("gpio:absent");
-    until([](const Shown& s) { return s.shot.samples == 2; });
+    const int before = until([](const Shown& s) { return s.shot.samples == 2; }).count;
+    press("samples_up");  // the others are heard
+    until([&](const Shown& s) { return s.shot.samples == 3 && s.count > before; });
   });
+  EXPECT_FALSE(std::filesystem::exists(directory_ / "takes/12A_take001"));
 }
 
 // Captured = rendered + dropped by cause, whatever was done in between.
@@ -311,10 +375,11 @@ TEST_F(RigLive, EveryCapturedFrameIsRenderedOrCounted) {
     until_mode(Mode::live);
     press("standby");
     until_said("button standby: standby");
-    std::this_thread::sleep_for(std::chrono::milliseconds(150));  // a few frames in the dark
+    until_counted("standby");  // a few frames in the dark
     press("live");
     until_mode(Mode::live);
   });
+  EXPECT_GT(metrics_.stages.at("render").dropped.at("standby"), 0u);
   EXPECT_EQ(test::accounted_for(metrics_), metrics_.stages.at("observer").frames);
 }
 
@@ -336,6 +401,11 @@ TEST_F(RigLive, MayEndOrChangeItsSetInAReview) {
     until_said("loading the set file again");
     review("12A_take002");
   });
+  EXPECT_EQ(count_said("button review: review"), 2);
+  for (const char* name : {"12A_take001", "12A_take002"}) {
+    const session::Session take = session::open_session(directory_ / "takes" / name);
+    EXPECT_TRUE(take.missing.empty()) << name << ": " << testing::PrintToString(take.missing);
+  }
 }
 
 // What is moved while no picture is made is where it was put when the frozen one is refined.
@@ -363,7 +433,12 @@ TEST_F(RigLive, GoesOnWhereItsFilesCannotBeWritten) {
     until_said((directory_ / "live").string());
     const int before = until([](const Shown&) { return true; }).count;
     until([&](const Shown& s) { return s.count > before + 2; });
+    std::filesystem::remove(directory_ / "live");
+    std::filesystem::create_directory(directory_ / "live");  // and it is written again
+    test::must_come("there is a picture.png again",
+                    [&] { return std::filesystem::exists(directory_ / "live/picture.png"); });
   });
+  EXPECT_EQ(output::read_png(directory_ / "live/picture.png").width, 48);
 }
 
 TEST_F(RigLive, ABadSetLeavesTheOldOneRunningAndAGoodOneTakesOver) {
@@ -407,7 +482,7 @@ TEST_F(RigLive, ASetThatCannotStartIsTriedOnce) {
     until_said("back to the set as it was");  // the rig saw the file by itself
     // What must not happen cannot be waited for: its next looks at the file, one a second.
     std::this_thread::sleep_for(std::chrono::seconds(4));
-    EXPECT_EQ(log_.text().find("back to"), log_.text().rfind("back to")) << log_.text();
+    EXPECT_EQ(count_said("back to"), 1) << log_.text();
     std::ofstream(directory_ / "set.toml") << other("samples = 2", "samples = 4");
     until([](const Shown& s) { return s.shot.samples == 4; });
   });
