@@ -28,6 +28,21 @@ TEST(CommandLine, LeavesToTheSetWhatItDoesNotSay) {
   EXPECT_FALSE(options.directory);
 }
 
+rig::LiveOptions live_options(const std::string& arguments) {
+  CLI::App app;
+  CommandLine said;
+  add_commands(app, said);
+  app.parse("run set.toml " + arguments, false);
+  return said.run;
+}
+
+TEST(CommandLine, ARunTakesItsSamplesFromTheSetOrAsItIsAsked) {
+  EXPECT_FALSE(live_options("").samples);
+  EXPECT_EQ(live_options("--spp 7").samples, 7);
+  EXPECT_THROW(live_options("--spp 0"), CLI::ParseError);
+  EXPECT_THROW(live_options("--spp many"), CLI::ParseError);
+}
+
 TEST(CommandLine, SaysBothSidesOfAChoice) {
   EXPECT_EQ(render_options("--adaptive").adaptive, true);
   EXPECT_EQ(render_options("--even").adaptive, false);

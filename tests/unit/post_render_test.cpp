@@ -4,9 +4,12 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 #include <thread>
 
@@ -15,6 +18,7 @@
 #include "daemon/pipeline/preview_size.hpp"
 #include "daemon/rig/live.hpp"
 #include "drivers/error.hpp"
+#include "tests/support/wait_until.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -40,6 +44,17 @@ class RenderSession : public testing::Test {
     options.directory = directory_ / "live";
     return options;
   }
+  // Requests the stop when the condition holds, and, with a failure, when it never does. The thread
+  // ends with the scope it is kept in, also where what it waits for never comes.
+  static std::jthread stop_when(const std::string& what, const std::function<bool()>& condition,
+                                std::stop_source stop) {
+    return std::jthread([=](const std::stop_token& left) mutable {
+      const auto result =
+          test::wait_until(what, [&] { return left.stop_requested() || condition(); });
+      EXPECT_TRUE(result);
+      stop.request_stop();
+    });
+  }
   static bool is_plate(const std::filesystem::path& png, int frame) {
     return output::read_png(png).samples == to_plate(small_take_frame(frame)).samples;
   }
@@ -48,6 +63,22 @@ class RenderSession : public testing::Test {
   report::Reports reports_{report::lines_to(out_)};
 };
 
+// The row that the card's middle is in, by its mask.
+double row_of_the_card(const render::Layers& layers) {
+  double rows = 0, covered = 0;
+  for (int y = 0; y < layers.height; ++y)
+    for (int x = 0; x < layers.width; ++x) {
+      const double mask = layers.mask[static_cast<std::size_t>(y * layers.width + x)];
+      rows += mask * y;
+      covered += mask;
+    }
+  return rows / covered;
+}
+
+// From frame to frame the camera goes 0.01 m along the picture's up: at f = 40 px a card 0.9 m away
+// goes down by 40 * 0.01 / 0.9 px. It is 13 px wide; with 2 samples a pixel the mask of the 52
+// pixels at its border deviates by at most 0.5 / sqrt(2), 6.5 px from its middle, which makes
+// sqrt(52) * 6.5 * 0.35 / 169 = 0.1 px.
 TEST_F(RenderSession, EveryFrameHasItsFilesAndItsRecord) {
   test::write_small_take(directory_.path());
   const RenderReport report = render({});
@@ -63,6 +94,9 @@ TEST_F(RenderSession, EveryFrameHasItsFilesAndItsRecord) {
     const bool untouched = i == small_take_lost || i == small_take_unlit;
     EXPECT_EQ(record.status == FrameStatus::untouched, untouched) << record.reason;
     EXPECT_EQ(layers.samples, untouched ? 0 : 2);
+    if (!untouched) {
+      EXPECT_NEAR(row_of_the_card(layers), 17.5 + i * 40 * 0.01 / 0.9, 4 * 0.1) << i;
+    }
     EXPECT_EQ(is_plate(directory_ / ("out/" + number + ".png"), i), untouched);
     EXPECT_EQ(record.counters.dropped_not_finite, 0u);
     EXPECT_EQ(record.counters.dropped_negative, 0u);
@@ -273,6 +307,27 @@ TEST_F(RenderSession, LiveAccountsForEveryFrame) {
   EXPECT_EQ(nlohmann::json::parse(metrics)["stages"]["observer"]["frames"], small_take_frames);
 }
 
+// `previzd run --spp N`.
+TEST_F(RenderSession, LiveTakesTheSamplesItIsAskedFor) {
+  test::write_small_take(directory_.path());  // whose set says 2
+  rig::LiveOptions options = live_options();
+  options.samples = 3;
+  options.loop = true;
+  std::stop_source stop;
+  options.stop = stop.get_token();
+  std::atomic<bool> rendered = false;
+  std::set<int> samples;  // of the pictures that were rendered whole
+  options.on_shown = [&](const pipeline::Shot& shot, const rig::Look&) {
+    if (!shot.whole || !shot.untouched.empty()) return;
+    samples.insert(shot.samples);
+    rendered = true;
+  };
+  const auto is_rendered = [&] { return rendered.load(); };
+  const auto stopper = stop_when("a picture is rendered", is_rendered, stop);
+  rig::run_live(options, out_);
+  EXPECT_EQ(samples, std::set<int>{3});
+}
+
 // quality.scale is of the preview only.
 TEST_F(RenderSession, LiveShowsThePreviewAtTheSetsScaleAndOfflineIsFullSize) {
   test::write_small_take(directory_.path(), false, "scale = 0.5\n");
@@ -295,9 +350,12 @@ TEST_F(RenderSession, LiveFillsTheLightFromTheFilmCamera) {
   rig::LiveOptions options = live_options();
   options.loop = true;
   options.stop = stop.get_token();
+  std::atomic<bool> lit = false;
   options.on_shown = [&](const pipeline::Shot& shot, const rig::Look&) {
-    if (shot.light) stop.request_stop();
+    if (shot.light) lit = true;
   };
+  const auto is_lit = [&] { return lit.load(); };
+  const auto stopper = stop_when("a picture has light", is_lit, stop);
   const pipeline::MetricsSnapshot metrics = rig::run_live(options, reports_);
   EXPECT_GT(metrics.stages.at("lighting").frames, 0u);
   EXPECT_NE(out_.str().find("filled by the rule \"observer\""), std::string::npos) << out_.str();
@@ -309,11 +367,8 @@ TEST_F(RenderSession, LiveStopsWhenAsked) {
   rig::LiveOptions options = live_options();
   options.loop = true;  // would never end by itself
   options.stop = stop.get_token();
-  std::jthread later([&] {
-    while (!std::filesystem::exists(directory_ / "live/picture.png"))
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));  // until something was shown
-    stop.request_stop();
-  });
+  const auto is_shown = [this] { return std::filesystem::exists(directory_ / "live/picture.png"); };
+  const auto stopper = stop_when("picture.png is written", is_shown, stop);
   EXPECT_GT(rig::run_live(options, reports_).stages.at("display").frames, 0u);
 }
 
