@@ -78,7 +78,7 @@ class AravisDevice final : public DeviceUnderTest {
   }
 
   // The exposure as told, and the rest of the picture bit for bit.
-  bool shows_its_exposure(const Frame& frame) const override {
+  std::optional<bool> shows_its_exposure(const Frame& frame) const override {
     std::uint32_t exposure_us = 0;
     std::memcpy(&exposure_us, frame.bytes.data(), 4);
     const bool bit_exact = std::ranges::any_of(take_, [&](const auto& bytes) {
@@ -106,10 +106,14 @@ class AravisDevice final : public DeviceUnderTest {
 };
 
 std::unique_ptr<DeviceUnderTest> make(double lost, bool triggered, std::string& why_not) {
-  enter_private_network();  // the camera's control port is fixed
+  const bool is_private = enter_private_network();  // the camera's control port is fixed
   auto device = std::make_unique<AravisDevice>(lost, triggered);
   if (device->is_running()) return device;
-  why_not = "Aravis' fake camera cannot listen on 127.0.0.1";
+  if (is_private)
+    throw Error("Aravis' fake camera cannot listen on 127.0.0.1, in a network of its own");
+  why_not =
+      "Aravis' fake camera cannot listen on 127.0.0.1, and this process may have no network of"
+      " its own";
   return nullptr;
 }
 

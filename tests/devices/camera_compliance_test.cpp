@@ -93,7 +93,7 @@ TEST_P(CameraCompliance, SaysWhatItsPicturesAreBeforeItStreams) {
   expect_silence(*camera);
 }
 
-TEST_P(CameraCompliance, DeliversExactlyTheFramesAskedFor) {
+TEST_P(CameraCompliance, DeliversWhileItStreamsAndNothingAfterwards) {
   const auto camera = device_->open();
   for (const int count : {1, 2, 7}) {
     camera->start();
@@ -103,16 +103,21 @@ TEST_P(CameraCompliance, DeliversExactlyTheFramesAskedFor) {
   }
 }
 
+// Where frames are lost on the way, the gap says how many: the camera's clock has gone on by no
+// less than nine tenths of what they last at its nominal rate, but for one frame.
 TEST_P(CameraCompliance, NumbersEveryFrameItCaptures) {
   const auto camera = device_->open();
   camera->start();
   ASSERT_NO_FATAL_FAILURE(take(*camera, 1));
-  const std::uint64_t first = last_->sequence;
+  const FramePtr first = last_;
   ASSERT_NO_FATAL_FAILURE(take(*camera, 8));
-  // Where frames are lost on the way, a gap tells which.
-  EXPECT_GE(last_->sequence, first + 8);
+  const auto numbered = last_->sequence - first->sequence;
+  EXPECT_GE(numbered, 8u);
   if (!device_->may_lose_frames()) {
-    EXPECT_EQ(last_->sequence, first + 8);
+    EXPECT_EQ(numbered, 8u);
+  } else if (camera->format().rate_hz > 0) {
+    const double seconds = 1e-9 * static_cast<double>(last_->timestamp_ns - first->timestamp_ns);
+    EXPECT_LE(static_cast<double>(numbered), seconds * camera->format().rate_hz / 0.9 + 1);
   }
 }
 
@@ -162,23 +167,27 @@ TEST_P(CameraCompliance, ClosesWhileItStreams) {
   }
 }
 
-TEST_P(CameraCompliance, DoesNotWaitLongerThanAsked) {
+// A call that finds nothing returns at once: within a tenth of the time that a frame lasts, where a
+// camera that does not say its rate is taken for one of 60 Hz. The median is not moved by calls
+// that the machine interrupted. Where every call finds a frame there is nothing to wait for.
+TEST_P(CameraCompliance, DoesNotWaitWhereItIsAskedNotTo) {
   const auto camera = device_->open();
   camera->start();
   ASSERT_NO_FATAL_FAILURE(take(*camera, 1));
-  // If each call waited for a frame (25 Hz or slower), a thousand would take 40 s or more. On a
-  // machine slower than the camera most calls find a frame, and converting it takes its time.
-  Clock::duration in_all{0}, in_vain{0};
-  int found_none = 0;
-  for (int i = 0; i < 1000 && found_none < 100; ++i) {
+  const double rate_hz = camera->format().rate_hz > 0 ? camera->format().rate_hz : 60;
+  const std::chrono::duration<double> frame(1 / rate_hz);
+  const auto enough = Clock::now() + patience;
+  std::vector<std::chrono::duration<double>> in_vain;
+  for (int i = 0; i < 1000 && in_vain.size() < 101; ++i) {
     const auto begin = Clock::now();
-    const bool none = std::holds_alternative<NoFrame>(camera->next(milliseconds(0)));
-    in_all += Clock::now() - begin;
-    if (!none) continue;
-    in_vain += Clock::now() - begin;
-    ++found_none;
+    ASSERT_LT(begin, enough) << "a thousand calls take longer than that";
+    if (std::holds_alternative<NoFrame>(camera->next(milliseconds(0))))
+      in_vain.push_back(Clock::now() - begin);
   }
-  EXPECT_LT(found_none > 0 ? in_vain : in_all, patience);
+  if (in_vain.empty()) return;
+  const auto middle = in_vain.begin() + static_cast<std::ptrdiff_t>(in_vain.size() / 2);
+  std::ranges::nth_element(in_vain, middle);
+  EXPECT_LT(middle->count(), 0.1 * frame.count());
 }
 
 TEST_P(CameraCompliance, ExposuresAppliedAreOnTheirFrames) {
@@ -194,7 +203,7 @@ TEST_P(CameraCompliance, ExposuresAppliedAreOnTheirFrames) {
       bool applied = false;
       for (int i = 0; i < 20 && !applied; ++i) {
         ASSERT_NO_FATAL_FAILURE(take(*camera, 1));
-        EXPECT_TRUE(device_->shows_its_exposure(*last_)) << last_->sequence;
+        EXPECT_NE(device_->shows_its_exposure(*last_), false) << last_->sequence;
         applied = std::abs(last_->exposure_s - exposure_s) < 1e-6 * exposure_s &&
                   std::abs(last_->gain - gain) < 1e-6 * gain;
       }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <span>
 #include <string>
@@ -38,8 +39,11 @@ class DeviceUnderTest {
     double gain;
   };
   virtual std::span<const Exposure> exposures() const { return {}; }
-  // Whether the picture shows that it was taken with the exposure the frame claims.
-  virtual bool shows_its_exposure(const Frame&) const { return true; }
+  // Whether the picture shows that it was taken with the exposure the frame claims; nothing where
+  // this device's pictures cannot say.
+  virtual std::optional<bool> shows_its_exposure(const Frame&) const { return std::nullopt; }
+  // Bytes that others' libraries may keep each time the device goes and comes.
+  virtual std::size_t kept_by_others() const { return 0; }
 };
 
 // A driver under test: one line in registry.cpp.

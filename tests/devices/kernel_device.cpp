@@ -27,6 +27,8 @@ class KernelDevice final : public DeviceUnderTest {
   std::chrono::milliseconds stall_timeout() const override { return std::chrono::seconds(5); }
 
   bool may_lose_frames() const override { return true; }  // under load the kernel drops
+  // A stated bound: libcamera and udev make what they need anew for each device that comes.
+  std::size_t kept_by_others() const override { return 1024; }
   std::span<const Exposure> exposures() const override {
     if (!drives_exposure_) return {};
     return some_exposures;

@@ -21,14 +21,15 @@ bool leave_network() {
   const std::string user = std::to_string(getuid()), group = std::to_string(getgid());
   if (unshare(CLONE_NEWUSER | CLONE_NEWNET) != 0) return false;
   std::ofstream("/proc/self/setgroups") << "deny";
-  std::ofstream("/proc/self/uid_map") << user << " " << user << " 1";
-  std::ofstream("/proc/self/gid_map") << group << " " << group << " 1";
-  return true;
+  std::ofstream users("/proc/self/uid_map"), groups("/proc/self/gid_map");
+  users << user << " " << user << " 1" << std::flush;
+  groups << group << " " << group << " 1" << std::flush;
+  return users.good() && groups.good();
 }
 
 }  // namespace
 
-void enter_private_network() {
+bool enter_private_network() {
   static const bool entered = [] {
     if (!leave_network()) return false;
     const OwnedDescriptor socket(::socket(AF_INET, SOCK_DGRAM, 0));
@@ -37,7 +38,7 @@ void enter_private_network() {
     loopback.ifr_flags = IFF_UP;
     return ioctl(socket.get(), SIOCSIFFLAGS, &loopback) == 0;
   }();
-  static_cast<void>(entered);
+  return entered;
 }
 
 }  // namespace previz::test

@@ -8,12 +8,12 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <thread>
 #include <vector>
 
 #include "drivers/camera_drivers.hpp"
 #include "drivers/lifeline.hpp"
 #include "drivers/usb/usb.hpp"
+#include "tests/support/wait_until.hpp"
 
 namespace previz::test {
 namespace usb_test {
@@ -88,18 +88,16 @@ TEST_P(UsbCamera, ThatIsWedgedIsResetAndSendsAgain) {
 TEST_P(UsbCamera, ThatIsPluggedInIsTold) {
   const usb::Hotplug hotplug;
   std::filesystem::remove(cable_);
-  const auto waits_for = [](const auto& condition) {
-    const auto end = std::chrono::steady_clock::now() + patience;
-    while (!condition() && std::chrono::steady_clock::now() < end)
-      std::this_thread::sleep_for(milliseconds(20));
-    return condition();
-  };
-  EXPECT_TRUE(waits_for([this] { return !driver_.usb_place(name_); }));
+  EXPECT_TRUE(wait_until(
+      "the camera is gone", [this] { return !driver_.usb_place(name_); }, patience));
   const std::uint64_t before = hotplug.arrivals();
   std::ofstream(cable_).close();
-  EXPECT_TRUE(waits_for([&] { return hotplug.arrivals() > before; }));
-  EXPECT_TRUE(waits_for(
-      [this] { return std::ranges::count(driver_.find(), name_, &FoundCamera::device) == 1; }));
+  EXPECT_TRUE(wait_until(
+      "an arrival is reported", [&] { return hotplug.arrivals() > before; }, patience));
+  EXPECT_TRUE(wait_until(
+      "the camera is found",
+      [this] { return std::ranges::count(driver_.find(), name_, &FoundCamera::device) == 1; },
+      patience));
 }
 
 std::vector<std::string> drivers_of_usb_cameras() {
