@@ -142,7 +142,8 @@ TEST(ExtremeLight, InsideAnObject) {
   }
 }
 
-// Exactly on the surface it would light, and exactly where the camera is.
+// Exactly on the surface it would light, and exactly where the camera is: no sample is dropped
+// (show() sees to that), and no pixel is infinite, negative or not a number.
 TEST(ExtremeLight, OnASurfaceAndInTheLens) {
   for (const auto type : {set::LightType::point, set::LightType::spot, set::LightType::rectangle,
                           set::LightType::sphere}) {
@@ -152,7 +153,11 @@ TEST(ExtremeLight, OnASurfaceAndInTheLens) {
       light.position = place;
       light.width_m = light.height_m = light.radius_m = 0.01;
       view.scene.lights.push_back(light);
-      show(view, 8);
+      const render::Layers layers = show(view, 8);
+      for (const auto* layer : {&layers.mixed, &layers.real})
+        for (const glm::vec3& radiance : *layer)
+          for (int c = 0; c < 3; ++c)
+            ASSERT_TRUE(std::isfinite(radiance[c]) && radiance[c] >= 0) << radiance[c];
     }
   }
 }

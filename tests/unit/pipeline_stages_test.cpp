@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "daemon/pipeline/metrics.hpp"
+#include "tests/support/wait_until.hpp"
 
 namespace previz::pipeline {
 namespace pipeline_stages_test {
@@ -121,12 +122,22 @@ TEST(StageThreads, DropsAreToldAsTheyHappen) {
   EXPECT_TRUE(looked);
 }
 
+// While they are at work, and before the source would end by itself. What the stages held is then
+// held by nobody.
 TEST(StageThreads, LeavingTheScopeEndsThem) {
   Metrics metrics;
-  Mailbox<std::unique_ptr<int>> mailbox;
-  StageThreads stages(metrics, {});
-  stages.source("camera", mailbox, count_to(1'000'000'000));
-  stages.sink("display", mailbox, [](std::unique_ptr<int>) {});
+  const auto alive = std::make_shared<std::atomic<int>>(0);
+  constexpr int total = 1'000'000'000;
+  {
+    Mailbox<std::unique_ptr<int>> mailbox;
+    StageThreads stages(metrics, {});
+    stages.source("camera", mailbox, count_to(total));
+    stages.sink("display", mailbox, [alive](std::unique_ptr<int>) { ++*alive; });
+    ASSERT_TRUE(test::wait_until("something is shown", [&] { return *alive > 0; }));
+    EXPECT_GT(alive.use_count(), 1);
+  }
+  EXPECT_EQ(alive.use_count(), 1);
+  EXPECT_LT(metrics.snapshot(1).stages.at("camera").frames, std::uint64_t{total});
 }
 
 TEST(Metrics, QuantilesAreNearestRank) {
