@@ -77,10 +77,13 @@ TEST(TrackingPhotographs, Room) {
   EXPECT_EQ(room.photographs, 48);
   EXPECT_EQ(room.false_ids, 0);
   EXPECT_LE(room.rms_px, 0.5);
-  EXPECT_GE(room.tracked, 46);
-  // Ids in the picture as a camera of the usual curve delivers it.
+  // In one photograph no tag decodes where it is sought in encoded values.
+  EXPECT_EQ(room.tracked, 47) << ::testing::PrintToString(room.not_tracked);
+  // Ids in the picture as a camera of the usual curve delivers it: all but two tags of that same
+  // photograph, which libapriltag 3.3.0's own program does not find either.
   const RoomResult usual = measure_room(shared() / "real/apriltag", 1);
-  EXPECT_GE(usual.found, 0.97 * usual.listed);
+  EXPECT_EQ(usual.listed, 157);
+  EXPECT_EQ(usual.found, 155) << ::testing::PrintToString(usual.missed);
   EXPECT_EQ(usual.false_ids, 0);
 }
 

@@ -318,6 +318,9 @@ TEST(Denoise, ChangesNoOtherLayerAndNoUntouchedPlate) {
 }
 
 // On rendered sets, against many samples: nearer to the truth, and with more samples nearer still.
+// The least that the denoiser must take away is a stated bound: a tenth of the squared error, which
+// as many more samples would. The limit's own noise, at most 16 / 512 = 3 % of the raw picture's
+// squared error, is in both of the errors that are compared.
 TEST(Denoise, BringsARenderedPictureNearerToItsLimit) {
   RandomScene options;
   options.width = 96;
@@ -346,8 +349,7 @@ TEST(Denoise, BringsARenderedPictureNearerToItsLimit) {
       const render::Layers raw = render(samples, 1);
       render::Layers clean = raw;
       renderer.show(true, &clean);
-      // On six such sets the ratio is 0.52 to 0.90.
-      EXPECT_LT(error(clean), 0.95 * error(raw)) << seed << ", " << samples << " samples";
+      EXPECT_LT(error(clean), std::sqrt(0.9) * error(raw)) << seed << ", " << samples << " samples";
       EXPECT_LT(error(clean), before) << seed << ", " << samples << " samples";
       before = error(clean);
     }
