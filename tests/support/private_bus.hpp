@@ -6,6 +6,8 @@
 
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <string>
 
 #include "tests/support/temporary_directory.hpp"
@@ -14,14 +16,22 @@ namespace previz::test {
 
 class PrivateBus {
  public:
-  PrivateBus() {
+  // Everybody may do everything on it; where there is a `policy`, a file as packages install for
+  // the system's bus, that says who may do what.
+  explicit PrivateBus(const std::filesystem::path& policy = {}) {
     const std::string address = "unix:path=" + (directory_ / "bus").string();
+    std::string configuration = "--session";
+    if (!policy.empty()) {
+      configuration = "--config-file=" + (directory_ / "system.conf").string();
+      std::ofstream(directory_ / "system.conf") << system_bus(address, policy);
+      std::filesystem::permissions(directory_.path(), std::filesystem::perms{0755});
+    }
     int ready[2];
     if (pipe(ready) != 0) return;
     child_ = fork();
     if (child_ == 0) {
       const std::string print = "--print-address=" + std::to_string(ready[1]);
-      execlp("dbus-daemon", "dbus-daemon", "--session", "--nofork", "--nopidfile",
+      execlp("dbus-daemon", "dbus-daemon", configuration.c_str(), "--nofork", "--nopidfile",
              ("--address=" + address).c_str(), print.c_str(), nullptr);
       _exit(127);
     }
@@ -42,6 +52,20 @@ class PrivateBus {
   bool running() const { return running_; }
 
  private:
+  // What the system's bus has before any package's policy: signals and replies for all, and no
+  // calls but to the bus itself (dbus-daemon's system.conf).
+  static std::string system_bus(const std::string& address, const std::filesystem::path& policy) {
+    return "<busconfig><type>system</type><listen>" + address +
+           "</listen><auth>EXTERNAL</auth><policy context=\"default\"><allow user=\"*\"/>"
+           "<deny own=\"*\"/><deny send_type=\"method_call\"/><allow send_type=\"signal\"/>"
+           "<allow send_requested_reply=\"true\" send_type=\"method_return\"/>"
+           "<allow send_requested_reply=\"true\" send_type=\"error\"/>"
+           "<allow receive_type=\"method_call\"/><allow receive_type=\"method_return\"/>"
+           "<allow receive_type=\"error\"/><allow receive_type=\"signal\"/>"
+           "<allow send_destination=\"org.freedesktop.DBus\"/></policy><include>" +
+           policy.string() + "</include></busconfig>\n";
+  }
+
   TemporaryDirectory directory_;
   pid_t child_ = -1;
   bool running_ = false;

@@ -1,6 +1,7 @@
 // The rig's bus on a bus of its own, operated by previzctl as from a shell.
 #include "daemon/control/bus.hpp"
 
+#include <grp.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <systemd/sd-bus.h>
@@ -10,6 +11,7 @@
 #include <atomic>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <string>
 #include <thread>
 #include <vector>
@@ -35,6 +37,7 @@ Said previzctl(const std::string& arguments) {
 
 class RigOnTheBus : public testing::Test {
  protected:
+  explicit RigOnTheBus(const std::filesystem::path& policy = {}) : bus_(policy) {}
   void SetUp() override {
     if (!bus_.running()) GTEST_SKIP() << "dbus-daemon is not installed";
     sd_event_new(&event_);
@@ -142,6 +145,61 @@ TEST_F(RigOnTheBus, EveryActionIsAMethodAndEveryChangeASignal) {
     while (sd_bus_process(client, nullptr) > 0) continue;
   EXPECT_EQ(signals, calls);
   sd_bus_flush_close_unref(client);
+}
+
+// The policy that the package ships, on a bus that keeps to it. The rig and one caller are root,
+// the other caller is a user of no group. (That the group previz may needs an installed package.)
+class ShippedPolicy : public RigOnTheBus {
+ protected:
+  ShippedPolicy() : RigOnTheBus(PREVIZ_SOURCE_DIR "/systemd/org.previz.Rig1.conf") {}
+  void SetUp() override {
+    if (geteuid() != 0) GTEST_SKIP() << "only root can be another user";
+    RigOnTheBus::SetUp();
+  }
+
+  // The name of the error that a call without arguments is answered with; empty where there is
+  // none. The policy is asked before anybody looks at the arguments.
+  static std::string error_of(const char* interface, const std::string& method, bool as_nobody) {
+    int answer[2];
+    if (pipe(answer) != 0) return "no pipe";
+    const pid_t child = fork();
+    if (child == 0) {
+      constexpr uid_t nobody = 65534;
+      std::string said = "the caller cannot be another user";
+      if (!as_nobody ||
+          (setgroups(0, nullptr) == 0 && setgid(nobody) == 0 && setuid(nobody) == 0)) {
+        sd_bus* bus = nullptr;
+        sd_bus_error error{};
+        said = sd_bus_open_system(&bus) < 0 ? "the bus cannot be reached" : "";
+        if (bus)
+          sd_bus_call_method(bus, bus_name, object_path, interface, method.c_str(), &error, nullptr,
+                             nullptr);
+        if (error.name) said = error.name;
+      }
+      const ssize_t written = write(answer[1], said.data(), said.size());
+      _exit(written == static_cast<ssize_t>(said.size()) ? 0 : 1);
+    }
+    close(answer[1]);
+    std::array<char, 256> text{};
+    const ssize_t size = read(answer[0], text.data(), text.size());
+    close(answer[0]);
+    waitpid(child, nullptr, 0);
+    return {text.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
+  }
+};
+
+TEST_F(ShippedPolicy, NobodyElseMayOperateTheRigAndEverybodyMayLook) {
+  std::vector<std::string> methods{"Action", "SetMode", "Record", "Metrics", "Actions"};
+  for (const set::Action& action : set::actions()) methods.push_back(method_name(action.name));
+  for (const std::string& method : methods) {
+    EXPECT_EQ(error_of(interface_name, method, true), SD_BUS_ERROR_ACCESS_DENIED) << method;
+    EXPECT_NE(error_of(interface_name, method, false), SD_BUS_ERROR_ACCESS_DENIED) << method;
+  }
+  constexpr const char* properties = "org.freedesktop.DBus.Properties";
+  EXPECT_EQ(error_of(properties, "Set", true), SD_BUS_ERROR_ACCESS_DENIED);
+  for (const char* method : {"Get", "GetAll"})  // for which the arguments are missing
+    EXPECT_EQ(error_of(properties, method, true), SD_BUS_ERROR_INVALID_ARGS) << method;
+  EXPECT_EQ(error_of("org.freedesktop.DBus.Introspectable", "Introspect", true), "");
 }
 
 TEST(BusWithoutARig, IsToldInPlainWords) {
