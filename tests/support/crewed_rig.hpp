@@ -70,7 +70,8 @@ inline pipeline::MetricsSnapshot run_crewed(rig::LiveOptions options,
   return rig::run_live(options, reports);
 }
 
-// Waits until metrics.json, which is written once a second, has counted `what`.
+// Waits until metrics.json, which is written once a second while pictures are shown, has counted
+// `what`.
 inline void must_be_counted(const std::filesystem::path& directory, const std::string& what) {
   const auto text = [file = directory / "live/metrics.json"] {
     return std::filesystem::exists(file) ? session::read_file(file) : std::string();
