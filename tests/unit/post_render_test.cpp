@@ -324,7 +324,7 @@ TEST_F(RenderSession, LiveTakesTheSamplesItIsAskedFor) {
   };
   const auto is_rendered = [&] { return rendered.load(); };
   const auto stopper = stop_when("a picture is rendered", is_rendered, stop);
-  rig::run_live(options, out_);
+  rig::run_live(options, reports_);
   EXPECT_EQ(samples, std::set<int>{3});
 }
 
