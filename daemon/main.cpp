@@ -59,7 +59,7 @@ int do_trade(trade::TradeOptions& options, const StopOnSignal& stop) {
   const trade::TradeReport report = trade::run_trade(options, std::cout);
   if (report.interrupted) return 128 + stop.received();
   std::cout << "\n";
-  for (const trade::TradeFrontPoint& at : trade::told_front_of(report))
+  for (const trade::TradeFrontPoint& at : trade::listed_front_of(report))
     std::cout << trade::front_words(report, at) << "\n";
   std::cout << "\n" << report.csv.string() << "\n" << report.page.string() << std::endl;
   return 0;

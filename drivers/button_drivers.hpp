@@ -18,11 +18,6 @@ namespace previz {
 //   hid:VENDOR:PRODUCT:SERIAL:SELECTOR
 bool is_button_name(const std::string& name);
 
-struct FoundButton {
-  std::string name;  // of a line; of a HID device without the selector
-  std::string description;
-};
-
 struct ButtonDriver {
   std::string_view name;
   // Opens one device with its buttons, full names of that device. What is not there, or goes away,

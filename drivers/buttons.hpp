@@ -21,6 +21,12 @@ struct ButtonEvent {
 
 using ButtonsEvent = std::variant<ButtonEvent, EndOfStream, DeviceTrouble>;
 
+// A button that is there now.
+struct FoundButton {
+  std::string name;  // of a line; of a HID device without the selector
+  std::string description;
+};
+
 // An open device with one or more buttons. Made for an event loop: one thread owns it, waits on
 // fd() together with everything else, and then takes what there is.
 class Buttons {

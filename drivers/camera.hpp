@@ -26,6 +26,13 @@ struct CameraFormat {
   friend bool operator==(const CameraFormat&, const CameraFormat&) = default;
 };
 
+// A camera that is there now.
+struct FoundCamera {
+  std::string driver;       // as in the set file
+  std::string device;       // its stable name
+  std::string description;  // vendor, model, where it is plugged in
+};
+
 // An open camera; making it opens the device and settles its format, destroying it gives the device
 // back whatever state it is in. Everything but the destructor may throw previz::Error only where it
 // says so. One thread at a time.

@@ -31,6 +31,19 @@ enum class DisplayScale {
   one_to_one  // a pixel is a pixel, centred; what does not fit is cut off
 };
 
+// What a set asks of a display. Plain data.
+struct DisplaySettings {
+  std::string connector;            // its stable name; empty: the first that has a screen
+  std::optional<DisplayMode> mode;  // absent: what the screen prefers; 0 Hz: the highest rate
+  DisplayScale scale = DisplayScale::letterbox;
+};
+
+// A display that is there now.
+struct FoundDisplay {
+  std::string connector;    // its stable name
+  std::string description;  // what is plugged in, and its modes
+};
+
 // A small picture that is laid over the shown one, at its own size. Premultiplied alpha.
 struct Overlay {
   int x = 0, y = 0;           // of its upper left corner, in pixels of the screen

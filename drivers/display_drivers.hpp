@@ -2,28 +2,13 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <span>
-#include <string>
 #include <string_view>
 #include <vector>
 
 #include "drivers/display.hpp"
 
 namespace previz {
-
-// What a set asks of a display. Plain data.
-struct DisplaySettings {
-  std::string connector;            // its stable name; empty: the first that has a screen
-  std::optional<DisplayMode> mode;  // absent: what the screen prefers; 0 Hz: the highest rate
-  DisplayScale scale = DisplayScale::letterbox;
-};
-
-// A display that is there now.
-struct FoundDisplay {
-  std::string connector;    // its stable name
-  std::string description;  // what is plugged in, and its modes
-};
 
 struct DisplayDriver {
   std::string_view name;

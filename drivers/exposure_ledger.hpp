@@ -1,9 +1,11 @@
-// Which exposure applied to which frame, of a device that does not say so itself.
+// Exposures of frames: which one applied to which frame of a device that does not say so itself.
 #pragma once
 
 #include <cstdint>
 #include <deque>
 #include <optional>
+
+#include "drivers/frame.hpp"
 
 namespace previz {
 
@@ -14,7 +16,7 @@ struct Exposure {
   friend bool operator==(const Exposure&, const Exposure&) = default;
 };
 
-// A device takes a new exposure over somewhere between the frame it is capturing when it is told
+// A device takes a new exposure over somewhere between the frame it is capturing when it is asked
 // and a few frames later. Frames before are of the old one, frames after of the new; for those in
 // between nobody knows, and a bracket with a wrong label would be worse than a missing frame.
 class ExposureLedger {
@@ -23,7 +25,7 @@ class ExposureLedger {
   ExposureLedger(const Exposure& initial, int settle_frames)
       : current_(initial), settle_frames_(settle_frames) {}
 
-  // The device was told between these two times (host clock).
+  // The device was asked between these two times (host clock).
   void changed(std::int64_t before_ns, std::int64_t after_ns, const Exposure& exposure) {
     changes_.push_back({before_ns, after_ns, exposure, settle_frames_});
   }
@@ -53,5 +55,14 @@ class ExposureLedger {
   int settle_frames_;
   std::deque<Change> changes_;
 };
+
+// Writes the exposure a frame was taken with into it. A shutter time that is not known (0) counts
+// as 1 s.
+inline void apply_exposure(Frame& frame, const Exposure& exposure, double responsivity) {
+  frame.exposure_s = exposure.exposure_s;
+  frame.gain = exposure.gain;
+  frame.exposure =
+      (exposure.exposure_s > 0 ? exposure.exposure_s : 1.0) * exposure.gain * responsivity;
+}
 
 }  // namespace previz

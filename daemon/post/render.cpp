@@ -319,7 +319,7 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
   }
 
   for (std::uint64_t frame = range.first; frame <= range.last; ++frame)
-    if (const FrameRecord* record = directory.finished(frame)) report.frames.push_back(*record);
+    if (const FinishedFrame* record = directory.finished(frame)) report.frames.push_back(*record);
   report.interrupted = options.stop.stop_requested();
   if (set.output.video && !report.interrupted && !report.frames.empty())
     report.video = directory.write_video(report.frames, out);

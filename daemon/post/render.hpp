@@ -13,6 +13,7 @@
 
 #include "daemon/pipeline/metrics.hpp"
 #include "daemon/pipeline/shot.hpp"
+#include "daemon/post/finished_frame.hpp"
 #include "daemon/render/renderer.hpp"
 #include "daemon/set/set.hpp"
 
@@ -50,28 +51,10 @@ struct RenderOptions {
   std::function<void(const pipeline::Shot&)> on_frame;
 };
 
-enum class FrameStatus { rendered, untouched };
-
-// A line of DIR/frames.jsonl.
-struct FrameRecord {
-  std::uint64_t frame = 0;
-  std::int64_t timestamp_ns = 0;
-  FrameStatus status = FrameStatus::rendered;
-  std::string reason;  // untouched: why the plate passed through as it is
-  std::int64_t samples = 0;
-  double render_s = 0;
-  double error = 0;  // estimated, where quality.error or .seconds was asked for
-  std::optional<tracking::Pose> pose;
-  std::vector<std::uint64_t> light_frames;  // sequence numbers; empty: not from the light camera
-  std::vector<lighting::Source> light_sources;
-  double light_dropped_share = 0;  // of all luminous flux, by lighting.sources.residual = "dropped"
-  render::Counters counters;
-};
-
 struct RenderReport {
   std::filesystem::path directory;
-  std::vector<FrameRecord> frames;  // every finished frame of the range, in order
-  std::size_t found_finished = 0;   // of those, the ones an earlier run had finished
+  std::vector<FinishedFrame> frames;  // every finished frame of the range, in order
+  std::size_t found_finished = 0;     // of those, the ones an earlier run had finished
   bool interrupted = false;
   double seconds = 0;           // wall clock, without opening the session, scene and device
   std::filesystem::path video;  // empty: none was made
@@ -80,7 +63,7 @@ struct RenderReport {
 
 // For every frame one NNNN.exr and NNNN.png, then review.mp4 over all pictures of the range, and
 //   DIR/render.json   the settings; a run with other settings refuses to mix its frames with these
-//   DIR/frames.jsonl  a line a finished frame (FrameRecord)
+//   DIR/frames.jsonl  a line a finished frame (FinishedFrame)
 // Frames that are finished are skipped. A frame whose pose is lost, or that no light frame
 // precedes, passes through untouched and is reported so. Progress and notes go to `out`. Throws
 // previz::Error on anything that keeps the job from being done.

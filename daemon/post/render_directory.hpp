@@ -2,12 +2,15 @@
 // of them were made with. Knows what is finished, so that a run can go on where another ended.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <iosfwd>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "daemon/pipeline/shot.hpp"
-#include "daemon/post/render.hpp"
+#include "daemon/post/finished_frame.hpp"
 #include "daemon/set/set.hpp"
 
 namespace previz::post {
@@ -21,13 +24,13 @@ class RenderDirectory {
 
   // Null: still to be rendered. A frame is finished if its line and all the files the set asks for
   // are there.
-  const FrameRecord* finished(std::uint64_t frame) const;
+  const FinishedFrame* finished(std::uint64_t frame) const;
 
   // Writes the shot's files, then its line.
   void write(const pipeline::Shot& shot, const set::Set& set);
 
   // Encodes the pictures of these frames to review.mp4 (or .mkv) and says with what on `out`.
-  std::filesystem::path write_video(const std::vector<FrameRecord>& frames,
+  std::filesystem::path write_video(const std::vector<FinishedFrame>& frames,
                                     std::ostream& out) const;
 
   const std::filesystem::path& path() const { return output_.directory; }
@@ -39,14 +42,7 @@ class RenderDirectory {
   void read_finished();
 
   const set::Output output_;
-  std::map<std::uint64_t, FrameRecord> finished_;
+  std::map<std::uint64_t, FinishedFrame> finished_;
 };
-
-// A line of frames.jsonl and back; from_json throws nlohmann::json::exception on a broken line.
-std::string to_json(const FrameRecord& record);
-FrameRecord from_json(const std::string& line);
-
-// What is recorded of a shot.
-FrameRecord record_of(const pipeline::Shot& shot);
 
 }  // namespace previz::post

@@ -183,7 +183,7 @@ std::string front_section(const TradeReport& report) {
                 {"of light on the real set", true},
                 {"of virtual objects", true},
                 {"", false}});
-  for (const TradeFrontPoint& at : told_front_of(report)) {
+  for (const TradeFrontPoint& at : listed_front_of(report)) {
     const TradePoint& point = report.point(at);
     const bool bend = corner_name(report, at) == "knee";
     html += (bend ? "<tr class=\"bend\">" : "<tr>") + cell(time_words(point.seconds), true) +

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "daemon/trade/trade.hpp"
+#include "daemon/trade/report.hpp"
 
 namespace previz::trade {
 

@@ -292,28 +292,6 @@ fs::path made_directory(const fs::path& directory) {
 
 }  // namespace
 
-std::vector<TradeFrontPoint> front_of(const TradeReport& report) {
-  std::vector<TradeFrontPoint> front;
-  for (std::size_t m = 0; m < report.methods.size(); ++m)
-    for (std::size_t i = 0; i < report.methods[m].points.size(); ++i)
-      if (report.methods[m].points[i].pareto) front.push_back({m, i});
-  std::ranges::stable_sort(front, {}, [&](const auto& at) { return report.point(at).seconds; });
-  return front;
-}
-
-std::vector<TradeFrontPoint> told_front_of(const TradeReport& report) {
-  std::vector<TradeFrontPoint> told;
-  const auto error = [&](const TradeFrontPoint& at) {
-    return report.point(at).errors.picture.value_or(0);
-  };
-  const auto is_corner = [&](const TradeFrontPoint& at) {
-    return std::ranges::find(report.corners, at, &TradeCorner::at) != report.corners.end();
-  };
-  for (const TradeFrontPoint& at : front_of(report))
-    if (told.empty() || is_corner(at) || error(at) < 0.9 * error(told.back())) told.push_back(at);
-  return told;
-}
-
 TradeReport run_trade(const TradeOptions& given, std::ostream& out) {
   const TradeOptions options = checked(given);
   TradeFrame frame(options.set_file, options.frame);

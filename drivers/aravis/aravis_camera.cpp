@@ -173,7 +173,7 @@ class AravisCamera final : public Camera {
         clock_.to_host(static_cast<std::int64_t>(arv_buffer_get_timestamp(&buffer)), arrival_ns);
     const std::optional<Exposure> exposure = exposure_of(buffer, frame->timestamp_ns);
     if (!exposure) return left_out("frames between two exposures");
-    tell_exposure(*frame, *exposure, settings_.responsivity);
+    apply_exposure(*frame, *exposure, settings_.responsivity);
     return frame;
   }
 

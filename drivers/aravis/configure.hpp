@@ -7,7 +7,8 @@
 #include <string>
 
 #include "drivers/aravis/gobject.hpp"
-#include "drivers/camera_drivers.hpp"
+#include "drivers/camera.hpp"
+#include "drivers/camera_settings.hpp"
 #include "drivers/convert/convert.hpp"
 #include "drivers/exposure_ledger.hpp"
 

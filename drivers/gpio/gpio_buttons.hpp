@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "drivers/button_drivers.hpp"
+#include "drivers/button_settings.hpp"
+#include "drivers/buttons.hpp"
 
 namespace previz {
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "drivers/display_drivers.hpp"
+#include "drivers/display.hpp"
 
 namespace previz {
 

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "drivers/button_drivers.hpp"
+#include "drivers/button_settings.hpp"
+#include "drivers/buttons.hpp"
 #include "drivers/hid/selector.hpp"
 
 namespace previz {

@@ -11,7 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "drivers/camera_drivers.hpp"
+#include "drivers/camera.hpp"
+#include "drivers/camera_settings.hpp"
 #include "drivers/convert/convert.hpp"
 #include "drivers/exposure_ledger.hpp"
 

@@ -100,7 +100,7 @@ class LibcameraCamera final : public Camera {
         order_.time_of(stamped ? std::optional(completed.timestamp_ns) : std::nullopt, arrival_ns);
     const std::optional<Exposure> exposure = exposure_of(completed, frame->timestamp_ns);
     if (!exposure) return left_out("frames between two exposures");
-    tell_exposure(*frame, *exposure, settings_.responsivity);
+    apply_exposure(*frame, *exposure, settings_.responsivity);
     return frame;
   }
 

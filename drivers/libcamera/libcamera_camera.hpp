@@ -2,9 +2,13 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
-#include "drivers/camera_drivers.hpp"
+#include "drivers/camera.hpp"
+#include "drivers/camera_settings.hpp"
+#include "drivers/usb/usb.hpp"
 
 namespace previz {
 

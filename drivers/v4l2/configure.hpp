@@ -6,7 +6,8 @@
 #include <optional>
 #include <string>
 
-#include "drivers/camera_drivers.hpp"
+#include "drivers/camera.hpp"
+#include "drivers/camera_settings.hpp"
 #include "drivers/convert/convert.hpp"
 #include "drivers/exposure_ledger.hpp"
 #include "drivers/v4l2/node.hpp"

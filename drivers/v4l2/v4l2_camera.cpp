@@ -177,7 +177,7 @@ class V4l2Camera final : public Camera {
     frame->timestamp_ns = order_.time_of(stamp_of(buffer), arrival_ns);
     const std::optional<Exposure> exposure = ledger_.of_frame(frame->timestamp_ns);
     if (!exposure) return left_out("frames between two exposures");
-    tell_exposure(*frame, *exposure, settings_.responsivity);
+    apply_exposure(*frame, *exposure, settings_.responsivity);
     return frame;
   }
 

@@ -39,13 +39,13 @@ struct Arguments {
 
 struct JudgedFrame {
   Measures measures;
-  post::FrameRecord record;
+  post::FinishedFrame record;
   std::vector<std::string> violations;
 };
 
 // Leaves DIR/NNNN.exr and NNNN.png, whatever the frame's place in the session.
-post::FrameRecord render_frame(const TruthSet& set, int frame, const Arguments& arguments,
-                               const fs::path& directory) {
+post::FinishedFrame render_frame(const TruthSet& set, int frame, const Arguments& arguments,
+                                 const fs::path& directory) {
   const std::uint64_t index = session_index(set, frame);
   post::RenderOptions options;
   options.session = directory / "session";

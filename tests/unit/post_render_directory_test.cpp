@@ -69,7 +69,7 @@ TEST_F(RenderDirectoryTest, WritesNumberedFilesAndALineAFrame) {
   EXPECT_EQ(output::read_png(directory_ / "out/0007.png").samples.front(), 99);
 
   const RenderDirectory again = open();
-  const FrameRecord* record = again.finished(7);
+  const FinishedFrame* record = again.finished(7);
   ASSERT_NE(record, nullptr);
   EXPECT_EQ(record->timestamp_ns, 1'280'000'000);
   EXPECT_EQ(record->samples, 16);
@@ -140,7 +140,7 @@ TEST_F(RenderDirectoryTest, WithoutFinishedFramesOtherSettingsAreNoMatter) {
 
 TEST_F(RenderDirectoryTest, VideoIsMadeOfThePicturesInOrder) {
   RenderDirectory directory = open();
-  std::vector<FrameRecord> frames;
+  std::vector<FinishedFrame> frames;
   for (const std::uint64_t frame : {0, 1, 2}) {
     directory.write(sample_shot(frame), set_);
     frames.push_back(*directory.finished(frame));

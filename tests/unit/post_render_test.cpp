@@ -86,7 +86,7 @@ TEST_F(RenderSession, EveryFrameHasItsFilesAndItsRecord) {
   EXPECT_FALSE(report.interrupted);
   EXPECT_TRUE(std::filesystem::exists(report.video));
   for (int i = 0; i < small_take_frames; ++i) {
-    const FrameRecord& record = report.frames[i];
+    const FinishedFrame& record = report.frames[i];
     const std::string number = "000" + std::to_string(i);
     const render::Layers layers = output::read_exr(directory_ / ("out/" + number + ".exr"));
     EXPECT_EQ(layers.width, 48);

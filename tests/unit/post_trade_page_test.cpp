@@ -82,7 +82,7 @@ TEST(TradePage, TellsTheFrontInWords) {
   EXPECT_EQ(front_words(report, {0, 1}), "0.2 s: the set's own settings, 4 samples, error 10 %");
   // (1, 1) is on the front, nearer than the one before it by just a tenth: not worth a line.
   EXPECT_EQ(front_of(report).size(), 3u);
-  EXPECT_EQ(told_front_of(report), (std::vector<TradeFrontPoint>{{1, 0}, {0, 1}}));
+  EXPECT_EQ(listed_front_of(report), (std::vector<TradeFrontPoint>{{1, 0}, {0, 1}}));
   EXPECT_NE(trade_page(report).find("set's own picture by: 1, 13 %"), std::string::npos);
 }
 

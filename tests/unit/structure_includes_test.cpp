@@ -109,5 +109,15 @@ TEST(Includes, TheLiveRigKnowsNothingOfTheOfflineRooms) {
   }
 }
 
+// A driver would otherwise be compiled again with every change of the list of drivers.
+TEST(Includes, NoDriverIncludesTheRegistryThatListsIt) {
+  for (const auto& [file, included] : includes()) {
+    if (fs::path(file).parent_path().parent_path() != "drivers") continue;
+    for (const Include& include : included)
+      EXPECT_FALSE(include.file.ends_with("_drivers.hpp"))
+          << file << ":" << include.line << ": includes " << include.file;
+  }
+}
+
 }  // namespace structure_includes_test
 }  // namespace previz

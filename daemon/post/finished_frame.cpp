@@ -1,0 +1,119 @@
+#include "daemon/post/finished_frame.hpp"
+
+#include <glm/mat4x4.hpp>
+#include <nlohmann/json.hpp>
+
+namespace previz::post {
+namespace {
+
+nlohmann::ordered_json rows(const glm::dmat4& matrix) {
+  nlohmann::ordered_json result;
+  for (int row = 0; row < 4; ++row)
+    result.push_back({matrix[0][row], matrix[1][row], matrix[2][row], matrix[3][row]});
+  return result;
+}
+
+glm::dmat4 matrix_of(const nlohmann::json& rows) {
+  glm::dmat4 matrix;
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column) matrix[column][row] = rows.at(row).at(column);
+  return matrix;
+}
+
+nlohmann::ordered_json numbers(const glm::dvec3& v) {
+  return {v.x, v.y, v.z};
+}
+
+glm::dvec3 vector_of(const nlohmann::json& json) {
+  return {json.at(0), json.at(1), json.at(2)};
+}
+
+}  // namespace
+
+FinishedFrame finished_frame(const pipeline::Shot& shot) {
+  FinishedFrame frame;
+  frame.frame = shot.index;
+  frame.timestamp_ns = shot.frame->timestamp_ns;
+  frame.status = shot.untouched.empty() ? FrameStatus::rendered : FrameStatus::untouched;
+  frame.reason = shot.untouched;
+  frame.samples = shot.layers.samples;
+  frame.render_s = shot.render_s;
+  frame.error = shot.error;
+  frame.pose = shot.track.pose;
+  if (shot.light) {
+    frame.light_frames = shot.light->sequences;
+    frame.light_sources = shot.light->lighting.sources;
+    frame.light_dropped_share = shot.light->lighting.report.dropped_share;
+  }
+  frame.counters = shot.counters;
+  return frame;
+}
+
+std::string to_json(const FinishedFrame& frame) {
+  nlohmann::ordered_json json;
+  json["frame"] = frame.frame;
+  json["timestamp_ns"] = frame.timestamp_ns;
+  json["status"] = frame.status == FrameStatus::rendered ? "rendered" : "untouched";
+  if (!frame.reason.empty()) json["reason"] = frame.reason;
+  json["samples"] = frame.samples;
+  json["render_s"] = frame.render_s;
+  if (frame.error > 0) json["error"] = frame.error;
+  if (frame.pose) {
+    json["world_from_camera"] = rows(frame.pose->world_from_camera);
+    json["covariance"] = frame.pose->covariance;
+    json["reprojection_rms_px"] = frame.pose->reprojection_rms_px;
+    json["tags"] = frame.pose->tags;
+  }
+  json["light_frames"] = frame.light_frames;
+  for (const lighting::Source& source : frame.light_sources)
+    json["light_sources"].push_back({{"id", source.id},
+                                     {"direction", numbers(source.direction)},
+                                     {"solid_angle_sr", source.solid_angle_sr},
+                                     {"flux", numbers(source.flux)}});
+  if (frame.light_dropped_share > 0) json["light_dropped_share"] = frame.light_dropped_share;
+  json["rays"] = frame.counters.rays;
+  json["shadow_rays"] = frame.counters.shadow_rays;
+  json["dropped_not_finite"] = frame.counters.dropped_not_finite;
+  json["dropped_negative"] = frame.counters.dropped_negative;
+  json["stopped_in_layers"] = frame.counters.stopped_in_layers;
+  if (frame.counters.measured + frame.counters.unmeasured > 0) {
+    json["measured"] = frame.counters.measured;
+    json["unmeasured"] = frame.counters.unmeasured;
+  }
+  return json.dump();
+}
+
+FinishedFrame from_json(const std::string& line) {
+  const nlohmann::json json = nlohmann::json::parse(line);
+  FinishedFrame frame;
+  frame.frame = json.at("frame");
+  frame.timestamp_ns = json.at("timestamp_ns");
+  frame.status = json.at("status") == "rendered" ? FrameStatus::rendered : FrameStatus::untouched;
+  frame.reason = json.value("reason", "");
+  frame.samples = json.at("samples");
+  frame.render_s = json.at("render_s");
+  frame.error = json.value("error", 0.0);
+  if (json.contains("world_from_camera")) {
+    frame.pose.emplace();
+    frame.pose->world_from_camera = matrix_of(json["world_from_camera"]);
+    frame.pose->covariance = json.at("covariance");
+    frame.pose->reprojection_rms_px = json.at("reprojection_rms_px");
+    frame.pose->tags = json.at("tags").get<std::vector<int>>();
+  }
+  frame.light_frames = json.at("light_frames").get<std::vector<std::uint64_t>>();
+  if (json.contains("light_sources"))
+    for (const nlohmann::json& source : json["light_sources"])
+      frame.light_sources.push_back({source.at("id"), vector_of(source.at("direction")),
+                                     source.at("solid_angle_sr"), vector_of(source.at("flux"))});
+  frame.light_dropped_share = json.value("light_dropped_share", 0.0);
+  frame.counters.rays = json.at("rays");
+  frame.counters.shadow_rays = json.at("shadow_rays");
+  frame.counters.dropped_not_finite = json.at("dropped_not_finite");
+  frame.counters.dropped_negative = json.at("dropped_negative");
+  frame.counters.stopped_in_layers = json.value("stopped_in_layers", std::uint64_t{0});
+  frame.counters.measured = json.value("measured", std::uint64_t{0});
+  frame.counters.unmeasured = json.value("unmeasured", std::uint64_t{0});
+  return frame;
+}
+
+}  // namespace previz::post

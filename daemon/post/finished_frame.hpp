@@ -1,0 +1,42 @@
+// A frame that `previzd render` has finished: what its line in DIR/frames.jsonl says.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/lighting/environment.hpp"
+#include "daemon/pipeline/shot.hpp"
+#include "daemon/render/renderer.hpp"
+#include "daemon/tracking/tracker.hpp"
+
+namespace previz::post {
+
+enum class FrameStatus { rendered, untouched };
+
+// A line of DIR/frames.jsonl.
+struct FinishedFrame {
+  std::uint64_t frame = 0;
+  std::int64_t timestamp_ns = 0;
+  FrameStatus status = FrameStatus::rendered;
+  std::string reason;  // untouched: why the plate passed through as it is
+  std::int64_t samples = 0;
+  double render_s = 0;
+  double error = 0;  // estimated, where quality.error or .seconds was asked for
+  std::optional<tracking::Pose> pose;
+  std::vector<std::uint64_t> light_frames;  // sequence numbers; empty: not from the light camera
+  std::vector<lighting::Source> light_sources;
+  double light_dropped_share = 0;  // of all luminous flux, by lighting.sources.residual = "dropped"
+  render::Counters counters;
+};
+
+// What is recorded of a shot whose pictures are written.
+FinishedFrame finished_frame(const pipeline::Shot& shot);
+
+// The frame as a line, without its end, and back; from_json throws nlohmann::json::exception on a
+// broken line.
+std::string to_json(const FinishedFrame& frame);
+FinishedFrame from_json(const std::string& line);
+
+}  // namespace previz::post
