@@ -1,6 +1,7 @@
 #include "drivers/button_drivers.hpp"
 
 #include <algorithm>
+#include <array>
 #include <map>
 
 #include "drivers/error.hpp"
@@ -15,22 +16,35 @@
 namespace previz {
 namespace {
 
-const std::vector<ButtonDriver>& all_button_drivers() {
-  static const std::vector<ButtonDriver> all{
+constexpr auto all_button_drivers = std::to_array<ButtonDriver>({
 #ifdef PREVIZ_WITH_GPIO
-      {"gpio", open_gpio, find_gpio, gpio_device_of, nullptr},
+    {"gpio", "gpio:CHIP:LINE", open_gpio, find_gpio, gpio_device_of, nullptr},
+#else
+    {"gpio", "gpio:CHIP:LINE"},
 #endif
 #ifdef PREVIZ_WITH_HID
-      {"hid", open_hid, find_hid, hid_device_of, hid::learn},
+    {"hid", "hid:VENDOR:PRODUCT:SELECTOR", open_hid, find_hid, hid_device_of, hid::learn},
+#else
+    {"hid", "hid:VENDOR:PRODUCT:SELECTOR"},
 #endif
-  };
-  return all;
+});
+
+// The driver's part of a button's name.
+std::string driver_part(const std::string& name) {
+  return name.substr(0, name.find(':'));
+}
+
+const ButtonDriver* named_by(const std::string& name) {
+  const std::string wanted = driver_part(name);
+  const auto found = std::ranges::find_if(all_button_drivers, [&](const ButtonDriver& driver) {
+    return wanted == driver.name && wanted != name;
+  });
+  return found == all_button_drivers.end() ? nullptr : &*found;
 }
 
 const ButtonDriver& driver_of(const std::string& name) {
-  const std::string wanted = name.substr(0, name.find(':'));
   try {
-    return driver_named(all_button_drivers(), wanted, "buttons");
+    return driver_named(button_drivers(), driver_part(name), "buttons");
   } catch (const Error& error) {
     throw Error("button \"" + name + "\": " + error.what());
   }
@@ -39,11 +53,24 @@ const ButtonDriver& driver_of(const std::string& name) {
 }  // namespace
 
 std::span<const ButtonDriver> button_drivers() {
-  return all_button_drivers();
+  static const auto drivers = built(all_button_drivers);
+  return drivers;
 }
 
 bool is_button_name(const std::string& name) {
-  return name.starts_with("gpio:") || name.starts_with("hid:");
+  return named_by(name) != nullptr;
+}
+
+void check_button_name(const std::string& name) {
+  if (const ButtonDriver* driver = named_by(name)) {
+    if (driver->device_of) driver->device_of(name);
+    return;
+  }
+  std::string forms;
+  for (const ButtonDriver& driver : all_button_drivers)
+    forms += (forms.empty() ? "" : " | ") + std::string(driver.form);
+  throw Error("no driver takes the name \"" + name + "\"; allowed: " + forms +
+              ", as `previzd devices` prints it");
 }
 
 std::vector<std::unique_ptr<Buttons>> open_buttons(std::span<const std::string> names,

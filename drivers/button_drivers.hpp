@@ -16,23 +16,30 @@ namespace previz {
 //   gpio:CHIP:LINE                 CHIP by its label, LINE by its name or offset
 //   hid:VENDOR:PRODUCT:SELECTOR    of the first such device; hexadecimal; see hid/selector.hpp
 //   hid:VENDOR:PRODUCT:SERIAL:SELECTOR
+
+// Whether the name begins with that of a driver, also of one that this build leaves out.
 bool is_button_name(const std::string& name);
 
+// Throws previz::Error that says what is allowed, if no driver takes the name.
+void check_button_name(const std::string& name);
+
 struct ButtonDriver {
-  std::string_view name;
+  const char* name;
+  const char* form;  // of its buttons' names, for people
   // Opens one device with its buttons, full names of that device. What is not there, or goes away,
-  // is told as trouble and waited for. Throws previz::Error where a name cannot be understood.
+  // is reported as trouble and waited for. Throws previz::Error where a name cannot be understood.
   std::unique_ptr<Buttons> (*open)(const std::string& device, const std::vector<std::string>& names,
-                                   const ButtonSettings& settings);
-  std::vector<FoundButton> (*find)();
+                                   const ButtonSettings& settings) = nullptr;
+  std::vector<FoundButton> (*find)() = nullptr;
   // The device part of a name. Throws previz::Error where it cannot be understood.
-  std::string (*device_of)(const std::string& name);
+  std::string (*device_of)(const std::string& name) = nullptr;
   // Reads a device until `stop` says so; calls back with the name of each button that goes down.
   // Throws previz::Error where it cannot be read. Null where names need no learning.
   void (*learn)(const std::string& device, const std::function<bool()>& stop,
-                const std::function<void(const std::string& name)>& pressed);
+                const std::function<void(const std::string& name)>& pressed) = nullptr;
 };
 
+// The drivers that this build has.
 std::span<const ButtonDriver> button_drivers();
 
 // Each device once, with all its buttons among `names`. Throws previz::Error naming the button

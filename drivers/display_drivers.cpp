@@ -1,5 +1,6 @@
 #include "drivers/display_drivers.hpp"
 
+#include <algorithm>
 #include <array>
 
 #include "drivers/headless/headless_display.hpp"
@@ -11,21 +12,35 @@
 namespace previz {
 namespace {
 
-constexpr auto drivers_of_displays = std::to_array<DisplayDriver>({
+constexpr auto all_display_drivers = std::to_array<DisplayDriver>({
 #ifdef PREVIZ_WITH_KMS
-    {"kms", open_kms, find_kms},
+    {"kms", true, open_kms, find_kms},
+#else
+    {"kms", true},
 #endif
-    {"headless", open_headless, find_headless},
+    {"headless", false, open_headless, find_headless},
 });
 
 }  // namespace
 
 std::span<const DisplayDriver> display_drivers() {
-  return drivers_of_displays;
+  static const auto drivers = built(all_display_drivers);
+  return drivers;
+}
+
+std::span<const char* const> display_driver_names() {
+  static const auto names = names_of(all_display_drivers);
+  return names;
+}
+
+bool drives_connectors(std::string_view name) {
+  return std::ranges::any_of(all_display_drivers, [name](const DisplayDriver& driver) {
+    return name == driver.name && driver.drives_connectors;
+  });
 }
 
 const DisplayDriver& display_driver(std::string_view name) {
-  return driver_named(drivers_of_displays, name, "displays");
+  return driver_named(display_drivers(), name, "displays");
 }
 
 }  // namespace previz

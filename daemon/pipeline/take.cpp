@@ -34,7 +34,8 @@ Take open_take(const std::filesystem::path& session_directory,
   if (take.set_text.empty())
     throw Error(session_directory.string() +
                 ": the session carries no set file; name one with --set FILE");
-  take.set = set::parse_set(take.set_text, name, assets);
+  take.set = set::parse_set(take.set_text, name, assets,
+                            set_file ? set::Origin::crew : set::Origin::session);
 
   take.observer = observer_calibration(take.set, take.session.info);
   take.set.observer.calibration = take.observer;

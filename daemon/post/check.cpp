@@ -67,14 +67,15 @@ Checked open(const fs::path& set_or_session) {
     checked.set.light_camera.calibration = take.light;
     checked.has_track = !take.session.track.empty();
     checked.remarks = take.session.missing;
-    if (!take.light_stream) checked.set.light_camera.driver = set::Driver::none;
+    if (!take.light_stream) checked.set.light_camera.driver = set::no_driver;
     return checked;
   }
   checked.set = set::load_set(set_or_session);
   auto& observer = checked.set.observer;
   auto& light = checked.set.light_camera;
-  const auto replayed = [&](const std::string& camera, set::Driver driver, const fs::path& device) {
-    if (driver != set::Driver::replay || device.empty()) return session::SessionInfo{};
+  const auto replayed = [&](const std::string& camera, const std::string& driver,
+                            const fs::path& device) {
+    if (driver != set::replay_driver || device.empty()) return session::SessionInfo{};
     if (!fs::exists(device)) {
       checked.remarks.push_back(camera + ".device: there is no session " + device.string());
       return session::SessionInfo{};
@@ -153,7 +154,7 @@ void remark_on_cameras(Checked& checked) {
     checked.remarks.push_back(
         "the observer has no calibration here: it must come with the session that is rendered");
   const bool has_light_camera =
-      set.light_camera.driver != set::Driver::none && set.light_camera.calibration;
+      set.light_camera.driver != set::no_driver && set.light_camera.calibration;
   if (set.lighting.from == set::LightFrom::camera && !set.lighting.environment && !has_light_camera)
     checked.remarks.push_back(
         "no environment and no calibrated light camera here: the light must come with the session");
@@ -176,8 +177,8 @@ void remark_on_scene(Checked& checked, const scene::Scene& scene) {
 }
 
 void print_cameras(const set::Set& set, std::ostream& out) {
-  const auto device = [](set::Driver driver, const std::string& name) {
-    return words(set::name_of(driver), name.empty() ? "" : " of ", name);
+  const auto device = [](const std::string& driver, const std::string& name) {
+    return words(driver, name.empty() ? "" : " of ", name);
   };
   out << "\ncameras\n  observer      " << device(set.observer.driver, set.observer.device);
   if (const auto& c = set.observer.calibration) {
@@ -189,8 +190,7 @@ void print_cameras(const set::Set& set, std::ostream& out) {
       out << "everything sharp";
   }
   out << "\n  light camera  " << device(set.light_camera.driver, set.light_camera.device);
-  if (const auto& c = set.light_camera.calibration;
-      c && set.light_camera.driver != set::Driver::none)
+  if (const auto& c = set.light_camera.calibration; c && set.light_camera.driver != set::no_driver)
     out << words(", ", c->intrinsics.width, "x", c->intrinsics.height, ", calibrated to ",
                  c->intrinsics.max_angle_rad * 180 / std::numbers::pi, " degrees off axis");
   out << '\n';

@@ -54,19 +54,19 @@ std::unique_ptr<session::StreamReader> open_frames(session::Session& session,
 }  // namespace
 
 Cameras open_cameras(const set::Set& set, bool loop, const Usb& usb) {
-  using set::Driver;
-  if (set.observer.driver == Driver::none)
+  if (set.observer.driver == set::no_driver)
     throw Error(set.file.string() + ": observer.driver: \"none\" shows nothing live");
   if (set.observer.device.empty())
     throw Error(set.file.string() + ": observer.device: names no session; a folder is needed here");
-  const Driver light_driver = set.lighting.environment ? Driver::none : set.light_camera.driver;
+  const std::string light_driver =
+      set.lighting.environment ? set::no_driver : set.light_camera.driver;
 
   Cameras cameras;
   ReplayOptions options;
   options.loop = loop;
   options.origin = {std::chrono::steady_clock::now() + replay_delay, 0};
   std::unique_ptr<session::StreamReader> observer;
-  if (set.observer.driver == Driver::replay) {
+  if (set.observer.driver == set::replay_driver) {
     cameras.recorded = session::open_session(set.observer.device);
     observer = open_frames(cameras.recorded, "observer");
     options.origin->timestamp_ns = observer->records().front().timestamp_ns;
@@ -75,7 +75,7 @@ Cameras open_cameras(const set::Set& set, bool loop, const Usb& usb) {
     cameras.observer = drive_camera(set, observer_order(set), usb);
   }
 
-  if (light_driver == Driver::replay) {
+  if (light_driver == set::replay_driver) {
     session::Session session = session::open_session(
         set.light_camera.device.empty() ? set.observer.device : set.light_camera.device);
     auto light = open_frames(session, "light");
@@ -90,7 +90,7 @@ Cameras open_cameras(const set::Set& set, bool loop, const Usb& usb) {
     }
     if (!cameras.recorded.info.light) cameras.recorded.info.light = session.info.light;
     cameras.light = start_replay(set, light_order(set), session, std::move(light), light_options);
-  } else if (light_driver != Driver::none) {
+  } else if (light_driver != set::no_driver) {
     cameras.light = drive_camera(set, light_order(set), usb);
   }
   if (observer) {
@@ -107,7 +107,7 @@ Cameras open_cameras(const set::Set& set, bool loop, const Usb& usb) {
 
 std::vector<std::unique_ptr<Buttons>> open_buttons(const set::Set& set, const Cameras& cameras) {
   std::vector<std::unique_ptr<Buttons>> buttons;
-  if (set.buttons.empty() || set.observer.driver != set::Driver::replay) return buttons;
+  if (set.buttons.empty() || set.observer.driver != set::replay_driver) return buttons;
   ReplayButtonsOptions options;
   options.due = cameras.origin.due;
   options.timestamp_ns = cameras.origin.timestamp_ns;

@@ -3,7 +3,6 @@
 #include <chrono>
 #include <utility>
 
-#include "daemon/set/names.hpp"
 #include "drivers/bracket.hpp"
 #include "drivers/camera_drivers.hpp"
 #include "drivers/error.hpp"
@@ -54,10 +53,9 @@ std::unique_ptr<Camera> drive_camera(const set::Set& set, const CameraOrder& ord
                                      const Usb& usb) {
   const CameraDriver* driver = nullptr;
   try {
-    driver = &camera_driver(set::name_of(order.driver));
+    driver = &camera_driver(order.driver);
   } catch (const Error& error) {
-    throw Error(set.file.string() + ": " + table_of(order) + ".driver: " + error.what() +
-                ", \"replay\"");
+    throw Error(set.file.string() + ": " + table_of(order) + ".driver: " + error.what());
   }
   CameraSettings settings = order.wish.settings;
   settings.source = order.role;

@@ -16,7 +16,7 @@ namespace previz::rig {
 // A camera of the set: its role ("observer" or "light"), and what the set says of it.
 struct CameraOrder {
   std::string role;
-  set::Driver driver;
+  std::string driver;
   std::string device;
   set::CameraWish wish;
   std::vector<std::string> faults;  // to rehearse

@@ -261,7 +261,7 @@ void Rig::show_facts() {
 }
 
 void Rig::feed_watchdog() {
-  const bool has_screen = loaded_.set.display.driver != set::DisplayDriver::none;
+  const bool has_screen = loaded_.set.display.driver != set::no_driver;
   const Progress now = progress_of(parts_.metrics.snapshot(0), controls_.look().state, has_screen);
   if (!advances(progress_, now)) return;
   progress_ = now;

@@ -71,7 +71,7 @@ DisplayOpener opener_of(const set::Set& set) {
   const set::Display& display = set.display;
   const DisplaySettings settings{display.connector, display.mode, display.scale};
   try {
-    const DisplayDriver& driver = display_driver(set::name_of(display.driver));
+    const DisplayDriver& driver = display_driver(display.driver);
     return [&driver, settings] { return driver.open(settings); };
   } catch (const Error& error) {
     throw Error(set.file.string() + ": display.driver: " + error.what());
@@ -190,8 +190,7 @@ void Screen::Impl::was_shown(const Shown& shown, bool fresh) {
 
 void Screen::Impl::read_back() {
   if (parts.on_screen) parts.on_screen(life.display()->read_back(), page);
-  if (settings.driver != set::DisplayDriver::headless || Clock::now() - written < file_interval)
-    return;
+  if (drives_connectors(settings.driver) || Clock::now() - written < file_interval) return;
   written = Clock::now();
   try {
     output::write_png(parts.directory / "screen.png", life.display()->read_back());
@@ -202,9 +201,8 @@ void Screen::Impl::read_back() {
 
 Screen::Screen(const set::Set& set, Parts parts)
     : metrics_(parts.metrics),
-      impl_(set.display.driver == set::DisplayDriver::none
-                ? nullptr
-                : std::make_unique<Impl>(set, std::move(parts))) {}
+      impl_(set.display.driver == set::no_driver ? nullptr
+                                                 : std::make_unique<Impl>(set, std::move(parts))) {}
 
 Screen::~Screen() = default;
 

@@ -24,19 +24,6 @@ namespace set {
 
 using previz::name_of;
 
-// A driver is listed once it exists.
-constexpr auto names(Driver) {
-  return std::to_array<Name<Driver>>({{"replay", Driver::replay},
-                                      {"v4l2", Driver::v4l2},
-                                      {"aravis", Driver::aravis},
-                                      {"libcamera", Driver::libcamera},
-                                      {"none", Driver::none}});
-}
-constexpr auto names(DisplayDriver) {
-  return std::to_array<Name<DisplayDriver>>({{"kms", DisplayDriver::kms},
-                                             {"headless", DisplayDriver::headless},
-                                             {"none", DisplayDriver::none}});
-}
 constexpr auto names(Presence) {
   return std::to_array<Name<Presence>>({{"phantom", Presence::phantom},
                                         {"virtual", Presence::virtual_object},

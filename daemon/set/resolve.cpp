@@ -9,7 +9,10 @@
 #include <set>
 
 #include "daemon/set/pose.hpp"
+#include "drivers/button_drivers.hpp"
 #include "drivers/calibration/read.hpp"
+#include "drivers/display_drivers.hpp"
+#include "drivers/error.hpp"
 
 namespace previz::set {
 namespace {
@@ -22,11 +25,13 @@ std::string bracket(const std::string& table) {
 
 class Resolver {
  public:
-  Resolver(Draft& draft, const fs::path& file, const Assets& assets, Problems& problems)
+  Resolver(Draft& draft, const fs::path& file, const Assets& assets, Origin origin,
+           Problems& problems)
       : draft_(draft),
         set_(draft.set),
         folder_(file.parent_path()),
         assets_(assets),
+        origin_(origin),
         problems_(problems) {
     set_.file = file;
   }
@@ -93,20 +98,19 @@ class Resolver {
                         " is missing; a calibration given here replaces the session's as a whole");
   }
 
-  void device(const std::string& table, Driver driver, std::string& device) {
-    if (driver == Driver::none)
+  void device(const std::string& table, const std::string& driver, std::string& device) {
+    if (driver == no_driver)
       exclude(given(table), {"device"}, "driver \"none\" has no device; leave one of the two out");
-    if (driver == Driver::replay && !device.empty()) device = located(device).string();
-    const bool recorded = driver == Driver::replay || driver == Driver::none;
+    if (driver == replay_driver && !device.empty()) device = located(device).string();
+    const bool recorded = driver == replay_driver || driver == no_driver;
     if (!recorded && device.empty())
       problem(given(table), "device",
-              std::string("is missing with driver \"") + name_of(driver) +
+              "is missing with driver \"" + driver +
                   "\"; allowed: a name that `previzd devices` prints");
     const Given& camera = given(table + ".camera");
     if (recorded && camera.at)
       problems_.add(*camera.at, camera.path,
-                    std::string("does not go with driver \"") + name_of(driver) +
-                        "\", which drives no camera");
+                    "does not go with driver \"" + driver + "\", which drives no camera");
     if (camera.has("width") != camera.has("height"))
       problem(camera, camera.has("width") ? "height" : "width",
               "is missing; width and height go together");
@@ -366,6 +370,7 @@ class Resolver {
     for (const auto& [table, button] : draft_.buttons) {
       if (table.good("name")) {
         if (button.name.empty()) problem(table, "name", "is empty; allowed: text");
+        if (origin_ == Origin::crew) pressable(table, button.name);
         const auto [other, fresh] =
             first.emplace(std::pair(button.name, button.press), table.where("name"));
         if (!fresh)
@@ -378,13 +383,25 @@ class Resolver {
     }
   }
 
+  // A name that no driver takes would be a typing error that nobody notices. The buttons of a
+  // replayed session have any name without a colon.
+  void pressable(const Given& table, const std::string& name) {
+    const bool may_be_recorded =
+        set_.observer.driver == replay_driver && name.find(':') == std::string::npos;
+    if (name.empty() || may_be_recorded) return;
+    try {
+      check_button_name(name);
+    } catch (const Error& error) {
+      problem(table, "name", error.what());
+    }
+  }
+
   void display() {
     const Display& display = set_.display;
-    if (display.driver == DisplayDriver::kms) return;
-    const std::string no = std::string("driver \"") + name_of(display.driver) + "\" has no ";
+    if (drives_connectors(display.driver)) return;
+    const std::string no = "driver \"" + display.driver + "\" has no ";
     exclude(given("display"), {"connector"}, no + "connector; leave it out");
-    if (display.driver == DisplayDriver::none)
-      exclude(given("display"), {"mode"}, no + "mode; leave it out");
+    if (display.driver == no_driver) exclude(given("display"), {"mode"}, no + "mode; leave it out");
   }
 
   // A table that no button goes by would be a typing error that nobody notices.
@@ -471,13 +488,15 @@ class Resolver {
   Set& set_;
   fs::path folder_;
   const Assets& assets_;
+  const Origin origin_;
   Problems& problems_;
 };
 
 }  // namespace
 
-Set resolve(Draft draft, const fs::path& file, const Assets& assets, Problems& problems) {
-  Resolver(draft, file, assets, problems).run();
+Set resolve(Draft draft, const fs::path& file, const Assets& assets, Origin origin,
+            Problems& problems) {
+  Resolver(draft, file, assets, origin, problems).run();
   return std::move(draft.set);
 }
 

@@ -15,7 +15,7 @@ namespace previz::set {
 using Assets = std::vector<std::pair<std::string, std::filesystem::path>>;
 
 // Adds what it finds to `problems`; the set is meaningful only if there are none.
-Set resolve(Draft draft, const std::filesystem::path& file, const Assets& assets,
+Set resolve(Draft draft, const std::filesystem::path& file, const Assets& assets, Origin origin,
             Problems& problems);
 
 }  // namespace previz::set

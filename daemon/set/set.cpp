@@ -115,7 +115,8 @@ class Reader {
 
 }  // namespace
 
-Set parse_set(const std::string& text, const std::filesystem::path& file, const Assets& assets) {
+Set parse_set(const std::string& text, const std::filesystem::path& file, const Assets& assets,
+              Origin origin) {
   Problems problems(file.string());
   Draft draft;
   try {
@@ -126,7 +127,7 @@ Set parse_set(const std::string& text, const std::filesystem::path& file, const 
                  "not valid TOML: " + std::string(error.description()));
     problems.throw_if_any();
   }
-  auto set = resolve(std::move(draft), file, assets, problems);
+  auto set = resolve(std::move(draft), file, assets, origin, problems);
   problems.throw_if_any();
   return set;
 }

@@ -18,7 +18,10 @@
 
 namespace previz::set {
 
-enum class Driver { none, replay, v4l2, aravis, libcamera };
+// What `driver` may say beside the names of drivers/camera_drivers.hpp and display_drivers.hpp: a
+// camera is a recorded session, and there is no camera or display at all.
+inline constexpr const char* replay_driver = "replay";
+inline constexpr const char* no_driver = "none";
 
 // How a camera that is no recording is to be driven.
 struct CameraWish {
@@ -29,7 +32,7 @@ struct CameraWish {
 };
 
 struct Observer {
-  Driver driver = Driver::replay;
+  std::string driver = replay_driver;
   std::string device;  // replay: session directory; otherwise the device's stable name
   CameraWish camera;
   std::vector<std::string> faults;  // to rehearse: drivers/faults.hpp says how they are written
@@ -39,7 +42,7 @@ struct Observer {
 };
 
 struct LightCamera {
-  Driver driver = Driver::replay;
+  std::string driver = replay_driver;
   std::string device;
   CameraWish camera;
   std::vector<std::string> faults;  // to rehearse: drivers/faults.hpp says how they are written
@@ -226,11 +229,9 @@ struct Recording {
   bool composite = false;  // what was shown is recorded too
 };
 
-enum class DisplayDriver { none, kms, headless };
-
 // The crew's screen.
 struct Display {
-  DisplayDriver driver = DisplayDriver::none;
+  std::string driver = no_driver;
   std::string connector;            // its stable name; empty: the first that has a screen
   std::optional<DisplayMode> mode;  // absent: what the screen prefers
   DisplayScale scale = DisplayScale::letterbox;
@@ -278,6 +279,10 @@ struct Set {
   Output output;
 };
 
+// Who gives a set file: the crew, who can mend it, or a session that was recorded with it. Buttons
+// that nobody can press are refused in the crew's files only.
+enum class Origin { crew, session };
+
 // Parses TOML text. `file` names it in errors, and its folder is what relative paths are relative
 // to; `assets` maps paths as the set writes them to paths that stand in for them (a session's
 // assets, relative to that folder too). The files of objects and the environment must exist; a
@@ -286,7 +291,8 @@ struct Set {
 // the file's lines: file:line:column: key: what is wrong; what is allowed. Where the text is no
 // TOML at all, that is the one problem, without a key.
 Set parse_set(const std::string& text, const std::filesystem::path& file,
-              const std::vector<std::pair<std::string, std::filesystem::path>>& assets = {});
+              const std::vector<std::pair<std::string, std::filesystem::path>>& assets = {},
+              Origin origin = Origin::crew);
 // The same from a file; throws previz::Error naming it if it cannot be read.
 Set load_set(const std::filesystem::path& file);
 

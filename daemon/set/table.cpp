@@ -4,6 +4,8 @@
 #include <variant>
 
 #include "daemon/set/actions.hpp"
+#include "drivers/camera_drivers.hpp"
+#include "drivers/display_drivers.hpp"
 
 namespace previz {
 
@@ -30,6 +32,27 @@ constexpr Unit seconds{"s", 1}, stops{"stops", 1}, megabytes{"MB", 1};
 constexpr const char* tag_families[] = {"tag36h11",      "tag25h9",          "tag16h5",
                                         "tag36h10",      "tagStandard41h12", "tagStandard52h13",
                                         "tagCircle21h7", "tagCircle49h12",   "tagCustom48h12"};
+
+// A replayed session, the drivers of cameras, none.
+std::span<const char* const> camera_driver_words() {
+  static const std::vector<const char*> words = [] {
+    std::vector<const char*> all{replay_driver};
+    for (const char* name : camera_driver_names()) all.push_back(name);
+    all.push_back(no_driver);
+    return all;
+  }();
+  return words;
+}
+
+std::span<const char* const> display_driver_words() {
+  static const std::vector<const char*> words = [] {
+    std::vector<const char*> all;
+    for (const char* name : display_driver_names()) all.push_back(name);
+    all.push_back(no_driver);
+    return all;
+  }();
+  return words;
+}
 
 Need required(const char* example) {
   return {Need::Kind::required, example};
@@ -65,7 +88,7 @@ Keys set_keys(Set& set) {
 
 Keys observer_keys(Observer& o) {
   return {
-      {"driver", &o.driver, plain, "Driver of the film camera."},
+      {"driver", &o.driver, Rule{.words = camera_driver_words()}, "Driver of the film camera."},
       {"device", &o.device, plain, "The camera's stable name, as `previzd devices` lists it; for replay the folder of the session, relative to this file. Default: the session named on the command line.", optional("\"sessions/take1\"")},
       {"faults", &o.faults, plain, "Faults to simulate, for rehearsals, and the frames at which they happen: drop, corrupt, late, stall, disconnect.", optional("[\"stall@250\", \"disconnect@1000+2.5s\"]")},
       {"exposure", &o.exposure, plain.above(0), "Absolute exposure, which overrides that of the frames: signal = exposure * radiance, where a signal of 1 is the sensor's white.", optional("1.0")},
@@ -98,7 +121,7 @@ Keys light_camera_driving_keys(CameraWish& wish) {
 
 Keys light_camera_keys(LightCamera& c) {
   return {
-      {"driver", &c.driver, plain, "Driver of the light camera, the fisheye that looks at the lamps."},
+      {"driver", &c.driver, Rule{.words = camera_driver_words()}, "Driver of the light camera, the fisheye that looks at the lamps."},
       {"device", &c.device, plain, "As in [observer].", optional("\"sessions/take1\"")},
       {"faults", &c.faults, plain, "As in [observer].", optional("[\"drop@30+5\"]")},
       {"exposure", &c.exposure, plain.above(0), "Absolute exposure, which overrides that of the frames; see [observer].", optional("0.35")},
@@ -240,7 +263,7 @@ Keys quality_keys(Quality& q) {
 
 Keys button_keys(Button& b) {
   return {
-      {"name", &b.name, plain, "The button, as `previzd devices` lists it.", required("\"pedal:left\"")},
+      {"name", &b.name, plain, "The button, as `previzd devices` lists it.", required("\"gpio:rig-buttons:button1\"")},
       {"press", &b.press, plain, "How it is pressed: released at once, held for 0.6 s, or pressed twice within 0.3 s."},
       {"action", &b.action, Rule{.words = action_names()}, "What it does; `previzctl actions` explains each.", required("\"record\"")},
   };
@@ -281,7 +304,7 @@ Keys recording_keys(Recording& r) {
 
 Keys display_keys(Display& d) {
   return {
-      {"driver", &d.driver, plain, "\"kms\": a screen on this computer's graphics card that no window system uses. \"headless\": no screen; the same is drawn and written to screen.png in the output folder about once a second. \"none\": nothing is drawn."},
+      {"driver", &d.driver, Rule{.words = display_driver_words()}, "\"kms\": a screen on this computer's graphics card that no window system uses. \"headless\": no screen; the same is drawn and written to screen.png in the output folder about once a second. \"none\": nothing is drawn."},
       {"connector", &d.connector, plain, "Connector of the screen, as `previzd devices` lists it. Default: the first one that has a screen.", optional("\"HDMI-A-1\"")},
       {"mode", &d.mode, plain, "Size and refresh rate. Default: what the screen prefers.", optional("\"1920x1080@50\"")},
       {"scale", &d.scale, plain, "\"letterbox\": the picture is as large as fits. \"1:1\": each pixel of the picture is one pixel of the screen."},

@@ -17,13 +17,13 @@ namespace fs = std::filesystem;
 pipeline::Take open_replayed_take(const fs::path& set_file) {
   const set::Set set = set::load_set(set_file);
   const set::Observer& observer = set.observer;
-  if (observer.driver != set::Driver::replay || observer.device.empty())
+  if (observer.driver != set::replay_driver || observer.device.empty())
     throw Error(set_file.string() +
                 ": observer: a trade needs a take that is replayed; driver = \"replay\" and the "
                 "session's folder as device are allowed");
   pipeline::Take take = pipeline::open_take(observer.device, set_file);
   const set::LightCamera& light = set.light_camera;
-  if (light.driver == set::Driver::replay && !light.device.empty() &&
+  if (light.driver == set::replay_driver && !light.device.empty() &&
       !fs::equivalent(light.device, observer.device)) {
     session::Session session = session::open_session(light.device);
     take.light = pipeline::light_calibration(set, session.info);

@@ -139,10 +139,10 @@ std::string range(const Rule& rule) {
 }  // namespace codec
 
 std::string Codec<std::string>::read(const Value& value, const Rule& rule) {
-  const auto& text = codec::text(value);
-  if (!rule.words.empty() && std::ranges::find(rule.words, text) == rule.words.end())
-    codec::misread(value, describe(rule));
-  return text;
+  const auto* text = std::get_if<std::string>(&value.data);
+  const bool allowed = text && std::ranges::find(rule.words, *text) != rule.words.end();
+  if (!rule.words.empty() && !allowed) codec::misread(value, describe(rule));
+  return codec::text(value);
 }
 
 std::string Codec<std::string>::describe(const Rule& rule) {

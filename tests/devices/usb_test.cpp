@@ -103,7 +103,8 @@ TEST_P(UsbCamera, ThatIsPluggedInIsTold) {
 std::vector<std::string> drivers_of_usb_cameras() {
   std::vector<std::string> names;
   for (const CameraDriver& driver : camera_drivers())
-    if (driver.name == "v4l2" || driver.name == "libcamera") names.emplace_back(driver.name);
+    if (const std::string name = driver.name; name == "v4l2" || name == "libcamera")
+      names.push_back(name);
   return names;
 }
 

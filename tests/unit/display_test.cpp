@@ -174,7 +174,7 @@ TEST(HeadlessDisplay, IsDarkWithoutAPictureAndWhenReleased) {
 }
 
 TEST(DisplayDrivers, NamesWhatThisBuildHas) {
-  EXPECT_EQ(display_driver("headless").name, "headless");
+  EXPECT_STREQ(display_driver("headless").name, "headless");
   try {
     display_driver("projector");
     FAIL();

@@ -28,7 +28,7 @@ class RigCameras : public testing::Test {
     set::Set set;
     set.file = "stage.toml";
     set.observer.device = take().string();
-    set.light_camera.driver = set::Driver::none;
+    set.light_camera.driver = set::no_driver;
     return set;
   }
 
@@ -72,7 +72,7 @@ TEST_F(RigCameras, LoopedStreamsOfASessionStayTogether) {
   test::write_small_take(directory_.path());
   set::Set set = replayed();
   set.observer.device = (directory_.path() / "session").string();
-  set.light_camera.driver = set::Driver::replay;
+  set.light_camera.driver = set::replay_driver;
   const Cameras cameras = open_cameras(set, /*loop=*/true);
   EXPECT_EQ(cameras.lap_ns, 8 * test::small_take_interval_ns);
   std::vector<FramePtr> frames;
@@ -89,10 +89,10 @@ TEST_F(RigCameras, MistakesNameFileAndKey) {
   set.observer.faults = {"melt@3"};
   EXPECT_THAT(error_of(set), HasSubstr("stage.toml: observer.faults: fault \"melt@3\""));
   set = replayed();
-  set.observer.driver = set::Driver{-1};  // one that this build lacks
+  set.observer.driver = "gopro";  // one that this build lacks
   EXPECT_THAT(error_of(set), HasSubstr("stage.toml: observer.driver: this build drives no"));
   set = replayed();
-  set.light_camera.driver = set::Driver::replay;
+  set.light_camera.driver = set::replay_driver;
   EXPECT_THAT(error_of(set), HasSubstr("the session has no light frames"));
 }
 
@@ -100,8 +100,7 @@ TEST_F(RigCameras, MistakesNameFileAndKey) {
 TEST_F(RigCameras, ACameraThatIsNotThereIsWaitedFor) {
   if (camera_drivers().empty()) GTEST_SKIP() << "this build has no driver for a real camera";
   set::Set set = replayed();
-  set.observer.driver =
-      camera_drivers().back().name == "v4l2" ? set::Driver::v4l2 : set::Driver::aravis;
+  set.observer.driver = camera_drivers().front().name;
   set.observer.device = "missing";
   const Cameras cameras = open_cameras(set);
   const CameraEvent event = cameras.observer->next(milliseconds(0));

@@ -128,7 +128,7 @@ TEST(SetValues, LookTheSameInline) {
   EXPECT_EQ(set.quality.samples, 3);
   ASSERT_EQ(set.tracking.tags.size(), 1u);
   EXPECT_EQ(set.tracking.tags[0].id, 2);
-  EXPECT_EQ(set.observer.driver, Driver::none);
+  EXPECT_EQ(set.observer.driver, no_driver);
 }
 
 TEST(SetValues, RotationTurnsAboutWorldXThenYThenZ) {
