@@ -1,7 +1,6 @@
 // Tracking as a stage: the pose of each observer frame, from the tags or from the session's track.
 #pragma once
 
-#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -10,6 +9,7 @@
 
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/set/set.hpp"
+#include "daemon/tracking/recorded_track.hpp"
 #include "daemon/tracking/tracker.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/session/session.hpp"
@@ -41,19 +41,16 @@ class TrackStage {
   std::vector<std::string> troubles() { return std::exchange(troubles_, {}); }
 
  private:
-  using Records = std::map<std::int64_t, session::TrackRecord>;
-  std::int64_t recorded_ns(const Shot& shot) const;
-  const session::TrackRecord* newest_record(const Shot& shot) const;
-  void track_camera(Shot& shot, const session::TrackRecord* record);
+  void track_camera(Shot& shot);
   void follow_carriers(const Shot& shot);
   void place(Shot& shot, const session::TrackRecord* record) const;
 
   const set::Set set_;
-  std::unique_ptr<tracking::Tracker> tracker_;  // null: recorded poses
+  const std::shared_ptr<const tracking::RecordedTrack> recorded_;
+  const std::unique_ptr<tracking::Tracker> tracker_;
   std::uint64_t next_index_ = 0;
-  std::shared_ptr<const Records> by_timestamp_;  // as recorded
-  std::set<std::string> recorded_carriers_;      // their names
-  std::int64_t start_ns_ = 0, first_ns_ = 0, lap_ns_ = 0;
+  std::set<std::string> recorded_carriers_;  // their names
+  std::int64_t start_ns_ = 0;
   session::Carriers carriers_;
   std::vector<std::string> troubles_;
 };

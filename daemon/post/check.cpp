@@ -20,7 +20,7 @@
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/names.hpp"
 #include "daemon/set/set.hpp"
-#include "daemon/tracking/apriltag_tracker.hpp"
+#include "daemon/tracking/trackers.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 #include "shaders/lib/render_shared.h"
@@ -143,9 +143,7 @@ void check_tracking(Checked& checked, Lines& problems) {
   if (!tracking.enabled && !checked.has_track)
     checked.remarks.push_back("tracking is off: only a session that recorded poses can be used");
   if (tracking.enabled && calibration)
-    attempt(problems, [&] {
-      tracking::make_apriltag_tracker(tracking, calibration->intrinsics, calibration->response);
-    });
+    attempt(problems, [&] { tracking::make_tracker(checked.set, *calibration, nullptr); });
 }
 
 void remark_on_cameras(Checked& checked) {

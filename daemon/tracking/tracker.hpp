@@ -17,7 +17,7 @@ struct Pose {
   // Row-major 6x6, rotation (rad) then translation (m), perturbation in the camera frame.
   std::array<double, 36> covariance{};
   double reprojection_rms_px = 0;
-  std::vector<int> tags;  // ids used
+  std::vector<int> tags;  // ids used; empty where the tracker goes by no tags
 };
 
 // Where a carrier of the set is.
@@ -42,14 +42,17 @@ struct Track {
   std::vector<Pose> candidates;  // ambiguous: both poses, likelier first
   // Lost or ambiguous: why, in plain words. Tracked: which tags were left out and why, if any.
   std::string reason;
-  std::vector<int> seen_tags;          // every id detected, of the map or not
+  std::vector<int> seen_tags;          // every id detected, of the map or not; empty without tags
   std::vector<CarrierTrack> carriers;  // all of the set's
 };
 
 class Tracker {
  public:
   virtual ~Tracker() = default;
-  // Frames in capture order; a tracker may use the last pose. Never throws for picture content.
+  // Where the camera was at the frame's time. A tracker that sees with other eyes than the camera's
+  // (a recorded track, FreeD, motion capture) needs nothing of the frame but its timestamp_ns, and
+  // leaves everything about tags empty. Frames come in capture order; a tracker may use the last
+  // pose. Never throws for picture content.
   virtual Track track(const Frame& frame) = 0;
   // Forgets the last pose (a cut, a seek).
   virtual void reset() = 0;
