@@ -46,13 +46,13 @@ class DeviceUnderTest {
   virtual std::size_t kept_by_others() const { return 0; }
 };
 
-// A driver under test: one line in registry.cpp.
+// A driver under test; registry.cpp lists them.
 struct RegisteredDevice {
   const char* name;
   bool live;         // its frames carry the host's time; those of a replayed take the take's
   bool has_a_cable;  // that can be pulled
   // Null where this machine has no such device; `why_not` then says what is missing.
-  std::unique_ptr<DeviceUnderTest> (*make)(std::string& why_not);
+  std::function<std::unique_ptr<DeviceUnderTest>(std::string& why_not)> make;
 };
 
 inline void PrintTo(const RegisteredDevice& device, std::ostream* out) {

@@ -1,6 +1,8 @@
-// Cameras that are really there: those PREVIZ_TEST_V4L2 and PREVIZ_TEST_LIBCAMERA name (as a set
-// would), or the first that their drivers find. The kernel's vivid does for V4L2 (modprobe vivid).
+// Cameras that are really there: those that PREVIZ_TEST_V4L2 and the like name (as a set would), or
+// the first that their drivers find. The kernel's vivid does for V4L2 (modprobe vivid).
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstdlib>
 #include <optional>
 
@@ -13,8 +15,8 @@ namespace {
 
 class KernelDevice final : public DeviceUnderTest {
  public:
-  KernelDevice(const char* driver, std::string name)
-      : driver_(driver), name_(std::move(name)), cable_(driver, name_) {
+  KernelDevice(std::string driver, std::string name)
+      : driver_(std::move(driver)), name_(std::move(name)), cable_(driver_, name_) {
     drives_exposure_ = open()->set_exposure(some_exposures[0].exposure_s, 1);
   }
 
@@ -45,28 +47,24 @@ class KernelDevice final : public DeviceUnderTest {
     return camera_driver(driver_).open(settings);
   }
 
-  const char* driver_;
+  const std::string driver_;
   const std::string name_;
   KernelCable cable_;
   bool drives_exposure_ = false;
 };
 
-std::unique_ptr<DeviceUnderTest> make(const char* driver, const char* variable) {
-  if (const char* name = std::getenv(variable)) return std::make_unique<KernelDevice>(driver, name);
-  const std::vector<FoundCamera> found = camera_driver(driver).find();
-  return found.empty() ? nullptr : std::make_unique<KernelDevice>(driver, found.front().device);
-}
-
 }  // namespace
 
-std::unique_ptr<DeviceUnderTest> make_v4l2(std::string& why_not) {
-  why_not = "this machine has no V4L2 camera (vivid would do: modprobe vivid)";
-  return make("v4l2", "PREVIZ_TEST_V4L2");
-}
-
-std::unique_ptr<DeviceUnderTest> make_libcamera(std::string& why_not) {
-  why_not = "this machine has no camera that libcamera knows";
-  return make("libcamera", "PREVIZ_TEST_LIBCAMERA");
+std::unique_ptr<DeviceUnderTest> make_found(const std::string& driver, std::string& why_not) {
+  why_not = "this machine has no camera of the driver " + driver +
+            (driver == "v4l2" ? " (vivid would do: modprobe vivid)" : "");
+  std::string variable = "PREVIZ_TEST_" + driver;
+  std::ranges::transform(variable, variable.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  if (const char* name = std::getenv(variable.c_str()))
+    return std::make_unique<KernelDevice>(driver, name);
+  const std::vector<FoundCamera> found = camera_driver(driver).find();
+  return found.empty() ? nullptr : std::make_unique<KernelDevice>(driver, found.front().device);
 }
 
 }  // namespace previz::test
