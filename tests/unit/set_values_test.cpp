@@ -7,6 +7,7 @@
 
 #include "daemon/set/pose.hpp"
 #include "daemon/set/set.hpp"
+#include "drivers/error.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace previz::set {
@@ -129,6 +130,14 @@ TEST(SetValues, LookTheSameInline) {
   ASSERT_EQ(set.tracking.tags.size(), 1u);
   EXPECT_EQ(set.tracking.tags[0].id, 2);
   EXPECT_EQ(set.observer.driver, no_driver);
+}
+
+// A take that was recorded with a button nobody could press is rendered all the same.
+TEST(SetValues, SetsOfSessionsMayNameButtonsThatNoDriverTakes) {
+  const std::string text = "[[button]]\nname = 'pedal:left'\naction = 'record'\n";
+  EXPECT_THROW(parse_set(text, "stage.toml"), Error);
+  const Set set = parse_set(text, "stage.toml", {}, Origin::session);
+  EXPECT_EQ(set.buttons.at(0).name, "pedal:left");
 }
 
 TEST(SetValues, RotationTurnsAboutWorldXThenYThenZ) {

@@ -5,7 +5,7 @@
 #include "drivers/error.hpp"
 
 namespace previz::tracking {
-namespace {
+namespace tracking_recorded_test {
 
 constexpr std::int64_t interval_ns = 40'000'000;
 
@@ -68,5 +68,5 @@ TEST(MakeTracker, SaysWhereRecordedPosesAreMissing) {
   }
 }
 
-}  // namespace
+}  // namespace tracking_recorded_test
 }  // namespace previz::tracking
