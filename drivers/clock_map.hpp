@@ -18,9 +18,6 @@ class ClockMap {
   // go backwards (the device started anew) begin a new map.
   std::int64_t to_host(std::int64_t device_ns, std::int64_t arrival_ns);
 
-  // How much faster the host's clock runs than the device's, as estimated: 1e-6 is one ppm.
-  double skew() const { return skew_; }
-
  private:
   struct Point {
     double device_s;  // since the map began
@@ -35,7 +32,7 @@ class ClockMap {
   std::int64_t last_device_ns_ = 0;
   std::int64_t last_host_ns_ = INT64_MIN;
   std::deque<Point> least_;  // the point of least delay of each second
-  double skew_ = 0;
+  double skew_ = 0;  // how much faster the host's clock runs than the device's, as estimated
 };
 
 }  // namespace previz

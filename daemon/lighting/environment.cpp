@@ -74,17 +74,4 @@ glm::dvec3 total_flux(const EnvironmentMap& map) {
   return sum * texel_sr(map.size);
 }
 
-glm::dvec3 irradiance(const EnvironmentMap& map, const glm::dvec3& normal) {
-  glm::dvec3 sum(0);
-  for (int j = 0; j < map.size; ++j) {
-    for (int i = 0; i < map.size; ++i) {
-      const glm::dvec3 direction(texel_direction(map.size, i, j));
-      const double cosine = glm::dot(direction, normal);
-      if (cosine > 0)
-        sum += cosine * glm::dvec3(map.radiance[static_cast<std::size_t>(j * map.size + i)]);
-    }
-  }
-  return sum * texel_sr(map.size);
-}
-
 }  // namespace previz::lighting

@@ -72,7 +72,5 @@ std::size_t wrapped_texel(int size, int i, int j);
 
 // Integral of radiance over all directions, per channel.
 glm::dvec3 total_flux(const EnvironmentMap& map);
-// Irradiance on a plane of this unit normal, per channel.
-glm::dvec3 irradiance(const EnvironmentMap& map, const glm::dvec3& normal);
 
 }  // namespace previz::lighting

@@ -4,7 +4,6 @@
 #include <ImfChromaticities.h>
 #include <ImfFrameBuffer.h>
 #include <ImfInputFile.h>
-#include <ImfOutputFile.h>
 #include <ImfStandardAttributes.h>
 
 #include <array>
@@ -93,27 +92,6 @@ LinearPicture read_exr_picture(const std::filesystem::path& path, std::vector<st
     throw;
   } catch (const std::exception& error) {
     throw Error(path.string() + ": cannot be read as OpenEXR: " + error.what());
-  }
-}
-
-void write_exr_picture(const std::filesystem::path& path, const LinearPicture& picture) {
-  try {
-    Imf::Header header(picture.width, picture.height);
-    header.compression() = Imf::ZIP_COMPRESSION;
-    Imf::FrameBuffer buffer;
-    const std::array<const char*, 3> names{"R", "G", "B"};
-    for (std::size_t c = 0; c < 3; ++c) {
-      header.channels().insert(names[c], Imf::Channel(Imf::FLOAT));
-      buffer.insert(names[c],
-                    Imf::Slice::Make(Imf::FLOAT, &picture.radiance[0][static_cast<int>(c)],
-                                     header.dataWindow(), sizeof(glm::vec3),
-                                     sizeof(glm::vec3) * static_cast<std::size_t>(picture.width)));
-    }
-    Imf::OutputFile file(path.c_str(), header);
-    file.setFrameBuffer(buffer);
-    file.writePixels(picture.height);
-  } catch (const std::exception& error) {
-    throw Error(path.string() + ": cannot be written: " + error.what());
   }
 }
 

@@ -19,7 +19,4 @@ struct LinearPicture {
 // the channels found where those are missing.
 LinearPicture read_exr_picture(const std::filesystem::path& path, std::vector<std::string>& notes);
 
-// 32-bit float RGB. Throws previz::Error naming the file.
-void write_exr_picture(const std::filesystem::path& path, const LinearPicture& picture);
-
 }  // namespace previz::lighting

@@ -165,9 +165,4 @@ HdrPicture merge(const Bracket& bracket, const SensorNoise& noise) {
   return picture;
 }
 
-HdrPicture merge_exposures(std::span<const FramePtr> frames, const ResponseCurve& response,
-                           const glm::dvec3& dark_level, const SensorNoise& noise) {
-  return merge(Bracket(frames, response, dark_level), noise);
-}
-
 }  // namespace previz::lighting

@@ -41,9 +41,4 @@ struct HdrPicture {
 // only where nothing better is there. Where every frame is clipped or black, see HdrPicture.
 HdrPicture merge(const Bracket& bracket, const SensorNoise& noise = {});
 
-// The same of frames; throws as Bracket does.
-HdrPicture merge_exposures(std::span<const FramePtr> frames, const ResponseCurve& response,
-                           const glm::dvec3& dark_level = glm::dvec3(0),
-                           const SensorNoise& noise = {});
-
 }  // namespace previz::lighting

@@ -25,9 +25,6 @@ void apply_mode(Lighting& lighting, const set::Lighting& settings, SourceTracker
 
 // How far from the viewpoint a source in this direction is, metres; nothing: at infinity.
 using SourceDistance = std::function<std::optional<double>(const glm::dvec3& direction)>;
-inline std::optional<double> at_infinity(const glm::dvec3&) {
-  return std::nullopt;
-}
 
 // A lamp for each source, the same in both worlds: a distant disc, or a sphere at its distance from
 // `viewpoint` (world, metres) that sends there the same flux under the same solid angle.

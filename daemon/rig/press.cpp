@@ -72,12 +72,4 @@ std::vector<Press> PressRecognizer::tick(std::int64_t now_ns) {
   return presses;
 }
 
-std::optional<std::int64_t> PressRecognizer::deadline() const {
-  std::optional<std::int64_t> first;
-  for (const auto& [name, button] : buttons_)
-    if (const std::optional<std::int64_t> at = due(button); at && (!first || *at < *first))
-      first = at;
-  return first;
-}
-
 }  // namespace previz::rig

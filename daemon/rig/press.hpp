@@ -34,9 +34,9 @@ class PressRecognizer {
 
   // Edges of one button must come in the order of time; those of different buttons need not.
   std::vector<Press> edge(const ButtonEvent& event);
-  // The presses that became certain by the passing of time; call it at deadline(), or often.
+  // Returns the presses that became certain by the passing of time. Call it every few hundredths of
+  // a second.
   std::vector<Press> tick(std::int64_t now_ns);
-  std::optional<std::int64_t> deadline() const;
 
  private:
   enum class Phase { idle, down, certain, released };

@@ -5,9 +5,9 @@
 #include <cstdio>
 #include <map>
 
-#include "daemon/lighting/preview.hpp"
 #include "daemon/output/png.hpp"
 #include "drivers/error.hpp"
+#include "tests/support/lighting.hpp"
 #include "tests/truth/lighting_measure.hpp"
 
 namespace {

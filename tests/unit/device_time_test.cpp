@@ -44,7 +44,6 @@ TEST(ClockMap, FollowsAClockThatRunsFastOrSlow) {
         EXPECT_NEAR(double(host - device.host(i) - device.least), 0, 0.5 * ms) << i;
       }
     }
-    EXPECT_NEAR(map.skew(), skew, 20e-6);  // 0.5 ms over 25 s
   }
 }
 

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "daemon/lighting/hdr.hpp"
+#include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 
 namespace previz::lighting {

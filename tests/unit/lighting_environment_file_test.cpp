@@ -15,8 +15,8 @@
 
 #include "daemon/lighting/exr_picture.hpp"
 #include "daemon/lighting/lighting.hpp"
-#include "daemon/lighting/preview.hpp"
 #include "drivers/error.hpp"
+#include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/temporary_directory.hpp"
 

@@ -9,6 +9,7 @@
 
 #include "daemon/lighting/response.hpp"
 #include "drivers/error.hpp"
+#include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 
 namespace previz::lighting {

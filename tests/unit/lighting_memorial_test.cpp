@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/lighting/hdr.hpp"
+#include "tests/support/lighting.hpp"
 
 namespace previz::lighting {
 namespace lighting_memorial_test {

@@ -12,10 +12,10 @@
 #include <optional>
 #include <sstream>
 
-#include "daemon/lighting/exr_picture.hpp"
 #include "daemon/post/render.hpp"
 #include "daemon/rig/live.hpp"
 #include "drivers/session/session.hpp"
+#include "tests/support/lighting.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/temporary_directory.hpp"

@@ -94,21 +94,5 @@ TEST(Presses, EdgesThatDoNotPairAreHarmless) {
             (Told{{40, short_press}}));
 }
 
-TEST(Presses, TheDeadlineIsTheNextThingThatTimeDecides) {
-  PressRecognizer recognizer({mapped(short_press), mapped(long_press), mapped(short_press, "blue"),
-                              mapped(double_press, "blue")});
-  EXPECT_FALSE(recognizer.deadline());
-  recognizer.edge({"red", true, 0});
-  EXPECT_EQ(recognizer.deadline(), PressRecognizer::long_ns);
-  recognizer.edge({"blue", true, 100 * ms});
-  EXPECT_EQ(recognizer.deadline(), PressRecognizer::long_ns);  // blue has no long press
-  recognizer.edge({"blue", false, 150 * ms});
-  EXPECT_EQ(recognizer.deadline(), 150 * ms + PressRecognizer::double_ns);
-  EXPECT_EQ(recognizer.tick(450 * ms).size(), 1u);
-  EXPECT_EQ(recognizer.deadline(), PressRecognizer::long_ns);
-  recognizer.edge({"red", false, 500 * ms});
-  EXPECT_FALSE(recognizer.deadline());
-}
-
 }  // namespace rig_press_test
 }  // namespace previz::rig

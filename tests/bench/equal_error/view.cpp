@@ -6,6 +6,7 @@
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
+#include "tests/support/lighting.hpp"
 #include "tests/truth/cpu_camera.hpp"
 
 namespace previz::bench {
