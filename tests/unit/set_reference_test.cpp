@@ -81,17 +81,52 @@ TEST(SetReference, ExamplesAreOfTheRightKind) {
   }
 }
 
+const auto example_file = config / "set.example.toml";
+
 // The example's files are the crew's own; any file stands in for them here.
+Set example(const std::string& text) {
+  const auto& any = example_file;
+  return parse_set(text, any,
+                   {{"stage/set.glb", any}, {"stage/creature.glb", any}, {"stage/lamp.glb", any}});
+}
+
 TEST(SetExample, Parses) {
-  const auto file = config / "set.example.toml";
-  const auto set =
-      parse_set(contents(file), file,
-                {{"stage/set.glb", file}, {"stage/creature.glb", file}, {"stage/lamp.glb", file}});
+  const Set set = example(contents(example_file));
   EXPECT_EQ(set.tracking.tags.size(), 3u);
   EXPECT_EQ(set.objects.size(), 3u);
-  EXPECT_EQ(set.lights.size(), 3u);
+  EXPECT_EQ(set.lights.size(), 2u);
   ASSERT_TRUE(set.observer.calibration && set.observer.calibration->lens);
   EXPECT_TRUE(set.light_camera.calibration);
+}
+
+// A crew that copies it has cameras, a screen, buttons, and a picture that keeps up with them.
+TEST(SetExample, IsALiveSet) {
+  const Set set = example(contents(example_file));
+  EXPECT_NE(set.observer.driver, Driver::replay);
+  EXPECT_NE(set.light_camera.driver, Driver::replay);
+  EXPECT_GT(set.light_camera.camera.bracket_s.size(), 1u);
+  EXPECT_EQ(set.display.driver, DisplayDriver::kms);
+  EXPECT_GT(set.quality.fps, 0);
+  EXPECT_FALSE(set.buttons.empty());
+  for (const Button& button : set.buttons)
+    EXPECT_TRUE(button.name.starts_with("gpio:") || button.name.starts_with("hid:")) << button.name;
+}
+
+// Its commented alternative: a recorded take in the camera's place.
+TEST(SetExample, CanReplayATake) {
+  std::string text = contents(example_file);
+  const std::string alternative = "# driver = \"replay\"\n# device = \"takes/12A_take003\"\n";
+  ASSERT_NE(text.find(alternative), std::string::npos);
+  const std::size_t begin = text.find("driver = \"v4l2\"");
+  const std::size_t end = text.find("# What is left out");
+  ASSERT_LT(begin, end);
+  text.replace(begin, end - begin, "driver = \"replay\"\ndevice = \"takes/12A_take003\"\n\n");
+  EXPECT_EQ(example(text).observer.driver, Driver::replay);
+}
+
+// `previzd run` on it keeps up with the take on any machine.
+TEST(SetDemo, HoldsARate) {
+  EXPECT_GT(load_set(config / "demo/demo.toml").quality.fps, 0);
 }
 
 }  // namespace set_reference_test
