@@ -68,6 +68,8 @@ struct Plate {
   std::vector<std::uint16_t> samples;  // 3*width*height, row-major, 0..2^bits-1
 };
 
+using PlatePtr = std::shared_ptr<const Plate>;
+
 // Converts a frame to its RGB plate. Bayer is demosaiced(), other gray repeats the sample; yuv422p8
 // is BT.709 limited range (ITU-R BT.709-6), chroma sited on the even columns and linear between
 // them, rounded to nearest, clipped to 0..255. Throws previz::Error if `bytes` has not the length

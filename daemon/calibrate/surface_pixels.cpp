@@ -5,9 +5,8 @@
 #include <optional>
 
 #include "daemon/lighting/response.hpp"
-#include "daemon/pipeline/light_stage.hpp"
 #include "daemon/pipeline/preview_size.hpp"
-#include "daemon/pipeline/track_stage.hpp"
+#include "daemon/pipeline/take_shots.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::calibrate {
@@ -89,21 +88,22 @@ std::vector<bool> blinded(const Plate& plate, int width, int height) {
   return blind;
 }
 
-// All light in one picture, lamps and all: what is compared does not depend on finding them.
-set::Set lit_by_image(set::Set set) {
-  set.lighting.mode = set::LightMode::image;
-  return set;
+// The light camera's own picture, lamps and all: what is compared depends neither on finding lamps
+// nor on what the film camera sees.
+set::Lighting lit_by_image(set::Lighting lighting) {
+  lighting.mode = set::LightMode::image;
+  if (lighting.unseen == set::UnseenRule::observer) lighting.unseen = set::UnseenRule::horizon;
+  return lighting;
 }
 
 class Probe {
  public:
-  Probe(pipeline::Take& take, const scene::Scene& scene,
+  Probe(const pipeline::Take& take, const scene::Scene& scene,
         const std::shared_ptr<render::Device>& device, const ProbeOptions& options)
       : take_(take),
         options_(options),
         scale_(std::min(1.0, double(options.width) / take.observer.intrinsics.width)),
         small_(pipeline::scaled(take.observer, scale_)),
-        light_stage_(lit_by_image(take.set), take.light, take.observer),
         worlds_(device, paired(take.set), small_),
         identity_(device, paired(take.set), small_) {
     const scene::Scene real = real_world(scene);
@@ -113,12 +113,22 @@ class Probe {
   }
 
   SurfacePixels run() {
-    const auto frames = tracked_frames();
-    for (const pipeline::Shot& shot : frames) {
-      see_light_until(shot.frame->timestamp_ns);
-      const pipeline::LightPtr light = light_stage_.light();
-      if (!light) continue;
-      worlds_.set_environment(light->lighting.environment, take_.set.lighting.sampling);
+    // The take is divided into equal shares, and the first tracked frame of each is probed.
+    const std::size_t count = take_.observer_stream->records().size();
+    const auto shares = std::size_t(options_.frames);
+    std::size_t share = 0;
+    pipeline::TakeShotsOptions options;
+    options.wanted = [&](std::uint64_t frame) {
+      return share < shares && frame >= share * count / shares;
+    };
+    options.lighting = lit_by_image(take_.set.lighting);
+    options.from_start = false;
+    for (pipeline::Shot& shot : pipeline::TakeShots(take_, options)) {
+      if (!shot.track.pose) continue;
+      do ++share;
+      while (share < shares && share * count / shares <= shot.index);
+      if (!shot.light) continue;
+      worlds_.set_environment(shot.light->lighting.environment, take_.set.lighting.sampling);
       add(shot);
       ++found_.frames;
     }
@@ -136,43 +146,14 @@ class Probe {
     return estimation;
   }
 
-  // As many as asked for, spread evenly over those that are tracked.
-  std::vector<pipeline::Shot> tracked_frames() {
-    const std::size_t count = take_.observer_stream->records().size();
-    const auto wanted = std::size_t(options_.frames);
-    std::vector<pipeline::Shot> shots;
-    pipeline::TrackStage track(take_.set, take_.observer, take_.session.track,
-                               pipeline::start_of(take_));
-    for (std::size_t i = 0; i < wanted; ++i) {
-      // The first that is tracked from here to where the next one's share begins; from the end for
-      // the last, since light comes after the first pictures of some takes.
-      for (std::size_t f = i * count / wanted; f < (i + 1) * count / wanted; ++f) {
-        pipeline::Shot shot;
-        shot.index = f;
-        shot.frame = take_.observer_stream->read(f);
-        track(shot);
-        if (!shot.track.pose) continue;
-        shots.push_back(std::move(shot));
-        break;
-      }
-    }
-    return shots;
-  }
-
-  void see_light_until(std::int64_t timestamp_ns) {
-    if (!take_.light_stream || !light_stage_.needs_frames()) return;
-    const auto& records = take_.light_stream->records();
-    for (; next_light_ < records.size() && records[next_light_].timestamp_ns <= timestamp_ns;
-         ++next_light_)
-      light_stage_.see(take_.light_stream->read(next_light_), next_light_);
-  }
-
-  void add(const pipeline::Shot& shot) {
-    const Plate full = to_plate(*shot.frame);
+  void add(pipeline::Shot& shot) {
+    const Plate& full = *plate_of(shot);
     const lighting::Response response(take_.observer.response, full.bits);
-    const Plate plate = pipeline::scaled(full, scale_, response);
+    const auto scaled_plate =
+        std::make_shared<const Plate>(pipeline::scaled(full, scale_, response));
+    const Plate& plate = *scaled_plate;
     const double exposure = take_.set.observer.exposure.value_or(shot.frame->exposure);
-    const render::FrameInput input{plate, exposure, shot.track.pose->world_from_camera};
+    const render::FrameInput input{scaled_plate, exposure, shot.track.pose->world_from_camera};
     identity_.begin(input);
     identity_.render(identity_samples);
     worlds_.begin(input);
@@ -207,19 +188,17 @@ class Probe {
     return std::uint32_t((found_.frames * tiles_a_side + row) * tiles_a_side + column);
   }
 
-  pipeline::Take& take_;
+  const pipeline::Take& take_;
   const ProbeOptions options_;
   const double scale_;
   const ObserverCalibration small_;
-  pipeline::LightStage light_stage_;
   render::Renderer worlds_, identity_;
-  std::size_t next_light_ = 0;
   SurfacePixels found_;
 };
 
 }  // namespace
 
-SurfacePixels probe_surfaces(pipeline::Take& take, const scene::Scene& scene,
+SurfacePixels probe_surfaces(const pipeline::Take& take, const scene::Scene& scene,
                              const std::shared_ptr<render::Device>& device,
                              const ProbeOptions& options) {
   return Probe(take, scene, device, options).run();

@@ -46,7 +46,7 @@ struct ProbeOptions {
 // white. Diffuse: opaque, no metal, nothing transmitted or emitted, and no coat smoother than
 // roughness 0.5. Surfaces of the same material name are one.
 // Throws previz::Error if no frame is tracked and lit.
-SurfacePixels probe_surfaces(pipeline::Take& take, const scene::Scene& scene,
+SurfacePixels probe_surfaces(const pipeline::Take& take, const scene::Scene& scene,
                              const std::shared_ptr<render::Device>& device,
                              const ProbeOptions& options);
 

@@ -21,7 +21,8 @@ struct LightFrame {
 
 // A picture of the film camera whose pose is known.
 struct ObserverView {
-  FramePtr frame;
+  PlatePtr plate;
+  double exposure = 1;  // of its frame
   glm::dmat4 world_from_camera{1.0};
 };
 

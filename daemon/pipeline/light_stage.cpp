@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "daemon/lighting/light_mode.hpp"
-#include "daemon/pipeline/light_record.hpp"
+#include "daemon/lighting/sources.hpp"
 #include "daemon/pipeline/room_model.hpp"
 #include "daemon/set/names.hpp"
 #include "drivers/bracket.hpp"
@@ -12,6 +12,26 @@
 
 namespace previz::pipeline {
 namespace {
+
+// The light as track.jsonl carries it: its sources, and everything else as lighting::blurred leaves
+// it. Light of lighting.mode = "sources" comes back from that as it was, bit for bit.
+session::CapturedLight to_record(const lighting::Lighting& lighting) {
+  session::CapturedLight record;
+  for (const lighting::Source& source : lighting.sources)
+    record.sources.push_back({source.id, source.direction, source.solid_angle_sr, source.flux});
+  lighting::EnvironmentMap ambient = lighting::blurred(lighting.environment);
+  record.ambient_size = ambient.size;
+  record.ambient = std::move(ambient.radiance);
+  return record;
+}
+
+lighting::Lighting from_record(const session::CapturedLight& record) {
+  lighting::Lighting lighting;
+  for (const session::CapturedSource& source : record.sources)
+    lighting.sources.push_back({source.id, source.direction, source.solid_angle_sr, source.flux});
+  lighting.environment = {record.ambient_size, record.ambient};
+  return lighting;
+}
 
 bool is_exposure(double exposure) {
   return exposure > 0 && std::isfinite(exposure);
@@ -144,9 +164,10 @@ void LightStage::see(FramePtr frame, std::uint64_t index) {
   changed_ = true;
 }
 
-void LightStage::see_observer(const Frame& frame, const glm::dmat4& world_from_camera) {
+void LightStage::see_observer(const Plate& plate, double exposure,
+                              const glm::dmat4& world_from_camera) {
   if (!observed_) return;
-  observed_->see(to_plate(frame), observer_exposure_.value_or(frame.exposure), world_from_camera);
+  observed_->see(plate, observer_exposure_.value_or(exposure), world_from_camera);
   changed_ = changed_ || !newest_.empty();
 }
 

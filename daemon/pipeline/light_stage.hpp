@@ -44,8 +44,8 @@ class LightStage {
   // than the calibration's, no exposure) is left out, the light stays as it was, and troubles()
   // says so.
   void see(FramePtr frame, std::uint64_t index);
-  // The film camera's picture, its pose known.
-  void see_observer(const Frame& frame, const glm::dmat4& world_from_camera);
+  // A picture of the film camera, with the exposure that its frame states.
+  void see_observer(const Plate& plate, double exposure, const glm::dmat4& world_from_camera);
 
   // The light from what was seen so far, computed only if that changed. Null: nothing usable yet.
   LightPtr light();

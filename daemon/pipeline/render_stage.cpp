@@ -55,7 +55,6 @@ RenderStage::RenderStage(std::shared_ptr<render::Device> device, const set::Set&
 }
 
 void RenderStage::operator()(Shot& shot) {
-  if (!shot.wanted) return;
   const auto start = std::chrono::steady_clock::now();
   if (!begin(shot)) return;
   const Refined refined = refine(
@@ -72,7 +71,7 @@ void RenderStage::operator()(Shot& shot) {
 
 bool RenderStage::begin(Shot& shot) {
   shot.whole = false;
-  Plate plate = plate_of(*shot.frame);
+  PlatePtr plate = sized_plate_of(shot);
   const auto untouched = [&](std::string reason) {
     pass_through(shot, std::move(plate), std::move(reason));
     return false;
@@ -102,15 +101,17 @@ void RenderStage::finish(Shot& shot) {
   shot.counters = renderer_.counters();
   const bool composite = view_ == render::View::composite;
   if (composite && !options_.layers) {
-    shot.picture = renderer_.show(set_.quality.denoise);
+    shot.picture = std::make_shared<const Plate>(renderer_.show(set_.quality.denoise));
     return;
   }
-  render::Layers layers = renderer_.layers();
-  if (options_.layers) error_ = render::estimate_error(layers).picture;
+  const auto layers = std::make_shared<render::Layers>(renderer_.layers());
+  if (options_.layers) error_ = render::estimate_error(*layers).picture;
+  Plate picture;
   if (composite || set_.quality.denoise)
-    shot.picture = renderer_.show(set_.quality.denoise, &layers);
-  if (!composite) shot.picture = picture_of(view_, layers, *response_, exposure_of(shot));
-  if (options_.layers) shot.layers = std::move(layers);
+    picture = renderer_.show(set_.quality.denoise, layers.get());
+  if (!composite) picture = picture_of(view_, *layers, *response_, exposure_of(shot));
+  shot.picture = std::make_shared<const Plate>(std::move(picture));
+  if (options_.layers) shot.layers = layers;
 }
 
 void RenderStage::resize(double scale) {
@@ -131,21 +132,23 @@ void RenderStage::place(const session::SceneState& state) {
   placed_ = state;
 }
 
-Plate RenderStage::plate_of(const Frame& frame) {
-  Plate plate = to_plate(frame);
-  if (!response_ || response_->bits() != plate.bits)
-    response_.emplace(calibration_.response, plate.bits);
+PlatePtr RenderStage::sized_plate_of(Shot& shot) {
+  const PlatePtr& plate = plate_of(shot);
+  if (!response_ || response_->bits() != plate->bits)
+    response_.emplace(calibration_.response, plate->bits);
   if (options_.scale == 1) return plate;
   const PinholeIntrinsics& lens = calibration_.intrinsics;
-  if (plate.width != lens.width || plate.height != lens.height)
-    throw Error("observer: a frame of " + std::to_string(plate.width) + "x" +
-                std::to_string(plate.height) + " does not fit the calibration's " +
+  if (plate->width != lens.width || plate->height != lens.height)
+    throw Error("observer: a frame of " + std::to_string(plate->width) + "x" +
+                std::to_string(plate->height) + " does not fit the calibration's " +
                 std::to_string(lens.width) + "x" + std::to_string(lens.height));
-  return scaled(plate, options_.scale, *response_);
+  return std::make_shared<const Plate>(scaled(*plate, options_.scale, *response_));
 }
 
-void RenderStage::pass_through(Shot& shot, Plate plate, std::string reason) const {
-  if (options_.layers) shot.layers = plate_layers(plate, exposure_of(shot), *response_);
+void RenderStage::pass_through(Shot& shot, PlatePtr plate, std::string reason) const {
+  if (options_.layers)
+    shot.layers =
+        std::make_shared<const render::Layers>(plate_layers(*plate, exposure_of(shot), *response_));
   shot.untouched = std::move(reason);
   shot.picture = std::move(plate);
   shot.whole = true;

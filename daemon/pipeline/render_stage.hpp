@@ -57,8 +57,8 @@ class RenderStage {
   bool cancelled() const { return options_.cancelled && options_.cancelled(); }
   double exposure_of(const Shot& shot) const;
   void place(const session::SceneState& state);
-  Plate plate_of(const Frame& frame);
-  void pass_through(Shot& shot, Plate plate, std::string reason) const;
+  PlatePtr sized_plate_of(Shot& shot);
+  void pass_through(Shot& shot, PlatePtr plate, std::string reason) const;
 
   set::Set set_;
   const ObserverCalibration calibration_;       // at the observer's size

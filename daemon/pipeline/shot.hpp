@@ -31,8 +31,8 @@ using LightPtr = std::shared_ptr<const Light>;
 struct Shot {
   // From the observer.
   std::uint64_t index = 0;  // in the stream, from 0
-  bool wanted = true;       // false: it is passed through for the light of later ones only
   FramePtr frame;
+  PlatePtr plate;  // the frame converted; null until plate_of() was called
   std::chrono::steady_clock::time_point arrived;  // when the daemon got it
 
   // From tracking and lighting.
@@ -45,8 +45,8 @@ struct Shot {
 
   // From rendering. `untouched` says why the plate passes through as it is; empty: it was rendered.
   std::string untouched;
-  Plate picture;
-  render::Layers layers;  // empty where the pipeline shows pictures only
+  PlatePtr picture;
+  std::shared_ptr<const render::Layers> layers;  // null where the pipeline shows pictures only
   render::Counters counters;
   bool whole = false;  // false: interrupted before its last sample
   double render_s = 0;
@@ -54,5 +54,11 @@ struct Shot {
   int samples = 0;      // of the picture; 0: untouched
   bool frozen = false;  // a round of refining one frame, not a new one
 };
+
+// The shot's frame as a plate, converted by the first call.
+inline const PlatePtr& plate_of(Shot& shot) {
+  if (!shot.plate) shot.plate = std::make_shared<const Plate>(to_plate(*shot.frame));
+  return shot.plate;
+}
 
 }  // namespace previz::pipeline

@@ -19,8 +19,8 @@ struct Take {
   std::string set_text;  // what `set` was read from
   ObserverCalibration observer;
   std::optional<LightCameraCalibration> light;  // absent: only an environment file can light it
-  std::unique_ptr<session::StreamReader> observer_stream;  // never null
-  std::unique_ptr<session::StreamReader> light_stream;     // null: none was recorded
+  std::shared_ptr<session::StreamReader> observer_stream;  // never null
+  std::shared_ptr<session::StreamReader> light_stream;     // null: none was recorded
 };
 
 // `set_file` instead of the set the session carries; files it names that are not beside it are

@@ -36,7 +36,7 @@ FinishedFrame finished_frame(const pipeline::Shot& shot) {
   frame.timestamp_ns = shot.frame->timestamp_ns;
   frame.status = shot.untouched.empty() ? FrameStatus::rendered : FrameStatus::untouched;
   frame.reason = shot.untouched;
-  frame.samples = shot.layers.samples;
+  frame.samples = shot.layers->samples;
   frame.render_s = shot.render_s;
   frame.error = shot.error;
   frame.pose = shot.track.pose;

@@ -9,21 +9,18 @@
 #include <ostream>
 #include <set>
 #include <utility>
-#include <variant>
 
 #include "daemon/output/progress.hpp"
-#include "daemon/pipeline/recorded_light.hpp"
 #include "daemon/pipeline/refinement.hpp"
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/stages.hpp"
 #include "daemon/pipeline/take.hpp"
-#include "daemon/pipeline/track_stage.hpp"
+#include "daemon/pipeline/take_shots.hpp"
 #include "daemon/post/render_directory.hpp"
 #include "daemon/report/report.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/names.hpp"
 #include "drivers/error.hpp"
-#include "drivers/replay/replay_camera.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::post {
@@ -83,111 +80,6 @@ FrameRange range_of(const RenderOptions& options, const pipeline::Take& take) {
   return range;
 }
 
-// Shots of the frames that are still to do (not empty), straight from the replay driver. With
-// `from_start` those before them come too, not wanted.
-class ObserverSource {
- public:
-  ObserverSource(pipeline::Take& take, std::set<std::uint64_t> to_do, bool from_start,
-                 output::Progress& progress, pipeline::Metrics& metrics)
-      : next_(from_start ? 0 : *to_do.begin()),
-        from_start_(from_start),
-        to_do_(std::move(to_do)),
-        progress_(progress),
-        metrics_(metrics) {
-    ReplayOptions options;
-    options.speed = 0;
-    options.first = next_;
-    options.last = *to_do_.rbegin();
-    camera_ = replay(std::move(take.observer_stream), "observer", options);
-    camera_->start();
-  }
-
-  std::optional<Shot> operator()() {
-    for (;;) {
-      CameraEvent event = camera_->next(std::chrono::milliseconds(100));
-      if (std::holds_alternative<EndOfStream>(event)) return std::nullopt;
-      if (std::holds_alternative<NoFrame>(event)) continue;
-      const std::uint64_t index = next_++;
-      if (const auto* trouble = std::get_if<DeviceTrouble>(&event)) {
-        progress_.note(trouble->device + ": " + trouble->what);
-        metrics_.dropped("observer", "device trouble");
-      } else if (from_start_ || to_do_.contains(index)) {
-        Shot shot;
-        shot.index = index;
-        shot.wanted = to_do_.contains(index);
-        shot.frame = std::get<FramePtr>(std::move(event));
-        shot.arrived = std::chrono::steady_clock::now();
-        return shot;
-      }
-    }
-  }
-
- private:
-  std::unique_ptr<Camera> camera_;
-  std::uint64_t next_;
-  const bool from_start_;
-  const std::set<std::uint64_t> to_do_;
-  output::Progress& progress_;
-  pipeline::Metrics& metrics_;
-};
-
-// Gives each shot its recorded light, and reports once what the estimate has to say.
-class LightSource {
- public:
-  LightSource(pipeline::Take& take, output::Progress& progress, pipeline::Metrics& metrics)
-      : light_(take.set, take.light, take.observer, std::move(take.light_stream),
-               take.session.directory),
-        progress_(progress),
-        metrics_(metrics) {}
-
-  bool remembers() const { return light_.remembers(); }
-
-  void operator()(Shot& shot) {
-    shot.light = light_.at(shot);
-    for (const std::string& trouble : light_.troubles()) {
-      note(trouble);
-      metrics_.dropped("lighting", "not usable");
-    }
-    if (!shot.light) return;
-    for (const std::string& what : shot.light->lighting.report.notes) note(what);
-  }
-
- private:
-  void note(const std::string& what) {
-    if (noted_.is_first(report::wording(what))) progress_.note("light: " + what);
-  }
-
-  pipeline::RecordedLight light_;
-  report::Once noted_;
-  output::Progress& progress_;
-  pipeline::Metrics& metrics_;
-};
-
-// Gives each shot its poses, and reports what is not found.
-class TrackSource {
- public:
-  TrackSource(const pipeline::Take& take, output::Progress& progress, pipeline::Metrics& metrics)
-      : track_(take.set, take.observer, take.session.track, pipeline::start_of(take)),
-        progress_(progress),
-        metrics_(metrics) {}
-
-  bool remembers() const { return track_.remembers(); }
-
-  void operator()(Shot& shot) {
-    track_(shot);
-    for (const std::string& trouble : track_.troubles()) {
-      metrics_.count("carrier not found");
-      if (noted_.is_first(report::wording(trouble))) progress_.note(trouble);
-    }
-  }
-
- private:
-  pipeline::TrackStage track_;
-  report::Once noted_;
-  output::Progress& progress_;
-  pipeline::Metrics& metrics_;
-};
-
 std::string percent_words(double share) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.2g %%", 100 * share);
@@ -197,7 +89,7 @@ std::string percent_words(double share) {
 std::string done_text(const Shot& shot) {
   const std::string frame = "frame " + std::to_string(shot.index) + ": ";
   if (!shot.untouched.empty()) return frame + "plate untouched, " + shot.untouched;
-  std::string text = frame + std::to_string(shot.layers.samples) + " samples in " +
+  std::string text = frame + std::to_string(shot.layers->samples) + " samples in " +
                      output::duration_words(shot.render_s);
   if (shot.error > 0) text += ", error " + percent_words(shot.error);
   return text;
@@ -282,9 +174,14 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
         << quality_words(set.quality) << ", on " << render::device_name(*device) << std::endl;
 
     output::Progress progress(out, options.terminal, to_do.size(), now_s());
-    LightSource light(take, progress, metrics);
-    TrackSource track(take, progress, metrics);
-    ObserverSource observer(take, to_do, light.remembers() || track.remembers(), progress, metrics);
+    pipeline::TakeShots shots(take,
+                              {.first = *to_do.begin(),
+                               .last = *to_do.rbegin(),
+                               .wanted = [&](std::uint64_t frame) { return to_do.contains(frame); },
+                               .note = [&](const std::string& what) { progress.note(what); },
+                               .metrics = &metrics,
+                               .stop = options.stop});
+    report::Once light_notes;
     pipeline::RenderStageOptions render_options;
     render_options.layers = true;
     render_options.cancelled = [&] { return options.stop.stop_requested(); };
@@ -294,19 +191,20 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
     render_options.note = [&](const std::string& what) { progress.note(what); };
     pipeline::RenderStage render(device, set, take.observer, scene, render_options);
 
-    // A frame ahead per stage is all that keeps them busy; whole layers wait in the last queue.
-    pipeline::BoundedQueue<Shot> seen(1), tracked(1), lit(1), rendered(1);
+    // One shot ahead of each stage keeps them all busy; whole layers wait in the last queue.
+    pipeline::BoundedQueue<Shot> lit(1), rendered(1);
     pipeline::StageThreads stages(metrics, options.stop);
-    const auto step = [](auto& stage) {
-      return [&stage](Shot shot) {
-        stage(shot);
-        return shot;
-      };
-    };
-    stages.source("observer", seen, [&] { return observer(); });
-    stages.stage("tracking", seen, tracked, step(track));
-    stages.stage("lighting", tracked, lit, step(light));
-    stages.stage("render", lit, rendered, step(render));
+    stages.source("observer", lit, [&] {
+      std::optional<Shot> shot = shots.next();
+      if (shot && shot->light)
+        for (const std::string& what : shot->light->lighting.report.notes)
+          if (light_notes.is_first(report::wording(what))) progress.note("light: " + what);
+      return shot;
+    });
+    stages.stage("render", lit, rendered, [&](Shot shot) {
+      render(shot);
+      return shot;
+    });
     stages.sink("output", rendered, [&](const Shot& shot) {
       if (!shot.whole) return;
       directory.write(shot, set);

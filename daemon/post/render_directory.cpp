@@ -91,9 +91,9 @@ const FinishedFrame* RenderDirectory::finished(std::uint64_t frame) const {
 
 void RenderDirectory::write(const pipeline::Shot& shot, const set::Set& set) {
   if (output_.exr)
-    output::write_exr(file(shot.index, ".exr"), shot.layers,
-                      output::exr_metadata(shot.layers, *shot.frame, shot.track, set));
-  if (wants_png()) output::write_png(file(shot.index, ".png"), shot.picture);
+    output::write_exr(file(shot.index, ".exr"), *shot.layers,
+                      output::exr_metadata(*shot.layers, *shot.frame, shot.track, set));
+  if (wants_png()) output::write_png(file(shot.index, ".png"), *shot.picture);
 
   const FinishedFrame record = finished_frame(shot);
   std::ofstream lines(path() / lines_name, std::ios::app);

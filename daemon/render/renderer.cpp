@@ -111,7 +111,7 @@ std::uint32_t Renderer::Impl::photons() const {
 std::uint32_t Renderer::Impl::needed() const {
   Demand demand = scene.demand(estimation);
   demand.has_aperture = calibration.lens.has_value();
-  demand.has_plate = !frame.plate.samples.empty();
+  demand.has_plate = frame.plate && !frame.plate->samples.empty();
   return needed_bits(demand);
 }
 
@@ -119,9 +119,9 @@ std::vector<glm::vec4> Renderer::Impl::measured() const {
   const std::vector<double>& radiance = response->inverse();
   const auto white = static_cast<std::uint16_t>(radiance.size() - 1);
   std::vector<glm::vec4> result;
-  result.reserve(frame.plate.samples.size() / 3);
-  for (std::size_t i = 0; i < frame.plate.samples.size(); i += 3) {
-    const std::uint16_t* rgb = &frame.plate.samples[i];
+  result.reserve(frame.plate->samples.size() / 3);
+  for (std::size_t i = 0; i < frame.plate->samples.size(); i += 3) {
+    const std::uint16_t* rgb = &frame.plate->samples[i];
     const bool clipped = std::max({rgb[0], rgb[1], rgb[2]}) >= white;
     const glm::dvec3 signal(radiance[rgb[0]], radiance[rgb[1]], radiance[rgb[2]]);
     result.emplace_back(glm::vec3(signal / frame.exposure), clipped ? 0.0f : 1.0f);
@@ -183,13 +183,13 @@ void Renderer::begin(FrameInput frame) {
   if (!r.has_scene || !r.has_environment)
     throw Error("renderer: a frame was begun before the scene and the environment were set");
   const PinholeIntrinsics& lens = r.calibration.intrinsics;
-  if (!frame.plate.samples.empty() &&
-      (frame.plate.width != lens.width || frame.plate.height != lens.height))
-    throw Error("observer: a frame of " + std::to_string(frame.plate.width) + "x" +
-                std::to_string(frame.plate.height) + " does not fit the calibration's " +
+  if (!frame.plate) frame.plate = std::make_shared<const Plate>();
+  const Plate& plate = *frame.plate;
+  if (!plate.samples.empty() && (plate.width != lens.width || plate.height != lens.height))
+    throw Error("observer: a frame of " + std::to_string(plate.width) + "x" +
+                std::to_string(plate.height) + " does not fit the calibration's " +
                 std::to_string(lens.width) + "x" + std::to_string(lens.height));
   r.frame = std::move(frame);
-  const Plate& plate = r.frame.plate;
   if (!r.response || r.response->bits() != plate.bits) {
     r.response.emplace(r.calibration.response, plate.bits);
     r.presenter.reset();
@@ -247,7 +247,7 @@ void Renderer::limit_samples(const std::vector<std::uint32_t>& limits) {
 Layers Renderer::layers() const {
   const Impl& r = *impl_;
   const PinholeIntrinsics& lens = r.calibration.intrinsics;
-  const PlateRadiance plate = plate_radiance(r.frame.plate, *r.response, r.frame.exposure);
+  const PlateRadiance plate = plate_radiance(*r.frame.plate, *r.response, r.frame.exposure);
   Layers layers = make_layers(lens.width, lens.height, r.sampled());
   layers.white = 1 / r.frame.exposure;
   for (const Wavefront::Sums& tile : r.wavefront->sums()) {
@@ -265,10 +265,10 @@ Plate Renderer::show(bool denoise, Layers* layers) {
   if (!r.denoiser) r.denoiser.emplace(*r.device);
   if (!r.presenter) r.presenter.emplace(*r.device, *r.response);
   const PinholeIntrinsics& lens = r.calibration.intrinsics;
-  const ToPresent what{r.wavefront->sums(), lens.width, lens.height, r.frame.plate,
+  const ToPresent what{r.wavefront->sums(), lens.width, lens.height, *r.frame.plate,
                        r.frame.exposure,    r.rule(),   r.sampled(), denoise};
   if (!denoise || !layers) return r.presenter->present(what, *r.denoiser);
-  const PlateRadiance plate = plate_radiance(r.frame.plate, *r.response, r.frame.exposure);
+  const PlateRadiance plate = plate_radiance(*r.frame.plate, *r.response, r.frame.exposure);
   Plate picture = r.presenter->present(what, *r.denoiser, [&](const Denoiser::Band& band) {
     r.denoiser->read(band, *layers, plate.value, r.rule());
   });

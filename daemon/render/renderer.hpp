@@ -20,7 +20,7 @@ namespace previz::render {
 
 // One observer frame as the renderer wants it.
 struct FrameInput {
-  Plate plate;                             // samples as captured; empty: composite over black
+  PlatePtr plate;                          // samples as captured; null: composite over black
   double exposure = 1.0;                   // absolute, of this frame
   glm::dmat4 world_from_camera{1.0};       // OpenCV camera axes
   std::optional<std::uint32_t> seed = {};  // absent: the set's, the same in every frame (P8)

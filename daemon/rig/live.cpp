@@ -114,9 +114,8 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     std::optional<LiveFiles> files;
     const auto show = [&](pipeline::Shot shot, const Look& look) {
       if (options.on_shown) options.on_shown(shot, look);
-      const auto picture = std::make_shared<const Plate>(std::move(shot.picture));
-      screen->show(shot, picture);
-      files->take(picture);
+      screen->show(shot, shot.picture);
+      files->take(std::move(shot.picture));
     };
     const auto show_facts = [&](RigFacts facts) { screen->show(std::move(facts)); };
     std::unique_ptr<Rig> rig;

@@ -30,7 +30,7 @@ void LiveLight::start(pipeline::StageThreads& stages, std::function<FramePtr()> 
 LightPtr LiveLight::estimate(std::vector<pipeline::LightFrame> frames,
                              const std::optional<pipeline::ObserverView>& view) {
   if (!needs_frames()) return nullptr;
-  if (view) stage_.see_observer(*view->frame, view->world_from_camera);
+  if (view) stage_.see_observer(*view->plate, view->exposure, view->world_from_camera);
   for (pipeline::LightFrame& waited : frames) stage_.see(std::move(waited.frame), waited.index);
   for (const std::string& trouble : stage_.troubles()) {
     parts_.reports(report::once({.severity = Severity::warning,
@@ -60,9 +60,10 @@ LightPtr LiveLight::light_for(const pipeline::Shot& shot, set::LightMode mode) {
   return stage_.light_for(shot);
 }
 
-void LiveLight::see_observer(const pipeline::Shot& shot) {
+void LiveLight::see_observer(pipeline::Shot& shot) {
   if (stage_.needs_observer() && shot.track.pose)
-    feed_.see_observer({shot.frame, shot.track.pose->world_from_camera});
+    feed_.see_observer(
+        {plate_of(shot), shot.frame->exposure, shot.track.pose->world_from_camera});
 }
 
 }  // namespace previz::rig

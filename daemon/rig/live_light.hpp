@@ -38,7 +38,7 @@ class LiveLight {
   // From the tracking stage, for a tracked shot: the newest light there is, without waiting.
   pipeline::LightPtr light_for(const pipeline::Shot& shot, set::LightMode mode);
   // The film camera's picture fills in what the light camera cannot see, if the set wants that.
-  void see_observer(const pipeline::Shot& shot);
+  void see_observer(pipeline::Shot& shot);
 
  private:
   pipeline::LightPtr estimate(std::vector<pipeline::LightFrame> frames,

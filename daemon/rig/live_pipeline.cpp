@@ -256,7 +256,7 @@ void LivePipeline::Impl::record_shown(const Shot& shot) {
   if (!parts.set.recording.composite || !state.recording || state.mode == Mode::review) return;
   const PinholeIntrinsics& whole = calibration.intrinsics;
   parts.recorder.offer_shown(std::make_shared<Frame>(output::shown_frame(
-      shot.picture, whole.width, whole.height, shown_frames++, shot.frame->timestamp_ns)));
+      *shot.picture, whole.width, whole.height, shown_frames++, shot.frame->timestamp_ns)));
 }
 
 void count_picture(const Shot& shot, pipeline::Metrics& metrics, report::Reports& reports) {

@@ -184,6 +184,7 @@ void LiveRender::keep_as_good(const Shot& shot, bool reviewed) {
   Shot good;
   good.index = shot.index;
   good.frame = shot.frame;
+  good.plate = shot.plate;
   good.arrived = shot.arrived;
   good.track = shot.track;
   good.light = shot.light;

@@ -22,9 +22,9 @@ std::filesystem::path write_snapshot(const pipeline::Shot& shot, const set::Set&
         !std::filesystem::exists(with(stem, ".png")))
       break;
   }
-  output::write_exr(with(stem, ".exr"), shot.layers,
-                    output::exr_metadata(shot.layers, *shot.frame, shot.track, set));
-  output::write_png(with(stem, ".png"), shot.picture);
+  output::write_exr(with(stem, ".exr"), *shot.layers,
+                    output::exr_metadata(*shot.layers, *shot.frame, shot.track, set));
+  output::write_png(with(stem, ".png"), *shot.picture);
   return stem;
 }
 

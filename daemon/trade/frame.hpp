@@ -10,6 +10,7 @@
 
 #include "daemon/lighting/response.hpp"
 #include "daemon/pipeline/shot.hpp"
+#include "daemon/pipeline/take.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
@@ -23,25 +24,21 @@ class TradeFrame {
   // and light. Throws previz::Error if there is none.
   TradeFrame(const std::filesystem::path& set_file, std::optional<std::uint64_t> index);
 
-  const set::Set& set() const { return set_; }
+  const set::Set& set() const { return take_.set; }
   std::uint64_t index() const { return shot_.index; }
   double exposure() const;
   const glm::dmat4& world_from_camera() const { return shot_.track.pose->world_from_camera; }
-  const ObserverCalibration& calibration() const { return calibration_; }
+  const ObserverCalibration& calibration() const { return take_.observer; }
   const lighting::Response& response() const { return *response_; }
-  Plate plate(double scale) const;
-  // As these settings make it of the light frames before this one; made once for each. Null where
-  // there are none.
+  PlatePtr plate(double scale) const;
+  // The light of the light frames before this one with these settings, without what smoothing and
+  // tracked sources would add from earlier frames; made once for each. Null where there are none.
   pipeline::LightPtr light(const set::Lighting& settings);
 
  private:
-  void see_light(session::StreamReader& stream);
-  std::string what_lacks();
+  std::string what_lacks() const;
 
-  set::Set set_;
-  ObserverCalibration calibration_;
-  std::optional<LightCameraCalibration> light_calibration_;
-  std::vector<FramePtr> light_frames_;  // from the stream's first on
+  const pipeline::Take take_;
   std::vector<std::pair<set::Lighting, pipeline::LightPtr>> lights_;
   pipeline::Shot shot_;
   std::optional<lighting::Response> response_;  // of the plate's bits

@@ -26,7 +26,7 @@ MethodRenderer::MethodRenderer(const std::shared_ptr<render::Device>& device, Tr
       adaptive_(settings.adaptive),
       denoise_(settings.denoise),
       plate_(frame.plate(sweep_scale * settings.scale)),
-      camera_(render::plate_radiance(plate_, frame.response(), exposure_).value),
+      camera_(render::plate_radiance(*plate_, frame.response(), exposure_).value),
       renderer_(device, settings.estimation,
                 method_calibration(frame, settings, sweep_scale * settings.scale)) {
   renderer_.set_scene(scene);

@@ -38,7 +38,7 @@ class MethodRenderer {
   const double exposure_;
   const glm::dmat4 world_from_camera_;
   const bool adaptive_, denoise_;
-  const Plate plate_;
+  const PlatePtr plate_;
   const std::vector<double> camera_;  // the plate's radiance, interleaved RGB
   render::Renderer renderer_;
   render::Layers layers_;

@@ -26,7 +26,7 @@ std::int64_t product(std::int64_t a, std::int64_t b) {
 
 class ReplayCamera final : public Camera {
  public:
-  ReplayCamera(std::unique_ptr<session::StreamReader> stream, std::string name,
+  ReplayCamera(std::shared_ptr<session::StreamReader> stream, std::string name,
                const ReplayOptions& options, HostClock clock,
                const std::vector<std::string>& trouble)
       : stream_(std::move(stream)),
@@ -160,7 +160,7 @@ class ReplayCamera final : public Camera {
     return frame;
   }
 
-  std::unique_ptr<session::StreamReader> stream_;
+  std::shared_ptr<session::StreamReader> stream_;
   std::string name_;
   ReplayOptions options_;
   HostClock clock_;
@@ -181,7 +181,7 @@ std::int64_t replay_lap_ns(std::span<const session::FrameRecord> records) {
   return intervals > 0 ? sum(span, span / intervals) : 1'000'000'000;
 }
 
-std::unique_ptr<Camera> replay(std::unique_ptr<session::StreamReader> stream, std::string name,
+std::unique_ptr<Camera> replay(std::shared_ptr<session::StreamReader> stream, std::string name,
                                const ReplayOptions& options, const HostClock& clock,
                                const std::vector<std::string>& trouble) {
   return std::make_unique<ReplayCamera>(std::move(stream), std::move(name), options, clock,

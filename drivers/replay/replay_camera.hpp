@@ -56,7 +56,7 @@ std::int64_t replay_lap_ns(std::span<const session::FrameRecord> records);
 // was. set_exposure() returns false. The name is "<session>/<source>". `trouble` is told, one
 // DeviceTrouble each, before the first frame. Throws previz::Error if the options leave no frame,
 // or speed is negative or not finite.
-std::unique_ptr<Camera> replay(std::unique_ptr<session::StreamReader> stream, std::string name,
+std::unique_ptr<Camera> replay(std::shared_ptr<session::StreamReader> stream, std::string name,
                                const ReplayOptions& options = {}, const HostClock& clock = {},
                                const std::vector<std::string>& trouble = {});
 

@@ -97,8 +97,9 @@ void run(const Options& options) {
       renderer.set_scene(scene);
       renderer.set_environment(sky(), set::LightSampling::importance);
       render::FrameInput frame;
-      frame.plate = {r.width, r.height, 8,
-                     std::vector<std::uint16_t>(std::size_t{3} * r.width * r.height, 128)};
+      frame.plate = std::make_shared<const Plate>(
+          Plate{r.width, r.height, 8,
+                std::vector<std::uint16_t>(std::size_t{3} * r.width * r.height, 128)});
       frame.world_from_camera = view_of_field(scene);
       const Times times = measure(renderer, frame, options.rounds);
       std::printf("| %zu | %dx%d | %.0f | %.0f |\n", count, r.width, r.height, times.wall_ms,

@@ -52,7 +52,8 @@ void run(const Options& options) {
   renderer.set_scene(scene);
   renderer.set_environment(lighting::EnvironmentMap{1, {glm::vec3(0.3F)}},
                            set::LightSampling::importance);
-  const render::FrameInput frame{noise(options), 1, view_of_field(scene)};
+  const render::FrameInput frame{std::make_shared<const Plate>(noise(options)), 1,
+                                 view_of_field(scene)};
 
   render::Layers layers;
   Plate picture;

@@ -43,7 +43,7 @@ void expect_shown(int width, int height) {
   render::Renderer renderer(shared_device(), estimation, view.calibration);
   renderer.set_scene(view.scene);
   renderer.set_environment(uniform_environment(glm::vec3(1)), set::LightSampling::bsdf);
-  renderer.begin({plate, 1, view.world_from_camera});
+  renderer.begin({std::make_shared<const Plate>(plate), 1, view.world_from_camera});
   renderer.render(2);
   expect_clean(renderer.counters());
   const render::Layers layers = renderer.layers();

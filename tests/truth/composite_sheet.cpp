@@ -74,7 +74,7 @@ render::Layers rendered(const std::shared_ptr<render::Device>& device, const Vie
   render::Renderer renderer(device, estimation, view.calibration);
   renderer.set_scene(view.scene);
   renderer.set_environment(view.environment, set::LightSampling::importance);
-  renderer.begin({plate, 1 / white, view.world_from_camera});
+  renderer.begin({std::make_shared<const Plate>(plate), 1 / white, view.world_from_camera});
   renderer.render(64);
   return renderer.layers();
 }

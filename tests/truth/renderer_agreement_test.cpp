@@ -265,7 +265,8 @@ TEST_P(CameraSets, HaveTheSameCompositeByTheCamera) {
     const auto renderer = renderer_by(radiance);
     truth::Scrambles result{plate.width, plate.height, {}};
     for (std::uint32_t i = 0; i < scrambles; ++i) {
-      renderer->begin({plate, 1 / white, view.world_from_camera, first_seed + i});
+      renderer->begin({std::make_shared<const Plate>(plate), 1 / white, view.world_from_camera,
+                       first_seed + i});
       renderer->render(16);
       expect_clean(renderer->counters());
       result.pictures.push_back(widen(renderer->layers().composite));

@@ -158,8 +158,8 @@ glm::dvec3 floor_seen_at(const Shot& shot, double x, double y) {
 // extremes there, which nine points find to a thousandth: the radiance bends by 4.5 / h^2 of
 // itself, h at least 0.2 m, and a pixel is some 3 mm.
 void expect_lit_by(const glm::dvec3& lamp, const Shot& shot) {
-  for (int y = 20; y < shot.layers.height; y += 20)
-    for (int x = 20; x < shot.layers.width; x += 20) {
+  for (int y = 20; y < shot.layers->height; y += 20)
+    for (int x = 20; x < shot.layers->width; x += 20) {
       double low = HUGE_VAL, high = 0;
       for (const double dy : {-1.5, 0.0, 1.5})
         for (const double dx : {-1.5, 0.0, 1.5}) {
@@ -167,7 +167,7 @@ void expect_lit_by(const glm::dvec3& lamp, const Shot& shot) {
           low = std::min(low, radiance);
           high = std::max(high, radiance);
         }
-      const float found = shot.layers.diff[static_cast<std::size_t>(y * shot.layers.width + x)].r;
+      const float found = shot.layers->diff[static_cast<std::size_t>(y * shot.layers->width + x)].r;
       EXPECT_GE(found, low * (1 - 1e-3)) << x << ", " << y;
       EXPECT_LE(found, high * (1 + 1e-3)) << x << ", " << y;
     }
@@ -263,7 +263,7 @@ TEST_F(MovingTake, IsRenderedAsItWasShown) {
         rendered(take.directory, directory_ / "as_recorded.toml", post::FrameRange{i, i}).at(0);
     EXPECT_EQ(again.scene, was->second.scene);
     EXPECT_EQ(again.motion.carriers, was->second.motion.carriers);
-    EXPECT_TRUE(again.picture.samples == was->second.picture.samples) << i;
+    EXPECT_TRUE(again.picture->samples == was->second.picture->samples) << i;
     ASSERT_TRUE(again.scene.animation_s);
     if (compared++ == 0) first_s = *again.scene.animation_s;
     last_s = *again.scene.animation_s;

@@ -182,7 +182,7 @@ TEST(LightStage, FillsFromTheFilmCamera) {
   view.height = 30;
   view.exposure = 2;
   view.bytes.assign(frame_bytes(view.format, 40, 30), 188);  // sRGB: a signal of 0.503
-  stage.see_observer(view, test::looking(0, -60));
+  stage.see_observer(to_plate(view), view.exposure, test::looking(0, -60));
   EXPECT_EQ(stage.light(), nullptr);  // the film camera alone is no light
   stage.see(studio.photograph(1), 0);
   const lighting::EnvironmentMap& map = stage.light()->lighting.environment;

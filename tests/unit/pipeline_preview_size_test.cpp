@@ -124,7 +124,7 @@ Shot card(double scale, bool denoise) {
   shot.track.pose->world_from_camera = {{1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}, {0, 0, 1, 1}};
   stage(shot);
   EXPECT_EQ(shot.untouched, "");
-  EXPECT_EQ(shot.picture.width, shot.layers.width);
+  EXPECT_EQ(shot.picture->width, shot.layers->width);
   shot.error = stage.error();
   return shot;
 }

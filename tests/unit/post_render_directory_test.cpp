@@ -35,8 +35,9 @@ pipeline::Shot sample_shot(std::uint64_t index) {
   light.lighting.sources = {{3, {0.6, 0, 0.8}, 0.01, {3, 2, 1.0 / 3}}};
   light.lighting.report.dropped_share = 0.25;
   shot.light = std::make_shared<pipeline::Light>(light);
-  shot.picture = {width, height, 8, std::vector<std::uint16_t>(3 * width * height, 99)};
-  render::Layers& layers = shot.layers;
+  shot.picture = std::make_shared<const Plate>(
+      Plate{width, height, 8, std::vector<std::uint16_t>(3 * width * height, 99)});
+  render::Layers layers;
   layers.width = width;
   layers.height = height;
   layers.samples = 16;
@@ -45,6 +46,7 @@ pipeline::Shot sample_shot(std::uint64_t index) {
     layer->resize(width * height, glm::vec3(0.5f));
   layers.mask.resize(width * height);
   layers.depth.resize(width * height);
+  shot.layers = std::make_shared<const render::Layers>(layers);
   shot.counters.rays = 1234;
   shot.whole = true;
   return shot;

@@ -115,7 +115,7 @@ TEST_F(RenderSession, TheVirtualCardCoversThePlateAndTheRestShowsIt) {
   options.frames = FrameRange{1, 1};
   options.denoise = false;
   render::Layers seen;
-  options.on_frame = [&](const pipeline::Shot& shot) { seen = shot.layers; };
+  options.on_frame = [&](const pipeline::Shot& shot) { seen = *shot.layers; };
   render(options);
   const std::size_t middle = 18 * 48 + 24;
   EXPECT_EQ(seen.mask[middle], 1.0f);
@@ -136,7 +136,7 @@ TEST_F(RenderSession, AnAdaptivePictureSaysSoAndIsNoOther) {
   render(options);
   EXPECT_NE(out_.str().find("64 samples on average"), std::string::npos) << out_.str();
   EXPECT_GT(shots.at(0).samples, 64);  // where it was noisy
-  EXPECT_EQ(shots.at(0).samples, shots.at(0).layers.samples);
+  EXPECT_EQ(shots.at(0).samples, shots.at(0).layers->samples);
   options.adaptive = false;
   EXPECT_THROW(render(options), Error);  // what is there already was made otherwise
   options.samples = 16;
@@ -150,7 +150,7 @@ TEST_F(RenderSession, ADenoisedPictureSaysSoAndItsOtherLayersAreAsRendered) {
   RenderOptions options;
   options.frames = FrameRange{1, 1};
   std::vector<render::Layers> seen;
-  options.on_frame = [&](const pipeline::Shot& shot) { seen.push_back(shot.layers); };
+  options.on_frame = [&](const pipeline::Shot& shot) { seen.push_back(*shot.layers); };
   options.denoise = false;
   render(options);
   const Plate noisy = output::read_png(directory_ / "out/0001.png");
@@ -174,7 +174,7 @@ TEST_F(RenderSession, TheRecordedLightLightsEveryFrame) {
   render::Layers seen;
   RenderOptions options;
   options.frames = FrameRange{small_take_unlit, small_take_unlit};
-  options.on_frame = [&](const pipeline::Shot& shot) { seen = shot.layers; };
+  options.on_frame = [&](const pipeline::Shot& shot) { seen = *shot.layers; };
   const RenderReport report = render(options);
   EXPECT_EQ(report.frames.front().status, FrameStatus::rendered);
   const glm::vec3 card = seen.mixed[18 * 48 + 24];
@@ -192,7 +192,7 @@ TEST_F(RenderSession, TheSetsOwnLightLightsEveryFrame) {
   render::Layers seen;
   RenderOptions options;
   options.frames = FrameRange{small_take_unlit, small_take_unlit};
-  options.on_frame = [&](const pipeline::Shot& shot) { seen = shot.layers; };
+  options.on_frame = [&](const pipeline::Shot& shot) { seen = *shot.layers; };
   EXPECT_EQ(render(options).frames.front().status, FrameStatus::rendered);
   const glm::vec3 card = seen.mixed[18 * 48 + 24];
   EXPECT_NEAR(card.r / card.b, 3, 1e-4);

@@ -57,7 +57,7 @@ Rendered render_over(const View& view, const Plate& plate, const set::Estimation
   render::Renderer renderer(shared_device(), estimation, view.calibration);
   renderer.set_scene(view.scene);
   renderer.set_environment(view.environment, set::LightSampling::importance);
-  renderer.begin({plate, 1 / white, view.world_from_camera, seed});
+  renderer.begin({std::make_shared<const Plate>(plate), 1 / white, view.world_from_camera, seed});
   renderer.render(samples);
   expect_clean(renderer.counters());
   return {renderer.layers(), renderer.counters()};
@@ -193,7 +193,7 @@ TEST(CameraRadiance, WithNothingVirtualThePlateIsUntouched) {
     render::Renderer renderer(shared_device(), by_camera(estimator), view.calibration);
     renderer.set_scene(view.scene);
     renderer.set_environment(view.environment, set::LightSampling::importance);
-    renderer.begin({plate, 1 / white, view.world_from_camera, 1});
+    renderer.begin({std::make_shared<const Plate>(plate), 1 / white, view.world_from_camera, 1});
     renderer.render(4);
     EXPECT_EQ(renderer.show(false).samples, plate.samples);
     expect_clean(renderer.counters());

@@ -7,7 +7,7 @@ namespace render_composite_test {
 
 Plate show(const View& view, const Plate& plate, int samples) {
   SetRenderer renderer(view);
-  renderer.begin({plate, 0.85, view.world_from_camera});
+  renderer.begin({std::make_shared<const Plate>(plate), 0.85, view.world_from_camera});
   renderer.render(samples);
   expect_clean(renderer.counters());
   return renderer.show(false);
@@ -120,7 +120,8 @@ TEST(Composite, TwoFloatSumsKeepWhatOneFloatLoses) {
 TEST(Composite, AFrameOfAnotherSizeIsRefused) {
   const View view = real_set();
   SetRenderer renderer(view);
-  EXPECT_THROW(renderer.begin({random_plate(32, 32, 8), 1.0, view.world_from_camera}),
+  EXPECT_THROW(renderer.begin({std::make_shared<const Plate>(random_plate(32, 32, 8)), 1.0,
+                               view.world_from_camera}),
                std::exception);
 }
 

@@ -302,7 +302,7 @@ TEST(Denoise, ChangesNoOtherLayerAndNoUntouchedPlate) {
   SetRenderer renderer(view);
   for (const int bits : {8, 16}) {
     const Plate plate = random_plate(70, 50, bits);
-    renderer.begin({plate, 0.85, view.world_from_camera});
+    renderer.begin({std::make_shared<const Plate>(plate), 0.85, view.world_from_camera});
     renderer.render(2);
     const render::Layers raw = renderer.layers();
     render::Layers clean = raw;

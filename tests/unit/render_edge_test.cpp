@@ -29,7 +29,8 @@ Picture converge(const View& view, const Plate& plate, set::Estimator estimator,
   result.mean.resize(width * height);
   result.error.resize(width * height);
   for (int i = 0; i < scrambles; ++i) {
-    renderer.begin({plate, 1 / white, view.world_from_camera, seed + i});
+    renderer.begin(
+        {std::make_shared<const Plate>(plate), 1 / white, view.world_from_camera, seed + i});
     renderer.render(32);
     expect_clean(renderer.counters());
     const std::vector<glm::vec3> layer = pick(renderer.layers());

@@ -57,7 +57,7 @@ TEST_P(ShowOf, ASetIsThePictureOfItsLayers) {
     for (const int samples : {1, 5}) {
       SCOPED_TRACE(std::to_string(bits) + " bits, " + std::to_string(samples) + " samples");
       const Plate plate = random_plate(71, 49, bits);
-      renderer.begin({plate, 0.85, view.world_from_camera});
+      renderer.begin({std::make_shared<const Plate>(plate), 0.85, view.world_from_camera});
       renderer.render(samples);
       render::Layers layers = renderer.layers();
       expect_same_but_for_rounding(renderer.show(false, &layers),
@@ -90,7 +90,7 @@ TEST(Show, WithoutAVirtualObjectIsThePlateBitForBit) {
     SetRenderer renderer(view, estimation);
     for (const int bits : {8, 16}) {
       const Plate plate = random_plate(71, 49, bits);
-      renderer.begin({plate, 0.85, view.world_from_camera});
+      renderer.begin({std::make_shared<const Plate>(plate), 0.85, view.world_from_camera});
       renderer.render(2);
       EXPECT_EQ(renderer.show(false).samples, plate.samples) << bits << " bits";
       EXPECT_EQ(renderer.show(true).samples, plate.samples) << bits << " bits, denoised";
@@ -120,7 +120,7 @@ TEST(Show, FollowsThePicturesSize) {
     view.calibration.intrinsics.height = height;
     renderer.resize(view.calibration);
     const Plate plate = random_plate(width, height, 8);
-    renderer.begin({plate, 1.0, view.world_from_camera});
+    renderer.begin({std::make_shared<const Plate>(plate), 1.0, view.world_from_camera});
     renderer.render(2);
     render::Layers layers = renderer.layers();
     const Plate shown = renderer.show(true, &layers);

@@ -56,7 +56,7 @@ class RigDisplay : public testing::Test {
     LiveOptions options;
     options.on_shown = [&](const pipeline::Shot& shot, const Look&) {
       const std::lock_guard lock(mutex_);
-      pictures_.push_back(std::make_shared<const Plate>(shot.picture));
+      pictures_.push_back(shot.picture);
       if (pictures_.size() > 1024) pictures_.pop_front();
       news_.notify_all();
     };

@@ -128,7 +128,7 @@ class RigLive : public testing::Test {
     options.frames = post::FrameRange{frame, frame};
     options.samples = static_cast<int>(samples);
     render::Layers layers;
-    options.on_frame = [&](const Shot& shot) { layers = shot.layers; };
+    options.on_frame = [&](const Shot& shot) { layers = *shot.layers; };
     std::ostringstream ignored;
     post::render_session(options, ignored);
     return layers;

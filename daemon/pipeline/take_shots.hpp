@@ -1,0 +1,95 @@
+// The shots of a recorded take, one after the other, each with its pose and its light.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <iterator>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "daemon/pipeline/light_stage.hpp"
+#include "daemon/pipeline/metrics.hpp"
+#include "daemon/pipeline/shot.hpp"
+#include "daemon/pipeline/take.hpp"
+#include "daemon/pipeline/track_stage.hpp"
+#include "daemon/report/report.hpp"
+#include "drivers/camera.hpp"
+
+namespace previz::pipeline {
+
+struct TakeShotsOptions {
+  // Observer frames by index in the stream, both ends included.
+  std::uint64_t first = 0;
+  std::uint64_t last = std::numeric_limits<std::uint64_t>::max();
+  // Frames for which this returns false are left out. It is called once a frame, in order, when
+  // all earlier shots have been handed out.
+  std::function<bool(std::uint64_t index)> wanted = {};
+  // False: frames that are left out are not gone through even where tracking or lighting remember
+  // them. That is quick, and the light of a shot is that of the light frames before it alone.
+  bool from_start = true;
+  // 1: shots come at the pace of the recording; 0: as fast as they are asked for.
+  double speed = 0;
+  std::optional<set::Lighting> lighting = {};  // takes the place of the set's
+  // Receives what could not be read, found or used, in plain words.
+  std::function<void(const std::string&)> note = {};
+  Metrics* metrics = nullptr;  // counts the work and the trouble
+  std::stop_token stop = {};   // ends the range
+};
+
+// A range that can be gone through once: for (Shot& shot : TakeShots(take, {.first = 3})) ...
+//
+// The shots are those that a pass through the whole take would give: where tracking or lighting
+// remember earlier frames, those that are left out are tracked and lit too. A shot without a pose
+// or without light (no light frame precedes it) is in the range; a frame that cannot be read is
+// not.
+class TakeShots {
+ public:
+  // The take must outlive this. Throws previz::Error if the light has to come from light frames and
+  // none were recorded, or if `first` lies behind the take's end.
+  explicit TakeShots(const Take& take, TakeShotsOptions options = {});
+
+  // Nothing: there are no more shots.
+  std::optional<Shot> next();
+
+  class Iterator {
+   public:
+    using difference_type = std::ptrdiff_t;
+    using value_type = Shot;
+
+    explicit Iterator(TakeShots& shots) : shots_(&shots), shot_(shots.next()) {}
+    Shot& operator*() { return *shot_; }
+    Iterator& operator++() {
+      shot_ = shots_->next();
+      return *this;
+    }
+    void operator++(int) { ++*this; }
+    friend bool operator==(const Iterator& at, std::default_sentinel_t) { return !at.shot_; }
+
+   private:
+    TakeShots* shots_;
+    std::optional<Shot> shot_;
+  };
+  Iterator begin() { return Iterator(*this); }
+  std::default_sentinel_t end() const { return {}; }
+
+ private:
+  void track(Shot& shot);
+  void light(Shot& shot);
+  void trouble(const std::string& words);
+  void count_work(const char* stage, std::chrono::steady_clock::time_point begin);
+
+  const TakeShotsOptions options_;
+  TrackStage track_;
+  LightStage light_;
+  const std::shared_ptr<session::StreamReader> light_stream_;
+  std::size_t next_light_ = 0;
+  std::unique_ptr<Camera> camera_;
+  bool goes_through_all_ = false;
+  std::uint64_t next_ = 0;  // index of the frame that the camera gives next
+  report::Once noted_;
+};
+
+}  // namespace previz::pipeline

@@ -1,0 +1,129 @@
+// The tracked and lit shots of a recorded take.
+#include <gtest/gtest.h>
+
+#include <set>
+#include <vector>
+
+#include "daemon/pipeline/take_shots.hpp"
+#include "drivers/error.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace previz::pipeline {
+namespace pipeline_take_shots_test {
+
+class TakeShotsTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    test::write_small_take(directory_.path());
+    take_ = open_take(directory_ / "session", {});
+  }
+
+  std::vector<Shot> all(const TakeShotsOptions& options = {}) const {
+    std::vector<Shot> shots;
+    for (Shot& shot : TakeShots(take_, options)) shots.push_back(std::move(shot));
+    return shots;
+  }
+
+  test::TemporaryDirectory directory_;
+  Take take_;
+};
+
+TEST_F(TakeShotsTest, EveryFrameComesOnceWithItsPoseAndItsLight) {
+  const std::vector<Shot> shots = all();
+  ASSERT_EQ(shots.size(), std::size_t{test::small_take_frames});
+  for (std::size_t i = 0; i < shots.size(); ++i) {
+    EXPECT_EQ(shots[i].index, i);
+    EXPECT_EQ(shots[i].frame->sequence, i);
+    EXPECT_TRUE(shots[i].tracking_done);
+    EXPECT_EQ(shots[i].track.pose.has_value(), i != test::small_take_lost) << i;
+    if (shots[i].track.pose) {
+      EXPECT_EQ(shots[i].track.pose->world_from_camera[3].y, 0.01 * static_cast<double>(i));
+    }
+    EXPECT_EQ(shots[i].light != nullptr, i != test::small_take_unlit) << i;
+  }
+  EXPECT_EQ(shots[1].light, shots.back().light);  // the same light frames
+}
+
+TEST_F(TakeShotsTest, ATakeCanBeGoneThroughAgain) {
+  EXPECT_EQ(all().size(), all().size());
+}
+
+TEST_F(TakeShotsTest, FirstAndLastAreInTheRange) {
+  TakeShotsOptions options;
+  options.first = 2;
+  options.last = 4;
+  const std::vector<Shot> shots = all(options);
+  ASSERT_EQ(shots.size(), 3u);
+  EXPECT_EQ(shots.front().index, 2u);
+  EXPECT_EQ(shots.back().index, 4u);
+  options.first = options.last = test::small_take_frames;
+  EXPECT_THROW(all(options), Error);
+}
+
+// What is wanted may depend on the shots before.
+TEST_F(TakeShotsTest, AFrameIsAskedForWhenItsTurnHasCome) {
+  std::uint64_t next = 1;
+  TakeShotsOptions options;
+  options.wanted = [&](std::uint64_t frame) { return frame >= next; };
+  std::vector<std::uint64_t> came;
+  for (const Shot& shot : TakeShots(take_, options)) {
+    came.push_back(shot.index);
+    next = shot.index + 3;
+  }
+  EXPECT_EQ(came, (std::vector<std::uint64_t>{1, 4, 7}));
+}
+
+// With unseen = "observer" the light is made of the earlier pictures too, so they are gone through.
+TEST_F(TakeShotsTest, WhereTheLightRemembersAShotIsWhatAPassThroughTheTakeGives) {
+  TakeShotsOptions options;
+  options.first = options.last = 5;
+  const auto tracked = [&](set::UnseenRule unseen) {
+    Metrics metrics;
+    options.metrics = &metrics;
+    options.lighting = take_.set.lighting;
+    options.lighting->unseen = unseen;
+    EXPECT_EQ(all(options).size(), 1u);
+    return metrics.snapshot(1).stages.at("tracking").frames;
+  };
+  EXPECT_EQ(tracked(set::UnseenRule::horizon), 1u);
+  EXPECT_EQ(tracked(set::UnseenRule::observer), 6u);
+  options.from_start = false;
+  EXPECT_EQ(tracked(set::UnseenRule::observer), 1u);
+  options.from_start = true;
+
+  const auto fifth = all(options);
+  options.first = 0;
+  const auto whole = all(options);
+  EXPECT_EQ(fifth[0].light->lighting.environment.radiance,
+            whole[5].light->lighting.environment.radiance);
+}
+
+TEST_F(TakeShotsTest, AStopEndsTheRange) {
+  std::stop_source stop;
+  TakeShotsOptions options;
+  options.stop = stop.get_token();
+  std::size_t came = 0;
+  for ([[maybe_unused]] const Shot& shot : TakeShots(take_, options))
+    if (++came == 2) stop.request_stop();
+  EXPECT_EQ(came, 2u);
+}
+
+TEST_F(TakeShotsTest, ATakeWithoutLightFramesIsRefusedWhereTheyAreNeeded) {
+  take_.light_stream.reset();
+  EXPECT_THROW(all(), Error);
+  TakeShotsOptions options;
+  options.lighting = take_.set.lighting;
+  options.lighting->from = set::LightFrom::set;
+  EXPECT_EQ(all(options).size(), std::size_t{test::small_take_frames});
+}
+
+TEST_F(TakeShotsTest, AFrameIsConvertedOnce) {
+  Shot shot = all().at(1);
+  const PlatePtr plate = plate_of(shot);
+  EXPECT_EQ(plate->samples, to_plate(*shot.frame).samples);
+  EXPECT_EQ(plate_of(shot), plate);
+}
+
+}  // namespace pipeline_take_shots_test
+}  // namespace previz::pipeline
