@@ -80,6 +80,12 @@ bool LightStage::remembers() const {
          (settings_.smoothing_s > 0 || needs_observer() || settings_.mode != set::LightMode::image);
 }
 
+// Exposures that the set states, or a frame that it names, are all there is to wait for.
+void LightStage::await_bracket(std::size_t exposures) {
+  if (!exposure_ && settings_.frame < 0)
+    awaited_ = std::clamp(exposures, std::size_t{1}, most_exposures);
+}
+
 void LightStage::use(set::LightMode mode) {
   if (settings_.mode == mode) return;
   if (settings_.from == set::LightFrom::recording) {
@@ -153,6 +159,7 @@ void LightStage::see(FramePtr frame, std::uint64_t index) {
   if (!needs_frames() ||
       (settings_.frame >= 0 && index != static_cast<std::uint64_t>(settings_.frame)))
     return;
+  ++seen_;
   if (exposure_) {
     auto exposed = std::make_shared<Frame>(*frame);
     exposed->exposure = *exposure_;
@@ -172,7 +179,8 @@ void LightStage::see_observer(const Plate& plate, double exposure,
 }
 
 LightPtr LightStage::light() {
-  if (changed_) {
+  if (changed_ && !awaits_bracket()) {
+    awaited_ = 1;
     std::vector<FramePtr> bracket;
     std::vector<std::uint64_t> sequences;
     std::int64_t newest_ns = 0;

@@ -36,6 +36,11 @@ class LightStage {
   // the middle of a take has to go through all the frames before it.
   bool remembers() const;
 
+  // Holds the first light back until a whole bracket of so many different exposures was seen; or
+  // twice as many frames, since exposures may get lost or come out alike. Without this call the
+  // first frame gives the first light.
+  void await_bracket(std::size_t exposures);
+
   // How the light is taken from what is seen, from the next light() on.
   void use(set::LightMode mode);
 
@@ -65,6 +70,7 @@ class LightStage {
                   session::CapturedLight record) const;
   bool usable(const Frame& frame);
   void drop_oldest();
+  bool awaits_bracket() const { return newest_.size() < awaited_ && seen_ < 2 * awaited_; }
 
   set::Lighting settings_;
   const std::optional<double> exposure_;           // overrides the frames' own
@@ -76,6 +82,8 @@ class LightStage {
   glm::dvec3 seen_from_{0};  // where the image is seen from; world, metres
   std::unique_ptr<lighting::ObservedLight> observed_;
   std::map<long, FramePtr> newest_;  // by exposure, in steps of 1 %
+  std::size_t awaited_ = 1;          // exposures of the first bracket
+  std::size_t seen_ = 0;             // light frames
   std::vector<std::string> troubles_;
   std::shared_ptr<const session::CapturedLight> shown_;  // what light_ is, if it is recorded
   bool changed_ = false;

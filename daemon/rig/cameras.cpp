@@ -1,9 +1,12 @@
 #include "daemon/rig/cameras.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <set>
 #include <string>
 #include <utility>
 
+#include "drivers/bracket.hpp"
 #include "drivers/error.hpp"
 #include "drivers/replay/replay_buttons.hpp"
 
@@ -51,6 +54,14 @@ std::unique_ptr<session::StreamReader> open_frames(session::Session& session,
   return stream;
 }
 
+std::size_t exposures_of(const session::StreamReader& stream) {
+  std::set<long> steps;
+  for (const session::FrameRecord& record : stream.records())
+    if (record.exposure > 0 && std::isfinite(record.exposure))
+      steps.insert(exposure_step(record.exposure));
+  return steps.size();
+}
+
 }  // namespace
 
 Cameras open_cameras(const set::Set& set, bool loop, const Usb& usb) {
@@ -88,9 +99,11 @@ Cameras open_cameras(const set::Set& set, bool loop, const Usb& usb) {
       options.lap_ns = std::max(options.lap_ns, light_options.lap_ns);
       light_options = options;
     }
+    cameras.light_exposures = exposures_of(*light);
     if (!cameras.recorded.info.light) cameras.recorded.info.light = session.info.light;
     cameras.light = start_replay(set, light_order(set), session, std::move(light), light_options);
   } else if (light_driver != set::no_driver) {
+    cameras.light_exposures = set.light_camera.camera.bracket_s.size();
     cameras.light = drive_camera(set, light_order(set), usb);
   }
   if (observer) {

@@ -18,10 +18,11 @@ namespace previz::rig {
 // common time; a real camera need not be there yet, and is picked up when it is.
 struct Cameras {
   std::unique_ptr<Camera> observer;
-  std::unique_ptr<Camera> light;  // null: the set has none, or gives an environment file
-  session::Session recorded;      // of the replayed observer: calibration and track
-  ReplayOptions::Origin origin;   // of the replayed observer
-  std::int64_t lap_ns = 0;        // of the observer, where it is replayed in a loop
+  std::unique_ptr<Camera> light;    // null: the set has none, or gives an environment file
+  std::size_t light_exposures = 1;  // different ones that the light camera takes in turn
+  session::Session recorded;        // of the replayed observer: calibration and track
+  ReplayOptions::Origin origin;     // of the replayed observer
+  std::int64_t lap_ns = 0;          // of the observer, where it is replayed in a loop
   // The cameras' clock, that of every timestamp_ns, less CLOCK_MONOTONIC.
   std::int64_t clock_offset_ns = 0;
 };

@@ -31,6 +31,9 @@ class LiveLight {
   // True where the light is made of the light camera's frames.
   bool needs_frames() const { return stage_.needs_frames(); }
 
+  // Holds the first light back until a whole bracket was seen; see LightStage::await_bracket().
+  void await_bracket(std::size_t exposures) { stage_.await_bracket(exposures); }
+
   // Adds the stages of the light camera. `next_frame` waits for its frames, in order; null ends
   // them. They are taken off the camera also where nobody needs them: they may be recorded.
   void start(pipeline::StageThreads& stages, std::function<FramePtr()> next_frame);

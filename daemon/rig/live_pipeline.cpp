@@ -100,6 +100,7 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
   if (light.needs_frames() && !parts.cameras.light)
     throw Error(parts.set.file.string() +
                 ": lighting: the set has neither a light camera nor lighting.environment");
+  light.await_bracket(parts.cameras.light_exposures);
   gpu_keeper.start();
   stages.emplace(parts.metrics, stop_source.get_token(), [this] { stop_source.request_stop(); });
   if (parts.cameras.light) light_stages();

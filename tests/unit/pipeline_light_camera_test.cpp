@@ -2,6 +2,7 @@
 // nobody waits for it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -107,6 +108,67 @@ TEST(LightStage, ASwitchedOffLightIsGoneWithinOneFrameInAnyPhaseOfTheBracket) {
     EXPECT_LT((first - dark) / (lit - dark), 0.035) << phase;
     EXPECT_GT(lit, 4 * dark);
   }
+}
+
+bool says_blinded(const LightPtr& light) {
+  return std::ranges::any_of(light->lighting.report.notes, [](const std::string& note) {
+    return note.find("blinded") != std::string::npos;
+  });
+}
+
+// The shortest exposure alone sees nothing but the lamp, and calls the light camera blinded.
+TEST(LightStage, TheFirstLightIsAWholeBracketsWhereOneIsAwaited) {
+  Studio studio;
+  LightStage at_once(plain_set(), light_camera(), film_camera());
+  LightStage stage(plain_set(), light_camera(), film_camera());
+  stage.await_bracket(bracket.size());
+  for (std::size_t i = 0; i < bracket.size(); ++i) {
+    EXPECT_EQ(stage.light(), nullptr) << i;
+    const FramePtr frame = studio.photograph(bracket[i]);
+    stage.see(frame, i);
+    at_once.see(frame, i);
+    if (i == 0) {
+      EXPECT_TRUE(says_blinded(at_once.light()));
+    }
+  }
+  const LightPtr first = stage.light();
+  ASSERT_NE(first, nullptr);
+  EXPECT_EQ(first->sequences.size(), bracket.size());
+  EXPECT_FALSE(says_blinded(first));
+  // It is what it would be without waiting, and later light waits for nothing.
+  EXPECT_EQ(first->lighting.environment.radiance, at_once.light()->lighting.environment.radiance);
+  stage.see(studio.photograph(bracket[0]), bracket.size());
+  EXPECT_NE(stage.light(), first);
+}
+
+TEST(LightStage, ABracketThatLacksAnExposureIsNotAwaitedForEver) {
+  Studio studio;
+  LightStage stage(plain_set(), light_camera(), film_camera());
+  stage.await_bracket(3);
+  for (std::size_t i = 0; i < 5; ++i) {
+    stage.see(studio.photograph(bracket[i % 2]), i);
+    EXPECT_EQ(stage.light(), nullptr) << i;
+  }
+  stage.see(studio.photograph(bracket[1]), 5);
+  EXPECT_NE(stage.light(), nullptr);
+}
+
+// Where the set states the exposure, all frames are of that one; a named frame comes once.
+TEST(LightStage, WhatHasNoBracketIsNotAwaited) {
+  Studio studio;
+  set::Set stated = plain_set();
+  stated.light_camera.exposure = 0.5;
+  LightStage by_exposure(stated, light_camera(), film_camera());
+  by_exposure.await_bracket(3);
+  by_exposure.see(studio.photograph(1), 0);
+  EXPECT_NE(by_exposure.light(), nullptr);
+
+  set::Set named = plain_set();
+  named.lighting.frame = 0;
+  LightStage by_frame(named, light_camera(), film_camera());
+  by_frame.await_bracket(3);
+  by_frame.see(studio.photograph(1), 0);
+  EXPECT_NE(by_frame.light(), nullptr);
 }
 
 TEST(LightStage, AStaticScenesFluxStandsStill) {

@@ -74,6 +74,7 @@ TEST_F(RigCameras, LoopedStreamsOfASessionStayTogether) {
   set.observer.device = (directory_.path() / "session").string();
   set.light_camera.driver = set::replay_driver;
   const Cameras cameras = open_cameras(set, /*loop=*/true);
+  EXPECT_EQ(cameras.light_exposures, 3u);
   EXPECT_EQ(cameras.lap_ns, 8 * test::small_take_interval_ns);
   std::vector<FramePtr> frames;
   while (frames.size() < 4) {
