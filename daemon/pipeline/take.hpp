@@ -29,7 +29,7 @@ struct Take {
 Take open_take(const std::filesystem::path& session_directory,
                const std::optional<std::filesystem::path>& set_file);
 
-// When its first observer frame was taken; the stream must still be there.
+// When its first observer frame was taken.
 std::int64_t start_of(const Take& take);
 
 // The calibration of each camera: the set's own, otherwise the session's. Throws previz::Error

@@ -112,16 +112,22 @@ TEST(SetExample, IsALiveSet) {
     EXPECT_TRUE(button.name.starts_with("gpio:") || button.name.starts_with("hid:")) << button.name;
 }
 
-// Its commented alternative: a recorded take in the camera's place.
+// Its commented alternative: a recorded take in the cameras' place.
 TEST(SetExample, CanReplayATake) {
   std::string text = contents(example_file);
-  const std::string alternative = "# driver = \"replay\"\n# device = \"takes/12A_take003\"\n";
-  ASSERT_NE(text.find(alternative), std::string::npos);
-  const std::size_t begin = text.find("driver = \"v4l2\"");
-  const std::size_t end = text.find("# What is left out");
-  ASSERT_LT(begin, end);
-  text.replace(begin, end - begin, "driver = \"replay\"\ndevice = \"takes/12A_take003\"\n\n");
-  EXPECT_EQ(example(text).observer.driver, Driver::replay);
+  ASSERT_NE(text.find("# driver = \"replay\"\n# device = \"takes/12A_take003\"\n"),
+            std::string::npos);
+  const auto replayed = [&](const char* first, const char* behind) {
+    const std::size_t begin = text.find(first), end = text.find(behind);
+    ASSERT_LT(begin, end);
+    ASSERT_NE(end, std::string::npos);
+    text.replace(begin, end - begin, "driver = \"replay\"\ndevice = \"takes/12A_take003\"\n\n");
+  };
+  replayed("driver = \"v4l2\"", "# To rehearse");
+  replayed("driver = \"aravis\"", "[light_camera.intrinsics]");
+  const Set set = example(text);
+  EXPECT_EQ(set.observer.driver, Driver::replay);
+  EXPECT_EQ(set.light_camera.driver, Driver::replay);
 }
 
 // `previzd run` on it keeps up with the take on any machine.
