@@ -103,12 +103,12 @@ void print(std::ostream& out, const Chapter& chapter) {
 
 // Returns "key = default", or "key = example" if there is no default.
 std::string assignment(const set::Key& key) {
-  const bool has_default = key.need.kind == set::Need::Kind::defaulted;
+  const bool has_default = key.need.kind == Need::Kind::defaulted;
   return bold(key.name) + " = " + escaped(has_default ? key.initial : key.need.example);
 }
 
 std::string explanation(const set::Key& key) {
-  using enum set::Need::Kind;
+  using enum Need::Kind;
   const char* need = key.need.kind == required   ? "; required"
                      : key.need.kind == optional ? "; may be left out, the value here is an example"
                                                  : "";

@@ -62,7 +62,7 @@ glm::dmat4 looking(double azimuth_deg, double elevation_deg, double roll_deg) {
 
 FramePtr photograph(const LightCameraCalibration& camera, const Sky& sky, double exposure,
                     Detail detail) {
-  const lighting::Fisheye lens(camera.intrinsics);
+  const Fisheye lens(camera.intrinsics);
   const glm::dmat3 world_from_camera(camera.world_from_camera);
   struct Mean {
     glm::dvec3 radiance{0};

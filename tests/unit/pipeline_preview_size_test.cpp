@@ -130,7 +130,7 @@ Shot card(double scale, bool denoise) {
 }
 
 render::Layers render_card(double scale) {
-  return card(scale, true).layers;
+  return *card(scale, true).layers;
 }
 
 // What is taken away is no error that is known to be gone.
@@ -139,9 +139,9 @@ TEST(RenderStageError, IsThatOfTheSamplesWhetherDenoisedOrNot) {
   const Shot clean = card(1, true);
   EXPECT_GT(noisy.error, 0);
   EXPECT_EQ(clean.error, noisy.error);
-  EXPECT_NE(clean.layers.variance, noisy.layers.variance);
-  EXPECT_FALSE(noisy.layers.denoised);
-  EXPECT_TRUE(clean.layers.denoised);
+  EXPECT_NE(clean.layers->variance, noisy.layers->variance);
+  EXPECT_FALSE(noisy.layers->denoised);
+  EXPECT_TRUE(clean.layers->denoised);
 }
 
 // In units of the picture's width and height.

@@ -8,6 +8,7 @@
 
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
+#include "daemon/post/render.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/temporary_directory.hpp"
 
