@@ -5,13 +5,14 @@
 # repository. Ends with one line that sums up, and with status 0 only if all of it passed.
 #
 #   tests/run.sh              the gate: release asan format lint
-#   tests/run.sh full         the gate, and then asan-all tsan soak package rig_vm
+#   tests/run.sh full         the gate, and then long asan-all tsan soak package rig_vm
 #   tests/run.sh STEP...      only the named steps
 #
-#   release    builds everything but the benchmarks, and runs every test
+#   release    builds everything but the benchmarks, and runs the tests
 #   asan       the test programs marked SANITIZED (tests/CMakeLists.txt) under ASan and UBSan
 #   format     clang-format
 #   lint       clang-tidy: of targets that have changed since they last passed on this machine
+#   long       the cases that tests/*/CMakeLists.txt leave out of the gate (LONG), in the release build
 #   asan-all   every test program under ASan and UBSan
 #   tsan       the test programs marked THREADS under ThreadSanitizer
 #   soak       half an hour of a whole rig (tests/soak)
@@ -26,7 +27,7 @@ jobs=$(nproc)
 gate=(release asan format lint)
 steps=("$@")
 [[ ${#steps[@]} -gt 0 ]] || steps=("${gate[@]}")
-[[ ${steps[*]} != full ]] || steps=("${gate[@]}" asan-all tsan soak package rig_vm)
+[[ ${steps[*]} != full ]] || steps=("${gate[@]}" long asan-all tsan soak package rig_vm)
 failures=()
 summaries=()
 costs=()
@@ -72,16 +73,20 @@ check_skips() {
 }
 
 # CTest counts programs; the cases in them, and which of those were skipped, are in its log.
+# run_tests PRESET [CTEST_OPTION]...
 run_tests() {
   local preset=$1 log=build/$1/Testing/Temporary/LastTest.log status=0
-  ctest --preset "$preset" --parallel "$jobs" || status=$?
+  ctest --preset "$preset" --parallel "$jobs" "${@:2}" || status=$?
   check_skips "$log" || status=1
   summaries+=("$preset: $(grep -c '^\[       OK \]' "$log") passed, $(grep -c \
     '^\[  FAILED  \] .* ms)$' "$log") failed, $(grep -c '^\[  SKIPPED \] .* ms)$' "$log") skipped")
   return "$status"
 }
 
-build_and_test() { check "build $1" build "$1" && check "tests $1" run_tests "$1"; }
+# Builds a preset and runs its tests; the gate leaves the long ones out.
+build_and_test() {
+  check "build $1" build "$1" && check "tests $1" run_tests "$1" --label-exclude long
+}
 
 format() { git ls-files '*.cpp' '*.hpp' | xargs clang-format --dry-run -Werror; }
 
@@ -102,13 +107,14 @@ config/install-deps.sh || exit 1
 for name in "${steps[@]}"; do
   case $name in
     release | asan | asan-all | tsan) build_and_test "$name" ;;
+    long) build release && check "long" run_tests release --label-regex long ;;
     format) check "format" format ;;
     lint) check "lint" lint ;;
     soak) build release && check "soak" build/release/tests/soak/soak --minutes 30 ;;
     package | rig_vm) check "$name" "tests/$name/run.sh" ;;
     *)
       echo "tests/run.sh: no step '$name'; allowed: full, or of release, asan, format, lint," \
-        "asan-all, tsan, soak, package and rig_vm" >&2
+        "long, asan-all, tsan, soak, package and rig_vm" >&2
       exit 2
       ;;
   esac

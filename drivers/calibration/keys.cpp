@@ -60,7 +60,7 @@ Keys pose_keys(PoseDraft& p) {
   return {
       {"pose", "position_m", &p.position, m, "Position in the world (Z up). Required unless world_from_camera is given.", optional("[0.5, 0.0, 1.6]"), ""},
       {"pose", "rotation_deg", &p.rotation, deg, "Rotation about world X, then Y, then Z. Without it the camera looks straight up, the right of the picture is X and its bottom is Y.", optional("[0.0, 0.0, 0.0]"), ""},
-      {"pose", "world_from_camera", &p.matrix, plain, "In place of both: the rigid transform, OpenCV axes (right, down, forward).", optional("[[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, 1.6], [0, 0, 0, 1]]")},
+      {"pose", "world_from_camera", &p.matrix, plain, "Instead of both: the rigid transform; camera axes as in OpenCV (right, down, forward).", optional("[[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, 1.6], [0, 0, 0, 1]]")},
   };
 }
 

@@ -245,7 +245,8 @@ TEST(UnseenHorizon, DoesNotSmearALampAtTheEdge) {
                      ASSERT_LT(radiance.r, 0.3);
                    }
                  });
-  EXPECT_NE(lighting.report.notes.back().find("8 times its median"), std::string::npos);
+  EXPECT_NE(lighting.report.notes.back().find("8 times as bright as its median"),
+            std::string::npos);
 }
 
 TEST(UnseenMirror, ShowsTheUpperHalfBelow) {
