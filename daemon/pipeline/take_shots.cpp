@@ -1,6 +1,7 @@
 #include "daemon/pipeline/take_shots.hpp"
 
 #include <chrono>
+#include <string>
 #include <utility>
 #include <variant>
 
@@ -25,6 +26,10 @@ TakeShots::TakeShots(const Take& take, TakeShotsOptions options)
   if (light_.needs_frames() && !light_stream_)
     throw Error(take.session.directory.string() +
                 ": the session has no light frames, and the set gives no lighting.environment");
+  const std::size_t frames = take.observer_stream->records().size();
+  if (options_.first >= frames)
+    throw Error(take.session.directory.string() + ": has no frame " +
+                std::to_string(options_.first) + ", only " + std::to_string(frames) + " frames");
   goes_through_all_ = options_.from_start && (track_.remembers() || light_.remembers());
   next_ = goes_through_all_ ? 0 : options_.first;
   ReplayOptions replayed;

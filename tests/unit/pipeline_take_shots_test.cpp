@@ -83,7 +83,9 @@ TEST_F(TakeShotsTest, WhereTheLightRemembersAShotIsWhatAPassThroughTheTakeGives)
     options.metrics = &metrics;
     options.lighting = take_.set.lighting;
     options.lighting->unseen = unseen;
+    options.lighting->smoothing_s = 0;  // the light remembers nothing by itself
     EXPECT_EQ(all(options).size(), 1u);
+    options.metrics = nullptr;
     return metrics.snapshot(1).stages.at("tracking").frames;
   };
   EXPECT_EQ(tracked(set::UnseenRule::horizon), 1u);
