@@ -1,5 +1,5 @@
-// The command line of previzd: its subcommands, and what each of them was told. The program parses
-// by it, and the manual page and the shell completion are printed from it.
+// Defines the command line of previzd: its subcommands and their options. The program parses with
+// it, and the manual page and the shell completion are printed from it.
 #pragma once
 
 #include <filesystem>
@@ -26,7 +26,8 @@ struct CommandLine {
   calibrate::Commands calibrate;
 };
 
-// Adds everything to `app`; `said` must outlive it.
+// Adds all subcommands and options to `app`, which writes what it parses into `said`; `said` must
+// outlive `app`.
 void add_commands(CLI::App& app, CommandLine& said);
 
 }  // namespace previz

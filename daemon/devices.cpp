@@ -69,8 +69,8 @@ void list_devices(std::ostream& out) {
   list_displays(out);
 }
 
-// A device is read by a thread of its own; two interfaces of one device have one name, and the
-// first of them is read.
+// Each device is read by a thread of its own. Two interfaces of one device have the same name, and
+// only the first of them is read.
 void learn_buttons(std::ostream& out, const std::stop_token& stop) {
   std::mutex mutex;
   std::vector<std::jthread> listeners;

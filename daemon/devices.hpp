@@ -1,4 +1,5 @@
-// `previzd devices`: what is plugged in, by the names a set file takes.
+// Implements `previzd devices`, which lists what is plugged in under the names that a set file
+// uses.
 #pragma once
 
 #include <iosfwd>
@@ -6,12 +7,12 @@
 
 namespace previz {
 
-// One line a device: its driver, its stable name, what it is. Drivers that cannot look (no
-// permission, no bus) say so instead.
+// Prints one line per device: its driver, its stable name and its description. A driver that cannot
+// look (no permission, no bus) prints the reason instead.
 void list_devices(std::ostream& out);
 
-// Until stopped, prints the name of every HID button that is pressed.
-// Throws previz::Error if there is no device to listen to.
+// Prints the name of every HID button that is pressed, until `stop` is requested. Throws
+// previz::Error if there is no device to listen to.
 void learn_buttons(std::ostream& out, const std::stop_token& stop);
 
 }  // namespace previz

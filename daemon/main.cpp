@@ -1,4 +1,4 @@
-// previzd: the subcommands; nothing else.
+// previzd parses the command line and runs the subcommand; it does nothing else.
 //
 // Exit status: 0 done; 1 an error, one line on standard error says which; 2 the command line cannot
 // be understood; 128 + N stopped by signal N (what was finished is on disk, and a render goes on
@@ -21,7 +21,8 @@ namespace {
 
 using namespace previz;
 
-// The journal gets the priority of an error; on a terminal the line looks like any command's.
+// Logs to the journal with the priority of an error; on a terminal the line looks like any
+// command's.
 void report_end(const std::exception& error) {
   if (report::destination() == report::Destination::journal)
     report::log({report::Severity::error, "", error.what()});
@@ -69,7 +70,7 @@ int do_run(rig::LiveOptions& options, const StopOnSignal& stop) {
   options.stop = stop.token();
   report::Reports reports(report::log);
   const std::string metrics = to_json(rig::run_live(options, reports));
-  if (!options.bus) std::cout << metrics;  // a service is asked for them on the bus
+  if (!options.bus) std::cout << metrics;  // a service publishes them on the bus
   return 0;                                // a rig runs until it is stopped
 }
 

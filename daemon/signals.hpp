@@ -1,4 +1,4 @@
-// SIGINT and SIGTERM as a stop request.
+// Turns SIGINT and SIGTERM into a stop request.
 #pragma once
 
 #include <atomic>
@@ -7,9 +7,9 @@
 
 namespace previz {
 
-// While it lives, SIGINT and SIGTERM are blocked in the constructing thread and in every thread
-// started after it, and the first one to come requests a stop; a second one ends the process at
-// once. Construct it in main, before any other thread.
+// While an object of this class lives, SIGINT and SIGTERM are blocked in the constructing thread
+// and in every thread started after it. The first signal to arrive requests a stop; a second one
+// ends the process at once. Construct the object in main, before any other thread.
 class StopOnSignal {
  public:
   StopOnSignal();
@@ -18,7 +18,7 @@ class StopOnSignal {
   StopOnSignal& operator=(const StopOnSignal&) = delete;
 
   std::stop_token token() const { return stop_.get_token(); }
-  // The signal that came, 0 if none did.
+  // Returns the signal that arrived; 0 if none has.
   int received() const { return received_; }
 
  private:

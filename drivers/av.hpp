@@ -1,4 +1,5 @@
-// Owning handles and error text for libav; who includes it links libav.
+// Owns libav's objects and puts its errors into words. A target that includes this header must link
+// libav.
 #pragma once
 
 extern "C" {
@@ -47,13 +48,13 @@ inline std::string error_text(int code) {
   return text.data();
 }
 
-// Throws previz::Error "<file>: <what>: <libav's reason>" if `code` says failure.
+// Returns `code`, or throws previz::Error "<file>: <what>: <libav's reason>" if it is an error.
 inline int check(int code, const std::filesystem::path& file, const std::string& what) {
   if (code < 0) throw Error(file.string() + ": " + what + ": " + error_text(code));
   return code;
 }
 
-// IEEE 802.3 (zlib's) CRC-32.
+// Returns the CRC-32 of a packet's bytes (IEEE 802.3, as zlib's).
 inline std::uint32_t crc32(const AVPacket& packet) {
   return ~av_crc(av_crc_get_table(AV_CRC_32_IEEE_LE), ~0u, packet.data,
                  static_cast<std::size_t>(packet.size));

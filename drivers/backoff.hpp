@@ -1,4 +1,5 @@
-// How long to wait between attempts at a device that is not there: doubling, up to a limit.
+// Decides how long to wait between attempts to open a device that is not there: each wait doubles,
+// up to a limit.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +23,7 @@ class Backoff {
     wait_ = std::clamp(2 * wait_, limits_.first, limits_.last);
     at_ = now + wait_;
   }
-  // The next failure waits as the first did; nothing is waited for now.
+  // Ends the wait; after the next failure it is as short as at first.
   void reset() {
     wait_ = std::chrono::milliseconds(0);
     at_ = {};

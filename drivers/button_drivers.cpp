@@ -29,7 +29,7 @@ constexpr auto all_button_drivers = std::to_array<ButtonDriver>({
 #endif
 });
 
-// The driver's part of a button's name.
+// Returns the driver's part of a button's name.
 std::string driver_part(const std::string& name) {
   return name.substr(0, name.find(':'));
 }

@@ -1,4 +1,4 @@
-// What a set asks of its buttons. Plain data.
+// The settings that a set gives for its buttons, as plain data.
 #pragma once
 
 #include <map>
@@ -6,7 +6,7 @@
 
 namespace previz {
 
-// How a contact is wired to its GPIO line.
+// Says how a contact is wired to its GPIO line.
 struct ContactWiring {
   enum class Bias { as_is, none, pull_up, pull_down };
   bool active_low = true;  // pressed pulls the line to ground
@@ -17,7 +17,7 @@ struct ContactWiring {
 };
 
 struct ButtonSettings {
-  // By "gpio:CHIP:LINE", or "gpio:CHIP" for all other lines of the chip.
+  // The key is "gpio:CHIP:LINE", or "gpio:CHIP" for all other lines of the chip.
   std::map<std::string, ContactWiring> wiring;
 
   ContactWiring wiring_of(const std::string& line_name) const {

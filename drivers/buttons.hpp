@@ -23,7 +23,7 @@ using ButtonsEvent = std::variant<ButtonEvent, EndOfStream, DeviceTrouble>;
 
 // A button that is there now.
 struct FoundButton {
-  std::string name;  // of a line; of a HID device without the selector
+  std::string name;  // name of a line, or of a HID device without the selector
   std::string description;
 };
 
@@ -36,15 +36,16 @@ class Buttons {
   // The stable name a set file uses for this device.
   virtual std::string name() const = 0;
 
-  // Readable (POLLIN) whenever next() has something to say; never read it. Valid, and the same, for
-  // the object's life.
+  // Returns a descriptor that is readable (POLLIN) whenever next() has something to return; the
+  // caller must never read it. It stays valid, and the same, for the object's life.
   virtual int fd() const = 0;
 
-  // The next edge, in order; none where nothing waits. Never blocks. A button held when the device
-  // is lost gets its release first. After EndOfStream or trouble that says `lost` nothing follows.
+  // Returns the next edge, in order of time; none if none is waiting. Never blocks. A button that
+  // is held when the device is lost gets its release first. Nothing follows EndOfStream or trouble
+  // with `lost`.
   virtual std::optional<ButtonsEvent> next() = 0;
 
-  // Since the object was made; to be asked by the thread that owns it.
+  // Counts since the object was made; only the thread that owns the object may call this.
   virtual DeviceCounters counters() const { return {}; }
 };
 

@@ -22,7 +22,8 @@ double least_illumination(const Vignetting& v, double max_angle_rad) {
   const auto consider = [&](double x) {
     if (x > 0 && x < end) least = std::min(least, at_square(v, x));
   };
-  // Where the slope v1 + 2 v2 x + 3 v3 x^2 is 0; q never cancels (Numerical Recipes, 5.6).
+  // The extremes lie where the slope v1 + 2 v2 x + 3 v3 x^2 is 0; q never cancels (Numerical
+  // Recipes, 5.6).
   const double discriminant = v[1] * v[1] - 3 * v[0] * v[2];
   if (discriminant >= 0) {
     const double q = -(v[1] + std::copysign(std::sqrt(discriminant), v[1]));

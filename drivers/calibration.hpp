@@ -1,4 +1,4 @@
-// What is known about a camera: lens, pose and response. Plain data, written in sessions and sets.
+// A camera's calibration: lens, pose and response, as plain data that sessions and sets hold.
 #pragma once
 
 #include <array>
@@ -54,15 +54,15 @@ struct ObserverCalibration {
   double responsivity = 1.0;  // exposure = exposure_s * gain * responsivity
 };
 
-// What a lens lets through at an angle off its axis, over what it lets through on it:
-// 1 + v1 t^2 + v2 t^4 + v3 t^6, t the angle.
+// The light that a lens passes at an angle t off its axis, relative to what it passes on the axis:
+// 1 + v1 t^2 + v2 t^4 + v3 t^6.
 using Vignetting = std::array<double, 3>;
 
 double relative_illumination(const Vignetting& v, double angle_rad);
-// Its least value from the axis to an angle off it.
+// Returns the least relative illumination from the axis to `max_angle_rad` off it.
 double least_illumination(const Vignetting& v, double max_angle_rad);
 
-// What goes beyond these is a broken lens or sensor, or a wrong calibration.
+// Values beyond these bounds mean a broken lens or sensor, or a wrong calibration.
 inline constexpr double min_illumination = 0.01, max_dark_level = 0.5;
 
 // value = forward(exposure * radiance * relative_illumination + dark_level), clipped at 1.

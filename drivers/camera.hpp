@@ -16,11 +16,11 @@ struct NoFrame {};
 
 using CameraEvent = std::variant<FramePtr, NoFrame, EndOfStream, DeviceTrouble>;
 
-// What the pictures of an open camera are. Fixed until it is closed.
+// The format of an open camera's pictures, which is fixed until the camera is closed.
 struct CameraFormat {
   PixelFormat format = PixelFormat::rgb8;
   int width = 0, height = 0;  // pixels
-  double rate_hz = 0;         // nominal; 0 where the camera has none (triggered, or not told)
+  double rate_hz = 0;         // nominal; 0 if the camera is triggered or reports none
   BayerPattern bayer = BayerPattern::none;
 
   friend bool operator==(const CameraFormat&, const CameraFormat&) = default;
@@ -33,14 +33,14 @@ struct FoundCamera {
   std::string description;  // vendor, model, where it is plugged in
 };
 
-// An open camera; making it opens the device and settles its format, destroying it gives the device
-// back whatever state it is in. Everything but the destructor may throw previz::Error only where it
-// says so. One thread at a time.
+// An open camera. Making it opens the device and settles its format; destroying it gives the device
+// back, whatever its state. A function throws previz::Error only if its comment says so. Only one
+// thread may use the camera at a time.
 //
-// Frames come in capture order, each once, of format(); what a device sends that is no whole frame
-// of that format is counted and never delivered. Sequence and timestamp_ns strictly increase, also
-// from one streaming to the next. timestamp_ns and arrival_ns are CLOCK_MONOTONIC (of replay: the
-// recorded session's clock).
+// Frames come in capture order, each once, of format(); anything else that a device sends is
+// counted and never delivered. Sequence and timestamp_ns strictly increase, also from one streaming
+// to the next. timestamp_ns and arrival_ns are CLOCK_MONOTONIC (for replay: the recorded session's
+// clock).
 class Camera {
  public:
   virtual ~Camera() = default;
@@ -50,23 +50,25 @@ class Camera {
 
   virtual CameraFormat format() const = 0;
 
-  // Frames captured from now on are delivered. Throws previz::Error if the device refuses. Does
-  // nothing while the camera streams.
+  // Starts streaming: frames captured from now on are delivered. Throws previz::Error if the device
+  // refuses. Does nothing while the camera streams.
   virtual void start() = 0;
 
-  // Ends streaming; what was captured and not yet taken is given up. May be called at any time.
+  // Ends streaming and drops the frames that were captured but not yet taken. May be called at any
+  // time.
   virtual void stop() = 0;
 
-  // Waits at most `timeout` for the next frame. NoFrame while the camera does not stream. After
-  // trouble that says `lost`, every later call says so again until the camera is closed.
+  // Waits at most `timeout` for the next frame. Returns NoFrame while the camera does not stream.
+  // After trouble with `lost`, every later call reports it again until the camera is closed.
   virtual CameraEvent next(std::chrono::milliseconds timeout) = 0;
 
-  // Asks for an exposure (shutter seconds, linear gain), applied from some later frame on, within
-  // what the device can. False where the device cannot be driven. What really applied is on each
-  // frame; between two exposures frames may be left out whose exposure is not known.
+  // Asks for an exposure (shutter seconds, linear gain), which applies from some later frame on,
+  // within what the device can do. Returns false if the device's exposure cannot be driven. Each
+  // frame carries the exposure that really applied; frames between two exposures may be left out if
+  // theirs is not known.
   virtual bool set_exposure(double exposure_s, double gain) = 0;
 
-  // Since the camera was opened.
+  // Counts since the camera was opened.
   virtual DeviceCounters counters() const = 0;
 };
 

@@ -1,4 +1,4 @@
-// The registry of camera drivers: who can open which camera, and which are there.
+// The registry of camera drivers, which open cameras and list those that are there.
 #pragma once
 
 #include <memory>
@@ -19,17 +19,18 @@ struct CameraDriver {
   // Throws previz::Error that names the device and says what is wrong.
   std::unique_ptr<Camera> (*open)(const CameraSettings& settings) = nullptr;
   std::vector<FoundCamera> (*find)() = nullptr;
-  // Where on the USB a camera is, also one that does not answer; none where it is not there.
+  // Returns the place of a camera on the USB, even if the camera does not answer; none if it is not
+  // there.
   std::optional<usb::Place> (*usb_place)(const std::string& device) = nullptr;
 };
 
-// The drivers that this build has.
+// Returns the drivers that this build has.
 std::span<const CameraDriver> camera_drivers();
 
-// The names of all drivers, also of those that this build leaves out.
+// Returns the names of all drivers, including those that this build leaves out.
 std::span<const char* const> camera_driver_names();
 
-// Throws previz::Error that says which drivers this build has, if it has not this one.
+// Throws previz::Error that lists the drivers of this build if this one is not among them.
 const CameraDriver& camera_driver(std::string_view name);
 
 }  // namespace previz

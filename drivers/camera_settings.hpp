@@ -1,4 +1,4 @@
-// What a set asks of a camera. Plain data.
+// The settings that a set asks of a camera, as plain data.
 #pragma once
 
 #include <optional>
@@ -6,8 +6,9 @@
 
 namespace previz {
 
-// What is absent is left as the device has it. What the device cannot do is an error that says what
-// it can; nothing is rounded in silence but a rate or an exposure to the device's own steps.
+// An absent setting stays as the device has it. A setting that the device cannot do is an error
+// that says what it can do; only a rate or an exposure is silently rounded, to the device's own
+// steps.
 struct CameraSettings {
   std::string source = "observer";    // becomes Frame::source
   std::string device;                 // the stable name, as `previzd devices` prints it
@@ -18,8 +19,8 @@ struct CameraSettings {
   std::optional<double> gain;             // linear, of a device whose gain is in dB
   std::optional<double> raw_gain;         // in the device's own units; its factor is then not known
   std::optional<double> white_balance_k;  // colour temperature
-  // Absent: the camera runs freely. "software": one frame a call of next(). Otherwise the hardware
-  // line in the device's own words ("Line1").
+  // Absent: the camera runs freely. "software": each call of next() triggers one frame. Otherwise:
+  // the hardware line in the device's own words ("Line1").
   std::optional<std::string> trigger;
   std::optional<int> packet_size;  // bytes, network cameras; absent: the largest that gets through
   double responsivity = 1;         // exposure = exposure_s * gain * responsivity

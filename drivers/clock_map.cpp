@@ -22,8 +22,8 @@ void ClockMap::add(const Point& point) {
   while (least_.front().device_s < point.device_s - window_s) least_.pop_front();
 }
 
-// The edge of the points' lower convex hull that lies under their middle: of all lines under the
-// points, the one nearest to them on average.
+// Fits the edge of the points' lower convex hull that lies under their middle: of all lines under
+// the points, it is the nearest to them on average.
 double ClockMap::least_delay_s(double device_s) {
   std::vector<Point> hull;
   double middle = 0;

@@ -1,4 +1,4 @@
-// From a device's own clock to the host's, out of nothing but when its frames arrived.
+// Maps a device's own clock to the host's, from nothing but the arrival times of its frames.
 #pragma once
 
 #include <cstdint>
@@ -10,12 +10,12 @@ namespace previz {
 // A frame arrives some delay after its device stamped it; the delay varies but is never negative.
 // The map is the line of least delay under the points (stamp, arrival): Moon, Skelly and Towsley,
 // "Estimation and Removal of Clock Skew from Network Delay Measurements" (INFOCOM 1999), over the
-// last half minute, so that a slowly drifting crystal is followed. What no one-way measurement can
-// know, the least delay itself, remains: mapped times are late by it.
+// last half minute, so that a slowly drifting crystal is followed. No one-way measurement can know
+// the least delay itself, so mapped times are late by that delay.
 class ClockMap {
  public:
-  // The host time of a frame; at most its arrival, and after every time given before. Stamps that
-  // go backwards (the device started anew) begin a new map.
+  // Returns the host time of a frame: at most its arrival, and after every time returned before. A
+  // stamp that goes backwards (the device was restarted) begins a new map.
   std::int64_t to_host(std::int64_t device_ns, std::int64_t arrival_ns);
 
  private:

@@ -1,4 +1,4 @@
-// One contact's edges without its bouncing.
+// Removes the bouncing from one contact's edges.
 #pragma once
 
 #include <cstdint>
@@ -6,22 +6,22 @@
 
 namespace previz {
 
-// The first edge counts at once, so that nothing is late; what follows within the window is
-// bouncing, and only the level it settles on counts.
+// The first edge counts at once, so that nothing is late. Later edges within the window are
+// bouncing, and only the level on which they settle counts.
 class Debouncer {
  public:
   explicit Debouncer(std::int64_t window_ns) : window_ns_(window_ns) {}
 
-  // An edge of the contact, in order of time. True where it is to be told; pressed() then says
-  // what.
+  // Takes the contact's edges in order of time. Returns true if the reported level changes;
+  // pressed() is then the new level.
   bool edge(bool closed, std::int64_t time_ns) {
     const bool settled = settle(time_ns);
     closed_ = closed;
     return take(time_ns) || settled;
   }
 
-  // To be called at settles_ns() or later: true where the contact settled on another level than it
-  // was told.
+  // Must be called at settles_ns() or later. Returns true if the contact settled on another level
+  // than the one last reported.
   bool settle(std::int64_t now_ns) {
     if (!quiet_until_ns_ || now_ns < *quiet_until_ns_) return false;
     const std::int64_t end_ns = *quiet_until_ns_;
@@ -29,14 +29,14 @@ class Debouncer {
     return take(end_ns);
   }
 
-  // The contact is gone: released, with nothing to settle.
+  // Forgets a contact that is gone: it counts as released and has nothing to settle.
   void reset() {
     closed_ = pressed_ = false;
     quiet_until_ns_.reset();
   }
 
-  bool pressed() const { return pressed_; }          // as last told
-  std::int64_t told_ns() const { return told_ns_; }  // when that was
+  bool pressed() const { return pressed_; }          // the level last reported
+  std::int64_t told_ns() const { return told_ns_; }  // the time of its edge
   std::optional<std::int64_t> settles_ns() const { return quiet_until_ns_; }
 
  private:

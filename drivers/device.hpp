@@ -1,4 +1,4 @@
-// What a device may say besides its data, and where it is in its life.
+// What a device reports besides its data, and the states that it goes through.
 #pragma once
 
 #include <cstdint>
@@ -7,32 +7,32 @@
 
 namespace previz {
 
-// The stream is over and will not come back (only replay says this).
+// The stream is over and will not come back (only replay reports this).
 struct EndOfStream {};
 
-// What is wrong with a device, in words for the display: the device, what happened, what follows.
-// A value in the stream, never an exception across threads.
+// Trouble with a device, in words for the display: the device, what happened, what follows. It is a
+// value in the stream, never an exception across threads.
 struct DeviceTrouble {
   std::string device;
   std::string what;
-  // Nothing more comes from this device until it is closed and opened again. Otherwise the stream
-  // goes on, with whatever was in trouble left out.
+  // True: nothing more comes from this device until it is closed and opened again. False: the
+  // stream goes on without the data that was in trouble.
   bool lost = false;
 };
 
-// Where a device that is kept alive is in its life.
+// The state of a device that a lifeline keeps alive.
 enum class DeviceState {
-  absent,     // not there, or not to be opened; tried again after a while
-  starting,   // open, and nothing came of it yet
+  absent,     // not there, or cannot be opened; tried again after a while
+  starting,   // open, but nothing has come of it yet
   streaming,  // frames come
-  stalled,    // frames came, and come no more; about to be given up
-  lost,       // closed after a failure; to be opened anew
+  stalled,    // frames came, but have stopped; about to be given up
+  lost,       // closed after a failure; will be reopened
 };
 
 const char* to_string(DeviceState state);
 
-// Totals by what was counted: "frames cut short", "stream missing packets". They only grow, and an
-// entry that is there once stays.
+// Totals by what they count: "frames cut short", "stream missing packets". They only grow, and no
+// entry is ever removed.
 using DeviceCounters = std::map<std::string, std::uint64_t>;
 
 }  // namespace previz

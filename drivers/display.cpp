@@ -11,7 +11,7 @@ namespace {
 constexpr int largest_side_px = 16384;
 constexpr double highest_rate_hz = 1000;
 
-// Reads a number and what follows it; false where there is none in front.
+// Reads a number and the character that follows it; false if the text does not begin with one.
 template <class Number>
 bool take_number(std::string_view& text, Number& number) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);

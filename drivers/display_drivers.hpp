@@ -1,4 +1,4 @@
-// The registry of display drivers: who can open which display, and which are there.
+// The registry of display drivers, which open displays and list those that are there.
 #pragma once
 
 #include <memory>
@@ -12,22 +12,22 @@ namespace previz {
 
 struct DisplayDriver {
   const char* name;        // as a set file writes it
-  bool drives_connectors;  // its displays are plugged into connectors, and are there for people
+  bool drives_connectors;  // its displays are screens on connectors, for people to see
   // Throws previz::Error that names the display and says what is wrong.
   std::unique_ptr<Display> (*open)(const DisplaySettings& settings) = nullptr;
   std::vector<FoundDisplay> (*find)() = nullptr;
 };
 
-// The drivers that this build has.
+// Returns the drivers that this build has.
 std::span<const DisplayDriver> display_drivers();
 
-// The names of all drivers, also of those that this build leaves out.
+// Returns the names of all drivers, including those that this build leaves out.
 std::span<const char* const> display_driver_names();
 
-// DisplayDriver::drives_connectors of any driver; false where there is no driver of that name.
+// Returns DisplayDriver::drives_connectors of any driver; false if there is no driver of that name.
 bool drives_connectors(std::string_view name);
 
-// Throws previz::Error that says which drivers this build has, if it has not this one.
+// Throws previz::Error that lists the drivers of this build if this one is not among them.
 const DisplayDriver& display_driver(std::string_view name);
 
 }  // namespace previz

@@ -40,7 +40,7 @@ void DisplayLifeline::release() {
   try {
     if (display_) display_->release();
   } catch (const Error&) {
-    display_.reset();  // free for others, too; opened anew when something is to be shown
+    display_.reset();  // frees the screen, too; the next show() reopens it
     state_ = DeviceState::lost;
   }
 }

@@ -1,4 +1,4 @@
-// A display that is never given up: opened when a screen is there, opened again when it is lost.
+// Keeps a display alive: opens it when a screen is there, and opens it again when it is lost.
 #pragma once
 
 #include <functional>
@@ -12,27 +12,27 @@
 namespace previz {
 
 using DisplayOpener = std::function<std::unique_ptr<Display>()>;
-// What to show on a screen of this mode.
+// Returns what to show on a screen of the given mode.
 using Composer = std::function<Screenful(const DisplayMode&)>;
 
-// All calls come from one thread. Each time it is opened the mode is agreed anew.
+// All calls must come from one thread. Every opening settles the mode anew.
 class DisplayLifeline {
  public:
-  // `name` is what trouble is told under. Opens nothing yet.
+  // `name` stands in reports of trouble. Opens nothing yet.
   DisplayLifeline(std::string name, DisplayOpener open, const BackoffLimits& backoff = {},
                   HostClock clock = {});
 
-  // Opens the display where that is due, and shows what is composed for it. Trouble is told once
-  // for each change to the worse, and never says `lost`; nothing is returned where nothing was
-  // shown and that was told before.
+  // Opens the display if an attempt is due, and shows what `compose` returns for it. Trouble is
+  // reported once for each change to the worse, and never with `lost`. Returns nothing if nothing
+  // was shown and the reason was reported before.
   std::optional<DisplayEvent> show(const Composer& compose);
   void release();
-  // Gives the display up. Whoever ends the thread that the calls came from calls it there: a
-  // graphics context stays that thread's.
+  // Closes the display. Whoever ends the thread of the other calls must call this on that thread,
+  // because a graphics context belongs to its thread.
   void close();
 
   DeviceState state() const { return state_; }  // absent, starting, streaming, lost
-  // Null while there is none; for mode() and read_back().
+  // Returns the display for mode() and read_back(); null while there is none.
   Display* display() { return display_.get(); }
 
  private:
@@ -44,7 +44,7 @@ class DisplayLifeline {
   const HostClock clock_;
   Backoff backoff_;
   DeviceState state_ = DeviceState::absent;
-  std::string told_;  // the trouble it is in, as last told
+  std::string told_;  // trouble last reported; empty while all is well
   std::unique_ptr<Display> display_;
 };
 

@@ -1,4 +1,4 @@
-// Exposures of frames: which one applied to which frame of a device that does not say so itself.
+// Works out which exposure applied to which frame of a device that does not report it.
 #pragma once
 
 #include <cstdint>
@@ -16,21 +16,21 @@ struct Exposure {
   friend bool operator==(const Exposure&, const Exposure&) = default;
 };
 
-// A device takes a new exposure over somewhere between the frame it is capturing when it is asked
-// and a few frames later. Frames before are of the old one, frames after of the new; for those in
-// between nobody knows, and a bracket with a wrong label would be worse than a missing frame.
+// A device applies a new exposure somewhere between the frame it is capturing when it is asked and
+// a few frames later. Earlier frames have the old exposure, later ones the new. In between nobody
+// knows, and a bracket with a wrong label would be worse than a missing frame.
 class ExposureLedger {
  public:
-  // `settle_frames`: how many frames begun after a change may still have the old exposure.
+  // `settle_frames` is how many frames begun after a change may still have the old exposure.
   ExposureLedger(const Exposure& initial, int settle_frames)
       : current_(initial), settle_frames_(settle_frames) {}
 
-  // The device was asked between these two times (host clock).
+  // Records that the device was asked for `exposure` between these two times (host clock).
   void changed(std::int64_t before_ns, std::int64_t after_ns, const Exposure& exposure) {
     changes_.push_back({before_ns, after_ns, exposure, settle_frames_});
   }
 
-  // The exposure of a frame that the device stamped so; none where it is not known. To be asked
+  // Returns the exposure of the frame with this time stamp; none if it is not known. Must be called
   // once a frame, in order.
   std::optional<Exposure> of_frame(std::int64_t timestamp_ns) {
     while (!changes_.empty() && timestamp_ns > changes_.front().after_ns) {
@@ -56,8 +56,8 @@ class ExposureLedger {
   std::deque<Change> changes_;
 };
 
-// Writes the exposure a frame was taken with into it. A shutter time that is not known (0) counts
-// as 1 s.
+// Writes the exposure that a frame was taken with into the frame. A shutter time that is not known
+// (0) counts as 1 s.
 inline void apply_exposure(Frame& frame, const Exposure& exposure, double responsivity) {
   frame.exposure_s = exposure.exposure_s;
   frame.gain = exposure.gain;

@@ -16,9 +16,9 @@ struct FaultyDevice::State {
   HostClock clock;
   std::atomic<bool> plugged = true;
   HostClock::Time back{};    // when a planned disconnection ends
-  std::uint64_t frames = 0;  // that the device has delivered
+  std::uint64_t frames = 0;  // frames that the device has delivered
 
-  // The fault that hits the frame'th frame.
+  // Returns the fault that hits the frame'th frame.
   const Fault* fault_at(std::uint64_t frame) const {
     for (const Fault& fault : plan)
       if (frame >= fault.frame && frame - fault.frame < fault.frames) return &fault;
@@ -81,7 +81,7 @@ class FaultyCamera final : public Camera {
     return frame;
   }
 
-  // What becomes of a frame; nothing where it is gone, or kept for later.
+  // Returns what becomes of a frame; nothing if it is lost or held for later.
   std::optional<CameraEvent> afflict(const FramePtr& frame) {
     const std::uint64_t index = device_->frames++;
     if (!held_.empty() && index >= release_) return release(frame);
@@ -109,7 +109,7 @@ class FaultyCamera final : public Camera {
     return std::nullopt;
   }
 
-  // All that was held arrives with this frame.
+  // Releases all held frames; they arrive together with this one.
   std::optional<CameraEvent> release(const FramePtr& last) {
     for (const FramePtr& frame : held_) {
       auto late = std::make_shared<Frame>(*frame);
@@ -135,7 +135,7 @@ class FaultyCamera final : public Camera {
               "left out), stall@FRAME and disconnect@FRAME+SECONDSs");
 }
 
-// The whole of `text` as a number.
+// Parses the whole of `text` as a number.
 template <typename Number>
 Number number(std::string_view text, const std::string& whole) {
   Number value{};

@@ -1,4 +1,4 @@
-// Faults put into any camera's stream by a plan: to rehearse, and to test, what happens then.
+// Puts planned faults into any camera's stream, to rehearse and to test what happens then.
 #pragma once
 
 #include <chrono>
@@ -13,10 +13,10 @@
 
 namespace previz {
 
-// Opens a device, each time anew; throws previz::Error while it cannot be opened.
+// Opens a device anew at each call; throws previz::Error while it cannot be opened.
 using CameraOpener = std::function<std::unique_ptr<Camera>()>;
 
-// What goes wrong at the frame'th frame (from 0) that the device delivers, over all its openings.
+// Says what goes wrong at frame number `frame`, counted from 0 over all openings of the device.
 struct Fault {
   enum class Kind {
     drop,        // `frames` frames never come; their sequence numbers are missing
@@ -33,7 +33,7 @@ struct Fault {
   friend bool operator==(const Fault&, const Fault&) = default;
 };
 
-// "drop@30", "drop@30+5", "corrupt@7", "late@12+3", "stall@60", "disconnect@90+1.5s".
+// Parses "drop@30", "drop@30+5", "corrupt@7", "late@12+3", "stall@60" or "disconnect@90+1.5s".
 // Throws previz::Error that quotes the text and says what is allowed.
 Fault parse_fault(const std::string& text);
 
@@ -46,7 +46,7 @@ class FaultyDevice {
   // Throws previz::Error while the device is unplugged, and what the opener throws.
   std::unique_ptr<Camera> open();
 
-  void unplug();  // the open camera is lost, at its next next()
+  void unplug();  // the open camera is lost at the next call of its next()
   void plug();
 
   struct State;
@@ -56,7 +56,7 @@ class FaultyDevice {
   std::shared_ptr<State> state_;
 };
 
-// The same as an opener.
+// Returns an opener for a FaultyDevice.
 CameraOpener with_faults(CameraOpener open, std::vector<Fault> plan, HostClock clock = {});
 
 }  // namespace previz

@@ -19,7 +19,7 @@ enum class PixelFormat {
 };
 
 // The colour filters over a sensor's samples, by its first two rows. A frame with a pattern is
-// gray8 or gray16, as the sensor counted; who wants its colours asks demosaiced() or to_plate().
+// gray8 or gray16, as the sensor counted; demosaiced() and to_plate() return its colours.
 enum class BayerPattern { none, rggb, grbg, gbrg, bggr };
 
 // Immutable once published; stages share it by FramePtr.
@@ -42,22 +42,22 @@ struct Frame {
 
 using FramePtr = std::shared_ptr<const Frame>;
 
-// Bytes of one frame of this format and size, without padding; yuv422p8 of odd width has
-// (width + 1) / 2 chroma columns.
+// Returns the bytes of one frame of this format and size, without padding; yuv422p8 of odd width
+// has (width + 1) / 2 chroma columns.
 std::size_t frame_bytes(PixelFormat format, int width, int height);
 
-// The format's name as written in session.toml: "rgb8", "gray16", ...
+// Returns the format's name as written in session.toml: "rgb8", "gray16", ...
 const char* to_string(PixelFormat format);
-// Inverse of to_string; throws std::invalid_argument naming the unknown format.
+// Inverts to_string; throws std::invalid_argument naming the unknown format.
 PixelFormat pixel_format_from_string(const std::string& name);
 
-// The same for patterns: "none", "rggb", ...
+// These do the same for patterns: "none", "rggb", ...
 const char* to_string(BayerPattern pattern);
 BayerPattern bayer_pattern_from_string(const std::string& name);
 
-// The frame in colour: with a Bayer pattern as rgb8 or rgb16, any other is itself. Edge-aware
-// (OpenCV), up to the picture's edge; a sample stays as it is in its own place. Throws
-// previz::Error if `bytes` has not the length of its format and size.
+// Returns the frame in colour: rgb8 or rgb16 if it has a Bayer pattern, otherwise the frame itself.
+// Interpolation is edge-aware (OpenCV) and reaches the picture's edge; a sample keeps its value in
+// its own place. Throws previz::Error if `bytes` has not the length of its format and size.
 FramePtr demosaiced(const FramePtr& frame);
 
 // The converted RGB plate: interleaved RGB, 8 or 16 bits a sample. "Bit for bit" refers to this.

@@ -1,4 +1,5 @@
-// The kernel's numbers and times of video frames, made to increase whatever the driver below does.
+// Makes the kernel's sequence numbers and times of video frames increase, whatever the driver below
+// does.
 #pragma once
 
 #include <algorithm>
@@ -11,23 +12,24 @@ namespace previz {
 
 class FrameOrder {
  public:
-  // What is odd is counted there.
+  // Irregularities are counted in `counters`.
   explicit FrameOrder(DeviceCounters& counters) : counters_(counters) {}
 
-  // The kernel counts from 0 after each start, in 32 bits.
+  // Must be called at each start, since the kernel then counts from 0 again, in 32 bits.
   void restart() { device_sequence_.reset(); }
 
   std::uint64_t sequence_of(std::uint32_t device_sequence) {
     const std::uint32_t step =
         device_sequence_ ? device_sequence - *device_sequence_ : std::uint32_t{1};
     device_sequence_ = device_sequence;
-    // A step backwards, or none, is a driver that does not count.
+    // A driver whose step is zero or backwards does not count.
     const std::uint32_t forward = step == 0 || step > 0x7fffffff ? 1 : step;
     if (forward > 1) counters_["frames missing in the sequence"] += forward - 1;
     return sequence_ += forward;
   }
 
-  // Strictly increasing, at most the arrival; drivers without monotonic stamps get the arrival.
+  // Returns the stamp, strictly increasing and at most the arrival; drivers without monotonic
+  // stamps get the arrival.
   std::int64_t time_of(std::optional<std::int64_t> stamp_ns, std::int64_t arrival_ns) {
     if (!stamp_ns) ++counters_["frames without a time stamp of the kernel"];
     const std::int64_t time_ns = std::min(arrival_ns, stamp_ns.value_or(arrival_ns));

@@ -8,7 +8,8 @@
 
 namespace previz {
 
-// Now on CLOCK_MONOTONIC, which steady_clock is in libstdc++ and every time stamp is taken from.
+// Returns the time on CLOCK_MONOTONIC, which is steady_clock's in libstdc++ and that of every time
+// stamp.
 inline std::int64_t monotonic_ns() {
   return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
 }

@@ -85,7 +85,7 @@ std::optional<CameraEvent> Lifeline::not_opened(const std::string& why) {
   return DeviceTrouble{name_, why + "; tried again until it is there"};
 }
 
-// What of a device's events goes on; nothing of NoFrame.
+// Returns the event to pass on; nothing for NoFrame.
 std::optional<CameraEvent> Lifeline::take(CameraEvent event) {
   if (auto* frame = std::get_if<FramePtr>(&event)) {
     state_ = DeviceState::streaming;
@@ -106,7 +106,7 @@ std::optional<CameraEvent> Lifeline::take(CameraEvent event) {
   return std::nullopt;
 }
 
-// A device that was opened anew may count from its beginning again.
+// Renumbers frames, because a device that was opened again may count from its beginning.
 FramePtr Lifeline::numbered(FramePtr frame) {
   if (!sequence_offset_)
     sequence_offset_ = frame->sequence < next_sequence_ ? next_sequence_ - frame->sequence : 0;
@@ -151,7 +151,8 @@ CameraEvent Lifeline::lose(const std::string& why) {
   return DeviceTrouble{name_, why + "; reopening it"};
 }
 
-// A device that was pulled says so; one that only says nothing may be wedged.
+// An unplugged device reports that itself; a device that is merely silent may be wedged, and is
+// reset.
 CameraEvent Lifeline::lose_silent(const std::string& why) {
   close();
   const std::optional<std::string> why_not = hooks_.reset ? hooks_.reset() : std::nullopt;
@@ -161,8 +162,8 @@ CameraEvent Lifeline::lose_silent(const std::string& why) {
   return lose(why + "; it was reset");
 }
 
-// Whatever came may be ours. Its node may follow a little later: attempts start as close together
-// as at first.
+// Any device that was plugged in may be this one. Its node may follow a little later, so attempts
+// are as close together again as at first.
 void Lifeline::look_for_arrivals() {
   const std::uint64_t arrivals = hooks_.arrivals ? hooks_.arrivals() : 0;
   if (std::exchange(arrivals_, arrivals) == arrivals) return;

@@ -1,4 +1,4 @@
-// A camera that is never given up: opened when it appears, opened again when it is lost.
+// Keeps a camera alive: opens it when it appears, and opens it again when it is lost.
 #pragma once
 
 #include <chrono>
@@ -16,43 +16,44 @@ namespace previz {
 
 struct LifelineOptions {
   std::chrono::milliseconds start_timeout{5000};   // from start() to the first frame
-  std::chrono::milliseconds stall_timeout{2000};   // between frames; to stalled
-  std::chrono::milliseconds stall_patience{1000};  // in stalled; to lost
+  std::chrono::milliseconds stall_timeout{2000};   // between frames, until stalled
+  std::chrono::milliseconds stall_patience{1000};  // while stalled, until lost
   BackoffLimits backoff;                           // between attempts to open
 };
 
-// What a lifeline can ask of the bus its device is on; empty: nothing.
+// Functions by which a lifeline asks the bus of its device; either may be empty.
 struct LifelineHooks {
-  // How many devices have been plugged in so far. When it grows, the next attempt to open is due at
-  // once.
+  // Returns how many devices have been plugged in so far. When the number grows, the next attempt
+  // to open is due at once.
   std::function<std::uint64_t()> arrivals;
-  // Resets a device that is silent while it should stream, before it is opened anew. Empty, or why
-  // it could not be done; none where there is nothing to reset.
+  // Resets a device that is silent while it should stream, before it is opened again. Returns "" if
+  // it was reset, the reason if it could not be, and none if there is nothing to reset.
   std::function<std::optional<std::string>()> reset;
 };
 
-// A camera whose device may come and go. next() does in turn what is due: opens, starts, waits for
-// a frame, closes; it belongs to one thread, so that a device that hangs holds up nobody else. Each
-// time the device is opened all is agreed anew; format() may be another then, and no frame of the
-// old one follows. Sequence numbers keep increasing over all openings.
+// A camera whose device may come and go. next() does whatever is due: it opens, starts, waits for a
+// frame, closes. It belongs to one thread, so that a device that hangs holds up nobody else. Every
+// opening settles the format anew; format() may change then, and no frame of the old format
+// follows. Sequence numbers keep increasing over all openings.
 //
-// Trouble is told once for each change to the worse, and never says `lost`. An EndOfStream of the
-// device ends this stream.
+// Trouble is reported once for each change to the worse, and never with `lost`. An EndOfStream of
+// the device ends this stream.
 class Lifeline final : public Camera {
  public:
-  // `name` is what trouble is told under. Opens nothing yet.
+  // `name` stands in reports of trouble. Opens nothing yet.
   Lifeline(std::string name, CameraOpener open, const LifelineOptions& options = {},
            HostClock clock = {}, LifelineHooks hooks = {});
 
   std::string name() const override { return name_; }
-  CameraFormat format() const override;  // of the last opening; before the first all zero
+  CameraFormat format() const override;  // that of the last opening; all zero before the first
   void start() override;                 // always succeeds; the device follows when it can
   void stop() override;                  // closes the device
   CameraEvent next(std::chrono::milliseconds timeout) override;
-  // Also for openings to come. True where the device, or no device yet, takes it.
+  // Asks for an exposure that later openings get, too. Returns true if the device takes it, or if
+  // there is no device yet.
   bool set_exposure(double exposure_s, double gain) override;
-  // Of all openings together; and "opened", "not opened", "stalled", "lost", "returned" (opened
-  // after a loss), "back-offs" (waits before an attempt to open), "reset".
+  // Returns the sums over all openings, and "opened", "not opened", "stalled", "lost", "returned"
+  // (opened after a loss), "back-offs" (waits before an attempt to open) and "reset".
   DeviceCounters counters() const override;
 
   DeviceState state() const { return state_; }
@@ -75,21 +76,21 @@ class Lifeline final : public Camera {
   const HostClock clock_;
   const LifelineHooks hooks_;
 
-  std::uint64_t arrivals_ = 0;  // seen
+  std::uint64_t arrivals_ = 0;  // last count seen
   DeviceState state_ = DeviceState::absent;
   bool wanted_ = false;             // started
-  HostClock::Time since_{};         // the state, or the last frame
+  HostClock::Time since_{};         // start of the state, or time of the last frame
   Backoff backoff_;                 // absent and lost only
-  std::string last_refusal_;        // why the device could not be opened, as last told
+  std::string last_refusal_;        // reason last reported why the device could not be opened
   std::unique_ptr<Camera> camera_;  // starting, streaming and stalled only
   CameraFormat format_;
-  std::uint64_t next_sequence_ = 0;               // the least that increases
+  std::uint64_t next_sequence_ = 0;               // the least number that increases
   std::optional<std::uint64_t> sequence_offset_;  // of this opening; none before its first frame
   struct Wanted {
     double exposure_s, gain;
   };
   std::optional<Wanted> exposure_;
-  DeviceCounters counters_;  // of closed openings, and our own
+  DeviceCounters counters_;  // those of closed openings, and the lifeline's own
 };
 
 }  // namespace previz

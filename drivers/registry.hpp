@@ -1,5 +1,5 @@
-// Lists of drivers. A build that leaves a driver out lists it all the same, without `open`, so that
-// every build reads every set.
+// Helps with lists of drivers. A build that leaves a driver out still lists it, but without `open`,
+// so that every build reads every set.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace previz {
 
-// The drivers of a list that this build has.
+// Returns the drivers of a list that this build has.
 template <class Drivers>
 auto built(const Drivers& all) {
   std::vector<typename Drivers::value_type> drivers;
@@ -21,7 +21,7 @@ auto built(const Drivers& all) {
   return drivers;
 }
 
-// The names of all drivers of a list.
+// Returns the names of all drivers of a list.
 template <class Drivers>
 std::vector<const char*> names_of(const Drivers& all) {
   std::vector<const char*> names;
@@ -29,8 +29,8 @@ std::vector<const char*> names_of(const Drivers& all) {
   return names;
 }
 
-// Finds a driver by its name in a list of those this build has. Throws previz::Error that says
-// which these are, if the driver is not among them; `of_what` is plural.
+// Finds a driver by its name in a list of those this build has. Throws previz::Error that names
+// them if the driver is not among them; `of_what` is their kind, in the plural.
 template <class Drivers>
 const auto& driver_named(const Drivers& drivers, std::string_view name, const char* of_what) {
   std::string known;

@@ -84,7 +84,7 @@ int on_action(sd_bus_message* call, void* data, sd_bus_error*) {
   return answer_with(call, static_cast<Verbs*>(data)->perform(*action));
 }
 
-// A method of its own: which one, its name says.
+// Performs an action that was called by its own method, whose name says which action it is.
 int on_own_method(sd_bus_message* call, void* data, sd_bus_error*) {
   const std::string member = sd_bus_message_get_member(call);
   for (const set::Action& action : set::actions())
@@ -148,7 +148,7 @@ std::string method_name(const std::string& action) {
 
 struct Bus::Impl {
   Verbs verbs;
-  std::deque<std::string> names;  // of methods; the table points at them
+  std::deque<std::string> names;  // names of methods, which the table points at
   std::vector<sd_bus_vtable> table;
   sd_bus* bus = nullptr;
   Status told;
@@ -182,7 +182,7 @@ struct Bus::Impl {
     table.push_back(SD_BUS_METHOD("Actions", "", "a(ss)", on_actions, SD_BUS_VTABLE_UNPRIVILEGED));
     for (const set::Action& action : set::actions()) {
       const std::string& name = names.emplace_back(method_name(action.name));
-      if (name == "Record") continue;  // has a method that says on or off
+      if (name == "Record") continue;  // Record(b) takes on or off instead
       table.push_back(
           SD_BUS_METHOD(name.c_str(), "", "s", on_own_method, SD_BUS_VTABLE_UNPRIVILEGED));
     }

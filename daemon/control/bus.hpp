@@ -1,5 +1,5 @@
-// org.previz.Rig1 on D-Bus, by sd-bus: the rig's verbs and what it is doing; nothing of its
-// insides.
+// Serves org.previz.Rig1 on D-Bus through sd-bus: the actions and the status of the rig, but
+// nothing of its internals.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ inline constexpr const char* bus_name = "org.previz.Rig1";
 inline constexpr const char* object_path = "/org/previz/Rig1";
 inline constexpr const char* interface_name = "org.previz.Rig1";
 
-// The properties; each has a PropertiesChanged signal.
+// The properties on the bus; each has a PropertiesChanged signal.
 struct Status {
   std::string mode;  // "standby", "live", "refine", "review"
   bool recording = false;
@@ -26,8 +26,8 @@ struct Status {
   std::string fault;  // why the last take ended by itself
   bool camera_lost = false;
   std::int32_t samples = 0;
-  std::string set, object, light;  // names: of the set, the selected object and lamp
-  std::string message;             // what was said last
+  std::string set, object, light;  // names of the set, the selected object and the selected lamp
+  std::string message;             // the last announcement
 };
 
 struct Answer {
@@ -37,27 +37,27 @@ struct Answer {
 
 struct Verbs {
   std::function<Answer(const set::Action&)> perform;
-  std::function<Answer(set::Mode)> go;  // unlike the actions of the modes no toggle
-  std::function<Answer(bool)> record;   // likewise
+  std::function<Answer(set::Mode)> go;  // enters the mode; the mode's action toggles
+  std::function<Answer(bool)> record;   // starts or stops; the action toggles
   std::function<Status()> status;
   std::function<std::string()> metrics;  // JSON
 };
 
-// "MoveLeft" for "move_left": the method that every action has on the bus.
+// Returns the name of an action's own method on the bus: "MoveLeft" for "move_left".
 std::string method_name(const std::string& action);
 
-// Methods, beside one for each action: Action(s), SetMode(s) and Record(b), each answering with
-// what the rig says, or the error org.previz.Error.Refused; Actions() -> a(ss); Metrics() -> s.
+// Serves the methods: one for each action; Action(s), SetMode(s) and Record(b), which also return
+// what the rig answers or the error org.previz.Error.Refused; Actions() -> a(ss); Metrics() -> s.
 class Bus {
  public:
-  // On the system bus ($DBUS_SYSTEM_BUS_ADDRESS), served by the event loop. Throws previz::Error if
-  // there is no bus, or it does not give out the name.
+  // Connects to the system bus ($DBUS_SYSTEM_BUS_ADDRESS); the event loop serves it. Throws
+  // previz::Error if there is no bus, or if it does not grant the name.
   Bus(sd_event* loop, Verbs verbs);
   ~Bus();
   Bus(const Bus&) = delete;
   Bus& operator=(const Bus&) = delete;
 
-  void changed();  // signals the properties that are not as they were
+  void changed();  // signals the properties that have changed
 
  private:
   struct Impl;

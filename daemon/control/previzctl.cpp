@@ -1,5 +1,5 @@
-// previzctl: the rig from a shell. Exit status: 0 done; 1 refused or no rig, one line says why; 2
-// the command line cannot be understood.
+// previzctl controls the rig from a shell. Its exit status is 0 if the request was done, 1 if it
+// was refused or there is no rig (one line says why), 2 if the command line cannot be understood.
 #include <systemd/sd-bus.h>
 
 #include <CLI/CLI.hpp>
@@ -29,7 +29,7 @@ class ErrorText {
  public:
   ~ErrorText() { sd_bus_error_free(&error_); }
   sd_bus_error* out() { return &error_; }
-  // Throws what the bus said, if the call failed.
+  // Throws the bus's error if the call failed.
   void check(int result) const {
     if (result >= 0) return;
     if (sd_bus_error_has_name(&error_, SD_BUS_ERROR_SERVICE_UNKNOWN) != 0 ||
@@ -63,7 +63,7 @@ std::string call(const char* method, const char* types, Arguments... arguments) 
   return said;
 }
 
-// One property's value, of the types the rig has.
+// Returns a property's value as text, for the types that the rig has.
 std::string value_text(sd_bus_message* message) {
   char type = 0;
   const char* contents = nullptr;
@@ -94,7 +94,7 @@ std::string value_text(sd_bus_message* message) {
   return text;
 }
 
-// A line a property of an a{sv}.
+// Prints the properties of an a{sv}, one a line.
 void print_properties(sd_bus_message* message) {
   sd_bus_message_enter_container(message, 'a', "{sv}");
   while (sd_bus_message_enter_container(message, 'e', "sv") > 0) {
@@ -124,7 +124,7 @@ int on_changed(sd_bus_message* signal, void*, sd_bus_error*) {
   return 0;
 }
 
-// Until it is interrupted.
+// Prints every change until it is interrupted.
 void watch() {
   print_status();
   const BusPtr bus = open_bus();
@@ -138,7 +138,7 @@ void watch() {
   }
 }
 
-// Needs no rig: the table is built in.
+// Prints the built-in table of actions, which needs no rig.
 void print_actions(bool names_only) {
   for (const set::Action& action : set::actions()) {
     std::cout << action.name;

@@ -1,5 +1,5 @@
-// The command line of previzctl: what is asked of the rig. The program parses by it, and the manual
-// page and the shell completion are printed from it.
+// Defines the command line of previzctl, by which the rig is asked for something. The program
+// parses with it, and the manual page and the shell completion are printed from it.
 #pragma once
 
 #include <string>
@@ -13,12 +13,13 @@ namespace previz::control {
 struct Request {
   std::string mode;    // "standby", "live", "refine", "review"
   std::string record;  // "on", "off"
-  std::string action;  // of daemon/set/actions.hpp
+  std::string action;  // a name in daemon/set/actions.hpp
   std::string set;     // "reload", "next", "previous"
   bool names_only = false;
 };
 
-// Adds everything to `app`; `asked` must outlive it.
+// Adds all subcommands and options to `app`, which writes what it parses into `asked`; `asked` must
+// outlive `app`.
 void add_requests(CLI::App& app, Request& asked);
 
 }  // namespace previz::control

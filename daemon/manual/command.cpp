@@ -5,7 +5,7 @@
 namespace previz::manual {
 namespace {
 
-// What stands between the first `open` and the next `close`; empty where they do not.
+// Returns the text between the first `open` and the next `close`; empty if they are not there.
 std::string between(const std::string& text, char open, char close) {
   const std::size_t begin = text.find(open);
   const std::size_t end = text.find(close, begin);

@@ -1,5 +1,5 @@
-// A program's command line as plain data, read off the parser itself: what its manual page and its
-// shell completion are printed from, so that neither can tell another story than the program.
+// Reads a program's command line off its parser, as plain data. The manual page and the shell
+// completion are printed from it, so that they always agree with the program.
 #pragma once
 
 #include <string>
@@ -12,13 +12,13 @@ class App;
 namespace previz::manual {
 
 struct Option {
-  std::vector<std::string> names;  // "-h", "--help"; of a positional its one name
+  std::vector<std::string> names;  // "-h", "--help"; a positional has one name
   bool positional = false;
   bool required = false;
   std::string value;                 // "TEXT", "INT", ...; empty: a flag
-  std::vector<std::string> choices;  // that the value is one of; empty: any
+  std::vector<std::string> choices;  // the values allowed; empty: any
   std::string range;                 // "1 - 100"; empty: any
-  std::string standard;              // the value where none is given; empty: as `about` says
+  std::string standard;              // the default value; empty: as `about` says
   std::string about;
 };
 
@@ -29,7 +29,8 @@ struct Command {
   std::vector<std::string> subcommands;
 };
 
-// The program itself first, then its subcommands as it lists them, each followed by its own.
+// Returns the program itself first, then its subcommands as it lists them, each followed by its
+// own.
 std::vector<Command> commands_of(const CLI::App& program);
 
 }  // namespace previz::manual

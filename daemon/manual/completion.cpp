@@ -5,7 +5,7 @@
 namespace previz::manual {
 namespace {
 
-// The words that may stand for a value; empty: anything may.
+// Returns the words that may stand for a value; empty: anything may.
 std::string offers(const Option& option) {
   if (option.value == "ACTION") return "$(previzctl actions --names)";
   std::string words;

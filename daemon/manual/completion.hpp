@@ -1,4 +1,4 @@
-// Completion of a program's command line by the shell.
+// Writes the script by which a shell completes a program's command line.
 #pragma once
 
 #include <string>
@@ -8,8 +8,9 @@
 
 namespace previz::manual {
 
-// For bash: commands, options, the words an option or an argument must be one of, the rig's actions
-// (asked of `previzctl actions`), and file names elsewhere.
+// Returns a script for bash that completes commands, options, the words that an option or an
+// argument must be one of, the rig's actions (it asks `previzctl actions`), and file names
+// elsewhere.
 std::string bash_completion(const std::vector<Command>& commands);
 
 }  // namespace previz::manual

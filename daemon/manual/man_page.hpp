@@ -1,4 +1,4 @@
-// Manual pages in the format of man(7).
+// Writes manual pages in the format of man(7).
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// What previzd comes with to be read and completed: three manual pages, two completions.
+// Builds the three manual pages and the two shell completions that are installed with previzd.
 #pragma once
 
 #include <string>
@@ -7,11 +7,11 @@
 namespace previz::manual {
 
 struct Page {
-  std::string name;  // of the file, as it is installed: "previzd.8"
+  std::string name;  // name of the installed file: "previzd.8"
   std::string text;
 };
 
 std::vector<Page> man_pages();
-std::vector<Page> bash_completions();  // named as the program is
+std::vector<Page> bash_completions();  // named after their programs
 
 }  // namespace previz::manual

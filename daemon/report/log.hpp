@@ -1,4 +1,4 @@
-// The program's log: systemd's journal where it listens, otherwise the terminal.
+// Writes the program's log to systemd's journal if it listens, otherwise to the terminal.
 #pragma once
 
 #include "daemon/report/report.hpp"
@@ -7,15 +7,16 @@ namespace previz::report {
 
 enum class Destination { journal, terminal };
 
-// The journal where standard error is connected to it (JOURNAL_STREAM of systemd.exec(5)).
+// Returns the journal if standard error is connected to it (JOURNAL_STREAM of systemd.exec(5)),
+// otherwise the terminal.
 Destination destination();
 
-// From now on log() writes there what is at least this severe. In the journal a report has the
-// priority of its severity (`journalctl -p err` finds the errors) and no prefix; on the terminal,
-// that is standard error, it has the time and the severity in front.
+// Makes log() write reports of at least this severity to `destination` from now on. In the journal
+// a report has the priority of its severity (`journalctl -p err` finds the errors) and no prefix;
+// on the terminal, which is standard error, the time and the severity stand in front.
 void start_log(Severity least, Destination destination = report::destination());
 
-// From any thread.
+// May be called from any thread.
 void log(const Report& report);
 
 }  // namespace previz::report

@@ -1,4 +1,4 @@
-// One thing that whoever runs the rig should know, as plain data.
+// A report is one thing that whoever runs the rig should know, as plain data.
 #pragma once
 
 #include <algorithm>
@@ -17,20 +17,20 @@ enum class Severity { info, warning, error };
 inline constexpr std::array<std::pair<const char*, Severity>, 3> severities = {
     {{"info", Severity::info}, {"warning", Severity::warning}, {"error", Severity::error}}};
 
-// By one of the names above; the least severe for any other.
+// Returns the severity of one of the names above; the least severe for any other name.
 inline Severity severity_named(std::string_view name) {
   const auto* const found = std::ranges::find(
       severities, name, [](const auto& known) { return std::string_view(known.first); });
   return found == severities.end() ? Severity::info : found->second;
 }
 
-// A line on the display, in the crew's words. A trouble has a source, and a newer one of the same
-// source takes its place; news has none.
+// A line on the display, in the crew's words. A trouble has a source and is replaced by a newer
+// trouble of the same source; news has no source.
 struct Notice {
   Severity severity = Severity::info;
   std::string source;  // "film camera"
   std::string text;    // "was unplugged"
-  bool lasts = false;  // until it is settled; otherwise it stands long enough to be read
+  bool lasts = false;  // shown until settled; otherwise only long enough to be read
 
   friend bool operator==(const Notice&, const Notice&) = default;
 };
@@ -39,17 +39,18 @@ struct Report {
   Severity severity = Severity::info;
   std::string source;                 // who reports: "light", "button red"; may be empty
   std::string text;                   // the first of its lines says what happened
-  std::string once_key = {};          // equal ones are logged once; empty: every time
-  std::optional<Notice> notice = {};  // what the display says of it, every time
+  std::string once_key = {};          // reports with equal keys are logged once; empty: every time
+  std::optional<Notice> notice = {};  // shown on the display, every time
 };
 
-// "film camera: was unplugged"; the text alone where there is no source.
+// Returns "film camera: was unplugged", or the text alone if there is no source.
 template <class T>
 std::string line_of(const T& said) {
   return said.source.empty() ? said.text : said.source + ": " + said.text;
 }
 
-// A line without its figures: the key under which what changes with every frame is the same.
+// Returns a line without its digits: a key that stays the same while the figures in the line
+// change.
 inline std::string wording(const std::string& line) {
   std::string words;
   std::ranges::remove_copy_if(line, std::back_inserter(words),
@@ -57,26 +58,26 @@ inline std::string wording(const std::string& line) {
   return words;
 }
 
-// The same report, to be logged once, whatever figures are in it.
+// Returns the report with a key that makes it logged once, whatever figures are in it.
 inline Report once(Report report) {
   report.once_key = wording(line_of(report));
   return report;
 }
 
-// A trouble that stands on the display until Reports::settle(source).
+// Returns a trouble that stands on the display until Reports::settle(source).
 inline Notice lasting(std::string source, std::string text) {
   return {Severity::error, std::move(source), std::move(text), true};
 }
 
-// A trouble that is over already.
+// Returns a trouble that is over already.
 inline Notice passing(std::string source, std::string text) {
   return {Severity::error, std::move(source), std::move(text), false};
 }
 
-// Keys that were seen before. Not thread-safe.
+// Remembers which keys were seen before. Not thread-safe.
 class Once {
  public:
-  // True the first time this key is asked for.
+  // Returns true the first time it is called with this key.
   bool is_first(std::string key) { return seen_.insert(std::move(key)).second; }
 
  private:

@@ -1,4 +1,4 @@
-// The one way a report takes: to the log, to the display's notices, and to the bus.
+// Distributes every report to the log, to the display's notices and to the bus.
 #pragma once
 
 #include <chrono>
@@ -14,16 +14,16 @@
 
 namespace previz::report {
 
-// What the display has to say now. Not thread-safe; time comes from the caller.
+// Keeps the notices that the display shows now. Not thread-safe; the caller passes the time.
 class Notices {
  public:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::chrono::seconds trouble_time{4}, news_time{3};  // to be read in
+  static constexpr std::chrono::seconds trouble_time{4}, news_time{3};  // reading time
   static constexpr std::size_t most_news = 3;                           // more push the oldest out
 
-  // Takes the place of the trouble of the same source, or of the same news.
+  // Adds a notice; it replaces a trouble of the same source, or the same news.
   void add(const Notice& notice, Clock::time_point now);
-  // The source is well again: its trouble goes once there was time to read it.
+  // Ends the trouble of a source that works again; the notice goes once there was time to read it.
   void settle(const std::string& source);
 
   std::vector<Notice> troubles(Clock::time_point now);  // by source
@@ -50,9 +50,9 @@ class Reports {
   explicit Reports(Log log) : log_(std::move(log)) {}
 
   void operator()(const Report& report, Clock::time_point now = Clock::now());
-  // The same for what somebody did, or the rig by itself: the bus publishes it as its message.
+  // Reports what somebody did, or the rig did by itself; the bus publishes it as its message.
   void announce(const Report& report, Clock::time_point now = Clock::now());
-  // The display alone says so; the log has it already, or need not have it.
+  // Shows a notice on the display only; the log has it already, or need not have it.
   void show(const Notice& notice, Clock::time_point now = Clock::now());
   void settle(const std::string& source);
 
@@ -60,7 +60,7 @@ class Reports {
   std::vector<Notice> news(Clock::time_point now = Clock::now());
   std::string announced() const;  // the line of the last announcement; empty: there was none
 
-  // Forgets notices and the announcement: another set begins, with other devices.
+  // Forgets all notices and the announcement, because another set begins, with other devices.
   void begin_set();
 
  private:
@@ -73,7 +73,7 @@ class Reports {
   std::string announced_;
 };
 
-// A log of plain lines, each flushed. `out` outlives it.
+// Returns a log that writes plain lines and flushes each. `out` must outlive it.
 Reports::Log lines_to(std::ostream& out);
 
 }  // namespace previz::report

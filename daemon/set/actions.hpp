@@ -1,5 +1,6 @@
-// The rig's verbs: the one table of everything that a button, D-Bus and previzctl can ask for.
-// A new action is one entry in actions.cpp; what it does is data here, and done in daemon/rig.
+// Declares the table of actions: everything that a button, D-Bus or previzctl can ask the rig to
+// do. A new action is one row in actions.cpp; its effect is described here as data, and daemon/rig
+// carries it out.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -12,24 +13,24 @@ namespace previz::set {
 
 enum class Mode {
   standby,  // cameras open, nothing tracked, rendered or shown
-  live,     // the preview follows the camera (P6)
-  refine,   // the last good frame, pose and light are frozen and get more samples (P7)
+  live,     // the preview follows the camera
+  refine,   // the last good frame, pose and light are frozen and get more samples
   review    // the last take is played
 };
 
-// What an action does. Steps are those of the set's [control].
-struct ToMode {  // and from there back to live
+// The effects that an action can have. The sizes of steps come from the set's [control] table.
+struct ToMode {  // enters the mode, or leaves it for live
   Mode mode = Mode::live;
 };
-struct Record {};  // start, and stop
+struct Record {};  // starts a take, or stops it
 struct MarkGood {};
 struct Snapshot {};
 struct ReloadSet {};
-struct OtherSet {  // of the running set's folder, by name
+struct OtherSet {  // loads the next set file by name in the running set's folder
   int next = 1;
 };
 struct ChangeSamples {
-  int next = 1;  // of the steps 1, 2, 3, 4, 6 ... 50
+  int next = 1;  // moves along 1, 2, 3, 4, 6 ... 50 samples per pixel
 };
 struct NextEstimator {};
 struct NextLightMode {};
@@ -48,8 +49,8 @@ struct ScaleObject {
   int steps = 1;
 };
 struct ResetObject {};
-struct PlayAnimations {};  // from their beginning
-struct HoldAnimations {};  // and go on
+struct PlayAnimations {};  // starts them from the beginning
+struct HoldAnimations {};  // pauses them, or lets them go on
 struct SelectLight {
   int next = 1;
 };
@@ -77,9 +78,9 @@ struct Action {
 };
 
 std::span<const Action> actions();
-// Null where there is no such action.
+// Returns null if there is no such action.
 const Action* find_action(const std::string& name);
-// The names alone, in the table's order.
+// Returns the names of all actions, in the table's order.
 std::span<const char* const> action_names();
 
 }  // namespace previz::set

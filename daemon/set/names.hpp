@@ -1,4 +1,4 @@
-// How the set file spells every enumeration; the one place where a new spelling is added.
+// Lists how the set file spells the values of its enumerations; a new spelling is added here alone.
 #pragma once
 
 #include <array>

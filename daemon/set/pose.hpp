@@ -1,4 +1,4 @@
-// Geometry that a set file gives by hand: transforms, and tags measured by their corners.
+// Checks geometry that a set file gives by hand: transforms, and tags measured by their corners.
 #pragma once
 
 #include <array>
@@ -10,18 +10,21 @@
 
 namespace previz::set {
 
-// Largest distance of a measured tag corner from the square fitted to all four, over its side.
+// Largest distance of a measured tag corner from the square fitted to all four, as a fraction of
+// the side.
 inline constexpr double square_tolerance = 0.02;
 
-// |det| over the product of the column lengths: 1 for orthogonal axes, 0 for singular ones.
+// Returns |det| divided by the product of the column lengths: 1 for orthogonal axes, 0 for a
+// singular matrix.
 double regularity(const glm::dmat4& transform);
 
 struct FittedSquare {
   glm::dmat4 world_from_tag;
-  double size;   // of a side, in the unit of the corners
-  double error;  // largest distance of a corner from the square, over the side
+  double size;   // side length, in the unit of the corners
+  double error;  // largest distance of a corner from the square, as a fraction of the side
 };
-// Corners: lower left, lower right, upper right, upper left. Nothing where they have no area.
+// Fits a square to four corners, given as lower left, lower right, upper right, upper left. Returns
+// nothing if the corners enclose no area.
 std::optional<FittedSquare> fit_square(const std::array<glm::dvec3, 4>& corners);
 
 }  // namespace previz::set

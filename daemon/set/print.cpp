@@ -12,7 +12,7 @@ std::vector<Key> keys_of(Draft& draft, const std::string& path) {
   return std::ranges::find(all, path, &Section::path)->open().keys;
 }
 
-// `without`: keys that contradict what the others say.
+// Prints one table, but not the keys in `without`, which would contradict the others.
 std::string table_toml(Draft draft, const std::string& path,
                        const std::vector<std::string>& without = {}) {
   Draft untouched;
@@ -29,7 +29,7 @@ std::string table_toml(Draft draft, const std::string& path,
   return text;
 }
 
-// A curve has the keys of its kind only.
+// Returns the keys that belong to the other kinds of curve.
 std::vector<std::string> keys_of_other_kinds(const ResponseCurve& curve) {
   std::vector<std::string> others;
   if (curve.kind != ResponseCurve::Kind::gamma) others.push_back("gamma");

@@ -1,4 +1,5 @@
-// Tables of a set file from values: what a calibration prints, for the crew to paste.
+// Prints values as tables of a set file; this is how calibrations print results for the crew to
+// paste.
 #pragma once
 
 #include <string>
@@ -7,8 +8,8 @@
 
 namespace previz::set {
 
-// Each is one table with its header, by the parser's own table of keys: parse_set reads back what
-// was printed, to 12 digits. Keys that hold their default are left out.
+// Each function returns one table with its header, written from the parser's own table of keys:
+// parse_set reads the values back, to 12 digits. Keys that hold their default are left out.
 std::string intrinsics_toml(const ObserverCalibration& calibration);  // [observer.intrinsics]
 std::string intrinsics_toml(
     const LightCameraCalibration& calibration);                        // [light_camera.intrinsics]

@@ -1,4 +1,5 @@
-// Every problem of one file, gathered while reading and told together in the order of its lines.
+// Gathers the problems of one file while it is read, and reports them together in the order of its
+// lines.
 #pragma once
 
 #include <string>
@@ -31,7 +32,7 @@ class Problems {
   std::vector<Problem> problems_;
 };
 
-// The word of `known` that `word` was most likely meant to be, or "" where none is near.
+// Returns the word of `known` that `word` was most likely meant to be, or "" if none is similar.
 std::string nearest(const std::string& word, const std::vector<std::string>& known);
 
 }  // namespace previz::set

@@ -14,7 +14,7 @@ constexpr auto preamble =
 # a key's name ends in; the world is right-handed, Z up; colours are linear Rec. 709.
 )";
 
-// A sentence or more as comment lines of at most 100 columns.
+// Writes sentences as comment lines of at most 100 columns.
 void comment(std::ostream& out, const std::string& text) {
   constexpr std::size_t columns = 100;
   std::istringstream words(text);

@@ -68,7 +68,7 @@ class Resolver {
     return (folder_ / as_written).lexically_normal();
   }
 
-  // A file that must be there. Assets stand in for what the file names.
+  // Returns the path of a file that must exist. An asset replaces the file that the set names.
   fs::path existing(const Given& table, const std::string& key, const fs::path& as_written) {
     if (!table.good(key)) return {};
     auto path = located(as_written);
@@ -82,14 +82,14 @@ class Resolver {
     return path;
   }
 
-  // Says so for every key of `keys` that is written although `reason` excludes it.
+  // Adds a problem for every key of `keys` that is given although `reason` excludes it.
   void exclude(const Given& table, std::initializer_list<const char*> keys,
                const std::string& reason) {
     for (const auto* key : keys)
       if (table.has(key)) problem(table, key, reason);
   }
 
-  // The table stands without the one it belongs to.
+  // Adds a problem if a part of a calibration is given without its intrinsics.
   void needs_intrinsics(const std::string& camera, const std::string& part) {
     const auto& table = given(camera + '.' + part);
     if (table.at && !given(camera + ".intrinsics").at)
@@ -155,7 +155,7 @@ class Resolver {
     set_.light_camera.calibration = draft_.light_camera.calibration;
   }
 
-  // A tag's pose, which must be given in one of the two forms that every pose has.
+  // Returns a tag's pose, which must be given in one of the two forms that every pose has.
   glm::dmat4 rigid(const TagDraft& draft) {
     GivenKeys keys;
     for (const auto& [name, key] : draft.given.keys) keys[name] = key.good;
@@ -166,7 +166,7 @@ class Resolver {
 
   void tags() {
     std::map<int, Position> first;
-    std::set<std::string> frames;  // carriers that a tag without a place is the frame of
+    std::set<std::string> frames;  // carriers whose frame is that of a tag
     for (const auto& draft : draft_.tags) {
       const auto& table = draft.given;
       if (table.good("id")) {
@@ -194,7 +194,7 @@ class Resolver {
     }
   }
 
-  // A carried tag without a pose: its frame is the carrier's.
+  // Returns whether a carried tag has no pose, so that its frame is the carrier's.
   static bool is_carrier_itself(const TagDraft& draft) {
     const auto& table = draft.given;
     return !draft.carrier.empty() && !table.has("position_m") && !table.has("rotation_deg") &&
@@ -219,7 +219,7 @@ class Resolver {
                               : "; did you mean " + codec::quote(near) + "?"));
   }
 
-  // A tag given by its four corners.
+  // Completes a tag that is given by its four corners.
   void measured(const TagDraft& draft, Tag& tag) {
     const auto& table = draft.given;
     exclude(table, {"position_m", "rotation_deg", "world_from_tag"},
@@ -383,8 +383,8 @@ class Resolver {
     }
   }
 
-  // A name that no driver takes would be a typing error that nobody notices. The buttons of a
-  // replayed session have any name without a colon.
+  // Refuses a name that no driver takes, since nobody would notice the typing error. The buttons of
+  // a replayed session may have any name without a colon.
   void pressable(const Given& table, const std::string& name) {
     const bool may_be_recorded =
         set_.observer.driver == replay_driver && name.find(':') == std::string::npos;
@@ -404,7 +404,7 @@ class Resolver {
     if (display.driver == no_driver) exclude(given("display"), {"mode"}, no + "mode; leave it out");
   }
 
-  // A table that no button goes by would be a typing error that nobody notices.
+  // Refuses wiring that no button uses, since nobody would notice the typing error.
   void contacts() {
     std::map<std::string, Position> first;
     for (const auto& [table, contact] : draft_.contacts) {

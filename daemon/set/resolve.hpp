@@ -1,5 +1,5 @@
-// From a draft to a set: what no single key can know - which form of a pose was meant, what needs
-// or contradicts what, where files are.
+// Turns a draft into a set by deciding what no single key can: which form of a pose was meant,
+// which keys need or contradict each other, and where files are.
 #pragma once
 
 #include <filesystem>
@@ -14,7 +14,7 @@ namespace previz::set {
 
 using Assets = std::vector<std::pair<std::string, std::filesystem::path>>;
 
-// Adds what it finds to `problems`; the set is meaningful only if there are none.
+// Adds every problem to `problems`; the set is meaningful only if there are none.
 Set resolve(Draft draft, const std::filesystem::path& file, const Assets& assets, Origin origin,
             Problems& problems);
 

@@ -1,4 +1,4 @@
-// The set file's parser: TOML in, by the table of keys; typed values or every problem of it out.
+// Parses a set file by the table of keys: TOML goes in; typed values, or every problem, come out.
 #include "daemon/set/set.hpp"
 
 #include <toml++/toml.h>
@@ -98,7 +98,7 @@ class Reader {
     problems_.add(at, full, std::string(is_table ? "unknown table; " : "unknown key; ") + hint);
   }
 
-  // The table that has such a key, or such a table inside it.
+  // Returns the table that has such a key, or such a table inside it.
   static std::string home_of(const std::string& key) {
     Draft scratch;
     for (const auto& section : sections(scratch))

@@ -18,24 +18,24 @@
 
 namespace previz::set {
 
-// What `driver` may say beside the names of drivers/camera_drivers.hpp and display_drivers.hpp: a
-// camera is a recorded session, and there is no camera or display at all.
+// Values of `driver` beside the names in drivers/camera_drivers.hpp and display_drivers.hpp: a
+// recorded session stands in for the camera, or there is no camera or display at all.
 inline constexpr const char* replay_driver = "replay";
 inline constexpr const char* no_driver = "none";
 
-// How a camera that is no recording is to be driven.
+// Says how to drive a camera that is not a recording.
 struct CameraWish {
   CameraSettings settings;
-  std::vector<double> bracket_s;  // shutter times in turn, one after every frame; empty: one
-  double start_timeout_s = 5;     // to the first frame, then the device is opened anew
-  double stall_timeout_s = 2;     // from frame to frame
+  std::vector<double> bracket_s;  // shutter times in turn, one per frame; empty: one
+  double start_timeout_s = 5;     // until the first frame; then the device is reopened
+  double stall_timeout_s = 2;     // between two frames
 };
 
 struct Observer {
   std::string driver = replay_driver;
   std::string device;  // replay: session directory; otherwise the device's stable name
   CameraWish camera;
-  std::vector<std::string> faults;  // to rehearse: drivers/faults.hpp says how they are written
+  std::vector<std::string> faults;  // faults to rehearse, written as in drivers/faults.hpp
   // Calibration given here overrides the session's.
   std::optional<ObserverCalibration> calibration;
   std::optional<double> exposure;  // absolute; overrides the frames' own
@@ -45,7 +45,7 @@ struct LightCamera {
   std::string driver = replay_driver;
   std::string device;
   CameraWish camera;
-  std::vector<std::string> faults;  // to rehearse: drivers/faults.hpp says how they are written
+  std::vector<std::string> faults;  // faults to rehearse, written as in drivers/faults.hpp
   std::optional<LightCameraCalibration> calibration;
   std::optional<double> exposure;
 };
@@ -58,8 +58,8 @@ struct Tag {
   glm::dmat4 world_from_tag{1.0};
 };
 
-// What is moved by hand with tags on it: a stick, a tray. Its own frame stands for the world in the
-// poses of its tags, and of the objects and lamps fixed to it.
+// A thing with tags on it that is moved by hand: a stick, a tray. The poses of its tags, and of the
+// objects and lamps fixed to it, are given in the carrier's frame instead of the world's.
 struct Carrier {
   std::string name;
   std::vector<Tag> tags;
@@ -76,17 +76,17 @@ struct Object {
   Presence presence = Presence::virtual_object;
   glm::dmat4 world_from_file{1.0};
   std::vector<std::string> nodes;  // glTF node names to take; empty: all
-  std::string carrier;             // whose frame stands for the world; empty: it stays
-  std::string animation;           // of the file, that is played; empty: none
-  bool loops = true;               // the animation, from its end to its beginning
+  std::string carrier;             // carrier that it is fixed to; empty: fixed in the world
+  std::string animation;           // name of the file's animation to play; empty: none
+  bool loops = true;               // the animation restarts when it ends
 };
 
 enum class LightType { point, spot, directional, rectangle, sphere };
 
-// What is known of a real surface better than its model says.
+// A measured property of a real surface, which replaces that of its model.
 struct Surface {
-  std::string material;  // as the glTF files of phantom and removed objects name it
-  glm::dvec3 albedo{0};  // its base colour factor, linear Rec. 709
+  std::string material;  // its name in the glTF files of phantom and removed objects
+  glm::dvec3 albedo{0};  // base colour factor, linear Rec. 709
 };
 
 // A lamp of the set. Gains scale its emission in the mixed and in the real world: an added light is
@@ -105,7 +105,7 @@ struct Light {
   double angular_radius_rad = 0;     // directional: 0 is a delta light
   double inner_cone_rad = 0, outer_cone_rad = std::numbers::pi / 4;  // spot, half angles
   double gain_mixed = 1, gain_real = 0;
-  std::string carrier;  // whose frame stands for the world; empty: it stays
+  std::string carrier;  // carrier that it is fixed to; empty: fixed in the world
 };
 
 enum class UnseenRule { constant, horizon, mirror, observer };
@@ -114,47 +114,49 @@ enum class LightMode { image, sources, hybrid };
 enum class Residual { blurred, dropped };
 enum class LightSampling { importance, bsdf };
 
-// A rough model of what the light comes from: near walls and lamps are then seen in the right
-// direction from where the virtual objects stand, and not from where the light camera stands.
+// A rough model of the surfaces that the light comes from. It puts near walls and lamps in the
+// direction in which the virtual objects see them, instead of that from the light camera.
 struct Room {
   // A box around its own origin; absent: the surfaces of `file`, a glTF.
   std::optional<glm::dvec3> size_m;
   std::filesystem::path file;
   std::string file_as_written;
   glm::dmat4 world_from_room{1.0};  // rigid
-  glm::dvec3 seen_from{0};          // the place that the light is wanted for
+  glm::dvec3 seen_from{0};          // the point that the light is computed for
 
   friend bool operator==(const Room&, const Room&) = default;
 };
 
-// What counts as a light source of the image, and what becomes of the rest (LightMode::sources).
+// Decides what counts as a light source in the image, and what becomes of the rest
+// (LightMode::sources).
 struct LightSources {
-  double contrast = 8;        // over the mean luminance of what is no source
-  double least_share = 0.01;  // of all luminous flux
+  double contrast = 8;        // times the mean luminance outside the sources
+  double least_share = 0.01;  // fraction of all luminous flux
   Residual residual = Residual::blurred;
-  // From the light camera; absent: on the walls of the room, or at infinity.
+  // Distance from the light camera; absent: the sources are on the walls of the room, or at
+  // infinity.
   std::optional<double> distance_m;
 
   friend bool operator==(const LightSources&, const LightSources&) = default;
 };
 
 struct Lighting {
-  // camera: its frames, or `environment` in their place. recording: as the session's track.jsonl
-  // carries it. set: `environment`, or none but the set's lights.
+  // camera: the light camera's frames, or `environment` instead. recording: the light stored in the
+  // session's track.jsonl. set: `environment`, or only the set's lights.
   LightFrom from = LightFrom::camera;
   LightMode mode = LightMode::image;
   LightSampling sampling = LightSampling::importance;
-  // EXR, latitude-longitude; instead of a fisheye.
+  // A latitude-longitude EXR, used instead of the fisheye camera.
   std::optional<std::filesystem::path> environment;
   std::string environment_as_written;
   double environment_rotation_rad = 0;  // about world Z, counter-clockwise from above
   double environment_gain = 1;
-  glm::dvec3 balance{1};  // times the light camera's radiance is the film camera's
+  glm::dvec3 balance{1};  // film camera's radiance over the light camera's
   int resolution = 0;     // octahedral map, texels a side; 0: from the source
   UnseenRule unseen = UnseenRule::horizon;
   glm::dvec3 unseen_radiance{0};  // UnseenRule::constant
   double smoothing_s = 0.25;      // time constant; 0: none
-  double clipped_gain = 1;        // of light that every exposure clips, over white
+  double clipped_gain = 1;        // radiance of light that every exposure clips, over white
   std::optional<Room> room;       // absent: all light comes from far away
   LightSources sources;           // LightMode::sources and hybrid
   // Light frame to use; -1: every bracket up to the newest before the observer frame.
@@ -180,31 +182,31 @@ struct Estimation {
   // Share of a shared path's directions that are sampled towards objects of one world only; 0 is
   // the paper's algorithm. At most 0.8: the BSDF keeps the rest.
   double difference_sampling = 0.5;
-  Caustics caustics = Caustics::photons;  // how light comes to rough surfaces by mirrors and glass
-  double photons = 0.1;                   // a pass (sample), per pixel of the picture
-  double photon_radius_px = 2;  // of the first pass, at the distance of the nearest such object
+  Caustics caustics = Caustics::photons;  // how light reaches rough surfaces via mirrors and glass
+  double photons = 0.1;                   // photons per pass (sample) and pixel of the picture
+  double photon_radius_px = 2;  // in the first pass, at the distance of the nearest mirror or glass
 
   friend bool operator==(const Estimation&, const Estimation&) = default;
 };
 
 struct Quality {
   int samples = 16;       // per pixel and frame, 1..1'000'000
-  bool adaptive = false;  // `samples` on average, where the picture is noisy; not in the preview
-  bool denoise = true;    // the composite, guided by its own variance
-  double error = 0;       // rms error over the picture's rms to go on to; 0: samples decide
-  double seconds = 0;     // a frame may take; 0: samples decide
-  double scale = 1.0;     // of the observer's resolution, preview only
-  double fps = 0;         // preview: held by samples, then by size; 0: the others decide
+  bool adaptive = false;  // noisy pixels get more, `samples` on average; not in the preview
+  bool denoise = true;    // denoises the composite, guided by its own variance
+  double error = 0;       // refines to this rms error over the picture's rms; 0: samples decide
+  double seconds = 0;     // time limit of a frame; 0: samples decide
+  double scale = 1.0;     // times the observer's resolution, preview only
+  double fps = 0;         // preview: kept by fewer samples, then pixels; 0: the others decide
 };
 
-// What the rig's buttons do, and by how much.
+// The kinds of press that an action can be bound to.
 enum class PressKind { short_press, long_press, double_press };
 struct Button {
-  std::string name;  // as its driver calls it
+  std::string name;  // as its driver names it
   PressKind press = PressKind::short_press;
-  std::string action;  // of daemon/set/actions.hpp
+  std::string action;  // a name in daemon/set/actions.hpp
 };
-// How the contacts of a GPIO chip, or of one of its lines, are wired.
+// The wiring of the contacts on a GPIO chip, or on one of its lines.
 struct GpioContact {
   std::string name;  // "gpio:CHIP" or "gpio:CHIP:LINE"
   ContactWiring wiring;
@@ -222,21 +224,21 @@ struct Recording {
   std::filesystem::path directory = "takes";
   std::string slate;        // scene and shot, as on the board; empty: the set's name
   std::string notes;        // written into every take
-  double preroll_s = 2;     // kept in memory, and put in front of a take
-  double queue_mb = 1024;   // of frames may wait for a slow disk
-  double reserve_mb = 512;  // a take ends before the disk has less left
+  double preroll_s = 2;     // length kept in memory and put in front of a take
+  double queue_mb = 1024;   // limit of the frames that wait for a slow disk
+  double reserve_mb = 512;  // free disk space at which a take ends
   double timecode_fps = 25;
-  bool composite = false;  // what was shown is recorded too
+  bool composite = false;  // the shown picture is recorded too
 };
 
 // The crew's screen.
 struct Display {
   std::string driver = no_driver;
-  std::string connector;            // its stable name; empty: the first that has a screen
-  std::optional<DisplayMode> mode;  // absent: what the screen prefers
+  std::string connector;            // stable name; empty: the first connector that has a screen
+  std::optional<DisplayMode> mode;  // absent: the screen's preferred mode
   DisplayScale scale = DisplayScale::letterbox;
-  bool osd = true;                // words over the picture
-  double text_height = 1.0 / 24;  // of the words, over the screen's height
+  bool osd = true;                // text over the picture
+  double text_height = 1.0 / 24;  // as a fraction of the screen's height
 
   friend bool operator==(const Display&, const Display&) = default;
 };
@@ -255,8 +257,8 @@ struct Tracking {
   double min_margin = 20.0;  // decision margin of a detection
   int max_hamming = 1;
   double ambiguity_ratio = 0.2;   // best/second reprojection error above which one tag is ambiguous
-  std::vector<Tag> tags;          // that stay where they are: the camera is found by them
-  std::vector<Carrier> carriers;  // found once the camera is
+  std::vector<Tag> tags;          // fixed in the world; the camera's pose comes from them
+  std::vector<Carrier> carriers;  // found after the camera
 };
 
 struct Set {
@@ -279,8 +281,8 @@ struct Set {
   Output output;
 };
 
-// Who gives a set file: the crew, who can mend it, or a session that was recorded with it. Buttons
-// that nobody can press are refused in the crew's files only.
+// Says where a set file comes from: the crew, who can mend it, or a session that was recorded with
+// it. Buttons that nobody can press are an error in the crew's files only.
 enum class Origin { crew, session };
 
 // Parses TOML text. `file` names it in errors, and its folder is what relative paths are relative
@@ -288,15 +290,17 @@ enum class Origin { crew, session };
 // assets, relative to that folder too). The files of objects and the environment must exist; a
 // replay device's session and the output directory need not. Tag and camera poses come out exactly
 // rigid. Throws previz::Error whose message holds every problem found, one a line, in the order of
-// the file's lines: file:line:column: key: what is wrong; what is allowed. Where the text is no
-// TOML at all, that is the one problem, without a key.
+// the file's lines: file:line:column: key: what is wrong; what is allowed. Text that is not TOML at
+// all is the only problem then, reported without a key.
 Set parse_set(const std::string& text, const std::filesystem::path& file,
               const std::vector<std::pair<std::string, std::filesystem::path>>& assets = {},
               Origin origin = Origin::crew);
-// The same from a file; throws previz::Error naming it if it cannot be read.
+// Reads and parses a file as parse_set() does; throws previz::Error that names it if it cannot be
+// read.
 Set load_set(const std::filesystem::path& file);
 
-// config/reference.toml: every key with its unit, default and range, from the parser's own table.
+// Returns the text of config/reference.toml: every key with its unit, default and range, from the
+// parser's own table.
 std::string reference_toml();
 
 }  // namespace previz::set

@@ -33,7 +33,7 @@ constexpr const char* tag_families[] = {"tag36h11",      "tag25h9",          "ta
                                         "tag36h10",      "tagStandard41h12", "tagStandard52h13",
                                         "tagCircle21h7", "tagCircle49h12",   "tagCustom48h12"};
 
-// A replayed session, the drivers of cameras, none.
+// Lists what a camera's `driver` may be: a replayed session, a camera driver, or none.
 std::span<const char* const> camera_driver_words() {
   static const std::vector<const char*> words = [] {
     std::vector<const char*> all{replay_driver};
@@ -63,7 +63,7 @@ Need optional(const char* example) {
 
 using Keys = std::vector<Key>;
 
-// The keys of a calibration that stand in one table.
+// Returns the keys of a calibration that stand in one table.
 template <class Draft>
 Keys calibration_keys(Draft& draft, std::string_view table) {
   Keys rows;

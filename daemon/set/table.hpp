@@ -1,5 +1,5 @@
-// The heart of the set file: one table of every key, which the parser reads by and the reference is
-// printed from. A new key is one line in table.cpp.
+// Declares the table of all keys of a set file: the parser reads by it, and the reference is
+// printed from it. A new key is a row in table.cpp and a member in set.hpp.
 #pragma once
 
 #include <functional>
@@ -15,19 +15,20 @@
 
 namespace previz::set {
 
-// Which keys a table of the file gave, and where. A key that could not be read is given, not good.
+// Records which keys a table of the file gives, and where. A key whose value cannot be read is
+// given, but not good.
 struct Given {
   struct Key {
     Position at;
     bool good = false;
   };
   std::string path;            // "observer.lens"
-  std::optional<Position> at;  // of the table's header; none: the file does not have the table
+  std::optional<Position> at;  // position of the table's header; none: the file lacks the table
   std::map<std::string, Key> keys;
 
   bool has(const std::string& key) const { return keys.contains(key); }
   bool good(const std::string& key) const { return has(key) && keys.at(key).good; }
-  // Where to point for a key: its own place, else the table's, else the top of the file.
+  // Returns the position to report for a key: its own, else the table's, else the top of the file.
   Position where(const std::string& key) const {
     return has(key) ? keys.at(key).at : at.value_or(Position{});
   }
@@ -70,11 +71,11 @@ struct GpioDraft {
   GpioContact contact;
 };
 
-// The file as it is written. What needs no second thought is read straight into `set`; the rest is
-// brought there by resolve().
+// Holds the file as it is written. Values that need no interpretation are read straight into `set`;
+// resolve() completes the rest.
 struct Draft {
   Set set;
-  std::map<std::string, Given> given;  // every table that stands once, by its path
+  std::map<std::string, Given> given;  // tables that occur at most once, by path
   calibration::ObserverDraft observer;
   calibration::LightCameraDraft light_camera;
   std::optional<std::filesystem::path> environment;
@@ -90,7 +91,7 @@ struct Draft {
   std::vector<GpioDraft> contacts;
 };
 
-// A row of the table, bound to the place its value goes to.
+// A row of the table, bound to the variable that receives its value.
 struct Key {
   template <class T>
   Key(const char* its_name, T* to, const Rule& rule, const char* its_about, Need its_need = {})
@@ -111,10 +112,11 @@ struct Key {
   std::string allowed;                     // type, unit, range
   std::string initial;                     // the default as TOML
   std::function<void(const Value&)> read;  // throws Misread
-  std::function<std::string()> print;      // the value as it is now; "" where there is none
+  std::function<std::string()> print;      // returns the current value; "" if there is none
 };
 
-// A table of the file, or an array of tables. `open` makes room for one in the draft.
+// A table of the file, or an array of tables. `open` makes room for one in the draft and returns
+// its keys.
 struct Section {
   enum class Kind { always, optional, repeated };
   struct Opened {
@@ -127,7 +129,7 @@ struct Section {
   std::function<Opened()> open;
 };
 
-// Every table of a set file, bound to `draft`, in the order of the reference.
+// Returns every table of a set file, bound to `draft`, in the order of the reference.
 std::vector<Section> sections(Draft& draft);
 
 }  // namespace previz::set

@@ -93,7 +93,7 @@ class AravisCamera final : public Camera {
     }
   }
 
-  // The stream goes with its buffers, so that none of them can come again.
+  // Destroys the stream with its buffers, so that none of them can come again.
   void stop() override {
     if (!stream_) return;
     Failure ignored;  // a camera that is gone cannot be stopped
@@ -148,7 +148,7 @@ class AravisCamera final : public Camera {
   }
 
  private:
-  // The frame of a filled buffer; null, and counted, where it is not whole.
+  // Returns the frame of a filled buffer; null, and counted, if it is not whole.
   FramePtr take(ArvBuffer& buffer) {
     const std::int64_t arrival_ns = arrival_of(buffer);
     if (const char* damage = damage_of(buffer)) return left_out(damage);
@@ -182,7 +182,7 @@ class AravisCamera final : public Camera {
     return nullptr;
   }
 
-  // What keeps a buffer from being a picture as agreed; null where nothing does.
+  // Returns what keeps a buffer from being a picture as agreed; null if nothing does.
   const char* damage_of(ArvBuffer& buffer) const {
     switch (arv_buffer_get_status(&buffer)) {
       case ARV_BUFFER_STATUS_SUCCESS:
@@ -224,7 +224,7 @@ class AravisCamera final : public Camera {
     return Exposure{1e-6 * us, agreed_.gain_in_db ? std::pow(10.0, gain_db / 20.0) : 1.0};
   }
 
-  // All of Aravis' own, which depend on the kind of stream.
+  // Adds all of Aravis' own counters, which depend on the kind of stream.
   void add_stream_counters(DeviceCounters& counters) const {
     if (!stream_) return;
     for (unsigned i = 0; i < arv_stream_get_n_infos(stream_.get()); ++i)
@@ -235,13 +235,13 @@ class AravisCamera final : public Camera {
 
   const CameraSettings settings_;
   Owned<ArvCamera> camera_;
-  ArvDevice* device_;  // the camera's
+  ArvDevice* device_;  // owned by camera_
   const aravis::Agreed agreed_;
   Owned<ArvChunkParser> chunks_;  // null: frames do not carry their exposure
   std::atomic<bool> control_lost_ = false;
   gulong lost_handler_ = 0;
   Owned<ArvStream> stream_;  // null: not streaming
-  bool triggered_ = false;   // by software, and not answered yet
+  bool triggered_ = false;   // by software; no frame has answered yet
   SequenceCounter sequence_;
   ClockMap clock_;
   ExposureLedger ledger_;

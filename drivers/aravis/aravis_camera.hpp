@@ -1,4 +1,4 @@
-// GigE Vision and USB3 Vision cameras, through Aravis.
+// Drives GigE Vision and USB3 Vision cameras through Aravis.
 #pragma once
 
 #include <memory>
@@ -12,17 +12,17 @@
 
 namespace previz {
 
-// `settings.device` is a serial number, an Aravis device id ("Vendor-Model-Serial", or without
-// the model), or the address of a network camera. Sequence numbers are the device's block ids,
+// `settings.device` is a serial number, an Aravis device id ("Vendor-Model-Serial", or without the
+// model), or the address of a network camera. Sequence numbers are the device's block ids,
 // unwrapped; capture times are the device's time stamps, mapped to the host's clock
-// (clock_map.hpp). Where the camera can put its exposure into each frame (chunk data) the frames
-// say that; otherwise frames around a change are left out and counted.
+// (clock_map.hpp). If the camera can put its exposure into each frame (chunk data), frames carry
+// that exposure; otherwise frames around a change are left out and counted.
 //
-// Gain is driven where the camera gives it in dB (x dB is a factor of 10^(x/20)); other scales are
-// the vendor's own, and a gain asked of them is an error. Frames then say 1.
+// Gain is driven if the camera gives it in dB (x dB is a factor of 10^(x/20)). Other scales are the
+// vendor's own: asking for a gain is then an error, and frames report a gain of 1.
 std::unique_ptr<Camera> open_aravis(const CameraSettings& settings);
 
-// Asks all networks and the USB bus, which takes about a second.
+// Searches all networks and the USB, which takes about a second.
 std::vector<FoundCamera> find_aravis();
 
 std::optional<usb::Place> usb_place_of_aravis(const std::string& device);

@@ -14,7 +14,7 @@ namespace previz {
 namespace aravis {
 namespace {
 
-// A picture larger than this is a broken description, not a camera.
+// A camera that describes a larger picture than this is broken.
 constexpr std::int64_t most_payload = std::int64_t{1} << 30;
 
 bool is_address(const std::string& text) {
@@ -31,7 +31,7 @@ bool gain_is_in_db(ArvCamera& camera) {
   return ARV_IS_GC_FLOAT(node) && or_nothing(arv_gc_float_get_unit(ARV_GC_FLOAT(node))) == "dB";
 }
 
-// Radiance is divided by it.
+// Throws if an exposure is not a number above 0 that radiance can be divided by.
 void check_exposure(const std::string& device, const Exposure& exposure) {
   const double product = exposure.exposure_s * exposure.gain;
   if (exposure.exposure_s > 0 && exposure.gain > 0 && std::isnormal(product)) return;
@@ -140,7 +140,7 @@ class Configuration {
   }
 
   void agree_on_rate() {
-    if (settings_.trigger) {  // setting a rate would end it
+    if (settings_.trigger) {  // setting a rate would end the trigger
       if (settings_.rate_hz) refuse("its trigger sets its rate; leave rate_hz out");
       return;
     }
@@ -188,7 +188,7 @@ class Configuration {
                                        settings_.gain.value_or(agreed_.exposure.gain)});
   }
 
-  // What the set states is not to be changed by the camera.
+  // Switches automatics off, so that the camera does not change what the set states.
   void end_automatics() {
     if ((settings_.exposure_s || settings_.gain) &&
         arv_camera_is_exposure_auto_available(&camera_, failure_.out())) {
@@ -202,7 +202,8 @@ class Configuration {
     }
   }
 
-  // Then a frame's exposure is only what its chunk data say.
+  // Returns whether the camera changes its exposure by itself; only its chunk data then say what a
+  // frame's exposure is.
   bool is_automatic() {
     return (arv_camera_is_exposure_auto_available(&camera_, failure_.out()) &&
             arv_camera_get_exposure_time_auto(&camera_, failure_.out()) != ARV_AUTO_OFF) ||
@@ -210,7 +211,7 @@ class Configuration {
             arv_camera_get_gain_auto(&camera_, failure_.out()) != ARV_AUTO_OFF);
   }
 
-  // SFNC knows ratios, not temperatures; which ratio a lamp needs only a calibration can say.
+  // SFNC has colour ratios, not temperatures; only a calibration can say which ratio a lamp needs.
   void agree_on_white_balance() const {
     if (settings_.white_balance_k)
       refuse("GenICam cameras have no colour temperature; leave white_balance_k out");
@@ -257,7 +258,8 @@ struct Listed {
   std::string id, address, serial, vendor, model, protocol;
 };
 
-// Of one list, which another thread that looks for its camera would free.
+// Aravis keeps one global device list; another thread that updated the list while looking for its
+// camera would free these entries.
 std::vector<Listed> list_devices() {
   static std::mutex mutex;
   const std::lock_guard lock(mutex);
@@ -350,7 +352,7 @@ std::vector<FoundCamera> find_aravis() {
   return found;
 }
 
-// USB3 Vision cameras; a network camera's serial number is on no USB.
+// Finds USB3 Vision cameras only, because a network camera's serial number is on no USB.
 std::optional<usb::Place> usb_place_of_aravis(const std::string& device) {
   if (const std::optional<usb::Place> place = usb::place_of_serial(device)) return place;
   const std::size_t dash = device.rfind('-');  // an id ends in the serial

@@ -1,5 +1,4 @@
-// Finding an Aravis camera and agreeing with it on what it will send. Not for use outside the
-// driver.
+// Finds an Aravis camera and settles with it what it will send. Not for use outside the driver.
 #pragma once
 
 #include <cstddef>
@@ -14,11 +13,11 @@
 
 namespace previz::aravis {
 
-// What a camera and we have settled on.
+// The settings that the camera and the driver have agreed on.
 struct Agreed {
   CameraFormat format;
   convert::WireFormat wire;
-  std::uint32_t pfnc = 0;   // of the wire format
+  std::uint32_t pfnc = 0;   // PFNC code of the wire format
   std::size_t payload = 0;  // bytes of a buffer
   Exposure exposure;
   bool drives_exposure = false;
@@ -34,10 +33,12 @@ Owned<ArvCamera> find_camera(const std::string& device);
 // names the device, the setting, and what the camera can.
 Agreed configure(ArvCamera& camera, const CameraSettings& settings);
 
-// What the camera made of it: within its bounds, in its steps. Throws previz::Error.
+// Sets an exposure and returns what the camera made of it, within its bounds and in its steps.
+// Throws previz::Error.
 Exposure set_exposure(ArvCamera& camera, const std::string& device, const Exposure& wanted);
 
-// What Aravis calls n_missing_packets is told as "stream missing packets".
+// Returns the name under which a counter of Aravis is published: "stream missing packets" for
+// n_missing_packets.
 std::string counter_name(std::string aravis_name);
 
 void configure_gige_stream(ArvStream& stream, std::size_t payload);

@@ -1,4 +1,5 @@
-// Owning handles and error text for Aravis' GObjects; who includes it links Aravis.
+// Owns Aravis' GObjects and puts their errors into words. A target that includes this header must
+// link Aravis.
 #pragma once
 
 #include <arv.h>
@@ -22,7 +23,7 @@ struct Free {
 template <typename Type>
 using OwnedArray = std::unique_ptr<Type[], Free>;
 
-// What a call says of its failure. out() goes in as the call's GError**.
+// Holds the error of a failed call; out() is passed as the call's GError**.
 class Failure {
  public:
   Failure() = default;

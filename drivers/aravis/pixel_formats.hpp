@@ -1,4 +1,4 @@
-// The pixel formats of GenICam (PFNC) that can be converted.
+// Lists the pixel formats of GenICam (PFNC) that can be converted.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +9,10 @@
 
 namespace previz::aravis {
 
-// `pfnc` as the camera gives it, e.g. 0x01080009 for BayerRG8. None where there is no conversion.
+// Returns the format of a PFNC code, e.g. 0x01080009 for BayerRG8; none if there is no conversion.
 std::optional<convert::WireFormat> wire_format(std::uint32_t pfnc);
 
-// Their names, for errors: "Mono8, Mono10, ...".
+// Returns the names of all these formats, for errors: "Mono8, Mono10, ...".
 std::string known_formats();
 
 }  // namespace previz::aravis

@@ -23,7 +23,7 @@ constexpr auto names(ResponseCurve::Kind) {
 namespace calibration {
 
 inline constexpr int max_picture_side_px = 16384;
-// A distance beyond which a lens cannot tell the difference, and a float still can.
+// A distance that a lens cannot tell from infinity, but a float still can.
 inline constexpr double far_m = 1e6;
 
 // Set files and FRAMES.json are authored: people write them, in the units that a key's name ends

@@ -1,4 +1,4 @@
-// Calibrations out of files: one reader and one check for every format.
+// Reads calibrations from files: one reader and one check serve every format.
 #pragma once
 
 #include <functional>

@@ -22,7 +22,7 @@ std::size_t channels(Layout layout) {
   return layout == Layout::rgb || layout == Layout::bgr ? 3 : 1;
 }
 
-// What is wrong with the numbers, before anything is computed from them.
+// Returns what is wrong with a picture's numbers, before anything is computed from them.
 std::optional<std::string> wrong_shape(const WirePicture& picture) {
   const auto& [format, width, height, stride, bytes] = picture;
   const std::string size = std::to_string(width) + "x" + std::to_string(height);
@@ -47,7 +47,7 @@ std::optional<std::string> wrong_shape(const WirePicture& picture) {
   return std::nullopt;
 }
 
-// Rows of a picture, whatever lies between them.
+// Finds the rows of a picture, whatever lies between them.
 class Rows {
  public:
   explicit Rows(const WirePicture& picture)
@@ -60,7 +60,7 @@ class Rows {
   std::size_t stride_;
 };
 
-// CSI-2: the fewest samples whose low bits fill whole bytes.
+// Returns the fewest samples whose low bits fill whole bytes in CSI-2.
 std::size_t csi2_group(std::size_t bits) {
   return bits == 12 ? 2 : 4;
 }
@@ -75,7 +75,7 @@ std::uint32_t csi2_sample(const std::uint8_t* row, std::size_t i, std::size_t bi
   return std::uint32_t{high[at]} << low_bits | ((window >> (first % 8)) & ((1u << low_bits) - 1));
 }
 
-// Sample `i` of a row.
+// Returns sample `i` of a row.
 std::uint32_t sample(const std::uint8_t* row, std::size_t i, const WireFormat& format) {
   const auto bits = static_cast<std::size_t>(format.bits);
   switch (format.packing) {
@@ -100,7 +100,8 @@ std::uint32_t sample(const std::uint8_t* row, std::size_t i, const WireFormat& f
   throw std::invalid_argument("unknown packing");
 }
 
-// Samples of 9 to 16 bits as full-range 16-bit words. What lies above a sample's bits is ignored.
+// Returns samples of 9 to 16 bits as full-range 16-bit words; bits above a sample's own are
+// ignored.
 std::vector<std::uint8_t> deep_samples(const WirePicture& picture) {
   const WireFormat& format = picture.format;
   const std::uint32_t white = (1u << format.bits) - 1;
@@ -146,7 +147,7 @@ std::vector<std::uint8_t> plain_samples(const WirePicture& picture) {
   return samples;
 }
 
-// Four bytes of a 4:2:2 row are two pixels; these are their places.
+// Four bytes of a 4:2:2 row are two pixels; these are the places of their samples.
 struct MacroPixel {
   std::size_t y, cb, cr;  // the second luma is at y + 2
 };

@@ -1,4 +1,4 @@
-// From a picture as a device lays it out in memory to a Frame's samples.
+// Converts a picture from a device's memory layout to a Frame's samples.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@
 
 namespace previz::convert {
 
-// What the samples are, in memory order. A Bayer layout is named by its first two rows.
+// Says what the samples are, in memory order. A Bayer layout is named by its first two rows.
 enum class Layout {
   mono,
   bayer_rggb,
@@ -28,7 +28,7 @@ enum class Layout {
   mjpeg,  // a JFIF picture; its own header says the rest
 };
 
-// How samples of 9 to 16 bits lie in bytes.
+// Says how samples of 9 to 16 bits lie in bytes.
 enum class Packing {
   words,  // little-endian 16-bit words, the sample in the low bits
   bits,   // one stream of bits, lowest first (GenICam PFNC "p": Mono10p, BayerRG12p)
@@ -53,27 +53,28 @@ struct WirePicture {
   std::span<const std::uint8_t> bytes;  // may be more than the picture needs
 };
 
-// What a picture becomes: gray8 or gray16, also of Bayer, whose samples stay a mosaic; rgb8 or
-// rgb16; yuv422p8 for 4:2:2 that is coded as yuv422p8 is (BT.709, limited range), whose samples so
-// stay as they are. Samples of 9 to 15 bits become 16 bits of full range, v -> round(65535 v /
-// (2^bits - 1)), which keeps every code apart.
+// Returns the format that a picture is converted to: gray8 or gray16, also for Bayer, whose samples
+// stay a mosaic; rgb8 or rgb16; yuv422p8 for 4:2:2 that is coded in the same way (BT.709, limited
+// range), whose samples then stay unchanged. Samples of 9 to 15 bits become 16 bits of full range,
+// v -> round(65535 v / (2^bits - 1)), which keeps every code apart.
 PixelFormat delivered_format(const WireFormat& format);
 BayerPattern bayer_pattern(const WireFormat& format);
 
-// The least bytes of a row, and of a whole picture (mjpeg: 0, which says nothing).
+// Return the least number of bytes of a row, and of a whole picture (0 for mjpeg, whose size is
+// unknown).
 std::size_t row_bytes(const WireFormat& format, int width);
 std::size_t picture_bytes(const WireFormat& format, int width, int height, std::size_t stride = 0);
 
 // Fills in frame.format, bayer, width, height and bytes. Returns what is wrong with the picture, in
 // words ("is cut short: 100 of 3072 bytes"), and leaves the frame alone, if it is not whole.
 //
-// 4:2:0 and 4:2:2 chroma is sited as MPEG-2 has it and linear in between.
+// 4:2:0 and 4:2:2 chroma is sited as in MPEG-2 and interpolated linearly.
 std::optional<std::string> convert(const WirePicture& picture, Frame& frame);
 
-// Parts of the above in files of their own.
+// The functions below are parts of convert() that have files of their own.
 std::optional<std::string> decode_jpeg(std::span<const std::uint8_t> jpeg, int width, int height,
                                        std::vector<std::uint8_t>& rgb);
-// Interleaved RGB of as many bits. A mosaic is 2x2 pixels at least.
+// Returns interleaved RGB with as many bits a sample. A mosaic is at least 2x2 pixels.
 std::vector<std::uint8_t> demosaic(BayerPattern pattern, bool deep, int width, int height,
                                    std::span<const std::uint8_t> mosaic);
 

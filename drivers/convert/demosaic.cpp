@@ -30,7 +30,7 @@ int edge_aware_code(BayerPattern pattern) {
 std::vector<std::uint8_t> demosaic(BayerPattern pattern, bool deep, int width, int height,
                                    std::span<const std::uint8_t> mosaic) {
   constexpr int margin = 2;
-  // Not written to; OpenCV has no read-only pictures.
+  // OpenCV only reads this picture, but has no type for that.
   const cv::Mat samples(height, width, deep ? CV_16UC1 : CV_8UC1,
                         const_cast<std::uint8_t*>(mosaic.data()));
   cv::Mat padded, colour;

@@ -39,7 +39,7 @@ struct Reports {
   }
 };
 
-// False with reports.damaged or, where header and expectation differ, without.
+// Returns false with reports.damaged set, or without it if header and expectation differ.
 bool decode(jpeg_decompress_struct& decoder, Reports& reports, std::span<const std::uint8_t> jpeg,
             int width, int height, std::vector<std::uint8_t>& rgb) {
   if (setjmp(reports.escape)) return false;

@@ -1,4 +1,4 @@
-// Y'CbCr to R'G'B', by the Recommendations' own equations.
+// Converts Y'CbCr to R'G'B' by the equations of the ITU-R Recommendations.
 #pragma once
 
 #include <array>
@@ -9,12 +9,12 @@ namespace previz::convert {
 enum class YuvMatrix { bt601, bt709 };  // Rec. ITU-R BT.601-7, BT.709-6
 enum class YuvRange { limited, full };  // 8-bit luma 16..235 and chroma 16..240, or all of 0..255
 
-// Tables for one coding; 8-bit in, 8-bit out, rounded to nearest, clipped to 0..255.
+// Holds the tables for one coding: 8-bit in, 8-bit out, rounded to nearest, clipped to 0..255.
 class YuvToRgb {
  public:
   YuvToRgb(YuvMatrix matrix, YuvRange range);
 
-  // Chroma in eighths of a code (0..2040), so that interpolated chroma keeps its fraction.
+  // Takes chroma in eighths of a code (0..2040), so that interpolated chroma keeps its fraction.
   void operator()(int y, int cb_eighths, int cr_eighths, std::uint8_t* rgb) const {
     const float luma = luma_[static_cast<std::size_t>(y)];
     const auto cb = static_cast<std::size_t>(cb_eighths), cr = static_cast<std::size_t>(cr_eighths);
@@ -29,7 +29,7 @@ class YuvToRgb {
 
   static std::uint8_t to_code(float value) {
     if (value <= 0) return 0;
-    const float half_up = value + 0.5f;  // three a pixel: std::lround would be a call each
+    const float half_up = value + 0.5f;  // runs three times a pixel: std::lround would be a call
     return value >= 255 ? 255 : static_cast<std::uint8_t>(half_up);
   }
 

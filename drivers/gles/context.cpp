@@ -12,7 +12,7 @@ namespace {
   throw Error("EGL: " + what + ": " + egl_error());
 }
 
-// One with eight bits a colour and, where it matters, the wanted native format.
+// Chooses a configuration with eight bits a colour and, if one is wanted, the native format.
 EGLConfig choose_config(EGLDisplay display, EGLint native_visual) {
   const EGLint wanted[] = {EGL_SURFACE_TYPE,
                            native_visual != 0 ? EGL_WINDOW_BIT : EGL_DONT_CARE,

@@ -8,9 +8,9 @@ namespace previz::gles {
 
 class Context {
  public:
-  // `platform` and `native` as eglGetPlatformDisplay takes them. `native_visual`, if not 0, is what
+  // `platform` and `native` are those of eglGetPlatformDisplay. `native_visual`, if not 0, is what
   // the configuration's EGL_NATIVE_VISUAL_ID must be: on GBM a DRM format. Throws previz::Error
-  // saying what EGL lacks.
+  // that says what EGL lacks.
   Context(EGLenum platform, void* native, EGLint native_visual = 0);
   ~Context();
   Context(const Context&) = delete;
@@ -19,8 +19,8 @@ class Context {
   EGLDisplay display() const { return display_; }
   EGLConfig config() const { return config_; }
 
-  // Drawing goes to this surface; EGL_NO_SURFACE: to framebuffer objects only. Throws
-  // previz::Error.
+  // Directs drawing to a surface; with EGL_NO_SURFACE only framebuffer objects can be drawn to.
+  // Throws previz::Error.
   void use(EGLSurface surface);
 
  private:
@@ -29,7 +29,7 @@ class Context {
   EGLContext context_ = EGL_NO_CONTEXT;
 };
 
-// Why EGL refused its last call in this thread.
+// Returns why EGL refused its last call in this thread.
 const char* egl_error();
 
 }  // namespace previz::gles

@@ -9,7 +9,8 @@
 namespace previz::gles {
 namespace {
 
-// A rectangle of the screen, in clip coordinates: left, top, width, height (downwards).
+// The uniform is a rectangle of the screen in clip coordinates: left, top, width, height
+// (downwards).
 constexpr const char* vertex_source = R"(#version 300 es
 uniform vec4 rectangle;
 out vec2 texture_point;
@@ -46,7 +47,7 @@ GLuint link() {
   for (const GLuint shader :
        {compile(GL_VERTEX_SHADER, vertex_source), compile(GL_FRAGMENT_SHADER, fragment_source)}) {
     glAttachShader(program, shader);
-    glDeleteShader(shader);  // with the program
+    glDeleteShader(shader);  // it is freed with the program
   }
   glLinkProgram(program);
   GLint linked = GL_FALSE;
@@ -77,7 +78,7 @@ void check_fits(int width, int height) {
                 " is larger than this GPU's " + std::to_string(most) + " pixels a side");
 }
 
-// 8 bits a sample, rounded to nearest.
+// Converts to 8 bits a sample, rounded to nearest.
 void to_bytes(const Plate& picture, std::vector<std::uint8_t>& bytes) {
   bytes.resize(picture.samples.size());
   const auto narrow = [deep = picture.bits == 16](std::uint16_t sample) {
@@ -86,7 +87,7 @@ void to_bytes(const Plate& picture, std::vector<std::uint8_t>& bytes) {
   std::ranges::transform(picture.samples, bytes.begin(), narrow);
 }
 
-// A framebuffer of its own to draw into, for as long as it lives.
+// Binds a framebuffer of its own to draw into, for as long as the object lives.
 class Offscreen {
  public:
   Offscreen(int width, int height) {
@@ -189,8 +190,8 @@ void Painter::draw(const Texture& texture, int x, int y, int width, int height, 
   glDrawArrays(GL_TRIANGLE_STRIP, 0, 4);
 }
 
-// At their own size texels fall on pixels; then both filters give the texel itself. A picture made
-// smaller than two thirds or so is taken from its halves, so that it does not alias.
+// At a picture's own size texels fall on pixels, and both filters give the texel itself. A picture
+// shown smaller than about two thirds is sampled from its mipmaps, so that it does not alias.
 void Painter::upload(const Plate& picture) {
   const Texture wanted{0, picture.width, picture.height};
   const bool same_size = picture_.width == wanted.width && picture_.height == wanted.height;

@@ -10,9 +10,9 @@
 
 namespace previz::gles {
 
-// Needs a current Context, for its whole life. Of a picture of 8 bits a sample that is shown at its
-// own size, and of opaque overlays, every sample comes out as it is; 16 bits are rounded to 8.
-// Larger is linear interpolation of picture values, smaller goes by way of halved pictures.
+// A Painter needs a current Context for its whole life. Every sample of an 8-bit picture shown at
+// its own size, and of opaque overlays, comes out as it is; 16 bits are rounded to 8. Larger
+// pictures are interpolated linearly, smaller ones are sampled from mipmaps.
 class Painter {
  public:
   Painter(int screen_width, int screen_height, DisplayScale scale);
@@ -20,12 +20,13 @@ class Painter {
   Painter(const Painter&) = delete;
   Painter& operator=(const Painter&) = delete;
 
-  // From now on this is drawn; an empty one is black. Throws previz::Error, here and below, saying
-  // what OpenGL refused.
+  // Sets what is drawn from now on; an empty screenful is black. This function and those below
+  // throw previz::Error that says what OpenGL refused.
   void take(const Screenful& screenful);
-  // Into the framebuffer bound now, whose first row is the lowest of the screen (as EGL has it).
+  // Draws into the framebuffer that is bound, whose first row is the lowest of the screen (as EGL
+  // has it).
   void draw();
-  // Into a framebuffer of its own, which is read: 8-bit RGB of the screen's size.
+  // Draws into a framebuffer of its own and returns that as 8-bit RGB of the screen's size.
   Plate read_back();
 
  private:
@@ -47,7 +48,7 @@ class Painter {
   const int width_, height_;
   const DisplayScale scale_;
   GLuint program_ = 0, vertices_ = 0;
-  GLint rectangle_ = -1;  // uniform
+  GLint rectangle_ = -1;  // location of the uniform
   Texture picture_;
   std::shared_ptr<const Plate> uploaded_;  // what picture_ holds
   std::vector<Quad> overlays_;

@@ -6,13 +6,13 @@
 namespace previz::gles {
 namespace {
 
-// a * b / c, rounded to nearest, at least 1.
+// Returns a * b / c, rounded to nearest, at least 1.
 int in_proportion(int a, int b, int c) {
   const std::int64_t product = std::int64_t{a} * b;
   return static_cast<int>(std::max<std::int64_t>((2 * product + c) / (2 * std::int64_t{c}), 1));
 }
 
-// Half of what is left, towards the upper left.
+// Returns half of what is left, rounded towards the upper left.
 int border(int screen, int picture) {
   const int left = screen - picture;
   return left >= 0 ? left / 2 : -((1 - left) / 2);

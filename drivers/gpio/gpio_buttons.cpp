@@ -25,7 +25,7 @@ constexpr std::int64_t second_ns = 1'000'000'000;
 constexpr const char* consumer = "previzd";
 
 struct CloseChip {
-  void operator()(gpiod_chip* chip) const { gpiod_chip_close(chip); }  // and releases its lines
+  void operator()(gpiod_chip* chip) const { gpiod_chip_close(chip); }  // also releases its lines
 };
 using Chip = std::unique_ptr<gpiod_chip, CloseChip>;
 
@@ -37,7 +37,7 @@ struct Contact {
   std::string chip, line;
 };
 
-// Of gpio:CHIP:LINE; a chip's label may have colons ("INTC1057:00").
+// Splits gpio:CHIP:LINE; a chip's label may have colons ("INTC1057:00").
 Contact contact_of(const std::string& name) {
   const std::size_t begin = name.find(':') + 1, end = name.rfind(':');
   if (end <= begin || end + 1 == name.size())
@@ -45,7 +45,7 @@ Contact contact_of(const std::string& name) {
   return {name.substr(begin, end - begin), name.substr(end + 1)};
 }
 
-// By label only: the number of a gpiochip changes from boot to boot.
+// Finds a chip by its label only, because the number of a gpiochip changes from boot to boot.
 Chip find_chip(const std::string& label) {
   Chip chip(gpiod_chip_open_by_label(label.c_str()));
   if (!chip) throw Error("no GPIO chip has the label \"" + label + "\": " + std::strerror(errno));
@@ -108,10 +108,10 @@ class GpioButtons final : public Buttons {
 
  private:
   struct Line {
-    std::string name;   // of the button
+    std::string name;   // name of the button
     std::string label;  // name or offset of the line
     int request_flags;
-    gpiod_line* line;  // the chip's; null while it is not there
+    gpiod_line* line;  // owned by chip_; null while it is not there
     Debouncer debouncer;
   };
 
@@ -146,7 +146,7 @@ class GpioButtons final : public Buttons {
     watch(gpiod_line_event_get_fd(line.line));
   }
 
-  // Held while the rig starts: pressed from now on.
+  // A button that is held while the rig starts counts as pressed from now on.
   void see_held(Line& line) {
     if (gpiod_line_get_value(line.line) == 1 && line.debouncer.edge(true, monotonic_ns()))
       push_edge(line);
@@ -180,8 +180,9 @@ class GpioButtons final : public Buttons {
         ButtonEvent{line.name, line.debouncer.pressed(), line.debouncer.told_ns()});
   }
 
-  // The timer wakes for what the lines themselves do not: events that wait, a contact that is to
-  // settle, a chip to look for, one that has gone (the kernel then fails reads, but wakes nobody).
+  // The timer wakes for what the lines themselves do not signal: events that wait, a contact that
+  // will settle, a chip to look for, and one that has gone (the kernel then fails reads, but wakes
+  // nobody).
   void arm() {
     std::optional<std::int64_t> due_ns;
     const auto at = [&](std::int64_t time_ns) {
@@ -200,7 +201,7 @@ class GpioButtons final : public Buttons {
   OwnedDescriptor epoll_, timer_;
   Chip chip_;
   std::int64_t retry_ns_ = 0;
-  std::string refusal_;  // as last told
+  std::string refusal_;  // trouble last reported
   std::list<Line> lines_;
   std::deque<ButtonsEvent> events_;
   DeviceCounters counters_{{"opened", 0}, {"not opened", 0}, {"lost", 0}};

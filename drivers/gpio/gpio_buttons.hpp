@@ -1,4 +1,5 @@
-// Buttons, pedals and switches on GPIO lines, through libgpiod (1.6; version 2 has another API).
+// Drives buttons, pedals and switches on GPIO lines through libgpiod (1.6; version 2 has another
+// API).
 #pragma once
 
 #include <memory>
@@ -11,11 +12,11 @@
 namespace previz {
 
 // `device` is "gpio:CHIP". Edges come from the kernel with their time; a chip or line that is not
-// there, or is in use, is trouble told once, and tried again every second.
+// there, or is in use, is reported as trouble once and tried again every second.
 std::unique_ptr<Buttons> open_gpio(const std::string& device, const std::vector<std::string>& names,
                                    const ButtonSettings& settings);
 
-// The named input lines that nobody uses.
+// Returns the named input lines that nobody uses.
 std::vector<FoundButton> find_gpio();
 
 std::string gpio_device_of(const std::string& name);

@@ -39,7 +39,7 @@ std::unique_ptr<Display> open_headless(const DisplaySettings& settings) {
   return std::make_unique<HeadlessDisplay>(settings);
 }
 
-// It is always there, and has no connector.
+// A headless display is always there, and has no connector.
 std::vector<FoundDisplay> find_headless() {
   return {};
 }

@@ -1,4 +1,4 @@
-// A display without a screen: drawn like any other (surfaceless EGL), to be read back.
+// A display without a screen: it is drawn like any other (surfaceless EGL) and read back.
 #pragma once
 
 #include <memory>
@@ -8,7 +8,8 @@
 
 namespace previz {
 
-// Of the mode's size, 1280x720 where none is given. Throws previz::Error where there is no EGL.
+// Opens a display of the mode's size, or of 1280x720 if none is given. Throws previz::Error if
+// there is no EGL.
 std::unique_ptr<Display> open_headless(const DisplaySettings& settings);
 std::vector<FoundDisplay> find_headless();
 

@@ -1,4 +1,5 @@
-// hidapi's two back ends: hidraw, through the kernel's own driver, and libusb, past it.
+// Loads hidapi's two back ends: hidraw, which goes through the kernel's own driver, and libusb,
+// which goes past it.
 #pragma once
 
 #include <hidapi.h>
@@ -18,12 +19,13 @@ struct Backend {
   decltype(&hid_free_enumeration) free_enumeration;
 };
 
-// Those this machine has, hidraw first: libusb takes a device away from the kernel, and is for
-// where hidraw may not be opened. Throws previz::Error where there is none.
+// Returns the back ends that this machine has, hidraw first: libusb takes a device away from the
+// kernel, and is for machines on which hidraw may not be opened. Throws previz::Error if there is
+// none.
 std::span<const Backend> backends();
 
-// Held while devices are looked for or opened: hidapi keeps the text of its last error in one
-// place, unguarded.
+// Must be held while devices are looked for or opened, since hidapi keeps the text of its last
+// error in one unguarded place.
 std::mutex& library_mutex();
 
 // An open device.
@@ -35,7 +37,7 @@ class Device {
 
   explicit operator bool() const { return device_ != nullptr; }
   const char* backend() const { return backend_->name; }
-  // Bytes read; 0 after the time-out, less where the device is gone.
+  // Returns the number of bytes read; 0 after the time-out, negative if the device is gone.
   int read(std::span<unsigned char> report, int timeout_ms) const {
     return backend_->read_timeout(device_.get(), report.data(), report.size(), timeout_ms);
   }

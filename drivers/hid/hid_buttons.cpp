@@ -23,7 +23,7 @@
 namespace previz {
 namespace {
 
-constexpr int poll_ms = 100;  // how late the end may be noticed
+constexpr int poll_ms = 100;  // how late a stop may be noticed
 constexpr std::chrono::seconds retry_interval{1};
 constexpr const char* cut_short = "reports too short for a button";
 
@@ -32,7 +32,7 @@ struct DeviceName {
   std::string serial;  // empty: any
 };
 
-// What is before the next colon, which is taken off with it.
+// Removes the part of `text` before the next colon, and the colon, and returns the part.
 std::string take_part(std::string& text) {
   const std::size_t end = text.find(':');
   std::string part = text.substr(0, end);
@@ -49,7 +49,7 @@ std::optional<unsigned short> hexadecimal(const std::string& text) {
 }
 
 DeviceName parse_device(const std::string& device) {
-  std::string serial = device;  // which may have colons: some pads give their network address
+  std::string serial = device;  // it may have colons: some pads give their network address
   take_part(serial);
   const auto vendor = hexadecimal(take_part(serial)), product = hexadecimal(take_part(serial));
   if (vendor && product) return {*vendor, *product, serial};
@@ -74,7 +74,7 @@ hid::Device open_device(const DeviceName& name) {
   return {};
 }
 
-// A thread reads, since hidapi has nothing to wait on.
+// A thread reads the device, since hidapi has no descriptor to wait on.
 class HidButtons final : public Buttons {
  public:
   HidButtons(std::string device, const std::vector<std::string>& names)
@@ -162,7 +162,7 @@ class HidButtons final : public Buttons {
 
   const std::string device_;
   const DeviceName device_name_;
-  hid::ReportReader reader_;  // the thread's
+  hid::ReportReader reader_;  // used by the thread only
   OwnedDescriptor signal_;
   mutable std::mutex mutex_;
   std::condition_variable_any wake_;
@@ -210,7 +210,8 @@ void learn(const std::string& device, const std::function<bool()>& stop,
   const Device opened = open_device(parse_device(device));
   if (!opened) throw Error(device + ": may not be opened");
   std::array<unsigned char, 4096> report{};
-  // By report number and length; the first of a kind is compared with nothing held.
+  // The last reports by number and length; the first of a kind is compared with one in which
+  // nothing is held.
   std::map<std::pair<unsigned char, int>, std::vector<std::uint8_t>> before;
   while (!stop()) {
     const int size = opened.read(report, poll_ms);
@@ -226,7 +227,7 @@ void learn(const std::string& device, const std::function<bool()>& stop,
 
 }  // namespace hid
 
-// hid:VENDOR:PRODUCT[:SERIAL]:SELECTOR without the selector.
+// Returns hid:VENDOR:PRODUCT[:SERIAL]:SELECTOR without the selector.
 std::string hid_device_of(const std::string& name) {
   std::string device = name.substr(0, name.rfind(':'));
   parse_device(device);
@@ -249,7 +250,7 @@ std::vector<FoundButton> find_hid() {
       char ids[16];
       std::snprintf(ids, sizeof ids, "%04x:%04x", info->vendor_id, info->product_id);
       const std::string device = std::string("hid:") + ids;
-      // libusb sees again what hidraw has found.
+      // libusb finds again what hidraw has found.
       if (std::ranges::any_of(found, [&](const FoundButton& other) {
             return other.name == device || other.name.starts_with(device + ':');
           }))

@@ -1,4 +1,4 @@
-// Foot pedals, macro pads and game pads, through hidapi.
+// Drives foot pedals, macro pads and game pads through hidapi.
 #pragma once
 
 #include <cstdint>
@@ -15,9 +15,9 @@
 namespace previz {
 
 // `device` is "hid:VENDOR:PRODUCT" or "hid:VENDOR:PRODUCT:SERIAL". A device that is not there, or
-// is unplugged, is trouble told once, and looked for every second; its buttons are then released.
-// It is read through hidraw, or through libusb where hidraw may not be opened.
-// A report that is too short for one of its buttons is counted and left out.
+// is unplugged, is reported as trouble once and looked for every second; its buttons are then
+// released. The device is read through hidraw, or through libusb where hidraw may not be opened. A
+// report that is too short for one of its buttons is counted and left out.
 std::unique_ptr<Buttons> open_hid(const std::string& device, const std::vector<std::string>& names,
                                   const ButtonSettings& settings);
 
@@ -27,7 +27,7 @@ std::string hid_device_of(const std::string& name);
 
 namespace hid {
 
-// What reports make of the buttons; without a device, for it and for its tests.
+// Turns HID reports into button events. It needs no device, so that a test can use it alone.
 class ReportReader {
  public:
   // Throws previz::Error where a name cannot be understood.
@@ -47,7 +47,8 @@ class ReportReader {
   std::uint64_t reports_cut_short_ = 0;
 };
 
-// Reads one device's reports until `stop`; calls back with what went down, as button names.
+// Reads one device's reports until `stop` returns true; calls `pressed` with the name of each
+// button that goes down.
 void learn(const std::string& device, const std::function<bool()>& stop,
            const std::function<void(const std::string& name)>& pressed);
 

@@ -11,7 +11,7 @@
 namespace previz::hid {
 namespace {
 
-constexpr std::size_t longest_report = 4096;  // of the kernel, HID_MAX_BUFFER_SIZE rounded down
+constexpr std::size_t longest_report = 4096;  // HID_MAX_BUFFER_SIZE of the kernel, rounded down
 
 [[noreturn]] void refuse(const std::string& text) {
   throw Error(

@@ -1,4 +1,4 @@
-// What of a HID report is a button.
+// Says which part of a HID report is a button.
 #pragma once
 
 #include <cstddef>
@@ -15,22 +15,22 @@ namespace previz::hid {
 // only in reports whose first byte is 3, for devices that number their reports.
 struct Selector {
   std::optional<std::uint8_t> report;  // the first byte
-  std::size_t first = 0, last = 0;     // bytes
-  std::optional<int> bit;              // else `value`
+  std::size_t first = 0, last = 0;     // indices of bytes
+  std::optional<int> bit;              // none: the bytes are compared with `value`
   std::uint8_t value = 0;
 
-  // Whether a report has anything to say of this button; of one that is too short, not.
+  // Returns whether the report concerns this button and is long enough for it.
   bool speaks(std::span<const std::uint8_t> report_bytes) const;
   bool too_short(std::span<const std::uint8_t> report_bytes) const;
-  // Of a report that speaks.
+  // Returns whether the button is pressed; the report must be one that speaks() of it.
   bool pressed(std::span<const std::uint8_t> report_bytes) const;
 };
 
 // Throws previz::Error that quotes the text and says what is allowed.
 Selector parse_selector(const std::string& text);
 
-// The selectors of what went down from one report to the next of the same length: of each bit that
-// was set, and of each byte that took a new value and is no single bit.
+// Returns the selectors of what went down from one report to the next of the same length: one for
+// each bit that was set, and one for each byte that took a new value and is no single bit.
 std::vector<std::string> pressed_between(std::span<const std::uint8_t> before,
                                          std::span<const std::uint8_t> after);
 

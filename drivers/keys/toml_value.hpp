@@ -1,4 +1,4 @@
-// The nodes of a TOML file as Values.
+// Converts the nodes of a TOML file to Values.
 #pragma once
 
 #include <toml++/toml.h>

@@ -33,7 +33,7 @@ std::string plain(double number) {
   return {digits.begin(), end};
 }
 
-// What the file says there, short enough for a message.
+// Returns what the file says there, short enough for a message.
 std::string seen(const Value& value) {
   constexpr std::size_t longest = 40;
   struct {

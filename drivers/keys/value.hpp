@@ -1,5 +1,5 @@
-// How a value of each C++ type is read from a file, checked, described and printed. Nothing here
-// knows the syntax of a file or the name of a key.
+// Reads, checks, describes and prints the values of each C++ type in a file. Nothing here knows the
+// syntax of a file or the name of a key.
 #pragma once
 
 #include <algorithm>
@@ -36,7 +36,7 @@ struct Value {
   std::variant<std::monostate, bool, std::int64_t, double, std::string, std::vector<Value>> data;
 };
 
-// `text` with control characters as \n, \t or \u00XX.
+// Returns `text` with control characters as \n, \t or \u00XX.
 std::string printable(const std::string& text);
 
 // Thrown by Codec::read, caught where the key is known.
@@ -55,7 +55,7 @@ struct Rule {
   std::span<const char* const> words{};  // the texts that are allowed; empty: any text
   const char* si_unit = unit;            // the unit of the struct
 
-  // The same bounds for a file in the unit of the struct.
+  // Returns the same bounds for a file in the unit of the struct.
   constexpr Rule in_si() const {
     return {si_unit, 1, low * si, high * si, low_excluded, words, si_unit};
   }
@@ -84,13 +84,13 @@ inline constexpr Unit plain{"", 1}, px{"px", 1}, m{"m", 1}, mm{"mm", 1e-3, "m"},
     deg{"degrees", std::numbers::pi / 180, "rad"};
 }
 
-// What a missing key means. `example` is shown in the reference.
+// Says what a missing key means. `example` is shown in the reference.
 struct Need {
   enum class Kind { defaulted, required, optional } kind = Kind::defaulted;
   std::string example;
 };
 
-// How files spell the values of an enumeration: `names(E)` lists them beside each E.
+// Says how files spell the values of an enumeration: `names(E)` lists them beside each E.
 template <class E>
 using Name = std::pair<const char*, E>;
 
@@ -193,7 +193,7 @@ struct Codec<E> {
   }
 };
 
-// Fixed numbers of numbers: vectors, polynomial coefficients.
+// Lists of fixed length hold vectors and polynomial coefficients.
 template <std::size_t N>
 struct Codec<std::array<double, N>> {
   static std::array<double, N> read(const Value& value, const Rule& rule) {
@@ -258,7 +258,7 @@ struct Codec<std::vector<std::string>> {
   static std::string describe(const Rule&) { return "list of texts"; }
 };
 
-// Keys that may be left out: "" where they are.
+// Keys that may be left out print as "" if they are.
 template <class T>
 struct Codec<std::optional<T>> {
   static std::optional<T> read(const Value& value, const Rule& rule) {

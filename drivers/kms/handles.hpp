@@ -1,4 +1,4 @@
-// Owners of what libdrm hands out, and its errors in words.
+// Owns the objects that libdrm hands out.
 #pragma once
 
 #include <xf86drm.h>

@@ -14,7 +14,7 @@ void Hotplug::Unref::operator()(udev_monitor* monitor) const {
   udev_monitor_unref(monitor);
 }
 
-// The kernel's own events: nothing has to be done by udev's rules first.
+// Listens to the kernel's own events, for which udev's rules need not run first.
 Hotplug::Hotplug()
     : context_(udev_new()),
       monitor_(context_ ? udev_monitor_new_from_netlink(context_.get(), "kernel") : nullptr) {

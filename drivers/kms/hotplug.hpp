@@ -1,4 +1,4 @@
-// Tells when something was plugged into a graphics card, or out of it.
+// Notices when something is plugged into a graphics card, or out of it.
 #pragma once
 
 #include <memory>
@@ -13,7 +13,7 @@ class Hotplug {
   // Throws previz::Error where udev does not answer.
   Hotplug();
 
-  // Whether anything was since it was asked last. Never blocks.
+  // Returns whether anything was plugged in or out since the last call. Never blocks.
   bool happened();
 
  private:

@@ -41,7 +41,7 @@ struct Target {
   DrmOwned<drmModeConnector> connector;
 };
 
-// The connector that is meant, or the first with a screen.
+// Returns the connector that is meant, or the first with a screen.
 Target find_target(const std::string& wanted) {
   std::string seen, refusal;
   for (const Card& card : find_cards()) {
@@ -99,7 +99,7 @@ class KmsDisplay final : public Display {
   Scanout scanout_;
   gles::Painter painter_;
   bool master_ = true;
-  std::optional<std::int64_t> flipped_ns_;  // by the card's event for the flip under way
+  std::optional<std::int64_t> flipped_ns_;  // time in the card's event for the flip under way
 };
 
 int KmsDisplay::checked_master(int card, const Card& where) {
@@ -120,14 +120,14 @@ KmsDisplay::~KmsDisplay() {
   try {
     scanout_.begin();
   } catch (const Error&) {
-    // The GPU was reset: what the painter had is gone with its context. The screen is not.
+    // After a reset of the GPU the painter's objects are gone with its context, but the screen is
+    // not.
   }
   if (!master_) return;
   output_.restore();
   drmDropMaster(card_);
 }
 
-// Draws before it asks for the screen: what was drawn is then as new as can be when it gets it.
 DisplayEvent KmsDisplay::show(const Screenful& screenful) {
   if (std::optional<DeviceTrouble> unplugged = look_at_plug()) return *std::move(unplugged);
   if (!master_) {
@@ -174,7 +174,7 @@ std::optional<DeviceTrouble> KmsDisplay::look_at_plug() {
   return std::nullopt;
 }
 
-// The time of the vertical blank, by the kernel on CLOCK_MONOTONIC.
+// Returns the time of the vertical blank, which the kernel gives on CLOCK_MONOTONIC.
 std::optional<std::int64_t> KmsDisplay::wait_for_flip() {
   drmEventContext handler{};
   handler.version = 3;

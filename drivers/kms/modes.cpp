@@ -9,13 +9,13 @@
 namespace previz::kms {
 namespace {
 
-constexpr double same_rate_hz = 0.5;  // 59.94 and 60 are one wish to most
+constexpr double same_rate_hz = 0.5;  // most people mean the same by 59.94 and 60
 
 bool interlaced(const drmModeModeInfo& info) {
   return (info.flags & DRM_MODE_FLAG_INTERLACE) != 0;
 }
 
-// How far a mode is from what was asked for: the less, the better.
+// Returns how far a mode is from the wanted one: the less, the better.
 double distance(const drmModeModeInfo& info, const DisplayMode& wanted) {
   const double rate_hz = mode_of(info).rate_hz;
   const double by_rate = wanted.rate_hz > 0 ? std::abs(rate_hz - wanted.rate_hz) : -rate_hz;

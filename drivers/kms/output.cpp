@@ -34,12 +34,12 @@ Output::~Output() {
   if (mode_blob_ != 0) drmModeDestroyPropertyBlob(card_, mode_blob_);
 }
 
-// The one the connector is on already, else one that nobody uses.
+// Chooses the CRTC that the connector is on already, else one that nobody uses.
 void Output::choose_crtc(const drmModeConnector& connector) {
   const DrmOwned<drmModeRes> resources(drmModeGetResources(card_));
   if (!resources) throw Error(std::string("the card has no outputs: ") + std::strerror(errno));
   const DrmOwned<drmModeEncoder> current(drmModeGetEncoder(card_, connector.encoder_id));
-  std::uint32_t possible = 0;  // a bit a CRTC
+  std::uint32_t possible = 0;  // one bit per CRTC
   for (int i = 0; i < connector.count_encoders; ++i)
     if (const DrmOwned<drmModeEncoder> encoder{drmModeGetEncoder(card_, connector.encoders[i])})
       possible |= encoder->possible_crtcs;
@@ -105,7 +105,7 @@ void Output::restore() {
     dark();
 }
 
-// Framebuffer 0: dark.
+// Framebuffer 0 makes the screen dark.
 int Output::commit(std::uint32_t framebuffer, void* data) {
   const DrmOwned<drmModeAtomicReq> request(drmModeAtomicAlloc());
   if (!request) return ENOMEM;

@@ -1,5 +1,5 @@
-// The way from a framebuffer to a screen: connector, CRTC and plane, by atomic commits, or by the
-// calls before those where the card has no others.
+// Puts framebuffers on a screen through a connector, CRTC and plane, by atomic commits or, if the
+// card has none, by the older calls.
 #pragma once
 
 #include <cstdint>
@@ -14,20 +14,20 @@ namespace previz::kms {
 
 class Output {
  public:
-  // `card` must be its master and stays open longer than this. Throws previz::Error where no CRTC
-  // is free for the connector.
+  // `card` must be DRM master and stay open longer than this object. Throws previz::Error if no
+  // CRTC is free for the connector.
   Output(int card, const drmModeConnector& connector, const drmModeModeInfo& mode);
   ~Output();
   Output(const Output&) = delete;
   Output& operator=(const Output&) = delete;
 
-  // Puts the framebuffer on the screen with the next vertical blank, of which the card then sends
-  // an event with `data`; the first time, and after dark(), it sets the mode before. Returns 0 or
+  // Puts the framebuffer on the screen at the next vertical blank, for which the card then sends an
+  // event with `data`. The first call, and the first after dark(), also sets the mode. Returns 0 or
   // an errno.
   int flip(std::uint32_t framebuffer, void* data);
-  // Nothing on the screen, which then sleeps. Returns 0 or an errno.
+  // Shows nothing on the screen, which then sleeps. Returns 0 or an errno.
   int dark();
-  // As it was before this came.
+  // Restores what the CRTC showed before this object was made.
   void restore();
 
   bool atomic() const { return plane_.has_value(); }

@@ -1,4 +1,4 @@
-// Pictures that the card can scan out: a GBM surface that OpenGL ES draws into.
+// Provides the buffers that OpenGL ES draws into and the card can scan out: a GBM surface.
 #pragma once
 
 #include <gbm.h>
@@ -13,20 +13,22 @@ namespace previz::kms {
 
 class Scanout {
  public:
-  // `card` stays open longer than this. Throws previz::Error saying what GBM or EGL lacks.
+  // `card` must stay open longer than this object. Throws previz::Error that says what GBM or EGL
+  // lacks.
   Scanout(int card, int width, int height);
   ~Scanout();
   Scanout(const Scanout&) = delete;
   Scanout& operator=(const Scanout&) = delete;
 
-  // OpenGL ES draws here from now on. Throws previz::Error.
+  // Makes OpenGL ES draw here from now on. Throws previz::Error.
   void begin() { context_.use(drawn_); }
-  // What was drawn becomes the next buffer: its framebuffer for the kernel. One at most is waiting;
-  // seen() or withdraw() comes before the next. Throws previz::Error.
+  // Makes what was drawn the next buffer, and returns its framebuffer for the kernel. At most one
+  // buffer may wait: seen() or withdraw() must come before the next call. Throws previz::Error.
   std::uint32_t finish();
-  // The buffer that waited is on the screen, and the one before may be drawn into again.
+  // Must be called once the waiting buffer is on the screen; the one before may then be drawn into
+  // again.
   void seen();
-  // It will never be on the screen.
+  // Takes back the waiting buffer, which will never be on the screen.
   void withdraw();
 
  private:

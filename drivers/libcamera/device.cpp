@@ -129,7 +129,7 @@ convert::WireFormat wire_format(const Known& known, const std::optional<lc::Colo
   return wire;
 }
 
-// A file of a buffer, mapped for reading.
+// Maps a file of a buffer for reading.
 class MappedFile {
  public:
   MappedFile(int descriptor, std::size_t length) : descriptor_(descriptor) {
@@ -144,18 +144,19 @@ class MappedFile {
 
   std::span<const std::uint8_t> memory() const { return memory_; }
 
-  // Tells the caches that the processor reads; memory that is no dma-buf needs no telling.
+  // Makes the caches ready for reads by the CPU; memory that is no dma-buf needs none of this, and
+  // the call's failure is ignored.
   void sync(std::uint64_t when) const {
     dma_buf_sync request{when | DMA_BUF_SYNC_READ};
     ioctl(descriptor_, DMA_BUF_IOCTL_SYNC, &request);
   }
 
  private:
-  int descriptor_;  // libcamera's
+  int descriptor_;  // owned by libcamera
   std::span<const std::uint8_t> memory_;
 };
 
-// A buffer's planes, which may share a file.
+// Maps a buffer's planes, which may share a file.
 class MappedBuffer {
  public:
   explicit MappedBuffer(const lc::FrameBuffer& buffer) {
@@ -309,8 +310,8 @@ struct Device::Impl {
              " bytes; its picture is " + std::to_string(least));
   }
 
-  // What the set asks for; else what the camera proposes, if that can be converted; else the first
-  // of its formats that can.
+  // Returns the format that the set asks for; else what the camera proposes, if that can be
+  // converted; else the first of its formats that can.
   lc::PixelFormat wanted_format(const lc::PixelFormat& proposed,
                                 const std::vector<lc::PixelFormat>& its) const {
     if (settings.format) {
@@ -356,7 +357,7 @@ struct Device::Impl {
     return controls;
   }
 
-  // On libcamera's thread.
+  // Runs on libcamera's thread.
   void completed(lc::Request* request) {
     const std::lock_guard lock(mutex);
     done.push_back(request);
@@ -407,7 +408,7 @@ struct Device::Impl {
   bool streaming = false;
   std::vector<std::unique_ptr<lc::Request>> requests;  // by buffer; while streaming
 
-  std::mutex mutex;  // of what follows
+  std::mutex mutex;  // guards the members below
   std::condition_variable wake;
   std::deque<lc::Request*> done;
   bool unplugged = false;

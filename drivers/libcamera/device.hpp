@@ -1,5 +1,5 @@
-// A camera of libcamera. What libcamera changes from version to version is in device.cpp alone,
-// which is written for 0.0.3 (Debian 12). Not for use outside the driver.
+// Wraps a camera of libcamera. Whatever differs between versions of libcamera is in device.cpp
+// alone, which is written for 0.0.3 (Debian 12). Not for use outside the driver.
 #pragma once
 
 #include <chrono>
@@ -24,13 +24,13 @@ struct Listed {
 };
 std::vector<Listed> list_cameras();
 
-// Vendor and product of a UVC camera, in which its id ends; none of any other camera.
+// The vendor and product in which the id of a UVC camera ends; other cameras have none.
 struct UvcProduct {
   std::uint16_t vendor = 0, product = 0;
 };
 std::optional<UvcProduct> uvc_product(const std::string& id);
 
-// What a camera and we have settled on.
+// The settings that the camera and the driver have agreed on.
 struct Agreed {
   CameraFormat format;
   convert::WireFormat wire;
@@ -45,9 +45,9 @@ struct Completed {
   Fate fate = Fate::given_up;
   std::uint32_t sequence = 0;        // the kernel's
   std::int64_t timestamp_ns = 0;     // CLOCK_MONOTONIC; 0 where there is none
-  std::optional<double> exposure_s;  // as the camera says; UVC cameras do not
-  double gain = 1;                   // with exposure_s only
-  bool overfull = false;             // says to hold more than the buffer can
+  std::optional<double> exposure_s;  // as the camera reports it; UVC cameras do not
+  double gain = 1;                   // known only with exposure_s
+  bool overfull = false;             // claims to hold more than the buffer can
   std::vector<std::span<const std::uint8_t>> planes;
 };
 
@@ -63,18 +63,18 @@ class Device {
   bool streaming() const;
   bool unplugged() const;
 
-  // Starts with every buffer queued. Throws previz::Error.
+  // Starts streaming with every buffer queued. Throws previz::Error.
   void start(const std::optional<Exposure>& exposure);
-  // All requests come back before it returns; none of them is told.
+  // Stops streaming. All requests come back before it returns; wait() reports none of them.
   void stop();
 
-  // The next request that came back; none after the time-out, or when the device is gone.
+  // Returns the next request that came back; none after the time-out, or if the device is gone.
   std::optional<Completed> wait(std::chrono::milliseconds timeout);
 
-  // The exposure as the camera can take it.
+  // Returns the exposure nearest to `wanted` that the camera can take.
   Exposure possible(const Exposure& wanted) const;
-  // Queues a buffer again, with a new exposure for its frame and those after it where one is given.
-  // False where the camera does not take it, which is its end.
+  // Queues a buffer again, with a new exposure for its frame and those after it if one is given.
+  // Returns false if the camera does not take the buffer, which is the end of the stream.
   bool queue(std::size_t buffer, const std::optional<Exposure>& exposure);
 
  private:

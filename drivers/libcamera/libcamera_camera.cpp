@@ -13,7 +13,8 @@ namespace {
 
 using libcam::Completed;
 
-// Of cameras that do not report exposures: the requests queued ahead, and what UVC takes besides.
+// Cameras that do not report exposures need this many frames: the requests queued ahead, and what
+// UVC takes besides.
 constexpr int libcamera_settle_frames = 8;
 
 class LibcameraCamera final : public Camera {
@@ -69,7 +70,7 @@ class LibcameraCamera final : public Camera {
   }
 
  private:
-  // A new exposure goes with the next request.
+  // Queues a buffer again; a new exposure goes with the next request.
   void queue_again(std::size_t buffer) {
     const bool changed = std::exchange(changed_, false);
     const std::int64_t before_ns = monotonic_ns();
@@ -115,13 +116,13 @@ class LibcameraCamera final : public Camera {
     return Exposure{*completed.exposure_s, completed.gain};
   }
 
-  // One plane after the other, as the conversions want them.
+  // Returns the planes one after the other, as the conversions want them.
   std::span<const std::uint8_t> bytes_of(const Completed& completed) {
     if (completed.planes.size() == 1) return completed.planes.front();
     joined_.clear();
     for (std::size_t i = 0; i < completed.planes.size(); ++i) {
       std::span<const std::uint8_t> plane = completed.planes[i];
-      // What follows the last row of the luma plane is no picture.
+      // Bytes after the last row of the luma plane are no part of the picture.
       const std::size_t luma =
           device_.agreed().stride * static_cast<std::size_t>(device_.agreed().format.height);
       if (i == 0) plane = plane.first(std::min(plane.size(), luma));
@@ -132,8 +133,8 @@ class LibcameraCamera final : public Camera {
 
   const CameraSettings settings_;
   libcam::Device device_;
-  std::optional<Exposure> exposure_;  // that was asked for; none: the camera's own
-  bool changed_ = false;              // and not told to the camera yet
+  std::optional<Exposure> exposure_;  // requested; none: the camera's own
+  bool changed_ = false;              // exposure_ was not yet sent to the camera
   ExposureLedger ledger_;
   std::vector<std::uint8_t> joined_;
   std::string lost_;  // why nothing more comes; empty while all is well

@@ -1,4 +1,4 @@
-// CSI cameras behind their ISP, and UVC cameras, through libcamera.
+// Drives CSI cameras behind their ISP, and UVC cameras, through libcamera.
 #pragma once
 
 #include <memory>

@@ -86,7 +86,7 @@ class ReplayCamera final : public Camera {
   }
 
  private:
-  // How much later this lap is than the recording.
+  // Returns how much later this lap is than the recording.
   std::int64_t shift_ns() const { return product(at_->lap, lap_ns()); }
 
   std::int64_t timestamp_ns(std::size_t index) const {
@@ -120,7 +120,7 @@ class ReplayCamera final : public Camera {
 
   bool begun() const { return at_->index > options_.first || at_->lap > 0; }
 
-  // To the start of the next lap where this one is over; false at the end of the stream.
+  // Moves to the start of the next lap if this one is over; returns false at the end of the stream.
   bool wrap() {
     if (at_->index <= options_.last) return true;
     if (!options_.loop) return false;
@@ -139,7 +139,7 @@ class ReplayCamera final : public Camera {
       ++at_->index;
   }
 
-  // Reads ahead of the time it is due, so that decoding does not make the frame late.
+  // Reads a frame before it is due, so that decoding does not make the frame late.
   bool load() {
     if (!wrap()) return false;
     try {
@@ -168,13 +168,13 @@ class ReplayCamera final : public Camera {
   std::deque<std::string> trouble_;
   bool streaming_ = false;
   std::uint64_t unreadable_ = 0;
-  std::shared_ptr<ReplayPosition> at_;  // the pending frame, or the next to load
+  std::shared_ptr<ReplayPosition> at_;  // position of the pending frame, or of the next to load
   std::optional<CameraEvent> pending_;
 };
 
 }  // namespace
 
-// The frames' span and one mean interval.
+// A lap is the frames' span and one mean interval.
 std::int64_t replay_lap_ns(std::span<const session::FrameRecord> records) {
   const std::int64_t span = difference(records.back().timestamp_ns, records.front().timestamp_ns);
   const auto intervals = static_cast<std::int64_t>(records.size() - 1);

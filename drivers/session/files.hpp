@@ -1,4 +1,4 @@
-// Files that survive a crash, and their content hash.
+// Writes files that survive a crash, and hashes their content.
 #pragma once
 
 #include <filesystem>
@@ -23,7 +23,7 @@ class OpenFile {
   OwnedDescriptor descriptor_;
 };
 
-// A text file that grows by whole lines; each is the kernel's as soon as append() returns.
+// A text file that grows by whole lines; each line has reached the kernel when append() returns.
 class LineFile {
  public:
   explicit LineFile(const std::filesystem::path& file);
@@ -36,9 +36,9 @@ class LineFile {
 
 // Replaces the file's content at once: a crash leaves the old or the new, never a part.
 void replace_file(const std::filesystem::path& file, const std::string& content);
-// The whole file; throws previz::Error naming it.
+// Returns the whole file; throws previz::Error naming it.
 std::string read_file(const std::filesystem::path& file);
-// SHA-256 of the file's content, 64 lower-case hexadecimal digits.
+// Returns the SHA-256 of the file's content, 64 lower-case hexadecimal digits.
 std::string sha256_of(const std::filesystem::path& file);
 
 }  // namespace previz::session

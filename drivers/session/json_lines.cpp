@@ -88,7 +88,7 @@ void get(const Json& json, glm::dvec3& value) {
   value = {numbers[0], numbers[1], numbers[2]};
 }
 
-// A 4x4 as 16 numbers, row by row.
+// A 4x4 matrix is stored as 16 numbers, row by row.
 void get(const Json& json, glm::dmat4& value) {
   std::array<double, 16> rows{};
   get(json, rows);
@@ -142,7 +142,7 @@ void get(const Json& json, std::optional<Value>& value) {
   if (!json.is_null()) get(json, value.emplace());
 }
 
-// The members of an object, read into the values of a map.
+// Reads the members of an object into the values of a map.
 template <typename Value>
 void get_members(const Json& json, const char* key, std::map<std::string, Value>& values) {
   if (!json.contains(key)) return;
@@ -201,7 +201,7 @@ bool in_order(const FrameLine& before, const FrameLine& line) {
 bool in_order(const TrackRecord& before, const TrackRecord& record) {
   return before.frame < record.frame;
 }
-// Events of several devices are written as they arrive.
+// Events of several devices are written as they arrive, so any order is right.
 bool in_order(const ButtonEvent&, const ButtonEvent&) {
   return true;
 }

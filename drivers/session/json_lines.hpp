@@ -1,5 +1,6 @@
-// The .jsonl files: one record a line, so that a torn line costs that line only. Numbers are
-// written so that every double comes back bit for bit. Not for use outside drivers/.
+// Reads and writes the .jsonl files, which have one record a line, so that a torn line costs that
+// line only. Numbers are written so that every double comes back bit for bit. Not for use outside
+// drivers/.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +20,7 @@ struct FrameLine {
   std::uint32_t crc32 = 0;    // of the packet's bytes (IEEE 802.3, as zlib's)
 };
 
-// Without the newline. Throw previz::Error if a number is not finite.
+// Return the line without its newline. Throw previz::Error if a number is not finite.
 std::string to_line(const FrameLine& line);
 std::string to_line(const TrackRecord& record);
 std::string to_line(const ButtonEvent& event);
@@ -27,14 +28,14 @@ std::string to_line(std::int64_t timestamp_ns, const std::string& event);
 
 template <typename Record>
 struct Lines {
-  std::vector<Record> records;           // whole lines; of frames strictly increasing
+  std::vector<Record> records;           // of whole lines; frames strictly increase
   std::vector<std::uint64_t> bad_lines;  // numbers, from 1, of lines that cannot be understood
 };
 
-// Read what can be read; a file that is not there has no lines.
+// Read every line that can be read; a file that is not there has no lines.
 Lines<FrameLine> read_frame_lines(const std::filesystem::path& file);
 Lines<TrackRecord> read_track_lines(const std::filesystem::path& file);
-// The edges among the events: lines that have a "button". Other events are not looked at.
+// Returns the edges among the events: lines that have a "button". Other events are not looked at.
 Lines<ButtonEvent> read_button_lines(const std::filesystem::path& file);
 
 }  // namespace previz::session

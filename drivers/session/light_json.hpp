@@ -1,4 +1,4 @@
-// The light of a track line as JSON. Not for use outside drivers/.
+// Converts the light of a track line to JSON and back. Not for use outside drivers/.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -9,7 +9,7 @@ namespace previz::session {
 
 // Throws previz::Error if a number is not finite.
 nlohmann::ordered_json to_json(const CapturedLight& light);
-// Throws std::exception if it is not what to_json makes.
+// Throws std::exception if `json` is not what to_json makes.
 CapturedLight captured_light_of(const nlohmann::ordered_json& json);
 
 }  // namespace previz::session

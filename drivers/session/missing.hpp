@@ -1,4 +1,4 @@
-// Plain words for what a damaged session lacks. Not for use outside drivers/.
+// Says in plain words what a damaged session lacks. Not for use outside drivers/.
 #pragma once
 
 #include <cstdint>
@@ -7,9 +7,9 @@
 
 namespace previz::session {
 
-// "1 frame", "24 frames".
+// Returns "1 frame", "24 frames".
 std::string count_of(const std::string& noun, std::uint64_t count);
-// "frame 7", "frames 1, 3 to 5 and 9"; a long list ends "and 12 more". Numbers increase.
+// Returns "frame 7", "frames 1, 3 to 5 and 9"; a long list ends "and 12 more". Numbers increase.
 std::string list_of(const std::string& noun, const std::vector<std::uint64_t>& numbers);
 
 }  // namespace previz::session

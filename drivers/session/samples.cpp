@@ -11,7 +11,8 @@ struct Plane {
   std::size_t rows;
 };
 
-// The planes of the formats whose samples libav holds as a Frame does, but for padded rows.
+// Returns the planes of those formats whose samples libav holds as a Frame does, apart from padded
+// rows.
 std::vector<Plane> planes(PixelFormat format, int width, int height) {
   const std::size_t w = width, h = height, half = (w + 1) / 2;
   switch (format) {

@@ -1,4 +1,4 @@
-// Between a frame's packed samples and libav's pictures. Not for use outside drivers/.
+// Converts between a frame's packed samples and libav's pictures. Not for use outside drivers/.
 #pragma once
 
 #include <cstdint>
@@ -11,15 +11,16 @@
 
 namespace previz::session {
 
-// What FFV1 is given; its bit stream for rgb8 and rgb16 is planar G, B, R through a reversible
-// transform, whichever way the samples lie in memory.
+// Returns the format that FFV1 is given; its bit stream for rgb8 and rgb16 is planar G, B, R
+// through a reversible transform, whichever way the samples lie in memory.
 AVPixelFormat encoder_format(PixelFormat format);
-// Whose samples a decoded picture holds; none where no session holds such pictures.
+// Returns the format whose samples a decoded picture holds; none if no session holds such pictures.
 std::optional<PixelFormat> session_format(AVPixelFormat format);
 
-// `bytes` as Frame::bytes, `picture` allocated with encoder_format(format) and its size set.
+// Copies `bytes`, laid out as Frame::bytes, into `picture`, which must be allocated with
+// encoder_format(format) and its size.
 void pack(std::span<const std::uint8_t> bytes, PixelFormat format, AVFrame& picture);
-// Frame::bytes of a decoded picture; its format must be one that session_format() knows.
+// Returns Frame::bytes of a decoded picture; its format must be one that session_format() knows.
 std::vector<std::uint8_t> unpack(const AVFrame& picture);
 
 }  // namespace previz::session

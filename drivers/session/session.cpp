@@ -4,8 +4,7 @@
 //     session.toml    format version, name, clock; per stream its pixel format, size and, once the
 //                     session is closed, its number of frames; calibrations; the asset map; the set
 //                     file verbatim. Replaced as a whole, never edited in place.
-//     observer.mkv    FFV1 level 3, every frame a key frame, slice checksums, one Matroska cluster
-//     a
+//     observer.mkv    FFV1 level 3, every frame a key frame, slice checksums, a Matroska cluster a
 //                     frame: RGB (8 or 16 bit), gray (8 or 16 bit) or 4:2:2 Y'CbCr. Matroska times
 //                     are milliseconds from the first frame, strictly increasing.
 //     observer.jsonl  a line a frame: frame, sequence, timestamp_ns, arrival_ns, exposure_s, gain,

@@ -1,5 +1,5 @@
-// The session format: what the devices of a take said, on disk. See docs at the top of session.cpp
-// for the directory layout; the .jsonl files are the truth for time, the .mkv for samples.
+// Reads and writes sessions: what the devices of a take delivered, on disk. The top of session.cpp
+// describes the directory layout; the .jsonl files are the truth for time, the .mkv for samples.
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@ namespace previz::session {
 
 inline constexpr int format_version = 1;
 
-// Which take a session is: what stands on the board.
+// Identifies the take of a session, as the clapperboard does.
 struct TakeInfo {
   int number = 0;
   std::string slate;     // scene and shot
@@ -37,7 +37,7 @@ struct TakeInfo {
 // session.toml. `set_text` is the set file verbatim; `set_name` the file name to use in errors.
 struct SessionInfo {
   std::string name;
-  std::string clock = "monotonic";  // what timestamp_ns counts
+  std::string clock = "monotonic";  // the clock of timestamp_ns
   std::string set_name = "set.toml";
   std::string set_text;
   std::optional<ObserverCalibration> observer;
@@ -47,7 +47,7 @@ struct SessionInfo {
   std::optional<TakeInfo> take;  // recorded on a rig
 };
 
-// What was moved or relit: only what is not as the set file has it, by name.
+// A lamp of the set that was moved or relit.
 struct LightState {
   glm::dvec3 position{0}, direction{0, 0, -1}, up{0, 1, 0};
   double gain_mixed = 1;
@@ -55,27 +55,28 @@ struct LightState {
 
   friend bool operator==(const LightState&, const LightState&) = default;
 };
+// Everything that was moved or relit, by name; what is as the set file has it is left out.
 struct SceneState {
-  // world_from_file; nothing: its carrier was not found yet, and it is nowhere.
+  // Each is world_from_file; nothing: its carrier was not found yet, and the object is nowhere.
   std::map<std::string, std::optional<glm::dmat4>> objects;
   std::map<std::string, std::optional<LightState>> lights;
-  std::optional<double> animation_s;  // played; absent: nothing is animated
+  std::optional<double> animation_s;  // time in the animations; absent: nothing is animated
 
   friend bool operator==(const SceneState&, const SceneState&) = default;
 };
 
-// Where something that is moved by hand was, by its tags.
+// The place of a carrier, which is moved by hand, as found by its tags.
 struct CarrierState {
-  glm::dmat4 world_from_carrier{1.0};  // the last that is known
+  glm::dmat4 world_from_carrier{1.0};  // the last one known
   // Row-major 6x6: rotation (rad) then translation (m), in the carrier's frame.
   std::array<double, 36> covariance{};
-  std::vector<int> tags;  // it was found by in this frame; none: it was not
+  std::vector<int> tags;  // ids that found it in this frame; none: it was not found
 
   friend bool operator==(const CarrierState&, const CarrierState&) = default;
 };
 using Carriers = std::map<std::string, CarrierState>;  // those that were found at least once
 
-// The light around the set, as it lit the frame: sources, and the rest without its shapes.
+// A light source around the set, as it lit the frame.
 struct CapturedSource {
   int id = 0;                     // the same from frame to frame
   glm::dvec3 direction{0, 0, 1};  // unit, world, from the light camera towards it
@@ -84,6 +85,7 @@ struct CapturedSource {
 
   friend bool operator==(const CapturedSource&, const CapturedSource&) = default;
 };
+// The light around the set, as it lit the frame: its sources, and the rest without its shapes.
 struct CapturedLight {
   std::vector<CapturedSource> sources;
   int ambient_size = 0;            // equal-area octahedral map, texels a side, at most 64
@@ -100,7 +102,7 @@ struct TrackRecord {
   glm::dmat4 world_from_camera{1.0};  // OpenCV camera axes, metres
   // Row-major 6x6: rotation (rad) then translation (m), in the camera frame.
   std::array<double, 36> covariance{};
-  std::vector<int> tags;  // ids used
+  std::vector<int> tags;  // ids of the tags used
   SceneState scene;       // when the frame was shown; empty: as in the set
   Carriers carriers;
   std::optional<CapturedLight> captured_light;  // absent: none was known, or an older session
@@ -125,7 +127,8 @@ class StreamReader {
   virtual BayerPattern bayer() const = 0;
   virtual int width() const = 0;   // pixels
   virtual int height() const = 0;  // pixels
-  // Frame `index`; seeks where it must. Throws previz::Error naming file and frame if unreadable.
+  // Reads frame `index`, seeking if it must. Throws previz::Error naming file and frame if
+  // unreadable.
   virtual FramePtr read(std::size_t index) = 0;
 };
 
@@ -141,14 +144,15 @@ struct Session {
 // Throws previz::Error naming the file (and line) if session.toml cannot be understood. Checks the
 // assets' content hashes, and with them reads the assets once.
 Session open_session(const std::filesystem::path& directory);
-// `source` is "observer", "light" or "composite" (what was shown); null where the session has no
-// such stream. What is missing of the stream is appended to session.missing. Reads the video once
-// from end to end, so that a damaged picture is known here (packet checksums) and never shown.
+// Opens the stream `source`: "observer", "light" or "composite" (what was shown). Returns null if
+// the session has no such stream. What is missing of the stream is appended to session.missing.
+// Reads the video once from end to end, so that a damaged picture is known here (packet checksums)
+// and never shown.
 std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& source);
 
 // Writes a session directory; every call leaves a readable session behind. FFV1 in Matroska,
-// lossless; streams open at their first frame. Throws previz::Error naming the file on failure.
-// A frame is the kernel's when write() returns: a process killed at any time loses at most the
+// lossless; streams open at their first frame. Throws previz::Error naming the file on failure. A
+// frame has reached the kernel when write() returns: a process killed at any time loses at most the
 // frame it was writing. About once a second write() also waits until all is on the disk
 // (fdatasync): a power cut loses about the last second. Call it from a thread that may wait. Not
 // thread-safe.
@@ -164,8 +168,8 @@ class SessionWriter {
   // and size, at least 8x8 pixels.
   void write(const Frame& frame);
   void write(const TrackRecord& record);
-  void write(const ButtonEvent& event);  // to events.jsonl
-  // Anything else that happened, in words, to events.jsonl.
+  void write(const ButtonEvent& event);  // writes to events.jsonl
+  // Writes anything else that happened, in words, to events.jsonl.
   void write_event(std::int64_t timestamp_ns, const std::string& what);
   void set_take(const TakeInfo& take);  // replaces session.toml
   // Copies a file into assets/ under its content hash and maps `as_written` to it.
@@ -177,7 +181,7 @@ class SessionWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-// Changes what a finished session says of its take. Throws previz::Error naming the file.
+// Changes the take that a finished session describes. Throws previz::Error naming the file.
 void change_take(const std::filesystem::path& directory,
                  const std::function<void(TakeInfo&)>& change);
 

@@ -79,7 +79,7 @@ bool reads_back(const std::string& assignment, const std::string& text) {
   }
 }
 
-// A set's text as a reader likes it best among the forms that bring it back byte for byte.
+// Writes a set's text in the most readable form that preserves it byte for byte.
 std::string text_assignment(const std::string& text) {
   std::string literal = "text = '''\n" + text + "'''\n";
   if (reads_back(literal, text)) return literal;
@@ -96,7 +96,7 @@ std::string line(const char* key, int value) {
   return std::string(key) + " = " + std::to_string(value) + "\n";
 }
 
-// A calibration's values, to the last bit.
+// Writes a calibration's values to the last bit.
 struct ValueText {
   std::string operator()(const int* value) const { return std::to_string(*value); }
   std::string operator()(const double* value) const { return to_text(*value); }
@@ -116,7 +116,7 @@ struct ValueText {
   }
 };
 
-// The table and the key of a path such as "lens.f_number"; the table of "fx" is "".
+// Splits a path such as "lens.f_number" into its table and key; the table of "fx" is "".
 std::pair<std::string, std::string> table_and_key(const std::string& path) {
   const auto dot = path.find('.');
   return dot == std::string::npos ? std::pair{std::string(), path}
@@ -173,7 +173,7 @@ std::string take_toml(const TakeInfo& take) {
 
 // ---- reading
 
-// Where a value is looked for, so that an error can name it.
+// Says where a value is looked for, so that an error can name it.
 struct Place {
   const std::filesystem::path& file;
   const toml::table& table;

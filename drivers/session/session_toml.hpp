@@ -1,4 +1,5 @@
-// session.toml: what a session says about itself, as text and back. Not for use outside drivers/.
+// Writes and parses session.toml, in which a session describes itself. Not for use outside
+// drivers/.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +12,8 @@
 
 namespace previz::session {
 
-// What session.toml says about a stream's pictures, so that a damaged video header is noticed.
+// The format of a stream's pictures, which session.toml repeats so that a damaged video header is
+// noticed.
 struct StreamFormat {
   PixelFormat format = PixelFormat::rgb8;
   int width = 0, height = 0;            // pixels

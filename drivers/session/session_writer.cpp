@@ -25,7 +25,7 @@ struct StreamWriter {
                const StreamFormat& format)
       : video(directory / (source + ".mkv"), format), lines(directory / (source + ".jsonl")) {}
 
-  // Picture first: a line always has its picture.
+  // The picture is written first, so that a line always has its picture.
   void write(const Frame& frame) {
     const VideoWriter::Stamp stamp = video.write(frame);
     lines.append(to_line(FrameLine{{frames++, frame.sequence, frame.timestamp_ns, frame.arrival_ns,
@@ -142,7 +142,8 @@ SessionWriter::~SessionWriter() {
   try {
     impl_->close();
   } catch (const std::exception&) {
-    // session.toml then says that the session was not closed; close() tells who wants to know.
+    // session.toml then says that the session was not closed; whoever wants the reason calls
+    // close().
   }
 }
 

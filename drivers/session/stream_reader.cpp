@@ -64,7 +64,7 @@ class RecordedStream final : public StreamReader {
   std::vector<VideoReader::PacketInfo> packets_;
 };
 
-// What joining lines with packets leaves over.
+// Frames and pictures that have no partner once lines are joined with packets.
 struct Leftovers {
   std::vector<std::uint64_t> without_picture;  // frames
   std::vector<std::uint64_t> damaged;          // frames

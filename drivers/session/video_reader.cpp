@@ -14,7 +14,7 @@ av::Demuxer open_demuxer(const std::filesystem::path& file) {
   const AVInputFormat* matroska = av_find_input_format("matroska");
   av::check(avformat_open_input(&context, file.c_str(), matroska, nullptr), file,
             "cannot be read as Matroska");
-  // Packets as they are in the file: no parser, no invented times.
+  // Packets are read as they are in the file: without a parser, and without invented times.
   context->flags |= AVFMT_FLAG_NOPARSE | AVFMT_FLAG_NOFILLIN;
   return av::Demuxer(context);
 }
@@ -63,7 +63,7 @@ struct VideoReader::Impl {
 
   void rewind() { demuxer = open_demuxer(file); }
 
-  // False at the end of what can be read.
+  // Returns false at the end of what can be read.
   bool next_packet() {
     do {
       av_packet_unref(packet.get());
@@ -79,7 +79,7 @@ struct VideoReader::Impl {
     return time_ms() == wanted.video_ms && av::crc32(*packet) == wanted.crc32;
   }
 
-  // Goes forward to the packet; a file's times increase, unless they are damaged.
+  // Searches forward for the packet; a file's times increase, unless they are damaged.
   bool find_forward(const PacketInfo& wanted) {
     while (next_packet())
       if (holds(wanted)) return true;

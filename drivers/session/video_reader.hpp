@@ -1,5 +1,5 @@
-// Packets and pictures of a stream's Matroska file, as far as it is whole. Not for use outside
-// drivers/.
+// Reads packets and pictures of a stream's Matroska file, as far as it is whole. Not for use
+// outside drivers/.
 #pragma once
 
 #include <cstdint>
@@ -15,17 +15,17 @@ class VideoReader {
  public:
   struct PacketInfo {
     std::int64_t video_ms = 0;  // Matroska time
-    std::uint32_t crc32 = 0;    // of the packet as it now is
+    std::uint32_t crc32 = 0;    // of the packet as it is in the file now
   };
 
   // Throws previz::Error naming the file if it holds no FFV1 track that can be read.
   VideoReader(const std::filesystem::path& file, const StreamFormat& format);
   ~VideoReader();
 
-  // Every packet that can be found, in file order. Reads the file once from end to end.
+  // Returns every packet that can be found, in file order. Reads the file once from end to end.
   std::vector<PacketInfo> scan();
-  // Frame::bytes of the packet; in order without seeking. Throws previz::Error naming the file and
-  // the time if the packet, or a whole picture in it, is not there.
+  // Returns Frame::bytes of the packet; packets read in order need no seeking. Throws previz::Error
+  // naming the file and the time if the packet, or a whole picture in it, is not there.
   std::vector<std::uint8_t> read(const PacketInfo& packet);
 
  private:

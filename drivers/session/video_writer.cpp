@@ -47,7 +47,7 @@ av::Codec open_encoder(const StreamFormat& format, const std::filesystem::path& 
   }
   av_opt_set_int(encoder->priv_data, "slicecrc", 1, 0);
   const bool deep = format.format == PixelFormat::rgb16 || format.format == PixelFormat::gray16;
-  if (deep) av_opt_set(encoder->priv_data, "coder", "range_tab", 0);  // all it has for 16 bits
+  if (deep) av_opt_set(encoder->priv_data, "coder", "range_tab", 0);  // its only coder for 16 bits
   av::check(avcodec_open2(encoder.get(), codec, nullptr), file, "FFV1 cannot be started");
   return encoder;
 }

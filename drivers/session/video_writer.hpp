@@ -1,4 +1,4 @@
-// FFV1 in Matroska, written so that every frame is in the file once write() returns. Not for use
+// Writes FFV1 in Matroska, such that every frame is in the file once write() returns. Not for use
 // outside drivers/.
 #pragma once
 
@@ -12,20 +12,21 @@ namespace previz::session {
 
 class VideoWriter {
  public:
-  // How to find and check a written frame again.
+  // The marks by which a written frame is found and checked again.
   struct Stamp {
     std::int64_t video_ms = 0;  // Matroska time; strictly increasing
     std::uint32_t crc32 = 0;    // of the packet
   };
 
-  // FFV1 level 3, intra only, with slice checksums. Throws previz::Error naming the file.
+  // Opens a file of FFV1 level 3, intra only, with slice checksums. Throws previz::Error naming the
+  // file.
   VideoWriter(const std::filesystem::path& file, const StreamFormat& format);
   ~VideoWriter();
 
   // The frame must have the format and size of the constructor.
   Stamp write(const Frame& frame);
-  void sync() const;  // to the medium
-  void finish();      // index and duration; nothing may be written afterwards
+  void sync() const;  // waits until all is on the medium
+  void finish();      // writes index and duration; nothing may be written afterwards
 
  private:
   struct Impl;

@@ -1,4 +1,4 @@
-// What the USB itself knows and can do, through libusb: that devices come, and a reset of one that
+// Asks the USB itself, through libusb: counts the devices that are plugged in, and resets one that
 // is wedged.
 #pragma once
 
@@ -17,24 +17,25 @@ struct Free {
   void operator()(libusb_context* context) const;
 };
 
-// Where a device is plugged in, until it is replugged.
+// The place where a device is plugged in, valid until it is replugged.
 struct Place {
   int bus = 0, address = 0;
 
   friend bool operator==(const Place&, const Place&) = default;
 };
 
-// The one device that is this; none where there is none, or more than one.
+// Return the place of the one device that matches; none if there is none, or more than one.
 std::optional<Place> place_of_serial(const std::string& serial);
 std::optional<Place> place_of_product(std::uint16_t vendor, std::uint16_t product);
 
-// As if the device had been replugged: its driver begins anew. Empty, or why it cannot be done.
+// Resets a device as if it had been replugged: its driver begins anew. Returns "", or why the reset
+// failed.
 std::string reset(const Place& place);
 
 // Counts the devices that are plugged in, on a thread of its own.
 class Hotplug {
  public:
-  // Throws previz::Error where this machine does not tell.
+  // Throws previz::Error if this machine does not report arrivals.
   Hotplug();
   ~Hotplug();
   Hotplug(const Hotplug&) = delete;

@@ -15,7 +15,7 @@ constexpr double exposure_step_s = 100e-6;  // the unit of V4L2_CID_EXPOSURE_ABS
 // A driver that never ends its lists must not hold us for ever.
 constexpr std::uint32_t most_entries = 1000;
 
-// Bounds of a control; none where the node has not got it, or not now.
+// Returns the bounds of a control; none if the node has no such control, or not now.
 std::optional<v4l2_queryctrl> query(Node& node, std::uint32_t id) {
   v4l2_queryctrl control{};
   control.id = id;
@@ -93,8 +93,8 @@ class Configuration {
     return names.empty() ? "none" : names;
   }
 
-  // What the set asks for; else what the node is set to, if that can be converted; else the first
-  // of its formats that can.
+  // Returns the format that the set asks for; else what the node is set to, if that can be
+  // converted; else the first of its formats that can.
   std::uint32_t wanted_format(std::uint32_t now) const {
     const std::vector<std::uint32_t> its = formats();
     if (settings_.format) {
@@ -173,7 +173,7 @@ class Configuration {
            " of " + asked + "; possible are: " + (sizes.empty() ? "not told" : sizes));
   }
 
-  // The nearest the node has; what it made of it is told in format().
+  // Asks for the rate, of which the node takes the nearest it has; format() reports the result.
   void agree_on_rate() {
     v4l2_streamparm parameters{};
     parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -210,7 +210,7 @@ class Configuration {
     }
   }
 
-  // A control that has an automatic, which is switched off.
+  // Sets a control that has an automatic, and switches that off.
   void agree_on_control(std::uint32_t automatic, std::uint32_t id, const char* key,
                         const std::optional<double>& value) const {
     if (!value) return;

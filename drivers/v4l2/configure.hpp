@@ -1,4 +1,4 @@
-// Agreeing with a video node on format, size, rate and controls. Not for use outside the driver.
+// Settles format, size, rate and controls with a video node. Not for use outside the driver.
 #pragma once
 
 #include <linux/videodev2.h>
@@ -14,12 +14,12 @@
 
 namespace previz::v4l2 {
 
-// What the node and we have settled on.
+// The settings that the node and the driver have agreed on.
 struct Agreed {
   CameraFormat format;
   convert::WireFormat wire;
   std::size_t stride = 0;  // bytes of a row; 0 for mjpeg
-  Exposure exposure;       // 0 s where the node does not tell it
+  Exposure exposure;       // 0 s if the node does not report it
   bool drives_exposure = false;
 };
 
@@ -27,8 +27,8 @@ struct Agreed {
 // names the device, the setting, and what the node can.
 Agreed configure(Node& node, const CameraSettings& settings);
 
-// Writes the shutter time, in the control's steps of 100 us and within its bounds; what the node
-// made of it. None where it refuses.
+// Writes the shutter time, in the control's steps of 100 us and within its bounds. Returns what the
+// node made of it; none if it refuses.
 std::optional<double> set_exposure(Node& node, double exposure_s);
 
 }  // namespace previz::v4l2

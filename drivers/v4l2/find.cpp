@@ -28,7 +28,7 @@ std::string property(udev_device& device, const char* key) {
   return value ? value : "";
 }
 
-// What follows `directory` in one of the links; empty where none is there.
+// Returns what follows `directory` in one of the links; empty if none begins with it.
 std::string link_below(const std::string& directory, const std::string& links) {
   std::istringstream words(links);
   for (std::string link; words >> link;)
@@ -43,7 +43,8 @@ int number(udev_device& device, const char* attribute) {
   return value;
 }
 
-// Of the USB device that a node belongs to; the parent is the child's.
+// Returns the place of the USB device that a node belongs to. udev owns the parent, which must not
+// be unreferenced.
 std::optional<usb::Place> usb_place(udev_device& device) {
   udev_device* parent = udev_device_get_parent_with_subsystem_devtype(&device, "usb", "usb_device");
   if (!parent) return std::nullopt;

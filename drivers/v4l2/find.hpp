@@ -1,4 +1,4 @@
-// Which video node a stable name means. Not for use outside the driver.
+// Finds the video node that a stable name means. Not for use outside the driver.
 #pragma once
 
 #include <optional>
@@ -16,17 +16,18 @@ struct FoundNode {
   std::string by_path;  // name below /dev/v4l/by-path
   std::string serial;
   std::string product;
-  std::optional<usb::Place> usb = {};  // of cameras on the USB
+  std::optional<usb::Place> usb = {};  // for cameras on the USB
 };
 
-// Asks udev. None where there is no udev.
+// Asks udev for every node that captures; finds none if there is no udev.
 std::vector<FoundNode> find_nodes();
 
-// The name to write into a set: by-id, but by-path where another of those found has the same id
-// (udev makes it from the model where there is no serial number).
+// Returns the name to write into a set: by-id, or by-path if another node that was found has the
+// same id (udev makes the id from the model if there is no serial number).
 std::string stable_name(const FoundNode& node, const std::vector<FoundNode>& found);
 
-// The node that `device` names. Throws previz::Error that says why it is none, or which are there.
+// Returns the node that `device` names. Throws previz::Error that says why the name is none, or
+// which nodes are there.
 std::string resolve(const std::string& device, const std::vector<FoundNode>& found);
 
 }  // namespace previz::v4l2

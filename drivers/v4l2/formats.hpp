@@ -1,4 +1,4 @@
-// V4L2's pixel formats as convert.hpp knows them. Not for use outside the driver.
+// Translates V4L2's pixel formats to those of convert.hpp. Not for use outside the driver.
 #pragma once
 
 #include <linux/videodev2.h>
@@ -11,15 +11,15 @@
 
 namespace previz::v4l2 {
 
-// None where there is no conversion.
+// Returns none if there is no conversion.
 std::optional<convert::WireFormat> wire_format(std::uint32_t fourcc);
 
-// With the colour coding the driver says, or V4L2's defaults stand for.
+// Adds the colour coding that the driver reports, or the one that V4L2 defines as its default.
 std::optional<convert::WireFormat> wire_format(const v4l2_pix_format& format);
 
-// "YUYV"; the code of a big-endian variant ends in "-BE".
+// Returns "YUYV" or the like; the code of a big-endian variant ends in "-BE".
 std::string fourcc_name(std::uint32_t fourcc);
-// Of the formats that can be converted. None where the name is no such format's.
+// Returns the code of a format that can be converted; none if no such format has this name.
 std::optional<std::uint32_t> fourcc_of(const std::string& name);
 std::string known_formats();
 

@@ -1,4 +1,4 @@
-// A video node's system calls: an interface only because a test must stand in for the kernel.
+// Makes a video node's system calls: an interface only because a test must stand in for the kernel.
 #pragma once
 
 #include <chrono>
@@ -14,13 +14,14 @@ class Node {
  public:
   virtual ~Node() = default;
 
-  // ioctl(2), repeated while signals interrupt it. 0, or errno.
+  // Calls ioctl(2), and again while signals interrupt it. Returns 0 or an errno.
   virtual int control(unsigned long request, void* argument) = 0;
 
-  // Waits until a buffer can be dequeued, or something is wrong; false after the time-out.
+  // Waits until a buffer can be dequeued, or something is wrong; returns false after the time-out.
   virtual bool wait(std::chrono::milliseconds timeout) = 0;
 
-  // Maps a buffer for reading, until unmap() or the node's end. Empty, with errno set, on failure.
+  // Maps a buffer for reading, until unmap() or the node's end. Returns nothing, with errno set, on
+  // failure.
   virtual std::span<const std::uint8_t> map(std::size_t offset, std::size_t length) = 0;
   virtual void unmap(std::span<const std::uint8_t> memory) = 0;
 };

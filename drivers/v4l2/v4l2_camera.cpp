@@ -74,7 +74,7 @@ class V4l2Camera final : public Camera {
     if (!streaming_) return;
     streaming_ = false;
     int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-    node_->control(VIDIOC_STREAMOFF, &type);  // fails where the device is gone, and need not then
+    node_->control(VIDIOC_STREAMOFF, &type);  // may fail: the device may be gone
     release_buffers();
   }
 
@@ -150,7 +150,8 @@ class V4l2Camera final : public Camera {
     node_->control(VIDIOC_REQBUFS, &request);
   }
 
-  // The frame in a buffer, which goes back to the kernel; null, and counted, where it is not whole.
+  // Returns the frame in a buffer and gives the buffer back to the kernel; null, and counted, if it
+  // is not whole.
   FramePtr take(v4l2_buffer& buffer) {
     const std::int64_t arrival_ns = monotonic_ns();
     if (buffer.index >= memory_.size()) return left_out("buffers that are none of ours");

@@ -1,4 +1,4 @@
-// Cameras of the Linux kernel (V4L2): UVC and capture cards, single-planar capture.
+// Drives cameras of the Linux kernel (V4L2): UVC cameras and capture cards, single-planar capture.
 #pragma once
 
 #include <memory>
@@ -17,14 +17,14 @@ namespace previz {
 // directory), or the device's serial number; never /dev/videoN, whose number changes. Capture times
 // are the kernel's (monotonic). The exposure is driven by V4L2_CID_EXPOSURE_ABSOLUTE; frames around
 // a change, whose exposure nobody knows, are left out and counted. The gain control has no unit:
-// `raw_gain` sets it, and frames say 1.
+// `raw_gain` sets it, and frames report a gain of 1.
 std::unique_ptr<Camera> open_v4l2(const CameraSettings& settings);
 
 std::vector<FoundCamera> find_v4l2();
 
 std::optional<usb::Place> usb_place_of_v4l2(const std::string& device);
 
-// The same on a node that is open already.
+// Opens the camera on a node that is open already.
 std::unique_ptr<Camera> open_v4l2(std::unique_ptr<v4l2::Node> node, const CameraSettings& settings);
 
 }  // namespace previz
