@@ -27,7 +27,7 @@ struct Resampling {
 // holds many pixels. A direction takes the pixel that it falls in.
 Resampling make_resampling(const Fisheye& lens, const Viewpoint& viewpoint, int size);
 
-// What the picture shows of each texel.
+// The part of the picture that falls into each texel.
 struct Resampled {
   int size = 0;
   std::vector<glm::vec3> radiance;  // integral over the texel's seen part / the texel's solid angle

@@ -32,7 +32,7 @@ class Device {
   // computer's for a CPU device.
   std::uint64_t memory_bytes() const;
   std::uint64_t validation_messages() const { return validation_messages_; }
-  // Whether debug labels can be recorded, which GPU debuggers show.
+  // Returns whether debug labels, which GPU debuggers show, can be recorded.
   bool has_labels() const { return has_labels_; }
 
   // Returns the index of a memory type of `allowed_bits` with all properties of `wanted`, and with

@@ -36,10 +36,10 @@ struct Feature {
   std::uint32_t bit = 0;        // FEATURE_* of the shaders; 0: no pipeline depends on it
   bool can_be_carried = false;  // `trade` may time it in a frame that does not need it, whose
                                 // picture is then the same, bit for bit
-  // Whether a material asks for the feature. Null: no material does.
+  // Returns whether a material asks for the feature. Null: no material does.
   bool (*in_material)(const scene::Material&, const scene::Scene&, double specular_alpha) = nullptr;
-  // Whether a frame needs the feature, given whether a material in use asks for it. Null: a frame
-  // needs it exactly where a material asks for it.
+  // Returns whether a frame needs the feature, given whether a material in use asks for it. Null: a
+  // frame needs it exactly where a material asks for it.
   bool (*in_frame)(bool in_material, const Demand&) = nullptr;
   // What `check` says, in words for a film crew, about a set that uses the feature and about one
   // that does not.

@@ -104,7 +104,7 @@ gpu::GpuLight encode_light(const set::Light& light, const glm::dvec3& camera_pos
     const double sine = std::sin(light.angular_radius_rad);
     const double half = std::sin(light.angular_radius_rad / 2);
     result.cone_sr = static_cast<float>(4 * pi * half * half);
-    // The disc's radiance that gives the stated irradiance on a plane facing it.
+    // This is the disc's radiance that gives the stated irradiance on a plane facing it.
     result.emission = glm::vec3(light.emission / (pi * sine * sine));
   }
   return result;

@@ -47,7 +47,7 @@ struct Renderer::Impl {
     return {estimation.composite, estimation.composite_floor / frame.exposure};
   }
   std::int64_t sampled() const { return std::max<std::int64_t>(samples, 1); }
-  // The plate as linear radiance; w: 0 where a channel is clipped.
+  // Returns the plate as linear radiance; w is 0 where a channel is clipped.
   std::vector<glm::vec4> measured() const;
 
   std::shared_ptr<Device> device;

@@ -107,7 +107,8 @@ struct Scene {
   // own lamps, which come last, in the set's order.
   std::vector<std::uint32_t> light_objects;
   std::vector<Animation> animations;  // at most one per object
-  // What was dropped or not understood while loading, in plain words (counted, never silent).
+  // Notes about what was dropped or not understood while loading, in plain words (counted, never
+  // silent).
   std::vector<std::string> notes;
 };
 
