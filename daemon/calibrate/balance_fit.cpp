@@ -10,8 +10,8 @@
 namespace previz::calibrate {
 namespace {
 
-constexpr std::size_t least_pixels = 8;      // of a tile
-constexpr double median_over_mean = 1.2533;  // standard errors of a Gaussian: sqrt(pi / 2)
+constexpr std::size_t least_pixels = 8;      // per tile
+constexpr double median_over_mean = 1.2533;  // of standard errors (Gaussian): sqrt(pi / 2)
 constexpr double sigma_over_mad = 1.4826;
 
 double median(std::vector<double> values) {
@@ -25,7 +25,7 @@ struct Location {
   double middle = 0, sigma = 0;
 };
 
-// Of values that may have outliers. Of one value nothing is known about its deviation; of two, half
+// Locates values that may have outliers. One value says nothing about its deviation; two give half
 // their distance.
 Location location(const std::vector<double>& values, double least_sigma) {
   Location at{median(values), least_sigma};
@@ -41,7 +41,7 @@ Location location(const std::vector<double>& values, double least_sigma) {
 
 using Logs = std::vector<double>;
 
-// Medians of log(plate / rendered) of a channel, by tile.
+// Returns the medians of log(plate / rendered) of a channel, by tile.
 Logs tile_medians(const SurfacePixels& seen, std::uint32_t surface, int channel) {
   std::map<std::uint32_t, Logs> by_tile;
   for (const SurfacePixel& pixel : seen.pixels)
@@ -64,7 +64,7 @@ std::vector<SurfaceRatio> ratios(const SurfacePixels& seen) {
       const Logs logs = tile_medians(seen, s, c);
       all_channels = all_channels && !logs.empty();
       if (logs.empty()) continue;
-      // One tile: what a step of an 8-bit code is worth in the middle of its range, 2 %.
+      // With one tile, the deviation is the step of an 8-bit code in the middle of its range, 2 %.
       const Location at = location(logs, logs.size() == 1 ? 0.02 : 0);
       surface.tiles = logs.size();
       surface.ratio[c] = std::exp(at.middle);

@@ -94,7 +94,7 @@ Board parse_board(const std::string& text) {
   Board board;
   const std::string& kind = parts.part(0, "kind");
   if (kind == "chessboard") {
-    parts.size(1, 3, board);  // fewer corners than findChessboardCorners can tell apart
+    parts.size(1, 3, board);  // cv::findChessboardCorners needs at least 3 corners a side
     board.square_m = parts.length_m(2, "square");
     parts.ends_after(3);
     add_lattice(board.columns, board.rows, board.square_m, board);

@@ -1,4 +1,4 @@
-// What a calibration looks at: a printed board whose points are known.
+// Describes the printed board that a calibration looks at, whose points are known.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -14,12 +14,12 @@ struct Board {
   double marker_m = 0;        // charuco: side of a marker; aprilgrid: gap between two tags
   std::string dictionary;     // charuco: "5x5_1000"; aprilgrid: the tag family
   int first_id = 0;           // aprilgrid: id of the lower left tag; ids count along the rows
-  // Metres in the board's plane, by corner id: along the rows; an aprilgrid has four a tag (lower
-  // left, lower right, upper right, upper left, as the tag is read).
+  // The points in the board's plane, metres, by corner id: along the rows; an aprilgrid has four
+  // per tag (lower left, lower right, upper right, upper left, as the tag is read).
   std::vector<glm::dvec3> points;
 };
 
-// How a board is written on a command line; lengths end in mm, cm, m or in:
+// A board is written on a command line as follows; lengths end in mm, cm, m or in:
 //   chessboard:9x6:25mm                    inner corners, side of a square
 //   charuco:12x8:0.709in:0.551in:5x5_1000  squares, their side, side of a marker, dictionary
 //                                          (4x4, 5x5, 6x6 or 7x7 _50, _100, _250 or _1000)
@@ -30,7 +30,7 @@ inline constexpr const char* board_grammar =
     "charuco:COLUMNSxROWS:SQUARE:MARKER:DICTIONARY (squares; 4x4_50 ... 7x7_1000) or "
     "aprilgrid:COLUMNSxROWS:TAG:GAP[:FAMILY[:FIRST_ID]]; lengths as 25mm, 2.5cm, 0.025m or 1in";
 
-// Throws previz::Error saying which part cannot be understood, and the grammar.
+// Throws previz::Error with the part that cannot be understood, and the grammar.
 Board parse_board(const std::string& text);
 
 }  // namespace previz::calibrate

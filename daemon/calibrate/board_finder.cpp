@@ -20,8 +20,9 @@ cv::Mat1b gray(const Frame& frame, const tracking::Photometry& photometry) {
   return cv::Mat1b(frame.height, frame.width, const_cast<std::uint8_t*>(samples.data())).clone();
 }
 
-// Half the window in which a corner is sharpened: as much of its four squares as holds no other
-// corner, at most 11 px. `ids` and `pixels` as in BoardCorners; `columns` corners a row.
+// Returns half the window in which a corner is refined: as much of its four squares as holds no
+// other corner, at most 11 px. `ids` and `pixels` are as in BoardCorners; a row has `columns`
+// corners.
 int window_px(const std::vector<int>& ids, const std::vector<cv::Point2f>& pixels, int columns) {
   double shortest = HUGE_VAL;
   for (std::size_t i = 0; i < ids.size(); ++i)
@@ -124,7 +125,7 @@ class CharucoFinder final : public BoardFinder {
   tracking::Photometry photometry_;
 };
 
-// Tags of the board's family in a picture, by id.
+// Finds tags of the board's family in a picture, by id.
 using TagSearch = std::function<std::vector<tracking::TagDetection>(const Frame&)>;
 
 TagSearch tag_search(const Board& board, const ResponseCurve& response, const KnownLens& lens) {
@@ -158,7 +159,7 @@ class AprilgridFinder final : public BoardFinder {
     for (const tracking::TagDetection& tag : search_(frame)) {
       const int index = tag.id - board_.first_id;
       const bool of_board = index >= 0 && index < board_.columns * board_.rows;
-      // An id seen twice is no board's: neither of the two is taken for it.
+      // An id that is seen twice cannot be trusted: both tags are dropped.
       if (index == last) remove(index, corners);
       if (!of_board || index == last || !tag.trouble.empty() || !tag.refined) continue;
       last = index;

@@ -1,4 +1,4 @@
-// The board's points in one picture.
+// Finds the board's points in one picture.
 #pragma once
 
 #include <glm/vec2.hpp>
@@ -20,20 +20,20 @@ struct BoardCorners {
 class BoardFinder {
  public:
   virtual ~BoardFinder() = default;
-  // Empty where the board is not seen. A chessboard is seen whole or not at all.
+  // Returns nothing if the board is not seen. A chessboard is seen whole or not at all.
   virtual BoardCorners find(const Frame& frame) = 0;
 };
 
-// `response` is the camera's. Chessboards: cv::findChessboardCornersSB (Duda and Frese 2018,
-// "Accurate Detection and Localization of Checkerboard Corners for Calibration"), and where that
-// finds none cv::findChessboardCorners; charuco: cv::aruco; both sharpened by cv::cornerSubPix.
-// aprilgrid: this project's own tag corners, whose edges are straight only through `lens`; where
-// none is known yet, a lens without distortion is assumed.
+// `response` is the camera's. Chessboards are found by cv::findChessboardCornersSB (Duda and Frese
+// 2018, "Accurate Detection and Localization of Checkerboard Corners for Calibration") and, if that
+// finds none, by cv::findChessboardCorners; charuco boards by cv::aruco; both are refined by
+// cv::cornerSubPix. An aprilgrid is found by this project's own tag corners, whose edges are
+// straight only through `lens`; if none is known yet, a lens without distortion is assumed.
 using KnownLens = std::variant<std::monostate, PinholeIntrinsics, FisheyeIntrinsics>;
 std::unique_ptr<BoardFinder> make_board_finder(const Board& board, const ResponseCurve& response,
                                                const KnownLens& lens = {});
 
-// True if a second look with the lens that the first one found is worth while.
+// Returns whether a second pass with the lens found in the first one is worth while.
 inline bool needs_lens(const Board& board) {
   return board.kind == Board::Kind::aprilgrid;
 }

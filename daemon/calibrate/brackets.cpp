@@ -27,7 +27,7 @@ BracketPicture picture_of(const NamedFrame& named, double exposure) {
   return picture;
 }
 
-// "0.25" or "1/4"; nothing if it is neither.
+// Reads "0.25" or "1/4"; returns nothing if the text is neither.
 std::optional<double> seconds(const std::string& text) {
   const char* const end = text.data() + text.size();
   double number = 0, divisor = 1;
@@ -61,7 +61,8 @@ std::map<std::string, double> read_exposures(const fs::path& file) {
   return times;
 }
 
-// Proportional to the light that the sensor makes a signal of: time, area of the aperture, speed.
+// Returns a number proportional to the light that the sensor turns into a signal: time * area of
+// the aperture * speed.
 double exif_exposure(const fs::path& file) {
   const PhotoData photo = read_exif(file);
   if (!photo.exposure_s)

@@ -17,7 +17,7 @@ constexpr int most_iterations = 200;
 constexpr int most_rejections = 10;
 constexpr double rejection_sigmas = 4.5;
 constexpr double least_rejection_px = 1;
-// The median of |e| of a two-dimensional Gaussian of deviation 1 (Rayleigh): sqrt(2 ln 2).
+// This is the median of |e| for a two-dimensional Gaussian of deviation 1 (Rayleigh): sqrt(2 ln 2).
 constexpr double rayleigh_median = 1.1774;
 
 tracking::CameraFromWorld moved(const tracking::CameraFromWorld& pose, const double* step) {
@@ -29,14 +29,14 @@ tracking::CameraFromWorld moved(const tracking::CameraFromWorld& pose, const dou
           pose.translation + glm::dvec3(step[3], step[4], step[5])};
 }
 
-// Of a view that mostly does not fit, the rest cannot be trusted either.
+// If most of a view does not fit, the rest of the view cannot be trusted either.
 void leave_out_poor_views(Selection& used) {
   for (auto& view : used)
     if (2 * std::ranges::count(view, true) < std::ssize(view)) view.assign(view.size(), false);
 }
 
-// Central differences: the step where their truncation and rounding errors meet, about the cube
-// root of a double's precision times the value's own scale.
+// The step of central differences is where truncation and rounding errors meet: about the cube root
+// of a double's precision times the value's own scale.
 constexpr double relative_step = 1e-5;
 
 class Problem {
@@ -44,7 +44,7 @@ class Problem {
   Problem(const std::vector<View>& views, const Projection& projection)
       : views_(views), projection_(projection) {}
 
-  // Residuals of every corner, used or not; nothing if one that is used cannot be seen.
+  // Returns the residuals of every corner, used or not; nothing if a used corner cannot be seen.
   std::optional<std::vector<std::vector<glm::dvec2>>> residuals(const Bundle& bundle,
                                                                 const Selection& used) const {
     std::vector<std::vector<glm::dvec2>> all(views_.size());
@@ -57,7 +57,8 @@ class Problem {
     return all;
   }
 
-  // What the lens can see; something else taken for a board may start behind the camera.
+  // Selects the corners that the lens can see; something mistaken for a board may start behind the
+  // camera.
   Selection visible(const Bundle& bundle) const {
     Selection seen(views_.size());
     for (std::size_t v = 0; v < views_.size(); ++v)
@@ -75,7 +76,8 @@ class Problem {
     return sum;
   }
 
-  // Normal equations in the order lens, pose of view 0, 1, ...: information * step = gradient.
+  // Builds the normal equations in the order lens, pose of view 0, 1, ...: information * step =
+  // gradient.
   void linearise(const Bundle& bundle, const Selection& used,
                  const std::vector<std::vector<glm::dvec2>>& residuals, cv::Mat1d& information,
                  cv::Mat1d& gradient) const {
@@ -106,7 +108,7 @@ class Problem {
     return pose.rotation * views_[view].points[i] + pose.translation;
   }
 
-  // Of the projected pixel, by the lens and by the pose's small motion.
+  // Computes the derivative of the projected pixel by the lens and by a small motion of the pose.
   void derivative(const Bundle& bundle, std::size_t view, std::size_t i, cv::Mat1d& row) const {
     const glm::dvec3 x = in_camera(bundle, view, i);
     std::vector<double> lens = bundle.lens;
@@ -135,7 +137,7 @@ class Problem {
           relative_step * glm::length(x));
     const glm::dvec3 arm = x - bundle.poses[view].translation;
     for (int k = 0; k < 2; ++k) {
-      // A turn w moves the point by w cross arm, a shift by itself.
+      // A rotation w moves the point by w cross arm, a translation by itself.
       const glm::dvec3 g(by_point[0][k], by_point[1][k], by_point[2][k]);
       const glm::dvec3 by_turn = glm::cross(arm, g);
       for (int c = 0; c < 3; ++c) {
@@ -148,8 +150,8 @@ class Problem {
   template <typename At>
   static glm::dvec2 difference(const At& at, double step) {
     const auto above = at(step), below = at(-step);
-    // Seen from one side only: the very edge of what the lens sees, where a corner cannot be told
-    // to move.
+    // The point is seen from one side only: it is at the very edge of what the lens sees, and the
+    // corner gets no derivative.
     if (!above || !below) return glm::dvec2(0);
     return (*above - *below) / (2 * step);
   }
@@ -167,7 +169,8 @@ Bundle stepped(const Bundle& bundle, const cv::Mat1d& step) {
   return next;
 }
 
-// The diagonal brought to 1, so that pixels and polynomial coefficients weigh alike.
+// Returns the scales that bring the diagonal to 1, so that pixels and polynomial coefficients have
+// equal weight.
 cv::Mat1d scales(const cv::Mat1d& information) {
   cv::Mat1d scale(information.rows, 1);
   for (int i = 0; i < information.rows; ++i)
@@ -175,13 +178,14 @@ cv::Mat1d scales(const cv::Mat1d& information) {
   return scale;
 }
 
-// Poses of views without a used corner do not move: their block is set to 1.
+// Holds the poses of views without a used corner: their block is set to 1.
 void hold_unseen(cv::Mat1d& information) {
   for (int i = 0; i < information.rows; ++i)
     if (information(i, i) == 0) information(i, i) = 1;
 }
 
-// Levenberg-Marquardt (Nocedal and Wright, "Numerical Optimization", 10.3), damped on the diagonal.
+// Runs Levenberg-Marquardt (Nocedal and Wright, "Numerical Optimization", 10.3), damped on the
+// diagonal.
 Bundle minimised(const Problem& problem, Bundle bundle, const Selection& used) {
   auto residuals = problem.residuals(bundle, used);
   if (!residuals) throw Error("the board's corners lie where no lens can see them");
@@ -244,7 +248,7 @@ Selection within(const std::vector<std::vector<glm::dvec2>>& residuals, double l
   return used;
 }
 
-// The block of `size` parameters from `first` on, row-major.
+// Returns the block of `size` parameters from `first` on, row-major.
 std::vector<double> block(const cv::Mat1d& matrix, int first, int size) {
   std::vector<double> values;
   for (int row = first; row < first + size; ++row)
@@ -252,7 +256,7 @@ std::vector<double> block(const cv::Mat1d& matrix, int first, int size) {
   return values;
 }
 
-// (J^T J)^-1 sigma^2 of all parameters.
+// Returns the covariance of all parameters, (J^T J)^-1 sigma^2.
 cv::Mat1d covariance(const Problem& problem, const BundleFit& fit) {
   cv::Mat1d information, gradient, inverse;
   problem.linearise(fit.bundle, fit.used, fit.residuals, information, gradient);

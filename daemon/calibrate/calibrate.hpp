@@ -1,4 +1,4 @@
-// `previzd calibrate ...`: from pictures to the set file's tables.
+// Implements `previzd calibrate ...`: from pictures to the set file's tables.
 #pragma once
 
 #include <filesystem>
@@ -15,15 +15,15 @@ namespace previz::calibrate {
 struct LensOptions {
   std::filesystem::path footage;  // session, folder of pictures, or video
   std::string board;              // board_grammar; light camera: empty where the lens is known
-  int every = 0;                  // picture to look at; 0: as many as are useful
+  int every = 0;                  // uses every n-th picture; 0: as many as are useful
   bool force = false;             // print the table although views are missing
-  std::optional<std::filesystem::path> table_file;     // where the tables go beside `out`
+  std::optional<std::filesystem::path> table_file;     // gets the tables too, beside `out`
   std::optional<std::filesystem::path> residual_plot;  // an SVG
 };
 
 struct LightOptions : LensOptions {
-  // Set file whose tags the light camera sees: its pose is found. Without `board` the lens is the
-  // set's, or else the session's.
+  // The set file whose tags the light camera sees; the camera's pose is found from them. Without
+  // `board` the lens is the set's, or else the session's.
   std::optional<std::filesystem::path> tags_set;
 };
 
@@ -33,7 +33,7 @@ struct ResponseOptions {
   std::filesystem::path footage;  // session or folder of pictures
   CameraRole camera = CameraRole::light;
   std::optional<std::filesystem::path> exposures;  // text file of NAME SECONDS
-  std::optional<ResponseMethod> method;            // absent: the one that predicts better
+  std::optional<ResponseMethod> method;            // absent: whichever predicts better
   std::optional<std::filesystem::path> table_file;
 };
 
@@ -44,7 +44,7 @@ struct DarkOptions {
 };
 
 struct VignettingOptions {
-  std::filesystem::path footage;   // likewise, of something evenly lit
+  std::filesystem::path footage;   // likewise; shows something evenly lit
   std::filesystem::path set_file;  // with the light camera's lens, response and dark level
   bool force = false;              // print the table although the light was not even
   std::optional<std::filesystem::path> table_file;
@@ -52,7 +52,7 @@ struct VignettingOptions {
 
 struct ThinLensOptions {
   std::optional<double> focal_length_mm, f_number, focus_distance_m, sensor_width_mm;
-  std::optional<std::filesystem::path> photo;     // of the lens as it is set, with EXIF
+  std::optional<std::filesystem::path> photo;     // taken with the lens as it is set, with EXIF
   std::optional<std::filesystem::path> set_file;  // with the observer's intrinsics
   std::optional<std::filesystem::path> table_file;
 };
@@ -67,8 +67,8 @@ struct BalanceOptions {
   std::optional<std::filesystem::path> table_file;
 };
 
-// What is found is told on `out`, the TOML tables last. Throws previz::Error: what cannot be read,
-// and where views are missing (unless forced), which.
+// Each reports its results on `out`, the TOML tables last. Throws previz::Error naming a file that
+// cannot be read or, unless forced, the views that are missing.
 void calibrate_observer(const LensOptions& options, std::ostream& out);
 void calibrate_light(const LightOptions& options, std::ostream& out);
 void calibrate_response(const ResponseOptions& options, std::ostream& out);

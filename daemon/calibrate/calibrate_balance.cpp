@@ -13,7 +13,7 @@
 namespace previz::calibrate {
 namespace {
 
-// Metadata that are right are so to a third of a stop, as shutters and aperture rings are.
+// Correct metadata are accurate to a third of a stop, as shutters and aperture rings are.
 constexpr double stated_well_stops = 1.0 / 3;
 
 std::string percent(const glm::dvec3& v) {
@@ -34,7 +34,8 @@ void print_exposure(const Balance& balance, std::ostream& out) {
              std::abs(stops), sigma, stops > 0 ? "dark" : "bright");
 }
 
-// The suggestion for one surface, as a table with its uncertainty; a note where there is none.
+// Returns the suggestion for one surface, as a table with its uncertainty, or a note if there is
+// none.
 std::string suggestion(const SurfaceRatio& surface, const KnownSurface& known,
                        const Balance& balance) {
   const AlbedoEstimate estimate = albedo_of(surface, known, balance);

@@ -11,7 +11,7 @@
 namespace previz::calibrate {
 namespace {
 
-// "2", or "-" where too little of the picture could be compared.
+// Returns words like "2", or "-" if too little of the picture could be compared.
 std::string codes(double error) {
   return error < 0 ? "-" : fmt::format("{:g}", error);
 }

@@ -10,7 +10,7 @@
 namespace previz::calibrate {
 namespace {
 
-// What is left where the light is even is noise; more than this is light that is not.
+// Under even light only noise is left; a residual above this means that the light was not even.
 constexpr double most_uneven = 0.03;
 
 void print_vignetting(const VignettingFit& fit, double max_angle_rad, std::ostream& out) {

@@ -1,4 +1,4 @@
-// The command line of `previzd calibrate` and its subcommands.
+// Parses the command line of `previzd calibrate` and its subcommands.
 #pragma once
 
 #include <ostream>
@@ -23,7 +23,7 @@ struct Commands {
 
 // Adds `calibrate` with its subcommands to `app`; `commands` must outlive it.
 void add_calibrate(CLI::App& app, Commands& commands);
-// Does the one that the command line asked for; the program's exit status.
+// Runs the subcommand that the command line asked for; returns the program's exit status.
 int do_calibrate(const CLI::App& app, const Commands& commands, std::ostream& out);
 
 }  // namespace previz::calibrate

@@ -13,7 +13,7 @@ constexpr double coverage_degree = std::numbers::pi / 180;
 constexpr int least_views = 5;
 constexpr int cover_columns = 3, cover_rows = 3;
 constexpr double least_tilt_spread = 30 * coverage_degree;
-constexpr double near_extent = 1.0 / 3;  // of the picture's diagonal
+constexpr double near_extent = 1.0 / 3;  // share of the picture's diagonal
 constexpr int least_near_views = 2;
 constexpr double certain_px = 1;
 
@@ -23,7 +23,7 @@ std::string number(const char* format, double value) {
   return text;
 }
 
-// Calls body(view, corner) for every corner that counted.
+// Calls body(view, corner) for every corner that was used.
 template <typename Body>
 void for_each_used(const Views& views, const BundleFit& fit, const Body& body) {
   for (std::size_t v = 0; v < views.views.size(); ++v)

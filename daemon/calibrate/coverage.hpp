@@ -1,4 +1,4 @@
-// What a capture for a calibration lacks, in the words of who holds the board.
+// Says what a capture for a calibration lacks, in the words of the person who holds the board.
 #pragma once
 
 #include <numbers>
@@ -10,27 +10,28 @@
 
 namespace previz::calibrate {
 
-// Which views are missing; empty if the capture is good enough. The rules, and why:
+// Returns which views are missing; empty if the capture is good enough. The rules, and why:
 //   number    at least 5 views are used. A view of a plane fixes 2 of the unknowns that all views
 //             share beyond its own pose (Zhang 2000, section 3.1), 9 with distortion: 5 views.
 //   picture   a corner in each of 3 x 3 fields of the picture: beyond the outermost corner the
 //             distortion is a polynomial extrapolated.
 //   tilt      the boards' normals spread over at least 30 degrees about either axis of the picture.
-//             Without tilt the distance of the board and the focal length cannot be told apart
+//             Without tilt the distance of the board cannot be separated from the focal length
 //             (Zhang 2000, section 4, and figure 4: the error falls until 45 degrees).
-//   distance  at least 2 views show the board across a third of the picture's diagonal: what tells
-//             tilt from size is the change of scale across the board, which a small board lacks.
+//   distance  at least 2 views show the board across a third of the picture's diagonal: tilt
+//   differs
+//             from size by the change of scale across the board, which a small board lacks.
 //   certainty over half of the picture the projection is certain to 1 px (one standard deviation),
 //             whatever else was wrong with the views.
-// The last is asked only where the others are content: it follows from them.
+// The last rule is only checked if the others hold, because it depends on them.
 std::vector<std::string> missing_views(const Views& views, const ObserverFit& observer);
 
-// The same for a fisheye, whose tilt comes with its field: a board that stands in a circle around
-// the lens is seen from many sides.
+// Returns the same for a fisheye, whose wide field provides the tilt: boards in a circle around
+// the lens are seen from many sides.
 //   number    as above.
 //   circle    corners at 60 degrees off axis or more in at least 5 of 8 directions around it: half
-//             of a hemisphere's solid angle lies beyond 60 degrees, and the centre of the model
-//             shows only in how far out opposite sides of the picture are.
+//             of a hemisphere's solid angle lies beyond 60 degrees, and the centre of the model is
+//             determined only by comparing opposite sides of the picture.
 //   certainty 1 px up to those 60 degrees.
 inline constexpr double least_fisheye_reach_rad = std::numbers::pi / 3;
 inline constexpr std::size_t least_fisheye_sectors = 5;

@@ -14,9 +14,9 @@
 namespace previz::calibrate {
 namespace {
 
-constexpr int tiles = 8;  // a side
+constexpr int tiles = 8;  // per side
 
-// Sums over the pictures, by pixel.
+// Sums over the pictures, one per pixel.
 struct DarkSums {
   int width = 0, height = 0, pictures = 0;
   std::vector<glm::dvec3> sum, squares;
@@ -53,7 +53,7 @@ bool is_hot(const glm::dvec3& mean, const glm::dvec3& median) {
   return std::max({mean.r - median.r, mean.g - median.g, mean.b - median.b}) > hot_signal;
 }
 
-// Means of the picture's parts.
+// Sums over the parts of the picture, from which each part's mean follows.
 struct Parts {
   std::vector<glm::dvec3> sum = std::vector<glm::dvec3>(tiles * tiles);
   std::vector<std::size_t> count = std::vector<std::size_t>(tiles * tiles);

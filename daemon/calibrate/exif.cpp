@@ -8,7 +8,7 @@
 namespace previz::calibrate {
 namespace {
 
-// A positive finite number; cameras write 0 for what they do not know.
+// Returns a positive finite number or nothing; cameras write 0 for what they do not know.
 std::optional<double> number(const Exiv2::ExifData& data, const char* key) {
   const auto found = data.findKey(Exiv2::ExifKey(key));
   if (found == data.end() || found->count() == 0) return std::nullopt;

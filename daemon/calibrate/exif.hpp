@@ -1,4 +1,4 @@
-// What a photograph says about how it was taken.
+// Reads how a photograph was taken.
 #pragma once
 
 #include <filesystem>
@@ -12,12 +12,12 @@ struct PhotoData {
   std::optional<double> f_number;
   std::optional<double> iso;  // speed rating
   std::optional<double> focal_length_m;
-  std::optional<double> focus_distance_m;  // of the subject
-  std::string lens;                        // its model; may be empty
+  std::optional<double> focus_distance_m;  // distance of the subject
+  std::string lens;                        // the lens's model; may be empty
 };
 
-// Of a file without EXIF nothing is known; that is no error. Throws previz::Error if it cannot be
-// read as a picture.
+// Returns no values for a file without EXIF, which is no error. Throws previz::Error if the file
+// cannot be read as a picture.
 PhotoData read_exif(const std::filesystem::path& file);
 
 }  // namespace previz::calibrate

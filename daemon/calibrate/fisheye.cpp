@@ -22,7 +22,7 @@ std::optional<glm::dvec2> project_fisheye(std::span<const double> lens, const gl
   return fisheye_pixel(fisheye(lens, 0, 0), point);
 }
 
-// Median distance of a view's corners from where lens and pose put them.
+// Returns the median distance of a view's corners from where lens and pose put them.
 double median_error_px(const View& view, const FisheyeIntrinsics& lens,
                        const tracking::CameraFromWorld& pose) {
   std::vector<double> errors;
@@ -58,7 +58,8 @@ Start equidistant(const Views& views, double focal_px) {
   return start;
 }
 
-// From a picture that shows 30 degrees to one whose image circle fills a third of it.
+// The starts range from a picture that shows 30 degrees to one whose image circle fills a third of
+// it.
 Bundle started(const Views& views) {
   Start best;
   const double side = std::min(views.width, views.height);
@@ -90,12 +91,12 @@ void measure_reach(const Views& views, FisheyeFit& fisheye_fit) {
     }
 }
 
-// Rings around the axis, a degree apart, as far as the polynomial grows.
+// Measures certainty on rings around the axis, a degree apart, as far as the polynomial grows.
 void measure_certainty(FisheyeFit& fisheye_fit) {
   const double limit = monotonic_limit_rad(fisheye_fit.intrinsics.k);
   std::vector<glm::dvec3> rays;
   std::vector<double> angles;
-  // The turn of the camera is told from what the corners have reached.
+  // The camera's rotation is estimated from the angles that the corners have reached.
   for (double angle = 0.5 * pi / 180; angle < fisheye_fit.widest_corner_rad; angle += pi / 180)
     for (int i = 0; i < 16; ++i) {
       const double around = 2 * pi * i / 16;

@@ -18,7 +18,7 @@ constexpr double half_view = std::numbers::pi / 4;
 constexpr double off_axis = std::numbers::pi / 3;
 constexpr int views_around = 6;
 
-// Linear luminance of a frame, once.
+// The linear luminance of a frame, computed once.
 struct LuminancePicture {
   int width = 0, height = 0;
   std::vector<float> values;
@@ -31,7 +31,7 @@ struct LuminancePicture {
       for (int x = 0; x < width; ++x) values.push_back(float(photometry.luminance(frame, x, y)));
   }
 
-  // Bilinear; 0 outside.
+  // Interpolates bilinearly; 0 outside the picture.
   double at(const glm::dvec2& p) const {
     const int x = int(std::floor(p.x)), y = int(std::floor(p.y));
     if (x < 0 || y < 0 || x + 1 >= width || y + 1 >= height) return 0;
@@ -54,7 +54,7 @@ glm::dvec3 ray_of(const PinholeIntrinsics& lens, const glm::dvec2& pixel) {
   return {(pixel.x - lens.cx) / lens.fx, (pixel.y - lens.cy) / lens.fy, 1};
 }
 
-// A linear 16-bit picture of what the pinhole camera sees.
+// Returns a linear 16-bit picture of what the pinhole camera sees.
 Frame resampled(const LuminancePicture& picture, const Fisheye& fisheye,
                 const PinholeIntrinsics& lens, const glm::dmat3& fisheye_from_view) {
   Frame frame;
@@ -84,7 +84,7 @@ std::vector<glm::dmat3> view_rotations() {
 
 struct Candidate {
   tracking::TagDetection tag;
-  double from_middle = HUGE_VAL;  // tangent of the angle
+  double from_middle = HUGE_VAL;  // tangent of the angle to the view's axis
 };
 
 double from_middle(const tracking::TagDetection& tag, const PinholeIntrinsics& lens) {

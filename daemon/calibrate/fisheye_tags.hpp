@@ -1,4 +1,4 @@
-// AprilTags in a fisheye's picture, measured where their edges are straight.
+// Detects AprilTags in a fisheye's picture, where their edges are straight.
 #pragma once
 
 #include <vector>
@@ -9,12 +9,12 @@
 
 namespace previz::calibrate {
 
-// The picture is resampled to pinhole views of 90 degrees, one along the axis and six around it at
-// 60 degrees, to 105 degrees off axis; the ordinary detector finds and measures the tags there, and
-// the corners are brought back by the lens. A tag in several views is taken from the one whose
-// middle it is nearest to. Tags that cannot be measured (TagDetection::trouble) are left out.
-// Corners in the fisheye's pixels; their covariance stays as it was measured, in px of the
-// resampled view, which has the scale of the fisheye's axis.
+// Resamples the picture to pinhole views of 90 degrees, one along the axis and six around it at 60
+// degrees, up to 105 degrees off axis. The ordinary detector finds and measures the tags there, and
+// the corners are brought back by the lens. A tag in several views is taken from the view whose
+// centre it is nearest to. Tags that cannot be measured (TagDetection::trouble) are left out. The
+// corners are in the fisheye's pixels; their covariance stays as measured, in px of the resampled
+// view, which has the scale of the fisheye's axis.
 std::vector<tracking::TagDetection> detect_in_fisheye(const Frame& frame,
                                                       const FisheyeIntrinsics& intrinsics,
                                                       const ResponseCurve& response,

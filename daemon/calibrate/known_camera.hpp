@@ -1,4 +1,4 @@
-// What a set or a session already knows of the camera that is calibrated.
+// Looks up what a set or a session already knows about the camera being calibrated.
 #pragma once
 
 #include <filesystem>
@@ -10,16 +10,17 @@
 
 namespace previz::calibrate {
 
-// By the session that the footage is; sRGB where it is none, or says nothing. `stream` is
-// "observer" or "light".
+// Returns the response that the session states; sRGB if the footage is no session, or the session
+// states none. `stream` is "observer" or "light".
 ResponseCurve response_of(const std::filesystem::path& footage, const std::string& stream);
 
-// What is known of the light camera's sensor: the set's, where it gives a lens, otherwise the
-// session's; sRGB and no more where neither says anything.
+// Returns what is known about the light camera's sensor: from the set if it gives a lens, otherwise
+// from the session; only sRGB if neither says anything.
 LightCameraCalibration light_sensor(const std::optional<std::filesystem::path>& set_file,
                                     const std::filesystem::path& footage);
 
-// The set's own, otherwise the session's. Throws previz::Error where neither has a lens.
+// Returns the set's light camera, otherwise the session's. Throws previz::Error if neither has a
+// lens.
 LightCameraCalibration known_light_camera(const set::Set& set,
                                           const std::filesystem::path& footage);
 

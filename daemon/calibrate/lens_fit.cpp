@@ -24,7 +24,8 @@ Found one_of(const std::optional<double>& stated, const std::optional<double>& f
   throw Error("the lens's " + what + " is not known; state it, or give a photograph that does");
 }
 
-// By the calibrated image distance; nothing without the sensor's width.
+// Computes the focal length from the calibrated image distance; returns nothing without the
+// sensor's width.
 std::optional<double> computed_focal_length_m(const LensFacts& facts, double focus_m) {
   if (!facts.sensor_width_m || !facts.intrinsics) return std::nullopt;
   const double image_m = facts.intrinsics->fx * *facts.sensor_width_m / facts.intrinsics->width;

@@ -1,4 +1,5 @@
-// What depth of field needs of the film camera's lens, from what the crew and the picture know.
+// Finds the thin lens that depth of field needs, from what the crew and the picture say about the
+// film camera's lens.
 #pragma once
 
 #include <optional>
@@ -10,7 +11,8 @@
 
 namespace previz::calibrate {
 
-// What is stated goes before what a photograph's EXIF says, and that before what is computed.
+// The facts about a lens. A stated value takes precedence over a photograph's EXIF, and that over a
+// computed value.
 struct LensFacts {
   std::optional<double> focal_length_m;
   std::optional<double> f_number;
@@ -25,15 +27,15 @@ struct LensFound {
   std::vector<std::string> notes;  // where each number is from, and what contradicts what
 };
 
-// Where no focal length is stated it follows from the calibration and the sensor: fx pixels are the
-// distance v of the image, and 1/f = 1/v + 1/d (thin lens) with the focus at d. Where one is stated
-// too, a difference of more than 5 % is a note. Throws previz::Error naming what is missing.
+// A focal length that is not stated follows from the calibration and the sensor: fx pixels are the
+// distance v of the image, and 1/f = 1/v + 1/d (thin lens) with the focus at d. If one is stated
+// too, a difference of more than 5 % is noted. Throws previz::Error naming what is missing.
 LensFound find_lens(const LensFacts& facts);
 
-// What is sharp: nearest and farthest distance whose circle of confusion is at most `circle_px` in
-// a picture of these intrinsics; the farthest may be infinite. With the aperture's diameter A and
-// the focus at d, a point at distance z makes a circle of fx A |1/d - 1/z| pixels (the sensor is
-// where fx says).
+// The range that is sharp: the nearest and the farthest distance whose circle of confusion is at
+// most `circle_px` in a picture of these intrinsics; the farthest may be infinite. With the
+// aperture's diameter A and the focus at d, a point at distance z makes a circle of fx A |1/d -
+// 1/z| pixels (the sensor is where fx says).
 struct SharpRange {
   double near_m = 0, far_m = 0;
 };

@@ -20,10 +20,10 @@ namespace {
 constexpr std::size_t most_pictures = 20;
 constexpr double consistent_px = 2;  // rms of a tag's corners
 
-// Every tag of the set in every picture, as one view of the stage.
+// All of the set's tags in all pictures, as one view of the stage.
 struct Sighting {
   View view{"light camera", {}, {}};
-  std::vector<int> ids;  // of each corner
+  std::vector<int> ids;  // each corner's tag
   int pictures = 0;
 };
 
@@ -68,15 +68,15 @@ std::vector<int> different(std::vector<int> ids) {
   return ids;
 }
 
-// Standard deviation along the longest axis of a 3x3 covariance.
+// Returns the standard deviation along the longest axis of a 3x3 covariance.
 double longest_axis(const cv::Matx33d& covariance) {
-  cv::Mat1d values;  // falling
+  cv::Mat1d values;  // in falling order
   cv::eigen(covariance, values);
   return std::sqrt(std::max(0.0, values(0)));
 }
 
-// Of the camera's place, in its own axes: for a turn w and a shift v of camera_from_world it moves
-// by w cross t - v.
+// Returns the covariance of the camera's position, in the camera's axes: a rotation w and a
+// translation v of camera_from_world move the position by w cross t - v.
 cv::Matx33d place_covariance(const cv::Matx66d& covariance, const glm::dvec3& t) {
   const double rows[] = {0,    t.z,  -t.y, -1, 0,  0,  //
                          -t.z, 0,    t.x,  0,  -1, 0,  //
@@ -95,7 +95,7 @@ View corners_of(const Sighting& sighting, const std::vector<int>& ids) {
   return view;
 }
 
-// Of some tags alone; nothing where no pose explains them.
+// Fits a pose to some of the tags; returns nothing if no pose explains them.
 std::optional<BundleFit> fit_to(const Sighting& sighting, const std::vector<int>& ids,
                                 const FisheyeIntrinsics& intrinsics) {
   const View view = corners_of(sighting, ids);
@@ -128,7 +128,7 @@ std::vector<int> explained(const Sighting& sighting, const tracking::CameraFromW
   return ids;
 }
 
-// The largest set of tags that one pose explains.
+// Returns the largest set of tags that one pose explains.
 std::vector<int> consistent_tags(const Sighting& sighting, const std::vector<int>& ids,
                                  const FisheyeIntrinsics& intrinsics) {
   std::vector<std::vector<int>> trials{ids};

@@ -32,7 +32,8 @@ std::vector<CvView> to_cv(const std::vector<View>& views) {
   return all;
 }
 
-// Focal lengths from the vanishing points of each view (Zhang 2000), no distortion yet.
+// Estimates the focal length from the vanishing points of each view (Zhang 2000), without
+// distortion yet.
 Bundle started_lens(const Views& views) {
   const std::vector<CvView> all = to_cv(views.views);
   std::vector<std::vector<cv::Point3f>> points;
@@ -44,7 +45,8 @@ Bundle started_lens(const Views& views) {
   cv::Mat1d camera = cv::initCameraMatrix2D(points, pixels, {views.width, views.height}, 1);
   const double widest = std::max(views.width, views.height);
   const double f = camera(0, 0);
-  // Views without tilt have their vanishing points anywhere: a lens of 50 degrees to begin with.
+  // Views without tilt have their vanishing points anywhere: start with a lens of 50 degrees
+  // instead.
   if (!(f > 0.2 * widest && f < 20 * widest)) camera(0, 0) = camera(1, 1) = 1.07 * widest;
 
   Bundle start;
@@ -59,7 +61,8 @@ Bundle started_lens(const Views& views) {
   return start;
 }
 
-// Smaller is better; what a further parameter must gain to be worth having.
+// Returns the Bayesian information criterion; smaller is better. A further parameter must lower it
+// to be kept.
 double bayesian_information(const BundleFit& fit, std::size_t parameters) {
   const double n = 2 * double(fit.corners_used);
   return n * std::log(fit.sigma_px * fit.sigma_px) + double(parameters) * std::log(n);

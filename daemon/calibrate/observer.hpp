@@ -1,4 +1,4 @@
-// The observer's intrinsics and Brown-Conrady distortion from views of a board.
+// Fits the observer's intrinsics and Brown-Conrady distortion to views of a board.
 #pragma once
 
 #include <array>
@@ -19,15 +19,15 @@ struct ObserverFit {
   PinholeIntrinsics intrinsics;
   BundleFit fit;                        // lens in the order of observer_parameters
   std::vector<double> sigma;            // standard deviations, in that order; 0 for k3 left at 0
-  std::vector<UncertainPixel> picture;  // on a grid over it
+  std::vector<UncertainPixel> picture;  // on a grid over the picture
 };
 
-// k3 is fitted only where the corners ask for it (Bayesian information criterion, Schwarz 1978).
-// Throws previz::Error if the views cannot determine a lens at all; whether they do it well is for
-// missing_views (coverage.hpp) to say.
+// k3 is fitted only if the corners justify it (Bayesian information criterion, Schwarz 1978).
+// Throws previz::Error if the views cannot determine a lens at all; missing_views (coverage.hpp)
+// decides whether they determine it well.
 ObserverFit fit_observer(const Views& views);
 
-// The lens as a bundle's parameters, and back.
+// Convert a bundle's parameters to a lens, and project by them.
 PinholeIntrinsics pinhole(std::span<const double> lens, int width, int height);
 std::optional<glm::dvec2> project_pinhole(std::span<const double> lens, const glm::dvec3& point);
 

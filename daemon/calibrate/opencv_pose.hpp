@@ -1,4 +1,4 @@
-// OpenCV's poses as ours.
+// Converts OpenCV's poses to ours.
 #pragma once
 
 #include <opencv2/calib3d.hpp>
@@ -7,7 +7,7 @@
 
 namespace previz::calibrate {
 
-// From cv::solvePnP's rotation vector and translation.
+// Converts cv::solvePnP's rotation vector and translation.
 inline tracking::CameraFromWorld from_opencv(const cv::Mat& turn, const cv::Mat& shift) {
   cv::Matx33d rotation;
   cv::Rodrigues(turn, rotation);

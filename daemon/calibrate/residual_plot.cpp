@@ -33,7 +33,8 @@ std::string escaped(const std::string& text) {
   return safe;
 }
 
-// Enlarges a typical residual to a twentieth of the plot's width: 1, 2 or 5 times a power of ten.
+// Returns the scale that enlarges a typical residual to a twentieth of the plot's width: 1, 2 or 5
+// times a power of ten.
 double enlargement(double rms_px, double picture_per_px) {
   const double wanted = plot_width / 20 / std::max(rms_px * picture_per_px, 1e-9);
   const double power = std::pow(10, std::floor(std::log10(wanted)));
@@ -58,7 +59,7 @@ std::string residuals_svg(const Views& views, const BundleFit& fit, double scale
     for (std::size_t i = 0; i < views.views[v].pixels.size(); ++i) {
       const glm::dvec2 at = views.views[v].pixels[i] * scale;
       const glm::dvec2 to = at + fit.residuals[v][i] * scale * enlarged;
-      // An outlier's line would cross the whole plot: its place is marked instead.
+      // An outlier's line would cross the whole plot, so only its place is marked.
       if (fit.used[v][i])
         used += fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\"/>\n",
                             at.x, at.y, to.x, to.y);

@@ -15,11 +15,11 @@ constexpr std::size_t most_pixels = 4000, least_samples = 100;
 constexpr int debevec_side = 10;
 constexpr float debevec_smoothness = 10, robertson_threshold = 0.01f;
 constexpr int robertson_rounds = 50;
-constexpr int noise_codes = 4;  // by which a brighter exposure may be darker
+constexpr int noise_codes = 4;  // a longer exposure may be darker by so much
 constexpr int dark_end = 15, bright_end = 240;
 constexpr std::size_t least_predicted = 50;
 
-// Codes of the chosen pixels: of exposure e, pixel p, channel c at [e][3 p + c].
+// Holds the codes of the chosen pixels: that of exposure e, pixel p, channel c is at [e][3 p + c].
 using Samples = std::vector<std::vector<std::uint8_t>>;
 
 bool rises(std::span<const BracketPicture> bracket, std::size_t sample) {
@@ -28,15 +28,15 @@ bool rises(std::span<const BracketPicture> bracket, std::size_t sample) {
   return true;
 }
 
-// Neither black nor white in at least two exposures.
+// Returns whether a sample is neither black nor white in at least two exposures.
 bool is_seen(std::span<const BracketPicture> bracket, std::size_t sample) {
   return std::ranges::count_if(bracket, [&](const BracketPicture& picture) {
            return picture.rgb[sample] >= dark_end && picture.rgb[sample] <= bright_end;
          }) >= 2;
 }
 
-// Up to `count` of the pixels, as many dark as bright ones: a picture is mostly of one brightness,
-// and a curve is needed at all.
+// Chooses up to `count` of the pixels, as many dark as bright ones: most of a picture has one
+// brightness, but the curve is needed for all.
 std::vector<std::size_t> spread(std::span<const BracketPicture> bracket,
                                 const std::vector<std::size_t>& pixels, std::size_t count) {
   std::vector<std::vector<std::size_t>> by_brightness(32);
@@ -46,7 +46,8 @@ std::vector<std::size_t> spread(std::span<const BracketPicture> bracket,
       for (std::size_t c = 0; c < 3; ++c) sum += picture.rgb[3 * p + c];
     by_brightness[sum * by_brightness.size() / (bracket.size() * 3 * code_count)].push_back(p);
   }
-  // Evenly over the picture within a brightness: those that are few give all they have.
+  // Within a brightness, pixels are spread evenly over the picture; a brightness with few pixels
+  // uses all of them.
   std::ranges::sort(by_brightness, {}, [](const auto& some) { return some.size(); });
   std::vector<std::size_t> chosen;
   for (std::size_t b = 0; b < by_brightness.size(); ++b) {
@@ -78,9 +79,9 @@ Samples choose(std::span<const BracketPicture> bracket) {
   return samples;
 }
 
-// Codes that no exposure showed (0 in OpenCV's answer) lie between their neighbours, in proportion
-// below the first. White stands for all that is brighter: its signal, the least that clips, goes on
-// from the codes below it.
+// Interpolates codes that no exposure showed (0 in OpenCV's answer) between their neighbours; below
+// the first code they are in proportion to it. White stands for everything brighter: its signal,
+// the least that clips, is extrapolated from the codes below it.
 void complete(std::vector<double>& signal) {
   constexpr std::size_t white = code_count - 1, run = 8;
   std::size_t last = 0;
@@ -98,7 +99,8 @@ void complete(std::vector<double>& signal) {
     signal[v] = signal[last] + slope * double(v - last);
 }
 
-// Relative signal by code, by OpenCV, from all exposures but one (or none, if there is no such).
+// Returns the relative signal by code, fitted by OpenCV to all exposures but one (or to all, if
+// `without` is no index).
 std::vector<double> solve(const Samples& samples, std::span<const BracketPicture> bracket,
                           ResponseMethod method, std::size_t without) {
   std::vector<cv::Mat> pictures;
@@ -111,7 +113,7 @@ std::vector<double> solve(const Samples& samples, std::span<const BracketPicture
   }
   cv::Mat response;
   if (method == ResponseMethod::debevec) {
-    // OpenCV picks its samples on a grid: it is given a picture that is the grid.
+    // OpenCV picks its samples on a grid, so it gets a picture that consists of that grid.
     for (cv::Mat& picture : pictures) {
       cv::Mat1b grid(debevec_side, debevec_side);
       for (int i = 0; i < int(grid.total()); ++i)
@@ -122,7 +124,7 @@ std::vector<double> solve(const Samples& samples, std::span<const BracketPicture
     cv::createCalibrateDebevec(debevec_side * debevec_side, debevec_smoothness)
         ->process(pictures, response, times);
   } else {
-    // OpenCV 4.6 takes it for granted that there are three channels.
+    // OpenCV 4.6 assumes that there are three channels.
     for (cv::Mat& picture : pictures) cv::merge(std::vector<cv::Mat>(3, picture), picture);
     cv::createCalibrateRobertson(robertson_rounds, robertson_threshold)
         ->process(pictures, response, times);
@@ -143,7 +145,7 @@ LeftOut predict(const Samples& samples, std::span<const BracketPicture> bracket,
     for (std::size_t s = c; s < samples[0].size(); s += 3) {
       const int seen = samples[left_out][s];
       if (seen < dark_end || seen > bright_end) continue;
-      // What photons would say, from codes that are neither near black nor near white.
+      // The predicted radiance comes from codes that are neither near black nor near white.
       double signals = 0, open = 0;
       for (std::size_t e = 0; e < samples.size(); ++e) {
         const std::uint8_t code = samples[e][s];
@@ -183,7 +185,7 @@ const char* to_string(ResponseMethod method) {
 }
 
 ResponseCurve monotone_curve(std::vector<double> signal) {
-  // Pool adjacent violators (Barlow et al. 1972) over the logarithms of codes 1 to 255.
+  // This is pool adjacent violators (Barlow et al. 1972) over the logarithms of codes 1 to 255.
   struct Pool {
     double sum;
     int count;
@@ -201,7 +203,7 @@ ResponseCurve monotone_curve(std::vector<double> signal) {
   ResponseCurve curve;
   curve.kind = ResponseCurve::Kind::table;
   curve.inverse_table = {0};
-  // Codes of one pool differ by a step that no one sees, and that survives being printed.
+  // Codes of one pool differ by a step that nobody sees but that survives printing.
   constexpr double step = 1e-7;
   for (const Pool& pool : pools)
     for (int i = 0; i < pool.count; ++i)

@@ -1,4 +1,4 @@
-// The camera's response curve from a bracket of exposures.
+// Fits the camera's response curve to a bracket of exposures.
 #pragma once
 
 #include <span>
@@ -13,12 +13,12 @@ namespace previz::calibrate {
 enum class ResponseMethod { debevec, robertson };
 const char* to_string(ResponseMethod method);
 
-// How well the curve of the other exposures predicts one that was left out.
+// Cross-validation: how well the curve from the other exposures predicts one that was left out.
 struct LeftOut {
   std::string name;
   double exposure = 0;
-  // Median of |predicted - seen| over the pixels seen as 15 to 240, in codes (of 255), by channel;
-  // below 0 where fewer than 50 pixels are.
+  // The median of |predicted - seen| over the pixels seen as 15 to 240, in codes (of 255), by
+  // channel; negative if there are fewer than 50 such pixels.
   double error_codes[3] = {-1, -1, -1};
 };
 
@@ -26,24 +26,23 @@ struct ResponseFit {
   ResponseMethod method = ResponseMethod::debevec;
   ResponseCurve curve;  // a table of 256 entries
   std::vector<LeftOut> left_out;
-  double error_codes = 0;  // mean of the medians above
-  int darkest = 0,
-      brightest = 0;  // codes that were seen; beyond them the curve is smoothness alone
+  double error_codes = 0;          // mean of left_out's medians
+  int darkest = 0, brightest = 0;  // codes seen; beyond them the curve is only smooth
 };
 
-// One curve for the three channels, up to whose scales (the white balance) a bracket cannot tell
-// them apart: channels enter as pixels of their own. From up to 4000 pixels, as many dark as bright
-// ones, whose value does not fall as the exposure grows (what moved is left out, and what is no
-// picture):
+// Fits one curve for the three channels, whose scales (the white balance) a bracket cannot
+// determine: channels enter as pixels of their own. The fit uses up to 4000 pixels, as many dark as
+// bright ones, whose value does not fall as the exposure grows (which leaves out whatever moved or
+// is no picture):
 //   debevec    Debevec and Malik 1997 (cv::createCalibrateDebevec), over 100 samples of them
 //   robertson  Robertson, Borman and Stevenson 1999 (cv::createCalibrateRobertson), over all
-// Then made to increase (isotonic regression of the logarithm: pool adjacent violators) and scaled
-// to run from 0 at code 0 to 1 at code 255. `bracket` as read_bracket returns it. Throws
-// previz::Error if fewer than 100 pixels can be used.
+// The curve is then made to increase (isotonic regression of the logarithm: pool adjacent
+// violators) and scaled to run from 0 at code 0 to 1 at code 255. `bracket` is as read_bracket
+// returns it. Throws previz::Error if fewer than 100 pixels can be used.
 ResponseFit fit_response(std::span<const BracketPicture> bracket, ResponseMethod method);
 
-// A curve through 256 positive values that may not increase, in the form a set file takes:
-// isotonic in the logarithm, strictly increasing from 0 to 1.
+// Returns a curve through 256 positive values that may not increase, in the form that a set file
+// takes: isotonic in the logarithm, strictly increasing from 0 to 1.
 ResponseCurve monotone_curve(std::vector<double> signal_by_code);
 
 }  // namespace previz::calibrate

@@ -1,4 +1,4 @@
-// A picture's linear signals, for what is measured on a camera's sensor.
+// Reads a picture's linear signals, for measurements on a camera's sensor.
 #pragma once
 
 #include <glm/vec3.hpp>

@@ -1,4 +1,5 @@
-// The pictures a calibration looks at: a stream of a recorded session, a folder, or a video.
+// Reads the pictures that a calibration looks at: a stream of a recorded session, a folder, or a
+// video.
 #pragma once
 
 #include <filesystem>
@@ -20,21 +21,23 @@ struct NamedFrame {
 class PictureSource {
  public:
   virtual ~PictureSource() = default;
-  // Nothing after the last. Throws previz::Error naming a picture that cannot be read.
+  // Returns nothing after the last picture. Throws previz::Error naming a picture that cannot be
+  // read.
   virtual std::optional<NamedFrame> next() = 0;
-  // How many there are; nothing where only reading them tells (a video).
+  // Returns the number of pictures; nothing if it is only known after reading them (a video).
   virtual std::optional<std::size_t> count() const { return std::nullopt; }
-  // What a reader of the result should know, complete after the last picture.
+  // Returns remarks for the reader of the result; complete after the last picture.
   virtual std::vector<std::string> notes() const { return {}; }
 };
 
-// `stream` is "observer" or "light", and counts for sessions only. Pictures of a folder come in the
+// `stream` is "observer" or "light" and matters for sessions only. Pictures of a folder come in the
 // order of their names, without exposure (Frame::exposure_s 0). Throws previz::Error if there is
 // nothing to read.
 std::unique_ptr<PictureSource> open_source(const std::filesystem::path& path,
                                            const std::string& stream);
 
-// The picture files (PNG, JPEG, TIFF) of a folder, by name. Throws previz::Error if it has none.
+// Returns the picture files (PNG, JPEG, TIFF) of a folder, by name. Throws previz::Error if there
+// are none.
 std::vector<std::filesystem::path> picture_files(const std::filesystem::path& folder);
 
 bool is_session(const std::filesystem::path& path);

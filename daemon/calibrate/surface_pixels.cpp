@@ -31,9 +31,10 @@ scene::Scene real_world(scene::Scene scene) {
   return scene;
 }
 
-// Every surface of the real world glows with its number; black where it is not diffuse.
+// Makes every surface of the real world glow with its number; surfaces that are not diffuse are
+// black.
 scene::Scene glowing(scene::Scene scene, std::vector<KnownSurface>& surfaces) {
-  // A recoloured surface leaves the material of its file behind, under the same name.
+  // A recoloured surface leaves its file's original material unused, under the same name.
   std::vector<bool> used(scene.materials.size());
   for (const scene::Instance& instance : scene.instances) used[instance.material] = true;
   for (std::size_t i = 0; i < scene.materials.size(); ++i) {
@@ -62,7 +63,7 @@ lighting::EnvironmentMap darkness() {
   return map;
 }
 
-// The number of the one surface that all samples of a pixel met, if it is one.
+// Returns the number of the one surface that all samples of a pixel met, or no_surface.
 std::uint32_t surface_of(const glm::vec3& mean) {
   constexpr float rounding = 1e-3f;
   if (std::abs(mean.b - 1) > rounding) return no_surface;
@@ -71,7 +72,7 @@ std::uint32_t surface_of(const glm::vec3& mean) {
   return is_one ? std::uint32_t(k) : no_surface;
 }
 
-// By scaled pixel: whether a sample of the plate under it is black or white.
+// Returns, for each scaled pixel, whether a sample of the plate under it is black or white.
 std::vector<bool> blinded(const Plate& plate, int width, int height) {
   std::vector<bool> blind(std::size_t(width) * std::size_t(height));
   const int white = (1 << plate.bits) - 1;
@@ -88,8 +89,8 @@ std::vector<bool> blinded(const Plate& plate, int width, int height) {
   return blind;
 }
 
-// The light camera's own picture, lamps and all: what is compared depends neither on finding lamps
-// nor on what the film camera sees.
+// Lights by the light camera's whole picture, including lamps: the comparison must depend neither
+// on finding lamps nor on what the film camera sees.
 set::Lighting lit_by_image(set::Lighting lighting) {
   lighting.mode = set::LightMode::image;
   if (lighting.unseen == set::UnseenRule::observer) lighting.unseen = set::UnseenRule::horizon;

@@ -1,4 +1,5 @@
-// Where the film camera sees real, diffuse surfaces: what it saw there, and what the model says.
+// Samples pixels in which the film camera sees real, diffuse surfaces: the radiance that the camera
+// saw and the radiance that the model predicts.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +18,7 @@ struct SurfacePixel {
   std::uint32_t surface = 0;  // index into SurfacePixels::surfaces
   std::uint32_t tile = 0;     // a sixteenth of one picture; pixels of a tile err together
   glm::dvec3 plate{0};        // linear Rec. 709 radiance of the camera's picture
-  glm::dvec3 rendered{0};     // of the real world's model under the light camera's light
+  glm::dvec3 rendered{0};     // from the real world's model under the light camera's light
 };
 
 // Surfaces are materials, by the name that a set's [[surface]] gives them.
@@ -34,18 +35,18 @@ struct SurfacePixels {
 };
 
 struct ProbeOptions {
-  int frames = 3;    // tracked ones, spread over the take
-  int width = 160;   // of the picture that is rendered
+  int frames = 3;    // tracked frames, spread over the take
+  int width = 160;   // of the rendered picture
   int samples = 64;  // per pixel
 };
 
-// Renders the real world alone (no virtual object) at a fraction of the observer's size, and which
-// surface each pixel shows: a pass in which surface k glows with (k, k^2, 1) and nothing else, so
-// that a pixel's means say whether it shows one surface only. Taken are pixels that show one
-// diffuse surface (as their four neighbours), where no sample of the plate under them is black or
-// white. Diffuse: opaque, no metal, nothing transmitted or emitted, and no coat smoother than
-// roughness 0.5. Surfaces of the same material name are one.
-// Throws previz::Error if no frame is tracked and lit.
+// Renders the real world alone (no virtual object) at a fraction of the observer's size. A second
+// pass finds which surface each pixel shows: surface k glows with (k, k^2, 1) and nothing else, so
+// that a pixel's means show whether it covers one surface only. The pixels returned show one
+// diffuse surface, as do their four neighbours, and no sample of the plate under them is black or
+// white. Diffuse means opaque, no metal, nothing transmitted or emitted, and no coat smoother than
+// roughness 0.5. Surfaces of the same material name are one surface. Throws previz::Error if no
+// frame is tracked and lit.
 SurfacePixels probe_surfaces(const pipeline::Take& take, const scene::Scene& scene,
                              const std::shared_ptr<render::Device>& device,
                              const ProbeOptions& options);

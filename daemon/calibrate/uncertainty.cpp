@@ -61,7 +61,7 @@ std::vector<UncertainPixel> projection_uncertainty(const BundleFit& fit,
       all.push_back(std::move(*s));
     }
   if (all.size() < 2) return {};
-  // The turn that takes up most of a change of the lens: turn = -implied * change.
+  // The implied rotation absorbs most of a change of the lens: turn = -implied * change.
   const cv::Mat1d implied = cv::Mat1d(turns.inv(cv::DECOMP_SVD)) * mixed;
   const int size = int(fit.bundle.lens.size());
   const cv::Mat1d covariance = cv::Mat1d(fit.lens_covariance).reshape(1, size);

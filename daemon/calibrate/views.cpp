@@ -10,9 +10,9 @@ namespace previz::calibrate {
 namespace {
 
 constexpr std::size_t looked_at_of_a_stream = 150;
-constexpr int every_of_a_video = 10;  // a third of a second
+constexpr int every_of_a_video = 10;  // about a third of a second
 constexpr std::size_t least_corners = 6;
-constexpr double same_view = 0.02;  // of the diagonal
+constexpr double same_view = 0.02;  // share of the diagonal
 
 int step(const PictureSource& source, const GatherOptions& options) {
   if (options.every > 0) return options.every;
@@ -22,8 +22,8 @@ int step(const PictureSource& source, const GatherOptions& options) {
       std::max<std::size_t>(1, (*count + looked_at_of_a_stream - 1) / looked_at_of_a_stream));
 }
 
-// The largest distance between the places of a corner that both have; infinite where one has
-// corners that the other has not.
+// Returns the largest distance that a corner has moved; infinite if one of the two has corners that
+// the other lacks.
 double largest_move(const BoardCorners& a, const BoardCorners& b) {
   if (a.ids != b.ids) return HUGE_VAL;
   double largest = 0;
@@ -38,7 +38,7 @@ View view_of(const BoardCorners& corners, const Board& board, const std::string&
   return view;
 }
 
-// `count` of them, evenly spread over the take.
+// Returns `count` of the views, evenly spread over the take.
 std::vector<View> thinned(std::vector<View> views, std::size_t count) {
   if (views.size() <= count) return views;
   std::vector<View> kept;

@@ -1,4 +1,4 @@
-// Views of a board, as a calibration takes them.
+// Gathers the views of a board that a calibration uses.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@
 
 namespace previz::calibrate {
 
-// Points that do not move between each other, seen in one picture.
+// Points that are fixed relative to each other, seen in one picture.
 struct View {
   std::string name;
   std::vector<glm::dvec3> points;  // metres
@@ -26,14 +26,14 @@ struct Views {
 };
 
 struct GatherOptions {
-  int every = 0;     // picture to look at; 0: all of a folder, at most 150 of a stream or video
-  int at_most = 50;  // views; a few dozen different ones say all that there is to know
+  int every = 0;  // uses every n-th picture; 0: all of a folder, at most 150 of a stream or video
+  int at_most = 50;  // views; a few dozen different ones are enough
 };
 
-// Looks for the board in the pictures of a source. A picture in which every corner is within 2 % of
-// the picture's diagonal of where a view already taken has it says nothing new and is left out; so
-// are pictures with fewer than 6 corners. `report` gets one line for every picture looked at.
-// Throws previz::Error if the pictures differ in size or the board is nowhere.
+// Looks for the board in the pictures of a source. A picture is left out if it shows fewer than 6
+// corners, or nothing new: every corner lies within 2 % of the picture's diagonal of its place in a
+// view already taken. `report` gets one line for every picture examined. Throws previz::Error if
+// the pictures differ in size or the board is nowhere.
 Views gather_views(PictureSource& source, BoardFinder& finder, const Board& board,
                    const GatherOptions& options,
                    const std::function<void(const std::string&)>& report);

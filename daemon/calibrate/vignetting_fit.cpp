@@ -18,11 +18,11 @@ namespace previz::calibrate {
 namespace {
 
 constexpr std::size_t most_samples = 20000;
-constexpr double least_signal = 0.02, most_signal = 0.97;  // of a channel; noise, and clipping
+constexpr double least_signal = 0.02, most_signal = 0.97;  // a channel; excludes noise, clipping
 constexpr int most_turns = 500;
 constexpr double settled = 1e-12;
 
-// Least squares of three parameters.
+// Solves least squares of three parameters.
 struct Normal3 {
   glm::dmat3 matrix{0.0};
   glm::dvec3 right{0};
@@ -34,7 +34,7 @@ struct Normal3 {
   glm::dvec3 solved() const { return glm::inverse(matrix) * right; }
 };
 
-// L, L gx and L gy of a picture, given V.
+// Returns L, L gx and L gy of a picture, given V.
 glm::dvec3 light_of(const FlatPicture& picture, const Vignetting& v) {
   Normal3 normal;
   for (const FlatSample& s : picture.samples)
@@ -46,7 +46,7 @@ double radiance(const glm::dvec3& light, const FlatSample& s) {
   return light.x + light.y * s.x + light.z * s.y;
 }
 
-// V of all pictures, given their light; each counts by its own level.
+// Returns V from all pictures, given their light; each is weighted by its own level.
 Vignetting falloff_of(const std::vector<FlatPicture>& pictures,
                       const std::vector<glm::dvec3>& lights) {
   Normal3 normal;

@@ -45,7 +45,7 @@ void check_frame(const Frame& frame, const Frame& first) {
                 std::to_string(first.width) + "x" + std::to_string(first.height));
 }
 
-// log2 of the first's radiance over the second's, of pixels that both see well.
+// Returns log2 of the first exposure's radiance over the second's, for pixels that both see well.
 std::vector<double> log_ratios(const Exposure& a, const Exposure& b, double read_noise) {
   constexpr std::size_t green = 1, most = 1 << 14;
   const auto radiance = [read_noise](const Exposure& e,

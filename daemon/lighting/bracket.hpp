@@ -1,4 +1,4 @@
-// The exposures of one scene as signals, and whether they can be of the same light.
+// Converts the exposures of one scene to signals, and checks whether they can show the same light.
 #pragma once
 
 #include <array>
@@ -13,24 +13,24 @@
 
 namespace previz::lighting {
 
-// What a sensor is taken to add to a signal s in [0, 1]: variance = s * signal_per_electron +
+// The noise model of a sensor: the variance of a signal s in [0, 1] is s * signal_per_electron +
 // read_noise^2, besides rounding to codes. Only ratios between exposures depend on it.
 struct SensorNoise {
   double signal_per_electron = 1.0 / 30000;
-  double read_noise = 3e-4;  // standard deviation, of the signal
-  // By so much, relatively, response curve and stated exposures may be wrong: exposures that differ
-  // by less still show the same light.
+  double read_noise = 3e-4;  // standard deviation of the signal
+  // The relative error that response curve and stated exposures may have: exposures that differ by
+  // less still show the same light.
   double calibration_error = 0.15;
 };
 
-// What a code of one channel says: the signal above the dark level, and the variance that is in it
-// for not knowing the signal better than the code. The same for all frames of a bit depth.
+// The meaning of one channel's codes: the signal above the dark level, and the variance that
+// rounding to the code leaves in it. The tables are the same for all frames of a bit depth.
 struct Codes {
   std::vector<double> signal;
   std::vector<double> rounding_variance;
   std::size_t darkest = 0;  // the code that a covered lens shows
-  double dark = 0;          // signal below which rounding to it or to its neighbour rules
-  double white = 1;         // of the highest code, which is clipped
+  double dark = 0;   // below this signal, rounding to the darkest code or its neighbour dominates
+  double white = 1;  // signal of the highest code, which is clipped
 
   bool clipped(std::uint16_t code) const { return code + 1u == signal.size(); }
   bool black(std::uint16_t code) const { return code <= darkest; }
@@ -43,7 +43,8 @@ struct Exposure {
   const std::array<Codes, 3>* codes = nullptr;  // by channel
 };
 
-// Newest first: by time, then by sequence number, then by the order given, the last being newest.
+// The exposures of a bracket, newest first: by time, then by sequence number, then by the order
+// given, the last being newest.
 class Bracket {
  public:
   // Throws previz::Error naming the frame whose exposure or size cannot be used.
@@ -54,7 +55,7 @@ class Bracket {
 
   int width() const { return exposures_.front().plate.width; }
   int height() const { return exposures_.front().plate.height; }
-  std::int64_t newest_ns() const { return newest_ns_; }  // when the newest was taken
+  std::int64_t newest_ns() const { return newest_ns_; }  // capture time of the newest
   const std::vector<Exposure>& exposures() const { return exposures_; }  // at least one
 
  private:
@@ -63,7 +64,7 @@ class Bracket {
   std::int64_t newest_ns_ = 0;
 };
 
-// Two exposures whose pictures differ by one factor all over, as a wrong exposure makes them, or a
+// Two exposures whose pictures differ by one factor everywhere. A wrong exposure causes that, or a
 // light that is nearly all the light there is.
 struct Disagreement {
   std::uint64_t shorter = 0, longer = 0;  // sequence numbers
@@ -71,8 +72,8 @@ struct Disagreement {
 };
 
 // Compares each exposure with the next longer one, over the pixels that both see well: neither near
-// white nor within 10 standard deviations of the dark. Half a stop and more is reported, where it
-// is clear against what single pixels say.
+// white nor within 10 standard deviations of the dark. Reports differences of half a stop or more
+// that are significant against the scatter of single pixels.
 std::vector<Disagreement> disagreements(const Bracket& bracket, const SensorNoise& noise = {});
 
 }  // namespace previz::lighting

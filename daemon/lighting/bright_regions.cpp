@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::uint32_t no_region = 0xffffffffu;
 
-// Peaks less than this over their saddle are one lamp with an uneven surface.
+// Peaks that rise over their saddle by less than this factor are one lamp with an uneven surface.
 constexpr double least_dynamics = 2;
 
 // A lens spreads the edge of a lamp over a pixel or two; texels are about a pixel or less.
@@ -30,13 +30,14 @@ std::array<std::uint32_t, 8> neighbours(int size, std::uint32_t texel) {
   return result;
 }
 
-// Peaks that grow as texels are added from the brightest down, and run together or do not.
+// Grows peaks as texels are added from the brightest down, and decides whether two peaks that meet
+// become one.
 class Watershed {
  public:
   Watershed(const EnvironmentMap& map, double least_flux)
       : map_(map), least_flux_(least_flux), region_(map.radiance.size(), no_region) {}
 
-  // Texels come in order of falling luminance.
+  // Texels must be added in order of falling luminance.
   void add(std::uint32_t texel) {
     const double height = luminance(map_.radiance[texel]);
     std::uint32_t home = no_region;
@@ -56,7 +57,7 @@ class Watershed {
     peaks_[home].flux += height * texel_sr(map_.size);
   }
 
-  // Of every texel the number of its region, counted from the brightest peak.
+  // Returns the number of every texel's region, counted from the brightest peak.
   std::vector<std::uint32_t> labels(std::uint32_t& count) {
     std::vector<std::uint32_t> number(peaks_.size(), no_region);
     count = 0;
@@ -80,8 +81,8 @@ class Watershed {
     return peak;
   }
 
-  // Two regions touch at a saddle: they become one, or the texel between them goes to the brighter.
-  // Peaks are numbered from the brightest down.
+  // Handles a saddle where two regions touch: they become one, or the texel between them goes to
+  // the brighter one. Peaks are numbered from the brightest down.
   std::uint32_t meet(std::uint32_t a, std::uint32_t b, double saddle) {
     Peak &brighter = peaks_[std::min(a, b)], &fainter = peaks_[std::max(a, b)];
     const bool parted = fainter.height >= least_dynamics * saddle &&
@@ -128,7 +129,7 @@ double bright_threshold(const EnvironmentMap& map, double contrast) {
   dark.reserve(map.radiance.size());
   double sum = 0;
   for (const glm::vec3& radiance : map.radiance) sum += dark.emplace_back(luminance(radiance));
-  // Every round takes what is above out of the mean, until nothing is.
+  // Every round removes the texels above the threshold from the mean, until there are none.
   for (;;) {
     const double threshold = dark.empty() ? 0 : contrast * sum / static_cast<double>(dark.size());
     const std::size_t before = dark.size();

@@ -1,5 +1,5 @@
-// The light around the set: radiance over all directions, at infinity, as an equal-area
-// octahedral map.
+// Defines the light around the set: radiance over all directions, at infinity, as an equal-area
+// octahedral map (shaders/README.md, "Light").
 #pragma once
 
 #include <cstddef>
@@ -17,8 +17,8 @@ struct EnvironmentMap {
   std::vector<glm::vec3> radiance;
 };
 
-// A light source in the image (sources.hpp). An even disc of radiance flux / solid_angle_sr stands
-// for it.
+// A light source in the image (sources.hpp). It is represented by an even disc of radiance flux /
+// solid_angle_sr.
 struct Source {
   int id = 0;                     // the same in every frame, from 1; 0: none yet
   glm::dvec3 direction{0, 0, 1};  // unit, to the centre of gravity of its luminance
@@ -28,19 +28,19 @@ struct Source {
   friend bool operator==(const Source&, const Source&) = default;
 };
 
-// How the map came to be; printed, and recorded with the frame.
+// How the map was made; the report is printed, and recorded with the frame.
 struct EnvironmentReport {
   double seen_sr = 0;          // solid angle measured by the camera
   double filled_sr = 0;        // filled by the unseen rule
   double overexposed_sr = 0;   // clipped in every exposure; radiance there is a lower bound
   double underexposed_sr = 0;  // black in every exposure
-  double moved_sr = 0;         // changed between the exposures; the newest ones count there
-  double dropped_share = 0;    // of all luminous flux; 0 but for lighting.sources.residual
+  double moved_sr = 0;         // changed between the exposures, so that the newest counted
+  double dropped_share = 0;    // share of all luminous flux; 0 except with residual = "dropped"
   std::vector<std::string> notes;
 };
 
-// Of the image that the camera saw, or a file gave. As the set's lighting.mode says, `environment`
-// is all of it, or what is left without its sources.
+// The light of the image that the camera saw or a file gave. Depending on the set's lighting.mode,
+// `environment` is the whole image or what is left without its sources.
 struct Lighting {
   EnvironmentMap environment{1, {glm::vec3(0)}};
   std::vector<Source> sources;
@@ -48,29 +48,29 @@ struct Lighting {
 };
 
 inline constexpr int max_resolution = 4096;
-inline constexpr int max_chosen_resolution = 2048;  // where the set leaves it to the source
+inline constexpr int max_chosen_resolution = 2048;  // where the set does not state one
 
-// Texels a side of the smallest map whose texels are not larger than `pixel_sr`, at most
-// max_chosen_resolution.
+// Returns the side, in texels, of the smallest map whose texels are not larger than `pixel_sr`, at
+// most max_chosen_resolution.
 int resolution_for(double pixel_sr);
-// The set's lighting.resolution, where 0 stands for resolution_for(pixel_sr). Throws previz::Error
-// if it is not a power of two up to max_resolution.
+// Returns the set's lighting.resolution, where 0 stands for resolution_for(pixel_sr). Throws
+// previz::Error if it is not a power of two up to max_resolution.
 int chosen_resolution(int setting, double pixel_sr);
 
 double texel_sr(int size);
-// Words for a solid angle: "an area 4.0 degrees wide", the width of a disc of that size, or "an
+// Describes a solid angle: "an area 4.0 degrees wide", the width of a disc of that size, or "an
 // area of 31 % of all directions" if the disc were wider than 90 degrees.
 std::string area_words(double solid_angle_sr);
-// Unit direction of a texel's centre.
+// Returns the unit direction of a texel's centre.
 glm::vec3 texel_direction(int size, int i, int j);
-// Index into `radiance` of the texel that a unit direction lies in.
+// Returns the index into `radiance` of the texel that contains a unit direction.
 std::size_t texel_index(int size, const glm::vec3& direction);
 
-// Index of texel (i, j) with i and j from -1 to size: past an edge of the square the sphere goes on
-// mirrored along that edge.
+// Returns the index of texel (i, j) for i and j from -1 to size: past an edge of the square the
+// sphere continues mirrored along that edge.
 std::size_t wrapped_texel(int size, int i, int j);
 
-// Integral of radiance over all directions, per channel.
+// Returns the integral of radiance over all directions, per channel.
 glm::dvec3 total_flux(const EnvironmentMap& map);
 
 }  // namespace previz::lighting

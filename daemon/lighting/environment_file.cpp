@@ -1,4 +1,4 @@
-// load_environment: a latitude-longitude picture to an octahedral map.
+// Implements load_environment: resamples a latitude-longitude picture to an octahedral map.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,8 +15,8 @@ namespace {
 
 using std::numbers::pi;
 
-// The picture with one more pixel on every side: wrapped in azimuth, repeated over the poles, so
-// that bilinear lookups need no branch.
+// The picture with a margin of one pixel: wrapped in azimuth, repeated over the poles, so that
+// bilinear lookups need no branch.
 class Panorama {
  public:
   explicit Panorama(const LinearPicture& picture) : width_(picture.width), height_(picture.height) {
@@ -35,7 +35,7 @@ class Panorama {
   int width() const { return width_; }
   int height() const { return height_; }
 
-  // Pixel centres at whole numbers; x in [-1, width], y in [-1, height].
+  // Pixel centres are at whole numbers; x is in [-1, width], y in [-1, height].
   glm::vec3 bilinear(float x, float y) const {
     const int column = static_cast<int>(x + 1) - 1, row = static_cast<int>(y + 1) - 1;
     const float s = x - static_cast<float>(column), t = y - static_cast<float>(row);
@@ -54,10 +54,10 @@ class Panorama {
   std::vector<glm::vec3> texels_;
 };
 
-// Means of the source over texels. The directions inside a texel stand on a regular grid of the
-// octahedral square, where azimuth and elevation have closed forms (Clarberg 2008): with a = |u|,
-// b = |v|, d = 1 - a - b and r = 1 - |d|, sin(elevation) = sign(d) (1 - r^2) depends on a + b
-// alone and is tabulated, and the azimuth within its quadrant is ((b - a) / r + 1) pi / 4.
+// Averages the source over texels. The directions inside a texel lie on a regular grid of the
+// octahedral square, where azimuth and elevation have closed forms (Clarberg 2008): with a = |u|, b
+// = |v|, d = 1 - a - b and r = 1 - |d|, sin(elevation) = sign(d) (1 - r^2) depends on a + b alone
+// and is tabulated, and the azimuth within its quadrant is ((b - a) / r + 1) pi / 4.
 class TexelMeans {
  public:
   TexelMeans(const Panorama& source, int size, int samples_a_side, double rotation_rad)
@@ -91,10 +91,10 @@ class TexelMeans {
  private:
   glm::vec3 sample(int k, int l) const {
     const int grid = size_ * samples_a_side_;
-    const int u = 2 * k + 1 - grid, v = 2 * l + 1 - grid;  // of [-grid, grid]
+    const int u = 2 * k + 1 - grid, v = 2 * l + 1 - grid;  // in [-grid, grid]
     const int a = std::abs(u), b = std::abs(v);
     const auto m = static_cast<std::size_t>((a + b) / 2);
-    const float inside =  // of the quadrant, from the x axis to the y axis
+    const float inside =  // the quadrant, from the x axis to the y axis
         0.5f * (static_cast<float>(b - a) / (radii_[m] * static_cast<float>(grid)) + 1);
     float quadrants = u < 0 ? 2 - inside : inside;
     if (v < 0) quadrants = -quadrants;
@@ -107,11 +107,11 @@ class TexelMeans {
 
   const Panorama& source_;
   int size_, samples_a_side_;
-  std::vector<float> rows_, radii_;  // by (a + b) / 2
+  std::vector<float> rows_, radii_;  // indexed by (a + b) / 2
   float quadrant_ = 0, start_ = 0;   // pixels: width of a quadrant; position of world azimuth 0
 };
 
-// Sets what is not a radiance to 0; returns how many pixels that were.
+// Sets values that are no radiance to 0; returns the number of such pixels.
 std::size_t drop_impossible(LinearPicture& picture) {
   std::size_t dropped = 0;
   for (glm::vec3& radiance : picture.radiance) {

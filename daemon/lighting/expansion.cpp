@@ -9,7 +9,8 @@ namespace {
 constexpr int reach = 2;
 constexpr std::array binomial{1.0f / 16, 4.0f / 16, 6.0f / 16, 4.0f / 16, 1.0f / 16};
 
-// Share of over-exposed pixels around one of them; beyond the picture's edge none.
+// Returns the share of over-exposed pixels around a pixel; beyond the picture's edge there are
+// none.
 float share_clipped(const HdrPicture& picture, int x, int y) {
   float share = 0;
   for (int dy = -reach; dy <= reach; ++dy) {

@@ -31,7 +31,7 @@ bool has_all(const Imf::ChannelList& channels, const std::array<const char*, 3>&
   return true;
 }
 
-// The channels that give red, green and blue.
+// Returns the channels that give red, green and blue.
 std::array<const char*, 3> choose_channels(const Imf::ChannelList& channels,
                                            const std::filesystem::path& path) {
   for (const std::array<const char*, 3>& names :
@@ -69,7 +69,7 @@ LinearPicture read(const std::filesystem::path& path, std::vector<std::string>& 
   const auto width = static_cast<std::size_t>(picture.width);
   picture.radiance.resize(width * static_cast<std::size_t>(picture.height));
 
-  // One frame-buffer slice a channel name; Y is read once and spread.
+  // There is one frame-buffer slice per channel name; Y is read once and copied to all three.
   const bool luminance = names[0] == names[1];
   Imf::FrameBuffer buffer;
   for (std::size_t c = 0; c < (luminance ? 1u : 3u); ++c)

@@ -1,4 +1,4 @@
-// Linear RGB pictures in OpenEXR files: environments, and what the lighting stage dumps.
+// Reads linear RGB pictures from OpenEXR files: environments, and what the lighting stage dumps.
 #pragma once
 
 #include <filesystem>
@@ -14,9 +14,9 @@ struct LinearPicture {
   std::vector<glm::vec3> radiance;  // row-major, linear Rec. 709
 };
 
-// Reads R, G and B, or Y, of half, float or integer samples; other channels are ignored. What is
-// odd but usable about the file is appended to `notes`. Throws previz::Error naming the file, and
-// the channels found where those are missing.
+// Reads R, G and B, or Y, of half, float or integer samples; other channels are ignored. Oddities
+// that do not prevent its use are appended to `notes`. Throws previz::Error naming the file and,
+// if channels are missing, those that it has.
 LinearPicture read_exr_picture(const std::filesystem::path& path, std::vector<std::string>& notes);
 
 }  // namespace previz::lighting

@@ -15,19 +15,19 @@ double variance_of(double signal, double rounding_variance, const SensorNoise& n
          rounding_variance;
 }
 
-// 1 well inside the range of codes, falling to 0 at white, where noise would clip some samples and
-// not others.
+// Returns 1 well inside the range of codes, falling to 0 at white, where noise would clip some
+// samples and not others.
 double trust(double signal, const Codes& codes) {
   if (signal < codes.dark) return 0;
   return std::clamp((codes.white - signal) / 0.08, 0.0, 1.0);
 }
 
-// What exposures say about one channel of a pixel, added up. Of a single one, or of several that
+// The evidence about one channel of a pixel, from a single exposure or summed over several that
 // agree.
 struct Evidence {
-  double signals = 0, open = 0;   // of those that are not clipped: sums of signals, of exposures
+  double signals = 0, open = 0;   // sums of signals and exposures, over exposures not clipped
   double variance = 0, dark = 0;  // of `signals`
-  double at_least = 0;            // radiance that would just clip those that are
+  double at_least = 0;            // least radiance that clips every exposure that is clipped
 
   void add(const Evidence& other) {
     signals += other.signals;
@@ -54,7 +54,8 @@ bool beyond(double excess, double variance) {
 }
 
 bool contradict(const Evidence& a, const Evidence& b, const SensorNoise& noise) {
-  // Whether a radiance lies below another that clips.
+  // Returns whether the radiance in `low` lies significantly below `high`, the least radiance that
+  // clips the other evidence.
   const auto below = [&](const Evidence& low, double high) {
     const double gap = high * (1 - noise.calibration_error) - low.radiance() - low.dark / low.open;
     return beyond(gap, low.variance / (low.open * low.open));
@@ -80,7 +81,8 @@ class PixelMerger {
   PixelMerger(const std::vector<Exposure>& exposures, const SensorNoise& noise)
       : exposures_(exposures), noise_(noise), agree_(exposures.size()) {}
 
-  // Whether every exposure agrees with the newer ones about the pixel; those that do will count.
+  // Returns whether every exposure agrees with the newer ones about the pixel. Those that agree are
+  // used from now on.
   bool select(std::size_t pixel) {
     std::array<Evidence, 3> newer{};
     bool all = true;
@@ -121,7 +123,8 @@ class PixelMerger {
     }
     if (black) return {0, seen.variance / (seen.open * seen.open), false, true};
     const double radiance = std::max(0.0, weights > 0 ? sum / weights : first);
-    // Too noisy to deny what a newer exposure clips, and no better than it.
+    // This evidence is too noisy to contradict a newer exposure that is clipped, and no better than
+    // it.
     if (radiance < seen.at_least * (1 - noise_.calibration_error))
       return {seen.at_least, 0, true, false};
     return {radiance, weights > 0 ? 1 / weights : seen.variance / (seen.open * seen.open), false,
@@ -132,7 +135,7 @@ class PixelMerger {
   const std::vector<Exposure>& exposures_;
   const SensorNoise& noise_;
   std::vector<bool> agree_;         // by exposure
-  std::array<Evidence, 3> seen_{};  // of those that agree
+  std::array<Evidence, 3> seen_{};  // of the exposures that agree
 };
 
 }  // namespace

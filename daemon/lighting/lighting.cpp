@@ -30,10 +30,10 @@ void check_size(std::span<const FramePtr> frames, const FisheyeIntrinsics& intri
   }
 }
 
-// Share of what the camera sees, from which on it sees nothing that matters.
+// If this share of the camera's view is lost, the camera sees nothing that matters.
 constexpr double blinded = 0.5;
 
-// What a user should know about this bracket, in plain words.
+// Returns what a user should know about this bracket, in plain words.
 std::vector<std::string> describe(std::span<const FramePtr> frames, const Bracket& bracket,
                                   const Fisheye& lens, const EnvironmentReport& report,
                                   const set::Lighting& settings) {
@@ -86,7 +86,7 @@ std::vector<std::string> describe(std::span<const FramePtr> frames, const Bracke
 
 namespace {
 
-// From the light camera's radiance to the film camera's.
+// Scales the light camera's radiance to the film camera's.
 void apply_balance(const glm::dvec3& balance, HdrPicture& picture) {
   if (balance == glm::dvec3(1)) return;
   const glm::vec3 factor(balance);

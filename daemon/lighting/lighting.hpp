@@ -1,4 +1,4 @@
-// From what the light camera saw, or an EXR environment, to the light around the set (P9).
+// Computes the light around the set from the light camera's frames or an EXR environment (P9).
 #pragma once
 
 #include <filesystem>
@@ -14,26 +14,27 @@
 
 namespace previz::lighting {
 
-// What one light camera says, frame after frame: a bracket is merged (merge, expand_clipped,
-// undo_vignetting), averaged over time (Smoothing), brought to the map (make_resampling, once) and
-// completed (fill_unseen). Not thread-safe.
+// Estimates the light from one light camera, frame after frame: a bracket is merged (merge,
+// expand_clipped, undo_vignetting), averaged over time (Smoothing), resampled to the map
+// (make_resampling, once) and completed (fill_unseen). Not thread-safe.
 //
-// The map is what the camera sees from where it stands, at infinity: the real table and cubes near
-// it are in it as well. The renderer meets their phantoms before it asks for those directions. With
-// a room it is what would be seen from Room::seen_from (Viewpoint).
+// The map is what the camera sees from where it stands, at infinity, including the real table and
+// cubes near it; the renderer hits their phantoms before it looks up those directions. With a room,
+// the map is what would be seen from Room::seen_from (Viewpoint).
 class Estimator {
  public:
-  // Resolution 0 gives the smallest power of two whose texels are not larger than a pixel on the
-  // optical axis, at most 2048. `room`, which stands for settings.room, may be null.
+  // Resolution 0 stands for the smallest power of two whose texels are not larger than a pixel on
+  // the optical axis, at most 2048. `room` is the room that settings.room describes; it may be
+  // null.
   Estimator(const LightCameraCalibration& calibration, const set::Lighting& settings,
             std::shared_ptr<const Room> room = nullptr);
   ~Estimator();
 
   int resolution() const;
-  // One exposure, or a bracket of several of the same scene, in any order; the newest decides where
-  // they contradict each other, and its time is the picture's. `observed` may be null; it counts
-  // where settings.unseen asks for it. Frames have the calibration's size; throws previz::Error
-  // naming the frame otherwise.
+  // Takes one exposure, or a bracket of several of the same scene, in any order; the newest wins
+  // where they contradict each other, and its time is the picture's. `observed` may be null; it is
+  // used if settings.unseen asks for it. Frames must have the calibration's size; otherwise throws
+  // previz::Error naming the frame.
   Lighting operator()(std::span<const FramePtr> frames, const ObservedLight* observed = nullptr);
 
  private:
@@ -41,17 +42,17 @@ class Estimator {
   std::unique_ptr<Impl> impl_;
 };
 
-// A single bracket, without what came before.
+// Estimates the light from a single bracket, without earlier frames.
 Lighting estimate(std::span<const FramePtr> frames, const LightCameraCalibration& calibration,
                   const set::Lighting& settings, std::shared_ptr<const Room> room = nullptr);
 
-// A latitude-longitude EXR: pixel centre column c, row r of w x h looks towards azimuth
-// 2 pi (0.5 - (c + 0.5) / w) from +X to +Y and elevation pi (0.5 - (r + 0.5) / h), Z up; the centre
-// of the picture is +X, seen from inside. Bilinear between pixel centres, integrated over each
-// texel; turned and scaled by the settings. Resolution 0 gives the smallest power of two whose
-// texels are not larger than a pixel on the equator, at most 2048: 512 for 512x256.
-// Negative and non-finite values are taken as 0 and noted. Throws previz::Error naming the file and
-// what is wrong with it; the channels allowed are R, G and B (others are ignored), or Y.
+// Loads a latitude-longitude EXR: pixel centre column c, row r of w x h looks towards azimuth 2 pi
+// (0.5 - (c + 0.5) / w) from +X to +Y and elevation pi (0.5 - (r + 0.5) / h), Z up; the centre of
+// the picture is +X, seen from inside. It is bilinear between pixel centres, integrated over each
+// texel, turned and scaled by the settings. Resolution 0 gives the smallest power of two whose
+// texels are not larger than a pixel on the equator, at most 2048: 512 for 512x256. Negative and
+// non-finite values are taken as 0 and noted. Throws previz::Error naming the file and what is
+// wrong with it; the channels allowed are R, G and B (others are ignored), or Y.
 Lighting load_environment(const set::Lighting& settings);
 
 }  // namespace previz::lighting

@@ -1,4 +1,5 @@
-// Luminance of linear Rec. 709 radiance (ITU-R BT.709-6, item 3.2), in the units of the radiance.
+// Computes the luminance of linear Rec. 709 radiance (ITU-R BT.709-6, item 3.2), in the units of
+// the radiance.
 #pragma once
 
 #include <glm/vec3.hpp>

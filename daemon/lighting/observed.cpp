@@ -17,7 +17,7 @@
 namespace previz::lighting {
 namespace {
 
-constexpr int samples_a_side = 4;  // of a texel
+constexpr int samples_a_side = 4;  // per texel
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 double corner_radius(const PinholeIntrinsics& lens) {
@@ -34,7 +34,7 @@ double corner_radius(const PinholeIntrinsics& lens) {
   return radius;
 }
 
-// Unit direction at a place of the texel, 0 to 1 both ways.
+// Returns the unit direction at a position in the texel; s and t run from 0 to 1.
 glm::dvec3 direction_in_texel(int size, int i, int j, double s, double t) {
   return glm::dvec3(octahedral_direction(glm::vec2(static_cast<float>(2 * (i + s) / size - 1),
                                                    static_cast<float>(2 * (j + t) / size - 1))));

@@ -1,5 +1,5 @@
-// What the film camera has seen of the directions that light comes from, for where the light camera
-// is blind.
+// Keeps the light that the film camera has seen from each direction, for directions in which the
+// light camera is blind.
 #pragma once
 
 #include <cstddef>
@@ -15,17 +15,18 @@
 
 namespace previz::lighting {
 
-// Radiance on the film camera's scale, as its response and exposures say; lighting.balance brings
-// the light camera's to the same. Each direction keeps what was seen in it last.
+// The radiance is on the film camera's scale, by its response and exposures; lighting.balance
+// scales the light camera's to the same. Each direction keeps what was last seen in it.
 class ObservedLight {
  public:
-  static constexpr int max_size = 256;  // texels a side; the film camera fills in, no more
+  static constexpr int max_size = 256;  // texels a side; enough to fill gaps
 
-  // `size`: of the light map; a power of two. `room` may be null, as in Viewpoint. Throws
-  // previz::Error where the lens cannot be inverted.
+  // `size` is the side of the light map in texels, a power of two. `room` may be null, as in
+  // Viewpoint. Throws previz::Error if the lens cannot be inverted.
   ObservedLight(const ObserverCalibration& calibration, int size, std::shared_ptr<const Room> room);
 
-  // Plates of the calibration's size; throws previz::Error otherwise.
+  // Adds what a plate shows. Throws previz::Error if the plate does not have the calibration's
+  // size.
   void see(const Plate& plate, double exposure, const glm::dmat4& world_from_camera);
 
   const Resampled& map() const { return map_; }  // `seen` is 0 or 1
@@ -33,17 +34,18 @@ class ObservedLight {
  private:
   struct Texel {
     glm::dvec3 direction{0};
-    double distance_m = 0;  // of the room's surface from Room::seen_from; infinite: far away
+    double distance_m = 0;  // from Room::seen_from to the room's surface; infinite: far away
   };
 
   bool hidden(const Texel& texel, const glm::dvec3& position) const;
-  // Where the film camera sees a direction; nothing outside its picture.
+  // Returns the pixel in which the film camera sees a direction; nothing if it lies outside the
+  // picture.
   std::optional<std::size_t> pixel_of(const glm::dvec3& direction, double distance_m,
                                       const glm::dmat4& world_from_camera) const;
 
   const ObserverCalibration calibration_;
   const std::shared_ptr<const Room> room_;
-  double max_radius_ = 0;  // of the normalised image plane, at the picture's farthest corner
+  double max_radius_ = 0;  // on the normalised image plane, of the picture's farthest corner
   std::vector<Texel> texels_;
   Resampled map_;
 };

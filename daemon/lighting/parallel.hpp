@@ -1,4 +1,4 @@
-// Rows of a map split over the few threads that lighting may use beside the renderer.
+// Splits the rows of a map over the few threads that lighting may use beside the renderer.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,8 @@ namespace previz::lighting {
 inline constexpr int max_threads = 2;
 
 // Calls body(begin, end) on contiguous blocks that together are [0, count), concurrently. The
-// result must not depend on where the blocks part. An exception of a block is thrown on.
+// result must not depend on where the blocks are split. An exception thrown in a block is
+// rethrown.
 template <typename Body>
 void parallel_blocks(int count, const Body& body) {
   const int threads =

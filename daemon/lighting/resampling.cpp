@@ -14,14 +14,14 @@
 namespace previz::lighting {
 namespace {
 
-constexpr int least_samples = 4, most_samples = 64;  // of a cell, a side
+constexpr int least_samples = 4, most_samples = 64;  // per side of a cell
 
-// Where a direction lands in the picture; nothing beyond the lens's angle.
+// The place in the picture where a direction lands; nothing beyond the lens's angle.
 using Landing = std::optional<glm::dvec2>;
 
 struct Hit {
   std::uint32_t pixel;
-  float weight;  // of a texel
+  float weight;  // share of a texel
 };
 
 class Gatherer {
@@ -32,7 +32,7 @@ class Gatherer {
         size_(size),
         cells_(std::max(size, resolution_for(lens.axis_pixel_sr()))) {}
 
-  // Entries of texel rows begin..end-1; `counts` has one number a texel.
+  // Gathers the entries of texel rows begin..end-1; `counts` has one number per texel.
   void gather(int begin, int end, std::vector<std::uint32_t>& counts,
               std::vector<std::uint32_t>& pixels, std::vector<float>& weights) const {
     const int cells_a_side = cells_ / size_;
@@ -56,7 +56,7 @@ class Gatherer {
   }
 
  private:
-  // Position in the square, in cells.
+  // Takes a position in the square, in cells.
   Landing land(double i, double j) const {
     const glm::vec2 point(static_cast<float>(2 * i / cells_ - 1),
                           static_cast<float>(2 * j / cells_ - 1));
@@ -70,21 +70,22 @@ class Gatherer {
     return row;
   }
 
-  // Whether the map is smooth inside a cell: not where it is folded along |u| + |v| = 1, nor at the
-  // poles.
+  // Returns whether the map is smooth inside a cell. It is not where it is folded along |u| + |v| =
+  // 1, nor at the poles.
   bool smooth(int i, int j) const {
     const int u = std::abs(2 * i + 1 - cells_), v = std::abs(2 * j + 1 - cells_);
     return u + v != cells_ && u + v != 2 && u + v != 2 * cells_ - 2;
   }
 
-  // Samples a side of a cell that reaches so far across the picture: at least two a pixel.
+  // Returns the samples per side of a cell that spans this much of the picture: at least two per
+  // pixel.
   static int samples_across(double reach_px) {
     return std::clamp(2 * static_cast<int>(std::ceil(reach_px)), least_samples, most_samples);
   }
 
-  // Appends the pixels of a cell's directions. Inside the picture the corners are interpolated;
-  // where an edge, of the picture or between the room's surfaces, crosses the cell every direction
-  // is projected by itself.
+  // Appends the pixels of a cell's directions. Inside the picture they are interpolated from the
+  // corners; if an edge, of the picture or between the room's surfaces, crosses the cell, every
+  // direction is projected individually.
   void sample_cell(int i, int j, const std::vector<Landing>& above,
                    const std::vector<Landing>& below, std::vector<Hit>& hits) const {
     const auto left = static_cast<std::size_t>(i), right = left + 1;

@@ -1,4 +1,5 @@
-// From the pixels of a fisheye picture to the texels of an octahedral map, energy kept.
+// Resamples the pixels of a fisheye picture to the texels of an octahedral map and preserves
+// energy.
 #pragma once
 
 #include <cstdint>
@@ -11,22 +12,22 @@
 
 namespace previz::lighting {
 
-// How much of each texel's solid angle each pixel covers; depends on lens, pose and room only, so
-// one serves every frame of a fixed light camera. The pixels of texel t (index into
-// EnvironmentMap::radiance) are entries first[t] .. first[t + 1] - 1.
+// The share of each texel's solid angle that each pixel covers. It depends on lens, pose and room
+// only, so one resampling serves every frame of a fixed light camera. The pixels of texel t (index
+// into EnvironmentMap::radiance) are entries first[t] .. first[t + 1] - 1.
 struct Resampling {
-  int size = 0;  // of the map, texels a side
+  int size = 0;  // texels a side of the map
   std::vector<std::uint32_t> first;
   std::vector<std::uint32_t> pixels;  // y * width + x
-  std::vector<float> weights;         // of a texel; they add up to the part that is seen
+  std::vector<float> weights;         // share of a texel; they add up to its seen part
 };
 
-// Every texel is divided into cells of about a pixel or less and these into 4x4 directions of equal
-// solid angle, or up to 64x64 where a room is seen so much smaller than from the camera that a cell
-// holds many pixels; a direction takes the pixel whose square it falls in.
+// Divides every texel into cells of about a pixel or less, and each cell into 4x4 directions of
+// equal solid angle, or up to 64x64 where a room looks so much smaller from the camera that a cell
+// holds many pixels. A direction takes the pixel that it falls in.
 Resampling make_resampling(const Fisheye& lens, const Viewpoint& viewpoint, int size);
 
-// What the picture says about each texel.
+// The part of the picture that falls into each texel.
 struct Resampled {
   int size = 0;
   std::vector<glm::vec3> radiance;  // integral over the texel's seen part / the texel's solid angle

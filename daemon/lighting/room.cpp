@@ -11,7 +11,8 @@
 namespace previz::lighting {
 
 Triangles box_triangles(const glm::dvec3& size_m, const glm::dmat4& world_from_box) {
-  // Corner i has bit 0 for +X, bit 1 for +Y, bit 2 for +Z; the sides as four corners around.
+  // Corner i has bit 0 for +X, bit 1 for +Y, bit 2 for +Z; each side lists its four corners in
+  // order.
   constexpr std::array<std::array<int, 4>, 6> sides{
       {{0, 2, 6, 4}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 3, 7, 6}, {0, 1, 3, 2}, {4, 5, 7, 6}}};
   const auto corner = [&](int i) {

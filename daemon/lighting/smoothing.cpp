@@ -10,9 +10,9 @@ namespace previz::lighting {
 namespace {
 
 constexpr float confidence_squared = 5 * 5;
-constexpr float most_noise = 4 * 4;  // over the pictures' own variance
+constexpr float most_noise = 4 * 4;  // a ratio to the pictures' own variance
 
-// Sums of differences and of their variances over the squares of one level.
+// The sums of differences and of their variances over the squares of one level.
 struct Level {
   int width = 0, height = 0;
   std::vector<glm::vec3> difference, variance;
@@ -36,8 +36,9 @@ Level pixel_level(const HdrPicture& average, const HdrPicture& picture) {
   return level;
 }
 
-// Variance of the differences over what the pictures say it is, 1 to most_noise: the median of the
-// squares over 0.4549, which is the median of a squared standard normal variable.
+// Returns the variance of the differences over the variance that the pictures state, 1 to
+// most_noise: the median of the squared ratios over 0.4549, which is the median of a squared
+// standard normal variable.
 float noise_of(const Level& pixels) {
   constexpr std::size_t green = 1, most = 1 << 14;
   std::vector<float> squares;
@@ -67,7 +68,7 @@ Level coarser(const Level& fine, const std::vector<bool>& left_out) {
   return coarse;
 }
 
-// By square of this level: whether it, or one that it is in, has changed.
+// Returns, for each square of this level, whether it or a square that contains it has changed.
 std::vector<bool> changes(const Level& level, float noise) {
   std::vector<bool> changed(level.difference.size());
   for (std::size_t i = 0; i < changed.size(); ++i) changed[i] = level.changed(i, noise);

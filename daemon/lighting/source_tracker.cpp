@@ -10,9 +10,9 @@
 namespace previz::lighting {
 namespace {
 
-// Beyond this many radii a source is another one.
+// A source farther away than this many radii is another source.
 constexpr double reach_radii = 4;
-// More than this is a lamp that moved or changed its shape, not noise.
+// A change by more than this is a lamp that moved or changed its shape, not noise.
 constexpr double tremble_radii = 0.25;
 constexpr double tremble_ratio = 1.25;
 
@@ -25,7 +25,8 @@ struct Pair {
   Source *known, *found;
 };
 
-// A share of the way from what was known to what is found; all of it where that is no tremble.
+// Moves `found` back so that it goes only a share of the way from the known values to the found
+// ones; changes that exceed noise are kept whole.
 void smooth(const Source& known, Source& found, double share) {
   if (angle_between(known.direction, found.direction) < tremble_radii * angular_radius(known))
     found.direction = glm::normalize(glm::mix(known.direction, found.direction, share));

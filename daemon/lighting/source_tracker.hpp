@@ -1,4 +1,4 @@
-// Which light source is which from one light frame to the next.
+// Matches light sources from one light frame to the next.
 #pragma once
 
 #include <cstdint>
@@ -9,19 +9,19 @@
 
 namespace previz::lighting {
 
-// Nothing here can make a lamp late: what is found is there at once, what is not is gone at once,
-// and the flux is what was found, so that sources and residual still add up to the image. Direction
-// and solid angle, which noise makes tremble, are smoothed with the time constant as long as they
-// do no more than that.
+// Tracking never delays a lamp: a source appears and disappears in the frame in which it does so in
+// the picture, and its flux is the measured one, so that sources and residual still add up to the
+// image. Direction and solid angle, which noise makes jitter, are smoothed with the time constant
+// as long as they only jitter.
 class SourceTracker {
  public:
   explicit SourceTracker(double time_constant_s) : time_constant_s_(time_constant_s) {}
 
-  // Gives sources that were there before their ids, nearest first, and new ones the next free ids,
-  // from 1. Times must not go back.
+  // Gives known sources their former ids, nearest first, and new ones the next free ids, from 1.
+  // Times must not go back.
   void follow(std::vector<Source>& sources, std::int64_t timestamp_ns);
 
-  // As they were last.
+  // Returns the sources of the last frame.
   std::span<const Source> known() const { return known_; }
 
  private:

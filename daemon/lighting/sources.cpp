@@ -15,10 +15,10 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double longest_aspect = 2;  // of what one disc stands for
+constexpr double longest_aspect = 2;  // of a region that one disc represents
 constexpr int blurred_size = 16;
 
-// The light of one texel, above the ring.
+// The light of one texel above the ring's.
 struct Glow {
   glm::dvec3 direction;
   glm::dvec3 excess;
@@ -29,12 +29,12 @@ using Glows = std::vector<Glow>;
 glm::dvec3 centre_of_gravity(const Glows& glows) {
   glm::dvec3 sum(0);
   for (const Glow& glow : glows) sum += glow.weight() * glow.direction;
-  // Light from all around has no direction of its own; any will do.
+  // Light from all around has no direction of its own; any direction is as good.
   return glm::length(sum) > 0 ? glm::normalize(sum) : glm::dvec3(0, 0, 1);
 }
 
-// Half of the light comes from texels at least as bright. That is a lamp's own luminance, whatever
-// a lens spread over its edge: the blurred edge has the lesser part of the light.
+// Returns the luminance such that half of the light comes from texels at least as bright. That is a
+// lamp's own luminance, however a lens blurs its edge: the edge has the lesser part of the light.
 double median_by_light(const Glows& glows) {
   std::vector<double> weights;
   double rest = 0;
@@ -54,7 +54,8 @@ Source measured(const Glows& glows, double sr) {
   return source;
 }
 
-// Of a spread of light over directions: how much longer than wide, and which way it is long.
+// The shape of a light distribution over directions: how much longer than wide it is, and along
+// which direction.
 struct Shape {
   double aspect = 1;
   glm::dvec3 along{1, 0, 0};
@@ -72,7 +73,8 @@ Shape shape_of(const Glows& glows, const glm::dvec3& centre, double sr) {
     sum += glow.weight();
   }
   if (!(sum > 0)) return {};
-  // Eigenvalues of the covariance; a texel has a width of its own, sr / 12 of variance.
+  // The shape follows from the eigenvalues of the covariance; a texel has a width of its own, sr /
+  // 12 of variance.
   const double middle = 0.5 * (uu + vv), spread = std::hypot(0.5 * (uu - vv), uv);
   const double least = std::max(middle - spread, 0.0) / sum + sr / 12;
   const double most = (middle + spread) / sum + sr / 12;
@@ -80,8 +82,8 @@ Shape shape_of(const Glows& glows, const glm::dvec3& centre, double sr) {
   return {std::sqrt(most / least), std::cos(angle) * u + std::sin(angle) * v};
 }
 
-// Appends the source of these texels, or the sources of their halves where they are too long for
-// one.
+// Appends the source of these texels, or the sources of their halves if they are too long for one
+// source.
 void measure_parts(const Glows& glows, double sr, std::vector<Source>& sources) {
   const Source whole = measured(glows, sr);
   const Shape shape = shape_of(glows, whole.direction, sr);
@@ -100,7 +102,7 @@ void measure_parts(const Glows& glows, double sr, std::vector<Source>& sources) 
 struct Candidate {
   BrightRegion region;
   std::vector<Source> parts;
-  double flux = 0;  // of luminance
+  double flux = 0;  // luminous
   bool known = false;
 };
 

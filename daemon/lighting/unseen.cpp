@@ -21,7 +21,7 @@ constexpr double sector_rad = 2 * pi / sectors;
 constexpr double band_rad = 10 * pi / 180;
 constexpr double outlier = 8;  // times the band's median luminance
 
-// Camera axes; psi from x to y around the optical axis.
+// Returns a direction in camera axes; psi goes from x to y around the optical axis.
 glm::dvec3 camera_direction(double off_axis, double psi) {
   return {std::sin(off_axis) * std::cos(psi), std::sin(off_axis) * std::sin(psi),
           std::cos(off_axis)};
@@ -31,7 +31,7 @@ struct Edge {
   std::array<double, sectors> limit_rad{};  // angle off axis at which the picture ends
   std::array<glm::vec3, sectors> radiance{};
   glm::vec3 mean{0};
-  double left_out = 0;  // part of the band's solid angle
+  double left_out = 0;  // share of the band's solid angle
 };
 
 double limit_rad(const Fisheye& lens, double psi) {
@@ -124,7 +124,7 @@ void fill_each(Resampled& map, const Fill& fill) {
   }
 }
 
-// Returns the solid angle that had to be left to the fallback.
+// Returns the solid angle that was filled by the fallback.
 template <typename Fallback>
 double fill_from(const Resampled& elsewhere, const Fallback& fallback, Resampled& map) {
   const int step = map.size / elsewhere.size;

@@ -1,4 +1,4 @@
-// What is put where the light camera cannot see.
+// Fills the part of the map that the light camera cannot see.
 #pragma once
 
 #include <string>
@@ -25,8 +25,8 @@ namespace previz::lighting {
 //   mirror    `elsewhere`, the picture mirrored about the plane through the camera that is
 //             perpendicular to its optical axis; where that is unseen too, as horizon.
 //   observer  `elsewhere`, what the film camera saw there; where it saw nothing, as horizon.
-// `elsewhere` has the map's size or one that divides it; the first two rules ignore it. What a
-// reader of the report should know is appended to `notes`.
+// `elsewhere` has the map's size or one that divides it; the first two rules ignore it. Remarks
+// for the reader of the report are appended to `notes`.
 void fill_unseen(const HdrPicture& picture, const Fisheye& lens, const Viewpoint& viewpoint,
                  const set::Lighting& settings, const Resampled* elsewhere, Resampled& map,
                  std::vector<std::string>& notes);

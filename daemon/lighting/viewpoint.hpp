@@ -1,4 +1,5 @@
-// Where the light camera has to look for what lies in a direction from the set.
+// Finds the direction in which the light camera sees the light that reaches the set from a given
+// direction.
 #pragma once
 
 #include <glm/mat3x3.hpp>
@@ -11,23 +12,23 @@
 
 namespace previz::lighting {
 
-// Light from far away: the same direction from everywhere. Light from a room: the point of the room
-// that is seen from Room::seen_from in that direction, as the camera sees it from where it stands;
-// through the room's openings light is from far away again. Radiance is taken to leave a surface
-// alike to both places.
+// Light from far away has the same direction everywhere. With a room, the light of a direction
+// comes from the point of the room that is seen from Room::seen_from in that direction, and the
+// camera sees that point from where it stands; through the room's openings light comes from far
+// away again. A surface is assumed to send the same radiance to both places.
 class Viewpoint {
  public:
-  // Orthogonal; it may mirror.
+  // The matrix must be orthogonal; it may mirror.
   explicit Viewpoint(const glm::dmat3& world_from_camera);
-  // Rigid. `room` may be null: from far away.
+  // The pose must be rigid. `room` may be null: all light is from far away.
   Viewpoint(const glm::dmat4& world_from_camera, std::shared_ptr<const Room> room);
 
-  // The same looking the other way: across the plane perpendicular to the optical axis.
+  // Returns the viewpoint mirrored across the plane perpendicular to the optical axis.
   Viewpoint mirrored() const;
   bool far_away() const { return !room_; }
 
-  // In camera axes, of any length, from a unit world direction. Nothing where another part of the
-  // room hides that point from the camera.
+  // Returns the direction in camera axes, of any length, for a unit world direction. Returns
+  // nothing where another part of the room hides that point from the camera.
   std::optional<glm::dvec3> camera_direction(const glm::dvec3& world_direction) const;
 
  private:

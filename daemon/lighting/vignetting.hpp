@@ -1,4 +1,4 @@
-// What a fisheye lens loses towards its edge, given back.
+// Compensates the light that a fisheye lens loses towards its edge.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,8 @@
 
 namespace previz::lighting {
 
-// By pixel: 1 / relative_illumination at its centre; 1 where the lens sees nothing. Empty for a
-// lens that loses nothing.
+// Returns for each pixel 1 / relative_illumination at its centre; 1 where the lens sees nothing.
+// Empty for a lens without vignetting.
 std::vector<float> vignetting_gains(const Fisheye& lens, const Vignetting& vignetting);
 
 void undo_vignetting(const std::vector<float>& gains, HdrPicture& picture);

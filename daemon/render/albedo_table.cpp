@@ -12,7 +12,7 @@
 namespace previz::render {
 namespace {
 
-// A visible half vector for the point u of the unit square (Dupuy and Benyoub 2023).
+// Samples a visible half vector for the point u of the unit square (Dupuy and Benyoub 2023).
 glm::dvec3 visible_half_vector(const glm::dvec3& o, double alpha, const glm::dvec2& u) {
   const glm::dvec3 stretched = glm::normalize(glm::dvec3(o.x * alpha, o.y * alpha, o.z));
   const double phi = 2 * std::numbers::pi * u.x;
@@ -36,19 +36,20 @@ double dielectric_reflectance(double cosine, double eta) {
   return 0.5 * (parallel * parallel + perpendicular * perpendicular);
 }
 
-// What passes the facets' shadowing, over what passed their masking, is the weight of a direction
-// that was sampled by the visible normals; 0 where it ends up on the wrong side.
+// Returns the weight of a direction that was sampled by the visible normals: the light that passes
+// the facets' shadowing over the light that passed their masking; 0 if the direction ends up on the
+// wrong side.
 double direction_weight(const glm::dvec3& o, const glm::dvec3& i, double side, double alpha) {
   if (i.z * side <= 0) return 0;
   const double masked = 1 + smith_lambda(o, alpha);
   return masked / (masked + smith_lambda(i, alpha));
 }
 
-// The mean of `weight(o, half vector, alpha)` over the visible normals, at every node.
+// Returns the mean of `weight(o, half vector, alpha)` over the visible normals, at every node.
 template <typename Weight>
 AlbedoTable tabulate(const Weight& weight) {
   constexpr int points = 2048;
-  constexpr double golden = 0.6180339887498949;  // a Fibonacci lattice
+  constexpr double golden = 0.6180339887498949;  // the step of a Fibonacci lattice
   AlbedoTable table;
   for (std::uint32_t row = 0; row < gpu::ALBEDO_SIDE; ++row) {
     // Roughness 0 is a mirror; the least alpha and cosine keep its numbers finite.

@@ -1,21 +1,22 @@
-// Directional albedo of single-scatter GGX: what a rough white surface reflects or lets through of
-// what it should, because the microfacet model loses light that bounces between facets. Its inverse
-// gives that light back (Turquin 2019, "Practical multiple scattering compensation").
+// The directional albedo of single-scatter GGX: the share of light that a rough white surface
+// reflects or transmits. It is below 1, because the microfacet model loses light that bounces
+// between facets; dividing by it gives that light back (Turquin 2019, "Practical multiple
+// scattering compensation"; shaders/README.md, "Materials").
 #pragma once
 
 #include <vector>
 
 namespace previz::render {
 
-// ALBEDO_SIDE^2 values, rows by GGX roughness (the root of alpha) from 0 to 1, columns by the root
-// of the cosine to the normal from 0 to 1; both ends are nodes. Values are in (0, 1].
+// A table has ALBEDO_SIDE^2 values in (0, 1]: rows by GGX roughness (the root of alpha) from 0 to
+// 1, columns by the root of the cosine to the normal from 0 to 1; both ends are nodes.
 using AlbedoTable = std::vector<float>;
 
-// Made once. Of reflection alone, Fresnel term 1; also of a thin pane, whose light goes through
-// mirrored.
+// The albedo of reflection alone, with a Fresnel term of 1. It also holds for a thin pane, which
+// transmits light in the mirrored direction. The table is computed once.
 const AlbedoTable& reflection_albedo();
-// Of reflection and refraction together; `eta`, not 1, is the ior behind the surface over the one
-// before it.
+// The albedo of reflection and refraction together. `eta` is the index of refraction behind the
+// surface over the one in front of it, and must not be 1.
 AlbedoTable refraction_albedo(double eta);
 
 }  // namespace previz::render

@@ -11,8 +11,9 @@
 namespace previz::render {
 namespace {
 
-// Around the centre of the triangles' box: exact for a sphere, at most sqrt(3) times too wide.
-// Triangles that are not finite are never traced; radius -1 where there is no other.
+// Returns the sphere around the centre of the triangles' box: exact for a sphere, at most sqrt(3)
+// times too wide. Triangles that are not finite are never traced and do not count; without any
+// other triangle the radius is -1.
 glm::dvec4 bounding_sphere(const scene::Mesh& mesh, const glm::dmat4& world_from_object) {
   const auto for_corners = [&](const auto& visit) {
     for (const glm::uvec3& triangle : mesh.triangles) {
@@ -47,8 +48,8 @@ glm::dvec4 merged_spheres(const glm::dvec4& a, const glm::dvec4& b) {
   return {glm::dvec3(a) + between * ((radius - a.w) / distance), radius};
 }
 
-// The most that the linear part stretches any vector, from above: the root of the largest row sum
-// of A^T A, which for a rotation and one scale is that scale.
+// Returns an upper bound on how far the linear part stretches any vector: the root of the largest
+// row sum of A^T A, which for a rotation with a uniform scale is that scale.
 double stretch(const glm::dmat3& a) {
   const glm::dmat3 product = glm::transpose(a) * a;
   double largest = 0;

@@ -1,4 +1,5 @@
-// Bounding spheres of the objects towards which directions and photons are aimed.
+// This header computes the bounding spheres that directions and photons are aimed at
+// (shaders/README.md, "Difference bounds" and "Caustics").
 #pragma once
 
 #include <glm/vec4.hpp>
@@ -8,25 +9,26 @@
 
 namespace previz::render {
 
-// Centre (world, metres) and radius, one an object; past the first 16 objects the rest share one,
-// because every shading point looks at each.
+// Each entry is the centre (world, metres) and the radius of one object. Past the first 16 objects
+// the rest share one sphere, because every shading point tests all of them.
 using Bounds = std::vector<glm::dvec4>;
 
-// One an instance, in world space; radius -1 where there is nothing to see.
+// There is one sphere per instance, in world space; its radius is -1 where the instance has nothing
+// to see.
 using Spheres = std::vector<glm::dvec4>;
-// Looks at every triangle.
+// Computes the spheres from scratch, which visits every triangle.
 Spheres bounding_spheres(const scene::Scene& scene);
-// Those of the same instances elsewhere, as wide as before where they moved rigidly: no triangle is
-// looked at.
+// Returns the spheres of the same instances at other places, without visiting a triangle. An
+// instance that moved rigidly keeps its radius.
 Spheres moved_spheres(const Spheres& spheres, const std::vector<scene::Instance>& before,
                       const std::vector<scene::Instance>& now);
 
-// Objects that are in one world only.
+// Returns the spheres of objects that are in one world only.
 Bounds difference_bounds(const scene::Scene& scene, const Spheres& spheres);
 
-// Objects on which light may be reflected or refracted without blur: glass, metal and plastic
-// whose GGX alpha is somewhere at or below `specular_alpha`, and glass that hardly refracts. Those
-// in no world count too: where a caustic can come, the pipelines are ready for it.
+// Returns the spheres of objects that may reflect or refract light without blur: glass, metal and
+// plastic whose GGX alpha is somewhere at or below `specular_alpha`, and glass that hardly
+// refracts. Objects in neither world count too, so that the pipelines are ready when they return.
 Bounds specular_bounds(const scene::Scene& scene, const Spheres& spheres, double specular_alpha);
 
 }  // namespace previz::render

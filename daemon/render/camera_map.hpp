@@ -1,6 +1,6 @@
-// The camera as a measurement. The map says which pixels of the plate show a single real surface,
-// and how far away it is, so that paths may take the surface's radiance from them
-// (shaders/README.md, "Camera radiance").
+// This header uses the camera as a measurement: its map says which pixels of the plate show a
+// single real surface, and how far away it is, so that paths may take the surface's radiance from
+// them (shaders/README.md, "Camera radiance").
 #pragma once
 
 #include <cstdint>
@@ -18,12 +18,13 @@ class CameraMap {
   explicit CameraMap(Device& device) : device_(device) { resize(1); }
 
   void create_kernels(std::uint32_t features);
-  // The map, for the passes that read it and those below.
+  // Adds the map's buffers, for the passes that read the map and for record().
   void add_to(Buffers& buffers) const;
-  // Row-major, linear radiance; w: 1 where a pixel may be used, 0 where it is clipped.
+  // Takes the plate: row-major, linear radiance; w is 1 where a pixel may be used, 0 where it is
+  // clipped.
   void upload(const std::vector<glm::vec4>& plate);
-  // Makes the map from the plate uploaded. `parts`: whole rows, which make up the picture;
-  // `buffers`: the scene's and the map's.
+  // Makes the map from the plate that was uploaded. `parts` are whole rows that together make up
+  // the picture; `buffers` hold the scene and the map.
   void record(const vk::raii::CommandBuffer& commands, const std::vector<gpu::GpuBatch>& parts,
               const Buffers& buffers);
 

@@ -8,7 +8,7 @@
 namespace previz::render {
 namespace {
 
-// What one pixel's sums say, in double precision.
+// The means that follow from one pixel's sums, in double precision.
 struct Means {
   glm::dvec3 mixed, diff, mixed_square, diff_square;
   double mask, depth_sum, hits, difference_only, samples;
@@ -34,18 +34,19 @@ Means means(const gpu::GpuPixel& p) {
           samples};
 }
 
-// Variance of a mean of n samples from the means of values and squares.
+// Returns the variance of a mean of n samples from the means of values and squares.
 glm::dvec3 variance_of_mean(const glm::dvec3& mean, const glm::dvec3& square, double n) {
   if (n < 2) return glm::dvec3(0);
   return glm::max(square - mean * mean, glm::dvec3(0)) / (n - 1);
 }
 
-// Interleaved RGB; black where there is no plate.
+// Reads pixel i of interleaved RGB; the pixel is black where there is no plate.
 glm::dvec3 pixel_of(const std::vector<double>& rgb, std::size_t i) {
   return rgb.empty() ? glm::dvec3(0) : glm::dvec3(rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2]);
 }
 
-// By how much a difference of one is added to the camera's radiance.
+// Returns the gain g of shaders/README.md, "The composite": the factor of the worlds' difference
+// when it is added to the camera's radiance.
 double gain(const CompositeRule& rule, double camera, double real, double plate_variance) {
   switch (rule.kind) {
     case set::Composite::additive:
@@ -107,7 +108,7 @@ void composite(Layers& layers, std::size_t first, std::span<const gpu::GpuPixel>
     Means m = means(sums);
     const glm::dvec3 camera = pixel_of(plate.value, i);
     const glm::dvec3 plate_variance = pixel_of(plate.variance, i);
-    // Where only the difference was traced, the camera has measured the real world.
+    // Where only the difference was traced, the camera's picture stands for the real world.
     if (m.difference_only > 0) m.mixed = camera + m.diff;
     const double uncovered = 1 - m.mask;
     const glm::dvec3 real = m.mixed - m.diff;

@@ -10,10 +10,10 @@
 namespace previz::render {
 namespace {
 
-// Levels of the transform: steps of 1, 2, 4 and 8 pixels.
+// The transform has four levels, with steps of 1, 2, 4 and 8 pixels.
 constexpr int wavelet_levels = 4;
-// Rows above and below that a row's result depends on: two steps of every level, and the neighbours
-// that give the variance there. A slope comes from rows nearer than those.
+// A row's result depends on this many rows above and below it: two steps of every level, and the
+// neighbours that give the variance there. A slope comes from nearer rows.
 constexpr int reach =
     2 * ((1 << wavelet_levels) - 1) + static_cast<int>(gpu::DENOISE_VARIANCE_REACH);
 static_assert(gpu::DENOISE_VARIANCE_REACH >= 2);
@@ -23,14 +23,15 @@ glm::vec3 camera_pixel(const std::vector<double>& camera, std::size_t i) {
   return {camera[3 * i], camera[3 * i + 1], camera[3 * i + 2]};
 }
 
-// What the camera's picture keeps of itself under the composite. In single precision as the
-// composite is, so that what is laid over an untouched pixel is exactly nothing.
+// Returns the part of the camera's picture that shows through the composite. Single precision, like
+// the composite's, makes the difference of the two exactly zero in an untouched pixel.
 glm::vec3 seen_through(const Layers& layers, const std::vector<double>& camera, std::size_t i) {
   return (1 - layers.mask[i]) * camera_pixel(camera, i);
 }
 
-// What a signal is counted in: the sensor's white or, where the composite multiplies the camera's
-// picture, that, whose texture is then not blurred. The floor keeps what is added to black.
+// Returns the unit of a signal: the sensor's white or, where the composite multiplies the camera's
+// picture, that picture, so that its texture is not blurred. The floor preserves light that is
+// added to black.
 struct Scale {
   const Layers& layers;
   const std::vector<double>& camera;
@@ -45,9 +46,9 @@ struct Scale {
 
 }  // namespace
 
-// A mean of n samples, each no brighter than white, deviates by white / sqrt(n) at most. More
-// samples than so many do not make it any surer, or what one of them met would never count as an
-// outlier.
+// A mean of n samples, each no brighter than white, has a standard deviation of at most white /
+// sqrt(n). The number of samples is capped, because otherwise the outlier that a single sample met
+// would never count as one.
 float most_sure_variance(float white, std::int64_t samples) {
   constexpr std::int64_t most_sure_samples = 16;
   return white * white /
@@ -62,7 +63,7 @@ Denoiser::Denoiser(Device& device, std::size_t most_pixels)
 
 void Denoiser::reserve(std::size_t pixels) {
   if (pixels <= pixels_) return;
-  pixels_ = 0;  // until all is there, whatever is thrown on the way
+  pixels_ = 0;  // stays 0 if an allocation below throws
   const auto texels = [&] {
     return create_texel_buffer(device_, pixels * sizeof(gpu::vec4),
                                vk::Format::eR32G32B32A32Sfloat);
@@ -75,7 +76,7 @@ void Denoiser::reserve(std::size_t pixels) {
   pixels_ = pixels;
 }
 
-// Each pass goes to the other side, from 0: first the one for the variance.
+// Each pass writes to the other side, starting from side 0; the variance pass is the first.
 constexpr int result_side = (1 + wavelet_levels) % 2;
 
 const Buffer& Denoiser::denoised_signal() const {
@@ -107,7 +108,8 @@ std::vector<Denoiser::Band> Denoiser::bands(int width, int height) const {
   const auto fitting = static_cast<int>(std::min<std::size_t>(
       most_pixels_ / static_cast<std::size_t>(width), static_cast<std::size_t>(height)));
   if (fitting == height) return {{0, height, 0, height}};
-  // Even where that is more than fits: a band of fewer rows would be mostly what others need, too.
+  // A band has at least `reach` rows, even if they do not fit: a smaller one would consist mostly
+  // of margin that its neighbours compute as well.
   const int rows = std::max(fitting - 2 * reach, reach);
   std::vector<Band> bands;
   for (int first = 0; first < height; first += rows) {

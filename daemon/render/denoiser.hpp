@@ -1,10 +1,10 @@
-// Takes noise out of a composite, guided by its own variance (P26): an edge-avoiding wavelet
-// transform in Vulkan compute (shaders/denoise.comp).
+// Takes noise out of a composite with an edge-avoiding wavelet transform on the GPU, guided by the
+// composite's own variance (P26; shaders/README.md, "Denoising").
 //
-// What is filtered is the one picture that is laid over the camera's: composite - (1 - M) Lc. So
-// the two worlds never get different weights, what the camera saw keeps its sharpness, and where
-// nothing virtual is near, the plate stays as it is, bit for bit. With more samples the variance
-// falls, and with it what the filter blurs: it converges to the same picture.
+// Only what was added to the camera's picture is filtered: composite - (1 - M) Lc. Both worlds
+// therefore get the same weights, the camera's picture keeps its sharpness, and where nothing
+// virtual is near, the plate stays as it is, bit for bit. As samples are added, the variance falls,
+// the filter blurs less, and the result converges to the same picture.
 #pragma once
 
 #include <vector>
@@ -16,43 +16,44 @@
 
 namespace previz::render {
 
-// The most variance that a composite of so many samples is taken to have.
+// Returns the highest variance that a composite of this many samples is assumed to have.
 float most_sure_variance(float white, std::int64_t samples);
 
 class Denoiser {
  public:
-  // About `most_pixels` are worked on at once, in bands of whole rows: 80 bytes of device memory
-  // each.
+  // Works on about `most_pixels` at once, in bands of whole rows, at 80 bytes of device memory per
+  // pixel.
   explicit Denoiser(Device& device, std::size_t most_pixels = most_band_pixels);
 
-  // Rows [first, last) come out right where rows [top, bottom) go in.
+  // A band: given rows [top, bottom) as input, rows [first, last) of the output are right.
   struct Band {
     int first, last, top, bottom;
   };
   std::vector<Band> bands(int width, int height) const;
-  // Makes the buffers large enough for so many pixels; they may then be others.
+  // Makes the buffers large enough for this many pixels, which may replace them.
   void reserve(std::size_t pixels);
 
-  // What goes in, a vec4 a pixel, as shaders/lib/denoise.glsl has it. shaders/composite.comp makes
-  // it of what was sampled.
+  // The input buffers have one vec4 per pixel in the layout of shaders/lib/denoise.glsl;
+  // shaders/composite.comp fills them from the samples.
   //
-  // What is brighter than the sensor's white counts as white, and as no surer than a few samples
-  // would be (most_sure_variance()): a lamp in a mirror, met by one sample of many, would else
-  // stay, or spread over all its neighbours. A channel that comes out white still stays as bright
-  // as it was.
+  // Radiance brighter than the sensor's white counts as white, and as no more certain than a few
+  // samples would be (most_sure_variance()). Otherwise the image of a lamp in a mirror, met by one
+  // sample of many, would stay as a speck or spread over all its neighbours. A channel that comes
+  // out white keeps its original brightness.
   Buffer& signal() { return signal_[0]; }
   Buffer& variance() { return variance_[0]; }
   Buffer& surface() { return surface_; }
-  // The passes over so many rows. `single_sample`: pixels do not know their variance.
+  // Records the passes over this many rows. `single_sample` says that pixels do not know their
+  // variance.
   void record(const vk::raii::CommandBuffer& commands, int width, int rows, bool single_sample);
-  // Where the signal is then.
+  // The buffer that holds the signal after the passes.
   const Buffer& denoised_signal() const;
 
-  // Once they have run over a band of the layers' picture: changes composite and variance of its
-  // rows, which is then an estimate of the noise left; no other layer. Their white must be finite.
-  // `camera`: the plate's
-  // radiance, interleaved RGB; empty: black. `rule`: by which the composite was made; what ratio
-  // and hybrid multiply the plate by is filtered, and not the plate.
+  // Reads the result of the passes over a band into the layers: replaces the composite and its
+  // variance in the band's rows (the variance then estimates the noise left) and no other layer.
+  // The layers' white must be finite. `camera` is the plate's radiance, interleaved RGB (empty:
+  // black). `rule` is the rule the composite was made by: with ratio and hybrid the factor of the
+  // plate is filtered, and not the plate.
   void read(const Band& band, Layers& layers, const std::vector<double>& camera,
             const CompositeRule& rule = {}) const;
 

@@ -14,7 +14,7 @@ namespace previz::render {
 namespace {
 
 constexpr std::uint64_t gpu_timeout_ns =
-    600'000'000'000;  // a batch on a slow CPU device is seconds
+    600'000'000'000;  // 10 minutes; a batch on a slow CPU device takes seconds
 
 VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT severity,
                                           VkDebugUtilsMessageTypeFlagsEXT,
@@ -41,7 +41,7 @@ bool has_layer(const vk::raii::Context& context, const char* name) {
   });
 }
 
-// Lower is better.
+// Ranks device types; the lowest rank is preferred.
 int rank(vk::PhysicalDeviceType type) {
   switch (type) {
     case vk::PhysicalDeviceType::eDiscreteGpu:
@@ -55,7 +55,7 @@ int rank(vk::PhysicalDeviceType type) {
   }
 }
 
-// Empty if the device can run us, otherwise what it lacks.
+// Says what the device lacks to run the renderer; empty if it lacks nothing.
 std::string lacks(const vk::raii::PhysicalDevice& physical) {
   if (physical.getProperties().apiVersion < VK_API_VERSION_1_3) return "no Vulkan 1.3";
   const auto features =
@@ -85,7 +85,7 @@ void Device::reopen() {
   open();
 }
 
-// The instance too: a card that was gone has another physical device when it is back.
+// The instance is closed too: a card that was gone has another physical device when it is back.
 void Device::close() {
   fence_.clear();
   commands_.clear();
@@ -166,7 +166,7 @@ void Device::create_device() {
   const vk::DeviceQueueCreateInfo queue({}, queue_family_, 1, &priority);
   vk::PhysicalDeviceVulkan13Features features13;
   features13.synchronization2 = VK_TRUE;
-  features13.maintenance4 = VK_TRUE;  // LocalSizeId, which glslang writes for 1.3
+  features13.maintenance4 = VK_TRUE;  // for LocalSizeId, which glslang emits for Vulkan 1.3
   vk::PhysicalDeviceVulkan12Features features12;
   features12.scalarBlockLayout = VK_TRUE;
   features12.pNext = &features13;
@@ -209,7 +209,7 @@ std::uint64_t Device::memory_bytes() const {
 void Device::submit(const std::function<void(const vk::raii::CommandBuffer&)>& record) {
   try {
     ++submissions_;
-    commands_.reset();  // a recording that threw is still in it
+    commands_.reset();  // it still holds a recording that threw
     commands_.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
     record(commands_);
     commands_.end();

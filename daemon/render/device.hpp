@@ -1,5 +1,5 @@
-// The Vulkan device: one compute queue, buffers and texel views. Internal to the render room: it
-// includes Vulkan-Hpp, so nothing outside daemon/render/ may include it.
+// This header wraps the Vulkan device: one compute queue, buffers and texel views. It is internal
+// to the render room: it includes Vulkan-Hpp, so nothing outside daemon/render/ may include it.
 #pragma once
 
 #include <atomic>
@@ -19,28 +19,31 @@ class Device {
  public:
   // Throws previz::Error saying what is missing and which devices were found.
   explicit Device(DeviceOptions options);
-  // All of it anew; throws as the constructor does, and can be called again.
+  // Closes and opens the device again. Throws as the constructor does, and can be called again
+  // after that.
   void reopen();
-  bool is_open() const { return static_cast<bool>(*device_); }  // not after a reopen() that threw
+  bool is_open() const { return static_cast<bool>(*device_); }  // false after a reopen() that threw
 
   const vk::raii::Device& vk() const { return device_; }
   const std::string& name() const { return name_; }
   const vk::PhysicalDeviceLimits& limits() const { return limits_; }
   bool is_cpu() const { return is_cpu_; }
-  // Bytes that all buffers may take: the device's own memory, or the computer's for a CPU device.
+  // Returns how many bytes all buffers together may take: the device's own memory, or the
+  // computer's for a CPU device.
   std::uint64_t memory_bytes() const;
   std::uint64_t validation_messages() const { return validation_messages_; }
-  // Whether debug labels can be recorded, which GPU debuggers show.
+  // Returns whether debug labels, which GPU debuggers show, can be recorded.
   bool has_labels() const { return has_labels_; }
 
-  // Index of a memory type of `allowed_bits` with all of `wanted`, preferring `preferred` too.
+  // Returns the index of a memory type of `allowed_bits` with all properties of `wanted`, and with
+  // those of `preferred` if there is one.
   std::uint32_t memory_type(std::uint32_t allowed_bits, vk::MemoryPropertyFlags wanted,
                             vk::MemoryPropertyFlags preferred) const;
 
-  // Records, submits and waits. Throws DeviceLost naming the device if it is lost. What `record`
-  // throws is passed on, and nothing of it is submitted.
+  // Records, submits and waits. Throws DeviceLost naming the device if it is lost. If `record`
+  // throws, the exception is passed on and nothing is submitted.
   void submit(const std::function<void(const vk::raii::CommandBuffer&)>& record);
-  // The number of submissions so far, with the one that is being recorded.
+  // The number of submissions so far, including the one that is being recorded.
   std::uint64_t submissions() const { return submissions_; }
 
  private:
@@ -69,8 +72,8 @@ class Device {
   vk::raii::Fence fence_{nullptr};
 };
 
-// Device memory with a size in bytes; at least 16 bytes are allocated, so that an empty array can
-// still be bound. Written and read through upload() and download().
+// A block of device memory, written and read through upload() and download(). `size` is in bytes;
+// at least 16 are allocated, so that an empty array can still be bound.
 struct Buffer {
   vk::raii::Buffer buffer{nullptr};
   vk::raii::DeviceMemory memory{nullptr};
@@ -81,14 +84,15 @@ struct Buffer {
 
 Buffer create_storage_buffer(Device& device, vk::DeviceSize size);
 Buffer create_indirect_buffer(Device& device, vk::DeviceSize size);
-// Read as texels, written by uploads or as a storage buffer.
+// Creates a buffer that shaders read as texels; it is written by uploads or as a storage buffer.
 Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format);
 
-// `offset` in bytes. Throws previz::Error where it would not fit.
+// Uploads to `offset` (bytes). Throws previz::Error where the data would not fit.
 void upload_bytes(Device& device, Buffer& buffer, std::span<const std::byte> bytes,
                   vk::DeviceSize offset = 0);
 void download_bytes(Device& device, const Buffer& buffer, std::span<std::byte> bytes);
-// The first `size` bytes, where they are if the host can read them, else a copy that is gone after.
+// Calls `visit` with the first `size` bytes: with the buffer's own memory if the host can read it,
+// otherwise with a copy that is freed afterwards.
 void read_bytes(Device& device, const Buffer& buffer, vk::DeviceSize size,
                 const std::function<void(const std::byte*)>& visit);
 
@@ -123,7 +127,7 @@ std::vector<T> download(Device& device, const Buffer& buffer, std::size_t count)
   return data;
 }
 
-// Records that the buffers are filled with zeros, and a barrier() after it.
+// Records commands that fill the buffers with zeros, and a barrier() after them.
 void record_clear(const vk::raii::CommandBuffer& commands,
                   std::initializer_list<const Buffer*> buffers);
 

@@ -1,4 +1,4 @@
-// The same for every pixel, on all cores.
+// Runs a function for every pixel, on all cores.
 #pragma once
 
 #include <cstddef>
@@ -6,7 +6,8 @@
 
 namespace previz::render {
 
-// `body(i)` for i < count, in no order and by several threads at once. `count`: at most 2^31 - 1.
+// Calls `body(i)` for every i < count, in no particular order and from several threads at once.
+// `count` is at most 2^31 - 1.
 void each_pixel(std::size_t count, const auto& body) {
   cv::parallel_for_(cv::Range(0, static_cast<int>(count)), [&](const cv::Range& part) {
     for (int i = part.start; i < part.end; ++i) body(static_cast<std::size_t>(i));

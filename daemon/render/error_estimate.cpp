@@ -14,8 +14,8 @@ int blocks_in(int pixels) {
   return (pixels + block - 1) / block;
 }
 
-// Of a channel's mean, as it is seen: how far a standard error reaches below white, and white
-// itself at the most.
+// Returns a channel's variance after clipping at white: only the part of the standard error that
+// reaches below white counts, and at most white itself.
 double seen_variance(double mean, double variance, double white) {
   if (mean <= white) return std::min(variance, white * white);
   const double below = std::clamp(std::sqrt(variance) - (mean - white), 0.0, white);
@@ -38,7 +38,8 @@ Grid grid_of(int width, int height) {
   return {blocks_in(width), blocks_in(height)};
 }
 
-// The standard error of each block, smoothed; its own variance counts half.
+// Returns each block's standard error, smoothed over its neighbours; the block's own variance
+// counts half.
 std::vector<double> smoothed(const ErrorEstimate& estimate, const Grid& grid) {
   constexpr double own_weight = 8;
   std::vector<double> result;
@@ -98,7 +99,7 @@ std::vector<bool> blocks_above(const ErrorEstimate& estimate, int width, int hei
 std::vector<std::uint32_t> spread_samples(const ErrorEstimate& estimate, int width, int height,
                                           int samples) {
   constexpr double least_share = 1.0 / 8, most_share = 8;
-  constexpr int halvings = 60;  // of an interval of doubles: all there are
+  constexpr int halvings = 60;  // bisections, which exhaust the precision of a double
   constexpr double no_error = 1e-12;
   const Grid grid = grid_of(width, height);
   const std::vector<double> error = smoothed(estimate, grid);
@@ -112,7 +113,8 @@ std::vector<std::uint32_t> spread_samples(const ErrorEstimate& estimate, int wid
   };
   if (*std::ranges::max_element(error) < no_error)
     return std::vector<std::uint32_t>(grid.size(), static_cast<std::uint32_t>(samples));
-  // Blocks at a bound leave more, or less, to the others.
+  // Blocks at a bound leave more, or fewer, samples to the others, so the common factor is found by
+  // bisection.
   double low = 0, high = most_share / no_error;
   for (int i = 0; i < halvings; ++i)
     (mean_share((low + high) / 2) < 1 ? low : high) = (low + high) / 2;

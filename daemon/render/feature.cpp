@@ -27,8 +27,8 @@ bool glows(const Material& m, const Scene&, double) {
   return scene::emits(m);
 }
 
-// Alpha as the shaders see it: texels are halves, and what lies between two texels may be rounded
-// below both.
+// Alpha is judged as the shaders see it: texels are half floats, and a value between two texels may
+// be rounded below both.
 bool lets_through(const Material& m, const Scene& scene, double) {
   if (m.alpha_mode == scene::AlphaMode::opaque) return false;
   float least = m.alpha, rounding = 0;

@@ -1,6 +1,7 @@
-// The features of the renderer, as one table: what each is called, when a frame needs it, which bit
-// the shaders are specialised on, and what `previzd check` says of it. The pipelines, `check` and
-// `trade` all ask this table. A new feature of materials is one row here and its shader.
+// This table lists the renderer's features: the name of each, when a frame needs it, which bit the
+// shaders are specialised on, and what `previzd check` says about it. The pipelines, `check` and
+// `trade` all use this table (shaders/README.md, "Only what the scene requires"). A new feature of
+// materials is one row here and its shader.
 #pragma once
 
 #include <bitset>
@@ -16,7 +17,7 @@ inline constexpr std::size_t max_features = 32;
 // One bit per row of the table, in its order.
 using MaterialFeatures = std::bitset<max_features>;
 
-// What a frame asks of the renderer, as far as it is known.
+// What a frame requires of the renderer, as far as it is known.
 struct Demand {
   const scene::Scene& scene;
   MaterialFeatures materials;  // material_features() of the scene
@@ -35,32 +36,33 @@ struct Feature {
   std::uint32_t bit = 0;        // FEATURE_* of the shaders; 0: no pipeline depends on it
   bool can_be_carried = false;  // `trade` may time it in a frame that does not need it, whose
                                 // picture is then the same, bit for bit
-  // Whether a material asks for the feature. Null: no material does.
+  // Returns whether a material asks for the feature. Null: no material does.
   bool (*in_material)(const scene::Material&, const scene::Scene&, double specular_alpha) = nullptr;
-  // Whether a frame needs the feature, given whether a material in use asks for it. Null: a frame
-  // needs it exactly where a material asks for it.
+  // Returns whether a frame needs the feature, given whether a material in use asks for it. Null: a
+  // frame needs it exactly where a material asks for it.
   bool (*in_frame)(bool in_material, const Demand&) = nullptr;
-  // What `check` says, in words for a film crew, of a set that uses the feature and of one that
-  // does not.
+  // What `check` says, in words for a film crew, about a set that uses the feature and about one
+  // that does not.
   const char* used;
   const char* left_out;
 };
 
 std::span<const Feature> features();
 
-// Which rows a material of the scene asks for. Only materials of instances count, but those of
-// instances that are in neither world count too: an object that a carrier has lost comes back, and
-// no pipeline is compiled anew for it. May look at every texel.
+// Returns which rows the materials of the scene ask for. Only materials of instances count,
+// including instances that are in neither world: when a lost carrier's object comes back, no
+// pipeline must be compiled for it. May read every texel.
 MaterialFeatures material_features(const scene::Scene& scene, double specular_alpha);
 
 // `feature` is a row of features().
 bool is_needed(const Feature& feature, const Demand& demand);
 
-// The FEATURE_* bits of all rows that are needed.
+// Returns the FEATURE_* bits of all rows that are needed.
 std::uint32_t needed_bits(const Demand& demand);
 
-// What the frames of a set ask for, before any is seen: light around the set is taken to shine
-// where there may be any. `materials`: material_features() with the set's specular threshold.
+// Returns what the frames of a set ask for before any of them is known: the light around the set
+// counts as shining wherever it may shine. `materials` is material_features() with the set's
+// specular threshold.
 Demand demand_of(const set::Set& set, const scene::Scene& scene, const MaterialFeatures& materials);
 
 }  // namespace previz::render

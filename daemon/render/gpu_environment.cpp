@@ -24,8 +24,8 @@ void check(const lighting::EnvironmentMap& map) {
         throw Error("environment map: a texel holds " + std::to_string(value));
 }
 
-// Integral of the bilinear interpolation of the mean channel over each texel: positive wherever the
-// interpolation is, so sampling by it misses nothing.
+// Returns the integral over each texel of the bilinearly interpolated mean channel. It is positive
+// wherever the interpolation is, so sampling by it misses nothing.
 std::vector<double> texel_weights(const EncodedEnvironment& e) {
   static constexpr double tent[3] = {0.125, 0.75, 0.125};
   const std::size_t stride = e.size + 2;
@@ -67,7 +67,8 @@ std::vector<glm::vec4> quads(const std::vector<double>& weights, std::size_t siz
   return result;
 }
 
-// Of a level of the pyramid; texels all have the same solid angle.
+// Returns EncodedEnvironment::spread of one level of the pyramid, whose texels all have the same
+// solid angle.
 double spread_of(const std::vector<double>& weights, double mean) {
   double information = 0;
   for (const double weight : weights) {
@@ -77,7 +78,8 @@ double spread_of(const std::vector<double>& weights, double mean) {
   return 2 * std::exp(-information / static_cast<double>(weights.size()));
 }
 
-// At most this many texels a side are looked at for the spread: a texel is then a lamp of a degree.
+// The spread is computed from at most this many texels per side, each as large as a lamp of a
+// degree.
 constexpr std::size_t spread_size = 256;
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The environment map in the layout the shaders read.
+// Encodes the environment map in the layout that the shaders read (shaders/README.md, "Light").
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace previz::render {
 
-// Black until it is made.
+// A default-constructed environment is black.
 struct EncodedEnvironment {
   std::uint32_t size = 1;
   std::uint32_t levels = 0;  // log2(size)
@@ -17,8 +17,9 @@ struct EncodedEnvironment {
   std::vector<glm::vec4> radiance = std::vector<glm::vec4>(9);
   std::vector<glm::vec4> importance;  // densities, level by level; see render_shared.h
   double mean = 0;                    // mean of (r + g + b) / 3 over the sphere
-  // Solid angle over 2 pi that its light comes from, the exponential of the entropy of where: 2 for
-  // an even sphere, a lamp's disc where all comes from that.
+  // The solid angle that the light comes from, over 2 pi: the exponential of the entropy of its
+  // distribution over directions. It is 2 for an even sphere, and a lamp's disc where all light
+  // comes from that lamp.
   double spread = 2;
 };
 

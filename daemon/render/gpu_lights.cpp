@@ -10,11 +10,12 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 
-// A disc narrower than this is one direction: those in floats are 1e-7 apart.
+// A disc narrower than this counts as one direction: neighbouring directions in single precision
+// are 1e-7 apart.
 constexpr double least_disc_rad = 1e-6;
 
-// Of the light samples, the part that is shared out evenly: so none is so faint beside another,
-// wherever it stands, that it is left to luck.
+// This share of the light samples is divided evenly, so that no light, however faint beside
+// another, is left to luck.
 constexpr double even_share = 0.1;
 
 std::uint32_t gpu_type(set::LightType type) {
@@ -54,8 +55,8 @@ double power(const gpu::GpuLight& light, double scene_radius) {
   }
 }
 
-// Over 2 pi, of a light that faces the scene from one scene radius away; of a point as if it were a
-// disc as wide as one direction is in floats.
+// Returns the solid angle over 2 pi of a light that faces the scene from a distance of one scene
+// radius. A point counts as a disc as wide as one direction in single precision.
 double solid_angle(const gpu::GpuLight& light, double scene_radius) {
   const double area = glm::length(glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v)));
   const double least = least_disc_rad * least_disc_rad / 2;
@@ -103,7 +104,7 @@ gpu::GpuLight encode_light(const set::Light& light, const glm::dvec3& camera_pos
     const double sine = std::sin(light.angular_radius_rad);
     const double half = std::sin(light.angular_radius_rad / 2);
     result.cone_sr = static_cast<float>(4 * pi * half * half);
-    // The disc's radiance that gives the stated irradiance on a plane facing it.
+    // This is the disc's radiance that gives the stated irradiance on a plane facing it.
     result.emission = glm::vec3(light.emission / (pi * sine * sine));
   }
   return result;
@@ -152,7 +153,7 @@ double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius) 
   std::size_t shining = 0;
   for (const gpu::GpuLight& light : lights) {
     const double watts = power(light, scene_radius);
-    if (!(watts > 0)) continue;  // black, or a triangle that is no number
+    if (!(watts > 0)) continue;  // black, or a triangle whose power is NaN
     total += watts;
     ++shining;
   }
@@ -163,7 +164,7 @@ double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius) 
     if (watts > 0)
       sum += (1 - even_share) * watts / total + even_share / static_cast<double>(shining);
     light.cdf = std::min(static_cast<float>(sum), 1.0f);
-    // What the shader picks by, rounded as it is.
+    // The probability is the rounded one that the shader picks by.
     light.selection = light.cdf - below;
     below = light.cdf;
   }

@@ -16,7 +16,7 @@
 namespace previz::render {
 namespace {
 
-// Three rows of an affine transform.
+// Stores the three rows of an affine transform.
 void set_rows(glm::vec4 (&rows)[3], const glm::dmat4& m) {
   for (int r = 0; r < 3; ++r) rows[r] = glm::vec4(m[0][r], m[1][r], m[2][r], m[3][r]);
 }
@@ -27,16 +27,18 @@ glm::dmat4 relative_to(const glm::dmat4& world_from_object, const glm::dvec3& ca
   return result;
 }
 
-// Probability of the environment where either may be sampled: by power, but neither is forgotten.
+// Returns the probability of sampling the environment where either may be sampled: by power, but
+// neither is forgotten.
 double environment_share(double environment_power, double light_power) {
   if (!(light_power > 0)) return 1;
   if (!(environment_power > 0)) return 0;
   return std::clamp(environment_power / (environment_power + light_power), 0.1, 0.9);
 }
 
-// Tables one after the other: the reflection's, where anything is rough, and those of glass.
+// Concatenates the albedo tables: reflection's first, if anything is rough, then those of each
+// glass.
 struct AlbedoTables {
-  std::vector<float> values{1};  // read by nobody
+  std::vector<float> values{1};  // a placeholder that no shader reads
   std::map<float, std::uint32_t> of_ior;
 
   std::uint32_t first_of(const scene::Material& m, double specular_alpha) {
@@ -286,17 +288,17 @@ void GpuScene::describe(gpu::GpuFrame& frame, std::uint32_t features) const {
   frame.difference_roulette = lights_differ_ ? 0.0f : 2.0f;
   frame.specular_bound_count = static_cast<std::uint32_t>(specular_bounds_.size());
   frame.scene_center = scene_center_;
-  // Wider, so that rounding leaves no surface outside.
+  // The radius is slightly wider, so that rounding leaves no surface outside.
   frame.scene_radius = static_cast<float>(scene_radius_ * 1.001);
-  // Light samples are shared out by power: of light from afar, what crosses the scene's disc. So a
-  // lamp of the environment is sampled as often as the same lamp taken out of it.
+  // Light samples are divided by power. The power of distant light is what crosses the scene's
+  // disc, so that a lamp in the environment is sampled as often as the same lamp taken out of it.
   const double disc = std::numbers::pi * scene_radius_ * scene_radius_;
   const double environment_power = 4 * std::numbers::pi * environment_mean_ * disc;
   const bool sampled = (features & gpu::FEATURE_ENVIRONMENT_SAMPLING) != 0;
   const double share = environment_share(environment_power, light_power_);
   frame.environment_selection = sampled ? static_cast<float>(share) : 0.0f;
   frame.photon_environment = static_cast<float>(share);
-  // What light samples do not look for counts as if it came from everywhere.
+  // Light that light samples do not look for counts as if it came from everywhere.
   frame.environment_spread = sampled ? static_cast<float>(environment_spread_) : 2.0f;
   frame.lamp_spread = static_cast<float>(light_spread_);
   const double all_power = environment_power + light_power_;

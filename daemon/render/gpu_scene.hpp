@@ -1,5 +1,6 @@
-// The scene in GPU memory: what stays while a scene stays, and what is placed anew for each camera
-// position, because GPU space is relative to the camera (subtracted in double precision).
+// Keeps the scene in GPU memory: data that lasts as long as the scene, and data that is placed anew
+// for each camera position, because GPU space is relative to the camera (subtracted in double
+// precision).
 #pragma once
 
 #include <cstdint>
@@ -25,23 +26,24 @@ class GpuScene {
   // Surfaces are perfect mirrors where their GGX alpha is at most `specular_alpha`.
   void set_scene(const scene::Scene& scene, double specular_alpha);
   void set_environment(const EncodedEnvironment& encoded, set::LightSampling sampling);
-  // The same meshes and materials at other places, under other lamps: nothing is built anew but the
-  // top level, with the next place(). As many instances as there are.
+  // Puts the same meshes and materials at other places, under other lamps. Only the top level is
+  // rebuilt, by the next place(). The number of instances must stay the same.
   void move(const std::vector<scene::Instance>& instances, const std::vector<set::Light>& lights);
-  // Lamps beside the scene's own, which may change from frame to frame.
+  // Sets lamps beside the scene's own, which may change from frame to frame.
   void set_sources(std::vector<set::Light> sources);
   // Uploads instances, top level and lights relative to `camera_position` (world, metres).
   void place(const glm::dvec3& camera_position);
 
-  // What the scene and the environment ask for, once placed. The result refers to this scene and to
-  // `estimation`, so it must not outlive them.
+  // Returns what the scene and the environment ask for; valid once placed. The result refers to
+  // this scene and to `estimation`, so it must not outlive them.
   Demand demand(const set::Estimation& estimation) const;
-  // From the camera to the centre of the nearest object that can throw a caustic, but at least its
-  // radius, metres; infinite where there is none.
+  // Returns the distance from the camera to the centre of the nearest object that can throw a
+  // caustic, but at least the object's radius (metres); infinite where there is none.
   double nearest_specular_distance(const glm::dvec3& camera_position) const;
   // Fills the fields of the frame that describe environment and lights. `features`: FEATURE_* bits.
   void describe(gpu::GpuFrame& frame, std::uint32_t features) const;
-  // What the shaders read of the scene, but for the frame and its rays, which are the renderer's.
+  // Returns the buffers that the shaders read, except the frame and its rays, which the renderer
+  // has.
   Buffers buffers() const;
 
  private:
@@ -56,7 +58,7 @@ class GpuScene {
   void upload_textures();
   void find_emitters();
   void find_bounds(const Spheres& spheres);
-  std::vector<set::Light> lamps() const;  // the scene's and the sources, those that rays meet first
+  std::vector<set::Light> lamps() const;  // scene lamps and sources; visible ones first
   std::vector<gpu::GpuLight> placed_lights(const std::vector<set::Light>& all_lamps,
                                            const glm::dvec3& camera_position) const;
   void find_extent(const glm::dvec3& camera_position);
@@ -68,9 +70,9 @@ class GpuScene {
   scene::Scene scene_;
   double specular_alpha_ = 0;
   MaterialFeatures material_features_;
-  std::vector<scene::Instance> instances_as_set_;   // by set_scene()
-  Spheres spheres_;                                 // of those
-  std::optional<std::vector<set::Light>> sources_;  // absent: there never are any
+  std::vector<scene::Instance> instances_as_set_;   // as set_scene() got them
+  Spheres spheres_;                                 // of instances_as_set_
+  std::optional<std::vector<set::Light>> sources_;  // absent: set_sources() was never called
   std::vector<MeshPlace> places_;
   std::vector<std::uint32_t> first_light_;  // by instance; NO_INDEX: not an emitter
   std::vector<std::uint32_t> emitters_;     // instances that emit, in the order of their lights

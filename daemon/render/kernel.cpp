@@ -11,8 +11,8 @@ namespace {
 constexpr auto compute = vk::PipelineBindPoint::eCompute;
 constexpr auto compute_stage = vk::ShaderStageFlagBits::eCompute;
 
-// The few of SPIR-V's enumerants that a kernel is described by (Khronos, "SPIR-V Specification",
-// 3.32 Instructions and the tables before it).
+// The few SPIR-V enumerants that describe a kernel (Khronos, "SPIR-V Specification", 3.32
+// Instructions and the tables before it).
 enum Op : std::uint32_t {
   op_name = 5,
   op_member_name = 6,
@@ -31,7 +31,7 @@ constexpr std::uint32_t mode_local_size = 17, mode_local_size_id = 38;
 constexpr std::uint32_t decoration_binding = 33;
 constexpr std::uint32_t storage_uniform_constant = 0, storage_storage_buffer = 12;
 
-// What a module says of one of its ids.
+// Everything that a module says about one of its ids.
 struct SpirvId {
   const char* name = "";
   const char* first_member = "";  // of a block
@@ -151,8 +151,8 @@ void Kernel::write(const BoundSet& bound) const {
   device_->vk().updateDescriptorSets(writes, {});
 }
 
-// A submission is waited for before the next one is recorded; so sets may be written when they are
-// first wanted in one, and stay as they are until its end.
+// Each submission is waited for before the next one is recorded. A set can therefore be written
+// when a submission first needs it, and then stays unchanged until the submission ends.
 const Kernel::BoundSet& Kernel::bound(const Buffers& buffers) {
   if (submission_ != device_->submissions()) sets_in_use_ = 0;
   submission_ = device_->submissions();

@@ -1,6 +1,6 @@
-// One description of a compute pass: its name and its SPIR-V. The bindings, the pipeline and the
-// size of a work group are read out of the SPIR-V, and a dispatch takes its buffers by the names
-// that the shader gives them.
+// A kernel is a compute pass, described by its name and its SPIR-V alone. The bindings, the
+// pipeline and the size of a work group are read out of the SPIR-V, and a dispatch takes its
+// buffers by the names that the shader gives them.
 #pragma once
 
 #include <cstdint>
@@ -16,12 +16,13 @@
 
 namespace previz::render {
 
-// Buffers by the names of the shaders' variables. A pass takes those that it declares and uses.
+// Maps the names of the shaders' variables to buffers. A pass takes those that it declares and
+// uses.
 using Buffers = std::map<std::string_view, const Buffer*>;
 
 // The push constants of a dispatch: a structure of shaders/lib/render_shared.h.
 struct Push {
-  static constexpr std::uint32_t most_bytes = 128;  // every Vulkan device has so many
+  static constexpr std::uint32_t most_bytes = 128;  // every Vulkan device has at least this many
   template <typename T>
   Push(const T& values) : bytes(std::as_bytes(std::span(&values, 1))) {
     static_assert(std::is_trivially_copyable_v<T> && sizeof(T) <= most_bytes);
@@ -29,7 +30,7 @@ struct Push {
   std::span<const std::byte> bytes;
 };
 
-// A command buffer, and what the dispatches that are recorded into it have in common.
+// A command buffer, and the arguments that the dispatches recorded into it share.
 struct Recording {
   const vk::raii::CommandBuffer& commands;
   Push push;
@@ -38,16 +39,16 @@ struct Recording {
 
 class Kernel {
  public:
-  Kernel() = default;  // nothing that could be dispatched
+  Kernel() = default;  // cannot be dispatched
   // `constants[i]` is specialisation constant i (32 bits each).
   Kernel(Device& device, const char* name, std::span<const std::uint32_t> spirv,
          std::initializer_list<std::uint32_t> constants = {});
 
-  // Record the pass, under a debug label with its name, and a barrier() after it: with as many work
-  // groups as hold so many invocations, or with the number of groups that lies at a place of an
-  // indirect buffer. Both throw previz::Error naming the pass where a buffer that it uses is
+  // Record the pass, under a debug label with its name, and a barrier() after it. The first runs as
+  // many work groups as `invocations` need, the second the number of groups stored in an indirect
+  // buffer at `offset`. Both throw previz::Error naming the pass where a buffer that it uses is
   // missing; the first also where the device does not allow so many groups. The buffers must stay
-  // until the submission is done.
+  // alive until the submission is done.
   void dispatch(const Recording& recording, std::uint32_t invocations);
   void dispatch_indirect(const Recording& recording, const Buffer& groups, vk::DeviceSize offset);
 
@@ -58,7 +59,7 @@ class Kernel {
     vk::DescriptorType type;
   };
   struct BoundSet {
-    std::vector<const Buffer*> buffers;  // as bindings_
+    std::vector<const Buffer*> buffers;  // in the order of bindings_
     vk::raii::DescriptorPool pool{nullptr};
     vk::raii::DescriptorSet set{nullptr};
   };
@@ -77,7 +78,7 @@ class Kernel {
   vk::raii::DescriptorSetLayout set_layout_{nullptr};
   vk::raii::PipelineLayout layout_{nullptr};
   vk::raii::Pipeline pipeline_{nullptr};
-  // The sets of the submission that is being recorded come first; a later one writes them anew.
+  // The sets used by the submission being recorded come first; a later submission rewrites them.
   std::vector<BoundSet> sets_;
   std::size_t sets_in_use_ = 0;
   std::uint64_t submission_ = 0;

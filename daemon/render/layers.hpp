@@ -1,4 +1,4 @@
-// What the renderer gives for one frame: the composite and everything it was made of.
+// The renderer's result for one frame: the composite and everything it was made of.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@ namespace previz::render {
 struct Layers {
   int width = 0;
   int height = 0;
-  bool denoised = false;  // noise was taken out of the composite; variance is what seems to be left
-  std::int64_t samples = 0;  // per pixel; the most, where some were left out
+  bool denoised = false;     // the composite was denoised; `variance` estimates the noise left
+  std::int64_t samples = 0;  // per pixel; the largest number, where it differs
   double white = std::numeric_limits<double>::infinity();  // radiance at which the sensor clips
   std::vector<glm::vec3> composite;  // by the set's rule: daemon/render/composite.hpp
   std::vector<glm::vec3> mixed;      // mean(Lm)
@@ -25,15 +25,15 @@ struct Layers {
   std::vector<float> depth;          // metres along the optical axis, mean over hits; 0: no hit
 };
 
-// Counted on the GPU, never silently discarded. The tests demand zeros.
+// Events counted on the GPU, never silently discarded. The tests demand zero drops.
 struct Counters {
   std::uint64_t rays = 0;  // path segments traced
   std::uint64_t shadow_rays = 0;
   std::uint64_t dropped_not_finite = 0;  // NaN or Inf samples
   std::uint64_t dropped_negative = 0;
-  std::uint64_t stopped_in_layers = 0;  // rays through more transparent surfaces than are followed
-  // With real_radiance = "camera": real surfaces whose radiance the plate gave, and those that were
-  // traced because it could not.
+  std::uint64_t stopped_in_layers = 0;  // rays through too many transparent surfaces
+  // With real_radiance = "camera": real surfaces whose radiance came from the plate, and real
+  // surfaces that had to be traced.
   std::uint64_t measured = 0;
   std::uint64_t unmeasured = 0;
 };

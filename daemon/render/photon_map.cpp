@@ -14,7 +14,7 @@ namespace previz::render {
 void PhotonMap::resize(std::uint32_t photons) {
   if (photons == photons_) return;
   photons_ = photons;
-  // As photon_bucket_count() of shaders/lib/photon_grid.glsl.
+  // This must equal photon_bucket_count() of shaders/lib/photon_grid.glsl.
   bucket_count_ = std::bit_ceil(2 * photons);
   const vk::DeviceSize slots = 2 * static_cast<vk::DeviceSize>(photons);
   photon_buffer_ = create_storage_buffer(device_, slots * sizeof(gpu::GpuPhoton));

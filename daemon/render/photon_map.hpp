@@ -1,5 +1,6 @@
-// Photons for caustics: progressive photon mapping in both worlds (P16). One pass of photons serves
-// the sample of the same index; the radius shrinks from pass to pass (Knaus and Zwicker 2011).
+// Progressive photon mapping for caustics, in both worlds (P16; shaders/README.md, "Caustics"). One
+// pass of photons serves the sample of the same index; the radius shrinks from pass to pass (Knaus
+// and Zwicker 2011).
 #pragma once
 
 #include <cstdint>
@@ -12,15 +13,16 @@ class PhotonMap {
  public:
   explicit PhotonMap(Device& device) : device_(device) { resize(1); }
 
-  // (Re)creates the buffers where `photons` a pass differs. At least 1, also where none are used.
+  // (Re)creates the buffers if the number of photons per pass changes. `photons` is at least 1,
+  // even where no photons are used.
   void resize(std::uint32_t photons);
   void create_kernels(std::uint32_t features);
-  // The map, for the passes that read it and those below.
+  // Adds the map's buffers, for the passes that read the map and for the passes below.
   void add_to(Buffers& buffers) const;
-  // A pass of photons, in this order: emission fills the queue of paths; after each extension, as
-  // many work groups as `groups` has at `offset` bounce off what they met; sorting makes the map.
-  // All take the buffers of the scene and of the paths, and a GpuBatch: first_sample is the pass,
-  // photon_radius.
+  // These record a pass of photons, in this order: emission fills the queue of paths; after each
+  // extension, as many work groups as `groups` holds at `offset` bounce the photons off what they
+  // hit; sorting makes the map. All take the buffers of the scene and of the paths, and a GpuBatch
+  // whose first_sample is the pass and whose photon_radius is the radius.
   void record_emission(const Recording& recording);
   void record_bounce(const Recording& recording, const Buffer& groups, vk::DeviceSize offset);
   void record_sorting(const Recording& recording);

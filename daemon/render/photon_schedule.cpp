@@ -6,7 +6,7 @@
 namespace previz::render {
 
 double photon_radius_factor(std::uint64_t pass) {
-  // The product of (k + alpha) / (k + 1) for k = 1 .. pass.
+  // This is the product of (k + alpha) / (k + 1) for k = 1 .. pass.
   constexpr double alpha = 2.0 / 3.0;
   const double n = static_cast<double>(pass) + 1;
   const double log_squared = std::lgamma(n + alpha) - std::lgamma(1 + alpha) - std::lgamma(n + 1);

@@ -12,11 +12,11 @@
 namespace previz::render {
 namespace {
 
-// A pixel of Layers: six of three floats and two of one; of the plate's radiance and its variance
-// (daemon/render/composite.hpp): three doubles each.
+// A pixel of Layers has six members of three floats and two of one; the plate's radiance and its
+// variance (daemon/render/composite.hpp) are three doubles each.
 constexpr std::uint64_t layer_bytes = (6 * 3 + 2) * sizeof(float) + 2 * 3 * sizeof(double);
 
-// A pixel of a band: six arrays of four floats (denoiser.hpp, presenter.hpp), and two of three
+// A pixel of a band takes six arrays of four floats (denoiser.hpp, presenter.hpp) and two of three
 // samples.
 constexpr std::uint64_t band_bytes = 6 * 4 * sizeof(float) + 2 * 3 * sizeof(std::uint16_t);
 

@@ -1,4 +1,4 @@
-// What a picture of a size takes, known before anything is allocated for it.
+// Computes how much memory a picture takes, before anything is allocated for it.
 #pragma once
 
 #include <cstddef>
@@ -6,22 +6,22 @@
 
 namespace previz::render {
 
-// A picture is shown in bands of about so many pixels (daemon/render/presenter.hpp).
+// A picture is shown in bands of about this many pixels (daemon/render/presenter.hpp).
 inline constexpr std::size_t most_band_pixels = std::size_t{1} << 21;
 
-// What there is of it.
+// The memory that is available for a picture.
 struct PictureMemory {
   std::uint64_t bytes = 0;
-  std::uint64_t texels = 0;  // that one texel buffer may have
-  bool read_back = false;    // the layers that are made of it lie in the same memory
+  std::uint64_t texels = 0;  // the most that one texel buffer may have
+  bool read_back = false;    // layers that are read back lie in the same memory
 };
 
-// Bytes that the sums of every pixel, the camera's rays and a band of what is shown take, and with
-// `read_back` the layers that are made of them for the one who asks.
+// Returns how many bytes are taken by the sums of every pixel, the camera's rays and a band of the
+// shown picture and, with `read_back`, by the layers made from them for the caller.
 std::uint64_t picture_bytes(int width, int height, bool read_back);
 
-// Throws previz::Error with the picture's size, what it takes and what there is, where it does not
-// fit or has no pixel.
+// Throws previz::Error, with the picture's size, the memory it takes and the memory there is, if
+// the picture does not fit or has no pixel.
 void refuse_too_large(int width, int height, const PictureMemory& memory);
 
 }  // namespace previz::render

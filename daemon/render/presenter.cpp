@@ -9,7 +9,7 @@
 namespace previz::render {
 namespace {
 
-// A pixel's samples are three halves of a word; two pixels are written at once.
+// A pixel's samples are three 16-bit halves of words, and two pixels are written at once.
 std::size_t words_of(std::size_t pixels) {
   return (pixels + 1) / 2 * 3;
 }
@@ -56,14 +56,14 @@ Presenter::Presenter(Device& device, const lighting::Response& response)
 
 void Presenter::reserve(std::size_t pixels) {
   if (pixels <= pixels_) return;
-  pixels_ = 0;  // until all is there, whatever is thrown on the way
+  pixels_ = 0;  // stays 0 if an allocation below throws
   composites_ = create_storage_buffer(device_, pixels * sizeof(gpu::vec4));
   plate_ = create_storage_buffer(device_, words_of(pixels) * sizeof(std::uint32_t));
   picture_ = create_storage_buffer(device_, words_of(pixels) * sizeof(std::uint32_t));
   pixels_ = pixels;
 }
 
-// From each tile the rows that the band has of it.
+// Composites the rows of the band that each tile holds.
 void Presenter::composite(const ToPresent& what, const Denoiser::Band& band, gpu::GpuShow constants,
                           Denoiser& denoiser) {
   const auto width = static_cast<std::uint32_t>(what.width);

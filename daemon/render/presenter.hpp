@@ -1,7 +1,7 @@
-// The picture that is shown, made where the samples are: composite (P2), denoising (P26) and
-// response (P5) on the device, so that of a live frame the plate goes up and the picture comes
-// down, and nothing else. In single precision; the layers are made by daemon/render/composite.hpp
-// in double.
+// Makes the picture that is shown where the samples are: composite (P2), denoising (P26) and
+// response (P5) run on the device, so that for a live frame only the plate goes up and only the
+// picture comes down. It works in single precision; daemon/render/composite.hpp makes the layers in
+// double.
 #pragma once
 
 #include <cstdint>
@@ -15,25 +15,25 @@
 
 namespace previz::render {
 
-// What it is made of.
+// The input of a shown picture.
 struct ToPresent {
-  std::vector<Wavefront::Sums> tiles;  // of all rows
+  std::vector<Wavefront::Sums> tiles;  // cover all rows
   int width, height;
-  const Plate& plate;  // of that size and the response's bits, or empty: over black
+  const Plate& plate;  // has that size and the response's bits; empty: black
   double exposure;     // signal over radiance, above 0
   CompositeRule rule;
-  std::int64_t samples;  // the most a pixel has
+  std::int64_t samples;  // the largest number that a pixel has
   bool denoise;
 };
 
 class Presenter {
  public:
-  // For pictures with this response. Where nothing virtual touches a pixel, it is the plate's own
-  // samples, bit for bit.
+  // Makes pictures with this response. Where nothing virtual touches a pixel, the result is the
+  // plate's own samples, bit for bit.
   Presenter(Device& device, const lighting::Response& response);
 
-  // Band by band, 28 bytes of device memory a pixel beside the denoiser's. `after_band` is called
-  // with each that the denoiser's passes have run over.
+  // Works band by band, with 28 bytes of device memory per pixel beside the denoiser's.
+  // `after_band` is called with each band that the denoiser's passes have run over.
   Plate present(const ToPresent& what, Denoiser& denoiser,
                 const std::function<void(const Denoiser::Band&)>& after_band = {});
 

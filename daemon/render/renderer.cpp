@@ -47,7 +47,7 @@ struct Renderer::Impl {
     return {estimation.composite, estimation.composite_floor / frame.exposure};
   }
   std::int64_t sampled() const { return std::max<std::int64_t>(samples, 1); }
-  // The plate as linear radiance; w: 0 where a channel is clipped.
+  // Returns the plate as linear radiance; w is 0 where a channel is clipped.
   std::vector<glm::vec4> measured() const;
 
   std::shared_ptr<Device> device;
@@ -56,7 +56,7 @@ struct Renderer::Impl {
   GpuScene scene;
   std::optional<Wavefront> wavefront;
   std::optional<Denoiser> denoiser;    // made when a picture is first shown
-  std::optional<Presenter> presenter;  // likewise, for the response
+  std::optional<Presenter> presenter;  // likewise; made for the response
   Buffer rays, frame_buffer;
   std::uint32_t carried = 0;  // FEATURE_* bits
   bool has_scene = false, has_environment = false;
@@ -67,7 +67,7 @@ struct Renderer::Impl {
 
 void Renderer::Impl::resize() {
   const PinholeIntrinsics& picture = calibration.intrinsics;
-  wavefront.reset();  // first the old memory, then the new
+  wavefront.reset();  // frees the old memory before the new is allocated
   wavefront.emplace(*device, picture.width, picture.height,
                     estimation.real_radiance == set::RealRadiance::camera ? 3 : 2);
   upload_texels(*device, rays, corner_rays(picture), vk::Format::eR32G32Sfloat);
@@ -86,7 +86,8 @@ void Renderer::Impl::upload_frame() {
     gpu_frame.lens_radius = static_cast<float>(lens.focal_length_m / (2 * lens.f_number));
     gpu_frame.focus_distance = static_cast<float>(lens.focus_distance_m);
   }
-  // A carried lens of a pinhole: every ray starts at its centre, aimed at a distance of one.
+  // If the lens is only carried, the camera is a pinhole: every ray starts at its centre and aims
+  // at a distance of one.
   if (!calibration.lens) gpu_frame.focus_distance = 1;
   const PinholeIntrinsics& k = calibration.intrinsics;
   gpu_frame.focal_px = {k.fx, k.fy};

@@ -18,7 +18,7 @@
 
 namespace previz::render {
 
-// One observer frame as the renderer wants it.
+// One observer frame, the renderer's input.
 struct FrameInput {
   PlatePtr plate;                          // samples as captured; null: composite over black
   double exposure = 1.0;                   // absolute, of this frame
@@ -32,48 +32,49 @@ class Renderer {
            const ObserverCalibration& calibration);
   ~Renderer();
 
-  // Uploads; may be called between any two frames (P13). Nothing is precomputed beyond BVHs.
+  // Uploads the scene; may be called between any two frames (P13). Nothing is precomputed beyond
+  // BVHs.
   void set_scene(const scene::Scene& scene);
-  // The scene set, with its instances elsewhere and other lamps: no BVH of a mesh is built.
+  // Moves the instances and changes the lamps of the scene last set; no mesh's BVH is rebuilt.
   void move(const std::vector<scene::Instance>& instances, const std::vector<set::Light>& lights);
-  // From the next begin() on: another estimator; the picture at another size, by the calibration of
-  // that size. Scene and environment stay.
+  // use() and resize() take effect at the next begin(): another estimator, or another picture size
+  // with its calibration. Scene and environment stay.
   void use(set::Estimator estimator);
   void resize(const ObserverCalibration& calibration);
   void set_environment(const lighting::EnvironmentMap& environment, set::LightSampling sampling);
-  // The same, encoded elsewhere: what is left to do is the upload.
+  // Sets an environment that was encoded elsewhere, so that only the upload is left to do.
   void set_environment(const EncodedEnvironment& environment, set::LightSampling sampling);
-  // Lamps beside those of the scene: the sources that were taken out of the environment. From the
-  // first call on the pipelines are made for any number of them, even none, so that lamps come and
-  // go between frames without new pipelines.
+  // Sets lamps beside those of the scene: the sources that were taken out of the environment. From
+  // the first call on the pipelines are made for any number of them, even none, so that lamps can
+  // come and go between frames without new pipelines.
   void set_sources(std::vector<set::Light> sources);
 
-  // From the next begin() on these features (FEATURE_* bits of rows of features() that can be
-  // carried) are in the pipelines, needed or not: what leaving them out saves can then be measured.
-  // No pixel depends on them.
+  // From the next begin() on, these features (FEATURE_* bits of rows of features() that can be
+  // carried) are in the pipelines, needed or not, so that the savings of leaving them out can be
+  // measured. No pixel depends on them.
   void carry(std::uint32_t features);
-  // FEATURE_* bits that the frame begun needs, without those that are only carried.
+  // Returns the FEATURE_* bits that the current frame needs, without those that are only carried.
   std::uint32_t needed() const;
 
-  // Starts a frame: clears what was accumulated.
+  // Starts a frame and clears what was accumulated.
   void begin(FrameInput frame);
-  // Adds samples to every pixel of the frame begun. The i-th sample of a pixel is the same however
-  // the calls split them (P8). `cancelled` is asked between batches.
+  // Adds samples to every pixel of the current frame. The i-th sample of a pixel is the same
+  // however the calls split them (P8). `cancelled` is asked between batches.
   void render(int samples, const std::function<bool()>& cancelled = {});
-  // Layers of samples of their own, with other random numbers, which are forgotten again: what is
-  // decided by them biases no picture. For a frame begun that has no samples yet; nothing where
-  // `cancelled` ended it.
+  // Returns layers of separate samples, with other random numbers, which are then forgotten:
+  // decisions based on them bias no picture. The current frame must have no samples yet. Returns
+  // nothing if `cancelled` ended it.
   std::optional<Layers> pilot(int samples, const std::function<bool()>& cancelled = {});
-  // From now on the pixels of a block of SAMPLED_BLOCK^2 (row-major) get no more than so many
-  // samples: adaptive sampling, daemon/render/error_estimate.hpp. begin() takes the limits away.
+  // From now on the pixels of each block of SAMPLED_BLOCK^2 (row-major) get no more than this many
+  // samples: adaptive sampling, daemon/render/error_estimate.hpp. begin() removes the limits.
   void limit_samples(const std::vector<std::uint32_t>& limits);
-  // Layers of the samples so far.
+  // Returns the layers of the samples so far.
   Layers layers() const;
-  // The composite of the samples so far through exposure and response, as the display shows it: the
-  // plate's own bits where nothing virtual touches it. `denoise`: noise is taken out of it
-  // (daemon/render/denoiser.hpp), also of the composite of these layers, which are those of the
-  // same samples; their variance then says what is left. Throws previz::Error where the device has
-  // no memory for it.
+  // Returns the composite of the samples so far through exposure and response, as the display shows
+  // it: the plate's own bits where nothing virtual touches it. With `denoise`, noise is taken out
+  // of it (daemon/render/denoiser.hpp), and also out of the composite of `layers`, which must be
+  // those of the same samples; their variance is then the noise left. Throws previz::Error where
+  // the device has no memory for it.
   Plate show(bool denoise, Layers* layers = nullptr);
   Counters counters() const;
 

@@ -10,7 +10,7 @@ namespace previz::render {
 
 namespace {
 
-// Forward projection, for the check (OpenCV's model; Brown 1966, Conrady 1919).
+// Projects forward, to check the inverse (OpenCV's model; Brown 1966, Conrady 1919).
 cv::Point2d project(const PinholeIntrinsics& k, double x, double y) {
   const double r2 = x * x + y * y;
   const double radial = 1 + r2 * (k.k1 + r2 * (k.k2 + r2 * k.k3));

@@ -1,5 +1,5 @@
-// The observer's lens as the shaders want it: undistorted rays at pixel corners. The camera picture
-// itself is never resampled.
+// Gives the shaders the observer's lens: undistorted rays at pixel corners. The camera picture
+// itself is never resampled (shaders/README.md, "Camera and depth of field").
 #pragma once
 
 #include <glm/vec2.hpp>
@@ -9,9 +9,10 @@
 
 namespace previz::render {
 
-// (width + 1) * (height + 1) entries, row-major: (x/z, y/z) of the ray through the corner (i, j),
-// which is OpenCV pixel position (i - 0.5, j - 0.5). Camera axes x right, y down, z forward.
-// Throws previz::Error naming the pixel where the distortion cannot be inverted to 0.01 px.
+// Returns (width + 1) * (height + 1) entries, row-major: (x/z, y/z) of the ray through the corner
+// (i, j), which is OpenCV pixel position (i - 0.5, j - 0.5). Camera axes x right, y down, z
+// forward. Throws previz::Error naming the pixel where the distortion cannot be inverted to 0.01
+// px.
 std::vector<glm::vec2> corner_rays(const PinholeIntrinsics& intrinsics);
 
 }  // namespace previz::render

@@ -9,7 +9,7 @@
 namespace previz::render {
 namespace {
 
-// Per pixel and channel: the signal, 0..1 or radiance times exposure.
+// Returns the signal of a pixel's channel: 0..1, or radiance times exposure.
 using Signal = std::function<double(std::size_t pixel, int channel)>;
 
 double sample_of(double share, int bits) {

@@ -1,4 +1,4 @@
-// What can be shown of a frame: the composite, or one of the layers it was made of.
+// Makes the debug views of a frame: the composite, or one of the layers it was made of.
 #pragma once
 
 #include <array>
@@ -15,10 +15,10 @@ inline constexpr std::array all_views = {View::composite,  View::mixed, View::re
                                          View::normal,     View::noise};
 const char* name_of(View view);
 
-// A layer as a picture of the response's bits. Radiance goes through exposure and response as the
-// camera's would; the difference is laid about middle grey at half its contrast; depth is
-// 1 m / (1 m + depth), black where nothing was met; normals are 0.5 + 0.5 n; noise is the standard
-// error of the composite, eight times.
+// Returns a layer as a picture with the response's bit depth. Radiance goes through exposure and
+// response as the camera's would; the difference is centred on middle grey at half its contrast;
+// depth is 1 m / (1 m + depth), black where nothing was hit; normals are 0.5 + 0.5 n; noise is
+// eight times the composite's standard error.
 Plate picture_of(View view, const Layers& layers, const lighting::Response& response,
                  double exposure);
 

@@ -16,15 +16,16 @@
 namespace previz::render {
 namespace {
 
-// Blocks of pixels in shaders/lib/path.glsl.
+// The size of the blocks of pixels in shaders/lib/path.glsl.
 constexpr std::uint32_t block_width = 8;
 constexpr std::uint32_t block_height = 4;
 
-// Slots in flight: what stays near a CPU's caches; enough to fill a GPU.
+// The number of slots in flight: on a CPU few enough to stay near its caches, on a GPU enough to
+// fill it.
 constexpr std::uint32_t cpu_slots = 1u << 17;
 constexpr std::uint32_t gpu_slots = 1u << 20;
 
-// Metres. Photons are gathered over the square of the radius, which must not round to nothing.
+// The least radius, in metres. Photons are gathered over its square, which must not round to zero.
 constexpr double least_photon_radius = 1e-15;
 
 std::uint32_t round_up(std::uint32_t value, std::uint32_t to) {
@@ -58,7 +59,7 @@ void Wavefront::create_tiles(int width, int height) {
   const auto rows = static_cast<std::uint32_t>(height);
   const std::uint32_t row_slots = round_up(columns, block_width) * block_height;
   const std::uint32_t most_rows = std::max(max_slots_ / row_slots * block_height, block_height);
-  // Bands of equal height, so that none is left with a few rows.
+  // The bands have equal height, so that none is left with a few rows.
   const std::uint32_t bands = (rows + most_rows - 1) / most_rows;
   const std::uint32_t band_rows = round_up((rows + bands - 1) / bands, block_height);
   for (std::uint32_t y = 0; y < rows; y += band_rows) {
@@ -116,7 +117,7 @@ void Wavefront::use_scene(Buffers scene, std::uint32_t features) {
 }
 
 void Wavefront::create_kernels(std::uint32_t features) {
-  features_.reset();  // until all are there, whatever is thrown on the way
+  features_.reset();  // stays empty if creating a kernel throws
   generate_ = Kernel(device_, "generate", generate_spv, {features});
   advance_ = Kernel(device_, "advance", advance_spv, {features});
   extend_ = Kernel(device_, "extend", extend_spv, {features});
@@ -165,8 +166,8 @@ void Wavefront::record_extension(const Recording& recording) {
 void Wavefront::record_batch(const Recording& recording, const gpu::GpuBatch& batch,
                              std::uint32_t max_depth) {
   generate_.dispatch(recording, slots_of(batch) * batch.samples);
-  // One segment a vertex, one more to meet light after the last vertex, and one because a fork
-  // goes on a round later than the path it parted from.
+  // There is one segment per vertex, one more to meet light after the last vertex, and one because
+  // a fork continues one round later than the path it split from.
   for (std::uint32_t segment = 0; segment < max_depth + 2; ++segment) {
     record_extension(recording);
     shade_.dispatch_indirect(recording, control_, offsetof(gpu::GpuControl, extend_groups));
@@ -176,7 +177,8 @@ void Wavefront::record_batch(const Recording& recording, const gpu::GpuBatch& ba
   accumulate_.dispatch(recording, batch.width * batch.height);
 }
 
-// Photons are paths of their own, before those of the sample. A fork goes on a round later.
+// Photons are paths of their own, traced before those of the sample. Here too a fork continues one
+// round later.
 void Wavefront::record_photons(const Recording& recording, std::uint32_t max_depth) {
   photons_.record_emission(recording);
   for (std::uint32_t segment = 0; segment < max_depth + 1; ++segment) {
@@ -207,16 +209,17 @@ bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::u
   return true;
 }
 
-// Of the picture's blocks, those that get the sample.
+// Returns the share of the picture's blocks that get the sample.
 double Wavefront::share_of(std::uint32_t sample) const {
   const auto first = std::ranges::upper_bound(sampled_until_, sample);
   return static_cast<double>(sampled_until_.end() - first) /
          static_cast<double>(sampled_until_.size());
 }
 
-// Sample by sample: each has photons of its own, which all tiles share. They cost the same however
-// few pixels look for them; so where a part of the picture is sampled, some samples share them. (As
-// many as make up a whole picture would leave the last photons with most of the weight.)
+// Renders sample by sample, since each sample has photons of its own, which all tiles share.
+// Photons cost the same however few pixels gather them, so where only a part of the picture is
+// still sampled, some samples share photons. (If a full picture's worth of samples shared them, the
+// last photons would carry most of the weight.)
 bool Wavefront::render_with_photons(std::uint32_t first_sample, std::uint32_t samples,
                                     std::uint32_t max_depth,
                                     const std::function<bool()>& cancelled) {

@@ -1,5 +1,6 @@
-// The path tracer's passes: generate, then extend, shade and shadow once a segment, then
-// accumulate. Paths are kept in compacted queues; a picture is worked on in tiles of whole rows.
+// Runs the path tracer's passes: generate, then extend, shade and shadow once per segment, then
+// accumulate (shaders/README.md, "The passes"). Paths are kept in compacted queues; a picture is
+// worked on in tiles of whole rows.
 #pragma once
 
 #include <cstdint>
@@ -16,18 +17,20 @@ namespace previz::render {
 
 class Wavefront {
  public:
-  // `paths_a_slot`: 2, or 3 where FEATURE_CAMERA may be asked for.
+  // `paths_a_slot` is 2, or 3 where FEATURE_CAMERA may be asked for.
   Wavefront(Device& device, int width, int height, std::uint32_t paths_a_slot);
 
-  // Traces in the scene that these buffers hold, which must stay where they are, with the pipelines
-  // for `features`.
+  // Uses the scene in these buffers, which must stay where they are, and the pipelines for
+  // `features`.
   void use_scene(Buffers scene, std::uint32_t features);
-  // Photons a pass and the radius (metres) of the first, where `features` has FEATURE_PHOTONS.
+  // Sets the photons per pass and the radius (metres) of the first pass; used where `features` has
+  // FEATURE_PHOTONS.
   void use_photons(std::uint32_t count, double radius);
   std::uint32_t most_photons() const { return slots_; }
-  // What the camera measured, row-major (CameraMap::upload), where `features` has FEATURE_CAMERA.
+  // Sets the camera's measurement, row-major (CameraMap::upload); used where `features` has
+  // FEATURE_CAMERA.
   void use_camera(const std::vector<glm::vec4>& plate);
-  // How many samples the pixels of each block of SAMPLED_BLOCK^2 get at most, row-major.
+  // Limits the number of samples for the pixels of each block of SAMPLED_BLOCK^2, row-major.
   void limit_samples(const std::vector<std::uint32_t>& limits);
   // Forgets all samples; every pixel is sampled again, without a limit.
   void clear();
@@ -37,7 +40,7 @@ class Wavefront {
   bool render(std::uint32_t first_sample, std::uint32_t samples, std::uint32_t max_depth,
               const std::function<bool()>& cancelled);
 
-  // What the picture's pixels have gathered, in tiles of whole rows from the top: GpuPixel[].
+  // The sums of the picture's pixels so far, in tiles of whole rows from the top: GpuPixel[].
   struct Sums {
     const Buffer& pixels;
     int first_row, rows;
@@ -47,15 +50,15 @@ class Wavefront {
 
  private:
   struct Tile {
-    gpu::GpuBatch batch;      // its rectangle
-    std::uint32_t limit = 0;  // the largest of its blocks'
+    gpu::GpuBatch batch;      // the tile's rectangle
+    std::uint32_t limit = 0;  // the largest limit of its blocks
     Buffer pixels;
   };
 
   void create_tiles(int width, int height);
   void create_paths();
   void create_kernels(std::uint32_t features);
-  Buffers buffers_of(const Tile& tile) const;  // of the scene and the maps, too
+  Buffers buffers_of(const Tile& tile) const;  // with the scene's and the maps'
   double share_of(std::uint32_t sample) const;
   bool render_with_photons(std::uint32_t first_sample, std::uint32_t samples,
                            std::uint32_t max_depth, const std::function<bool()>& cancelled);
@@ -70,10 +73,10 @@ class Wavefront {
   int width_, height_;
   PhotonMap photons_;
   CameraMap camera_;
-  std::vector<std::uint32_t> sampled_until_;  // the limits of all blocks, least first
-  double photon_radius_ = 0;                  // metres, of the first sample
-  double traced_radius_ = 0;                  // and of the photons that there are
-  double photons_owed_ = 0;                   // passes: at 1 they are traced anew
+  std::vector<std::uint32_t> sampled_until_;  // the limits of all blocks, sorted, least first
+  double photon_radius_ = 0;                  // metres; of the first sample
+  double traced_radius_ = 0;                  // metres; of the current photons
+  double photons_owed_ = 0;                   // passes; photons are traced anew at 1
   Buffers scene_;
   std::vector<Tile> tiles_;
   std::optional<std::uint32_t> features_;  // of the kernels, once they are made

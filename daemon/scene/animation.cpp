@@ -8,7 +8,7 @@
 namespace previz::scene {
 namespace {
 
-// The keys that a time lies between, and how far it has gone from one to the next.
+// The keys on either side of a time, and how far the time has moved from one to the next.
 struct Segment {
   std::size_t before = 0, after = 0;
   double part = 0;        // 0..1
@@ -25,7 +25,7 @@ Segment segment_at(const AnimationChannel& channel, double time_s) {
   return {after - 1, after, (time_s - times[after - 1]) / duration, duration};
 }
 
-// glTF 2.0, C.5: Hermite's spline with tangents per second.
+// Interpolates by a Hermite spline with tangents per second (glTF 2.0, C.5).
 glm::dvec4 cubic(const AnimationChannel& channel, const Segment& s) {
   const auto at = [&](std::size_t key, std::size_t part) { return channel.values[3 * key + part]; };
   if (s.before == s.after) return at(s.before, 1);

@@ -16,8 +16,8 @@ std::uint32_t chunk_length(const char* bytes) {
   return value;
 }
 
-// The JSON of a glTF 2.0 file: the whole of a .gltf, the first chunk of a .glb (12 bytes of header,
-// then the chunk's length and type).
+// Returns the JSON of a glTF 2.0 file: the whole of a .gltf, the first chunk of a .glb (12 bytes of
+// header, then the chunk's length and type).
 std::string gltf_json(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   std::array<char, 20> header{};

@@ -1,4 +1,4 @@
-// The files that a set needs beside it.
+// Lists the files that a set refers to.
 #pragma once
 
 #include <filesystem>
@@ -10,8 +10,9 @@
 
 namespace previz::scene {
 
-// Every file that the set names, as it writes it and where it is. Throws previz::Error for a glTF
-// file that itself refers to further files, which a session could not hold.
+// Returns every file that the set names: the name as written in the set, and the path. Throws
+// previz::Error for a glTF file that itself refers to further files, which a session could not
+// hold.
 std::vector<std::pair<std::string, std::filesystem::path>> assets_of(const set::Set& set);
 
 }  // namespace previz::scene

@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::uint32_t records_per_block = 8;
 constexpr float largest_coordinate = 1e20f;
-constexpr std::size_t most_triangles = 1u << 24;  // a hit's primitive has 24 bits
+constexpr std::size_t most_triangles = 1u << 24;  // the primitive of a hit is stored in 24 bits
 
 struct Triangles {
   std::vector<std::array<glm::vec3, 3>> corners;
@@ -82,7 +82,8 @@ Record space_record(const glm::dmat4& grid_from_world, std::uint32_t first_recor
   return record;
 }
 
-// The wide tree of the chosen quality; the balanced one should that be too deep for the stack.
+// Returns the wide tree of the chosen quality, or the balanced one if that would be too deep for
+// the traversal stack.
 WideTree make_tree(std::span<const Aabb> boxes, BvhQuality quality, const SplitPrimitive& split,
                    const std::function<Record(std::uint32_t)>& leaf, std::uint32_t most_levels) {
   WideTree tree = make_wide_tree(build_binary_tree(boxes, quality, split), leaf);
@@ -100,8 +101,8 @@ glm::dmat4 uniform_scale(double scale) {
   return result;
 }
 
-// Rounding of the ray on its way into an instance, as a share of the coordinates, may take a hit
-// this far out of the box.
+// Pads a box by the rounding error of a ray that is transformed into an instance, a share of the
+// coordinates, which may move a hit out of the box.
 Aabb padded(const Aabb& box) {
   const auto margin = static_cast<float>(extent_of(box) * std::ldexp(1.0, -20));
   return {box.low - margin, box.high + margin};
@@ -123,7 +124,7 @@ MeshBvh build_mesh_bvh(const Mesh& mesh, BvhQuality quality) {
 
   const float scale = std::ldexp(1.0f, bvh.grid_exponent);
   for (auto& corners : triangles.corners)
-    for (glm::vec3& p : corners) p *= scale;  // exact
+    for (glm::vec3& p : corners) p *= scale;  // exact: a power of two
   const std::vector<TrianglePair> pairs = make_pairs(triangles.corners, triangles.primitives);
   std::vector<Aabb> boxes;
   boxes.reserve(pairs.size());
@@ -141,7 +142,8 @@ MeshBvh build_mesh_bvh(const Mesh& mesh, BvhQuality quality) {
   return bvh;
 }
 
-// One block for the record where rays start, one for the root, one for each node's children.
+// There is one block for the record where rays start, one for the root, and one for each node's
+// children.
 std::size_t top_bvh_texels(std::size_t instance_count) {
   return (instance_count + 2) * records_per_block * texels_per_record;
 }

@@ -1,15 +1,15 @@
-// Two-level bounding volume hierarchy for shaders/lib/trace.glsl: Embree builds, we collapse to
-// eight-wide quantised nodes after Ylitie, Karras, Laine, "Efficient Incoherent Ray Traversal on
-// GPUs Through Compressed Wide BVHs" (HPG 2017). Objects move by rebuilding the small top level.
+// Builds the two-level bounding volume hierarchy for shaders/lib/trace.glsl: Embree builds binary
+// trees, which we collapse to eight-wide quantised nodes after Ylitie, Karras, Laine, "Efficient
+// Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs" (HPG 2017). Objects move by
+// rebuilding the small top level (shaders/README.md, "Rays").
 //
 // Everything is a record of 64 bytes, four RGBA32UI texels (shaders/lib/shared.h): a node, a leaf
 // of up to two triangles that share an edge, or an instance. The one buffer that the shader reads
-// is the top level followed by the meshes:
+// is the top level followed by the meshes. To build it:
 //
-//   std::vector<glm::uvec4> texels(top_bvh_texels(instance_count));    // reserved for the top
-//   level for each mesh: first_record = texels.size() / texels_per_record; append its
-//   MeshBvh::texels overwrite the front with build_top_bvh(...).texels, now and whenever an
-//   instance has moved
+//   1. Reserve the top: std::vector<glm::uvec4> texels(top_bvh_texels(instance_count)).
+//   2. For each mesh: first_record = texels.size() / texels_per_record; append MeshBvh::texels.
+//   3. Overwrite the front with build_top_bvh(...).texels, now and whenever an instance moves.
 #pragma once
 
 #include <cstddef>
@@ -31,25 +31,27 @@ struct Aabb {
   glm::vec3 high{-1e30f};
 };
 
-// The bottom level of one mesh. Position independent: indices inside are relative to its start.
+// The bottom level of one mesh. It is position independent: indices inside it are relative to its
+// start.
 struct MeshBvh {
   std::vector<glm::uvec4> texels;  // whole records, in blocks of eight
   Aabb bounds;                     // object space; empty where the mesh has no triangle
   int grid_exponent = 0;           // the tree is in grid space = object space * 2^exponent
   double sah_cost = 0;             // expected records visited by a ray that meets the bounds
   std::uint32_t depth = 0;         // levels of nodes, at most gpu::MESH_BVH_DEPTH
-  std::uint32_t leaves = 0;        // pairs and single triangles, split references counted
-  // Zero area, a bad index, or a coordinate that is not finite or past 1e20: never traced.
+  std::uint32_t leaves = 0;        // pairs and single triangles; split references count each
+  // Triangles of zero area, with a bad index, or with a coordinate that is not finite or past 1e20.
+  // They are never traced.
   std::uint32_t dropped_triangles = 0;
 };
 
-// Embree's Morton, binned SAH, and binned SAH with spatial splits.
+// The qualities are Embree's Morton, binned SAH, and binned SAH with spatial splits.
 enum class BvhQuality { low, medium, high };
 
-// Same input, same bytes. Throws previz::Error past 2^24 triangles.
+// The same input gives the same bytes. Throws previz::Error past 2^24 triangles.
 MeshBvh build_mesh_bvh(const Mesh& mesh, BvhQuality quality = BvhQuality::medium);
 
-// One instance for the top level; the hit names it by its place in the span given.
+// One instance of the top level; a hit identifies it by its index in the span given.
 struct TopInstance {
   const MeshBvh* mesh = nullptr;
   std::uint32_t first_record = 0;       // where the mesh's records start in the whole buffer
@@ -62,11 +64,11 @@ struct TopBvh {
   std::uint32_t dropped_instances = 0;  // not invertible or not finite; empty meshes do not count
 };
 
-// Texels that the top level over so many instances takes, whatever their places.
+// Returns how many texels the top level over this many instances takes, wherever they are.
 std::size_t top_bvh_texels(std::size_t instance_count);
 TopBvh build_top_bvh(std::span<const TopInstance> instances);
 
-// World bounds of an instance (conservative for any affine transform).
+// Returns the world bounds of an instance (conservative for any affine transform).
 Aabb transform_bounds(const Aabb& object_bounds, const glm::dmat4& world_from_object);
 
 }  // namespace previz::scene

@@ -14,10 +14,10 @@
 namespace previz::scene {
 namespace {
 
-// What Embree's callbacks allocate; freed with Embree's tree.
+// A node that Embree's callbacks allocate; it is freed with Embree's tree.
 struct BuiltNode {
   BuiltNode* children[2];
-  RTCBuildPrimitive* primitives;  // of a leaf, else null
+  RTCBuildPrimitive* primitives;  // of a leaf; null for an inner node
   std::size_t count;
 };
 
@@ -48,7 +48,7 @@ void set_children(void* node, void** children, unsigned count, void*) {
     static_cast<BuiltNode*>(node)->children[i] = static_cast<BuiltNode*>(children[i]);
 }
 
-void ignore_bounds(void*, const RTCBounds**, unsigned, void*) {}  // they follow from the leaves
+void ignore_bounds(void*, const RTCBounds**, unsigned, void*) {}  // computed from the leaves later
 
 void split_primitive(const RTCBuildPrimitive* primitive, unsigned axis, float position,
                      RTCBounds* left, RTCBounds* right, void* user) {
@@ -130,7 +130,7 @@ std::vector<BinaryNode> build_binary_tree(std::span<const Aabb> boxes, BvhQualit
   for (std::uint32_t i = 0; i < boxes.size(); ++i)
     primitives[i] = {boxes[i].low.x,  boxes[i].low.y,  boxes[i].low.z,  0,
                      boxes[i].high.x, boxes[i].high.y, boxes[i].high.z, i};
-  // Room for the references that spatial splits add.
+  // The array needs room for the references that spatial splits add.
   if (quality == BvhQuality::high) primitives.resize(boxes.size() * 2);
 
   const DevicePtr device(rtcNewDevice(nullptr), rtcReleaseDevice);
@@ -151,7 +151,7 @@ std::vector<BinaryNode> build_binary_tree(std::span<const Aabb> boxes, BvhQualit
   arguments.splitPrimitive = split_primitive;
   arguments.userPtr = const_cast<SplitPrimitive*>(&split);
   const auto* root = static_cast<const BuiltNode*>(rtcBuildBVH(&arguments));
-  // Embree gives up on trees that grow too deep; such a scene still has to be drawn.
+  // Embree fails on trees that grow too deep, but such a scene still has to be drawn.
   if (root == nullptr) {
     if (rtcGetDeviceError(device.get()) == RTC_ERROR_OUT_OF_MEMORY)
       throw Error("scene: out of memory while building a BVH over " + std::to_string(boxes.size()) +

@@ -1,5 +1,5 @@
-// A binary tree over boxes, one box a leaf: what the wide tree is collapsed from. Internal to the
-// scene room.
+// Builds a binary tree over boxes, one box per leaf, from which the wide tree is collapsed. It is
+// internal to the scene room.
 #pragma once
 
 #include <cstdint>
@@ -17,23 +17,24 @@ struct BinaryNode {
   std::uint32_t primitive = 0;        // of a leaf
 };
 
-// Bounds of the parts of a primitive, as far as it lies in `bounds`, on either side of a plane.
+// Computes the bounds of the two parts of a primitive, clipped to `bounds`, on either side of a
+// plane.
 using SplitPrimitive = std::function<void(std::uint32_t primitive, const Aabb& bounds, int axis,
                                           float position, Aabb& left, Aabb& right)>;
 
-// Nodes in depth-first order, the root first. High quality may split primitives, which then are in
-// several leaves. `boxes` must not be empty. Throws previz::Error if Embree fails.
+// Returns the nodes in depth-first order, the root first. High quality may split primitives, which
+// are then in several leaves. `boxes` must not be empty. Throws previz::Error if Embree fails.
 std::vector<BinaryNode> build_binary_tree(std::span<const Aabb> boxes, BvhQuality quality,
                                           const SplitPrimitive& split);
 
-// Median splits: no thought for cost, but as shallow as can be.
+// Builds a tree by median splits: it ignores cost but is as shallow as possible.
 std::vector<BinaryNode> build_balanced_tree(std::span<const Aabb> boxes);
 
 inline Aabb merged(const Aabb& a, const Aabb& b) {
   return {glm::min(a.low, b.low), glm::max(a.high, b.high)};
 }
 
-// Half the surface area.
+// Returns half the surface area.
 inline double half_area(const Aabb& box) {
   const glm::dvec3 size = glm::dvec3(box.high) - glm::dvec3(box.low);
   return size.x * size.y + size.y * size.z + size.z * size.x;

@@ -20,7 +20,7 @@ bool before(const glm::vec3& a, const glm::vec3& b) {
   return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
 }
 
-// A number a place: equal positions, equal numbers (-0 is 0).
+// Numbers the places: equal positions have equal numbers (-0 equals 0).
 std::vector<std::array<std::uint32_t, 3>> places_of(std::span<const Corners> corners) {
   std::vector<std::uint32_t> order(corners.size() * 3);
   std::iota(order.begin(), order.end(), 0u);
@@ -44,7 +44,7 @@ Aabb bounds_of_triangle(const Corners& corners) {
 
 // Side k of a triangle goes from corner k to corner k + 1.
 struct Side {
-  std::uint64_t places = 0;  // both ends, the lower first
+  std::uint64_t places = 0;  // numbers of both ends, the lower first
   std::uint32_t triangle = 0;
   std::uint8_t side = 0;
   bool forward = false;  // from the lower place to the higher
@@ -79,7 +79,7 @@ std::vector<Candidate> candidates_of(std::span<const Corners> corners) {
   const std::vector<Side> sides = sides_of(corners);
   std::vector<Candidate> candidates;
   candidates.reserve(corners.size() * 3 / 2);
-  // Where more than two triangles meet in an edge, neighbours in the list are tried.
+  // Where more than two triangles meet in an edge, only neighbours in the list are tried.
   for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
     const Side& a = sides[i];
     const Side& b = sides[i + 1];
@@ -98,7 +98,7 @@ std::vector<Candidate> candidates_of(std::span<const Corners> corners) {
   return candidates;
 }
 
-// The convex polygon of a triangle inside one side of a plane adds to `box`.
+// Extends `box` by the part of a triangle that lies on one side of a plane, a convex polygon.
 void add_clipped(const Corners& corners, int axis, float position, bool keep_low, Aabb& box) {
   for (int i = 0; i < 3; ++i) {
     const glm::vec3& a = corners[i];

@@ -1,5 +1,5 @@
-// The leaves of a mesh's tree: triangles joined by twos along an edge, where that makes one box no
-// worse than two. Internal to the scene room.
+// Makes the leaves of a mesh's tree: triangles are joined in pairs along an edge where one box is
+// no worse than two. It is internal to the scene room.
 #pragma once
 
 #include <array>
@@ -12,8 +12,8 @@
 
 namespace previz::scene {
 
-// Triangles (v0, v1, v2) and (v0, v2, v3); v3 = v2 where there is only the first. A triangle's
-// vertices are its primitive's corners turned left `rotation` times.
+// A pair is the triangles (v0, v1, v2) and (v0, v2, v3); v3 = v2 where there is only the first. A
+// triangle's vertices are its primitive's corners rotated left `rotation` times.
 struct TrianglePair {
   std::array<glm::vec3, 4> vertices;
   std::array<std::uint32_t, 2> primitives{};
@@ -22,11 +22,13 @@ struct TrianglePair {
 
 Aabb bounds_of(const TrianglePair& pair);
 
-// Bounds of the parts of the pair inside `bounds` on either side of the plane, slightly enlarged.
+// Computes the bounds of the parts of the pair inside `bounds` on either side of the plane,
+// slightly enlarged.
 void split_pair(const TrianglePair& pair, const Aabb& bounds, int axis, float position, Aabb& left,
                 Aabb& right);
 
-// `corners` are positions, `primitives` their index in the mesh; vertices at one place are one.
+// `corners` are the positions of triangles, `primitives` the triangles' indices in the mesh.
+// Vertices at the same position count as one.
 std::vector<TrianglePair> make_pairs(std::span<const std::array<glm::vec3, 3>> corners,
                                      std::span<const std::uint32_t> primitives);
 

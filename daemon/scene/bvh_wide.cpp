@@ -11,8 +11,8 @@ namespace {
 
 constexpr int branches = 8;
 
-// Least cost of covering a binary subtree by at most k wide subtrees, k = 1..8 (Ylitie et al.,
-// section 3.1). A node and a leaf both cost one visit, times the chance of meeting their box.
+// The least cost of covering a binary subtree by at most k wide subtrees, k = 1..8 (Ylitie et al.,
+// section 3.1). A node and a leaf both cost one visit, times the probability of hitting their box.
 struct Cover {
   std::array<float, branches + 1> cost{};
   std::array<std::uint8_t, branches + 1> left{};  // subtrees given to the left child; 0: one node
@@ -44,7 +44,7 @@ std::vector<Cover> cover(std::span<const BinaryNode> binary) {
     for (int k = 2; k <= branches; ++k)
       divided[k] = cheapest_split(covers[node.left], covers[node.right], k, split[k]);
     c.cost[1] = area + divided[branches];
-    c.left[1] = split[branches];  // how its own children are divided, should it be a wide node
+    c.left[1] = split[branches];  // how the children are divided if this becomes a wide node
     for (int k = 2; k <= branches; ++k) {
       c.cost[k] = std::min(divided[k], c.cost[1]);
       c.left[k] = divided[k] < c.cost[1] ? split[k] : std::uint8_t{0};
@@ -107,8 +107,8 @@ class Collapse {
     tree_.sah_cost += root_area_ > 0 ? half_area(binary_[node].bounds) / root_area_ : 1;
   }
 
-  // Which child goes into which slot: of all pairs, the one that lies most towards the slot's
-  // octant first (greedy form of the paper's assignment).
+  // Assigns children to slots: repeatedly the pair of child and slot whose child lies farthest
+  // towards the slot's octant (greedy form of the paper's assignment).
   std::array<std::uint32_t, branches> assign_slots(std::span<const std::uint32_t> children,
                                                    const Aabb& bounds) const {
     const glm::vec3 middle = bounds.low + bounds.high;
@@ -202,7 +202,8 @@ int grid_exponent(double extent) {
   if (extent <= 0) return 0;
   int exponent = 0;
   std::frexp(extent, &exponent);  // extent < 2^exponent
-  // Beyond these the squared length of a direction in grid space leaves the range of a float.
+  // Beyond these exponents the squared length of a direction in grid space leaves the range of a
+  // float.
   return std::clamp(23 - exponent, -48, 48);
 }
 

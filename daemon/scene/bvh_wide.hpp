@@ -1,5 +1,5 @@
-// Collapses a binary tree to the eight-wide one of least cost and encodes it. Internal to the scene
-// room.
+// Collapses a binary tree to the eight-wide tree of least cost and encodes it. It is internal to
+// the scene room.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace previz::scene {
 
-// Four texels as sixteen words; the layout is in shaders/lib/shared.h.
+// A record is four texels as sixteen words; the layout is in shaders/lib/shared.h.
 using Record = std::array<std::uint32_t, 16>;
 
 struct WideTree {
@@ -22,11 +22,12 @@ struct WideTree {
   std::uint32_t leaves = 0;
 };
 
-// `leaf` gives a primitive's record. The binary tree is in grid space: integers of at most 2^23.
+// `leaf` returns a primitive's record. The binary tree must be in grid space: integers of at most
+// 2^23.
 WideTree make_wide_tree(std::span<const BinaryNode> binary,
                         const std::function<Record(std::uint32_t primitive)>& leaf);
 
-// Exponent e such that coordinates of at most `extent`, times 2^e, stay below 2^23.
+// Returns an exponent e such that coordinates of at most `extent`, times 2^e, stay below 2^23.
 int grid_exponent(double extent);
 
 void append_texels(std::vector<glm::uvec4>& texels, std::span<const Record> records);

@@ -64,7 +64,7 @@ struct GltfFile::Loader {
   Notes notes;
   tinygltf::Model model;
   GltfMaterials materials;
-  std::map<MeshSource, std::optional<std::uint32_t>> meshes;  // nothing: empty
+  std::map<MeshSource, std::optional<std::uint32_t>> meshes;  // nothing for an empty mesh
 };
 
 void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index) {

@@ -1,4 +1,4 @@
-// One glTF 2.0 file, read once and put into the scene for every object that names it.
+// Reads one glTF 2.0 file once and puts it into the scene for every object that names it.
 #pragma once
 
 #include <cstdint>
@@ -18,17 +18,17 @@ inline constexpr glm::dmat4 z_up_from_y_up{1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 
 class GltfFile {
  public:
   // Meshes, materials, textures, instances and lights go into `scene`, each once, when first
-  // needed. Throws previz::Error naming the file where it cannot be read.
+  // needed. Throws previz::Error naming the file if the file cannot be read.
   GltfFile(const std::filesystem::path& file, Scene& scene, Budget& budget);
   ~GltfFile();
 
-  // Puts the nodes that the object asks for, and what hangs below them, into the scene as instances
-  // and lights of set object `index`. Throws previz::Error where the object asks for a node that
-  // the file's scene lacks (naming the nearest that it has), where the nodes are no tree, and where
-  // accessors, indices or images are out of range.
+  // Puts the nodes that the object asks for, and their descendants, into the scene as instances and
+  // lights of set object `index`. Throws previz::Error where the object asks for a node that the
+  // file's scene lacks (naming the most similar name that it has), where the nodes are no tree,
+  // and where accessors, indices or images are out of range.
   void add(const set::Object& object, std::uint32_t index);
 
-  // What was left out or not understood so far, ready to print.
+  // Returns what was left out or not understood so far, ready to print.
   std::vector<std::string> notes() const;
 
  private:

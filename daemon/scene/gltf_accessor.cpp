@@ -85,7 +85,7 @@ const tinygltf::Accessor& checked(const tinygltf::Model& model, int index,
   return model.accessors[static_cast<std::size_t>(index)];
 }
 
-// The part of a view that holds `count` elements of `size` bytes, `stride` apart.
+// Returns the part of a view that holds `count` elements of `size` bytes, `stride` apart.
 const unsigned char* elements(std::span<const unsigned char> bytes, std::uint64_t offset,
                               std::uint64_t count, std::size_t size, std::size_t stride,
                               const std::string& where) {

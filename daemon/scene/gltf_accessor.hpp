@@ -1,6 +1,6 @@
-// The numbers of a glTF accessor: every component type, normalised integers, strides and sparse
-// accessors (glTF 2.0, 3.6.2; KHR_mesh_quantization). Everything is checked against the buffers
-// before it is read; `where` begins the message of the previz::Error thrown.
+// Reads the numbers of a glTF accessor: every component type, normalised integers, strides and
+// sparse accessors (glTF 2.0, 3.6.2; KHR_mesh_quantization). Everything is checked against the
+// buffers before it is read; `where` begins the message of the previz::Error thrown.
 #pragma once
 
 #include <tiny_gltf.h>
@@ -26,7 +26,7 @@ std::vector<float> read_scalars(const tinygltf::Model& model, int accessor,
 std::vector<std::uint32_t> read_indices(const tinygltf::Model& model, int accessor,
                                         const std::string& where);
 
-// Number of elements, without reading them.
+// Returns the number of elements, without reading them.
 std::uint64_t element_count(const tinygltf::Model& model, int accessor, const std::string& where);
 
 std::span<const unsigned char> view_bytes(const tinygltf::Model& model, int buffer_view,

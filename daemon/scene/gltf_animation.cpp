@@ -100,7 +100,7 @@ GltfAnimation::GltfAnimation(const tinygltf::Model& model, const std::string& na
 void GltfAnimation::read_channel(const tinygltf::Animation& animation,
                                  const tinygltf::AnimationChannel& given,
                                  const std::string& where) {
-  if (given.target_node < 0) return;  // glTF 2.0, 3.11: to be ignored
+  if (given.target_node < 0) return;  // such a channel is ignored (glTF 2.0, 3.11)
   if (place(given.target_node) >= moved_.size())
     throw Error(where + ": there is no node " + std::to_string(given.target_node));
   const tinygltf::Node& node = model_.nodes[place(given.target_node)];
@@ -134,7 +134,7 @@ void GltfAnimation::find_parents() {
     }
 }
 
-// Each node is looked at once: up to one that is known, and down again.
+// Visits each node once: climbs to an ancestor whose state is known, and goes back down.
 void GltfAnimation::find_moved() {
   std::vector<bool> is_known(parents_.size());
   std::vector<int> path;
@@ -158,7 +158,7 @@ std::uint32_t GltfAnimation::use(int node, std::vector<AnimatedNode>& nodes) {
 }
 
 std::uint32_t GltfAnimation::take_up(int node, std::vector<AnimatedNode>& nodes) {
-  std::vector<int> path;  // from the node up to the first that is there already, or a root
+  std::vector<int> path;  // the node and its ancestors that are not in the list yet
   for (int at = node; at >= 0 && taken_up_[place(at)] == no_node; at = parents_[place(at)])
     path.push_back(at);
   for (auto at = path.rbegin(); at != path.rend(); ++at) {

@@ -1,4 +1,4 @@
-// An animation of a glTF file by its name (glTF 2.0, 3.11).
+// Reads an animation of a glTF file by its name (glTF 2.0, 3.11).
 #pragma once
 
 #include <tiny_gltf.h>
@@ -11,18 +11,18 @@
 
 namespace previz::scene {
 
-// The animated nodes of one object, taken up as they are used.
+// Reads one animation and adds the nodes that it moves to an object's list as they are used.
 class GltfAnimation {
  public:
-  // Throws previz::Error naming `file` where there is no animation of this name (and the nearest
-  // that is there), or its keys cannot be understood. Channels that move no node's place (morph
-  // weights) are noted and left out.
+  // Throws previz::Error naming `file` and the most similar name if there is no animation of this
+  // name, or if its keys cannot be understood. Channels that do not move a node (morph weights)
+  // are noted and left out.
   GltfAnimation(const tinygltf::Model& model, const std::string& name, const std::string& file,
                 Notes& notes);
 
   double duration_s() const { return duration_s_; }
-  // Index in `nodes` of a node that the animation moves, itself or with one above it: taken up with
-  // all above it where it is not there yet. no_node: it stands still.
+  // Returns the index in `nodes` of a node that moves, by itself or with an ancestor; the node and
+  // its ancestors are added if they are not there yet. Returns no_node if the node stands still.
   std::uint32_t use(int node, std::vector<AnimatedNode>& nodes);
 
  private:
@@ -36,10 +36,10 @@ class GltfAnimation {
   std::string file_;
   Notes& notes_;
   double duration_s_ = 0;
-  // Of every node of the file.
+  // These arrays have one entry per node of the file.
   std::vector<int> parents_;  // -1: a root
   std::vector<AnimatedNode> moved_;
-  std::vector<bool> is_moved_;  // itself, or one above it
+  std::vector<bool> is_moved_;  // the node or an ancestor
   std::vector<std::uint32_t> taken_up_;
 };
 

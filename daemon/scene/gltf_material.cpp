@@ -13,7 +13,7 @@ namespace previz::scene {
 namespace {
 
 constexpr double max_radiance = 1e30;
-constexpr double max_distance_m = 1e15;  // beyond, nothing is attenuated
+constexpr double max_distance_m = 1e15;  // attenuation is negligible beyond this
 
 template <typename TextureInfo>
 UvMapping mapping_of(const TextureInfo& texture, const std::string& what, Notes& notes) {
@@ -28,7 +28,8 @@ UvMapping mapping_of(const TextureInfo& texture, const std::string& what, Notes&
   const std::vector<double> scale = numbers(transform, "scale", {1, 1});
   const double rotation = number(transform, "rotation", 0);
   const double c = std::cos(rotation), s = std::sin(rotation);
-  // Counter-clockwise as seen with v downwards: the extension's example, and what viewers do.
+  // The rotation is counter-clockwise as seen with v downwards, as in the extension's example and
+  // in other viewers.
   mapping.affine = {c * scale[0], s * scale[1], offset[0], -s * scale[0], c * scale[1], offset[1]};
   for (const double value : mapping.affine)
     if (!std::isfinite(value)) throw Error(what + ": its texture transform is not finite");
@@ -115,7 +116,7 @@ UsedMaterial GltfMaterials::read(const tinygltf::Material& given, const std::str
 void GltfMaterials::read_extensions(const tinygltf::Material& given, const std::string& what,
                                     Material& material) {
   const tinygltf::Value ior = extension(given.extensions, "KHR_materials_ior");
-  // An ior of 0 stands for a Fresnel term of 1, for old specular-glossiness assets.
+  // An ior of 0 stands for a Fresnel term of 1 and is there for old specular-glossiness assets.
   material.ior = within(number(ior, "ior", 1.5), 1, 100, what + ": ior", notes_);
 
   const tinygltf::Value specular = extension(given.extensions, "KHR_materials_specular");

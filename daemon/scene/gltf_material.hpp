@@ -1,4 +1,5 @@
-// glTF materials: metallic-roughness and the KHR_materials_* extensions of scene.hpp's Material.
+// Reads glTF materials: metallic-roughness and the KHR_materials_* extensions that scene.hpp's
+// Material has.
 #pragma once
 
 #include <tiny_gltf.h>
@@ -14,16 +15,16 @@
 
 namespace previz::scene {
 
-// A material in the scene, and how the meshes it is put on must make their texture coordinates. A
-// mesh has one set of coordinates: textures that are mapped otherwise than the first (base colour,
-// metallic-roughness, emission, normal, in this order) are left out with a note.
+// A material in the scene, and how a mesh that uses it must transform its texture coordinates. A
+// mesh has one set of coordinates: textures whose mapping differs from that of the first (base
+// colour, metallic-roughness, emission, normal, in this order) are left out with a note.
 struct UsedMaterial {
   std::uint32_t index = 0;  // in Scene::materials
   UvMapping mapping;
   bool is_textured = false;
 };
 
-// Materials of one file, each made when first used.
+// Holds the materials of one file, each created when first used.
 class GltfMaterials {
  public:
   GltfMaterials(const tinygltf::Model& model, std::string file, Scene& scene, Notes& notes,
@@ -34,8 +35,8 @@ class GltfMaterials {
         notes_(notes),
         textures_(model, std::move(file), scene, notes, budget) {}
 
-  // -1 is glTF's default material. Throws previz::Error where there is no such material, texture
-  // or image.
+  // Material -1 is glTF's default. Throws previz::Error if the material, its texture or an image
+  // does not exist.
   UsedMaterial use(int material);
 
  private:

@@ -12,7 +12,7 @@
 namespace previz::scene {
 namespace {
 
-// Squares and products of coordinates stay finite in single precision.
+// Up to this coordinate, squares and products stay finite in single precision.
 constexpr float max_coordinate = 1e15f;
 constexpr std::uint32_t unused = 0xffffffffu;
 
@@ -20,7 +20,7 @@ std::string count_of(std::uint64_t count, const std::string& one, const std::str
   return std::to_string(count) + " " + (count == 1 ? one : many);
 }
 
-// Triangles of a list, strip or fan in the order and winding of glTF 2.0, 3.7.2.1.
+// Returns the triangles of a list, strip or fan in the order and winding of glTF 2.0, 3.7.2.1.
 std::vector<glm::uvec3> triangulate(const std::vector<std::uint32_t>& indices, int mode) {
   std::vector<glm::uvec3> triangles;
   if (indices.size() < 3) return triangles;
@@ -63,7 +63,7 @@ std::vector<glm::uvec3> read_triangles(const tinygltf::Model& model, const MeshS
   return triangulate(indices, source.mode);
 }
 
-// Twice the area, on the side of counter-clockwise winding.
+// Returns the normal on the side of counter-clockwise winding; its length is twice the area.
 glm::dvec3 area_normal(const std::vector<glm::vec3>& positions, const glm::uvec3& triangle) {
   const glm::dvec3 a = positions[triangle.x];
   return glm::cross(glm::dvec3(positions[triangle.y]) - a, glm::dvec3(positions[triangle.z]) - a);
@@ -93,7 +93,7 @@ void drop_bad_triangles(Mesh& mesh, const std::string& what, Notes& notes) {
               " no area; dropped");
 }
 
-// Every corner its own vertex.
+// Gives every corner of a triangle a vertex of its own.
 void split_corners(Mesh& mesh) {
   std::vector<glm::vec3> positions;
   std::vector<glm::vec2> uvs;
@@ -141,8 +141,8 @@ void set_flat_normals(Mesh& mesh) {
   }
 }
 
-// Makes normals unit, and puts right those that are no direction or that point to the back of every
-// triangle around: the winding says which side is the front.
+// Normalises the normals, and repairs those that have no direction or that point to the back of
+// every adjacent triangle: the winding says which side is the front.
 void repair_normals(Mesh& mesh, const std::string& what, Notes& notes) {
   struct Around {
     glm::dvec3 sum{0}, any{0};

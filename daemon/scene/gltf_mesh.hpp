@@ -1,4 +1,4 @@
-// One glTF primitive as a mesh: triangulated, cleaned, with normals (glTF 2.0, 3.7.2).
+// Reads one glTF primitive as a mesh: triangulated, cleaned, with normals (glTF 2.0, 3.7.2).
 #pragma once
 
 #include <tiny_gltf.h>
@@ -13,15 +13,15 @@
 
 namespace previz::scene {
 
-// Which TEXCOORD_n a material reads and how it is transformed (KHR_texture_transform):
-// (u', v') = (a u + b v + c, d u + e v + f).
+// The TEXCOORD_n that a material reads, and its transform (KHR_texture_transform): (u', v') = (a u
+// + b v + c, d u + e v + f).
 struct UvMapping {
   int set = 0;
   std::array<double, 6> affine{1, 0, 0, 0, 1, 0};
   auto operator<=>(const UvMapping&) const = default;
 };
 
-// All that a mesh is made of: primitives with equal sources are the same mesh.
+// Everything that a mesh is made of: primitives with equal sources are the same mesh.
 struct MeshSource {
   int positions = -1, normals = -1, uvs = -1, indices = -1;  // accessors; -1: none
   int mode = TINYGLTF_MODE_TRIANGLES;
@@ -31,9 +31,9 @@ struct MeshSource {
 
 MeshSource mesh_source(const tinygltf::Primitive& primitive, const UvMapping& mapping);
 
-// Nothing where no triangle is left; what was dropped is in the notes. `where` names file, mesh and
-// primitive and begins the message of the previz::Error thrown for indices and accessors out of
-// range; `what` does the same, without the file, in notes.
+// Returns nothing if no triangle is left; what was dropped is in the notes. `where` names file,
+// mesh and primitive and begins the message of the previz::Error thrown for indices and accessors
+// out of range; `what` names mesh and primitive for the notes.
 std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& source,
                               const std::string& where, const std::string& what, Notes& notes,
                               Budget& budget);

@@ -37,7 +37,7 @@ std::vector<int> root_nodes(const tinygltf::Model& model, const std::string& fil
 
 }  // namespace
 
-// A matrix, or translation * rotation * scale.
+// A node has a matrix, or translation * rotation * scale.
 NodeTransform transform_of(const tinygltf::Node& node, const std::string& where) {
   const auto has = [&](const std::vector<double>& values, std::size_t count) {
     if (values.empty()) return false;
@@ -76,7 +76,7 @@ std::vector<PlacedNode> place_nodes(const tinygltf::Model& model,
                                     const std::vector<std::string>& names, const std::string& file,
                                     Notes& notes) {
   struct Visit {
-    PlacedNode placed;  // its matrix is the parent's until it is visited
+    PlacedNode placed;  // file_from_node is the parent's until the node is visited
     bool is_wanted;
   };
   std::vector<Visit> to_visit;

@@ -1,4 +1,4 @@
-// The node hierarchy of a glTF file as a flat list with world matrices (glTF 2.0, 3.5.3).
+// Flattens the node hierarchy of a glTF file to a list with world matrices (glTF 2.0, 3.5.3).
 #pragma once
 
 #include <tiny_gltf.h>
@@ -18,23 +18,23 @@ struct PlacedNode {
   glm::dmat4 file_from_node{1.0};
 };
 
-// Nodes of the default scene (else the first, else all roots), parents before children, those of
-// `names` with what hangs below them, or all where `names` is empty. Throws previz::Error naming
-// `file` where the nodes are no tree or a name is not there.
+// Returns nodes of the default scene (or the first, or all roots), parents before children: the
+// nodes called `names` with their descendants, or all nodes where `names` is empty. Throws
+// previz::Error naming `file` if the nodes are no tree or a name does not exist.
 std::vector<PlacedNode> place_nodes(const tinygltf::Model& model,
                                     const std::vector<std::string>& names, const std::string& file,
                                     Notes& notes);
 
-// What a node says of its own place; a matrix has no parts.
+// A node's own transform; one given as a matrix is not split into parts.
 struct NodeTransform {
   glm::dmat4 parent_from_node{1.0};
   glm::dvec3 translation{0}, scale{1};
   glm::dquat rotation{1, 0, 0, 0};
 };
-// Throws previz::Error beginning with `where` where the numbers are none of it.
+// Throws previz::Error beginning with `where` if the numbers are no valid transform.
 NodeTransform transform_of(const tinygltf::Node& node, const std::string& where);
 
-// "node 3 "cow"", for messages.
+// Returns a name for messages: "node 3 "cow"".
 std::string node_name(const tinygltf::Model& model, int node);
 
 }  // namespace previz::scene

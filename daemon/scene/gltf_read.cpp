@@ -22,7 +22,7 @@ constexpr std::array known_extensions = {
     "KHR_mesh_quantization",      "KHR_texture_transform"};
 constexpr int max_json_depth = 128;
 
-// tinygltf's messages are lines.
+// Joins the lines of a tinygltf message.
 std::string one_line(std::string text) {
   while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
   for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos;)
@@ -46,7 +46,7 @@ std::string read_file(const fs::path& file, std::vector<unsigned char>& bytes) {
 }
 
 // tinygltf looks for external files beside the glTF file, whose directory we give as absolute, and
-// then in the working directory, where none belongs.
+// then in the working directory, where no file may be taken from.
 bool file_exists(const std::string& path, void*) {
   std::error_code error;
   return fs::path(path).is_absolute() && fs::is_regular_file(path, error);
@@ -64,7 +64,8 @@ bool write_nothing(std::string*, const std::string&, const std::vector<unsigned 
   return false;
 }
 
-// The pointer is not checked by tinygltf for images in a buffer view: those are decoded later.
+// tinygltf does not check the pointer of images in a buffer view, which are therefore decoded
+// later.
 bool keep_encoded(tinygltf::Image* image, int, std::string*, std::string*, int, int,
                   const unsigned char* bytes, int size, void*) {
   if (image->bufferView < 0 && size > 0) image->image.assign(bytes, bytes + size);
@@ -96,7 +97,7 @@ std::uint32_t little_endian(const std::vector<unsigned char>& bytes, std::size_t
          static_cast<std::uint32_t>(bytes[at + 3]) << 24u;
 }
 
-// The JSON of a binary file; checks that every chunk lies within the file (glTF 2.0, 4.4).
+// Returns the JSON of a binary file; checks that every chunk lies within the file (glTF 2.0, 4.4).
 std::string_view binary_json(const std::vector<unsigned char>& bytes, const std::string& file) {
   if (bytes.size() < 20) throw Error(file + ": a binary glTF file has at least 20 bytes");
   const std::uint64_t length = little_endian(bytes, 8);

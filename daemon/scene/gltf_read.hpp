@@ -1,6 +1,6 @@
-// A glTF 2.0 file, text or binary, through tinygltf. Guards what tinygltf 2.7 does not: nesting
-// that would overflow its stack, a binary chunk past the end of the file, files that are no regular
-// files. Images stay encoded.
+// Reads a glTF 2.0 file, text or binary, with tinygltf. It guards against what tinygltf 2.7 lets
+// through: nesting that would overflow the stack, a binary chunk past the end of the file, and
+// paths that are not regular files. Images stay encoded.
 #pragma once
 
 #include <tiny_gltf.h>
@@ -12,9 +12,9 @@
 
 namespace previz::scene {
 
-// Image::image holds the encoded bytes of images that are not in a buffer view; empty where the
-// image's file cannot be read. Throws previz::Error naming the file; extensions that are required
-// and not known are an error, those only used a note.
+// Image::image holds the encoded bytes of images that are not in a buffer view; it is empty if the
+// image's file cannot be read. Throws previz::Error naming the file. An unknown extension is an
+// error if it is required and a note if it is only used.
 tinygltf::Model read_gltf(const std::filesystem::path& file, Notes& notes);
 
 }  // namespace previz::scene

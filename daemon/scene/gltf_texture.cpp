@@ -17,8 +17,8 @@
 namespace previz::scene {
 namespace {
 
-// Deflate packs at most 1032 bytes into one, a PNG of one bit a pixel 8 pixels into each of those;
-// JPEG is less dense.
+// A file has at most this many texels per byte: Deflate packs at most 1032 bytes into one, and a
+// PNG of one bit per pixel has 8 pixels in each of those bytes. JPEG is less dense.
 constexpr std::uint64_t max_texels_a_byte = 8256;
 
 Wrap wrap(int gltf) {

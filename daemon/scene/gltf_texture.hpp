@@ -1,4 +1,4 @@
-// glTF textures: PNG and JPEG images decoded to linear floats.
+// Decodes glTF textures, PNG and JPEG images, to linear floats.
 #pragma once
 
 #include <tiny_gltf.h>
@@ -16,18 +16,18 @@ namespace previz::scene {
 
 enum class Encoding { srgb, linear };  // of red, green and blue; alpha is always linear
 
-// The sRGB transfer function's inverse (IEC 61966-2-1), value 0..1.
+// Inverts the sRGB transfer function (IEC 61966-2-1) for a value in 0..1.
 double linear_from_srgb(double value);
 
-// Textures of one file, each decoded when first used.
+// Holds the textures of one file, each decoded when first used.
 class GltfTextures {
  public:
   GltfTextures(const tinygltf::Model& model, std::string file, Scene& scene, Notes& notes,
                Budget& budget)
       : model_(model), file_(std::move(file)), scene_(scene), notes_(notes), budget_(budget) {}
 
-  // Index in Scene::textures, or no_texture, with a note, where the texture has no image that is
-  // PNG or JPEG. Throws previz::Error naming file and image where it cannot be read.
+  // Returns an index in Scene::textures, or no_texture with a note where the texture has no PNG or
+  // JPEG image. Throws previz::Error naming file and image if the image cannot be read.
   std::uint32_t use(int texture, Encoding encoding);
 
  private:

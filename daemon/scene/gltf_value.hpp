@@ -1,4 +1,4 @@
-// Numbers out of the free-form JSON of glTF's extensions.
+// Reads numbers from the free-form JSON of glTF's extensions.
 #pragma once
 
 #include <tiny_gltf.h>
@@ -12,7 +12,7 @@
 
 namespace previz::scene {
 
-// The extension's object; an empty one where it is absent.
+// Returns the extension's object, or an empty one if the extension is absent.
 inline tinygltf::Value extension(const tinygltf::ExtensionMap& extensions,
                                  const std::string& name) {
   const auto at = extensions.find(name);
@@ -26,7 +26,8 @@ inline double number(const tinygltf::Value& object, const std::string& key, doub
                                                        : otherwise;
 }
 
-// The first numbers of an array; `otherwise` where it is absent, shorter or no numbers.
+// Returns the first numbers of an array, or `otherwise` if the array is absent, shorter, or not of
+// numbers.
 inline std::vector<double> numbers(const tinygltf::Value& object, const std::string& key,
                                    std::vector<double> otherwise) {
   if (!object.Has(key) || object.Get(key).ArrayLen() < otherwise.size()) return otherwise;
@@ -39,7 +40,7 @@ inline std::vector<double> numbers(const tinygltf::Value& object, const std::str
   return values;
 }
 
-// `value` brought into what is allowed, with a note where it was not.
+// Clamps `value` to the allowed range, with a note if that changes it.
 inline float within(double value, double low, double high, const std::string& what, Notes& notes) {
   const double allowed = value >= low ? std::min(value, high) : low;
   if (allowed != value) notes.add(what + " is out of range; brought to the nearest allowed");

@@ -1,4 +1,4 @@
-// What loading keeps count of: notes about what was left out, and how much has been loaded.
+// Keeps count while a scene is loaded: notes about what was left out, and how much has been loaded.
 #pragma once
 
 #include <cstddef>
@@ -9,12 +9,12 @@
 
 namespace previz::scene {
 
-// Notes of one file. The same note again is counted, not repeated.
+// Collects notes about one file. A repeated note is counted, not repeated.
 class Notes {
  public:
   explicit Notes(std::string file) : file_(std::move(file)) {}
   void add(const std::string& what);
-  // "file: what" or "file: what (3 times)", in the order of first mention.
+  // Returns "file: what" or "file: what (3 times)", in the order of first mention.
   std::vector<std::string> lines() const;
 
  private:
@@ -23,8 +23,8 @@ class Notes {
   std::unordered_map<std::string, std::size_t> place_;
 };
 
-// Counts against scene.hpp's limits. `where` begins the message of the previz::Error that says
-// which limit would be passed; call before allocating.
+// Counts against scene.hpp's limits; call before allocating. `where` begins the message of the
+// previz::Error, which says which limit would be passed.
 class Budget {
  public:
   void add_vertices(std::uint64_t count, const std::string& where);

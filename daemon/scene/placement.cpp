@@ -19,7 +19,7 @@ void move_lamp(set::Light& light, const glm::dmat4& moved_from_set) {
   light.up = turn(light.up);
 }
 
-// Everything that came from the set's object with this index.
+// Moves everything that came from the set's object with this index.
 void move_object(const Scene& scene, std::size_t object, const glm::dmat4& moved_from_set,
                  Placement& placement) {
   for (Instance& instance : placement.instances)
@@ -33,7 +33,7 @@ void put_out(set::Light& light) {
   light.gain_mixed = light.gain_real = 0;
 }
 
-// What is flattened is not seen.
+// Moves everything to its place in the animation. An instance that is flattened is not seen.
 void play(const Animation& animation, double time_s, Placement& placement) {
   const std::vector<glm::dmat4> now = world_from_nodes(animation, time_s);
   for (const Animation::Use& use : animation.instances) {
@@ -50,7 +50,7 @@ void play(const Animation& animation, double time_s, Placement& placement) {
       put_out(placement.lights[use.what]);
 }
 
-// It stays in the scene, so that it is back at once, but in neither world.
+// Takes an object out of both worlds. The object stays in the scene, so that it can return at once.
 void take_away_object(const Scene& scene, std::size_t object, Placement& placement) {
   for (Instance& instance : placement.instances)
     if (instance.object == object) instance.presence = 0;

@@ -1,4 +1,4 @@
-// Where everything is once the crew has moved and relit it: a scene with a SceneState put onto it.
+// Puts a SceneState onto a scene: where everything is once the crew has moved and relit it.
 #pragma once
 
 #include <string>
@@ -10,19 +10,20 @@
 
 namespace previz::scene {
 
-// Stands in for Scene::instances and Scene::lights; no mesh, material or texture depends on it.
+// A placement replaces Scene::instances and Scene::lights; no mesh, material or texture depends on
+// it.
 struct Placement {
   std::vector<Instance> instances;
   std::vector<set::Light> lights;
-  std::vector<std::string> unknown;  // names of the state that the set has not, in plain words
+  std::vector<std::string> unknown;  // names in the state that the set lacks, in plain words
 };
 
-// `scene` is load_scene(set). An object takes its own lamps along. What the state does not name is
-// bit for bit as it was; what it says is nowhere is in neither world. A tint is of the mixed world
-// only: a lamp that also shines in the real one is split in two.
+// `scene` is load_scene(set). An object takes its own lamps along. Whatever the state does not name
+// stays as it was, bit for bit; whatever the state says is nowhere is in neither world. A tint
+// applies to the mixed world only: a lamp that also shines in the real one is split in two.
 Placement place(const Scene& scene, const set::Set& set, const session::SceneState& state);
 
-// The lamp as the set has it: a state that changes nothing.
+// Returns the lamp's state as the set has it, which changes nothing.
 session::LightState state_of(const set::Light& light);
 
 }  // namespace previz::scene

@@ -14,7 +14,7 @@
 namespace previz::scene {
 namespace {
 
-// The smallest factor that a texture puts on the roughness.
+// Returns the smallest factor that a texture applies to the roughness.
 float least_roughness_factor(const Scene& scene, std::uint32_t texture) {
   if (texture == no_texture) return 1.0f;
   float least = 1.0f;
@@ -22,11 +22,10 @@ float least_roughness_factor(const Scene& scene, std::uint32_t texture) {
   return least;
 }
 
-// Only real objects take the colours that the set knows better: a virtual object of the same file
-// keeps the material it was made with.
+// Only real objects take the colours that the set states: a virtual object of the same file keeps
+// the material it was made with.
 void apply(const set::Surface& surface, const std::string& set_file, Scene& scene) {
-  std::map<std::uint32_t, std::uint32_t>
-      recoloured;  // materials: as loaded, as real objects have it
+  std::map<std::uint32_t, std::uint32_t> recoloured;  // index as loaded to index as recoloured
   std::string known;
   for (Instance& instance : scene.instances) {
     if ((instance.presence & world_real) == 0) continue;

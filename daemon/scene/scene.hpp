@@ -1,5 +1,6 @@
-// The scene as data: meshes, instances with presence, materials, textures and lights. World space
-// is right-handed, Z up, metres. No GPU and no glTF in here.
+// This header defines the scene as data: meshes, instances with presence, materials, textures and
+// lights. World space is right-handed, Z up, in metres. Nothing here depends on the GPU or on
+// glTF's file format.
 #pragma once
 
 #include <cstdint>
@@ -16,15 +17,17 @@
 
 namespace previz::scene {
 
-// The worlds an instance exists in; also the ray mask. A phantom is both, a virtual object mixed
-// only, a removed real object real only.
+// The worlds that an instance exists in; also the ray mask. A phantom is in both, a virtual object
+// in the mixed world only, a removed real object in the real world only (shaders/README.md,
+// "Pairs").
 inline constexpr std::uint32_t world_mixed = 1;
 inline constexpr std::uint32_t world_real = 2;
 inline constexpr std::uint32_t world_both = world_mixed | world_real;
 
-// Object space. All three arrays have one entry a vertex; `uvs` is empty where there are none (a
-// texture is then read at (0, 0)). Every vertex is finite and used; no triangle has zero area.
-// Normals are unit and, for at least one triangle around, on the side of counter-clockwise winding.
+// A mesh is in object space. All three arrays have one entry per vertex; `uvs` is empty where there
+// are none (a texture is then read at (0, 0)). Every vertex is finite and used; no triangle has
+// zero area. Normals are unit and, for at least one adjacent triangle, on the side of
+// counter-clockwise winding.
 struct Mesh {
   std::string name;
   std::vector<glm::vec3> positions;
@@ -33,27 +36,27 @@ struct Mesh {
   std::vector<glm::uvec3> triangles;  // vertex indices
 };
 
-// world_from_object is finite and invertible. Where its determinant is negative it turns
-// orientation around and the front stays where it was in object space (glTF 2.0, 3.7.4): normals,
-// shading and geometric, go through the inverse transpose; a geometric normal made as a cross
-// product of world space edges must be multiplied by the determinant's sign.
+// world_from_object is finite and invertible. A negative determinant reverses orientation, but the
+// front stays where it was in object space (glTF 2.0, 3.7.4): shading and geometric normals go
+// through the inverse transpose; a geometric normal computed as a cross product of world space
+// edges must be multiplied by the determinant's sign.
 struct Instance {
   std::string name;
   std::uint32_t mesh = 0;
   std::uint32_t material = 0;
   std::uint32_t presence = world_both;
-  std::uint32_t object = 0;  // index of the set's [[object]] it came from
+  std::uint32_t object = 0;  // index of the set's [[object]] that the instance came from
   glm::dmat4 world_from_object{1.0};
 };
 
 inline constexpr std::uint32_t no_texture = 0xffffffffu;
 inline constexpr std::uint32_t no_object = 0xffffffffu;
 
-// `mask`: a hit counts where alpha >= alpha_cutoff; `blend`: with probability alpha.
+// With `mask` a hit counts where alpha >= alpha_cutoff, with `blend` with probability alpha.
 enum class AlphaMode : std::uint32_t { opaque, mask, blend };
 
-// glTF 2.0 metallic-roughness with the extensions the shaders implement. A texture multiplies its
-// factor.
+// A material is glTF 2.0 metallic-roughness with the extensions that the shaders implement. A
+// texture multiplies its factor.
 struct Material {
   std::string name;
   glm::vec3 base_color{1};  // linear Rec. 709
@@ -70,8 +73,9 @@ struct Material {
   std::uint32_t emission_texture = no_texture;
   AlphaMode alpha_mode = AlphaMode::opaque;
   float alpha_cutoff = 0.5f;
-  // KHR_materials_volume: white light is attenuation_color after this far inside (Beer-Lambert). No
-  // shader reads it yet: the inside of glass is rendered clear, and a note of the scene says so.
+  // KHR_materials_volume: after attenuation_distance_m inside, white light has become
+  // attenuation_color (Beer-Lambert). No shader reads it yet: the inside of glass is rendered
+  // clear, and a note of the scene says so.
   glm::vec3 attenuation_color{1};
   float attenuation_distance_m = std::numeric_limits<float>::infinity();
   std::uint32_t normal_texture = no_texture;  // tangent space, +Y up, along the uvs
@@ -80,7 +84,7 @@ struct Material {
 
 enum class Wrap : std::uint32_t { repeat, clamp, mirror };
 
-// Decoded and linearised (colour textures from sRGB; data textures as they are).
+// Textures are decoded and linearised: colour from sRGB, data as it is.
 struct Texture {
   std::string name;
   int width = 0, height = 0;
@@ -94,21 +98,22 @@ struct Scene {
   std::vector<Instance> instances;
   std::vector<Material> materials;
   std::vector<Texture> textures;
-  // Of the set and of KHR_lights_punctual, in world space. Emissive meshes are not here: the
-  // renderer finds them. glTF's photometric numbers are taken as radiometric ones, per channel of
-  // linear Rec. 709: candela as W/sr, lux as W/m^2. Gains follow the object's presence: virtual
+  // The lights of the set and of KHR_lights_punctual, in world space. Emissive meshes are not here:
+  // the renderer finds them. glTF's photometric numbers are taken as radiometric ones, per channel
+  // of linear Rec. 709: candela as W/sr, lux as W/m^2. Gains follow the object's presence: virtual
   // (1, 0), phantom (1, 1), removed (0, 1).
   std::vector<set::Light> lights;
-  // Per light the index of the [[object]] whose file it came with; no_object: the set's own lamps,
-  // which are the last, in the set's order.
+  // For each light, the index of the [[object]] whose file it came with; no_object for the set's
+  // own lamps, which come last, in the set's order.
   std::vector<std::uint32_t> light_objects;
-  std::vector<Animation> animations;  // one an object at most
-  // What was dropped or not understood while loading, in plain words (counted, never silent).
+  std::vector<Animation> animations;  // at most one per object
+  // Notes about what was dropped or not understood while loading, in plain words (counted, never
+  // silent).
   std::vector<std::string> notes;
 };
 
-// How much there is in a scene. Meshes count once, however many instances they have; those that no
-// instance shows do not count.
+// The size of a scene. A mesh counts once, however many instances it has, and not at all if no
+// instance shows it.
 struct Size {
   std::uint64_t triangles = 0;
   std::uint64_t vertices = 0;
@@ -117,7 +122,7 @@ struct Size {
 };
 
 // At most this much is loaded; anything larger is refused before it is allocated.
-inline constexpr std::uint64_t max_triangles = 1ull << 26;  // unique, and vertices
+inline constexpr std::uint64_t max_triangles = 1ull << 26;  // unique ones; also for vertices
 inline constexpr std::uint64_t max_instances = 1ull << 20;
 inline constexpr std::uint64_t max_texels = 1ull << 27;  // of all textures together
 inline constexpr int max_texture_side = 16384;
@@ -126,17 +131,18 @@ inline constexpr std::uint64_t max_file_bytes = 0xffffffffull;  // glTF binary's
 // Loads every object of the set. Geometry that nodes share (the same accessors) becomes one mesh
 // with several instances, also where objects name the same file. Throws previz::Error naming the
 // file and what is wrong in it; what can be left out (zero-area and NaN triangles, extensions that
-// are used but not required) goes into Scene::notes. The set's surfaces give materials of real
-// objects their colour; a surface that none has is an error too.
+// are used but not required) goes into Scene::notes. The set's surfaces replace the colours of
+// real objects' materials; a surface that no real object has is an error too.
 Scene load_scene(const set::Set& set);
 
 bool emits(const Material& material);
 
-// Whether anything of this material lets light through: a texture can take metal away.
+// Returns whether any part of this material lets light through: a texture can take metal away.
 bool transmits(const Material& material);
 
-// Whether light can leave a surface of this material without blur: clear glass, and metal, glass or
-// a coat whose GGX alpha is somewhere at or below `specular_alpha`.
+// Returns whether light can leave a surface of this material without blur: clear glass, and metal,
+// glass or a coat whose GGX alpha is somewhere at or below `specular_alpha` (shaders/README.md,
+// "Caustics").
 bool can_be_dirac(const Scene& scene, const Material& material, double specular_alpha);
 
 Size size_of(const Scene& scene);

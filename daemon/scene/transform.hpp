@@ -1,4 +1,4 @@
-// What a transform read from a file must be checked for.
+// Checks transforms that were read from a file.
 #pragma once
 
 #include <cmath>

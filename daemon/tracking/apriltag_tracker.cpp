@@ -69,8 +69,8 @@ class AprilTagTracker final : public Tracker {
   struct Carrier {
     std::string name;
     TagMap map;
-    bool following;             // the frame before showed it
-    std::optional<Pose> found;  // of the camera, in the carrier's frame; in this frame
+    bool following;             // the previous frame showed the carrier
+    std::optional<Pose> found;  // this picture's camera pose, in the carrier's frame
   };
 
   void reset_following() {
@@ -134,7 +134,7 @@ class AprilTagTracker final : public Tracker {
   TagDetector detector_;
   TagMap stage_;
   std::vector<Carrier> carriers_;
-  bool following_ = false;  // the frame before was tracked
+  bool following_ = false;  // the previous frame was tracked
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The camera's pose from AprilTags of a known map: all of them in one joint PnP (P12).
+// Finds the camera's pose from AprilTags of a known map: all of them in one joint PnP (P12).
 #pragma once
 
 #include <memory>
@@ -9,15 +9,16 @@
 
 namespace previz::tracking {
 
-// Frames must have the lens's size; `response` is the camera's, undone before corners are measured.
-// Throws previz::Error naming the key where the family is unknown, a tag's size is not positive, an
-// id is used twice, or the lens has no size or focal length.
+// Frames must have the lens's size; `response` is the camera's; it is inverted before corners are
+// measured. Throws previz::Error naming the key where the family is unknown, a tag's size is not
+// positive, an id is used twice, or the lens has no size or focal length.
 //
-// A pose that two views explain about equally well (one tag seen face on, a small flat map) is
-// ambiguous unless a pose tracked at most 0.5 s before lies within reach (3 rad/s) of one of them
-// only. A frame that follows a tracked one is searched at `settings.decimate`, and once more at
-// full resolution if that finds no pose, or not that of a carrier which the frame before showed;
-// every other frame at full resolution. Carriers are found by the same rules, each by its own tags.
+// If two poses explain a picture about equally well (one tag seen face on, a small flat map), the
+// pose is ambiguous unless only one of them lies within reach (3 rad/s) of a pose tracked at most
+// 0.5 s before. A frame that follows a tracked one is searched at `settings.decimate`, and again at
+// full resolution if no pose is found or a carrier of the previous frame is missing; every other
+// frame is searched at full resolution. Carriers are found by the same rules, each by its own
+// tags.
 std::unique_ptr<Tracker> make_apriltag_tracker(const set::Tracking& settings,
                                                const PinholeIntrinsics& intrinsics,
                                                const ResponseCurve& response = {});

@@ -8,8 +8,9 @@
 namespace previz::tracking {
 namespace {
 
-// Brings a small motion (rotation, translation) along the camera's axes into the carrier's frame:
-// carrier_from_camera * motion * camera_from_carrier = [R 0; [t]x R  R] on it.
+// Returns the matrix that brings a small motion (rotation, translation) along the camera's axes
+// into the carrier's frame: carrier_from_camera * motion * camera_from_carrier = [R 0; [t]x R  R]
+// applied to the motion.
 cv::Matx<double, 6, 6> adjoint(const glm::dmat4& carrier_from_camera) {
   const glm::dmat3 r(carrier_from_camera);
   const glm::dvec3 t(carrier_from_camera[3]);

@@ -13,7 +13,8 @@
 namespace previz::tracking {
 namespace {
 
-// The homography of the square (-1,-1),(1,-1),(1,1),(-1,1) onto four points (Heckbert 1989).
+// Returns the homography of the square (-1,-1),(1,-1),(1,1),(-1,1) onto four points (Heckbert
+// 1989).
 glm::dmat3 square_to_quad(const CornerPixels& q) {
   const glm::dvec2 d1 = q[1] - q[2], d2 = q[3] - q[2], s = q[0] - q[1] + q[2] - q[3];
   const double det = d1.x * d2.y - d2.x * d1.y;
@@ -37,7 +38,7 @@ double distance_to_line(glm::dvec2 p, glm::dvec2 a, glm::dvec2 b) {
   return std::abs(d.x * (p - a).y - d.y * (p - a).x) / glm::length(d);
 }
 
-// The least depth of the ring of cells beside edge k, inside (side -1) or outside (+1), px.
+// Returns the least depth of the ring of cells beside edge k, inside (side -1) or outside (+1), px.
 double cell_depth(const CornerPixels& q, const glm::dmat3& h, int k, int cells, int side) {
   const glm::dvec2 a = kSquare[std::size_t(k)], b = kSquare[std::size_t((k + 1) % 4)];
   const glm::dvec2 outward = (a + b) / 2.0;

@@ -16,12 +16,12 @@ namespace previz::tracking {
 namespace {
 
 constexpr double kSearchStepPx = 0.5;
-constexpr int kSearchSteps = 4;                             // either way
+constexpr int kSearchSteps = 4;                             // to either side
 constexpr double kSearchPx = kSearchSteps * kSearchStepPx;  // how far off the guess may be
 constexpr double kMinContrast = 0.05;                       // sRGB-encoded, 13 of 255
 constexpr double kMaxBlurPx = 4.0;
-constexpr double kMinNoise = 0.003;  // of the contrast; 8-bit rounding of white is about that
-constexpr double kClipped = 0.99;    // linear; where a sensor's white begins
+constexpr double kMinNoise = 0.003;  // share of the contrast; about 8-bit rounding of white
+constexpr double kClipped = 0.99;    // linear; a brighter sample counts as clipped
 constexpr double kClippedVariance = 0.15 * 0.15;  // px^2
 constexpr int kMaxColumns = 200;                  // pixel columns used of a long edge
 
@@ -35,13 +35,15 @@ struct Sample {
   double weight = 1;
 };
 
-// Shading across the edge is left out on purpose: it moves the line by thousandths, but as a
-// parameter it would take up one side of a blur that is not Gaussian, and that moves it by tenths.
+// Shading across the edge is deliberately not a parameter: it moves the line by thousandths of a
+// pixel, but the fit would use it to absorb one side of a blur that is not Gaussian, which moves
+// the line by tenths.
 constexpr int kEndA = 0, kEndB = 1, kBlack = 2, kWhite = 3, kBlur = 4, kShade = 5, kParameters = 6;
 using Vector = cv::Vec<double, kParameters>;
 using Matrix = cv::Matx<double, kParameters, kParameters>;
 
-// The usual deviation of what short edges do not show: relative shading over the edge's length, px.
+// The priors' standard deviations, for parameters that short edges do not determine: relative
+// shading over the edge's length, and blur in px.
 constexpr double kShadePrior = 0.3, kBlurPrior = 1.0;
 
 struct Line {
@@ -56,7 +58,7 @@ Line make_line(glm::dvec2 a, glm::dvec2 b, glm::dvec2 bright_side) {
   return {a, b, normal, length};
 }
 
-// The pixels within [-dark, bright] px of the line and between its ends less `margin_px`.
+// Collects the pixels within [-dark, bright] px of the line and between its ends less `margin_px`.
 std::vector<Sample> gather(const Luminance& luminance, const PinholeIntrinsics& lens,
                            const Line& line, double dark, double bright, double margin_px) {
   std::vector<Sample> samples;
@@ -68,7 +70,7 @@ std::vector<Sample> gather(const Luminance& luminance, const PinholeIntrinsics& 
   const int minor = 1 - major;
   const int size[2] = {lens.width, lens.height};
   const double margin = margin_px / line.length;
-  // 2 px more than a straight edge needs: the lens may bend it.
+  // The reach is 2 px more than a straight edge needs, because the lens may bend it.
   const double reach = (std::max(dark, bright) + 2) * glm::length(d) / std::abs(d[major]);
 
   const int first = std::max(0, int(std::ceil(std::min(pa[major], pb[major]))));
@@ -89,7 +91,7 @@ std::vector<Sample> gather(const Luminance& luminance, const PinholeIntrinsics& 
       s.offset = glm::dot(u - line.a, line.normal);
       glm::dmat2 pixel_by_ray;
       distort(lens, *ray, &pixel_by_ray);
-      // d(offset)/d(pixel), whose length is undistorted px per picture px
+      // This is d(offset)/d(pixel); its length is in undistorted px per picture px.
       const glm::dvec2 gradient =
           glm::transpose(glm::inverse(pixel_by_ray)) * (line.normal * focal);
       const double steepness = glm::length(gradient);
@@ -174,7 +176,7 @@ System linearise(std::vector<Sample>& samples, const Vector& p, double cutoff, d
   return sum;
 }
 
-// Levenberg-Marquardt; false where it came to nothing finite.
+// Runs Levenberg-Marquardt; returns false if the result is not finite.
 bool minimise(std::vector<Sample>& samples, double cutoff, double noise, int iterations,
               Vector* p) {
   double damping = 1e-3;
@@ -213,8 +215,8 @@ double median_residual(const std::vector<Sample>& samples, const Vector& p) {
   return percentile(std::move(r), 0.5);
 }
 
-// The plain areas' values, and the shift and blur that fit best on a coarse grid. A clipped white
-// may be anything above 1.
+// Returns the values of the plain areas, and the shift and blur that fit best on a coarse grid. A
+// clipped white may be anything above 1.
 Vector coarse_start(const std::vector<Sample>& samples) {
   std::vector<double> values;
   for (const Sample& s : samples) values.push_back(s.value);
@@ -246,7 +248,7 @@ bool visible(const Vector& p) {
   return srgb_encode(p[kWhite]) - srgb_encode(p[kBlack]) > kMinContrast;
 }
 
-// Phi and the integrals E[max(x + z,0)], E[max(x + z,0)^2]/2 of a Gaussian z.
+// Holds Phi(x) and the integrals E[max(x + z,0)], E[max(x + z,0)^2]/2 of a Gaussian z.
 struct Ramp {
   double step, ramp, parabola;
 };
@@ -294,7 +296,7 @@ std::optional<EdgeFit> fit_edge(const Luminance& luminance, const PinholeIntrins
     if (!visible(p)) return *why = "without contrast", std::nullopt;
     const double contrast = p[kWhite] - p[kBlack];
     const double least_noise = kMinNoise * contrast;
-    // Wide at first, so that a shifted start is not taken for outliers.
+    // The cutoff is wide at first, so that a shifted start does not make outliers of good pixels.
     const double cutoff = round == 0 ? 10 * contrast : std::max(6 * noise, 0.15 * contrast);
     if (!minimise(samples, cutoff, std::max(noise, least_noise), round == 0 ? 15 : 8, &p))
       return *why = "without a fit", std::nullopt;
@@ -306,8 +308,8 @@ std::optional<EdgeFit> fit_edge(const Luminance& luminance, const PinholeIntrins
     if (round < 2) p[kEndA] = p[kEndB] = 0;
     if (total_shift > 1.5 * kSearchPx + 2 * p[kBlur])
       return *why = "not where the detector saw it", std::nullopt;
-    // Stay clear of the next printed cell and of the corners by what the blur carries over; as far
-    // to one side as to the other, so that a blur that is not Gaussian cannot shift the line.
+    // The fit stays clear of the next printed cell and of the corners by the reach of the blur, and
+    // uses the same depth on both sides, so that a blur that is not Gaussian cannot shift the line.
     const double free = std::min(guess.dark_depth_px, guess.bright_depth_px) - 0.5 - 2 * p[kBlur];
     dark = bright = std::clamp(free, 1.2, 1.5 + 3 * p[kBlur]);
     margin = std::min(0.25 * line.length, 1 + 2.5 * p[kBlur]);
@@ -329,7 +331,8 @@ std::optional<EdgeFit> fit_edge(const Luminance& luminance, const PinholeIntrins
       std::max(kMinNoise * contrast, std::sqrt(squares / std::max(1.0, weight - kParameters)));
   if (rms > 0.2 * contrast) return *why = "unclear", std::nullopt;
   const Matrix covariance = system.information.inv(cv::DECOMP_CHOLESKY) * (rms * rms);
-  // How far a clipped white really goes, and with it where half of it is, is then only a guess.
+  // If many samples are clipped, the true white is only a guess, and with it the place where half
+  // of it is reached: the variance grows.
   const auto whites = std::count_if(samples.begin(), samples.end(),
                                     [](const Sample& x) { return x.value >= kClipped; });
   const double clipped = 10 * whites > std::ptrdiff_t(samples.size()) ? kClippedVariance : 0;

@@ -12,8 +12,8 @@
 namespace previz::tracking {
 namespace {
 
-// What the picture's noise does not say (lens model, response, print, map) is a further deviation
-// of every corner coordinate: at least this, more where the residuals ask for it.
+// Errors beside the picture's noise (lens model, response, print, map) are a further deviation of
+// every corner coordinate: at least this, more where the residuals require it.
 constexpr double kCornerFloorPx = 0.03;
 constexpr double kDecisiveDrop = 4;
 
@@ -48,15 +48,15 @@ Whitening whitening(const TagObservation& tag, double model_error_px) {
   return inverse;
 }
 
-// A tag made ready: world corners and the whitening of its residuals.
+// A tag prepared for the fit: world corners and the whitening of its residuals.
 struct Prepared {
   std::array<glm::dvec3, 4> world;
   CornerPixels corners;
   Whitening whiten;
 };
 
-// measured - projected (x0,y0,..) and, where asked for, its derivative by the camera's small
-// motion.
+// Computes measured - projected (x0,y0,..) and, where asked for, the derivative by a small motion
+// of the camera.
 bool residual(const Prepared& tag, const PinholeIntrinsics& lens, const CameraFromWorld& pose,
               cv::Matx<double, 8, 1>* r, cv::Matx<double, 8, 6>* jacobian) {
   for (std::size_t i = 0; i < 4; ++i) {
@@ -93,8 +93,8 @@ CameraFromWorld moved(const CameraFromWorld& pose, const Vector6& step) {
   return next;
 }
 
-// What is minimised: whitened squares, or a redescending loss of each tag's distance in px (Geman
-// and McClure), which lets tags at odds with the rest go as `scale_px` shrinks.
+// The cost function: whitened squares, or a redescending loss of each tag's distance in px (Geman
+// and McClure), which drops tags at odds with the rest as `scale_px` shrinks.
 struct Loss {
   bool robust = false;
   double scale_px = 0;
@@ -150,7 +150,7 @@ class Problem {
     return sum;
   }
 
-  // Levenberg-Marquardt to a standstill. Nothing where the start is behind the camera.
+  // Runs Levenberg-Marquardt until it stops. Returns nothing if the start is behind the camera.
   std::optional<CameraFromWorld> minimise(const std::vector<std::size_t>& used,
                                           CameraFromWorld pose, Loss loss, int iterations) const {
     double damping = 1e-4;
@@ -181,7 +181,7 @@ class Problem {
   std::vector<Prepared> tags_;
 };
 
-// Inverse of a positive definite matrix whose rows have different units.
+// Inverts a positive definite matrix whose rows have different units.
 Matrix6 inverse_scaled(const Matrix6& m) {
   Vector6 scale;
   Matrix6 n = m;
@@ -228,7 +228,8 @@ bool better(const FittedPose& a, const FittedPose& b) {
   return a.chi_square < b.chi_square;
 }
 
-// The distinct minima over exactly these tags, better first, each seeing every tag from its front.
+// Returns the distinct minima over exactly these tags, best first, each seeing every tag from its
+// front.
 std::vector<FittedPose> minima(const Problem& problem, const std::vector<TagObservation>& tags,
                                const PinholeIntrinsics& lens, const std::vector<std::size_t>& used,
                                const std::vector<CameraFromWorld>& starts) {
@@ -255,8 +256,8 @@ std::vector<std::size_t> explained(const std::vector<TagObservation>& tags,
   return used;
 }
 
-// From a pose that fits some tags to one that fits as many as agree: the loss first spans the
-// better half of the tags as they are, then closes to the gate.
+// Moves from a pose that fits some tags to one that fits as many as agree: the loss is first as
+// wide as the errors of the better half of the tags, then narrows to the gate.
 std::optional<CameraFromWorld> agree(const Problem& problem,
                                      const std::vector<TagObservation>& tags,
                                      const PinholeIntrinsics& lens, const CameraFromWorld& start) {
@@ -285,8 +286,8 @@ struct Consensus {
   CameraFromWorld pose;
 };
 
-// A tag moved by little is taken in by bending the pose. It is let go where the others (two at
-// least) agree kDecisiveDrop times better without it.
+// Drops tags that were moved by so little that bending the pose explains them. A tag is dropped if
+// the others (at least two) agree kDecisiveDrop times better without it.
 void let_go(const Problem& problem, const std::vector<TagObservation>& tags,
             const PinholeIntrinsics& lens, Consensus* consensus) {
   while (consensus->used.size() >= 3) {
@@ -312,8 +313,8 @@ void let_go(const Problem& problem, const std::vector<TagObservation>& tags,
   }
 }
 
-// The least model error with which the residuals are no larger than their degrees of freedom let
-// expect, one standard deviation allowed: few tags say little about it.
+// Returns the least model error at which the residuals are no larger than expected for their
+// degrees of freedom, with one standard deviation allowed, since few tags determine little.
 double model_error_px(Problem& problem, const PinholeIntrinsics& lens, const Consensus& consensus) {
   const double degrees = 8.0 * double(consensus.used.size()) - 6;
   const double expected = degrees + std::sqrt(2 * degrees);
@@ -343,7 +344,8 @@ CameraFromWorld camera_from_world(const glm::dmat4& world_from_camera) {
 }
 
 double rotation_between(const CameraFromWorld& a, const CameraFromWorld& b) {
-  // From the difference's Frobenius norm: exact for small angles, where acos of the trace is not.
+  // The angle follows from the difference's Frobenius norm, which is accurate for small angles,
+  // where acos of the trace is not.
   const glm::dmat3 d = a.rotation - b.rotation;
   const double norm2 = glm::dot(d[0], d[0]) + glm::dot(d[1], d[1]) + glm::dot(d[2], d[2]);
   return 2 * std::asin(std::min(1.0, std::sqrt(norm2 / 8)));

@@ -1,4 +1,5 @@
-// One camera pose from the corners of many tags: robust, with every pose that explains them.
+// Solves for one camera pose from the corners of many tags: robustly, with every pose that explains
+// them.
 #pragma once
 
 #include <array>
@@ -13,7 +14,7 @@
 
 namespace previz::tracking {
 
-// x_camera = rotation * x_world + translation (m)
+// A point is transformed by x_camera = rotation * x_world + translation (m).
 struct CameraFromWorld {
   glm::dmat3 rotation{1.0};
   glm::dvec3 translation{0};
@@ -21,7 +22,7 @@ struct CameraFromWorld {
 
 glm::dmat4 world_from_camera(const CameraFromWorld& pose);
 CameraFromWorld camera_from_world(const glm::dmat4& world_from_camera);
-// The angle of the rotation between two poses, rad.
+// Returns the angle of the rotation between two poses, rad.
 double rotation_between(const CameraFromWorld& a, const CameraFromWorld& b);
 
 struct TagObservation {
@@ -34,30 +35,31 @@ struct TagObservation {
 
 struct FittedPose {
   CameraFromWorld pose;
-  // Row-major, rotation (rad) then translation (m): the true world_from_camera is the estimate
-  // times the small motion (rotation, translation), both along the camera's axes.
+  // Row-major 6x6, rotation (rad) then translation (m): the true world_from_camera is the
+  // estimate times the small motion (rotation, translation), both along the camera's axes.
   std::array<double, 36> covariance{};
   double rms_px = 0;      // of the used corners, per coordinate pair
   double chi_square = 0;  // of the used corners against the covariance they were given
   int degrees_of_freedom = 0;
-  std::vector<std::size_t> used;  // indices of the observations it explains
+  std::vector<std::size_t> used;  // indices of the observations that the pose explains
 };
 
-// How far off a tag's corners may be (rms) and still be explained: 2 px, more on wide pictures.
+// Returns how far off a tag's corners may be (rms, px) and still count as explained: 2 px, more on
+// wide pictures.
 double consistency_gate_px(const PinholeIntrinsics& lens);
 
-// Every local minimum that explains the largest number of tags, better (by chi-square) first. Those
-// with different `used` are tags at odds, equally many on either side. `seed` is a further start
-// beside those of pose_starts. Levenberg-Marquardt from each, over all tags with a loss that lets
-// go of tags at odds with the rest (a moved tag); then over the tags that remain, with their
-// covariance and a model error of at least 0.03 px, as large as their residuals ask for. Empty
-// where no pose explains a tag.
+// Returns every local minimum that explains the largest number of tags, best (by chi-square) first.
+// Minima with different `used` mean that equally many tags contradict each other. `seed` is a
+// further start beside those of pose_starts. Levenberg-Marquardt runs from each start, first over
+// all tags with a loss that drops tags at odds with the rest (a moved tag), then over the remaining
+// tags with their covariance and a model error of at least 0.03 px, as large as their residuals
+// require. Returns an empty list if no pose explains a tag.
 std::vector<FittedPose> solve_joint_pose(const std::vector<TagObservation>& tags,
                                          const PinholeIntrinsics& lens,
                                          const std::optional<CameraFromWorld>& seed);
 
-// Rms distance in px between a tag's corners and their projection; infinite where it cannot be seen
-// (behind the camera or from behind).
+// Returns the rms distance in px between a tag's corners and their projection; infinite if the tag
+// cannot be seen (it is behind the camera, or seen from behind).
 double tag_error_px(const TagObservation& tag, const CameraFromWorld& pose,
                     const PinholeIntrinsics& lens);
 

@@ -14,7 +14,7 @@ double srgb_decode(double value) {
   return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
 }
 
-// value in [0,1] to the linear signal in [0,1]
+// Converts a value in [0,1] to the linear signal in [0,1].
 double inverse_response(const ResponseCurve& curve, double value) {
   value = std::clamp(value, 0.0, 1.0);
   switch (curve.kind) {

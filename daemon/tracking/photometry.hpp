@@ -1,4 +1,5 @@
-// Frames of any format as grey: 8 bits to find tags in, exact luminance to measure them with.
+// Converts frames of any format to grey: 8 bits to find tags in, exact luminance to measure them
+// with.
 #pragma once
 
 #include <cstdint>
@@ -9,20 +10,20 @@
 
 namespace previz::tracking {
 
-// The sRGB transfer curve; `signal` is clipped to [0,1]. `slope`, where given, becomes its
+// Applies the sRGB transfer curve; `signal` is clipped to [0,1]. `slope`, where given, receives the
 // derivative (0 where clipped).
 double srgb_encode(double signal, double* slope = nullptr);
 
-// The camera's response undone. Holds no frame.
+// Inverts the camera's response. Holds no frame.
 class Photometry {
  public:
   explicit Photometry(const ResponseCurve& response);
 
-  // The whole picture, sRGB-encoded luma of the linear signal, row-major, width*height.
+  // Returns the whole picture as sRGB-encoded luma of the linear signal, row-major, width*height.
   std::vector<std::uint8_t> gray8(const Frame& frame) const;
 
-  // Linear luminance (Rec. 709, white = 1) of one pixel. Of yuv422p8 the luma sample alone is
-  // read: chroma has half the resolution.
+  // Returns the linear luminance (Rec. 709, white = 1) of one pixel. For yuv422p8 only the luma
+  // sample is read, because chroma has half the resolution.
   double luminance(const Frame& frame, int x, int y) const;
 
  private:

@@ -11,11 +11,11 @@
 namespace previz::tracking {
 namespace {
 
-constexpr std::size_t kMaxTags = 8;                    // that give starts of their own
+constexpr std::size_t kMaxTags = 8;                    // tags that give starts of their own
 constexpr double kNearlyPlanar = 0.05;                 // least over middle extent of all corners
 constexpr std::size_t kSquareOrder[4] = {3, 2, 1, 0};  // as SOLVEPNP_IPPE_SQUARE wants them
 
-// Every pose the method finds, as camera_from_object.
+// Returns every pose that the method finds, as camera_from_object.
 std::vector<CameraFromWorld> solve(const std::vector<cv::Point3d>& object,
                                    const std::vector<cv::Point2d>& rays,
                                    cv::SolvePnPMethod method) {
@@ -42,7 +42,7 @@ std::vector<CameraFromWorld> solve(const std::vector<cv::Point3d>& object,
   return poses;
 }
 
-// camera_from_object after object_from_world
+// Composes camera_from_object with object_from_world.
 CameraFromWorld compose(const CameraFromWorld& a, const glm::dmat3& rotation,
                         glm::dvec3 translation) {
   return {a.rotation * rotation, a.rotation * translation + a.translation};
@@ -53,7 +53,7 @@ double side_px(const TagObservation& tag) {
          glm::distance(tag.corners[1], tag.corners[3]);
 }
 
-// All corners in axes of their own plane, and how flat they are (0: exactly).
+// All corners in the axes of their own plane, and their flatness (0: exactly flat).
 struct PlaneFrame {
   glm::dmat3 world_from_plane{1.0};
   glm::dvec3 origin{0};

@@ -1,4 +1,4 @@
-// The poses that a session recorded, as a tracker that takes no pictures.
+// Plays back the poses that a session recorded, as a tracker that looks at no pictures.
 #pragma once
 
 #include <cstdint>
@@ -11,16 +11,17 @@
 
 namespace previz::tracking {
 
-// The lines of a session's track.jsonl, found by the times of frames. `lap_ns` is the length of a
-// lap of frames that are replayed in a loop (replay_lap_ns), otherwise 0.
+// Holds the lines of a session's track.jsonl, found by the times of frames. `lap_ns` is the length
+// of one lap if the frames are replayed in a loop (replay_lap_ns), otherwise 0.
 class RecordedTrack {
  public:
   explicit RecordedTrack(const std::vector<session::TrackRecord>& records, std::int64_t lap_ns = 0);
 
   bool empty() const { return by_timestamp_.empty(); }
-  // The line of the frame itself; null where the track has none. `timestamp_ns` may be of any lap.
+  // Returns the line of the frame itself; null if the track has none. `timestamp_ns` may be of any
+  // lap.
   const session::TrackRecord* at(std::int64_t timestamp_ns) const;
-  // The line of the frame, or of the last frame before it that has one.
+  // Returns the line of the frame, or of the last frame before it that has one.
   const session::TrackRecord* newest(std::int64_t timestamp_ns) const;
 
  private:
@@ -30,8 +31,8 @@ class RecordedTrack {
   std::int64_t lap_ns_;
 };
 
-// Reads the frames' times only. A frame without a line, or that was lost when it was recorded, is
-// lost. The tracks have no carriers.
+// The tracker reads only the frames' times. A frame is lost if it has no line or was lost when it
+// was recorded. The tracks have no carriers.
 std::unique_ptr<Tracker> make_recorded_tracker(std::shared_ptr<const RecordedTrack> track);
 
 }  // namespace previz::tracking

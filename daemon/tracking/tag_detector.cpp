@@ -48,9 +48,9 @@ const Family& family_by_name(const std::string& name) {
 }
 
 constexpr int kMinPictureSide =
-    16;                             // libapriltag thresholds in tiles and reads beyond smaller ones
-constexpr double kMinSidePx = 8;    // of a tag; below, a code is read from less than a pixel a cell
-constexpr double kMinCellPx = 1.7;  // for the refinement: an edge and a plain pixel on either side
+    16;  // libapriltag thresholds in tiles and reads past the end of smaller pictures
+constexpr double kMinSidePx = 8;    // of a tag; a smaller one has less than a pixel per cell
+constexpr double kMinCellPx = 1.7;  // the refinement needs an edge and a plain pixel on either side
 constexpr double kUnrefinedSigmaPx = 0.5;  // libapriltag's corners, decimated or of tiny tags
 
 // A tag cut by the picture's border is seen with a false corner on that border.
@@ -128,7 +128,7 @@ std::vector<TagDetection> TagDetector::detect(const Frame& frame, double decimat
     tag.id = d->id;
     tag.hamming = d->hamming;
     tag.margin = d->decision_margin;
-    // (0,0) is a pixel's corner there, its centre here.
+    // In libapriltag (0,0) is a pixel's corner; here it is a pixel's centre.
     for (std::size_t k = 0; k < 4; ++k) tag.corners[k] = {d->p[k][0] - 0.5, d->p[k][1] - 0.5};
     if (area(tag.corners) >= kMinSidePx * kMinSidePx) tags.push_back(tag);
   }

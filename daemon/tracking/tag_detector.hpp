@@ -1,4 +1,4 @@
-// AprilTags in one picture: ids by libapriltag, corners by our own refinement.
+// Detects AprilTags in one picture: libapriltag finds the ids, our own refinement the corners.
 #pragma once
 
 #include <array>
@@ -19,8 +19,8 @@ struct TagDetection {
   double margin = 0;  // libapriltag's decision margin
   CornerPixels corners{};
   std::array<double, 64> covariance{};  // row-major 8x8 of the corners, px^2
-  bool refined = false;  // false: libapriltag's corners, for cells too small to measure
-  std::string trouble;   // not empty: the id stands, the corners must not be used
+  bool refined = false;  // false: libapriltag's corners, because cells are too small to measure
+  std::string trouble;   // not empty: the id is valid, but the corners must not be used
 };
 
 struct DetectorSettings {
@@ -29,16 +29,16 @@ struct DetectorSettings {
   int max_hamming = 1;
 };
 
-// Families of libapriltag by name: tag36h11, tag25h9, tag16h5, tagStandard41h12, ...; throws
-// previz::Error naming them all where `settings.family` is none of them.
+// Families are libapriltag's, by name: tag36h11, tag25h9, tag16h5, tagStandard41h12, ... Throws
+// previz::Error naming them all if `settings.family` is none of them.
 class TagDetector {
  public:
   TagDetector(const DetectorSettings& settings, const PinholeIntrinsics& lens,
               const ResponseCurve& response);
   ~TagDetector();
 
-  // Every tag that passes the gates, by id, then from left to right. `decimate` >= 1 shrinks the
-  // picture in which they are looked for; corners are always measured at full resolution. Frames
+  // Returns every tag that passes the gates, by id, then from left to right. `decimate` >= 1
+  // shrinks the picture that is searched; corners are always measured at full resolution. Frames
   // below 16 px a side show no tag.
   std::vector<TagDetection> detect(const Frame& frame, double decimate);
 

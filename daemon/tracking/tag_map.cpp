@@ -10,11 +10,12 @@
 namespace previz::tracking {
 namespace {
 
-constexpr std::int64_t kMemoryNs = 500'000'000;           // a pose older than this says nothing
-constexpr double kReachRad = 0.035, kReachRadPerS = 3.0;  // how far a camera may have turned
-// Likelihood ratio exp(-10): below this difference of chi-squares noise alone could swap two poses.
+constexpr std::int64_t kMemoryNs = 500'000'000;           // an older pose is forgotten
+constexpr double kReachRad = 0.035, kReachRadPerS = 3.0;  // how far a camera may have turned since
+// Below this difference of chi-squares (a likelihood ratio of exp(-10)) noise alone could swap two
+// poses.
 constexpr double kDecisiveChiSquare = 20;
-constexpr double kSamePoseChiSquare = 16;  // two poses within each other's noise, 6 degrees
+constexpr double kSamePoseChiSquare = 16;  // within each other's noise; 6 degrees of freedom
 
 Pose to_pose(const FittedPose& fit, const std::vector<TagObservation>& tags) {
   Pose pose;
@@ -25,7 +26,7 @@ Pose to_pose(const FittedPose& fit, const std::vector<TagObservation>& tags) {
   return pose;
 }
 
-// Whether b lies within the noise of a: then there is nothing to choose between.
+// Returns whether b lies within the noise of a, so that there is nothing to choose between them.
 bool within_noise(const FittedPose& a, const FittedPose& b) {
   const glm::dmat3 turn = a.pose.rotation * glm::transpose(b.pose.rotation);
   const glm::dvec3 axis(turn[1][2] - turn[2][1], turn[2][0] - turn[0][2], turn[0][1] - turn[1][0]);
@@ -119,7 +120,7 @@ void TagMap::choose(const std::vector<FittedPose>& poses, const std::vector<TagO
     return;
   }
 
-  // The poses that cannot be ruled out, better first.
+  // These are the poses that cannot be ruled out, best first.
   const FittedPose& best = poses.front();
   const double variance = std::max(1.0, best.chi_square / std::max(1, best.degrees_of_freedom));
   bool contradiction = false;

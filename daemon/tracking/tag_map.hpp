@@ -1,5 +1,5 @@
-// Tags that keep their places among each other, and the camera's pose among them: those of the
-// stage, or those of a carrier, whose frame then stands for the world.
+// Locates the camera among tags that are fixed relative to each other: the tags of the stage, or of
+// a carrier, whose frame then stands for the world.
 #pragma once
 
 #include <cstdint>
@@ -16,10 +16,10 @@
 
 namespace previz::tracking {
 
-// "tags 3, 5 and 8"
+// Returns words like "tags 3, 5 and 8".
 std::string tags_in_words(const std::vector<int>& ids);
 
-// Remembers the last pose, which settles what one picture leaves open.
+// Remembers the last pose, which resolves what one picture leaves ambiguous.
 class TagMap {
  public:
   // Throws previz::Error naming the key where a tag's size is not positive or an id is used twice.
@@ -27,8 +27,8 @@ class TagMap {
 
   bool has(int id) const { return tags_.contains(id); }
 
-  // The camera's pose by those detections that are of this map. Fills neither seen_tags nor
-  // carriers.
+  // Returns the camera's pose from the detections that belong to this map. Fills neither seen_tags
+  // nor carriers.
   Track locate(const std::vector<TagDetection>& detections, std::int64_t time_ns) const;
   void remember(const Pose& pose, std::int64_t time_ns);
   void forget_if_old(std::int64_t now_ns);

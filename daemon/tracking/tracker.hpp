@@ -1,4 +1,4 @@
-// Where the camera is: the one interface a tracking system stands behind (P12).
+// This is the interface of every tracking system: it reports where the camera is (P12).
 #pragma once
 
 #include <array>
@@ -17,19 +17,19 @@ struct Pose {
   // Row-major 6x6, rotation (rad) then translation (m), perturbation in the camera frame.
   std::array<double, 36> covariance{};
   double reprojection_rms_px = 0;
-  std::vector<int> tags;  // ids used; empty where the tracker goes by no tags
+  std::vector<int> tags;  // ids used; empty if the tracker uses no tags
 };
 
-// Where a carrier of the set is.
+// The place of a carrier of the set.
 struct CarrierPose {
   glm::dmat4 world_from_carrier{1.0};
-  // As Pose::covariance, of the camera's pose too, in the carrier's frame.
+  // As Pose::covariance, but in the carrier's frame; includes the error of the camera's pose.
   std::array<double, 36> covariance{};
   std::vector<int> tags;  // ids used
 };
 struct CarrierTrack {
   std::string name;
-  std::optional<CarrierPose> pose;  // absent: not found in this frame, or the camera was not
+  std::optional<CarrierPose> pose;  // absent: carrier or camera not found in this frame
   std::string reason;               // as Track::reason
 };
 
@@ -40,21 +40,22 @@ struct Track {
   TrackStatus status = TrackStatus::lost;
   std::optional<Pose> pose;      // set only if tracked
   std::vector<Pose> candidates;  // ambiguous: both poses, likelier first
-  // Lost or ambiguous: why, in plain words. Tracked: which tags were left out and why, if any.
+  // If lost or ambiguous, the reason in plain words. If tracked, which tags were left out and why,
+  // if any.
   std::string reason;
-  std::vector<int> seen_tags;          // every id detected, of the map or not; empty without tags
+  std::vector<int> seen_tags;          // every id detected, in the map or not; empty without tags
   std::vector<CarrierTrack> carriers;  // all of the set's
 };
 
 class Tracker {
  public:
   virtual ~Tracker() = default;
-  // Where the camera was at the frame's time. A tracker that sees with other eyes than the camera's
-  // (a recorded track, FreeD, motion capture) needs nothing of the frame but its timestamp_ns, and
-  // leaves everything about tags empty. Frames come in capture order; a tracker may use the last
-  // pose. Never throws for picture content.
+  // Returns where the camera was at the frame's time. A tracker that does not look through this
+  // camera (a recorded track, FreeD, motion capture) only reads the frame's timestamp_ns and leaves
+  // everything about tags empty. Frames come in capture order; a tracker may use the last pose.
+  // Never throws for picture content.
   virtual Track track(const Frame& frame) = 0;
-  // Forgets the last pose (a cut, a seek).
+  // Forgets the last pose (after a cut or a seek).
   virtual void reset() = 0;
 };
 

@@ -1,4 +1,4 @@
-// The one place where it is decided which tracker a set asks for.
+// Decides which tracker a set asks for; nothing else does.
 #pragma once
 
 #include <memory>
@@ -10,9 +10,9 @@
 
 namespace previz::tracking {
 
-// The tracker of the observer whose calibration this is. `recorded` is what the session recorded;
-// it may be null where the set does not ask for it. Throws previz::Error where the set asks for
-// recorded poses and there are none, and as the trackers do.
+// Returns the tracker of the observer with this calibration. `recorded` is the track that the
+// session recorded; it may be null if the set does not ask for it. Throws previz::Error if the set
+// asks for recorded poses and there are none, and as the trackers do.
 std::unique_ptr<Tracker> make_tracker(const set::Set& set, const ObserverCalibration& calibration,
                                       std::shared_ptr<const RecordedTrack> recorded);
 
