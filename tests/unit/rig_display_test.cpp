@@ -170,7 +170,7 @@ TEST_F(RigDisplay, ShowsThePictureAndTheWordsOfEveryMode) {
     });
     press("live");
     press("standby");  // refused: a take runs
-    until([](const OsdPage& page) { return says(page.notices, "stop it first"); });
+    until([](const OsdPage& page) { return says(page.notices, "end the take first"); });
     press("record");
     press("snapshot");
     until([](const OsdPage& page) { return says(page.notices, "snapshot"); });
