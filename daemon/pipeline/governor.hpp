@@ -11,8 +11,7 @@ namespace previz::pipeline {
 class Governor {
  public:
   static constexpr int most_samples = 50;  // P6: 1 to 50
-  static constexpr double headroom =
-      0.9;  // share of a frame's time that is planned for; the rest absorbs variation
+  static constexpr double headroom = 0.9;  // planned share of a frame's time; the rest may vary
   static constexpr double least_scale = 0.125;
   static constexpr int settle_frames = 12;
 

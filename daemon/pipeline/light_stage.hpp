@@ -85,8 +85,7 @@ class LightStage {
   std::size_t awaited_ = 1;          // exposures of the first bracket
   std::size_t seen_ = 0;             // number of light frames
   std::vector<std::string> troubles_;
-  std::shared_ptr<const session::CapturedLight>
-      shown_;  // the record that light_ was made from, if any
+  std::shared_ptr<const session::CapturedLight> shown_;  // source of light_, if recorded
   bool changed_ = false;
   lighting::SourceTracker tracker_;
   LightPtr light_;

@@ -22,9 +22,8 @@ namespace previz::pipeline {
 // A finished light estimate and the sequence numbers of the light frames it was made from.
 struct Light {
   lighting::Lighting lighting;
-  std::vector<set::Light> lamps;  // the sources as lamps
-  render::EncodedEnvironment
-      encoded;  // encoded in advance for the renderer, so that no frame waits for it
+  std::vector<set::Light> lamps;         // the sources as lamps
+  render::EncodedEnvironment encoded;    // made in advance, so that no frame waits for it
   std::vector<std::uint64_t> sequences;  // empty: an environment given as a file
   session::CapturedLight record;         // the form in which a take carries the light
 };
