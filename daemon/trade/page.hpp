@@ -14,7 +14,7 @@ namespace previz::trade {
 //   e_diff, e_virtual, e_picture     TradeErrors, as shares; empty: no such pixels
 //   reference_noise                  the reference's own e_picture
 //   pareto                           1: on the front of seconds and e_picture
-//   within_noise                     which errors the reference is too noisy to tell
+//   within_noise                     errors for which the reference is too noisy
 //   bias                             of the variant (TradeReference::Bias); empty: not known
 std::string trade_csv(const TradeReport& report);
 
