@@ -15,11 +15,11 @@
 namespace previz::exchange {
 namespace {
 
-// Still-photographers' full frame: what a focal length of an unknown sensor is told for.
+// The focal length of an unknown sensor is stated for still photography's full frame.
 constexpr double full_frame_width_m = 0.036;
-constexpr double tenths = 10;  // of a scene unit (metre), UsdGeomCamera's unit of lengths on film
+constexpr double tenths = 10;  // of a metre: UsdGeomCamera counts lengths on film in them
 
-// The shortest text that comes back bit for bit.
+// Returns the shortest text that reads back bit for bit.
 std::string number_text(double value) {
   std::array<char, 32> buffer{};
   const auto end =
@@ -32,7 +32,7 @@ std::string tuple_text(const glm::dvec4& row) {
          number_text(row.z) + ", " + number_text(row.w) + ")";
 }
 
-// From a camera that looks along -Z with Y up to one that looks along Z with Y down.
+// Converts between a camera that looks along Z with Y down and one that looks along -Z with Y up.
 glm::dmat4 turned(const glm::dmat4& world_from_camera) {
   glm::dmat4 matrix = world_from_camera;
   matrix[1] = -matrix[1];
@@ -61,7 +61,8 @@ std::string usd_lens(const ObserverCalibration& calibration) {
   text += attribute("float", "focalLength", number_text(focal));
   text += attribute("float", "horizontalAperture", number_text(focal * i.width / i.fx));
   text += attribute("float", "verticalAperture", number_text(focal * i.height / i.fy));
-  // Where the middle of the film lies, seen from the axis; pixel 0 is the centre of the first.
+  // The offset is the film's middle relative to the optical axis; coordinate 0 is the centre of the
+  // first pixel.
   text += attribute("float", "horizontalApertureOffset",
                     number_text(focal * (0.5 * i.width - (i.cx + 0.5)) / i.fx));
   text += attribute("float", "verticalApertureOffset",
@@ -121,7 +122,7 @@ glm::dvec3 zxy_degrees(const glm::dmat3& rotation) {
   const double x = std::asin(std::clamp(-at(1, 2), -1.0, 1.0));
   const double y = std::atan2(at(0, 2), at(2, 2));
   const double z = std::atan2(at(1, 0), at(1, 1));
-  // Looking straight up or down, only the sum of the other two is known.
+  // If the camera looks straight up or down, only the sum of the other two angles is known.
   if (std::abs(at(1, 2)) > 1 - 1e-12)
     return glm::degrees(glm::dvec3(x, 0, std::atan2(-at(0, 1), at(0, 0))));
   return glm::degrees(glm::dvec3(x, y, z));

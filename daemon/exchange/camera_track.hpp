@@ -1,4 +1,4 @@
-// The camera of a take for the crew's other tools: USD, Nuke's .chan.
+// Exports the camera of a take for other tools, as USD and as Nuke's .chan.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 namespace previz::exchange {
 
 struct CameraKey {
-  std::uint64_t frame = 0;            // of the take, from 0
+  std::uint64_t frame = 0;            // place in the take, from 0
   glm::dmat4 world_from_camera{1.0};  // OpenCV camera axes, metres, world Z up
 };
 
@@ -23,37 +23,38 @@ struct CameraTrack {
   std::string name;
   ObserverCalibration calibration;
   double fps = 25;
-  std::uint64_t frames = 0;     // of the take
+  std::uint64_t frames = 0;     // number of frames in the take
   std::vector<CameraKey> keys;  // the frames that were tracked
 };
 
-// Rates are the mean of the observer's times. Throws previz::Error if the take has no calibration
-// or no pose.
+// Makes the camera track of a take; its rate is the mean over the observer's times. Throws
+// previz::Error if the take has no calibration or no pose.
 CameraTrack camera_track(const session::Session& session,
                          const std::vector<session::FrameRecord>& frames,
                          const ObserverCalibration& calibration);
 
-// A .usda layer, Z up, in metres: one UsdGeomCamera with a matrix a tracked frame (USD interpolates
-// between them). It looks along its -Z with Y up, and its matrices are of row vectors. Focal length
-// and apertures are in tenths of a metre, as USD counts them; where the lens is not known, its
-// focal length is that of a sensor 36 mm wide. The principal point is the aperture's offset;
-// distortion USD cannot say, and is told in the camera's documentation.
+// Returns a .usda layer, Z up, in metres: one UsdGeomCamera with a matrix for each tracked frame
+// (USD interpolates between them). The camera looks along its -Z with Y up, and its matrices
+// multiply row vectors. Focal length and apertures are in tenths of a metre, as USD counts them; if
+// the lens is not known, the focal length assumes a sensor 36 mm wide. The principal point becomes
+// the aperture's offset. USD cannot express distortion, so the camera's documentation states it.
 std::string to_usda(const CameraTrack& track);
 
-// Nuke's camera: a line a tracked frame, "frame tx ty tz rx ry rz vfov", metres and degrees. Nuke's
-// world is Y up (X stays, its -Z is our Y); the rotation order is Nuke's default, ZXY: the matrix
-// is Ry Rx Rz. vfov is the full vertical angle of the picture about the principal point's column.
+// Returns Nuke's camera: a line for each tracked frame, "frame tx ty tz rx ry rz vfov", metres and
+// degrees. Nuke's world is Y up (X stays, its -Z is our Y); the rotation order is Nuke's default,
+// ZXY: the matrix is Ry Rx Rz. vfov is the full vertical angle of the picture about the principal
+// point's column.
 std::string to_chan(const CameraTrack& track);
 
-// Degrees (x, y, z) of that order for a rotation matrix; |x| <= 90.
+// Returns the angles (x, y, z) in degrees of a rotation matrix in the order ZXY; |x| <= 90.
 glm::dvec3 zxy_degrees(const glm::dmat3& rotation);
 
 struct ExportOptions {
   std::filesystem::path session;
   std::filesystem::path directory;  // made if need be
 };
-// `previzd export`: DIR/camera.usda, DIR/camera.chan, and the set's glTF files beside them. Poses
-// are the take's; what they lack is told on `out`.
+// Writes DIR/camera.usda, DIR/camera.chan and the set's glTF files, as `previzd export` does. Poses
+// are the take's; gaps in them are reported on `out`.
 void export_take(const ExportOptions& options, std::ostream& out);
 
 }  // namespace previz::exchange

@@ -1,4 +1,4 @@
-// Pictures from files, one after the other, in a format that a session can hold.
+// Reads pictures from files, one after the other, in a format that a session can hold.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace previz::exchange {
 struct Picture {
   PixelFormat format = PixelFormat::rgb8;
   int width = 0, height = 0;
-  std::vector<std::uint8_t> bytes;           // as Frame::bytes
+  std::vector<std::uint8_t> bytes;           // laid out as Frame::bytes
   std::string name;                          // for errors: the file, or file and frame
   std::optional<std::int64_t> container_ns;  // a video's own time, from its first frame
 };
@@ -23,9 +23,10 @@ struct Picture {
 class Footage {
  public:
   virtual ~Footage() = default;
-  // Nothing after the last picture. Throws previz::Error naming the picture that cannot be read.
+  // Returns the next picture, or nothing after the last. Throws previz::Error naming the picture
+  // that cannot be read.
   virtual std::optional<Picture> next() = 0;
-  // What was converted, in plain words; known after the first picture.
+  // Returns the conversions in plain words; they are known after the first picture.
   virtual std::vector<std::string> notes() const { return {}; }
 };
 

@@ -20,7 +20,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A folder beside `target` that takes its name when it is complete, and otherwise goes away.
+// A folder beside `target` that gets the target's name when it is complete, and is otherwise
+// removed.
 class Draft {
  public:
   explicit Draft(const fs::path& target) : target_(fs::absolute(target)) {
@@ -126,7 +127,7 @@ class FootageImport {
   }
 
  private:
-  // How many frames the lists are for; 0 if there is none.
+  // Returns how many frames the lists are for; 0 if there are no lists.
   std::size_t listed() const {
     std::size_t count = footage_.timestamps_ns.size();
     for (const auto* series : {&footage_.exposure, &footage_.exposure_s, &footage_.gain})

@@ -16,7 +16,6 @@
 //
 // observer, light - the pictures, exactly one of:
 //   pictures      list of paths; or a path whose file name holds one number "%d" or "%04d" (all
-//   that
 //                 there are; a gap is an error), or wildcards * and ? (in the order of the numbers
 //                 in the names). PNG, JPEG or TIFF, grey or RGB, 8 or 16 bits; all alike.
 //   video         path of a video. Y'CbCr 4:2:2 in 8 bits, BT.709, limited range, and grey are kept
@@ -29,8 +28,7 @@
 //                 members below; other columns are not used.
 // observer, light - the times, exactly one of:
 //   timestamps_ns list, one a frame, on the same clock for both cameras; or "container": the
-//   video's
-//                 own times, from start_ns on
+//                 times in the video itself, from start_ns on
 //   fps           frames per second; frame i is taken at start_ns + i / fps
 //   (csv)         its column timestamp_ns
 //   start_ns      for fps and "container"; default 0
@@ -65,14 +63,14 @@ struct ImportReport {
   std::uint64_t light_frames = 0;
   std::uint64_t poses = 0;
   std::uint64_t assets = 0;
-  std::uintmax_t bytes = 0;        // of the session
+  std::uintmax_t bytes = 0;        // size of the session
   double seconds = 0;              // wall clock
   std::vector<std::string> notes;  // conversions, in plain words
 };
 
-// Writes into a folder beside the session, which takes its name once it is complete: an import that
-// fails leaves nothing. Throws previz::Error naming FRAMES.json and the member, or the picture,
-// that is wrong and what is allowed.
+// Imports the footage. It is written into a folder beside the session that gets the session's name
+// once it is complete, so that a failed import leaves nothing. Throws previz::Error naming
+// FRAMES.json and the member, or the picture, that is wrong and what is allowed.
 ImportReport import_session(const ImportOptions& options);
 
 }  // namespace previz::exchange

@@ -38,7 +38,7 @@ void needs_intrinsics(const Members& camera, std::initializer_list<const char*> 
                   "needs intrinsics beside it; a calibration is given as a whole or not at all");
 }
 
-// Where a camera's calibration is, in members that are named as the set file's tables.
+// A camera's calibration, in members that are named as the set file's tables.
 template <typename Draft>
 calibration::Source calibration_source(const Members& camera) {
   std::map<std::string, std::vector<std::string>> known;
@@ -91,10 +91,10 @@ std::vector<Number> parse_column(const Table& table, const std::string& name,
   return values;
 }
 
-// A camera's members, with its table beside them.
+// A camera's members together with its CSV table.
 struct CameraMembers {
   const Members& members;
-  fs::path folder;  // that paths are relative to
+  fs::path folder;  // paths are relative to this
   std::optional<Table> table;
 
   bool in_table(const std::string& column) const {
@@ -279,7 +279,8 @@ std::vector<session::TrackRecord> read_track(const Members& top) {
   return track;
 }
 
-// What turns shutter time into exposure: of the calibration here, otherwise of the set's.
+// Returns the factor from shutter time to exposure, from the calibration here, otherwise from the
+// set's.
 template <typename Calibration>
 double responsivity_of(const std::optional<Calibration>& here,
                        const std::optional<Calibration>& in_set) {

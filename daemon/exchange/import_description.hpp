@@ -1,4 +1,4 @@
-// FRAMES.json as plain data, checked as far as it can be without decoding a picture.
+// Reads FRAMES.json as plain data, checked as far as possible without decoding a picture.
 #pragma once
 
 #include <cstdint>
@@ -35,7 +35,7 @@ struct ImportDescription {
   std::vector<session::TrackRecord> track;  // timestamps not filled in
 };
 
-// Throws previz::Error as import_session() does.
+// Reads the description. Throws previz::Error as import_session() does.
 ImportDescription read_description(const std::filesystem::path& file);
 
 }  // namespace previz::exchange

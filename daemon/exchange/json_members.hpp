@@ -1,5 +1,5 @@
-// The members of a JSON object as typed values; every error names the file, the member's path and
-// what is allowed.
+// Reads the members of a JSON object as typed values; every error names the file, the member's path
+// and what is allowed.
 #pragma once
 
 #include <filesystem>
@@ -13,7 +13,8 @@ namespace previz::exchange {
 
 using Json = nlohmann::json;
 
-// A list becomes a list of Values; null and an object, which no key takes, become a monostate.
+// Converts JSON to a Value. A list becomes a list of Values; null and objects, which no key takes,
+// become a monostate.
 Value value_of(const Json& json);
 
 class Members {
@@ -27,15 +28,15 @@ class Members {
   std::string path(const std::string& key) const;
   [[noreturn]] void fail(const std::string& key, const std::string& what) const;
 
-  // Fails over a value: the key's own rule is broken, in the words of the set file.
+  // Fails because a value breaks the key's own rule, in the words of the set file.
   [[noreturn]] void fault(const std::string& key, const std::string& what) const;
 
-  // The value of a member that must be there.
+  // Returns the value of a member that must be there.
   template <typename T>
   T read(const std::string& key, const Rule& rule = {}) const {
     return read_value<T>(key, value(key), rule);
   }
-  // The entries of a list that must be there; an error names the entry.
+  // Returns the entries of a list that must be there; an error names the entry.
   template <typename T>
   std::vector<T> read_list(const std::string& key, const Rule& rule = {}) const {
     std::vector<T> values;
@@ -43,12 +44,12 @@ class Members {
       values.push_back(read_value<T>(key + "[" + std::to_string(values.size()) + "]", entry, rule));
     return values;
   }
-  // The object under `key`.
+  // Returns the object under `key`.
   Members object(const std::string& key, std::vector<std::string> allowed) const;
-  // The objects of the list under `key`.
+  // Returns the objects of the list under `key`.
   std::vector<Members> objects(const std::string& key,
                                const std::vector<std::string>& allowed) const;
-  // Any form; for members that may take several.
+  // Returns the JSON under `key`, for members that may take several forms.
   const Json& value(const std::string& key) const;
 
  private:
@@ -67,7 +68,7 @@ class Members {
   std::string path_;
 };
 
-// Throws previz::Error naming file, line and column. The document must be an object.
+// Reads a document, which must be an object. Throws previz::Error naming file, line and column.
 Json read_json(const std::filesystem::path& file);
 
 }  // namespace previz::exchange

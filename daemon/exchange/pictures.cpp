@@ -7,7 +7,8 @@
 namespace previz::exchange {
 namespace {
 
-// An alpha channel says that a picture is no camera's, unless it says nothing.
+// A picture with transparency cannot come from a camera; an alpha channel that is opaque everywhere
+// is harmless.
 bool is_opaque(const cv::Mat& bgra) {
   cv::Mat alpha;
   cv::extractChannel(bgra, alpha, 3);
@@ -29,7 +30,7 @@ class PictureFiles final : public Footage {
   std::optional<Picture> next() override {
     if (index_ == files_.size()) return std::nullopt;
     const std::string name = files_[index_++].string();
-    // UNCHANGED: no conversion of depth, no turning after EXIF.
+    // UNCHANGED keeps the bit depth and ignores EXIF's rotation.
     cv::Mat image = cv::imread(name, cv::IMREAD_UNCHANGED);
     if (image.empty())
       throw Error(name + ": cannot be read as a picture; allowed: PNG, JPEG, TIFF");

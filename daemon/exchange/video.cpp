@@ -11,7 +11,7 @@ extern "C" {
 namespace previz::exchange {
 namespace {
 
-// The picture as the session will hold it, and libav's name for that.
+// The session's format for the picture, and libav's name for that format.
 struct Target {
   PixelFormat format;
   AVPixelFormat av_format;
@@ -22,7 +22,7 @@ AVColorSpace matrix_of(const AVFrame& frame) {
   return frame.height >= 720 ? AVCOL_SPC_BT709 : AVCOL_SPC_SMPTE170M;
 }
 
-// Older formats that say "full range" in their name, which swscale takes as a setting.
+// Older formats say "full range" in their names; swscale takes that as a setting.
 AVPixelFormat without_range(AVPixelFormat format) {
   switch (format) {
     case AV_PIX_FMT_YUVJ420P:
@@ -78,7 +78,7 @@ class VideoFile final : public Footage {
     decoder_.reset(avcodec_alloc_context3(codec));
     av::check(avcodec_parameters_to_context(decoder_.get(), context->streams[track_]->codecpar),
               file, "cannot be decoded");
-    decoder_->thread_count = 0;  // as many as there are cores
+    decoder_->thread_count = 0;  // 0: one thread per core
     decoder_->err_recognition = AV_EF_EXPLODE;
     av::check(avcodec_open2(decoder_.get(), codec, nullptr), file, "cannot be decoded");
   }
@@ -102,7 +102,7 @@ class VideoFile final : public Footage {
   std::vector<std::string> notes() const override { return notes_; }
 
  private:
-  // False after the last frame.
+  // Returns false after the last frame.
   bool decode() {
     for (;;) {
       const int got = avcodec_receive_frame(decoder_.get(), frame_.get());

@@ -28,7 +28,7 @@
 namespace previz::output {
 namespace {
 
-// A layer of three channels and one of a single channel, by the names they have in the file.
+// Layers of three channels and of one channel, with their names in the file.
 struct ColorLayer {
   std::array<const char*, 3> channels;
   std::vector<glm::vec3> render::Layers::*values;
@@ -68,7 +68,7 @@ Imf::FrameBuffer frame_buffer(const render::Layers& layers) {
   return buffer;
 }
 
-// Imath's matrices are of row vectors.
+// Imath's matrices multiply row vectors.
 Imath::M44f row_vector_matrix(const glm::dmat4& matrix) {
   Imath::M44f result;
   for (int i = 0; i < 4; ++i)
@@ -124,8 +124,8 @@ Imf::Header header(const render::Layers& layers, const ExrMetadata& metadata) {
   return header;
 }
 
-// A file that remembers what went wrong: OpenEXR writes the end of a picture in a destructor, which
-// cannot report it.
+// A file that remembers its errors, because OpenEXR writes the end of a picture in a destructor,
+// which cannot report them.
 class WrittenFile final : public Imf::OStream {
  public:
   explicit WrittenFile(const std::filesystem::path& file)
@@ -146,7 +146,7 @@ class WrittenFile final : public Imf::OStream {
     remember();
   }
 
-  // Throws previz::Error where anything of it could not be written.
+  // Throws previz::Error if any part of the file could not be written.
   void close() {
     stream_.close();
     remember();

@@ -1,4 +1,5 @@
-// One frame as one multi-layer OpenEXR file: every layer of the render, linear, 32-bit float.
+// Writes one frame as one multi-layer OpenEXR file with every layer of the render, linear, 32-bit
+// float.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +16,7 @@
 
 namespace previz::output {
 
-// What stands in the file's header beside the picture. Attribute names:
+// The contents of the file's header beside the picture. The attribute names are:
 //   software (string), chromaticities (Rec. 709, D65),
 //   previz.samples (int), previz.denoised (int: 1 where noise was taken out of composite, and
 //   variance says what seems to be left; outliers beyond the sensor's white are then gone, too),
@@ -32,25 +33,26 @@ struct ExrMetadata {
   std::string set_name;
   std::string pose = "tracked";
   glm::dmat4 world_from_camera{1.0};
-  std::optional<PinholeIntrinsics> intrinsics;  // of the picture's size
+  std::optional<PinholeIntrinsics> intrinsics;  // for the picture's size
   std::optional<ThinLens> lens;
   double exposure_s = 0;  // 0: not known
 };
 
-// The metadata of a picture of these layers, rendered into `frame` as `track` saw it.
+// Returns the metadata for a picture of these layers, which was rendered into `frame` with the pose
+// of `track`.
 ExrMetadata exr_metadata(const render::Layers& layers, const Frame& frame,
                          const tracking::Track& track, const set::Set& set);
 
-// Channels, 32-bit float, ZIP compressed: composite.R/.G/.B, mixed.R/.G/.B, real.R/.G/.B,
-// diff.R/.G/.B, mask.Y, depth.Z, normal.X/.Y/.Z, variance.R/.G/.B.
-// diff is what virtual things do to real pixels: (1 - mask) * (Lm - Lr), which is Lm - Lr where the
-// mask is 0 and 0 where it is 1. The file appears whole or not at all; throws previz::Error naming
-// it on failure.
+// Writes the channels composite.R/.G/.B, mixed.R/.G/.B, real.R/.G/.B, diff.R/.G/.B, mask.Y,
+// depth.Z, normal.X/.Y/.Z and variance.R/.G/.B, 32-bit float, ZIP compressed. diff is the change
+// that virtual things make to real pixels: (1 - mask) * (Lm - Lr), which is Lm - Lr where the mask
+// is 0 and 0 where it is 1. The file appears whole or not at all; throws previz::Error naming the
+// file on failure.
 void write_exr(const std::filesystem::path& path, const render::Layers& layers,
                const ExrMetadata& metadata);
 
-// Reads the layers of a file that write_exr wrote (diff comes back as written, so multiplied by
-// 1 - mask). Throws previz::Error naming the file and the channel that is missing.
+// Reads the layers of a file that write_exr wrote (diff comes back as written, multiplied by 1 -
+// mask). Throws previz::Error naming the file and the channel that is missing.
 render::Layers read_exr(const std::filesystem::path& path);
 
 }  // namespace previz::output

@@ -1,5 +1,5 @@
-// Files that are whole or not there: written beside their place, synced, then renamed into it.
-// (For text that is in memory already: session::replace_file.)
+// Makes files that are whole or not there: each is written beside its place, synced, then renamed
+// into it. (For text that is already in memory use session::replace_file.)
 #pragma once
 
 #include <filesystem>
@@ -7,7 +7,8 @@
 
 namespace previz::output {
 
-// The name `write_whole` and the video writer use until a file is finished: "<path>.part".
+// Returns the name that `write_whole` and the video writer use until a file is finished:
+// "<path>.part".
 std::filesystem::path unfinished_name(const std::filesystem::path& path);
 
 // Calls `write` with the unfinished name, then syncs that file to disk and renames it to `path`.
@@ -16,7 +17,7 @@ std::filesystem::path unfinished_name(const std::filesystem::path& path);
 void write_whole(const std::filesystem::path& path,
                  const std::function<void(const std::filesystem::path& unfinished)>& write);
 
-// Syncs and renames an unfinished file somebody else wrote.
+// Syncs and renames an unfinished file that somebody else wrote. Throws as write_whole() does.
 void finish(const std::filesystem::path& unfinished, const std::filesystem::path& path);
 
 }  // namespace previz::output

@@ -20,7 +20,7 @@ int pixels(long units) {
   return static_cast<int>((units + units_a_pixel / 2) / units_a_pixel);
 }
 
-// A text as glyphs with the way from each to the next.
+// A text as glyphs with the advance from each to the next.
 class Shaped {
  public:
   Shaped(hb_font_t* font, const std::string& utf8) : buffer_(hb_buffer_create()) {
@@ -52,7 +52,7 @@ class Shaped {
   hb_buffer_t* buffer_;
 };
 
-// Glyphs may overlap; what of one lies outside is cut off.
+// Adds a glyph, which may overlap others; its parts outside the picture are cut off.
 void add(const FT_Bitmap& glyph, int left, int top, Coverage& to) {
   for (int row = 0; row < static_cast<int>(glyph.rows); ++row)
     for (int column = 0; column < static_cast<int>(glyph.width); ++column) {

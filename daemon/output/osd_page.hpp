@@ -1,4 +1,4 @@
-// What the overlay (on-screen display) says: words by place, without pixels. Plain data.
+// The words of the overlay (on-screen display) by place, as plain data without pixels.
 #pragma once
 
 #include <string>
@@ -7,9 +7,9 @@
 namespace previz::output {
 
 enum class OsdTone {
-  plain,      // what is as it should be
-  mode,       // what the rig does, where that is not the ordinary
-  recording,  // a take runs
+  plain,      // everything is as it should be
+  mode,       // the rig is in an unusual mode
+  recording,  // a take is being recorded
   warning,    // worth a look
   alarm       // something is broken or missing
 };
@@ -22,7 +22,7 @@ struct OsdText {
   friend bool operator==(const OsdText&, const OsdText&) = default;
 };
 
-// Boxes beside each other in the corners; notices in the middle below, one above the other.
+// The boxes of each corner stand beside each other; notices are stacked at the bottom centre.
 struct OsdPage {
   std::vector<OsdText> top_left, top_right, bottom_left, bottom_right, notices;
 

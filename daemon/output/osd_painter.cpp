@@ -8,18 +8,18 @@
 namespace previz::output {
 namespace {
 
-// 0..1, as the screen shows it (not linear).
+// Colour values are 0..1 as the screen shows them (not linear).
 struct Colour {
   double red, green, blue;
 };
 struct Style {
   Colour ground;
-  double opacity;  // of the ground
+  double opacity;  // opacity of the box behind the text
   Colour text;
 };
 
-// Dark grounds for what is always there, so that they do not draw the eye from the picture; loud
-// ones for what must not be missed. Every pair has a contrast of at least 4.5 on any picture.
+// Permanent texts have dark grounds, so that they do not draw the eye from the picture; texts that
+// must not be missed have loud ones. Every pair has a contrast of at least 4.5 on any picture.
 const Style& style_of(OsdTone tone) {
   constexpr Colour white{1, 1, 1}, black{0, 0, 0};
   static constexpr std::array<Style, 5> styles = {{
@@ -32,7 +32,8 @@ const Style& style_of(OsdTone tone) {
   return styles[static_cast<std::size_t>(tone)];
 }
 
-// How much of the pixel is within a rectangle with rounded corners, by the distance of its middle.
+// Returns how much of a pixel lies within a rectangle with rounded corners, from the distance of
+// the pixel's centre.
 double rounded(int x, int y, int width, int height, double radius) {
   const double dx = std::max({radius - (x + 0.5), (x + 0.5) - (width - radius), 0.0});
   const double dy = std::max({radius - (y + 0.5), (y + 0.5) - (height - radius), 0.0});
@@ -54,7 +55,7 @@ std::vector<std::string> words_in(const std::string& text) {
 }
 
 bool continues_a_character(char byte) {
-  return (static_cast<unsigned char>(byte) & 0xc0) == 0x80;  // UTF-8
+  return (static_cast<unsigned char>(byte) & 0xc0) == 0x80;  // continuation byte in UTF-8
 }
 
 }  // namespace
@@ -102,7 +103,7 @@ bool OsdPainter::fits(const std::string& text) const {
   return font_.width(text) + 2 * padding_ <= width_ - 2 * margin_;
 }
 
-// Lines that fit: between words, and within one that is wider than the screen.
+// Breaks text into lines that fit, between words, and within a word that is wider than the screen.
 std::vector<OsdText> OsdPainter::broken(const OsdText& words) const {
   std::vector<std::string> lines;
   for (std::string word : words_in(words.text)) {
@@ -125,8 +126,8 @@ std::vector<OsdText> OsdPainter::broken(const OsdText& words) const {
   return boxes;
 }
 
-// From the left in order, and the right ones against the right edge, of the first row where all of
-// them fit; rows are filled from the top.
+// Places the left boxes in order from the left, and the right ones against the right edge of the
+// first row in which all of them fit. Rows are filled from the top.
 OsdPainter::Rows OsdPainter::rows_of(const std::vector<OsdText>& left,
                                      const std::vector<OsdText>& right) const {
   Rows rows;
@@ -148,7 +149,7 @@ OsdPainter::Rows OsdPainter::rows_of(const std::vector<OsdText>& left,
     total += against.back().width + gap_;
   }
   if (against.empty()) return rows;
-  if (total + margin_ > width_ - margin_) {  // more than a row: they follow the left ones
+  if (total + margin_ > width_ - margin_) {  // too wide for one row: they follow the left ones
     std::vector<OsdText> all = left;
     all.insert(all.end(), right.begin(), right.end());
     return rows_of(all, {});

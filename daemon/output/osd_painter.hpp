@@ -12,15 +12,14 @@ namespace previz::output {
 
 class OsdPainter {
  public:
-  // For a screen of this size in pixels; `text_height` is the em over the screen's height. Throws
+  // The screen's size is in pixels; `text_height` is the em over the screen's height. Throws
   // previz::Error naming the font if it cannot be read.
   OsdPainter(int screen_width, int screen_height, double text_height,
              const std::filesystem::path& font = default_font());
 
-  // Boxes within the screen that do not overlap. What does not fit beside each other goes to
-  // further rows, what is too long for a row is broken; notices for which there is no row left are
-  // counted by the last one. Of what is always there, a screen without the rows for it has the
-  // upper ones.
+  // Returns boxes within the screen that do not overlap. Boxes that do not fit beside each other go
+  // to further rows; text that is too long for a row is broken. If rows run out, the last notice
+  // says how many are hidden, and the permanent texts lose their lower rows.
   std::vector<Overlay> paint(const OsdPage& page) const;
 
  private:
@@ -32,7 +31,7 @@ class OsdPainter {
   using Rows = std::vector<std::vector<Box>>;
 
   int width_of(const OsdText& words) const;
-  bool fits(const std::string& text) const;  // in a row
+  bool fits(const std::string& text) const;  // true: fits in one row
   std::vector<OsdText> broken(const OsdText& words) const;
   Rows rows_of(const std::vector<OsdText>& left, const std::vector<OsdText>& right) const;
   Rows notices(const std::vector<OsdText>& notices, std::size_t most) const;

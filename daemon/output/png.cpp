@@ -14,9 +14,8 @@
 namespace previz::output {
 namespace {
 
-// libpng leaves on an error by longjmp to where setjmp was called last. Every function that calls
-// setjmp here holds nothing with a destructor; what went wrong is kept in PngError and thrown
-// after.
+// On an error libpng calls longjmp to the last setjmp. So the functions here that call setjmp hold
+// nothing with a destructor; PngError keeps the error, which is thrown afterwards.
 struct PngError {
   std::string message;
 };
@@ -39,7 +38,7 @@ FilePtr open(const std::filesystem::path& path, const char* mode) {
   return file;
 }
 
-// Row-major bytes as PNG has them: 16-bit samples are big-endian.
+// Row-major bytes in PNG's order: 16-bit samples are big-endian.
 std::vector<png_byte> to_bytes(const Plate& picture) {
   const std::size_t bytes_a_sample = picture.bits == 16 ? 2 : 1;
   std::vector<png_byte> bytes(picture.samples.size() * bytes_a_sample);
@@ -61,7 +60,7 @@ std::vector<png_bytep> row_pointers(std::vector<png_byte>& bytes, int height) {
   return rows;
 }
 
-// Holds nothing that needs a destructor, so that libpng may jump out of it.
+// This function holds nothing that needs a destructor, so that libpng may jump out of it.
 bool encode(png_structp png, png_infop info, std::FILE* file, const Plate& picture,
             png_bytepp rows) {
   if (setjmp(png_jmpbuf(png))) return false;
@@ -79,7 +78,7 @@ bool read_header(png_structp png, png_infop info, std::FILE* file) {
   if (setjmp(png_jmpbuf(png))) return false;
   png_init_io(png, file);
   png_read_info(png, info);
-  png_set_expand(png);  // palettes and less than 8 bits
+  png_set_expand(png);  // expands palettes and less than 8 bits
   png_set_strip_alpha(png);
   png_set_gray_to_rgb(png);
   png_set_interlace_handling(png);

@@ -1,4 +1,4 @@
-// Pictures as the display shows them: PNG, RGB, 8 or 16 bits a sample as the plate has them.
+// Writes and reads plates as PNG: RGB, with the plate's 8 or 16 bits a sample.
 #pragma once
 
 #include <filesystem>
@@ -7,7 +7,8 @@
 
 namespace previz::output {
 
-// Lossless; the file appears whole or not at all. Throws previz::Error naming the file.
+// Writes a picture without loss; the file appears whole or not at all. Throws previz::Error naming
+// the file.
 void write_png(const std::filesystem::path& path, const Plate& picture);
 
 // Reads an RGB, RGBA or gray PNG of 8 or 16 bits; alpha is dropped, gray is repeated. Throws

@@ -1,4 +1,4 @@
-// Progress of a long job, for people: one rewritten line on a terminal, plain lines elsewhere.
+// Shows the progress of a long job: one rewritten line on a terminal, plain lines elsewhere.
 #pragma once
 
 #include <cstdint>
@@ -8,19 +8,19 @@
 
 namespace previz::output {
 
-// "47 s", "3:05", "2:03:05"; for times to come and times past.
+// Returns a duration as "47 s", "3:05" or "2:03:05".
 std::string duration_words(double seconds);
 
 class Progress {
  public:
-  // `total_frames` are still to be done. Times are in seconds of any one clock.
+  // `total_frames` is the number of frames still to do. Times are in seconds of any one clock.
   Progress(std::ostream& out, bool terminal, std::uint64_t total_frames, double start_s);
 
-  // Within a frame; shown on a terminal only.
+  // Shows progress within a frame, on a terminal only.
   void sample(std::uint64_t frame, int done, int total, double now_s);
-  // A frame is finished; `text` says how.
+  // Reports a finished frame; `text` describes the result.
   void frame_done(const std::string& text, double now_s);
-  // A line that stays.
+  // Prints a line that stays.
   void note(const std::string& text);
 
  private:
@@ -36,15 +36,16 @@ class Progress {
   bool line_shown_ = false;
 };
 
-// Progress of a job whose parts take very different times: by the share of the work that is done.
+// Shows the progress of a job whose parts take very different times, by the share of the work that
+// is done.
 class ShareProgress {
  public:
-  // `total`: of any measure of work. Times are in seconds of any one clock.
+  // `total` is the whole work in any unit. Times are in seconds of any one clock.
   ShareProgress(std::ostream& out, bool terminal, double total, double start_s);
 
-  // Some work of a step is done; shown on a terminal only.
+  // Adds some work of a step; shown on a terminal only.
   void worked(const std::string& step, double work, double now_s);
-  // A step is finished.
+  // Reports a finished step.
   void step_done(const std::string& text, double now_s);
 
  private:

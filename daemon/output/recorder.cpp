@@ -15,10 +15,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// A stopped take waits so long for what tracking still has in hand of its last frame.
+// A stopped take waits so long for the tracking of its last frames.
 constexpr std::chrono::milliseconds track_patience{500};
 constexpr std::chrono::seconds disk_interval{1};
-// A frame that was offered when the button was pressed may have been captured so much earlier.
+// A frame may be offered so long after its capture.
 constexpr std::chrono::seconds late{1};
 
 std::string megabytes(std::uint64_t bytes) {
@@ -115,8 +115,8 @@ void Recorder::enqueue(Entry entry) {
   filled_.notify_one();
 }
 
-// The newest frame of the ring says what time it is. A full ring must fit the queue with room to
-// spare.
+// Drops the ring's oldest entries, counting time from its newest frame. A full ring must fit the
+// queue with room to spare.
 void Recorder::trim_ring() {
   const std::int64_t newest = std::get<Captured>(ring_.back()).frame->timestamp_ns;
   const auto keep_ns = static_cast<std::int64_t>(options_.preroll_s * 1e9);
@@ -135,7 +135,8 @@ void Recorder::forget_first_of_ring() {
   ring_.pop_front();
 }
 
-// Nothing is offered in standby, or by a camera that is not there: the ring then ends long ago.
+// In standby, or while the camera is missing, nothing is offered, and the ring's entries become too
+// old.
 void Recorder::forget_what_is_long_ago() {
   const auto keep = std::chrono::duration<double>(options_.preroll_s) + late;
   const auto is_long_ago = [&](const Entry& entry) {
@@ -239,7 +240,7 @@ void Recorder::handle(Entry& entry) {
     note(Severity::info,
          last.empty() ? "there is no take to mark" : last.filename().string() + " is marked good");
   } else if (!take_) {
-    return;  // it has failed meanwhile
+    return;  // the take has failed meanwhile
   } else if (std::holds_alternative<Stop>(entry)) {
     end_at_ = Clock::now() + track_patience;
   } else if (const auto* captured = std::get_if<Captured>(&entry)) {
@@ -255,7 +256,7 @@ void Recorder::handle(Entry& entry) {
 
 void Recorder::write(const Captured& captured) {
   if (!take_->fits(*captured.frame) && captured.frame->source == "composite") {
-    const std::lock_guard lock(mutex_);  // of a camera as it was before its format changed
+    const std::lock_guard lock(mutex_);  // forgets lights from before the camera's format changed
     ++status_.dropped_shown;
     return;
   }
@@ -296,7 +297,7 @@ void Recorder::end_take() {
                            std::to_string(take->observer_frames()) + " frames");
 }
 
-// What is on disk stays as it is: a session that was not closed opens up to its last whole frame.
+// Leaves the files as they are: a session that was not closed opens up to its last whole frame.
 void Recorder::fail(const std::string& why) {
   end_at_.reset();
   const bool any = take_ && take_->observer_frames() > 0;
@@ -315,7 +316,7 @@ void Recorder::fail(const std::string& why) {
   if (options_.note) options_.note({Severity::error, "recording ended", why});
 }
 
-// Ends the take in order while there is still room to do so.
+// Ends the take properly while there is still room on the disk.
 void Recorder::check_disk() {
   checked_ = Clock::now();
   std::filesystem::create_directories(options_.take.directory);
@@ -327,7 +328,7 @@ void Recorder::check_disk() {
               " are kept free (recording.reserve_mb)");
 }
 
-// The directory may not be there yet: then the disk is the one it will be made on.
+// If the directory is not there yet, this asks the disk on which it will be made.
 std::uint64_t Recorder::free_on_disk() const {
   if (options_.free_bytes) return options_.free_bytes();
   std::filesystem::path folder = std::filesystem::absolute(options_.take.directory);

@@ -1,4 +1,4 @@
-// What a display shows, as a frame of a take: the stream "composite".
+// Makes a shown picture into a frame of a take's stream "composite".
 #pragma once
 
 #include <cstdint>
@@ -7,9 +7,9 @@
 
 namespace previz::output {
 
-// `picture` at width x height, at least its own size: a preview's pixels are repeated, so that the
-// stream keeps one size whatever the preview's. `timestamp_ns` is the camera frame's it was made
-// of.
+// Returns `picture` at width x height, which must be at least its own size. A preview's pixels are
+// repeated, so that the stream keeps one size. `timestamp_ns` is the time of the camera frame from
+// which the picture was made.
 Frame shown_frame(const Plate& picture, int width, int height, std::uint64_t sequence,
                   std::int64_t timestamp_ns);
 

@@ -55,7 +55,7 @@ std::string take_name(const std::string& slate, int number) {
   std::string name = slate;
   for (char& c : name) {
     const auto code = static_cast<unsigned char>(c);
-    const bool letter = std::isalnum(code) != 0 || code >= 0x80;  // UTF-8 stays
+    const bool letter = std::isalnum(code) != 0 || code >= 0x80;  // UTF-8 is kept
     if (!letter && c != '-' && c != '+' && c != '.') c = '_';
   }
   if (name.empty() || name.front() == '.') name.insert(name.begin(), '_');

@@ -1,4 +1,4 @@
-// One take on its way to the disk: a session directory with its number, slate and timecode.
+// Writes one take to disk, as a session directory with its number, slate and timecode.
 #pragma once
 
 #include <chrono>
@@ -16,34 +16,37 @@
 
 namespace previz::output {
 
-// What every take of a set begins with.
+// The common beginning of all takes of a set.
 struct TakeTemplate {
-  std::filesystem::path directory;  // of the takes
+  std::filesystem::path directory;  // parent of the takes
   session::SessionInfo info;        // calibrations, set; take: slate, notes and timecode_fps
   std::vector<std::pair<std::string, std::filesystem::path>> assets;
 };
 
-// Time of day as "HH:MM:SS:FF", without drop-frame: frames of a second are counted by the nearest
-// whole rate.
+// Both return a time of day as "HH:MM:SS:FF", without drop-frame: the frames of a second are
+// counted at the nearest whole rate.
 std::string timecode(std::chrono::nanoseconds since_midnight, double fps);
 std::string timecode_of(std::chrono::system_clock::time_point time, double fps);  // local time
 
-// "12A_take007" for slate "12A": what a file system cannot hold, or a shell breaks on, becomes "_".
+// Returns "12A_take007" for slate "12A". Characters that a file system cannot hold, or a shell
+// breaks on, become "_".
 std::string take_name(const std::string& slate, int number);
-// One more than the highest number of the slate's takes there; 1 where there is none.
+// Returns one more than the highest number of the slate's takes in the directory; 1 if there is
+// none.
 int next_take_number(const std::filesystem::path& directory, const std::string& slate);
 
-// Everything throws previz::Error naming the file; what was written before stays readable.
+// Every function throws previz::Error naming the file; data written before stays readable.
 class TakeWriter {
  public:
   // Makes the directory under the next free number and copies the assets.
   explicit TakeWriter(const TakeTemplate& take);
 
-  // Whether the frame goes with those before it: a stream has one format and size.
+  // Returns whether the frame has the format and size of its stream.
   bool fits(const Frame& frame) const;
   // `captured` gives the take its timecode with the first observer frame.
   void write(const Frame& frame, std::chrono::system_clock::time_point captured);
-  // Of a frame that was written (found by its time), in order; any other is of no use and ignored.
+  // Writes the track of a frame that was written before, found by its time, in order; any other
+  // track is ignored.
   void write(session::TrackRecord record);
   void write(const ButtonEvent& event) { writer_.write(event); }
   void write_event(std::int64_t timestamp_ns, const std::string& what) {
@@ -55,7 +58,7 @@ class TakeWriter {
   const std::filesystem::path& directory() const { return directory_; }
   int number() const { return take_.number; }
   std::uint64_t observer_frames() const { return frame_of_.size(); }
-  // The last observer frame has its line in the track.
+  // Returns true if the last observer frame has its line in the track.
   bool track_is_complete() const { return next_track_ == frame_of_.size(); }
 
  private:
@@ -70,8 +73,8 @@ class TakeWriter {
   session::TakeInfo take_;
   const std::filesystem::path directory_;
   session::SessionWriter writer_;
-  std::map<std::string, Format> formats_;                     // by source
-  std::unordered_map<std::int64_t, std::uint64_t> frame_of_;  // by time
+  std::map<std::string, Format> formats_;                     // key: source
+  std::unordered_map<std::int64_t, std::uint64_t> frame_of_;  // key: timestamp_ns
   std::uint64_t next_track_ = 0;
 };
 

@@ -14,10 +14,11 @@ extern "C" {
 namespace previz::output {
 namespace {
 
-// Fine enough for jittered capture times, and below MPEG-4's limit of 65535 ticks a second.
+// This clock is fine enough for jittered capture times, and below MPEG-4's limit of 65535 ticks a
+// second.
 constexpr AVRational video_clock{1, 60000};
 
-// An encoder opened for pictures of this size, or null where libav cannot.
+// Opens an encoder for pictures of this size; returns null if libav cannot.
 av::Codec open_encoder(const VideoCodec& codec, int width, int height) {
   const AVCodec* found = avcodec_find_encoder_by_name(codec.encoder.c_str());
   if (!found) return nullptr;
@@ -33,7 +34,7 @@ av::Codec open_encoder(const VideoCodec& codec, int width, int height) {
   context->color_trc = AVCOL_TRC_IEC61966_2_1;
   context->colorspace = AVCOL_SPC_BT709;
   context->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
-  context->log_level_offset = AV_LOG_VERBOSE - AV_LOG_INFO;  // x264 tells its life otherwise
+  context->log_level_offset = AV_LOG_VERBOSE - AV_LOG_INFO;  // x264 is very talkative otherwise
   if (codec.encoder == "libx264") {
     av_opt_set(context->priv_data, "preset", "medium", 0);
     av_opt_set(context->priv_data, "crf", "17", 0);
@@ -75,21 +76,21 @@ struct VideoWriter::Impl {
   av::Scaler converter;
   av::Picture frame{av_frame_alloc()};
   av::Packet packet{av_packet_alloc()};
-  AVStream* stream = nullptr;  // of `file`
+  AVStream* stream = nullptr;  // belongs to `file`
   std::optional<std::int64_t> first_timestamp_ns;
   std::int64_t last_tick = -1;
-  std::int64_t last_interval = video_clock.den / 25;  // of a single picture
+  std::int64_t last_interval = video_clock.den / 25;  // for a single picture
 
   void check(int result, const char* what) const { av::check(result, path, what); }
 
-  // Null: no more pictures.
+  // Encodes a picture; null ends the stream.
   void encode(const AVFrame* picture) {
     check(avcodec_send_frame(encoder.get(), picture), "cannot be encoded");
     for (;;) {
       const int result = avcodec_receive_packet(encoder.get(), packet.get());
       if (result == AVERROR(EAGAIN) || result == AVERROR_EOF) return;
       check(result, "cannot be encoded");
-      // Players drop a last picture that lasts no time; those before it last until the next.
+      // Players drop a last picture without a duration; earlier ones last until the next.
       packet->duration = last_interval;
       av_packet_rescale_ts(packet.get(), encoder->time_base, stream->time_base);
       packet->stream_index = stream->index;

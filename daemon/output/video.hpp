@@ -1,4 +1,4 @@
-// The review video: the pictures at the times they were taken, small enough to send around.
+// Encodes the review video: the pictures at the times they were taken, small enough to send around.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ struct VideoCodec {
   std::string extension;    // ".mp4"
 };
 
-// What a review video may be encoded with, best first: H.264, then MPEG-4 part 2, then FFV1. Only
-// those that this machine's libav can open.
+// Returns the codecs for a review video that this machine's libav can open, best first: H.264, then
+// MPEG-4 part 2, then FFV1.
 std::vector<VideoCodec> review_codecs();
 
 // Encodes to "<stem><extension>", which appears when it is whole. All pictures have one size;
@@ -29,12 +29,12 @@ class VideoWriter {
  public:
   // Throws previz::Error naming the file if it cannot be written.
   VideoWriter(const std::filesystem::path& stem, int width, int height, const VideoCodec& codec);
-  ~VideoWriter();  // an unfinished file is removed
+  ~VideoWriter();  // removes an unfinished file
   VideoWriter(const VideoWriter&) = delete;
   VideoWriter& operator=(const VideoWriter&) = delete;
 
-  // Times must increase (by at least 1/60000 s, the video's clock); the first is the video's time
-  // 0.
+  // Adds a picture. Times must increase by at least 1/60000 s, the video's clock; the first is the
+  // video's time 0.
   void write(const Plate& picture, std::int64_t timestamp_ns);
   // Finishes the file, puts it in place and returns its path.
   std::filesystem::path close();

@@ -1,4 +1,4 @@
-// How far the animations have been played, by the times of the pictures.
+// Measures how far the animations have been played, by the times of the frames.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,9 @@ namespace previz::pipeline {
 
 class AnimationClock {
  public:
-  // At a frame of this time. `plays`: how often playing was begun anew so far; the frame that first
-  // knows of one shows the beginning. While `held`, nothing goes on.
+  // Returns the animation time in seconds at a frame of this time. `plays` counts how often playing
+  // was restarted; the first frame with a new count shows the beginning. While `held`, the
+  // animation time stands still.
   double at(std::int64_t timestamp_ns, std::uint64_t plays, bool held) {
     if (!last_ns_ || plays != plays_)
       played_ns_ = 0;

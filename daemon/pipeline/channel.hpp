@@ -1,5 +1,5 @@
-// What stands between two threads: a mailbox (newest value only), a bounded queue (never drops), or
-// a value that is published and stays.
+// Passes values between threads, through a mailbox (newest value only), a bounded queue (never
+// drops), or a published value that stays.
 #pragma once
 
 #include <chrono>
@@ -14,28 +14,31 @@
 
 namespace previz::pipeline {
 
-// One writer side, one reader side; any thread may close. What passes is moved; share big values by
-// std::shared_ptr<const T>.
+// A channel has one writer and one reader; any thread may close it. Values are moved; share big
+// ones by std::shared_ptr<const T>.
 template <class T>
 class Channel {
  public:
   virtual ~Channel() = default;
 
-  // False if the channel is closed: the value is gone and the writer should end.
+  // Returns false if the channel is closed: the value is gone and the writer should end.
   virtual bool push(T value) = 0;
-  // Waits for a value; empty once the channel is closed and drained: the reader should end.
+  // Waits for a value. Returns nothing once the channel is closed and drained: the reader should
+  // end.
   virtual std::optional<T> pop() = 0;
-  // What is there now, without waiting.
+  // Returns the value that is there now, if any, without waiting.
   virtual std::optional<T> try_pop() = 0;
-  // No more pushes; wakes everybody. What is inside can still be popped.
+  // Ends pushing and wakes everybody who waits. Values inside can still be popped.
   virtual void close() = 0;
-  // Closes and throws away what is inside (another stage failed; the backlog is of no use).
+  // Closes the channel and throws away the values inside, for when another stage has failed and the
+  // backlog is of no use.
   virtual void abandon() = 0;
-  // Values that were pushed and never popped because a newer one took their place.
+  // Counts the values that were never popped because a newer one took their place.
   virtual std::uint64_t dropped() const = 0;
 };
 
-// Live: a push replaces what was not taken yet, and counts it as dropped. Never blocks the writer.
+// The channel for live use: a push replaces a value that was not taken yet and counts it as
+// dropped. The writer never waits.
 template <class T>
 class Mailbox final : public Channel<T> {
  public:
@@ -61,13 +64,13 @@ class Mailbox final : public Channel<T> {
     return std::exchange(value_, std::nullopt);
   }
 
-  // Like pop(), for readers with something else to look after: empty also once the time is over.
+  // Works like pop(), but also returns nothing once the time is over, for readers with other work.
   std::optional<T> pop_for(std::chrono::milliseconds timeout) {
     std::unique_lock lock(mutex_);
     filled_.wait_for(lock, timeout, [this] { return value_ || closed_; });
     return std::exchange(value_, std::nullopt);
   }
-  // Closed and drained: nothing will ever come.
+  // Returns true once the channel is closed and drained: nothing will ever come.
   bool finished() const {
     const std::lock_guard lock(mutex_);
     return closed_ && !value_;
@@ -98,7 +101,8 @@ class Mailbox final : public Channel<T> {
   bool closed_ = false;
 };
 
-// Recording and offline: at most `capacity` (>= 1) values wait, in order; a push waits for room.
+// The channel for recording and offline use: at most `capacity` (>= 1) values wait, in order; a
+// push waits for room.
 template <class T>
 class BoundedQueue final : public Channel<T> {
  public:
@@ -158,7 +162,7 @@ class BoundedQueue final : public Channel<T> {
   bool closed_ = false;
 };
 
-// One immutable value that a thread publishes and any other looks at.
+// Holds one immutable value that a thread publishes and any other thread reads.
 template <class T>
 class Newest {
  public:

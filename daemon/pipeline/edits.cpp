@@ -23,8 +23,8 @@ glm::dvec3 tint(const LightEdit& edit) {
 
 namespace {
 
-// Where the frame is that a thing's pose is in: the stage's own, or its carrier's; nothing: that
-// was not found yet.
+// Returns the frame that an object's or a lamp's pose is given in: the stage's, or its carrier's.
+// Returns nothing if the carrier was not found yet.
 std::optional<glm::dmat4> world_from(const std::string& carrier,
                                      const session::Carriers& carriers) {
   if (carrier.empty()) return glm::dmat4(1);

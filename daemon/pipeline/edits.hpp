@@ -1,5 +1,5 @@
-// What the crew changed of a set's objects and lamps, as steps from where the set has them; and
-// with what is moved by hand, where everything is.
+// The crew's changes to a set's objects and lamps, as steps from where the set has them. Together
+// with what is moved by hand they say where everything is.
 #pragma once
 
 #include <glm/mat3x3.hpp>
@@ -12,10 +12,10 @@
 
 namespace previz::pipeline {
 
-// Axes are the stage's, or those of the object's carrier.
+// A change of one object. Its axes are the stage's, or the carrier's if the object has one.
 struct ObjectEdit {
   glm::dvec3 offset_m{0};
-  glm::dmat3 turn{1};  // through the object's origin
+  glm::dmat3 turn{1};  // about the object's origin
   double scale = 1;
 
   friend bool operator==(const ObjectEdit&, const ObjectEdit&) = default;
@@ -33,21 +33,22 @@ struct Edits {
   friend bool operator==(const Edits&, const Edits&) = default;
 };
 
-// The object's transform with the edit put on `world_from_file`, which says where its origin is.
+// Returns the object's transform: the edit applied to `world_from_file`, which says where the
+// object's origin is.
 glm::dmat4 edited(const glm::dmat4& world_from_file, const ObjectEdit& edit);
 
-// Half of warm_stops goes to red and is taken from blue; half of green_stops goes to green and is
-// taken from both others.
+// Returns a factor for each channel: half of warm_stops is added to red and taken from blue; half
+// of green_stops is added to green and taken from red and blue.
 glm::dvec3 tint(const LightEdit& edit);
 
-// What moves without the crew's buttons.
+// The things that move without the crew's buttons.
 struct Motion {
   session::Carriers carriers;
   double animation_s = 0;
 };
 
-// Everything that is not as the set has it, and everything that moves by itself or is carried.
-// Names the set has not are left out.
+// Returns the state of everything that is not as the set has it, moves by itself or is carried.
+// Names that are not in the set are left out.
 session::SceneState scene_state(const set::Set& set, const Edits& edits, const Motion& motion = {});
 
 }  // namespace previz::pipeline

@@ -8,8 +8,8 @@
 namespace previz::pipeline {
 namespace {
 
-constexpr double step = std::numbers::sqrt2;  // of a side: half or twice the pixels
-constexpr double follow_down = 0.2;           // share of a faster frame in the new cost
+constexpr double step = std::numbers::sqrt2;  // factor on each side, for half or twice the pixels
+constexpr double follow_down = 0.2;           // weight of a faster frame in the new cost
 
 }  // namespace
 

@@ -1,5 +1,5 @@
-// Light frames in, the newest light out, estimated in a thread of its own: who asks for the light
-// never waits for it (P11).
+// Estimates the light from light frames on a thread of its own, so that a reader of the newest
+// light never waits for it (P11).
 #pragma once
 
 #include <cstdint>
@@ -16,27 +16,28 @@ namespace previz::pipeline {
 
 struct LightFrame {
   FramePtr frame;
-  std::uint64_t index = 0;  // in its stream, from 0
+  std::uint64_t index = 0;  // place in its stream, from 0
 };
 
-// A picture of the film camera whose pose is known.
+// A picture of the film camera and its pose.
 struct ObserverView {
   PlatePtr plate;
-  double exposure = 1;  // of its frame
+  double exposure = 1;  // the frame's
   glm::dmat4 world_from_camera{1.0};
 };
 
 class LightFeed {
  public:
   using Source = std::function<std::optional<LightFrame>()>;
-  // All light frames that waited, at least one, and the newest view, where there is one.
+  // Makes the light from all light frames that waited, at least one, and the newest view, if any.
   using Estimate =
       std::function<LightPtr(std::vector<LightFrame>, const std::optional<ObserverView>&)>;
 
   // Adds the two stages "light camera" and "lighting". `stages` ends before this object.
   void start(StageThreads& stages, Source source, Estimate estimate);
 
-  // From any one thread each; neither waits. Null until the first estimate.
+  // Each of the two may be called from any one thread, and neither waits. newest() is null until
+  // the first estimate.
   void see_observer(ObserverView view) { views_.push(std::move(view)); }
   LightPtr newest();
 

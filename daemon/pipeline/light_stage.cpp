@@ -13,8 +13,9 @@
 namespace previz::pipeline {
 namespace {
 
-// The light as track.jsonl carries it: its sources, and everything else as lighting::blurred leaves
-// it. Light of lighting.mode = "sources" comes back from that as it was, bit for bit.
+// Returns the light as track.jsonl carries it: its sources, and everything else as
+// lighting::blurred leaves it. Light of lighting.mode = "sources" can be restored from this record
+// bit for bit.
 session::CapturedLight to_record(const lighting::Lighting& lighting) {
   session::CapturedLight record;
   for (const lighting::Source& source : lighting.sources)
@@ -66,7 +67,7 @@ LightStage::LightStage(const set::Set& set, std::optional<LightCameraCalibration
         std::make_unique<lighting::ObservedLight>(observer, estimator_->resolution(), room_);
 }
 
-// By the set file, once and for all.
+// True if the set file fixes the light, so that it never changes.
 bool LightStage::given() const {
   return settings_.environment || settings_.from == set::LightFrom::set;
 }
@@ -80,7 +81,7 @@ bool LightStage::remembers() const {
          (settings_.smoothing_s > 0 || needs_observer() || settings_.mode != set::LightMode::image);
 }
 
-// Exposures that the set states, or a frame that it names, are all there is to wait for.
+// There is no bracket to wait for if the set states the exposure or names the frame to use.
 void LightStage::await_bracket(std::size_t exposures) {
   if (!exposure_ && settings_.frame < 0)
     awaited_ = std::clamp(exposures, std::size_t{1}, most_exposures);
@@ -122,7 +123,8 @@ void LightStage::drop_oldest() {
   newest_.erase(oldest);
 }
 
-// The image's sources stand where the set says, seen from where the image is.
+// Places the image's sources at the distance that the set or its room gives, as seen from
+// seen_from_.
 LightPtr LightStage::placed(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
                             session::CapturedLight record) const {
   Light light;
@@ -138,7 +140,7 @@ LightPtr LightStage::placed(lighting::Lighting lighting, std::vector<std::uint64
   return std::make_shared<const Light>(std::move(light));
 }
 
-// A take carries sources, whatever the picture is lit by.
+// A take always carries sources, even if the picture is lit by the image.
 LightPtr LightStage::finished(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
                               std::int64_t timestamp_ns) {
   session::CapturedLight record;
@@ -198,7 +200,7 @@ LightPtr LightStage::light() {
 LightPtr LightStage::light_for(const Shot& shot) {
   if (settings_.from != set::LightFrom::recording) return light();
   if (!shot.recorded_light) return nullptr;
-  // Lights change seldom; the same one need not be put into the renderer again.
+  // The light changes seldom; an unchanged one need not be put into the renderer again.
   if (!shown_ || *shown_ != *shot.recorded_light)
     light_ = placed(from_record(*shot.recorded_light), {}, *shot.recorded_light);
   shown_ = shot.recorded_light;

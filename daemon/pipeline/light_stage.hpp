@@ -1,4 +1,4 @@
-// Lighting as a stage: light frames in, the newest estimate of the light out (P9, P11).
+// The lighting stage turns light frames into the newest estimate of the light (P9, P11).
 #pragma once
 
 #include <map>
@@ -18,47 +18,47 @@
 namespace previz::pipeline {
 
 // Keeps the newest light frame of every exposure seen so far; together they are the bracket that is
-// merged. (Two exposures within 1 % are the same one; of an auto-exposure that wanders, the newest
-// most_exposures stay.) A set whose light does not come from a camera needs no light
-// frames.
+// merged. (Two exposures within 1 % count as the same; where an automatic exposure wanders, the
+// newest most_exposures stay.) A set whose light does not come from a camera needs no light frames.
 class LightStage {
  public:
-  // Loads the environment if the set gives one, and the room if it has one. Throws previz::Error
-  // if the light camera's calibration is needed and not known.
+  // Loads the environment if the set gives one, and the room if it has one. Throws previz::Error if
+  // the light camera's calibration is needed but not known.
   LightStage(const set::Set& set, std::optional<LightCameraCalibration> calibration,
              const ObserverCalibration& observer);
 
-  // True where the light is made of frames.
+  // True if the light is made from light frames.
   bool needs_frames() const { return estimator_.has_value(); }
-  // True where the film camera's pictures fill in what the light camera cannot see.
+  // True if the film camera's pictures fill in what the light camera cannot see.
   bool needs_observer() const { return observed_ != nullptr; }
-  // True where the light depends on more than the newest bracket: who wants the light of a frame in
-  // the middle of a take has to go through all the frames before it.
+  // True if the light depends on more than the newest bracket, so that the light of a frame in the
+  // middle of a take needs all the frames before it.
   bool remembers() const;
 
-  // Holds the first light back until a whole bracket of so many different exposures was seen; or
+  // Holds the first light back until a whole bracket of so many different exposures was seen, or
   // twice as many frames, since exposures may get lost or come out alike. Without this call the
   // first frame gives the first light.
   void await_bracket(std::size_t exposures);
 
-  // How the light is taken from what is seen, from the next light() on.
+  // Sets how the light is taken from the frames, from the next light() on.
   void use(set::LightMode mode);
 
-  // Frames in capture order. `index` is the frame's place in its stream, from 0; it matters only
-  // where the set names the one to use (lighting.frame). A frame that cannot be used (another size
-  // than the calibration's, no exposure) is left out, the light stays as it was, and troubles()
-  // says so.
+  // Takes a light frame; frames come in capture order. `index` is the frame's place in its stream,
+  // from 0, and matters only if the set names the one frame to use (lighting.frame). A frame that
+  // cannot be used (another size than the calibration's, no exposure) is left out, the light stays
+  // as it was, and troubles() says so.
   void see(FramePtr frame, std::uint64_t index);
-  // A picture of the film camera, with the exposure that its frame states.
+  // Takes a picture of the film camera, with the exposure that its frame states.
   void see_observer(const Plate& plate, double exposure, const glm::dmat4& world_from_camera);
 
-  // The light from what was seen so far, computed only if that changed. Null: nothing usable yet.
+  // Returns the light from the frames so far, computed only if there are new ones; null if no frame
+  // was usable yet.
   LightPtr light();
-  // The same for an observer frame, tracked: with lighting.from = "recording" the light recorded
-  // with it, null where none was.
+  // Returns the same for a tracked observer frame; with lighting.from = "recording", the light that
+  // was recorded with the frame, or null if there is none.
   LightPtr light_for(const Shot& shot);
 
-  // What was left out since the last call, in plain words.
+  // Returns what was left out since the last call, in plain words.
   std::vector<std::string> troubles() { return std::exchange(troubles_, {}); }
 
  private:
@@ -73,19 +73,19 @@ class LightStage {
   bool awaits_bracket() const { return newest_.size() < awaited_ && seen_ < 2 * awaited_; }
 
   set::Lighting settings_;
-  const std::optional<double> exposure_;           // overrides the frames' own
-  const std::optional<double> observer_exposure_;  // likewise
-  std::optional<lighting::Estimator> estimator_;   // where it needs frames
-  lighting::Lighting given_;                       // by the set file
-  FisheyeIntrinsics intrinsics_;                   // of the light camera
+  const std::optional<double> exposure_;           // overrides the light frames' own
+  const std::optional<double> observer_exposure_;  // overrides the observer frames' own
+  std::optional<lighting::Estimator> estimator_;   // absent: the light needs no frames
+  lighting::Lighting given_;                       // from the set file
+  FisheyeIntrinsics intrinsics_;                   // the light camera's
   std::shared_ptr<const lighting::Room> room_;
   glm::dvec3 seen_from_{0};  // where the image is seen from; world, metres
   std::unique_ptr<lighting::ObservedLight> observed_;
-  std::map<long, FramePtr> newest_;  // by exposure, in steps of 1 %
+  std::map<long, FramePtr> newest_;  // key: exposure in steps of 1 %
   std::size_t awaited_ = 1;          // exposures of the first bracket
-  std::size_t seen_ = 0;             // light frames
+  std::size_t seen_ = 0;             // number of light frames
   std::vector<std::string> troubles_;
-  std::shared_ptr<const session::CapturedLight> shown_;  // what light_ is, if it is recorded
+  std::shared_ptr<const session::CapturedLight> shown_;  // source of light_, if recorded
   bool changed_ = false;
   lighting::SourceTracker tracker_;
   LightPtr light_;

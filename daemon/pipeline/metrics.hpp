@@ -1,5 +1,5 @@
-// What the pipeline did: frames and time per stage, every drop with its cause, latency to display;
-// and who brings the totals of channels and devices into it.
+// Counts what the pipeline does: frames and time per stage, every drop with its cause, latency to
+// display. DropCount and DeviceCounts add the totals of channels and devices.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +17,7 @@ namespace previz::pipeline {
 
 struct StageMetrics {
   std::uint64_t frames = 0;
-  double busy_s = 0;                             // spent working, not waiting
+  double busy_s = 0;                             // time spent working, not waiting
   std::map<std::string, std::uint64_t> dropped;  // cause -> frames
 };
 
@@ -25,12 +25,12 @@ struct MetricsSnapshot {
   double seconds = 0;  // since the start
   std::map<std::string, StageMetrics> stages;
   std::map<std::string, std::uint64_t> counts;    // events that are no drops: "pose lost"
-  std::map<std::string, DeviceCounters> devices;  // as their drivers count, by device
-  double latency_p50_s = 0;  // capture to display, over the last frames; 0 where none was shown
+  std::map<std::string, DeviceCounters> devices;  // the drivers' own counters, by device
+  double latency_p50_s = 0;  // capture to display, over the last frames; 0: none was shown
   double latency_p99_s = 0;
 };
 
-// Safe to use from every stage's thread.
+// Every stage's thread may use it.
 class Metrics {
  public:
   void worked(const std::string& stage, double seconds);
@@ -38,11 +38,11 @@ class Metrics {
   void busy(const std::string& stage, double seconds);
   void dropped(const std::string& stage, const std::string& cause, std::uint64_t frames = 1);
   void count(const std::string& event, std::uint64_t times = 1);
-  // Adds what a device has counted since the last call for it.
+  // Adds what the device has counted since the last call for this device.
   void device_counted(const std::string& device, const DeviceCounters& more);
   void shown(double latency_s);
 
-  // `seconds` since the start, by the caller's clock.
+  // `seconds` is the time since the start, by the caller's clock.
   MetricsSnapshot snapshot(double seconds) const;
 
  private:
@@ -56,11 +56,11 @@ class Metrics {
   std::size_t next_latency_ = 0;
 };
 
-// What a channel dropped, for the metrics of the stage that reads it.
+// Counts what a channel dropped, in the metrics of the stage that reads the channel.
 template <class T>
 class DropCount {
  public:
-  // All three outlive this.
+  // The metrics and the channel must outlive this object.
   DropCount(Metrics& metrics, std::string stage, const Channel<T>& channel)
       : metrics_(metrics), stage_(std::move(stage)), channel_(channel) {}
 
@@ -77,8 +77,9 @@ class DropCount {
   std::uint64_t counted_ = 0;
 };
 
-// A device's own counters. The metrics outlive the device, which is opened anew with every set that
-// is loaded and then counts from 0; only the increase since the last call is added.
+// Adds a device's own counters to the metrics. The metrics outlive the device, which is opened anew
+// with every set that is loaded and then counts from 0; only the increase since the last call is
+// added.
 class DeviceCounts {
  public:
   DeviceCounts(Metrics& metrics, std::string device)
@@ -103,7 +104,8 @@ class DeviceCounts {
 //  "p99": ...}}
 std::string to_json(const MetricsSnapshot& snapshot);
 
-// The smallest value that at least `fraction` (0..1) of the values do not exceed; 0 of none.
+// Returns the smallest value that at least `fraction` (0..1) of the values do not exceed; 0 if
+// there are no values.
 double quantile(std::vector<double> values, double fraction);
 
 }  // namespace previz::pipeline

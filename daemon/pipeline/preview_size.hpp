@@ -1,4 +1,5 @@
-// The observer at a fraction of its size (quality.scale): what a preview renders and shows.
+// Scales the observer's calibration and plates to the size that a preview renders and shows
+// (quality.scale).
 #pragma once
 
 #include "daemon/lighting/response.hpp"
@@ -7,13 +8,13 @@
 
 namespace previz::pipeline {
 
-// The same lens seen by fewer, larger pixels: sides are rounded to nearest and at least 1, and the
-// picture keeps its edges, so a point at pixel u comes to (u + 0.5) width'/width - 0.5. `scale` is
-// above 0 and at most 1; 1 changes nothing.
+// Returns the calibration of the same lens with fewer, larger pixels. Sides are rounded to nearest
+// and are at least 1. The picture keeps its edges, so a point at pixel u comes to (u + 0.5)
+// width'/width - 0.5. `scale` is above 0 and at most 1; 1 changes nothing.
 ObserverCalibration scaled(ObserverCalibration calibration, double scale);
 
-// The plate at the same size: each pixel the mean, in linear light, of the area it covers.
-// `response` is of the plate's bits.
+// Returns the plate at that size; each pixel is the mean, in linear light, of the area that it
+// covers. `response` must be for the plate's bit depth.
 Plate scaled(const Plate& plate, double scale, const lighting::Response& response);
 
 }  // namespace previz::pipeline

@@ -12,14 +12,15 @@
 namespace previz::pipeline {
 namespace {
 
-// Often enough for a progress line and a clock, seldom enough to cost nothing.
+// A round is cut into this many batches: enough for a progress line and a time limit, few enough to
+// cost nothing.
 constexpr int batches_a_round = 32;
-// Fewer samples do not know their own spread.
+// The spread of fewer samples cannot be estimated.
 constexpr int least_samples = 8;
 constexpr int most_samples = 1 << 24;
-// Of the samples, those that tell where the others are needed.
+// One sample in this many is a pilot sample, which decides where the others are needed.
 constexpr int pilot_share = 16;
-// With fewer samples too many of them would be spent on that.
+// With fewer samples too large a share of them would be pilot samples.
 constexpr int least_adaptive_samples = 32;
 
 bool goes_on(const set::Quality& quality) {
@@ -33,8 +34,9 @@ std::vector<std::uint32_t> limits_of(const std::vector<bool>& active, int sample
   return limits;
 }
 
-// A number of samples on average, spent where they bring most. What the first tell decides only
-// where the others go: they are not in the picture, which would be biased by what they have missed.
+// Renders `samples` a pixel on average, spent where they help most. The pilot samples only decide
+// where the others go. They are left out of the picture, because it would be biased by what they
+// have missed.
 Refined spread(render::Renderer& renderer, int samples, const std::function<bool()>& cancelled,
                const std::function<void(int samples)>& progress) {
   Refined refined;

@@ -1,5 +1,5 @@
-// How many samples a picture gets: a number, or as many as a target error or a time asks for, spent
-// where the picture still needs them.
+// Gives a picture its samples: a fixed number, or as many as a target error or a time asks for,
+// spent where the picture still needs them.
 #pragma once
 
 #include <functional>
@@ -11,20 +11,23 @@ namespace previz::pipeline {
 
 struct Refined {
   bool whole = false;  // false: cancelled
-  int samples = 0;     // the most that a pixel got
-  double error = 0;    // estimated rms error over the picture's rms; 0 where nothing was asked for
+  int samples = 0;     // largest number of any pixel
+  double error = 0;    // estimated rms error over the picture's rms; 0: no target was set
 };
 
-// Whether so many samples are spread by need: quality.adaptive, without a target, and enough of
-// them (32) that those which tell where to are not too large a part.
+// True if samples are spread by need: with quality.adaptive, without a target error or time, and
+// with at least 32 samples a pixel, because with fewer the pilot samples would eat too much of the
+// budget.
 bool spreads_samples(const set::Quality& quality);
 
-// Gives the frame that the renderer has begun its samples. With neither quality.error nor .seconds
-// every pixel gets quality.samples, or, where they are spread, that many on average, where they
-// bring most; a sixteenth of them, at least 8, tell where. Else every pixel gets that many (at
-// least 8), and then, round after round, twice as many where 8x8 blocks are still above the error
-// (with a time alone: above half of the picture's), until none is or the time is over. `progress`
-// is told how many of quality.samples are spent, and beyond them the most that a pixel got.
+// Renders the samples of the frame that the renderer has begun. With neither quality.error nor
+// .seconds every pixel gets quality.samples. If they are spread (spreads_samples), that number is
+// the average: a sixteenth of them, at least 8 a pixel, are pilot samples that decide where the
+// others help most. With a target every pixel first gets quality.samples (at least 8); then, round
+// after round, the samples are doubled in 8x8 blocks that are still above the error (with a time
+// alone: above half of the picture's error), until no block is or the time is over. `progress`
+// receives how many samples are done: the average where they are spread, else the largest number of
+// any pixel.
 Refined refine(render::Renderer& renderer, const set::Quality& quality,
                const std::function<bool()>& cancelled,
                const std::function<void(int samples)>& progress);

@@ -12,7 +12,8 @@
 namespace previz::pipeline {
 namespace {
 
-// What a plate looks like with nothing in front of it and nothing known behind it.
+// Returns the layers of a plate alone, with no virtual object in front and no geometry behind:
+// everything but the composite is 0.
 render::Layers plate_layers(const Plate& plate, double exposure,
                             const lighting::Response& response) {
   const std::vector<double>& signal = response.inverse();
@@ -81,7 +82,7 @@ bool RenderStage::begin(Shot& shot) {
 
   if (light_ != shot.light) {
     renderer_.set_environment(shot.light->encoded, set_.lighting.sampling);
-    // Once there can be lamps there may be none again: the mode changes live.
+    // The light mode can change live: once there were lamps, the renderer must also be given none.
     has_sources_ |= set_.lighting.mode != set::LightMode::image || !shot.light->lamps.empty();
     if (has_sources_) renderer_.set_sources(shot.light->lamps);
     light_ = shot.light;

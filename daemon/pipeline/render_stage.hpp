@@ -1,4 +1,5 @@
-// Rendering as a stage: the composite of each shot, or its plate untouched where it cannot be made.
+// The render stage makes the composite of each shot, or passes its plate through untouched where
+// that is not possible.
 #pragma once
 
 #include <functional>
@@ -18,38 +19,41 @@ namespace previz::pipeline {
 
 struct RenderStageOptions {
   bool layers = false;  // fill shot.layers
-  double scale = 1;     // of everything a shot gets, over the observer's size (preview_size.hpp)
+  double scale = 1;  // size of everything a shot gets, over the observer's size (preview_size.hpp)
   std::function<bool()> cancelled;
   std::function<void(const Shot&, int samples_done)> progress;  // a few times per frame
-  std::function<void(const std::string&)> note;                 // anything worth a line, once
+  std::function<void(const std::string&)> note;                 // each message once
 };
 
 class RenderStage {
  public:
-  // Keeps of the scene where things are and the lamps; the rest is the device's.
+  // Keeps only the instances and lamps of the scene; the rest goes to the device.
   RenderStage(std::shared_ptr<render::Device> device, const set::Set& set,
               const ObserverCalibration& calibration, const scene::Scene& scene,
               RenderStageOptions options);
 
   // Fills picture, layers, counters and untouched. Every frame uses the same random numbers (P8).
-  // It is begin(), the samples of the set's quality, and finish().
+  // This is begin(), the samples that the set's quality asks for, and finish().
   void operator()(Shot& shot);
 
-  // The same in parts, for a frame that gets samples until somebody interrupts (P7).
-  // False: the plate passes through untouched; the shot is then finished.
+  // begin(), add_samples() and finish() do the same in parts, for a frame that gets samples until
+  // somebody interrupts (P7). begin() returns false if the plate passes through untouched; the shot
+  // is then finished.
   bool begin(Shot& shot);
-  // False: cancelled; the frame has then no samples and must be begun again.
+  // Returns false if it was cancelled; the frame then has no samples and must be begun again.
   bool add_samples(int samples);
   void finish(Shot& shot);
-  // Estimated from the samples of the last shot that was given layers, over the picture's rms; what
-  // denoising then took away is not known well enough to be left out.
+  // Returns the error over the picture's rms, estimated from the samples of the last shot that was
+  // given layers. The noise that denoising then took away is included, because its amount is not
+  // known well enough.
   double error() const { return error_; }
 
-  // From the next begin() on. `scale` as in the options; costs new buffers, and no scene.
+  // use() and resize() take effect with the next begin(). `scale` is as in the options; a new one
+  // costs new buffers, but no new scene.
   void use(const set::Quality& quality) { set_.quality = quality; }
   void use(set::Estimator estimator) { renderer_.use(estimator); }
   void resize(double scale);
-  // From the next finish() on.
+  // show() and fill_layers() take effect with the next finish().
   void show(render::View view) { view_ = view; }
   void fill_layers(bool layers) { options_.layers = layers; }
 
@@ -62,7 +66,7 @@ class RenderStage {
 
   set::Set set_;
   const ObserverCalibration calibration_;       // at the observer's size
-  std::optional<lighting::Response> response_;  // of the last plate's bits
+  std::optional<lighting::Response> response_;  // for the last plate's bit depth
   RenderStageOptions options_;
   render::View view_ = render::View::composite;
   render::Renderer renderer_;
@@ -71,7 +75,7 @@ class RenderStage {
   session::SceneState placed_;     // what the renderer holds
   LightPtr light_;                 // the one the renderer holds
   bool has_sources_ = false;       // lamps beside the scene\'s were ever set
-  std::set<std::string> unknown_;  // names of recorded states that were told
+  std::set<std::string> unknown_;  // names in recorded states that were already reported
 };
 
 }  // namespace previz::pipeline

@@ -1,4 +1,5 @@
-// One observer frame on its way: what is known of it so far. Owned by one stage at a time.
+// One observer frame on its way through the stages, with everything known about it so far. One
+// stage owns it at a time.
 #pragma once
 
 #include <chrono>
@@ -18,44 +19,45 @@
 
 namespace previz::pipeline {
 
-// A finished light estimate and the light frames (by sequence number) it was made from.
+// A finished light estimate and the sequence numbers of the light frames it was made from.
 struct Light {
   lighting::Lighting lighting;
-  std::vector<set::Light> lamps;       // of its sources
-  render::EncodedEnvironment encoded;  // as the renderer takes it, so that no frame waits for that
+  std::vector<set::Light> lamps;         // the sources as lamps
+  render::EncodedEnvironment encoded;    // made in advance, so that no frame waits for it
   std::vector<std::uint64_t> sequences;  // empty: an environment given as a file
-  session::CapturedLight record;         // as a take carries it
+  session::CapturedLight record;         // the form in which a take carries the light
 };
 using LightPtr = std::shared_ptr<const Light>;
 
 struct Shot {
-  // From the observer.
-  std::uint64_t index = 0;  // in the stream, from 0
+  // The observer camera fills these in.
+  std::uint64_t index = 0;  // place in the stream, from 0
   FramePtr frame;
-  PlatePtr plate;  // the frame converted; null until plate_of() was called
+  PlatePtr plate;  // converted frame; null until plate_of() was called
   std::chrono::steady_clock::time_point arrived;  // when the daemon got it
 
-  // From tracking and lighting.
+  // Tracking and lighting fill these in.
   tracking::Track track;
-  bool tracking_done = false;  // false: tracking was paused, and the track says nothing
+  bool tracking_done = false;  // false: tracking was paused, and `track` is not valid
   LightPtr light;              // null: no light frame yet
   std::shared_ptr<const session::CapturedLight> recorded_light;  // null: none came with the frame
-  Motion motion;              // what is moved by hand, and by itself
-  session::SceneState scene;  // what was moved or relit; empty: as in the set
+  Motion motion;              // things moved by hand, and by themselves
+  session::SceneState scene;  // things moved or relit; empty: as in the set
 
-  // From rendering. `untouched` says why the plate passes through as it is; empty: it was rendered.
+  // Rendering fills these in. `untouched` says why the plate passes through as it is; empty: it was
+  // rendered.
   std::string untouched;
   PlatePtr picture;
-  std::shared_ptr<const render::Layers> layers;  // null where the pipeline shows pictures only
+  std::shared_ptr<const render::Layers> layers;  // null: the pipeline only shows pictures
   render::Counters counters;
   bool whole = false;  // false: interrupted before its last sample
   double render_s = 0;
   double error = 0;     // Refined::error
-  int samples = 0;      // of the picture; 0: untouched
-  bool frozen = false;  // a round of refining one frame, not a new one
+  int samples = 0;      // samples of the picture; 0: untouched
+  bool frozen = false;  // true: a round of refining one frame, not a new frame
 };
 
-// The shot's frame as a plate, converted by the first call.
+// Returns the shot's frame as a plate, which the first call converts.
 inline const PlatePtr& plate_of(Shot& shot) {
   if (!shot.plate) shot.plate = std::make_shared<const Plate>(to_plate(*shot.frame));
   return shot.plate;

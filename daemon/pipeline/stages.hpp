@@ -19,8 +19,8 @@ namespace previz::pipeline {
 
 // Every stage ends when its input ends (and then ends its output), so a stream's end runs through
 // the whole line in order, and what was begun is finished. A stop ends the sources. An exception in
-// any stage abandons every channel at once, and calls `on_failure`, which is to end sources that
-// wait for something else than their channel. Channels must outlive this object.
+// any stage abandons every channel at once and calls `on_failure`, which must end sources that wait
+// for something other than their channel. Channels must outlive this object.
 class StageThreads {
  public:
   StageThreads(Metrics& metrics, std::stop_token stop, std::function<void()> on_failure = {})
@@ -32,7 +32,8 @@ class StageThreads {
   StageThreads(const StageThreads&) = delete;
   StageThreads& operator=(const StageThreads&) = delete;
 
-  // `produce`: () -> std::optional<Out>; empty ends the stream. Its waiting is not counted as work.
+  // Starts a source. `produce` is () -> std::optional<Out>; empty ends the stream. The time that it
+  // waits is not counted as work.
   template <class Out, class Produce>
   void source(std::string name, Channel<Out>& output, Produce produce) {
     source(output, [this, name = std::move(name), produce = std::move(produce)]() mutable {
@@ -42,7 +43,7 @@ class StageThreads {
     });
   }
 
-  // The same where `produce` counts by itself.
+  // Starts a source whose `produce` counts its own work.
   template <class Out, class Produce>
   void source(Channel<Out>& output, Produce produce) {
     know(output);
@@ -55,7 +56,7 @@ class StageThreads {
     });
   }
 
-  // `work`: (In) -> Out.
+  // Starts a stage; `work` is (In) -> Out.
   template <class In, class Out, class Work>
   void stage(std::string name, Channel<In>& input, Channel<Out>& output, Work work) {
     know(input);
@@ -74,7 +75,7 @@ class StageThreads {
     });
   }
 
-  // `consume`: (In) -> void.
+  // Starts a sink; `consume` is (In) -> void.
   template <class In, class Consume>
   void sink(std::string name, Channel<In>& input, Consume consume) {
     know(input);
@@ -90,7 +91,7 @@ class StageThreads {
     });
   }
 
-  // Waits for the end of every stage; throws what the first failing stage threw.
+  // Waits for every stage to end, then rethrows the exception of the first stage that failed.
   void wait() {
     join();
     if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));

@@ -1,5 +1,5 @@
-// A recorded session together with the set it is to be rendered with, and the calibrations in
-// force.
+// Opens a take: a recorded session together with the set it is to be rendered with, and the
+// calibrations in force.
 #pragma once
 
 #include <filesystem>
@@ -23,17 +23,18 @@ struct Take {
   std::shared_ptr<session::StreamReader> light_stream;     // null: none was recorded
 };
 
-// `set_file` instead of the set the session carries; files it names that are not beside it are
-// taken from the session's assets where they are. Calibration in the set overrides the session's.
-// Throws previz::Error: what cannot be read, has no observer frames, or no observer calibration.
+// Opens a take. `set_file` replaces the set that the session carries; a file that it names but that
+// is not beside it is taken from the session's assets if it is there. Calibration in the set
+// overrides the session's. Throws previz::Error if something cannot be read, or there are no
+// observer frames or no observer calibration.
 Take open_take(const std::filesystem::path& session_directory,
                const std::optional<std::filesystem::path>& set_file);
 
-// When its first observer frame was taken.
+// Returns the timestamp (ns) of the take's first observer frame.
 std::int64_t start_of(const Take& take);
 
-// The calibration of each camera: the set's own, otherwise the session's. Throws previz::Error
-// naming the set file if the observer has none.
+// These return a camera's calibration: the set's own, otherwise the session's.
+// observer_calibration() throws previz::Error naming the set file if there is none.
 ObserverCalibration observer_calibration(const set::Set& set, const session::SessionInfo& session);
 std::optional<LightCameraCalibration> light_calibration(const set::Set& set,
                                                         const session::SessionInfo& session);

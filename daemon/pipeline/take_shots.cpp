@@ -74,7 +74,7 @@ void TakeShots::track(Shot& shot) {
   count_work("tracking", begin);
 }
 
-// The light is that of the light frames up to this one.
+// The light comes from the light frames up to the time of the shot's frame.
 void TakeShots::light(Shot& shot) {
   const auto begin = std::chrono::steady_clock::now();
   while (light_.needs_frames() && next_light_ < light_stream_->records().size() &&

@@ -1,4 +1,4 @@
-// The shots of a recorded take, one after the other, each with its pose and its light.
+// Iterates over the shots of a recorded take, each with its pose and its light.
 #pragma once
 
 #include <cstdint>
@@ -27,22 +27,23 @@ struct TakeShotsOptions {
   // Frames for which this returns false are left out. It is called once a frame, in order, when
   // all earlier shots have been handed out.
   std::function<bool(std::uint64_t index)> wanted = {};
-  // False: frames that are left out are not gone through even where tracking or lighting remember
-  // them. That is quick, and the light of a shot is that of the light frames before it alone.
+  // If this is false, frames that are left out are skipped even where tracking or lighting remember
+  // earlier frames. That is quick, but then the light of a shot comes from its preceding light
+  // frames alone.
   bool from_start = true;
-  // 1: shots come at the pace of the recording; 0: as fast as they are asked for.
+  // At 1, shots come at the pace of the recording; at 0, as fast as they are asked for.
   double speed = 0;
-  std::optional<set::Lighting> lighting = {};  // takes the place of the set's
+  std::optional<set::Lighting> lighting = {};  // replaces the set's
   // Receives what could not be read, found or used, in plain words.
   std::function<void(const std::string&)> note = {};
-  Metrics* metrics = nullptr;  // counts the work and the trouble
+  Metrics* metrics = nullptr;  // counts work and troubles; may be null
   std::stop_token stop = {};   // ends the range
 };
 
-// A range that can be gone through once: for (Shot& shot : TakeShots(take, {.first = 3})) ...
+// This is a range that can be iterated once: for (Shot& shot : TakeShots(take, {.first = 3})) ...
 //
-// The shots are those that a pass through the whole take would give: where tracking or lighting
-// remember earlier frames, those that are left out are tracked and lit too. A shot without a pose
+// The shots are the ones that a pass through the whole take would give: where tracking or lighting
+// remember earlier frames, frames that are left out are tracked and lit too. A shot without a pose
 // or without light (no light frame precedes it) is in the range; a frame that cannot be read is
 // not.
 class TakeShots {
@@ -51,7 +52,7 @@ class TakeShots {
   // none were recorded, or if `first` lies behind the take's end.
   explicit TakeShots(const Take& take, TakeShotsOptions options = {});
 
-  // Nothing: there are no more shots.
+  // Returns the next shot, or nothing if there are no more.
   std::optional<Shot> next();
 
   class Iterator {

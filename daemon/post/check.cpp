@@ -31,14 +31,14 @@ namespace {
 namespace fs = std::filesystem;
 using Lines = std::vector<std::string>;
 
-// The set, with the calibrations in force put into it, and what is known besides.
+// The set with the calibrations in force put into it, and further facts about it.
 struct Checked {
   set::Set set;
   bool has_track = false;  // the session has poses
-  Lines remarks;           // allowed, and worth a look
+  Lines remarks;           // things that are allowed but unusual
 };
 
-// Digits in groups of three: 1 234 567.
+// Writes digits in groups of three: 1 234 567.
 std::string grouped(std::uint64_t number) {
   auto digits = std::to_string(number);
   for (auto at = static_cast<std::ptrdiff_t>(digits.size()) - 3; at > 0; at -= 3)
@@ -91,7 +91,7 @@ Checked open(const fs::path& set_or_session) {
   return checked;
 }
 
-// Runs `work`; what it throws is appended to `problems`.
+// Runs `work` and appends the words of an exception to `problems`.
 void attempt(Lines& problems, const std::function<void()>& work) {
   try {
     work();
@@ -100,7 +100,7 @@ void attempt(Lines& problems, const std::function<void()>& work) {
   }
 }
 
-// The scene, or what is wrong with each object's file.
+// Loads the scene, or appends the problems of each object's file.
 std::optional<scene::Scene> load_scene(const set::Set& set, Lines& problems) {
   try {
     return scene::load_scene(set);
@@ -109,10 +109,10 @@ std::optional<scene::Scene> load_scene(const set::Set& set, Lines& problems) {
     for (const auto& object : set.objects) {
       auto alone = set;
       alone.objects = {object};
-      alone.surfaces.clear();  // of the other objects, too
+      alone.surfaces.clear();  // clears the other objects' too
       attempt(problems, [&] { scene::load_scene(alone); });
     }
-    if (problems.size() == before) problems.push_back(whole.what());  // only all together too much
+    if (problems.size() == before) problems.push_back(whole.what());  // too much only together
     return std::nullopt;
   }
 }
@@ -120,7 +120,7 @@ std::optional<scene::Scene> load_scene(const set::Set& set, Lines& problems) {
 void check_environment(Checked& checked, Lines& problems) {
   if (!checked.set.lighting.environment) return;
   auto coarse = checked.set.lighting;
-  coarse.resolution = 16;  // the file is what is checked
+  coarse.resolution = 16;  // only the file is checked
   attempt(problems, [&] {
     for (const auto& note : lighting::load_environment(coarse).report.notes)
       checked.remarks.push_back(note);
@@ -275,11 +275,11 @@ void print_features(const render::Demand& demand, const scene::Size& size, std::
   for (const auto& line : unused) out << "  " << line << '\n';
 }
 
-// What a frame asks of the GPU, before anything is measured; `previzd trade` measures.
+// Estimates what a frame asks of the GPU, without measuring; `previzd trade` measures.
 void print_costs(const set::Set& set, std::uint32_t needed, const scene::Size& size,
                  std::ostream& out) {
-  // Bytes a vertex, triangle and texel in lib/render_shared.h's buffers; a tree of pairs takes
-  // about one record of 64 bytes a triangle.
+  // These are the bytes a vertex, triangle and texel in lib/render_shared.h's buffers; a tree of
+  // pairs takes about one record of 64 bytes a triangle.
   const double scene_bytes =
       32.0 * size.vertices + (16.0 + 64.0) * size.triangles + 8.0 * size.texels;
   constexpr double mebibyte = 1024.0 * 1024.0;
@@ -295,7 +295,8 @@ void print_costs(const set::Set& set, std::uint32_t needed, const scene::Size& s
                              render::picture_bytes(intrinsics.width, intrinsics.height, false)) /
                          mebibyte),
                " MiB\n");
-  // A path and a light sample a bounce, and one more segment; twice, where the worlds part.
+  // A path has a segment and a light sample a bounce, and one more segment; twice as many where the
+  // worlds part.
   const double most = samples * (2.0 * set.estimation.max_depth + 1) *
                       ((needed & gpu::FEATURE_FORKS) != 0 ? 2.0 : 1.0);
   out << "  rays: " << grouped(static_cast<std::uint64_t>(2 * samples)) << " at least, "

@@ -1,4 +1,4 @@
-// A frame that `previzd render` has finished: what its line in DIR/frames.jsonl says.
+// The line in DIR/frames.jsonl about a frame that `previzd render` has finished.
 #pragma once
 
 #include <cstdint>
@@ -23,19 +23,19 @@ struct FinishedFrame {
   std::string reason;  // untouched: why the plate passed through as it is
   std::int64_t samples = 0;
   double render_s = 0;
-  double error = 0;  // estimated, where quality.error or .seconds was asked for
+  double error = 0;  // estimated if quality.error or .seconds is set
   std::optional<tracking::Pose> pose;
   std::vector<std::uint64_t> light_frames;  // sequence numbers; empty: not from the light camera
   std::vector<lighting::Source> light_sources;
-  double light_dropped_share = 0;  // of all luminous flux, by lighting.sources.residual = "dropped"
+  double light_dropped_share = 0;  // of all luminous flux; lighting.sources.residual = "dropped"
   render::Counters counters;
 };
 
-// What is recorded of a shot whose pictures are written.
+// Returns the record of a shot whose pictures are written.
 FinishedFrame finished_frame(const pipeline::Shot& shot);
 
-// The frame as a line, without its end, and back; from_json throws nlohmann::json::exception on a
-// broken line.
+// These write the frame as a line, without the newline, and read it back; from_json throws
+// nlohmann::json::exception on a broken line.
 std::string to_json(const FinishedFrame& frame);
 FinishedFrame from_json(const std::string& line);
 

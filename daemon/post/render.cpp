@@ -46,7 +46,8 @@ void override_set(set::Set& set, const RenderOptions& options) {
   if (options.video) set.output.video = *options.video;
 }
 
-// Everything that decides what the pictures look like, as RenderDirectory compares it.
+// Returns everything that decides what the pictures look like, as JSON that RenderDirectory
+// compares.
 std::string settings_of(const pipeline::Take& take, const set::Set& set) {
   nlohmann::ordered_json json;
   json["software"] = "previzd " PREVIZ_VERSION;
@@ -108,7 +109,8 @@ std::string quality_words(const set::Quality& quality) {
   return text;
 }
 
-// NaN and negative samples are left out of the means; nobody may miss that, nor what was cut short.
+// Reports NaN and negative samples, which are left out of the means, and paths that were cut short,
+// so that nobody misses them.
 std::string dropped_text(const render::Counters& counters) {
   std::string text;
   const auto add = [&](std::uint64_t count, const char* what) {

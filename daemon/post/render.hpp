@@ -1,5 +1,5 @@
-// `previzd render`: the daemon's pipeline over a recorded session, without a clock and without
-// drops.
+// Runs the daemon's pipeline over a recorded session, without a clock and without drops, as
+// `previzd render` does.
 #pragma once
 
 #include <cstdint>
@@ -25,14 +25,14 @@ struct FrameRange {
   std::uint64_t last = 0;
 };
 
-// "7", "3-9", "3-" (to the end); throws previz::Error saying what is allowed.
+// Reads "7", "3-9" or "3-" (to the end); throws previz::Error saying what is allowed.
 FrameRange parse_frame_range(const std::string& text);
 
-// What is given here overrides the set file.
+// Options that are given override the set file.
 struct RenderOptions {
   std::filesystem::path session;
   std::optional<std::filesystem::path> set_file;  // instead of the one in the session
-  std::optional<FrameRange> frames;               // all
+  std::optional<FrameRange> frames;               // absent: all
   std::optional<int> samples;                     // quality.samples
   std::optional<double> error;                    // quality.error
   std::optional<bool> adaptive;                   // quality.adaptive
@@ -42,11 +42,11 @@ struct RenderOptions {
   std::optional<set::Estimator> estimator;
   std::optional<std::filesystem::path> directory;  // output.directory
   std::optional<bool> exr, png, video;
-  bool force = false;  // render again what is there with other settings, or with these
+  bool force = false;  // render frames again that are already there
   render::DeviceOptions device;
-  bool terminal = false;  // the report goes to a terminal: one line that is rewritten
-  std::stop_token stop;   // ends cleanly, with what is finished on disk
-  // Called after a frame's files are written, from the output stage's thread, in frame order; not
+  bool terminal = false;  // `out` is a terminal: progress is one rewritten line
+  std::stop_token stop;   // ends cleanly, with finished frames on disk
+  // Called after a frame's files are written, on the output stage's thread, in frame order, but not
   // for frames that were finished before. The shot has its layers.
   std::function<void(const pipeline::Shot&)> on_frame;
 };
@@ -54,14 +54,14 @@ struct RenderOptions {
 struct RenderReport {
   std::filesystem::path directory;
   std::vector<FinishedFrame> frames;  // every finished frame of the range, in order
-  std::size_t found_finished = 0;     // of those, the ones an earlier run had finished
+  std::size_t found_finished = 0;     // number that an earlier run had finished
   bool interrupted = false;
   double seconds = 0;           // wall clock, without opening the session, scene and device
   std::filesystem::path video;  // empty: none was made
   pipeline::MetricsSnapshot metrics;
 };
 
-// For every frame one NNNN.exr and NNNN.png, then review.mp4 over all pictures of the range, and
+// Writes NNNN.exr and NNNN.png for every frame, then review.mp4 over all pictures of the range, and
 //   DIR/render.json   the settings; a run with other settings refuses to mix its frames with these
 //   DIR/frames.jsonl  a line a finished frame (FinishedFrame)
 // Frames that are finished are skipped. A frame whose pose is lost, or that no light frame

@@ -19,7 +19,7 @@ namespace {
 constexpr const char* settings_name = "render.json";
 constexpr const char* lines_name = "frames.jsonl";
 
-// "quality.samples is 16 there and 64 now": the first few settings that differ.
+// Returns the first few settings that differ: "quality.samples is 16 there and 64 now".
 std::string differences(const nlohmann::json& there, const nlohmann::json& now) {
   std::string text;
   for (const auto& [key, value] : now.items()) {
@@ -70,7 +70,7 @@ void RenderDirectory::read_finished() {
       const FinishedFrame record = from_json(line);
       finished_[record.frame] = record;
     } catch (const nlohmann::json::exception&) {
-      // The line a power cut left half written: its frame is rendered again.
+      // A power cut may leave a line half written; its frame is rendered again.
     }
   }
 }

@@ -56,7 +56,7 @@ void ButtonDesk::act(const Press& press) {
   });
   if (mapped == mapped_.end()) return;
   const set::Action& action = *set::find_action(mapped->action);
-  // A press that ended the refinement has gone where a mode button goes: to live.
+  // A press that ended the refinement has already changed the mode, to live.
   const bool ended_refinement = ended_refinement_.erase(press.button) > 0;
   if (ended_refinement && Controls::is_mode(action)) return;
   asks_.act(action, press.button, ended_refinement);

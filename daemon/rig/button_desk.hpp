@@ -1,5 +1,5 @@
-// The buttons of a set: their devices are read, presses are recognised, and what the set maps to a
-// press is asked for.
+// Reads the devices of a set's buttons, recognises presses, and asks for the action that the set
+// maps to each press.
 #pragma once
 
 #include <cstdint>
@@ -24,7 +24,7 @@ class ButtonDesk {
  public:
   struct Device {
     std::unique_ptr<Buttons> buttons;
-    std::int64_t clock_offset_ns = 0;  // added to its timestamps: the cameras' clock less its own
+    std::int64_t clock_offset_ns = 0;  // the cameras' clock minus the device's
   };
   struct Parts {  // outlive the desk
     EventLoop& loop;
@@ -35,13 +35,14 @@ class ButtonDesk {
   struct Asks {
     // Comes before every event that is read; false leaves the event for another desk.
     std::function<bool()> listens;
-    // A button went down or up; true if that ended a refinement.
+    // Receives every push and release of a button; returns true if it ended a refinement.
     std::function<bool(const ButtonEvent&)> edge;
-    // `ended_refinement`: the same press did.
+    // Performs an action. `ended_refinement` is true if the same press ended a refinement.
     std::function<void(const set::Action&, const std::string& button, bool ended_refinement)> act;
   };
 
-  // `mapped`: what the set maps to presses. Devices are read from now on while the loop runs.
+  // `mapped` is the set's mapping from presses to actions. From now on the devices are read while
+  // the loop runs.
   ButtonDesk(const std::vector<set::Button>& mapped, std::vector<Device> devices, Parts parts,
              Asks asks);
   ButtonDesk(const ButtonDesk&) = delete;
@@ -49,7 +50,7 @@ class ButtonDesk {
 
   // Acts on the presses that became certain by the passing of time (PressRecognizer::tick).
   void tick(std::int64_t now_ns);
-  // Brings the devices' counters into the metrics.
+  // Adds the devices' counters to the metrics.
   void count();
 
  private:
@@ -67,12 +68,13 @@ class ButtonDesk {
   const Parts parts_;
   const Asks asks_;
   PressRecognizer presses_;
-  std::set<std::string> ended_refinement_;  // buttons whose running press did
+  std::set<std::string> ended_refinement_;  // buttons whose present press ended one
   std::vector<Watched> devices_;
 };
 
-// The devices of every button that the set maps: those of the replayed session, those that are
-// plugged in, and `more`, or empty. Throws previz::Error naming a button that cannot be understood.
+// Opens the devices of every button that the set maps: the replayed session's, those that are
+// plugged in, and `more`'s (which may be empty). Throws previz::Error naming a button that cannot
+// be understood.
 std::vector<ButtonDesk::Device> open_button_devices(
     const set::Set& set, const Cameras& cameras,
     const std::function<std::vector<std::unique_ptr<Buttons>>()>& more);

@@ -1,4 +1,5 @@
-// Frames of a camera for the pipeline; its troubles are counted, and reported to the crew.
+// Delivers a camera's frames to the pipeline, counts the camera's troubles and reports them to the
+// crew.
 #pragma once
 
 #include <chrono>
@@ -20,16 +21,16 @@ class CameraSource {
     std::stop_token stop;
     report::Reports& reports;
     pipeline::Metrics& metrics;
-    double silence_s;  // a camera counts as lost once it has said so, or said nothing for so long
-    std::function<void(bool lost)> presence;  // called when that changes; or empty
+    double silence_s;  // a camera counts as lost when it says so, or sends nothing for so long
+    std::function<void(bool lost)> presence;  // called when that changes; may be empty
   };
-  // Metrics are counted under the stage's name; the display calls the camera by the crew's name.
+  // Metrics count under the stage's name; the display uses the crew's name for the camera.
   CameraSource(Camera& camera, std::string stage, std::string crews_name, Parts parts);
 
-  // The next frame; null at the end of the stream, or once a stop is requested.
+  // Waits for the next frame; returns null at the end of the stream, or once a stop is requested.
   FramePtr next();
 
-  // Exposes longer or shorter than the last frame by so many stops.
+  // Sets an exposure that is longer or shorter than the last frame's by so many stops.
   void change_exposure(double stops);
 
  private:

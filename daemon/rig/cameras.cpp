@@ -13,7 +13,7 @@
 namespace previz::rig {
 namespace {
 
-// Threads and device start before the first frame is due.
+// The first replayed frame is due so late that the threads and the device have started by then.
 constexpr std::chrono::milliseconds replay_delay{200};
 
 CameraOrder observer_order(const set::Set& set) {
@@ -28,7 +28,7 @@ CameraOrder light_order(const set::Set& set) {
   return {"light", light.driver, light.device, light.camera, light.faults, responsivity};
 }
 
-// A session's stream, replayed in its own time; under the lifeline where faults are rehearsed.
+// Replays a session's stream in its own time; under a lifeline if faults are to be rehearsed.
 std::unique_ptr<Camera> start_replay(const set::Set& set, CameraOrder order,
                                      const session::Session& session,
                                      std::unique_ptr<session::StreamReader> stream,

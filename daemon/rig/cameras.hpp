@@ -1,4 +1,4 @@
-// The one registry of drivers: from what a set file names to open cameras and buttons.
+// Opens the cameras and buttons that a set file names.
 #pragma once
 
 #include <cstdint>
@@ -14,26 +14,26 @@
 
 namespace previz::rig {
 
-// The rig's cameras as the set names them, started. Replayed streams of one session keep their
-// common time; a real camera need not be there yet, and is picked up when it is.
+// The started cameras of a set. Replayed streams of one session keep their common time. A real
+// camera may still be missing and is picked up when it comes.
 struct Cameras {
   std::unique_ptr<Camera> observer;
-  std::unique_ptr<Camera> light;    // null: the set has none, or gives an environment file
-  std::size_t light_exposures = 1;  // different ones that the light camera takes in turn
-  session::Session recorded;        // of the replayed observer: calibration and track
-  ReplayOptions::Origin origin;     // of the replayed observer
-  std::int64_t lap_ns = 0;          // of the observer, where it is replayed in a loop
-  // The cameras' clock, that of every timestamp_ns, less CLOCK_MONOTONIC.
+  std::unique_ptr<Camera> light;    // null: the set has none, or an environment file
+  std::size_t light_exposures = 1;  // number of different exposures in a bracket
+  session::Session recorded;        // the replayed observer's: calibration and track
+  ReplayOptions::Origin origin;     // the replayed observer's
+  std::int64_t lap_ns = 0;          // length of a lap if the observer is looped, else 0
+  // The cameras' clock, which every timestamp_ns is on, minus CLOCK_MONOTONIC.
   std::int64_t clock_offset_ns = 0;
 };
 
-// `usb` wakes those who wait for a camera.
-// `loop`: replayed streams start again at their end. Throws previz::Error naming the key whose
-// driver this build has not, or the session that cannot be read.
+// Opens and starts the set's cameras. With `loop`, replayed streams start again at their end. `usb`
+// announces devices that are plugged in. Throws previz::Error naming the key whose driver this
+// build does not have, or the session that cannot be read.
 Cameras open_cameras(const set::Set& set, bool loop = false, const Usb& usb = nullptr);
 
-// The rig's buttons. With a replayed observer they are those of its session, pressed again when its
-// frames come; none where the set maps no button.
+// Opens the buttons of a replayed observer's session, which are pressed again as its frames come.
+// Returns none if the set maps no button.
 std::vector<std::unique_ptr<Buttons>> open_buttons(const set::Set& set, const Cameras& cameras);
 
 }  // namespace previz::rig

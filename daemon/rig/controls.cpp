@@ -12,7 +12,7 @@
 namespace previz::rig {
 namespace {
 
-// The name after (or before) this one in the enumeration, around its end.
+// Returns the value after this one in the order of names, wrapping around at the end.
 template <class E>
 E next_named(E value) {
   const auto all = set::names(E{});

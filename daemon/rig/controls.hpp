@@ -1,4 +1,4 @@
-// The rig's desk: what the actions have set so far. No thread, no device, no clock.
+// Holds what the actions have set so far and performs them, without a thread, device or clock.
 #pragma once
 
 #include <cstdint>
@@ -14,34 +14,34 @@
 
 namespace previz::rig {
 
-// What the pipeline is to do with the next frame. Published as a whole, never changed.
+// Settings of the pipeline for the next frame. A Look is published as a whole and never changed.
 struct Look {
   State state;
   int samples = 16;
-  bool governed = false;  // quality.fps decides the samples, as long as nobody asks for a number
+  bool governed = false;  // quality.fps decides the samples until somebody asks for a number
   set::Estimator estimator = set::Estimator::paired;
   set::LightMode light_mode = set::LightMode::image;
   render::View view = render::View::composite;
   bool osd = true;
   pipeline::Edits edits;
-  std::uint64_t plays = 0;  // of the animations, begun anew so far
+  std::uint64_t plays = 0;  // restarts of the animations so far
   bool animations_held = false;
-  int exposure_steps = 0;               // asked for so far, up less down
-  std::uint64_t snapshots = 0;          // asked for so far of live pictures
-  std::uint64_t refined_snapshots = 0;  // and of refined ones
+  int exposure_steps = 0;               // requested so far, up minus down
+  std::uint64_t snapshots = 0;          // requested so far, of live pictures
+  std::uint64_t refined_snapshots = 0;  // requested so far, of refined pictures
   std::uint64_t refinements = 0;        // begun so far
 };
 
-// Only somebody with devices and files can do these.
+// Requests that Controls cannot carry out, because they need devices or files.
 enum class Request { start_take, stop_take, mark_good, reload_set, next_set, previous_set };
 
 struct Outcome {
-  std::string said;  // for display, log and whoever asked
+  std::string said;  // words for the display, the log and whoever asked
   bool refused = false;
   std::optional<Request> request;
 };
 
-// P6: what samples_up and samples_down go through.
+// samples_up and samples_down step through these numbers (P6).
 inline constexpr int sample_steps[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 50};
 
 class Controls {
@@ -49,15 +49,15 @@ class Controls {
   explicit Controls(const set::Set& set);
 
   const Look& look() const { return look_; }
-  // "vase", or empty where the set has none.
+  // Both return a name such as "vase", or nothing if the set has none.
   std::string selected_object() const;
   std::string selected_light() const;
 
-  // Performs what D-Bus or previzctl asks for, or a press once its kind is known.
-  // `ended_refinement`: the press has ended a refinement itself, and was meant for it.
+  // Performs an action that D-Bus, previzctl or a press asks for. `ended_refinement` means that the
+  // press itself has ended a refinement, which the action then concerns.
   Outcome perform(const set::Action& action, bool ended_refinement = false);
-  // A button went down: a refinement ends at once, before it is known what was pressed. Returns
-  // true if one did; a mode that the same press asks for is then not wanted.
+  // Call this when a button goes down: it ends a refinement at once, before the kind of press is
+  // known. Returns true if it did; a mode that the same press asks for is then not wanted.
   bool pushed();
   static bool is_mode(const set::Action& action);
 
@@ -91,7 +91,7 @@ class Controls {
   Outcome apply(const set::ChangeExposure& effect);
 
   const set::Control control_;
-  std::vector<std::string> objects_;  // the virtual ones
+  std::vector<std::string> objects_;  // names of the virtual objects
   std::vector<std::string> lights_;
   const bool is_animated_;
   std::size_t object_ = 0, light_ = 0;

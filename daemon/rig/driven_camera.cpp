@@ -61,7 +61,7 @@ std::unique_ptr<Camera> drive_camera(const set::Set& set, const CameraOrder& ord
   settings.source = order.role;
   settings.device = order.device;
   settings.responsivity = order.responsivity;
-  // A camera that is driven has no automatic exposure.
+  // A camera that takes brackets must not expose automatically.
   if (!order.wish.bracket_s.empty()) settings.exposure_s = order.wish.bracket_s.front();
   LifelineHooks hooks;
   if (usb) hooks.arrivals = [usb] { return usb->arrivals(); };

@@ -1,4 +1,4 @@
-// From what a set wishes of a camera to one that is kept alive.
+// Opens a camera as a set describes it, and keeps it alive through losses.
 #pragma once
 
 #include <memory>
@@ -13,24 +13,25 @@
 
 namespace previz::rig {
 
-// A camera of the set: its role ("observer" or "light"), and what the set says of it.
+// A set's description of a camera, and the camera's role ("observer" or "light").
 struct CameraOrder {
   std::string role;
   std::string driver;
   std::string device;
   set::CameraWish wish;
-  std::vector<std::string> faults;  // to rehearse
+  std::vector<std::string> faults;  // faults to rehearse
   double responsivity = 1;
 };
 
-// The rig's USB; null where it does not tell of devices that come.
+// Announces devices that are plugged into the USB; null if this machine cannot.
 using Usb = std::shared_ptr<const usb::Hotplug>;
 
-// A started camera that is opened when it is there, and again whenever it is back. Throws
-// previz::Error naming file and key if this build has no such driver or a fault cannot be read.
+// Returns a started camera that is opened when the device is there, and again whenever it comes
+// back. Throws previz::Error naming file and key if this build does not have the driver or a fault
+// cannot be read.
 std::unique_ptr<Camera> drive_camera(const set::Set& set, const CameraOrder& order, const Usb& usb);
 
-// The same of any opener; for replay to rehearse faults.
+// Does the same with any opener, so that replay can rehearse faults.
 std::unique_ptr<Camera> keep_alive(const set::Set& set, const CameraOrder& order, CameraOpener open,
                                    LifelineHooks hooks = {});
 

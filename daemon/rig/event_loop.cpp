@@ -29,7 +29,7 @@ class Source final : public EventLoop::Watch {
   sd_event_source* get() const { return source_; }
   std::uint64_t interval_us = 0;
 
-  // An exception must not pass through C: it is kept for run().
+  // An exception must not pass through C code, so it is kept for run() to rethrow.
   int call() {
     const std::shared_ptr<EventLoop::Callback> alive = callback_;
     sd_event* const event = event_;

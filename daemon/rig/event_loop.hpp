@@ -1,4 +1,4 @@
-// The main thread's loop: descriptors, signals and timers, by sd-event.
+// The main thread's loop over descriptors, signals and timers, on top of sd-event.
 #pragma once
 
 #include <sys/types.h>
@@ -13,26 +13,26 @@ namespace previz::rig {
 
 class EventLoop {
  public:
-  // While it lives, the callback is called; it may destroy any watch, its own too.
+  // The callback is called while the Watch lives. A callback may destroy any watch, even its own.
   class Watch {
    public:
     virtual ~Watch() = default;
   };
   using Callback = std::function<void()>;
 
-  // Throws previz::Error, here and below, where the system refuses.
+  // The constructor and the functions below throw previz::Error if the system refuses.
   EventLoop();
   ~EventLoop();
   EventLoop(const EventLoop&) = delete;
   EventLoop& operator=(const EventLoop&) = delete;
 
-  // Level-triggered: again as long as the descriptor is readable.
+  // This watch is level-triggered: it calls again as long as the descriptor is readable.
   std::unique_ptr<Watch> on_readable(int descriptor, Callback callback);
   std::unique_ptr<Watch> every(std::chrono::milliseconds interval, Callback callback);
   // The signal must be blocked in every thread.
   std::unique_ptr<Watch> on_signal(int signal, Callback callback);
 
-  // Until exit(). An exception of a callback ends it and passes on.
+  // Runs until exit(). An exception in a callback ends run(), which rethrows it.
   void run();
   void exit();
 

@@ -1,4 +1,4 @@
-// Keeps what renders alive through losses of the graphics device.
+// Rebuilds the renderer after a loss of the graphics device.
 #pragma once
 
 #include <chrono>
@@ -14,29 +14,29 @@ namespace previz::rig {
 
 class GpuKeeper {
  public:
-  // What is done to the device and to what renders on it; every call may throw render::DeviceLost.
+  // The operations on the device and its renderer; every call may throw render::DeviceLost.
   struct Gpu {
     std::function<bool()> is_open;
-    std::function<void()> open;  // again, after a loss
+    std::function<void()> open;  // opens the device again after a loss
     std::function<std::string()> name;
-    std::function<void()> build;  // makes what renders
-    std::function<void()> drop;   // and takes it away
+    std::function<void()> build;  // makes the renderer
+    std::function<void()> drop;   // destroys the renderer
   };
   struct Parts {  // references outlive the keeper
     report::Reports& reports;
     pipeline::Metrics& metrics;
     std::stop_token stop;
-    std::chrono::milliseconds patience{500};  // from one attempt to open the device to the next
+    std::chrono::milliseconds patience{500};  // time between attempts to open the device
   };
 
   GpuKeeper(Gpu gpu, Parts parts) : gpu_(std::move(gpu)), parts_(std::move(parts)) {}
 
-  // Builds what renders, also where the device was lost before this set. Throws what keeps it from
+  // Builds the renderer, even if the device was lost before this set. Throws whatever keeps it from
   // being built, and DeviceLost if a stop comes first.
   void start();
 
-  // Drops what was rendering, and tries until it is built anew: from the render thread, for which
-  // nobody waits while frames go on into the recorder. False: a stop came first.
+  // Drops the renderer and tries until it is rebuilt; returns false if a stop came first. Call it
+  // from the render thread: nobody waits for that thread, and frames still reach the recorder.
   bool renew(const render::DeviceLost& lost);
 
  private:

@@ -29,7 +29,7 @@ class Inbox {
     events_.push_back(event);
     eventfd_write(descriptor_.get(), 1);
   }
-  // Everything ended: the observer's stream, or a stage with an error.
+  // Call this when the pipeline has ended, with the observer's stream or by a stage's error.
   void finish() {
     const std::lock_guard lock(mutex_);
     finished_ = true;

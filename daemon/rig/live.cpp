@@ -24,7 +24,7 @@ void override_set(set::Set& set, const LiveOptions& options) {
   if (options.directory) set.output.directory = *options.directory;
 }
 
-// The screen stays open from one set to the next if both say the same of it.
+// The screen stays open from one set to the next if both describe it alike.
 class CrewScreen {
  public:
   CrewScreen(report::Reports& reports, pipeline::Metrics& metrics,
@@ -91,7 +91,8 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
   // A file that may not grow (RLIMIT_FSIZE) fails the recorder's write and does not end the
   // process.
   std::signal(SIGXFSZ, SIG_IGN);
-  // SIGHUP is for the loop, which reads the set again; it is blocked before any thread starts here.
+  // The loop takes SIGHUP and reads the set again; the signal is blocked before any thread starts
+  // here.
   sigset_t hangup;
   sigemptyset(&hangup);
   sigaddset(&hangup, SIGHUP);

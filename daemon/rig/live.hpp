@@ -1,4 +1,5 @@
-// `previzd run`: the live pipeline. Newest value only between stages; drops are counted.
+// Runs the live pipeline, as `previzd run` does. Only the newest value passes between stages; drops
+// are counted.
 #pragma once
 
 #include <filesystem>
@@ -30,14 +31,14 @@ struct LiveOptions {
   std::function<std::vector<std::unique_ptr<Buttons>>()> buttons;
   // Called with every picture as it goes to the display, on the pipeline's last thread.
   std::function<void(const pipeline::Shot&, const Look&)> on_shown;
-  // Called with every screenful, as it is read back, and the overlay's words; on the display's
+  // Called with every screenful as it is read back, and the overlay's words, on the display's
   // thread.
   std::function<void(const Plate&, const output::OsdPage&)> on_screen;
 };
 
-// Runs until the observer's stream ends or a stop is requested; buttons, and changes of the set
-// file, act as the set says. About once a second, and at the end, writes the newest picture to
-// DIR/picture.png and what the pipeline did to DIR/metrics.json. A frame whose pose is lost, or
+// Runs until the observer's stream ends or a stop is requested. Buttons act as the set says;
+// changes of the set file take effect. About once a second, and at the end, the newest picture is
+// written to DIR/picture.png and the metrics to DIR/metrics.json. A frame whose pose is lost, or
 // that comes before the first light, shows its plate untouched. Throws previz::Error on anything
 // that keeps the rig from running.
 pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& reports);

@@ -1,4 +1,4 @@
-// The newest picture and the metrics as files, for whoever looks on.
+// Writes the newest picture and the metrics to files that other programs can watch.
 #pragma once
 
 #include <filesystem>
@@ -14,13 +14,14 @@
 
 namespace previz::rig {
 
-// A disk that does not take the files is reported, and no reason to stop.
+// A disk that does not take the files is reported but is no reason to stop.
 class LiveFiles {
  public:
-  // Makes the directory; throws previz::Error if it cannot. `metrics` gives metrics.json.
+  // Makes the directory; throws previz::Error if it cannot. `metrics` returns the text of
+  // metrics.json.
   LiveFiles(std::filesystem::path directory, std::function<std::string()> metrics,
             report::Reports& reports);
-  ~LiveFiles();  // writes the last ones
+  ~LiveFiles();  // writes the last picture and metrics
   LiveFiles(const LiveFiles&) = delete;
   LiveFiles& operator=(const LiveFiles&) = delete;
 

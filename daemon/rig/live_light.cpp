@@ -26,7 +26,7 @@ void LiveLight::start(pipeline::StageThreads& stages, std::function<FramePtr()> 
       });
 }
 
-// While tracking rests, the light stays as it was.
+// Estimates the light from the frames; while tracking rests, the light stays as it was.
 LightPtr LiveLight::estimate(std::vector<pipeline::LightFrame> frames,
                              const std::optional<pipeline::ObserverView>& view) {
   if (!needs_frames()) return nullptr;

@@ -1,5 +1,5 @@
-// The light of the live pictures: estimated from the light camera on threads of its own, or as the
-// set gives it.
+// Provides the light of the live pictures, estimated from the light camera on threads of its own or
+// given by the set.
 #pragma once
 
 #include <functional>
@@ -28,19 +28,20 @@ class LiveLight {
   LiveLight(Parts parts, const std::optional<LightCameraCalibration>& calibration,
             const ObserverCalibration& observer);
 
-  // True where the light is made of the light camera's frames.
+  // True if the light is made from the light camera's frames.
   bool needs_frames() const { return stage_.needs_frames(); }
 
   // Holds the first light back until a whole bracket was seen; see LightStage::await_bracket().
   void await_bracket(std::size_t exposures) { stage_.await_bracket(exposures); }
 
-  // Adds the stages of the light camera. `next_frame` waits for its frames, in order; null ends
-  // them. They are taken off the camera also where nobody needs them: they may be recorded.
+  // Adds the stages of the light camera. `next_frame` waits for the next frame; null ends the
+  // stream. Frames are taken even if lighting does not need them, because they may be recorded.
   void start(pipeline::StageThreads& stages, std::function<FramePtr()> next_frame);
 
-  // From the tracking stage, for a tracked shot: the newest light there is, without waiting.
+  // Returns the newest light for a tracked shot, without waiting. The tracking stage calls it.
   pipeline::LightPtr light_for(const pipeline::Shot& shot, set::LightMode mode);
-  // The film camera's picture fills in what the light camera cannot see, if the set wants that.
+  // Lets the film camera's picture fill in what the light camera cannot see, if the set asks for
+  // that.
   void see_observer(pipeline::Shot& shot);
 
  private:

@@ -76,10 +76,10 @@ struct LivePipeline::Impl {
   std::optional<CameraSource> observer;
   std::uint64_t next_index = 0;
   std::uint64_t shown_frames = 0;
-  int exposure_steps = 0;  // of Look::exposure_steps, done
+  int exposure_steps = 0;  // steps of Look::exposure_steps done so far
 
   pipeline::Mailbox<Shot> seen, tracked, reviewed, rendered;
-  pipeline::BoundedQueue<Shot> snapshots{4};  // ends with the render thread, or at a stop
+  pipeline::BoundedQueue<Shot> snapshots{4};  // closed by the render thread, or at a stop
   std::stop_callback<std::function<void()>> close_snapshots{stop_source.get_token(),
                                                             [this] { snapshots.close(); }};
   std::exception_ptr failure;
@@ -188,13 +188,13 @@ std::optional<Shot> LivePipeline::Impl::capture() {
   Shot shot;
   shot.frame = observer->next();
   if (!shot.frame) {
-    light_stop.request_stop();  // a light camera alone has nothing to light
+    light_stop.request_stop();  // without the observer there is nothing to light
     return std::nullopt;
   }
   shot.index = next_index++;
   shot.arrived = std::chrono::steady_clock::now();
   record_captured(shot.frame);
-  shot.frame = demosaiced(shot.frame);  // once, for all that follow
+  shot.frame = demosaiced(shot.frame);  // once for all later stages
   return shot;
 }
 
@@ -243,7 +243,8 @@ void LivePipeline::Impl::output_stages() {
   });
 }
 
-// This thread makes the recorder's frame of each picture, so that the render thread need not.
+// This runs on the display thread, so that the render thread need not make the recorder's frame of
+// each picture.
 void LivePipeline::Impl::show(Shot shot) {
   if (!shot.whole) return parts.metrics.dropped("display", "stopped while rendering");
   count_picture(shot, parts.metrics, parts.reports);

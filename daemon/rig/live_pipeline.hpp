@@ -1,5 +1,5 @@
-// The rig's stages for one set: cameras, tracking, lighting, rendering and display, each a thread,
-// with mailboxes between them and the recorder beside them.
+// Runs the rig's stages for one set: cameras, tracking, lighting, rendering and display, each on a
+// thread of its own, with mailboxes between them and the recorder beside them.
 #pragma once
 
 #include <functional>
@@ -20,7 +20,7 @@
 
 namespace previz::rig {
 
-// Counts and reports what is odd about a picture that is to be shown.
+// Counts and reports anything odd about a picture that is to be shown.
 void count_picture(const pipeline::Shot& shot, pipeline::Metrics& metrics,
                    report::Reports& reports);
 
@@ -39,17 +39,18 @@ class LivePipeline {
     std::function<void(pipeline::Shot)> show;  // on the display's thread
   };
 
-  // Throws previz::Error on anything that keeps the set from running; nothing runs then.
+  // Throws previz::Error on anything that keeps the set from running; then no thread is left
+  // running.
   LivePipeline(Parts parts, std::stop_token stop);
   ~LivePipeline();  // stops it
   LivePipeline(const LivePipeline&) = delete;
   LivePipeline& operator=(const LivePipeline&) = delete;
 
-  // Waits for the end of every stage, after Inbox::finish; throws what the first failing stage
-  // threw.
+  // Waits for every stage to end, after Inbox::finish, then rethrows the exception of the first
+  // stage that failed.
   void wait();
 
-  pipeline::Mailbox<pipeline::Shot>& reviewed();  // where a review puts its frames
+  pipeline::Mailbox<pipeline::Shot>& reviewed();  // a review pushes its frames here
 
  private:
   struct Impl;

@@ -15,7 +15,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds patience{100};  // how late a change of mode may be noticed
 constexpr int most_round = 64;
 constexpr double round_s = 1;
-constexpr int most_samples = 1 << 24;  // up to where the sums are exact enough (P4)
+constexpr int most_samples = 1 << 24;  // above this the sums are no longer exact enough (P4)
 
 double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
@@ -73,7 +73,7 @@ std::optional<Shot> LiveRender::refine_round(const Look& look) {
   }
   if (!refining_ && !begin_refinement(look)) return std::nullopt;
   Shot& shot = *good_;
-  if (shot.samples >= most_samples) {  // the picture stays, and is shown to be there
+  if (shot.samples >= most_samples) {  // the finished picture stays on the screen
     std::this_thread::sleep_for(patience);
     return refined_;
   }
@@ -95,20 +95,22 @@ std::optional<Shot> LiveRender::refine_round(const Look& look) {
   return shown;
 }
 
-// The crew sees it grow: as many again as there are, but about a second's worth at the most.
+// Each round doubles the samples, but takes at most about a second, so that the crew sees the
+// picture improve.
 int LiveRender::next_round(const Look& look) const {
   const int wanted = good_->samples == 0 ? look.samples : std::min(good_->samples, most_round);
-  if (!(sample_s_ > 0)) return 1;  // to learn the pace
+  if (!(sample_s_ > 0)) return 1;  // one sample measures the pace
   return std::clamp(static_cast<int>(round_s / sample_s_), 1, wanted);
 }
 
-// Full size, whatever the preview's: what is refined is what `previzd render` makes.
+// A refinement has full size, whatever the preview's: it shows the picture that `previzd render`
+// makes.
 bool LiveRender::begin_refinement(const Look& look) {
   if (!good_) return false;
   Shot& shot = *good_;
   refined_.reset();
   shot.samples = 0;
-  // Moved since it was captured: in standby, or without a camera or tags.
+  // Things may have moved since the frame was captured: in standby, or without a camera or tags.
   if (!good_is_reviewed_) shot.scene = pipeline::scene_state(set_, look.edits, shot.motion);
   stage_->fill_layers(true);
   stage_->use(look.estimator);
@@ -127,7 +129,7 @@ std::optional<Shot> LiveRender::wait_for_frame(const Look& look) {
     metrics_.dropped("render", "standby");
     return std::nullopt;
   }
-  if (!shot->tracking_done) {  // it came while tracking paused
+  if (!shot->tracking_done) {  // the shot came while tracking was paused
     metrics_.dropped("render", "refining");
     return std::nullopt;
   }
@@ -144,7 +146,7 @@ Shot LiveRender::render(const Look& look, Shot shot) {
     quality.samples = governor_->samples();
     quality.error = quality.seconds = 0;
   }
-  // Of a refinement that ended before its first round there is only this one.
+  // If a refinement ended before its first round, this picture is the only one to save for it.
   const bool of_live = look.snapshots > snapshots_;
   const bool snapshot = of_live || look.refined_snapshots > refined_snapshots_;
   stage_->use(quality);
@@ -152,7 +154,7 @@ Shot LiveRender::render(const Look& look, Shot shot) {
   stage_->show(look.view);
   stage_->fill_layers(snapshot);
   stage_->resize(governed ? governor_->scale() : set_.quality.scale);
-  // What is reviewed was not captured now.
+  // A reviewed frame was not captured now, so its loss is not counted.
   const bool captured = look.state.mode != Mode::review;
   try {
     (*stage_)(shot);
@@ -178,7 +180,7 @@ Shot LiveRender::render(const Look& look, Shot shot) {
   return shot;
 }
 
-// The frame and what belongs to it, without what was made of it.
+// Keeps the frame with its pose, light and scene, but without the rendered picture.
 void LiveRender::keep_as_good(const Shot& shot, bool reviewed) {
   if (!good_) inbox_.post(Event::good_frame);
   Shot good;
@@ -196,8 +198,8 @@ void LiveRender::keep_as_good(const Shot& shot, bool reviewed) {
   good_is_reviewed_ = reviewed;
 }
 
-// What a button was pressed at is what is saved, also where the press ended the refinement and
-// another picture was shown before it was known what the press asks for.
+// Saves the picture that was on the screen when the button went down, even if the press ended the
+// refinement and another picture was shown before its kind was known.
 void LiveRender::save_refined(const Look& look) {
   while (refined_ && refined_snapshots_ < look.refined_snapshots) {
     ++refined_snapshots_;

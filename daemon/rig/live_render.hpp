@@ -1,5 +1,5 @@
-// The render thread of the rig: a picture of each new frame, or rounds of refining the last good
-// one, as the desk says.
+// The work of the rig's render thread: it renders each new frame, or refines the last good one in
+// rounds, as the Look says.
 #pragma once
 
 #include <chrono>
@@ -21,27 +21,28 @@ namespace previz::rig {
 class LiveRender {
  public:
   struct Channels {
-    pipeline::Mailbox<pipeline::Shot>& tracked;         // of the camera
-    pipeline::Mailbox<pipeline::Shot>& reviewed;        // of a take, with their light
-    pipeline::BoundedQueue<pipeline::Shot>& snapshots;  // out: with layers
+    pipeline::Mailbox<pipeline::Shot>& tracked;         // the camera's
+    pipeline::Mailbox<pipeline::Shot>& reviewed;        // a take's, with their light
+    pipeline::BoundedQueue<pipeline::Shot>& snapshots;  // output, with layers
   };
 
-  // The stage must ask interrupted().
+  // The stage that renders must ask interrupted() whether it is cancelled.
   LiveRender(const set::Set& set, const pipeline::Newest<Look>& look, Inbox& inbox,
              pipeline::Metrics& metrics, Channels channels, std::stop_token stop);
 
   void use(pipeline::RenderStage& stage) { stage_ = &stage; }
 
-  // Returns the next picture to show; nothing once the camera's frames have ended. If the device is
-  // lost meanwhile, `renew` is called; it returns true once there is another stage to use(), and
-  // false if a stop came first. A refinement's rounds grow: first the preview's samples, then as
-  // many again as there are, at most 64 and what takes about a second.
+  // Returns the next picture to show, or nothing once the camera's frames have ended. If the device
+  // is lost, `renew` is called; it returns true once there is another stage to use(), and false if
+  // a stop came first. A refinement starts with the preview's samples, and each round doubles them,
+  // by at most 64 samples and about a second's worth.
   std::optional<pipeline::Shot> next(const std::function<bool(const render::DeviceLost&)>& renew);
 
-  // Counts the frames that a newer one took the place of since the last call; next() does it too.
+  // Counts the frames that newer ones replaced since the last call; next() does so too.
   void count_dropped() { drops_.update(); }
 
-  // True if what is being rendered is no longer wanted; from the render thread.
+  // Returns true if the picture that is being rendered is no longer wanted. Call it from the render
+  // thread.
   bool interrupted() const;
 
  private:
@@ -63,14 +64,14 @@ class LiveRender {
   const std::stop_token stop_;
   pipeline::RenderStage* stage_ = nullptr;
   std::optional<pipeline::Governor> governor_;
-  std::optional<pipeline::Shot> good_;     // the last one with pose and light: its frame only
-  bool good_is_reviewed_ = false;          // and so its scene is the take's, not the rig's
-  std::optional<pipeline::Shot> refined_;  // the last round's, with layers, until the next begins
+  std::optional<pipeline::Shot> good_;     // last shot with pose and light: its frame only
+  bool good_is_reviewed_ = false;          // true: good_'s scene is the take's, not the rig's
+  std::optional<pipeline::Shot> refined_;  // result of the last round, with layers
   bool refining_ = false;
   pipeline::Edits refined_edits_;
-  double sample_s_ = 0;  // that a sample of a refinement took last; 0: not known
+  double sample_s_ = 0;  // time of the last refinement's sample; 0: not known
   pipeline::DropCount<pipeline::Shot> drops_;
-  std::uint64_t snapshots_ = 0, refined_snapshots_ = 0, refinements_ = 0;  // of the look's, done
+  std::uint64_t snapshots_ = 0, refined_snapshots_ = 0, refinements_ = 0;  // the Look's, done
 };
 
 }  // namespace previz::rig

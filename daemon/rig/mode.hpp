@@ -1,4 +1,4 @@
-// What the rig is doing, and what each wish does to it: the whole state machine, as a pure table.
+// The rig's state machine: its mode, and the effect of every event, as a pure function.
 #pragma once
 
 #include <array>
@@ -12,19 +12,19 @@ using set::Mode;
 struct State {
   Mode mode = Mode::live;
   bool recording = false;
-  bool camera_lost = false;  // the observer; shown, and in the way of nothing
-  bool has_good = false;     // a frame with pose and light was seen: refine has what to freeze
-  bool has_take = false;     // a take is finished: review has what to play
+  bool camera_lost = false;  // the observer's loss is shown but blocks nothing
+  bool has_good = false;     // a frame with pose and light was seen, so refine can freeze it
+  bool has_take = false;     // a take is finished, so review can play it
 
   friend bool operator==(const State&, const State&) = default;
 };
 
-// Refining and standby let tracking and light estimation rest (P7), except that a take gets its
-// poses whatever is shown.
+// Returns whether tracking and light estimation run. They rest while refining and in standby (P7),
+// except that a take gets its poses in every mode.
 bool tracks(const State& state);
 
-// What happens to the rig. A mode that is wished for twice stays; one that is toggled goes back to
-// live.
+// Events that happen to the rig. A mode that is wished for twice stays; a mode that is toggled
+// twice goes back to live.
 enum class Event {
   wish_standby,
   wish_live,
@@ -33,7 +33,7 @@ enum class Event {
   toggle_standby,
   toggle_refine,
   toggle_review,
-  press,  // of any button, before its action: a refinement ends
+  press,  // any button, before its action: ends a refinement
   record_on,
   record_off,
   record_toggle,
@@ -51,16 +51,17 @@ inline constexpr std::array all_events = {
     Event::take_finished,  Event::review_ended,  Event::good_frame,    Event::camera_lost,
     Event::camera_back};
 
-// The event by which somebody asks for this mode.
+// Returns the event that asks for this mode.
 Event wish_for(Mode mode);
 
 struct Step {
   State state;
-  const char* refused = nullptr;  // in words for the display; the state is then as it was
+  const char* refused = nullptr;  // reason for the display; the state is then unchanged
 };
 
-// Recording never ends by a change of mode: what would end it is refused. Record always rolls: from
-// standby and review it goes live first. A lost camera changes nothing but State::camera_lost.
+// Returns the state after the event. A change of mode that would end a recording is refused.
+// Recording can always start: from standby and review the rig first goes live. A lost camera
+// changes nothing but State::camera_lost.
 Step step(const State& state, Event event);
 
 }  // namespace previz::rig

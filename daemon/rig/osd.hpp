@@ -32,7 +32,7 @@ struct Pace {
   double latency_s = 0;  // capture to display
 };
 
-// Facts about everything else.
+// Facts about the rig apart from the picture.
 struct RigFacts {
   Look look;
   std::string take;       // name of the take that is being recorded
@@ -40,11 +40,11 @@ struct RigFacts {
   std::uint64_t frames_lost = 0;
   std::string recorder_fault;
   std::optional<std::uint64_t> free_bytes;  // for takes, without the reserve; none: not known
-  std::vector<report::Notice> news;         // what buttons and the rig itself did, oldest first
-  std::vector<report::Notice> troubles;     // of devices
+  std::vector<report::Notice> news;         // actions of buttons and of the rig, oldest first
+  std::vector<report::Notice> troubles;     // troubles of devices
 };
 
-// `picture` is null before the first one.
+// Returns the overlay's words. `picture` is null before the first picture.
 output::OsdPage osd_page(const RigFacts& rig, const PictureFacts* picture, const Pace& pace);
 
 }  // namespace previz::rig

@@ -1,4 +1,4 @@
-// From edges of buttons to presses: short, long and double.
+// Recognises short, long and double presses from the edges of buttons.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace previz::rig {
 struct Press {
   std::string button;
   set::PressKind kind = set::PressKind::short_press;
-  std::int64_t timestamp_ns = 0;  // when it was certain which kind it is
+  std::int64_t timestamp_ns = 0;  // when the kind became certain
 
   friend bool operator==(const Press&, const Press&) = default;
 };
@@ -26,7 +26,7 @@ struct Press {
 // the time for a second push has passed. Time comes from the caller.
 class PressRecognizer {
  public:
-  static constexpr std::int64_t long_ns = 600'000'000;    // held so long: long
+  static constexpr std::int64_t long_ns = 600'000'000;    // a press held so long is long
   static constexpr std::int64_t double_ns = 300'000'000;  // from release to the second push
 
   // `buttons` says which presses have an action. A button that has none is never returned.
@@ -43,7 +43,7 @@ class PressRecognizer {
   struct Button {
     bool has_short = false, has_long = false, has_double = false;
     Phase phase = Phase::idle;
-    std::int64_t since_ns = 0;  // of the phase
+    std::int64_t since_ns = 0;  // begin of the phase
   };
 
   static std::optional<std::int64_t> due(const Button& button);

@@ -17,13 +17,13 @@ namespace previz::rig {
 
 class Review {
  public:
-  // Posts Event::review_ended at the take's end, or with a report if it cannot be played: for one
-  // thing because it was recorded with another set than the one that runs. `out` outlives this.
+  // Posts Event::review_ended at the take's end. If the take cannot be played, for example because
+  // it was recorded with another set, it also reports why. `out` outlives this.
   Review(std::filesystem::path take, std::string set_text, pipeline::Mailbox<pipeline::Shot>& out,
          Inbox& inbox, report::Reports& reports);
 
   void stop() { thread_.request_stop(); }
-  bool done() const { return done_; }  // its destructor would not wait
+  bool done() const { return done_; }  // true: the destructor does not wait
 
  private:
   std::atomic<bool> done_ = false;

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::chrono::milliseconds tick_interval{20};
 constexpr int ticks_a_second = 50;
-constexpr int ticks_a_page = 5;  // the overlay's clock and faults
+constexpr int ticks_a_page = 5;  // the overlay is updated once in so many ticks
 
 output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& cameras,
                                    Reports& reports) {
@@ -54,7 +54,7 @@ output::RecorderOptions recorder_options(const LoadedSet& loaded, const Cameras&
   return options;
 }
 
-// Without a watch cameras are found too, but only when the next attempt is due.
+// If the USB cannot be watched, cameras are still found, but only when the next attempt is due.
 Usb watch_usb(Reports& reports) {
   try {
     return std::make_shared<const usb::Hotplug>();
@@ -94,7 +94,7 @@ Rig::Rig(Parts parts)
   show_facts();
 }
 
-// Reviews must end before the pipeline, to which they hand what they play.
+// Reviews must end before the pipeline, because they push their frames into it.
 Rig::~Rig() {
   review_.reset();
   ended_reviews_.clear();
@@ -102,8 +102,8 @@ Rig::~Rig() {
 
 ButtonDesk::Asks Rig::asks_of_buttons() {
   ButtonDesk::Asks asks;
-  // A frame that came before the press is known before it. What was pressed after a set was read
-  // again is the next rig's.
+  // Frames that came before the press must be known first. Presses after a set was read again
+  // belong to the next rig.
   asks.listens = [this] {
     take_inbox();
     return !parts_.sets.has_next();
@@ -127,7 +127,7 @@ void Rig::run() {
   if (const auto interval = service::watchdog_interval())
     watchdog = parts_.loop.every(*interval, [this] { feed_watchdog(); });
   service::ready("set \"" + loaded_.set.name + "\"");
-  service::feed_watchdog();  // a set that was read again took its time
+  service::feed_watchdog();  // reading a set again takes long
   parts_.loop.run();
   if (!parts_.sets.has_next()) pipeline_.wait();
 }
@@ -145,10 +145,10 @@ Outcome Rig::apply(Outcome outcome, const std::string& by, Severity severity) {
     if (std::optional<std::string> why_not = carry_out(*outcome.request))
       outcome = {*std::move(why_not), true, {}};
   }
-  publish_look();  // after the request: there is a take before what is shown is to be in it
+  publish_look();  // after the request, so that a take exists before its first shown picture
   if (outcome.refused) severity = Severity::warning;
   report::Report report{severity, by, outcome.said + (outcome.refused ? " (refused)" : "")};
-  // The mode has its own place on the display.
+  // The mode has its own place on the display and needs no notice.
   if (outcome.said != set::name_of(controls_.look().state.mode))
     report.notice = {outcome.refused ? Severity::warning : Severity::info, "", outcome.said};
   parts_.reports.announce(report);

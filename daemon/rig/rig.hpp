@@ -1,5 +1,5 @@
-// The rig running one set: mode and recorder, between the desk of buttons and the pipeline, on the
-// main thread's event loop.
+// Runs one set: keeps mode and recorder, between the buttons and the pipeline, on the main thread's
+// event loop.
 #pragma once
 
 #include <cstdint>
@@ -31,13 +31,13 @@ class Rig {
  public:
   struct Parts {  // outlive the rig
     EventLoop& loop;
-    SetKeeper& sets;  // whose running set this is
+    SetKeeper& sets;  // the rig runs its running set
     report::Reports& reports;
     pipeline::Metrics& metrics;
     std::shared_ptr<render::Device> device;
     std::function<void(pipeline::Shot, const Look&)> show;  // on the pipeline's last thread
-    std::function<void(RigFacts)> show_facts;               // what the overlay may say
-    std::function<std::vector<std::unique_ptr<Buttons>>()> more_buttons;  // or empty
+    std::function<void(RigFacts)> show_facts;               // facts for the overlay
+    std::function<std::vector<std::unique_ptr<Buttons>>()> more_buttons;  // may be empty
     bool loop_cameras = false;
     std::stop_token stop;
   };
@@ -52,7 +52,7 @@ class Rig {
   // what a stage threw.
   void run();
 
-  // Both are for the loop's thread; `by` says who asks, for the log and the take: "button red".
+  // Call both on the loop's thread. `by` names who asks, for the log and the take: "button red".
   Outcome perform(const set::Action& action, const std::string& by);
   Outcome wish(Event event, const std::string& by);
 
@@ -68,10 +68,10 @@ class Rig {
   void look_at_recorder();
   void feed_watchdog();
   void show_facts();
-  // Does what the outcome asks for, and announces what became of it, which is returned.
+  // Carries out the outcome's request, announces the result and returns it.
   Outcome apply(Outcome outcome, const std::string& by,
                 report::Severity severity = report::Severity::info);
-  // Returns why the request was not carried out; nothing if it was.
+  // Returns why the request was not carried out, or nothing if it was.
   std::optional<std::string> carry_out(Request request);
   std::optional<std::string> change_set(int next);
   void publish_look();

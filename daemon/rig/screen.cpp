@@ -23,15 +23,15 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds words_interval{
-    100};  // between looks at words without a picture
+    100};  // how often the words are checked while no picture comes
 constexpr std::chrono::seconds file_interval{1};
 
 struct Picture {
   std::shared_ptr<const Plate> plate;
   PictureFacts facts;
-  Clock::time_point arrived;  // at the daemon
-  double in_device_s = 0;     // before: from capture to arrival, as the driver reports it
-  bool frozen = false;        // of a refinement: no newer frame, and as late as it was frozen
+  Clock::time_point arrived;  // arrival at the daemon
+  double in_device_s = 0;     // from capture to arrival, as the driver reports it
+  bool frozen = false;        // a refinement's picture, which has no latency
 
   double latency_s(std::int64_t shown_ns) const {
     const auto arrived_ns = std::chrono::nanoseconds(arrived.time_since_epoch()).count();
@@ -119,7 +119,7 @@ Screen::Impl::Impl(const set::Set& set, Parts the_parts)
       parts(std::move(the_parts)),
       life(set.display.connector.empty() ? "display" : "display " + set.display.connector,
            opener_of(set)) {
-  const output::Font is_there(output::default_font(), 1);  // throws now, and not on the thread
+  const output::Font is_there(output::default_font(), 1);  // throws here rather than on the thread
   thread = std::jthread([this] { run(); });
 }
 

@@ -16,7 +16,7 @@ Progress progress_of(const pipeline::MetricsSnapshot& metrics, const State& stat
     const auto found = metrics.counts.find(event);
     return found == metrics.counts.end() ? 0 : found->second;
   };
-  // A picture that no display was there for did not stop the screen.
+  // A picture that was dropped because there was no display does not mean that the screen hangs.
   std::uint64_t screened = frames_of("screen");
   if (const auto screen = metrics.stages.find("screen"); screen != metrics.stages.end())
     for (const auto& [cause, dropped] : screen->second.dropped) screened += dropped;

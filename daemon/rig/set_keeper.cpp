@@ -12,7 +12,7 @@ using report::Severity;
 
 LoadedSet load_whole_set(const std::filesystem::path& file) {
   LoadedSet loaded;
-  std::error_code missing;  // reading the file reports that in better words
+  std::error_code missing;  // reading the file gives a better error
   loaded.changed = std::filesystem::last_write_time(file, missing);
   loaded.text = session::read_file(file);
   loaded.set = set::parse_set(loaded.text, file);
@@ -81,7 +81,7 @@ bool SetKeeper::go_back(const std::string& why) {
   if (!before_) return false;
   reports_(
       {Severity::error, "", why + "\nback to the set as it was: " + before_->set.file.string()});
-  // The same file is not tried again until it is changed again.
+  // The same file is not tried again until it changes again.
   if (before_->set.file == running_.set.file) before_->changed = running_.changed;
   run(*std::exchange(before_, std::nullopt));
   return true;

@@ -1,5 +1,5 @@
-// Which set runs, which one is to run next, and which one to go back to: a set with a fault never
-// takes the place of one that runs.
+// Keeps the set that runs, the one that is to run next and the one to go back to, so that a faulty
+// set never replaces a running one.
 #pragma once
 
 #include <filesystem>
@@ -14,16 +14,16 @@
 
 namespace previz::rig {
 
-// A set and everything that its files can be wrong about, already read.
+// A set whose files, the scene's included, have been read, so that none of them can still be wrong.
 struct LoadedSet {
   set::Set set;
-  std::string text;                         // of the file, as it goes into takes
-  std::filesystem::file_time_type changed;  // of the file, before it was read
+  std::string text;                         // text of the file, as it goes into takes
+  std::filesystem::file_time_type changed;  // time of the file, taken before it was read
   scene::Scene scene;
 };
 
-// Notices once that a set file has changed: when two looks one after the other find the same new
-// time, because until then the file may still be being written.
+// Notices once that a set file has changed: when two successive looks find the same new time,
+// because before that the file may still be being written.
 class SetFileWatch {
  public:
   using Time = std::filesystem::file_time_type;
@@ -38,32 +38,33 @@ class SetFileWatch {
   Time known_, seen_;
 };
 
-// Throws previz::Error with every problem of the set, or of its scene.
+// Reads a set with its scene. Throws previz::Error with every problem of the set or of the scene.
 LoadedSet load_whole_set(const std::filesystem::path& file);
 
-// The set file `next` places after `file` in its folder, by name and around the end; files are
-// those that end in .toml.
+// Returns the set file `next` places after `file` among the .toml files of its folder, by name and
+// wrapping around.
 std::filesystem::path neighbour(const std::filesystem::path& file, int next);
 
 class SetKeeper {
  public:
-  // Reads the first set; throws previz::Error with every problem of it. `override_set` is applied
-  // to every set that is to run. `reports` outlives the keeper.
+  // Reads the first set; throws previz::Error with all its problems. `override_set` is applied to
+  // every set that is to run. `reports` outlives the keeper.
   SetKeeper(const std::filesystem::path& file, std::function<void(set::Set&)> override_set,
             report::Reports& reports);
 
   const LoadedSet& running() const { return running_; }
   bool has_next() const { return next_.has_value(); }
 
-  // Reads the set file `next` places on in the folder; 0: the running one again. Either has_next()
-  // is true afterwards, or the reason why not is returned, in one line, and reported in full.
+  // Reads the set file `next` places on in the folder; with 0, the running one again. Afterwards
+  // has_next() is true, or the reason why not is returned in one line and reported in full.
   std::optional<std::string> change(int next);
-  // Looks at the running set's file, and reads it again where it has changed; once a second.
+  // Reads the running set's file again if it has changed. Call it once a second.
   void look_at_file();
 
-  // The next set is the running one from now on; has_next() must hold.
+  // Makes the next set the running one; has_next() must hold.
   void begin_next();
-  // The running set could not be started: the one before it takes its place. False: there is none.
+  // Puts the previous set in place of the running one, which could not be started. Returns false if
+  // there is none.
   bool go_back(const std::string& why);
 
  private:

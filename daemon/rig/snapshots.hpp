@@ -1,4 +1,4 @@
-// Snapshots: what was shown, as EXR with every layer and as PNG.
+// Writes snapshots: the picture that was shown, as EXR with every layer and as PNG.
 #pragma once
 
 #include <filesystem>
@@ -9,8 +9,8 @@
 
 namespace previz::rig {
 
-// DIR/snapshot_NNNN.exr and .png under the next free number; returns the path without extension.
-// Throws previz::Error naming the file.
+// Writes DIR/snapshot_NNNN.exr and .png under the next free number; returns the path without
+// extension. Throws previz::Error naming the file.
 std::filesystem::path write_snapshot(const pipeline::Shot& shot, const set::Set& set);
 
 }  // namespace previz::rig

@@ -17,7 +17,8 @@ std::string number_words(double value) {
   return text;
 }
 
-// Every spelling that the set file knows; `field`: TradeSettings& -> the enumeration.
+// Returns an axis over every value of an enumeration of the set file; `field` maps TradeSettings&
+// to it.
 template <class Field>
 TradeAxis spelled(std::string name, std::string what, Field field) {
   TradeAxis axis{std::move(name), std::move(what), {}, ""};
@@ -27,7 +28,7 @@ TradeAxis spelled(std::string name, std::string what, Field field) {
   return axis;
 }
 
-// A few numbers; `field`: TradeSettings& -> the number.
+// Returns an axis over a few numbers; `field` maps TradeSettings& to the number.
 template <class Field, class Number>
 TradeAxis numbered(std::string name, std::string what, TradeSettings own,
                    std::initializer_list<Number> values, Field field) {
@@ -37,7 +38,7 @@ TradeAxis numbered(std::string name, std::string what, TradeSettings own,
   return axis;
 }
 
-// What was recorded are sources; there is no image to go back to.
+// Light from a recording has no variants, because only its sources were recorded and no image.
 TradeAxis light_modes(const set::Lighting& own) {
   if (own.from == set::LightFrom::recording) return {"light_mode", "", {}, set::name_of(own.mode)};
   return spelled(

@@ -1,4 +1,4 @@
-// What `previzd trade` sweeps: one table of axes, each a list of variants of the set's own
+// The table of axes that `previzd trade` sweeps. Each axis is a list of variants of the set's own
 // settings.
 #pragma once
 
@@ -32,21 +32,21 @@ struct TradeVariant {
 
 struct TradeAxis {
   std::string name;  // in the CSV
-  std::string what;  // for people: what is traded
+  std::string what;  // what is traded, in words for people
   std::vector<TradeVariant> variants;
-  std::string own;  // how the set's own variant is called where it is none of the list
+  std::string own;  // name of the set's own variant if it is not in the list
 };
 
-// The axes that have something to trade on this set. `needed`: the FEATURE_* bits that its
-// pipelines are made with.
+// Returns the axes that have something to trade on this set. `needed` holds the FEATURE_* bits that
+// its pipelines are made with.
 std::vector<TradeAxis> trade_axes(const TradeSettings& own, std::uint32_t needed);
 
-// The name of the axis of features that are not needed but carried: its variants must show the
-// set's own picture, bit for bit.
+// The name of the axis whose variants carry features that are not needed. They must show the set's
+// own picture, bit for bit.
 inline constexpr const char* parts_axis = "parts";
 
-// Different settings to measure, each once, however many axes they are on; the first are the set's
-// own.
+// The settings to measure. Each method is listed once, even if it is on several axes; the first is
+// the set's own settings.
 struct TradePlan {
   struct Entry {
     std::string variant;
@@ -63,7 +63,8 @@ struct TradePlan {
   std::vector<Method> methods;
   std::vector<Axis> axes;  // on each are the set's own settings and at least one more
 };
-// `wanted`: names of axes; empty: all. Throws previz::Error naming one that is not there.
+// Plans the sweep over the axes named in `wanted`, or all if it is empty. Throws previz::Error
+// naming an axis that does not exist.
 TradePlan plan_trade(const TradeSettings& own, std::vector<TradeAxis> axes,
                      const std::vector<std::string>& wanted = {});
 

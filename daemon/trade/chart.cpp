@@ -22,7 +22,7 @@ std::string coordinate(double value) {
   return formatted("%.1f", value);
 }
 
-// Two significant digits without an exponent.
+// Formats two significant digits without an exponent.
 std::string two_digits(double value) {
   if (!(value > 0)) return "0";
   const int digits = std::max(0, 1 - static_cast<int>(std::floor(std::log10(value) + 1e-9)));
@@ -35,7 +35,7 @@ std::string two_digits(double value) {
   return words;
 }
 
-// A logarithmic axis: values to pixels.
+// A logarithmic axis, which maps values to pixels.
 struct LogAxis {
   double low = std::numeric_limits<double>::infinity(), high = 0;
   double from_px = 0, to_px = 0;
@@ -44,7 +44,7 @@ struct LogAxis {
     low = std::min(low, value);
     high = std::max(high, value);
   }
-  // Room for dots at the ends, and never without an extent.
+  // Makes room for dots at the ends, so that the axis always has an extent.
   void widen() {
     low /= 1.35;
     high *= 1.35;
@@ -52,7 +52,7 @@ struct LogAxis {
   double at(double value) const {
     return from_px + (to_px - from_px) * std::log(value / low) / std::log(high / low);
   }
-  // Round numbers, as many as the axis has room for.
+  // Returns round numbers, as many as the axis has room for.
   std::vector<double> ticks() const {
     const std::vector<double> steps = high / low < 8     ? std::vector<double>{1, 1.5, 2, 3, 5, 7}
                                       : high / low < 300 ? std::vector<double>{1, 2, 5}
@@ -98,8 +98,8 @@ std::string curve_svg(const ChartCurve& curve, const LogAxis& x, const LogAxis& 
          (joined ? "<polyline points=\"" + line + "\"/>\n" : "") + dots + "</g>\n";
 }
 
-// Names beside the ends of the curves, moved apart where they would lie on each other; on the front
-// above their dots.
+// Draws the names beside the ends of the curves, moved apart where they would overlap. The front's
+// names stand above their dots.
 std::string labels_svg(const LogChart& chart, const LogAxis& x, const LogAxis& y) {
   struct Label {
     double x, y;
@@ -115,7 +115,7 @@ std::string labels_svg(const LogChart& chart, const LogAxis& x, const LogAxis& y
   std::ranges::sort(labels, {}, &Label::y);
   for (std::size_t i = 1; i < labels.size(); ++i)
     labels[i].y = std::max(labels[i].y, labels[i - 1].y + label_height);
-  // Pushed below the picture: back up again, from the last.
+  // Labels that were pushed below the picture move up again, from the last.
   double lowest = chart.height - margin_bottom - 2;
   for (std::size_t i = labels.size(); i-- > 0; lowest -= label_height)
     labels[i].y = std::min(labels[i].y, lowest);

@@ -14,7 +14,7 @@ struct ChartPoint {
 };
 
 struct ChartCurve {
-  std::string name;   // at its end
+  std::string name;   // label at its end
   std::string style;  // CSS class: "own", "front", "cloud" (dots alone) or "s1" to "s6"
   std::vector<ChartPoint> points;
 };
@@ -22,18 +22,18 @@ struct ChartCurve {
 struct LogChart {
   std::string title, x_label, y_label;  // y is a share, and labelled in percent; x in seconds
   std::vector<ChartCurve> curves;
-  std::optional<double> doubtful_below;  // a y: what lies below is shaded
+  std::optional<double> doubtful_below;  // the area below this y is shaded
   int width = 460, height = 320;
 };
 
-// Empty where there is no point to draw.
+// Returns the chart as SVG, or nothing if there is no point to draw.
 std::string to_svg(const LogChart& chart);
 
-// "32 ms", "3.2 s", "1:20".
+// Returns a time as "32 ms", "3.2 s" or "1:20".
 std::string time_words(double seconds);
-// Two digits: "0.35 %", "4 %", "120 %".
+// Returns a share with two digits: "0.35 %", "4 %", "120 %".
 std::string share_words(double share);
-// For text in HTML and SVG.
+// Escapes text for HTML and SVG.
 std::string escaped(const std::string& text);
 
 }  // namespace previz::trade

@@ -56,7 +56,7 @@ TradeFrame::TradeFrame(const fs::path& set_file, std::optional<std::uint64_t> in
   response_.emplace(calibration().response, plate_of(shot_)->bits);
 }
 
-// Why the frame cannot be rendered; empty: it can.
+// Returns why the frame cannot be rendered; empty if it can.
 std::string TradeFrame::what_lacks() const {
   if (!shot_.track.pose)
     return std::string("pose ") + to_string(shot_.track.status) +

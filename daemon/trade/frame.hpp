@@ -20,8 +20,8 @@ namespace previz::trade {
 
 class TradeFrame {
  public:
-  // Frame `index` of the take that stands in for the set's observer; absent: the first with a pose
-  // and light. Throws previz::Error if there is none.
+  // Takes frame `index` of the take that replaces the set's observer, or, if absent, the first with
+  // a pose and light. Throws previz::Error if there is none.
   TradeFrame(const std::filesystem::path& set_file, std::optional<std::uint64_t> index);
 
   const set::Set& set() const { return take_.set; }
@@ -31,8 +31,9 @@ class TradeFrame {
   const ObserverCalibration& calibration() const { return take_.observer; }
   const lighting::Response& response() const { return *response_; }
   PlatePtr plate(double scale) const;
-  // The light of the light frames before this one with these settings, without what smoothing and
-  // tracked sources would add from earlier frames; made once for each. Null where there are none.
+  // Returns the light of the light frames before this frame with these settings, computed once for
+  // each. Smoothing and tracked sources add nothing from earlier frames. Returns null if there are
+  // no light frames.
   pipeline::LightPtr light(const set::Lighting& settings);
 
  private:
@@ -41,7 +42,7 @@ class TradeFrame {
   const pipeline::Take take_;
   std::vector<std::pair<set::Lighting, pipeline::LightPtr>> lights_;
   pipeline::Shot shot_;
-  std::optional<lighting::Response> response_;  // of the plate's bits
+  std::optional<lighting::Response> response_;  // for the plate's bit depth
 };
 
 }  // namespace previz::trade

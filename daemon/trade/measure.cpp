@@ -13,7 +13,7 @@ namespace previz::trade {
 namespace {
 
 constexpr std::size_t block_px = 8;
-// An error is claimed where the reference's own is at most this part of it.
+// An error counts as measured if the reference's own error is at most this part of it.
 constexpr double allowed_noise = 0.1;
 
 // Sums of squares over pixels and channels.
@@ -52,11 +52,12 @@ std::vector<glm::vec3> enlarged_layer(const std::vector<glm::vec3>& layer, int f
   return result;
 }
 
-// What is known of one pixel's differences from the set's own picture, over its channels.
+// Products of one pixel's differences from the set's own picture, summed over its channels.
 struct CommonDifference {
   double common = 0;  // the mean of d e over all pairs of differences
-  // A product of two noises, as d e is where d and e are nothing else: two combinations of the
-  // first three in which everything cancels but noise, each of one's variance and uncorrelated.
+  // A sample of d e if d and e were only noise. Both factors are linear combinations of the first
+  // three differences in which the signal cancels; each has the variance of one difference, and
+  // they are uncorrelated.
   double noise = 0;
 };
 
@@ -89,7 +90,7 @@ TradePicture trade_picture(const render::Layers& layers, const std::vector<doubl
     const glm::dvec3 seen(camera[3 * i], camera[3 * i + 1], camera[3 * i + 2]);
     const glm::dvec3 shown = glm::clamp(glm::dvec3(layers.composite[i]), 0.0, white);
     picture.shown.emplace_back(shown);
-    // Untouched is untouched, whatever rounding made of the camera's value.
+    // An untouched pixel adds exactly nothing, whatever rounding did to the camera's value.
     const bool same = glm::vec3(seen) == layers.composite[i];
     picture.added.emplace_back(same ? glm::dvec3(0) : shown - seen);
   }
@@ -101,11 +102,11 @@ TradePicture enlarged(const TradePicture& picture, int width, int height) {
   const auto layer = [&](const std::vector<glm::vec3>& from) {
     return enlarged_layer(from, picture.width, picture.height, width, height);
   };
-  // The mask that counts is the reference's.
+  // The result needs no mask, because errors use the reference's.
   return {width, height, layer(picture.shown), layer(picture.added), {}};
 }
 
-// The mean of the halves is as far from the truth, in expectation, as from either half.
+// In expectation the mean of the halves is as far from the truth as from either half.
 TradeReference::TradeReference(const TradePicture& a, const TradePicture& b)
     : mean_(middle(a, b)), noise_(errors(a)) {}
 
@@ -126,7 +127,7 @@ TradeReference::Bias TradeReference::bias(std::span<const TradePicture> alike,
   const auto width = static_cast<std::size_t>(mean_.width);
   const auto height = static_cast<std::size_t>(mean_.height);
   const std::size_t columns = (width + block_px - 1) / block_px;
-  // By block of 8x8 pixels, because pixels that share photons share their noise.
+  // Noise is summed by blocks of 8x8 pixels, because pixels that share photons share their noise.
   std::vector<double> noise(columns * ((height + block_px - 1) / block_px));
   double common = 0, signal = 0;
   for (std::size_t i = 0; i < mean_.shown.size(); ++i) {
@@ -136,7 +137,7 @@ TradeReference::Bias TradeReference::bias(std::span<const TradePicture> alike,
     signal += glm::dot(glm::dvec3(mean_.shown[i]), glm::dvec3(mean_.shown[i]));
   }
   if (!(signal > 0)) return {};
-  double variance = 0;  // of one product's sum; those of different pairs are uncorrelated
+  double variance = 0;  // variance of one pair's sum; the sums of different pairs are uncorrelated
   for (const double block : noise) variance += block * block;
   const auto pairs = static_cast<double>(alike.size() * (alike.size() - 1)) / 2;
   const double three_errors = 3 * std::sqrt(variance / pairs);

@@ -1,4 +1,4 @@
-// One frame rendered with one method of a trade's plan, and timed.
+// Renders one frame with one method of a trade's plan, and times it.
 #pragma once
 
 #include <cstdint>
@@ -15,21 +15,23 @@ namespace previz::trade {
 
 class MethodRenderer {
  public:
-  // `sweep_scale`: of the observer's size; the settings' scale is of that.
+  // `sweep_scale` is relative to the observer's size; the settings' scale is relative to the
+  // sweep's size.
   MethodRenderer(const std::shared_ptr<render::Device>& device, TradeFrame& frame,
                  const scene::Scene& scene, const TradeSettings& settings, double sweep_scale);
 
-  // A first sample makes the device ready: its pipelines are compiled when they are first used.
+  // Renders one sample, so that the device compiles its pipelines, which happens at their first
+  // use.
   void warm_up();
-  // Forgets what was rendered.
+  // Begins the frame anew, without samples.
   void begin(std::uint32_t seed);
-  // All the samples of a frame begun, as the settings spread them, and what they do to the picture
-  // then. Seconds.
+  // Renders all samples of the frame begun, as the settings spread them, then denoises if the
+  // settings say so. Returns the time in seconds.
   double render(int samples);
-  // Some more for every pixel, of which layers() and picture() then are as they came.
+  // Adds samples to every pixel; layers() and picture() then return the plain result.
   void add(int samples);
 
-  // FEATURE_* bits of the frame begun.
+  // Returns the FEATURE_* bits of the frame begun.
   std::uint32_t needed() const { return renderer_.needed(); }
   const render::Layers& layers() const { return layers_; }
   TradePicture picture() const;

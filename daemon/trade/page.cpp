@@ -54,7 +54,7 @@ std::string plain_words(std::string name) {
   return name;
 }
 
-// With a capital letter.
+// Begins the words with a capital letter.
 std::string sentence(std::string words) {
   words.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(words.front())));
   return words;
@@ -157,7 +157,7 @@ std::string front_chart(const TradeReport& report) {
   return to_svg(chart);
 }
 
-// "4 %", or "≈ 4 %" where the reference's own error is more than a tenth of it.
+// Returns "4 %", or "≈ 4 %" if the reference's own error is more than a tenth of it.
 std::string error_words(const TradeReport& report, const TradePoint& point, Measure measure) {
   TradeErrors alone, noise;
   alone.*measure = point.errors.*measure;
@@ -234,7 +234,7 @@ std::string axis_chart(const TradeReport& report, const TradePlan::Axis& axis, c
   return to_svg(chart);
 }
 
-// Which variants do not show what the set's own settings do, where that is seen.
+// Returns a sentence that names the variants with a detected bias against the set's own settings.
 std::string bias_sentence(const TradeReport& report, const TradePlan::Axis& axis) {
   std::string biased;
   for (const TradePlan::Entry& entry : axis.entries) {

@@ -1,4 +1,5 @@
-// What `previzd trade` measured: every method at every number of samples, and the front of them.
+// The measurements of `previzd trade`: every method at every number of samples, and their Pareto
+// front.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,7 @@ struct TradePoint {
   int samples = 0;
   double seconds = 0;  // rendering alone, after a warm-up; the median of the rounds
   TradeErrors errors;
-  std::string within_noise;  // the errors that the reference is too noisy to tell
+  std::string within_noise;  // errors for which the reference is too noisy
   bool pareto = false;       // by seconds and errors.picture
 };
 
@@ -26,7 +27,8 @@ struct TradeMethod {
   std::string name;
   std::vector<TradePoint> points;            // in order of samples
   std::optional<TradeReference::Bias> bias;  // absent: fewer than three rounds
-  // Parts carried along: pixels that differ from the set's own picture; must be 0.
+  // For methods that carry unneeded features: the number of pixels that differ from the set's own
+  // picture, which must be 0.
   std::optional<std::size_t> changed_pixels;
 };
 
@@ -64,10 +66,10 @@ struct TradeReport {
   }
 };
 
-// The points on the front, in order of time.
+// Returns the points on the front, in order of time.
 std::vector<TradeFrontPoint> front_of(const TradeReport& report);
-// The points of the front that are worth a line: each is nearer than the one before by a tenth of
-// its error at least; the first and the last of the front, and the corners, always are.
+// Returns the points of the front that are worth a line: each reduces the error of the one before
+// by at least a tenth. The first, the last and the corners are always included.
 std::vector<TradeFrontPoint> listed_front_of(const TradeReport& report);
 
 }  // namespace previz::trade

@@ -21,10 +21,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The best row's reference error is a sixteenth of its own.
+// With so many times the samples of the best row, the reference's error is a sixteenth of that
+// row's.
 constexpr int reference_over_most = 256;
 constexpr int most_samples = 1'000'000;
-// A long rendering is made in parts, for the line on the terminal and for a stop.
+// A long rendering is cut into parts, for the progress line and so that it can be stopped.
 constexpr int parts_of_half = 32;
 
 double steady_s() {
@@ -42,7 +43,7 @@ class Sweep {
   MethodRenderer renderer_of(std::size_t method) const {
     return {device_, frame_, scene_, report_.plan.methods[method].settings, options_.scale};
   }
-  // All methods with one seed differ by their settings alone.
+  // In one round all methods use the same seed, so that they differ by their settings alone.
   std::uint32_t seed(int round) const {
     return report_.plan.methods.front().settings.estimation.seed + 1 +
            static_cast<std::uint32_t>(round);
@@ -68,14 +69,14 @@ class Sweep {
   const std::shared_ptr<render::Device> device_;
   TradeReport report_;
   std::optional<TradeReference> reference_;
-  // Of a point, an entry a round.
+  // The measurements of one point, with one entry a round.
   struct Rounds {
     std::vector<TradeErrors> errors;
     std::vector<double> seconds;
   };
   std::vector<std::vector<Rounds>> rounds_;      // by method and point
-  std::vector<std::vector<TradePicture>> best_;  // by method: at the most samples, of each round
-  render::Layers own_;                           // likewise the set's own, first round
+  std::vector<std::vector<TradePicture>> best_;  // by method and round: at the most samples
+  render::Layers own_;                           // the set's own, from the first round
 };
 
 Sweep::Sweep(const TradeOptions& options, TradeFrame& frame, std::ostream& out)
@@ -138,7 +139,7 @@ TradeReport Sweep::run(std::ostream& out) {
     throw Error(frame_.set().file.string() + ": frame " + std::to_string(report_.frame) +
                 ": nothing virtual, removed or relit is seen in it; there is nothing to trade");
 
-  // A machine that slows down or speeds up does so for another method in every round.
+  // Methods take turns, so that a drift of the machine's speed does not favour one of them.
   for (int round = 0; round < options_.rounds; ++round)
     for (int i = 0; i < methods; ++i) {
       const int turned = (i + round * methods / options_.rounds) % methods;
@@ -187,7 +188,7 @@ void Sweep::measure(std::size_t method, int round, output::ShareProgress& progre
                      steady_s());
 }
 
-// The set's own settings are the first method of the first round.
+// This relies on the set's own settings being the first method of the first round.
 void Sweep::compare_parts(std::size_t method, const render::Layers& layers) {
   if (method == 0) own_ = layers;
   if (report_.plan.methods[method].settings.carried == 0) return;
@@ -208,7 +209,7 @@ void Sweep::conclude() {
       point.seconds = pipeline::quantile(rounds_[m][i].seconds, 0.5);
       point.errors = rms(rounds_[m][i].errors);
       point.within_noise = within_noise(point.errors, report_.noise);
-      if (method.changed_pixels) continue;  // what nobody needs is no choice
+      if (method.changed_pixels) continue;  // features that are not needed are no choice
       candidates.push_back(&point);
       costs.push_back({point.seconds, point.errors.picture.value_or(0)});
     }
@@ -259,7 +260,7 @@ Plate Sweep::displayed(const TradePicture& picture) const {
   return plate;
 }
 
-// What can be wrong with the options is told before anything is rendered.
+// Checks the options before anything is rendered.
 TradeOptions checked(TradeOptions options) {
   if (!(options.scale > 0 && options.scale <= 1))
     throw Error("--scale " + std::to_string(options.scale) + ": must be above 0 and at most 1");

@@ -1,5 +1,6 @@
-// `previzd trade`: what time buys on a set. One frame of its take is rendered with every variant of
-// every axis (axes.hpp) and compared with a long reference made with the set's own settings.
+// Measures what render time buys on a set, as `previzd trade` does: one frame of its take is
+// rendered with every variant of every axis (axes.hpp) and compared with a long reference made with
+// the set's own settings.
 #pragma once
 
 #include <cstdint>
@@ -17,23 +18,23 @@ namespace previz::trade {
 
 struct TradeOptions {
   std::filesystem::path set_file;
-  std::optional<std::uint64_t> frame;  // of the observer; the first with a pose and light
-  std::optional<std::filesystem::path> directory;  // the set's output directory, /trade below it
+  std::optional<std::uint64_t> frame;              // absent: the first with a pose and light
+  std::optional<std::filesystem::path> directory;  // absent: trade/ in the set's output directory
   double scale = 0.25;                             // of the observer's size, above 0 and at most 1
   std::vector<std::string> axes;                   // by name; empty: all
   std::vector<int> samples = {1, 2, 4, 8, 16};     // per pixel
-  // Of both halves together; absent: 256 times the most of `samples`, so that the reference's error
-  // is about a sixteenth of the set's own best.
+  // Samples of both halves together; absent: 256 times the largest of `samples`, so that the
+  // reference's error is about a sixteenth of the set's own best.
   std::optional<int> reference_samples;
   int rounds = 3;  // each variant is measured so often, with other random numbers each time
   render::DeviceOptions device;
-  bool terminal = false;  // progress goes to a terminal: a line that is rewritten
+  bool terminal = false;  // `out` is a terminal: progress is one rewritten line
   std::stop_token stop;   // ends without a result
 };
 
 // Writes DIR/trade.csv and DIR/trade.html (page.hpp). Progress and notes go to `out`. Throws
-// previz::Error: a set without a replayed observer, a frame that is not there or was not tracked,
-// an impossible scale, a directory that is a file, nothing virtual in the picture.
+// previz::Error for a set without a replayed observer, a frame that is missing or was not tracked,
+// an impossible scale, a directory that is a file, or a picture with nothing virtual in it.
 TradeReport run_trade(const TradeOptions& options, std::ostream& out);
 
 }  // namespace previz::trade

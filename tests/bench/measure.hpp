@@ -1,4 +1,4 @@
-// What benchmarks measure with.
+// Clock and median for the benchmarks.
 #pragma once
 
 #include <sys/resource.h>
@@ -19,7 +19,7 @@ inline double cpu_seconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-// The upper one of an even number. At least one value.
+// Returns the median of at least one value; of an even number, the upper of the middle two.
 inline double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());

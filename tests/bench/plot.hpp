@@ -1,4 +1,4 @@
-// A line chart as SVG.
+// Writes a line chart as SVG.
 #pragma once
 
 #include <filesystem>

@@ -1,6 +1,6 @@
 // Aravis' own fake GigE Vision camera on the loopback network: real GVCP and GVSP over UDP. It
-// sends a recorded take through its fill callback, the exposure it was told in the first four
-// bytes.
+// sends a recorded take through its fill callback, with the exposure it was set to in the first
+// four bytes.
 #include <arv.h>
 
 #include <algorithm>
@@ -77,7 +77,7 @@ class AravisDevice final : public DeviceUnderTest {
     return all;
   }
 
-  // The exposure as told, and the rest of the picture bit for bit.
+  // True if the frame carries the exposure that was set, and a picture of the take bit for bit.
   std::optional<bool> shows_its_exposure(const Frame& frame) const override {
     std::uint32_t exposure_us = 0;
     std::memcpy(&exposure_us, frame.bytes.data(), 4);

@@ -40,7 +40,7 @@ TEST(DebouncerTest, TheFirstEdgeCountsAtOnceAndBouncingDoesNot) {
   EXPECT_FALSE(contact.edge(false, 101));
   EXPECT_FALSE(contact.edge(true, 102));
   EXPECT_FALSE(contact.settle(104));
-  EXPECT_FALSE(contact.settle(105));  // as it was told
+  EXPECT_FALSE(contact.settle(105));  // unchanged since the last report
   EXPECT_TRUE(contact.edge(false, 200));
   EXPECT_FALSE(contact.pressed());
 }
@@ -173,7 +173,7 @@ void expect_trouble(Buttons& buttons, const std::string& words) {
   EXPECT_FALSE(std::get<DeviceTrouble>(*event).lost);
 }
 
-// Whether the device is opened once more; what it tells meanwhile is taken.
+// Returns whether the device is opened once more; events that come meanwhile are taken.
 bool opens_again(Buttons& buttons, std::uint64_t opened_before) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   while (std::chrono::steady_clock::now() < end) {
@@ -311,7 +311,7 @@ TEST(ButtonDevices, APadThatIsPulledAHundredTimes) {
     ASSERT_TRUE(opens_again(*buttons[0], opened));
     opened = buttons[0]->counters().at("opened");
     pad->report(Report{1});
-    // The pad's end is told after whatever it said before, or instead of it.
+    // The pad's end is reported after its earlier events, or instead of them.
   });
   EXPECT_GE(buttons[0]->counters().at("lost"), 99u);
 }

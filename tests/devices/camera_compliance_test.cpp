@@ -1,4 +1,5 @@
-// What every camera driver must do, whatever stands behind it; see drivers/camera.hpp.
+// Every camera driver must pass these tests, whatever device stands behind it; see
+// drivers/camera.hpp.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -215,7 +215,7 @@ class Life {
     const auto* trouble = std::get_if<DeviceTrouble>(&*event);
     return trouble ? trouble->what : "shown";
   }
-  // What is told first that has these words, or last within ten seconds.
+  // Returns the first report with these words, or the last report within ten seconds.
   std::string until(const std::string& words) {
     std::string last;
     for (int i = 0; i < 500 && last.find(words) == std::string::npos; ++i) {

@@ -1,4 +1,4 @@
-// A hundred times unplugged and plugged in again: nothing is left behind.
+// A camera is unplugged and plugged in again a hundred times, and nothing may be left behind.
 #include <gtest/gtest.h>
 
 #include <algorithm>

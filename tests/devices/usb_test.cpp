@@ -53,7 +53,7 @@ class UsbCamera : public testing::TestWithParam<std::string> {
   std::string name_;
 };
 
-// The trouble that is told until a frame comes.
+// Returns the trouble that is reported before a frame comes.
 std::vector<std::string> trouble_until_a_frame(Lifeline& lifeline, const auto& may_come) {
   std::vector<std::string> told;
   const auto end = std::chrono::steady_clock::now() + patience;

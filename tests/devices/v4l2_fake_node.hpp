@@ -1,4 +1,4 @@
-// A kernel's video node as the driver sees it, told what to be and what to send.
+// A stand-in for a kernel's video node as the driver sees it; a test sets what it is and sends.
 #pragma once
 
 #include <linux/videodev2.h>

@@ -19,8 +19,8 @@ struct DecodedTriangle {
 struct DecodedRecord {
   scene::Aabb bounds;                      // as the parent's planes say; empty for the root
   std::uint32_t level = 0;                 // 1: the root
-  std::vector<scene::Aabb> children;       // of a node
-  std::vector<DecodedTriangle> triangles;  // of a leaf: one or two
+  std::vector<scene::Aabb> children;       // of an inner node
+  std::vector<DecodedTriangle> triangles;  // one or two if the record is a leaf
 };
 
 // Visits every record that a ray could meet, parents first. Returns how many empty slots there are

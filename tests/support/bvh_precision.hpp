@@ -27,13 +27,13 @@ struct ExactHit {
   bool possibly() const { return !proper || least_weight() > -weight_error; }
 };
 
-// Instance and primitive of the scene, corners rounded nowhere.
+// Intersects the ray with a primitive of an instance, whose corners are never rounded.
 ExactHit exact_hit(const scene::Scene& scene, std::uint32_t instance, std::uint32_t primitive,
                    const bench::Ray& ray);
 
-// Whether hits `a` and `b` of one ray can both come from correct tracers: the same t within their
-// errors, or one of them so near its triangle's edge (or the ray's ends) that the other may miss
-// it.
+// Returns whether hits `a` and `b` of one ray can both come from correct tracers: t is the same
+// within their errors, or one hit is so near its triangle's edge (or the ray's ends) that the other
+// tracer may miss it.
 bool agree(const scene::Scene& scene, const bench::Ray& ray, const bench::TracedHit& a,
            const bench::TracedHit& b);
 

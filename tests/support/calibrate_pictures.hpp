@@ -1,4 +1,5 @@
-// calibrate::Views of a board as a camera would have them, for the tests of the calibrations.
+// Makes the calibrate::Views that a camera would have of a board, for the tests of the
+// calibrations.
 #pragma once
 
 #include <functional>
@@ -13,14 +14,15 @@ namespace previz::test {
 
 using Lens = std::function<std::optional<glm::dvec2>(const glm::dvec3& point)>;
 
-// How a board is held before the camera: turned about the picture's vertical and horizontal axis
-// and about the line of sight, its middle at `middle`, camera axes, metres.
+// The pose of a board before the camera: turned about the picture's vertical and horizontal axis
+// and about the line of sight, with its middle at `middle` (camera axes, metres).
 struct Held {
   double turn_deg = 0, tip_deg = 0, roll_deg = 0;
   glm::dvec3 middle{0, 0, 1};
 };
 
-// One view a Held, corners with Gaussian noise; those outside the picture are not seen.
+// Returns one view for each Held. Corners have Gaussian noise; corners outside the picture are left
+// out.
 calibrate::Views hold(const calibrate::Board& board, const std::vector<Held>& how, const Lens& lens,
                       int width, int height, double noise_px, std::mt19937& random);
 

@@ -1,4 +1,4 @@
-// The rig on the small take, which is looped, with a crew of one hand.
+// Runs the rig on the small take, looped, with one Hand as its crew.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@
 
 namespace previz::test {
 
-// For a set file: a button for every action, named like it.
+// Returns the lines of a set file that map a button to every action, named like the action.
 inline std::string button_for_every_action() {
   std::string text;
   for (const set::Action& action : set::actions())
@@ -33,8 +33,8 @@ inline std::string button_for_every_action() {
   return text;
 }
 
-// Waits until the condition, whose change `news` announces, holds. `seen` says what there was
-// instead.
+// Waits until the condition holds; `news` announces its changes. `seen` describes what was there if
+// it never does.
 template <typename Condition, typename Seen>
 void await(std::condition_variable& news, std::unique_lock<std::mutex>& lock, Condition condition,
            Seen seen) {
@@ -42,8 +42,8 @@ void await(std::condition_variable& news, std::unique_lock<std::mutex>& lock, Co
     throw WaitedInVain("the crew waited in vain; seen last: " + seen());
 }
 
-// Until the script, on a thread of its own, has ended or waited in vain. set.toml is in
-// `directory`; `options` says what is to be done with what is shown.
+// Runs the rig until the script, on a thread of its own, has ended or waited in vain. set.toml is
+// in `directory`; `options` may watch the shown pictures.
 inline pipeline::MetricsSnapshot run_crewed(rig::LiveOptions options,
                                             const std::filesystem::path& directory, Hand& hand,
                                             const std::function<void()>& script,
@@ -81,8 +81,8 @@ inline void must_be_counted(const std::filesystem::path& directory, const std::s
       [&] { return text().find("\"" + what + "\"") != std::string::npos; }, text);
 }
 
-// Frames that were rendered, or dropped on the way there by a cause that is counted: of those
-// captured, all.
+// Counts the frames that were rendered, or dropped for a counted cause. This must equal the number
+// captured.
 inline std::uint64_t accounted_for(const pipeline::MetricsSnapshot& metrics) {
   std::uint64_t frames = metrics.stages.at("render").frames;
   for (const char* stage : {"tracking", "render"})

@@ -15,7 +15,7 @@ namespace previz::test {
 class GltfWriter {
  public:
   using Json = nlohmann::json;
-  // Buffer and its length are added when the file is saved.
+  // The buffer and its length are added when the file is saved.
   Json json = {{"asset", {{"version", "2.0"}}}};
 
   // Each returns the index of what it added.
@@ -23,7 +23,7 @@ class GltfWriter {
   int view(const std::vector<unsigned char>& bytes, int stride = 0);
   int accessor(int view, int component_type, const char* type, std::size_t count,
                bool normalized = false, std::size_t offset = 0);
-  // An accessor of packed values: one number, glm::vec2 or glm::vec3 an element.
+  // Adds an accessor of packed values; each element is one number, glm::vec2 or glm::vec3.
   template <typename Value>
   int values(int component_type, const char* type, const std::vector<Value>& values,
              bool normalized = false) {

@@ -1,4 +1,4 @@
-// Footage made on the spot: pictures of noise in every kind of file, and a video.
+// Makes footage for the tests of the import: pictures of noise in every kind of file, and a video.
 #pragma once
 
 #include <filesystem>

@@ -1,5 +1,4 @@
-// What tests need of the light that the daemon does not: maps and pictures to look at, files to
-// read.
+// Helpers for light that only tests need: maps and pictures to look at, files to read.
 #pragma once
 
 #include <filesystem>

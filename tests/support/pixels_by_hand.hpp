@@ -1,5 +1,4 @@
-// Pixels and layers that are made by hand, through what the renderer does with those it has
-// sampled.
+// Runs pixels and layers that a test makes by hand through the renderer's steps after sampling.
 #pragma once
 
 #include <random>
@@ -18,7 +17,7 @@ inline Plate random_plate(int width, int height, int bits) {
   return plate;
 }
 
-// One row of them.
+// Makes layers of one row of pixels.
 inline render::Layers layers_of(std::span<const gpu::GpuPixel> pixels, std::int64_t samples,
                                 const render::PlateRadiance& plate = {},
                                 const render::CompositeRule& rule = {}) {
@@ -27,7 +26,7 @@ inline render::Layers layers_of(std::span<const gpu::GpuPixel> pixels, std::int6
   return layers;
 }
 
-// The picture of these pixels. `plate`: of the same size.
+// Returns the picture of these pixels. `plate` must have the same size.
 inline Plate present(std::span<const gpu::GpuPixel> pixels, const Plate& plate,
                      const lighting::Response& response, double exposure,
                      render::Denoiser& denoiser, bool denoise, int tile_rows) {
@@ -47,12 +46,12 @@ inline Plate present(std::span<const gpu::GpuPixel> pixels, const Plate& plate,
   return render::Presenter(*shared_device(), response).present(what, denoiser);
 }
 
-// What the denoiser wants, as shaders/composite.comp makes it.
+// The denoiser's input, as shaders/composite.comp makes it.
 struct DenoiserInput {
   std::vector<glm::vec4> signal, variance, surface;
 };
 
-// Of pixels [first, last). `camera` and `rule` as Denoiser::read() has them.
+// Makes the input of pixels [first, last). `camera` and `rule` are those of Denoiser::read().
 inline DenoiserInput denoiser_input(const render::Layers& layers, const std::vector<double>& camera,
                                     const render::CompositeRule& rule, std::size_t first,
                                     std::size_t last) {
@@ -76,7 +75,7 @@ inline DenoiserInput denoiser_input(const render::Layers& layers, const std::vec
   return input;
 }
 
-// Takes noise out of the layers.
+// Removes noise from the layers.
 inline void denoise(render::Denoiser& denoiser, render::Layers& layers,
                     const std::vector<double>& camera = {},
                     const render::CompositeRule& rule = {}) {

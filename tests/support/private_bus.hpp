@@ -1,4 +1,4 @@
-// A message bus that nobody else is on, in the place of the system's, while it lives.
+// Replaces the system's message bus by a private one while it lives.
 #pragma once
 
 #include <sys/wait.h>
@@ -16,8 +16,8 @@ namespace previz::test {
 
 class PrivateBus {
  public:
-  // Everybody may do everything on it; where there is a `policy`, a file as packages install for
-  // the system's bus, that says who may do what.
+  // Everybody may do everything on the bus, unless a `policy` is given: a file such as packages
+  // install for the system's bus, which says who may do what.
   explicit PrivateBus(const std::filesystem::path& policy = {}) {
     const std::string address = "unix:path=" + (directory_ / "bus").string();
     std::string configuration = "--session";

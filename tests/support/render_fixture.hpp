@@ -1,4 +1,4 @@
-// What the renderer's tests share: one device with the validation layer on, and pictures of a view.
+// Shared by the renderer's tests: one device with the validation layer on, and pictures of a view.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
-// Do two estimators agree? Block-wise over independent scrambles (README.md, "Agreement").
+// Tests block-wise over independent scrambles whether two estimators agree (README.md,
+// "Agreement").
 #pragma once
 
 #include <glm/vec3.hpp>

@@ -1,5 +1,5 @@
-// How well captured light does on a ground truth set: the map made from the fisheye frames against
-// the set's true environment.
+// Measures captured light on a ground truth set: the map made from the fisheye frames against the
+// set's true environment.
 #pragma once
 
 #include <optional>
@@ -18,7 +18,7 @@ struct IrradianceError {
   double worst = 0;
 };
 
-// A disc that the set's makers painted into the environment, as set.json tells.
+// A disc that the set's makers painted into the environment, as set.json states it.
 struct Lamp {
   std::string name;
   glm::dvec3 direction{0, 0, 1};  // unit
@@ -45,7 +45,7 @@ struct LightingMeasure {
   double compared_sr = 0;
   IrradianceError irradiance;  // both sides over the directions that can be compared only
   IrradianceError sphere;      // over all directions: what the table and the unseen part cost
-  // Of fisheye_true.exr, where the set has it: the error of resampling alone.
+  // The error of resampling alone, from fisheye_true.exr if the set has it.
   std::optional<IrradianceError> resampling;
   std::vector<LampError> lamps;
   lighting::Extraction extraction;   // of the captured map

@@ -1,4 +1,4 @@
-// How well the tracker does on a ground truth set: every frame against exact poses and corners.
+// Measures the tracker on a ground truth set: every frame against exact poses and corners.
 #pragma once
 
 #include <string>

@@ -1,5 +1,5 @@
-// The tracker on real photographs and video (PREVIZ_SHARED/real, which is never part of this
-// repository): ids found, false ids, and how well a known map explains them.
+// Measures the tracker on real photographs and video (PREVIZ_SHARED/real, which is never part of
+// this repository): ids found, false ids, and how well a known map explains them.
 #pragma once
 
 #include <filesystem>

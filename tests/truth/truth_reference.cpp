@@ -90,7 +90,7 @@ void run(const std::filesystem::path& directory, int frame, int reduction, int s
   CpuTracer tracer(scene, lighting.environment);
   const ObserverCalibration camera = resized(truth_set.observer, 1.0 / reduction);
   const glm::dmat4 pose = observer_frame(truth_set, frame).world_from_camera;
-  // Two independent halves tell the estimate's own noise. The same random numbers in both worlds:
+  // Two independent halves show the estimate's own noise. The same random numbers in both worlds:
   // what the virtual objects do not touch cancels.
   const auto half = [&](std::uint64_t seed) {
     return estimated(truth, tracer.trace(camera, pose, scene::world_mixed, samples / 2, seed),

@@ -1,4 +1,4 @@
-// A ground truth set as a recorded session with its set file, as a crew's recorder would leave it.
+// Writes a ground truth set as a recorded session with its set file, as a crew's recorder would.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Blender Cycles' shadow catcher as a method: tests/bench/cycles/shadow_catcher.py renders, this
-// reads.
+// Uses Blender Cycles' shadow catcher as a method: runs tests/bench/cycles/shadow_catcher.py and
+// reads its pictures.
 #pragma once
 
 #include <cstdint>
@@ -29,10 +29,11 @@ std::vector<CyclesRender> render_with_cycles(const CyclesOptions& options,
                                              const std::vector<int>& samples, std::uint32_t seed,
                                              const std::filesystem::path& directory);
 
-// What a user composites: Combined over the plate times the Shadow Catcher pass, the ratio of the
-// catcher's light with and without the virtual objects. As layers: the mask is Combined's alpha,
-// the difference plate (ratio - 1), mixed Combined without its factor alpha, real the plate.
-// Without composite and picture. Throws previz::Error naming the file.
+// Reads the composite that a user makes: Combined over the plate times the Shadow Catcher pass,
+// which is the ratio of the catcher's light with and without the virtual objects. As layers, the
+// mask is Combined's alpha, the difference is plate (ratio - 1), mixed is Combined without its
+// factor alpha, and real is the plate; composite and picture are left empty. Throws previz::Error
+// naming the file.
 truth::EstimatedFrame read_shadow_catcher(const std::filesystem::path& file,
                                           const truth::TruthFrame& plate);
 

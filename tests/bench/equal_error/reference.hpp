@@ -1,4 +1,4 @@
-// What errors are measured against: a long render in two independent halves.
+// The reference for errors: a long render in two independent halves.
 #pragma once
 
 #include "tests/bench/equal_error/method.hpp"
@@ -14,12 +14,13 @@ struct Reference {
 Reference reference_of(truth::TruthFrame frame, const truth::EstimatedFrame& a,
                        const truth::EstimatedFrame& b);
 
-// By `method`, which traces both worlds at once. The plate, which says where the sensor clips,
-// comes from its paired form with an eighth of the samples. `samples`: of both halves together.
+// Renders the reference by `method`, which traces both worlds at once. The plate, which decides
+// where the sensor clips, comes from the method's paired form with an eighth of the samples.
+// `samples` counts both halves together.
 Reference make_reference(const std::shared_ptr<render::Device>& device, const View& view,
                          const Method& method, int samples);
 
-// The estimate composited over the reference's plate, against it.
+// Composites the estimate over the reference's plate and returns its errors against the reference.
 truth::Measures error_of(const Reference& reference, truth::EstimatedFrame estimate);
 
 }  // namespace previz::bench

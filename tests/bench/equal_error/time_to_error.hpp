@@ -1,4 +1,4 @@
-// When a method gets to an error, from a few points of its way there.
+// Estimates when a method reaches an error, from a few measured points.
 #pragma once
 
 #include <vector>
@@ -11,11 +11,12 @@ struct Point {
 
 struct TimeToError {
   double cpu_s = 0;
-  bool is_beyond = false;  // the points: it was not measured there
+  bool is_beyond = false;  // true: outside the points, so not measured there
 };
 
-// Between the points around it, both axes logarithmic; beyond them as noise falls, with the inverse
-// square root of time. `points` are in order of time, at least one, errors above 0.
+// Interpolates between the neighbouring points on logarithmic axes; beyond the points it assumes
+// that the error falls like noise, with the inverse square root of time. `points` are in order of
+// time, at least one, with errors above 0.
 TimeToError time_to_error(const std::vector<Point>& points, double error);
 
 }  // namespace previz::bench

@@ -28,8 +28,8 @@ struct View {
 View load_view(const std::filesystem::path& set, std::optional<int> frame, int width,
                set::LightMode light = set::LightMode::image);
 
-// The same scene as one of the two worlds sees it, without the other: what is not in it is gone,
-// and what is in it is no longer compared with anything.
+// Returns the scene of one world alone: things that are not in that world are gone, and the rest is
+// no longer compared with the other world.
 scene::Scene world_alone(const scene::Scene& scene, std::uint32_t world);
 
 }  // namespace previz::bench
