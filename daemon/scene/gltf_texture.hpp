@@ -16,9 +16,6 @@ namespace previz::scene {
 
 enum class Encoding { srgb, linear };  // of red, green and blue; alpha is always linear
 
-// The sRGB transfer function's inverse (IEC 61966-2-1), value 0..1.
-double linear_from_srgb(double value);
-
 // Textures of one file, each decoded when first used.
 class GltfTextures {
  public:
