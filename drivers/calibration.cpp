@@ -12,6 +12,10 @@ double at_square(const Vignetting& v, double x) {
 
 }  // namespace
 
+double srgb_signal(double value) {
+  return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
+}
+
 double relative_illumination(const Vignetting& v, double angle_rad) {
   return at_square(v, angle_rad * angle_rad);
 }

@@ -47,6 +47,9 @@ struct ResponseCurve {
   std::vector<double> inverse_table;
 };
 
+// The signal of a value 0..1 by the sRGB curve (IEC 61966-2-1).
+double srgb_signal(double value);
+
 struct ObserverCalibration {
   PinholeIntrinsics intrinsics;
   std::optional<ThinLens> lens;  // absent: pinhole

@@ -1,8 +1,10 @@
 // The one exception type: a message that already names the file, line, key or device at fault.
+// Beside it stands what spells out lists in such messages.
 #pragma once
 
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 namespace previz {
 
@@ -10,5 +12,11 @@ class Error : public std::runtime_error {
  public:
   explicit Error(const std::string& message) : std::runtime_error(message) {}
 };
+
+// Appends an item to a list in words: "a, b, c".
+inline void add_to_list(std::string& list, std::string_view item, const char* between = ", ") {
+  if (!list.empty()) list += between;
+  list += item;
+}
 
 }  // namespace previz

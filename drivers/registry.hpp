@@ -36,8 +36,7 @@ const auto& driver_named(const Drivers& drivers, std::string_view name, const ch
   std::string known;
   for (const auto& driver : drivers) {
     if (name == driver.name) return driver;
-    known += known.empty() ? "" : ", ";
-    known += driver.name;
+    add_to_list(known, driver.name);
   }
   throw Error("this build drives no \"" + std::string(name) + "\" " + of_what + "; it has " +
               (known.empty() ? "none" : known));

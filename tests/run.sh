@@ -5,13 +5,15 @@
 # repository. Ends with one line that sums up, and with status 0 only if all of it passed.
 #
 #   tests/run.sh              the gate: release asan format lint
-#   tests/run.sh full         the gate, and then long asan-all tsan soak package rig_vm
+#   tests/run.sh full         the gate, and then lint-all long asan-all tsan soak package rig_vm
 #   tests/run.sh STEP...      only the named steps
 #
 #   release    builds everything but the benchmarks, and runs the tests
 #   asan       the test programs marked SANITIZED (tests/CMakeLists.txt) under ASan and UBSan
 #   format     clang-format
-#   lint       clang-tidy: of targets that have changed since they last passed on this machine
+#   lint       clang-tidy, of targets that have changed since they last passed on this machine, the
+#              newest first; in the gate for 3 minutes at most, and it says how many are left
+#   lint-all   the same without a limit
 #   long       the cases that tests/*/CMakeLists.txt leave out of the gate (LONG), in the release build
 #   asan-all   every test program under ASan and UBSan
 #   tsan       the test programs marked THREADS under ThreadSanitizer
@@ -27,7 +29,7 @@ jobs=$(nproc)
 gate=(release asan format lint)
 steps=("$@")
 [[ ${#steps[@]} -gt 0 ]] || steps=("${gate[@]}")
-[[ ${steps[*]} != full ]] || steps=("${gate[@]}" long asan-all tsan soak package rig_vm)
+[[ ${steps[*]} != full ]] || steps=("${gate[@]}" lint-all long asan-all tsan soak package rig_vm)
 failures=()
 summaries=()
 costs=()
@@ -90,17 +92,24 @@ build_and_test() {
 
 format() { git ls-files '*.cpp' '*.hpp' | xargs clang-format --dry-run -Werror; }
 
-# clang-tidy on all sources, a target's at once: most of its time goes into the headers of the
-# libraries, which so are read once a target. A target that passed is known by what it reads, and is
-# not looked at again until that changes.
+# clang-tidy, a target's sources at once: most of its time goes into the headers of the libraries,
+# which so are read once a target. Targets whose newest commit is the newest come first; after LIMIT_S
+# seconds no further one is begun. A target that passed is not looked at again until it changes.
 lint() {
-  local passed=${XDG_CACHE_HOME:-$HOME/.cache}/previzd/lint
+  local limit_s=$1 passed=${XDG_CACHE_HOME:-$HOME/.cache}/previzd/lint status=0
   mkdir -p "$passed"
   rm -rf build/lint
-  cmake --preset lint --log-level=WARNING || return
+  cmake --preset lint --log-level=WARNING >/dev/null || return
   cmake --build build/lint --target previz_render_shaders previz_tracer_shaders >/dev/null || return
-  find build/lint -name 'unity_*.cxx' -print0 | xargs -0 ls -S |
-    xargs -P "$jobs" -I{} tests/lint_target.sh build/lint "$passed" {}
+  find build/lint -name 'unity_*.cxx' | while read -r unity; do
+    local folder=${unity#build/lint/}
+    printf '%s %s\n' "$(git log -1 --format=%ct -- "${folder%%/CMakeFiles/*}")" "$unity"
+  done | sort -rn | cut -d' ' -f2 |
+    LINT_UNTIL=$(($(date +%s) + limit_s)) xargs -P "$jobs" -I{} tests/lint_target.sh build/lint "$passed" {} || status=$?
+  local left
+  left=$(find build/lint -name 'unity_*.cxx.left' | wc -l)
+  [[ $left == 0 ]] || printf 'lint: %d targets are left to "tests/run.sh lint-all"\n' "$left"
+  return "$status"
 }
 
 config/install-deps.sh || exit 1
@@ -109,12 +118,13 @@ for name in "${steps[@]}"; do
     release | asan | asan-all | tsan) build_and_test "$name" ;;
     long) build release && check "long" run_tests release --label-regex long ;;
     format) check "format" format ;;
-    lint) check "lint" lint ;;
+    lint) check "lint" lint 180 ;;
+    lint-all) check "lint-all" lint 86400 ;;
     soak) build release && check "soak" build/release/tests/soak/soak --minutes 30 ;;
     package | rig_vm) check "$name" "tests/$name/run.sh" ;;
     *)
       echo "tests/run.sh: no step '$name'; allowed: full, or of release, asan, format, lint," \
-        "long, asan-all, tsan, soak, package and rig_vm" >&2
+        "lint-all, long, asan-all, tsan, soak, package and rig_vm" >&2
       exit 2
       ;;
   esac

@@ -78,7 +78,7 @@ std::vector<SurfaceRatio> ratios(const SurfacePixels& seen) {
 std::string listed(const SurfacePixels& seen, const std::vector<SurfaceRatio>& surfaces) {
   std::string names;
   for (const SurfaceRatio& surface : surfaces)
-    names += (names.empty() ? "" : ", ") + seen.surfaces[surface.surface].material;
+    add_to_list(names, seen.surfaces[surface.surface].material);
   return names.empty() ? "none" : names;
 }
 

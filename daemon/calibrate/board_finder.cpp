@@ -86,7 +86,7 @@ cv::Ptr<cv::aruco::Dictionary> dictionary_by_name(const std::string& name) {
   std::string names;
   for (const auto& entry : known) {
     if (name == entry.name) return cv::aruco::getPredefinedDictionary(entry.id);
-    names += (names.empty() ? "" : ", ") + std::string(entry.name);
+    add_to_list(names, entry.name);
   }
   throw Error("board: \"" + name + "\" is not a dictionary of markers; known are " + names);
 }

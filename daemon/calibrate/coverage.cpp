@@ -6,6 +6,8 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "drivers/error.hpp"
+
 namespace previz::calibrate {
 namespace {
 
@@ -42,12 +44,6 @@ std::string field_name(int column, int row) {
   return std::string(down[row]) + " " + across[column];
 }
 
-std::string listed(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
 void miss_number(const Views& views, const BundleFit& fit, std::vector<std::string>& missing) {
   const auto used = int(views.views.size() - fit.views_left_out.size());
   if (used < least_views)
@@ -64,12 +60,11 @@ void miss_picture(const Views& views, const BundleFit& fit, std::vector<std::str
     const int row = std::clamp(int((p.y + 0.5) * cover_rows / views.height), 0, cover_rows - 1);
     seen[row][column] = true;
   });
-  std::vector<std::string> empty;
+  std::string empty;
   for (int row = 0; row < cover_rows; ++row)
     for (int column = 0; column < cover_columns; ++column)
-      if (!seen[row][column]) empty.push_back(field_name(column, row));
-  if (!empty.empty())
-    missing.push_back("the board in these fields of the picture: " + listed(empty));
+      if (!seen[row][column]) add_to_list(empty, field_name(column, row));
+  if (!empty.empty()) missing.push_back("the board in these fields of the picture: " + empty);
 }
 
 void miss_tilt(const BundleFit& fit, std::vector<std::string>& missing) {

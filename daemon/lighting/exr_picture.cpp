@@ -19,7 +19,7 @@ namespace {
 std::string channel_names(const Imf::ChannelList& channels) {
   std::string names;
   for (auto channel = channels.begin(); channel != channels.end(); ++channel)
-    names += (names.empty() ? "" : ", ") + std::string(channel.name());
+    add_to_list(names, channel.name());
   return names.empty() ? "none" : names;
 }
 

@@ -10,14 +10,8 @@
 namespace previz::lighting {
 namespace {
 
-constexpr double srgb_linear_end = 0.0031308;
-
 double srgb_value(double signal) {
-  return signal <= srgb_linear_end ? 12.92 * signal : 1.055 * std::pow(signal, 1 / 2.4) - 0.055;
-}
-
-double srgb_signal(double value) {
-  return value <= 12.92 * srgb_linear_end ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
+  return signal <= 0.0031308 ? 12.92 * signal : 1.055 * std::pow(signal, 1 / 2.4) - 0.055;
 }
 
 double table_value(const std::vector<double>& table, double signal) {

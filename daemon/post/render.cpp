@@ -114,7 +114,7 @@ std::string quality_words(const set::Quality& quality) {
 std::string dropped_text(const render::Counters& counters) {
   std::string text;
   const auto add = [&](std::uint64_t count, const char* what) {
-    if (count > 0) text += (text.empty() ? "" : ", ") + std::to_string(count) + what;
+    if (count > 0) add_to_list(text, std::to_string(count) + what);
   };
   add(counters.dropped_not_finite, " samples not finite");
   add(counters.dropped_negative, " samples negative");

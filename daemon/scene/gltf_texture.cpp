@@ -41,7 +41,7 @@ std::vector<glm::vec4> linearise(const Sample* samples, std::size_t texels, Enco
   for (std::size_t i = 0; i < values; ++i) {
     const double value = static_cast<double>(i) / static_cast<double>(values - 1);
     data[i] = static_cast<float>(value);
-    color[i] = static_cast<float>(encoding == Encoding::srgb ? linear_from_srgb(value) : value);
+    color[i] = static_cast<float>(encoding == Encoding::srgb ? srgb_signal(value) : value);
   }
   std::vector<glm::vec4> linear(texels);
   for (std::size_t i = 0; i < texels; ++i, samples += 4)
@@ -55,10 +55,6 @@ std::string failure() {
 }
 
 }  // namespace
-
-double linear_from_srgb(double value) {
-  return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
-}
 
 std::uint32_t GltfTextures::use(int index, Encoding encoding) {
   const std::string name = "texture " + std::to_string(index);

@@ -16,9 +16,6 @@ namespace previz::scene {
 
 enum class Encoding { srgb, linear };  // of red, green and blue; alpha is always linear
 
-// Inverts the sRGB transfer function (IEC 61966-2-1) for a value in 0..1.
-double linear_from_srgb(double value);
-
 // Holds the textures of one file, each decoded when first used.
 class GltfTextures {
  public:

@@ -103,9 +103,7 @@ class AprilTagTracker final : public Tracker {
       if (!stage_.has(d.id) && !is_carried(d.id)) strangers.push_back(d.id);
     }
     if (!any_of_stage) {
-      const auto add = [&](const std::string& text) {
-        track.reason += (track.reason.empty() ? "" : "; ") + text;
-      };
+      const auto add = [&](const std::string& text) { add_to_list(track.reason, text, "; "); };
       if (detections.empty()) add("no tag in the picture");
       if (!strangers.empty()) add("not in the map: " + tags_in_words(strangers));
       if (track.reason.empty()) add("no tag of the stage in the picture");

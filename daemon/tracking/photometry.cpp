@@ -10,16 +10,12 @@ namespace {
 
 constexpr double kRed = 0.2126, kGreen = 0.7152, kBlue = 0.0722;  // Rec. 709
 
-double srgb_decode(double value) {
-  return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
-}
-
 // Converts a value in [0,1] to the linear signal in [0,1].
 double inverse_response(const ResponseCurve& curve, double value) {
   value = std::clamp(value, 0.0, 1.0);
   switch (curve.kind) {
     case ResponseCurve::Kind::srgb:
-      return srgb_decode(value);
+      return srgb_signal(value);
     case ResponseCurve::Kind::linear:
       return value;
     case ResponseCurve::Kind::gamma:

@@ -42,7 +42,7 @@ const Family& family_by_name(const std::string& name) {
   std::string known;
   for (const Family& family : kFamilies) {
     if (name == family.name) return family;
-    known += (known.empty() ? "" : ", ") + std::string(family.name);
+    add_to_list(known, family.name);
   }
   throw Error("tracking.family: \"" + name + "\" is not a tag family; known are " + known);
 }

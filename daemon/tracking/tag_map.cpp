@@ -62,14 +62,11 @@ Track TagMap::locate(const std::vector<TagDetection>& detections, std::int64_t t
   Track track;
   std::vector<TagObservation> tags;
   std::string trouble;
-  const auto add = [&](const std::string& text) {
-    trouble += (trouble.empty() ? "" : "; ") + text;
-  };
   for (const TagDetection& d : detections) {
     const auto known = tags_.find(d.id);
     if (known == tags_.end()) continue;
     if (!d.trouble.empty())
-      add(tags_in_words({d.id}) + ": " + d.trouble);
+      add_to_list(trouble, tags_in_words({d.id}) + ": " + d.trouble, "; ");
     else
       tags.push_back(
           {d.id, known->second.size_m, known->second.world_from_tag, d.corners, d.covariance});
@@ -90,9 +87,10 @@ Track TagMap::locate(const std::vector<TagDetection>& detections, std::int64_t t
       else
         used.erase(found);
     }
-    if (!left_out.empty()) add(tags_in_words(left_out) + ": not where the map says");
+    if (!left_out.empty())
+      add_to_list(trouble, tags_in_words(left_out) + ": not where the map says", "; ");
   }
-  if (!trouble.empty()) track.reason += (track.reason.empty() ? "" : "; ") + trouble;
+  if (!trouble.empty()) add_to_list(track.reason, trouble, "; ");
   return track;
 }
 

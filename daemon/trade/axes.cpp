@@ -63,7 +63,7 @@ void keep_wanted(std::vector<TradeAxis>& axes, const std::vector<std::string>& w
   for (const std::string& name : wanted) {
     if (std::ranges::find(axes, name, &TradeAxis::name) != axes.end()) continue;
     std::string allowed;
-    for (const TradeAxis& axis : axes) allowed += (allowed.empty() ? "" : ", ") + axis.name;
+    for (const TradeAxis& axis : axes) add_to_list(allowed, axis.name);
     throw Error("--axes " + name + ": there is no such axis; " + allowed + " are allowed");
   }
   std::erase_if(axes, [&](const TradeAxis& axis) {

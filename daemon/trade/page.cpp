@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "daemon/trade/chart.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::trade {
 namespace {
@@ -73,18 +74,6 @@ std::string setting_words(const TradeReport& report, const TradeFrontPoint& at) 
          samples_words(report.point(at).samples);
 }
 
-std::string base64(std::span<const unsigned char> bytes) {
-  constexpr const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    const auto byte = [&](std::size_t at) { return at < bytes.size() ? bytes[at] : 0u; };
-    const unsigned group = byte(i) << 16 | byte(i + 1) << 8 | byte(i + 2);
-    for (unsigned place = 0; place < 4; ++place)
-      text += i + place <= bytes.size() ? digits[group >> (18 - 6 * place) & 63] : '=';
-  }
-  return text;
-}
-
 std::string png_uri(const Plate& plate) {
   cv::Mat3b picture(plate.height, plate.width);
   std::ranges::transform(plate.samples, picture.ptr<std::uint8_t>(),
@@ -92,7 +81,7 @@ std::string png_uri(const Plate& plate) {
   cv::cvtColor(picture, picture, cv::COLOR_RGB2BGR);  // OpenCV's order
   std::vector<unsigned char> bytes;
   cv::imencode(".png", picture, bytes);
-  return "data:image/png;base64," + base64(bytes);
+  return "data:image/png;base64," + session::base64(std::as_bytes(std::span(bytes)));
 }
 
 std::string figure(const Plate& picture, const std::string& caption) {

@@ -91,10 +91,7 @@ class Configuration {
     const OwnedArray<const char*> formats(
         arv_camera_dup_available_pixel_formats_as_strings(&camera_, &count, ignored.out()));
     std::string names;
-    for (unsigned i = 0; i < count; ++i) {
-      names += i ? ", " : "";
-      names += formats[i];
-    }
+    for (unsigned i = 0; i < count; ++i) add_to_list(names, formats[i]);
     return names;
   }
 
@@ -290,8 +287,7 @@ Owned<ArvCamera> find_camera(const std::string& device) {
     if (device == listed.serial || device == listed.id ||
         device == listed.vendor + "-" + listed.serial)
       return open_camera(listed.id, device);
-    seen += seen.empty() ? "" : ", ";
-    seen += listed.serial + " (" + listed.address + ")";
+    add_to_list(seen, listed.serial + " (" + listed.address + ")");
   }
   throw Error(device + ": is not there; seen are: " + (seen.empty() ? "no cameras" : seen));
 }

@@ -2,6 +2,8 @@
 
 #include <array>
 
+#include "drivers/error.hpp"
+
 namespace previz::aravis {
 namespace {
 
@@ -84,10 +86,7 @@ std::optional<convert::WireFormat> wire_format(std::uint32_t pfnc) {
 
 std::string known_formats() {
   std::string names;
-  for (const Known& known : table) {
-    names += names.empty() ? "" : ", ";
-    names += known.name;
-  }
+  for (const Known& known : table) add_to_list(names, known.name);
   return names;
 }
 

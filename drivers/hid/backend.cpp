@@ -38,7 +38,7 @@ struct Libraries {
                        find(library, "hid_free_enumeration", backend.free_enumeration);
     if (whole && init() == 0) return loaded.push_back(backend);
     const char* why = whole ? "cannot be started" : dlerror();
-    missing += (missing.empty() ? "" : "; ") + std::string(why ? why : file);
+    add_to_list(missing, why ? why : file, "; ");
   }
 };
 

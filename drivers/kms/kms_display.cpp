@@ -58,7 +58,7 @@ Target find_target(const std::string& wanted) {
       if (meant && has_screen(*connector))
         return {card, std::move(descriptor), std::move(connector)};
       if (meant && !wanted.empty()) throw Error(name + ": no screen is plugged in");
-      seen += (seen.empty() ? "" : ", ") + name;
+      add_to_list(seen, name);
     }
   }
   if (wanted.empty())

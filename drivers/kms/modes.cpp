@@ -62,7 +62,7 @@ std::string list_of(std::span<const drmModeModeInfo> modes) {
     const std::string name = to_string(mode_of(info)) + (interlaced(info) ? " interlaced" : "");
     if (std::ranges::find(names, name) != names.end()) continue;
     names.push_back(name);
-    list += (list.empty() ? "" : ", ") + name;
+    add_to_list(list, name);
   }
   return list;
 }

@@ -113,10 +113,7 @@ const Known* find_known(const lc::PixelFormat& format) {
 
 std::string names_of(const std::vector<lc::PixelFormat>& formats) {
   std::string names;
-  for (const lc::PixelFormat& format : formats) {
-    names += names.empty() ? "" : ", ";
-    names += format.toString();
-  }
+  for (const lc::PixelFormat& format : formats) add_to_list(names, format.toString());
   return names.empty() ? "none" : names;
 }
 
@@ -234,8 +231,7 @@ struct Device::Impl {
     std::string there;
     for (const auto& candidate : (*manager).cameras()) {
       if (candidate->id() == settings.device) camera = candidate;
-      there += there.empty() ? "" : ", ";
-      there += candidate->id();
+      add_to_list(there, candidate->id());
     }
     if (!camera) refuse("is not there; there are: " + (there.empty() ? "no cameras" : there));
   }
@@ -292,7 +288,7 @@ struct Device::Impl {
         config.pixelFormat != wanted || (asked_size && config.size != size)) {
       std::string sizes;
       for (const lc::Size& possible : formats.sizes(wanted))
-        sizes += (sizes.empty() ? "" : ", ") + possible.toString();
+        add_to_list(sizes, possible.toString());
       refuse("made " + config.toString() + " of " + size.toString() + "-" + wanted.toString() +
              "; possible are: " + (sizes.empty() ? "not told" : sizes));
     }

@@ -91,4 +91,12 @@ std::string sha256_of(const std::filesystem::path& file) {
   return text;
 }
 
+std::string base64(std::span<const std::byte> bytes) {
+  std::string text(4 * ((bytes.size() + 2) / 3), '\0');
+  EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
+                  reinterpret_cast<const unsigned char*>(bytes.data()),
+                  static_cast<int>(bytes.size()));
+  return text;
+}
+
 }  // namespace previz::session

@@ -1,7 +1,9 @@
-// Writes files that survive a crash, and hashes their content.
+// Writes files that survive a crash, hashes their content, and writes bytes as text.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -40,5 +42,7 @@ void replace_file(const std::filesystem::path& file, const std::string& content)
 std::string read_file(const std::filesystem::path& file);
 // Returns the SHA-256 of the file's content, 64 lower-case hexadecimal digits.
 std::string sha256_of(const std::filesystem::path& file);
+// Base64 with padding, on one line (RFC 4648).
+std::string base64(std::span<const std::byte> bytes);
 
 }  // namespace previz::session

@@ -5,6 +5,7 @@
 #include <toml++/toml.h>
 #include <array>
 #include <charconv>
+#include <span>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "drivers/calibration/read.hpp"
 #include "drivers/error.hpp"
 #include "drivers/keys/toml_value.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::session {
 namespace {
@@ -50,14 +52,6 @@ std::string quote(std::string_view text) {
   return quoted + '"';
 }
 
-std::string base64(const std::string& bytes) {
-  std::string text(4 * ((bytes.size() + 2) / 3), '\0');
-  EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
-                  reinterpret_cast<const unsigned char*>(bytes.data()),
-                  static_cast<int>(bytes.size()));
-  return text;
-}
-
 std::string from_base64(const std::string& text) {
   std::string bytes(text.size() / 4 * 3, '\0');
   const int size = EVP_DecodeBlock(reinterpret_cast<unsigned char*>(bytes.data()),
@@ -85,7 +79,8 @@ std::string text_assignment(const std::string& text) {
   if (reads_back(literal, text)) return literal;
   std::string escaped = "text = " + quote(text) + "\n";
   if (reads_back(escaped, text)) return escaped;
-  return "text_base64 = \"" + base64(text) + "\"  # the set file is not UTF-8\n";
+  return "text_base64 = \"" + base64(std::as_bytes(std::span(text))) +
+         "\"  # the set file is not UTF-8\n";
 }
 
 std::string line(const char* key, double value) {

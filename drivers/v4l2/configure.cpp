@@ -86,10 +86,7 @@ class Configuration {
 
   std::string format_names() const {
     std::string names;
-    for (const std::uint32_t fourcc : formats()) {
-      names += names.empty() ? "" : ", ";
-      names += fourcc_name(fourcc);
-    }
+    for (const std::uint32_t fourcc : formats()) add_to_list(names, fourcc_name(fourcc));
     return names.empty() ? "none" : names;
   }
 

@@ -110,8 +110,7 @@ std::string resolve(const std::string& device, const std::vector<FoundNode>& fou
                     node.by_path + "\" tell them apart");
       meant = &node;
     }
-    there += there.empty() ? "" : ", ";
-    there += stable_name(node, found);
+    add_to_list(there, stable_name(node, found));
   }
   if (meant) return meant->node;
   if (device.starts_with("/dev/video"))

@@ -2,6 +2,8 @@
 
 #include <array>
 
+#include "drivers/error.hpp"
+
 namespace previz::v4l2 {
 namespace {
 
@@ -102,10 +104,7 @@ std::optional<std::uint32_t> fourcc_of(const std::string& name) {
 
 std::string known_formats() {
   std::string names;
-  for (const Known& known : table) {
-    names += names.empty() ? "" : ", ";
-    names += fourcc_name(known.fourcc);
-  }
+  for (const Known& known : table) add_to_list(names, fourcc_name(known.fourcc));
   return names;
 }
 

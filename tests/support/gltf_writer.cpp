@@ -3,7 +3,10 @@
 #include <stb_image_write.h>
 
 #include <fstream>
+#include <span>
 #include <stdexcept>
+
+#include "drivers/session/files.hpp"
 
 namespace previz::test {
 namespace {
@@ -89,16 +92,7 @@ void GltfWriter::save(const std::filesystem::path& path) const {
 }
 
 std::string base64(const std::vector<unsigned char>& bytes) {
-  const char* digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t group = 0;
-    for (std::size_t j = 0; j < 3; ++j)
-      group = group << 8 | (i + j < bytes.size() ? bytes[i + j] : 0u);
-    for (std::size_t j = 0; j < 4; ++j)
-      text.push_back(i + j <= bytes.size() ? digits[group >> (18 - 6 * j) & 63] : '=');
-  }
-  return text;
+  return session::base64(std::as_bytes(std::span(bytes)));
 }
 
 std::vector<unsigned char> png(int width, int height, const std::vector<unsigned char>& rgba) {
