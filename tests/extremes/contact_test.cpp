@@ -2,7 +2,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <numbers>
 
-#include "tests/support/render_fixture.hpp"
+#include "tests/extremes/every_way.hpp"
 
 namespace previz::test {
 namespace contact_test {
@@ -39,6 +39,17 @@ Rendered show(const View& view, set::Estimator estimator = set::Estimator::paire
   estimation.estimator = estimator;
   return render_clean(view, 4, estimation);
 }
+
+class ContactByEveryWay : public EveryWay {
+ protected:
+  // Over what the sun makes of the table.
+  static Rendered show(const View& view) {
+    static const Seen lit_table = seen_by_camera(table(), 1, 4, up_to_depth(1));
+    return render_by(GetParam(), view, lit_table, 4, up_to_depth(1));
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Ways, ContactByEveryWay, testing::Values(paired, difference, by_camera),
+                         name_of_way);
 
 // Pixels whose whole area shows the table inside of a rectangle, by their corners.
 template <typename Visit>
@@ -119,7 +130,7 @@ TEST(Contact, AnInterpenetratingBoxCastsItsShadowWithoutAGap) {
 
 // Two virtual boxes with all their faces in common, and one that reaches through both: the picture
 // is that of the first.
-TEST(Contact, TwinsLookLikeOne) {
+TEST_P(ContactByEveryWay, TwinsLookLikeOne) {
   View one = table();
   add_virtual(one, box_mesh({0.4, 0.4, 0.4}), {0, 0, 0.2});
   View twins = one;
@@ -132,7 +143,7 @@ TEST(Contact, TwinsLookLikeOne) {
 }
 
 // The same again and again: nothing depends on the order in which invocations run.
-TEST(Contact, IsDeterministic) {
+TEST_P(ContactByEveryWay, IsDeterministic) {
   View view = table();
   add_virtual(view, box_mesh({0.4, 0.4, 0.4}), {0, 0, 0.1});
   add_virtual(view, uv_sphere_mesh(0.2, 24, 12), {0.15, -0.1, 0.1});

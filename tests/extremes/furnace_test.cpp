@@ -1,5 +1,5 @@
 // White furnaces at the ends of the materials' ranges: what goes in comes out, to 1e-3.
-#include "tests/support/render_fixture.hpp"
+#include "tests/extremes/every_way.hpp"
 
 namespace previz::test {
 namespace furnace_test {
@@ -121,6 +121,39 @@ TEST(ExtremeFurnace, SixtyFourBouncesAddUp) {
     EXPECT_NEAR(mean(result.layers.mixed).g, expected,
                 4 * standard_error_of_pixels(result.layers) + 1e-5 * expected);
     EXPECT_LT(standard_error_of_pixels(result.layers), energy * expected);
+  }
+}
+
+// A virtual ball of each material at its end, none of which takes light, on a real white floor in a
+// white environment: nothing of it can be seen, and it casts no shadow.
+class FurnaceByEveryWay : public EveryWay {};
+INSTANTIATE_TEST_SUITE_P(Ways, FurnaceByEveryWay, testing::Values(paired, difference, by_camera),
+                         name_of_way);
+
+TEST_P(FurnaceByEveryWay, AWhiteBallOnAWhiteFloorIsNotSeen) {
+  scene::Material thin = glass(2.5f);
+  thin.thin_walled = true;
+  for (const scene::Material& material :
+       {diffuse(glm::vec3(1)), metal(glm::vec3(1), 0), metal(glm::vec3(1), 1e-4f),
+        plastic(glm::vec3(1), 0, 2.5f), glass(1.0001f), glass(2.5f), thin}) {
+    View view;
+    add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({8, 8})),
+                 add_material(view.scene, diffuse(glm::vec3(1))));
+    glm::dmat4 pose(1);
+    pose[3] = {0, 0, 0.3, 1};
+    add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.3, 3)),
+                 add_material(view.scene, material), pose, scene::world_mixed);
+    view.environment = uniform_environment(glm::vec3(1));
+    view.calibration = pinhole(24, 18, 0.6);
+    view.world_from_camera = look_at({0, -1.5, 1}, {0, 0, 0.2});
+    set::Estimation estimation = up_to_depth(64);
+    estimation.caustics = set::Caustics::traced;
+    const Seen white{{24, 18, 16, std::vector<std::uint16_t>(3 * 24 * 18, 32768)}, 32768.0 / 65535};
+    const render::Layers layers = render_by(GetParam(), view, white, 16, estimation).layers;
+    // The pixels' errors are independent of each other.
+    EXPECT_NEAR(mean(layers.mixed).g, 1, 4 * standard_error_of_pixels(layers) + energy);
+    EXPECT_NEAR(mean(layers.composite).g, 1, 4 * standard_error_of_pixels(layers) + energy);
+    EXPECT_LT(standard_error_of_pixels(layers), 0.02) << "too noisy to say anything";
   }
 }
 

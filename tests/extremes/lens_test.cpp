@@ -3,7 +3,7 @@
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session_toml.hpp"
-#include "tests/support/render_fixture.hpp"
+#include "tests/extremes/every_way.hpp"
 
 namespace previz::test {
 namespace lens_test {
@@ -75,6 +75,35 @@ TEST(ExtremeLens, WideOpenBlursAndKeepsTheLight) {
       sum += static_cast<double>(layers.mixed[static_cast<std::size_t>(y) * 48 + x].g);
   // 192 pixels of 16 samples, each 0.1 or 0.9: a standard error of 0.4 / sqrt(3072).
   EXPECT_NEAR(sum / count, 0.5, 4 * 0.4 / std::sqrt(3072.0));
+}
+
+// A virtual ball before a lit table, far out of focus: where the lens may show the ball, no way
+// takes the pixel for one that only the table is in.
+class LensByEveryWay : public EveryWay {};
+INSTANTIATE_TEST_SUITE_P(Ways, LensByEveryWay, testing::Values(difference, by_camera), name_of_way);
+
+TEST_P(LensByEveryWay, CoversWhatThePairedEstimatorCovers) {
+  View view;
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({8, 8})),
+               add_material(view.scene, diffuse(glm::vec3(0.5f))));
+  glm::dmat4 pose(1);
+  pose[3] = {0, 0, 0.4, 1};
+  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.1, 3)),
+               add_material(view.scene, plastic(glm::vec3(0.8f, 0.2f, 0.1f), 0.3f)), pose,
+               scene::world_mixed);
+  view.environment = uniform_environment(glm::vec3(1));
+  view.calibration = pinhole(48, 36, 0.8);
+  view.world_from_camera = look_at({0, -1.2, 1}, {0, 0, 0.3});
+  for (const ThinLens& lens : {ThinLens{0.05, 0.5, 0.3}, ThinLens{0.05, 0.5, 1e6},
+                               ThinLens{0.005, 0.5, 0.01}, ThinLens{0.05, 1e30, 0.3}}) {
+    SCOPED_TRACE("f/" + std::to_string(lens.f_number) + " at " +
+                 std::to_string(lens.focus_distance_m) + " m");
+    view.calibration.lens = lens;
+    const Seen seen = seen_by_camera(view, 0.5, 8, up_to_depth(3));
+    const render::Layers all = render_by(paired, view, seen, 8, up_to_depth(3)).layers;
+    EXPECT_EQ(render_by(GetParam(), view, seen, 8, up_to_depth(3)).layers.mask, all.mask);
+    EXPECT_GT(std::count_if(all.mask.begin(), all.mask.end(), [](float m) { return m > 0; }), 20);
+  }
 }
 
 // The message of a set file with this lens, "" where it is taken.

@@ -1,7 +1,7 @@
 // Photons after a million passes, photons that never arrive, and radii of nothing.
 #include "daemon/render/device.hpp"
 #include "daemon/render/photon_schedule.hpp"
-#include "tests/support/render_fixture.hpp"
+#include "tests/extremes/every_way.hpp"
 
 namespace previz::test {
 namespace photon_test {
@@ -52,12 +52,24 @@ TEST(ExtremePhotons, TheRadiusAfterAMillionPassesIsTheRules) {
   EXPECT_GT(render::photon_radius_factor(0xffffffff), 0);
 }
 
+// The lamp shines on the real table; over a black plate the difference estimator's picture is what
+// the ball changes.
+class PhotonsByEveryWay : public EveryWay {
+ protected:
+  static render::Layers show(const View& view, int samples, const set::Estimation& estimation) {
+    static const Seen nothing{{24, 24, 16, std::vector<std::uint16_t>(3 * 24 * 24)}, 1};
+    return render_by(GetParam(), view, nothing, samples, estimation).layers;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Ways, PhotonsByEveryWay, testing::Values(paired, difference, by_camera),
+                         name_of_way);
+
 // What a million passes leave of the radius, and what is left after far more: finite, even where no
 // disc holds a photon any more.
-TEST(ExtremePhotons, AShrunkRadiusIsFinite) {
+TEST_P(PhotonsByEveryWay, AShrunkRadiusIsFinite) {
   const View view = caustic_set();
   for (const double shrunk : {0.1, 1e-6, 1e-30}) {
-    const render::Layers layers = render_clean(view, 8, photons_of_radius(2 * shrunk)).layers;
+    const render::Layers layers = show(view, 8, photons_of_radius(2 * shrunk));
     for (const glm::vec3& pixel : layers.mixed)
       for (int c = 0; c < 3; ++c) ASSERT_TRUE(std::isfinite(pixel[c])) << shrunk;
   }
@@ -87,7 +99,7 @@ TEST(ExtremePhotons, ASmallerRadiusLosesNoLight) {
 
 // The lamp shines away from all glass, or is black, or the ball is where no photon can reach it:
 // nothing is stored, nothing is divided by it.
-TEST(ExtremePhotons, NoneStoredIsNoCaustic) {
+TEST_P(PhotonsByEveryWay, NoneStoredIsNoCaustic) {
   View away = caustic_set();
   away.scene.lights[0].type = set::LightType::spot;
   away.scene.lights[0].direction = {0, 0, 1};
@@ -95,8 +107,7 @@ TEST(ExtremePhotons, NoneStoredIsNoCaustic) {
   View black = caustic_set();
   black.scene.lights[0].emission = glm::dvec3(0);
   for (const View& view : {away, black}) {
-    const Rendered result = render_clean(view, 4, photons_of_radius(2));
-    EXPECT_EQ(mean(result.layers.mixed), glm::dvec3(0));
+    EXPECT_EQ(mean(show(view, 4, photons_of_radius(2)).mixed), glm::dvec3(0));
   }
   View hidden = caustic_set();
   glm::dmat4 pose(1);
@@ -105,8 +116,7 @@ TEST(ExtremePhotons, NoneStoredIsNoCaustic) {
                add_material(hidden.scene, diffuse(glm::vec3(0.6f))), pose, scene::world_mixed);
   set::Estimation none = photons_of_radius(2);
   none.caustics = set::Caustics::none;
-  EXPECT_EQ(render_view(hidden, 4, photons_of_radius(2)).layers.mixed,
-            render_view(hidden, 4, none).layers.mixed);
+  EXPECT_EQ(show(hidden, 4, photons_of_radius(2)).mixed, show(hidden, 4, none).mixed);
 }
 
 }  // namespace photon_test

@@ -3,7 +3,7 @@
 #include <numbers>
 
 #include "shaders/lib/octahedral.h"
-#include "tests/support/render_fixture.hpp"
+#include "tests/extremes/every_way.hpp"
 
 namespace previz::test {
 namespace radiance_test {
@@ -32,11 +32,27 @@ render::Layers show(const View& view) {
   return render_clean(view, 8, up_to_depth(6)).layers;
 }
 
-TEST(Radiance, ByAPowerOfTwoScalesEveryBit) {
+// The camera's exposure is as much shorter as the light is brighter, so that its picture stays.
+class RadianceByEveryWay : public EveryWay {
+ protected:
+  static render::Layers show(const View& view, float factor, Plate* shown = nullptr) {
+    static const Seen seen = seen_by_camera(lit_set(), 0.25, 8, up_to_depth(6));
+    Seen exposed = seen;
+    exposed.exposure /= static_cast<double>(factor);
+    return render_by(GetParam(), brightened(view, factor), exposed, 8, up_to_depth(6), shown)
+        .layers;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Ways, RadianceByEveryWay, testing::Values(paired, difference, by_camera),
+                         name_of_way);
+
+TEST_P(RadianceByEveryWay, APowerOfTwoScalesEveryBit) {
   const View view = lit_set();
-  const render::Layers plain = show(view);
+  Plate plain_picture, picture;
+  const render::Layers plain = show(view, 1, &plain_picture);
   for (const float factor : {0x1p-20f, 0x1p20f}) {
-    const render::Layers other = show(brightened(view, factor));
+    const render::Layers other = show(view, factor, &picture);
+    EXPECT_EQ(picture.samples, plain_picture.samples) << factor;
     for (std::size_t i = 0; i < plain.mixed.size(); ++i) {
       ASSERT_EQ(other.mixed[i], factor * plain.mixed[i]) << factor;
       ASSERT_EQ(other.diff[i], factor * plain.diff[i]) << factor;
@@ -44,11 +60,11 @@ TEST(Radiance, ByAPowerOfTwoScalesEveryBit) {
   }
 }
 
-TEST(Radiance, ByAMillionAndAMillionthScalesThePicture) {
+TEST_P(RadianceByEveryWay, AMillionAndAMillionthScaleThePicture) {
   const View view = lit_set();
-  const render::Layers plain = show(view);
+  const render::Layers plain = show(view, 1);
   for (const float factor : {1e-6f, 1e6f}) {
-    const render::Layers other = show(brightened(view, factor));
+    const render::Layers other = show(view, factor);
     for (std::size_t i = 0; i < plain.mixed.size(); ++i)
       for (int c = 0; c < 3; ++c)
         ASSERT_NEAR(other.mixed[i][c] / factor, plain.mixed[i][c], 1e-4 * plain.mixed[i][c]);

@@ -4,7 +4,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "tests/support/render_fixture.hpp"
+#include "tests/extremes/every_way.hpp"
 
 namespace previz::test {
 namespace scale_test {
@@ -53,9 +53,26 @@ View resized(View view, double factor, const glm::dvec3& move = {}) {
   return view;
 }
 
+constexpr int samples = 8;
+
 Rendered show(const View& view) {
-  return render_clean(view, 8, up_to_depth(6));
+  return render_clean(view, samples, up_to_depth(6));
 }
+
+// The camera's picture of the set at its own size, which is the same at every size and place.
+const Seen& seen() {
+  static const Seen plate = seen_by_camera(rich_set(), 0.25, samples, up_to_depth(6));
+  return plate;
+}
+
+class ScaleByEveryWay : public EveryWay {
+ protected:
+  static Rendered show(const View& view, Plate* shown = nullptr) {
+    return render_by(GetParam(), view, seen(), samples, up_to_depth(6), shown);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Ways, ScaleByEveryWay, testing::Values(paired, difference, by_camera),
+                         name_of_way);
 
 // Rounding takes a path another way only where it passes an edge, of an object, a lobe or a
 // shadow, by less than about 1e-6 of the set's size. A sample makes up to 6 * 3 such choices where
@@ -75,11 +92,13 @@ void expect_same(const render::Layers& a, const render::Layers& b) {
 
 // Nothing in the renderer may know how large a metre is: times a power of two, every product and
 // every sum rounds as it did, and no bit changes.
-TEST(Scale, ByAPowerOfTwoChangesNoBit) {
+TEST_P(ScaleByEveryWay, APowerOfTwoChangesNoBit) {
   const View view = rich_set();
-  const render::Layers plain = show(view).layers;
+  Plate plain_picture, picture;
+  const render::Layers plain = show(view, &plain_picture).layers;
   for (const double factor : {1.0 / 1024, 1024.0}) {
-    const render::Layers other = show(resized(view, factor)).layers;
+    const render::Layers other = show(resized(view, factor), &picture).layers;
+    EXPECT_EQ(picture.samples, plain_picture.samples) << factor;
     EXPECT_EQ(other.mixed, plain.mixed) << factor;
     EXPECT_EQ(other.diff, plain.diff) << factor;
     EXPECT_EQ(other.mask, plain.mask) << factor;
@@ -88,7 +107,7 @@ TEST(Scale, ByAPowerOfTwoChangesNoBit) {
   }
 }
 
-TEST(Scale, ByAThousandAndAThousandthShowsTheSame) {
+TEST_P(ScaleByEveryWay, AThousandAndAThousandthShowTheSame) {
   const View view = rich_set();
   const render::Layers plain = show(view).layers;
   for (const double factor : {1e-3, 1e3}) {
@@ -99,7 +118,7 @@ TEST(Scale, ByAThousandAndAThousandthShowsTheSame) {
 
 // GPU space is relative to the camera, subtracted in double precision: 1 km away, what is left of
 // a position is right to 1e-13 m.
-TEST(Scale, AKilometreFromTheOriginShowsTheSame) {
+TEST_P(ScaleByEveryWay, AKilometreFromTheOriginShowsTheSame) {
   const View view = rich_set();
   expect_same(show(resized(view, 1, {700, -600, 400})).layers, show(view).layers);
 }

@@ -28,11 +28,11 @@ struct BlockSums {
   double error2 = 0, signal2 = 0, error = 0, signal = 0;
   int blocks = 0;
 
-  void add(const glm::dvec3& estimate, const glm::dvec3& truth) {
+  void add(const glm::dvec3& estimate, const glm::dvec3& wanted, const glm::dvec3& truth) {
     for (int c = 0; c < 3; ++c) {
-      error2 += (estimate[c] - truth[c]) * (estimate[c] - truth[c]);
+      error2 += (estimate[c] - wanted[c]) * (estimate[c] - wanted[c]);
       signal2 += truth[c] * truth[c];
-      error += estimate[c] - truth[c];
+      error += estimate[c] - wanted[c];
       signal += truth[c];
     }
     ++blocks;
@@ -93,12 +93,13 @@ std::vector<bool> near_mask_edge(const TruthFrame& truth) {
   return near;
 }
 
-void measure_mask(const TruthFrame& truth, const EstimatedFrame& estimate, Measures& out) {
+void measure_mask(const TruthFrame& truth, const EstimatedFrame& wanted,
+                  const EstimatedFrame& estimate, Measures& out) {
   const std::vector<bool> near = near_mask_edge(truth);
   double near_sum = 0;
   std::size_t near_count = 0;
   for (std::size_t i = 0; i < truth.mask.size(); ++i) {
-    const double error = std::abs(static_cast<double>(estimate.mask[i]) - truth.mask[i]);
+    const double error = std::abs(static_cast<double>(estimate.mask[i]) - wanted.mask[i]);
     out.e_mask += error / static_cast<double>(truth.mask.size());
     if (near[i]) {
       near_sum += error;
@@ -168,22 +169,34 @@ double plane_ssim(const std::vector<double>& a, const std::vector<double>& b, in
   return sum / static_cast<double>(mean_a.size());
 }
 
-}  // namespace
+EstimatedFrame ideal_estimate(const TruthFrame& truth) {
+  EstimatedFrame out;
+  out.composite = ideal_composite(truth);
+  out.mixed = truth.mixed;
+  out.real = truth.real;
+  for (std::size_t i = 0; i < truth.mixed.size(); ++i)
+    out.diff.push_back(truth.mixed[i] - truth.real[i]);
+  out.mask = truth.mask;
+  out.picture = displayed(out.composite, truth.width, truth.height, truth.exposure, truth.response);
+  return out;
+}
 
-Measures compare(const TruthFrame& truth, const EstimatedFrame& estimate) {
-  require_sizes(truth, estimate);
+// The measures of an estimate against what is wanted, relative to the truth.
+Measures compare_with(const TruthFrame& truth, const EstimatedFrame& wanted,
+                      const EstimatedFrame& estimate) {
   const double white = 1 / truth.exposure;
-  const std::vector<glm::vec3> ideal = ideal_composite(truth);
-
-  const PixelValue diff = [&](std::size_t i) {
-    return clipped(truth.mixed[i], white) - clipped(truth.real[i], white);
+  const auto diff = [&](const EstimatedFrame& of) -> PixelValue {
+    return [&](std::size_t i) {
+      return clipped(truth.real[i] + of.diff[i], white) - clipped(truth.real[i], white);
+    };
   };
-  const PixelValue diff_estimate = [&](std::size_t i) {
-    return clipped(truth.real[i] + estimate.diff[i], white) - clipped(truth.real[i], white);
-  };
-  const auto clip = [&](const std::vector<glm::vec3>& picture) {
+  const auto clip = [&](const std::vector<glm::vec3>& picture) -> PixelValue {
     return [&](std::size_t i) { return clipped(picture[i], white); };
   };
+  const PixelValue true_diff = [&](std::size_t i) {
+    return clipped(truth.mixed[i], white) - clipped(truth.real[i], white);
+  };
+  const std::vector<glm::vec3> ideal = ideal_composite(truth);
 
   BlockSums diff_sums, virtual_sums, edge_sums, real_sums;
   for (int by = 0; by < truth.height / block_px; ++by) {
@@ -191,16 +204,18 @@ Measures compare(const TruthFrame& truth, const EstimatedFrame& estimate) {
       const auto mean = [&](const PixelValue& value) {
         return block_mean(value, truth.width, bx, by);
       };
-      real_sums.add(mean(clip(estimate.real)), mean(clip(truth.real)));
+      real_sums.add(mean(clip(estimate.real)), mean(clip(wanted.real)), mean(clip(truth.real)));
       switch (kind_of(truth, bx, by)) {
         case BlockKind::uncovered:
-          diff_sums.add(mean(diff_estimate), mean(diff));
+          diff_sums.add(mean(diff(estimate)), mean(diff(wanted)), mean(true_diff));
           break;
         case BlockKind::covered:
-          virtual_sums.add(mean(clip(estimate.mixed)), mean(clip(truth.mixed)));
+          virtual_sums.add(mean(clip(estimate.mixed)), mean(clip(wanted.mixed)),
+                           mean(clip(truth.mixed)));
           break;
         case BlockKind::edge:
-          edge_sums.add(mean(clip(estimate.composite)), mean(clip(ideal)));
+          edge_sums.add(mean(clip(estimate.composite)), mean(clip(wanted.composite)),
+                        mean(clip(ideal)));
       }
     }
   }
@@ -216,11 +231,9 @@ Measures compare(const TruthFrame& truth, const EstimatedFrame& estimate) {
   out.diff_blocks = diff_sums.blocks;
   out.virtual_blocks = virtual_sums.blocks;
   out.edge_blocks = edge_sums.blocks;
-  measure_mask(truth, estimate, out);
-
-  const Plate wanted = displayed(ideal, truth.width, truth.height, truth.exposure, truth.response);
-  out.psnr = psnr(estimate.picture, wanted);
-  out.ssim = ssim(estimate.picture, wanted);
+  measure_mask(truth, wanted, estimate, out);
+  out.psnr = psnr(estimate.picture, wanted.picture);
+  out.ssim = ssim(estimate.picture, wanted.picture);
 
   if (truth.diff_rmse && diff_sums.signal_rms() > 0) {
     out.noise_diff = *truth.diff_rmse / block_px / diff_sums.signal_rms();
@@ -234,6 +247,33 @@ Measures compare(const TruthFrame& truth, const EstimatedFrame& estimate) {
     out.noise_virtual =
         *truth.mixed_rmse_of_mean * picture_mean / block_px / virtual_sums.signal_rms();
   }
+  return out;
+}
+
+// Mean square of a picture's error over that of white.
+double mean_square(double psnr_db) {
+  return std::pow(10.0, -psnr_db / 10);
+}
+
+}  // namespace
+
+Measures compare(const TruthFrame& truth, const EstimatedFrame& estimate) {
+  require_sizes(truth, estimate);
+  return compare_with(truth, ideal_estimate(truth), estimate);
+}
+
+Chance chance_between(const TruthFrame& truth, const EstimatedFrame& a, const EstimatedFrame& b) {
+  require_sizes(truth, a);
+  require_sizes(truth, b);
+  const Measures apart = compare_with(truth, a, b);
+  Chance out;
+  out.e_diff = apart.e_diff / std::sqrt(2.0);
+  out.e_virtual = apart.e_virtual / std::sqrt(2.0);
+  out.e_edge = apart.e_edge / std::sqrt(2.0);
+  out.e_mask = apart.e_mask;
+  out.e_mask_edge = apart.e_mask_edge;
+  out.mean_square = mean_square(apart.psnr) / 2;
+  out.dissimilarity = 1 - apart.ssim;
   return out;
 }
 
@@ -321,7 +361,7 @@ Bounds bounds_named(const std::string& name) {
   throw Error("bounds: '" + name + "' is not one of paired, full, captured");
 }
 
-std::vector<std::string> violations(const Measures& m, const Bounds& bounds) {
+std::vector<std::string> violations(const Measures& m, const Bounds& bounds, const Chance& chance) {
   std::vector<std::string> out;
   const auto check = [&](const char* name, double value, double allowed, bool at_most) {
     if (at_most ? value <= allowed : value >= allowed) return;
@@ -330,14 +370,15 @@ std::vector<std::string> violations(const Measures& m, const Bounds& bounds) {
                   at_most ? "at most" : "at least", allowed);
     out.emplace_back(line);
   };
-  const double allowed_virtual = std::hypot(bounds.e_virtual, m.noise_virtual.value_or(0));
-  check("e_diff", m.e_diff, std::hypot(bounds.e_diff, m.noise_diff.value_or(0)), true);
-  check("e_virtual", m.e_virtual, allowed_virtual, true);
-  check("e_edge", m.e_edge, allowed_virtual, true);
-  check("e_mask", m.e_mask, bounds.e_mask, true);
-  if (bounds.true_pose) check("e_mask_edge", m.e_mask_edge, 0.03, true);
-  check("psnr", m.psnr, bounds.psnr, false);
-  check("ssim", m.ssim, bounds.ssim, false);
+  const double noise_diff = m.noise_diff.value_or(0), noise_virtual = m.noise_virtual.value_or(0);
+  check("e_diff", m.e_diff, std::hypot(bounds.e_diff, noise_diff, chance.e_diff), true);
+  check("e_virtual", m.e_virtual, std::hypot(bounds.e_virtual, noise_virtual, chance.e_virtual),
+        true);
+  check("e_edge", m.e_edge, std::hypot(bounds.e_virtual, noise_virtual, chance.e_edge), true);
+  check("e_mask", m.e_mask, bounds.e_mask + chance.e_mask, true);
+  if (bounds.true_pose) check("e_mask_edge", m.e_mask_edge, 0.03 + chance.e_mask_edge, true);
+  check("psnr", m.psnr, -10 * std::log10(mean_square(bounds.psnr) + chance.mean_square), false);
+  check("ssim", m.ssim, bounds.ssim - chance.dissimilarity, false);
   return out;
 }
 

@@ -76,8 +76,22 @@ struct Bounds {
 };
 // "paired", "full" or "captured"; throws previz::Error naming what is allowed.
 Bounds bounds_named(const std::string& name);
-// One line a violated bound, with the figure and what is allowed (sqrt(bound^2 + noise^2)); empty
-// where all hold.
-std::vector<std::string> violations(const Measures& measures, const Bounds& bounds);
+
+// What too few samples may add to the errors of an estimate, so that bounds meant for many samples
+// can judge it (README.md, "Few samples"). All zero: nothing.
+struct Chance {
+  double e_diff = 0, e_virtual = 0, e_edge = 0;  // standard errors, relative as the measures are
+  double e_mask = 0, e_mask_edge = 0;            // mean absolute errors, at most
+  double mean_square = 0;                        // of the 8-bit picture's error, over that of white
+  double dissimilarity = 0;                      // 1 - ssim, at most
+};
+// From two estimates of the same frame at the same number of samples and with independent random
+// numbers; holds for either of them. Throws as compare() does.
+Chance chance_between(const TruthFrame& truth, const EstimatedFrame& a, const EstimatedFrame& b);
+
+// One line a violated bound, with the figure and what is allowed (README.md, "Bounds" and "Few
+// samples"); empty where all hold.
+std::vector<std::string> violations(const Measures& measures, const Bounds& bounds,
+                                    const Chance& chance = {});
 
 }  // namespace previz::truth

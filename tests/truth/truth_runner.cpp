@@ -11,12 +11,11 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
-#include "daemon/post/render.hpp"
 #include "drivers/error.hpp"
 #include "tests/truth/compare.hpp"
 #include "tests/truth/comparison_sheet.hpp"
+#include "tests/truth/truth_render.hpp"
 #include "tests/truth/truth_set.hpp"
 #include "tests/truth/truth_take.hpp"
 
@@ -29,12 +28,10 @@ using nlohmann::ordered_json;
 struct Arguments {
   std::vector<fs::path> sets;
   TakeOptions take;
-  int samples = 256;
-  bool adaptive = false, denoise = false;
+  RenderSettings render;
   fs::path out;
   std::optional<std::string> bounds;
   std::vector<int> frames;  // empty: every truth frame
-  std::string device;
 };
 
 struct JudgedFrame {
@@ -43,47 +40,15 @@ struct JudgedFrame {
   std::vector<std::string> violations;
 };
 
-// Leaves DIR/NNNN.exr and NNNN.png, whatever the frame's place in the session.
-post::FinishedFrame render_frame(const TruthSet& set, int frame, const Arguments& arguments,
-                                 const fs::path& directory) {
-  const std::uint64_t index = session_index(set, frame);
-  post::RenderOptions options;
-  options.session = directory / "session";
-  options.frames = post::FrameRange{index, index};
-  options.samples = arguments.samples;
-  options.adaptive = arguments.adaptive;
-  options.denoise = arguments.denoise;
-  options.directory = directory / "render";
-  options.exr = options.png = true;
-  options.video = false;
-  options.force = true;
-  options.device.name = arguments.device;
-  const post::RenderReport report = post::render_session(options, std::cerr);
-  if (report.frames.empty()) {
-    throw Error(set.name + ": frame " + std::to_string(frame) + " was not rendered");
-  }
-  for (const char* extension : {".exr", ".png"}) {
-    fs::rename(directory / "render" / (frame_name(static_cast<int>(index)) + extension),
-               directory / (frame_name(frame) + extension));
-  }
-  return report.frames.front();
-}
-
 JudgedFrame judge_frame(const TruthSet& set, int frame, const Arguments& arguments,
                         const fs::path& directory) {
+  RenderedFrame rendered = render_truth_frame(set, frame, arguments.render, directory);
   JudgedFrame out;
-  out.record = render_frame(set, frame, arguments, directory);
-  render::Layers layers = output::read_exr(directory / (frame_name(frame) + ".exr"));
-  EstimatedFrame estimate;
-  estimate.picture = output::read_png(directory / (frame_name(frame) + ".png"));
-  estimate.composite = std::move(layers.composite);
-  estimate.mixed = std::move(layers.mixed);
-  estimate.real = std::move(layers.real);
-  estimate.diff = std::move(layers.diff);
-  estimate.mask = std::move(layers.mask);
+  out.record = std::move(rendered.record);
+  EstimatedFrame estimate = std::move(rendered.estimate);
 
   const TruthFrame truth = load_truth_frame(set, frame);
-  if (arguments.denoise) estimate = as_composited(truth.plate, std::move(estimate));
+  if (arguments.render.denoise) estimate = as_composited(truth.plate, std::move(estimate));
   out.measures = compare(truth, estimate);
   output::write_png(directory / (frame_name(frame) + "_compare.png"),
                     comparison_sheet(truth, estimate));
@@ -178,7 +143,7 @@ bool run_set(const fs::path& path, const Arguments& arguments) {
     held = held && judged.violations.empty();
   }
   metrics["seconds"] = seconds;
-  metrics["samples"] = arguments.samples;
+  metrics["samples"] = arguments.render.samples;
   metrics["light"] = arguments.take.light == LightFrom::truth ? "truth" : "captured";
   metrics["pose"] = arguments.take.pose == PoseFrom::truth ? "truth" : "tracked";
   std::ofstream file(directory / "metrics.json");
@@ -208,10 +173,11 @@ int main(int argc, char** argv) {
   app.add_option("--pose", arguments.take.pose, "truth: the set's poses; tracked: by its tags")
       ->transform(CLI::Transformer(poses, CLI::ignore_case))
       ->type_name("truth|tracked");
-  app.add_option("--spp", arguments.samples, "samples per pixel [256]")
+  app.add_option("--spp", arguments.render.samples, "samples per pixel [256]")
       ->check(CLI::Range(1, 1000000));
-  app.add_flag("--adaptive", arguments.adaptive, "so many on average, where they bring most");
-  app.add_flag("--denoise", arguments.denoise, "take noise out of the composite");
+  app.add_flag("--adaptive", arguments.render.adaptive,
+               "so many on average, where they bring most");
+  app.add_flag("--denoise", arguments.render.denoise, "take noise out of the composite");
   app.add_option("--out", arguments.out, "directory for the pictures and figures")->required();
   app.add_option("--bounds", arguments.bounds, "judge by this row of bounds")
       ->check(CLI::IsMember({"paired", "full", "captured"}));
@@ -223,7 +189,7 @@ int main(int argc, char** argv) {
   app.add_option("--estimator", arguments.take.estimator,
                  "a line for the set file's [estimator], as 'caustics = \"traced\"'; repeatable")
       ->allow_extra_args(false);
-  app.add_option("--device", arguments.device, "Vulkan device by a part of its name");
+  app.add_option("--device", arguments.render.device, "Vulkan device by a part of its name");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
