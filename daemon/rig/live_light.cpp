@@ -62,8 +62,7 @@ LightPtr LiveLight::light_for(const pipeline::Shot& shot, set::LightMode mode) {
 
 void LiveLight::see_observer(pipeline::Shot& shot) {
   if (stage_.needs_observer() && shot.track.pose)
-    feed_.see_observer(
-        {plate_of(shot), shot.frame->exposure, shot.track.pose->world_from_camera});
+    feed_.see_observer({plate_of(shot), shot.frame->exposure, shot.track.pose->world_from_camera});
 }
 
 }  // namespace previz::rig

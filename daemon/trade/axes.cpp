@@ -47,10 +47,8 @@ TradeAxis light_modes(const set::Lighting& own) {
 }
 
 TradeAxis left_out(std::uint32_t needed) {
-  TradeAxis axis{parts_axis,
-                 "features that this set does not need: left out, or switched on",
-                 {},
-                 "left out"};
+  TradeAxis axis{
+      parts_axis, "features that this set does not need: left out, or switched on", {}, "left out"};
   for (const render::Feature& feature : render::features())
     if (feature.can_be_carried && (feature.bit & needed) == 0)
       axis.variants.push_back(

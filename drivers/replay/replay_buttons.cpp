@@ -95,7 +95,7 @@ std::unique_ptr<Buttons> open_replay_buttons(const std::filesystem::path& sessio
   auto buttons = std::make_unique<ReplayButtons>(std::move(lines.records), file.string(), options);
   if (!lines.bad_lines.empty())
     buttons->put_first(session::list_of("line", lines.bad_lines) +
-                        " cannot be understood and are left out");
+                       " cannot be understood and are left out");
   return buttons;
 }
 

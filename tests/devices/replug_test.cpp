@@ -72,8 +72,8 @@ TEST_P(Replugging, AHundredTimesLeavesNothingBehind) {
   ASSERT_NO_FATAL_FAILURE(take(lifeline, 2));
   EXPECT_EQ(open_descriptors(), descriptors);
   // malloc gives no less than 32 bytes: the smallest object left behind in each cycle is as much.
-  // Three quarters of it leave room for 1920 bytes that differ once, as between two states of a queue
-  // (1296 were seen).
+  // Three quarters of it leave room for 1920 bytes that differ once, as between two states of a
+  // queue (1296 were seen).
   const std::size_t least = std::max<std::size_t>(24, device_->kept_by_others());
   const std::size_t kept = live_bytes() - std::min(bytes, live_bytes());
   RecordProperty("bytes_a_cycle", static_cast<int>(kept / (cycles - warm_cycles)));

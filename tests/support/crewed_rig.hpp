@@ -19,8 +19,8 @@
 #include "daemon/rig/live.hpp"
 #include "daemon/set/actions.hpp"
 #include "drivers/session/files.hpp"
-#include "tests/support/wait_until.hpp"
 #include "tests/support/hand.hpp"
+#include "tests/support/wait_until.hpp"
 
 namespace previz::test {
 

@@ -11,8 +11,8 @@
 
 namespace previz::tracking {
 
-using test::flat_tag;
 using test::camera_looking;
+using test::flat_tag;
 using test::TagScene;
 
 inline constexpr std::int64_t kFrameNs = 40'000'000;

@@ -8,9 +8,9 @@
 #include "daemon/output/png.hpp"
 #include "daemon/render/renderer.hpp"
 #include "daemon/set/names.hpp"
+#include "tests/support/scenes.hpp"
 #include "tests/truth/compare.hpp"
 #include "tests/truth/comparison_sheet.hpp"
-#include "tests/support/scenes.hpp"
 
 namespace previz::truth {
 namespace {

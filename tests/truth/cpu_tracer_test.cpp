@@ -9,10 +9,10 @@
 #include <numbers>
 
 #include "shaders/lib/octahedral.h"
+#include "tests/support/scenes.hpp"
 #include "tests/truth/cpu_bsdf.hpp"
 #include "tests/truth/cpu_camera.hpp"
 #include "tests/truth/cpu_environment.hpp"
-#include "tests/support/scenes.hpp"
 
 namespace previz::truth {
 namespace cpu_tracer_test {

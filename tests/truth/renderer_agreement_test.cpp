@@ -6,11 +6,11 @@
 #include <string>
 
 #include "daemon/lighting/lighting.hpp"
+#include "tests/support/render_fixture.hpp"
 #include "tests/truth/agreement.hpp"
 #include "tests/truth/cpu_camera.hpp"
 #include "tests/truth/cpu_tracer.hpp"
 #include "tests/truth/truth_set.hpp"
-#include "tests/support/render_fixture.hpp"
 
 namespace previz::test {
 namespace renderer_agreement_test {

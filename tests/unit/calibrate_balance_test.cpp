@@ -13,8 +13,8 @@
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
-#include "tests/truth/truth_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/truth/truth_take.hpp"
 
 namespace previz::calibrate {
 namespace calibrate_balance_test {

@@ -104,8 +104,7 @@ FramePtr flat_picture(double brightness, const glm::dvec2& gradient, const Vigne
                 relative_illumination(loss, std::acos(std::min(ray->z, 1.0)));
       signals.push_back(light * glm::dvec3(1, 0.8, 0.6) + lens_of.dark_level);
     }
-  return test::make_frame(lens_of.intrinsics.width, lens_of.intrinsics.height, 1,
-                                    signals);
+  return test::make_frame(lens_of.intrinsics.width, lens_of.intrinsics.height, 1, signals);
 }
 
 TEST(VignettingFit, TheLensIsToldFromTheLight) {

@@ -14,9 +14,9 @@
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/full_disk.hpp"
-#include "tests/support/wait_until.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_take.hpp"
+#include "tests/support/wait_until.hpp"
 
 namespace previz {
 namespace daemon_death_test {

@@ -15,9 +15,9 @@
 #include "daemon/post/render.hpp"
 #include "daemon/rig/live.hpp"
 #include "drivers/session/session.hpp"
-#include "tests/support/lighting.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/gltf_writer.hpp"
+#include "tests/support/lighting.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 

@@ -12,8 +12,8 @@
 #include "drivers/bracket.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/full_disk.hpp"
-#include "tests/support/wait_until.hpp"
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/wait_until.hpp"
 
 namespace previz::output {
 namespace output_recorder_test {

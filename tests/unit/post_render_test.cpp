@@ -18,9 +18,9 @@
 #include "daemon/pipeline/preview_size.hpp"
 #include "daemon/rig/live.hpp"
 #include "drivers/error.hpp"
-#include "tests/support/wait_until.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/wait_until.hpp"
 
 namespace previz::post {
 namespace post_render_test {

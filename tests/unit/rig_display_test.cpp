@@ -14,10 +14,10 @@
 #include "daemon/rig/live.hpp"
 #include "daemon/set/actions.hpp"
 #include "drivers/session/session.hpp"
-#include "tests/support/wait_until.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/wait_until.hpp"
 
 namespace previz::rig {
 namespace rig_display_test {

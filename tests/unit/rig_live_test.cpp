@@ -23,10 +23,10 @@
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
-#include "tests/support/wait_until.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/wait_until.hpp"
 
 namespace previz::rig {
 namespace rig_live_test {

@@ -159,8 +159,9 @@ TEST(Tracker, CovarianceHoldsOnPictures) {
   double sum = 0;
   int counted = 0;
   for (int t = 0; t < trials; ++t) {
-    scene.world_from_camera = camera_looking({0.1 + 0.1 * unit(random), -0.6, 0.45 + 0.1 * unit(random)},
-                                      {0.02 * unit(random), 0.03, 0});
+    scene.world_from_camera =
+        camera_looking({0.1 + 0.1 * unit(random), -0.6, 0.45 + 0.1 * unit(random)},
+                       {0.02 * unit(random), 0.03, 0});
     const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
     const Track track = tracker->track(picture(scene, random, 200));
     if (!track.pose) continue;
