@@ -12,7 +12,7 @@
 #   asan       the test programs marked SANITIZED (tests/CMakeLists.txt) under ASan and UBSan
 #   format     clang-format
 #   lint       clang-tidy, of targets that have changed since they last passed on this machine, the
-#              newest first; in the gate for 3 minutes at most, and it says how many are left
+#              newest first; in the gate for a minute at most, and it says how many are left
 #   lint-all   the same without a limit
 #   long       the cases that tests/*/CMakeLists.txt leave out of the gate (LONG), in the release build
 #   asan-all   every test program under ASan and UBSan
@@ -74,11 +74,12 @@ check_skips() {
   return "$status"
 }
 
-# CTest counts programs; the cases in them, and which of those were skipped, are in its log.
+# CTest counts programs; the cases in them, and which of those were skipped, are in its log. Some
+# programs mostly wait, so there is one more at a time than there are cores.
 # run_tests PRESET [CTEST_OPTION]...
 run_tests() {
   local preset=$1 log=build/$1/Testing/Temporary/LastTest.log status=0
-  ctest --preset "$preset" --parallel "$jobs" "${@:2}" || status=$?
+  ctest --preset "$preset" --parallel $((jobs + 1)) "${@:2}" || status=$?
   check_skips "$log" || status=1
   summaries+=("$preset: $(grep -c '^\[       OK \]' "$log") passed, $(grep -c \
     '^\[  FAILED  \] .* ms)$' "$log") failed, $(grep -c '^\[  SKIPPED \] .* ms)$' "$log") skipped")
@@ -118,7 +119,7 @@ for name in "${steps[@]}"; do
     release | asan | asan-all | tsan) build_and_test "$name" ;;
     long) build release && check "long" run_tests release --label-regex long ;;
     format) check "format" format ;;
-    lint) check "lint" lint 180 ;;
+    lint) check "lint" lint 60 ;;
     lint-all) check "lint-all" lint 86400 ;;
     soak) build release && check "soak" build/release/tests/soak/soak --minutes 30 ;;
     package | rig_vm) check "$name" "tests/$name/run.sh" ;;

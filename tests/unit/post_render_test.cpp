@@ -47,7 +47,7 @@ class RenderSession : public testing::Test {
   // Requests the stop when the condition holds, and, with a failure, when it never does. The thread
   // ends with the scope it is kept in, also where what it waits for never comes.
   static std::jthread stop_when(const std::string& what, const std::function<bool()>& condition,
-                                std::stop_source stop) {
+                                const std::stop_source& stop) {
     return std::jthread([=](const std::stop_token& left) mutable {
       const auto result =
           test::wait_until(what, [&] { return left.stop_requested() || condition(); });
