@@ -140,7 +140,8 @@ void read_times(const CameraMembers& camera, FootageDescription& footage) {
            "must be given in exactly one way: timestamps_ns, fps, or a csv with a "
            "column timestamp_ns");
   if (m.has("start_ns"))
-    footage.start_ns = m.read<std::int64_t>("start_ns", plain.within(0, latest_ns / 2));
+    footage.start_ns =
+        m.read<std::int64_t>("start_ns", plain.within(0, static_cast<double>(latest_ns) / 2));
   if (in_table) {
     footage.timestamps_ns = parse_column<std::int64_t>(
         *camera.table, "timestamp_ns", "a whole number of nanoseconds, not negative",

@@ -20,12 +20,13 @@ std::string joined(const std::vector<std::string>& words) {
 
 Value value_of(const Json& json) {
   Value out;
+  const bool is_whole =
+      json.is_number_integer() &&
+      !(json.is_number_unsigned() &&
+        json.get<std::uint64_t>() > std::uint64_t{std::numeric_limits<std::int64_t>::max()});
   if (json.is_boolean())
     out.data = json.get<bool>();
-  else if (json.is_number_unsigned() &&
-           json.get<std::uint64_t>() > std::uint64_t{std::numeric_limits<std::int64_t>::max()})
-    out.data = json.get<double>();
-  else if (json.is_number_integer())
+  else if (is_whole)
     out.data = json.get<std::int64_t>();
   else if (json.is_number())
     out.data = json.get<double>();

@@ -141,7 +141,10 @@ TEST(SourceStage, ATakeCarriesTheSourcesOfAnImageToo) {
 TEST(SourceStage, ARecordingWithoutLightIsRefused) {
   set::Set set = set_with(set::LightMode::sources);
   set.lighting.from = set::LightFrom::recording;
-  EXPECT_THROW(TrackStage(set, ObserverCalibration{}, {session::TrackRecord{}}, 0), Error);
+  ObserverCalibration observer;
+  observer.intrinsics.width = observer.intrinsics.height = 64;
+  observer.intrinsics.fx = observer.intrinsics.fy = 60;
+  EXPECT_THROW(TrackStage(set, observer, {session::TrackRecord{}}, 0), Error);
 }
 
 TEST(SourceStage, TheSetsOwnLightNeedsNoCamera) {
