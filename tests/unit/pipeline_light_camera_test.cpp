@@ -156,7 +156,7 @@ TEST(LightStage, ABracketThatLacksAnExposureIsNotAwaitedForEver) {
   EXPECT_NE(stage.light(), nullptr);
 }
 
-// Where the set states the exposure, all frames are of that one; a named frame comes once.
+// A set that states the exposure has no other to wait for, and a frame that it names comes once.
 TEST(LightStage, WhatHasNoBracketIsNotAwaited) {
   Studio studio;
   set::Set stated = plain_set();

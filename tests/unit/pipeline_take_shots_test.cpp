@@ -61,7 +61,7 @@ TEST_F(TakeShotsTest, FirstAndLastAreInTheRange) {
   EXPECT_THROW(all(options), Error);
 }
 
-// What is wanted may depend on the shots before.
+// Which frames are wanted may depend on the shots before.
 TEST_F(TakeShotsTest, AFrameIsAskedForWhenItsTurnHasCome) {
   std::uint64_t next = 1;
   TakeShotsOptions options;

@@ -49,7 +49,7 @@ std::string refusal(Kernel& kernel, const Buffers& buffers, std::uint32_t invoca
   return "";
 }
 
-TEST(Kernel, a_missing_buffer_is_named_with_its_pass) {
+TEST(Kernel, AMissingBufferIsNamedWithItsPass) {
   Kernel kernel = prepare_shadow();
   const std::string words = refusal(kernel, {});
   EXPECT_NE(words.find("\"prepare_shadow\""), std::string::npos) << words;
@@ -62,7 +62,7 @@ TEST(Kernel, a_missing_buffer_is_named_with_its_pass) {
   EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
 }
 
-TEST(Kernel, more_work_groups_than_the_device_allows_are_refused_by_name) {
+TEST(Kernel, MoreWorkGroupsThanTheDeviceAllowsAreRefusedByName) {
   const std::uint32_t most = shared_device()->limits().maxComputeWorkGroupCount[0];
   if (most >= std::numeric_limits<std::uint32_t>::max() / gpu::WORKGROUP_SIZE)
     GTEST_SKIP() << "this device allows more work groups than can be asked for";
@@ -77,9 +77,9 @@ TEST(Kernel, more_work_groups_than_the_device_allows_are_refused_by_name) {
   EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
 }
 
-// Of one submission every dispatch has the buffers that it was given, and so has a later one, also
-// where it has fewer.
-TEST(Kernel, dispatches_of_one_submission_keep_their_own_buffers) {
+// Every dispatch of a submission reads the buffers that it was given. So does one of a later
+// submission that has fewer dispatches.
+TEST(Kernel, DispatchesOfOneSubmissionKeepTheirOwnBuffers) {
   Kernel kernel = prepare_shadow();
   const gpu::GpuBatch batch{};
   for (const std::uint32_t used : {3u, 1u, 4u}) {

@@ -106,7 +106,7 @@ TEST_F(Damage, LinesCutAnywhereGiveAPrefix) {
   }
 }
 
-// Where the packets of a video lie in its file: their bytes are in it as they are.
+// Returns where the packets of a video lie in its file, which holds their bytes unchanged.
 std::vector<std::pair<std::size_t, std::size_t>> packets_of(const std::filesystem::path& file) {
   const std::string content = content_of(file);
   std::vector<std::pair<std::size_t, std::size_t>> places;
