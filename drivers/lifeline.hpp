@@ -36,8 +36,9 @@ struct LifelineHooks {
 // opening settles the format anew; format() may change then, and no frame of the old format
 // follows. Sequence numbers keep increasing over all openings.
 //
-// Trouble is reported once for each change to the worse, and never with `lost`. An EndOfStream of
-// the device ends this stream.
+// A camera that cannot be opened or stalls is reported once, and again only when the cause changes;
+// the event `lost` then carries the cause, without a second report. An EndOfStream of the device ends
+// this stream.
 class Lifeline final : public Camera {
  public:
   // `name` stands in reports of trouble. Opens nothing yet.

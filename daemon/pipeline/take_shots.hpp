@@ -49,7 +49,7 @@ struct TakeShotsOptions {
 class TakeShots {
  public:
   // The take must outlive this. Throws previz::Error if the light has to come from light frames and
-  // none were recorded, or if `first` lies behind the take's end.
+  // none were recorded, or if `first` lies after the take's end.
   explicit TakeShots(const Take& take, TakeShotsOptions options = {});
 
   // Returns the next shot, or nothing if there are no more.

@@ -1,5 +1,6 @@
-// Takes noise out of a composite with an edge-avoiding wavelet transform on the GPU, guided by the
-// composite's own variance (P26; shaders/README.md, "Denoising").
+// Takes noise out of a composite with an edge-avoiding wavelet transform on the GPU: the more a
+// pixel varies from sample to sample, the more of its neighbours it is averaged with (the paper's
+// feature P26; shaders/README.md, "Denoising").
 //
 // Only what was added to the camera's picture is filtered: composite - (1 - M) Lc. Both worlds
 // therefore get the same weights, the camera's picture keeps its sharpness, and where nothing
@@ -16,7 +17,8 @@
 
 namespace previz::render {
 
-// Returns the highest variance that a composite of this many samples is assumed to have.
+// Returns the least variance that is assumed of a composite of this many samples where it is brighter
+// than `white`: the variance of a few samples, however alike they were.
 float most_sure_variance(float white, std::int64_t samples);
 
 class Denoiser {

@@ -1,6 +1,7 @@
-// Runs the path tracer's passes: generate, then extend, shade and shadow once per segment, then
-// accumulate (shaders/README.md, "The passes"). Paths are kept in compacted queues; a picture is
-// worked on in tiles of whole rows.
+// Adds samples to a picture: runs the path tracer one segment at a time for all paths at once. One
+// pass generates camera rays, then for each segment one finds what the rays hit, one shades it and
+// one traces the shadow rays, and a last one adds up (shaders/README.md, "The passes"). A picture is
+// worked on in tiles of whole rows, and paths that have ended leave the queues.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +18,8 @@ namespace previz::render {
 
 class Wavefront {
  public:
-  // `paths_a_slot` is 2, or 3 where FEATURE_CAMERA may be asked for.
+  // A slot is the place of one sample of one pixel; its path forks where the worlds part. So
+  // `paths_a_slot` is 2, or 3 where FEATURE_CAMERA may be asked for, which forks once more.
   Wavefront(Device& device, int width, int height, std::uint32_t paths_a_slot);
 
   // Uses the scene in these buffers, which must stay where they are, and the pipelines for

@@ -1,5 +1,5 @@
-// Runs one set: keeps mode and recorder, between the buttons and the pipeline, on the main thread's
-// event loop.
+// The running rig: opens a set's cameras, buttons and display, starts the live pipeline and the
+// recorder, and carries out what buttons and bus ask for. All of it on the main thread's event loop.
 #pragma once
 
 #include <cstdint>

@@ -50,10 +50,11 @@ double consistency_gate_px(const PinholeIntrinsics& lens);
 
 // Returns every local minimum that explains the largest number of tags, best (by chi-square) first.
 // Minima with different `used` mean that equally many tags contradict each other. `seed` is a
-// further start beside those of pose_starts. Levenberg-Marquardt runs from each start, first over
-// all tags with a loss that drops tags at odds with the rest (a moved tag), then over the remaining
-// tags with their covariance and a model error of at least 0.03 px, as large as their residuals
-// require. Returns an empty list if no pose explains a tag.
+// further start beside those of pose_starts(). From each start, Levenberg-Marquardt runs twice. The
+// first run is over all tags, with a loss that drops those at odds with the rest (a moved tag). The
+// second is over the remaining ones, weighed by their covariance; to that it adds an error of the
+// model itself, at least 0.03 px, and as much as the residuals show. Returns an empty list if no
+// pose explains a tag.
 std::vector<FittedPose> solve_joint_pose(const std::vector<TagObservation>& tags,
                                          const PinholeIntrinsics& lens,
                                          const std::optional<CameraFromWorld>& seed);

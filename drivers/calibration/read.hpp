@@ -10,12 +10,14 @@
 
 namespace previz::calibration {
 
-// Checks what no key shows alone, and completes draft.calibration by its lens or pose. A key that
-// could not be read is not judged again.
+// Checks what only several keys together show (a response table's length, a lens shorter than its
+// focus), and completes draft.calibration by its lens or pose. Says nothing more of a key that could
+// not be read.
 //
-// The one difference between the formats is a fisheye whose picture folds back within its
-// calibrated angle. Whoever authored it gets an error, and can correct it. A recording has to open
-// for ever, and is used up to the fold (Fisheye::max_angle_rad), which the lighting notes.
+// A fisheye may be described so that beyond some angle the picture runs inwards again ("folds
+// back"). If that angle lies within the calibrated one, a set file is refused, because its author
+// can mend it. A recording has to open for ever: it is used up to that angle
+// (Fisheye::max_angle_rad), and the lighting says so.
 std::vector<KeyFault> check(ObserverDraft& draft, const GivenKeys& given, Format format);
 std::vector<KeyFault> check(LightCameraDraft& draft, const GivenKeys& given, Format format);
 
