@@ -97,14 +97,14 @@ uint meet_surface(inout Flight f, Surface s, vec2 random) {
   return f.vertices < frame.max_depth ? FLIGHT_GOES_ON : FLIGHT_OVER;
 }
 
-// Stores a photon, with the gains of the worlds that it is in, and counts it in its bucket.
+// Stores a photon, with its flux in the worlds that it is in, and counts it in its bucket.
 void store_photon(uint path, Flight f, Surface s) {
   photons[path].position = s.position;
   photons[path].vertices = f.vertices;
   photons[path].direction = f.direction;
   photons[path].normal = s.geometric_normal;
-  photons[path].flux = f.flux;
-  photons[path].gain *= vec2((f.worlds & WORLD_MIXED) != 0u, (f.worlds & WORLD_REAL) != 0u);
+  photons[path].mixed *= (f.worlds & WORLD_MIXED) != 0u ? f.flux : vec3(0.0);
+  photons[path].real *= (f.worlds & WORLD_REAL) != 0u ? f.flux : vec3(0.0);
   atomicAdd(buckets[photon_bucket(photon_cell(s.position))].count, 1u);
 }
 

@@ -13,12 +13,14 @@ void main() {
   bool leaves = false;
   if (photon < frame.photon_count) {
     const Emission e = emit_photon(photon_sampler(photon));
-    const uint worlds = (e.gain.x > 0.0 ? WORLD_MIXED : 0u) | (e.gain.y > 0.0 ? WORLD_REAL : 0u);
+    const uint worlds = (any(greaterThan(e.gain.mixed, vec3(0.0))) ? WORLD_MIXED : 0u) |
+                        (any(greaterThan(e.gain.real, vec3(0.0))) ? WORLD_REAL : 0u);
     leaves = worlds != 0u && any(greaterThan(e.flux, vec3(0.0)));
-    photons[path].vertices = 0u;
-    photons[path].gain = e.gain;
-    photons[path + 1u].vertices = 0u;
-    photons[path + 1u].gain = e.gain;
+    for (uint half_path = path; half_path < path + 2u; ++half_path) {
+      photons[half_path].vertices = 0u;
+      photons[half_path].mixed = e.gain.mixed;
+      photons[half_path].real = e.gain.real;
+    }
     ray_origin[path] = vec4(e.origin, 0.0);
     ray_direction[path] = vec4(e.direction, 1.0);
     path_throughput[path] = vec4(e.flux, uintBitsToFloat(worlds));

@@ -39,9 +39,9 @@ void sort_bucket(uint first, uint count) {
 void write_sorted(uint place) {
   const GpuPhoton p = photons[photon_order[place]];
   sorted_photons[TEXELS_PER_PHOTON * place] = vec4(p.position, float(p.vertices));
-  sorted_photons[TEXELS_PER_PHOTON * place + 1u] = vec4(p.direction, p.gain.x);
-  sorted_photons[TEXELS_PER_PHOTON * place + 2u] = vec4(p.normal, p.gain.y);
-  sorted_photons[TEXELS_PER_PHOTON * place + 3u] = vec4(p.flux, 0.0);
+  sorted_photons[TEXELS_PER_PHOTON * place + 1u] = vec4(p.direction, p.mixed.r);
+  sorted_photons[TEXELS_PER_PHOTON * place + 2u] = vec4(p.normal, p.mixed.g);
+  sorted_photons[TEXELS_PER_PHOTON * place + 3u] = vec4(p.mixed.b, p.real);
 }
 
 void main() {

@@ -55,12 +55,12 @@ void store_path(Path p, uint index) {
 bool is_caustic(Path p) { return p.rough && p.pdf <= 0.0; }
 
 // Returns whether light with this gain is equal in both worlds of the path and so cancels.
-bool cancels(Path p, vec2 gain) {
-  return p.difference && p.worlds == WORLD_BOTH && gain.x == gain.y;
+bool cancels(Path p, Gain gain) {
+  return p.difference && p.worlds == WORLD_BOTH && gain.mixed == gain.real;
 }
 
-void receive(Path p, vec3 radiance, vec2 gain) {
-  add_radiance(p.slot, p.worlds, p.landed, radiance, gain);
+void receive(Path p, vec3 radiance, Gain gain) {
+  add_pair(p.slot, p.worlds, p.landed, radiance * gain.mixed, radiance * gain.real);
 }
 
 // Returns the weight of the power heuristic with exponent 2 (Veach 1997, section 9.2). pdf = 0
@@ -74,25 +74,26 @@ float mis_weight(float pdf, float other) {
 // Adds the lights without a mesh that the ray crosses before its hit. They block nothing.
 void meet_lights(Path p, float t_hit) {
   for (uint i = 0u; i < frame.visible_light_count; ++i) {
-    if (cancels(p, lights[i].gain)) continue;
+    const Gain gain = gain_of(lights[i]);
+    if (cancels(p, gain)) continue;
     float pdf;
     const float t = meet_light(lights[i], p.origin, p.direction, pdf);
     if (t < 0.0 || t <= p.t_min || t > t_hit) continue;
     const float other = (1.0 - frame.environment_selection) * lights[i].selection * pdf;
-    receive(p, p.throughput * lights[i].emission * mis_weight(p.pdf, other), lights[i].gain);
+    receive(p, p.throughput * lights[i].emission * mis_weight(p.pdf, other), gain);
   }
 }
 
 void meet_environment(Path p) {
-  if (cancels(p, vec2(1.0))) return;
+  if (cancels(p, EQUAL_GAIN)) return;
   float weight = 1.0;
   if (has_feature(FEATURE_ENVIRONMENT_SAMPLING) && p.pdf > 0.0)
     weight = mis_weight(p.pdf, frame.environment_selection * environment_pdf(p.direction));
-  receive(p, p.throughput * environment_radiance(p.direction) * weight, vec2(1.0));
+  receive(p, p.throughput * environment_radiance(p.direction) * weight, EQUAL_GAIN);
 }
 
 void meet_emission(Path p, Surface s, GpuHit hit) {
-  if (all(equal(s.emission, vec3(0.0))) || cancels(p, vec2(1.0))) return;
+  if (all(equal(s.emission, vec3(0.0))) || cancels(p, EQUAL_GAIN)) return;
   float weight = 1.0;
   const uint first = instances[hit.instance].first_light;
   if (has_feature(FEATURE_LIGHTS) && p.pdf > 0.0 && first != NO_INDEX) {
@@ -100,7 +101,7 @@ void meet_emission(Path p, Surface s, GpuHit hit) {
     const float pdf = triangle_pdf(light, p.direction, hit.t);
     weight = mis_weight(p.pdf, (1.0 - frame.environment_selection) * light.selection * pdf);
   }
-  receive(p, p.throughput * s.emission * weight, vec2(1.0));
+  receive(p, p.throughput * s.emission * weight, EQUAL_GAIN);
 }
 
 // If less than this part of bound_share would suffice, the objects are left to the BSDF, which
@@ -162,7 +163,7 @@ bool sample_direction(Technique t, Surface s, Lobes l, vec2 u, float choice, out
 // Samples the environment or a light as seen from a point; `selection` is the probability with
 // which it was picked.
 bool choose_light(vec3 point, vec2 u, out LightSample light, out float selection) {
-  light = LightSample(vec3(0.0), 3.4e38, vec3(0.0), 0.0, vec2(1.0));
+  light = LightSample(vec3(0.0), 3.4e38, vec3(0.0), 0.0, EQUAL_GAIN);
   selection = frame.environment_selection;
   if (has_feature(FEATURE_LIGHTS) && !choose(u.x, selection)) {
     if (frame.light_count == 0u) return false;
@@ -202,17 +203,19 @@ bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, out GpuS
   ray.direction = light.direction;
   ray.t_max = light.t_max;
   ray.slot_and_worlds = (p.slot << 3) | (p.landed ? 4u : 0u) | p.worlds;
-  ray.contribution = p.throughput * value * light.radiance * (weight / pdf);
-  ray.gain = light.gain;
+  const vec3 contribution = p.throughput * value * light.radiance * (weight / pdf);
+  ray.mixed = (p.worlds & WORLD_MIXED) != 0u ? contribution * light.gain.mixed : vec3(0.0);
+  ray.real = (p.worlds & WORLD_REAL) != 0u ? contribution * light.gain.real : vec3(0.0);
   if (cancels(p, light.gain) && !meets_bounds(ray.origin, ray.direction, ray.t_max)) return false;
-  return any(notEqual(ray.contribution, vec3(0.0)));  // NaN is kept, to be counted
+  // NaN is kept, to be counted.
+  return any(notEqual(ray.mixed, vec3(0.0))) || any(notEqual(ray.real, vec3(0.0)));
 }
 
 // Adds caustics by photons. Both worlds sum the same photons in the same order, so that the sums
 // are equal wherever the photons are.
 void meet_photons(Path p, Surface s, Lobes l) {
   if (!is_rough(l)) return;
-  const bool differing = cancels(p, vec2(1.0));
+  const bool differing = cancels(p, EQUAL_GAIN);
   const GatheredPair gathered = gather_photons(s, l, frame.max_depth - p.depth - 1u, differing);
   add_pair(p.slot, p.worlds, p.landed, p.throughput * gathered.mixed, p.throughput * gathered.real);
 }
@@ -275,7 +278,7 @@ void count_unmeasured() {
 // path that is in the mixed world takes it as well and continues, once, for the difference of the
 // worlds at that point.
 bool meet_measured(inout Path p, Surface s, GpuHit hit) {
-  const bool is_needed = p.worlds == WORLD_REAL || !(p.landed || cancels(p, vec2(1.0)));
+  const bool is_needed = p.worlds == WORLD_REAL || !(p.landed || cancels(p, EQUAL_GAIN));
   if (p.depth == 0u || !is_needed || (instances[hit.instance].presence & WORLD_REAL) == 0u)
     return false;
   vec3 radiance;
@@ -285,7 +288,7 @@ bool meet_measured(inout Path p, Surface s, GpuHit hit) {
     return false;
   }
   count_measured();
-  receive(p, p.throughput * radiance, vec2(1.0));
+  receive(p, p.throughput * radiance, EQUAL_GAIN);
   if (p.worlds == WORLD_REAL) return true;
   p.worlds = WORLD_BOTH;
   p.difference = true;

@@ -11,6 +11,6 @@ void main() {
   const GpuShadowRay ray = shadow_rays[gl_GlobalInvocationID.x];
   const uint worlds = ray.slot_and_worlds & 3u;
   const vec2 through = light_through(ray.origin, ray.direction, ray.t_max, worlds);
-  add_radiance(ray.slot_and_worlds >> 3, worlds, (ray.slot_and_worlds & 4u) != 0u,
-               ray.contribution, ray.gain * through);
+  add_pair(ray.slot_and_worlds >> 3, worlds, (ray.slot_and_worlds & 4u) != 0u,
+           ray.mixed * through.x, ray.real * through.y);
 }

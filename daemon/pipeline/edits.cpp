@@ -67,7 +67,7 @@ session::SceneState scene_state(const set::Set& set, const Edits& edits, const M
     if (!light.carrier.empty()) carry(*now, *frame);
     if (!is_edited) continue;
     now->gain_mixed *= std::exp2(edit->second.stops);
-    now->tint = tint(edit->second);
+    now->tint *= tint(edit->second);
   }
   return state;
 }

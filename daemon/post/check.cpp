@@ -164,8 +164,7 @@ void remark_on_scene(Checked& checked, const scene::Scene& scene) {
     return std::ranges::find(checked.set.objects, presence, &set::Object::presence) !=
            checked.set.objects.end();
   };
-  const bool relit = std::ranges::any_of(
-      scene.lights, [](const set::Light& light) { return light.gain_mixed != light.gain_real; });
+  const bool relit = std::ranges::any_of(scene.lights, &set::Light::is_relit);
   if (!has(set::Presence::virtual_object) && !has(set::Presence::removed) && !relit)
     checked.remarks.push_back(
         "nothing is virtual, removed or relit: the picture will be the camera's own");
@@ -241,15 +240,19 @@ void print_lights(const set::Set& set, const scene::Scene& scene, std::ostream& 
   if (lighting.mode == set::LightMode::hybrid)
     out << "    its lamps light the set, and the rest as a picture\n";
   for (const auto& light : scene.lights) {
-    const char* change = light.gain_real == 0                  ? "added"
-                         : light.gain_mixed == light.gain_real ? "as it is"
-                         : light.gain_mixed == 0               ? "taken away"
-                         : light.gain_mixed < light.gain_real  ? "dimmed"
-                                                               : "brightened";
+    const char* change = light.gain_real == 0                 ? "added"
+                         : !light.is_relit()                  ? "as it is"
+                         : light.gain_mixed == 0              ? "taken away"
+                         : light.gain_mixed < light.gain_real ? "dimmed"
+                         : light.gain_mixed > light.gain_real ? "brightened"
+                                                              : "tinted";
     out << "  " << (light.name.empty() ? "(no name)" : light.name) << ": "
         << set::name_of(light.type) << ", " << change
         << words(", gain ", light.gain_mixed, " in the picture, ", light.gain_real,
-                 " in the real scene\n");
+                 " in the real scene");
+    if (light.tint != glm::dvec3(1))
+      out << words(", tint ", light.tint.r, " ", light.tint.g, " ", light.tint.b);
+    out << '\n';
   }
 }
 

@@ -90,9 +90,7 @@ constexpr std::array<Feature, 19> feature_table = {{
     {.name = "relighting",
      .in_frame =
          [](bool, const Demand& d) {
-           return std::ranges::any_of(d.scene.lights, [](const set::Light& light) {
-             return light.gain_mixed != light.gain_real;
-           });
+           return std::ranges::any_of(d.scene.lights, &set::Light::is_relit);
          },
      .used = "a lamp is added, taken away, dimmed, brightened or tinted",
      .left_out = "every lamp shines in the picture as it does on the stage"},

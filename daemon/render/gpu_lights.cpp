@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numbers>
 
@@ -34,9 +35,12 @@ std::uint32_t gpu_type(set::LightType type) {
   return gpu::LIGHT_POINT;
 }
 
+// The power is that of the world and the channel in which the lamp's gain is largest, so that what
+// changes in a single channel is sampled, too.
 double power(const gpu::GpuLight& light, double scene_radius) {
   const double emission = (light.emission.r + light.emission.g + light.emission.b) / 3.0;
-  const double gain = std::max(light.gain.x, light.gain.y);
+  const glm::vec3 gains = glm::max(light.gain_mixed, light.gain_real);
+  const double gain = std::max({gains.r, gains.g, gains.b});
   const double area = glm::length(glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v)));
   const double disc = pi * scene_radius * scene_radius;
   switch (light.type) {
@@ -86,7 +90,8 @@ gpu::GpuLight encode_light(const set::Light& light, const glm::dvec3& camera_pos
   result.position = glm::vec3(light.position - camera_position);
   result.direction = glm::vec3(glm::normalize(light.direction));
   result.emission = glm::vec3(light.emission);
-  result.gain = glm::vec2(light.gain_mixed, light.gain_real);
+  result.gain_mixed = glm::vec3(light.gain_mixed * light.tint);
+  result.gain_real = glm::vec3(static_cast<float>(light.gain_real));
   result.radius = static_cast<float>(light.radius_m);
   result.emission_texture = gpu::NO_INDEX;
   result.alpha_material = gpu::NO_INDEX;
@@ -133,8 +138,8 @@ std::vector<gpu::GpuLight> encode_emitter(const scene::Instance& instance, const
     light.direction =
         doubled_area > 0 ? glm::vec3(normal / doubled_area) : glm::vec3(0.0f, 0.0f, 1.0f);
     light.emission = material.emission;
-    light.gain = glm::vec2((instance.presence & scene::world_mixed) != 0 ? 1 : 0,
-                           (instance.presence & scene::world_real) != 0 ? 1 : 0);
+    light.gain_mixed = glm::vec3((instance.presence & scene::world_mixed) != 0 ? 1 : 0);
+    light.gain_real = glm::vec3((instance.presence & scene::world_real) != 0 ? 1 : 0);
     light.emission_texture = material.emission_texture;
     light.alpha_material =
         material.alpha_mode == scene::AlphaMode::opaque ? gpu::NO_INDEX : instance.material;

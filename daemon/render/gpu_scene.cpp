@@ -259,8 +259,9 @@ void GpuScene::upload_lights(const glm::dvec3& camera_position) {
   light_count_ = static_cast<std::uint32_t>(lights.size());
   light_power_ = select_by_power(lights, scene_radius_);
   light_spread_ = spread_of(lights, scene_radius_);
-  lights_differ_ = std::any_of(lights.begin(), lights.end(),
-                               [](const auto& light) { return light.gain.x != light.gain.y; });
+  lights_differ_ = std::any_of(lights.begin(), lights.end(), [](const auto& light) {
+    return light.gain_mixed != light.gain_real;
+  });
   auto next = static_cast<std::uint32_t>(all_lamps.size());
   for (const std::uint32_t i : emitters_) {
     first_light_[i] = next;

@@ -58,25 +58,18 @@ void take_away_object(const Scene& scene, std::size_t object, Placement& placeme
     if (scene.light_objects[i] == object) put_out(placement.lights[i]);
 }
 
-void relight(set::Light& light, const session::LightState& state, std::vector<set::Light>& more) {
+void relight(set::Light& light, const session::LightState& state) {
   light.position = state.position;
   light.direction = state.direction;
   light.up = state.up;
   light.gain_mixed = state.gain_mixed;
-  if (state.tint == glm::dvec3(1)) return;
-  if (light.gain_real > 0) {
-    set::Light real = light;
-    real.gain_mixed = 0;
-    more.push_back(real);
-    light.gain_real = 0;
-  }
-  light.emission *= state.tint;
+  light.tint = state.tint;
 }
 
 }  // namespace
 
 session::LightState state_of(const set::Light& light) {
-  return {light.position, light.direction, light.up, light.gain_mixed, glm::dvec3(1)};
+  return {light.position, light.direction, light.up, light.gain_mixed, light.tint};
 }
 
 Placement place(const Scene& scene, const set::Set& set, const session::SceneState& state) {
@@ -98,7 +91,6 @@ Placement place(const Scene& scene, const set::Set& set, const session::SceneSta
   }
   // The set's own lamps are the last of the scene's.
   const std::size_t first = scene.lights.size() - set.lights.size();
-  std::vector<set::Light> more;
   for (const auto& [name, light] : state.lights) {
     const auto found = std::ranges::find(set.lights, name, &set::Light::name);
     if (found == set.lights.end()) {
@@ -108,11 +100,10 @@ Placement place(const Scene& scene, const set::Set& set, const session::SceneSta
     set::Light& placed =
         placement.lights[first + static_cast<std::size_t>(found - set.lights.begin())];
     if (light)
-      relight(placed, *light, more);
+      relight(placed, *light);
     else
       put_out(placed);
   }
-  placement.lights.insert(placement.lights.end(), more.begin(), more.end());
   return placement;
 }
 

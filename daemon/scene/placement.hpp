@@ -19,8 +19,8 @@ struct Placement {
 };
 
 // `scene` is load_scene(set). An object takes its own lamps along. Whatever the state does not name
-// stays as it was, bit for bit; whatever the state says is nowhere is in neither world. A tint
-// applies to the mixed world only: a lamp that also shines in the real one is split in two.
+// stays as it was, bit for bit; whatever the state says is nowhere is in neither world. Gain
+// and tint of a lamp apply to the mixed world only.
 Placement place(const Scene& scene, const set::Set& set, const session::SceneState& state);
 
 // Returns the lamp's state as the set has it, which changes nothing.

@@ -90,7 +90,8 @@ struct Surface {
 };
 
 // A lamp of the set. Gains scale its emission in the mixed and in the real world: an added light is
-// (1,0), a real light that stays is (1,1), a dimmed one (g,1).
+// (1,0), a real light that stays is (1,1), a dimmed one (g,1). In the mixed world the tint scales
+// each channel besides.
 struct Light {
   std::string name;
   LightType type = LightType::point;
@@ -105,7 +106,11 @@ struct Light {
   double angular_radius_rad = 0;     // directional: 0 is a delta light
   double inner_cone_rad = 0, outer_cone_rad = std::numbers::pi / 4;  // spot, half angles
   double gain_mixed = 1, gain_real = 0;
+  glm::dvec3 tint{1};
   std::string carrier;  // carrier that it is fixed to; empty: fixed in the world
+
+  // Returns whether the lamp shines differently in the two worlds.
+  bool is_relit() const { return gain_mixed * tint != glm::dvec3(gain_real); }
 };
 
 enum class UnseenRule { constant, horizon, mirror, observer };

@@ -191,6 +191,7 @@ Keys light_keys(Light& l) {
       {"carrier", &l.carrier, plain, "Carrier of a [[tag]] that it is attached to: it moves along, and its pose is relative to the carrier.", optional("\"stick\"")},
       {"gain_mixed", &l.gain_mixed, plain.at_least(0), "Brightness in the composite: 1 as it is, 0 off, 0.3 dimmed to 30 %."},
       {"gain_real", &l.gain_real, plain.at_least(0), "Brightness on the real set: 1 for a real lamp, 0 for one that is added."},
+      {"tint", &l.tint, plain.at_least(0), "Colour of its light in the composite over that on the real set: one factor for each of red, green and blue.", optional("[1.0, 0.8, 0.6]")},
   };
 }
 
@@ -358,7 +359,7 @@ std::vector<Section> sections(Draft& d) {
       many("tag", "A printed tag; one table for each. Its pose is given in one of three forms.", d.tags, tag_keys),
       many("object", "A piece of geometry, real or virtual; one table for each.", d.objects, object_keys),
       many("surface", "The colour of a real surface, where it is known better than by the model; one table for each.", d.surfaces, [](SurfaceDraft& s) { return surface_keys(s.surface); }),
-      many("light", "A lamp that is added, or a real one whose brightness is changed; one table for each. To change the colour of a real lamp, switch it off with gain_mixed = 0 and add another lamp in its place.", d.lights, [](LightDraft& l) { return light_keys(l.light); }),
+      many("light", "A lamp that is added, or a real one whose brightness or colour is changed; one table for each.", d.lights, [](LightDraft& l) { return light_keys(l.light); }),
       once("lighting", always, "The light on the set.", [&d] { return lighting_keys(d); }),
       once("lighting.room", optional, "The room, if the lamps and walls are near: the light camera's picture is projected onto its walls, and the set sees them from where it is. Without this table, light comes from far away.", [&d] { return room_keys(d); }),
       once("lighting.sources", always, "How lamps are found in the light camera's picture, with mode = \"sources\" or \"hybrid\".", [&d] { return light_sources_keys(d.set.lighting.sources); }),

@@ -11,7 +11,8 @@
 // sorted_photons and buckets, because texel buffers are read faster on lavapipe.
 //
 // RGBA32F, TEXELS_PER_PHOTON texels a photon, those of a bucket together: position, Dirac vertices;
-// direction, gain in the mixed world; normal, gain in the real world; flux.
+// direction; normal; flux in the real world. The fluxes of red, green and blue in the mixed world
+// are the fourth components of the second and third texel and the first one of the fourth.
 uniform textureBuffer found_photons;
 uniform utextureBuffer found_buckets;  // RG32UI: first photon, number of photons
 
@@ -38,15 +39,16 @@ void gather_photon(uint photon, vec4 position, Surface s, Lobes l, uint most_ver
   // The side from which the photon came is left to the BSDF: rough glass accepts both.
   if (abs(dot(normal.xyz, s.geometric_normal)) < SAME_SURFACE_COS) return;
   const vec4 direction = texelFetch(found_photons, first + 1);
-  if (differing && direction.w == normal.w) return;
+  const vec4 fluxes = texelFetch(found_photons, first + 3);
+  const vec3 mixed = vec3(direction.w, normal.w, fluxes.x);
+  const vec3 real = fluxes.yzw;
+  if (differing && mixed == real) return;
   const float cos_geometric = -dot(direction.xyz, normal.xyz);
   float pdf;
   const vec3 value = bsdf_evaluate(s, l, -direction.xyz, pdf);
   if (pdf <= 0.0 || cos_geometric <= 0.0) return;
-  const vec3 flux = texelFetch(found_photons, first + 3).rgb;
-  const vec3 radiance = value * flux * (closeness / cos_geometric);
-  sum.mixed += radiance * direction.w;
-  sum.real += radiance * normal.w;
+  sum.mixed += value * mixed * (closeness / cos_geometric);
+  sum.real += value * real * (closeness / cos_geometric);
 }
 
 // Returns whether the disc can reach into a cell, by comparing the distance of the disc's plane

@@ -3,15 +3,18 @@
 #define PREVIZ_LIGHT_GLSL
 
 #include "shaders/lib/bsdf.glsl"
+#include "shaders/lib/path.glsl"
 
 layout(scalar) readonly buffer Lights { GpuLight lights[]; };
+
+Gain gain_of(GpuLight light) { return Gain(light.gain_mixed, light.gain_real); }
 
 struct LightSample {
   vec3 direction;  // unit, from the point towards the light
   float t_max;     // only a nearer surface blocks the light
   vec3 radiance;   // Le; for a delta light its irradiance on a plane that faces it
   float pdf;       // per steradian; 0 for a delta light
-  vec2 gain;
+  Gain gain;
 };
 
 // A shadow ray ends at this share of the distance, so that it does not meet the light's own
@@ -96,7 +99,7 @@ bool sample_area(GpuLight light, vec3 point, vec3 on_light, vec3 normal, float a
 
 // Samples a light as it is seen from a point; false if it does not shine there.
 bool sample_light(GpuLight light, vec3 point, vec2 u, out LightSample result) {
-  result = LightSample(vec3(0.0), 3.4e38, light.emission, 0.0, light.gain);
+  result = LightSample(vec3(0.0), 3.4e38, light.emission, 0.0, gain_of(light));
   switch (light.type) {
     case LIGHT_POINT:
     case LIGHT_SPOT: {

@@ -77,6 +77,14 @@ uint path_slot(uint path) {
                                                                   : path >> 1;
 }
 
+// The factors by which emission is scaled in each world.
+struct Gain {
+  vec3 mixed;
+  vec3 real;
+};
+// The gain of what shines in both worlds alike.
+const Gain EQUAL_GAIN = Gain(vec3(1.0), vec3(1.0));
+
 // Adds light to the radiance of the worlds that a path is in. Of a slot's paths only one is in each
 // world, and the real part of a landed path has a sum of its own, so no two invocations write the
 // same value.
@@ -87,9 +95,6 @@ void add_pair(uint slot, uint worlds, bool landed, vec3 mixed, vec3 real) {
     sample_landed[slot].rgb += real;
   else
     sample_real[slot].rgb += real;
-}
-void add_radiance(uint slot, uint worlds, bool landed, vec3 radiance, vec2 gain) {
-  add_pair(slot, worlds, landed, radiance * gain.x, radiance * gain.y);
 }
 
 #endif

@@ -15,7 +15,7 @@ struct Emission {
   vec3 origin;
   vec3 direction;
   vec3 flux;  // watts: radiance, intensity or irradiance over the sample's density
-  vec2 gain;
+  Gain gain;
 };
 
 vec4 specular_bound(uint i) { return bounds[frame.bound_count + i]; }
@@ -89,7 +89,7 @@ Emission emit_environment(Sampler random, vec2 choice) {
   float area;
   const vec3 to_light = environment_sample(sample_2d(random, PAIR_ON_LIGHT), pdf);
   const vec3 origin = aim_along(to_light, choice.y, sample_2d(random, PAIR_AIM), area);
-  return Emission(origin, -to_light, environment_radiance(to_light) * (area / pdf), vec2(1.0));
+  return Emission(origin, -to_light, environment_radiance(to_light) * (area / pdf), EQUAL_GAIN);
 }
 
 Emission emit_directional(GpuLight light, Sampler random, vec2 choice) {
@@ -101,7 +101,7 @@ Emission emit_directional(GpuLight light, Sampler random, vec2 choice) {
   }
   float area;
   const vec3 origin = aim_along(to_light, choice.y, sample_2d(random, PAIR_AIM), area);
-  return Emission(origin, -to_light, flux * area, light.gain);
+  return Emission(origin, -to_light, flux * area, gain_of(light));
 }
 
 // Emits from a point of a light's surface; a two-sided light emits on the side of the direction.
@@ -114,7 +114,8 @@ Emission emit_surface(GpuLight light, Sampler random, vec2 choice, vec3 at, vec3
   cosine = two_sided ? abs(cosine) : max(cosine, 0.0);
   const vec3 reach = abs(at) + abs(light.edge_u) + abs(light.edge_v);
   const float clear = 1e-6 * (reach.x + reach.y + reach.z);
-  return Emission(at + clear * side, direction, radiance * (cosine * area / pdf), light.gain);
+  return Emission(at + clear * side, direction, radiance * (cosine * area / pdf),
+                  gain_of(light));
 }
 
 Emission emit_light(GpuLight light, Sampler random, vec2 choice) {
@@ -125,7 +126,8 @@ Emission emit_light(GpuLight light, Sampler random, vec2 choice) {
       float pdf;
       const vec3 direction = aim_from(light.position, choice.y, sample_2d(random, PAIR_AIM), pdf);
       const float falloff = spot_falloff(light, dot(direction, light.direction));
-      return Emission(light.position, direction, light.emission * (falloff / pdf), light.gain);
+      return Emission(light.position, direction, light.emission * (falloff / pdf),
+                      gain_of(light));
     }
     case LIGHT_DIRECTIONAL:
       return emit_directional(light, random, choice);

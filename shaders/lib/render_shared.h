@@ -77,8 +77,10 @@ struct GpuShadowRay {
   float t_max;
   vec3 direction;
   uint slot_and_worlds;  // slot << 3 | landed << 2 | WORLD_*
-  vec3 contribution;     // throughput * f * cos * Le / pdf * MIS weight
-  vec2 gain;             // emission gain in the (mixed, real) world
+  // What arrives in each world if nothing blocks it: throughput * f * cos * Le / pdf * MIS weight,
+  // times the lamp's gain there.
+  vec3 mixed;
+  vec3 real;
 };
 
 // A photon that arrived, by way of Dirac lobes only, at a surface with a lobe that is not Dirac.
@@ -87,8 +89,10 @@ struct GpuPhoton {
   uint vertices;   // Dirac vertices on its way; 0: it was not stored
   vec3 direction;  // unit, in which it travelled
   vec3 normal;     // geometric, on the side from which it arrived
-  vec3 flux;       // watts, not yet divided by the number of photons of the pass
-  vec2 gain;       // in the (mixed, real) world
+  // Its flux in each world: watts, not yet divided by the number of photons of the pass. Until the
+  // photon is stored these are the gains of its lamp.
+  vec3 mixed;
+  vec3 real;
 };
 
 struct GpuPhotonBucket {
@@ -201,8 +205,9 @@ struct GpuLight {
   float cos_outer; // spot
   vec3 emission;   // intensity, irradiance (directional delta) or radiance
   float cone_sr;   // directional: solid angle of its disc, 0 for a delta light
-  vec2 gain;       // (mixed, real)
+  vec3 gain_mixed; // factors of the emission in each world
   float selection; // probability that a light sample picks this light
+  vec3 gain_real;
   float cdf;       // sum of selection up to and including this light
   vec2 uv0, uv1, uv2;  // triangle: texture coordinates
   uint emission_texture;
@@ -272,18 +277,18 @@ struct GpuShow {
 static_assert(sizeof(GpuDenoise) == 16);
 static_assert(sizeof(GpuShow) == 44);
 static_assert(sizeof(GpuHit) == 20);
-static_assert(sizeof(GpuShadowRay) == 52);
+static_assert(sizeof(GpuShadowRay) == 56);
 static_assert(sizeof(GpuPixel) == 144);
 static_assert(sizeof(GpuControl) == 92);
 static_assert(sizeof(GpuInstance) == 112);
 static_assert(sizeof(GpuMaterial) == 84);
 static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
-static_assert(sizeof(GpuLight) == 128);
-static_assert(offsetof(GpuLight, uv0) == 96);
+static_assert(sizeof(GpuLight) == 144);
+static_assert(offsetof(GpuLight, uv0) == 112);
 static_assert(sizeof(GpuFrame) == 188);
 static_assert(sizeof(GpuBatch) == 28);
-static_assert(sizeof(GpuPhoton) == 60);
+static_assert(sizeof(GpuPhoton) == 64);
 static_assert(sizeof(GpuPhotonBucket) == 8);
 }  // namespace previz::gpu
 #endif

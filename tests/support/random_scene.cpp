@@ -201,6 +201,9 @@ View random_scene(std::uint32_t seed, const RandomScene& options) {
   add_instance(view.scene, table, table_material, glm::translate(glm::dmat4(1.0), {0, 0, -0.015}));
   add_objects(view.scene, random, seed, options);
   for (int i = 0; i < options.lights; ++i) view.scene.lights.push_back(random_light(random));
+  Random tints(seed + 1);  // numbers of their own, so that the rest of the view stays as it is
+  if (options.tinted)
+    for (set::Light& light : view.scene.lights) light.tint = glm::dvec3(tints.color(0.2, 1.6));
   view.environment = random_environment(random, options.environment_size);
 
   const double azimuth = random.uniform(0, 2 * pi);

@@ -73,6 +73,7 @@ struct RandomScene {
   int real_objects = 4, virtual_objects = 4;  // together at most 12
   int removed_objects = 0;                    // further objects, in the real world only
   int lights = 0;                             // further set lights, of random types and gains
+  bool tinted = false;                        // each set light has another colour when mixed
   bool lens = false;                          // thin lens focused on the table's centre
   int environment_size = 64;
 };

@@ -45,7 +45,8 @@ std::vector<set::Light> placed_lamps(const scene::Scene& scene, const glm::dvec3
   std::vector<set::Light> lamps = scene.lights;
   for (set::Light& lamp : lamps) {
     lamp.position -= origin;
-    lamp.emission *= world == scene::world_mixed ? lamp.gain_mixed : lamp.gain_real;
+    lamp.emission *=
+        world == scene::world_mixed ? lamp.gain_mixed * lamp.tint : glm::dvec3(lamp.gain_real);
   }
   std::erase_if(lamps, [](const set::Light& lamp) { return lamp.emission == glm::dvec3(0); });
   return lamps;

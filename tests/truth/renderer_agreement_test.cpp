@@ -130,9 +130,12 @@ View alone(View view, std::uint32_t world) {
   std::erase_if(view.scene.instances,
                 [world](const auto& instance) { return (instance.presence & world) == 0; });
   for (scene::Instance& instance : view.scene.instances) instance.presence = scene::world_both;
-  for (set::Light& light : view.scene.lights)
+  for (set::Light& light : view.scene.lights) {
+    if (world == scene::world_mixed) light.emission *= light.tint;
+    light.tint = glm::dvec3(1);
     light.gain_mixed = light.gain_real =
         world == scene::world_mixed ? light.gain_mixed : light.gain_real;
+  }
   return view;
 }
 
@@ -149,6 +152,28 @@ TEST_P(SeparateRenders, ShowWhatOneRunShows) {
   EXPECT_TRUE(in_mixed.agree) << "mixed: " << in_mixed.report();
   const truth::Agreement in_real = truth::agreement(pair.real, real.real);
   EXPECT_TRUE(in_real.agree) << "real: " << in_real.report();
+}
+
+// Lamps that are real, dimmed or added, each in a colour of its own when mixed.
+class TintedSets : public RandomSets {
+ protected:
+  static View view() {
+    RandomScene options;
+    options.width = 64;
+    options.height = 48;
+    options.lights = 3;
+    options.tinted = true;
+    return random_scene(GetParam(), options);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Seeds, TintedSets, ::testing::Values(21u, 22u, 23u));
+
+TEST_P(TintedSets, AgreeWithTheCpuTracer) {
+  expect_agreement(view(), 16, true);
+}
+
+TEST_P(TintedSets, HaveTheSameDifferenceByBothEstimators) {
+  expect_same_difference(view(), 16, true);
 }
 
 // Patches of normals up to half a radian off.

@@ -241,6 +241,20 @@ TEST(MirrorCaustic, OfADimmedLamp) {
   EXPECT_NEAR(measured.mixed.g, 0.25 * measured.real.g, 1e-6 * measured.real.g);
 }
 
+// A lamp of another colour throws an image of that colour there, likewise.
+TEST(MirrorCaustic, OfATintedLamp) {
+  View view = mirror_and_floor();
+  set::Light light = lamp(set::LightType::point);
+  light.tint = {2, 0.5, 0};
+  view.scene.lights.push_back(light);
+  const Measured measured = measure(view, photon_estimation());
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(measured.mixed[c], light.tint[c] * measured.real[c], 1e-6 * measured.real[c]);
+  // The photons bring a good part of it.
+  const auto direct = [&](const glm::dvec3& p) { return point_irradiance(light, p); };
+  EXPECT_GT(measured.real.g, 1.1 * expected_mean(view, direct, false).g);
+}
+
 // A glass ball under a wide lamp: what photons bring is what paths bring that happen to find it, in
 // total over the picture. Gathering moves light over a disc, so what the ball hides of the floor
 // weighs on the total with the radius over the ball's, squared: 0.5 % of the caustic, itself 2 %.

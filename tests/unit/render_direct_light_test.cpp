@@ -1,6 +1,7 @@
 // Direct light of every kind of lamp on a Lambert plane, against closed forms.
 #include <numbers>
 
+#include "daemon/scene/placement.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test {
@@ -134,6 +135,27 @@ TEST(DirectLight, EmissiveMeshIsTheSameAsARectangle) {
   expect_radiance(view, albedo * colour * 4.0 * corner_form_factor(0.6, 0.4, 1.5), 1e-3);
 }
 
+TEST(DirectLight, ATintScalesTheMixedWorldChannelByChannel) {
+  View view = lit_point(albedo);
+  set::Light light = lamp(set::LightType::point, colour);
+  light.position = {0, 0, 2};
+  light.gain_mixed = 0.5;
+  light.tint = {2, 0.5, 0};
+  view.scene.lights.push_back(light);
+  for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
+    set::Estimation estimation;
+    estimation.estimator = estimator;
+    const Rendered result = render_clean(view, 4, estimation);
+    for (int c = 0; c < 3; ++c) {
+      const double full = albedo / pi * colour[c] / 4;
+      EXPECT_NEAR(mean(result.layers.diff)[c] / full, 0.5 * light.tint[c] - 1, 1e-3);
+      if (estimator == set::Estimator::difference) continue;
+      EXPECT_NEAR(mean(result.layers.mixed)[c] / full, 0.5 * light.tint[c], 1e-3);
+      EXPECT_NEAR(mean(result.layers.real)[c] / full, 1, 1e-3);
+    }
+  }
+}
+
 TEST(DirectLight, AGainScalesItsWorldOnly) {
   View view = lit_point(albedo);
   set::Light light = lamp(set::LightType::point, colour);
@@ -164,6 +186,47 @@ TEST(DirectLight, ARecolouredLampIsOneTakenAwayAndOneAdded) {
   for (int c = 0; c < 3; ++c) {
     EXPECT_NEAR(mean(layers.mixed)[c] / (brought * light.emission[c]), 1, 4 * error + 1e-3);
     EXPECT_NEAR(mean(layers.real)[c] / (brought * colour[c]), 1, 4 * error + 1e-3);
+  }
+}
+
+// The crew's tint of a real lamp, as live and offline apply it. Another lamp shines as well, so
+// that light samples have a choice between them.
+View tinted(const glm::dvec3& tint, double gain) {
+  View view = lit_point(albedo);
+  set::Light light = lamp(set::LightType::point, colour);
+  light.name = "fill";
+  light.position = {1, 1, 2};
+  view.scene.lights.push_back(light);
+  light.name = "key";
+  light.position = {0, 0, 2};
+  view.scene.lights.push_back(light);
+  set::Set set;
+  set.lights = view.scene.lights;
+  session::SceneState state;
+  state.lights["key"] = scene::state_of(light);
+  state.lights["key"]->gain_mixed = gain;
+  state.lights["key"]->tint = tint;
+  view.scene.lights = scene::place(view.scene, set, state).lights;
+  return view;
+}
+
+// Where a lamp is 7 % redder, nothing may be noisier than where it is 7 % brighter: the red channel
+// is the same to the last bit, and the others do not differ between the worlds at all.
+TEST(DirectLight, ATintIsNoNoisierThanAGain) {
+  for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
+    set::Estimation estimation = up_to_depth(1);
+    estimation.estimator = estimator;
+    const render::Layers gained = render_clean(tinted(glm::dvec3(1), 1.07), 16, estimation).layers;
+    const render::Layers tint =
+        render_clean(tinted(glm::dvec3(1.07, 1, 1), 1), 16, estimation).layers;
+    for (std::size_t i = 0; i < tint.diff.size(); ++i) {
+      ASSERT_EQ(tint.diff[i].r, gained.diff[i].r) << i;
+      ASSERT_EQ(tint.diff[i].g, 0) << i;
+      ASSERT_EQ(tint.diff[i].b, 0) << i;
+    }
+    // The key brings E = I / d^2 to the plane; a half of the samples is the key's, more or less.
+    const double expected = 0.07 * albedo / pi * colour.r / 4;
+    EXPECT_NEAR(mean(tint.diff).r / expected, 1, 0.01);
   }
 }
 

@@ -52,7 +52,7 @@ gpu::GpuLight shining(std::uint32_t type) {
   gpu::GpuLight light{};
   light.type = type;
   light.emission = glm::vec3(1);
-  light.gain = glm::vec2(1);
+  light.gain_mixed = light.gain_real = glm::vec3(1);
   return light;
 }
 

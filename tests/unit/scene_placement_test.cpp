@@ -130,19 +130,29 @@ TEST(Placement, DimmingIsOfTheMixedWorldOnly) {
   EXPECT_EQ(placement.lights[1].emission, stage.set.lights[0].emission);
 }
 
-// The real world keeps the lamp as it is: together they are what the state says.
-TEST(Placement, ATintedRealLampIsSplitInTwo) {
+// Two lamps, one of each world, would share no sample, and their difference would be all noise.
+TEST(Placement, ATintedRealLampStaysOneLamp) {
   const Stage stage;
   session::SceneState state;
   state.lights["key"] = state_of(stage.set.lights[0]);
   state.lights["key"]->tint = {2, 1, 0.5};
   const Placement placement = place(stage.scene, stage.set, state);
-  ASSERT_EQ(placement.lights.size(), 3u);
-  EXPECT_EQ(placement.lights[1].gain_real, 0);
-  EXPECT_EQ(placement.lights[1].emission, glm::dvec3(4, 3, 2));
-  EXPECT_EQ(placement.lights[2].gain_mixed, 0);
-  EXPECT_EQ(placement.lights[2].gain_real, 1);
-  EXPECT_EQ(placement.lights[2].emission, stage.set.lights[0].emission);
+  ASSERT_EQ(placement.lights.size(), 2u);
+  EXPECT_EQ(placement.lights[1].gain_mixed, 1);
+  EXPECT_EQ(placement.lights[1].tint, glm::dvec3(2, 1, 0.5));
+  EXPECT_EQ(placement.lights[1].gain_real, 1);
+  EXPECT_EQ(placement.lights[1].emission, stage.set.lights[0].emission);
+}
+
+TEST(Placement, ALampThatTheSetTintsKeepsItsTintUnlessTheStateSaysOtherwise) {
+  Stage stage;
+  stage.set.lights[0].tint = stage.scene.lights[1].tint = {1, 0.5, 0.25};
+  session::SceneState state;
+  EXPECT_EQ(place(stage.scene, stage.set, state).lights[1].tint, glm::dvec3(1, 0.5, 0.25));
+  state.lights["key"] = state_of(stage.set.lights[0]);
+  EXPECT_EQ(place(stage.scene, stage.set, state).lights[1].tint, glm::dvec3(1, 0.5, 0.25));
+  state.lights["key"]->tint = {1, 1, 1};
+  EXPECT_EQ(place(stage.scene, stage.set, state).lights[1].tint, glm::dvec3(1));
 }
 
 TEST(Placement, NamesTheSetHasNotAreTold) {

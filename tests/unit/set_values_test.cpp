@@ -86,6 +86,7 @@ direction = [0, 3, -4]
 emission = [1, 2, 3]
 outer_cone_deg = 30
 gain_real = 1
+tint = [1, 0.8, 0.6]
 )");
   EXPECT_EQ(set.observer.exposure, 2.0);
   const auto& observer = set.observer.calibration.value();
@@ -119,6 +120,7 @@ gain_real = 1
   EXPECT_DOUBLE_EQ(set.lights[0].outer_cone_rad, std::numbers::pi / 6);
   EXPECT_EQ(set.lights[0].gain_mixed, 1);
   EXPECT_EQ(set.lights[0].gain_real, 1);
+  EXPECT_EQ(set.lights[0].tint, glm::dvec3(1, 0.8, 0.6));
 }
 
 TEST(SetValues, LookTheSameInline) {

@@ -60,9 +60,12 @@ scene::Scene world_alone(const scene::Scene& scene, std::uint32_t world) {
   std::erase_if(alone.instances,
                 [&](const scene::Instance& instance) { return (instance.presence & world) == 0; });
   for (scene::Instance& instance : alone.instances) instance.presence = scene::world_both;
-  for (set::Light& light : alone.lights)
+  for (set::Light& light : alone.lights) {
+    if (world == scene::world_mixed) light.emission *= light.tint;
+    light.tint = glm::dvec3(1);
     light.gain_mixed = light.gain_real =
         world == scene::world_mixed ? light.gain_mixed : light.gain_real;
+  }
   return alone;
 }
 
