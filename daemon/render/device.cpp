@@ -87,6 +87,7 @@ void Device::reopen() {
 
 // The instance is closed too: a card that was gone has another physical device when it is back.
 void Device::close() {
+  programs_.clear();
   fence_.clear();
   commands_.clear();
   pool_.clear();
@@ -95,6 +96,22 @@ void Device::close() {
   physical_.clear();
   messenger_.clear();
   instance_.clear();
+}
+
+std::shared_ptr<const Program> Device::program(
+    const std::uint32_t* spirv, std::span<const std::uint32_t> constants,
+    const std::function<std::shared_ptr<const Program>()>& compile) {
+  const std::lock_guard lock(programs_mutex_);
+  const auto found = std::ranges::find_if(programs_, [&](const Compiled& each) {
+    return each.spirv == spirv && std::ranges::equal(each.constants, constants);
+  });
+  if (found != programs_.end()) {
+    std::rotate(found, found + 1, programs_.end());
+  } else {
+    programs_.push_back({spirv, {constants.begin(), constants.end()}, compile()});
+    if (programs_.size() > most_programs) programs_.erase(programs_.begin());
+  }
+  return programs_.back().program;
 }
 
 void Device::open() {

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <functional>
 #include <initializer_list>
+#include <memory>
+#include <mutex>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,6 +16,8 @@
 #include "daemon/render/gpu.hpp"
 
 namespace previz::render {
+
+struct Program;  // a compute pass compiled for a device: daemon/render/kernel.hpp
 
 class Device {
  public:
@@ -46,7 +50,22 @@ class Device {
   // The number of submissions so far, including the one that is being recorded.
   std::uint64_t submissions() const { return submissions_; }
 
+  // Returns what `compile` made for the same SPIR-V and constants before, or calls it: compiling
+  // may take longer than a picture, and a renderer that is made anew mostly wants what the last one
+  // had. The 128 programs that were wanted last are kept; a reopened device has none. `spirv` is
+  // known by its address and must stay there.
+  std::shared_ptr<const Program> program(
+      const std::uint32_t* spirv, std::span<const std::uint32_t> constants,
+      const std::function<std::shared_ptr<const Program>()>& compile);
+  static constexpr std::size_t most_programs = 128;
+
  private:
+  struct Compiled {
+    const std::uint32_t* spirv;
+    std::vector<std::uint32_t> constants;
+    std::shared_ptr<const Program> program;
+  };
+
   void open();
   void close();
   void create_instance(bool validation);
@@ -70,6 +89,8 @@ class Device {
   vk::raii::CommandPool pool_{nullptr};
   vk::raii::CommandBuffer commands_{nullptr};
   vk::raii::Fence fence_{nullptr};
+  std::mutex programs_mutex_;
+  std::vector<Compiled> programs_;  // in the order in which they were last wanted
 };
 
 // A block of device memory, written and read through upload() and download(). `size` is in bytes;

@@ -41,12 +41,10 @@ struct SpirvId {
   bool is_used = false;
 };
 
-}  // namespace
-
 // A variable's name is its own or, where a block without an instance name declares it, that of the
 // block's first member. Variables that are declared in a header and not used here have no binding
 // of their own: the compiler leaves all of them at 0.
-void Kernel::reflect(std::span<const std::uint32_t> spirv) {
+void reflect(std::span<const std::uint32_t> spirv, Program& program) {
   std::vector<SpirvId> ids(spirv[3]);
   std::vector<std::uint32_t> variables;
   std::uint32_t group_size_id = 0;
@@ -61,7 +59,7 @@ void Kernel::reflect(std::span<const std::uint32_t> spirv) {
         if (operands[1] == 0) ids[operands[0]].first_member = text(2);
         break;
       case op_execution_mode:
-        if (operands[1] == mode_local_size) group_size_ = operands[2];
+        if (operands[1] == mode_local_size) program.group_size = operands[2];
         break;
       case op_execution_mode_id:
         if (operands[1] == mode_local_size_id) group_size_id = operands[2];
@@ -89,64 +87,74 @@ void Kernel::reflect(std::span<const std::uint32_t> spirv) {
         break;
     }
   }
-  if (group_size_id != 0) group_size_ = ids[group_size_id].value;
+  if (group_size_id != 0) program.group_size = ids[group_size_id].value;
   for (const std::uint32_t id : variables) {
     const SpirvId& variable = ids[id];
     const bool is_storage = variable.storage == storage_storage_buffer;
     if (!variable.is_used || !(is_storage || variable.storage == storage_uniform_constant))
       continue;
     const char* own = variable.name;
-    bindings_.push_back({*own != 0 ? own : ids[ids[variable.type].pointee].first_member,
-                         variable.binding,
-                         is_storage ? vk::DescriptorType::eStorageBuffer
-                                    : vk::DescriptorType::eUniformTexelBuffer});
+    program.bindings.push_back({*own != 0 ? own : ids[ids[variable.type].pointee].first_member,
+                                variable.binding,
+                                is_storage ? vk::DescriptorType::eStorageBuffer
+                                           : vk::DescriptorType::eUniformTexelBuffer});
   }
 }
 
-Kernel::Kernel(Device& device, const char* name, std::span<const std::uint32_t> spirv,
-               std::initializer_list<std::uint32_t> constants)
-    : device_(&device), name_(name) {
-  reflect(spirv);
+std::shared_ptr<const Program> compile(const Device& device, std::span<const std::uint32_t> spirv,
+                                       std::span<const std::uint32_t> constants) {
+  const auto program = std::make_shared<Program>();
+  reflect(spirv, *program);
   std::vector<vk::DescriptorSetLayoutBinding> bindings;
-  for (const Binding& binding : bindings_)
+  for (const Program::Binding& binding : program->bindings)
     bindings.emplace_back(binding.number, binding.type, 1, compute_stage);
-  set_layout_ = vk::raii::DescriptorSetLayout(device.vk(), {{}, bindings});
+  program->set_layout = vk::raii::DescriptorSetLayout(device.vk(), {{}, bindings});
   const vk::PushConstantRange push(compute_stage, 0, Push::most_bytes);
-  layout_ = vk::raii::PipelineLayout(device.vk(), {{}, *set_layout_, push});
+  program->layout = vk::raii::PipelineLayout(device.vk(), {{}, *program->set_layout, push});
 
   const vk::raii::ShaderModule module(device.vk(), {{}, spirv.size_bytes(), spirv.data()});
   std::vector<vk::SpecializationMapEntry> entries;
   for (std::uint32_t i = 0; i < constants.size(); ++i) entries.emplace_back(i, 4 * i, 4);
   const vk::SpecializationInfo specialization(static_cast<std::uint32_t>(entries.size()),
-                                              entries.data(), 4 * constants.size(),
-                                              constants.begin());
+                                              entries.data(), constants.size_bytes(),
+                                              constants.data());
   const vk::PipelineShaderStageCreateInfo stage({}, compute_stage, *module, "main",
                                                 &specialization);
-  pipeline_ =
-      vk::raii::Pipeline(device.vk(), nullptr, vk::ComputePipelineCreateInfo({}, stage, *layout_));
+  program->pipeline = vk::raii::Pipeline(
+      device.vk(), nullptr, vk::ComputePipelineCreateInfo({}, stage, *program->layout));
+  return program;
 }
+
+}  // namespace
+
+Kernel::Kernel(Device& device, const char* name, std::span<const std::uint32_t> spirv,
+               std::initializer_list<std::uint32_t> constants)
+    : device_(&device), name_(name), program_(device.program(spirv.data(), constants, [&] {
+        return compile(device, spirv, constants);
+      })) {}
 
 Kernel::BoundSet Kernel::create_set() const {
   std::vector<vk::DescriptorPoolSize> sizes;
-  for (const Binding& binding : bindings_) sizes.emplace_back(binding.type, 1);
+  for (const Program::Binding& binding : program_->bindings) sizes.emplace_back(binding.type, 1);
   BoundSet result;
   result.pool = vk::raii::DescriptorPool(
       device_->vk(), {vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet, 1, sizes});
-  const vk::DescriptorSetLayout layout = *set_layout_;
+  const vk::DescriptorSetLayout layout = *program_->set_layout;
   result.set = std::move(vk::raii::DescriptorSets(device_->vk(), {*result.pool, layout}).front());
   return result;
 }
 
 void Kernel::write(const BoundSet& bound) const {
-  std::vector<vk::DescriptorBufferInfo> infos(bindings_.size());
-  std::vector<vk::BufferView> views(bindings_.size());
+  const std::vector<Program::Binding>& bindings = program_->bindings;
+  std::vector<vk::DescriptorBufferInfo> infos(bindings.size());
+  std::vector<vk::BufferView> views(bindings.size());
   std::vector<vk::WriteDescriptorSet> writes;
-  for (std::size_t i = 0; i < bindings_.size(); ++i) {
+  for (std::size_t i = 0; i < bindings.size(); ++i) {
     const Buffer& buffer = *bound.buffers[i];
     infos[i] = vk::DescriptorBufferInfo(*buffer.buffer, 0, buffer.size);
     views[i] = *buffer.view;
-    writes.emplace_back(*bound.set, bindings_[i].number, 0, 1, bindings_[i].type, nullptr,
-                        &infos[i], &views[i]);
+    writes.emplace_back(*bound.set, bindings[i].number, 0, 1, bindings[i].type, nullptr, &infos[i],
+                        &views[i]);
   }
   device_->vk().updateDescriptorSets(writes, {});
 }
@@ -157,7 +165,7 @@ const Kernel::BoundSet& Kernel::bound(const Buffers& buffers) {
   if (submission_ != device_->submissions()) sets_in_use_ = 0;
   submission_ = device_->submissions();
   std::vector<const Buffer*> wanted;
-  for (const Binding& binding : bindings_) {
+  for (const Program::Binding& binding : program_->bindings) {
     const auto found = buffers.find(binding.name);
     if (found == buffers.end())
       throw Error("Vulkan: pass \"" + name_ + "\" was given no buffer \"" + binding.name + "\"");
@@ -179,9 +187,9 @@ void Kernel::bind(const Recording& recording) {
   const std::span<const std::byte> push = recording.push.bytes;
   const vk::DescriptorSet set = *bound(recording.buffers).set;
   if (device_->has_labels()) commands.beginDebugUtilsLabelEXT({name_.c_str()});
-  commands.bindPipeline(compute, *pipeline_);
-  commands.bindDescriptorSets(compute, *layout_, 0, set, {});
-  commands.pushConstants<std::byte>(*layout_, compute_stage, 0,
+  commands.bindPipeline(compute, *program_->pipeline);
+  commands.bindDescriptorSets(compute, *program_->layout, 0, set, {});
+  commands.pushConstants<std::byte>(*program_->layout, compute_stage, 0,
                                     {static_cast<std::uint32_t>(push.size()), push.data()});
 }
 
@@ -191,7 +199,8 @@ void Kernel::finish(const Recording& recording) const {
 }
 
 void Kernel::dispatch(const Recording& recording, std::uint32_t invocations) {
-  const std::uint32_t groups = invocations / group_size_ + (invocations % group_size_ != 0);
+  const std::uint32_t groups =
+      invocations / program_->group_size + (invocations % program_->group_size != 0);
   const std::uint32_t most = device_->limits().maxComputeWorkGroupCount[0];
   if (groups > most)
     throw Error("Vulkan: pass \"" + name_ + "\" needs " + std::to_string(groups) +

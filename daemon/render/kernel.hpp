@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <initializer_list>
 #include <map>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -37,10 +38,24 @@ struct Recording {
   const Buffers& buffers;
 };
 
+// What is compiled of a pass. All kernels of a device with the same SPIR-V and constants share it.
+struct Program {
+  struct Binding {
+    std::string name;
+    std::uint32_t number;
+    vk::DescriptorType type;
+  };
+  std::vector<Binding> bindings;
+  std::uint32_t group_size = 1;
+  vk::raii::DescriptorSetLayout set_layout{nullptr};
+  vk::raii::PipelineLayout layout{nullptr};
+  vk::raii::Pipeline pipeline{nullptr};
+};
+
 class Kernel {
  public:
   Kernel() = default;  // cannot be dispatched
-  // `constants[i]` is specialisation constant i (32 bits each).
+  // `spirv` is static; `constants[i]` is specialisation constant i (32 bits each).
   Kernel(Device& device, const char* name, std::span<const std::uint32_t> spirv,
          std::initializer_list<std::uint32_t> constants = {});
 
@@ -53,18 +68,12 @@ class Kernel {
   void dispatch_indirect(const Recording& recording, const Buffer& groups, vk::DeviceSize offset);
 
  private:
-  struct Binding {
-    std::string name;
-    std::uint32_t number;
-    vk::DescriptorType type;
-  };
   struct BoundSet {
-    std::vector<const Buffer*> buffers;  // in the order of bindings_
+    std::vector<const Buffer*> buffers;  // in the order of the program's bindings
     vk::raii::DescriptorPool pool{nullptr};
     vk::raii::DescriptorSet set{nullptr};
   };
 
-  void reflect(std::span<const std::uint32_t> spirv);
   void bind(const Recording& recording);
   void finish(const Recording& recording) const;
   const BoundSet& bound(const Buffers& buffers);
@@ -73,11 +82,7 @@ class Kernel {
 
   Device* device_ = nullptr;
   std::string name_;
-  std::vector<Binding> bindings_;
-  std::uint32_t group_size_ = 1;
-  vk::raii::DescriptorSetLayout set_layout_{nullptr};
-  vk::raii::PipelineLayout layout_{nullptr};
-  vk::raii::Pipeline pipeline_{nullptr};
+  std::shared_ptr<const Program> program_;
   // The sets used by the submission being recorded come first; a later submission rewrites them.
   std::vector<BoundSet> sets_;
   std::size_t sets_in_use_ = 0;

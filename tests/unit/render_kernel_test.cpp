@@ -2,7 +2,9 @@
 // what is wrong with a dispatch.
 #include "daemon/render/kernel.hpp"
 
+#include <array>
 #include <limits>
+#include <memory>
 
 #include "shaders/lib/render_shared.h"
 #include "shaders/prepare_shadow.spv.h"
@@ -98,6 +100,66 @@ TEST(Kernel, DispatchesOfOneSubmissionKeepTheirOwnBuffers) {
     for (std::uint32_t i = 0; i < used; ++i) EXPECT_EQ(groups_in(controls[i]), i + used);
   }
   EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
+}
+
+// Counts how often `compile` is called for one of two shaders with a constant.
+struct Compiler {
+  static constexpr std::uint32_t shaders[2] = {};
+  Device& device;
+  int calls = 0;
+
+  std::shared_ptr<const render::Program> program(int shader, std::uint32_t constant) {
+    return device.program(&shaders[shader], std::array{constant}, [&] {
+      ++calls;
+      return std::make_shared<const render::Program>();
+    });
+  }
+};
+
+TEST(Programs, OfTheSameShaderAndConstantsAreCompiledOnce) {
+  Device device({.validation = true, .name = ""});
+  Compiler compiler{device};
+  const auto first = compiler.program(0, 1);
+  EXPECT_NE(compiler.program(0, 2), first);
+  EXPECT_NE(compiler.program(1, 1), first);
+  EXPECT_EQ(compiler.program(0, 1), first);
+  EXPECT_EQ(compiler.calls, 3);
+}
+
+TEST(Programs, ThatWereNotWantedForLongAreForgotten) {
+  Device device({.validation = true, .name = ""});
+  Compiler compiler{device};
+  constexpr int most = Device::most_programs;
+  for (int i = 0; i < most; ++i) compiler.program(0, static_cast<std::uint32_t>(i));
+  compiler.program(0, 0);  // wanted again, so that 1 is the oldest
+  EXPECT_EQ(compiler.calls, most);
+  compiler.program(1, 0);
+  compiler.program(0, 0);
+  EXPECT_EQ(compiler.calls, most + 1);
+  compiler.program(0, 1);
+  EXPECT_EQ(compiler.calls, most + 2);
+}
+
+TEST(Programs, AreCompiledAnewForAReopenedDevice) {
+  Device device({.validation = true, .name = ""});
+  for (int opened = 0; opened < 2; ++opened) {
+    gpu::GpuControl control{};
+    control.shadow_count = 3 * gpu::WORKGROUP_SIZE;
+    Buffer buffer;
+    render::upload_storage(device, buffer, std::vector{control});
+    for (int renderer = 0; renderer < 2; ++renderer) {
+      Kernel kernel(device, "prepare_shadow", prepare_shadow_spv, {0});
+      const gpu::GpuBatch batch{};
+      const Buffers buffers{{"control", &buffer}};
+      device.submit([&](const vk::raii::CommandBuffer& commands) {
+        kernel.dispatch({commands, batch, buffers}, 1);
+      });
+      EXPECT_EQ(render::download<gpu::GpuControl>(device, buffer, 1).front().shadow_groups[0], 3u);
+    }
+    buffer = {};
+    if (opened == 0) device.reopen();
+  }
+  EXPECT_EQ(device.validation_messages(), 0u);
 }
 
 }  // namespace render_kernel_test
