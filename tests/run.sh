@@ -5,15 +5,16 @@
 # repository. Ends with one line that sums up, and with status 0 only if all of it passed.
 #
 #   tests/run.sh              the gate: release asan format lint
-#   tests/run.sh full         the gate, and then lint-all long asan-all tsan soak package rig_vm
+#   tests/run.sh full         the gate, and then bench lint-all long asan-all tsan soak package rig_vm
 #   tests/run.sh STEP...      only the named steps
 #
-#   release    builds everything but the benchmarks, and runs the tests
+#   release    builds everything but the benchmarks and soak, and runs the tests
 #   asan       the test programs marked SANITIZED (tests/CMakeLists.txt) under ASan and UBSan
 #   format     clang-format
 #   lint       clang-tidy, of targets that have changed since they last passed on this machine, the
-#              newest first; in the gate for a minute at most, and it says how many are left
+#              newest first; in the gate none is begun after 20 s, and it says how many are left
 #   lint-all   the same without a limit
+#   bench      builds the benchmarks and the programs that measure, and runs their test
 #   long       the cases that tests/*/CMakeLists.txt leave out of the gate (LONG), in the release build
 #   asan-all   every test program under ASan and UBSan
 #   tsan       the test programs marked THREADS under ThreadSanitizer
@@ -29,7 +30,7 @@ jobs=$(nproc)
 gate=(release asan format lint)
 steps=("$@")
 [[ ${#steps[@]} -gt 0 ]] || steps=("${gate[@]}")
-[[ ${steps[*]} != full ]] || steps=("${gate[@]}" lint-all long asan-all tsan soak package rig_vm)
+[[ ${steps[*]} != full ]] || steps=("${gate[@]}" bench lint-all long asan-all tsan soak package rig_vm)
 failures=()
 summaries=()
 costs=()
@@ -91,6 +92,19 @@ build_and_test() {
   check "build $1" build "$1" && check "tests $1" run_tests "$1" --label-exclude long
 }
 
+bench() {
+  local status=0
+  cmake --preset release --log-level=WARNING -DPREVIZ_BENCH=ON &&
+    cmake --build --preset release --parallel "$jobs" && run_tests release --tests-regex equal_error || status=$?
+  cmake --preset release --log-level=WARNING -DPREVIZ_BENCH=OFF >/dev/null
+  return "$status"
+}
+
+soak() {
+  cmake --preset release --log-level=WARNING && cmake --build --preset release --parallel "$jobs" --target soak &&
+    build/release/tests/soak/soak --minutes 30
+}
+
 format() { git ls-files '*.cpp' '*.hpp' | xargs clang-format --dry-run -Werror; }
 
 # clang-tidy, a target's sources at once: most of its time goes into the headers of the libraries,
@@ -119,13 +133,13 @@ for name in "${steps[@]}"; do
     release | asan | asan-all | tsan) build_and_test "$name" ;;
     long) build release && check "long" run_tests release --label-regex long ;;
     format) check "format" format ;;
-    lint) check "lint" lint 60 ;;
+    lint) check "lint" lint 20 ;;
     lint-all) check "lint-all" lint 86400 ;;
-    soak) build release && check "soak" build/release/tests/soak/soak --minutes 30 ;;
+    bench | soak) check "$name" "$name" ;;
     package | rig_vm) check "$name" "tests/$name/run.sh" ;;
     *)
       echo "tests/run.sh: no step '$name'; allowed: full, or of release, asan, format, lint," \
-        "lint-all, long, asan-all, tsan, soak, package and rig_vm" >&2
+        "bench, lint-all, long, asan-all, tsan, soak, package and rig_vm" >&2
       exit 2
       ;;
   esac
