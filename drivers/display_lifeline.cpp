@@ -13,7 +13,7 @@ DisplayLifeline::DisplayLifeline(std::string name, DisplayOpener open, const Bac
 std::optional<DisplayEvent> DisplayLifeline::show(const Composer& compose) {
   if (!display_) {
     if (!backoff_.due(clock_.now())) return std::nullopt;
-    if (std::optional<DisplayEvent> told = open()) return told;
+    if (std::optional<DisplayEvent> event = open()) return event;
     if (!display_) return std::nullopt;
   }
   DisplayEvent event = [&]() -> DisplayEvent {

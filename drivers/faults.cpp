@@ -69,7 +69,7 @@ class FaultyCamera final : public Camera {
         return take_ready();
       }
       if (!frame) return event;
-      if (std::optional<CameraEvent> told = afflict(*frame)) return *std::move(told);
+      if (std::optional<CameraEvent> affliction = afflict(*frame)) return *std::move(affliction);
     } while (device_->clock.now() < deadline || !ready_.empty());
     return NoFrame{};
   }

@@ -44,14 +44,14 @@ CameraEvent Lifeline::next(milliseconds timeout) {
       look_for_arrivals();
       clock_.sleep_until(std::min(backoff_.at(), deadline));
       if (!backoff_.due(clock_.now())) return NoFrame{};
-      if (std::optional<CameraEvent> told = open()) return *std::move(told);
+      if (std::optional<CameraEvent> event = open()) return *std::move(event);
       continue;
     }
     const HostClock::Time until = std::min(deadline, next_deadline());
     const auto wait = std::chrono::ceil<milliseconds>(until - clock_.now());
-    if (std::optional<CameraEvent> told = take(camera_->next(std::max(wait, milliseconds(0)))))
-      return *std::move(told);
-    if (std::optional<CameraEvent> told = watch()) return *std::move(told);
+    if (std::optional<CameraEvent> event = take(camera_->next(std::max(wait, milliseconds(0)))))
+      return *std::move(event);
+    if (std::optional<CameraEvent> event = watch()) return *std::move(event);
   } while (clock_.now() < deadline);
   return NoFrame{};
 }

@@ -151,7 +151,7 @@ struct Bus::Impl {
   std::deque<std::string> names;  // names of methods, which the table points at
   std::vector<sd_bus_vtable> table;
   sd_bus* bus = nullptr;
-  Status told;
+  Status published;
 
   Impl(sd_event* loop, Verbs the_verbs) : verbs(std::move(the_verbs)) {
     fill_table();
@@ -166,7 +166,7 @@ struct Bus::Impl {
       sd_bus_unref(bus);
       throw;
     }
-    told = verbs.status();
+    published = verbs.status();
   }
   ~Impl() {
     sd_bus_detach_event(bus);
@@ -200,8 +200,8 @@ void Bus::changed() {
   const Status now = impl_->verbs.status();
   std::vector<char*> names;
   for (const Property& property : properties)
-    if (!property.same(impl_->told, now)) names.push_back(const_cast<char*>(property.name));
-  impl_->told = now;
+    if (!property.same(impl_->published, now)) names.push_back(const_cast<char*>(property.name));
+  impl_->published = now;
   if (names.empty()) return;
   names.push_back(nullptr);
   sd_bus_emit_properties_changed_strv(impl_->bus, object_path, interface_name, names.data());

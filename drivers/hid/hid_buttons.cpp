@@ -109,19 +109,19 @@ class HidButtons final : public Buttons {
 
  private:
   void run(const std::stop_token& stop) {
-    bool told = false;
+    bool reported = false;
     while (!stop.stop_requested()) {
       const hid::Device device = open_device(device_name_);
       count(device ? "opened" : "not opened");
       if (device) {
         count(std::string("opened through ") + device.backend());
-        told = false;
+        reported = false;
         read(device, stop);
         if (stop.stop_requested()) return;
         count("lost");
         for (ButtonEvent& event : reader_.release_all(monotonic_ns())) push(std::move(event));
       }
-      if (!std::exchange(told, true))
+      if (!std::exchange(reported, true))
         push(DeviceTrouble{device_, device ? "was unplugged; looked for until it is back"
                                            : "is not there, or may not be opened; looked for until "
                                              "it is there"});

@@ -290,7 +290,7 @@ struct Device::Impl {
       for (const lc::Size& possible : formats.sizes(wanted))
         add_to_list(sizes, possible.toString());
       refuse("made " + config.toString() + " of " + size.toString() + "-" + wanted.toString() +
-             "; possible are: " + (sizes.empty() ? "not told" : sizes));
+             "; possible are: " + (sizes.empty() ? "not known" : sizes));
     }
     check(camera->configure(configuration.get()), "does not take " + config.toString());
     const Known& known = *find_known(config.pixelFormat);
@@ -365,7 +365,7 @@ struct Device::Impl {
     wake.notify_one();
   }
 
-  Completed told(lc::Request& request) const {
+  Completed outcome_of(lc::Request& request) const {
     Completed completed;
     completed.buffer = request.cookie();
     const lc::FrameBuffer* buffer = request.findBuffer(stream);
@@ -459,7 +459,7 @@ std::optional<Completed> Device::wait(std::chrono::milliseconds timeout) {
   if (impl_->unplugged || impl_->done.empty()) return std::nullopt;
   lc::Request* request = impl_->done.front();
   impl_->done.pop_front();
-  return impl_->told(*request);
+  return impl_->outcome_of(*request);
 }
 
 Exposure Device::possible(const Exposure& wanted) const {

@@ -113,7 +113,7 @@ class Configuration {
   void agree_on_format() {
     v4l2_format format{};
     format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-    check(node_.control(VIDIOC_G_FMT, &format), "does not tell its format");
+    check(node_.control(VIDIOC_G_FMT, &format), "does not report its format");
     v4l2_pix_format& picture = format.fmt.pix;
     const std::uint32_t wanted = wanted_format(picture.pixelformat);
     picture.pixelformat = wanted;
@@ -167,7 +167,7 @@ class Configuration {
              ? " " + std::to_string(*settings_.width) + "x" + std::to_string(*settings_.height)
              : "");
     refuse("made " + fourcc_name(made.pixelformat) + " " + size_text(made.width, made.height) +
-           " of " + asked + "; possible are: " + (sizes.empty() ? "not told" : sizes));
+           " of " + asked + "; possible are: " + (sizes.empty() ? "not known" : sizes));
   }
 
   // Asks for the rate, of which the node takes the nearest it has; format() reports the result.

@@ -55,15 +55,15 @@ class UsbCamera : public testing::TestWithParam<std::string> {
 
 // Returns the trouble that is reported before a frame comes.
 std::vector<std::string> trouble_until_a_frame(Lifeline& lifeline, const auto& may_come) {
-  std::vector<std::string> told;
+  std::vector<std::string> reports;
   const auto end = std::chrono::steady_clock::now() + patience;
   while (std::chrono::steady_clock::now() < end) {
     const CameraEvent event = lifeline.next(milliseconds(50));
-    if (const auto* trouble = std::get_if<DeviceTrouble>(&event)) told.push_back(trouble->what);
-    if (std::holds_alternative<FramePtr>(event) && may_come()) return told;
+    if (const auto* trouble = std::get_if<DeviceTrouble>(&event)) reports.push_back(trouble->what);
+    if (std::holds_alternative<FramePtr>(event) && may_come()) return reports;
   }
-  ADD_FAILURE() << "no frame came; told was " << testing::PrintToString(told);
-  return told;
+  ADD_FAILURE() << "no frame came; reported was " << testing::PrintToString(reports);
+  return reports;
 }
 
 // The wedge is gone when the device was reset: nothing else takes it away while it is plugged in.
@@ -79,9 +79,9 @@ TEST_P(UsbCamera, ThatIsWedgedIsResetAndSendsAgain) {
   lifeline.start();
   trouble_until_a_frame(lifeline, [] { return true; });
   std::ofstream(wedge()).close();
-  const std::vector<std::string> told =
+  const std::vector<std::string> reports =
       trouble_until_a_frame(lifeline, [this] { return !exists(wedge()); });
-  EXPECT_THAT(told, testing::Contains(testing::HasSubstr("it was reset")));
+  EXPECT_THAT(reports, testing::Contains(testing::HasSubstr("it was reset")));
   EXPECT_GE(lifeline.counters().at("reset"), 1u);
 }
 

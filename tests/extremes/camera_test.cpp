@@ -106,8 +106,8 @@ double cap_sr(double radius_rad) {
 }
 
 // The disc of the sun, a million times its sky, which no bracket of a camera reaches: its flux is a
-// lower bound of white over the pixels that it touches, told with the solid angle and the exposure
-// that would be needed, and its direction is right.
+// lower bound of white over the pixels that it touches, reported with the solid angle and the
+// exposure that would be needed, and its direction is right.
 TEST(ExtremeCamera, ASunInFrameIsAToldLowerBoundInTheRightDirection) {
   LightCameraCalibration camera = fisheye_camera();
   camera.world_from_camera = looking(0, 90);
@@ -178,10 +178,10 @@ TEST(ExtremeCamera, AnExposureStatedTwoStopsWrongIsTold) {
     bracket.push_back(std::make_shared<Frame>(std::move(frame)));
   }
   const Lighting lighting = estimate(bracket, camera, {});
-  const auto told = std::ranges::find_if(lighting.report.notes, [](const std::string& note) {
+  const auto reported = std::ranges::find_if(lighting.report.notes, [](const std::string& note) {
     return note.find("disagree by 2.0 stops") != std::string::npos;
   });
-  ASSERT_NE(told, lighting.report.notes.end());
+  ASSERT_NE(reported, lighting.report.notes.end());
   const auto up = texel_index(lighting.environment.size, glm::vec3(0, 0, 1));
   EXPECT_NEAR(lighting.environment.radiance[up].g, 0.7, 0.005);
 }

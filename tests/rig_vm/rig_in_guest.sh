@@ -56,12 +56,12 @@ dpkg --force-confold --install previzd.deb || fail "the package does not install
 systemctl is-active --quiet previzd || fail "the service does not run"
 [[ $(stat -c '%U %a' /var/lib/previzd) == "previz 750" ]] || fail "/var/lib/previzd is open to others"
 within 60 "the bus answers" status_is Set rig
-within 60 "a camera that is not there is told" status_is CameraLost yes
+within 60 "a camera that is not there is reported" status_is CameraLost yes
 
 step "the film camera is plugged in"
 camera
 within 600 "frames are shown" above '.stages.display.frames' 0
-status_is CameraLost no || fail "the camera is still told as lost"
+status_is CameraLost no || fail "the camera is still reported as lost"
 advances render "rendering goes on"
 advances lighting "the light camera lights the scene"
 
@@ -152,7 +152,7 @@ lines=$(wc -l <"$take/observer.jsonl")
 lights=$(wc -l <"$take/light.jsonl")
 echo "   $frames frames: $lines of the film camera, $lights of the light camera"
 [[ $lines -ge 5 && $lights -ge 1 ]] || fail "the take is not complete"
-grep -q '"record"\|button1' "$take/events.jsonl" || fail "the take does not tell the button"
+grep -q '"record"\|button1' "$take/events.jsonl" || fail "the take has no event of the button"
 previzctl metrics >metrics.json
 
 step "another light camera, by another set while the daemon runs"

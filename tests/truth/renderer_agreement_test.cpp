@@ -1,12 +1,12 @@
 // The GPU renderer against the independent CPU tracer, both radiances, at reduced size: on sets
 // varied by seed (camera, objects diffuse, textured, plastic, rough and smooth metal, emitter,
 // removed, lamps, lens) and on the ground truth sets.
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 
 #include "daemon/lighting/lighting.hpp"
 #include "tests/support/render_fixture.hpp"
+#include "tests/support/shared_data.hpp"
 #include "tests/truth/agreement.hpp"
 #include "tests/truth/cpu_camera.hpp"
 #include "tests/truth/cpu_tracer.hpp"
@@ -303,13 +303,10 @@ TEST_P(CameraSets, HaveTheSameCompositeByTheCamera) {
   EXPECT_TRUE(agreement.agree) << agreement.report();
 }
 
-// The committed glass set, or one of the others beside the project (PREVIZ_SHARED names the
-// folder).
+// The committed glass set, or one of the others.
 std::filesystem::path truth_directory(const std::string& name) {
-  const std::filesystem::path source = PREVIZ_SOURCE_DIR;
-  if (name == "glass") return source / "tests/truth/data/glass";
-  const char* shared = std::getenv("PREVIZ_SHARED");
-  return (shared ? std::filesystem::path(shared) : source / "../shared") / "groundtruth" / name;
+  if (name == "glass") return PREVIZ_SOURCE_DIR "/tests/truth/data/glass";
+  return shared_data("groundtruth") / name;
 }
 
 View truth_view(const std::filesystem::path& directory) {
@@ -336,15 +333,13 @@ class TruthScenes : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(TruthScenes, AgreeWithTheCpuTracer) {
   const auto directory = truth_directory(GetParam());
-  if (!std::filesystem::exists(directory / "set.json"))
-    GTEST_SKIP() << "no ground truth set at " << directory;
+  PREVIZ_NEEDS(directory / "set.json");
   expect_agreement(truth_view(directory), 32, false);
 }
 
 TEST_P(TruthScenes, HaveTheSameDifferenceByBothEstimators) {
   const auto directory = truth_directory(GetParam());
-  if (!std::filesystem::exists(directory / "set.json"))
-    GTEST_SKIP() << "no ground truth set at " << directory;
+  PREVIZ_NEEDS(directory / "set.json");
   expect_same_difference(truth_view(directory), 32, false);
 }
 

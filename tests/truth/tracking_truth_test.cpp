@@ -4,11 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <set>
 #include <string>
 
+#include "tests/support/shared_data.hpp"
 #include "tests/truth/tracking_measure.hpp"
 #include "tests/truth/tracking_photographs.hpp"
 
@@ -16,11 +16,6 @@ namespace previz::truth {
 namespace tracking_truth_test {
 
 namespace fs = std::filesystem;
-
-fs::path shared() {
-  const char* variable = std::getenv("PREVIZ_SHARED");
-  return variable ? fs::path(variable) : fs::path(PREVIZ_SOURCE_DIR).parent_path() / "shared";
-}
 
 // The bounds: 0.5 px mean over the virtual vertices, 0.3 px mean over the corners, in every frame.
 void expect_bounds(const fs::path& directory, double decimate, const std::set<int>& hidden) {
@@ -57,8 +52,8 @@ TEST(TrackingTruth, CommittedSet) {
 class TrackingSharedSets : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(TrackingSharedSets, WithinBounds) {
-  const fs::path set = shared() / "groundtruth" / GetParam();
-  if (!fs::exists(set)) GTEST_SKIP() << "PREVIZ_SHARED names no folder with " << GetParam();
+  const fs::path set = test::shared_data("groundtruth") / GetParam();
+  PREVIZ_NEEDS(set);
   const std::set<int> hidden =
       std::string(GetParam()) == "desk" ? std::set<int>{15, 16} : std::set<int>{};
   expect_bounds(set, 1, hidden);
@@ -68,12 +63,13 @@ TEST_P(TrackingSharedSets, WithinBounds) {
 INSTANTIATE_TEST_SUITE_P(Sets, TrackingSharedSets, ::testing::Values("desk", "statues", "glass"));
 
 TEST(TrackingPhotographs, Room) {
-  if (!fs::exists(shared() / "real/apriltag/room")) GTEST_SKIP() << "PREVIZ_SHARED has no room";
+  const fs::path apriltag = test::shared_data("real/apriltag");
+  PREVIZ_NEEDS(apriltag / "room");
   // The map was fitted to corners found in encoded values, so they are sought there; the
   // telephone's own curve is not known.
   ResponseCurve encoded;
   encoded.kind = ResponseCurve::Kind::linear;
-  const RoomResult room = measure_room(shared() / "real/apriltag", 1, encoded);
+  const RoomResult room = measure_room(apriltag, 1, encoded);
   EXPECT_EQ(room.photographs, 48);
   EXPECT_EQ(room.false_ids, 0);
   EXPECT_LE(room.rms_px, 0.5);
@@ -81,23 +77,23 @@ TEST(TrackingPhotographs, Room) {
   EXPECT_EQ(room.tracked, 47) << ::testing::PrintToString(room.not_tracked);
   // Ids in the picture as a camera of the usual curve delivers it: all but two tags of that same
   // photograph, which libapriltag 3.3.0's own program does not find either.
-  const RoomResult usual = measure_room(shared() / "real/apriltag", 1);
+  const RoomResult usual = measure_room(apriltag, 1);
   EXPECT_EQ(usual.listed, 157);
   EXPECT_EQ(usual.found, 155) << ::testing::PrintToString(usual.missed);
   EXPECT_EQ(usual.false_ids, 0);
 }
 
 TEST(TrackingPhotographs, Counts) {
-  const fs::path misc = shared() / "real/apriltag/misc";
-  if (!fs::exists(misc)) GTEST_SKIP() << "PREVIZ_SHARED has no misc";
+  const fs::path misc = test::shared_data("real/apriltag/misc");
+  PREVIZ_NEEDS(misc);
   EXPECT_EQ(count_tags(misc / "36h11_stress_test.png", "tag36h11", 20).tags, 280);
   EXPECT_EQ(count_tags(misc / "phone_tag1_640_480.jpg", "tag36h11", 20).tags, 1);
   EXPECT_EQ(count_tags(misc / "negative_16h5_field2023.png", "tag36h11", 0).tags, 0);
 }
 
 TEST(TrackingPhotographs, Video) {
-  const fs::path video = shared() / "real/video/wall_tags3and4_1080p.mp4";
-  if (!fs::exists(video)) GTEST_SKIP() << "PREVIZ_SHARED has no video";
+  const fs::path video = test::shared_data("real/video/wall_tags3and4_1080p.mp4");
+  PREVIZ_NEEDS(video);
   const VideoResult result = measure_video(video, 2);
   EXPECT_GE(result.frames, 159);
   EXPECT_EQ(result.with_both, result.frames);

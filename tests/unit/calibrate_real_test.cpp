@@ -1,8 +1,7 @@
-// The calibrations on real pictures of shared/real, where they are there.
+// The calibrations on real pictures, where they are there.
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <glm/mat4x4.hpp>
@@ -14,20 +13,16 @@
 #include "daemon/calibrate/fisheye.hpp"
 #include "daemon/calibrate/observer.hpp"
 #include "daemon/calibrate/source.hpp"
+#include "tests/support/shared_data.hpp"
 
 namespace previz::calibrate {
 namespace calibrate_real_test {
 
 namespace fs = std::filesystem;
 
-fs::path real(const std::string& name) {
-  const char* named = std::getenv("PREVIZ_SHARED");
-  return (named ? fs::path(named) : fs::path(PREVIZ_SOURCE_DIR).parent_path() / "shared") / "real" /
-         name;
+fs::path real(const fs::path& name) {
+  return test::shared_data("real" / name);
 }
-
-#define PREVIZ_REAL(folder) \
-  if (!fs::is_directory(folder)) GTEST_SKIP() << (folder) << " is not there; set PREVIZ_SHARED"
 
 Views look(const fs::path& folder, const std::string& board_text) {
   const Board board = parse_board(board_text);
@@ -37,7 +32,7 @@ Views look(const fs::path& folder, const std::string& board_text) {
 }
 
 TEST(RealObserver, OpencvsChessboard) {
-  PREVIZ_REAL(real("calib/opencv_left"));
+  PREVIZ_NEEDS(real("calib/opencv_left"));
   const Views views = look(real("calib/opencv_left"), "chessboard:9x6:25mm");
   EXPECT_EQ(views.views.size(), 13u);
   const ObserverFit observer = fit_observer(views);
@@ -52,7 +47,7 @@ TEST(RealObserver, OpencvsChessboard) {
 
 // cv::calibrateCamera on the same corners: the same minimum, found by other code.
 TEST(RealObserver, AgreesWithOpencvsSolver) {
-  PREVIZ_REAL(real("calib/opencv_left"));
+  PREVIZ_NEEDS(real("calib/opencv_left"));
   const Views views = look(real("calib/opencv_left"), "chessboard:9x6:25mm");
   const ObserverFit observer = fit_observer(views);
   std::vector<std::vector<cv::Point3f>> points;
@@ -74,7 +69,7 @@ TEST(RealObserver, AgreesWithOpencvsSolver) {
 }
 
 TEST(RealObserver, ACharucoBoardThatWasHardlyTiltedIsRefused) {
-  PREVIZ_REAL(real("calib/charuco_lifecam_1280"));
+  PREVIZ_NEEDS(real("calib/charuco_lifecam_1280"));
   const Views views = look(real("calib/charuco_lifecam_1280"), "charuco:8x8:1in:0.75in:4x4_1000");
   EXPECT_EQ(views.views.size(), 13u);
   const ObserverFit observer = fit_observer(views);
@@ -157,12 +152,12 @@ void expect_fisheye(const std::string& name, double bound_px) {
 }
 
 TEST(RealFisheye, CubeOfBoards) {
-  PREVIZ_REAL(real("fisheye/ov_cube"));
+  PREVIZ_NEEDS(real("fisheye/ov_cube"));
   expect_fisheye("ov_cube", 0.40);
 }
 
 TEST(RealFisheye, PlaneSeenBeyond90Degrees) {
-  PREVIZ_REAL(real("fisheye/ov_plane"));
+  PREVIZ_NEEDS(real("fisheye/ov_plane"));
   expect_fisheye("ov_plane", 0.60);
 }
 

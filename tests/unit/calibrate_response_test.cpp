@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <random>
@@ -14,6 +13,7 @@
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
+#include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace previz::calibrate {
@@ -242,11 +242,8 @@ TEST_F(BracketFiles, OfASessionAreItsExposures) {
 // scans, whose three layers have curves of their own, are farther from having one: the bound of 8
 // codes is a stated one, a fifth of a stop in the middle of the scale.
 TEST(RealResponse, PredictsAnExposureThatWasLeftOut) {
-  const char* named = std::getenv("PREVIZ_SHARED");
-  const fs::path shared =
-      named ? fs::path(named) : fs::path(PREVIZ_SOURCE_DIR).parent_path() / "shared";
-  const fs::path hdr = shared / "real/hdr";
-  if (!fs::is_directory(hdr)) GTEST_SKIP() << hdr << " is not there; set PREVIZ_SHARED";
+  const fs::path hdr = test::shared_data("real/hdr");
+  PREVIZ_NEEDS(hdr);
   const auto window = read_bracket(hdr / "window", "", std::nullopt);  // by their EXIF
   EXPECT_EQ(window.size(), 12u);
   const ResponseFit fit = fit_response(window, ResponseMethod::debevec);

@@ -1,4 +1,4 @@
-// Clocks and exposures of devices that do not tell the host's.
+// Clocks and exposures of devices that do not keep the host's.
 #include <gtest/gtest.h>
 
 #include <random>

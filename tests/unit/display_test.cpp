@@ -216,7 +216,7 @@ TEST(DisplayLifeline, OpensWaitsBacksOffAndOpensAgain) {
   clock.now = [&] { return now; };
   DisplayLifeline life(
       "HDMI-A-1", [&] { return std::make_unique<PluggedScreen>(cable); }, {100ms, 400ms}, clock);
-  const auto told = [&]() -> std::string {
+  const auto report = [&]() -> std::string {
     const auto event = life.show([](const DisplayMode& mode) {
       EXPECT_EQ(mode, (DisplayMode{8, 8, 50}));
       return Screenful{};
@@ -226,30 +226,30 @@ TEST(DisplayLifeline, OpensWaitsBacksOffAndOpensAgain) {
     return std::get<DeviceTrouble>(*event).device + ": " + std::get<DeviceTrouble>(*event).what;
   };
   EXPECT_EQ(life.state(), DeviceState::absent);
-  EXPECT_EQ(told(), "HDMI-A-1: no screen is plugged in; tried again until it is there");
+  EXPECT_EQ(report(), "HDMI-A-1: no screen is plugged in; tried again until it is there");
   cable.plugged = true;
-  EXPECT_EQ(told(), "");  // not before its time
+  EXPECT_EQ(report(), "");  // not before its time
   now += 100ms;
-  EXPECT_EQ(told(), "shown");
+  EXPECT_EQ(report(), "shown");
   EXPECT_EQ(life.state(), DeviceState::streaming);
 
-  cable.taken = true;  // stays open; told once
-  EXPECT_EQ(told(), "HDMI-A-1: another program has it");
-  EXPECT_EQ(told(), "");
+  cable.taken = true;  // stays open; reported once
+  EXPECT_EQ(report(), "HDMI-A-1: another program has it");
+  EXPECT_EQ(report(), "");
   cable.taken = false;
-  EXPECT_EQ(told(), "shown");
+  EXPECT_EQ(report(), "shown");
 
   cable.plugged = false;
-  EXPECT_EQ(told(), "HDMI-A-1: was unplugged; reopening it");
+  EXPECT_EQ(report(), "HDMI-A-1: was unplugged; reopening it");
   EXPECT_EQ(life.state(), DeviceState::lost);
   EXPECT_EQ(life.display(), nullptr);
   now += 100ms;
-  EXPECT_EQ(told(), "HDMI-A-1: no screen is plugged in; tried again until it is there");
+  EXPECT_EQ(report(), "HDMI-A-1: no screen is plugged in; tried again until it is there");
   now += 199ms;  // then 200
   cable.plugged = true;
-  EXPECT_EQ(told(), "");
+  EXPECT_EQ(report(), "");
   now += 1ms;
-  EXPECT_EQ(told(), "shown");
+  EXPECT_EQ(report(), "shown");
   EXPECT_EQ(cable.opened, 2);
 }
 

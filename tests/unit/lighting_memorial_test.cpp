@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
@@ -15,16 +14,10 @@
 #include <vector>
 
 #include "tests/support/lighting.hpp"
+#include "tests/support/shared_data.hpp"
 
 namespace previz::lighting {
 namespace lighting_memorial_test {
-
-std::filesystem::path memorial_directory() {
-  const char* named = std::getenv("PREVIZ_SHARED");
-  return (named ? std::filesystem::path(named)
-                : std::filesystem::path(PREVIZ_SOURCE_DIR).parent_path() / "shared") /
-         "real/hdr/memorial";
-}
 
 struct Memorial {
   std::vector<cv::Mat> pictures;  // 8-bit BGR
@@ -109,9 +102,8 @@ double quantile_of(std::vector<double>& values, double q) {
 }
 
 TEST(MergeExposures, MatchesThePublishedMapOfRealExposures) {
-  const std::filesystem::path directory = memorial_directory();
-  if (!std::filesystem::is_directory(directory))
-    GTEST_SKIP() << directory << " is not there; set PREVIZ_SHARED";
+  const std::filesystem::path directory = test::shared_data("real/hdr/memorial");
+  PREVIZ_NEEDS(directory);
   const Memorial memorial = load_memorial(directory);
   ASSERT_EQ(memorial.pictures.size(), 16u);
   cv::Mat robertson;

@@ -91,7 +91,7 @@ TEST(ExpandClipped, IsBoundedKeepsColourAndTouchesNothingElse) {
   }
 }
 
-// P5: one exposure only, a lamp that clips it; told by how much the light is a guess.
+// P5: one exposure only, a lamp that clips it; the report says how much the light is a guess.
 TEST(Estimate, ExpandsWhatOneExposureClipsAndSaysSo) {
   LightCameraCalibration camera = test::fisheye_camera(256);
   camera.world_from_camera = test::looking(0, 90);

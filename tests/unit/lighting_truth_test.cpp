@@ -2,22 +2,16 @@
 // there.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <numbers>
 
+#include "tests/support/shared_data.hpp"
 #include "tests/truth/lighting_measure.hpp"
 
 namespace previz::truth {
 namespace lighting_truth_test {
 
 constexpr double degree = std::numbers::pi / 180;
-
-std::filesystem::path shared_directory() {
-  const char* named = std::getenv("PREVIZ_SHARED");
-  return named ? std::filesystem::path(named)
-               : std::filesystem::path(PREVIZ_SOURCE_DIR).parent_path() / "shared";
-}
 
 // The same bounds for the sources of the map, and 0.1 % for what sources and residual add up to.
 void expect_sources(const LightingMeasure& measure) {
@@ -64,9 +58,8 @@ TEST(CapturedLight, MatchesTheBundledSet) {
 }
 
 TEST(CapturedLight, MatchesTheSharedSets) {
-  const std::filesystem::path sets = shared_directory() / "groundtruth";
-  if (!std::filesystem::is_directory(sets))
-    GTEST_SKIP() << sets << " is not there; set PREVIZ_SHARED";
+  const std::filesystem::path sets = test::shared_data("groundtruth");
+  PREVIZ_NEEDS(sets);
   for (const auto& entry : std::filesystem::directory_iterator(sets))
     if (std::filesystem::exists(entry.path() / "set.json")) expect_captured(entry.path());
 }

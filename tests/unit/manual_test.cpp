@@ -1,4 +1,4 @@
-// The manual pages and the completions tell what the programs do.
+// The manual pages and the completions say what the programs do.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

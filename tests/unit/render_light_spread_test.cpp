@@ -127,7 +127,7 @@ TEST(DirectionsTowardsWhatDiffers, AreTakenUnderASkyAndNotUnderALamp) {
   view.scene.lights = {sun};
   EXPECT_TRUE(rays_of(view).same_picture);
 
-  // A lamp that is faint beside the sky changes nothing that could be told: of the rays that the
+  // A lamp that is faint beside the sky changes nothing that could be seen: of the rays that the
   // directions cost, some thousand, less than a tenth, three deviations of such a number.
   sun.emission = glm::dvec3(1e-6);
   view.environment = uniform_environment(glm::vec3(1));

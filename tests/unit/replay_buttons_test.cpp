@@ -90,10 +90,10 @@ TEST(ReplayButtons, DamagedLinesAreToldAndOtherEventsAreNotButtons) {
                          "7\n"
                          "{\"timestamp_ns\":6,\"button\":\"a\",\"pressed\":fal");
   const auto buttons = open_replay_buttons(directory.path(), due_at({}));
-  const auto told = std::get<DeviceTrouble>(buttons->next().value());
-  EXPECT_EQ(told.device, (directory / "events.jsonl").string());
-  EXPECT_EQ(told.what, "lines 3 to 6 cannot be understood and are left out");
-  EXPECT_FALSE(told.lost);
+  const auto trouble = std::get<DeviceTrouble>(buttons->next().value());
+  EXPECT_EQ(trouble.device, (directory / "events.jsonl").string());
+  EXPECT_EQ(trouble.what, "lines 3 to 6 cannot be understood and are left out");
+  EXPECT_FALSE(trouble.lost);
   EXPECT_EQ(due_events(*buttons), (std::vector<ButtonEvent>{{"a", true, 1}}));
 }
 

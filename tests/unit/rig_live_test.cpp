@@ -153,8 +153,8 @@ void expect_same(const render::Layers& a, const render::Layers& b) {
   EXPECT_TRUE(a.depth == b.depth);
 }
 
-// The lines that tell what was done, in order.
-std::vector<std::string> told(const std::string& log) {
+// The log's lines on what was done, in order.
+std::vector<std::string> deeds(const std::string& log) {
   std::vector<std::string> lines;
   std::istringstream text(log);
   for (std::string line; std::getline(text, line);)
@@ -243,7 +243,7 @@ TEST_F(RigLive, ThroughEveryModeByButtons) {
       "button snapshot: snapshot",
       "button standby: standby",
       "button standby: live"};
-  std::vector<std::string> lines = told(log_.text());
+  std::vector<std::string> lines = deeds(log_.text());
   std::erase_if(lines, [](const std::string& line) { return line.starts_with("recording: "); });
   EXPECT_EQ(lines, transcript);
 
@@ -385,7 +385,7 @@ TEST_F(RigLive, EveryCapturedFrameIsRenderedOrCounted) {
   EXPECT_EQ(test::accounted_for(metrics_), metrics_.stages.at("observer").frames);
 }
 
-// A review's own thread plays until it is told to end.
+// A review's own thread plays until it is asked to end.
 TEST_F(RigLive, MayEndOrChangeItsSetInAReview) {
   write_set();
   run([&] {
@@ -425,7 +425,7 @@ TEST_F(RigLive, ARefinementShowsWhatWasMovedInStandby) {
   });
 }
 
-// A disk that does not take picture.png is told of, and no reason to stop.
+// A disk that does not take picture.png is reported, and no reason to stop.
 TEST_F(RigLive, GoesOnWhereItsFilesCannotBeWritten) {
   write_set();
   run([&] {
@@ -535,7 +535,7 @@ class NotifySocket {
   void until(const std::string& words) {
     for (std::string said = next(60'000); said.find(words) == std::string::npos;
          said = next(60'000))
-      if (said.empty()) throw test::WaitedInVain("systemd is not told " + words);
+      if (said.empty()) throw test::WaitedInVain("systemd is not sent " + words);
   }
 
  private:
@@ -557,7 +557,7 @@ TEST_F(RigLive, TheWatchdogIsFedOnlyWhileFramesAdvance) {
       while (!systemd.next(0).empty()) continue;
       press("samples_up");  // the loop answers
       systemd.until("STATUS=button samples_up");
-      // A loop that was held up over that half second had frames to tell of after this answer;
+      // A loop that was held up over that half second had frames to report after this answer;
       // after the next one it had not.
       press("samples_down");
       systemd.until("STATUS=button samples_down");

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -10,6 +9,7 @@
 
 #include "daemon/render/feature.hpp"
 #include "daemon/scene/scene.hpp"
+#include "tests/support/shared_data.hpp"
 
 namespace previz::scene {
 namespace scene_groundtruth_test {
@@ -17,18 +17,11 @@ namespace scene_groundtruth_test {
 using Json = nlohmann::json;
 namespace fs = std::filesystem;
 
-fs::path groundtruth() {
-  const char* shared = std::getenv("PREVIZ_SHARED");
-  return (shared ? fs::path(shared) : fs::path(PREVIZ_SOURCE_DIR) / ".." / "shared") /
-         "groundtruth";
-}
-
 class GroundTruthScene : public ::testing::TestWithParam<const char*> {
  protected:
   void SetUp() override {
-    directory = groundtruth() / GetParam();
-    if (!fs::exists(directory / "set.json"))
-      GTEST_SKIP() << directory << " is not there; PREVIZ_SHARED names the folder it is in";
+    directory = test::shared_data("groundtruth") / GetParam();
+    PREVIZ_NEEDS(directory / "set.json");
     json = Json::parse(std::ifstream(directory / "set.json"));
     set::Object phantom, virtual_object;
     phantom.file = directory / "phantom.glb";

@@ -1,5 +1,5 @@
-// Every kind of mistake in a set file: told once, at its line and column, with the key and a way
-// out.
+// Every kind of mistake in a set file: reported once, at its line and column, with the key and a
+// way out.
 #include <gtest/gtest.h>
 
 #include <fstream>

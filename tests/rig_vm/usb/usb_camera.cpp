@@ -1,6 +1,6 @@
 // A USB camera (UVC 1.0, YUYV over a bulk endpoint) with manual exposure, plugged into a guest of
 // QEMU: it sends the light camera's frames of a recorded take at half their size, of those with the
-// exposure that is nearest to the one it was told.
+// exposure that is nearest to the one it was given.
 //   rig_vm_usb_camera SOCKET CABLE SESSION FRAMES_PER_SECOND
 // It is plugged in as long as the file CABLE is there, and wedged, until it is reset or replugged,
 // once CABLE.wedged comes into being.
