@@ -6,13 +6,13 @@
 
 #include "daemon/lighting/response.hpp"
 #include "daemon/render/composite.hpp"
+#include "daemon/render/corner_rays.hpp"
 #include "daemon/render/denoiser.hpp"
 #include "daemon/render/feature.hpp"
 #include "daemon/render/gpu_scene.hpp"
 #include "daemon/render/photon_schedule.hpp"
 #include "daemon/render/picture_memory.hpp"
 #include "daemon/render/presenter.hpp"
-#include "daemon/render/view.hpp"
 #include "daemon/render/wavefront.hpp"
 #include "drivers/error.hpp"
 

@@ -1,4 +1,4 @@
-#include "daemon/render/view.hpp"
+#include "daemon/render/corner_rays.hpp"
 
 #include <cmath>
 #include <opencv2/calib3d.hpp>
