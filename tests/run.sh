@@ -27,6 +27,7 @@
 set -uo pipefail
 cd "$(dirname "$0")/.." || exit
 jobs=$(nproc)
+export CCACHE_DEPEND=1  # a compiler cache that is empty needs no preprocessor of its own
 gate=(release asan format lint)
 steps=("$@")
 [[ ${#steps[@]} -gt 0 ]] || steps=("${gate[@]}")
