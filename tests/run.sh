@@ -77,11 +77,14 @@ check_skips() {
 }
 
 # CTest counts programs; the cases in them, and which of those were skipped, are in its log. Some
-# programs mostly wait, so there is one more at a time than there are cores.
+# programs mostly wait, so there is one more at a time than there are cores, and another one of those
+# that have a sanitizer.
 # run_tests PRESET [CTEST_OPTION]...
 run_tests() {
   local preset=$1 log=build/$1/Testing/Temporary/LastTest.log status=0
-  ctest --preset "$preset" --parallel $((jobs + 1)) "${@:2}" || status=$?
+  local at_once=$((jobs + 1))
+  [[ $preset == release ]] || at_once=$((jobs + 2))
+  ctest --preset "$preset" --parallel "$at_once" "${@:2}" || status=$?
   check_skips "$log" || status=1
   summaries+=("$preset: $(grep -c '^\[       OK \]' "$log") passed, $(grep -c \
     '^\[  FAILED  \] .* ms)$' "$log") failed, $(grep -c '^\[  SKIPPED \] .* ms)$' "$log") skipped")
