@@ -37,8 +37,8 @@ struct LifelineHooks {
 // follows. Sequence numbers keep increasing over all openings.
 //
 // A camera that cannot be opened or stalls is reported once, and again only when the cause changes;
-// the event `lost` then carries the cause, without a second report. An EndOfStream of the device ends
-// this stream.
+// the event `lost` then carries the cause, without a second report. An EndOfStream of the device
+// ends this stream.
 class Lifeline final : public Camera {
  public:
   // `name` stands in reports of trouble. Opens nothing yet.

@@ -17,8 +17,8 @@
 
 namespace previz::render {
 
-// Returns the least variance that is assumed of a composite of this many samples where it is brighter
-// than `white`: the variance of a few samples, however alike they were.
+// Returns the least variance that is assumed of a composite of this many samples where it is
+// brighter than `white`: the variance of a few samples, however alike they were.
 float most_sure_variance(float white, std::int64_t samples);
 
 class Denoiser {

@@ -1,7 +1,7 @@
 // Adds samples to a picture: runs the path tracer one segment at a time for all paths at once. One
 // pass generates camera rays, then for each segment one finds what the rays hit, one shades it and
-// one traces the shadow rays, and a last one adds up (shaders/README.md, "The passes"). A picture is
-// worked on in tiles of whole rows, and paths that have ended leave the queues.
+// one traces the shadow rays, and a last one adds up (shaders/README.md, "The passes"). A picture
+// is worked on in tiles of whole rows, and paths that have ended leave the queues.
 #pragma once
 
 #include <cstdint>

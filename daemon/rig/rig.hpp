@@ -1,5 +1,6 @@
 // The running rig: opens a set's cameras, buttons and display, starts the live pipeline and the
-// recorder, and carries out what buttons and bus ask for. All of it on the main thread's event loop.
+// recorder, and carries out what buttons and bus ask for. All of it on the main thread's event
+// loop.
 #pragma once
 
 #include <cstdint>

@@ -11,8 +11,8 @@
 namespace previz::calibration {
 
 // Checks what only several keys together show (a response table's length, a lens shorter than its
-// focus), and completes draft.calibration by its lens or pose. Says nothing more of a key that could
-// not be read.
+// focus), and completes draft.calibration by its lens or pose. Says nothing more of a key that
+// could not be read.
 //
 // A fisheye may be described so that beyond some angle the picture runs inwards again ("folds
 // back"). If that angle lies within the calibrated one, a set file is refused, because its author
