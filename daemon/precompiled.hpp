@@ -1,5 +1,5 @@
-// The headers of libraries that most rooms read, compiled once for all of them (PREVIZ_PRECOMPILED).
-// A file still includes what it uses, as builds without it show.
+// The headers of libraries that most rooms read, compiled once for all of them
+// (PREVIZ_PRECOMPILED). A file still includes what it uses, as builds without it show.
 #pragma once
 
 #include <algorithm>
