@@ -187,6 +187,7 @@ Measures compare_with(const TruthFrame& truth, const EstimatedFrame& wanted,
   const double white = 1 / truth.exposure;
   const auto diff = [&](const EstimatedFrame& of) -> PixelValue {
     return [&](std::size_t i) {
+      if (of.is_as_shown) return clipped(of.composite[i], white) - clipped(truth.plate[i], white);
       return clipped(truth.real[i] + of.diff[i], white) - clipped(truth.real[i], white);
     };
   };
@@ -319,6 +320,7 @@ EstimatedFrame composited(const TruthFrame& truth, EstimatedFrame estimate) {
 }
 
 EstimatedFrame as_composited(const std::vector<glm::vec3>& plate, EstimatedFrame estimate) {
+  estimate.is_as_shown = !plate.empty();
   for (std::size_t i = 0; i < estimate.composite.size(); ++i) {
     if (estimate.mask[i] == 0)
       estimate.diff[i] = estimate.composite[i] - (plate.empty() ? glm::vec3(0) : plate[i]);

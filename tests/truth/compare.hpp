@@ -28,7 +28,8 @@ struct TruthFrame {
 struct EstimatedFrame {
   std::vector<glm::vec3> composite, mixed, real, diff;
   std::vector<float> mask;
-  Plate picture;  // 8 bit
+  Plate picture;             // 8 bit
+  bool is_as_shown = false;  // the composite is judged, and not the difference that it was made of
 };
 
 struct Measures {
@@ -60,7 +61,7 @@ EstimatedFrame composited(const TruthFrame& truth, EstimatedFrame estimate);
 
 // The estimate with what its composite over a plate (empty: black) shows in place of diff, where
 // its mask is 0, and of mixed, where it is 1: a composite from which noise was taken is not made of
-// them.
+// them. Clipping then applies to what is shown.
 EstimatedFrame as_composited(const std::vector<glm::vec3>& plate, EstimatedFrame estimate);
 
 double psnr(const Plate& a, const Plate& b);

@@ -32,6 +32,7 @@ struct Arguments {
   fs::path out;
   std::optional<std::string> bounds;
   std::vector<int> frames;  // empty: every truth frame
+  double expose = 1;        // how many times as long the camera exposes
 };
 
 struct JudgedFrame {
@@ -116,7 +117,7 @@ void print_row(const std::string& set, int frame, const JudgedFrame& judged) {
 
 // True where every bound holds.
 bool run_set(const fs::path& path, const Arguments& arguments) {
-  const TruthSet set = load_truth_set(path);
+  TruthSet set = load_truth_set(path);
   for (const std::string& note : set.notes) std::cerr << "note: " << note << std::endl;
   std::vector<int> frames = arguments.frames.empty() ? set.truth_frames : arguments.frames;
   for (const int frame : frames) {
@@ -129,6 +130,7 @@ bool run_set(const fs::path& path, const Arguments& arguments) {
   fs::remove_all(directory / "session");
   fs::remove_all(directory / "render");
   fs::create_directories(directory);
+  if (arguments.expose != 1) expose_longer(set, arguments.expose, directory / "plates");
   write_take(set, arguments.take, directory / "session");
 
   ordered_json metrics;
@@ -181,6 +183,9 @@ int main(int argc, char** argv) {
   app.add_option("--out", arguments.out, "directory for the pictures and figures")->required();
   app.add_option("--bounds", arguments.bounds, "judge by this row of bounds")
       ->check(CLI::IsMember({"paired", "full", "captured"}));
+  app.add_option("--expose", arguments.expose,
+                 "expose the plate this many times as long as the set did, and clip it [1]")
+      ->check(CLI::Range(1.0, 1000.0));
   app.add_option("--frames", arguments.frames, "only these truth frames, as 0,12 [all]")
       ->delimiter(',');
   app.add_option("--lighting", arguments.take.lighting,

@@ -356,6 +356,19 @@ TruthSet load_truth_set(const fs::path& directory) {
   return set;
 }
 
+void expose_longer(TruthSet& set, double times, const fs::path& directory) {
+  fs::create_directories(directory);
+  set.exposure *= times;
+  for (ObserverFrame& frame : set.frames) {
+    Plate plate = output::read_png(frame.file);
+    const lighting::Response response(set.observer.response, plate.bits);
+    for (std::uint16_t& code : plate.samples)
+      code = response.forward(times * response.inverse()[code]);
+    frame.file = directory / frame.file.filename();
+    output::write_png(frame.file, plate);
+  }
+}
+
 const ObserverFrame& observer_frame(const TruthSet& set, int frame) {
   const auto found = std::find_if(set.frames.begin(), set.frames.end(),
                                   [&](const auto& f) { return f.index == frame; });

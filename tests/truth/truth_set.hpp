@@ -53,6 +53,11 @@ TruthSet load_truth_set(const std::filesystem::path& directory);
 // Reads the truth pictures and the plate of one frame. Throws previz::Error naming the file.
 TruthFrame load_truth_frame(const TruthSet& set, int frame);
 
+// Replaces the observer's pictures by what it would have taken with an exposure so many times as
+// long: writes them into a directory and makes the set name them. Throws previz::Error naming the
+// file.
+void expose_longer(TruthSet& set, double times, const std::filesystem::path& directory);
+
 const ObserverFrame& observer_frame(const TruthSet& set, int frame);
 
 // "0012"
