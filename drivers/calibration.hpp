@@ -45,6 +45,9 @@ struct ResponseCurve {
   double gamma = 2.2;  // Kind::gamma only: value = signal^(1/gamma)
   // Kind::table only: signal at value i/(n-1), i = 0..n-1; strictly increasing from 0 to 1.
   std::vector<double> inverse_table;
+  // A value of this share of the largest one or more is clipped: it means at least so much light.
+  // Conversion, compression and limited range put what the sensor clipped below the largest value.
+  double clip_share = 0.98;
 };
 
 // The signal of a value 0..1 by the sRGB curve (IEC 61966-2-1).

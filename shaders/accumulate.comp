@@ -54,8 +54,10 @@ void main() {
     add_exactly(sums.mixed_high, sums.mixed_low, mixed);
     add_exactly(sums.diff_high, sums.diff_low, vec4(diff, aov.w));
     sums.normal += vec4(aov.xyz, aov.w > 0.0 ? 1.0 : 0.0);
-    add_exactly(sums.square_mixed_high, sums.square_mixed_low, vec4(mixed.rgb * mixed.rgb, real.w));
-    add_exactly(sums.square_diff_high, sums.square_diff_low, vec4(diff * diff, 1.0));
+    const bool covered = mixed.w > 0.0;
+    add_exactly(sums.uncovered_high, sums.uncovered_low, vec4(covered ? vec3(0.0) : diff, real.w));
+    const vec3 added = covered ? mixed.rgb : diff;
+    add_exactly(sums.square_high, sums.square_low, vec4(added * added, 1.0));
   }
   pixels[gl_GlobalInvocationID.x] = sums;
 }

@@ -1,92 +1,77 @@
 // Makes the composite of each pixel from its sums and the plate, in single precision, and the input
-// of the denoiser. The rule is that of daemon/render/composite.hpp (shaders/README.md, "The
-// composite").
+// of the denoiser: what the composite is made of, because its rule is not linear and follows once
+// more when noise has been taken out (shaders/README.md, "The composite").
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shaders/lib/show.glsl"
 
-layout(scalar) readonly buffer Pixels { GpuPixel pixels[]; };       // of a tile
+layout(scalar) readonly buffer Pixels { GpuPixel pixels[]; };  // of a tile
 layout(scalar) writeonly buffer Composites { vec4 composites[]; };  // of the band: composite, mean(M)
 // The denoiser's, as lib/denoise.glsl reads them.
 layout(scalar) writeonly buffer Signals { vec4 signals[]; };
 layout(scalar) writeonly buffer Variances { vec4 variances[]; };
 layout(scalar) writeonly buffer Surfaces { vec4 surfaces[]; };
+layout(scalar) writeonly buffer Uncovered { vec4 uncovered[]; };
+layout(scalar) writeonly buffer Reals { vec4 reals[]; };
+// Of the band: which channels are brighter than white by more than chance (bit 0: red).
+layout(scalar) writeonly buffer Highlights { uint highlights[]; };
 
-// Gains are limited to this: a larger ratio means nothing, and its square would overflow.
-const float MOST_GAIN = 1e15;
-
-// Returns the variance that rounding to codes leaves in the plate: step^2 / 12, the variance of a
-// uniform distribution, with the mean step to the two neighbouring codes.
-vec3 plate_variance(uvec3 codes) {
-  const uvec3 low = max(codes, 1u) - 1u;
-  const uvec3 high = min(codes + 1u, show.most);
-  const vec3 step = (radiance_of(high) - radiance_of(low)) / vec3(high - low);
-  return step * step / 12.0;
-}
-
-// Returns the factor by which the difference is multiplied before it is added to the camera's
-// radiance. For hybrid, both terms are first divided by the larger one, because their squares could
-// overflow.
-float gain(float camera, float real, float variance) {
-  if (show.composite == COMPOSITE_RATIO) return real > 0.0 ? min(camera / real, MOST_GAIN) : 0.0;
-  if (show.composite == COMPOSITE_HYBRID) {
-    const float spread = sqrt(variance + show.floor * show.floor);
-    const float most = max(real, spread);
-    if (!(most > 0.0)) return 1.0;
-    const float r = real / most;
-    const float s = spread / most;
-    return min((r * (camera / most) + s * s) / (r * r + s * s), MOST_GAIN);
-  }
-  return 1.0;
-}
-
+// Returns the variance of a mean of independent samples.
 vec3 variance_of_mean(vec3 mean, vec3 square, float samples) {
   if (samples < 2.0) return vec3(0.0);
   return max(square - mean * mean, vec3(0.0)) / (samples - 1.0);
+}
+
+// Returns the variance of the change. A sample adds Lm in place of Lc where it is covered, and
+// Lm - Lr where it is not.
+vec3 variance_of_change(vec3 change, vec3 own, vec3 square, float mask, vec3 camera, float samples) {
+  if (mask <= 0.0 || mask >= 1.0) return variance_of_mean(change, square, samples);
+  return variance_of_mean(change - mask * camera,
+                          square + camera * (mask * camera - 2.0 * (change - own)), samples);
+}
+
+// Returns the channels that are brighter than white by more than two standard errors: a reflection
+// of a lamp, and no outlier that a single sample of many met.
+uint highlight_bits(vec3 above_white, vec3 variance) {
+  uint bits = 0u;
+  if (show.is_single != 0u) return bits;
+  for (uint c = 0u; c < 3u; ++c)
+    if (above_white[c] > 2.0 * sqrt(variance[c])) bits |= 1u << c;
+  return bits;
 }
 
 void main() {
   if (gl_GlobalInvocationID.x >= show.count) return;
   const GpuPixel sums = pixels[show.in_tile + gl_GlobalInvocationID.x];
   const uint index = show.in_band + gl_GlobalInvocationID.x;
-  const float samples = max(sums.square_diff_high.w + sums.square_diff_low.w, 1.0);
-  vec4 mixed = (sums.mixed_high + sums.mixed_low) / samples;
+  const float samples = max(sums.square_high.w + sums.square_low.w, 1.0);
+  const vec4 mixed = (sums.mixed_high + sums.mixed_low) / samples;
   const vec4 diff = (sums.diff_high + sums.diff_low) / samples;
-  const vec4 square_mixed = (sums.square_mixed_high + sums.square_mixed_low) / samples;
-  const vec3 square_diff = (sums.square_diff_high.rgb + sums.square_diff_low.rgb) / samples;
+  const vec4 own = (sums.uncovered_high + sums.uncovered_low) / samples;
+  const vec3 square = (sums.square_high.rgb + sums.square_low.rgb) / samples;
   const float mask = mixed.w;
-
-  vec3 camera = vec3(0.0);
-  vec3 camera_variance = vec3(0.0);
-  if (show.has_plate != 0u) {
-    const uvec3 codes = plate_codes(index);
-    camera = radiance_of(codes);
-    if (show.composite == COMPOSITE_HYBRID) camera_variance = plate_variance(codes);
-  }
-  vec3 real = ((sums.mixed_high.rgb - sums.diff_high.rgb) +
-               (sums.mixed_low.rgb - sums.diff_low.rgb)) / samples;
+  const Measured camera = measured_at(index);
+  const vec3 change = mask * mixed.rgb + (1.0 - mask) * diff.rgb;
   // Where only the difference was traced, the camera's measurement stands for the real world.
-  if (square_mixed.w > 0.0) {
-    real = camera;
-    mixed.rgb = camera + diff.rgb;
-  }
-  vec3 gains;
-  for (uint c = 0u; c < 3u; ++c) gains[c] = gain(camera[c], real[c], camera_variance[c]);
-  const float uncovered = 1.0 - mask;
-  const vec3 composite = mask * mixed.rgb + uncovered * (camera + gains * diff.rgb);
-  const vec3 variance =
-      mask * mask * variance_of_mean(mixed.rgb, square_mixed.rgb, samples) +
-      uncovered * uncovered * gains * gains * variance_of_mean(diff.rgb, square_diff, samples);
+  const vec3 traced = ((sums.mixed_high.rgb - sums.diff_high.rgb) +
+                       (sums.mixed_low.rgb - sums.diff_low.rgb)) / samples;
+  const vec3 real = own.w > 0.0 ? camera.radiance : traced;
+  const vec3 composite = compose(camera, Estimate(change, mask, own.rgb, real));
   composites[index] = vec4(composite, mask);
+  uncovered[index] = vec4(own.rgb / show.white, 0.0);
+  reals[index] = vec4(real / show.white, 0.0);
 
   const float hits = sums.normal.w;
   const float depth = hits > 0.0 ? diff.w * samples / hits : 0.0;
-  const vec3 unit = denoise_unit(camera, mask);
-  const vec3 through = uncovered * camera;
-  const vec3 shown = min(composite, max(through, show.white));
-  signals[index] = vec4((shown - through) / unit, depth > 0.0 ? 1.0 / depth : 0.0);
-  variances[index] = vec4(min(variance, vec3(show.most_variance)) / unit / unit, 0.0);
+  const vec3 variance = variance_of_change(change, own.rgb, square, mask, camera.radiance, samples);
+  vec3 gains;  // of an error of the change in the composite
+  for (uint i = 0u; i < 3u; ++i)
+    gains[i] = mix(gain(camera.radiance[i], real[i], camera.variance[i]), 1.0, mask);
+  highlights[index] = highlight_bits(composite - show.white, gains * gains * variance);
+  signals[index] = vec4(min(change / show.white, vec3(DENOISE_MOST_WHITES)), depth > 0.0 ? 1.0 / depth : 0.0);
+  variances[index] =
+      vec4(min(variance, vec3(show.most_variance)) / (show.white * show.white), 0.0);
   surfaces[index] = vec4(hits > 0.0 ? sums.normal.xyz / hits : vec3(0.0), mask);
 }

@@ -1,6 +1,6 @@
 // One level of an edge-avoiding wavelet transform that is guided by variance. The kernel is a B3
 // spline over 5x5 pixels that are `step` apart. A neighbour's weight falls the less it shows the
-// same surface, and the more it differs than its noise explains (Dammertz et al. 2010,
+// same surface, and the more its guide differs than noise explains (Dammertz et al. 2010,
 // "Edge-Avoiding A-Trous Wavelet Transform"; Schied et al. 2017, "Spatiotemporal Variance-Guided
 // Filtering").
 #version 460
@@ -9,11 +9,23 @@
 
 #include "shaders/lib/denoise.glsl"
 
-// A neighbour's weight has fallen to 1 / e at a difference of so many standard deviations. A larger
-// number blurs detail, a smaller one leaves noise; 1.5 to 3 differ little. The standard deviations
-// are those of independent neighbours. If the overlap were included, coarse levels would blend
-// more, and lose by blur what they gain in noise (tests/truth/RESULTS.md).
-const float NOISE_SCALE = 2.0;
+// The same for the guide, which denoise_guide.comp makes.
+uniform textureBuffer guides;
+uniform textureBuffer guide_variances;
+// What the composite needs beside the signal, over white; filtered with the signal's weights.
+uniform textureBuffer uncovered;
+uniform textureBuffer reals;
+layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
+layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
+layout(scalar) writeonly buffer DenoisedUncovered { vec4 denoised_uncovered[]; };
+layout(scalar) writeonly buffer DenoisedReals { vec4 denoised_reals[]; };
+
+// A neighbour's weight has fallen to 1 / e where its guide is off by so many standard deviations. A
+// larger number blurs detail, a smaller one leaves noise. Light that changes on real surfaces has
+// soft edges, and little of it is seen by few samples; virtual objects have detail of their own.
+// The standard deviations are those of independent neighbours (tests/truth/RESULTS.md).
+const float CHANGE_NOISE_SCALE = 8.0;
+const float OBJECT_NOISE_SCALE = 3.0;
 // The least variance of a signal, in units of the sensor's white squared: far below what 16 bits
 // show.
 const float LEAST_VARIANCE = 1e-12;
@@ -26,11 +38,20 @@ const float OVERLAP_POWER = 0.535;
 
 const float SPLINE[3] = float[3](0.375, 0.25, 0.0625);
 
-// Returns the squared difference of two signals over the one that noise alone would cause, as a
-// mean over the channels.
-float signal_distance(Pixel a, Pixel b) {
+struct Guide {
+  vec3 signal, variance;
+};
+
+Guide load_guide(ivec2 at) {
+  const int index = pixel_index(at);
+  return Guide(texelFetch(guides, index).rgb, texelFetch(guide_variances, index).rgb);
+}
+
+// Returns the squared difference of two guides over the one that noise alone would cause, as a mean
+// over the channels.
+float guide_distance(Guide a, Guide b, float scale) {
   const vec3 off = a.signal - b.signal;
-  const vec3 expected = NOISE_SCALE * NOISE_SCALE * (a.variance + b.variance) + LEAST_VARIANCE;
+  const vec3 expected = scale * scale * (a.variance + b.variance) + LEAST_VARIANCE;
   return dot(off * off / expected, vec3(1.0 / 3.0));
 }
 
@@ -39,10 +60,17 @@ void main() {
   if (index >= denoise.width * denoise.height) return;
   const ivec2 at = ivec2(index % denoise.width, index / denoise.width);
   const Pixel here = load_pixel(at);
-  const vec2 slope = vec2(inverse_depth_slope(at, ivec2(1, 0), here.inverse_depth),
-                          inverse_depth_slope(at, ivec2(0, 1), here.inverse_depth));
+  const Guide guide = load_guide(at);
+  // The guide lies between pixels, and does not see what is finer than its step. Where pixels know
+  // their variance, their values show that.
+  const Guide own_value = Guide(here.signal, here.variance);
+  const float scale = here.cover > 0.0 ? OBJECT_NOISE_SCALE : CHANGE_NOISE_SCALE;
+  const vec2 slope = inverse_depth_slopes(at, here.inverse_depth);
+  const bool has_companions = denoise.has_companions != 0u;
   vec3 change = vec3(0.0);
   vec3 variance = vec3(0.0);
+  vec3 own = vec3(0.0);
+  vec3 real = vec3(0.0);
   float overlap = 0.0;
   float total = 0.0;
   float squares = 0.0;
@@ -55,16 +83,26 @@ void main() {
       if (x != 0 || y != 0) {
         if (!are_alike(here, there)) continue;
         const float foretold = here.inverse_depth + dot(slope, vec2(off));
-        weight *= exp(-(signal_distance(here, there) + surface_distance(here, there, foretold)));
+        float distance = guide_distance(guide, load_guide(at + off), scale) +
+                         surface_distance(here, there, foretold);
+        if (denoise.single_sample == 0u)
+          distance += guide_distance(own_value, Guide(there.signal, there.variance), scale);
+        weight *= exp(-distance);
       }
       change += weight * (there.signal - here.signal);
       variance += weight * weight * there.variance;
       overlap += weight * there.overlap;
       total += weight;
       squares += weight * weight;
+      if (!has_companions) continue;
+      own += weight * texelFetch(uncovered, pixel_index(at + off)).rgb;
+      real += weight * texelFetch(reals, pixel_index(at + off)).rgb;
     }
   overlap /= total;
   if (denoise.step > 1u) overlap *= pow(total * total / squares, 1.0 - OVERLAP_POWER);
   denoised_signals[index] = vec4(here.signal + change / total, here.inverse_depth);
   denoised_variances[index] = vec4(variance / (total * total), overlap);
+  if (!has_companions) return;
+  denoised_uncovered[index] = vec4(own / total, 0.0);
+  denoised_reals[index] = vec4(real / total, 0.0);
 }

@@ -7,6 +7,10 @@
 
 #include "shaders/lib/denoise.glsl"
 
+// What the levels read.
+layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
+layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
+
 vec3 mean_variance(ivec2 at, Pixel here) {
   vec3 sum = vec3(0.0);
   float count = 0.0;

@@ -6,6 +6,7 @@
 #include "shaders/lib/append.glsl"
 #include "shaders/lib/calibrated_ray.glsl"
 #include "shaders/lib/difference_bounds.glsl"
+#include "shaders/lib/plate.glsl"
 #include "shaders/lib/sampler.glsl"
 
 // Returns whether an object that is in one world only may cover a part of the pixel. Its bound is
@@ -27,6 +28,14 @@ bool may_be_covered(uvec2 pixel) {
   return false;
 }
 
+// Returns whether the plate says no more of some channel than that it is at least white. The
+// composite then needs the model's own radiance, not the difference alone.
+bool may_be_clipped(uvec2 pixel) {
+  if (frame.clip_from == NO_INDEX) return false;
+  const uvec3 codes = plate_codes(pixel.y * frame.width + pixel.x);
+  return any(greaterThanEqual(codes, uvec3(frame.clip_from)));
+}
+
 void main() {
   const uint slot = gl_GlobalInvocationID.x;
   const uvec2 in_tile = slot_pixel(slot);
@@ -45,7 +54,7 @@ void main() {
     const uint path = 2u * slot;
     ray_origin[path] = vec4(transform_vector(frame.world_from_camera, origin), 0.0);
     ray_direction[path] = vec4(normalize(transform_vector(frame.world_from_camera, target)), 0.0);
-    const bool difference = has_feature(FEATURE_DIFFERENCE) && !may_be_covered(pixel);
+    const bool difference = has_feature(FEATURE_DIFFERENCE) && !may_be_covered(pixel) && !may_be_clipped(pixel);
     const uint bits = WORLD_BOTH | (difference ? PATH_DIFFERENCE : 0u);
     path_throughput[path] = vec4(1.0, 1.0, 1.0, uintBitsToFloat(bits));
     sample_mixed[slot] = vec4(0.0);

@@ -10,17 +10,11 @@
 // The least signal that becomes each code.
 layout(scalar) readonly buffer LeastOf { float least_of[]; };
 layout(scalar) readonly buffer Composites { vec4 composites[]; };  // as composite.comp writes them
-layout(scalar) readonly buffer Signals { vec4 signals[]; };        // denoised, or as composited
-layout(scalar) writeonly buffer Picture { uint picture[]; };       // samples, as the plate's
-
-// Replaces the composite by its denoised signal. A channel that was white and comes out above
-// NEARLY_WHITE stays as it was.
-vec3 without_noise(vec3 composite, vec3 camera, float mask, vec3 signal) {
-  const vec3 clean = (1.0 - mask) * camera + denoise_unit(camera, mask) * signal;
-  for (uint c = 0u; c < 3u; ++c)
-    if (composite[c] < show.white || clean[c] < NEARLY_WHITE * show.white) composite[c] = clean[c];
-  return composite;
-}
+layout(scalar) readonly buffer Signals { vec4 signals[]; };        // denoised, and so are the next two
+layout(scalar) readonly buffer Uncovered { vec4 uncovered[]; };
+layout(scalar) readonly buffer Reals { vec4 reals[]; };
+layout(scalar) readonly buffer Highlights { uint highlights[]; };
+layout(scalar) writeonly buffer Picture { uint picture[]; };     // samples, as the plate's
 
 // Returns the largest code whose least signal is not above `signal`, and 0 for NaN.
 uint code_of(float signal) {
@@ -35,18 +29,31 @@ uint code_of(float signal) {
   return code;
 }
 
+// Returns the composite without noise. A channel that was white stays as it was where it is a
+// highlight, or comes out above NEARLY_WHITE and was not cut by the denoiser.
+vec3 without_noise(vec3 composite, vec3 clean, uint highlight) {
+  for (uint c = 0u; c < 3u; ++c) {
+    const bool is_bright = clean[c] >= NEARLY_WHITE * show.white &&
+                           composite[c] <= DENOISE_MOST_WHITES * show.white;
+    const bool stays = (highlight & (1u << c)) != 0u || is_bright;
+    if (composite[c] < show.white || !stays) composite[c] = clean[c];
+  }
+  return composite;
+}
+
 uvec3 codes_of(uint pixel) {
   const uint index = show.in_band + pixel;
   const vec4 shown = composites[index];
+  const float mask = shown.w;
   const vec3 signal = signals[index].rgb;
-  vec3 camera = vec3(0.0);
-  if (show.has_plate != 0u) {
-    const uvec3 own = plate_codes(index);
-    if (shown.w == 0.0 && signal == vec3(0.0)) return own;
-    camera = radiance_of(own);
+  if (show.has_plate != 0u && mask == 0.0 && signal == vec3(0.0))
+    return plate_codes(show.in_picture + index);
+  vec3 radiance = shown.rgb;
+  if (show.is_denoised != 0u) {
+    const Estimate estimate = Estimate(show.white * signal, mask, show.white * uncovered[index].rgb,
+                                       show.white * reals[index].rgb);
+    radiance = without_noise(radiance, compose(measured_at(index), estimate), highlights[index]);
   }
-  const vec3 radiance =
-      show.is_denoised != 0u ? without_noise(shown.rgb, camera, shown.w, signal) : shown.rgb;
   const vec3 exposed = show.exposure * radiance;
   return uvec3(code_of(exposed.r), code_of(exposed.g), code_of(exposed.b));
 }

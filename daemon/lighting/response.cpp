@@ -82,6 +82,20 @@ std::uint16_t Response::forward(double signal) const {
       std::floor(max * curve_value(curve_, std::min(signal, 1.0)) + 0.5));
 }
 
+float Clipping::share(std::uint32_t code) const {
+  if (code < from) return 0;
+  return std::min(1.0f, static_cast<float>(code - from + 1) / static_cast<float>(at - from + 1));
+}
+
+Clipping Response::clipping() const {
+  constexpr double rise = 0.04;  // of the codes: ten of 8 bits
+  const double max = static_cast<double>((1 << bits_) - 1);
+  const auto code = [&](double share) {
+    return static_cast<std::uint32_t>(std::ceil(max * std::max(share, 0.0)));
+  };
+  return {std::max(code(curve_.clip_share - rise), 1u), std::max(code(curve_.clip_share), 1u)};
+}
+
 double Response::least_signal(std::uint16_t code) const {
   if (code == 0) return 0;
   const double max = static_cast<double>((1 << bits_) - 1);

@@ -8,6 +8,14 @@
 
 namespace previz::lighting {
 
+// Which codes mean "at least so much light", because the sensor, or what came after it, clipped:
+// wholly from code `at` on, not at all below code `from`, and in between by a share that rises
+// evenly, so that nothing jumps where a picture runs into white.
+struct Clipping {
+  std::uint32_t from = 0, at = 0;
+  float share(std::uint32_t code) const;
+};
+
 // `inverse` has 2^bits entries: the linear signal (exposure * radiance) that each sample stands
 // for, with inverse[0] = 0 and inverse[max] = 1. forward(inverse[v]) == v for every v: the
 // constructor checks it and throws previz::Error saying which code the curve cannot return.
@@ -21,6 +29,8 @@ class Response {
   const std::vector<double>& inverse() const { return inverse_; }
   // Returns floor(max * curve(clip(signal)) + 0.5). NaN becomes 0 and is the caller's bug.
   std::uint16_t forward(double signal) const;
+  // By the curve's clip_share.
+  Clipping clipping() const;
   // Returns the least signal that forward() maps to this code, up to rounding; 0 for code 0.
   double least_signal(std::uint16_t code) const;
 

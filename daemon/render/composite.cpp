@@ -10,7 +10,7 @@ namespace {
 
 // The means that follow from one pixel's sums, in double precision.
 struct Means {
-  glm::dvec3 mixed, diff, mixed_square, diff_square;
+  glm::dvec3 mixed, diff, uncovered, square;
   double mask, depth_sum, hits, difference_only, samples;
 };
 
@@ -20,17 +20,17 @@ Means means(const gpu::GpuPixel& p) {
   };
   const glm::dvec4 mixed = sum(p.mixed_high, p.mixed_low);
   const glm::dvec4 diff = sum(p.diff_high, p.diff_low);
-  const glm::dvec4 mixed_square = sum(p.square_mixed_high, p.square_mixed_low);
-  const glm::dvec4 diff_square = sum(p.square_diff_high, p.square_diff_low);
-  const double samples = std::max(diff_square.w, 1.0);
+  const glm::dvec4 uncovered = sum(p.uncovered_high, p.uncovered_low);
+  const glm::dvec4 square = sum(p.square_high, p.square_low);
+  const double samples = std::max(square.w, 1.0);
   return {glm::dvec3(mixed) / samples,
           glm::dvec3(diff) / samples,
-          glm::dvec3(mixed_square) / samples,
-          glm::dvec3(diff_square) / samples,
+          glm::dvec3(uncovered) / samples,
+          glm::dvec3(square) / samples,
           mixed.w / samples,
           diff.w,
           p.normal.w,
-          mixed_square.w / samples,
+          uncovered.w / samples,
           samples};
 }
 
@@ -40,9 +40,14 @@ glm::dvec3 variance_of_mean(const glm::dvec3& mean, const glm::dvec3& square, do
   return glm::max(square - mean * mean, glm::dvec3(0)) / (n - 1);
 }
 
-// Reads pixel i of interleaved RGB; the pixel is black where there is no plate.
-glm::dvec3 pixel_of(const std::vector<double>& rgb, std::size_t i) {
-  return rgb.empty() ? glm::dvec3(0) : glm::dvec3(rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2]);
+// Returns the variance of the change. A sample adds Lm in place of Lc where it is covered, and
+// Lm - Lr where it is not; the mean of M Lm is that of the change without the uncovered part, but
+// for the covariance of M and Lr.
+glm::dvec3 variance_of_change(const Means& m, const glm::dvec3& change, const glm::dvec3& camera) {
+  if (m.mask <= 0 || m.mask >= 1) return variance_of_mean(change, m.square, m.samples);
+  const glm::dvec3 covered = change - m.uncovered;
+  return variance_of_mean(change - m.mask * camera,
+                          m.square + camera * (m.mask * camera - 2.0 * covered), m.samples);
 }
 
 // Returns the gain g of shaders/README.md, "The composite": the factor of the worlds' difference
@@ -64,6 +69,22 @@ double gain(const CompositeRule& rule, double camera, double real, double plate_
 
 }  // namespace
 
+double compose(const CompositeRule& rule, const MeasuredChannel& camera, const Estimate& e) {
+  const double seen = camera.radiance;
+  const double uncovered = (1 - e.mask);
+  const double plain =
+      uncovered * seen + (e.change + (gain(rule, seen, e.real, camera.variance) - 1) * e.uncovered);
+  if (camera.clipped <= 0) return plain;
+  const double behind = seen + camera.clipped * std::max(e.real - seen, 0.0);
+  const double whole = uncovered * behind +
+                       (e.change + (gain(rule, behind, e.real, camera.variance) - 1) * e.uncovered);
+  return std::min(whole, std::max(seen, plain));
+}
+
+double gain_of(const CompositeRule& rule, const MeasuredChannel& camera, const Estimate& e) {
+  return e.mask + (1 - e.mask) * gain(rule, camera.radiance, e.real, camera.variance);
+}
+
 PlateRadiance plate_radiance(const Plate& plate, const lighting::Response& response,
                              double exposure) {
   const std::vector<double>& inverse = response.inverse();
@@ -74,16 +95,25 @@ PlateRadiance plate_radiance(const Plate& plate, const lighting::Response& respo
     const double step = (inverse[high] - inverse[low]) / static_cast<double>(high - low) / exposure;
     of_code.value.push_back(inverse[code] / exposure);
     of_code.variance.push_back(step * step / 12);
+    of_code.clipped.push_back(response.clipping().share(static_cast<std::uint16_t>(code)));
   }
   PlateRadiance result{std::vector<double>(plate.samples.size()),
-                       std::vector<double>(plate.samples.size())};
+                       std::vector<double>(plate.samples.size()),
+                       std::vector<float>(plate.samples.size())};
   each_pixel(plate.samples.size() / 3, [&](std::size_t pixel) {
     for (std::size_t i = 3 * pixel; i < 3 * pixel + 3; ++i) {
       result.value[i] = of_code.value[plate.samples[i]];
       result.variance[i] = of_code.variance[plate.samples[i]];
+      result.clipped[i] = of_code.clipped[plate.samples[i]];
     }
   });
   return result;
+}
+
+MeasuredChannel PlateRadiance::channel(std::size_t pixel, int channel) const {
+  if (value.empty()) return {};
+  const std::size_t i = 3 * pixel + static_cast<std::size_t>(channel);
+  return {value[i], variance[i], clipped.empty() ? 0.0 : static_cast<double>(clipped[i])};
 }
 
 Layers make_layers(int width, int height, std::int64_t samples) {
@@ -105,22 +135,24 @@ void composite(Layers& layers, std::size_t first, std::span<const gpu::GpuPixel>
   each_pixel(pixels.size(), [&](std::size_t at) {
     const gpu::GpuPixel& sums = pixels[at];
     const std::size_t i = first + at;
-    Means m = means(sums);
-    const glm::dvec3 camera = pixel_of(plate.value, i);
-    const glm::dvec3 plate_variance = pixel_of(plate.variance, i);
+    const Means m = means(sums);
+    glm::dvec3 camera, result, gains;  // gains: of an error in the change
+    const glm::dvec3 change = m.mask * m.mixed + (1 - m.mask) * m.diff;
     // Where only the difference was traced, the camera's picture stands for the real world.
-    if (m.difference_only > 0) m.mixed = camera + m.diff;
-    const double uncovered = 1 - m.mask;
-    const glm::dvec3 real = m.mixed - m.diff;
-    glm::dvec3 gains;
-    for (int c = 0; c < 3; ++c) gains[c] = gain(rule, camera[c], real[c], plate_variance[c]);
-    layers.composite[i] = glm::vec3(m.mask * m.mixed + uncovered * (camera + gains * m.diff));
-    layers.mixed[i] = glm::vec3(m.mixed);
-    layers.real[i] = glm::vec3(real);
+    const bool is_difference = m.difference_only > 0;
+    for (int c = 0; c < 3; ++c) {
+      const MeasuredChannel measured = plate.channel(i, c);
+      camera[c] = measured.radiance;
+      const double real = is_difference ? measured.radiance : m.mixed[c] - m.diff[c];
+      const Estimate estimate{change[c], m.mask, m.uncovered[c], real};
+      result[c] = compose(rule, measured, estimate);
+      gains[c] = gain_of(rule, measured, estimate);
+    }
+    layers.composite[i] = glm::vec3(result);
+    layers.mixed[i] = glm::vec3(is_difference ? camera + m.diff : m.mixed);
+    layers.real[i] = glm::vec3(is_difference ? camera : m.mixed - m.diff);
     layers.diff[i] = glm::vec3(m.diff);
-    layers.variance[i] = glm::vec3(
-        m.mask * m.mask * variance_of_mean(m.mixed, m.mixed_square, m.samples) +
-        uncovered * uncovered * gains * gains * variance_of_mean(m.diff, m.diff_square, m.samples));
+    layers.variance[i] = glm::vec3(gains * gains * variance_of_change(m, change, camera));
     layers.mask[i] = static_cast<float>(m.mask);
     layers.depth[i] = static_cast<float>(m.hits > 0 ? m.depth_sum / m.hits : 0);
     const glm::dvec3 normal(sums.normal.x, sums.normal.y, sums.normal.z);

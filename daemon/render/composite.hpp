@@ -13,11 +13,20 @@
 
 namespace previz::render {
 
-// The plate as linear radiance, interleaved RGB: `value` is inverse_response(sample) / exposure;
-// `variance` is what rounding to samples leaves in it, the squared step between neighbouring codes
-// over 12.
+// What the camera measured in one channel of a pixel.
+struct MeasuredChannel {
+  double radiance = 0;  // inverse_response(sample) / exposure
+  double variance = 0;  // what rounding to samples leaves: the squared step between codes over 12
+  double clipped = 0;   // 0 to 1: how far the code means "at least this much" (lighting::Clipping)
+};
+
+// The plate as linear radiance, interleaved RGB.
 struct PlateRadiance {
   std::vector<double> value, variance;
+  std::vector<float> clipped;  // empty: nothing is
+
+  // Returns zeros if there is no plate.
+  MeasuredChannel channel(std::size_t pixel, int channel) const;
 };
 PlateRadiance plate_radiance(const Plate& plate, const lighting::Response& response,
                              double exposure);
@@ -33,14 +42,31 @@ struct CompositeRule {
   double floor = 0;  // radiance; used by hybrid
 };
 
+// What the samples say about one channel of a pixel.
+struct Estimate {
+  double change = 0;     // mean(Lm) - (1 - mean(M)) mean(Lr): what is added to (1 - mean(M)) Lc
+  double mask = 0;       // mean(M)
+  double uncovered = 0;  // mean((1 - M)(Lm - Lr)): the part of `change` that the rule multiplies
+  double real = 0;       // mean(Lr)
+};
+
+// Returns the composite of one channel. A clipped channel stands for the model's mean(Lr) where
+// that is brighter, so that a shadow first takes what the sensor could not show; the result is then
+// no brighter than the plate or than the composite with the plate as it is.
+double compose(const CompositeRule& rule, const MeasuredChannel& camera, const Estimate& estimate);
+
+// Returns the factor that a small error of the change has in the composite: the rule's gain where
+// nothing covers the pixel, and 1 where it is covered.
+double gain_of(const CompositeRule& rule, const MeasuredChannel& camera, const Estimate& estimate);
+
 // Returns all-zero layers of this size. `samples` is the largest number of samples that a pixel
 // has.
 Layers make_layers(int width, int height, std::int64_t samples);
 
 // Fills in all layers of the pixels from index `first` on, row-major, from the pixels' sums and the
-// plate of the whole picture (empty: black). The composite is mean(M) mean(Lm) + (1 - mean(M)) U,
-// where U follows from `rule`. With the additive rule it equals mean(Lm) + (1 - mean(M)) (Lc -
-// mean(Lr)), but no two large sums are subtracted (shaders/README.md, "The composite").
+// plate of the whole picture (empty: black). With the additive rule the composite equals mean(Lm) +
+// (1 - mean(M)) (Lc - mean(Lr)), but no two large sums are subtracted (shaders/README.md, "The
+// composite").
 void composite(Layers& layers, std::size_t first, std::span<const gpu::GpuPixel> pixels,
                const PlateRadiance& plate, const CompositeRule& rule = {});
 

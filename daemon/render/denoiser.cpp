@@ -1,9 +1,11 @@
 #include "daemon/render/denoiser.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "daemon/render/each_pixel.hpp"
 #include "shaders/denoise.spv.h"
+#include "shaders/denoise_guide.spv.h"
 #include "shaders/denoise_variance.spv.h"
 #include "shaders/lib/render_shared.h"
 
@@ -12,95 +14,94 @@ namespace {
 
 // The transform has four levels, with steps of 1, 2, 4 and 8 pixels.
 constexpr int wavelet_levels = 4;
-// A row's result depends on this many rows above and below it: two steps of every level, and the
-// neighbours that give the variance there. A slope comes from nearer rows.
+// A row's result depends on this many rows above and below it: at every level two steps and one
+// more of the guide, and the neighbours that give the variance. A slope comes from nearer rows.
 constexpr int reach =
-    2 * ((1 << wavelet_levels) - 1) + static_cast<int>(gpu::DENOISE_VARIANCE_REACH);
+    3 * ((1 << wavelet_levels) - 1) + static_cast<int>(gpu::DENOISE_VARIANCE_REACH);
 static_assert(gpu::DENOISE_VARIANCE_REACH >= 2);
-
-glm::vec3 camera_pixel(const std::vector<double>& camera, std::size_t i) {
-  if (camera.empty()) return glm::vec3(0);
-  return {camera[3 * i], camera[3 * i + 1], camera[3 * i + 2]};
-}
-
-// Returns the part of the camera's picture that shows through the composite. Single precision, like
-// the composite's, makes the difference of the two exactly zero in an untouched pixel.
-glm::vec3 seen_through(const Layers& layers, const std::vector<double>& camera, std::size_t i) {
-  return (1 - layers.mask[i]) * camera_pixel(camera, i);
-}
-
-// Returns the unit of a signal: the sensor's white or, where the composite multiplies the camera's
-// picture, that picture, so that its texture is not blurred. The floor preserves light that is
-// added to black.
-struct Scale {
-  const Layers& layers;
-  const std::vector<double>& camera;
-  const CompositeRule& rule;
-  float white;
-
-  glm::vec3 operator()(std::size_t i) const {
-    if (rule.kind == set::Composite::additive || layers.mask[i] > 0) return glm::vec3(white);
-    return camera_pixel(camera, i) + std::max(static_cast<float>(rule.floor), 1e-3f * white);
-  }
-};
 
 }  // namespace
 
-// A mean of n samples, each no brighter than white, has a standard deviation of at most white /
-// sqrt(n). The number of samples is capped, because otherwise the outlier that a single sample met
-// would never count as one.
+// A mean of n samples, each no brighter than DENOISE_MOST_WHITES, has a standard deviation of at
+// most that / sqrt(n). The number of samples is capped, because otherwise the outlier that a single
+// sample met would never count as one.
 float most_sure_variance(float white, std::int64_t samples) {
   constexpr std::int64_t most_sure_samples = 16;
-  return white * white /
-         static_cast<float>(std::clamp<std::int64_t>(samples, 1, most_sure_samples));
+  const float most = gpu::DENOISE_MOST_WHITES * white;
+  return most * most / static_cast<float>(std::clamp<std::int64_t>(samples, 1, most_sure_samples));
 }
 
 Denoiser::Denoiser(Device& device, std::size_t most_pixels)
     : device_(device),
       most_pixels_(most_pixels),
       variance_pass_(device, "denoise_variance", denoise_variance_spv),
+      guide_pass_(device, "denoise_guide", denoise_guide_spv),
       level_pass_(device, "denoise", denoise_spv) {}
 
-void Denoiser::reserve(std::size_t pixels) {
-  if (pixels <= pixels_) return;
-  pixels_ = 0;  // stays 0 if an allocation below throws
-  const auto texels = [&] {
-    return create_texel_buffer(device_, pixels * sizeof(gpu::vec4),
-                               vk::Format::eR32G32B32A32Sfloat);
-  };
-  for (int side : {0, 1}) {
-    signal_[side] = texels();
-    variance_[side] = texels();
+void Denoiser::reserve(std::size_t pixels, bool companions) {
+  const bool is_large_enough = pixels <= pixels_ && (has_companions_ || !companions);
+  if (!is_large_enough) {
+    pixels = std::max(pixels, pixels_);
+    pixels_ = 0;  // stays 0 if an allocation below throws
+    const auto texels = [&](std::size_t count) {
+      return create_texel_buffer(device_, count * sizeof(gpu::vec4),
+                                 vk::Format::eR32G32B32A32Sfloat);
+    };
+    for (int side : {0, 1}) {
+      signal_[side] = texels(pixels);
+      variance_[side] = texels(pixels);
+    }
+    for (int side : {0, 1})
+      for (Buffer* companion : {&uncovered_[side], &real_[side]})
+        // composite.comp and present.comp use one side, whether it is filtered or not.
+        *companion = texels(companions || side == 0 ? pixels : 1);
+    for (Buffer* other : {&surface_, &guide_, &guide_variance_}) *other = texels(pixels);
+    pixels_ = pixels;
   }
-  surface_ = texels();
-  pixels_ = pixels;
+  has_companions_ = companions;
 }
 
-// Each pass writes to the other side, starting from side 0; the variance pass is the first.
+// Each pass writes to the other side, starting from side 0; the variance pass is the first. It
+// leaves the companions where they are.
 constexpr int result_side = (1 + wavelet_levels) % 2;
+constexpr int companions_side = wavelet_levels % 2;
 
 const Buffer& Denoiser::denoised_signal() const {
   return signal_[result_side];
 }
+const Buffer& Denoiser::denoised_uncovered() const {
+  return uncovered_[has_companions_ ? companions_side : 0];
+}
+const Buffer& Denoiser::denoised_real() const {
+  return real_[has_companions_ ? companions_side : 0];
+}
 
 void Denoiser::record(const vk::raii::CommandBuffer& commands, int width, int rows,
                       bool single_sample) {
-  gpu::GpuDenoise constants{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(rows), 0,
-                            single_sample ? 1u : 0u};
-  int side = 0;
+  gpu::GpuDenoise constants{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(rows), 1,
+                            single_sample ? 1u : 0u, has_companions_ ? 1u : 0u};
+  int side = 0, companion = 0;
   const auto run = [&](Kernel& pass) {
     const Buffers buffers{{"signals", &signal_[side]},
                           {"variances", &variance_[side]},
                           {"surfaces", &surface_},
+                          {"guides", &guide_},
+                          {"guide_variances", &guide_variance_},
+                          {"uncovered", &uncovered_[companion]},
+                          {"reals", &real_[companion]},
                           {"denoised_signals", &signal_[1 - side]},
-                          {"denoised_variances", &variance_[1 - side]}};
+                          {"denoised_variances", &variance_[1 - side]},
+                          {"denoised_uncovered", &uncovered_[1 - companion]},
+                          {"denoised_reals", &real_[1 - companion]}};
     pass.dispatch({commands, constants, buffers}, constants.width * constants.height);
-    side = 1 - side;
   };
   run(variance_pass_);
   for (int level = 0; level < wavelet_levels; ++level) {
+    side = 1 - side;
     constants.step = 1u << level;
+    run(guide_pass_);
     run(level_pass_);
+    companion = 1 - companion;
   }
 }
 
@@ -119,27 +120,40 @@ std::vector<Denoiser::Band> Denoiser::bands(int width, int height) const {
   return bands;
 }
 
-void Denoiser::read(const Band& band, Layers& layers, const std::vector<double>& camera,
+void Denoiser::read(const Band& band, Layers& layers, const PlateRadiance& plate,
                     const CompositeRule& rule) const {
   const auto width = static_cast<std::size_t>(layers.width);
   const std::size_t top = static_cast<std::size_t>(band.top) * width;
   const std::size_t first = static_cast<std::size_t>(band.first) * width;
   const std::size_t last = static_cast<std::size_t>(band.last) * width;
-  const auto signals = download<glm::vec4>(device_, signal_[result_side], last - top);
+  const auto signals = download<glm::vec4>(device_, denoised_signal(), last - top);
   const auto variances = download<glm::vec4>(device_, variance_[result_side], last - top);
+  std::vector<glm::vec4> uncovered, real;
+  if (has_companions_) {
+    uncovered = download<glm::vec4>(device_, denoised_uncovered(), last - top);
+    real = download<glm::vec4>(device_, denoised_real(), last - top);
+  }
   const auto white = static_cast<float>(layers.white);
-  const Scale scale{layers, camera, rule, white};
   each_pixel(last - first, [&](std::size_t at) {
     const std::size_t i = first + at;
     const glm::vec4& variance = variances[i - top];
-    const glm::vec3 units = scale(i);
-    const glm::vec3 denoised =
-        seen_through(layers, camera, i) + units * glm::vec3(signals[i - top]);
-    const glm::vec3 left = units * units * variance.w * glm::vec3(variance);
     for (int c = 0; c < 3; ++c) {
-      if (layers.composite[i][c] >= white && denoised[c] >= gpu::NEARLY_WHITE * white) continue;
-      layers.composite[i][c] = denoised[c];
-      layers.variance[i][c] = left[c];
+      const MeasuredChannel measured = plate.channel(i, c);
+      Estimate estimate{layers.white * signals[i - top][c], layers.mask[i], 0, 0};
+      if (has_companions_) {
+        estimate.uncovered = layers.white * uncovered[i - top][c];
+        estimate.real = layers.white * real[i - top][c];
+      }
+      const auto clean = static_cast<float>(compose(rule, measured, estimate));
+      float& composite = layers.composite[i][c];
+      float& left = layers.variance[i][c];
+      const bool is_highlight = layers.samples > 1 && composite - white > 2 * std::sqrt(left);
+      const bool is_bright =
+          clean >= gpu::NEARLY_WHITE * white && composite <= gpu::DENOISE_MOST_WHITES * white;
+      if (composite >= white && (is_highlight || is_bright)) continue;
+      composite = clean;
+      const double gain = gain_of(rule, measured, estimate);
+      left = static_cast<float>(gain * gain) * white * white * variance.w * variance[c];
     }
   });
 }

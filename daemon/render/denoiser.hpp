@@ -17,14 +17,14 @@
 
 namespace previz::render {
 
-// Returns the least variance that is assumed of a composite of this many samples where it is
-// brighter than `white`: the variance of a few samples, however alike they were.
+// Returns the largest variance that a change of this many samples is taken to have: no sample is
+// counted as brighter than DENOISE_MOST_WHITES times `white`.
 float most_sure_variance(float white, std::int64_t samples);
 
 class Denoiser {
  public:
-  // Works on about `most_pixels` at once, in bands of whole rows, at 80 bytes of device memory per
-  // pixel.
+  // Works on about `most_pixels` at once, in bands of whole rows, at 112 bytes of device memory per
+  // pixel, and 176 with companions.
   explicit Denoiser(Device& device, std::size_t most_pixels = most_band_pixels);
 
   // A band: given rows [top, bottom) as input, rows [first, last) of the output are right.
@@ -32,39 +32,47 @@ class Denoiser {
     int first, last, top, bottom;
   };
   std::vector<Band> bands(int width, int height) const;
-  // Makes the buffers large enough for this many pixels, which may replace them.
-  void reserve(std::size_t pixels);
+  // Makes the buffers large enough for this many pixels, which may replace them. With `companions`,
+  // what the composite needs beside the signal (its uncovered part and mean(Lr)) is filtered too:
+  // where the rule is not additive, or the plate is clipped.
+  void reserve(std::size_t pixels, bool companions);
 
   // The input buffers have one vec4 per pixel in the layout of shaders/lib/denoise.glsl;
   // shaders/composite.comp fills them from the samples.
   //
-  // Radiance brighter than the sensor's white counts as white, and as no more certain than a few
-  // samples would be (most_sure_variance()). Otherwise the image of a lamp in a mirror, met by one
-  // sample of many, would stay as a speck or spread over all its neighbours. A channel that comes
-  // out white keeps its original brightness.
+  // A change of more than DENOISE_MOST_WHITES counts as that much, and its variance accordingly
+  // (most_sure_variance()). Otherwise the image of a lamp in a mirror, met by one sample of many,
+  // would stay as a speck or spread over all its neighbours. A channel that is brighter than white
+  // by more than two standard errors is a highlight and keeps its brightness.
   Buffer& signal() { return signal_[0]; }
   Buffer& variance() { return variance_[0]; }
   Buffer& surface() { return surface_; }
+  Buffer& uncovered() { return uncovered_[0]; }
+  Buffer& real() { return real_[0]; }
   // Records the passes over this many rows. `single_sample` says that pixels do not know their
   // variance.
   void record(const vk::raii::CommandBuffer& commands, int width, int rows, bool single_sample);
-  // The buffer that holds the signal after the passes.
+  // The buffers that hold the signal and its companions after the passes.
   const Buffer& denoised_signal() const;
+  const Buffer& denoised_uncovered() const;
+  const Buffer& denoised_real() const;
 
   // Reads the result of the passes over a band into the layers: replaces the composite and its
   // variance in the band's rows (the variance then estimates the noise left) and no other layer.
-  // The layers' white must be finite. `camera` is the plate's radiance, interleaved RGB (empty:
-  // black). `rule` is the rule the composite was made by: with ratio and hybrid the factor of the
-  // plate is filtered, and not the plate.
-  void read(const Band& band, Layers& layers, const std::vector<double>& camera,
+  // The layers' white must be finite. `plate` (empty: black) and `rule` are those that the
+  // composite was made with.
+  void read(const Band& band, Layers& layers, const PlateRadiance& plate,
             const CompositeRule& rule = {}) const;
 
  private:
   Device& device_;
   std::size_t most_pixels_;
   std::size_t pixels_ = 0;
-  Kernel variance_pass_, level_pass_;
-  Buffer signal_[2], variance_[2], surface_;  // a pass reads one side and writes the other
+  bool has_companions_ = false;
+  Kernel variance_pass_, guide_pass_, level_pass_;
+  // A pass reads one side and writes the other.
+  Buffer signal_[2], variance_[2], uncovered_[2], real_[2];
+  Buffer surface_, guide_, guide_variance_;
 };
 
 }  // namespace previz::render

@@ -14,6 +14,12 @@ std::size_t words_of(std::size_t pixels) {
   return (pixels + 1) / 2 * 3;
 }
 
+// Returns whether the composite needs more than the change: the rule's gain, or what lies behind a
+// clipped plate.
+bool needs_companions(const ToPresent& what) {
+  return what.has_plate && (what.is_clipped || what.rule.kind != set::Composite::additive);
+}
+
 std::uint32_t composite_kind(set::Composite composite) {
   switch (composite) {
     case set::Composite::additive:
@@ -26,9 +32,12 @@ std::uint32_t composite_kind(set::Composite composite) {
   return gpu::COMPOSITE_ADDITIVE;
 }
 
-gpu::GpuShow constants_of(const ToPresent& what, int bits) {
+gpu::GpuShow constants_of(const ToPresent& what, int bits, const lighting::Clipping& clipping) {
   gpu::GpuShow constants{};
-  constants.has_plate = what.plate.samples.empty() ? 0 : 1;
+  constants.has_plate = what.has_plate ? 1 : 0;
+  constants.clip_from = clipping.from;
+  constants.clip_at = clipping.at;
+  constants.is_single = what.samples < 2 ? 1 : 0;
   constants.most = (1u << bits) - 1;
   constants.composite = composite_kind(what.rule.kind);
   constants.floor = static_cast<float>(what.rule.floor);
@@ -44,6 +53,7 @@ gpu::GpuShow constants_of(const ToPresent& what, int bits) {
 Presenter::Presenter(Device& device, const lighting::Response& response)
     : device_(device),
       bits_(response.bits()),
+      clipping_(response.clipping()),
       composite_(device, "composite", composite_spv),
       present_(device, "present", present_spv) {
   const std::vector<double>& inverse = response.inverse();
@@ -58,7 +68,7 @@ void Presenter::reserve(std::size_t pixels) {
   if (pixels <= pixels_) return;
   pixels_ = 0;  // stays 0 if an allocation below throws
   composites_ = create_storage_buffer(device_, pixels * sizeof(gpu::vec4));
-  plate_ = create_storage_buffer(device_, words_of(pixels) * sizeof(std::uint32_t));
+  highlights_ = create_storage_buffer(device_, pixels * sizeof(std::uint32_t));
   picture_ = create_storage_buffer(device_, words_of(pixels) * sizeof(std::uint32_t));
   pixels_ = pixels;
 }
@@ -74,10 +84,16 @@ void Presenter::composite(const ToPresent& what, const Denoiser::Band& band, gpu
     constants.count = static_cast<std::uint32_t>(last - first) * width;
     constants.in_tile = static_cast<std::uint32_t>(first - tile.first_row) * width;
     constants.in_band = static_cast<std::uint32_t>(first - band.top) * width;
-    const Buffers buffers{{"pixels", &tile.pixels},         {"plate", &plate_},
-                          {"signal_of", &signal_of_},       {"composites", &composites_},
-                          {"signals", &denoiser.signal()},  {"variances", &denoiser.variance()},
-                          {"surfaces", &denoiser.surface()}};
+    const Buffers buffers{{"pixels", &tile.pixels},
+                          {"plate_samples", &what.plate},
+                          {"signal_of", &signal_of_},
+                          {"composites", &composites_},
+                          {"highlights", &highlights_},
+                          {"signals", &denoiser.signal()},
+                          {"variances", &denoiser.variance()},
+                          {"surfaces", &denoiser.surface()},
+                          {"uncovered", &denoiser.uncovered()},
+                          {"reals", &denoiser.real()}};
     device_.submit([&](const vk::raii::CommandBuffer& commands) {
       composite_.dispatch({commands, constants, buffers}, constants.count);
     });
@@ -94,20 +110,22 @@ Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
     const std::size_t first = static_cast<std::size_t>(band.first) * width;
     const std::size_t count = static_cast<std::size_t>(band.last - band.first) * width;
     const std::size_t pixels = static_cast<std::size_t>(band.bottom - band.top) * width;
-    denoiser.reserve(pixels);
+    const bool filters_companions = what.denoise && needs_companions(what);
+    denoiser.reserve(pixels, filters_companions);
     reserve(pixels);
-    gpu::GpuShow constants = constants_of(what, bits_);
-    if (constants.has_plate != 0)
-      upload_bytes(device_, plate_,
-                   std::as_bytes(std::span(what.plate.samples).subspan(3 * top, 3 * pixels)));
+    gpu::GpuShow constants = constants_of(what, bits_, clipping_);
+    constants.in_picture = static_cast<std::uint32_t>(top);
     composite(what, band, constants, denoiser);
     constants.count = static_cast<std::uint32_t>(count);
     constants.in_band = static_cast<std::uint32_t>(first - top);
     const Buffers buffers{
-        {"plate", &plate_},
+        {"plate_samples", &what.plate},
         {"signal_of", &signal_of_},
         {"least_of", &least_of_},
         {"composites", &composites_},
+        {"highlights", &highlights_},
+        {"uncovered", &denoiser.denoised_uncovered()},
+        {"reals", &denoiser.denoised_real()},
         {"signals", what.denoise ? &denoiser.denoised_signal() : &denoiser.signal()},
         {"picture", &picture_}};
     device_.submit([&](const vk::raii::CommandBuffer& commands) {

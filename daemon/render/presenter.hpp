@@ -19,8 +19,10 @@ namespace previz::render {
 struct ToPresent {
   std::vector<Wavefront::Sums> tiles;  // cover all rows
   int width, height;
-  const Plate& plate;  // has that size and the response's bits; empty: black
-  double exposure;     // signal over radiance, above 0
+  const Buffer& plate;  // codes of the response's bits as shaders/lib/plate.glsl reads them
+  bool has_plate;       // if not, the composite is over black
+  bool is_clipped;      // some code of the plate is from response.clipping().from on
+  double exposure;      // signal over radiance, above 0
   CompositeRule rule;
   std::int64_t samples;  // the largest number that a pixel has
   bool denoise;
@@ -32,7 +34,7 @@ class Presenter {
   // plate's own samples, bit for bit.
   Presenter(Device& device, const lighting::Response& response);
 
-  // Works band by band, with 28 bytes of device memory per pixel beside the denoiser's.
+  // Works band by band, with 26 bytes of device memory per pixel beside the denoiser's.
   // `after_band` is called with each band that the denoiser's passes have run over.
   Plate present(const ToPresent& what, Denoiser& denoiser,
                 const std::function<void(const Denoiser::Band&)>& after_band = {});
@@ -44,9 +46,10 @@ class Presenter {
 
   Device& device_;
   int bits_;
+  lighting::Clipping clipping_;
   Kernel composite_, present_;
   std::size_t pixels_ = 0;
-  Buffer signal_of_, least_of_, plate_, composites_, picture_;
+  Buffer signal_of_, least_of_, composites_, highlights_, picture_;
 };
 
 }  // namespace previz::render

@@ -49,6 +49,7 @@ struct Renderer::Impl {
   std::int64_t sampled() const { return std::max<std::int64_t>(samples, 1); }
   // Returns the plate as linear radiance; w is 0 where a channel is clipped.
   std::vector<glm::vec4> measured() const;
+  void upload_plate();
 
   std::shared_ptr<Device> device;
   set::Estimation estimation;
@@ -58,6 +59,8 @@ struct Renderer::Impl {
   std::optional<Denoiser> denoiser;    // made when a picture is first shown
   std::optional<Presenter> presenter;  // likewise; made for the response
   Buffer rays, frame_buffer;
+  Buffer plate;               // the camera's codes (shaders/lib/plate.glsl)
+  bool is_clipped = false;    // some code of the plate may mean "at least so much light"
   std::uint32_t carried = 0;  // FEATURE_* bits
   bool has_scene = false, has_environment = false;
   FrameInput frame;
@@ -100,6 +103,7 @@ void Renderer::Impl::upload_frame() {
   gpu_frame.specular_alpha = static_cast<float>(estimation.specular_roughness);
   gpu_frame.bound_share = static_cast<float>(estimation.difference_sampling);
   gpu_frame.photon_count = photons();
+  gpu_frame.clip_from = is_clipped ? response->clipping().from : gpu::NO_INDEX;
   scene.describe(gpu_frame, needed());
   upload_storage(*device, frame_buffer, std::vector{gpu_frame});
 }
@@ -118,16 +122,25 @@ std::uint32_t Renderer::Impl::needed() const {
 
 std::vector<glm::vec4> Renderer::Impl::measured() const {
   const std::vector<double>& radiance = response->inverse();
-  const auto white = static_cast<std::uint16_t>(radiance.size() - 1);
+  const std::uint32_t clipped_from = response->clipping().from;
   std::vector<glm::vec4> result;
   result.reserve(frame.plate->samples.size() / 3);
   for (std::size_t i = 0; i < frame.plate->samples.size(); i += 3) {
     const std::uint16_t* rgb = &frame.plate->samples[i];
-    const bool clipped = std::max({rgb[0], rgb[1], rgb[2]}) >= white;
+    const bool clipped = std::max({rgb[0], rgb[1], rgb[2]}) >= clipped_from;
     const glm::dvec3 signal(radiance[rgb[0]], radiance[rgb[1]], radiance[rgb[2]]);
     result.emplace_back(glm::vec3(signal / frame.exposure), clipped ? 0.0f : 1.0f);
   }
   return result;
+}
+
+void Renderer::Impl::upload_plate() {
+  const std::vector<std::uint16_t>& codes = frame.plate->samples;
+  is_clipped = !codes.empty() && *std::ranges::max_element(codes) >= response->clipping().from;
+  const std::size_t words = std::max<std::size_t>((codes.size() + 1) / 2, 1);
+  if (plate.size < words * sizeof(std::uint32_t))
+    plate = create_storage_buffer(*device, words * sizeof(std::uint32_t));
+  if (!codes.empty()) upload_bytes(*device, plate, std::as_bytes(std::span(codes)));
 }
 
 Renderer::Renderer(std::shared_ptr<Device> device, const set::Estimation& estimation,
@@ -196,12 +209,14 @@ void Renderer::begin(FrameInput frame) {
     r.presenter.reset();
   }
   r.samples = 0;
+  r.upload_plate();
   r.scene.place(glm::dvec3(r.frame.world_from_camera[3]));
   r.upload_frame();
 
   Buffers buffers = r.scene.buffers();
   buffers["corner_rays"] = &r.rays;
   buffers["frame"] = &r.frame_buffer;
+  buffers["plate_samples"] = &r.plate;
   const std::uint32_t features = r.needed() | r.carried;
   if ((features & gpu::FEATURE_PHOTONS) != 0) {
     const double distance =
@@ -266,12 +281,20 @@ Plate Renderer::show(bool denoise, Layers* layers) {
   if (!r.denoiser) r.denoiser.emplace(*r.device);
   if (!r.presenter) r.presenter.emplace(*r.device, *r.response);
   const PinholeIntrinsics& lens = r.calibration.intrinsics;
-  const ToPresent what{r.wavefront->sums(), lens.width, lens.height, *r.frame.plate,
-                       r.frame.exposure,    r.rule(),   r.sampled(), denoise};
+  const ToPresent what{r.wavefront->sums(),
+                       lens.width,
+                       lens.height,
+                       r.plate,
+                       !r.frame.plate->samples.empty(),
+                       r.is_clipped,
+                       r.frame.exposure,
+                       r.rule(),
+                       r.sampled(),
+                       denoise};
   if (!denoise || !layers) return r.presenter->present(what, *r.denoiser);
   const PlateRadiance plate = plate_radiance(*r.frame.plate, *r.response, r.frame.exposure);
   Plate picture = r.presenter->present(what, *r.denoiser, [&](const Denoiser::Band& band) {
-    r.denoiser->read(band, *layers, plate.value, r.rule());
+    r.denoiser->read(band, *layers, plate, r.rule());
   });
   layers->denoised = true;
   return picture;

@@ -74,6 +74,12 @@ Keys response_keys(ResponseCurve& r, double& responsivity) {
   };
 }
 
+Keys clip_keys(ResponseCurve& r) {
+  return {
+      {"response", "clip_share", &r.clip_share, plain.within(0.5, 1), "From this share of the largest picture value on, a pixel is clipped: it means at least so much light. Lower it where white areas of the picture stay below it, as in compressed video or video of limited range.", {}, "response.clip_share", {}, true},
+  };
+}
+
 Keys shading_keys(LightCameraCalibration& c) {
   return {
       {"intrinsics", "vignetting", &c.vignetting, plain, "v1 to v3 of the share of light that the lens passes, 1 + v1 t^2 + v2 t^4 + v3 t^6, where t is the angle off axis in radians (previzd calibrate vignetting).", {}, "vignetting", {}, true},
@@ -99,7 +105,7 @@ std::string Key::allowed(Format format) const {
 std::vector<Key> keys(ObserverDraft& draft) {
   ObserverCalibration& c = draft.calibration;
   return joined({pinhole_keys(c.intrinsics), response_keys(c.response, c.responsivity),
-                 lens_keys(draft.lens)});
+                 clip_keys(c.response), lens_keys(draft.lens)});
 }
 
 std::vector<Key> keys(LightCameraDraft& draft) {

@@ -11,21 +11,18 @@
 layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(scalar, push_constant) uniform Denoise { GpuDenoise denoise; };
-// RGBA32F, width * height: the signal over the sensor's white (ratio, hybrid: over the camera's picture
-// where nothing covers it), 1 / depth (0: none).
+// RGBA32F, width * height: the signal (the change of the composite) over the sensor's white, 1 / depth
+// (0: none).
 uniform textureBuffer signals;
 uniform textureBuffer variances;  // of the signal, to be multiplied by the fourth component
 uniform textureBuffer surfaces;   // normal, mean(M)
-// The signal and its variance to write, which the next pass reads.
-layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
-layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
 
 // A neighbour's weight has fallen to 1 / e at a difference of the mask of MASK_SCALE, at a squared
 // chord between the normals of NORMAL_SCALE, or where the inverse depth is off what the surface's
 // slope predicts by a share of DEPTH_SCALE.
 const float MASK_SCALE = 0.05;
-const float NORMAL_SCALE = 0.03;
-const float DEPTH_SCALE = 0.01;
+const float NORMAL_SCALE = 0.1;
+const float DEPTH_SCALE = 0.03;
 
 struct Pixel {
   vec3 signal;
@@ -73,6 +70,11 @@ float inverse_depth_slope(ivec2 at, ivec2 off, float here) {
                               abs(rising - falling) <= 0.5 * max(abs(rising), abs(falling));
   if (is_one_surface) return 0.5 * (rising + falling);
   return abs(rising) < abs(falling) ? rising : falling;
+}
+
+// Returns the change of the inverse depth to the right and downwards.
+vec2 inverse_depth_slopes(ivec2 at, float here) {
+  return vec2(inverse_depth_slope(at, ivec2(1, 0), here), inverse_depth_slope(at, ivec2(0, 1), here));
 }
 
 // Returns the squared distance of two pixels as parts of one surface, in units of the scales above.

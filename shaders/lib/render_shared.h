@@ -20,6 +20,9 @@ PREVIZ_CONST uint TEXELS_PER_PHOTON = 4u;
 
 // Pixels from which the variance of a single sample is taken, to each side.
 PREVIZ_CONST uint DENOISE_VARIANCE_REACH = 3u;
+// What a pixel changes is filtered up to this many times the sensor's white. Brighter light, such as
+// a mirrored lamp that few samples meet, would spread over all its neighbours.
+PREVIZ_CONST float DENOISE_MOST_WHITES = 4.0f;
 // A channel counts as white from this share of the sensor's white on, a step of 8 bits below it.
 PREVIZ_CONST float NEARLY_WHITE = 0.99f;
 
@@ -111,11 +114,11 @@ struct GpuPixel {
   vec4 mixed_low;
   vec4 diff_high;   // Lm - Lr, depth
   vec4 diff_low;
+  vec4 uncovered_high;  // (1 - M)(Lm - Lr); w: number of SAMPLE_DIFFERENCE
+  vec4 uncovered_low;
+  vec4 square_high;  // squares, for the variance: of Lm where M = 1, of Lm - Lr where M = 0;
+  vec4 square_low;   // w: number of samples
   vec4 normal;      // sum of normals; w: number of samples that hit a surface
-  vec4 square_mixed_high;  // sums of squares, for the variance; w: number of SAMPLE_DIFFERENCE
-  vec4 square_mixed_low;
-  vec4 square_diff_high;   // w: number of samples
-  vec4 square_diff_low;
 };
 
 // The first surface of the real world at the middle of a pixel.
@@ -239,6 +242,7 @@ struct GpuFrame {
   float photon_environment;   // probability that a photon starts from the environment
   vec3 scene_center;
   float scene_radius;         // of a sphere that contains everything
+  uint clip_from;             // code of the plate from which a channel may be clipped; NO_INDEX: none
   vec2 focal_px, principal_px;  // of the observer's lens, OpenCV's convention
   vec3 radial;                  // k1, k2, k3
   vec2 tangential;              // p1, p2
@@ -254,8 +258,9 @@ struct GpuBatch {
 // Push constants of the denoiser's passes.
 struct GpuDenoise {
   uint width, height;
-  uint step;           // pixels between neighbours
-  uint single_sample;  // 1: pixels have one sample, and so no variance of their own
+  uint step;            // pixels between neighbours
+  uint single_sample;   // 1: pixels have one sample, and so no variance of their own
+  uint has_companions;  // 1: `uncovered` and `reals` are filtered as well, with the same weights
 };
 
 // Push constants of the passes that make the shown picture.
@@ -263,19 +268,23 @@ struct GpuShow {
   uint count;          // pixels to work on
   uint in_tile;        // index of the first one in the tile
   uint in_band;        // and in the band
+  uint in_picture;     // index of the band's first pixel in the picture
   uint has_plate;      // 0: the composite is over black
   uint most;           // the largest code
+  uint clip_from;      // a channel counts as clipped not at all below this code,
+  uint clip_at;        // and wholly from this one on
   uint composite;      // COMPOSITE_*
   float floor;         // radiance, of COMPOSITE_HYBRID
   float exposure;      // signal over radiance
   float white;         // radiance at which the sensor clips, 1 / exposure
   float most_variance; // radiance squared
-  uint is_denoised;    // 1: signals are denoised and replace the composite
+  uint is_single;      // 1: pixels have one sample, and so no variance of their own
+  uint is_denoised;    // 1: the denoised change replaces that of the samples
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(GpuDenoise) == 16);
-static_assert(sizeof(GpuShow) == 44);
+static_assert(sizeof(GpuDenoise) == 20);
+static_assert(sizeof(GpuShow) == 60);
 static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 56);
 static_assert(sizeof(GpuPixel) == 144);
@@ -286,7 +295,7 @@ static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
 static_assert(sizeof(GpuLight) == 144);
 static_assert(offsetof(GpuLight, uv0) == 112);
-static_assert(sizeof(GpuFrame) == 188);
+static_assert(sizeof(GpuFrame) == 192);
 static_assert(sizeof(GpuBatch) == 28);
 static_assert(sizeof(GpuPhoton) == 64);
 static_assert(sizeof(GpuPhotonBucket) == 8);

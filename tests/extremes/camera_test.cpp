@@ -48,7 +48,7 @@ TEST(ExtremeCamera, EveryCodeComesBackThroughTheComposite) {
         EXPECT_DOUBLE_EQ(radiance.value.back(), 1 / exposure);
         std::vector<gpu::GpuPixel> untouched(256), covered(256);
         for (std::size_t i = 0; i < 256; ++i) {
-          untouched[i].square_diff_high.w = covered[i].square_diff_high.w = 1;
+          untouched[i].square_high.w = covered[i].square_high.w = 1;
           const double value = radiance.value[3 * i];
           const auto high = static_cast<float>(value);
           const auto low = static_cast<float>(value - static_cast<double>(high));

@@ -1,6 +1,7 @@
 // Runs pixels and layers that a test makes by hand through the renderer's steps after sampling.
 #pragma once
 
+#include <algorithm>
 #include <random>
 #include <span>
 
@@ -39,45 +40,49 @@ inline Plate present(std::span<const gpu::GpuPixel> pixels, const Plate& plate,
     render::upload_storage(*shared_device(), buffers.emplace_back(),
                            std::vector(tile.begin(), tile.end()));
   }
-  const auto samples = static_cast<std::int64_t>(pixels.front().square_diff_high.w);
-  render::ToPresent what{{}, plate.width, plate.height, plate, exposure, {}, samples, denoise};
+  const auto samples = static_cast<std::int64_t>(pixels.front().square_high.w);
+  render::Buffer codes;
+  std::vector<std::uint16_t> padded = plate.samples;
+  padded.resize((padded.size() + 2) / 2 * 2);
+  render::upload_storage(*shared_device(), codes, padded);
+  const bool has_plate = !plate.samples.empty();
+  const bool is_clipped =
+      has_plate && *std::ranges::max_element(plate.samples) >= response.clipping().from;
+  render::ToPresent what{{},         plate.width, plate.height, codes,   has_plate,
+                         is_clipped, exposure,    {},           samples, denoise};
   for (std::size_t i = 0; i < rows.size(); ++i)
     what.tiles.push_back({buffers[i], rows[i].first, rows[i].second});
   return render::Presenter(*shared_device(), response).present(what, denoiser);
 }
 
-// The denoiser's input, as shaders/composite.comp makes it.
+// The denoiser's input, as shaders/composite.comp makes it. Where a pixel is partly covered, its
+// uncovered part is taken to be that share of the difference.
 struct DenoiserInput {
-  std::vector<glm::vec4> signal, variance, surface;
+  std::vector<glm::vec4> signal, variance, surface, uncovered, real;
 };
 
-// Makes the input of pixels [first, last). `camera` and `rule` are those of Denoiser::read().
-inline DenoiserInput denoiser_input(const render::Layers& layers, const std::vector<double>& camera,
-                                    const render::CompositeRule& rule, std::size_t first,
+// Makes the input of pixels [first, last).
+inline DenoiserInput denoiser_input(const render::Layers& layers, std::size_t first,
                                     std::size_t last) {
   DenoiserInput input;
   const auto white = static_cast<float>(layers.white);
   const float most_variance = render::most_sure_variance(white, layers.samples);
   for (std::size_t i = first; i < last; ++i) {
-    glm::vec3 plate(0);
-    if (!camera.empty()) plate = {camera[3 * i], camera[3 * i + 1], camera[3 * i + 2]};
-    const bool multiplied = rule.kind != set::Composite::additive && layers.mask[i] == 0;
-    const glm::vec3 unit = multiplied
-                               ? plate + std::max(static_cast<float>(rule.floor), 1e-3f * white)
-                               : glm::vec3(white);
-    const glm::vec3 through = (1 - layers.mask[i]) * plate;
-    const glm::vec3 shown = glm::min(layers.composite[i], glm::max(through, white));
-    input.signal.emplace_back((shown - through) / unit,
+    const float mask = layers.mask[i];
+    const glm::vec3 change = mask * layers.mixed[i] + (1 - mask) * layers.diff[i];
+    input.signal.emplace_back(glm::min(change / white, gpu::DENOISE_MOST_WHITES),
                               layers.depth[i] > 0 ? 1 / layers.depth[i] : 0);
-    input.variance.emplace_back(glm::min(layers.variance[i], most_variance) / (unit * unit), 0);
-    input.surface.emplace_back(layers.normal[i], layers.mask[i]);
+    input.variance.emplace_back(glm::min(layers.variance[i], most_variance) / (white * white), 0);
+    input.surface.emplace_back(layers.normal[i], mask);
+    input.uncovered.emplace_back((1 - mask) * layers.diff[i] / white, 0);
+    input.real.emplace_back(layers.real[i] / white, 0);
   }
   return input;
 }
 
-// Removes noise from the layers.
+// Removes noise from the layers. The change of the composite is taken from `mixed` and `diff`.
 inline void denoise(render::Denoiser& denoiser, render::Layers& layers,
-                    const std::vector<double>& camera = {},
+                    const render::PlateRadiance& plate = {},
                     const render::CompositeRule& rule = {}) {
   render::Device& device = *shared_device();
   const render::Layers raw = layers;
@@ -85,15 +90,20 @@ inline void denoise(render::Denoiser& denoiser, render::Layers& layers,
   for (const render::Denoiser::Band& band : denoiser.bands(layers.width, layers.height)) {
     const std::size_t top = static_cast<std::size_t>(band.top) * width;
     const std::size_t bottom = static_cast<std::size_t>(band.bottom) * width;
-    const DenoiserInput input = denoiser_input(raw, camera, rule, top, bottom);
-    denoiser.reserve(bottom - top);
-    render::upload_bytes(device, denoiser.signal(), std::as_bytes(std::span(input.signal)));
-    render::upload_bytes(device, denoiser.variance(), std::as_bytes(std::span(input.variance)));
-    render::upload_bytes(device, denoiser.surface(), std::as_bytes(std::span(input.surface)));
+    const DenoiserInput input = denoiser_input(raw, top, bottom);
+    denoiser.reserve(bottom - top, true);
+    const auto upload = [&](render::Buffer& buffer, const std::vector<glm::vec4>& texels) {
+      render::upload_bytes(device, buffer, std::as_bytes(std::span(texels)));
+    };
+    upload(denoiser.signal(), input.signal);
+    upload(denoiser.variance(), input.variance);
+    upload(denoiser.surface(), input.surface);
+    upload(denoiser.uncovered(), input.uncovered);
+    upload(denoiser.real(), input.real);
     device.submit([&](const vk::raii::CommandBuffer& commands) {
       denoiser.record(commands, layers.width, band.bottom - band.top, layers.samples < 2);
     });
-    denoiser.read(band, layers, camera, rule);
+    denoiser.read(band, layers, plate, rule);
   }
 }
 

@@ -65,8 +65,8 @@ TEST(Composite, CoveredPixelsUseMeansNotSamples) {
   // Two samples: one covered (Lm = 0.5, Lr = 1), one not (Lm = Lr = 0).
   pixel.mixed_high = gpu::vec4(0.5f, 0.5f, 0.5f, 1.0f);
   pixel.diff_high = gpu::vec4(-0.5f, -0.5f, -0.5f, 0.0f);
-  pixel.square_diff_high.w = 2;
-  const render::PlateRadiance plate{std::vector<double>(3, 0.5), std::vector<double>(3, 0.0)};
+  pixel.square_high.w = 2;
+  const render::PlateRadiance plate{std::vector<double>(3, 0.5), std::vector<double>(3, 0.0), {}};
   const render::Layers layers = layers_of(std::span(&pixel, 1), 2, plate);
   // 0.25 + (1 - 0.5) (0.5 - 0.5)
   EXPECT_FLOAT_EQ(layers.composite[0].g, 0.25f);
@@ -79,8 +79,10 @@ double composited(double camera, double mixed, double real, const render::Compos
   gpu::GpuPixel pixel{};
   pixel.mixed_high = gpu::vec4(static_cast<float>(mixed));
   pixel.mixed_high.w = 0;
-  pixel.diff_high = gpu::vec4(static_cast<float>(mixed - real));
-  const render::PlateRadiance plate{std::vector<double>(3, camera), std::vector<double>(3, 1e-6)};
+  pixel.diff_high = pixel.uncovered_high = gpu::vec4(static_cast<float>(mixed - real));
+  pixel.uncovered_high.w = gpu::SAMPLE_FULL;
+  const render::PlateRadiance plate{
+      std::vector<double>(3, camera), std::vector<double>(3, 1e-6), {}};
   return layers_of(std::span(&pixel, 1), 1, plate, rule).composite[0].g;
 }
 
@@ -106,6 +108,101 @@ TEST(Composite, AllRulesAreOneWhereTheModelIsRight) {
   using enum set::Composite;
   for (const auto kind : {additive, ratio, hybrid})
     EXPECT_FLOAT_EQ(composited(0.5, 0.2, 0.5, {kind, 0.01}), 0.2);
+}
+
+// A virtual object of radiance 1 covers half of a pixel whose phantom has half of the true albedo.
+// The rule may forgive that on the real surface, but it must not multiply the object's own light:
+// the true value is 0.5 * 1 + 0.5 * 0.2.
+TEST(Composite, NoRuleMultipliesAnObjectsOwnLight) {
+  using enum set::Composite;
+  gpu::GpuPixel pixel{};
+  // Two samples: one covered (Lm = 1, Lr = 0.1), one not (Lm = Lr = 0.1).
+  pixel.mixed_high = gpu::vec4(1.1f, 1.1f, 1.1f, 1.0f);
+  pixel.diff_high = gpu::vec4(0.9f, 0.9f, 0.9f, 0.0f);
+  pixel.square_high.w = 2;
+  const render::PlateRadiance plate{std::vector<double>(3, 0.2), std::vector<double>(3, 0.0), {}};
+  for (const auto kind : {additive, ratio, hybrid}) {
+    const render::Layers layers = layers_of(std::span(&pixel, 1), 2, plate, {kind, 0.01});
+    EXPECT_NEAR(layers.composite[0].g, 0.6, 1e-6);
+  }
+}
+
+// Half of n samples meet a virtual object of radiance 1, the others a real surface of 0.2 on which
+// nothing changes. The composite is 0.2 + 0.8 mean(M), and M has a variance of 1/4.
+TEST(Composite, TheVarianceAtAnEdgeHoldsTheMasks) {
+  const float n = 100;
+  gpu::GpuPixel pixel{};
+  pixel.mixed_high = n * gpu::vec4(0.6f, 0.6f, 0.6f, 0.5f);
+  pixel.diff_high = n * gpu::vec4(0.4f, 0.4f, 0.4f, 0.0f);
+  pixel.square_high = n * gpu::vec4(0.5f, 0.5f, 0.5f, 1.0f);
+  const render::PlateRadiance plate{std::vector<double>(3, 0.2), std::vector<double>(3, 0.0), {}};
+  const render::Layers layers = layers_of(std::span(&pixel, 1), 100, plate);
+  EXPECT_NEAR(layers.composite[0].g, 0.6, 1e-6);
+  EXPECT_NEAR(layers.variance[0].g, 0.64 * 0.25 / (n - 1.0), 1e-8);
+}
+
+// A ramp of light from black to three times white, in a shadow that leaves a share of it: the
+// picture is that which the camera would have taken of the shadow, by every rule, and it is
+// continuous where the ramp runs into white.
+TEST(Composite, AShadowOnAClippedPlateIsNoDarkerThanTheCameraWouldSeeIt) {
+  constexpr int width = 600;
+  const lighting::Response response({}, 8);
+  Plate plate{width, 1, 8, {}};
+  std::vector<gpu::GpuPixel> pixels(width);
+  for (const double share : {0.999, 0.7, 0.5, 0.2}) {
+    plate.samples.clear();
+    for (int x = 0; x < width; ++x) {
+      const double light = 3.0 * x / width;
+      plate.samples.insert(plate.samples.end(), 3, response.forward(light));
+      const auto real = static_cast<float>(light), mixed = static_cast<float>(share * light);
+      pixels[x] = {};
+      pixels[x].mixed_high = gpu::vec4(mixed, mixed, mixed, 0);
+      pixels[x].diff_high = pixels[x].uncovered_high =
+          gpu::vec4(mixed - real, mixed - real, mixed - real, gpu::SAMPLE_FULL);
+      pixels[x].square_high.w = 1;
+    }
+    const render::PlateRadiance radiance = render::plate_radiance(plate, response, 1);
+    for (const auto kind :
+         {set::Composite::additive, set::Composite::ratio, set::Composite::hybrid}) {
+      const render::Layers layers = layers_of(pixels, 1, radiance, {kind, 0.01});
+      // The plate is off by half a code at most. The sum keeps that as radiance, and in the shadow
+      // a code is share^0.58 of the radiance that it is in the light (the exponent of sRGB's
+      // derivative, 1 - 1 / 2.4): 0.5 / 0.2^0.58 = 1.3 codes, and half a code by its own rounding.
+      for (int x = 0; x < width; ++x)
+        EXPECT_NEAR(response.forward(layers.composite[x].g),
+                    response.forward(share * 3.0 * x / width), 2)
+            << x << ", " << share;
+    }
+  }
+}
+
+// The same on the device, for a table in the sun that is exposed three times too long.
+TEST(Composite, AShadowOnAnOverexposedTableStaysWhiteByBothEstimators) {
+  View view = random_scene(4, {.width = 64, .height = 48, .real_objects = 0});
+  for (glm::vec3& radiance : view.environment.radiance) radiance *= 8.0f;
+  for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
+    set::Estimation estimation;
+    estimation.estimator = estimator;
+    SetRenderer renderer(view, estimation);
+    Plate plate{64, 48, 8, std::vector<std::uint16_t>(3 * 64 * 48, 255)};
+    renderer.begin({std::make_shared<const Plate>(plate), 1.0, view.world_from_camera});
+    renderer.render(64);
+    const render::Layers layers = renderer.layers();
+    const Plate shown = renderer.show(false);
+    std::size_t shaded = 0;
+    for (std::size_t i = 0; i < layers.mask.size(); ++i) {
+      if (layers.mask[i] > 0 || layers.diff[i].g >= 0) continue;
+      ++shaded;
+      // What the camera would take: the light that is left, or the plate where that is still white.
+      const double left = std::max(layers.real[i].g, 1.0f) + layers.diff[i].g;
+      EXPECT_NEAR(layers.composite[i].g, std::min(left, 1.0), 1e-4) << i;
+      if (left > 1) {
+        EXPECT_EQ(shown.samples[3 * i + 1], 255) << i;
+      }
+    }
+    EXPECT_GT(shaded, 100u);
+    expect_clean(renderer.counters());
+  }
 }
 
 TEST(Composite, TwoFloatSumsKeepWhatOneFloatLoses) {

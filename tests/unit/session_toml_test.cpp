@@ -178,7 +178,8 @@ TEST(SessionToml, ErrorsNameFileLineAndKey) {
     static_cast<void>(error_of(good.substr(0, length)));
 }
 
-// Sessions are read for ever, and by other programs: what is written must not change by a byte.
+// Sessions are read for ever, and by other programs: keys may be added, but what is written of the
+// others must not change by a byte.
 TEST(SessionToml, CalibrationsAreWrittenAsEver) {
   SessionFile file;
   ObserverCalibration observer;
@@ -213,6 +214,7 @@ responsivity = 3.5
 [observer.calibration.response]
 kind = "gamma"
 gamma = 2.4
+clip_share = 0.98
 
 [observer.calibration.lens]
 focal_length_m = 0.0353
