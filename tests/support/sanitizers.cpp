@@ -1,11 +1,23 @@
-// Linked into programs of the sanitizer build, for LeakSanitizer's sake: Mesa's lavapipe leaves a
-// hundred bytes a device behind. The report could not tell whose they are, since the Vulkan loader
-// has unloaded the driver by then; so libraries stay loaded, and the driver's leaks can be named.
+// What sanitizers must know of libraries that are not built with them; linked into every program of
+// theirs. LeakSanitizer: Mesa's lavapipe leaves a hundred bytes a device behind. The report could
+// not say whose they are, since the Vulkan loader has unloaded the driver by then; so libraries
+// stay loaded, and the driver's leaks can be named. ThreadSanitizer sees neither the locks of GLib
+// nor the threads' hand-over within Aravis and Mesa's CPU driver; and it lets a child that was
+// forked beside threads start its own, as the recorder's tests do, only if it is asked to.
 
 extern "C" {
 
 const char* __lsan_default_suppressions() {
   return "leak:libvulkan_lvp.so\n";
+}
+
+const char* __tsan_default_suppressions() {
+  return "race:libaravis-0.8.so\nrace:libglib-2.0.so\nrace:libgio-2.0.so\nrace:libgobject-2.0.so\n"
+         "race:swrast_dri.so\n";
+}
+
+const char* __tsan_default_options() {
+  return "die_after_fork=0";
 }
 
 int dlclose(void* /*library*/) {

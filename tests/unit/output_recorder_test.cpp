@@ -373,6 +373,9 @@ TEST(Recorder, AFileThatCannotGrowEndsTheTakeWithEverythingSoFarReadable) {
 // has 2304 bytes; with its lines and the file system's pages it takes less than twice that, so that
 // at least 28 fit.
 TEST(Recorder, AFullDiskEndsTheTakeWithEverythingSoFarReadable) {
+#ifdef __SANITIZE_THREAD__
+  GTEST_SKIP() << "ThreadSanitizer confuses the threads of a child with those it was forked beside";
+#endif
   const TemporaryDirectory directory;
   constexpr int may_not_mount = 77;
   std::fflush(nullptr);
