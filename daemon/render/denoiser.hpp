@@ -23,7 +23,7 @@ float most_sure_variance(float white, std::int64_t samples);
 
 class Denoiser {
  public:
-  // Works on about `most_pixels` at once, in bands of whole rows, at 112 bytes of device memory per
+  // Works on about `most_pixels` at once, in bands of whole rows, at 144 bytes of device memory per
   // pixel, and 176 with companions.
   explicit Denoiser(Device& device, std::size_t most_pixels = most_band_pixels);
 

@@ -13,12 +13,17 @@ namespace previz::render {
 namespace {
 
 // A pixel of Layers has six members of three floats and two of one; the plate's radiance and its
-// variance (daemon/render/composite.hpp) are three doubles each.
-constexpr std::uint64_t layer_bytes = (6 * 3 + 2) * sizeof(float) + 2 * 3 * sizeof(double);
+// variance (daemon/render/composite.hpp) are three doubles each, and what of it is clipped three
+// floats.
+constexpr std::uint64_t layer_bytes =
+    (6 * 3 + 2) * sizeof(float) + 2 * 3 * sizeof(double) + 3 * sizeof(float);
 
-// A pixel of a band takes six arrays of four floats (denoiser.hpp, presenter.hpp) and two of three
-// samples.
-constexpr std::uint64_t band_bytes = 6 * 4 * sizeof(float) + 2 * 3 * sizeof(std::uint16_t);
+// A pixel of the plate and of the shown picture is three samples.
+constexpr std::uint64_t plate_bytes = 3 * sizeof(std::uint16_t);
+
+// A pixel of a band takes eleven arrays of four floats in the denoiser (denoiser.hpp) and one in
+// the presenter (presenter.hpp), a word of flags, and its part of the shown picture.
+constexpr std::uint64_t band_bytes = 12 * 4 * sizeof(float) + sizeof(std::uint32_t) + plate_bytes;
 
 std::uint64_t rays_of(int width, int height) {
   return (static_cast<std::uint64_t>(width) + 1) * (static_cast<std::uint64_t>(height) + 1);
@@ -35,7 +40,7 @@ std::string gigabytes(std::uint64_t bytes) {
 std::uint64_t picture_bytes(int width, int height, bool read_back) {
   const std::uint64_t pixels =
       static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
-  const std::uint64_t device = pixels * sizeof(gpu::GpuPixel) +
+  const std::uint64_t device = pixels * (sizeof(gpu::GpuPixel) + plate_bytes) +
                                rays_of(width, height) * sizeof(glm::vec2) +
                                std::min<std::uint64_t>(pixels, most_band_pixels) * band_bytes;
   return read_back ? device + pixels * layer_bytes : device;

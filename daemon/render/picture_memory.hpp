@@ -16,8 +16,8 @@ struct PictureMemory {
   bool read_back = false;    // layers that are read back lie in the same memory
 };
 
-// Returns how many bytes are taken by the sums of every pixel, the camera's rays and a band of the
-// shown picture and, with `read_back`, by the layers made from them for the caller.
+// Returns how many bytes are taken by the sums of every pixel, the plate, the camera's rays and a
+// band of the shown picture and, with `read_back`, by the layers made from them for the caller.
 std::uint64_t picture_bytes(int width, int height, bool read_back);
 
 // Throws previz::Error, with the picture's size, the memory it takes and the memory there is, if
