@@ -15,7 +15,8 @@ layout(scalar) writeonly buffer Variances { vec4 variances[]; };
 layout(scalar) writeonly buffer Surfaces { vec4 surfaces[]; };
 layout(scalar) writeonly buffer Uncovered { vec4 uncovered[]; };
 layout(scalar) writeonly buffer Reals { vec4 reals[]; };
-// Of the band: which channels are brighter than white by more than chance (bit 0: red).
+// For each pixel of the band, the bits of channels that are brighter than white by more than chance
+// (bit 0: red).
 layout(scalar) writeonly buffer Highlights { uint highlights[]; };
 
 // Returns the variance of a mean of independent samples.

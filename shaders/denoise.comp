@@ -9,10 +9,10 @@
 
 #include "shaders/lib/denoise.glsl"
 
-// The same for the guide, which denoise_guide.comp makes.
+// denoise_guide.comp makes the guide and its variance.
 uniform textureBuffer guides;
 uniform textureBuffer guide_variances;
-// What the composite needs beside the signal, over white; filtered with the signal's weights.
+// The uncovered part of the change and mean(Lr), over white, get the signal's weights.
 uniform textureBuffer uncovered;
 uniform textureBuffer reals;
 layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };

@@ -7,7 +7,7 @@
 
 #include "shaders/lib/denoise.glsl"
 
-// What the levels read.
+// The levels of the transform read these.
 layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
 layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
 

@@ -8,9 +8,9 @@
 
 namespace previz::lighting {
 
-// Which codes mean "at least so much light", because the sensor, or what came after it, clipped:
-// wholly from code `at` on, not at all below code `from`, and in between by a share that rises
-// evenly, so that nothing jumps where a picture runs into white.
+// A clipped code means "at least so much light", because the sensor, or what came after it, could
+// show no more. Codes from `at` on are clipped wholly, those below `from` not at all, and between
+// them the share rises evenly, so that nothing jumps where a picture runs into white.
 struct Clipping {
   std::uint32_t from = 0, at = 0;
   float share(std::uint32_t code) const;
@@ -29,7 +29,7 @@ class Response {
   const std::vector<double>& inverse() const { return inverse_; }
   // Returns floor(max * curve(clip(signal)) + 0.5). NaN becomes 0 and is the caller's bug.
   std::uint16_t forward(double signal) const;
-  // By the curve's clip_share.
+  // Returns which codes count as clipped, which follows from the curve's clip_share.
   Clipping clipping() const;
   // Returns the least signal that forward() maps to this code, up to rounding; 0 for code 0.
   double least_signal(std::uint16_t code) const;

@@ -71,12 +71,12 @@ double gain(const CompositeRule& rule, double camera, double real, double plate_
 
 double compose(const CompositeRule& rule, const MeasuredChannel& camera, const Estimate& e) {
   const double seen = camera.radiance;
-  const double uncovered = (1 - e.mask);
+  const double through = 1 - e.mask;
   const double plain =
-      uncovered * seen + (e.change + (gain(rule, seen, e.real, camera.variance) - 1) * e.uncovered);
+      through * seen + (e.change + (gain(rule, seen, e.real, camera.variance) - 1) * e.uncovered);
   if (camera.clipped <= 0) return plain;
   const double behind = seen + camera.clipped * std::max(e.real - seen, 0.0);
-  const double whole = uncovered * behind +
+  const double whole = through * behind +
                        (e.change + (gain(rule, behind, e.real, camera.variance) - 1) * e.uncovered);
   return std::min(whole, std::max(seen, plain));
 }
@@ -88,6 +88,7 @@ double gain_of(const CompositeRule& rule, const MeasuredChannel& camera, const E
 PlateRadiance plate_radiance(const Plate& plate, const lighting::Response& response,
                              double exposure) {
   const std::vector<double>& inverse = response.inverse();
+  const lighting::Clipping clipping = response.clipping();
   PlateRadiance of_code;
   for (std::size_t code = 0; code < inverse.size(); ++code) {
     const std::size_t low = code > 0 ? code - 1 : 0;
@@ -95,7 +96,7 @@ PlateRadiance plate_radiance(const Plate& plate, const lighting::Response& respo
     const double step = (inverse[high] - inverse[low]) / static_cast<double>(high - low) / exposure;
     of_code.value.push_back(inverse[code] / exposure);
     of_code.variance.push_back(step * step / 12);
-    of_code.clipped.push_back(response.clipping().share(static_cast<std::uint16_t>(code)));
+    of_code.clipped.push_back(clipping.share(static_cast<std::uint16_t>(code)));
   }
   PlateRadiance result{std::vector<double>(plate.samples.size()),
                        std::vector<double>(plate.samples.size()),

@@ -25,10 +25,10 @@ static_assert(gpu::DENOISE_VARIANCE_REACH >= 2);
 // A mean of n samples, each no brighter than DENOISE_MOST_WHITES, has a standard deviation of at
 // most that / sqrt(n). The number of samples is capped, because otherwise the outlier that a single
 // sample met would never count as one.
-float most_sure_variance(float white, std::int64_t samples) {
-  constexpr std::int64_t most_sure_samples = 16;
+float most_variance(float white, std::int64_t samples) {
+  constexpr std::int64_t most_counted = 16;
   const float most = gpu::DENOISE_MOST_WHITES * white;
-  return most * most / static_cast<float>(std::clamp<std::int64_t>(samples, 1, most_sure_samples));
+  return most * most / static_cast<float>(std::clamp<std::int64_t>(samples, 1, most_counted));
 }
 
 Denoiser::Denoiser(Device& device, std::size_t most_pixels)
@@ -39,26 +39,29 @@ Denoiser::Denoiser(Device& device, std::size_t most_pixels)
       level_pass_(device, "denoise", denoise_spv) {}
 
 void Denoiser::reserve(std::size_t pixels, bool companions) {
-  const bool is_large_enough = pixels <= pixels_ && (has_companions_ || !companions);
-  if (!is_large_enough) {
-    pixels = std::max(pixels, pixels_);
-    pixels_ = 0;  // stays 0 if an allocation below throws
-    const auto texels = [&](std::size_t count) {
-      return create_texel_buffer(device_, count * sizeof(gpu::vec4),
-                                 vk::Format::eR32G32B32A32Sfloat);
-    };
+  filters_companions_ = companions;
+  const auto texels = [&](std::size_t count) {
+    return create_texel_buffer(device_, count * sizeof(gpu::vec4), vk::Format::eR32G32B32A32Sfloat);
+  };
+  if (pixels > pixels_) {
+    pixels_ = companion_pixels_ = 0;  // stay 0 if an allocation below throws
     for (int side : {0, 1}) {
       signal_[side] = texels(pixels);
       variance_[side] = texels(pixels);
     }
-    for (int side : {0, 1})
-      for (Buffer* companion : {&uncovered_[side], &real_[side]})
-        // composite.comp and present.comp use one side, whether it is filtered or not.
-        *companion = texels(companions || side == 0 ? pixels : 1);
     for (Buffer* other : {&surface_, &guide_, &guide_variance_}) *other = texels(pixels);
+    // composite.comp and present.comp use side 0 of the companions, filtered or not.
+    uncovered_[0] = texels(pixels);
+    real_[0] = texels(pixels);
+    uncovered_[1] = texels(1);
+    real_[1] = texels(1);
     pixels_ = pixels;
   }
-  has_companions_ = companions;
+  if (companions && companion_pixels_ < pixels_) {
+    uncovered_[1] = texels(pixels_);
+    real_[1] = texels(pixels_);
+    companion_pixels_ = pixels_;
+  }
 }
 
 // Each pass writes to the other side, starting from side 0; the variance pass is the first. It
@@ -70,16 +73,16 @@ const Buffer& Denoiser::denoised_signal() const {
   return signal_[result_side];
 }
 const Buffer& Denoiser::denoised_uncovered() const {
-  return uncovered_[has_companions_ ? companions_side : 0];
+  return uncovered_[filters_companions_ ? companions_side : 0];
 }
 const Buffer& Denoiser::denoised_real() const {
-  return real_[has_companions_ ? companions_side : 0];
+  return real_[filters_companions_ ? companions_side : 0];
 }
 
 void Denoiser::record(const vk::raii::CommandBuffer& commands, int width, int rows,
                       bool single_sample) {
   gpu::GpuDenoise constants{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(rows), 1,
-                            single_sample ? 1u : 0u, has_companions_ ? 1u : 0u};
+                            single_sample ? 1u : 0u, filters_companions_ ? 1u : 0u};
   int side = 0, companion = 0;
   const auto run = [&](Kernel& pass) {
     const Buffers buffers{{"signals", &signal_[side]},
@@ -129,7 +132,7 @@ void Denoiser::read(const Band& band, Layers& layers, const PlateRadiance& plate
   const auto signals = download<glm::vec4>(device_, denoised_signal(), last - top);
   const auto variances = download<glm::vec4>(device_, variance_[result_side], last - top);
   std::vector<glm::vec4> uncovered, real;
-  if (has_companions_) {
+  if (filters_companions_) {
     uncovered = download<glm::vec4>(device_, denoised_uncovered(), last - top);
     real = download<glm::vec4>(device_, denoised_real(), last - top);
   }
@@ -140,7 +143,7 @@ void Denoiser::read(const Band& band, Layers& layers, const PlateRadiance& plate
     for (int c = 0; c < 3; ++c) {
       const MeasuredChannel measured = plate.channel(i, c);
       Estimate estimate{layers.white * signals[i - top][c], layers.mask[i], 0, 0};
-      if (has_companions_) {
+      if (filters_companions_) {
         estimate.uncovered = layers.white * uncovered[i - top][c];
         estimate.real = layers.white * real[i - top][c];
       }

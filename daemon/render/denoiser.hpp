@@ -19,7 +19,7 @@ namespace previz::render {
 
 // Returns the largest variance that a change of this many samples is taken to have: no sample is
 // counted as brighter than DENOISE_MOST_WHITES times `white`.
-float most_sure_variance(float white, std::int64_t samples);
+float most_variance(float white, std::int64_t samples);
 
 class Denoiser {
  public:
@@ -33,15 +33,15 @@ class Denoiser {
   };
   std::vector<Band> bands(int width, int height) const;
   // Makes the buffers large enough for this many pixels, which may replace them. With `companions`,
-  // what the composite needs beside the signal (its uncovered part and mean(Lr)) is filtered too:
-  // where the rule is not additive, or the plate is clipped.
+  // the following record() filters the change's uncovered part and mean(Lr) as well, which the
+  // composite needs where the rule is not additive or the plate is clipped.
   void reserve(std::size_t pixels, bool companions);
 
   // The input buffers have one vec4 per pixel in the layout of shaders/lib/denoise.glsl;
   // shaders/composite.comp fills them from the samples.
   //
   // A change of more than DENOISE_MOST_WHITES counts as that much, and its variance accordingly
-  // (most_sure_variance()). Otherwise the image of a lamp in a mirror, met by one sample of many,
+  // (most_variance()). Otherwise the image of a lamp in a mirror, met by one sample of many,
   // would stay as a speck or spread over all its neighbours. A channel that is brighter than white
   // by more than two standard errors is a highlight and keeps its brightness.
   Buffer& signal() { return signal_[0]; }
@@ -68,7 +68,8 @@ class Denoiser {
   Device& device_;
   std::size_t most_pixels_;
   std::size_t pixels_ = 0;
-  bool has_companions_ = false;
+  std::size_t companion_pixels_ = 0;  // that both sides of the companions have room for
+  bool filters_companions_ = false;
   Kernel variance_pass_, guide_pass_, level_pass_;
   // A pass reads one side and writes the other.
   Buffer signal_[2], variance_[2], uncovered_[2], real_[2];

@@ -38,7 +38,7 @@ struct Recording {
   const Buffers& buffers;
 };
 
-// What is compiled of a pass. All kernels of a device with the same SPIR-V and constants share it.
+// A pass in compiled form. All kernels of a device with the same SPIR-V and constants share it.
 struct Program {
   struct Binding {
     std::string name;

@@ -17,7 +17,7 @@ std::size_t words_of(std::size_t pixels) {
 // Returns whether the composite needs more than the change: the rule's gain, or what lies behind a
 // clipped plate.
 bool needs_companions(const ToPresent& what) {
-  return what.has_plate && (what.is_clipped || what.rule.kind != set::Composite::additive);
+  return what.is_clipped || what.rule.kind != set::Composite::additive;
 }
 
 std::uint32_t composite_kind(set::Composite composite) {
@@ -43,7 +43,7 @@ gpu::GpuShow constants_of(const ToPresent& what, int bits, const lighting::Clipp
   constants.floor = static_cast<float>(what.rule.floor);
   constants.exposure = static_cast<float>(what.exposure);
   constants.white = static_cast<float>(1 / what.exposure);
-  constants.most_variance = most_sure_variance(constants.white, what.samples);
+  constants.most_variance = most_variance(constants.white, what.samples);
   constants.is_denoised = what.denoise ? 1 : 0;
   return constants;
 }

@@ -1,6 +1,5 @@
 // The running rig: opens a set's cameras, buttons and display, starts the live pipeline and the
-// recorder, and carries out what buttons and bus ask for. All of it on the main thread's event
-// loop.
+// recorder, and carries out what buttons and bus ask for. It runs on the main thread's event loop.
 #pragma once
 
 #include <cstdint>

@@ -66,7 +66,7 @@ inline DenoiserInput denoiser_input(const render::Layers& layers, std::size_t fi
                                     std::size_t last) {
   DenoiserInput input;
   const auto white = static_cast<float>(layers.white);
-  const float most_variance = render::most_sure_variance(white, layers.samples);
+  const float most_variance = render::most_variance(white, layers.samples);
   for (std::size_t i = first; i < last; ++i) {
     const float mask = layers.mask[i];
     const glm::vec3 change = mask * layers.mixed[i] + (1 - mask) * layers.diff[i];

@@ -47,7 +47,7 @@ class LifelineTest : public testing::Test {
     return std::chrono::floor<milliseconds>(now_ - HostClock::Time{});
   }
 
-  // What is reported until `end`: one letter a frame, the words of trouble between them.
+  // Returns what is reported until `end`: one letter for a frame, and the words of trouble between.
   std::string story(Lifeline& lifeline, milliseconds end) {
     std::string story;
     while (elapsed() < end) {

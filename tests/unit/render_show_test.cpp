@@ -100,15 +100,20 @@ TEST(Show, WithoutAVirtualObjectIsThePlateBitForBit) {
   }
 }
 
-TEST(Show, IsOverBlackWhereThereIsNoPlate) {
+TEST_P(ShowOf, ASetIsOverBlackWhereThereIsNoPlate) {
   RandomScene options;
   options.width = 40;
   options.height = 30;
+  set::Estimation estimation;
+  estimation.composite = GetParam();
   const View view = random_scene(4, options);
-  SetRenderer renderer(view);
+  SetRenderer renderer(view, estimation);
   renderer.begin({{}, 1.0, view.world_from_camera});
   renderer.render(3);
-  expect_same_but_for_rounding(renderer.show(false), reference(renderer.layers(), {}, 8, 1));
+  render::Layers layers = renderer.layers();
+  expect_same_but_for_rounding(renderer.show(false), reference(layers, {}, 8, 1));
+  const Plate shown = renderer.show(true, &layers);  // which denoises the layers
+  expect_same_but_for_rounding(shown, reference(layers, {}, 8, 1));
 }
 
 TEST(Show, FollowsThePicturesSize) {
