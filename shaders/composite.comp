@@ -27,7 +27,8 @@ vec3 variance_of_mean(vec3 mean, vec3 square, float samples) {
 
 // Returns the variance of the change. A sample adds Lm in place of Lc where it is covered, and
 // Lm - Lr where it is not.
-vec3 variance_of_change(vec3 change, vec3 own, vec3 square, float mask, vec3 camera, float samples) {
+vec3 variance_of_change(vec3 change, vec3 own, vec3 square, float mask, vec3 camera,
+                        float samples) {
   if (mask <= 0.0 || mask >= 1.0) return variance_of_mean(change, square, samples);
   return variance_of_mean(change - mask * camera,
                           square + camera * (mask * camera - 2.0 * (change - own)), samples);
@@ -71,7 +72,8 @@ void main() {
   for (uint i = 0u; i < 3u; ++i)
     gains[i] = mix(gain(camera.radiance[i], real[i], camera.variance[i]), 1.0, mask);
   highlights[index] = highlight_bits(composite - show.white, gains * gains * variance);
-  signals[index] = vec4(min(change / show.white, vec3(DENOISE_MOST_WHITES)), depth > 0.0 ? 1.0 / depth : 0.0);
+  signals[index] = vec4(min(change / show.white, vec3(DENOISE_MOST_WHITES)),
+                        depth > 0.0 ? 1.0 / depth : 0.0);
   variances[index] =
       vec4(min(variance, vec3(show.most_variance)) / (show.white * show.white), 0.0);
   surfaces[index] = vec4(hits > 0.0 ? sums.normal.xyz / hits : vec3(0.0), mask);

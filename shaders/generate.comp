@@ -54,7 +54,8 @@ void main() {
     const uint path = 2u * slot;
     ray_origin[path] = vec4(transform_vector(frame.world_from_camera, origin), 0.0);
     ray_direction[path] = vec4(normalize(transform_vector(frame.world_from_camera, target)), 0.0);
-    const bool difference = has_feature(FEATURE_DIFFERENCE) && !may_be_covered(pixel) && !may_be_clipped(pixel);
+    const bool difference =
+        has_feature(FEATURE_DIFFERENCE) && !may_be_covered(pixel) && !may_be_clipped(pixel);
     const uint bits = WORLD_BOTH | (difference ? PATH_DIFFERENCE : 0u);
     path_throughput[path] = vec4(1.0, 1.0, 1.0, uintBitsToFloat(bits));
     sample_mixed[slot] = vec4(0.0);

@@ -11,8 +11,8 @@
 layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(scalar, push_constant) uniform Denoise { GpuDenoise denoise; };
-// RGBA32F, width * height: the signal (the change of the composite) over the sensor's white, 1 / depth
-// (0: none).
+// RGBA32F, width * height: the signal (the change of the composite) over the sensor's white,
+// 1 / depth (0: none).
 uniform textureBuffer signals;
 uniform textureBuffer variances;  // of the signal, to be multiplied by the fourth component
 uniform textureBuffer surfaces;   // normal, mean(M)
@@ -74,7 +74,8 @@ float inverse_depth_slope(ivec2 at, ivec2 off, float here) {
 
 // Returns the change of the inverse depth to the right and downwards.
 vec2 inverse_depth_slopes(ivec2 at, float here) {
-  return vec2(inverse_depth_slope(at, ivec2(1, 0), here), inverse_depth_slope(at, ivec2(0, 1), here));
+  return vec2(inverse_depth_slope(at, ivec2(1, 0), here),
+              inverse_depth_slope(at, ivec2(0, 1), here));
 }
 
 // Returns the squared distance of two pixels as parts of one surface, in units of the scales above.

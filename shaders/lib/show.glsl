@@ -75,13 +75,13 @@ vec3 compose(Measured camera, Estimate e) {
   vec3 result;
   for (uint c = 0u; c < 3u; ++c) {
     const float seen = camera.radiance[c];
-    const float plain = (1.0 - e.mask) * seen +
-                        (e.change[c] + (gain(seen, e.real[c], camera.variance[c]) - 1.0) * e.uncovered[c]);
+    const float extra = gain(seen, e.real[c], camera.variance[c]) - 1.0;
+    const float plain = (1.0 - e.mask) * seen + (e.change[c] + extra * e.uncovered[c]);
     result[c] = plain;
     if (camera.clipped[c] <= 0.0) continue;
     const float behind = seen + camera.clipped[c] * max(e.real[c] - seen, 0.0);
-    const float whole = (1.0 - e.mask) * behind +
-                        (e.change[c] + (gain(behind, e.real[c], camera.variance[c]) - 1.0) * e.uncovered[c]);
+    const float extra_behind = gain(behind, e.real[c], camera.variance[c]) - 1.0;
+    const float whole = (1.0 - e.mask) * behind + (e.change[c] + extra_behind * e.uncovered[c]);
     result[c] = min(whole, max(seen, plain));
   }
   return result;
