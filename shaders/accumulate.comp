@@ -35,7 +35,15 @@ void reject_impossible(inout vec4 mixed, inout vec4 real, inout vec3 landed) {
   landed = vec3(0.0);
 }
 
+// Empties the queue of what is left in it, which is counted: the next batch uses the same slots for
+// other samples.
+void end_batch() {
+  control.unfinished += control.next_count;
+  control.next_count = 0u;
+}
+
 void main() {
+  if (gl_GlobalInvocationID.x == 0u) end_batch();
   if (gl_GlobalInvocationID.x >= batch.width * batch.height) return;
   const uvec2 in_tile = uvec2(gl_GlobalInvocationID.x % batch.width, gl_GlobalInvocationID.x / batch.width);
   const uint limit = sample_limit(uvec2(batch.x, batch.y) + in_tile);

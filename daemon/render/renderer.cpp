@@ -311,6 +311,7 @@ Counters Renderer::counters() const {
   counters.dropped_not_finite = control.dropped_not_finite;
   counters.dropped_negative = control.dropped_negative;
   counters.stopped_in_layers = control.stopped_in_layers;
+  counters.unfinished = control.unfinished;
   counters.measured = wide(control.measured_high, control.measured_low);
   counters.unmeasured = wide(control.unmeasured_high, control.unmeasured_low);
   return counters;

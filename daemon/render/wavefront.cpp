@@ -166,9 +166,12 @@ void Wavefront::record_extension(const Recording& recording) {
 void Wavefront::record_batch(const Recording& recording, const gpu::GpuBatch& batch,
                              std::uint32_t max_depth) {
   generate_.dispatch(recording, slots_of(batch) * batch.samples);
-  // There is one segment per vertex, one more to meet light after the last vertex, and one because
-  // a fork continues one round later than the path it split from.
-  for (std::uint32_t segment = 0; segment < max_depth + 2; ++segment) {
+  // There is one segment per vertex, one more to meet light after the last vertex, and one for each
+  // fork, because the half that parts continues one round later. A path forks once, and once more
+  // where it can take the camera's radiance.
+  const bool by_camera = (features_.value() & gpu::FEATURE_CAMERA) != 0;
+  const std::uint32_t segments = max_depth + (by_camera ? 3 : 2);
+  for (std::uint32_t segment = 0; segment < segments; ++segment) {
     record_extension(recording);
     shade_.dispatch_indirect(recording, control_, offsetof(gpu::GpuControl, extend_groups));
     prepare_shadow_.dispatch(recording, 1);

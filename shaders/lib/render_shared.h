@@ -139,6 +139,7 @@ struct GpuControl {
   uint dropped_not_finite;
   uint dropped_negative;
   uint stopped_in_layers;
+  uint unfinished;  // paths that a batch left in the queue
   uint measured_low, measured_high;      // vertices whose radiance the plate gave
   uint unmeasured_low, unmeasured_high;  // real vertices for which it could not
 };
@@ -288,7 +289,7 @@ static_assert(sizeof(GpuShow) == 60);
 static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 56);
 static_assert(sizeof(GpuPixel) == 144);
-static_assert(sizeof(GpuControl) == 92);
+static_assert(sizeof(GpuControl) == 96);
 static_assert(sizeof(GpuInstance) == 112);
 static_assert(sizeof(GpuMaterial) == 84);
 static_assert(offsetof(GpuMaterial, base_color_texture) == 48);

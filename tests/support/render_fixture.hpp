@@ -50,6 +50,7 @@ inline void expect_clean(const render::Counters& counters) {
   EXPECT_EQ(counters.dropped_not_finite, 0u);
   EXPECT_EQ(counters.dropped_negative, 0u);
   EXPECT_EQ(counters.stopped_in_layers, 0u);
+  EXPECT_EQ(counters.unfinished, 0u);
   EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
 }
 

@@ -1,5 +1,6 @@
 // The plate as the radiance of real surfaces: what mirrors and virtual objects take from it, and
 // where it may not be taken.
+#include <initializer_list>
 #include <numbers>
 
 #include "tests/support/render_fixture.hpp"
@@ -198,6 +199,43 @@ TEST(CameraRadiance, WithNothingVirtualThePlateIsUntouched) {
     EXPECT_EQ(renderer.show(false).samples, plate.samples);
     expect_clean(renderer.counters());
   }
+}
+
+// A path that forks at the camera ray's first hit and again where it has landed on the floor is two
+// rounds behind the one that it started as: a removed board hides a virtual ball, which mirrors the
+// floor that the camera sees. What a batch left in the queue would be added to other samples of the
+// next one.
+TEST(CameraRadiance, APathThatForksTwiceEndsWithItsBatch) {
+  View view;
+  view.world_from_camera = look_at({0, -2, 1.2}, {0, 0, 0});
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({8, 8})),
+               add_material(view.scene, diffuse(glm::vec3(albedo))));
+  // A metre before the camera, over the upper half of its view.
+  glm::dmat4 before = view.world_from_camera;
+  before[3] += before[2] - 1.45 * before[1];
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({3, 3})), 0, before,
+               scene::world_real);
+  glm::dmat4 above(1);
+  above[3] = {0, 0, 0.5, 1};
+  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.4, 3)),
+               add_material(view.scene, metal(glm::vec3(0.9f), 0)), above, scene::world_mixed);
+  view.environment = uniform_environment(glm::vec3(1));
+  view.calibration = pinhole(width, height, 0.9);
+  view.calibration.response.kind = ResponseCurve::Kind::linear;
+  set::Estimation estimation = by_camera(set::Estimator::difference);
+  estimation.max_depth = 2;
+  const auto plate =
+      std::make_shared<const Plate>(plate_of([](int, int) { return glm::dvec3(1); }));
+  SetRenderer renderer(view, estimation);
+  const auto layers_by = [&](std::initializer_list<int> parts) {
+    renderer.begin({plate, 1 / white, view.world_from_camera, 1});
+    for (const int samples : parts) renderer.render(samples);
+    expect_clean(renderer.counters());
+    return renderer.layers();
+  };
+  const render::Layers whole = layers_by({7}), split = layers_by({1, 4, 2});
+  EXPECT_EQ(whole.mixed, split.mixed);
+  EXPECT_EQ(whole.diff, split.diff);
 }
 
 // Without a plate there is nothing to take: the pictures are those that are traced, bit for bit.
