@@ -10,9 +10,11 @@
 #include "shaders/lib/environment.glsl"
 #include "shaders/lib/gather.glsl"
 
-// A path of the difference survives each vertex with at least this probability, which bounds its
-// weight.
+// A path of the difference that is far from all differences survives a vertex with at least this
+// probability, and its throughput is never raised above the inverse.
 const float LEAST_SURVIVAL = 0.1;
+
+float largest_of(vec3 v) { return max(max(v.r, v.g), v.b); }
 
 struct Path {
   uint index;
@@ -225,8 +227,11 @@ void meet_photons(Path p, Surface s, Lobes l) {
 bool ends_far_off(inout Path p, Surface s, inout float chance) {
   if (!p.difference || p.worlds != WORLD_BOTH || p.depth == 0u || frame.difference_roulette <= 0.0)
     return false;
-  const float survival = clamp(frame.difference_roulette * bounds_reach(s.position),
-                               LEAST_SURVIVAL, 1.0);
+  // The roulette is played at every vertex. If the throughput did not count, a path that survived k
+  // vertices would bring 10^k times its light.
+  const float least =
+      LEAST_SURVIVAL * clamp(largest_of(abs(p.throughput)), 1.0, 1.0 / LEAST_SURVIVAL);
+  const float survival = clamp(frame.difference_roulette * bounds_reach(s.position), least, 1.0);
   if (chance >= survival) return true;
   chance /= survival;
   p.throughput /= survival;
@@ -242,8 +247,7 @@ bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, vec2
   if (!sample_direction(t, s, l, u, chance.y, direction, weight, pdf)) return false;
   p.throughput *= weight;
   if (all(equal(p.throughput, vec3(0.0)))) return false;
-  const vec3 size = abs(p.throughput);
-  const float strongest = max(max(size.r, size.g), size.b);
+  const float strongest = largest_of(abs(p.throughput));
   if (p.depth + 1u >= frame.roulette_depth && strongest < 1.0) {
     if (chance.x >= strongest) return false;
     p.throughput /= strongest;

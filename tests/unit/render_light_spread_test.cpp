@@ -169,5 +169,35 @@ TEST(DirectionsTowardsWhatDiffers, AreThoseOfTheFrameHoweverOftenItIsBegun) {
   EXPECT_EQ(pictures[0], pictures[1]);
 }
 
+// A small ball in a hall of 40 m whose walls shine with 1 and reflect a half: almost every path of
+// the difference is far off, and plays the roulette at each of its 8 vertices. Its throughput is at
+// most 10. A light sample brings at most f L / (2 p) of it, where p is half the BSDF's density or
+// more, hence half at each vertex; what its parted halves meet brings 1 + 1/2 + 1/4 + ..., and half as
+// much again by light samples, hence three times. So no sample brings more than 10 (8 / 2 + 3).
+TEST(DifferenceRoulette, NeverRaisesAPathAboveTenTimesItsLight) {
+  View view;
+  scene::Material wall = diffuse(glm::vec3(0.5f));
+  wall.emission = glm::vec3(1);
+  view.scene = furnace_box({40, 40, 40}, wall);
+  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.1, 2)),
+               add_material(view.scene, diffuse(glm::vec3(0))), glm::dmat4(1), scene::world_mixed);
+  view.environment = uniform_environment(glm::vec3(0));
+  view.calibration = pinhole(48, 36, 0.9);
+  view.world_from_camera = look_at({5, 5, 5}, {20, 20, 3});
+  set::Estimation estimation = up_to_depth(8);
+  estimation.estimator = set::Estimator::difference;
+  estimation.roulette_depth = 64;  // no other roulette
+  SetRenderer renderer(view, estimation);
+  float most = 0;
+  for (std::uint32_t seed = 0; seed < 64; ++seed) {
+    renderer.begin({{}, 1.0, view.world_from_camera, seed});
+    renderer.render(1);
+    expect_clean(renderer.counters());
+    for (const glm::vec3& diff : renderer.layers().diff) most = std::max(most, std::abs(diff.g));
+  }
+  EXPECT_LE(most, 70);
+  EXPECT_GT(most, 0);
+}
+
 }  // namespace render_light_spread_test
 }  // namespace previz::test
