@@ -15,8 +15,12 @@ void main() {
   const uint path = queue[active_queue_index(gl_GlobalInvocationID.x)];
   const vec4 origin = ray_origin[path];
   const uint bits = floatBitsToUint(path_throughput[path].w);
+  // The path leaves its last hit, unless it starts here or resumes on its way.
+  const bool leaves_surface = path_depth(bits) > 0u && origin.w == 0.0;
+  const uvec2 source =
+      leaves_surface ? uvec2(hits[path].instance, hits[path].primitive) : TRACE_FROM_NOWHERE;
   Hit hit;
   const bool found = closest_met(origin.xyz, ray_direction[path].xyz, origin.w * RESUME_BEFORE,
-                                 3.4e38, path_worlds(bits), hit);
+                                 3.4e38, path_worlds(bits), source, hit);
   hits[path] = GpuHit(found ? hit.t : -1.0, hit.barycentrics, hit.instance, hit.primitive);
 }

@@ -204,7 +204,7 @@ bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, out GpuS
       delta ? 1.0 : mis_weight(pdf, combined_pdf(t, s, light.direction, bsdf_pdf));
   ray.direction = light.direction;
   ray.t_max = light.t_max;
-  ray.slot_and_worlds = (p.slot << 3) | (p.landed ? 4u : 0u) | p.worlds;
+  ray.path_and_worlds = (p.index << 3) | (p.landed ? 4u : 0u) | p.worlds;
   const vec3 contribution = p.throughput * value * light.radiance * (weight / pdf);
   ray.mixed = (p.worlds & WORLD_MIXED) != 0u ? contribution * light.gain.mixed : vec3(0.0);
   ray.real = (p.worlds & WORLD_REAL) != 0u ? contribution * light.gain.real : vec3(0.0);

@@ -33,24 +33,25 @@ bool is_met(Hit hit, vec3 origin, vec3 direction) {
 }
 
 // Finds the closest surface that the ray meets, as trace_closest() does.
-bool closest_met(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds, out Hit hit) {
+bool closest_met(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds, uvec2 source,
+                 out Hit hit) {
   if (!has_feature(FEATURE_ALPHA))
-    return trace_closest(origin, direction, t_min, t_max, worlds, hit);
+    return trace_closest(origin, direction, t_min, t_max, worlds, source, hit);
   for (uint layer = 0u; layer < MAX_LAYERS; ++layer) {
-    if (!trace_closest(origin, direction, t_min, t_max, worlds, hit)) return false;
+    if (!trace_closest(origin, direction, t_min, t_max, worlds, source, hit)) return false;
     if (is_met(hit, origin, direction)) return true;
     t_min = hit.t;
   }
   atomicAdd(control.stopped_in_layers, 1u);
-  return trace_closest(origin, direction, t_min, t_max, worlds, hit);
+  return trace_closest(origin, direction, t_min, t_max, worlds, source, hit);
 }
 
 // Returns the share of light that passes along the ray in the (mixed, real) world; it is 0 in a
 // world that is not in `worlds`.
-vec2 light_through(vec3 origin, vec3 direction, float t_max, uint worlds) {
+vec2 light_through(vec3 origin, vec3 direction, float t_max, uint worlds, uvec2 source) {
   vec2 share = vec2((worlds & WORLD_MIXED) != 0u, (worlds & WORLD_REAL) != 0u);
   if (!has_feature(FEATURE_ALPHA)) {
-    const uint blocked = trace_blocked(origin, direction, 0.0, t_max, worlds);
+    const uint blocked = trace_blocked(origin, direction, 0.0, t_max, worlds, source);
     return share * vec2((blocked & WORLD_MIXED) == 0u, (blocked & WORLD_REAL) == 0u);
   }
   float t_min = 0.0;
@@ -60,7 +61,7 @@ vec2 light_through(vec3 origin, vec3 direction, float t_max, uint worlds) {
       return vec2(0.0);
     }
     Hit hit;
-    if (!trace_closest(origin, direction, t_min, t_max, worlds, hit)) return share;
+    if (!trace_closest(origin, direction, t_min, t_max, worlds, source, hit)) return share;
     const float through = 1.0 - hit_coverage(hit);
     if ((hit.presence & WORLD_MIXED) != 0u) share.x *= through;
     if ((hit.presence & WORLD_REAL) != 0u) share.y *= through;

@@ -79,7 +79,7 @@ struct GpuShadowRay {
   vec3 origin;
   float t_max;
   vec3 direction;
-  uint slot_and_worlds;  // slot << 3 | landed << 2 | WORLD_*
+  uint path_and_worlds;  // path << 3 | landed << 2 | WORLD_*
   // What arrives in each world if nothing blocks it: throughput * f * cos * Le / pdf * MIS weight,
   // times the lamp's gain there.
   vec3 mixed;

@@ -103,16 +103,22 @@ vec3 position_error(GpuInstance instance, vec3 object_bound, vec3 position) {
                   abs(transform_translation(instance.world_from_object)));
 }
 
+// For slivers the bound below grows with their aspect only up to here. Beyond it the bound would
+// reach over things that lie on the sliver: 12 cm on a road of 1 km x 4 m. A ray never meets the
+// triangle that it leaves, so that the bound has to cover the triangles beside it only, and those
+// only where the ray starts within rounding of a common edge.
+const float MOST_ASPECT = 4.0;
+
 // Returns a bound on the distance from a triangle's plane at which rounding in lib/trace.glsl may
 // see the origin of a ray that starts on the plane. Distances are combined from those of the
-// corners, so the error grows with the triangle's size. For slivers it also grows with their
-// aspect, as the error of the weights does; that factor is kept below 256.
+// corners, so the error grows with the triangle's size, and with its aspect, as the error of the
+// weights does.
 float plane_error(GpuInstance instance, vec3 edge1, vec3 edge2) {
   const vec3 e1 = transform_vector(instance.world_from_object, edge1);
   const vec3 e2 = transform_vector(instance.world_from_object, edge2);
   const float size = max(length(e1), length(e2));
   const float doubled_area = length(cross(e1 / size, e2 / size));  // over size^2
-  return 8.0 * 5.9604645e-8 * size * clamp(1.0 / doubled_area, 1.0, 256.0);
+  return 8.0 * 5.9604645e-8 * size * clamp(1.0 / doubled_area, 1.0, MOST_ASPECT);
 }
 
 vec2 triangle_uv(vec4 p0, vec4 n0, vec4 p1, vec4 n1, vec4 p2, vec4 n2, vec3 b) {

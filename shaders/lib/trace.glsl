@@ -33,6 +33,10 @@ const float TRACE_SLACK = 9.5367432e-7;  // 2^-20
 // speckle.
 const float TRACE_TIE = 9.5367432e-7;
 
+// The triangle that a ray leaves, which it never meets, whatever rounding says: instance and
+// primitive.
+const uvec2 TRACE_FROM_NOWHERE = uvec2(0xffffffffu);
+
 // A ray in the space of a tree.
 struct TraceSpace {
   vec3 origin;
@@ -135,7 +139,7 @@ vec3 trace_project(vec3 vertex, const TraceSpace s) {
 // `worlds` in which the ray is blocked. Otherwise it returns 1 and sets `hit` to the closest hit,
 // or returns 0.
 uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, float t_max,
-                uint worlds, inout Hit hit) {
+                uint worlds, uvec2 source, inout Hit hit) {
   uint stack[TRACE_STACK_SIZE + 1u];  // groups: block of children << 8 | children still to visit
   uint top = 0u;
   uint bottom = 0u;  // where the stack of the tree that is being traversed begins
@@ -161,6 +165,8 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
     const uint b6 = 1u << (s.octant ^ 6u);
     const uint b7 = 1u << (s.octant ^ 7u);
     const bvec3 backwards = lessThan(s.inverse, vec3(0.0));
+    // A pair's primitive is stored above eight other bits.
+    const uint left_out = s.instance == source.x ? source.y << 8 : 0xffffffffu;
     uint group = fresh && (s.presence & worlds & ~blocked) != 0u ? b0 : 0u;
     uint entered = 0u;
 
@@ -218,8 +224,10 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
         const vec3 p1 = trace_project(uintBitsToFloat(uvec3(w1.w, w2.xy)), s);
         const vec3 p2 = trace_project(uintBitsToFloat(uvec3(w2.zw, w3.x)), s);
         const vec3 p3 = trace_project(uintBitsToFloat(w3.yzw), s);
-        const TraceTriangle first = trace_triangle(p0, p1, p2, t_min, t_max);
-        const TraceTriangle second = trace_triangle(p0, p2, p3, t_min, t_max);
+        TraceTriangle first = trace_triangle(p0, p1, p2, t_min, t_max);
+        TraceTriangle second = trace_triangle(p0, p2, p3, t_min, t_max);
+        first.hit = first.hit && (head.x ^ left_out) > 0xffu;
+        second.hit = second.hit && (head.y ^ left_out) > 0xffu;
         const bool is_pair = kind == RECORD_PAIR;
         if (shadow) {
           if (is_pair && (first.hit || second.hit)) {
@@ -275,12 +283,12 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
 // Finds the closest hit with t_min < t < t_max, t_min >= 0, among the instances that are present in
 // any of `worlds`. `direction` may have any length but zero; t is in units of it. Where surfaces of
 // two instances coincide, the lower instance is hit; where two triangles of an instance do, the
-// lower primitive.
-bool trace_closest(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds,
+// lower primitive. `source` is the triangle that the ray leaves, or TRACE_FROM_NOWHERE.
+bool trace_closest(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds, uvec2 source,
                    out Hit hit) {
   hit = Hit(t_max, vec2(0.0), 0xffffffffu, 0xffffffffu, 0u);
   const bool found =
-      trace_rays(false, origin, direction, t_min, t_max, worlds, hit) != 0u;
+      trace_rays(false, origin, direction, t_min, t_max, worlds, source, hit) != 0u;
   // The stored vertices are those of the primitive, rotated left; the weights are rotated back.
   const uint rotation = hit.primitive & 3u;
   const vec3 stored = vec3(1.0 - hit.barycentrics.x - hit.barycentrics.y, hit.barycentrics);
@@ -291,9 +299,19 @@ bool trace_closest(vec3 origin, vec3 direction, float t_min, float t_max, uint w
 
 // Returns the subset of `worlds` in which something lies between t_min and t_max. The search stops
 // as soon as that is all of them.
-uint trace_blocked(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds) {
+uint trace_blocked(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds,
+                   uvec2 source) {
   Hit unused;
-  return trace_rays(true, origin, direction, t_min, t_max, worlds, unused);
+  return trace_rays(true, origin, direction, t_min, t_max, worlds, source, unused);
+}
+
+// These trace rays that leave no triangle.
+bool trace_closest(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds,
+                   out Hit hit) {
+  return trace_closest(origin, direction, t_min, t_max, worlds, TRACE_FROM_NOWHERE, hit);
+}
+uint trace_blocked(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds) {
+  return trace_blocked(origin, direction, t_min, t_max, worlds, TRACE_FROM_NOWHERE);
 }
 
 #endif

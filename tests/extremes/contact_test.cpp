@@ -122,6 +122,40 @@ TEST(Contact, ARestingBoxCastsItsShadowWithoutAGap) {
   }
 }
 
+// A road of 1 km x 4 m is two slivers. The bound on their rounding must not lift rays over the box.
+TEST(Contact, ABoxOnALongRoadCastsItsShadowWithoutAGap) {
+  for (const glm::dvec2& size : {glm::dvec2(1000, 4), glm::dvec2(4, 1000)}) {
+    for (const double top : {0.05, 0.01}) {
+      View view = table();
+      view.scene.meshes[0] = rectangle_mesh(size);
+      add_virtual(view, box_mesh({0.4, 0.4, top}), {0, 0, top / 2});
+      // The shadow of the low box is 2 cm wide, less than a pixel of the others' picture.
+      view.world_from_camera = look_at({0.01, -0.2 - 8 * top, 6 * top}, {0, -0.2 - top, 0});
+      expect_dark_before_box(view, top);
+    }
+  }
+}
+
+// The road by itself, turned any way, is lit everywhere: no ray meets what it leaves. Beside an edge
+// of two slivers rounding may still see the other one: within a few ulps of the kilometre, 6e-5 m, of
+// which each pixel of the picture is a hundredth or more; here that is a few samples of 12288.
+TEST(Contact, ALongRoadDoesNotShadowItself) {
+  for (const double turn : {0.0, 0.4, 1.1}) {
+    View view = table();
+    view.scene.meshes[0] = rectangle_mesh({1000, 4});
+    const glm::dmat4 turned =
+        glm::rotate(glm::dmat4(1), turn, glm::normalize(glm::dvec3(1, 2, 3)));
+    view.scene.instances[0].world_from_object = turned;
+    view.scene.lights[0].direction = glm::dmat3(turned) * view.scene.lights[0].direction;
+    view.world_from_camera = turned * view.world_from_camera;
+    const Rendered result = show(view);
+    int dark = 0;
+    for (const glm::vec3& pixel : result.layers.mixed)
+      if (std::abs(pixel.g - lit) > 1e-5) ++dark;
+    EXPECT_LE(dark, 4) << turn;
+  }
+}
+
 TEST(Contact, AnInterpenetratingBoxCastsItsShadowWithoutAGap) {
   View view = table();
   add_virtual(view, box_mesh({0.4, 0.4, 0.4}), {0, 0, 0.1});
