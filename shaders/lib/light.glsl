@@ -47,7 +47,9 @@ vec3 sample_cone(vec3 axis, float cap, vec2 u) {
   const float depth = u.x * cap;  // 1 - cos, which for small cones would be lost in cos
   const float sin_theta = sqrt(depth * (2.0 - depth));
   const float phi = 2.0 * PI * u.y;
-  return make_frame(axis) * vec3(sin_theta * cos(phi), sin_theta * sin(phi), 1.0 - depth);
+  // A driver's sine and cosine may be off by 2^-11, which turns the direction about the axis but must
+  // not change its length.
+  return normalize(make_frame(axis) * vec3(sin_theta * cos(phi), sin_theta * sin(phi), 1.0 - depth));
 }
 
 // Returns the distance along a unit ray to a sphere that is seen from outside, below 0 if it is

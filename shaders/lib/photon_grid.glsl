@@ -10,7 +10,11 @@
 // Lavapipe of Mesa 22.3 silently ends a loop after 65535 rounds, so longer loops run in chunks.
 const uint LOOP_CHUNK = 32768u;
 
-ivec3 photon_cell(vec3 position) { return ivec3(floor(position / (2.0 * batch.photon_radius))); }
+// Floats beyond the range of an int have no defined int; where the radius has shrunk so far, a disc
+// holds no photon.
+ivec3 photon_cell(vec3 position) {
+  return ivec3(clamp(floor(position / (2.0 * batch.photon_radius)), vec3(-1e9), vec3(1e9)));
+}
 
 // Returns twice the number of photons, rounded up to a power of two; daemon/render/photon_map.cpp
 // allocates as many buckets.
