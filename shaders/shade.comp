@@ -277,6 +277,20 @@ void count_unmeasured() {
   if (atomicAdd(control.unmeasured_low, 1u) == 0xffffffffu) atomicAdd(control.unmeasured_high, 1u);
 }
 
+// Returns whether a surface looks the same from everywhere, but for the coat of paint or plastic: such
+// a coat is left out of account where it is rough and reflects little, to the viewer and to the
+// camera (shaders/README.md, "Camera radiance").
+const float LEAST_MATT_ALPHA = 0.25;
+const float MOST_COAT = 0.1;
+
+bool is_matt(Surface s) {
+  if (!is_specular(s)) return true;
+  if (s.metallic > 0.0 || s.transmission > 0.0 || s.alpha < LEAST_MATT_ALPHA) return false;
+  const vec3 to_camera = -normalize(s.position);  // the camera is the origin
+  const float least_cosine = min(dot(s.normal, s.wo), dot(s.normal, to_camera));
+  return least_cosine > 0.0 && s.specular * fresnel_dielectric(least_cosine, s.ior) <= MOST_COAT;
+}
+
 // Uses the camera's measurement at a diffuse real surface that the plate shows (shaders/README.md,
 // "Camera radiance"). A path of the real world takes it and ends, for which the result is true. A
 // path that is in the mixed world takes it as well and continues, once, for the difference of the
@@ -286,7 +300,7 @@ bool meet_measured(inout Path p, Surface s, GpuHit hit) {
   if (p.depth == 0u || !is_needed || (instances[hit.instance].presence & WORLD_REAL) == 0u)
     return false;
   vec3 radiance;
-  if (is_specular(s) || any(greaterThan(s.emission, vec3(0.0))) ||
+  if (!is_matt(s) || any(greaterThan(s.emission, vec3(0.0))) ||
       !measured_radiance(s.position, radiance)) {
     count_unmeasured();
     return false;

@@ -90,8 +90,8 @@ bool is_inside(const glm::dvec2& pixel) {
 
 // The floor is dark in the model, and bright in the plate, rising from left to right: the mirror
 // shows the plate's floor.
-TEST(CameraRadiance, AMirrorShowsThePlate) {
-  const View view = floor_and_mirror();
+// `where_it_can`: where the floor is seen too flat, the model is traced, which is black.
+void expect_mirror_shows_plate(const View& view, bool where_it_can = false) {
   const auto shade = [](double x) { return 0.2 + x / width; };
   const Plate plate = plate_of([&](int x, int) { return glm::dvec3(1, 0.5, 0.25) * shade(x); });
   for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
@@ -105,12 +105,63 @@ TEST(CameraRadiance, AMirrorShowsThePlate) {
         if (!is_inside(seen) || result.layers.mask[i] != 1) continue;
         // Samples are spread over the pixel: its image is less than three pixels wide, of whose
         // slope of 1/width the 16 stratified samples' mean is off by less than a quarter.
-        EXPECT_NEAR(result.layers.composite[i].g, 0.5 * shade(seen.x), 0.25 * 3 * 0.5 / width);
+        const double off = result.layers.composite[i].g - 0.5 * shade(seen.x);
+        const double allowed = 0.25 * 3 * 0.5 / width;
+        if (where_it_can && off < -allowed) continue;
+        EXPECT_NEAR(off, 0, allowed);
         ++compared;
       }
     }
     EXPECT_GT(compared, 20) << "the mirror must show the floor";
   }
+}
+
+TEST(CameraRadiance, AMirrorShowsThePlate) {
+  expect_mirror_shows_plate(floor_and_mirror());
+}
+
+// Paint and plastic as glTF's defaults have them, and as Blender writes them: the rough coat reflects
+// a few per cent, but more than a tenth where the floor is seen at less than 28 degrees.
+TEST(CameraRadiance, AMirrorShowsThePlateOfAPaintedFloor) {
+  for (const float roughness : {0.5f, 1.0f}) {
+    View view = floor_and_mirror();
+    view.scene.materials[0] = plastic(glm::vec3(albedo), roughness);
+    expect_mirror_shows_plate(view, true);
+  }
+}
+
+// What the camera sees in the coat of a painted floor is not what the mirror sees in it. Both are at
+// most a tenth of what arrives there, here 1 from everywhere but the floor itself.
+TEST(CameraRadiance, OfAPaintedFloorIsWrongByNoMoreThanItsCoat) {
+  View view = floor_and_mirror();
+  view.scene.materials[0] = plastic(glm::vec3(albedo), 0.5f);
+  view.environment = uniform_environment(glm::vec3(1));
+  const View real = [&] {
+    View alone = view;
+    alone.scene.instances.pop_back();
+    return alone;
+  }();
+  const render::Layers seen = render_clean(real, 256).layers;
+  const Plate plate = plate_of([&](int x, int y) {
+    return glm::dvec3(seen.real[static_cast<std::size_t>(y) * width + x]);
+  });
+  set::Estimation traced = by_camera();
+  traced.real_radiance = set::RealRadiance::traced;
+  const render::Layers by_plate = render_over(view, plate, by_camera(), 64).layers;
+  const render::Layers by_model = render_over(view, plate, traced, 64).layers;
+  render::Layers shown;
+  double expected = 0;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const auto i = static_cast<std::size_t>(y) * width + x;
+      if (!is_inside(mirrored_pixel(view, x, y)) || by_plate.mask[i] != 1) continue;
+      shown.mixed.push_back(by_plate.mixed[i] - by_model.mixed[i]);
+      expected += static_cast<double>(by_model.mixed[i].g);
+    }
+  }
+  ASSERT_GT(shown.mixed.size(), 20u);
+  EXPECT_LT(std::abs(mean(shown.mixed).g), 0.1 + 4 * standard_error_of_pixels(shown));
+  EXPECT_GT(expected / static_cast<double>(shown.mixed.size()), 0.3);
 }
 
 // In the sun, the mirror shows the plate's floor and on it the shadow of a virtual ball, darker
@@ -155,11 +206,12 @@ TEST(CameraRadiance, WhatCannotBeMeasuredIsTracedAndCounted) {
   const Plate gray = plate_of([](int, int) { return glm::dvec3(1); });
   View view = floor_and_mirror();
   expect_traced(view, plate_of([](int, int) { return glm::dvec3(1, white, 1); }));
-  view.scene.materials[0] = plastic(glm::vec3(albedo), 0.5f);
+  view.scene.materials[0] = plastic(glm::vec3(albedo), 0.3f);
   expect_traced(view, gray);
   view.scene.materials[0] = emitter(glm::vec3(0));
   view.scene.materials[0].emission_texture = scene::no_texture;
   view.scene.materials[0].specular = 1;
+  view.scene.materials[0].roughness = 0.3f;
   expect_traced(view, gray);
 }
 
