@@ -19,8 +19,10 @@ void main() {
   const bool leaves_surface = path_depth(bits) > 0u && origin.w == 0.0;
   const uvec2 source =
       leaves_surface ? uvec2(hits[path].instance, hits[path].primitive) : TRACE_FROM_NOWHERE;
+  const bool is_behind = has_feature(FEATURE_PANES) && (bits & PATH_BEHIND) != 0u;
+  const float t_min = is_behind ? origin.w : origin.w * RESUME_BEFORE;
   Hit hit;
-  const bool found = closest_met(origin.xyz, ray_direction[path].xyz, origin.w * RESUME_BEFORE,
-                                 3.4e38, path_worlds(bits), source, hit);
+  const bool found = closest_met(origin.xyz, ray_direction[path].xyz, t_min, 3.4e38,
+                                 path_worlds(bits), source, hit);
   hits[path] = GpuHit(found ? hit.t : -1.0, hit.barycentrics, hit.instance, hit.primitive);
 }

@@ -6,7 +6,7 @@
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shaders/lib/append.glsl"
-#include "shaders/lib/bsdf.glsl"
+#include "shaders/lib/pane.glsl"
 #include "shaders/lib/photon.glsl"
 
 struct Flight {
@@ -17,6 +17,8 @@ struct Flight {
   vec3 flux;
   uint worlds;
   uint vertices;
+  uint passes;     // panes that it met and passed
+  bool is_behind;  // see PATH_BEHIND
 };
 
 Flight load_flight(uint path) {
@@ -25,20 +27,22 @@ Flight load_flight(uint path) {
   const vec4 flux = path_throughput[path];
   const uint bits = floatBitsToUint(flux.w);
   return Flight(origin.xyz, origin.w, direction.xyz, direction.w, flux.rgb, path_worlds(bits),
-                path_depth(bits));
+                path_depth(bits), has_feature(FEATURE_PANES) ? path_passes(bits) : 0u, false);
 }
 
 void store_flight(Flight f, uint path) {
   ray_origin[path] = vec4(f.origin, f.t_min);
   ray_direction[path] = vec4(f.direction, f.survival);
-  path_throughput[path] =
-      vec4(f.flux, uintBitsToFloat(f.worlds | (f.vertices << PATH_DEPTH_SHIFT)));
+  const uint bits = f.worlds | (f.is_behind ? PATH_BEHIND : 0u) |
+                    (f.passes << PATH_PASSES_SHIFT) | (f.vertices << PATH_DEPTH_SHIFT);
+  path_throughput[path] = vec4(f.flux, uintBitsToFloat(bits));
 }
 
 // Samples the Dirac lobes of a surface in the direction of light. It is the adjoint of
 // bsdf_sample(), which follows paths from the camera: the colour of a solid tints on leaving, and
 // flux that enters is divided by ior^2, because bsdf_sample() leaves radiance unscaled.
-bool sample_dirac(Surface s, Lobes l, float p_mirror, float choice, out vec3 wi, out vec3 weight) {
+bool sample_dirac(Surface s, Lobes l, vec3 through, float p_mirror, float choice, out vec3 wi,
+                  out vec3 weight) {
   const float cos_o = dot(s.normal, s.wo);
   wi = vec3(0.0);
   weight = vec3(0.0);
@@ -46,6 +50,10 @@ bool sample_dirac(Surface s, Lobes l, float p_mirror, float choice, out vec3 wi,
   if (choice < p_mirror) {
     wi = 2.0 * cos_o * s.normal - s.wo;
     weight = reflection_color(l, cos_o) / p_mirror;
+    if (!reflects_to(s, wi)) return false;
+  } else if (has_feature(FEATURE_PANES) && any(greaterThan(through, vec3(0.0)))) {
+    wi = 2.0 * cos_o * s.normal - s.wo;  // what passes the pane has passed
+    weight = vec3(l.glass / (1.0 - p_mirror));
     if (!reflects_to(s, wi)) return false;
   } else {
     const float fresh = clamp((choice - p_mirror) / (1.0 - p_mirror), 0.0, 0.99999994);
@@ -66,9 +74,33 @@ const uint FLIGHT_OVER = 0u;
 const uint FLIGHT_STAYS = 1u;
 const uint FLIGHT_GOES_ON = 2u;
 
+// Lets a photon that has met a pane pass in the colour that is left, for which the result is true, or
+// makes up for those that have passed.
+bool pass_pane(inout Flight f, vec3 through, GpuHit hit) {
+  if (all(lessThanEqual(through, vec3(0.0)))) return false;
+  const uint key = hash_meeting(hit.instance, hit.primitive, f.origin, f.direction);
+  vec3 factor;
+  const bool passes = passes_met_pane(through, unit_float(hash_bits(key ^ KEY_PASSES_MET)), factor);
+  f.flux *= factor;
+  f.t_min = passes ? hit.t : f.t_min;
+  f.is_behind = passes;
+  f.passes += uint(passes);
+  return passes;
+}
+
 // Decides what a photon does at a surface, and divides its flux by the probability of the decision.
-uint meet_surface(inout Flight f, Surface s, vec2 random) {
-  const Lobes l = make_lobes(s);
+uint meet_surface(inout Flight f, Surface s, GpuHit hit, vec2 random) {
+  Lobes l = make_lobes(s);
+  vec3 through = vec3(0.0);
+  if (has_feature(FEATURE_PANES)) {
+    through = pane_transmittance(s);
+    if (pass_pane(f, through, hit)) {
+      if (f.passes <= MOST_PASSES) return FLIGHT_GOES_ON;
+      atomicAdd(control.stopped_in_layers, 1u);
+      return FLIGHT_OVER;
+    }
+    l = without_passing(s, l, through);
+  }
   const float mirror = l.smooth_reflection ? l.p_reflection : 0.0;
   const float dirac = mirror + (l.smooth_glass ? l.p_glass : 0.0);
   const float rough = is_rough(l) ? 1.0 - dirac : 0.0;
@@ -80,7 +112,8 @@ uint meet_surface(inout Flight f, Surface s, vec2 random) {
   const float fresh = min((random.x - p_stay) / (1.0 - p_stay), 0.99999994);
   vec3 weight;
   vec3 wi;
-  if (dirac <= 0.0 || !sample_dirac(s, l, mirror / dirac, fresh, wi, weight)) return FLIGHT_OVER;
+  if (dirac <= 0.0 || !sample_dirac(s, l, through, mirror / dirac, fresh, wi, weight))
+    return FLIGHT_OVER;
   f.flux *= weight / (1.0 - p_stay);
   f.vertices += 1u;
   f.survival *= min(max(max(weight.r, weight.g), weight.b), 1.0);
@@ -127,7 +160,7 @@ void main() {
         f.worlds = presence;
       }
       const Surface s = make_surface(hit, f.direction);
-      outcome = meet_surface(f, s, sample_2d(photon_sampler(path >> 1), PAIR_BOUNCE + f.vertices));
+      outcome = meet_surface(f, s, hit, sample_2d(photon_sampler(path >> 1), PAIR_BOUNCE + f.vertices));
       if (outcome == FLIGHT_STAYS) store_photon(path, f, s);
       if (outcome == FLIGHT_GOES_ON) store_flight(f, path);
     }

@@ -9,12 +9,11 @@
 #include "shaders/lib/difference_bounds.glsl"
 #include "shaders/lib/environment.glsl"
 #include "shaders/lib/gather.glsl"
+#include "shaders/lib/pane.glsl"
 
 // A path of the difference that is far from all differences survives a vertex with at least this
 // probability, and its throughput is never raised above the inverse.
 const float LEAST_SURVIVAL = 0.1;
-
-float largest_of(vec3 v) { return max(max(v.r, v.g), v.b); }
 
 struct Path {
   uint index;
@@ -29,6 +28,8 @@ struct Path {
   bool rough;  // some vertex so far scattered by a lobe that is not Dirac
   bool difference;  // light that is equal in both worlds need not be traced
   bool landed;      // see PATH_LANDED
+  uint passes;      // panes that it met and passed
+  bool is_behind;   // see PATH_BEHIND
 };
 
 Path load_path(uint index) {
@@ -40,7 +41,8 @@ Path load_path(uint index) {
               path_worlds(bits), path_depth(bits), (bits & PATH_ROUGH) != 0u,
               (has_feature(FEATURE_DIFFERENCE) || has_feature(FEATURE_CAMERA)) &&
                   (bits & PATH_DIFFERENCE) != 0u,
-              has_feature(FEATURE_CAMERA) && (bits & PATH_LANDED) != 0u);
+              has_feature(FEATURE_CAMERA) && (bits & PATH_LANDED) != 0u,
+              has_feature(FEATURE_PANES) ? path_passes(bits) : 0u, false);
 }
 
 void store_path(Path p, uint index) {
@@ -48,6 +50,7 @@ void store_path(Path p, uint index) {
   ray_direction[index] = vec4(p.direction, p.pdf);
   const uint bits = p.worlds | (p.rough ? PATH_ROUGH : 0u) |
                     (p.difference ? PATH_DIFFERENCE : 0u) | (p.landed ? PATH_LANDED : 0u) |
+                    (p.is_behind ? PATH_BEHIND : 0u) | (p.passes << PATH_PASSES_SHIFT) |
                     (p.depth << PATH_DEPTH_SHIFT);
   path_throughput[index] = vec4(p.throughput, uintBitsToFloat(bits));
 }
@@ -142,11 +145,18 @@ float combined_pdf(Technique t, Surface s, vec3 direction, float bsdf_pdf) {
   return mix(bsdf_pdf, bounds_pdf(s.position, t.total, direction), t.share);
 }
 
+bool sample_lobes(Surface s, Lobes l, vec2 u, float choice, out vec3 direction, out vec3 weight,
+                  out float pdf) {
+  if (has_feature(FEATURE_PANES) && any(greaterThan(pane_transmittance(s), vec3(0.0))))
+    return sample_met_pane(s, l, u, choice, direction, weight, pdf);
+  return bsdf_sample(s, l, u, choice, direction, weight, pdf);
+}
+
 // Samples a direction by either technique, with the results of bsdf_sample().
 bool sample_direction(Technique t, Surface s, Lobes l, vec2 u, float choice, out vec3 direction,
                       out vec3 weight, out float pdf) {
   if (!choose(u.x, t.share)) {
-    if (!bsdf_sample(s, l, u, choice, direction, weight, pdf)) return false;
+    if (!sample_lobes(s, l, u, choice, direction, weight, pdf)) return false;
     if (t.share <= 0.0) return true;
     const float all = pdf > 0.0 ? combined_pdf(t, s, direction, pdf) : 1.0 - t.share;
     weight *= (pdf > 0.0 ? pdf : 1.0) / all;
@@ -229,8 +239,7 @@ bool ends_far_off(inout Path p, Surface s, inout float chance) {
     return false;
   // The roulette is played at every vertex. If the throughput did not count, a path that survived k
   // vertices would bring 10^k times its light.
-  const float least =
-      LEAST_SURVIVAL * clamp(largest_of(abs(p.throughput)), 1.0, 1.0 / LEAST_SURVIVAL);
+  const float least = LEAST_SURVIVAL * clamp(largest_of(abs(p.throughput)), 1.0, 1.0 / LEAST_SURVIVAL);
   const float survival = clamp(frame.difference_roulette * bounds_reach(s.position), least, 1.0);
   if (chance >= survival) return true;
   chance /= survival;
@@ -258,6 +267,21 @@ bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, vec2
   p.pdf = pdf;
   p.rough = p.rough || pdf > 0.0;
   return true;
+}
+
+// Lets a path that has met a pane pass in the colour that is left, for which the result is true, or
+// makes up for those that have passed.
+bool pass_pane(inout Path p, Surface s, GpuHit hit) {
+  const vec3 through = pane_transmittance(s);
+  if (all(lessThanEqual(through, vec3(0.0)))) return false;
+  const uint key = hash_meeting(hit.instance, hit.primitive, p.origin, p.direction);
+  vec3 factor;
+  const bool passes = passes_met_pane(through, unit_float(hash_bits(key ^ KEY_PASSES_MET)), factor);
+  p.throughput *= factor;
+  p.t_min = passes ? hit.t : p.t_min;
+  p.is_behind = passes;
+  p.passes += uint(passes);
+  return passes;
 }
 
 // Forks the path: in the worlds that do not contain the hit it continues along the same ray, as a
@@ -331,7 +355,8 @@ void shade_vertex(inout Path p, Surface s, out GpuShadowRay ray, out bool lit, o
   const Sampler random = make_sampler(frame.seed, pixel, slot_sample(p.slot));
   vec2 chance = sample_2d(random, vertex_pair(PAIR_CHANCE, p.depth));
   if (ends_far_off(p, s, chance.x)) return;
-  const Lobes l = make_lobes(s);
+  Lobes l = make_lobes(s);
+  if (has_feature(FEATURE_PANES)) l = without_passing(s, l, pane_transmittance(s));
   const Technique t = make_technique(p, s, l);
   if (has_feature(FEATURE_PHOTONS)) meet_photons(p, s, l);
   lit = light_ray(p, s, l, t, random, ray);
@@ -363,12 +388,15 @@ void main() {
       }
       const Surface s = make_surface(hit, p.direction);
       if (p.depth == 0u && (p.worlds & WORLD_MIXED) != 0u) write_aov(p, s, hit.t);
-      if (takes_light) meet_emission(p, s, hit);
-      const bool ends = has_feature(FEATURE_CAMERA) && meet_measured(p, s, hit);
-      if (!ends && p.depth < frame.max_depth) {
-        shade_vertex(p, s, ray, lit, scattered);
-        if (scattered) store_path(p, p.index);
+      if (has_feature(FEATURE_PANES) && pass_pane(p, s, hit)) {
+        scattered = p.passes <= MOST_PASSES;
+        if (!scattered) atomicAdd(control.stopped_in_layers, 1u);
+      } else {
+        if (takes_light) meet_emission(p, s, hit);
+        const bool ends = has_feature(FEATURE_CAMERA) && meet_measured(p, s, hit);
+        if (!ends && p.depth < frame.max_depth) shade_vertex(p, s, ray, lit, scattered);
       }
+      if (scattered) store_path(p, p.index);
     }
   }
   append_shadow(lit, ray);

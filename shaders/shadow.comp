@@ -12,7 +12,7 @@ void main() {
   const uint worlds = ray.path_and_worlds & 3u;
   const uint path = ray.path_and_worlds >> 3;
   const uvec2 source = uvec2(hits[path].instance, hits[path].primitive);
-  const vec2 through = light_through(ray.origin, ray.direction, ray.t_max, worlds, source);
+  const Gain through = light_through(ray.origin, ray.direction, ray.t_max, worlds, source);
   add_pair(path_slot(path), worlds, (ray.path_and_worlds & 4u) != 0u,
-           ray.mixed * through.x, ray.real * through.y);
+           ray.mixed * through.mixed, ray.real * through.real);
 }

@@ -69,7 +69,7 @@ bool lamps_shine(const Scene& scene) {
          });
 }
 
-constexpr std::array<Feature, 19> feature_table = {{
+constexpr std::array<Feature, 20> feature_table = {{
     {.name = "two worlds",
      .bit = gpu::FEATURE_FORKS,
      .can_be_carried = true,
@@ -116,6 +116,15 @@ constexpr std::array<Feature, 19> feature_table = {{
      .in_material = [](const Material& m, const Scene&, double) { return scene::transmits(m); },
      .used = "light goes through glass or another clear material",
      .left_out = "nothing is made of glass or another clear material"},
+    {.name = "panes",
+     .bit = gpu::FEATURE_PANES,
+     .can_be_carried = true,
+     .in_material = [](const Material& m, const Scene& scene,
+                       double alpha) {
+           return m.thin_walled && scene::transmits(m) && scene::can_be_dirac(scene, m, alpha);
+         },
+     .used = "light goes straight through thin panes of smooth glass",
+     .left_out = "no object is a thin pane of smooth glass"},
     {.name = "photons",
      .bit = gpu::FEATURE_PHOTONS,
      .in_material = [](const Material& m, const Scene& scene,

@@ -163,14 +163,18 @@ void Wavefront::record_extension(const Recording& recording) {
   extend_.dispatch_indirect(recording, control_, offsetof(gpu::GpuControl, extend_groups));
 }
 
+std::uint32_t Wavefront::passes() const {
+  return (features_.value() & gpu::FEATURE_PANES) != 0 ? gpu::MOST_PASSES : 0;
+}
+
 void Wavefront::record_batch(const Recording& recording, const gpu::GpuBatch& batch,
                              std::uint32_t max_depth) {
   generate_.dispatch(recording, slots_of(batch) * batch.samples);
-  // There is one segment per vertex, one more to meet light after the last vertex, and one for each
-  // fork, because the half that parts continues one round later. A path forks once, and once more
-  // where it can take the camera's radiance.
+  // There is one segment per vertex, one more to meet light after the last vertex, one for each pane
+  // that a path meets and passes, and one for each fork, because the half that parts continues one
+  // round later. A path forks once, and once more where it can take the camera's radiance.
   const bool by_camera = (features_.value() & gpu::FEATURE_CAMERA) != 0;
-  const std::uint32_t segments = max_depth + (by_camera ? 3 : 2);
+  const std::uint32_t segments = max_depth + (by_camera ? 3 : 2) + passes();
   for (std::uint32_t segment = 0; segment < segments; ++segment) {
     record_extension(recording);
     shade_.dispatch_indirect(recording, control_, offsetof(gpu::GpuControl, extend_groups));
@@ -181,10 +185,10 @@ void Wavefront::record_batch(const Recording& recording, const gpu::GpuBatch& ba
 }
 
 // Photons are paths of their own, traced before those of the sample. Here too a fork continues one
-// round later.
+// round later, and so does what passes a pane.
 void Wavefront::record_photons(const Recording& recording, std::uint32_t max_depth) {
   photons_.record_emission(recording);
-  for (std::uint32_t segment = 0; segment < max_depth + 1; ++segment) {
+  for (std::uint32_t segment = 0; segment < max_depth + 1 + passes(); ++segment) {
     record_extension(recording);
     photons_.record_bounce(recording, control_, offsetof(gpu::GpuControl, extend_groups));
   }

@@ -1,9 +1,10 @@
 // Rays among surfaces with transparent parts. The closest hit may pass through a surface, as its
-// alpha says, and shadow rays are weakened by the surfaces that they cross. Without FEATURE_ALPHA
-// these functions do what those of lib/trace.glsl do.
+// alpha says or because it is a pane, and shadow rays are weakened by the surfaces that they cross.
+// Without FEATURE_ALPHA and FEATURE_PANES these functions do what those of lib/trace.glsl do.
 #ifndef PREVIZ_ALPHA_GLSL
 #define PREVIZ_ALPHA_GLSL
 
+#include "shaders/lib/pane.glsl"
 #include "shaders/lib/path.glsl"
 #include "shaders/lib/sampler.glsl"
 #include "shaders/lib/trace.glsl"
@@ -19,23 +20,28 @@ float hit_coverage(Hit hit) {
   return coverage(material, hit_uv(hit.instance, hit.primitive, hit.barycentrics));
 }
 
-// Decides whether the ray meets the surface; the probability is the surface's coverage. A hash of
-// the ray and the surface is as good as a random number, because no two rays are alike, and it
-// gives both worlds of a ray the same decision.
+vec3 hit_transmittance(Hit hit, vec3 direction) {
+  if (!may_be_pane(instances[hit.instance].material)) return vec3(0.0);
+  return pane_transmittance(
+      make_surface(GpuHit(hit.t, hit.barycentrics, hit.instance, hit.primitive), direction));
+}
+
+// Decides whether the ray meets the surface; the probability is the surface's coverage, less what
+// passes it as a pane.
 bool is_met(Hit hit, vec3 origin, vec3 direction) {
-  const float share = hit_coverage(hit);
-  if (share >= 1.0) return true;
-  uint key = hash_pair(hit.instance, hit.primitive);
-  key = hash_pair(key, hash_pair(floatBitsToUint(direction.x), floatBitsToUint(direction.y)));
-  key = hash_pair(key, hash_pair(floatBitsToUint(direction.z), floatBitsToUint(origin.x)));
-  key = hash_pair(key, hash_pair(floatBitsToUint(origin.y), floatBitsToUint(origin.z)));
-  return unit_float(key) < share;
+  const float share = has_feature(FEATURE_ALPHA) ? hit_coverage(hit) : 1.0;
+  const float passes =
+      has_feature(FEATURE_PANES) ? least_of(hit_transmittance(hit, direction)) : 0.0;
+  if (share >= 1.0 && passes <= 0.0) return true;
+  const uint key = hash_meeting(hit.instance, hit.primitive, origin, direction);
+  return (share >= 1.0 || unit_float(key) < share) &&
+         (passes <= 0.0 || unit_float(hash_bits(key ^ KEY_PASSES)) >= passes);
 }
 
 // Finds the closest surface that the ray meets, as trace_closest() does.
 bool closest_met(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds, uvec2 source,
                  out Hit hit) {
-  if (!has_feature(FEATURE_ALPHA))
+  if (!has_feature(FEATURE_ALPHA | FEATURE_PANES))
     return trace_closest(origin, direction, t_min, t_max, worlds, source, hit);
   for (uint layer = 0u; layer < MAX_LAYERS; ++layer) {
     if (!trace_closest(origin, direction, t_min, t_max, worlds, source, hit)) return false;
@@ -46,26 +52,29 @@ bool closest_met(vec3 origin, vec3 direction, float t_min, float t_max, uint wor
   return trace_closest(origin, direction, t_min, t_max, worlds, source, hit);
 }
 
-// Returns the share of light that passes along the ray in the (mixed, real) world; it is 0 in a
-// world that is not in `worlds`.
-vec2 light_through(vec3 origin, vec3 direction, float t_max, uint worlds, uvec2 source) {
-  vec2 share = vec2((worlds & WORLD_MIXED) != 0u, (worlds & WORLD_REAL) != 0u);
-  if (!has_feature(FEATURE_ALPHA)) {
+// Returns the share of light that passes along the ray in each world; it is 0 in a world that is not
+// in `worlds`.
+Gain light_through(vec3 origin, vec3 direction, float t_max, uint worlds, uvec2 source) {
+  Gain share = Gain(vec3((worlds & WORLD_MIXED) != 0u), vec3((worlds & WORLD_REAL) != 0u));
+  if (!has_feature(FEATURE_ALPHA | FEATURE_PANES)) {
     const uint blocked = trace_blocked(origin, direction, 0.0, t_max, worlds, source);
-    return share * vec2((blocked & WORLD_MIXED) == 0u, (blocked & WORLD_REAL) == 0u);
+    return Gain(share.mixed * float((blocked & WORLD_MIXED) == 0u),
+                share.real * float((blocked & WORLD_REAL) == 0u));
   }
   float t_min = 0.0;
   for (uint layer = 0u; worlds != 0u; ++layer) {
     if (layer == MAX_LAYERS) {
       atomicAdd(control.stopped_in_layers, 1u);
-      return vec2(0.0);
+      return Gain(vec3(0.0), vec3(0.0));
     }
     Hit hit;
     if (!trace_closest(origin, direction, t_min, t_max, worlds, source, hit)) return share;
-    const float through = 1.0 - hit_coverage(hit);
-    if ((hit.presence & WORLD_MIXED) != 0u) share.x *= through;
-    if ((hit.presence & WORLD_REAL) != 0u) share.y *= through;
-    if (through <= 0.0) worlds &= ~hit.presence;
+    const float coverage = has_feature(FEATURE_ALPHA) ? hit_coverage(hit) : 1.0;
+    vec3 through = vec3(1.0 - coverage);
+    if (has_feature(FEATURE_PANES)) through += coverage * hit_transmittance(hit, direction);
+    if ((hit.presence & WORLD_MIXED) != 0u) share.mixed *= through;
+    if ((hit.presence & WORLD_REAL) != 0u) share.real *= through;
+    if (all(lessThanEqual(through, vec3(0.0)))) worlds &= ~hit.presence;
     t_min = hit.t;
   }
   return share;

@@ -58,6 +58,7 @@ PREVIZ_CONST uint FEATURE_PHOTONS = 512u;   // photons bring caustics
 PREVIZ_CONST uint FEATURE_NORMAL_MAPS = 2048u;
 PREVIZ_CONST uint FEATURE_ALPHA = 4096u;  // any surface that may be transparent by its alpha
 PREVIZ_CONST uint FEATURE_DIFFERENCE = 1024u;  // where possible, only the difference is traced
+PREVIZ_CONST uint FEATURE_PANES = 16384u;  // any smooth thin wall through which light goes straight
 PREVIZ_CONST uint FEATURE_CAMERA = 8192u;  // the plate gives the radiance of points that it shows
 
 // These bits are a path's state.
@@ -67,6 +68,11 @@ PREVIZ_CONST uint PATH_ROUGH = 4u;            // some lobe so far was not Dirac
 PREVIZ_CONST uint PATH_DIFFERENCE = 8u;       // while in both worlds, only the difference is traced
 PREVIZ_CONST uint PATH_LANDED = 16u;          // took the plate's radiance at a vertex and
                                               // continues for Lm - Lr of that vertex
+PREVIZ_CONST uint PATH_BEHIND = 32u;          // goes on behind the pane at its origin + t_min
+PREVIZ_CONST uint PATH_PASSES_SHIFT = 16u;    // number of panes so far that it met and passed
+
+// A path meets and passes no more sides of coloured panes than these.
+PREVIZ_CONST uint MOST_PASSES = 8u;
 
 struct GpuHit {
   float t;  // below 0: nothing was hit

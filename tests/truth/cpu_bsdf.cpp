@@ -216,6 +216,13 @@ bool only_dirac(const Bsdf& bsdf) {
   return !diffuse && !rough && !glass;
 }
 
+glm::dvec3 straight_through(const Bsdf& bsdf, const ShadingPoint& point) {
+  const double nv = glm::dot(point.shading_normal, point.wo);
+  if (!bsdf.thin_walled || !bsdf.smooth_glass() || nv <= 0) return glm::dvec3(0);
+  return (1 - bsdf.metallic) * bsdf.transmission * (1 - glass_reflectance(bsdf, point, nv)) *
+         bsdf.base_color;
+}
+
 bool scatters_behind(const Bsdf& bsdf) {
   return bsdf.metallic < 1 && bsdf.transmission > 0 && !bsdf.smooth_glass();
 }

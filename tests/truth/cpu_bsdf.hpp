@@ -53,5 +53,7 @@ bool scatters_behind(const Bsdf& bsdf);
 bool is_specular(const Bsdf& bsdf);
 // True where evaluate() is zero everywhere.
 bool only_dirac(const Bsdf& bsdf);
+// The share of light that goes straight through a smooth thin wall; 0 of anything else.
+glm::dvec3 straight_through(const Bsdf& bsdf, const ShadingPoint& point);
 
 }  // namespace previz::truth

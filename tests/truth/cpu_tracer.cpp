@@ -37,7 +37,7 @@ struct World {
   std::uint32_t bit;
   std::vector<set::Light> lamps;  // relative to the camera, gain applied
   EmissiveMeshes emissive;
-  bool has_alpha;
+  bool has_layers;  // surfaces that let light pass straight through
 };
 
 std::vector<set::Light> placed_lamps(const scene::Scene& scene, const glm::dvec3& origin,
@@ -57,10 +57,14 @@ Ray resumed(const Ray& ray, const Hit& hit) {
   return {ray.origin + ray.direction * (hit.distance + 2 * hit.offset), ray.direction};
 }
 
-// The closest surface that is there, each by the odds of its alpha.
+// The closest surface that is there, each by the odds of its alpha; only what lies behind `from`,
+// which the ray has met before.
 std::optional<Hit> closest_met(const scene::Scene& scene, const Geometry& geometry, const Ray& ray,
-                               std::uint32_t worlds, Random& random) {
-  auto hit = geometry.closest(ray, worlds);
+                               std::uint32_t worlds, Random& random,
+                               const std::optional<Hit>& from = {}) {
+  const Ray start = from ? resumed(ray, *from) : ray;
+  auto hit = geometry.closest(start, worlds);
+  if (hit) hit->distance += glm::dot(start.origin - ray.origin, ray.direction);
   while (hit) {
     const double coverage = coverage_at(scene, hit->instance, hit->uv);
     if (coverage >= 1 || random.uniform() < coverage) break;
@@ -69,20 +73,6 @@ std::optional<Hit> closest_met(const scene::Scene& scene, const Geometry& geomet
     if (hit) hit->distance += glm::dot(behind.origin - ray.origin, ray.direction);
   }
   return hit;
-}
-
-// The share of light that comes this far along the ray.
-double light_through(const World& world, Ray ray, double distance) {
-  if (!world.has_alpha) return world.geometry.blocked(ray, distance, world.bit) ? 0 : 1;
-  double share = 1;
-  while (share > 0) {
-    const auto hit = world.geometry.closest(ray, world.bit);
-    if (!hit || hit->distance >= distance) break;
-    share *= 1 - coverage_at(world.scene, hit->instance, hit->uv);
-    distance -= hit->distance + 2 * hit->offset;
-    ray = resumed(ray, *hit);
-  }
-  return share;
 }
 
 // A surface point of the path, ready for shading.
@@ -116,17 +106,35 @@ Vertex vertex_at(const World& world, const Hit& hit, const glm::dvec3& wo) {
   return {hit, bsdf, {geometric_normal, normal, wo, side > 0}};
 }
 
+// The share of light that comes this far along the ray: what alpha leaves of it, and panes.
+glm::dvec3 light_through(const World& world, Ray ray, double distance) {
+  if (!world.has_layers)
+    return glm::dvec3(world.geometry.blocked(ray, distance, world.bit) ? 0 : 1);
+  glm::dvec3 share(1);
+  while (share != glm::dvec3(0)) {
+    const auto hit = world.geometry.closest(ray, world.bit);
+    if (!hit || hit->distance >= distance) break;
+    const double coverage = coverage_at(world.scene, hit->instance, hit->uv);
+    const Vertex vertex = vertex_at(world, *hit, -ray.direction);
+    share *= 1 - coverage + coverage * straight_through(vertex.bsdf, vertex.point);
+    distance -= hit->distance + 2 * hit->offset;
+    ray = resumed(ray, *hit);
+  }
+  return share;
+}
+
 // What a ray meets that shines: every lamp it crosses, then the surface or the environment behind
-// them. `bsdf_pdf` 0: no light sample competes.
+// them. `bsdf_pdf` 0: no light sample competes. Lamps nearer than `from` were met before.
 glm::dvec3 emitted(const World& world, const Ray& ray, const std::optional<Hit>& hit,
-                   double bsdf_pdf) {
+                   double bsdf_pdf, double from) {
   const auto weight = [&](double light_pdf) {
     return bsdf_pdf > 0 ? power_heuristic(bsdf_pdf, light_pdf) : 1.0;
   };
   glm::dvec3 sum(0);
   for (const set::Light& lamp : world.lamps) {
     const auto met = meet_lamp(lamp, ray);
-    if (met && (!hit || met->distance < hit->distance)) sum += weight(met->pdf) * met->radiance;
+    if (met && met->distance > from && (!hit || met->distance < hit->distance))
+      sum += weight(met->pdf) * met->radiance;
   }
   if (!hit) {
     return sum +
@@ -197,31 +205,58 @@ glm::dvec3 radiance(const World& world, Ray ray, Random& random, double& first_d
   double bsdf_pdf = 0;
   bool last_dirac = false;
   bool has_rough_vertex = false;
-  for (int depth = 0;; ++depth) {
-    const auto hit = closest_met(world.scene, world.geometry, ray, world.bit, random);
-    if (depth == 0) first_distance = hit ? hit->distance : 0;
+  std::optional<Hit> passed;  // the last pane on this ray
+  first_distance = -1;
+  for (int depth = 0;;) {
+    const auto hit = closest_met(world.scene, world.geometry, ray, world.bit, random, passed);
+    if (first_distance < 0) first_distance = hit ? hit->distance : 0;
     const bool caustic = has_rough_vertex && last_dirac;
     if (world.options.caustics || !caustic) {
-      sum += throughput * emitted(world, ray, hit, bsdf_pdf);
+      sum += throughput * emitted(world, ray, hit, bsdf_pdf, passed ? passed->distance : 0);
     }
-    if (!hit || depth == world.options.max_depth) return sum;
+    if (!hit) return sum;
 
     const Vertex vertex = vertex_at(world, *hit, -ray.direction);
-    if (!only_dirac(vertex.bsdf)) sum += throughput * direct_light(world, vertex, random);
+    const bool ends = depth == world.options.max_depth;
+    if (ends && straight_through(vertex.bsdf, vertex.point) == glm::dvec3(0)) return sum;
+    if (!ends && !only_dirac(vertex.bsdf)) sum += throughput * direct_light(world, vertex, random);
 
     const auto next = sample(vertex.bsdf, vertex.point, random);
     if (!next) return sum;
     throughput *= next->weight;
+    // To go straight through a pane is no event: the ray, and what competes with it, stay as they
+    // are.
+    if (next->dirac && next->wi == -vertex.point.wo) {
+      passed = hit;
+      continue;
+    }
+    if (ends) return sum;
+    passed.reset();
+    ++depth;
     bsdf_pdf = next->pdf;
     last_dirac = next->dirac;
     has_rough_vertex = has_rough_vertex || !next->dirac;
-    if (depth + 1 >= roulette_depth) {
+    if (depth >= roulette_depth) {
       const double survival = std::min(1.0, largest(throughput));
       if (random.uniform() >= survival) return sum;
       throughput /= survival;
     }
     ray = {vertex.start(next->wi), next->wi};
   }
+}
+
+// Whether the first thing that the ray meets in either world is in one of them only. It passes a
+// pane by the odds of the least channel that the pane lets through.
+bool is_covered(const World& world, const Ray& ray, Random& random) {
+  std::optional<Hit> hit;
+  for (;;) {
+    hit = closest_met(world.scene, world.geometry, ray, scene::world_both, random, hit);
+    if (!hit) return false;
+    const Vertex vertex = vertex_at(world, *hit, -ray.direction);
+    const glm::dvec3 through = straight_through(vertex.bsdf, vertex.point);
+    if (random.uniform() >= std::min({through.x, through.y, through.z})) break;
+  }
+  return world.scene.instances[hit->instance].presence != scene::world_both;
 }
 
 struct PixelSums {
@@ -244,15 +279,16 @@ void require_supported(const scene::Scene& scene) {
 struct CpuTracer::Impl {
   Impl(const scene::Scene& traced, const lighting::EnvironmentMap& map, const TraceOptions& how)
       : scene(traced), environment(map), options(how), geometry(traced) {
-    has_alpha = std::any_of(scene.materials.begin(), scene.materials.end(),
-                            [](const auto& m) { return m.alpha_mode != scene::AlphaMode::opaque; });
+    has_layers = std::any_of(scene.materials.begin(), scene.materials.end(), [](const auto& m) {
+      return m.alpha_mode != scene::AlphaMode::opaque || (m.thin_walled && m.transmission > 0);
+    });
   }
 
   const scene::Scene& scene;
   Environment environment;
   TraceOptions options;
   Geometry geometry;
-  bool has_alpha = false;
+  bool has_layers = false;
 };
 
 CpuTracer::CpuTracer(const scene::Scene& scene, const lighting::EnvironmentMap& environment,
@@ -279,7 +315,7 @@ TracedPicture CpuTracer::trace(const ObserverCalibration& calibration,
                     world_bit,
                     placed_lamps(impl_->scene, eye, world_bit),
                     EmissiveMeshes(impl_->scene, impl_->geometry, world_bit),
-                    impl_->has_alpha};
+                    impl_->has_layers};
 
   const auto pixel = [&](int x, int y) {
     Random random(seed, (static_cast<std::uint64_t>(y) << 32) | static_cast<std::uint32_t>(x));
@@ -300,11 +336,7 @@ TracedPicture CpuTracer::trace(const ObserverCalibration& calibration,
         sums.depth += distance * in_camera.direction.z;
         ++sums.hits;
       }
-      const auto either =
-          closest_met(impl_->scene, impl_->geometry, ray, scene::world_both, random);
-      if (either && impl_->scene.instances[either->instance].presence != scene::world_both) {
-        ++sums.mask;
-      }
+      if (is_covered(world, ray, random)) ++sums.mask;
     }
     return sums;
   };

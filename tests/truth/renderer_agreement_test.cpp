@@ -242,6 +242,62 @@ View rough_materials() {
   return view;
 }
 
+// Panes of both worlds and of one: a clear and a stained one between lamps and the table, one with a
+// matt share, one bent round a lamp, and a mirror and a solid ball that show them; lamps of every
+// extent, one of them a mesh, in front of the panes and behind.
+View panes() {
+  View view;
+  scene::Scene& scene = view.scene;
+  const auto add = [&](scene::Mesh mesh, const scene::Material& material, const glm::dvec3& at,
+                       std::uint32_t presence) {
+    glm::dmat4 placed(1.0);
+    placed[3] = glm::dvec4(at, 1);
+    add_instance(scene, add_mesh(scene, std::move(mesh)), add_material(scene, material), placed,
+                 presence);
+  };
+  const auto pane = [](const glm::vec3& tint) {
+    scene::Material material = glass(1.5f);
+    material.thin_walled = true;
+    material.base_color = tint;
+    return material;
+  };
+  scene::Material dusty = pane({0.9f, 0.8f, 0.7f});
+  dusty.transmission = 0.6f;
+  dusty.specular = 0;
+  add(rectangle_mesh({3, 3}), diffuse({0.6f, 0.5f, 0.4f}), {0, 0, 0}, scene::world_both);
+  add(rectangle_mesh({0.9, 0.9}), pane(glm::vec3(1)), {-0.5, 0, 0.5}, scene::world_both);
+  add(rectangle_mesh({0.7, 0.7}), pane({0.9f, 0.5f, 0.1f}), {0.5, 0.1, 0.4}, scene::world_mixed);
+  add(box_mesh({0.5, 0.05, 0.4}), dusty, {0, 0.6, 0.25}, scene::world_real);
+  add(uv_sphere_mesh(0.15, 32, 16), pane({0.5f, 0.9f, 0.9f}), {0.1, -0.6, 0.3}, scene::world_mixed);
+  add(uv_sphere_mesh(0.15, 32, 16), metal(glm::vec3(0.9f), 0.3f), {-0.5, -0.4, 0.15},
+      scene::world_mixed);
+  add(rectangle_mesh({0.3, 0.3}), emitter({4, 3, 2}), {-0.4, 0.3, 0.9}, scene::world_both);
+  set::Light ball = lamp(set::LightType::sphere, glm::dvec3(8, 6, 4));
+  ball.position = {0.1, -0.6, 0.3};
+  ball.radius_m = 0.08;
+  scene.lights.push_back(ball);
+  set::Light panel = lamp(set::LightType::rectangle, glm::dvec3(3, 4, 5));
+  panel.position = {0.6, 0.2, 1};
+  panel.direction = {0, 0, -1};
+  panel.width_m = panel.height_m = 0.4;
+  panel.gain_mixed = 0.6;
+  panel.tint = {1, 0.7, 0.5};
+  scene.lights.push_back(panel);
+  view.environment = uniform_environment(glm::vec3(0.3f, 0.4f, 0.5f), 8);
+  for (int i = 0; i < 6; ++i) view.environment.radiance[static_cast<std::size_t>(9 + i)] *= 6.0f;
+  view.calibration = pinhole(48, 32, 0.8);
+  view.world_from_camera = look_at({0.6, -2, 1.2}, {0, 0, 0.15});
+  return view;
+}
+
+TEST(Panes, AgreeWithTheCpuTracer) {
+  expect_agreement(panes(), 16, true);
+}
+
+TEST(Panes, HaveTheSameDifferenceByBothEstimators) {
+  expect_same_difference(panes(), 16, true);
+}
+
 TEST(RoughMaterials, AgreeWithTheCpuTracer) {
   expect_agreement(rough_materials(), 32, true);
 }
