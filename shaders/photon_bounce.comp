@@ -138,7 +138,7 @@ void store_photon(uint path, Flight f, Surface s) {
   photons[path].normal = s.geometric_normal;
   photons[path].mixed *= (f.worlds & WORLD_MIXED) != 0u ? f.flux : vec3(0.0);
   photons[path].real *= (f.worlds & WORLD_REAL) != 0u ? f.flux : vec3(0.0);
-  atomicAdd(buckets[photon_bucket(photon_cell(s.position))].count, 1u);
+  atomicAdd(buckets[photon_bucket(s.position)].count, 1u);
 }
 
 void main() {

@@ -8,6 +8,6 @@
 void main() {
   const uint photon = gl_GlobalInvocationID.x;
   if (photon >= 2u * frame.photon_count || photons[photon].vertices == 0u) return;
-  const uint bucket = photon_bucket(photon_cell(photons[photon].position));
+  const uint bucket = photon_bucket(photons[photon].position);
   photon_order[buckets[bucket].first + atomicAdd(filled[bucket], 1u)] = photon;
 }

@@ -4,7 +4,6 @@
 #include <cassert>
 #include <cmath>
 #include <glm/gtc/packing.hpp>
-#include <limits>
 #include <map>
 #include <numbers>
 #include <utility>
@@ -304,14 +303,6 @@ void GpuScene::describe(gpu::GpuFrame& frame, std::uint32_t features) const {
   frame.lamp_spread = static_cast<float>(light_spread_);
   const double all_power = environment_power + light_power_;
   frame.lamp_part = all_power > 0 ? static_cast<float>(light_power_ / all_power) : 0.0f;
-}
-
-double GpuScene::nearest_specular_distance(const glm::dvec3& camera_position) const {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (const glm::dvec4& bound : specular_bounds_)
-    nearest =
-        std::min(nearest, std::max(glm::length(glm::dvec3(bound) - camera_position), bound.w));
-  return nearest;
 }
 
 Buffers GpuScene::buffers() const {

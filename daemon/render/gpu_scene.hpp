@@ -37,9 +37,6 @@ class GpuScene {
   // Returns what the scene and the environment ask for; valid once placed. The result refers to
   // this scene and to `estimation`, so it must not outlive them.
   Demand demand(const set::Estimation& estimation) const;
-  // Returns the distance from the camera to the centre of the nearest object that can throw a
-  // caustic, but at least the object's radius (metres); infinite where there is none.
-  double nearest_specular_distance(const glm::dvec3& camera_position) const;
   // Fills the fields of the frame that describe environment and lights. `features`: FEATURE_* bits.
   void describe(gpu::GpuFrame& frame, std::uint32_t features) const;
   // Returns the buffers that the shaders read, except the frame and its rays, which the renderer

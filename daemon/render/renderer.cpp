@@ -218,11 +218,8 @@ void Renderer::begin(FrameInput frame) {
   buffers["frame"] = &r.frame_buffer;
   buffers["plate_samples"] = &r.plate;
   const std::uint32_t features = r.needed() | r.carried;
-  if ((features & gpu::FEATURE_PHOTONS) != 0) {
-    const double distance =
-        r.scene.nearest_specular_distance(glm::dvec3(r.frame.world_from_camera[3]));
-    r.wavefront->use_photons(r.photons(), r.estimation.photon_radius_px * distance / lens.fx);
-  }
+  if ((features & gpu::FEATURE_PHOTONS) != 0)
+    r.wavefront->use_photons(r.photons(), r.estimation.photon_radius_px / lens.fx);
   r.wavefront->use_scene(std::move(buffers), features);
   if ((features & gpu::FEATURE_CAMERA) != 0) r.wavefront->use_camera(r.measured());
   r.wavefront->clear();

@@ -25,8 +25,10 @@ constexpr std::uint32_t block_height = 4;
 constexpr std::uint32_t cpu_slots = 1u << 17;
 constexpr std::uint32_t gpu_slots = 1u << 20;
 
-// The least radius, in metres. Photons are gathered over its square, which must not round to zero.
-constexpr double least_photon_radius = 1e-15;
+// The least and the largest radius over the distance from the camera. Photons are gathered over the
+// square of the radius, which must not round to zero; a disc that reached the camera itself would
+// have no place in the grid.
+constexpr double least_photon_radius = 1e-15, most_photon_radius = 0.5;
 
 std::uint32_t round_up(std::uint32_t value, std::uint32_t to) {
   return (value + to - 1) / to * to;
@@ -258,7 +260,7 @@ bool Wavefront::render_with_photons(std::uint32_t first_sample, std::uint32_t sa
 
 void Wavefront::use_photons(std::uint32_t count, double radius) {
   photons_.resize(count);
-  photon_radius_ = radius;
+  photon_radius_ = std::min(radius, most_photon_radius);
 }
 
 void Wavefront::use_camera(const std::vector<glm::vec4>& plate) {

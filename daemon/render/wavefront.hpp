@@ -25,8 +25,8 @@ class Wavefront {
   // Uses the scene in these buffers, which must stay where they are, and the pipelines for
   // `features`.
   void use_scene(Buffers scene, std::uint32_t features);
-  // Sets the photons per pass and the radius (metres) of the first pass; used where `features` has
-  // FEATURE_PHOTONS.
+  // Sets the photons per pass and the radius of the first pass, over the distance from the camera;
+  // used where `features` has FEATURE_PHOTONS.
   void use_photons(std::uint32_t count, double radius);
   std::uint32_t most_photons() const { return slots_; }
   // Sets the camera's measurement, row-major (CameraMap::upload); used where `features` has
@@ -77,8 +77,8 @@ class Wavefront {
   PhotonMap photons_;
   CameraMap camera_;
   std::vector<std::uint32_t> sampled_until_;  // the limits of all blocks, sorted, least first
-  double photon_radius_ = 0;                  // metres; of the first sample
-  double traced_radius_ = 0;                  // metres; of the current photons
+  double photon_radius_ = 0;                  // over the distance; of the first sample
+  double traced_radius_ = 0;                  // likewise; of the current photons
   double photons_owed_ = 0;                   // passes; photons are traced anew at 1
   Buffers scene_;
   std::vector<Tile> tiles_;

@@ -246,7 +246,7 @@ Keys estimator_keys(Estimation& e) {
       {"difference_sampling", &e.difference_sampling, plain.within(0, 0.8), "Largest share of directions that are aimed at virtual and removed objects, because only there can the two worlds differ. Fewer are aimed where small lamps give most of the light, since these find the objects anyway. 0: none, as in the paper."},
       {"caustics", &e.caustics, plain, "Light that falls onto rough surfaces by way of mirrors and glass. \"photons\": soft at first, then sharper. \"traced\": by paths that happen to find it, noisy. \"none\": left out."},
       {"photons", &e.photons, plain.within(0.001, 10), "With caustics = \"photons\": photons per sample and pixel; at least 1024 per sample in all."},
-      {"photon_radius_px", &e.photon_radius_px, plain.within(0.1, 100), "Blur of caustics in the first sample: radius over which photons are averaged, in pixels at the distance of the nearest mirror or glass. It shrinks with every sample."},
+      {"photon_radius_px", &e.photon_radius_px, plain.within(0.1, 100), "Blur of caustics in the first sample: radius over which photons are averaged, in pixels. It shrinks with every sample."},
   };
 }
 

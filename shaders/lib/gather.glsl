@@ -1,5 +1,5 @@
 // The light that photons bring to a vertex, by density estimation over a disc (Jensen 1996). Its
-// radius shrinks from pass to pass so that the mean over the passes converges (Knaus and Zwicker
+// radius is that of a number of pixels at the vertex's distance from the camera, and shrinks from pass to pass so that the mean over the passes converges (Knaus and Zwicker
 // 2011).
 #ifndef PREVIZ_GATHER_GLSL
 #define PREVIZ_GATHER_GLSL
@@ -7,7 +7,7 @@
 #include "shaders/lib/bsdf.glsl"
 #include "shaders/lib/photon_grid.glsl"
 
-// The photons of one pass, in a hash grid of cells twice as wide as the radius. These are views of
+// The photons of one pass, in a hash grid (lib/photon_grid.glsl). These are views of
 // sorted_photons and buckets, because texel buffers are read faster on lavapipe.
 //
 // RGBA32F, TEXELS_PER_PHOTON texels a photon, those of a bucket together: position, Dirac vertices;
@@ -26,14 +26,10 @@ struct GatheredPair {
   vec3 real;
 };
 
-// Adds f times the flux of one photon, weighted by its distance, without the kernel's constant.
-// bsdf_evaluate() returns f * cos, hence the division. `position` is texel 0 of the photon.
-void gather_photon(uint photon, vec4 position, Surface s, Lobes l, uint most_vertices,
-                   bool differing, inout GatheredPair sum) {
-  const vec3 off = position.xyz - s.position;
-  const float closeness = 1.0 - dot(off, off) / (batch.photon_radius * batch.photon_radius);
-  if (closeness <= 0.0 || uint(position.w) > most_vertices) return;
-  if (abs(dot(off, s.geometric_normal)) > SAME_SURFACE_HEIGHT * batch.photon_radius) return;
+// Adds f times the flux of one photon, weighted by its closeness, 1 - d^2 / r^2, without the kernel's
+// constant. bsdf_evaluate() returns f * cos, hence the division.
+void gather_photon(uint photon, float closeness, Surface s, Lobes l, bool differing,
+                   inout GatheredPair sum) {
   const int first = int(photon * TEXELS_PER_PHOTON);
   const vec4 normal = texelFetch(found_photons, first + 2);
   // The side from which the photon came is left to the BSDF: rough glass accepts both.
@@ -53,17 +49,36 @@ void gather_photon(uint photon, vec4 position, Surface s, Lobes l, uint most_ver
 
 // Returns whether the disc can reach into a cell, by comparing the distance of the disc's plane
 // from the cell's centre with half the cell's extent along the normal.
-bool reaches_cell(Surface s, ivec3 cell) {
-  const float half_width = batch.photon_radius;
-  const vec3 center = (vec3(cell) + 0.5) * (2.0 * half_width);
+bool reaches_cell(Surface s, float radius, ivec3 cell, float width) {
+  const vec3 center = (vec3(cell) + 0.5) * width;
   const vec3 n = s.geometric_normal;
-  const float reach = abs(n.x) + abs(n.y) + abs(n.z) + SAME_SURFACE_HEIGHT + 1e-3;
-  return abs(dot(center - s.position, n)) <= reach * half_width;
+  const float reach = (0.5 * (abs(n.x) + abs(n.y) + abs(n.z)) + 1e-3) * width;
+  return abs(dot(center - s.position, n)) <= reach + SAME_SURFACE_HEIGHT * radius;
 }
 
 // Returns one of the eight cells whose lowest is `first`.
 ivec3 neighbour_cell(ivec3 first, uint corner) {
   return first + ivec3(corner & 1u, (corner >> 1) & 1u, corner >> 2);
+}
+
+// Adds the photons of one cell that lie on the disc and met no more than `most_vertices` Dirac
+// vertices.
+void gather_cell(ivec3 cell, int level, float radius, Surface s, Lobes l, uint most_vertices,
+                 bool differing, inout GatheredPair sum) {
+  const uvec2 bucket = texelFetch(found_buckets, int(photon_bucket(cell, level))).xy;
+  const uint end = bucket.x + bucket.y;
+  for (uint chunk = bucket.x; chunk < end; chunk += LOOP_CHUNK) {
+    for (uint i = chunk; i < min(chunk + LOOP_CHUNK, end); ++i) {
+      const vec4 photon = texelFetch(found_photons, int(i * TEXELS_PER_PHOTON));
+      const vec3 off = photon.xyz - s.position;
+      const float closeness = 1.0 - dot(off, off) / (radius * radius);
+      if (closeness <= 0.0 || uint(photon.w) > most_vertices) continue;
+      if (abs(dot(off, s.geometric_normal)) > SAME_SURFACE_HEIGHT * radius) continue;
+      // Other cells, even two of those that are searched, may share the bucket.
+      if (photon_level(photon.xyz) != level || photon_cell(photon.xyz, level) != cell) continue;
+      gather_photon(i, closeness, s, l, differing, sum);
+    }
+  }
 }
 
 // Returns the radiance of both worlds towards the viewer that photons bring by way of the lobes
@@ -72,27 +87,25 @@ ivec3 neighbour_cell(ivec3 first, uint corner) {
 // equal in both worlds.
 GatheredPair gather_photons(Surface s, Lobes l, uint most_vertices, bool differing) {
   GatheredPair sum = GatheredPair(vec3(0.0), vec3(0.0));
-  const ivec3 first_cell = photon_cell(s.position - batch.photon_radius);
-  // First the cells are selected, then only those are searched: on lavapipe, lanes that skip a
-  // round of a loop cost as much as those that do not.
-  uint reached = 0u;
-  for (uint corner = 0u; corner < 8u; ++corner)
-    if (reaches_cell(s, neighbour_cell(first_cell, corner))) reached |= 1u << corner;
-  for (; reached != 0u; reached &= reached - 1u) {
-    const ivec3 cell = neighbour_cell(first_cell, uint(findLSB(reached)));
-    const uvec2 bucket = texelFetch(found_buckets, int(photon_bucket(cell))).xy;
-    const uint end = bucket.x + bucket.y;
-    for (uint chunk = bucket.x; chunk < end; chunk += LOOP_CHUNK) {
-      for (uint i = chunk; i < min(chunk + LOOP_CHUNK, end); ++i) {
-        const vec4 position = texelFetch(found_photons, int(i * TEXELS_PER_PHOTON));
-        // Other cells, even two of these eight, may share the bucket.
-        if (photon_cell(position.xyz) != cell) continue;
-        gather_photon(i, position, s, l, most_vertices, differing, sum);
-      }
-    }
+  const float radius = photon_radius(s.position);
+  // What is on the disc may be nearer to the camera than its centre, or farther, by the radius.
+  const int last_level = photon_level(radius * (1.0 + batch.photon_radius) * 1.0001);
+  for (int level = photon_level(radius * (1.0 - batch.photon_radius) * 0.9999);
+       level <= last_level; ++level) {
+    const float width = cell_width(level);
+    const ivec3 first_cell = photon_cell(s.position - radius, level);
+    // First the cells are selected, then only those are searched: on lavapipe, lanes that skip a
+    // round of a loop cost as much as those that do not.
+    uint reached = 0u;
+    for (uint corner = 0u; corner < 8u; ++corner)
+      if (reaches_cell(s, radius, neighbour_cell(first_cell, corner), width))
+        reached |= 1u << corner;
+    for (; reached != 0u; reached &= reached - 1u)
+      gather_cell(neighbour_cell(first_cell, uint(findLSB(reached))), level, radius, s, l,
+                  most_vertices, differing, sum);
   }
   // The kernel is Epanechnikov's on a disc, 2 / (pi r^2) (1 - d^2 / r^2).
-  const float scale = 2.0 / (PI * batch.photon_radius * batch.photon_radius * float(frame.photon_count));
+  const float scale = 2.0 / (PI * radius * radius * float(frame.photon_count));
   sum.mixed *= scale;
   sum.real *= scale;
   return sum;

@@ -259,7 +259,8 @@ struct GpuFrame {
 struct GpuBatch {
   uint x, y, width, height;   // tile
   uint first_sample, samples;
-  float photon_radius;        // metres; the photons of a pass serve the sample of the same index
+  float photon_radius;        // over the distance from the camera; the photons of a pass serve the
+                              // sample of the same index
 };
 
 // Push constants of the denoiser's passes.
