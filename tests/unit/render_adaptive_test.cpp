@@ -207,5 +207,43 @@ TEST(Adaptive, ABudgetSpentByNeedMakesTheBetterPictureAndNoOther) {
   EXPECT_LT(std::abs(adaptive.mean() - even.mean()), 4 * standard_error);
 }
 
+// A ball of glass throws a caustic that paths find by luck: a block that has missed it looks quiet.
+// If that alone ended it, it would stay too dark (Kirk and Arvo 1991).
+TEST(Adaptive, StoppingAtAnErrorLosesNoLight) {
+  View view;
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({1, 1})),
+               add_material(view.scene, diffuse(glm::vec3(0.6f))));
+  glm::dmat4 pose(1);
+  pose[3] = {0, 0, 0.12, 1};
+  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.1, 3)),
+               add_material(view.scene, glass(1.5f)), pose, scene::world_mixed);
+  view.environment = uniform_environment(glm::vec3(0.1f));
+  set::Light light = lamp(set::LightType::sphere, glm::dvec3(10));
+  light.position = {0.3, 0, 1};
+  light.radius_m = 0.1;
+  view.scene.lights.push_back(light);
+  view.calibration = pinhole(32, 32, 0.5);
+  view.world_from_camera = look_at({0, -0.8, 1}, {-0.05, 0, 0.03});
+  set::Estimation estimation = up_to_depth(6);
+  estimation.caustics = set::Caustics::traced;
+  SetRenderer renderer(view, estimation);
+  Group even, adaptive;
+  const auto add = [&](Group& group, const set::Quality& wish, std::uint32_t seed) {
+    renderer.begin({{}, 1.0, view.world_from_camera, seed});
+    pipeline::refine(renderer, wish, {}, {});
+    double sum = 0;
+    for (const glm::vec3& value : renderer.layers().composite) sum += value.r + value.g + value.b;
+    group.sums.push_back(sum);
+  };
+  for (std::uint32_t seed = 1; seed <= 64; ++seed) add(adaptive, quality(8, 0.1), seed);
+  for (std::uint32_t seed = 101; seed <= 116; ++seed) add(even, quality(256, 0), seed);
+  const double standard_error =
+      std::sqrt(even.squared_standard_error() + adaptive.squared_standard_error());
+  RecordProperty("relative_bias", std::to_string(adaptive.mean() / even.mean() - 1));
+  RecordProperty("relative_error", std::to_string(standard_error / even.mean()));
+  EXPECT_LT(std::abs(adaptive.mean() - even.mean()), 4 * standard_error);
+  EXPECT_LT(standard_error, 0.01 * even.mean());
+}
+
 }  // namespace render_adaptive_test
 }  // namespace previz::test
