@@ -119,8 +119,8 @@ constexpr std::array<Feature, 20> feature_table = {{
     {.name = "panes",
      .bit = gpu::FEATURE_PANES,
      .can_be_carried = true,
-     .in_material = [](const Material& m, const Scene& scene,
-                       double alpha) {
+     .in_material =
+         [](const Material& m, const Scene& scene, double alpha) {
            return m.thin_walled && scene::transmits(m) && scene::can_be_dirac(scene, m, alpha);
          },
      .used = "light goes straight through thin panes of smooth glass",

@@ -172,9 +172,9 @@ std::uint32_t Wavefront::passes() const {
 void Wavefront::record_batch(const Recording& recording, const gpu::GpuBatch& batch,
                              std::uint32_t max_depth) {
   generate_.dispatch(recording, slots_of(batch) * batch.samples);
-  // There is one segment per vertex, one more to meet light after the last vertex, one for each pane
-  // that a path meets and passes, and one for each fork, because the half that parts continues one
-  // round later. A path forks once, and once more where it can take the camera's radiance.
+  // There is one segment per vertex, one more to meet light after the last vertex, one for each
+  // pane that a path meets and passes, and one for each fork, because the half that parts continues
+  // one round later. A path forks once, and once more where it can take the camera's radiance.
   const bool by_camera = (features_.value() & gpu::FEATURE_CAMERA) != 0;
   const std::uint32_t segments = max_depth + (by_camera ? 3 : 2) + passes();
   for (std::uint32_t segment = 0; segment < segments; ++segment) {

@@ -61,7 +61,7 @@ class Wavefront {
   void create_paths();
   void create_kernels(std::uint32_t features);
   Buffers buffers_of(const Tile& tile) const;  // with the scene's and the maps'
-  std::uint32_t passes() const;  // rounds for panes that paths meet and pass
+  std::uint32_t passes() const;                // rounds for panes that paths meet and pass
   double share_of(std::uint32_t sample) const;
   bool render_with_photons(std::uint32_t first_sample, std::uint32_t samples,
                            std::uint32_t max_depth, const std::function<bool()>& cancelled);

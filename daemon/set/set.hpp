@@ -189,7 +189,7 @@ struct Estimation {
   double difference_sampling = 0.5;
   Caustics caustics = Caustics::photons;  // how light reaches rough surfaces via mirrors and glass
   double photons = 0.1;                   // photons per pass (sample) and pixel of the picture
-  double photon_radius_px = 2;  // in the first pass
+  double photon_radius_px = 2;            // in the first pass
 
   friend bool operator==(const Estimation&, const Estimation&) = default;
 };

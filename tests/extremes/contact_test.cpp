@@ -102,8 +102,8 @@ TEST(Contact, OfTwoFacesInOnePlaneOneWinsEverywhere) {
 }
 
 // The sun comes from behind the box: all of the table before it, up to its very foot, loses all of
-// its light, to the rounding of a float. Rays that start `lift_m` above the table miss the tip of the
-// shadow by twice that.
+// its light, to the rounding of a float. Rays that start `lift_m` above the table miss the tip of
+// the shadow by twice that.
 void expect_dark_before_box(const View& view, double top_m, double lift_m = 0) {
   for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
     const Rendered result = show(view, estimator);
@@ -139,15 +139,15 @@ TEST(Contact, ABoxOnALongRoadCastsItsShadowWithoutAGap) {
   }
 }
 
-// The road by itself, turned any way, is lit everywhere: no ray meets what it leaves. Beside an edge
-// of two slivers rounding may still see the other one: within a few ulps of the kilometre, 6e-5 m, of
-// which each pixel of the picture is a hundredth or more; here that is a few samples of 12288.
+// The road by itself, turned any way, is lit everywhere: no ray meets what it leaves. Beside an
+// edge of two slivers rounding may still see the other one: within a few ulps of the kilometre,
+// 6e-5 m, of which each pixel of the picture is a hundredth or more; here that is a few samples of
+// 12288.
 TEST(Contact, ALongRoadDoesNotShadowItself) {
   for (const double turn : {0.0, 0.4, 1.1}) {
     View view = table();
     view.scene.meshes[0] = rectangle_mesh({1000, 4});
-    const glm::dmat4 turned =
-        glm::rotate(glm::dmat4(1), turn, glm::normalize(glm::dvec3(1, 2, 3)));
+    const glm::dmat4 turned = glm::rotate(glm::dmat4(1), turn, glm::normalize(glm::dvec3(1, 2, 3)));
     view.scene.instances[0].world_from_object = turned;
     view.scene.lights[0].direction = glm::dmat3(turned) * view.scene.lights[0].direction;
     view.world_from_camera = turned * view.world_from_camera;

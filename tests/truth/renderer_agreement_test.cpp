@@ -242,8 +242,8 @@ View rough_materials() {
   return view;
 }
 
-// Panes of both worlds and of one: a clear and a stained one between lamps and the table, one with a
-// matt share, one bent round a lamp, and a mirror and a solid ball that show them; lamps of every
+// Panes of both worlds and of one: a clear and a stained one between lamps and the table, one with
+// a matt share, one bent round a lamp, and a mirror and a solid ball that show them; lamps of every
 // extent, one of them a mesh, in front of the panes and behind.
 View panes() {
   View view;

@@ -120,8 +120,8 @@ TEST(CameraRadiance, AMirrorShowsThePlate) {
   expect_mirror_shows_plate(floor_and_mirror());
 }
 
-// Paint and plastic as glTF's defaults have them, and as Blender writes them: the rough coat reflects
-// a few per cent, but more than a tenth where the floor is seen at less than 28 degrees.
+// Paint and plastic as glTF's defaults have them, and as Blender writes them: the rough coat
+// reflects a few per cent, but more than a tenth where the floor is seen at less than 28 degrees.
 TEST(CameraRadiance, AMirrorShowsThePlateOfAPaintedFloor) {
   for (const float roughness : {0.5f, 1.0f}) {
     View view = floor_and_mirror();
@@ -130,8 +130,8 @@ TEST(CameraRadiance, AMirrorShowsThePlateOfAPaintedFloor) {
   }
 }
 
-// What the camera sees in the coat of a painted floor is not what the mirror sees in it. Both are at
-// most a tenth of what arrives there, here 1 from everywhere but the floor itself.
+// What the camera sees in the coat of a painted floor is not what the mirror sees in it. Both are
+// at most a tenth of what arrives there, here 1 from everywhere but the floor itself.
 TEST(CameraRadiance, OfAPaintedFloorIsWrongByNoMoreThanItsCoat) {
   View view = floor_and_mirror();
   view.scene.materials[0] = plastic(glm::vec3(albedo), 0.5f);
@@ -142,9 +142,8 @@ TEST(CameraRadiance, OfAPaintedFloorIsWrongByNoMoreThanItsCoat) {
     return alone;
   }();
   const render::Layers seen = render_clean(real, 256).layers;
-  const Plate plate = plate_of([&](int x, int y) {
-    return glm::dvec3(seen.real[static_cast<std::size_t>(y) * width + x]);
-  });
+  const Plate plate = plate_of(
+      [&](int x, int y) { return glm::dvec3(seen.real[static_cast<std::size_t>(y) * width + x]); });
   set::Estimation traced = by_camera();
   traced.real_radiance = set::RealRadiance::traced;
   const render::Layers by_plate = render_over(view, plate, by_camera(), 64).layers;

@@ -323,8 +323,8 @@ TEST(Photons, GiveTheSamePictureHoweverTheSamplesAreSplit) {
 }
 
 // A glass bead close to the lens, where it is not seen and takes hardly a photon: the caustic far
-// behind it is neither noisier nor smoother. (If its radius followed the nearest glass, here ten times
-// nearer, there would be a hundredth of the photons on a disc.)
+// behind it is neither noisier nor smoother. (If its radius followed the nearest glass, here ten
+// times nearer, there would be a hundredth of the photons on a disc.)
 TEST(PhotonRadius, OfACausticDoesNotDependOnGlassElsewhere) {
   const auto spread_of = [](bool with_bead) {
     View view = mirror_and_floor();

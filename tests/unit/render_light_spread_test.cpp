@@ -172,8 +172,8 @@ TEST(DirectionsTowardsWhatDiffers, AreThoseOfTheFrameHoweverOftenItIsBegun) {
 // A small ball in a hall of 40 m whose walls shine with 1 and reflect a half: almost every path of
 // the difference is far off, and plays the roulette at each of its 8 vertices. Its throughput is at
 // most 10. A light sample brings at most f L / (2 p) of it, where p is half the BSDF's density or
-// more, hence half at each vertex; what its parted halves meet brings 1 + 1/2 + 1/4 + ..., and half as
-// much again by light samples, hence three times. So no sample brings more than 10 (8 / 2 + 3).
+// more, hence half at each vertex; what its parted halves meet brings 1 + 1/2 + 1/4 + ..., and half
+// as much again by light samples, hence three times. So no sample brings more than 10 (8 / 2 + 3).
 TEST(DifferenceRoulette, NeverRaisesAPathAboveTenTimesItsLight) {
   View view;
   scene::Material wall = diffuse(glm::vec3(0.5f));

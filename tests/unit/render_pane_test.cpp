@@ -131,8 +131,9 @@ TEST(Pane, MirrorsTheFloorBelowIt) {
               4 * standard_error_of_pixels(result.layers) / expected + 2e-3);
 }
 
-// A mirror beside the floor, and the lamp in a bubble of tinted air that bends nothing: direct light
-// and the mirror's image, which photons bring, are dimmed by the tint to the last photon's noise.
+// A mirror beside the floor, and the lamp in a bubble of tinted air that bends nothing: direct
+// light and the mirror's image, which photons bring, are dimmed by the tint to the last photon's
+// noise.
 TEST(Pane, LetsPhotonsThroughByItsTint) {
   View view;
   add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({1, 1})),
