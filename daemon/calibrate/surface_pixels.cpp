@@ -123,6 +123,7 @@ class Probe {
       return share < shares && frame >= share * count / shares;
     };
     options.lighting = lit_by_image(take_.set.lighting);
+    options.whole_light = true;
     options.from_start = false;
     for (pipeline::Shot& shot : pipeline::TakeShots(take_, options)) {
       if (!shot.track.pose) continue;

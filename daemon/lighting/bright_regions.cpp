@@ -10,8 +10,6 @@
 namespace previz::lighting {
 namespace {
 
-constexpr std::uint32_t no_region = 0xffffffffu;
-
 // Peaks that rise over their saddle by less than this factor are one lamp with an uneven surface.
 constexpr double least_dynamics = 2;
 
@@ -109,7 +107,8 @@ std::vector<std::uint32_t> bright_texels(const EnvironmentMap& map, double thres
   return bright;
 }
 
-// Gives the unlabelled neighbours of `front` its labels, and returns them.
+}  // namespace
+
 std::vector<std::uint32_t> grow(const std::vector<std::uint32_t>& front, int size,
                                 std::vector<std::uint32_t>& labels) {
   std::vector<std::uint32_t> next;
@@ -121,8 +120,6 @@ std::vector<std::uint32_t> grow(const std::vector<std::uint32_t>& front, int siz
       }
   return next;
 }
-
-}  // namespace
 
 double bright_threshold(const EnvironmentMap& map, double contrast) {
   std::vector<double> dark;

@@ -15,6 +15,13 @@ struct BrightRegion {
   glm::dvec3 ring{0};  // mean radiance of the texels around `texels`; 0: there are none
 };
 
+inline constexpr std::uint32_t no_region = 0xffffffffu;
+
+// Gives the unlabelled neighbours (no_region) of `front` its labels, and returns them. `labels` has
+// an entry for every texel of a map of this size.
+std::vector<std::uint32_t> grow(const std::vector<std::uint32_t>& front, int size,
+                                std::vector<std::uint32_t>& labels);
+
 // Returns the luminance above which a texel is bright: `contrast` times the mean luminance of all
 // texels that are not bright. It is the largest such value, found from above as Ridler and Calvard
 // 1978 find theirs ("Picture Thresholding Using an Iterative Selection Method"): it does not depend

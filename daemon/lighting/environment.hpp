@@ -24,6 +24,8 @@ struct Source {
   glm::dvec3 direction{0, 0, 1};  // unit, to the centre of gravity of its luminance
   double solid_angle_sr = 0;      // luminous flux / the luminance that half of it comes from above
   glm::dvec3 flux{0};             // integral of radiance over solid angle, above the ring around it
+  int claim = -1;   // index of the declared lamp that it belongs to (claims.hpp); -1: none
+  int region = -1;  // index of its region (Extraction::regions); -1: none
 
   friend bool operator==(const Source&, const Source&) = default;
 };

@@ -17,14 +17,19 @@ std::string counted(std::size_t number, const char* noun) {
 
 }  // namespace
 
-void apply_mode(Lighting& lighting, const set::Lighting& settings, SourceTracker& tracker,
-                std::int64_t timestamp_ns) {
-  if (settings.mode == set::LightMode::image) return;
+std::vector<std::vector<std::uint32_t>> apply_mode(Lighting& lighting,
+                                                   const set::Lighting& settings,
+                                                   SourceTracker& tracker,
+                                                   std::int64_t timestamp_ns,
+                                                   std::vector<Source> declared) {
+  lighting.sources = std::move(declared);
+  if (settings.mode == set::LightMode::image) return {};
   Extraction extraction = extract_sources(lighting.environment, settings.sources, tracker.known());
-  tracker.follow(extraction.sources, timestamp_ns);
-  lighting.sources = std::move(extraction.sources);
   std::string note =
-      counted(lighting.sources.size(), "lamp") + " found in the light camera's picture";
+      counted(extraction.sources.size(), "lamp") + " found in the light camera's picture";
+  lighting.sources.insert(lighting.sources.end(), extraction.sources.begin(),
+                          extraction.sources.end());
+  tracker.follow(lighting.sources, timestamp_ns);
   if (extraction.left > 0)
     note += ", " + counted(static_cast<std::size_t>(extraction.left), "bright region") +
             " not taken for lamps (too faint, too wide or too many)";
@@ -41,6 +46,7 @@ void apply_mode(Lighting& lighting, const set::Lighting& settings, SourceTracker
     lighting.environment = {1, {glm::vec3(0)}};
   }
   lighting.report.notes.push_back(std::move(note));
+  return std::move(extraction.regions);
 }
 
 std::vector<set::Light> lamps_of(const std::vector<Source>& sources, const glm::dvec3& viewpoint,
@@ -48,9 +54,11 @@ std::vector<set::Light> lamps_of(const std::vector<Source>& sources, const glm::
   std::vector<set::Light> lamps;
   for (const Source& source : sources) {
     set::Light& lamp = lamps.emplace_back();
-    lamp.name = "source " + std::to_string(source.id);
+    lamp.name = "found " + std::to_string(source.id);
+    lamp.direction = -source.direction;
     lamp.gain_mixed = lamp.gain_real = 1;
     const double radius = angular_radius(source), sine = std::sin(radius);
+    lamp.angular_radius_rad = radius;
     if (const auto distance = distance_of(source.direction)) {
       lamp.type = set::LightType::sphere;
       lamp.position = viewpoint + *distance * source.direction;
@@ -58,8 +66,6 @@ std::vector<set::Light> lamps_of(const std::vector<Source>& sources, const glm::
       lamp.emission = radiance(source);
     } else {
       lamp.type = set::LightType::directional;
-      lamp.direction = -source.direction;
-      lamp.angular_radius_rad = radius;
       lamp.emission = radiance(source) * (std::numbers::pi * sine * sine);  // facing it
     }
   }

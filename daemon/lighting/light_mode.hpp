@@ -19,9 +19,14 @@ namespace previz::lighting {
 //   hybrid   the sources are taken out of the environment, which keeps the rest.
 //   sources  the sources are taken out too, and the rest is blurred (sources.hpp) or, with
 //            residual = "dropped", black; its share of the light is then in the report.
-// Unless light is dropped, sources and environment together have the image's flux.
-void apply_mode(Lighting& lighting, const set::Lighting& settings, SourceTracker& tracker,
-                std::int64_t timestamp_ns);
+// Unless light is dropped, sources and environment together have the image's flux. `declared` are
+// sources that were taken out of the environment before (Claims::take_out); they come first.
+// Returns the texels of each Source::region.
+std::vector<std::vector<std::uint32_t>> apply_mode(Lighting& lighting,
+                                                   const set::Lighting& settings,
+                                                   SourceTracker& tracker,
+                                                   std::int64_t timestamp_ns,
+                                                   std::vector<Source> declared = {});
 
 // Returns the distance (metres) from the viewpoint to a source in this direction; nothing: at
 // infinity.
@@ -29,7 +34,8 @@ using SourceDistance = std::function<std::optional<double>(const glm::dvec3& dir
 
 // Returns a lamp for each source, the same in both worlds: a distant disc, or a sphere at its
 // distance from `viewpoint` (world, metres), which sends the viewpoint the same flux under the
-// same solid angle.
+// same solid angle. Its name, "found 1", has the source's id. A sphere too has the direction, away
+// from the source, and the angular radius.
 std::vector<set::Light> lamps_of(const std::vector<Source>& sources, const glm::dvec3& viewpoint,
                                  const SourceDistance& distance_of);
 

@@ -106,16 +106,21 @@ struct Candidate {
   bool known = false;
 };
 
-Candidate measured(BrightRegion region, const EnvironmentMap& map, std::span<const Source> known) {
-  Candidate candidate;
+Glows glows_of(const BrightRegion& region, const EnvironmentMap& map) {
   Glows glows;
-  const double sr = texel_sr(map.size);
   for (const std::uint32_t t : region.texels) {
     const int i = static_cast<int>(t) % map.size, j = static_cast<int>(t) / map.size;
     const glm::dvec3 excess = glm::max(glm::dvec3(map.radiance[t]) - region.ring, 0.0);
     glows.push_back({glm::dvec3(texel_direction(map.size, i, j)), excess});
-    candidate.flux += sr * luminance(excess);
   }
+  return glows;
+}
+
+Candidate measured(BrightRegion region, const EnvironmentMap& map, std::span<const Source> known) {
+  Candidate candidate;
+  const Glows glows = glows_of(region, map);
+  const double sr = texel_sr(map.size);
+  for (const Glow& glow : glows) candidate.flux += sr * glow.weight();
   candidate.known = std::ranges::any_of(known, [&](const Source& source) {
     const auto texel = texel_index(map.size, glm::vec3(source.direction));
     return std::ranges::find(region.texels, texel) != region.texels.end();
@@ -159,13 +164,27 @@ Extraction extract_sources(const EnvironmentMap& map, const set::LightSources& s
       ++extraction.left;
       continue;
     }
-    for (const Source& part : candidate.parts) extraction.sources.push_back(part);
-    for (const std::uint32_t t : candidate.region.texels)
-      extraction.residual.radiance[t] = glm::min(map.radiance[t], glm::vec3(candidate.region.ring));
+    for (const Source& part : candidate.parts) {
+      extraction.sources.push_back(part);
+      extraction.sources.back().region = static_cast<int>(extraction.regions.size());
+    }
+    extraction.regions.push_back(candidate.region.texels);
+    fill(candidate.region, extraction.residual);
   }
   std::ranges::stable_sort(extraction.sources, std::greater{},
                            [](const Source& source) { return luminance(glm::vec3(source.flux)); });
   return extraction;
+}
+
+std::vector<Source> measure(const BrightRegion& region, const EnvironmentMap& map) {
+  std::vector<Source> parts;
+  measure_parts(glows_of(region, map), texel_sr(map.size), parts);
+  return parts;
+}
+
+void fill(const BrightRegion& region, EnvironmentMap& map) {
+  for (const std::uint32_t t : region.texels)
+    map.radiance[t] = glm::min(map.radiance[t], glm::vec3(region.ring));
 }
 
 EnvironmentMap blurred(const EnvironmentMap& map) {

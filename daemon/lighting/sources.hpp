@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
 #include <vector>
 
+#include "daemon/lighting/bright_regions.hpp"
 #include "daemon/lighting/environment.hpp"
 #include "daemon/set/set.hpp"
 
@@ -16,7 +18,8 @@ double angular_radius(const Source& source);  // rad
 glm::dvec3 radiance(const Source& source);
 
 struct Extraction {
-  std::vector<Source> sources;  // sorted by falling flux
+  std::vector<Source> sources;                      // sorted by falling flux
+  std::vector<std::vector<std::uint32_t>> regions;  // texels of each Source::region
   // The map with each hole filled by the mean of the ring around it, or by the original radiance if
   // that is less: sources + residual = map, per channel.
   EnvironmentMap residual;
@@ -33,6 +36,12 @@ inline constexpr double widest_source_rad = 0.5236;  // 30 degrees; wider ones s
 // until its parts are not, so that its light still comes from all along it.
 Extraction extract_sources(const EnvironmentMap& map, const set::LightSources& settings,
                            std::span<const Source> known = {});
+
+// Returns what the region has above its ring, as one source or, where it is longer than a disc can
+// stand for, several; none where it has nothing.
+std::vector<Source> measure(const BrightRegion& region, const EnvironmentMap& map);
+// Fills the region with its ring's mean, or with what is there if that is less.
+void fill(const BrightRegion& region, EnvironmentMap& map);
 
 // Returns the map at 16 texels a side (14 degrees) or less: the same flux, hardly any shape.
 EnvironmentMap blurred(const EnvironmentMap& map);

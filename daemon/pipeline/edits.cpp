@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
+#include <numbers>
 
+#include "daemon/pipeline/relight.hpp"
 #include "daemon/scene/placement.hpp"
 
 namespace previz::pipeline {
@@ -41,6 +43,19 @@ void carry(session::LightState& light, const glm::dmat4& world_from_carrier) {
   light.up = turn * light.up;
 }
 
+session::LightState state_of(const set::CapturedLamp& lamp) {
+  session::LightState state;
+  state.direction = -lamp.direction;
+  state.gain_mixed = lamp.gain_mixed;
+  state.tint = lamp.tint;
+  return state;
+}
+
+void relight(const LightEdit& edit, session::LightState& light) {
+  light.gain_mixed *= std::exp2(edit.stops);
+  light.tint *= tint(edit);
+}
+
 }  // namespace
 
 session::SceneState scene_state(const set::Set& set, const Edits& edits, const Motion& motion) {
@@ -65,11 +80,94 @@ session::SceneState scene_state(const set::Set& set, const Edits& edits, const M
     if (!frame) continue;
     now = scene::state_of(light);
     if (!light.carrier.empty()) carry(*now, *frame);
-    if (!is_edited) continue;
-    now->gain_mixed *= std::exp2(edit->second.stops);
-    now->tint *= tint(edit->second);
+    if (is_edited) relight(edit->second, *now);
+  }
+  for (const set::CapturedLamp& lamp : set.captured_lamps) {
+    const auto edit = edits.lights.find(lamp.name);
+    if (edit == edits.lights.end()) continue;
+    session::LightState now = state_of(lamp);
+    relight(edit->second, now);
+    state.lights[lamp.name] = now;
+  }
+  for (const auto& [name, edit] : edits.lights) {
+    if (!edit.found_towards || state.lights.contains(name)) continue;
+    session::LightState now;
+    now.direction = -*edit.found_towards;
+    relight(edit, now);
+    state.lights[name] = now;
   }
   return state;
+}
+
+glm::dvec3 angles_of(const glm::dmat3& rotation) {
+  // rotation = Rz(z) Ry(y) Rx(x); at y of a quarter turn, x and z are one turn, which is given to
+  // z.
+  const double sine = std::clamp(-rotation[0][2], -1.0, 1.0);
+  if (std::abs(sine) > 1 - 1e-12)
+    return {0, std::copysign(std::numbers::pi / 2, sine),
+            std::atan2(-rotation[1][0], rotation[1][1])};
+  return {std::atan2(rotation[1][2], rotation[2][2]), std::asin(sine),
+          std::atan2(rotation[0][1], rotation[0][0])};
+}
+
+namespace {
+
+// Returns the state of the lamp that a change means: as it is in `state`, or else as the set has
+// it.
+session::LightState& state_of_edited(const std::string& name, const LightEdit& edit,
+                                     const set::Set& set, session::SceneState& state) {
+  if (edit.found_towards) {
+    for (auto& [other, lamp] : state.lights)
+      if (lamp && !is_declared_lamp(set, other) &&
+          is_same_lamp(-lamp->direction, *edit.found_towards, 0))
+        return *lamp;
+    std::string free = name;
+    while (state.lights.contains(free)) free += '+';
+    session::LightState& lamp = state.lights[free].emplace();
+    lamp.direction = -*edit.found_towards;
+    return lamp;
+  }
+  std::optional<session::LightState>& now = state.lights[name];
+  if (now) return *now;
+  const auto light = std::ranges::find(set.lights, name, &set::Light::name);
+  if (light != set.lights.end()) return now.emplace(scene::state_of(*light));
+  return now.emplace(
+      state_of(*std::ranges::find(set.captured_lamps, name, &set::CapturedLamp::name)));
+}
+
+}  // namespace
+
+session::SceneState with_edits(session::SceneState state, const set::Set& set, const Edits& edits) {
+  for (const auto& [name, edit] : edits.objects) {
+    const auto object = std::ranges::find(set.objects, name, &set::Object::name);
+    if (object == set.objects.end()) continue;
+    const auto [now, is_new] = state.objects.try_emplace(name, object->world_from_file);
+    if (now->second) now->second = edited(*now->second, edit);
+  }
+  for (const auto& [name, edit] : edits.lights) {
+    const auto is_nowhere = state.lights.find(name);
+    if (is_nowhere != state.lights.end() && !is_nowhere->second) continue;
+    if (edit.found_towards || is_declared_lamp(set, name))
+      relight(edit, state_of_edited(name, edit, set, state));
+  }
+  return state;
+}
+
+std::vector<std::string> drop_unknown(Edits& edits, const set::Set& set) {
+  std::vector<std::string> unknown;
+  std::erase_if(edits.objects, [&](const auto& entry) {
+    const auto object = std::ranges::find(set.objects, entry.first, &set::Object::name);
+    const bool is_there =
+        object != set.objects.end() && object->presence == set::Presence::virtual_object;
+    if (!is_there) unknown.push_back(entry.first);
+    return !is_there;
+  });
+  std::erase_if(edits.lights, [&](const auto& entry) {
+    const bool is_there = entry.second.found_towards || is_declared_lamp(set, entry.first);
+    if (!is_there) unknown.push_back(entry.first);
+    return !is_there;
+  });
+  return unknown;
 }
 
 }  // namespace previz::pipeline

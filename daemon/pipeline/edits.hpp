@@ -5,7 +5,9 @@
 #include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 #include <map>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "daemon/set/set.hpp"
 #include "drivers/session/session.hpp"
@@ -23,6 +25,9 @@ struct ObjectEdit {
 struct LightEdit {
   double stops = 0;  // brightness in the mixed world, factors of two
   double warm_stops = 0, green_stops = 0;
+  // A lamp that was found in the light: the direction towards it, which says which one is meant.
+  std::optional<glm::dvec3> found_towards = {};
+  double found_radius_rad = 0;  // its angular radius, when it was changed last
 
   friend bool operator==(const LightEdit&, const LightEdit&) = default;
 };
@@ -41,6 +46,10 @@ glm::dmat4 edited(const glm::dmat4& world_from_file, const ObjectEdit& edit);
 // of green_stops is added to green and taken from red and blue.
 glm::dvec3 tint(const LightEdit& edit);
 
+// Returns the turns (rad) about the stage's X, then Y, then Z axis that make up a rotation, as a
+// set file has them.
+glm::dvec3 angles_of(const glm::dmat3& rotation);
+
 // The things that move without the crew's buttons.
 struct Motion {
   session::Carriers carriers;
@@ -48,7 +57,14 @@ struct Motion {
 };
 
 // Returns the state of everything that is not as the set has it, moves by itself or is carried.
-// Names that are not in the set are left out.
+// Names that are not in the set are left out, but for lamps that were found in the light.
 session::SceneState scene_state(const set::Set& set, const Edits& edits, const Motion& motion = {});
+
+// Returns the state with the crew's changes on top of it: those of a take in review. An object's
+// change has the stage's axes; what is nowhere stays so.
+session::SceneState with_edits(session::SceneState state, const set::Set& set, const Edits& edits);
+
+// Removes the changes of objects and lamps that the set does not have, and returns their names.
+std::vector<std::string> drop_unknown(Edits& edits, const set::Set& set);
 
 }  // namespace previz::pipeline

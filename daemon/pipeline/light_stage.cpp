@@ -1,6 +1,8 @@
 #include "daemon/pipeline/light_stage.hpp"
 
+#include <fmt/format.h>
 #include <algorithm>
+#include <glm/geometric.hpp>
 #include <utility>
 
 #include "daemon/lighting/light_mode.hpp"
@@ -41,30 +43,51 @@ bool is_exposure(double exposure) {
 }  // namespace
 
 LightStage::LightStage(const set::Set& set, std::optional<LightCameraCalibration> calibration,
-                       const ObserverCalibration& observer)
+                       const ObserverCalibration& observer, const scene::Scene* scene)
     : settings_(set.lighting),
+      captured_lamps_(set.captured_lamps),
+      lights_(set.lights),
       exposure_(set.light_camera.exposure),
       observer_exposure_(set.observer.exposure),
       tracker_(set.lighting.smoothing_s) {
+  if (calibration) seen_from_ = camera_place_ = glm::dvec3(calibration->world_from_camera[3]);
   if (given()) {
     if (settings_.environment) given_ = lighting::load_environment(settings_);
+    if (settings_.environment) claim_lamps(set, scene, given_.environment.size);
     show_given();
     return;
   }
   if (calibration) {
-    room_ = open_room(set, glm::dvec3(calibration->world_from_camera[3]));
-    seen_from_ = room_ ? room_->seen_from() : glm::dvec3(calibration->world_from_camera[3]);
+    room_ = open_room(set, camera_place_);
+    if (room_) seen_from_ = room_->seen_from();
   }
-  if (settings_.from == set::LightFrom::recording) return;
+  if (settings_.from == set::LightFrom::recording) {
+    claim_lamps(set, scene, 1);  // a recording has no map
+    return;
+  }
   if (!calibration)
     throw Error(set.file.string() +
                 ": lighting: neither lighting.environment nor a light camera with a calibration is "
                 "given; one of them must light the set, or with from = \"set\" its own lights");
   intrinsics_ = calibration->intrinsics;
   estimator_.emplace(*calibration, settings_, room_);
+  claim_lamps(set, scene, estimator_->resolution());
   if (settings_.unseen == set::UnseenRule::observer)
     observed_ =
         std::make_unique<lighting::ObservedLight>(observer, estimator_->resolution(), room_);
+}
+
+void LightStage::claim_lamps(const set::Set& set, const scene::Scene* scene, int map_size) {
+  claimed_ = claims_of(set, scene, camera_place_);
+  const auto from_camera = [room = room_, from = seen_from_, camera = camera_place_](
+                               const glm::dvec3& direction) -> std::optional<glm::dvec3> {
+    const auto distance = room ? room->distance(from, direction) : std::nullopt;
+    if (!distance) return direction;
+    const glm::dvec3 point = from + *distance * direction;
+    if (!room->sees(camera, point)) return std::nullopt;
+    return glm::normalize(point - camera);
+  };
+  claims_ = lighting::Claims(claimed_.claims, map_size, from_camera);
 }
 
 // True if the set file fixes the light, so that it never changes.
@@ -123,38 +146,116 @@ void LightStage::drop_oldest() {
   newest_.erase(oldest);
 }
 
-// Places the image's sources at the distance that the set or its room gives, as seen from
-// seen_from_.
+std::optional<double> LightStage::distance_to(const glm::dvec3& direction) const {
+  if (settings_.sources.distance_m) return settings_.sources.distance_m;
+  return room_ ? room_->distance(seen_from_, direction) : std::nullopt;
+}
+
+// Places a source at the distance that its lamp, the set or its room gives, as seen from
+// seen_from_. The light of a lamp or an object that the set declares has its place there.
+void LightStage::add_lamps(const lighting::Source& source, std::vector<set::Light>& lamps) const {
+  const auto claim = static_cast<std::size_t>(source.claim);
+  if (source.claim >= 0 && claim >= captured_lamps_.size()) return;
+  const set::CapturedLamp* declared = source.claim < 0 ? nullptr : &captured_lamps_[claim];
+  const auto distance_of = [&](const glm::dvec3& direction) {
+    return declared && declared->position
+               ? std::optional(glm::length(*declared->position - seen_from_))
+               : distance_to(direction);
+  };
+  set::Light lamp = lighting::lamps_of({source}, seen_from_, distance_of).front();
+  if (declared) {
+    lamp.name = declared->name;
+    lamp.captured = true;
+    lamp.gain_mixed = declared->gain_mixed;
+    lamp.tint = declared->tint;
+  }
+  lamps.push_back(std::move(lamp));
+}
+
+// Returns the source's flux where the light camera stands; a wall that is nearer there fills more
+// of the view, at the same radiance.
+glm::dvec3 LightStage::flux_at_camera(const lighting::Source& source) const {
+  const auto distance = room_ ? room_->distance(seen_from_, source.direction) : std::nullopt;
+  if (!distance) return source.flux;
+  const glm::dvec3 point = seen_from_ + *distance * source.direction;
+  const double nearer = *distance / glm::length(point - camera_place_);
+  return source.flux * (nearer * nearer);
+}
+
+// Gives the set's measured lamps their emission, and notes what was taken out for each lamp.
+void LightStage::measure_declared(Light& light) const {
+  std::vector<glm::dvec3> fluxes(claimed_.claims.size());
+  for (const lighting::Source& source : light.lighting.sources)
+    if (source.claim >= 0) fluxes[static_cast<std::size_t>(source.claim)] += flux_at_camera(source);
+  for (std::size_t c = 0; c < fluxes.size(); ++c) {
+    const glm::dvec3& flux = fluxes[c];
+    std::string note = fmt::format(
+        "the light of \"{}\" is taken out of the light around the set: "
+        "{:.3g} {:.3g} {:.3g} W/m^2 facing it",
+        claimed_.claims[c].lamp, flux.r, flux.g, flux.b);
+    const std::size_t index =
+        c < captured_lamps_.size() ? no_light : claimed_.lights[c - captured_lamps_.size()];
+    if (index != no_light) {
+      const set::Light& lamp = lights_[index];
+      const std::optional<glm::dvec3> emission = emission_for(lamp, flux, camera_place_);
+      if (lamp.measured && emission) light.emissions[lamp.name] = *emission / lamp.gain_real;
+      if (lamp.measured && !emission)
+        note +=
+            "; it cannot be measured by that, because it does not shine towards the light "
+            "camera";
+      else if (emission)
+        note += fmt::format("; that is an emission of {:.3g} {:.3g} {:.3g}", emission->r,
+                            emission->g, emission->b);
+    }
+    light.lighting.report.notes.push_back(std::move(note));
+  }
+}
+
 LightPtr LightStage::placed(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
-                            session::CapturedLight record) const {
+                            session::CapturedLight record,
+                            std::shared_ptr<ImageLamps> image_lamps) const {
   Light light;
-  light.lamps = lighting::lamps_of(
-      lighting.sources, seen_from_, [&](const glm::dvec3& direction) -> std::optional<double> {
-        if (settings_.sources.distance_m) return settings_.sources.distance_m;
-        return room_ ? room_->distance(seen_from_, direction) : std::nullopt;
-      });
+  for (const lighting::Source& source : lighting.sources) add_lamps(source, light.lamps);
   light.encoded = render::encode_environment(lighting.environment);
   light.lighting = std::move(lighting);
+  measure_declared(light);
+  light.image_lamps = std::move(image_lamps);
   light.sequences = std::move(sequences);
   light.record = std::move(record);
   return std::make_shared<const Light>(std::move(light));
 }
 
-// A take always carries sources, even if the picture is lit by the image.
+// A take always carries all sources, even if the picture is lit by the image, so that its light can
+// be had again whatever the set declares.
 LightPtr LightStage::finished(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
                               std::int64_t timestamp_ns) {
-  session::CapturedLight record;
-  if (settings_.mode == set::LightMode::image) {
-    lighting::Lighting as_sources = lighting;
-    set::Lighting settings = settings_;
-    settings.mode = set::LightMode::hybrid;
-    lighting::apply_mode(as_sources, settings, tracker_, timestamp_ns);
-    record = to_record(as_sources);
-  } else {
-    lighting::apply_mode(lighting, settings_, tracker_, timestamp_ns);
-    record = to_record(lighting);
+  std::vector<lighting::Source> declared =
+      claims_.take_out(lighting.environment, settings_.sources);
+  if (settings_.mode != set::LightMode::image) {
+    lighting::apply_mode(lighting, settings_, tracker_, timestamp_ns, std::move(declared));
+    for (lighting::Source& source : lighting.sources) source.region = -1;
+    session::CapturedLight record = to_record(lighting);
+    return placed(std::move(lighting), std::move(sequences), std::move(record), nullptr);
   }
-  return placed(std::move(lighting), std::move(sequences), std::move(record));
+  lighting::Lighting as_sources = lighting;
+  set::Lighting settings = settings_;
+  settings.mode = set::LightMode::hybrid;
+  auto image_lamps = std::make_shared<ImageLamps>();
+  image_lamps->texels =
+      lighting::apply_mode(as_sources, settings, tracker_, timestamp_ns, declared);
+  session::CapturedLight record = to_record(as_sources);
+  for (const lighting::Source& source : as_sources.sources) {
+    if (source.claim >= 0) {
+      lighting.sources.push_back(source);
+    } else {
+      add_lamps(source, image_lamps->lamps);
+      image_lamps->regions.push_back(source.region);
+    }
+  }
+  image_lamps->without =
+      std::make_shared<const lighting::EnvironmentMap>(std::move(as_sources.environment));
+  return placed(std::move(lighting), std::move(sequences), std::move(record),
+                std::move(image_lamps));
 }
 
 void LightStage::see(FramePtr frame, std::uint64_t index) {
@@ -201,8 +302,11 @@ LightPtr LightStage::light_for(const Shot& shot) {
   if (settings_.from != set::LightFrom::recording) return light();
   if (!shot.recorded_light) return nullptr;
   // The light changes seldom; an unchanged one need not be put into the renderer again.
-  if (!shown_ || *shown_ != *shot.recorded_light)
-    light_ = placed(from_record(*shot.recorded_light), {}, *shot.recorded_light);
+  if (!shown_ || *shown_ != *shot.recorded_light) {
+    lighting::Lighting lighting = from_record(*shot.recorded_light);
+    claims_.mark(lighting.sources);
+    light_ = placed(std::move(lighting), {}, *shot.recorded_light, nullptr);
+  }
   shown_ = shot.recorded_light;
   return light_;
 }

@@ -10,6 +10,7 @@
 
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/lighting/source_tracker.hpp"
+#include "daemon/pipeline/lamp_claims.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration.hpp"
@@ -22,10 +23,12 @@ namespace previz::pipeline {
 // newest most_exposures stay.) A set whose light does not come from a camera needs no light frames.
 class LightStage {
  public:
-  // Loads the environment if the set gives one, and the room if it has one. Throws previz::Error if
-  // the light camera's calibration is needed but not known.
+  // Loads the environment if the set gives one, and the room if it has one. The light of lamps that
+  // the set declares, and of real objects of `scene` that glow, is taken out of it (claims_of);
+  // without a scene, objects do not count. Throws previz::Error if the light camera's calibration
+  // is needed but not known.
   LightStage(const set::Set& set, std::optional<LightCameraCalibration> calibration,
-             const ObserverCalibration& observer);
+             const ObserverCalibration& observer, const scene::Scene* scene = nullptr);
 
   // True if the light is made from light frames.
   bool needs_frames() const { return estimator_.has_value(); }
@@ -64,22 +67,32 @@ class LightStage {
  private:
   bool given() const;
   void show_given();
+  void claim_lamps(const set::Set& set, const scene::Scene* scene, int map_size);
   LightPtr finished(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
                     std::int64_t timestamp_ns);
   LightPtr placed(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
-                  session::CapturedLight record) const;
+                  session::CapturedLight record, std::shared_ptr<ImageLamps> image_lamps) const;
+  std::optional<double> distance_to(const glm::dvec3& direction) const;
+  void add_lamps(const lighting::Source& source, std::vector<set::Light>& lamps) const;
+  void measure_declared(Light& light) const;
+  glm::dvec3 flux_at_camera(const lighting::Source& source) const;
   bool usable(const Frame& frame);
   void drop_oldest();
   bool awaits_bracket() const { return newest_.size() < awaited_ && seen_ < 2 * awaited_; }
 
   set::Lighting settings_;
+  const std::vector<set::CapturedLamp> captured_lamps_;
+  const std::vector<set::Light> lights_;           // the set's
   const std::optional<double> exposure_;           // overrides the light frames' own
   const std::optional<double> observer_exposure_;  // overrides the observer frames' own
   std::optional<lighting::Estimator> estimator_;   // absent: the light needs no frames
   lighting::Lighting given_;                       // from the set file
   FisheyeIntrinsics intrinsics_;                   // the light camera's
   std::shared_ptr<const lighting::Room> room_;
-  glm::dvec3 seen_from_{0};  // where the image is seen from; world, metres
+  glm::dvec3 seen_from_{0};     // where the image is seen from; world, metres
+  glm::dvec3 camera_place_{0};  // where the light camera stands; world, metres
+  LampClaims claimed_;
+  lighting::Claims claims_;
   std::unique_ptr<lighting::ObservedLight> observed_;
   std::map<long, FramePtr> newest_;  // key: exposure in steps of 1 %
   std::size_t awaited_ = 1;          // exposures of the first bracket

@@ -80,14 +80,8 @@ bool RenderStage::begin(Shot& shot) {
   if (!shot.track.pose) return untouched(why_no_pose(shot.track));
   if (!shot.light) return untouched("no light frame yet");
 
-  if (light_ != shot.light) {
-    renderer_.set_environment(shot.light->encoded, set_.lighting.sampling);
-    // The light mode can change live: once there were lamps, the renderer must also be given none.
-    has_sources_ |= set_.lighting.mode != set::LightMode::image || !shot.light->lamps.empty();
-    if (has_sources_) renderer_.set_sources(shot.light->lamps);
-    light_ = shot.light;
-  }
-  if (placed_ != shot.scene) place(shot.scene);
+  light(shot);
+  if (placed_ != shot.scene || is_measured_anew_) place(shot.scene);
   renderer_.begin({std::move(plate), exposure_of(shot), shot.track.pose->world_from_camera});
   return true;
 }
@@ -125,12 +119,33 @@ double RenderStage::exposure_of(const Shot& shot) const {
   return set_.observer.exposure.value_or(shot.frame->exposure);
 }
 
+// Gives the renderer a new light, and what the shot's state changes of its lamps.
+void RenderStage::light(const Shot& shot) {
+  LampStates changed = lamp_states_beside(shot.scene, set_);
+  if (light_ == shot.light && changed == relit_) return;
+  const LightPtr light = with_lamps_parted(shot.light, set_, shot.scene);
+  renderer_.set_environment(light->encoded, set_.lighting.sampling);
+  // The light mode can change live, and lamps come and go: once there were lamps, the renderer must
+  // also be given none.
+  has_sources_ |= set_.lighting.mode != set::LightMode::image || !set_.captured_lamps.empty() ||
+                  !light->lamps.empty();
+  if (has_sources_) renderer_.set_sources(relit(*light, set_, shot.scene));
+  is_measured_anew_ |= give_emissions(*light, set_, scene_.lights);
+  unmatched_ = unmatched(*light, set_, shot.scene);
+  light_ = shot.light;
+  relit_ = std::move(changed);
+}
+
 void RenderStage::place(const session::SceneState& state) {
-  const scene::Placement placement = scene::place(scene_, set_, state);
+  session::SceneState known = state;
+  for (const auto& [name, lamp] : relit_)
+    if (!unmatched_.contains(name)) known.lights.erase(name);
+  const scene::Placement placement = scene::place(scene_, set_, known);
   for (const std::string& what : placement.unknown)
     if (unknown_.insert(what).second && options_.note) options_.note(what);
   renderer_.move(placement.instances, placement.lights);
   placed_ = state;
+  is_measured_anew_ = false;
 }
 
 PlatePtr RenderStage::sized_plate_of(Shot& shot) {

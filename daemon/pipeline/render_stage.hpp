@@ -9,6 +9,7 @@
 #include <string>
 
 #include "daemon/lighting/response.hpp"
+#include "daemon/pipeline/relight.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/render/renderer.hpp"
 #include "daemon/render/views.hpp"
@@ -60,6 +61,7 @@ class RenderStage {
  private:
   bool cancelled() const { return options_.cancelled && options_.cancelled(); }
   double exposure_of(const Shot& shot) const;
+  void light(const Shot& shot);
   void place(const session::SceneState& state);
   PlatePtr sized_plate_of(Shot& shot);
   void pass_through(Shot& shot, PlatePtr plate, std::string reason) const;
@@ -71,11 +73,14 @@ class RenderStage {
   render::View view_ = render::View::composite;
   render::Renderer renderer_;
   double error_ = 0;
-  scene::Scene scene_;             // as in the set; instances and lamps only
-  session::SceneState placed_;     // what the renderer holds
-  LightPtr light_;                 // the one the renderer holds
-  bool has_sources_ = false;       // lamps beside the scene\'s were ever set
-  std::set<std::string> unknown_;  // names in recorded states that were already reported
+  scene::Scene scene_;          // as in the set; instances and lamps only
+  session::SceneState placed_;  // what the renderer holds
+  LightPtr light_;              // the one the renderer holds
+  LampStates relit_;            // the changes of lamps that the renderer holds beside the scene's
+  std::set<std::string> unmatched_;  // names in relit_ of which the light has no lamp
+  bool has_sources_ = false;         // lamps beside the scene's were ever set
+  bool is_measured_anew_ = false;    // lamps in scene_ have another emission than the renderer's
+  std::set<std::string> unknown_;    // names in recorded states that were already reported
 };
 
 }  // namespace previz::pipeline

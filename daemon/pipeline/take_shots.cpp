@@ -11,8 +11,11 @@
 namespace previz::pipeline {
 namespace {
 
-set::Set with_lighting(set::Set set, const std::optional<set::Lighting>& lighting) {
-  if (lighting) set.lighting = *lighting;
+set::Set lit(set::Set set, const TakeShotsOptions& options) {
+  if (options.lighting) set.lighting = *options.lighting;
+  if (!options.whole_light) return set;
+  set.captured_lamps.clear();
+  for (set::Light& light : set.lights) light.captured = light.measured = false;
   return set;
 }
 
@@ -21,7 +24,8 @@ set::Set with_lighting(set::Set set, const std::optional<set::Lighting>& lightin
 TakeShots::TakeShots(const Take& take, TakeShotsOptions options)
     : options_(std::move(options)),
       track_(take.set, take.observer, take.session.track, start_of(take)),
-      light_(with_lighting(take.set, options_.lighting), take.light, take.observer),
+      light_(lit(take.set, options_), take.light, take.observer,
+             options_.whole_light ? nullptr : options_.scene),
       light_stream_(take.light_stream) {
   if (light_.needs_frames() && !light_stream_)
     throw Error(take.session.directory.string() +

@@ -34,6 +34,8 @@ struct TakeShotsOptions {
   // At 1, shots come at the pace of the recording; at 0, as fast as they are asked for.
   double speed = 0;
   std::optional<set::Lighting> lighting = {};  // replaces the set's
+  bool whole_light = false;             // no lamp of the set is taken out of the light around it
+  const scene::Scene* scene = nullptr;  // as LightStage's
   // Receives what could not be read, found or used, in plain words.
   std::function<void(const std::string&)> note = {};
   Metrics* metrics = nullptr;  // counts work and troubles; may be null

@@ -239,21 +239,29 @@ void print_lights(const set::Set& set, const scene::Scene& scene, std::ostream& 
         << '\n';
   if (lighting.mode == set::LightMode::hybrid)
     out << "    its lamps light the set, and the rest as a picture\n";
-  for (const auto& light : scene.lights) {
-    const char* change = light.gain_real == 0                 ? "added"
-                         : !light.is_relit()                  ? "as it is"
-                         : light.gain_mixed == 0              ? "taken away"
-                         : light.gain_mixed < light.gain_real ? "dimmed"
-                         : light.gain_mixed > light.gain_real ? "brightened"
-                                                              : "tinted";
-    out << "  " << (light.name.empty() ? "(no name)" : light.name) << ": "
-        << set::name_of(light.type) << ", " << change
-        << words(", gain ", light.gain_mixed, " in the picture, ", light.gain_real,
-                 " in the real scene");
-    if (light.tint != glm::dvec3(1))
-      out << words(", tint ", light.tint.r, " ", light.tint.g, " ", light.tint.b);
-    out << '\n';
-  }
+  const auto print = [&](const std::string& name, const std::string& kind, double mixed,
+                         double real, const glm::dvec3& tint, const std::string& more) {
+    const char* change = real == 0                          ? "added"
+                         : mixed * tint == glm::dvec3(real) ? "as it is"
+                         : mixed == 0                       ? "taken away"
+                         : mixed < real                     ? "dimmed"
+                         : mixed > real                     ? "brightened"
+                                                            : "tinted";
+    out << "  " << (name.empty() ? "(no name)" : name) << ": " << kind << ", " << change
+        << words(", gain ", mixed, " in the picture, ", real, " in the real scene");
+    if (tint != glm::dvec3(1)) out << words(", tint ", tint.r, ' ', tint.g, ' ', tint.b);
+    out << more << '\n';
+  };
+  for (const auto& light : scene.lights)
+    print(light.name, set::name_of(light.type), light.gain_mixed, light.gain_real, light.tint,
+          light.captured ? words("; taken out of the light around the set",
+                                 light.measured ? ", which says how bright it is" : "")
+                         : "");
+  for (const auto& lamp : set.captured_lamps)
+    print(lamp.name,
+          words("within ", lamp.cone_rad * 180 / std::numbers::pi,
+                " degrees in the light around the set"),
+          lamp.gain_mixed, 1, lamp.tint, "; taken out of it");
 }
 
 void print_estimator(const set::Set& set, std::ostream& out) {

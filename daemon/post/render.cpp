@@ -180,6 +180,7 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
                               {.first = *to_do.begin(),
                                .last = *to_do.rbegin(),
                                .wanted = [&](std::uint64_t frame) { return to_do.contains(frame); },
+                               .scene = &scene,
                                .note = [&](const std::string& what) { progress.note(what); },
                                .metrics = &metrics,
                                .stop = options.stop});

@@ -90,7 +90,7 @@ constexpr std::array<Feature, 20> feature_table = {{
     {.name = "relighting",
      .in_frame =
          [](bool, const Demand& d) {
-           return std::ranges::any_of(d.scene.lights, &set::Light::is_relit);
+           return d.relights_captured || std::ranges::any_of(d.scene.lights, &set::Light::is_relit);
          },
      .used = "a lamp is added, taken away, dimmed, brightened or tinted",
      .left_out = "every lamp shines in the picture as it does on the stage"},
@@ -261,7 +261,10 @@ Demand demand_of(const set::Set& set, const Scene& scene, const MaterialFeatures
   Demand demand{.scene = scene, .materials = materials, .estimation = set.estimation};
   demand.light_sampling = lighting.sampling;
   demand.shines_around = lighting.from != set::LightFrom::set || lighting.environment.has_value();
-  demand.finds_lamps = lighting.mode != set::LightMode::image;
+  demand.finds_lamps = lighting.mode != set::LightMode::image || !set.captured_lamps.empty();
+  demand.relights_captured = std::ranges::any_of(set.captured_lamps, [](const auto& lamp) {
+    return lamp.gain_mixed != 1 || lamp.tint != glm::dvec3(1);
+  });
   demand.lamps_shine = lamps_shine(scene);
   demand.has_aperture = observer && observer->lens;
   demand.has_plate = true;

@@ -23,11 +23,12 @@ struct Demand {
   MaterialFeatures materials;  // material_features() of the scene
   const set::Estimation& estimation;
   set::LightSampling light_sampling = set::LightSampling::importance;
-  bool shines_around = false;  // the light around the set is not black
-  bool finds_lamps = false;    // lamps are taken out of the light around the set
-  bool lamps_shine = false;    // a lamp of the scene or a glowing surface gives light
-  bool has_aperture = false;   // the observer's calibration has a thin lens
-  bool has_plate = false;      // the camera has a picture for this frame
+  bool shines_around = false;      // the light around the set is not black
+  bool finds_lamps = false;        // lamps are taken out of the light around the set
+  bool relights_captured = false;  // one of them is dimmed or tinted, by the set file
+  bool lamps_shine = false;        // a lamp of the scene or a glowing surface gives light
+  bool has_aperture = false;       // the observer's calibration has a thin lens
+  bool has_plate = false;          // the camera has a picture for this frame
   bool denoises = false;
 };
 

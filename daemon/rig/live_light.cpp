@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "daemon/pipeline/relight.hpp"
+
 namespace previz::rig {
 
 using pipeline::LightPtr;
@@ -9,7 +11,7 @@ using report::Severity;
 
 LiveLight::LiveLight(Parts parts, const std::optional<LightCameraCalibration>& calibration,
                      const ObserverCalibration& observer)
-    : parts_(parts), stage_(parts.set, calibration, observer) {}
+    : parts_(parts), stage_(parts.set, calibration, observer, &parts.scene) {}
 
 void LiveLight::start(pipeline::StageThreads& stages, std::function<FramePtr()> next_frame) {
   feed_.start(
@@ -45,7 +47,9 @@ LightPtr LiveLight::estimate(std::vector<pipeline::LightFrame> frames,
     return last_;
   }
   stage_.use(look->light_mode);
-  last_ = stage_.light();
+  // The lamps that the crew has changed are parted from an image here, so that no picture waits.
+  last_ = pipeline::with_lamps_parted(stage_.light(), parts_.set,
+                                      pipeline::scene_state(parts_.set, look->edits));
   if (last_)
     for (const std::string& what : last_->lighting.report.notes)
       parts_.reports(report::once({Severity::info, "light", what}));

@@ -19,6 +19,7 @@ class LiveLight {
  public:
   struct Parts {  // outlive the light
     const set::Set& set;
+    const scene::Scene& scene;
     const pipeline::Newest<Look>& look;
     report::Reports& reports;
     pipeline::Metrics& metrics;

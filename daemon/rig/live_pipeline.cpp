@@ -92,7 +92,7 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
       stop_from_outside(std::move(stop), [this] { stop_source.request_stop(); }),
       calibration(pipeline::observer_calibration(parts.set, parts.cameras.recorded.info)),
       track_stage(parts.set, calibration, parts.cameras.recorded.track, 0, parts.cameras.lap_ns),
-      light({parts.set, parts.look, parts.reports, parts.metrics},
+      light({parts.set, parts.scene, parts.look, parts.reports, parts.metrics},
             pipeline::light_calibration(parts.set, parts.cameras.recorded.info), calibration),
       live_render(parts.set, parts.look, parts.inbox, parts.metrics, {tracked, reviewed, snapshots},
                   stop_source.get_token()),

@@ -44,6 +44,7 @@ class Resolver {
     objects();
     surfaces();
     lights();
+    captured_lamps();
     lighting();
     room();
     buttons();
@@ -311,9 +312,62 @@ class Resolver {
                   codec::quote(draft.light.name) + " is already in line " +
                       std::to_string(other->second.line) + "; allowed: each name once");
       }
+      captured(draft);
       if (draft.given.good("type")) light(draft.given, draft.light);
       carried(draft.given, draft.light.carrier);
       set_.lights.push_back(draft.light);
+    }
+  }
+
+  // Decides whether a lamp is taken out of the light around the set.
+  void captured(LightDraft& draft) {
+    const auto& table = draft.given;
+    Light& light = draft.light;
+    const bool is_real = light.gain_real > 0 && light.carrier.empty();
+    const bool is_filmed = set_.lighting.from != LightFrom::set && !draft_.environment;
+    light.captured = draft.captured.value_or(is_real && is_filmed);
+    if (light.captured && !is_real)
+      problem(table, "captured",
+              "does not go with a lamp that is only added, or moved by hand; allowed: true with "
+              "gain_real above 0 and no carrier");
+    if (!light.captured)
+      exclude(table, {"cone_deg"}, "goes with captured = true only; leave it out");
+    light.measured = light.captured && !table.has("emission");
+    if (!light.captured && !table.has("emission"))
+      problem(table, "emission",
+              "is missing; allowed: 3 numbers, at least 0, like [10.0, 9.5, 8.0]");
+  }
+
+  void captured_lamps() {
+    std::map<std::string, Position> first;
+    for (auto& draft : draft_.captured_lamps) {
+      const auto& table = draft.given;
+      CapturedLamp& lamp = draft.lamp;
+      if (table.good("name")) {
+        if (lamp.name.empty()) problem(table, "name", "is empty; allowed: text");
+        const auto [other, fresh] = first.emplace(lamp.name, table.where("name"));
+        if (!fresh)
+          problem(table, "name",
+                  codec::quote(lamp.name) + " is already in line " +
+                      std::to_string(other->second.line) + "; allowed: each name once");
+        if (std::ranges::find(set_.lights, lamp.name, &Light::name) != set_.lights.end())
+          problem(table, "name",
+                  codec::quote(lamp.name) + " is a [[light]] too; allowed: each name once");
+      }
+      if (table.has("position_m"))
+        exclude(table, {"direction"}, "contradicts position_m; leave one of the two out");
+      else if (!table.has("direction"))
+        problem(table, "direction", "is missing; allowed: 3 numbers, or position_m");
+      if (table.good("direction")) {
+        if (glm::length(lamp.direction) > 0)
+          lamp.direction = glm::normalize(lamp.direction);
+        else
+          problem(table, "direction", "has no length; allowed: any other vector");
+      }
+      if (set_.lighting.from == LightFrom::set && !draft_.environment && table.at)
+        problems_.add(*table.at, table.path,
+                      "does not go with lighting.from = \"set\", which captures no light");
+      set_.captured_lamps.push_back(lamp);
     }
   }
 

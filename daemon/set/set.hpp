@@ -108,9 +108,24 @@ struct Light {
   double gain_mixed = 1, gain_real = 0;
   glm::dvec3 tint{1};
   std::string carrier;  // carrier that it is fixed to; empty: fixed in the world
+  // True: the light around the set shows this lamp too, and it is taken out of it.
+  bool captured = false;
+  double cone_rad = 0;    // captured: taken out is this half angle around it; 0: its outline
+  bool measured = false;  // captured: its emission is that of what is taken out
 
   // Returns whether the lamp shines differently in the two worlds.
   bool is_relit() const { return gain_mixed * tint != glm::dvec3(gain_real); }
+};
+
+// A lamp that the light camera sees and that nothing else is known of. Its light is taken out of
+// the light around the set, and shines in both worlds.
+struct CapturedLamp {
+  std::string name;
+  glm::dvec3 direction{0, 0, 1};       // unit, from the light camera towards it
+  std::optional<glm::dvec3> position;  // replaces the direction, and gives the distance too
+  double cone_rad = 0;                 // half angle of the cone that holds its light
+  double gain_mixed = 1;
+  glm::dvec3 tint{1};  // times its light in the mixed world
 };
 
 enum class UnseenRule { constant, horizon, mirror, observer };
@@ -275,6 +290,7 @@ struct Set {
   std::vector<Object> objects;
   std::vector<Surface> surfaces;
   std::vector<Light> lights;
+  std::vector<CapturedLamp> captured_lamps;
   Lighting lighting;
   Estimation estimation;
   Quality quality;

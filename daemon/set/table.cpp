@@ -174,14 +174,15 @@ Keys surface_keys(Surface& s) {
   };
 }
 
-Keys light_keys(Light& l) {
+Keys light_keys(LightDraft& d) {
+  Light& l = d.light;
   return {
       {"name", &l.name, plain, "Name used in messages.", optional("\"key light\"")},
       {"type", &l.type, plain, "Shape of the lamp.", required("\"spot\"")},
       {"position_m", &l.position, m, "Position of its centre; not for a directional light.", optional("[0.0, -1.0, 2.0]")},
       {"direction", &l.direction, plain, "Direction in which the light travels: spot, directional, rectangle.", optional("[0.0, 0.5, -1.0]")},
       {"up", &l.up, plain, "Rectangle: direction of its height; the part along `direction` is ignored.", optional("[0.0, 1.0, 0.0]")},
-      {"emission", &l.emission, plain.at_least(0), "Linear Rec. 709, in the units of the set's radiance. Point, spot: intensity in W/sr; directional: W/m^2 on a plane that faces it; rectangle, sphere: radiance in W/sr/m^2.", required("[10.0, 9.5, 8.0]")},
+      {"emission", &l.emission, plain.at_least(0), "Linear Rec. 709, in the units of the set's radiance. Point, spot: intensity in W/sr; directional: W/m^2 on a plane that faces it; rectangle, sphere: radiance in W/sr/m^2. Required, but for a lamp with captured = true: without it, the lamp is as bright as the light camera sees it.", optional("[10.0, 9.5, 8.0]")},
       {"width_m", &l.width_m, m.above(0), "Rectangle: its width.", optional("1.0")},
       {"height_m", &l.height_m, m.above(0), "Rectangle: its height.", optional("0.5")},
       {"radius_m", &l.radius_m, m.above(0), "Sphere: its radius.", optional("0.05")},
@@ -192,6 +193,19 @@ Keys light_keys(Light& l) {
       {"gain_mixed", &l.gain_mixed, plain.at_least(0), "Brightness in the composite: 1 as it is, 0 off, 0.3 dimmed to 30 %."},
       {"gain_real", &l.gain_real, plain.at_least(0), "Brightness on the real set: 1 for a real lamp, 0 for one that is added."},
       {"tint", &l.tint, plain.at_least(0), "Colour of its light in the composite over that on the real set: one factor for each of red, green and blue.", optional("[1.0, 0.8, 0.6]")},
+      {"captured", &d.captured, plain, "Whether the light around the set shows this lamp too. It is then taken out of it, so that it does not shine twice, and dimming or removing it changes the light. Default: true for a lamp with gain_real above 0 and no carrier where the light comes from a light camera.", optional("false")},
+      {"cone_deg", &l.cone_rad, deg.above(0, 60), "With captured = true: what is taken out is a cone of this half angle around the lamp. Default: its outline as the light camera sees it, and 1 degree around that.", optional("5.0")},
+  };
+}
+
+Keys captured_lamp_keys(CapturedLamp& l) {
+  return {
+      {"name", &l.name, plain, "Name used in messages and by the buttons; each at most once, and not that of a [[light]].", required("\"window\"")},
+      {"direction", &l.direction, plain, "Direction from the light camera towards the lamp. Required unless position_m is given.", optional("[0.71, 0.33, 0.62]")},
+      {"position_m", &l.position, m, "Instead of direction: the lamp's place, from which its light then comes.", optional("[1.2, 0.4, 2.3]")},
+      {"cone_deg", &l.cone_rad, deg.above(0, 60), "Half angle of the cone that holds the whole lamp; what is brighter in it than at its edge is the lamp's light.", required("6.0")},
+      {"gain_mixed", &l.gain_mixed, plain.at_least(0), "Brightness in the composite: 1 as it is, 0 off, 0.3 dimmed to 30 %."},
+      {"tint", &l.tint, plain.at_least(0), "Colour of its light in the composite, as factors of red, green and blue."},
   };
 }
 
@@ -359,7 +373,8 @@ std::vector<Section> sections(Draft& d) {
       many("tag", "A printed tag; one table for each. Its pose is given in one of three forms.", d.tags, tag_keys),
       many("object", "A piece of geometry, real or virtual; one table for each.", d.objects, object_keys),
       many("surface", "The colour of a real surface, where it is known better than by the model; one table for each.", d.surfaces, [](SurfaceDraft& s) { return surface_keys(s.surface); }),
-      many("light", "A lamp that is added, or a real one whose brightness or colour is changed; one table for each.", d.lights, [](LightDraft& l) { return light_keys(l.light); }),
+      many("light", "A lamp that is added, or a real one whose brightness or colour is changed; one table for each.", d.lights, light_keys),
+      many("captured_light", "A real lamp of which nothing is known but that the light camera sees it; one table for each. Its light can be dimmed, tinted and removed. (In the picture of the light camera, lamps are found without such a table too, and the buttons can change them; it is bound to a direction, so that it means the same lamp whatever else is found.)", d.captured_lamps, [](CapturedLampDraft& l) { return captured_lamp_keys(l.lamp); }),
       once("lighting", always, "The light on the set.", [&d] { return lighting_keys(d); }),
       once("lighting.room", optional, "The room, if the lamps and walls are near: the light camera's picture is projected onto its walls, and the set sees them from where it is. Without this table, light comes from far away.", [&d] { return room_keys(d); }),
       once("lighting.sources", always, "How lamps are found in the light camera's picture, with mode = \"sources\" or \"hybrid\".", [&d] { return light_sources_keys(d.set.lighting.sources); }),

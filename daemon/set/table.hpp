@@ -59,6 +59,12 @@ struct SurfaceDraft {
 struct LightDraft {
   Given given;
   Light light;
+  std::optional<bool> captured;
+};
+
+struct CapturedLampDraft {
+  Given given;
+  CapturedLamp lamp;
 };
 
 struct ButtonDraft {
@@ -87,6 +93,7 @@ struct Draft {
   std::vector<ObjectDraft> objects;
   std::vector<SurfaceDraft> surfaces;
   std::vector<LightDraft> lights;
+  std::vector<CapturedLampDraft> captured_lamps;
   std::vector<ButtonDraft> buttons;
   std::vector<GpioDraft> contacts;
 };

@@ -73,12 +73,13 @@ PlatePtr TradeFrame::plate(double scale) const {
   return std::make_shared<const Plate>(pipeline::scaled(*shot_.plate, scale, *response_));
 }
 
-pipeline::LightPtr TradeFrame::light(const set::Lighting& settings) {
+pipeline::LightPtr TradeFrame::light(const set::Lighting& settings, const scene::Scene& scene) {
   for (const auto& [known, light] : lights_)
     if (known == settings) return light;
   pipeline::TakeShotsOptions options;
   options.first = options.last = shot_.index;
   options.lighting = settings;
+  options.scene = &scene;
   options.from_start = false;
   pipeline::LightPtr light;
   for (const pipeline::Shot& shot : pipeline::TakeShots(take_, options)) light = shot.light;

@@ -11,6 +11,7 @@
 #include "daemon/lighting/response.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/pipeline/take.hpp"
+#include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
@@ -34,7 +35,7 @@ class TradeFrame {
   // Returns the light of the light frames before this frame with these settings, computed once for
   // each. Smoothing and tracked sources add nothing from earlier frames. Returns null if there are
   // no light frames.
-  pipeline::LightPtr light(const set::Lighting& settings);
+  pipeline::LightPtr light(const set::Lighting& settings, const scene::Scene& scene);
 
  private:
   std::string what_lacks() const;

@@ -4,6 +4,7 @@
 
 #include "daemon/pipeline/preview_size.hpp"
 #include "daemon/pipeline/refinement.hpp"
+#include "daemon/pipeline/relight.hpp"
 #include "daemon/render/composite.hpp"
 
 namespace previz::trade {
@@ -30,9 +31,12 @@ MethodRenderer::MethodRenderer(const std::shared_ptr<render::Device>& device, Tr
       renderer_(device, settings.estimation,
                 method_calibration(frame, settings, sweep_scale * settings.scale)) {
   renderer_.set_scene(scene);
-  const pipeline::LightPtr light = frame.light(settings.lighting);
+  const pipeline::LightPtr light = frame.light(settings.lighting, scene);
+  std::vector<set::Light> lamps = scene.lights;
+  if (pipeline::give_emissions(*light, frame.set(), lamps)) renderer_.move(scene.instances, lamps);
   renderer_.set_environment(light->encoded, settings.lighting.sampling);
-  if (settings.lighting.mode != set::LightMode::image) renderer_.set_sources(light->lamps);
+  if (settings.lighting.mode != set::LightMode::image || !light->lamps.empty())
+    renderer_.set_sources(pipeline::relit(*light, frame.set(), {}));
   renderer_.carry(settings.carried);
 }
 

@@ -312,6 +312,17 @@ void load_truth_list(const Node& truth, TruthSet& set) {
   }
 }
 
+std::vector<RelitLamp> parse_relit(const Node& relit) {
+  std::vector<RelitLamp> lamps;
+  for (const Node& node : relit["lamps"].list()) {
+    RelitLamp& lamp = lamps.emplace_back();
+    lamp.direction = glm::normalize(node["direction_world"].vector());
+    lamp.radius_rad = node["radius_deg"].number_above_zero() * std::numbers::pi / 180;
+    lamp.gain_mixed = node["gain_mixed"].vector();
+  }
+  return lamps;
+}
+
 }  // namespace
 
 std::string frame_name(int frame) {
@@ -350,6 +361,7 @@ TruthSet load_truth_set(const fs::path& directory) {
   set.environment = directory / root["env"]["file"].text();
   set.phantom = directory / root["gltf"]["phantom"].text();
   set.virtual_objects = directory / root["gltf"]["virtual"].text();
+  if (root.has("relit")) set.relit = parse_relit(root["relit"]);
   load_truth_list(root["truth"], set);
   if (set.truth_frames.empty())
     throw Error(file.string() + ": no frame has both truth and picture");

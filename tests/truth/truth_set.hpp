@@ -31,6 +31,13 @@ struct TruthStatistics {
   std::optional<double> diff_rmse, mixed_rmse_of_mean;
 };
 
+// A real lamp that is changed in the mixed world: a disc in the environment.
+struct RelitLamp {
+  glm::dvec3 direction{0, 0, 1};  // unit, towards it
+  double radius_rad = 0;
+  glm::dvec3 gain_mixed{1};
+};
+
 struct TruthSet {
   std::string name;
   std::filesystem::path directory;
@@ -42,6 +49,7 @@ struct TruthSet {
   std::optional<LightCameraCalibration> light_camera;
   std::vector<LightFrame> light_frames;  // auto and brackets, by time; no sequence with other light
   std::filesystem::path environment, phantom, virtual_objects;
+  std::vector<RelitLamp> relit;   // the truth has these changes
   std::vector<int> truth_frames;  // those whose truth and observer picture are there
   std::map<int, TruthStatistics> statistics;
   std::vector<std::string> notes;  // what was left out and why, in plain words

@@ -1,6 +1,7 @@
 #include "tests/truth/truth_take.hpp"
 
 #include <algorithm>
+#include <numbers>
 #include <sstream>
 
 #include "daemon/output/png.hpp"
@@ -32,6 +33,16 @@ std::string matrix(const glm::dmat4& m) {
   }
   return out.str() + "]";
 }
+
+std::string row(const glm::dvec3& v) {
+  std::ostringstream out;
+  out.precision(17);
+  out << std::showpoint << "[" << v.x << ", " << v.y << ", " << v.z << "]";
+  return out.str();
+}
+
+// A fisheye's lens and pixels spread a lamp by about this much around its disc.
+constexpr double blur_deg = 1.5;
 
 // Paths in the set file, which the session's assets stand for.
 std::string as_written(const fs::path& file) {
@@ -97,7 +108,14 @@ std::string set_file_text(const TruthSet& set, const TakeOptions& options) {
       << "\npresence = \"phantom\"\n"
       << "\n[[object]]\nname = \"virtual\"\nfile = " << quoted(as_written(set.virtual_objects))
       << "\npresence = \"virtual\"\n"
-      << "\n[lighting]\n";
+      << "\n";
+  for (std::size_t i = 0; i < set.relit.size(); ++i) {
+    const RelitLamp& lamp = set.relit[i];
+    const double cone_deg = lamp.radius_rad * 180 / std::numbers::pi + blur_deg;
+    out << "[[captured_light]]\nname = \"lamp " << i << "\"\ndirection = " << row(lamp.direction)
+        << "\ncone_deg = " << cone_deg << "\ntint = " << row(lamp.gain_mixed) << "\n\n";
+  }
+  out << "[lighting]\n";
   if (options.light == LightFrom::truth) {
     out << "environment = " << quoted(as_written(set.environment)) << "\n";
   }

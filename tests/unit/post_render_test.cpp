@@ -184,6 +184,52 @@ TEST_F(RenderSession, TheRecordedLightLightsEveryFrame) {
   EXPECT_EQ(report.frames.front().light_sources[0].flux.r, 10);
 }
 
+// The lamp above is dimmed to a third: its light falls by two thirds on the virtual card and on the
+// real floor, and goes altogether with gain 0. By the same random numbers everything is linear in
+// the gain, to single precision's rounding of sums of a few samples.
+TEST_F(RenderSession, ACapturedLampIsDimmedOnVirtualAndRealSurfaces) {
+  const session::CapturedLight light{
+      {{1, {0, 0, 1}, 0.01, {10, 5, 2}}, {2, {0.8, 0, 0.6}, 0.01, {1, 1, 1}}}, 1, {{0, 0, 0}}};
+  struct Seen {
+    glm::dvec3 card, floor, floor_difference;
+  };
+  const auto seen = [&](const std::string& captured) {
+    const test::TemporaryDirectory folder;
+    test::write_small_take(folder.path(), true,
+                           "[lighting]\nmode = \"sources\"\nfrom = \"recording\"\n" + captured,
+                           light);
+    Seen result;
+    RenderOptions options;
+    options.session = folder / "session";
+    options.directory = folder / "out";
+    options.frames = FrameRange{small_take_unlit, small_take_unlit};
+    options.on_frame = [&](const pipeline::Shot& shot) {
+      const std::size_t card = 18 * 48 + 24, floor = 3 * 48 + 4;
+      EXPECT_EQ(shot.layers->mask[floor], 0);
+      result = {shot.layers->mixed[card], shot.layers->mixed[floor], shot.layers->diff[floor]};
+    };
+    render_session(options, out_);
+    return result;
+  };
+  const std::string window =
+      "[[captured_light]]\nname = \"window\"\ndirection = [0.02, 0, 1]\ncone_deg = 5\n";
+  const Seen plain = seen(""), declared = seen(window), off = seen(window + "gain_mixed = 0\n"),
+             third = seen(window + "gain_mixed = 0.33\n");
+  for (int c = 0; c < 3; ++c) {
+    const auto expect = [](double found, double expected) {
+      EXPECT_NEAR(found, expected, 1e-5 * std::abs(expected) + 1e-6);
+    };
+    expect(declared.card[c], plain.card[c]);
+    expect(declared.floor_difference[c], 0);
+    const double lamp = declared.card[c] - off.card[c];
+    EXPECT_GT(lamp, 0.3 * declared.card[c]);
+    expect(third.card[c], off.card[c] + 0.33 * lamp);
+    expect(off.floor_difference[c], off.floor[c] - declared.floor[c]);
+    EXPECT_LT(off.floor_difference[c], 0);
+    expect(third.floor_difference[c], 0.67 * off.floor_difference[c]);
+  }
+}
+
 // A take may be lit by what its set says alone, whatever the light camera saw.
 TEST_F(RenderSession, TheSetsOwnLightLightsEveryFrame) {
   test::write_small_take(directory_.path(), true,

@@ -15,7 +15,7 @@ class LiveLightTest : public testing::Test {
  protected:
   LiveLightTest() { set_.file = "stage.toml"; }
 
-  LiveLight::Parts parts() { return {set_, look_, reports_, metrics_}; }
+  LiveLight::Parts parts() { return {set_, scene_, look_, reports_, metrics_}; }
   static LightCameraCalibration camera() {
     LightCameraCalibration camera = test::fisheye_camera(32);
     camera.world_from_camera = test::looking(0, 90);
@@ -39,6 +39,7 @@ class LiveLightTest : public testing::Test {
   }
 
   set::Set set_;
+  scene::Scene scene_;
   pipeline::Newest<Look> look_{Look{}};
   std::ostringstream log_;
   report::Reports reports_{report::lines_to(log_)};

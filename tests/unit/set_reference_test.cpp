@@ -94,7 +94,11 @@ TEST(SetExample, Parses) {
   const Set set = example(contents(example_file));
   EXPECT_EQ(set.tracking.tags.size(), 3u);
   EXPECT_EQ(set.objects.size(), 3u);
-  EXPECT_EQ(set.lights.size(), 2u);
+  ASSERT_EQ(set.lights.size(), 3u);
+  EXPECT_TRUE(set.lights[0].captured && set.lights[0].measured) << "the real lamp";
+  EXPECT_FALSE(set.lights[1].captured || set.lights[2].captured) << "the added ones";
+  ASSERT_EQ(set.captured_lamps.size(), 1u);
+  EXPECT_EQ(set.captured_lamps[0].gain_mixed, 0.33);
   ASSERT_TRUE(set.observer.calibration && set.observer.calibration->lens);
   EXPECT_TRUE(set.light_camera.calibration);
 }

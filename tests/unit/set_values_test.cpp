@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <glm/geometric.hpp>
 #include <numbers>
 
 #include "daemon/set/pose.hpp"
@@ -278,6 +279,30 @@ carrier = "stick"
   EXPECT_EQ(tray.tags[0].world_from_tag[3], glm::dvec4(0.1, 0, 0, 1));
   EXPECT_NEAR(tray.tags[1].size_m, 1, rounding);
   EXPECT_EQ(set.lights.at(0).carrier, "stick");
+}
+
+// A real lamp is in the light camera's picture unless the set says otherwise; in the picture of an
+// environment file it is only where the set says so.
+TEST(SetValues, RealLampsAreTakenOutOfTheCapturedLight) {
+  const auto lamp = [](const std::string& keys, const std::string& more = "") {
+    return parse("[[light]]\ntype = \"point\"\nposition_m = [0, 0, 1]\n" + keys + more).lights[0];
+  };
+  const std::string emits = "emission = [1, 1, 1]\n";
+  EXPECT_FALSE(lamp(emits).captured);
+  EXPECT_TRUE(lamp(emits + "gain_real = 1\n").captured);
+  EXPECT_FALSE(lamp(emits + "gain_real = 1\n").measured);
+  EXPECT_TRUE(lamp("gain_real = 1\n").measured);
+  EXPECT_FALSE(lamp(emits + "gain_real = 1\ncaptured = false\n").captured);
+  EXPECT_FALSE(lamp(emits + "gain_real = 1\n", "[lighting]\nfrom = \"set\"\n").captured);
+  const Light wide = lamp("gain_real = 1\ncone_deg = 9\ntint = [1, 0.5, 0.25]\n");
+  EXPECT_NEAR(wide.cone_rad, 9 * std::numbers::pi / 180, rounding);
+  EXPECT_EQ(wide.tint, glm::dvec3(1, 0.5, 0.25));
+  const Set set = parse(
+      "[[captured_light]]\nname = \"window\"\ndirection = [0, 3, 4]\ncone_deg = 18\n"
+      "[[captured_light]]\nname = \"bulb\"\nposition_m = [1, 2, 3]\ncone_deg = 2\n");
+  ASSERT_EQ(set.captured_lamps.size(), 2u);
+  EXPECT_LT(glm::length(set.captured_lamps[0].direction - glm::dvec3(0, 0.6, 0.8)), rounding);
+  EXPECT_EQ(set.captured_lamps[1].position, glm::dvec3(1, 2, 3));
 }
 
 }  // namespace set_values_test

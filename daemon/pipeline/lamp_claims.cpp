@@ -1,0 +1,178 @@
+#include "daemon/pipeline/lamp_claims.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
+
+namespace previz::pipeline {
+namespace {
+
+using lighting::Claim;
+using std::numbers::pi;
+
+constexpr std::array<glm::uvec3, 12> box_sides = {{{0, 1, 3},
+                                                   {0, 3, 2},
+                                                   {4, 5, 7},
+                                                   {4, 7, 6},
+                                                   {0, 1, 5},
+                                                   {0, 5, 4},
+                                                   {2, 3, 7},
+                                                   {2, 7, 6},
+                                                   {0, 2, 6},
+                                                   {0, 6, 4},
+                                                   {1, 3, 7},
+                                                   {1, 7, 5}}};
+
+std::vector<glm::dvec3> box_outline(const scene::Instance& instance, const scene::Mesh& mesh,
+                                    const glm::dvec3& seen_from) {
+  glm::dvec3 least(mesh.positions.front()), most = least;
+  for (const glm::vec3& position : mesh.positions) {
+    least = glm::min(least, glm::dvec3(position));
+    most = glm::max(most, glm::dvec3(position));
+  }
+  std::array<glm::dvec3, 8> corners;
+  for (int i = 0; i < 8; ++i) {
+    const glm::dvec3 corner((i & 1) != 0 ? most.x : least.x, (i & 2) != 0 ? most.y : least.y,
+                            (i & 4) != 0 ? most.z : least.z);
+    corners[static_cast<std::size_t>(i)] =
+        glm::dvec3(instance.world_from_object * glm::dvec4(corner, 1)) - seen_from;
+  }
+  std::vector<glm::dvec3> outline;
+  for (const glm::uvec3& side : box_sides)
+    for (int k = 0; k < 3; ++k) outline.push_back(corners[side[k]]);
+  return outline;
+}
+
+// Returns the corners of a rectangle's two triangles.
+std::array<glm::dvec3, 6> rectangle_corners(const set::Light& light) {
+  const glm::dvec3 across = glm::cross(light.up, light.direction) * (light.width_m / 2);
+  const glm::dvec3 up = light.up * (light.height_m / 2);
+  const glm::dvec3 a = light.position - across - up, b = light.position + across - up;
+  const glm::dvec3 c = light.position + across + up, d = light.position - across + up;
+  return {a, b, c, a, c, d};
+}
+
+// Returns the solid angle of a triangle (van Oosterom and Strackee 1983, equation 8).
+double triangle_sr(glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) {
+  a = glm::normalize(a), b = glm::normalize(b), c = glm::normalize(c);
+  const double volume = std::abs(glm::dot(a, glm::cross(b, c)));
+  return 2 * std::atan2(volume, 1 + glm::dot(a, b) + glm::dot(b, c) + glm::dot(c, a));
+}
+
+double sphere_radius_rad(const set::Light& light, const glm::dvec3& seen_from) {
+  const double distance = glm::length(light.position - seen_from);
+  return distance > light.radius_m ? std::asin(light.radius_m / distance) : pi / 2;
+}
+
+double cap_sr(double radius_rad) {
+  const double half = std::sin(radius_rad / 2);
+  return 4 * pi * half * half;
+}
+
+Claim claim_of(const set::Light& light, const glm::dvec3& seen_from) {
+  using enum set::LightType;
+  Claim claim;
+  claim.lamp = light.name;
+  const bool is_distant = light.type == directional;
+  const glm::dvec3 to_lamp = is_distant ? -light.direction : light.position - seen_from;
+  claim.centre = glm::length(to_lamp) > 0 ? glm::normalize(to_lamp) : glm::dvec3(0, 0, 1);
+  claim.cone_rad = light.cone_rad;
+  if (light.cone_rad > 0) return claim;
+  if (light.type == rectangle)
+    for (const glm::dvec3& corner : rectangle_corners(light))
+      claim.outline.push_back(corner - seen_from);
+  // A lamp without extent gets the margin alone, which a sphere and a disc get too.
+  else
+    claim.cone_rad =
+        lighting::outline_margin_rad + (light.type == sphere ? sphere_radius_rad(light, seen_from)
+                                        : is_distant         ? light.angular_radius_rad
+                                                             : 0);
+  claim.has_size = light.type == rectangle || light.type == sphere ||
+                   (is_distant && light.angular_radius_rad > 0);
+  return claim;
+}
+
+void claim_glowing_objects(const set::Set& set, const scene::Scene& scene,
+                           const glm::dvec3& seen_from, LampClaims& result) {
+  for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+    const std::uint32_t object = scene.light_objects[i];
+    if (object == scene::no_object || scene.lights[i].gain_real == 0 ||
+        !set.objects[object].carrier.empty())
+      continue;
+    result.claims.push_back(claim_of(scene.lights[i], seen_from));
+    result.claims.back().lamp = set.objects[object].name;
+    result.lights.push_back(no_light);
+  }
+  for (const scene::Instance& instance : scene.instances) {
+    const set::Object& object = set.objects[instance.object];
+    const bool is_real = (instance.presence & scene::world_real) != 0;
+    if (!is_real || !object.carrier.empty() || !scene::emits(scene.materials[instance.material]))
+      continue;
+    Claim claim;
+    claim.lamp = object.name;
+    claim.outline = box_outline(instance, scene.meshes[instance.mesh], seen_from);
+    glm::dvec3 middle(0);
+    for (const glm::dvec3& corner : claim.outline)
+      middle += corner / static_cast<double>(claim.outline.size());
+    claim.centre = glm::length(middle) > 0 ? glm::normalize(middle) : glm::dvec3(0, 0, 1);
+    result.claims.push_back(std::move(claim));
+    result.lights.push_back(no_light);
+  }
+}
+
+}  // namespace
+
+LampClaims claims_of(const set::Set& set, const scene::Scene* scene, const glm::dvec3& seen_from) {
+  LampClaims result;
+  for (const set::CapturedLamp& lamp : set.captured_lamps) {
+    const glm::dvec3 direction =
+        lamp.position ? glm::normalize(*lamp.position - seen_from) : lamp.direction;
+    result.claims.push_back({lamp.name, direction, lamp.cone_rad, {}});
+  }
+  for (std::size_t i = 0; i < set.lights.size(); ++i) {
+    if (!set.lights[i].captured) continue;
+    result.claims.push_back(claim_of(set.lights[i], seen_from));
+    result.lights.push_back(i);
+  }
+  if (scene && !set.lighting.environment) claim_glowing_objects(set, *scene, seen_from, result);
+  return result;
+}
+
+std::optional<glm::dvec3> emission_for(const set::Light& light, const glm::dvec3& flux,
+                                       const glm::dvec3& seen_from) {
+  using enum set::LightType;
+  const glm::dvec3 to_place = seen_from - light.position;
+  const double distance = glm::length(to_place);
+  switch (light.type) {
+    case point:
+      return flux * (distance * distance);
+    case spot: {
+      const double cosine = distance > 0 ? glm::dot(to_place, light.direction) / distance : 1;
+      const double inner = std::cos(light.inner_cone_rad), outer = std::cos(light.outer_cone_rad);
+      if (!(cosine > outer)) return std::nullopt;
+      const double x = inner > outer ? std::clamp((cosine - outer) / (inner - outer), 0.0, 1.0) : 1;
+      const double falloff = x * x * (3 - 2 * x);  // spot_falloff of shaders/lib/light.glsl
+      return falloff > 0 ? std::optional(flux * (distance * distance / falloff)) : std::nullopt;
+    }
+    case directional: {
+      const double radius = light.angular_radius_rad, sine = std::sin(radius);
+      return radius > 0 ? flux * (pi * sine * sine / cap_sr(radius)) : flux;
+    }
+    case rectangle: {
+      if (!(glm::dot(to_place, light.direction) > 0)) return std::nullopt;
+      const auto corners = rectangle_corners(light);
+      double solid_angle = 0;
+      for (std::size_t i = 0; i < corners.size(); i += 3)
+        solid_angle += triangle_sr(corners[i] - seen_from, corners[i + 1] - seen_from,
+                                   corners[i + 2] - seen_from);
+      return solid_angle > 0 ? std::optional(flux / solid_angle) : std::nullopt;
+    }
+    case sphere:
+      return flux / cap_sr(sphere_radius_rad(light, seen_from));
+  }
+  return std::nullopt;
+}
+
+}  // namespace previz::pipeline
