@@ -34,7 +34,8 @@ std::string actions_text() {
 }
 
 const Chapter service_chapter{"THE SERVICE", R"(
-previzd.service runs `previzd run --bus --loop /etc/previzd/set.toml` as the user previz. When the set file is saved, it is loaded again, at the latest on `systemctl reload previzd`. If it has a mistake, the old one keeps running, and the journal and `previzctl status` say what is wrong.
+previzd.service runs `previzd run --bus --loop /etc/previzd/set.toml` as the user previz. When the set file is saved, it is loaded again, at the latest on `systemctl reload previzd`. If it has a mistake, the old one keeps running, and the journal and `previzctl status` say what is wrong. What buttons have moved and relit stays.
+`previzctl action keep` writes what buttons have changed into the set file. As installed, the service may write nowhere in /etc: keep the set file in /var/lib/previzd, or let the service write (`systemctl edit previzd`, ReadWritePaths=/etc/previzd) into a folder that belongs to previz.
 `journalctl -u previzd` shows what it reports, each line with the priority of its severity: with `-p err` only the errors.
 Members of the group previz may operate the rig with previzctl.
 )"};
@@ -61,8 +62,9 @@ carrier: A thing that is moved by hand, such as a stick or a tray, with a tag on
 composite: The finished picture: the plate with the virtual objects, their shadows and their light.
 difference: The light that the virtual objects add to the real set or take from it.
 film camera: The camera whose picture is composited; the table [observer] of a set file.
-lamp: A light source: one that was found in the light camera's picture, or one that the set file declares.
+lamp: A light source: one that was found in the light camera's picture ("found 1"), or one that the set file declares.
 layer: One of the pictures that an EXR file consists of, such as mask or depth.
+keep: To write what buttons have changed into the set file.
 light camera: The fisheye that looks at the lamps and measures the light on the set.
 live: The mode in which every frame is composited as it comes.
 mixed world: The set as the composite shows it, with the virtual objects and lamps.

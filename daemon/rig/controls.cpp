@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <glm/common.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <iterator>
+#include <numbers>
+#include <utility>
 #include <variant>
 
 #include "daemon/set/names.hpp"
@@ -30,13 +33,15 @@ Outcome none_of(const char* what) {
 
 }  // namespace
 
-Controls::Controls(const set::Set& set)
+Controls::Controls(const set::Set& set, pipeline::Edits edits)
     : control_(set.control),
       is_animated_(std::ranges::any_of(
           set.objects, [](const set::Object& object) { return !object.animation.empty(); })) {
   for (const set::Object& object : set.objects)
     if (object.presence == set::Presence::virtual_object) objects_.push_back(object.name);
-  for (const set::Light& light : set.lights) lights_.push_back(light.name);
+  for (const set::Light& light : set.lights) set_lights_.push_back(light.name);
+  for (const set::CapturedLamp& lamp : set.captured_lamps) set_lights_.push_back(lamp.name);
+  look_.edits = std::move(edits);
   look_.samples = set.quality.samples;
   look_.governed = set.quality.fps > 0;
   look_.estimator = set.estimation.estimator;
@@ -48,8 +53,48 @@ std::string Controls::selected_object() const {
   return objects_.empty() ? "" : objects_[object_];
 }
 
+std::vector<std::string> Controls::lights() const {
+  std::vector<std::string> names = set_lights_;
+  for (const pipeline::FoundLamp& lamp : found_) names.push_back(lamp.name);
+  return names;
+}
+
 std::string Controls::selected_light() const {
-  return lights_.empty() ? "" : lights_[light_];
+  const std::vector<std::string> names = lights();
+  if (names.empty() || std::ranges::find(names, light_) != names.end()) return light_;
+  return names.front();
+}
+
+void Controls::use_found(std::vector<pipeline::FoundLamp> found) {
+  std::vector<std::string> taken = set_lights_;
+  for (pipeline::FoundLamp& lamp : found) {
+    // A lamp that was changed keeps the name of its change, whatever number it has now.
+    const auto known = std::ranges::find_if(edits().lights, [&](const auto& entry) {
+      return entry.second.found_towards &&
+             pipeline::is_same_lamp(*entry.second.found_towards, lamp.direction, lamp.radius_rad);
+    });
+    if (known != edits().lights.end()) lamp.name = known->first;
+    const auto is_taken = [&] { return std::ranges::find(taken, lamp.name) != taken.end(); };
+    for (int number = 1; is_taken(); ++number) lamp.name = "found " + std::to_string(number);
+    taken.push_back(lamp.name);
+  }
+  std::ranges::stable_sort(found, {}, [](const pipeline::FoundLamp& lamp) {
+    return std::pair(lamp.name.size(), lamp.name);  // by number
+  });
+  // A selected lamp that is gone for a moment stays selected, if only by its name.
+  found_ = std::move(found);
+}
+
+// Returns the change of the selected lamp; a found one is meant by its direction.
+pipeline::LightEdit& Controls::light_edit() {
+  const std::string name = selected_light();
+  pipeline::LightEdit& edit = edits().lights[name];
+  const auto found = std::ranges::find(found_, name, &pipeline::FoundLamp::name);
+  if (found != found_.end()) {
+    if (!edit.found_towards) edit.found_towards = found->direction;
+    edit.found_radius_rad = found->radius_rad;
+  }
+  return edit;
 }
 
 Outcome Controls::perform(const set::Action& action, bool ended_refinement) {
@@ -77,6 +122,9 @@ Outcome Controls::change(Event event) {
   const Step taken = step(before, event);
   if (taken.refused) return {taken.refused, true, {}};
   look_.state = taken.state;
+  // A refinement is of the picture that was shown before.
+  if (taken.state.mode != Mode::refine) look_.of_take = taken.state.mode == Mode::review;
+  if (event == Event::take_finished) look_.take_edits = {};
   if (taken.state.mode == Mode::refine && before.mode != Mode::refine) ++look_.refinements;
   Outcome outcome;
   if (taken.state.recording != before.recording) {
@@ -124,6 +172,15 @@ Outcome Controls::snapshot(std::uint64_t Look::*of) {
 Outcome Controls::apply(const set::ReloadSet&) {
   if (look_.state.recording) return {"still recording; end the take first", true, {}};
   return {"loading the set file again", false, Request::reload_set};
+}
+
+Outcome Controls::apply(const set::KeepEdits&) {
+  if (look_.state.recording) return {"still recording; end the take first", true, {}};
+  if (look_.of_take)
+    return {"what is changed in a take is not the set's; keep that of the live picture", true, {}};
+  if (look_.edits == pipeline::Edits{})
+    return {"buttons have changed nothing; there is nothing to keep", true, {}};
+  return {"changes kept in the set file", false, Request::keep_edits};
 }
 
 Outcome Controls::apply(const set::OtherSet& effect) {
@@ -174,7 +231,7 @@ Outcome Controls::apply(const set::SelectObject& effect) {
 
 Outcome Controls::apply(const set::MoveObject& effect) {
   if (objects_.empty()) return none_of("virtual object");
-  glm::dvec3& offset = look_.edits.objects[selected_object()].offset_m;
+  glm::dvec3& offset = edits().objects[selected_object()].offset_m;
   offset += control_.move_step_m * effect.steps;
   return {fmt::format("{} moved to {:+.3f} {:+.3f} {:+.3f} m", selected_object(), offset.x,
                       offset.y, offset.z),
@@ -184,24 +241,33 @@ Outcome Controls::apply(const set::MoveObject& effect) {
 
 Outcome Controls::apply(const set::TurnObject& effect) {
   if (objects_.empty()) return none_of("virtual object");
-  glm::dmat3& turn = look_.edits.objects[selected_object()].turn;
+  glm::dmat3& turn = edits().objects[selected_object()].turn;
   turn = glm::dmat3(glm::rotate(glm::dmat4(1), control_.turn_step_rad * glm::length(effect.steps),
                                 glm::normalize(effect.steps))) *
          turn;
-  return {selected_object() + " turned", false, {}};
+  // Rounded, so that no angle is -0.
+  const glm::dvec3 angles =
+      glm::round(pipeline::angles_of(turn) * (1800 / std::numbers::pi)) / 10.0;
+  return {fmt::format("{} turned to {:+.1f} {:+.1f} {:+.1f} degrees", selected_object(),
+                      angles.x + 0.0, angles.y + 0.0, angles.z + 0.0),
+          false,
+          {}};
 }
 
 Outcome Controls::apply(const set::ScaleObject& effect) {
   if (objects_.empty()) return none_of("virtual object");
-  double& scale = look_.edits.objects[selected_object()].scale;
+  double& scale = edits().objects[selected_object()].scale;
   scale *= effect.steps > 0 ? control_.scale_step : 1 / control_.scale_step;
   return {fmt::format("{} at {:.3g} of its size", selected_object(), scale), false, {}};
 }
 
 Outcome Controls::apply(const set::ResetObject&) {
   if (objects_.empty()) return none_of("virtual object");
-  look_.edits.objects.erase(selected_object());
-  return {selected_object() + " is back where the set file has it", false, {}};
+  edits().objects.erase(selected_object());
+  return {
+      selected_object() + " is back where the " + (look_.of_take ? "take" : "set file") + " has it",
+      false,
+      {}};
 }
 
 Outcome Controls::apply(const set::PlayAnimations&) {
@@ -218,21 +284,23 @@ Outcome Controls::apply(const set::HoldAnimations&) {
 }
 
 Outcome Controls::apply(const set::SelectLight& effect) {
-  if (lights_.empty()) return none_of("lamp");
-  light_ = around(light_, effect.next, lights_.size());
+  const std::vector<std::string> names = lights();
+  if (names.empty()) return none_of("lamp");
+  const auto at = std::ranges::find(names, selected_light()) - names.begin();
+  light_ = names[around(static_cast<std::size_t>(at), effect.next, names.size())];
   return {"lamp: " + selected_light(), false, {}};
 }
 
 Outcome Controls::apply(const set::DimLight& effect) {
-  if (lights_.empty()) return none_of("lamp");
-  double& stops = look_.edits.lights[selected_light()].stops;
+  if (lights().empty()) return none_of("lamp");
+  double& stops = light_edit().stops;
   stops += effect.steps * control_.light_step_stops;
   return {fmt::format("{} {:+.2f} stops", selected_light(), stops), false, {}};
 }
 
 Outcome Controls::apply(const set::TintLight& effect) {
-  if (lights_.empty()) return none_of("lamp");
-  pipeline::LightEdit& edit = look_.edits.lights[selected_light()];
+  if (lights().empty()) return none_of("lamp");
+  pipeline::LightEdit& edit = light_edit();
   edit.warm_stops += effect.warmer * control_.tint_step_stops;
   edit.green_stops += effect.greener * control_.tint_step_stops;
   return {fmt::format("{} warm {:+.2f} green {:+.2f} stops", selected_light(), edit.warm_stops,
@@ -242,9 +310,10 @@ Outcome Controls::apply(const set::TintLight& effect) {
 }
 
 Outcome Controls::apply(const set::ResetLight&) {
-  if (lights_.empty()) return none_of("lamp");
-  look_.edits.lights.erase(selected_light());
-  return {selected_light() + " is back as in the set file", false, {}};
+  if (lights().empty()) return none_of("lamp");
+  edits().lights.erase(selected_light());
+  return {
+      selected_light() + " is back as in the " + (look_.of_take ? "take" : "set file"), false, {}};
 }
 
 Outcome Controls::apply(const set::ChangeExposure& effect) {

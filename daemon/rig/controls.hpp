@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "daemon/pipeline/edits.hpp"
+#include "daemon/pipeline/relight.hpp"
 #include "daemon/render/views.hpp"
 #include "daemon/rig/mode.hpp"
 #include "daemon/set/actions.hpp"
@@ -23,8 +24,10 @@ struct Look {
   set::LightMode light_mode = set::LightMode::image;
   render::View view = render::View::composite;
   bool osd = true;
-  pipeline::Edits edits;
-  std::uint64_t plays = 0;  // restarts of the animations so far
+  pipeline::Edits edits;       // of the live picture
+  pipeline::Edits take_edits;  // of the take in review, on top of what was recorded with it
+  bool of_take = false;        // the picture is a take's: what is changed now are take_edits
+  std::uint64_t plays = 0;     // restarts of the animations so far
   bool animations_held = false;
   int exposure_steps = 0;               // requested so far, up minus down
   std::uint64_t snapshots = 0;          // requested so far, of live pictures
@@ -33,7 +36,15 @@ struct Look {
 };
 
 // Requests that Controls cannot carry out, because they need devices or files.
-enum class Request { start_take, stop_take, mark_good, reload_set, next_set, previous_set };
+enum class Request {
+  start_take,
+  stop_take,
+  mark_good,
+  reload_set,
+  keep_edits,
+  next_set,
+  previous_set
+};
 
 struct Outcome {
   std::string said;  // words for the display, the log and whoever asked
@@ -46,12 +57,17 @@ inline constexpr int sample_steps[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 50};
 
 class Controls {
  public:
-  explicit Controls(const set::Set& set);
+  // `edits` are those that were made before the set was read again.
+  explicit Controls(const set::Set& set, pipeline::Edits edits = {});
 
   const Look& look() const { return look_; }
   // Both return a name such as "vase", or nothing if the set has none.
   std::string selected_object() const;
   std::string selected_light() const;
+
+  // Takes the lamps that were found in the light of the shown picture. They can be selected after
+  // the set's own, under names that stay theirs as long as they are changed.
+  void use_found(std::vector<pipeline::FoundLamp> found);
 
   // Performs an action that D-Bus, previzctl or a press asks for. `ended_refinement` means that the
   // press itself has ended a refinement, which the action then concerns.
@@ -71,6 +87,7 @@ class Controls {
   Outcome apply(const set::MarkGood& effect);
   Outcome apply(const set::Snapshot& effect);
   Outcome apply(const set::ReloadSet& effect);
+  Outcome apply(const set::KeepEdits& effect);
   Outcome apply(const set::OtherSet& effect);
   Outcome apply(const set::ChangeSamples& effect);
   Outcome apply(const set::NextEstimator& effect);
@@ -90,11 +107,18 @@ class Controls {
   Outcome apply(const set::ResetLight& effect);
   Outcome apply(const set::ChangeExposure& effect);
 
+  pipeline::Edits& edits() { return look_.of_take ? look_.take_edits : look_.edits; }
+  const pipeline::Edits& edits() const { return look_.of_take ? look_.take_edits : look_.edits; }
+  std::vector<std::string> lights() const;
+  pipeline::LightEdit& light_edit();
+
   const set::Control control_;
   std::vector<std::string> objects_;  // names of the virtual objects
-  std::vector<std::string> lights_;
+  std::vector<std::string> set_lights_;
+  std::vector<pipeline::FoundLamp> found_;
   const bool is_animated_;
-  std::size_t object_ = 0, light_ = 0;
+  std::size_t object_ = 0;
+  std::string light_;  // the selected lamp; empty: the first there is
   Look look_;
 };
 

@@ -140,6 +140,7 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     const auto reload =
         loop.on_signal(SIGHUP, [&] { rig->perform(*set::find_action("reload_set"), "SIGHUP"); });
     rig->run();
+    sets.leave(rig->controls().look().edits);
     if (!sets.has_next()) service::stopping();
     rig->on_change({});
     bus.reset();

@@ -79,6 +79,7 @@ struct LivePipeline::Impl {
   int exposure_steps = 0;  // steps of Look::exposure_steps done so far
 
   pipeline::Mailbox<Shot> seen, tracked, reviewed, rendered;
+  pipeline::Newest<std::vector<pipeline::FoundLamp>> found{{}};
   pipeline::BoundedQueue<Shot> snapshots{4};  // closed by the render thread, or at a stop
   std::stop_callback<std::function<void()>> close_snapshots{stop_source.get_token(),
                                                             [this] { snapshots.close(); }};
@@ -94,8 +95,8 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
       track_stage(parts.set, calibration, parts.cameras.recorded.track, 0, parts.cameras.lap_ns),
       light({parts.set, parts.scene, parts.look, parts.reports, parts.metrics},
             pipeline::light_calibration(parts.set, parts.cameras.recorded.info), calibration),
-      live_render(parts.set, parts.look, parts.inbox, parts.metrics, {tracked, reviewed, snapshots},
-                  stop_source.get_token()),
+      live_render(parts.set, parts.look, parts.inbox, parts.metrics,
+                  {tracked, reviewed, snapshots, found}, stop_source.get_token()),
       gpu_keeper(gpu(), {parts.reports, parts.metrics, stop_source.get_token()}) {
   if (light.needs_frames() && !parts.cameras.light)
     throw Error(parts.set.file.string() +
@@ -289,6 +290,10 @@ void LivePipeline::wait() {
 
 pipeline::Mailbox<Shot>& LivePipeline::reviewed() {
   return impl_->reviewed;
+}
+
+std::vector<pipeline::FoundLamp> LivePipeline::found_lamps() const {
+  return *impl_->found.get();
 }
 
 }  // namespace previz::rig

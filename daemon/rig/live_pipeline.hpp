@@ -51,6 +51,8 @@ class LivePipeline {
   void wait();
 
   pipeline::Mailbox<pipeline::Shot>& reviewed();  // a review pushes its frames here
+  // Returns the lamps that were found in the light of the last picture.
+  std::vector<pipeline::FoundLamp> found_lamps() const;
 
  private:
   struct Impl;

@@ -67,8 +67,7 @@ std::optional<Shot> LiveRender::next_picture() {
 
 std::optional<Shot> LiveRender::refine_round(const Look& look) {
   while (channels_.tracked.try_pop()) metrics_.dropped("render", "refining");
-  if (refining_ && refined_edits_ != look.edits) {  // P14: moved while it is refined
-    good_->scene = pipeline::scene_state(set_, look.edits, good_->motion);
+  if (refining_ && refined_edits_ != edits_of_good(look)) {  // P14: moved while it is refined
     refining_ = false;
   }
   if (!refining_ && !begin_refinement(look)) return std::nullopt;
@@ -111,13 +110,28 @@ bool LiveRender::begin_refinement(const Look& look) {
   refined_.reset();
   shot.samples = 0;
   // Things may have moved since the frame was captured: in standby, or without a camera or tags.
-  if (!good_is_reviewed_) shot.scene = pipeline::scene_state(set_, look.edits, shot.motion);
+  shot.scene = scene_of_good(look);
   stage_->fill_layers(true);
   stage_->use(look.estimator);
   stage_->resize(1);
   refining_ = stage_->begin(shot);
-  refined_edits_ = look.edits;
+  refined_edits_ = edits_of_good(look);
   return refining_;
+}
+
+const pipeline::Edits& LiveRender::edits_of_good(const Look& look) const {
+  return good_recorded_ ? look.take_edits : look.edits;
+}
+
+session::SceneState LiveRender::scene_of_good(const Look& look) const {
+  return good_recorded_ ? pipeline::with_edits(*good_recorded_, set_, look.take_edits)
+                        : pipeline::scene_state(set_, look.edits, good_->motion);
+}
+
+void LiveRender::publish_found(const pipeline::LightPtr& light) {
+  if (!light || light == found_in_) return;
+  found_in_ = light;
+  channels_.found.set(pipeline::found_lamps(*light));
 }
 
 std::optional<Shot> LiveRender::wait_for_frame(const Look& look) {
@@ -156,6 +170,11 @@ Shot LiveRender::render(const Look& look, Shot shot) {
   stage_->resize(governed ? governor_->scale() : set_.quality.scale);
   // A reviewed frame was not captured now, so its loss is not counted.
   const bool captured = look.state.mode != Mode::review;
+  // The crew's changes go on top of what was recorded, never in its place.
+  std::optional<session::SceneState> recorded;
+  if (!captured)
+    recorded = std::exchange(shot.scene, pipeline::with_edits(shot.scene, set_, look.take_edits));
+  publish_found(shot.light);
   try {
     (*stage_)(shot);
   } catch (const render::DeviceLost&) {
@@ -170,7 +189,7 @@ Shot LiveRender::render(const Look& look, Shot shot) {
     metrics_.count("pictures reviewed");
   if (!shot.whole) return shot;
   if (shot.untouched.empty()) {
-    keep_as_good(shot, !captured);
+    keep_as_good(shot, std::move(recorded));
     if (governed) governor_->took(took);
   }
   if (snapshot) {
@@ -181,7 +200,7 @@ Shot LiveRender::render(const Look& look, Shot shot) {
 }
 
 // Keeps the frame with its pose, light and scene, but without the rendered picture.
-void LiveRender::keep_as_good(const Shot& shot, bool reviewed) {
+void LiveRender::keep_as_good(const Shot& shot, std::optional<session::SceneState> recorded) {
   if (!good_) inbox_.post(Event::good_frame);
   Shot good;
   good.index = shot.index;
@@ -195,7 +214,7 @@ void LiveRender::keep_as_good(const Shot& shot, bool reviewed) {
   good.tracking_done = true;
   good.frozen = true;
   good_ = std::move(good);
-  good_is_reviewed_ = reviewed;
+  good_recorded_ = std::move(recorded);
 }
 
 // Saves the picture that was on the screen when the button went down, even if the press ended the

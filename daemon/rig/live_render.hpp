@@ -21,9 +21,10 @@ namespace previz::rig {
 class LiveRender {
  public:
   struct Channels {
-    pipeline::Mailbox<pipeline::Shot>& tracked;         // the camera's
-    pipeline::Mailbox<pipeline::Shot>& reviewed;        // a take's, with their light
-    pipeline::BoundedQueue<pipeline::Shot>& snapshots;  // output, with layers
+    pipeline::Mailbox<pipeline::Shot>& tracked;                 // the camera's
+    pipeline::Mailbox<pipeline::Shot>& reviewed;                // a take's, with their light
+    pipeline::BoundedQueue<pipeline::Shot>& snapshots;          // output, with layers
+    pipeline::Newest<std::vector<pipeline::FoundLamp>>& found;  // output, of the last light
   };
 
   // The stage that renders must ask interrupted() whether it is cancelled.
@@ -54,7 +55,10 @@ class LiveRender {
   bool begin_refinement(const Look& look);
   std::optional<pipeline::Shot> wait_for_frame(const Look& look);
   pipeline::Shot render(const Look& look, pipeline::Shot shot);
-  void keep_as_good(const pipeline::Shot& shot, bool reviewed);
+  void keep_as_good(const pipeline::Shot& shot, std::optional<session::SceneState> recorded);
+  const pipeline::Edits& edits_of_good(const Look& look) const;
+  session::SceneState scene_of_good(const Look& look) const;
+  void publish_found(const pipeline::LightPtr& light);
 
   const set::Set& set_;
   const pipeline::Newest<Look>& look_;
@@ -64,8 +68,10 @@ class LiveRender {
   const std::stop_token stop_;
   pipeline::RenderStage* stage_ = nullptr;
   std::optional<pipeline::Governor> governor_;
-  std::optional<pipeline::Shot> good_;     // last shot with pose and light: its frame only
-  bool good_is_reviewed_ = false;          // true: good_'s scene is the take's, not the rig's
+  std::optional<pipeline::Shot> good_;  // last shot with pose and light: its frame only
+  // The scene that good_ was recorded with, if it is a frame of a take and not of the rig.
+  std::optional<session::SceneState> good_recorded_;
+  pipeline::LightPtr found_in_;            // the light that the found lamps were published of
   std::optional<pipeline::Shot> refined_;  // result of the last round, with layers
   bool refining_ = false;
   pipeline::Edits refined_edits_;

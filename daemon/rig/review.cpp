@@ -14,10 +14,10 @@ using report::Severity;
 
 namespace {
 
-void play(const std::stop_token& stop, const std::filesystem::path& directory,
-          const std::string& set_text, pipeline::Mailbox<pipeline::Shot>& out, Reports& reports) {
+void play(const std::stop_token& stop, const std::filesystem::path& directory, const LoadedSet& set,
+          pipeline::Mailbox<pipeline::Shot>& out, Reports& reports) {
   pipeline::Take take = pipeline::open_take(directory, {});
-  if (take.set_text != set_text)
+  if (take.set_text != set.text)
     throw Error(directory.string() + ": was recorded with another set; run that one to review it");
   for (const std::string& what : take.session.missing)
     reports(report::once({Severity::warning, directory.string(), what}));
@@ -28,17 +28,18 @@ void play(const std::stop_token& stop, const std::filesystem::path& directory,
     reports(report::once({Severity::warning, "review", what}));
   };
   options.stop = stop;
+  options.scene = &set.scene;
   for (pipeline::Shot& shot : pipeline::TakeShots(take, options)) out.push(std::move(shot));
 }
 
 }  // namespace
 
-Review::Review(std::filesystem::path take, std::string set_text,
+Review::Review(std::filesystem::path take, const LoadedSet& set,
                pipeline::Mailbox<pipeline::Shot>& out, Inbox& inbox, Reports& reports)
-    : thread_([take = std::move(take), set_text = std::move(set_text), &out, &inbox, &reports,
+    : thread_([take = std::move(take), &set, &out, &inbox, &reports,
                this](const std::stop_token& stop) {
         try {
-          play(stop, take, set_text, out, reports);
+          play(stop, take, set, out, reports);
         } catch (const std::exception& error) {
           reports({Severity::error, "review", error.what()});
         }

@@ -4,22 +4,22 @@
 
 #include <atomic>
 #include <filesystem>
-#include <string>
 #include <thread>
 
 #include "daemon/pipeline/channel.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/report/reports.hpp"
 #include "daemon/rig/inbox.hpp"
-#include "daemon/set/set.hpp"
+#include "daemon/rig/set_keeper.hpp"
 
 namespace previz::rig {
 
 class Review {
  public:
   // Posts Event::review_ended at the take's end. If the take cannot be played, for example because
-  // it was recorded with another set, it also reports why. `out` outlives this.
-  Review(std::filesystem::path take, std::string set_text, pipeline::Mailbox<pipeline::Shot>& out,
+  // it was recorded with another set, it also reports why. `set` is the running one; it, `out` and
+  // the other two outlive this.
+  Review(std::filesystem::path take, const LoadedSet& set, pipeline::Mailbox<pipeline::Shot>& out,
          Inbox& inbox, report::Reports& reports);
 
   void stop() { thread_.request_stop(); }

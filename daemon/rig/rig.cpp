@@ -70,7 +70,7 @@ Rig::Rig(Parts parts)
     : parts_(std::move(parts)),
       loaded_(parts_.sets.running()),
       cameras_(open_cameras(loaded_.set, parts_.loop_cameras, watch_usb(parts_.reports))),
-      controls_(loaded_.set),
+      controls_(loaded_.set, parts_.sets.edits()),
       look_(controls_.look()),
       recorder_(recorder_options(loaded_, cameras_, parts_.reports)),
       pipeline_(
@@ -115,6 +115,7 @@ ButtonDesk::Asks Rig::asks_of_buttons() {
     return true;
   };
   asks.act = [this](const set::Action& action, const std::string& button, bool ended_refinement) {
+    controls_.use_found(pipeline_.found_lamps());
     apply(controls_.perform(action, ended_refinement), "button " + button);
   };
   return asks;
@@ -133,6 +134,7 @@ void Rig::run() {
 }
 
 Outcome Rig::perform(const set::Action& action, const std::string& by) {
+  controls_.use_found(pipeline_.found_lamps());
   return apply(controls_.perform(action), by);
 }
 
@@ -165,8 +167,8 @@ void Rig::publish_look() {
   const bool review = controls_.look().state.mode == Mode::review;
   if (review && !review_) {
     pipeline_.reviewed().try_pop();
-    review_ = std::make_unique<Review>(recorder_.status().directory, loaded_.text,
-                                       pipeline_.reviewed(), inbox_, parts_.reports);
+    review_ = std::make_unique<Review>(recorder_.status().directory, loaded_, pipeline_.reviewed(),
+                                       inbox_, parts_.reports);
   } else if (!review && review_) {
     review_->stop();
     ended_reviews_.push_back(std::move(review_));
@@ -186,6 +188,11 @@ std::optional<std::string> Rig::carry_out(Request request) {
       break;
     case Request::reload_set:
       return change_set(0);
+    case Request::keep_edits: {
+      std::optional<std::string> why_not = parts_.sets.keep(controls_.look().edits);
+      if (!why_not) parts_.loop.exit();
+      return why_not;
+    }
     case Request::next_set:
       return change_set(1);
     case Request::previous_set:

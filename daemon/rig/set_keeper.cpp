@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "daemon/rig/kept_edits.hpp"
 #include "daemon/rig/service.hpp"
 #include "drivers/session/files.hpp"
 
@@ -67,6 +68,45 @@ void SetKeeper::look_at_file() {
   change(0);
 }
 
+std::optional<std::string> SetKeeper::keep(const pipeline::Edits& edits) {
+  const std::filesystem::path& file = running_.set.file;
+  const auto refused = [&](const std::string& why) {
+    const std::string first = why.substr(0, why.find('\n'));
+    reports_({Severity::error, "keep", why});
+    return "not kept: " + first;
+  };
+  try {
+    // What a symbolic link leads to is written, not the link.
+    const std::filesystem::path target = std::filesystem::canonical(file);
+    if (session::read_file(target) != running_.text)
+      return refused(file.string() + " was changed since it was read; load it again first");
+    const std::string text = with_edits(running_.text, running_.set, edits);
+    set::parse_set(text, file);
+    const std::filesystem::path old = keep_beside(target);
+    session::replace_file(target, text);
+    std::filesystem::permissions(target, std::filesystem::status(old).permissions());
+    reports_(
+        {Severity::info, "keep", file.string() + " has the changes; as it was: " + old.string()});
+  } catch (const std::exception& error) {
+    return refused(error.what());
+  }
+  std::optional<std::string> why_not = change(0);
+  are_kept_ = !why_not;
+  return why_not;
+}
+
+// Keeps the changes that were made to a set that is read again; those to another set end with it.
+void SetKeeper::carry_edits() {
+  const bool is_same = before_ && before_->set.file == running_.set.file;
+  if (!is_same || std::exchange(are_kept_, false)) edits_ = {};
+  are_kept_ = false;
+  for (const std::string& name : pipeline::drop_unknown(edits_, running_.set))
+    reports_({Severity::warning, "",
+              "\"" + name +
+                  "\" was changed by buttons and is no longer in the set; the change is "
+                  "dropped"});
+}
+
 void SetKeeper::run(LoadedSet set) {
   running_ = std::move(set);
   file_ = SetFileWatch(running_.changed);
@@ -75,6 +115,7 @@ void SetKeeper::run(LoadedSet set) {
 void SetKeeper::begin_next() {
   before_ = std::move(running_);
   run(*std::exchange(next_, std::nullopt));
+  carry_edits();
 }
 
 bool SetKeeper::go_back(const std::string& why) {

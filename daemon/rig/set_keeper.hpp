@@ -1,5 +1,5 @@
 // Keeps the set that runs, the one that is to run next and the one to go back to, so that a faulty
-// set never replaces a running one.
+// set never replaces a running one, and what buttons have changed since the set was written.
 #pragma once
 
 #include <filesystem>
@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "daemon/pipeline/edits.hpp"
 #include "daemon/report/reports.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
@@ -61,6 +62,16 @@ class SetKeeper {
   // Reads the running set's file again if it has changed. Call it once a second.
   void look_at_file();
 
+  // The changes to begin the running set with: those with which its last run ended (leave()), if it
+  // was the same file. Changes of what the file no longer has are dropped and reported.
+  const pipeline::Edits& edits() const { return edits_; }
+  void leave(pipeline::Edits edits) { edits_ = std::move(edits); }
+
+  // Writes the changes into the running set's file, keeps the old file beside it, and reads it
+  // again, as change(0) does; the next run begins without changes. Returns why not, in one line, if
+  // the file was changed meanwhile or cannot be written; it is then as it was.
+  std::optional<std::string> keep(const pipeline::Edits& edits);
+
   // Makes the next set the running one; has_next() must hold.
   void begin_next();
   // Puts the previous set in place of the running one, which could not be started. Returns false if
@@ -69,12 +80,15 @@ class SetKeeper {
 
  private:
   void run(LoadedSet set);
+  void carry_edits();
 
   const std::function<void(set::Set&)> override_set_;
   report::Reports& reports_;
   LoadedSet running_;
   SetFileWatch file_;
   std::optional<LoadedSet> next_, before_;
+  pipeline::Edits edits_;
+  bool are_kept_ = false;  // the next set has the edits in its file
 };
 
 }  // namespace previz::rig

@@ -16,6 +16,7 @@ constexpr Action action_table[] = {
     {"mark_good", "Mark the running take, or the last one, as good.", MarkGood{}},
     {"snapshot", "Write the shown picture as EXR and PNG.", Snapshot{}},
     {"reload_set", "Load the set file again; if it has a mistake, the old one stays in force.", ReloadSet{}},
+    {"keep", "Write the objects' places and the lamps' brightness and colour, as buttons have changed them, into the set file; the old file stays beside it.", KeepEdits{}},
     {"next_set", "Change to the next set file of the folder.", OtherSet{1}},
     {"previous_set", "Change to the previous set file of the folder.", OtherSet{-1}},
     {"samples_up", "More samples per pixel: less noise, fewer pictures a second.", ChangeSamples{1}},

@@ -26,7 +26,8 @@ struct Record {};  // starts a take, or stops it
 struct MarkGood {};
 struct Snapshot {};
 struct ReloadSet {};
-struct OtherSet {  // loads the next set file by name in the running set's folder
+struct KeepEdits {};  // writes what buttons have changed into the set file
+struct OtherSet {     // loads the next set file by name in the running set's folder
   int next = 1;
 };
 struct ChangeSamples {
@@ -66,7 +67,7 @@ struct ChangeExposure {
 };
 
 using Effect =
-    std::variant<ToMode, Record, MarkGood, Snapshot, ReloadSet, OtherSet, ChangeSamples,
+    std::variant<ToMode, Record, MarkGood, Snapshot, ReloadSet, KeepEdits, OtherSet, ChangeSamples,
                  NextEstimator, NextLightMode, NextView, ToggleOsd, SelectObject, MoveObject,
                  TurnObject, ScaleObject, ResetObject, PlayAnimations, HoldAnimations, SelectLight,
                  DimLight, TintLight, ResetLight, ChangeExposure>;

@@ -146,6 +146,94 @@ TEST(Controls, LampsAreDimmedInStopsAndTinted) {
   EXPECT_EQ(desk.scene().lights.size(), 1u);
 }
 
+TEST(Controls, TurnsAreReportedInDegrees) {
+  Desk desk;
+  EXPECT_EQ(desk("turn_left").said, "vase turned to +0.0 +0.0 +5.0 degrees");
+  EXPECT_EQ(desk("tilt_back").said.substr(0, 19), "vase turned to -5.0");
+  desk("tilt_forward");
+  EXPECT_EQ(desk("turn_right").said, "vase turned to +0.0 +0.0 +0.0 degrees");
+}
+
+const pipeline::FoundLamp first{"found 1", {1, 0, 0}, 0.05}, second{"found 2", {0, 1, 0}, 0.05};
+
+// Lamps that nobody has declared come after the set's own.
+TEST(Controls, FoundLampsAreSelectedAndChangedByTheirDirection) {
+  Desk desk;
+  desk.controls.use_found({first, second});
+  desk("next_light");
+  EXPECT_EQ(desk("next_light").said, "lamp: found 1");
+  EXPECT_EQ(desk("light_down").said, "found 1 -0.33 stops");
+  const pipeline::LightEdit& edit = desk.controls.look().edits.lights.at("found 1");
+  EXPECT_EQ(edit.found_towards, first.direction);
+  EXPECT_EQ(desk.scene().lights.at("found 1")->direction, -first.direction);
+  EXPECT_EQ(desk("next_light").said, "lamp: found 2");
+  EXPECT_EQ(desk("next_light").said, "lamp: key");
+}
+
+// Its number is the light frame's; its direction is the lamp's.
+TEST(Controls, AChangedLampKeepsItsName) {
+  Desk desk;
+  desk.controls.use_found({first, second});
+  for (int i = 0; i < 3; ++i) desk("next_light");
+  desk("light_up");  // found 2
+  desk.controls.use_found(
+      {{"found 1", second.direction, 0.05}, {"found 2", first.direction, 0.05}});
+  EXPECT_EQ(desk.controls.selected_light(), "found 2");
+  desk("light_up");
+  ASSERT_EQ(desk.controls.look().edits.lights.size(), 1u);
+  EXPECT_EQ(desk.controls.look().edits.lights.at("found 2").found_towards, second.direction);
+  EXPECT_EQ(desk("next_light").said, "lamp: key");
+  EXPECT_EQ(desk("previous_light").said, "lamp: found 2");
+  EXPECT_EQ(desk("previous_light").said, "lamp: found 1") << "the other one has another name";
+}
+
+TEST(Controls, AFoundLampHasNoNameOfTheSets) {
+  set::Set set = stage();
+  set.captured_lamps.push_back({"found 1", {0, 0, 1}, {}, 0.1});
+  Controls controls(set);
+  controls.use_found({first});
+  EXPECT_EQ(controls.perform(*set::find_action("previous_light")).said, "lamp: found 2");
+  EXPECT_EQ(controls.perform(*set::find_action("previous_light")).said, "lamp: found 1");
+}
+
+// What is changed in a take in review is the take's, also while it is refined, until another take
+// is recorded.
+TEST(Controls, AReviewHasChangesOfItsOwn) {
+  Desk desk;
+  desk("move_right");
+  desk.controls.happened(Event::good_frame);
+  desk.controls.happened(Event::take_finished);
+  desk("review");
+  desk("move_up");
+  desk("refine");
+  EXPECT_TRUE(desk.controls.look().of_take);
+  EXPECT_TRUE(desk("keep").refused);
+  desk("light_up");
+  EXPECT_EQ(desk.controls.look().take_edits.objects.at("vase").offset_m, glm::dvec3(0, 0, 0.01));
+  EXPECT_EQ(desk.controls.look().take_edits.lights.size(), 1u);
+  EXPECT_EQ(desk.controls.look().edits.objects.at("vase").offset_m, glm::dvec3(0.01, 0, 0));
+  EXPECT_TRUE(desk.controls.look().edits.lights.empty());
+  desk("live");
+  EXPECT_FALSE(desk.controls.look().of_take);
+  desk("refine");
+  EXPECT_FALSE(desk.controls.look().of_take);
+  EXPECT_EQ(desk("keep").request, Request::keep_edits);
+  EXPECT_NE(desk.controls.look().take_edits, pipeline::Edits{});
+  desk.controls.happened(Event::take_finished);
+  EXPECT_EQ(desk.controls.look().take_edits, pipeline::Edits{});
+}
+
+TEST(Controls, KeepWritesWhatIsChangedAndOnlyThat) {
+  Desk desk;
+  EXPECT_TRUE(desk("keep").refused);
+  desk("move_right");
+  EXPECT_EQ(desk("keep").request, Request::keep_edits);
+  Controls again(desk.set, desk.controls.look().edits);
+  EXPECT_EQ(again.look().edits, desk.controls.look().edits);
+  desk("record");
+  EXPECT_TRUE(desk("keep").refused);
+}
+
 TEST(Controls, RecordingAsksForATakeAndForItsEnd) {
   Desk desk;
   EXPECT_EQ(desk("record").request, Request::start_take);

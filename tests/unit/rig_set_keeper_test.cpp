@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace previz::rig {
@@ -96,6 +97,84 @@ TEST_F(SetKeeperTest, ASetThatDoesNotStartIsTriedOnce) {
   sets.look_at_file();
   EXPECT_FALSE(sets.has_next());
   EXPECT_FALSE(sets.go_back("nor is there one now"));
+}
+
+constexpr const char* stage = R"(# The desk.
+[[light]]  # over the table
+name = "key"
+type = "point"
+position_m = [0, 0, 1]
+emission = [1, 1, 1]
+gain_mixed = 0.5   # half
+)";
+
+pipeline::Edits a_stop_down(const std::string& lamp) {
+  pipeline::Edits edits;
+  edits.lights[lamp].stops = -1;
+  return edits;
+}
+
+TEST_F(SetKeeperTest, ChangesOutlastTheSameFileAndNoOther) {
+  write("b.toml", stage);
+  write("c.toml", stage);
+  SetKeeper sets = keeper();
+  EXPECT_EQ(sets.edits(), pipeline::Edits{});
+  pipeline::Edits edits = a_stop_down("key");
+  edits.lights["gone"].stops = 1;
+  edits.objects["vase"].scale = 2;
+  sets.change(0);
+  sets.leave(edits);
+  sets.begin_next();
+  EXPECT_EQ(sets.edits(), a_stop_down("key"));
+  EXPECT_TRUE(says("\"gone\" was changed by buttons and is no longer in the set"));
+  EXPECT_TRUE(says("\"vase\" was changed by buttons and is no longer in the set"));
+  sets.change(1);
+  sets.begin_next();
+  EXPECT_EQ(sets.edits(), pipeline::Edits{});
+}
+
+TEST_F(SetKeeperTest, KeepsChangesInTheFileAndTheOldOneBesideIt) {
+  write("b.toml", stage);
+  SetKeeper sets = keeper();
+  ASSERT_EQ(sets.keep(a_stop_down("key")), std::nullopt);
+  std::string expected = stage;
+  expected.replace(expected.find("0.5 "), 4, "0.25 ");
+  EXPECT_EQ(session::read_file(folder_ / "b.toml"), expected);
+  EXPECT_EQ(session::read_file(folder_ / "b.toml.1.old"), stage);
+  ASSERT_TRUE(sets.has_next());
+  sets.leave(a_stop_down("key"));
+  sets.begin_next();
+  EXPECT_EQ(sets.edits(), pipeline::Edits{}) << "changed twice";
+  EXPECT_EQ(sets.running().set.lights[0].gain_mixed, 0.25);
+  ASSERT_EQ(sets.keep(a_stop_down("key")), std::nullopt);
+  EXPECT_EQ(session::read_file(folder_ / "b.toml.1.old"), stage);
+  EXPECT_EQ(session::read_file(folder_ / "b.toml.2.old"), expected);
+}
+
+TEST_F(SetKeeperTest, KeepsNothingOverAChangedFile) {
+  write("b.toml", stage);
+  SetKeeper sets = keeper();
+  write("b.toml", std::string(stage) + "# by hand\n");
+  const std::optional<std::string> why_not = sets.keep(a_stop_down("key"));
+  ASSERT_TRUE(why_not);
+  EXPECT_NE(why_not->find("was changed since it was read"), std::string::npos) << *why_not;
+  EXPECT_EQ(session::read_file(folder_ / "b.toml"), std::string(stage) + "# by hand\n");
+  EXPECT_FALSE(sets.has_next());
+}
+
+TEST_F(SetKeeperTest, KeepsNothingWhereItMayNotWrite) {
+  write("b.toml", stage);
+  SetKeeper sets = keeper();
+  // Nobody, not even root, makes a file where a directory is.
+  for (const char* number : {"1", "2"})
+    std::filesystem::create_directory(folder_ / (std::string("b.toml.") + number + ".old"));
+  std::filesystem::create_directory(folder_ / "b.toml.part");
+  const std::optional<std::string> why_not = sets.keep(a_stop_down("key"));
+  ASSERT_TRUE(why_not);
+  EXPECT_NE(why_not->find("not kept: "), std::string::npos) << *why_not;
+  EXPECT_NE(why_not->find("b.toml.part"), std::string::npos) << *why_not;
+  EXPECT_EQ(session::read_file(folder_ / "b.toml"), stage);
+  EXPECT_FALSE(sets.has_next());
 }
 
 TEST(SetFileWatch, WaitsUntilAFileIsWritten) {

@@ -1,0 +1,23 @@
+// Writes what buttons have changed into the text of a set file.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "daemon/pipeline/edits.hpp"
+#include "daemon/set/set.hpp"
+
+namespace previz::rig {
+
+// Returns the set file's text with the changes in the keys that say so: an object's position_m,
+// rotation_deg and scale, or its world_from_file; a lamp's gain_mixed and tint; a
+// [[captured_light]] for each found lamp that was changed. Everything else of the text stays. `set`
+// is what the text means. Lengths are rounded to a micrometre and angles to a ten-thousandth of a
+// degree. Throws previz::Error if the text cannot be changed.
+std::string with_edits(const std::string& text, const set::Set& set, const pipeline::Edits& edits);
+
+// Copies a file beside itself, as NAME.1.old or the next number that is free, and returns the copy.
+// Throws previz::Error naming the file that cannot be read or written.
+std::filesystem::path keep_beside(const std::filesystem::path& file);
+
+}  // namespace previz::rig

@@ -1,0 +1,102 @@
+#include "daemon/set/file_edit.hpp"
+
+#include <toml++/toml.h>
+#include <algorithm>
+
+#include "drivers/error.hpp"
+
+namespace previz::set {
+namespace {
+
+toml::table parsed(const std::string& text) {
+  try {
+    return toml::parse(text);
+  } catch (const toml::parse_error& error) {
+    throw Error("not valid TOML: " + std::string(error.description()));
+  }
+}
+
+// Returns the offset of a position, whose column counts code points.
+std::size_t offset_of(const std::string& text, const toml::source_position& at) {
+  std::size_t offset = 0;
+  for (auto line = at.line; line > 1 && offset < text.size(); --line)
+    offset = std::min(text.find('\n', offset), text.size() - 1) + 1;
+  for (auto column = at.column; column > 1 && offset < text.size(); --column) {
+    ++offset;
+    const auto continues = [&] {
+      return offset < text.size() && (static_cast<unsigned char>(text[offset]) & 0xc0) == 0x80;
+    };
+    while (continues()) ++offset;
+  }
+  return offset;
+}
+
+}  // namespace
+
+FileEdit::FileEdit(std::string text) : text_(std::move(text)) {
+  const toml::table root = parsed(text_);
+  for (const auto& [name, node] : root) {
+    const toml::array* array = node.as_array();
+    if (!array) continue;
+    std::vector<Table>& all = tables_[std::string(name.str())];
+    for (const toml::node& entry : *array) {
+      const toml::table* given = entry.as_table();
+      if (!given) continue;
+      Table& table = all.emplace_back();
+      table.is_inline = given->is_inline();
+      table.new_keys =
+          std::min(text_.find('\n', offset_of(text_, given->source().begin)), text_.size());
+      for (const auto& [key, value] : *given) {
+        const toml::source_region& source = value.source();
+        if (value.is_table() || (value.is_array() && value.as_array()->is_array_of_tables()))
+          continue;
+        const Span span{offset_of(text_, source.begin), offset_of(text_, source.end)};
+        table.values[std::string(key.str())] = span;
+        table.new_keys =
+            std::max(table.new_keys, std::min(text_.find('\n', span.end), text_.size()));
+      }
+    }
+  }
+}
+
+const FileEdit::Table& FileEdit::table(const std::string& tables, std::size_t index) const {
+  const auto found = tables_.find(tables);
+  if (found == tables_.end() || index >= found->second.size())
+    throw Error("there is no [[" + tables + "]] number " + std::to_string(index + 1));
+  if (found->second[index].is_inline)
+    throw Error("[[" + tables + "]] number " + std::to_string(index + 1) +
+                " is written in braces; write it as a table under [[" + tables + "]]");
+  return found->second[index];
+}
+
+bool FileEdit::has(const std::string& tables, std::size_t index, const std::string& key) const {
+  return table(tables, index).values.contains(key);
+}
+
+void FileEdit::put(const std::string& tables, std::size_t index, const std::string& key,
+                   const std::string& value) {
+  const Table& where = table(tables, index);
+  const auto known = where.values.find(key);
+  if (known != where.values.end())
+    replacements_.push_back({known->second, value});
+  else
+    replacements_.push_back({{where.new_keys, where.new_keys}, "\n" + key + " = " + value});
+}
+
+std::string FileEdit::text() const {
+  std::vector<Replacement> in_order = replacements_;
+  std::ranges::stable_sort(in_order, {}, [](const Replacement& r) { return r.span.begin; });
+  std::string result;
+  std::size_t done = 0;
+  for (const Replacement& replacement : in_order) {
+    result += text_.substr(done, replacement.span.begin - done) + replacement.by;
+    done = replacement.span.end;
+  }
+  result += text_.substr(done);
+  if (!appended_.empty() && !result.empty() && result.back() != '\n') result += '\n';
+  result += appended_;
+  parsed(result);
+  return result;
+}
+
+}  // namespace previz::set

@@ -1,0 +1,51 @@
+// Changes values in the text of a set file and leaves everything else of it as it is: comments,
+// order, spaces.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace previz::set {
+
+class FileEdit {
+ public:
+  // Throws previz::Error if `text` is not TOML.
+  explicit FileEdit(std::string text);
+
+  // These concern the table number `index` (from 0) of the file's [[tables]] of this name. They
+  // throw previz::Error if there is no such table, or if it is written in braces, {...}.
+  bool has(const std::string& tables, std::size_t index, const std::string& key) const;
+  // Gives a key this value, written as TOML. A new key comes after the table's last one.
+  void put(const std::string& tables, std::size_t index, const std::string& key,
+           const std::string& value);
+
+  // Adds a table, with its header, at the end of the file.
+  void append(const std::string& table) { appended_ += "\n" + table; }
+
+  // Returns the text with all changes. Throws previz::Error if that is not TOML.
+  std::string text() const;
+
+ private:
+  struct Span {
+    std::size_t begin = 0, end = 0;  // bytes of text_
+  };
+  struct Table {
+    bool is_inline = false;
+    std::size_t new_keys = 0;  // where they go: behind the table's last value
+    std::map<std::string, Span> values;
+  };
+  const Table& table(const std::string& tables, std::size_t index) const;
+
+  std::string text_, appended_;
+  std::map<std::string, std::vector<Table>> tables_;
+  struct Replacement {
+    Span span;
+    std::string by;
+  };
+  std::vector<Replacement> replacements_;
+};
+
+}  // namespace previz::set
