@@ -6,6 +6,7 @@
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shaders/lib/append.glsl"
+#include "shaders/lib/medium.glsl"
 #include "shaders/lib/pane.glsl"
 #include "shaders/lib/photon.glsl"
 
@@ -13,10 +14,11 @@ struct Flight {
   vec3 origin;
   float t_min;
   vec3 direction;
-  float survival;  // product of the Dirac lobes' weights so far, for Russian roulette
+  float survival;  // what Dirac lobes and media left of the flux so far, for Russian roulette
   vec3 flux;
   uint worlds;
   uint vertices;
+  uint medium;
   uint passes;     // panes that it met and passed
   bool is_behind;  // see PATH_BEHIND
 };
@@ -27,14 +29,16 @@ Flight load_flight(uint path) {
   const vec4 flux = path_throughput[path];
   const uint bits = floatBitsToUint(flux.w);
   return Flight(origin.xyz, origin.w, direction.xyz, direction.w, flux.rgb, path_worlds(bits),
-                path_depth(bits), has_feature(FEATURE_PANES) ? path_passes(bits) : 0u, false);
+                path_depth(bits), path_medium(bits),
+                has_feature(FEATURE_PANES) ? path_passes(bits) : 0u, false);
 }
 
 void store_flight(Flight f, uint path) {
   ray_origin[path] = vec4(f.origin, f.t_min);
   ray_direction[path] = vec4(f.direction, f.survival);
   const uint bits = f.worlds | (f.is_behind ? PATH_BEHIND : 0u) |
-                    (f.passes << PATH_PASSES_SHIFT) | (f.vertices << PATH_DEPTH_SHIFT);
+                    (f.passes << PATH_PASSES_SHIFT) | (f.vertices << PATH_DEPTH_SHIFT) |
+                    (f.medium << PATH_MEDIUM_SHIFT);
   path_throughput[path] = vec4(f.flux, uintBitsToFloat(bits));
 }
 
@@ -70,6 +74,15 @@ bool sample_dirac(Surface s, Lobes l, vec3 through, float p_mirror, float choice
   return true;
 }
 
+// Takes away the light that is lost on the way to the surface.
+void cross_medium(inout Flight f, Surface s, float t) {
+  if (!has_feature(FEATURE_ATTENUATION)) return;
+  f.medium = medium_before(f.medium, s);
+  const vec3 left = medium_transmittance(f.medium, t);
+  f.flux *= left;
+  f.survival *= max(max(left.r, left.g), left.b);
+}
+
 const uint FLIGHT_OVER = 0u;
 const uint FLIGHT_STAYS = 1u;
 const uint FLIGHT_GOES_ON = 2u;
@@ -101,6 +114,7 @@ uint meet_surface(inout Flight f, Surface s, GpuHit hit, vec2 random) {
     }
     l = without_passing(s, l, through);
   }
+  cross_medium(f, s, hit.t);
   const float mirror = l.smooth_reflection ? l.p_reflection : 0.0;
   const float dirac = mirror + (l.smooth_glass ? l.p_glass : 0.0);
   const float rough = is_rough(l) ? 1.0 - dirac : 0.0;
@@ -125,6 +139,7 @@ uint meet_surface(inout Flight f, Surface s, GpuHit hit, vec2 random) {
   f.origin = offset_origin(s, wi);
   f.t_min = 0.0;
   f.direction = wi;
+  f.medium = medium_beyond(f.medium, s, wi);
   // After the last allowed vertex a photon ends, because one that stayed later would never be
   // gathered.
   return f.vertices < frame.max_depth ? FLIGHT_GOES_ON : FLIGHT_OVER;

@@ -9,6 +9,7 @@
 #include "shaders/lib/difference_bounds.glsl"
 #include "shaders/lib/environment.glsl"
 #include "shaders/lib/gather.glsl"
+#include "shaders/lib/medium.glsl"
 #include "shaders/lib/pane.glsl"
 
 // A path of the difference that is far from all differences survives a vertex with at least this
@@ -28,6 +29,7 @@ struct Path {
   bool rough;  // some vertex so far scattered by a lobe that is not Dirac
   bool difference;  // light that is equal in both worlds need not be traced
   bool landed;      // see PATH_LANDED
+  uint medium;      // see lib/medium.glsl
   uint passes;      // panes that it met and passed
   bool is_behind;   // see PATH_BEHIND
 };
@@ -41,7 +43,7 @@ Path load_path(uint index) {
               path_worlds(bits), path_depth(bits), (bits & PATH_ROUGH) != 0u,
               (has_feature(FEATURE_DIFFERENCE) || has_feature(FEATURE_CAMERA)) &&
                   (bits & PATH_DIFFERENCE) != 0u,
-              has_feature(FEATURE_CAMERA) && (bits & PATH_LANDED) != 0u,
+              has_feature(FEATURE_CAMERA) && (bits & PATH_LANDED) != 0u, path_medium(bits),
               has_feature(FEATURE_PANES) ? path_passes(bits) : 0u, false);
 }
 
@@ -51,7 +53,7 @@ void store_path(Path p, uint index) {
   const uint bits = p.worlds | (p.rough ? PATH_ROUGH : 0u) |
                     (p.difference ? PATH_DIFFERENCE : 0u) | (p.landed ? PATH_LANDED : 0u) |
                     (p.is_behind ? PATH_BEHIND : 0u) | (p.passes << PATH_PASSES_SHIFT) |
-                    (p.depth << PATH_DEPTH_SHIFT);
+                    (p.depth << PATH_DEPTH_SHIFT) | (p.medium << PATH_MEDIUM_SHIFT);
   path_throughput[index] = vec4(p.throughput, uintBitsToFloat(bits));
 }
 
@@ -85,7 +87,8 @@ void meet_lights(Path p, float t_hit) {
     const float t = meet_light(lights[i], p.origin, p.direction, pdf);
     if (t < 0.0 || t <= p.t_min || t > t_hit) continue;
     const float other = (1.0 - frame.environment_selection) * lights[i].selection * pdf;
-    receive(p, p.throughput * lights[i].emission * mis_weight(p.pdf, other), gain);
+    receive(p, p.throughput * lights[i].emission * mis_weight(p.pdf, other) *
+                   medium_transmittance(p.medium, t), gain);
   }
 }
 
@@ -94,7 +97,8 @@ void meet_environment(Path p) {
   float weight = 1.0;
   if (has_feature(FEATURE_ENVIRONMENT_SAMPLING) && p.pdf > 0.0)
     weight = mis_weight(p.pdf, frame.environment_selection * environment_pdf(p.direction));
-  receive(p, p.throughput * environment_radiance(p.direction) * weight, EQUAL_GAIN);
+  receive(p, p.throughput * environment_radiance(p.direction) * weight *
+                 medium_transmittance(p.medium, 3.4e38), EQUAL_GAIN);
 }
 
 void meet_emission(Path p, Surface s, GpuHit hit) {
@@ -215,7 +219,10 @@ bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, out GpuS
   ray.direction = light.direction;
   ray.t_max = light.t_max;
   ray.path_and_worlds = (p.index << 3) | (p.landed ? 4u : 0u) | p.worlds;
-  const vec3 contribution = p.throughput * value * light.radiance * (weight / pdf);
+  vec3 contribution = p.throughput * value * light.radiance * (weight / pdf);
+  if (has_feature(FEATURE_ATTENUATION))
+    contribution *= medium_transmittance(medium_beyond(p.medium, s, light.direction),
+                                         light.t_max / SHADOW_END);
   ray.mixed = (p.worlds & WORLD_MIXED) != 0u ? contribution * light.gain.mixed : vec3(0.0);
   ray.real = (p.worlds & WORLD_REAL) != 0u ? contribution * light.gain.real : vec3(0.0);
   if (cancels(p, light.gain) && !meets_bounds(ray.origin, ray.direction, ray.t_max)) return false;
@@ -264,6 +271,7 @@ bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, vec2
   p.origin = offset_origin(s, direction);
   p.t_min = 0.0;
   p.direction = direction;
+  p.medium = medium_beyond(p.medium, s, direction);
   p.pdf = pdf;
   p.rough = p.rough || pdf > 0.0;
   return true;
@@ -392,6 +400,8 @@ void main() {
         scattered = p.passes <= MOST_PASSES;
         if (!scattered) atomicAdd(control.stopped_in_layers, 1u);
       } else {
+        p.medium = medium_before(p.medium, s);
+        p.throughput *= medium_transmittance(p.medium, hit.t);
         if (takes_light) meet_emission(p, s, hit);
         const bool ends = has_feature(FEATURE_CAMERA) && meet_measured(p, s, hit);
         if (!ends && p.depth < frame.max_depth) shade_vertex(p, s, ray, lit, scattered);

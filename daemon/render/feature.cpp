@@ -69,7 +69,7 @@ bool lamps_shine(const Scene& scene) {
          });
 }
 
-constexpr std::array<Feature, 20> feature_table = {{
+constexpr std::array<Feature, 21> feature_table = {{
     {.name = "two worlds",
      .bit = gpu::FEATURE_FORKS,
      .can_be_carried = true,
@@ -125,6 +125,12 @@ constexpr std::array<Feature, 20> feature_table = {{
          },
      .used = "light goes straight through thin panes of smooth glass",
      .left_out = "no object is a thin pane of smooth glass"},
+    {.name = "coloured glass",
+     .bit = gpu::FEATURE_ATTENUATION,
+     .can_be_carried = true,
+     .in_material = [](const Material& m, const Scene&, double) { return scene::attenuates(m); },
+     .used = "glass or a liquid colours light more the longer its way through",
+     .left_out = "light keeps its colour on its way through what is clear"},
     {.name = "photons",
      .bit = gpu::FEATURE_PHOTONS,
      .in_material = [](const Material& m, const Scene& scene,

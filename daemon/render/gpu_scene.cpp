@@ -59,6 +59,14 @@ struct AlbedoTables {
   }
 };
 
+// A path has so many bits to say which medium it is in.
+void check_medium(const scene::Material& material, std::size_t index) {
+  if (index >= gpu::MAX_MEDIUM && scene::attenuates(material))
+    throw Error("scene: material \"" + material.name + "\" is coloured inside and is number " +
+                std::to_string(index + 1) + "; only the first " + std::to_string(gpu::MAX_MEDIUM) +
+                " can be");
+}
+
 template <typename T>
 void append(std::vector<T>& to, const std::vector<T>& from) {
   to.insert(to.end(), from.begin(), from.end());
@@ -121,7 +129,8 @@ void GpuScene::upload_meshes() {
 void GpuScene::upload_materials(double specular_alpha) {
   std::vector<gpu::GpuMaterial> materials;
   AlbedoTables albedo;
-  for (const scene::Material& m : scene_.materials)
+  for (const scene::Material& m : scene_.materials) {
+    check_medium(m, materials.size());
     materials.push_back({.base_color = m.base_color,
                          .metallic = m.metallic,
                          .emission = m.emission,
@@ -138,7 +147,9 @@ void GpuScene::upload_materials(double specular_alpha) {
                          .alpha_mode = static_cast<std::uint32_t>(m.alpha_mode),
                          .alpha = m.alpha,
                          .alpha_cutoff = m.alpha_cutoff,
-                         .albedo_table = albedo.first_of(m, specular_alpha)});
+                         .albedo_table = albedo.first_of(m, specular_alpha),
+                         .attenuation = scene::attenuation_per_m(m)});
+  }
   upload_storage(device_, materials_, materials);
   upload_texels(device_, albedo_, albedo.values, vk::Format::eR32Sfloat);
 }

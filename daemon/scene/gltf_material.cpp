@@ -141,11 +141,6 @@ void GltfMaterials::read_extensions(const tinygltf::Material& given, const std::
     material.attenuation_distance_m = static_cast<float>(distance_m);
   else if (distance_m <= 0)
     notes_.add(what + ": attenuationDistance must be greater than 0; taken as infinite");
-  const bool is_coloured_inside = material.transmission > 0 && !material.thin_walled &&
-                                  material.attenuation_color != glm::vec3(1) &&
-                                  std::isfinite(material.attenuation_distance_m);
-  if (is_coloured_inside)
-    notes_.add(what + ": its attenuationColor is not rendered yet; the glass is clear inside");
 }
 
 }  // namespace previz::scene

@@ -1,6 +1,7 @@
 #include "daemon/scene/scene.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <string>
@@ -78,6 +79,23 @@ bool emits(const Material& m) {
 
 bool transmits(const Material& m) {
   return m.transmission > 0 && (m.metallic < 1 || m.metallic_roughness_texture != no_texture);
+}
+
+bool attenuates(const Material& m) {
+  return attenuation_per_m(m) != glm::vec3(0);
+}
+
+glm::vec3 attenuation_per_m(const Material& m) {
+  if (m.thin_walled || !transmits(m) || !std::isfinite(m.attenuation_distance_m))
+    return glm::vec3(0);
+  glm::vec3 result;
+  for (int i = 0; i < 3; ++i) {
+    // Black takes away all but what no picture shows, and stays finite.
+    const double color = std::clamp(static_cast<double>(m.attenuation_color[i]), 1e-30, 1.0);
+    result[i] = static_cast<float>(
+        std::min(-std::log(color) / static_cast<double>(m.attenuation_distance_m), 1e30));
+  }
+  return result;
 }
 
 bool can_be_dirac(const Scene& scene, const Material& m, double specular_alpha) {

@@ -74,8 +74,7 @@ struct Material {
   AlphaMode alpha_mode = AlphaMode::opaque;
   float alpha_cutoff = 0.5f;
   // KHR_materials_volume: after attenuation_distance_m inside, white light has become
-  // attenuation_color (Beer-Lambert). No shader reads it yet: the inside of glass is rendered
-  // clear, and a note of the scene says so.
+  // attenuation_color (Beer-Lambert).
   glm::vec3 attenuation_color{1};
   float attenuation_distance_m = std::numeric_limits<float>::infinity();
   std::uint32_t normal_texture = no_texture;  // tangent space, +Y up, along the uvs
@@ -139,6 +138,13 @@ bool emits(const Material& material);
 
 // Returns whether any part of this material lets light through: a texture can take metal away.
 bool transmits(const Material& material);
+
+// Returns whether the inside of what is made of this material takes light away.
+bool attenuates(const Material& material);
+
+// Returns how much of each channel the inside takes away per metre: exp(-result * metres) is left.
+// The result is 0 where nothing is taken away or nothing gets in.
+glm::vec3 attenuation_per_m(const Material& material);
 
 // Returns whether light can leave a surface of this material without blur: clear glass, and metal,
 // glass or a coat whose GGX alpha is somewhere at or below `specular_alpha` (shaders/README.md,

@@ -67,7 +67,7 @@ uint next_queue_index(uint i) { return (1u - control.queue_side) * (queue.length
 
 uint path_worlds(uint bits) { return bits & PATH_WORLDS_MASK; }
 uint path_depth(uint bits) { return (bits >> PATH_DEPTH_SHIFT) & 0xffu; }
-uint path_passes(uint bits) { return (bits >> PATH_PASSES_SHIFT) & 0xffu; }
+uint path_passes(uint bits) { return (bits >> PATH_PASSES_SHIFT) & 0xfu; }
 
 // Returns the number of slots for whose paths there is room.
 uint slot_count() {

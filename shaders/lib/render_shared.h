@@ -60,6 +60,7 @@ PREVIZ_CONST uint FEATURE_ALPHA = 4096u;  // any surface that may be transparent
 PREVIZ_CONST uint FEATURE_DIFFERENCE = 1024u;  // where possible, only the difference is traced
 PREVIZ_CONST uint FEATURE_PANES = 16384u;  // any smooth thin wall through which light goes straight
 PREVIZ_CONST uint FEATURE_CAMERA = 8192u;  // the plate gives the radiance of points that it shows
+PREVIZ_CONST uint FEATURE_ATTENUATION = 32768u;  // clear solids that take light away inside
 
 // These bits are a path's state.
 PREVIZ_CONST uint PATH_WORLDS_MASK = 3u;      // WORLD_*
@@ -70,6 +71,8 @@ PREVIZ_CONST uint PATH_LANDED = 16u;          // took the plate's radiance at a 
                                               // continues for Lm - Lr of that vertex
 PREVIZ_CONST uint PATH_BEHIND = 32u;          // goes on behind the pane at its origin + t_min
 PREVIZ_CONST uint PATH_PASSES_SHIFT = 16u;    // number of panes so far that it met and passed
+PREVIZ_CONST uint PATH_MEDIUM_SHIFT = 20u;    // medium that the path is in (lib/medium.glsl)
+PREVIZ_CONST uint MAX_MEDIUM = 0xfffu;
 
 // A path meets and passes no more sides of coloured panes than these.
 PREVIZ_CONST uint MOST_PASSES = 8u;
@@ -177,6 +180,7 @@ struct GpuMaterial {
   float alpha;
   float alpha_cutoff;
   uint albedo_table;  // rough glass: its table seen from outside; the next is from inside
+  vec3 attenuation;   // inside, per metre; 0: clear, or nothing gets in
 };
 
 // glTF's alpha modes: the surface is all there, or there where its alpha reaches the cutoff, or its
@@ -298,7 +302,7 @@ static_assert(sizeof(GpuShadowRay) == 56);
 static_assert(sizeof(GpuPixel) == 144);
 static_assert(sizeof(GpuControl) == 96);
 static_assert(sizeof(GpuInstance) == 112);
-static_assert(sizeof(GpuMaterial) == 84);
+static_assert(sizeof(GpuMaterial) == 96);
 static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
 static_assert(sizeof(GpuLight) == 144);

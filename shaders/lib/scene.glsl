@@ -36,6 +36,7 @@ struct Surface {
   bool thin_walled;
   uint albedo_table;      // rough glass: its first table of ALBEDO
   vec3 emission;
+  uint medium;            // behind the surface, where that is a coloured solid (lib/medium.glsl)
 };
 
 vec4 fetch_texel(GpuTexture t, ivec2 at) {
@@ -203,6 +204,9 @@ void apply_material(inout Surface s, uint material, vec2 uv) {
     if (m.emission_texture != NO_INDEX) s.emission *= sample_texture(m.emission_texture, uv).rgb;
   }
   s.alpha = roughness * roughness;
+  s.medium = 0u;
+  if (has_feature(FEATURE_ATTENUATION) && any(greaterThan(m.attenuation, vec3(0.0))))
+    s.medium = material + 1u;
 }
 
 // Returns whether the surface has any reflecting or refracting lobe, rough or smooth.

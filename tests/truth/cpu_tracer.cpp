@@ -5,6 +5,7 @@
 #include <cmath>
 #include <future>
 #include <glm/common.hpp>
+#include <glm/exponential.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 
@@ -123,10 +124,46 @@ glm::dvec3 light_through(const World& world, Ray ray, double distance) {
   return share;
 }
 
+// What fills the space that a ray crosses: the inside of a coloured solid, or null where it is
+// clear.
+using Medium = const scene::Material*;
+
+Medium inside_of(const World& world, std::uint32_t instance) {
+  const scene::Material& m = world.scene.materials[world.scene.instances[instance].material];
+  const bool is_coloured = m.transmission > 0 && !m.thin_walled &&
+                           m.attenuation_color != glm::vec3(1) &&
+                           std::isfinite(m.attenuation_distance_m);
+  return is_coloured ? &m : nullptr;
+}
+
+glm::dvec3 transmittance(Medium medium, double distance) {
+  if (!medium) return glm::dvec3(1);
+  return glm::pow(glm::dvec3(medium->attenuation_color),
+                  glm::dvec3(distance / static_cast<double>(medium->attenuation_distance_m)));
+}
+
+// The medium of a segment that ends at the vertex: one that never entered a solid and ends at an
+// opaque solid's inner side was inside from its start.
+Medium medium_before(const World& world, Medium medium, const Vertex& vertex) {
+  if (medium || vertex.point.outside) return medium;
+  const Medium solid = inside_of(world, vertex.hit.instance);
+  return solid && solid->alpha_mode == scene::AlphaMode::opaque ? solid : nullptr;
+}
+
+Medium medium_beyond(const World& world, Medium medium, const Vertex& vertex,
+                     const glm::dvec3& direction) {
+  if (vertex.bsdf.thin_walled || glm::dot(direction, vertex.point.geometric_normal) >= 0)
+    return medium;
+  const Medium solid = inside_of(world, vertex.hit.instance);
+  if (vertex.point.outside) return solid;
+  return medium == solid ? nullptr : medium;
+}
+
 // What a ray meets that shines: every lamp it crosses, then the surface or the environment behind
-// them. `bsdf_pdf` 0: no light sample competes. Lamps nearer than `from` were met before.
+// them. `bsdf_pdf` 0: no light sample competes. Lamps nearer than `from` were met before. `medium`
+// is known before the surface is met, `at_hit` from it.
 glm::dvec3 emitted(const World& world, const Ray& ray, const std::optional<Hit>& hit,
-                   double bsdf_pdf, double from) {
+                   double bsdf_pdf, double from, Medium medium, Medium at_hit) {
   const auto weight = [&](double light_pdf) {
     return bsdf_pdf > 0 ? power_heuristic(bsdf_pdf, light_pdf) : 1.0;
   };
@@ -134,18 +171,18 @@ glm::dvec3 emitted(const World& world, const Ray& ray, const std::optional<Hit>&
   for (const set::Light& lamp : world.lamps) {
     const auto met = meet_lamp(lamp, ray);
     if (met && met->distance > from && (!hit || met->distance < hit->distance))
-      sum += weight(met->pdf) * met->radiance;
+      sum += weight(met->pdf) * met->radiance * transmittance(medium, met->distance);
   }
   if (!hit) {
-    return sum +
-           weight(world.environment.pdf(ray.direction)) * world.environment.radiance(ray.direction);
+    return sum + weight(world.environment.pdf(ray.direction)) *
+                     world.environment.radiance(ray.direction) * transmittance(medium, infinity);
   }
   const glm::dvec3 emission = emission_at(world.scene, hit->instance, hit->uv);
   if (emission == glm::dvec3(0)) return sum;
   const double cosine = std::abs(glm::dot(hit->geometric_normal, ray.direction));
   const double pdf = world.emissive.area_pdf(hit->instance, hit->triangle) * hit->distance *
                      hit->distance / cosine;
-  return sum + weight(pdf) * emission;
+  return sum + weight(pdf) * emission * transmittance(at_hit, hit->distance);
 }
 
 // f cos / pdf, weighted against finding the same direction by the BSDF; `light_pdf` 0: a light no
@@ -156,7 +193,8 @@ glm::dvec3 reflected(const Vertex& vertex, const glm::dvec3& wi, double light_pd
   return mis * evaluate(vertex.bsdf, vertex.point, wi);
 }
 
-glm::dvec3 light_from_meshes(const World& world, const Vertex& vertex, Random& random) {
+glm::dvec3 light_from_meshes(const World& world, const Vertex& vertex, Medium medium,
+                             Random& random) {
   const EmissiveMeshes::Sample s = world.emissive.sample(random);
   if (s.area_pdf <= 0) return glm::dvec3(0);
   const glm::dvec3 towards = s.position - vertex.hit.position;
@@ -173,11 +211,12 @@ glm::dvec3 light_from_meshes(const World& world, const Vertex& vertex, Random& r
   if (f == glm::dvec3(0)) return f;
   const double coverage = coverage_at(world.scene, s.instance, s.uv);
   return f * coverage * emission_at(world.scene, s.instance, s.uv) / light_pdf *
+         transmittance(medium_beyond(world, medium, vertex, wi), distance) *
          light_through(world, {start, wi}, distance - margin);
 }
 
 // Next-event estimation: one sample of the environment, of every lamp and of the emissive meshes.
-glm::dvec3 direct_light(const World& world, const Vertex& vertex, Random& random) {
+glm::dvec3 direct_light(const World& world, const Vertex& vertex, Medium medium, Random& random) {
   const glm::dvec3 above = vertex.start(vertex.point.geometric_normal);
   const bool behind = scatters_behind(vertex.bsdf);
   glm::dvec3 sum(0);
@@ -185,7 +224,8 @@ glm::dvec3 direct_light(const World& world, const Vertex& vertex, Random& random
                        const glm::dvec3& value) {
     const glm::dvec3 f = reflected(vertex, wi, light_pdf) * value;
     if (f == glm::dvec3(0)) return;
-    sum += f * light_through(world, {behind ? vertex.start(wi) : above, wi}, distance);
+    sum += f * transmittance(medium_beyond(world, medium, vertex, wi), distance) *
+           light_through(world, {behind ? vertex.start(wi) : above, wi}, distance);
   };
   if (!world.environment.black()) {
     const DirectionSample s = world.environment.sample(random.uniform2());
@@ -195,7 +235,7 @@ glm::dvec3 direct_light(const World& world, const Vertex& vertex, Random& random
     const LightSample s = sample_lamp(lamp, behind ? vertex.hit.position : above, random);
     add(s.direction, s.distance, s.pdf, s.value);
   }
-  if (!world.emissive.empty()) sum += light_from_meshes(world, vertex, random);
+  if (!world.emissive.empty()) sum += light_from_meshes(world, vertex, medium, random);
   return sum;
 }
 
@@ -205,32 +245,40 @@ glm::dvec3 radiance(const World& world, Ray ray, Random& random, double& first_d
   double bsdf_pdf = 0;
   bool last_dirac = false;
   bool has_rough_vertex = false;
+  Medium medium = nullptr;
   std::optional<Hit> passed;  // the last pane on this ray
   first_distance = -1;
   for (int depth = 0;;) {
     const auto hit = closest_met(world.scene, world.geometry, ray, world.bit, random, passed);
     if (first_distance < 0) first_distance = hit ? hit->distance : 0;
+    std::optional<Vertex> met;
+    if (hit) met.emplace(vertex_at(world, *hit, -ray.direction));
+    const Medium at_hit = met ? medium_before(world, medium, *met) : medium;
     const bool caustic = has_rough_vertex && last_dirac;
     if (world.options.caustics || !caustic) {
-      sum += throughput * emitted(world, ray, hit, bsdf_pdf, passed ? passed->distance : 0);
+      sum += throughput *
+             emitted(world, ray, hit, bsdf_pdf, passed ? passed->distance : 0, medium, at_hit);
     }
     if (!hit) return sum;
 
-    const Vertex vertex = vertex_at(world, *hit, -ray.direction);
+    const Vertex& vertex = *met;
     const bool ends = depth == world.options.max_depth;
     if (ends && straight_through(vertex.bsdf, vertex.point) == glm::dvec3(0)) return sum;
-    if (!ends && !only_dirac(vertex.bsdf)) sum += throughput * direct_light(world, vertex, random);
+    const glm::dvec3 arriving = throughput * transmittance(at_hit, hit->distance);
+    if (!ends && !only_dirac(vertex.bsdf))
+      sum += arriving * direct_light(world, vertex, at_hit, random);
 
     const auto next = sample(vertex.bsdf, vertex.point, random);
     if (!next) return sum;
-    throughput *= next->weight;
     // To go straight through a pane is no event: the ray, and what competes with it, stay as they
     // are.
     if (next->dirac && next->wi == -vertex.point.wo) {
+      throughput *= next->weight;
       passed = hit;
       continue;
     }
     if (ends) return sum;
+    throughput = arriving * next->weight;
     passed.reset();
     ++depth;
     bsdf_pdf = next->pdf;
@@ -241,6 +289,7 @@ glm::dvec3 radiance(const World& world, Ray ray, Random& random, double& first_d
       if (random.uniform() >= survival) return sum;
       throughput /= survival;
     }
+    medium = medium_beyond(world, at_hit, vertex, next->wi);
     ray = {vertex.start(next->wi), next->wi};
   }
 }
@@ -265,15 +314,6 @@ struct PixelSums {
   int hits = 0;
 };
 
-void require_supported(const scene::Scene& scene) {
-  for (const scene::Material& m : scene.materials) {
-    const std::string what = "reference tracer: material '" + m.name + "' has ";
-    if (m.attenuation_color != glm::vec3(1)) {
-      throw Error(what + "an attenuating volume, which is not traced");
-    }
-  }
-}
-
 }  // namespace
 
 struct CpuTracer::Impl {
@@ -293,7 +333,6 @@ struct CpuTracer::Impl {
 
 CpuTracer::CpuTracer(const scene::Scene& scene, const lighting::EnvironmentMap& environment,
                      const TraceOptions& options) {
-  require_supported(scene);
   impl_ = std::make_unique<Impl>(scene, environment, options);
 }
 

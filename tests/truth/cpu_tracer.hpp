@@ -40,8 +40,7 @@ struct TracedPicture {
 
 class CpuTracer {
  public:
-  // The scene and the map must outlive the tracer. Throws previz::Error naming the material if the
-  // scene needs what this tracer does not do (alpha, attenuating volumes).
+  // The scene and the map must outlive the tracer.
   CpuTracer(const scene::Scene& scene, const lighting::EnvironmentMap& environment,
             const TraceOptions& options = {});
   ~CpuTracer();

@@ -302,6 +302,52 @@ TEST(RoughMaterials, AgreeWithTheCpuTracer) {
   expect_agreement(rough_materials(), 32, true);
 }
 
+// A coloured ball with a matt cube and a glowing one inside, a rough coloured box, and a coloured
+// block in both worlds that a lamp with a size stands in.
+View coloured_solids() {
+  View view;
+  scene::Scene& scene = view.scene;
+  const auto add = [&](scene::Mesh mesh, const scene::Material& material, const glm::dvec3& at,
+                       std::uint32_t presence) {
+    glm::dmat4 placed(1.0);
+    placed[3] = glm::dvec4(at, 1);
+    add_instance(scene, add_mesh(scene, std::move(mesh)), add_material(scene, material), placed,
+                 presence);
+  };
+  scene::Material jelly = glass(1.3f);
+  jelly.attenuation_color = {0.8f, 0.2f, 0.3f};
+  jelly.attenuation_distance_m = 0.2f;
+  scene::Material frosted = glass(1.5f);
+  frosted.roughness = 0.5f;
+  frosted.attenuation_color = {0.2f, 0.6f, 0.9f};
+  frosted.attenuation_distance_m = 0.15f;
+  scene::Material block = glass(1.0f);
+  block.attenuation_color = {0.3f, 0.9f, 0.2f};
+  block.attenuation_distance_m = 0.3f;
+  add(rectangle_mesh({3, 3}), diffuse({0.6f, 0.5f, 0.4f}), {0, 0, 0}, scene::world_both);
+  add(uv_sphere_mesh(0.3, 48, 24), jelly, {-0.3, -0.2, 0.32}, scene::world_mixed);
+  add(box_mesh({0.15, 0.15, 0.15}), diffuse({0.9f, 0.9f, 0.8f}), {-0.35, -0.2, 0.3},
+      scene::world_mixed);
+  add(box_mesh({0.08, 0.08, 0.08}), emitter({3, 3, 2}), {-0.2, -0.25, 0.42}, scene::world_mixed);
+  add(box_mesh({0.3, 0.3, 0.4}), frosted, {0.35, -0.3, 0.22}, scene::world_mixed);
+  add(box_mesh({0.4, 0.3, 0.5}), block, {0.1, 0.4, 0.27}, scene::world_both);
+  scene.lights.push_back(lamp(set::LightType::sphere, glm::dvec3(8, 7, 6)));
+  scene.lights.back().position = {0.1, 0.4, 0.3};
+  scene.lights.back().radius_m = 0.08;
+  view.environment = uniform_environment(glm::vec3(0.3f, 0.4f, 0.5f), 8);
+  view.calibration = pinhole(48, 32, 0.7);
+  view.world_from_camera = look_at({0.4, -2, 1.1}, {0, 0, 0.2});
+  return view;
+}
+
+TEST(ColouredSolids, AgreeWithTheCpuTracer) {
+  expect_agreement(coloured_solids(), 32, true);
+}
+
+TEST(ColouredSolids, HaveTheSameDifferenceByBothEstimators) {
+  expect_same_difference(coloured_solids(), 16, true);
+}
+
 // The difference estimator against the paired one: by the difference where nothing covers the
 // picture, and by the composite over black everywhere. Lamps differ between the worlds in every
 // other set, objects are taken away in the rest.

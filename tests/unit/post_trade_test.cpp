@@ -101,8 +101,9 @@ TEST_F(Trade, PartsThatNobodyNeedsChangeNoPixel) {
     EXPECT_FALSE(method.points.back().pareto) << "is no choice";
   }
   EXPECT_EQ(carried, (std::vector<std::string>{"parts lens", "parts refraction", "parts panes",
-                                               "parts textures", "parts normal maps", "parts alpha",
-                                               "parts lamps", "parts lamps in view"}));
+                                               "parts coloured glass", "parts textures",
+                                               "parts normal maps", "parts alpha", "parts lamps",
+                                               "parts lamps in view"}));
 }
 
 TEST_F(Trade, RefusesWhatCannotBeTraded) {

@@ -114,6 +114,20 @@ TEST_F(Features, ReadMaterials) {
   EXPECT_FALSE(needs("lamps in view"));  // found as surfaces
 }
 
+TEST_F(Features, GlassIsColouredWhereItsInsideTakesLightAway) {
+  scene::Material bottle = glass(1.5f);
+  bottle.attenuation_distance_m = 0.1f;
+  add(bottle);
+  EXPECT_FALSE(needs("coloured glass"));  // white takes nothing away
+  bottle.attenuation_color = {0.1f, 0.8f, 0.3f};
+  bottle.thin_walled = true;
+  add(bottle);
+  EXPECT_FALSE(needs("coloured glass"));  // a pane has no inside
+  bottle.thin_walled = false;
+  add(bottle);
+  EXPECT_TRUE(needs("coloured glass"));
+}
+
 TEST_F(Features, MaterialsOfWhatCannotBeHitDoNotCount) {
   scene::Mesh nothing = box_mesh({1, 1, 1});
   for (glm::vec3& p : nothing.positions) p.x = std::numeric_limits<float>::quiet_NaN();

@@ -113,25 +113,20 @@ TEST_F(GltfMaterials, OpaqueMeansAlphaOneAndThicknessZeroMeansThin) {
   EXPECT_TRUE(m.thin_walled);
 }
 
-// No shader attenuates light inside of glass, and nobody shall wonder where the colour went.
-TEST_F(GltfMaterials, ColourInsideOfGlassIsNotRenderedAndNoted) {
-  const auto glass = [&](double transmission, double thickness, const Json& color, Json distance) {
-    Json volume = {{"thicknessFactor", thickness}, {"attenuationColor", color}};
-    if (!distance.is_null()) volume["attenuationDistance"] = std::move(distance);
-    use({{"name", "glass"},
-         {"extensions",
-          {{"KHR_materials_transmission", {{"transmissionFactor", transmission}}},
-           {"KHR_materials_volume", volume}}}});
-  };
-  const Json green = {0.1, 0.9, 0.2}, white = {1, 1, 1};
-  glass(0, 0.01, green, 0.5);      // light does not get in
-  glass(1, 0, green, 0.5);         // a thin pane has no inside
-  glass(1, 0.01, white, 0.5);      // takes nothing away
-  glass(1, 0.01, green, nullptr);  // over an infinite distance
-  EXPECT_THAT(load().notes, IsEmpty());
-  glass(1, 0.01, green, 0.5);
-  EXPECT_THAT(load().notes, ElementsAre(HasSubstr("material 4 \"glass\": its attenuationColor is "
-                                                  "not rendered yet; the glass is clear inside")));
+// White light that went this far inside has the attenuation colour: exp(-sigma d) = colour.
+TEST_F(GltfMaterials, ColourInsideOfGlassIsPerMetre) {
+  const scene::Material m = loaded({{"extensions",
+                                     {{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
+                                      {"KHR_materials_volume",
+                                       {{"thicknessFactor", 0.01},
+                                        {"attenuationColor", {0.1, 1, 0}},
+                                        {"attenuationDistance", 0.5}}}}},
+                                    {"pbrMetallicRoughness", {{"metallicFactor", 0}}}});
+  EXPECT_TRUE(scene::attenuates(m));
+  const glm::vec3 sigma = scene::attenuation_per_m(m);
+  EXPECT_FLOAT_EQ(sigma.r, -std::log(0.1f) / 0.5f);
+  EXPECT_EQ(sigma.g, 0);
+  EXPECT_TRUE(std::isfinite(sigma.b) && sigma.b > 100);  // black is finite, and leaves nothing
 }
 
 TEST_F(GltfMaterials, BringsNumbersIntoRangeWithANote) {
