@@ -53,6 +53,7 @@ RenderStage::RenderStage(std::shared_ptr<render::Device> device, const set::Set&
   scene_.lights = scene.lights;
   scene_.light_objects = scene.light_objects;
   scene_.animations = scene.animations;
+  scene_.deformations = scene.deformations;
 }
 
 void RenderStage::operator()(Shot& shot) {
@@ -143,6 +144,7 @@ void RenderStage::place(const session::SceneState& state) {
   const scene::Placement placement = scene::place(scene_, set_, known);
   for (const std::string& what : placement.unknown)
     if (unknown_.insert(what).second && options_.note) options_.note(what);
+  renderer_.deform(placement.shapes);
   renderer_.move(placement.instances, placement.lights);
   placed_ = state;
   is_measured_anew_ = false;

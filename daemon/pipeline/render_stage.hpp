@@ -28,7 +28,8 @@ struct RenderStageOptions {
 
 class RenderStage {
  public:
-  // Keeps only the instances and lamps of the scene; the rest goes to the device.
+  // Keeps only the instances and lamps of the scene and what moves them; the rest goes to the
+  // device.
   RenderStage(std::shared_ptr<render::Device> device, const set::Set& set,
               const ObserverCalibration& calibration, const scene::Scene& scene,
               RenderStageOptions options);
@@ -73,7 +74,7 @@ class RenderStage {
   render::View view_ = render::View::composite;
   render::Renderer renderer_;
   double error_ = 0;
-  scene::Scene scene_;          // as in the set; instances and lamps only
+  scene::Scene scene_;          // as in the set; what place() needs of it
   session::SceneState placed_;  // what the renderer holds
   LightPtr light_;              // the one the renderer holds
   LampStates relit_;            // the changes of lamps that the renderer holds beside the scene's

@@ -83,6 +83,20 @@ Spheres bounding_spheres(const scene::Scene& scene) {
   return spheres;
 }
 
+glm::dvec4 bounding_sphere(const scene::Aabb& box, const glm::dmat4& world_from_object) {
+  if (!(box.low.x <= box.high.x)) return {0, 0, 0, -1};
+  const glm::dvec3 low = box.low, high = box.high;
+  const glm::dvec3 centre(world_from_object * glm::dvec4(0.5 * (low + high), 1));
+  double radius = 0;
+  for (int corner = 0; corner < 8; ++corner) {
+    const glm::dvec3 at((corner & 1 ? high : low).x, (corner & 2 ? high : low).y,
+                        (corner & 4 ? high : low).z);
+    radius =
+        std::max(radius, glm::distance(glm::dvec3(world_from_object * glm::dvec4(at, 1)), centre));
+  }
+  return {centre, radius};
+}
+
 Spheres moved_spheres(const Spheres& spheres, const std::vector<scene::Instance>& before,
                       const std::vector<scene::Instance>& now) {
   Spheres moved = spheres;

@@ -5,6 +5,7 @@
 #include <glm/vec4.hpp>
 #include <vector>
 
+#include "daemon/scene/bvh.hpp"
 #include "daemon/scene/scene.hpp"
 
 namespace previz::render {
@@ -22,6 +23,9 @@ Spheres bounding_spheres(const scene::Scene& scene);
 // instance that moved rigidly keeps its radius.
 Spheres moved_spheres(const Spheres& spheres, const std::vector<scene::Instance>& before,
                       const std::vector<scene::Instance>& now);
+
+// Returns the sphere around a box of the object's space.
+glm::dvec4 bounding_sphere(const scene::Aabb& box, const glm::dmat4& world_from_object);
 
 // Returns the spheres of objects that are in one world only.
 Bounds difference_bounds(const scene::Scene& scene, const Spheres& spheres);

@@ -84,7 +84,28 @@ void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha) {
   find_emitters();
   spheres_ = bounding_spheres(scene_);
   instances_as_set_ = scene_.instances;
+  std::vector<scene::Shape> at_rest;
+  for (const scene::Deformation& deformation : scene_.deformations)
+    at_rest.push_back(scene::shape_at_rest(deformation));
+  deform(at_rest);
   find_bounds(spheres_);
+}
+
+void GpuScene::deform(const std::vector<scene::Shape>& shapes) {
+  assert(shapes.size() == scene_.deformations.size());
+  if (shapes.empty()) return;
+  deformer_.deform(shapes, bvh_, vertices_);
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    const scene::Deformation& deformation = scene_.deformations[i];
+    const scene::Instance& instance = instances_as_set_[deformation.instance];
+    spheres_[deformation.instance] =
+        bounding_sphere(places_[deformation.mesh].bvh.bounds, instance.world_from_object);
+    // Light samples are taken on the CPU's copy.
+    scene::Mesh& mesh = scene_.meshes[deformation.mesh];
+    if (scene::emits(scene_.materials[instance.material]))
+      mesh.positions = scene::deformed(mesh.undeformed, shapes[i]).positions;
+  }
+  find_bounds(moved_spheres(spheres_, instances_as_set_, scene_.instances));
 }
 
 void GpuScene::move(const std::vector<scene::Instance>& instances,
@@ -105,14 +126,20 @@ void GpuScene::upload_meshes() {
   std::vector<glm::vec4> vertices;
   std::vector<glm::uvec4> triangles;
   places_.clear();
+  deformer_.clear();
+  std::map<const scene::Mesh*, scene::MeshBvh> deforming;
+  for (const scene::Deformation& deformation : scene_.deformations)
+    deforming[&scene_.meshes[deformation.mesh]] = deformer_.add(scene_, deformation);
   for (const scene::Mesh& mesh : scene_.meshes) {
     MeshPlace place;
-    place.bvh = scene::build_mesh_bvh(mesh);
+    const auto built = deforming.find(&mesh);
+    place.bvh = built != deforming.end() ? std::move(built->second) : scene::build_mesh_bvh(mesh);
     place.first_record = static_cast<std::uint32_t>(bvh.size() / scene::texels_per_record);
     place.first_triangle = static_cast<std::uint32_t>(triangles.size());
     append(bvh, std::exchange(place.bvh.texels, {}));
-    places_.push_back(std::move(place));
     const auto first = static_cast<std::uint32_t>(vertices.size() / 2);
+    place.first_vertex = first;
+    places_.push_back(std::move(place));
     for (const glm::uvec3& t : mesh.triangles)
       triangles.emplace_back(first + t.x, first + t.y, first + t.z, 0u);
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
@@ -124,6 +151,12 @@ void GpuScene::upload_meshes() {
   upload_texels(device_, bvh_, bvh, vk::Format::eR32G32B32A32Uint);
   upload_texels(device_, vertices_, vertices, vk::Format::eR32G32B32A32Sfloat);
   upload_texels(device_, triangles_, triangles, vk::Format::eR32G32B32A32Uint);
+  std::vector<Deformer::Place> deformed;
+  for (const scene::Deformation& deformation : scene_.deformations) {
+    MeshPlace& place = places_[deformation.mesh];
+    deformed.push_back({&place.bvh, place.first_record, place.first_vertex});
+  }
+  deformer_.upload(std::move(deformed));
 }
 
 void GpuScene::upload_materials(double specular_alpha) {

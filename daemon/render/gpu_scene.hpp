@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "daemon/render/bounds.hpp"
+#include "daemon/render/deformer.hpp"
 #include "daemon/render/feature.hpp"
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/kernel.hpp"
@@ -20,7 +21,7 @@ namespace previz::render {
 
 class GpuScene {
  public:
-  explicit GpuScene(Device& device) : device_(device) {}
+  explicit GpuScene(Device& device) : device_(device), deformer_(device) {}
 
   // Builds the meshes' BVHs and uploads everything that does not depend on the camera.
   // Surfaces are perfect mirrors where their GGX alpha is at most `specular_alpha`.
@@ -29,6 +30,11 @@ class GpuScene {
   // Puts the same meshes and materials at other places, under other lamps. Only the top level is
   // rebuilt, by the next place(). The number of instances must stay the same.
   void move(const std::vector<scene::Instance>& instances, const std::vector<set::Light>& lights);
+  // Gives the meshes that deform their shapes, those of Scene::deformations in their order. The
+  // meshes stay in the shape at rest until the first call.
+  void deform(const std::vector<scene::Shape>& shapes);
+  // Returns how many trees of meshes that deform were built anew since set_scene().
+  std::uint64_t rebuilt_trees() const { return deformer_.rebuilt(); }
   // Sets lamps beside the scene's own, which may change from frame to frame.
   void set_sources(std::vector<set::Light> sources);
   // Uploads instances, top level and lights relative to `camera_position` (world, metres).
@@ -48,6 +54,7 @@ class GpuScene {
     scene::MeshBvh bvh;  // its texels moved into the shared buffer
     std::uint32_t first_record = 0;
     std::uint32_t first_triangle = 0;
+    std::uint32_t first_vertex = 0;
   };
 
   void upload_meshes();
@@ -71,6 +78,7 @@ class GpuScene {
   Spheres spheres_;                                 // of instances_as_set_
   std::optional<std::vector<set::Light>> sources_;  // absent: set_sources() was never called
   std::vector<MeshPlace> places_;
+  Deformer deformer_;
   std::vector<std::uint32_t> first_light_;  // by instance; NO_INDEX: not an emitter
   std::vector<std::uint32_t> emitters_;     // instances that emit, in the order of their lights
   Bounds difference_bounds_, specular_bounds_;

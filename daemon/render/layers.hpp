@@ -37,6 +37,8 @@ struct Counters {
   // surfaces that had to be traced.
   std::uint64_t measured = 0;
   std::uint64_t unmeasured = 0;
+  // Trees of meshes that deform that were built anew, since the scene was set.
+  std::uint64_t rebuilt_trees = 0;
 };
 
 }  // namespace previz::render

@@ -170,6 +170,10 @@ void Renderer::move(const std::vector<scene::Instance>& instances,
   impl_->scene.move(instances, lights);
 }
 
+void Renderer::deform(const std::vector<scene::Shape>& shapes) {
+  impl_->scene.deform(shapes);
+}
+
 void Renderer::use(set::Estimator estimator) {
   impl_->estimation.estimator = estimator;
 }
@@ -311,6 +315,7 @@ Counters Renderer::counters() const {
   counters.unfinished = control.unfinished;
   counters.measured = wide(control.measured_high, control.measured_low);
   counters.unmeasured = wide(control.unmeasured_high, control.unmeasured_low);
+  counters.rebuilt_trees = impl_->scene.rebuilt_trees();
   return counters;
 }
 

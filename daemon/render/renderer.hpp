@@ -37,6 +37,9 @@ class Renderer {
   void set_scene(const scene::Scene& scene);
   // Moves the instances and changes the lamps of the scene last set; no mesh's BVH is rebuilt.
   void move(const std::vector<scene::Instance>& instances, const std::vector<set::Light>& lights);
+  // Gives the meshes that deform their shapes, those of Scene::deformations in their order. Until
+  // the first call after set_scene() they have those at rest.
+  void deform(const std::vector<scene::Shape>& shapes);
   // use() and resize() take effect at the next begin(): another estimator, or another picture size
   // with its calibration. Scene and environment stay.
   void use(set::Estimator estimator);

@@ -8,25 +8,8 @@
 namespace previz::scene {
 namespace {
 
-// The keys on either side of a time, and how far the time has moved from one to the next.
-struct Segment {
-  std::size_t before = 0, after = 0;
-  double part = 0;        // 0..1
-  double duration_s = 0;  // of the segment
-};
-
-Segment segment_at(const AnimationChannel& channel, double time_s) {
-  const std::vector<double>& times = channel.times_s;
-  const auto next = std::ranges::upper_bound(times, time_s);
-  if (next == times.begin()) return {};
-  const auto after = static_cast<std::size_t>(next - times.begin());
-  if (next == times.end()) return {after - 1, after - 1, 0, 0};
-  const double duration = *next - times[after - 1];
-  return {after - 1, after, (time_s - times[after - 1]) / duration, duration};
-}
-
 // Interpolates by a Hermite spline with tangents per second (glTF 2.0, C.5).
-glm::dvec4 cubic(const AnimationChannel& channel, const Segment& s) {
+glm::dvec4 cubic(const AnimationChannel& channel, const KeySegment& s) {
   const auto at = [&](std::size_t key, std::size_t part) { return channel.values[3 * key + part]; };
   if (s.before == s.after) return at(s.before, 1);
   const double t = s.part, t2 = t * t, t3 = t2 * t;
@@ -62,8 +45,17 @@ std::vector<glm::dmat4> down_the_tree(const Animation& animation, const Local& l
 
 }  // namespace
 
+KeySegment segment_at(std::span<const double> times, double time_s) {
+  const auto next = std::ranges::upper_bound(times, time_s);
+  if (next == times.begin()) return {};
+  const auto after = static_cast<std::size_t>(next - times.begin());
+  if (next == times.end()) return {after - 1, after - 1, 0, 0};
+  const double duration = *next - times[after - 1];
+  return {after - 1, after, (time_s - times[after - 1]) / duration, duration};
+}
+
 glm::dvec3 vector_at(const AnimationChannel& channel, double time_s) {
-  const Segment s = segment_at(channel, time_s);
+  const KeySegment s = segment_at(channel.times_s, time_s);
   switch (channel.interpolation) {
     case Interpolation::step:
       return glm::dvec3(channel.values[s.before]);
@@ -77,7 +69,7 @@ glm::dvec3 vector_at(const AnimationChannel& channel, double time_s) {
 }
 
 glm::dquat rotation_at(const AnimationChannel& channel, double time_s) {
-  const Segment s = segment_at(channel, time_s);
+  const KeySegment s = segment_at(channel.times_s, time_s);
   switch (channel.interpolation) {
     case Interpolation::step:
       return quaternion(channel.values[s.before]);
@@ -90,9 +82,13 @@ glm::dquat rotation_at(const AnimationChannel& channel, double time_s) {
   return quaternion(cubic(channel, s));
 }
 
+double played_time(const Animation& animation, double time_s) {
+  return animation.loops ? std::fmod(time_s, animation.duration_s)
+                         : std::min(time_s, animation.duration_s);
+}
+
 std::vector<glm::dmat4> world_from_nodes(const Animation& animation, double time_s) {
-  const double time = animation.loops ? std::fmod(time_s, animation.duration_s)
-                                      : std::min(time_s, animation.duration_s);
+  const double time = played_time(animation, time_s);
   return down_the_tree(animation,
                        [time](const AnimatedNode& node) { return parent_from_node(node, time); });
 }

@@ -2,16 +2,29 @@
 // places it gives to nodes at a time.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <span>
 #include <vector>
 
 namespace previz::scene {
 
 enum class Interpolation { step, linear, cubic_spline };
+
+// The keys on either side of a time, and how far the time has moved from one to the next.
+struct KeySegment {
+  std::size_t before = 0, after = 0;
+  double part = 0;        // 0..1
+  double duration_s = 0;  // of the segment
+};
+
+// `times_s` is increasing and not empty. Before the first key and after the last, both are that
+// key.
+KeySegment segment_at(std::span<const double> times_s, double time_s);
 
 // One animated component of one node.
 struct AnimationChannel {
@@ -52,6 +65,9 @@ struct Animation {
   std::vector<AnimatedNode> nodes;
   std::vector<Use> instances, lights;
 };
+
+// Returns the time in the animation after so many seconds: it begins anew, or stays at its end.
+double played_time(const Animation& animation, double time_s);
 
 // Returns world_from_node of each node at a time after the start, with the object where the set has
 // it.

@@ -57,20 +57,6 @@ double extent_of(const Aabb& bounds) {
   return std::max({extent.x, extent.y, extent.z});
 }
 
-std::uint32_t with_fill(std::uint32_t value, std::uint32_t rotation = 0) {
-  return value << 8 | (gpu::RECORD_FILL + rotation);
-}
-
-Record pair_record(const TrianglePair& pair) {
-  Record record{with_fill(pair.primitives[0], pair.rotations[0]),
-                with_fill(pair.primitives[1], pair.rotations[1]), gpu::RECORD_PAIR, 0};
-  for (std::size_t v = 0; v < 4; ++v)
-    for (int axis = 0; axis < 3; ++axis)
-      record[4 + 3 * v + static_cast<std::size_t>(axis)] =
-          std::bit_cast<std::uint32_t>(pair.vertices[v][axis]);
-  return record;
-}
-
 Record space_record(const glm::dmat4& grid_from_world, std::uint32_t first_record,
                     std::uint32_t presence, std::uint32_t index) {
   Record record{with_fill(first_record / records_per_block), with_fill(presence), gpu::RECORD_SPACE,
@@ -80,19 +66,6 @@ Record space_record(const glm::dmat4& grid_from_world, std::uint32_t first_recor
       record[4 + static_cast<std::size_t>(4 * row + column)] =
           std::bit_cast<std::uint32_t>(static_cast<float>(grid_from_world[column][row]));
   return record;
-}
-
-// Returns the wide tree of the chosen quality, or the balanced one if that would be too deep for
-// the traversal stack.
-WideTree make_tree(std::span<const Aabb> boxes, BvhQuality quality, const SplitPrimitive& split,
-                   const std::function<Record(std::uint32_t)>& leaf, std::uint32_t most_levels) {
-  WideTree tree = make_wide_tree(build_binary_tree(boxes, quality, split), leaf);
-  if (tree.depth > most_levels) tree = make_wide_tree(build_balanced_tree(boxes), leaf);
-  if (tree.depth > most_levels)
-    throw Error("scene: a BVH over " + std::to_string(boxes.size()) + " boxes needs " +
-                std::to_string(tree.depth) + " levels; at most " + std::to_string(most_levels) +
-                " are allowed");
-  return tree;
 }
 
 glm::dmat4 uniform_scale(double scale) {
@@ -110,6 +83,10 @@ Aabb padded(const Aabb& box) {
 
 }  // namespace
 
+int grid_exponent_of(const Aabb& bounds) {
+  return grid_exponent(extent_of(bounds));
+}
+
 MeshBvh build_mesh_bvh(const Mesh& mesh, BvhQuality quality) {
   if (mesh.triangles.size() > most_triangles)
     throw Error("scene: mesh \"" + mesh.name + "\" has " + std::to_string(mesh.triangles.size()) +
@@ -120,7 +97,7 @@ MeshBvh build_mesh_bvh(const Mesh& mesh, BvhQuality quality) {
       static_cast<std::uint32_t>(mesh.triangles.size() - triangles.primitives.size());
   if (triangles.primitives.empty()) return bvh;
   bvh.bounds = bounds_of(triangles);
-  bvh.grid_exponent = grid_exponent(extent_of(bvh.bounds));
+  bvh.grid_exponent = grid_exponent_of(bvh.bounds);
 
   const float scale = std::ldexp(1.0f, bvh.grid_exponent);
   for (auto& corners : triangles.corners)

@@ -68,6 +68,9 @@ struct TopBvh {
 std::size_t top_bvh_texels(std::size_t instance_count);
 TopBvh build_top_bvh(std::span<const TopInstance> instances);
 
+// Returns the exponent of the grid of a tree with these bounds: MeshBvh::grid_exponent.
+int grid_exponent_of(const Aabb& bounds);
+
 // Returns the world bounds of an instance (conservative for any affine transform).
 Aabb transform_bounds(const Aabb& object_bounds, const glm::dmat4& world_from_object);
 

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "daemon/scene/bvh_binary.hpp"
+#include "shaders/lib/shared.h"
 
 namespace previz::scene {
 namespace {
@@ -55,8 +56,9 @@ struct Candidate {
   Side first, second;
 };
 
-std::vector<Side> sides_of(std::span<const Corners> corners) {
-  const auto places = places_of(corners);
+using Places = std::array<std::uint32_t, 3>;
+
+std::vector<Side> sides_of(std::span<const Places> places) {
   std::vector<Side> sides;
   sides.reserve(places.size() * 3);
   for (std::uint32_t t = 0; t < places.size(); ++t) {
@@ -72,11 +74,12 @@ std::vector<Side> sides_of(std::span<const Corners> corners) {
   return sides;
 }
 
-std::vector<Candidate> candidates_of(std::span<const Corners> corners) {
+std::vector<Candidate> candidates_of(std::span<const Corners> corners,
+                                     std::span<const Places> places) {
   std::vector<double> area(corners.size());
   for (std::size_t t = 0; t < corners.size(); ++t)
     area[t] = half_area(bounds_of_triangle(corners[t]));
-  const std::vector<Side> sides = sides_of(corners);
+  const std::vector<Side> sides = sides_of(places);
   std::vector<Candidate> candidates;
   candidates.reserve(corners.size() * 3 / 2);
   // Where more than two triangles meet in an edge, only neighbours in the list are tried.
@@ -144,11 +147,17 @@ void split_pair(const TrianglePair& pair, const Aabb& bounds, int axis, float po
 }
 
 std::vector<TrianglePair> make_pairs(std::span<const Corners> corners,
-                                     std::span<const std::uint32_t> primitives) {
+                                     std::span<const std::uint32_t> primitives,
+                                     std::span<const std::array<std::uint32_t, 3>> places) {
+  std::vector<std::array<std::uint32_t, 3>> by_position;
+  if (places.empty()) {
+    by_position = places_of(corners);
+    places = by_position;
+  }
   std::vector<TrianglePair> pairs;
   pairs.reserve(corners.size());
   std::vector<bool> taken(corners.size(), false);
-  for (const Candidate& candidate : candidates_of(corners)) {
+  for (const Candidate& candidate : candidates_of(corners, places)) {
     const auto [a, b] = std::pair(candidate.first, candidate.second);
     if (taken[a.triangle] || taken[b.triangle]) continue;
     taken[a.triangle] = taken[b.triangle] = true;
@@ -169,6 +178,16 @@ std::vector<TrianglePair> make_pairs(std::span<const Corners> corners,
                      {0, 0}});
   }
   return pairs;
+}
+
+Record pair_record(const TrianglePair& pair) {
+  Record record{with_fill(pair.primitives[0], pair.rotations[0]),
+                with_fill(pair.primitives[1], pair.rotations[1]), gpu::RECORD_PAIR, 0};
+  for (std::size_t v = 0; v < 4; ++v)
+    for (int axis = 0; axis < 3; ++axis)
+      record[4 + 3 * v + static_cast<std::size_t>(axis)] =
+          std::bit_cast<std::uint32_t>(pair.vertices[v][axis]);
+  return record;
 }
 
 }  // namespace previz::scene

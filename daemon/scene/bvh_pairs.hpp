@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "daemon/scene/bvh.hpp"
+#include "daemon/scene/bvh_wide.hpp"
 
 namespace previz::scene {
 
@@ -28,8 +29,12 @@ void split_pair(const TrianglePair& pair, const Aabb& bounds, int axis, float po
                 Aabb& right);
 
 // `corners` are the positions of triangles, `primitives` the triangles' indices in the mesh.
-// Vertices at the same position count as one.
+// Corners with equal numbers in `places` count as one; without `places`, those at the same
+// position.
 std::vector<TrianglePair> make_pairs(std::span<const std::array<glm::vec3, 3>> corners,
-                                     std::span<const std::uint32_t> primitives);
+                                     std::span<const std::uint32_t> primitives,
+                                     std::span<const std::array<std::uint32_t, 3>> places = {});
+
+Record pair_record(const TrianglePair& pair);
 
 }  // namespace previz::scene

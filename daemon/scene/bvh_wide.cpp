@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "drivers/error.hpp"
 #include "shaders/lib/shared.h"
 
 namespace previz::scene {
@@ -196,6 +197,21 @@ class Collapse {
 WideTree make_wide_tree(std::span<const BinaryNode> binary,
                         const std::function<Record(std::uint32_t primitive)>& leaf) {
   return Collapse(binary, leaf).run();
+}
+
+WideTree make_tree(std::span<const Aabb> boxes, BvhQuality quality, const SplitPrimitive& split,
+                   const std::function<Record(std::uint32_t)>& leaf, std::uint32_t most_levels) {
+  WideTree tree = make_wide_tree(build_binary_tree(boxes, quality, split), leaf);
+  if (tree.depth > most_levels) tree = make_wide_tree(build_balanced_tree(boxes), leaf);
+  if (tree.depth > most_levels)
+    throw Error("scene: a BVH over " + std::to_string(boxes.size()) + " boxes needs " +
+                std::to_string(tree.depth) + " levels; at most " + std::to_string(most_levels) +
+                " are allowed");
+  return tree;
+}
+
+std::uint32_t with_fill(std::uint32_t value, std::uint32_t rotation) {
+  return value << 8 | (gpu::RECORD_FILL + rotation);
 }
 
 int grid_exponent(double extent) {

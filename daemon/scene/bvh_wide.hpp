@@ -27,6 +27,15 @@ struct WideTree {
 WideTree make_wide_tree(std::span<const BinaryNode> binary,
                         const std::function<Record(std::uint32_t primitive)>& leaf);
 
+// Returns the wide tree of the chosen quality, or the balanced one if that would be too deep for
+// the traversal's stack. Throws previz::Error where that is too deep as well.
+WideTree make_tree(std::span<const Aabb> boxes, BvhQuality quality, const SplitPrimitive& split,
+                   const std::function<Record(std::uint32_t primitive)>& leaf,
+                   std::uint32_t most_levels);
+
+// Returns a word of a record that is no node, with a harmless exponent (shaders/lib/shared.h).
+std::uint32_t with_fill(std::uint32_t value, std::uint32_t rotation = 0);
+
 // Returns an exponent e such that coordinates of at most `extent`, times 2^e, stay below 2^23.
 int grid_exponent(double extent);
 

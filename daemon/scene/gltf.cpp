@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "daemon/scene/gltf_animation.hpp"
+#include "daemon/scene/gltf_deformation.hpp"
 #include "daemon/scene/gltf_material.hpp"
 #include "daemon/scene/gltf_mesh.hpp"
 #include "daemon/scene/gltf_nodes.hpp"
@@ -46,17 +47,21 @@ struct GltfFile::Loader {
     const auto ignored = [&](std::size_t count, const char* what) {
       if (count > 0) notes.add("has " + std::to_string(count) + " " + what + "; ignored");
     };
-    ignored(model.skins.size(), "skins");
     ignored(model.cameras.size(), "cameras");
   }
 
   void add(const set::Object& object, std::uint32_t object_index);
-  void add_mesh(const PlacedNode& placed, const Instance& instance_of_node);
+  void add_mesh(const PlacedNode& placed, const Instance& instance_of_node,
+                const glm::dmat4& world_from_file, NodeDeformation deforms);
   void add_light(const PlacedNode& placed, const glm::dmat4& world_from_node,
                  std::uint32_t presence);
   std::optional<std::uint32_t> use_mesh(const tinygltf::Primitive& primitive,
-                                        const UsedMaterial& material, const std::string& name,
+                                        const MeshSource& source, const std::string& name,
                                         const std::string& what);
+  std::optional<std::uint32_t> add_deformed(const tinygltf::Primitive& primitive,
+                                            const MeshSource& source, const std::string& name,
+                                            const std::string& what, bool moves,
+                                            const Deformation& deformation);
 
   std::string file;
   Scene& scene;
@@ -65,6 +70,7 @@ struct GltfFile::Loader {
   tinygltf::Model model;
   GltfMaterials materials;
   std::map<MeshSource, std::optional<std::uint32_t>> meshes;  // nothing for an empty mesh
+  std::vector<std::uint32_t> carried;  // instances that the node added last takes along
 };
 
 void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index) {
@@ -79,15 +85,21 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
     instance.presence = presence_bits(object.presence);
     instance.object = object_index;
     instance.world_from_object = object.world_from_file * z_up_from_y_up * placed.file_from_node;
-    const auto first_instance = static_cast<std::uint32_t>(scene.instances.size());
+    carried.clear();
     const auto first_light = static_cast<std::uint32_t>(scene.lights.size());
-    if (node.mesh >= 0) add_mesh(placed, instance);
+    if (node.mesh >= 0) {
+      const std::string where = file + ": " + node_name(model, placed.node);
+      if (static_cast<std::size_t>(node.mesh) >= model.meshes.size())
+        throw Error(where + ": there is no mesh " + std::to_string(node.mesh));
+      add_mesh(placed, instance, object.world_from_file * z_up_from_y_up,
+               read_node_deformation(model, placed.node, where, played ? &*played : nullptr,
+                                     animation.nodes));
+    }
     add_light(placed, instance.world_from_object, instance.presence);
     if (!played) continue;
     const std::uint32_t moved = played->use(placed.node, animation.nodes);
     if (moved == no_node) continue;
-    for (auto i = first_instance; i < scene.instances.size(); ++i)
-      animation.instances.push_back({i, moved});
+    for (const std::uint32_t i : carried) animation.instances.push_back({i, moved});
     for (auto i = first_light; i < scene.lights.size(); ++i) animation.lights.push_back({i, moved});
   }
   if (!played && !model.animations.empty())
@@ -104,16 +116,12 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
     notes.add("object \"" + set::printable(object.name) + "\" has nothing to see in it");
 }
 
-void GltfFile::Loader::add_mesh(const PlacedNode& placed, const Instance& instance_of_node) {
+void GltfFile::Loader::add_mesh(const PlacedNode& placed, const Instance& instance_of_node,
+                                const glm::dmat4& world_from_file, NodeDeformation deforms) {
   const std::string node = node_name(model, placed.node);
   const int index = model.nodes[static_cast<std::size_t>(placed.node)].mesh;
-  if (static_cast<std::size_t>(index) >= model.meshes.size())
-    throw Error(file + ": " + node + ": there is no mesh " + std::to_string(index));
   const tinygltf::Mesh& mesh = model.meshes[static_cast<std::size_t>(index)];
-  if (!is_invertible(instance_of_node.world_from_object)) {
-    notes.add(node + ": its transform is singular or not finite; skipped");
-    return;
-  }
+  deforms.deformation.object = instance_of_node.object;
   if (mesh.primitives.empty())
     notes.add("mesh " + std::to_string(index) + ": has no primitives; skipped");
   for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
@@ -128,30 +136,69 @@ void GltfFile::Loader::add_mesh(const PlacedNode& placed, const Instance& instan
       throw Error(file + ": " + what + ": mode " + std::to_string(primitive.mode) +
                   " is not one of glTF's");
     const UsedMaterial material = materials.use(primitive.material);
+    MeshSource source = mesh_source(primitive, material.mapping);
+    add_deformation(primitive, deforms, file + ": " + what, source);
+    if (material.is_textured && source.uvs < 0)
+      notes.add(what + ": has no TEXCOORD_" + std::to_string(material.mapping.set) +
+                " for its textures; they are read at (0, 0)");
+    const bool is_skinned = !source.influences.empty();
+    Instance instance = instance_of_node;
+    if (is_skinned) instance.world_from_object = world_from_file;
+    if (!is_invertible(instance.world_from_object)) {
+      notes.add(node + ": its transform is singular or not finite; skipped");
+      return;
+    }
     std::string suffix;
     if (mesh.primitives.size() > 1) suffix.append(".").append(std::to_string(i));
-    const auto used = use_mesh(primitive, material, mesh.name + suffix, what);
+    const bool moves = (is_skinned && deforms.is_skin_moved) ||
+                       (!source.targets.empty() && deforms.are_weights_moved);
+    const auto instance_index = static_cast<std::uint32_t>(scene.instances.size());
+    deforms.deformation.instance = instance_index;
+    const auto used =
+        is_skinned || !source.targets.empty()
+            ? add_deformed(primitive, source, mesh.name + suffix, what, moves, deforms.deformation)
+            : use_mesh(primitive, source, mesh.name + suffix, what);
     if (!used) continue;
     budget.add_instance(file);
-    Instance instance = instance_of_node;
     instance.name += suffix;
     instance.mesh = *used;
     instance.material = material.index;
+    if (!is_skinned) carried.push_back(instance_index);
     scene.instances.push_back(std::move(instance));
   }
 }
 
+// Every instance of a mesh that deforms has a mesh of its own.
+std::optional<std::uint32_t> GltfFile::Loader::add_deformed(const tinygltf::Primitive& primitive,
+                                                            const MeshSource& source,
+                                                            const std::string& name,
+                                                            const std::string& what, bool moves,
+                                                            const Deformation& deformation) {
+  if (primitive.attributes.contains("COLOR_0"))
+    notes.add(what + ": its vertex colours are ignored");
+  std::optional<Mesh> mesh = read_mesh(model, source, file + ": " + what, what, notes, budget);
+  if (!mesh) return {};
+  mesh->name = name;
+  DeformedVertices at_rest = deformed(mesh->undeformed, shape_at_rest(deformation));
+  mesh->positions = std::move(at_rest.positions);
+  mesh->normals = std::move(at_rest.normals);
+  if (!moves && !keep_shape(*mesh, what, notes)) return {};
+  if (!has_usable_positions(*mesh))
+    throw Error(file + ": " + what + ": its joints or targets take vertices beyond 1e15 at rest");
+  const auto index = static_cast<std::uint32_t>(scene.meshes.size());
+  scene.meshes.push_back(std::move(*mesh));
+  if (!moves) return index;
+  scene.deformations.push_back(deformation);
+  scene.deformations.back().mesh = index;
+  return index;
+}
+
 std::optional<std::uint32_t> GltfFile::Loader::use_mesh(const tinygltf::Primitive& primitive,
-                                                        const UsedMaterial& material,
+                                                        const MeshSource& source,
                                                         const std::string& name,
                                                         const std::string& what) {
-  const MeshSource source = mesh_source(primitive, material.mapping);
-  if (material.is_textured && source.uvs < 0)
-    notes.add(what + ": has no TEXCOORD_" + std::to_string(material.mapping.set) +
-              " for its textures; they are read at (0, 0)");
   const auto [at, is_new] = meshes.try_emplace(source);
   if (!is_new) return at->second;
-  if (!primitive.targets.empty()) notes.add(what + ": its morph targets are ignored");
   if (primitive.attributes.contains("COLOR_0"))
     notes.add(what + ": its vertex colours are ignored");
   std::optional<Mesh> mesh = read_mesh(model, source, file + ": " + what, what, notes, budget);

@@ -176,6 +176,22 @@ std::vector<glm::vec4> read_vec4s(const tinygltf::Model& model, int accessor,
   return read_vectors<glm::vec4>(model, accessor, TINYGLTF_TYPE_VEC4, where);
 }
 
+// Matrices of floats have no padding between their columns (glTF 2.0, 3.6.2.4).
+std::vector<glm::dmat4> read_mat4s(const tinygltf::Model& model, int index,
+                                   const std::string& where) {
+  const tinygltf::Accessor& accessor = checked(model, index, where);
+  if (accessor.type != TINYGLTF_TYPE_MAT4 ||
+      accessor.componentType != TINYGLTF_COMPONENT_TYPE_FLOAT)
+    throw Error(where + ": must have 4 by 4 floats an element");
+  std::vector<glm::dmat4> values(element_count(model, index, where), glm::dmat4(0));
+  read_elements(model, accessor, 16, where, [&](std::size_t element, const unsigned char* at) {
+    for (int i = 0; i < 16; ++i)
+      values[element][i / 4][i % 4] =
+          static_cast<double>(load<float>(at + static_cast<std::size_t>(i) * sizeof(float)));
+  });
+  return values;
+}
+
 std::vector<float> read_scalars(const tinygltf::Model& model, int accessor,
                                 const std::string& where) {
   std::vector<float> values;

@@ -6,6 +6,7 @@
 #include <tiny_gltf.h>
 
 #include <cstdint>
+#include <glm/mat4x4.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
@@ -21,6 +22,8 @@ std::vector<glm::vec3> read_vec3s(const tinygltf::Model& model, int accessor,
                                   const std::string& where);
 std::vector<glm::vec4> read_vec4s(const tinygltf::Model& model, int accessor,
                                   const std::string& where);
+std::vector<glm::dmat4> read_mat4s(const tinygltf::Model& model, int accessor,
+                                   const std::string& where);
 std::vector<float> read_scalars(const tinygltf::Model& model, int accessor,
                                 const std::string& where);
 std::vector<std::uint32_t> read_indices(const tinygltf::Model& model, int accessor,

@@ -46,6 +46,19 @@ std::vector<double> times_of(const tinygltf::Model& model, int accessor, const s
   return times;
 }
 
+WeightChannel weight_channel_of(const tinygltf::Model& model,
+                                const tinygltf::AnimationSampler& sampler,
+                                const std::string& where) {
+  WeightChannel channel;
+  channel.interpolation = interpolation_of(sampler, where);
+  channel.times_s = times_of(model, sampler.input, where);
+  for (const float value : read_scalars(model, sampler.output, where + ", output")) {
+    if (!std::isfinite(value)) throw Error(where + ", output: a weight is not finite");
+    channel.values.push_back(value);
+  }
+  return channel;
+}
+
 AnimationChannel channel_of(const tinygltf::Model& model, const tinygltf::AnimationSampler& sampler,
                             bool is_rotation, const std::string& where) {
   AnimationChannel channel;
@@ -81,8 +94,9 @@ GltfAnimation::GltfAnimation(const tinygltf::Model& model, const std::string& na
     : model_(model),
       file_(file),
       notes_(notes),
-      parents_(model.nodes.size(), -1),
+      parents_(parents_of(model, file)),
       moved_(model.nodes.size()),
+      weights_(model.nodes.size()),
       is_moved_(model.nodes.size()),
       taken_up_(model.nodes.size(), no_node) {
   const tinygltf::Animation& animation = animation_named(model, name, file);
@@ -93,7 +107,6 @@ GltfAnimation::GltfAnimation(const tinygltf::Model& model, const std::string& na
   if (!(duration_s_ > 0))
     throw Error(file + ": animation \"" + set::printable(name) +
                 "\" moves nothing, or for no time");
-  find_parents();
   find_moved();
 }
 
@@ -109,29 +122,36 @@ void GltfAnimation::read_channel(const tinygltf::Animation& animation,
                                     : given.target_path == "rotation"  ? &moved.rotations
                                     : given.target_path == "scale"     ? &moved.scales
                                                                        : nullptr;
-  if (!channel)
+  const bool is_weights = given.target_path == "weights";
+  if (!channel && !is_weights)
     return notes_.add("animation \"" + set::printable(animation.name) + "\": its channels of \"" +
                       set::printable(given.target_path) + "\" are not played");
+  if (given.sampler < 0 || place(given.sampler) >= animation.samplers.size())
+    throw Error(where + ": there is no sampler " + std::to_string(given.sampler));
+  const tinygltf::AnimationSampler& sampler = animation.samplers[place(given.sampler)];
+  if (is_weights) {
+    weights_[place(given.target_node)] = weight_channel_of(model_, sampler, where);
+    const double end_s = weights_[place(given.target_node)].times_s.back();
+    duration_s_ = std::max(duration_s_, end_s);
+    return;
+  }
   if (!node.matrix.empty())
     throw Error(where + ": " + node_name(model_, given.target_node) +
                 " has a matrix; only translation, rotation and scale can be animated");
-  if (given.sampler < 0 || place(given.sampler) >= animation.samplers.size())
-    throw Error(where + ": there is no sampler " + std::to_string(given.sampler));
-  *channel = channel_of(model_, animation.samplers[place(given.sampler)],
-                        channel == &moved.rotations, where);
+  *channel = channel_of(model_, sampler, channel == &moved.rotations, where);
   moved.moves = true;
   duration_s_ = std::max(duration_s_, channel->times_s.back());
 }
 
-void GltfAnimation::find_parents() {
-  for (std::size_t i = 0; i < parents_.size(); ++i)
-    for (const int child : model_.nodes[i].children) {
-      if (child < 0 || place(child) >= parents_.size())
-        throw Error(file_ + ": there is no node " + std::to_string(child));
-      if (parents_[place(child)] >= 0)
-        throw Error(file_ + ": " + node_name(model_, child) + " has two parents");
-      parents_[place(child)] = static_cast<int>(i);
-    }
+WeightChannel GltfAnimation::weights_of(int node, std::size_t targets) const {
+  const WeightChannel& channel = weights_[place(node)];
+  const bool is_cubic = channel.interpolation == Interpolation::cubic_spline;
+  if (channel.values.size() != channel.times_s.size() * targets * (is_cubic ? 3 : 1))
+    throw Error(file_ + ": " + node_name(model_, node) + ": its animated weights are " +
+                std::to_string(channel.values.size()) + " numbers for " +
+                std::to_string(channel.times_s.size()) + " times and " + std::to_string(targets) +
+                " morph targets");
+  return channel;
 }
 
 // Visits each node once: climbs to an ancestor whose state is known, and goes back down.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "daemon/scene/animation.hpp"
+#include "daemon/scene/deformation.hpp"
 #include "daemon/scene/load_log.hpp"
 
 namespace previz::scene {
@@ -15,8 +16,8 @@ namespace previz::scene {
 class GltfAnimation {
  public:
   // Throws previz::Error naming `file` and the most similar name if there is no animation of this
-  // name, or if its keys cannot be understood. Channels that do not move a node (morph weights)
-  // are noted and left out.
+  // name, or if its keys cannot be understood. Channels of what glTF 2.0 itself does not name are
+  // noted and left out.
   GltfAnimation(const tinygltf::Model& model, const std::string& name, const std::string& file,
                 Notes& notes);
 
@@ -24,11 +25,13 @@ class GltfAnimation {
   // Returns the index in `nodes` of a node that moves, by itself or with an ancestor; the node and
   // its ancestors are added if they are not there yet. Returns no_node if the node stands still.
   std::uint32_t use(int node, std::vector<AnimatedNode>& nodes);
+  // Returns how the weights of the node's morph targets change; the channel is empty where they do
+  // not. Throws previz::Error if it does not have `targets` weights a key.
+  WeightChannel weights_of(int node, std::size_t targets) const;
 
  private:
   void read_channel(const tinygltf::Animation& animation, const tinygltf::AnimationChannel& given,
                     const std::string& where);
-  void find_parents();
   void find_moved();
   std::uint32_t take_up(int node, std::vector<AnimatedNode>& nodes);
 
@@ -39,6 +42,7 @@ class GltfAnimation {
   // These arrays have one entry per node of the file.
   std::vector<int> parents_;  // -1: a root
   std::vector<AnimatedNode> moved_;
+  std::vector<WeightChannel> weights_;
   std::vector<bool> is_moved_;  // the node or an ancestor
   std::vector<std::uint32_t> taken_up_;
 };

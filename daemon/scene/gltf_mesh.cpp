@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "daemon/scene/gltf_accessor.hpp"
+#include "daemon/scene/gltf_deformation.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::scene {
@@ -69,13 +70,14 @@ glm::dvec3 area_normal(const std::vector<glm::vec3>& positions, const glm::uvec3
   return glm::cross(glm::dvec3(positions[triangle.y]) - a, glm::dvec3(positions[triangle.z]) - a);
 }
 
+// Comparisons with NaN are false.
+bool is_usable(const glm::vec3& p) {
+  return std::abs(p.x) <= max_coordinate && std::abs(p.y) <= max_coordinate &&
+         std::abs(p.z) <= max_coordinate;
+}
+
 void drop_bad_triangles(Mesh& mesh, const std::string& what, Notes& notes) {
-  const auto is_finite = [&](std::uint32_t vertex) {
-    const glm::vec3& p = mesh.positions[vertex];
-    // Comparisons with NaN are false.
-    return std::abs(p.x) <= max_coordinate && std::abs(p.y) <= max_coordinate &&
-           std::abs(p.z) <= max_coordinate;
-  };
+  const auto is_finite = [&](std::uint32_t vertex) { return is_usable(mesh.positions[vertex]); };
   std::uint64_t not_finite = 0, no_area = 0;
   std::erase_if(mesh.triangles, [&](const glm::uvec3& triangle) {
     if (!is_finite(triangle.x) || !is_finite(triangle.y) || !is_finite(triangle.z))
@@ -93,41 +95,54 @@ void drop_bad_triangles(Mesh& mesh, const std::string& what, Notes& notes) {
               " no area; dropped");
 }
 
+// Takes the elements of these vertices, `each` for every vertex; an empty array stays empty.
+template <typename T>
+void take(std::vector<T>& values, const std::vector<std::uint32_t>& vertices,
+          std::size_t each = 1) {
+  if (values.empty()) return;
+  std::vector<T> taken;
+  taken.reserve(vertices.size() * each);
+  for (const std::uint32_t vertex : vertices)
+    for (std::size_t i = 0; i < each; ++i) taken.push_back(values[vertex * each + i]);
+  values = std::move(taken);
+}
+
+// Replaces the vertices by those listed, which may repeat. Triangles are left as they are.
+void take_vertices(Mesh& mesh, const std::vector<std::uint32_t>& vertices) {
+  take(mesh.positions, vertices);
+  take(mesh.normals, vertices);
+  take(mesh.uvs, vertices);
+  for (MorphTarget& target : mesh.undeformed.targets) {
+    take(target.positions, vertices);
+    take(target.normals, vertices);
+  }
+  take(mesh.undeformed.influences, vertices, mesh.undeformed.influences_per_vertex);
+}
+
 // Gives every corner of a triangle a vertex of its own.
 void split_corners(Mesh& mesh) {
-  std::vector<glm::vec3> positions;
-  std::vector<glm::vec2> uvs;
-  positions.reserve(3 * mesh.triangles.size());
-  uvs.reserve(mesh.uvs.empty() ? 0 : 3 * mesh.triangles.size());
-  for (glm::uvec3& triangle : mesh.triangles) {
+  std::vector<std::uint32_t> vertices;
+  vertices.reserve(3 * mesh.triangles.size());
+  for (glm::uvec3& triangle : mesh.triangles)
     for (int i = 0; i < 3; ++i) {
       const std::uint32_t vertex = triangle[i];
-      triangle[i] = static_cast<std::uint32_t>(positions.size());
-      positions.push_back(mesh.positions[vertex]);
-      if (!mesh.uvs.empty()) uvs.push_back(mesh.uvs[vertex]);
+      triangle[i] = static_cast<std::uint32_t>(vertices.size());
+      vertices.push_back(vertex);
     }
-  }
-  mesh.positions = std::move(positions);
-  mesh.uvs = std::move(uvs);
+  take_vertices(mesh, vertices);
 }
 
 // Keeps the vertices that a triangle uses, in their order.
 void drop_unused_vertices(Mesh& mesh) {
-  std::vector<std::uint32_t> place(mesh.positions.size(), unused);
+  std::vector<std::uint32_t> place(mesh.positions.size(), unused), vertices;
   for (const glm::uvec3& triangle : mesh.triangles)
     for (int i = 0; i < 3; ++i) place[triangle[i]] = 0;
-  std::uint32_t count = 0;
   for (std::uint32_t vertex = 0; vertex < place.size(); ++vertex) {
     if (place[vertex] == unused) continue;
-    place[vertex] = count;
-    mesh.positions[count] = mesh.positions[vertex];
-    if (!mesh.normals.empty()) mesh.normals[count] = mesh.normals[vertex];
-    if (!mesh.uvs.empty()) mesh.uvs[count] = mesh.uvs[vertex];
-    ++count;
+    place[vertex] = static_cast<std::uint32_t>(vertices.size());
+    vertices.push_back(vertex);
   }
-  mesh.positions.resize(count);
-  if (!mesh.normals.empty()) mesh.normals.resize(count);
-  if (!mesh.uvs.empty()) mesh.uvs.resize(count);
+  take_vertices(mesh, vertices);
   for (glm::uvec3& triangle : mesh.triangles)
     triangle = {place[triangle.x], place[triangle.y], place[triangle.z]};
 }
@@ -221,6 +236,22 @@ MeshSource mesh_source(const tinygltf::Primitive& primitive, const UvMapping& ma
   return source;
 }
 
+bool has_usable_positions(const Mesh& mesh) {
+  return std::ranges::all_of(mesh.positions, is_usable);
+}
+
+bool keep_shape(Mesh& mesh, const std::string& what, Notes& notes) {
+  mesh.undeformed = {};
+  drop_bad_triangles(mesh, what, notes);
+  if (mesh.triangles.empty()) {
+    notes.add(what + ": is empty; skipped");
+    return false;
+  }
+  drop_unused_vertices(mesh);
+  repair_normals(mesh, what, notes);
+  return true;
+}
+
 std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& source,
                               const std::string& where, const std::string& what, Notes& notes,
                               Budget& budget) {
@@ -238,6 +269,7 @@ std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& so
   if ((source.normals >= 0 && mesh.normals.size() != count) ||
       (source.uvs >= 0 && mesh.uvs.size() != count))
     throw Error(where + ": its attributes have different numbers of elements");
+  read_undeformed(model, source, where, what, notes, mesh);
 
   drop_bad_triangles(mesh, what, notes);
   if (mesh.triangles.empty()) {
@@ -252,6 +284,10 @@ std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& so
       budget.add_vertices(3 * mesh.triangles.size() - count, where);
     set_flat_normals(mesh);
   }
+  if (mesh.undeformed.is_empty()) return mesh;
+  mesh.undeformed.positions = mesh.positions;
+  mesh.undeformed.normals = mesh.normals;
+  mesh.undeformed.flat = source.normals < 0;
   return mesh;
 }
 

@@ -7,6 +7,8 @@
 #include <compare>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "daemon/scene/load_log.hpp"
 #include "daemon/scene/scene.hpp"
@@ -26,10 +28,20 @@ struct MeshSource {
   int positions = -1, normals = -1, uvs = -1, indices = -1;  // accessors; -1: none
   int mode = TINYGLTF_MODE_TRIANGLES;
   UvMapping mapping;
+  std::vector<std::pair<int, int>> influences;  // accessors: joints, weights
+  std::vector<std::pair<int, int>> targets;     // accessors: positions, normals; -1: none
+  std::size_t joints = 0;                       // of the skin
   auto operator<=>(const MeshSource&) const = default;
 };
 
 MeshSource mesh_source(const tinygltf::Primitive& primitive, const UvMapping& mapping);
+
+// Takes the shape that the mesh has in its place for good: what deformed it is forgotten. False if
+// no triangle is left; what was dropped is in the notes.
+bool keep_shape(Mesh& mesh, const std::string& what, Notes& notes);
+
+// Returns whether every position is a number of at most 1e15, below which nothing overflows.
+bool has_usable_positions(const Mesh& mesh);
 
 // Returns nothing if no triangle is left; what was dropped is in the notes. `where` names file,
 // mesh and primitive and begins the message of the previz::Error thrown for indices and accessors

@@ -66,6 +66,32 @@ NodeTransform transform_of(const tinygltf::Node& node, const std::string& where)
   return transform;
 }
 
+std::vector<int> parents_of(const tinygltf::Model& model, const std::string& file) {
+  std::vector<int> parents(model.nodes.size(), -1);
+  for (std::size_t i = 0; i < parents.size(); ++i)
+    for (const int child : model.nodes[i].children) {
+      if (child < 0 || static_cast<std::size_t>(child) >= parents.size())
+        throw Error(file + ": there is no node " + std::to_string(child));
+      int& parent = parents[static_cast<std::size_t>(child)];
+      if (parent >= 0) throw Error(file + ": " + node_name(model, child) + " has two parents");
+      parent = static_cast<int>(i);
+    }
+  return parents;
+}
+
+glm::dmat4 FileNodes::file_from_node(int node) const {
+  glm::dmat4 file_from_node(1.0);
+  std::size_t above = 0;
+  for (int at = node; at >= 0; at = parents_[static_cast<std::size_t>(at)]) {
+    if (above++ == parents_.size())
+      throw Error(where_ + ": " + node_name(model_, at) + " is its own ancestor");
+    const tinygltf::Node& given = model_.nodes[static_cast<std::size_t>(at)];
+    file_from_node = transform_of(given, where_ + ": " + node_name(model_, at)).parent_from_node *
+                     file_from_node;
+  }
+  return file_from_node;
+}
+
 std::string node_name(const tinygltf::Model& model, int node) {
   const std::string& name = model.nodes[static_cast<std::size_t>(node)].name;
   return "node " + std::to_string(node) +

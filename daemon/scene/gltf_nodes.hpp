@@ -34,6 +34,24 @@ struct NodeTransform {
 // Throws previz::Error beginning with `where` if the numbers are no valid transform.
 NodeTransform transform_of(const tinygltf::Node& node, const std::string& where);
 
+// Returns the parent of each node of the file, -1 for a root. Throws previz::Error naming `file` if
+// a child does not exist or has two parents.
+std::vector<int> parents_of(const tinygltf::Model& model, const std::string& file);
+
+// The places of a file's nodes at rest, also of those that no scene has.
+class FileNodes {
+ public:
+  // `where` begins the messages of the previz::Errors thrown.
+  FileNodes(const tinygltf::Model& model, std::string where)
+      : model_(model), where_(std::move(where)), parents_(parents_of(model, where_)) {}
+  glm::dmat4 file_from_node(int node) const;
+
+ private:
+  const tinygltf::Model& model_;
+  std::string where_;
+  std::vector<int> parents_;
+};
+
 // Returns a name for messages: "node 3 "cow"".
 std::string node_name(const tinygltf::Model& model, int node);
 

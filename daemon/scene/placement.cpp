@@ -34,8 +34,17 @@ void put_out(set::Light& light) {
 }
 
 // Moves everything to its place in the animation. An instance that is flattened is not seen.
-void play(const Animation& animation, double time_s, Placement& placement) {
+void play(const Scene& scene, const Animation& animation, double time_s, Placement& placement) {
   const std::vector<glm::dmat4> now = world_from_nodes(animation, time_s);
+  for (std::size_t i = 0; i < scene.deformations.size(); ++i) {
+    const Deformation& deformation = scene.deformations[i];
+    if (deformation.object != animation.object) continue;
+    placement.shapes[i] = shape_at(deformation, animation, now, time_s);
+    if (!is_finite(placement.shapes[i])) {
+      placement.shapes[i] = shape_at_rest(deformation);
+      placement.instances[deformation.instance].presence = 0;
+    }
+  }
   for (const Animation::Use& use : animation.instances) {
     Instance& instance = placement.instances[use.what];
     instance.world_from_object = now[use.node];
@@ -73,10 +82,12 @@ session::LightState state_of(const set::Light& light) {
 }
 
 Placement place(const Scene& scene, const set::Set& set, const session::SceneState& state) {
-  Placement placement{scene.instances, scene.lights, {}};
+  Placement placement{scene.instances, scene.lights, {}, {}};
+  for (const Deformation& deformation : scene.deformations)
+    placement.shapes.push_back(shape_at_rest(deformation));
   if (state.animation_s)
     for (const Animation& animation : scene.animations)
-      play(animation, *state.animation_s, placement);
+      play(scene, animation, *state.animation_s, placement);
   for (const auto& [name, world_from_file] : state.objects) {
     const auto found = std::ranges::find(set.objects, name, &set::Object::name);
     if (found == set.objects.end()) {

@@ -10,11 +10,12 @@
 
 namespace previz::scene {
 
-// A placement replaces Scene::instances and Scene::lights; no mesh, material or texture depends on
-// it.
+// A placement replaces Scene::instances and Scene::lights, and shapes the meshes that deform; no
+// other mesh, material or texture depends on it.
 struct Placement {
   std::vector<Instance> instances;
   std::vector<set::Light> lights;
+  std::vector<Shape> shapes;         // of Scene::deformations, in their order
   std::vector<std::string> unknown;  // names in the state that the set lacks, in plain words
 };
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "daemon/scene/animation.hpp"
+#include "daemon/scene/deformation.hpp"
 #include "daemon/set/set.hpp"
 
 namespace previz::scene {
@@ -27,13 +28,15 @@ inline constexpr std::uint32_t world_both = world_mixed | world_real;
 // A mesh is in object space. All three arrays have one entry per vertex; `uvs` is empty where there
 // are none (a texture is then read at (0, 0)). Every vertex is finite and used; no triangle has
 // zero area. Normals are unit and, for at least one adjacent triangle, on the side of
-// counter-clockwise winding.
+// counter-clockwise winding. Of a mesh that deforms that holds before it is deformed; positions and
+// normals are those at rest, as the renderer is given it.
 struct Mesh {
   std::string name;
   std::vector<glm::vec3> positions;
   std::vector<glm::vec3> normals;
   std::vector<glm::vec2> uvs;
   std::vector<glm::uvec3> triangles;  // vertex indices
+  Undeformed undeformed;              // empty: the mesh keeps its shape
 };
 
 // world_from_object is finite and invertible. A negative determinant reverses orientation, but the
@@ -105,7 +108,8 @@ struct Scene {
   // For each light, the index of the [[object]] whose file it came with; no_object for the set's
   // own lamps, which come last, in the set's order.
   std::vector<std::uint32_t> light_objects;
-  std::vector<Animation> animations;  // at most one per object
+  std::vector<Animation> animations;      // at most one per object
+  std::vector<Deformation> deformations;  // of the meshes whose shape an animation changes
   // Notes about what was dropped or not understood while loading, in plain words (counted, never
   // silent).
   std::vector<std::string> notes;

@@ -275,6 +275,63 @@ struct GpuDenoise {
   uint has_companions;  // 1: `uncovered` and `reals` are filtered as well, with the same weights
 };
 
+// Up to four joints that a vertex follows: scene::Influence.
+struct GpuInfluence {
+  uint joints_low, joints_high;  // two of 16 bits each, the first in the low half
+  vec4 weights;
+};
+
+// An offset of a morph target, of one vertex.
+struct GpuMorphOffset {
+  vec3 position, normal;
+};
+
+// A morph target that takes part in a shape.
+struct GpuMorphWeight {
+  uint target;
+  float weight;
+};
+
+// Push constants of the pass that deforms a mesh (daemon/render/deformer.hpp). All firsts count
+// elements of the buffers that hold those of all meshes.
+struct GpuDeform {
+  uint vertices;
+  uint first_vertex;
+  uint first_undeformed;
+  uint influences_per_vertex;  // 0: there is no skin
+  uint first_influence;
+  uint first_joint;
+  uint first_offset;  // of the first target and vertex; a target's offsets are together
+  uint first_weight;
+  uint weights;
+  uint flat_normals;  // 1: vertices 3 i to 3 i + 2 take the normal of their triangle
+};
+
+// A leaf of a deforming mesh's tree: its record, counted from the start of the tree, and its four
+// vertices, counted from the mesh's first.
+struct GpuRefitLeaf {
+  uint record;
+  uvec4 vertices;
+};
+
+// Push constants of the passes that refit a tree.
+struct GpuRefit {
+  uint count;         // leaves or nodes to work on
+  uint first;         // in refit_leaves or refit_nodes
+  uint first_record;  // of the tree, in BVH
+  uint first_box;     // of the tree, in refit_boxes
+  uint first_vertex;  // of the mesh
+  float scale;        // grid space over object space
+};
+
+// The box of a record in grid space, and the expected visits below and including it, times half the
+// tree's surface area.
+struct GpuRefitBox {
+  vec3 low;
+  float cost;
+  vec3 high;
+};
+
 // Push constants of the passes that make the shown picture.
 struct GpuShow {
   uint count;          // pixels to work on
@@ -311,6 +368,12 @@ static_assert(sizeof(GpuFrame) == 192);
 static_assert(sizeof(GpuBatch) == 28);
 static_assert(sizeof(GpuPhoton) == 64);
 static_assert(sizeof(GpuPhotonBucket) == 8);
+static_assert(sizeof(GpuInfluence) == 24);
+static_assert(sizeof(GpuMorphOffset) == 24);
+static_assert(sizeof(GpuDeform) == 40);
+static_assert(sizeof(GpuRefitLeaf) == 20);
+static_assert(sizeof(GpuRefit) == 24);
+static_assert(sizeof(GpuRefitBox) == 28);
 }  // namespace previz::gpu
 #endif
 #endif

@@ -18,4 +18,5 @@ if head -n 1 "$out/rays.md" | grep -q llvmpipe; then default=cpu; else default=w
 "$bench/bench_frame" --clock "${CLOCK:-$default}" --out "$out" | tee "$out/frame.md"
 "$bench/bench_picture" | tee "$out/picture.md"
 "$bench/bench_move" | tee "$out/move.md"
+"$bench/bench_deform" | tee "$out/deform.md"
 [ $# -eq 0 ] || "$bench/bench_equal_error" "$@" | tee "$out/equal_error.md"

@@ -12,6 +12,8 @@
 #include <random>
 
 #include "daemon/render/feature.hpp"
+#include "daemon/scene/bvh_refit.hpp"
+#include "daemon/scene/placement.hpp"
 #include "daemon/scene/scene.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/gltf_writer.hpp"
@@ -21,6 +23,39 @@ namespace previz::test {
 namespace gltf_mutation_test {
 
 using Json = GltfWriter::Json;
+
+// A pyramid with a skin and a morph target, and an animation "go" of both.
+void add_figure(GltfWriter& gltf, Json attributes, int indices) {
+  const std::vector<unsigned char> joints = {0, 1, 0, 0, 1, 0, 0, 0, 1, 1,
+                                             0, 0, 0, 0, 0, 0, 1, 1, 1, 1};
+  const std::vector<glm::vec4> weights(5, glm::vec4(0.75f, 0.25f, 0, 0));
+  const std::vector<glm::mat4> inverse(2, glm::mat4(1));
+  attributes["JOINTS_0"] = gltf.accessor(gltf.view(joints), 5121, "VEC4", 5);
+  attributes["WEIGHTS_0"] =
+      gltf.accessor(gltf.view(GltfWriter::bytes_of(weights)), 5126, "VEC4", 5);
+  const std::vector<glm::vec3> offsets(5, glm::vec3(0, 0.5f, 0));
+  const int mesh = gltf.mesh(
+      {{"attributes", attributes},
+       {"indices", indices},
+       {"targets", {{{"POSITION", gltf.positions(offsets)}, {"NORMAL", gltf.normals(offsets)}}}}},
+      "figure");
+  const int tip = gltf.add("nodes", {{"translation", {0, 1, 0}}});
+  gltf.root("foot", -1, {{"children", {tip}}});
+  gltf.root("figure", mesh, {{"skin", 0}, {"weights", {0.5}}});
+  const int bind =
+      gltf.accessor(gltf.view(GltfWriter::bytes_of(inverse)), 5126, "MAT4", inverse.size());
+  gltf.json["skins"] = {{{"joints", {tip + 1, tip}}, {"inverseBindMatrices", bind}}};
+  const int times = gltf.values<float>(5126, "SCALAR", {0, 1});
+  const int places = gltf.positions({{0, 1, 0}, {1, 1, 0}});
+  const int changes = gltf.values<float>(5126, "SCALAR", {0, 1});
+  gltf.json["animations"] = {
+      {{"name", "go"},
+       {"channels",
+        {{{"sampler", 0}, {"target", {{"node", tip}, {"path", "translation"}}}},
+         {{"sampler", 1}, {"target", {{"node", tip + 2}, {"path", "weights"}}}}}},
+       {"samplers",
+        {{{"input", times}, {"output", places}}, {{"input", times}, {"output", changes}}}}}};
+}
 
 // A bit of everything the loader reads.
 GltfWriter sample() {
@@ -69,6 +104,7 @@ GltfWriter sample() {
       gltf.add("nodes", {{"mesh", strip}, {"rotation", {0, 0.6, 0, 0.8}}, {"scale", {1, -2, 1}}});
   gltf.root("pyramid", pyramid, {{"children", {child}}, {"translation", {0, 1, 0}}});
   gltf.root("lamp", -1, {{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+  add_figure(gltf, attributes, indices);
   gltf.root("again", pyramid, {{"matrix", {0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 3, 0, 0, 1}}});
   return gltf;
 }
@@ -175,6 +211,17 @@ void expect_sound(const scene::Scene& scene) {
     for (const glm::uvec3& t : mesh.triangles)
       ASSERT_LT(std::max({t.x, t.y, t.z}), mesh.positions.size());
   }
+  session::SceneState state;
+  state.animation_s = 0.5;
+  const std::vector<scene::Shape> shapes = scene::place(scene, {}, state).shapes;
+  for (std::size_t i = 0; i < scene.deformations.size(); ++i) {
+    const scene::Mesh& mesh = scene.meshes.at(scene.deformations[i].mesh);
+    ASSERT_EQ(scene::deformed(mesh.undeformed, shapes.at(i)).positions.size(),
+              mesh.positions.size());
+    const auto pairs = scene::deforming_pairs(mesh);
+    ASSERT_GT(scene::build_refittable_bvh(pairs, mesh.positions).bvh.leaves, 0u);
+    scene::deformed_bounds(scene::reach_of(mesh, shapes[i].joints.size()), shapes[i]);
+  }
   for (const scene::Instance& instance : scene.instances) {
     ASSERT_LT(instance.mesh, scene.meshes.size());
     ASSERT_LT(instance.material, scene.materials.size());
@@ -200,9 +247,15 @@ void expect_sound(const scene::Scene& scene) {
 class GltfMutations : public ::testing::Test {
  protected:
   void load(const std::filesystem::path& file) {
+    load(file, "");
+    load(file, "go");
+  }
+
+  void load(const std::filesystem::path& file, const std::string& animation) {
     set::Set set;
     set.objects.resize(1);
     set.objects[0].file = file;
+    set.objects[0].animation = animation;
     const std::clock_t start = std::clock();
     try {
       const scene::Scene scene = scene::load_scene(set);
@@ -245,7 +298,7 @@ TEST_F(GltfMutations, OfBytesOfABinaryFile) {
   std::ifstream stream(directory_ / "sample.glb", std::ios::binary);
   const std::string whole{std::istreambuf_iterator<char>(stream), {}};
   load(directory_ / "sample.glb");
-  ASSERT_EQ(loaded_, 1);
+  ASSERT_EQ(loaded_, 2);
   for (std::uint32_t seed = 0; seed < 4000; ++seed) {
     SCOPED_TRACE(seed);
     std::ofstream(file, std::ios::binary) << Mutator(seed).bytes(whole);

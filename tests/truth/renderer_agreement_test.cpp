@@ -5,6 +5,7 @@
 #include <string>
 
 #include "daemon/lighting/lighting.hpp"
+#include "tests/support/figure.hpp"
 #include "tests/support/render_fixture.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/truth/agreement.hpp"
@@ -30,13 +31,15 @@ Worlds sized(const View& view) {
   return {{k.width, k.height, {}}, {k.width, k.height, {}}};
 }
 
-Worlds gpu_scrambles(const View& view, int samples, bool caustics, std::uint32_t first_seed) {
+Worlds gpu_scrambles(const View& view, int samples, bool caustics, std::uint32_t first_seed,
+                     const std::vector<scene::Shape>& shapes = {}) {
   Worlds worlds = sized(view);
   set::Estimation estimation;
   estimation.caustics = caustics ? set::Caustics::traced : set::Caustics::none;
   render::Renderer renderer(shared_device(), estimation, view.calibration);
   renderer.set_scene(view.scene);
   renderer.set_environment(view.environment, set::LightSampling::importance);
+  renderer.deform(shapes);
   for (std::uint32_t i = 0; i < scrambles; ++i) {
     render::FrameInput frame;
     frame.world_from_camera = view.world_from_camera;
@@ -71,9 +74,13 @@ Worlds cpu_scrambles(const View& view, int samples, bool caustics) {
 
 // Without caustics where mirrors or glass meet small lamps: so rare and bright are the paths that
 // sixteen scrambles do not know their own spread.
-void expect_agreement(const View& view, int samples, bool caustics) {
-  const Worlds gpu = gpu_scrambles(view, samples, caustics, 1000);
-  const Worlds cpu = cpu_scrambles(view, samples, caustics);
+// The GPU deforms the meshes to `shapes`; the CPU tracer is given them in those shapes.
+void expect_agreement(const View& view, int samples, bool caustics,
+                      const std::vector<scene::Shape>& shapes = {}) {
+  const Worlds gpu = gpu_scrambles(view, samples, caustics, 1000, shapes);
+  View still = view;
+  still.scene = posed(view.scene, shapes);
+  const Worlds cpu = cpu_scrambles(still, samples, caustics);
   const truth::Agreement mixed = truth::agreement(gpu.mixed, cpu.mixed);
   EXPECT_TRUE(mixed.agree) << "mixed: " << mixed.report();
   const truth::Agreement real = truth::agreement(gpu.real, cpu.real);
@@ -81,7 +88,8 @@ void expect_agreement(const View& view, int samples, bool caustics) {
 }
 
 // The same picture by both estimators.
-void expect_same_difference(const View& view, int samples, bool caustics) {
+void expect_same_difference(const View& view, int samples, bool caustics,
+                            const std::vector<scene::Shape>& shapes = {}) {
   const auto scrambled = [&](set::Estimator estimator, std::uint32_t first_seed) {
     set::Estimation estimation;
     estimation.estimator = estimator;
@@ -89,6 +97,7 @@ void expect_same_difference(const View& view, int samples, bool caustics) {
     render::Renderer renderer(shared_device(), estimation, view.calibration);
     renderer.set_scene(view.scene);
     renderer.set_environment(view.environment, set::LightSampling::importance);
+    renderer.deform(shapes);
     truth::Scrambles result;
     result.width = view.calibration.intrinsics.width;
     result.height = view.calibration.intrinsics.height;
@@ -346,6 +355,40 @@ TEST(ColouredSolids, AgreeWithTheCpuTracer) {
 
 TEST(ColouredSolids, HaveTheSameDifferenceByBothEstimators) {
   expect_same_difference(coloured_solids(), 16, true);
+}
+
+// A limb and a ball that change their shape, one in both worlds and one virtual, on a table.
+View figures() {
+  View view;
+  scene::Scene& scene = view.scene;
+  add_instance(scene, add_mesh(scene, rectangle_mesh({3, 3})),
+               add_material(scene, diffuse({0.6f, 0.5f, 0.4f})));
+  glm::dmat4 placed(1);
+  placed[3] = {-0.4, 0.2, 0.05, 1};
+  add_limb(scene, limb_mesh(24, 16, 5), 5, add_material(scene, diffuse({0.8f, 0.3f, 0.2f})), placed,
+           scene::world_mixed);
+  placed[3] = {0.5, -0.1, 0.32, 1};
+  add_squeezed_ball(scene, squeezed_ball_mesh(0.3, 32, 16),
+                    add_material(scene, metal({0.3f, 0.5f, 0.7f}, 0.4f)), placed);
+  view.environment = uniform_environment(glm::vec3(0.3f, 0.4f, 0.5f), 8);
+  for (int i = 0; i < 6; ++i) view.environment.radiance[static_cast<std::size_t>(9 + i)] *= 6.0f;
+  view.calibration = pinhole(48, 32, 0.9);
+  view.world_from_camera = look_at({0.3, -2, 1.1}, {0, 0, 0.3});
+  return view;
+}
+
+std::vector<scene::Shape> shapes_of(const View& view) {
+  return {bent_limb(view.scene.deformations[0], 0.3), {{0.9}, {}}};
+}
+
+TEST(DeformedFigures, AgreeWithTheCpuTracer) {
+  const View view = figures();
+  expect_agreement(view, 32, true, shapes_of(view));
+}
+
+TEST(DeformedFigures, HaveTheSameDifferenceByBothEstimators) {
+  const View view = figures();
+  expect_same_difference(view, 16, true, shapes_of(view));
 }
 
 // The difference estimator against the paired one: by the difference where nothing covers the

@@ -60,7 +60,8 @@ Frame picture(int index) {
   return frame;
 }
 
-// A square of this side, facing up, of a matt grey; `animated`: going along X and back each second.
+// A square of this side, facing up, of a matt grey; `animated`: each second it goes along X and
+// back while one of its corners is lifted.
 void write_square(const std::filesystem::path& file, float side_m, float height_m, bool animated) {
   test::GltfWriter gltf;
   const float s = side_m / 2;
@@ -72,17 +73,23 @@ void write_square(const std::filesystem::path& file, float side_m, float height_
                      {{"baseColorFactor", {albedo, albedo, albedo, 1}}, {"metallicFactor", 0}}},
                     {"extensions", {{"KHR_materials_specular", {{"specularFactor", 0}}}}}});
   gltf.json["extensionsUsed"] = {"KHR_materials_specular"};
-  gltf.root("square", gltf.mesh({{"attributes", {{"POSITION", positions}}},
-                                 {"indices", indices},
-                                 {"material", material}}));
+  Json primitive = {
+      {"attributes", {{"POSITION", positions}}}, {"indices", indices}, {"material", material}};
   if (animated) {
+    primitive["targets"] = {
+        {{"POSITION", gltf.positions({{0, 0, 0}, {0, s, 0}, {0, 0, 0}, {0, 0, 0}})}}};
     const int times = gltf.values<float>(5126, "SCALAR", {0, 0.5, 1});
     const int places = gltf.positions({{0, 0, 0}, {0.1f, 0, 0}, {0, 0, 0}});
+    const int weights = gltf.values<float>(5126, "SCALAR", {0, 1, 0});
     gltf.json["animations"] = {
         {{"name", "sway"},
-         {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}}},
-         {"samplers", {{{"input", times}, {"output", places}}}}}};
+         {"channels",
+          {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}},
+           {{"sampler", 1}, {"target", {{"node", 0}, {"path", "weights"}}}}}},
+         {"samplers",
+          {{{"input", times}, {"output", places}}, {{"input", times}, {"output", weights}}}}}};
   }
+  gltf.root("square", gltf.mesh(primitive));
   gltf.save(file);
 }
 

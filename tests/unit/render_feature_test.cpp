@@ -128,6 +128,13 @@ TEST_F(Features, GlassIsColouredWhereItsInsideTakesLightAway) {
   EXPECT_TRUE(needs("coloured glass"));
 }
 
+TEST_F(Features, AnAnimatedShapeIsADeformingObject) {
+  add(diffuse({1, 1, 1}));
+  EXPECT_FALSE(needs("deforming objects"));
+  scene.deformations.emplace_back();
+  EXPECT_TRUE(needs("deforming objects"));
+}
+
 TEST_F(Features, MaterialsOfWhatCannotBeHitDoNotCount) {
   scene::Mesh nothing = box_mesh({1, 1, 1});
   for (glm::vec3& p : nothing.positions) p.x = std::numeric_limits<float>::quiet_NaN();

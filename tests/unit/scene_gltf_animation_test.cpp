@@ -99,10 +99,10 @@ TEST_F(GltfAnimations, StayAtTheirEndWhereTheyDoNotLoop) {
   EXPECT_EQ(world_from_nodes(loaded.animations.at(0), 9)[0][3], glm::dvec4(0, -2, 0, 1));
 }
 
-TEST_F(GltfAnimations, OfMorphWeightsAreToldNotPlayed) {
+TEST_F(GltfAnimations, OfWhatGltfDoesNotNameAreNotedAndNotPlayed) {
   gltf.root("a", gltf.triangle_mesh());
-  go({{{"sampler", 0}, {"target", {{"node", 0}, {"path", "weights"}}}}});
-  EXPECT_THAT(load().notes, Contains(HasSubstr("its channels of \"weights\" are not played")));
+  go({{{"sampler", 0}, {"target", {{"node", 0}, {"path", "pointer"}}}}});
+  EXPECT_THAT(load().notes, Contains(HasSubstr("its channels of \"pointer\" are not played")));
 }
 
 TEST_F(GltfAnimations, AreRefusedWhereTheyMakeNoSense) {

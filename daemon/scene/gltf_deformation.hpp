@@ -1,0 +1,41 @@
+// Reads what changes the shape of meshes: skins, morph targets and their weights (glTF 2.0, 3.7.2
+// and 3.7.3).
+#pragma once
+
+#include <tiny_gltf.h>
+
+#include <string>
+
+#include "daemon/scene/gltf_animation.hpp"
+#include "daemon/scene/gltf_mesh.hpp"
+#include "daemon/scene/load_log.hpp"
+#include "daemon/scene/scene.hpp"
+
+namespace previz::scene {
+
+// What changes the shape of a node's mesh. Of the deformation only the weights, their channel and
+// the joints are set.
+struct NodeDeformation {
+  Deformation deformation;
+  bool is_skinned = false, is_skin_moved = false;
+  bool is_morphed = false, are_weights_moved = false;  // some weight is not 0, or changes
+};
+
+// Reads the skin and the weights of a node that has a mesh. `played` may be null; the joints that
+// it moves are added to `nodes`. Throws previz::Error beginning with `where` for a skin, a joint or
+// a matrix that is not there or makes no sense.
+NodeDeformation read_node_deformation(const tinygltf::Model& model, int node,
+                                      const std::string& where, GltfAnimation* played,
+                                      std::vector<AnimatedNode>& nodes);
+
+// Adds the primitive's joints and targets to the source of its mesh, as far as the node uses them.
+// Throws previz::Error beginning with `where` if their number does not fit the weights'.
+void add_deformation(const tinygltf::Primitive& primitive, const NodeDeformation& node,
+                     const std::string& where, MeshSource& source);
+
+// Reads influences and targets into `mesh.undeformed`; the mesh has its positions, as many as the
+// file. Throws previz::Error beginning with `where`.
+void read_undeformed(const tinygltf::Model& model, const MeshSource& source,
+                     const std::string& where, const std::string& what, Notes& notes, Mesh& mesh);
+
+}  // namespace previz::scene

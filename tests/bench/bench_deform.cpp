@@ -1,0 +1,97 @@
+// What it costs that a figure walks: the time of a frame before which a figure with a skin took
+// another shape, over that of a frame before which nothing changed (P13). Both alternate.
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+#include "daemon/render/renderer.hpp"
+#include "drivers/error.hpp"
+#include "tests/bench/measure.hpp"
+#include "tests/bench/tracers/shapes.hpp"
+#include "tests/support/figure.hpp"
+
+namespace previz::bench {
+namespace {
+
+struct Options {
+  int rings = 500, segments = 50;  // 2 * rings * segments triangles
+  int joints = 60;
+  int rounds = 15;
+  int width = 640, height = 480;
+};
+
+scene::Scene make_scene(const Options& options) {
+  scene::Scene scene = scene_of(grid(4, 8));  // the real table
+  glm::dmat4 placed(1);
+  placed[3] = {-0.3, 0, 0.02, 1};
+  test::add_limb(scene, test::limb_mesh(options.rings, options.segments, options.joints),
+                 options.joints, 0, placed, scene::world_mixed);
+  return scene;
+}
+
+void run(const Options& options) {
+  const auto device = render::open_device();
+  const scene::Scene scene = make_scene(options);
+  ObserverCalibration calibration;
+  calibration.intrinsics = {options.width,
+                            options.height,
+                            1.0 * options.height,
+                            1.0 * options.height,
+                            0.5 * (options.width - 1),
+                            0.5 * (options.height - 1)};
+  set::Estimation estimation;
+  estimation.max_depth = 4;
+  render::Renderer renderer(device, estimation, calibration);
+  renderer.set_scene(scene);
+  renderer.set_environment({4, std::vector<glm::vec3>(16, glm::vec3(0.5f))},
+                           set::LightSampling::importance);
+  render::FrameInput frame;
+  // 3 m above, looking down.
+  frame.world_from_camera = {{1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}, {0, 0, 3, 1}};
+
+  // [0]: nothing changed, [1]: the figure did. In CPU time: the machine may be busy.
+  std::vector<double> placed_ms[2], whole_ms[2];
+  for (int round = -2; round < 2 * options.rounds; ++round) {
+    const std::size_t deformed = round & 1;
+    const double angle = 0.03 * std::sin(0.4 * round);  // a stride is some 16 frames long
+    const std::vector<scene::Shape> shapes = {test::bent_limb(scene.deformations[0], angle)};
+    const double start = cpu_seconds();
+    if (deformed != 0) renderer.deform(shapes);
+    renderer.begin(frame);
+    const double placed = cpu_seconds();
+    renderer.render(1);
+    if (round < 0) continue;  // compiles the pipelines
+    placed_ms[deformed].push_back(1e3 * (placed - start));
+    whole_ms[deformed].push_back(1e3 * (cpu_seconds() - start));
+  }
+  std::printf("%s, %zu triangles, %d joints, %dx%d, 1 sample, CPU ms, %llu trees built anew\n\n",
+              render::device_name(*device).c_str(), scene.meshes.back().triangles.size(),
+              options.joints, options.width, options.height,
+              static_cast<unsigned long long>(renderer.counters().rebuilt_trees));
+  std::printf("| frame | until the first ray | whole |\n| --- | --- | --- |\n");
+  for (const std::size_t deformed : {0, 1})
+    std::printf("| %s | %.2f | %.1f |\n", deformed != 0 ? "deformed" : "still",
+                median(placed_ms[deformed]), median(whole_ms[deformed]));
+}
+
+}  // namespace
+}  // namespace previz::bench
+
+int main(int argc, char** argv) {
+  CLI::App app("The time of frames between which a figure changes its shape");
+  previz::bench::Options options;
+  app.add_option("--rings", options.rings, "100 triangles each")->check(CLI::Range(1, 5000));
+  app.add_option("--joints", options.joints)->check(CLI::Range(1, 1000));
+  app.add_option("--rounds", options.rounds)->check(CLI::Range(1, 1000));
+  app.add_option("--width", options.width)->check(CLI::Range(8, 8192));
+  app.add_option("--height", options.height)->check(CLI::Range(8, 8192));
+  CLI11_PARSE(app, argc, argv);
+  try {
+    previz::bench::run(options);
+  } catch (const previz::Error& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+  return 0;
+}
