@@ -57,6 +57,7 @@ struct Animation {
   struct Use {
     std::uint32_t what = 0;  // index of an instance or a light of the scene
     std::uint32_t node = 0;
+    glm::dmat4 node_from_object{1.0};  // of an instance that is one of the node's copies
   };
   std::uint32_t object = 0;  // index in the set
   double duration_s = 0;     // > 0

@@ -36,6 +36,14 @@ std::uint32_t presence_bits(set::Presence presence) {
 
 }  // namespace
 
+// One use of a mesh by a node.
+struct MeshUse {
+  const Instance& instance;   // the node's
+  glm::dmat4 node_from_copy;  // EXT_mesh_gpu_instancing
+  glm::dmat4 world_from_file;
+  const NodeDeformation& deforms;
+};
+
 struct GltfFile::Loader {
   Loader(const std::filesystem::path& path, Scene& target, Budget& limits)
       : file(path.string()),
@@ -51,8 +59,9 @@ struct GltfFile::Loader {
   }
 
   void add(const set::Object& object, std::uint32_t object_index);
-  void add_mesh(const PlacedNode& placed, const Instance& instance_of_node,
-                const glm::dmat4& world_from_file, NodeDeformation deforms);
+  void add_mesh(const PlacedNode& placed, const MeshUse& use);
+  bool add_primitive(const tinygltf::Primitive& primitive, const MeshUse& use,
+                     const std::string& name, const std::string& suffix, const std::string& what);
   void add_light(const PlacedNode& placed, const glm::dmat4& world_from_node,
                  std::uint32_t presence);
   std::optional<std::uint32_t> use_mesh(const tinygltf::Primitive& primitive,
@@ -60,8 +69,8 @@ struct GltfFile::Loader {
                                         const std::string& what);
   std::optional<std::uint32_t> add_deformed(const tinygltf::Primitive& primitive,
                                             const MeshSource& source, const std::string& name,
-                                            const std::string& what, bool moves,
-                                            const Deformation& deformation);
+                                            const std::string& what,
+                                            const NodeDeformation& deforms);
 
   std::string file;
   Scene& scene;
@@ -70,7 +79,8 @@ struct GltfFile::Loader {
   tinygltf::Model model;
   GltfMaterials materials;
   std::map<MeshSource, std::optional<std::uint32_t>> meshes;  // nothing for an empty mesh
-  std::vector<std::uint32_t> carried;  // instances that the node added last takes along
+  // Instances that the node added last takes along, and where they are in it.
+  std::vector<std::pair<std::uint32_t, glm::dmat4>> carried;
 };
 
 void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index) {
@@ -91,16 +101,21 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
       const std::string where = file + ": " + node_name(model, placed.node);
       if (static_cast<std::size_t>(node.mesh) >= model.meshes.size())
         throw Error(where + ": there is no mesh " + std::to_string(node.mesh));
-      add_mesh(placed, instance, object.world_from_file * z_up_from_y_up,
-               read_node_deformation(model, placed.node, where, played ? &*played : nullptr,
-                                     animation.nodes));
+      NodeDeformation deforms = read_node_deformation(model, placed.node, where,
+                                                      played ? &*played : nullptr, animation.nodes);
+      deforms.deformation.object = object_index;
+      for (const glm::dmat4& node_from_copy : node_from_copies(model, node, where))
+        add_mesh(placed,
+                 {instance, node_from_copy, object.world_from_file * z_up_from_y_up, deforms});
     }
     add_light(placed, instance.world_from_object, instance.presence);
     if (!played) continue;
     const std::uint32_t moved = played->use(placed.node, animation.nodes);
     if (moved == no_node) continue;
-    for (const std::uint32_t i : carried) animation.instances.push_back({i, moved});
-    for (auto i = first_light; i < scene.lights.size(); ++i) animation.lights.push_back({i, moved});
+    for (const auto& [i, node_from_object] : carried)
+      animation.instances.push_back({i, moved, node_from_object});
+    for (auto i = first_light; i < scene.lights.size(); ++i)
+      animation.lights.push_back({i, moved, glm::dmat4(1)});
   }
   if (!played && !model.animations.empty())
     notes.add("object \"" + set::printable(object.name) + "\" plays none of its " +
@@ -116,12 +131,9 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
     notes.add("object \"" + set::printable(object.name) + "\" has nothing to see in it");
 }
 
-void GltfFile::Loader::add_mesh(const PlacedNode& placed, const Instance& instance_of_node,
-                                const glm::dmat4& world_from_file, NodeDeformation deforms) {
-  const std::string node = node_name(model, placed.node);
+void GltfFile::Loader::add_mesh(const PlacedNode& placed, const MeshUse& use) {
   const int index = model.nodes[static_cast<std::size_t>(placed.node)].mesh;
   const tinygltf::Mesh& mesh = model.meshes[static_cast<std::size_t>(index)];
-  deforms.deformation.object = instance_of_node.object;
   if (mesh.primitives.empty())
     notes.add("mesh " + std::to_string(index) + ": has no primitives; skipped");
   for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
@@ -135,61 +147,71 @@ void GltfFile::Loader::add_mesh(const PlacedNode& placed, const Instance& instan
     if (primitive.mode > TINYGLTF_MODE_TRIANGLE_FAN)
       throw Error(file + ": " + what + ": mode " + std::to_string(primitive.mode) +
                   " is not one of glTF's");
-    const UsedMaterial material = materials.use(primitive.material);
-    MeshSource source = mesh_source(primitive, material.mapping);
-    add_deformation(primitive, deforms, file + ": " + what, source);
-    if (material.is_textured && source.uvs < 0)
-      notes.add(what + ": has no TEXCOORD_" + std::to_string(material.mapping.set) +
-                " for its textures; they are read at (0, 0)");
-    const bool is_skinned = !source.influences.empty();
-    Instance instance = instance_of_node;
-    if (is_skinned) instance.world_from_object = world_from_file;
-    if (!is_invertible(instance.world_from_object)) {
-      notes.add(node + ": its transform is singular or not finite; skipped");
-      return;
-    }
     std::string suffix;
     if (mesh.primitives.size() > 1) suffix.append(".").append(std::to_string(i));
-    const bool moves = (is_skinned && deforms.is_skin_moved) ||
-                       (!source.targets.empty() && deforms.are_weights_moved);
-    const auto instance_index = static_cast<std::uint32_t>(scene.instances.size());
-    deforms.deformation.instance = instance_index;
-    const auto used =
-        is_skinned || !source.targets.empty()
-            ? add_deformed(primitive, source, mesh.name + suffix, what, moves, deforms.deformation)
-            : use_mesh(primitive, source, mesh.name + suffix, what);
-    if (!used) continue;
-    budget.add_instance(file);
-    instance.name += suffix;
-    instance.mesh = *used;
-    instance.material = material.index;
-    if (!is_skinned) carried.push_back(instance_index);
-    scene.instances.push_back(std::move(instance));
+    if (!add_primitive(primitive, use, mesh.name, suffix, what)) {
+      notes.add(node_name(model, placed.node) +
+                ": its transform is singular or not finite; skipped");
+      return;
+    }
   }
+}
+
+// Returns false if the primitive would have no place.
+bool GltfFile::Loader::add_primitive(const tinygltf::Primitive& primitive, const MeshUse& use,
+                                     const std::string& name, const std::string& suffix,
+                                     const std::string& what) {
+  const bool is_skinned = follows_joints(primitive, use.deforms);
+  Instance instance = use.instance;
+  instance.world_from_object =
+      is_skinned ? use.world_from_file : instance.world_from_object * use.node_from_copy;
+  if (!is_invertible(instance.world_from_object)) return false;
+
+  const UsedMaterial material = materials.use(primitive.material);
+  MeshSource source = mesh_source(primitive, material.mapping);
+  add_deformation(primitive, use.deforms, file + ": " + what, source);
+  if (material.is_textured && source.uvs < 0)
+    notes.add(what + ": has no TEXCOORD_" + std::to_string(material.mapping.set) +
+              " for its textures; they are read at (0, 0)");
+  const auto index = static_cast<std::uint32_t>(scene.instances.size());
+  const auto mesh = is_skinned || !source.targets.empty()
+                        ? add_deformed(primitive, source, name + suffix, what, use.deforms)
+                        : use_mesh(primitive, source, name + suffix, what);
+  if (!mesh) return true;
+  budget.add_instance(file);
+  instance.name += suffix;
+  instance.mesh = *mesh;
+  instance.material = material.index;
+  if (!is_skinned) carried.emplace_back(index, use.node_from_copy);
+  scene.instances.push_back(std::move(instance));
+  return true;
 }
 
 // Every instance of a mesh that deforms has a mesh of its own.
 std::optional<std::uint32_t> GltfFile::Loader::add_deformed(const tinygltf::Primitive& primitive,
                                                             const MeshSource& source,
                                                             const std::string& name,
-                                                            const std::string& what, bool moves,
-                                                            const Deformation& deformation) {
+                                                            const std::string& what,
+                                                            const NodeDeformation& deforms) {
   if (primitive.attributes.contains("COLOR_0"))
     notes.add(what + ": its vertex colours are ignored");
   std::optional<Mesh> mesh = read_mesh(model, source, file + ": " + what, what, notes, budget);
   if (!mesh) return {};
   mesh->name = name;
-  DeformedVertices at_rest = deformed(mesh->undeformed, shape_at_rest(deformation));
+  DeformedVertices at_rest = deformed(mesh->undeformed, shape_at_rest(deforms.deformation));
   mesh->positions = std::move(at_rest.positions);
   mesh->normals = std::move(at_rest.normals);
+  const bool moves = (!source.influences.empty() && deforms.is_skin_moved) ||
+                     (!source.targets.empty() && deforms.are_weights_moved);
   if (!moves && !keep_shape(*mesh, what, notes)) return {};
   if (!has_usable_positions(*mesh))
     throw Error(file + ": " + what + ": its joints or targets take vertices beyond 1e15 at rest");
   const auto index = static_cast<std::uint32_t>(scene.meshes.size());
   scene.meshes.push_back(std::move(*mesh));
   if (!moves) return index;
-  scene.deformations.push_back(deformation);
+  scene.deformations.push_back(deforms.deformation);
   scene.deformations.back().mesh = index;
+  scene.deformations.back().instance = static_cast<std::uint32_t>(scene.instances.size());
   return index;
 }
 

@@ -144,6 +144,11 @@ NodeDeformation read_node_deformation(const tinygltf::Model& model, int index,
   return result;
 }
 
+bool follows_joints(const tinygltf::Primitive& primitive, const NodeDeformation& node) {
+  return node.is_skinned && attribute_of(primitive.attributes, "JOINTS_0") >= 0 &&
+         attribute_of(primitive.attributes, "WEIGHTS_0") >= 0;
+}
+
 void add_deformation(const tinygltf::Primitive& primitive, const NodeDeformation& node,
                      const std::string& where, MeshSource& source) {
   for (int set = 0; node.is_skinned; ++set) {

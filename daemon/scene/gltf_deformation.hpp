@@ -28,6 +28,9 @@ NodeDeformation read_node_deformation(const tinygltf::Model& model, int node,
                                       const std::string& where, GltfAnimation* played,
                                       std::vector<AnimatedNode>& nodes);
 
+// Returns whether the node's skin moves the primitive. If not, the node itself places it.
+bool follows_joints(const tinygltf::Primitive& primitive, const NodeDeformation& node);
+
 // Adds the primitive's joints and targets to the source of its mesh, as far as the node uses them.
 // Throws previz::Error beginning with `where` if their number does not fit the weights'.
 void add_deformation(const tinygltf::Primitive& primitive, const NodeDeformation& node,

@@ -8,6 +8,8 @@
 #include <numeric>
 #include <set>
 
+#include "daemon/scene/gltf_accessor.hpp"
+#include "daemon/scene/gltf_value.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
 
@@ -64,6 +66,37 @@ NodeTransform transform_of(const tinygltf::Node& node, const std::string& where)
       glm::translate(glm::dmat4(1.0), transform.translation) * glm::mat4_cast(transform.rotation),
       transform.scale);
   return transform;
+}
+
+std::vector<glm::dmat4> node_from_copies(const tinygltf::Model& model, const tinygltf::Node& node,
+                                         const std::string& where) {
+  const tinygltf::Value copies = extension(node.extensions, "EXT_mesh_gpu_instancing");
+  if (!copies.Has("attributes") || !copies.Get("attributes").IsObject()) return {glm::dmat4(1)};
+  const tinygltf::Value& attributes = copies.Get("attributes");
+  const auto accessor = [&](const char* name) {
+    return static_cast<int>(std::clamp(number(attributes, name, -1), -1.0, 2e9));
+  };
+  const std::string what = where + ", its copies";
+  std::vector<glm::vec3> translations, scales;
+  std::vector<glm::vec4> rotations;
+  if (accessor("TRANSLATION") >= 0) translations = read_vec3s(model, accessor("TRANSLATION"), what);
+  if (accessor("ROTATION") >= 0) rotations = read_vec4s(model, accessor("ROTATION"), what);
+  if (accessor("SCALE") >= 0) scales = read_vec3s(model, accessor("SCALE"), what);
+  const std::size_t count = std::max({translations.size(), rotations.size(), scales.size()});
+  const auto fits = [&](std::size_t size) { return size == 0 || size == count; };
+  if (!fits(translations.size()) || !fits(rotations.size()) || !fits(scales.size()))
+    throw Error(what + ": their attributes have different numbers of elements");
+  std::vector<glm::dmat4> places(count, glm::dmat4(1));
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!translations.empty()) places[i] = glm::translate(places[i], glm::dvec3(translations[i]));
+    if (!rotations.empty()) {
+      const glm::dvec4 q = rotations[i];  // x, y, z, w
+      if (!(glm::dot(q, q) > 1e-12)) throw Error(what + ": a rotation has no length");
+      places[i] *= glm::mat4_cast(glm::normalize(glm::dquat(q.w, q.x, q.y, q.z)));
+    }
+    if (!scales.empty()) places[i] = glm::scale(places[i], glm::dvec3(scales[i]));
+  }
+  return places.empty() ? std::vector{glm::dmat4(1)} : places;
 }
 
 std::vector<int> parents_of(const tinygltf::Model& model, const std::string& file) {

@@ -34,6 +34,11 @@ struct NodeTransform {
 // Throws previz::Error beginning with `where` if the numbers are no valid transform.
 NodeTransform transform_of(const tinygltf::Node& node, const std::string& where);
 
+// Returns the places of a node's copies (EXT_mesh_gpu_instancing), or the node's own. Throws
+// previz::Error beginning with `where` if the copies' accessors make no sense.
+std::vector<glm::dmat4> node_from_copies(const tinygltf::Model& model, const tinygltf::Node& node,
+                                         const std::string& where);
+
 // Returns the parent of each node of the file, -1 for a root. Throws previz::Error naming `file` if
 // a child does not exist or has two parents.
 std::vector<int> parents_of(const tinygltf::Model& model, const std::string& file);

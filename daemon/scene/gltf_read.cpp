@@ -16,10 +16,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array known_extensions = {
-    "KHR_lights_punctual",        "KHR_materials_emissive_strength",
-    "KHR_materials_ior",          "KHR_materials_specular",
-    "KHR_materials_transmission", "KHR_materials_volume",
-    "KHR_mesh_quantization",      "KHR_texture_transform"};
+    "EXT_mesh_gpu_instancing", "KHR_lights_punctual",    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",       "KHR_materials_specular", "KHR_materials_transmission",
+    "KHR_materials_volume",    "KHR_mesh_quantization",  "KHR_texture_transform"};
 constexpr int max_json_depth = 128;
 
 // Joins the lines of a tinygltf message.
@@ -115,6 +114,17 @@ std::string_view binary_json(const std::vector<unsigned char>& bytes, const std:
           static_cast<std::size_t>(std::min<std::uint64_t>(json_length, bytes.size() - 20))};
 }
 
+// Returns what a user can do about an extension that cannot be read.
+std::string remedy_for(const std::string& name) {
+  if (name == "KHR_draco_mesh_compression" || name == "EXT_meshopt_compression" ||
+      name == "KHR_meshopt_compression")
+    return "; export the file without compression of meshes, or decompress it: gltf-transform copy "
+           "IN OUT";
+  if (name == "KHR_texture_basisu" || name == "EXT_texture_webp")
+    return "; export the file with textures in PNG or JPEG";
+  return "";
+}
+
 void check_extensions(const tinygltf::Model& model, const std::string& file, Notes& notes) {
   const auto is_known = [](const std::string& name) {
     return std::find(known_extensions.begin(), known_extensions.end(), name) !=
@@ -123,7 +133,7 @@ void check_extensions(const tinygltf::Model& model, const std::string& file, Not
   for (const std::string& name : model.extensionsRequired)
     if (!is_known(name))
       throw Error(file + ": requires the extension \"" + set::printable(name) +
-                  "\", which is not supported");
+                  "\", which is not supported" + remedy_for(name));
   for (const std::string& name : model.extensionsUsed)
     if (!is_known(name))
       notes.add("the extension \"" + set::printable(name) + "\" is not supported; ignored");

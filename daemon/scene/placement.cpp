@@ -47,7 +47,7 @@ void play(const Scene& scene, const Animation& animation, double time_s, Placeme
   }
   for (const Animation::Use& use : animation.instances) {
     Instance& instance = placement.instances[use.what];
-    instance.world_from_object = now[use.node];
+    instance.world_from_object = now[use.node] * use.node_from_object;
     if (!is_invertible(now[use.node])) instance.presence = 0;
   }
   if (animation.lights.empty()) return;

@@ -39,7 +39,10 @@ TEST_F(GltfFiles, RefusesRequiredExtensionsAndNotesUsedOnes) {
   gltf.json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
   EXPECT_EQ(error(), (directory / "test.gltf").string() +
                          ": requires the extension \"KHR_draco_mesh_compression\", which is not "
-                         "supported");
+                         "supported; export the file without compression of meshes, or "
+                         "decompress it: gltf-transform copy IN OUT");
+  gltf.json["extensionsRequired"] = {"EXT_texture_webp"};
+  EXPECT_THAT(error(), HasSubstr("textures in PNG or JPEG"));
 }
 
 TEST_F(GltfFiles, NotesWhatIsNotShown) {

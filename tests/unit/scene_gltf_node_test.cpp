@@ -3,6 +3,7 @@
 #include <glm/matrix.hpp>
 #include <numbers>
 
+#include "daemon/scene/placement.hpp"
 #include "tests/support/gltf_test.hpp"
 
 namespace previz::test {
@@ -54,6 +55,48 @@ TEST_F(GltfNodes, MultipliesTheHierarchyAsComputedByHand) {
   // origin (0,0,1) -> (10,0,1). Then (x, y, z) -> (x, -z, y), then up by 5.
   expect_near(scene.instances[0].world_from_object,
               {0, 2, 0, 0, -2, 0, 0, 0, 0, 0, 2, 0, 10, -1, 5, 1});
+}
+
+// EXT_mesh_gpu_instancing: copies of a mesh, each placed within the node, which an animation may
+// move.
+TEST_F(GltfNodes, PlacesTheCopiesOfANode) {
+  const double half = std::sqrt(0.5);
+  const std::vector<glm::vec4> turns = {{0, 0, 0, 1}, {0, 0, float(half), float(half)}};
+  const int translations = gltf.positions({{1, 0, 0}, {0, 3, 0}});
+  const int scales = gltf.positions({{2, 2, 2}, {1, 1, 1}});
+  const int rotations =
+      gltf.accessor(gltf.view(GltfWriter::bytes_of(turns)), 5126, "VEC4", turns.size());
+  gltf.root(
+      "trees", gltf.triangle_mesh(),
+      {{"translation", {0, 0, 5}},
+       {"extensions",
+        {{"EXT_mesh_gpu_instancing",
+          {{"attributes",
+            {{"TRANSLATION", translations}, {"ROTATION", rotations}, {"SCALE", scales}}}}}}}});
+  gltf.json["extensionsRequired"] = {"EXT_mesh_gpu_instancing"};
+  const int times = gltf.values<float>(5126, "SCALAR", {0, 1});
+  const int places = gltf.positions({{0, 0, 5}, {0, 0, 7}});
+  gltf.json["animations"] = {
+      {{"name", "go"},
+       {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}}},
+       {"samplers", {{{"input", times}, {"output", places}}}}}};
+  object.animation = "go";
+  object.loops = false;
+  scene::Scene scene = load();
+  EXPECT_THAT(scene.notes, IsEmpty());
+  ASSERT_EQ(scene.instances.size(), 2u);
+  EXPECT_EQ(scene.instances[0].mesh, scene.instances[1].mesh);
+  // glTF's (x, y, z) is the world's (x, -z, y).
+  EXPECT_EQ(world(scene.instances[0], {1, 0, 0}), glm::dvec3(3, -5, 0));
+  EXPECT_NEAR(glm::distance(world(scene.instances[1], {1, 0, 0}), {0, -5, 4}), 0, 1e-6);
+  session::SceneState state;
+  state.animation_s = 1;
+  scene.instances = scene::place(scene, {}, state).instances;
+  EXPECT_EQ(world(scene.instances[0], {1, 0, 0}), glm::dvec3(3, -7, 0));
+  EXPECT_NEAR(glm::distance(world(scene.instances[1], {1, 0, 0}), {0, -7, 4}), 0, 1e-6);
+  gltf.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["SCALE"] =
+      gltf.positions({{1, 1, 1}});
+  EXPECT_THAT(error(), HasSubstr("its copies: their attributes have different numbers"));
 }
 
 TEST_F(GltfNodes, KeepsMirroredTransformsAndTheFrontOfTheObject) {
