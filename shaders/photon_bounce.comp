@@ -53,7 +53,7 @@ bool sample_dirac(Surface s, Lobes l, vec3 through, float p_mirror, float choice
   if (cos_o <= 0.0) return false;
   if (choice < p_mirror) {
     wi = 2.0 * cos_o * s.normal - s.wo;
-    weight = reflection_color(l, cos_o) / p_mirror;
+    weight = mirror_color(l, cos_o) / p_mirror;
     if (!reflects_to(s, wi)) return false;
   } else if (has_feature(FEATURE_PANES) && any(greaterThan(through, vec3(0.0)))) {
     wi = 2.0 * cos_o * s.normal - s.wo;  // what passes the pane has passed
@@ -115,7 +115,7 @@ uint meet_surface(inout Flight f, Surface s, GpuHit hit, vec2 random) {
     l = without_passing(s, l, through);
   }
   cross_medium(f, s, hit.t);
-  const float mirror = l.smooth_reflection ? l.p_reflection : 0.0;
+  const float mirror = mirror_probability(l);
   const float dirac = mirror + (l.smooth_glass ? l.p_glass : 0.0);
   const float rough = is_rough(l) ? 1.0 - dirac : 0.0;
   const float p_stay = f.vertices > 0u && rough > 0.0 ? rough / (rough + dirac) : 0.0;

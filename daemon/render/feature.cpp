@@ -69,7 +69,7 @@ bool lamps_shine(const Scene& scene) {
          });
 }
 
-constexpr std::array<Feature, 21> feature_table = {{
+constexpr std::array<Feature, 23> feature_table = {{
     {.name = "two worlds",
      .bit = gpu::FEATURE_FORKS,
      .can_be_carried = true,
@@ -110,6 +110,12 @@ constexpr std::array<Feature, 21> feature_table = {{
      .in_material = reflects,
      .used = "a surface reflects: metal, or the sheen of paint or plastic",
      .left_out = "every surface is matt"},
+    {.name = "lacquer",
+     .bit = gpu::FEATURE_CLEARCOAT,
+     .can_be_carried = true,
+     .in_material = [](const Material& m, const Scene&, double) { return m.clearcoat > 0; },
+     .used = "a surface has a clear coat above its own",
+     .left_out = "no surface has a clear coat above its own"},
     {.name = "metal",
      .in_material = [](const Material& m, const Scene&, double) { return m.metallic > 0; },
      .used = "an object is metal",
@@ -125,7 +131,8 @@ constexpr std::array<Feature, 21> feature_table = {{
      .can_be_carried = true,
      .in_material =
          [](const Material& m, const Scene& scene, double alpha) {
-           return m.thin_walled && scene::transmits(m) && scene::can_be_dirac(scene, m, alpha);
+           return m.thin_walled && m.clearcoat <= 0 && scene::transmits(m) &&
+                  scene::can_be_dirac(scene, m, alpha);
          },
      .used = "light goes straight through thin panes of smooth glass",
      .left_out = "no object is a thin pane of smooth glass"},

@@ -181,7 +181,9 @@ void GpuScene::upload_materials(double specular_alpha) {
                          .alpha = m.alpha,
                          .alpha_cutoff = m.alpha_cutoff,
                          .albedo_table = albedo.first_of(m, specular_alpha),
-                         .attenuation = scene::attenuation_per_m(m)});
+                         .attenuation = scene::attenuation_per_m(m),
+                         .clearcoat = m.clearcoat,
+                         .clearcoat_roughness = m.clearcoat_roughness});
   }
   upload_storage(device_, materials_, materials);
   upload_texels(device_, albedo_, albedo.values, vk::Format::eR32Sfloat);

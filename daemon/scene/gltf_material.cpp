@@ -141,6 +141,18 @@ void GltfMaterials::read_extensions(const tinygltf::Material& given, const std::
     material.attenuation_distance_m = static_cast<float>(distance_m);
   else if (distance_m <= 0)
     notes_.add(what + ": attenuationDistance must be greater than 0; taken as infinite");
+
+  const tinygltf::Value lacquer = extension(given.extensions, "KHR_materials_clearcoat");
+  material.clearcoat =
+      within(number(lacquer, "clearcoatFactor", 0), 0, 1, what + ": clearcoatFactor", notes_);
+  material.clearcoat_roughness = within(number(lacquer, "clearcoatRoughnessFactor", 0), 0, 1,
+                                        what + ": clearcoatRoughnessFactor", notes_);
+  if (material.clearcoat > 0 &&
+      (lacquer.Has("clearcoatTexture") || lacquer.Has("clearcoatRoughnessTexture") ||
+       lacquer.Has("clearcoatNormalTexture")))
+    notes_.add(what + ": the textures of its clear coat are not supported; left out");
+  if (material.clearcoat > 0 && given.normalTexture.index >= 0)
+    notes_.add(what + ": its clear coat follows its normal texture");
 }
 
 }  // namespace previz::scene

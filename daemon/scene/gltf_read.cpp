@@ -16,9 +16,11 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array known_extensions = {
-    "EXT_mesh_gpu_instancing", "KHR_lights_punctual",    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",       "KHR_materials_specular", "KHR_materials_transmission",
-    "KHR_materials_volume",    "KHR_mesh_quantization",  "KHR_texture_transform"};
+    "EXT_mesh_gpu_instancing",    "KHR_lights_punctual",
+    "KHR_materials_clearcoat",    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",          "KHR_materials_specular",
+    "KHR_materials_transmission", "KHR_materials_volume",
+    "KHR_mesh_quantization",      "KHR_texture_transform"};
 constexpr int max_json_depth = 128;
 
 // Joins the lines of a tinygltf message.

@@ -101,6 +101,8 @@ glm::vec3 attenuation_per_m(const Material& m) {
 bool can_be_dirac(const Scene& scene, const Material& m, double specular_alpha) {
   const bool glass = transmits(m);
   if (glass && m.ior < gpu::LEAST_ROUGH_IOR) return true;
+  const double lacquer = m.clearcoat_roughness;
+  if (m.clearcoat > 0 && lacquer * lacquer <= specular_alpha * (1 + 1e-5)) return true;
   if (!glass && !(m.metallic > 0) && !(m.specular > 0 && m.ior > 1)) return false;
   const double roughness =
       m.roughness * least_roughness_factor(scene, m.metallic_roughness_texture);

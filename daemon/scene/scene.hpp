@@ -80,6 +80,8 @@ struct Material {
   // attenuation_color (Beer-Lambert).
   glm::vec3 attenuation_color{1};
   float attenuation_distance_m = std::numeric_limits<float>::infinity();
+  float clearcoat = 0;            // KHR_materials_clearcoat, 0..1: lacquer above all else
+  float clearcoat_roughness = 0;  // perceptual, 0..1
   std::uint32_t normal_texture = no_texture;  // tangent space, +Y up, along the uvs
   float normal_scale = 1;
 };
@@ -151,8 +153,8 @@ bool attenuates(const Material& material);
 glm::vec3 attenuation_per_m(const Material& material);
 
 // Returns whether light can leave a surface of this material without blur: clear glass, and metal,
-// glass or a coat whose GGX alpha is somewhere at or below `specular_alpha` (shaders/README.md,
-// "Caustics").
+// glass, a coat or lacquer whose GGX alpha is somewhere at or below `specular_alpha`
+// (shaders/README.md, "Caustics").
 bool can_be_dirac(const Scene& scene, const Material& material, double specular_alpha);
 
 Size size_of(const Scene& scene);

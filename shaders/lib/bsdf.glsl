@@ -103,15 +103,25 @@ struct Lobes {
   vec3 conductor_gain;  // returns the energy that single scattering loses
   float glass;
   float glass_gain;
-  float p_diffuse, p_reflection, p_glass;
+  float clear;          // weight of the reflection of a coat of lacquer above all else
+  float p_diffuse, p_reflection, p_glass, p_clear;
   bool smooth_reflection;  // the reflection is a Dirac delta
   bool smooth_glass;
+  bool smooth_clear;
 };
 
 // A lobe is rough here if it is not a Dirac delta.
 bool has_rough_reflection(Lobes l) { return l.p_reflection > 0.0 && !l.smooth_reflection; }
 bool has_rough_glass(Lobes l) { return l.p_glass > 0.0 && !l.smooth_glass; }
-bool is_rough(Lobes l) { return l.p_diffuse > 0.0 || has_rough_reflection(l) || has_rough_glass(l); }
+bool has_rough_clear(Lobes l) {
+  return has_feature(FEATURE_CLEARCOAT) && l.p_clear > 0.0 && !l.smooth_clear;
+}
+bool is_rough(Lobes l) {
+  return l.p_diffuse > 0.0 || has_rough_reflection(l) || has_rough_glass(l) || has_rough_clear(l);
+}
+
+// Lacquer has this index of refraction (KHR_materials_clearcoat).
+const float CLEARCOAT_IOR = 1.5;
 
 // The p_* sum to 1, in proportion to the lobes' luminance, or are all 0 on a black surface.
 Lobes make_lobes(Surface s) {
@@ -146,9 +156,24 @@ Lobes make_lobes(Surface s) {
     const uint table = s.thin_walled ? 0u : s.albedo_table + (s.entering ? 0u : 1u);
     if (!l.smooth_glass) l.glass_gain = 1.0 / single_scatter_albedo(table, nv, s.alpha);
   }
+  l.clear = 0.0;
+  l.smooth_clear = false;
+  if (has_feature(FEATURE_CLEARCOAT) && s.clearcoat > 0.0) {
+    l.clear = s.clearcoat * fresnel_dielectric(nv, CLEARCOAT_IOR);
+    l.smooth_clear = s.clearcoat_alpha <= frame.specular_alpha;
+    // What the lacquer does not reflect is left for what is below it.
+    const float below = 1.0 - l.clear;
+    l.diffuse *= below;
+    l.coat *= below;
+    l.conductor_weight *= below;
+    l.glass *= below;
+    reflection *= below;
+  }
   const float diffuse = luminance(l.diffuse);
-  const float total = diffuse + reflection + l.glass;
+  float total = diffuse + reflection + l.glass;
+  if (has_feature(FEATURE_CLEARCOAT)) total += l.clear;
   const float scale = total > 0.0 ? 1.0 / total : 0.0;
+  l.p_clear = l.clear * scale;
   l.p_diffuse = diffuse * scale;
   l.p_reflection = reflection * scale;
   l.p_glass = l.glass * scale;
@@ -160,6 +185,18 @@ Lobes make_lobes(Surface s) {
 vec3 reflection_color(Lobes l, float cos_half) {
   return vec3(l.coat) +
          l.conductor_weight * l.conductor_gain * fresnel_schlick(l.conductor, cos_half);
+}
+
+// Returns the colour of all reflections that are Dirac deltas.
+vec3 mirror_color(Lobes l, float cos_o) {
+  const vec3 color = l.smooth_reflection ? reflection_color(l, cos_o) : vec3(0.0);
+  return has_feature(FEATURE_CLEARCOAT) && l.smooth_clear ? color + l.clear : color;
+}
+
+// Returns the probability with which bsdf_sample() chooses a reflection that is a Dirac delta.
+float mirror_probability(Lobes l) {
+  const float base = l.smooth_reflection ? l.p_reflection : 0.0;
+  return has_feature(FEATURE_CLEARCOAT) && l.smooth_clear ? base + l.p_clear : base;
 }
 
 // A reflected direction counts only if it is above both the surface and the plane of the shading
@@ -224,6 +261,15 @@ void add_reflection(Surface s, Lobes l, vec3 o, vec3 i, inout vec3 value, inout 
   pdf += probability * density / (1.0 + lambda_o);
 }
 
+// Adds f * cos and the density of rough lacquer.
+void add_clearcoat(Surface s, Lobes l, vec3 o, vec3 i, inout vec3 value, inout float pdf) {
+  const float alpha = s.clearcoat_alpha;
+  const float density = ggx_density(normalize(o + i), alpha) / (4.0 * o.z);
+  const float lambda_o = ggx_lambda(o, alpha);
+  value += l.clear * density / (1.0 + lambda_o + ggx_lambda(i, alpha));
+  pdf += l.p_clear * density / (1.0 + lambda_o);
+}
+
 // Returns f * cos of all lobes that are not Dirac deltas, and in `pdf` the density per steradian
 // with which bsdf_sample() chooses wi among them.
 vec3 bsdf_evaluate(Surface s, Lobes l, vec3 wi, out float pdf) {
@@ -236,11 +282,13 @@ vec3 bsdf_evaluate(Surface s, Lobes l, vec3 wi, out float pdf) {
     pdf = l.p_diffuse * (cos_i / PI);
   }
   const bool glass = has_feature(FEATURE_TRANSMISSION) && has_rough_glass(l);
-  if (!glass && !(has_feature(FEATURE_GLOSSY) && has_rough_reflection(l))) return value;
+  const bool base = glass || (has_feature(FEATURE_GLOSSY) && has_rough_reflection(l));
+  if (!base && !has_rough_clear(l)) return value;
   const mat3 local = make_frame(s.normal);
   const vec3 o = s.wo * local;
   if (o.z <= 0.0) return value;
-  if (reflects)
+  if (reflects && has_rough_clear(l)) add_clearcoat(s, l, o, wi * local, value, pdf);
+  if (reflects && base)
     add_reflection(s, l, o, wi * local, value, pdf);
   else if (glass && dot(wi, s.geometric_normal) < 0.0 && dot(wi, s.normal) < 0.0)
     add_transmission(s, l, o, wi * local, value, pdf);
@@ -299,6 +347,19 @@ bool bsdf_sample(Surface s, Lobes l, vec2 u, float choice, out vec3 wi, out vec3
   weight = vec3(0.0);
   if (choose(u.x, l.p_diffuse)) {
     wi = make_frame(s.normal) * sample_cosine(u);
+  } else if (has_feature(FEATURE_CLEARCOAT) && l.p_clear > 0.0 &&
+             choose(u.x, l.p_clear / (l.p_clear + l.p_glass + l.p_reflection))) {
+    const float cos_o = dot(s.normal, s.wo);
+    if (cos_o <= 0.0) return false;
+    if (l.smooth_clear) {
+      wi = 2.0 * cos_o * s.normal - s.wo;
+      weight = vec3(l.clear / l.p_clear);
+      return reflects_to(s, wi);
+    }
+    const mat3 local = make_frame(s.normal);
+    const vec3 o = s.wo * local;
+    const vec3 h = sample_ggx(o, s.clearcoat_alpha, u);
+    wi = local * (2.0 * dot(o, h) * h - o);
   } else if (has_feature(FEATURE_TRANSMISSION) && l.p_glass > 0.0 &&
              choose(u.x, l.p_glass / (l.p_glass + l.p_reflection))) {
     if (l.smooth_glass) {

@@ -61,6 +61,7 @@ PREVIZ_CONST uint FEATURE_DIFFERENCE = 1024u;  // where possible, only the diffe
 PREVIZ_CONST uint FEATURE_PANES = 16384u;  // any smooth thin wall through which light goes straight
 PREVIZ_CONST uint FEATURE_CAMERA = 8192u;  // the plate gives the radiance of points that it shows
 PREVIZ_CONST uint FEATURE_ATTENUATION = 32768u;  // clear solids that take light away inside
+PREVIZ_CONST uint FEATURE_CLEARCOAT = 65536u;  // a coat of lacquer above the base material
 
 // These bits are a path's state.
 PREVIZ_CONST uint PATH_WORLDS_MASK = 3u;      // WORLD_*
@@ -181,6 +182,8 @@ struct GpuMaterial {
   float alpha_cutoff;
   uint albedo_table;  // rough glass: its table seen from outside; the next is from inside
   vec3 attenuation;   // inside, per metre; 0: clear, or nothing gets in
+  float clearcoat;
+  float clearcoat_roughness;
 };
 
 // glTF's alpha modes: the surface is all there, or there where its alpha reaches the cutoff, or its
@@ -359,7 +362,7 @@ static_assert(sizeof(GpuShadowRay) == 56);
 static_assert(sizeof(GpuPixel) == 144);
 static_assert(sizeof(GpuControl) == 96);
 static_assert(sizeof(GpuInstance) == 112);
-static_assert(sizeof(GpuMaterial) == 96);
+static_assert(sizeof(GpuMaterial) == 104);
 static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
 static_assert(sizeof(GpuLight) == 144);

@@ -36,6 +36,8 @@ struct Surface {
   bool thin_walled;
   uint albedo_table;      // rough glass: its first table of ALBEDO
   vec3 emission;
+  float clearcoat;        // weight of a coat of lacquer above all else
+  float clearcoat_alpha;
   uint medium;            // behind the surface, where that is a coloured solid (lib/medium.glsl)
 };
 
@@ -204,6 +206,8 @@ void apply_material(inout Surface s, uint material, vec2 uv) {
     if (m.emission_texture != NO_INDEX) s.emission *= sample_texture(m.emission_texture, uv).rgb;
   }
   s.alpha = roughness * roughness;
+  s.clearcoat = has_feature(FEATURE_CLEARCOAT) ? m.clearcoat : 0.0;
+  s.clearcoat_alpha = m.clearcoat_roughness * m.clearcoat_roughness;
   s.medium = 0u;
   if (has_feature(FEATURE_ATTENUATION) && any(greaterThan(m.attenuation, vec3(0.0))))
     s.medium = material + 1u;
@@ -211,7 +215,8 @@ void apply_material(inout Surface s, uint material, vec2 uv) {
 
 // Returns whether the surface has any reflecting or refracting lobe, rough or smooth.
 bool is_specular(Surface s) {
-  return s.metallic > 0.0 || s.transmission > 0.0 || (s.specular > 0.0 && s.ior > 1.0);
+  return s.metallic > 0.0 || s.transmission > 0.0 || (s.specular > 0.0 && s.ior > 1.0) ||
+         (has_feature(FEATURE_CLEARCOAT) && s.clearcoat > 0.0);
 }
 
 // At the silhouette of a smooth mesh, or under a normal map, a mirror direction may dip below the

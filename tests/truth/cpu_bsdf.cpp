@@ -148,8 +148,10 @@ std::optional<glm::dvec3> sample_rough_glass(const Bsdf& bsdf, const ShadingPoin
 // What each lobe reflects, and how likely sample() takes it.
 struct Lobes {
   double nv = 0;
-  double plastic_fresnel = 0;                   // s Fr(N.V)
-  double diffuse = 0, specular = 0, glass = 0;  // probabilities, sum 1 unless nothing reflects
+  double plastic_fresnel = 0;  // s Fr(N.V)
+  double lacquer = 0;  // what the clear coat reflects; the rest is left for what is below it
+  // Probabilities, sum 1 unless nothing reflects.
+  double diffuse = 0, specular = 0, glass = 0, clearcoat = 0;
 };
 
 Lobes lobes_of(const Bsdf& bsdf, const ShadingPoint& point) {
@@ -164,21 +166,30 @@ Lobes lobes_of(const Bsdf& bsdf, const ShadingPoint& point) {
     lobes.specular =
         opaque * lobes.plastic_fresnel + bsdf.metallic * mean(schlick(bsdf.base_color, lobes.nv));
   }
-  const double sum = lobes.diffuse + lobes.specular + lobes.glass;
+  lobes.lacquer = bsdf.clearcoat * fresnel_dielectric(std::clamp(lobes.nv, 0.0, 1.0), 1.5);
+  const double below = 1 - lobes.lacquer;
+  lobes.diffuse *= below;
+  lobes.specular *= below;
+  lobes.glass *= below;
+  lobes.clearcoat = lobes.nv > 0 ? lobes.lacquer : 0;
+  const double sum = lobes.diffuse + lobes.specular + lobes.glass + lobes.clearcoat;
   if (sum > 0) {
     lobes.diffuse /= sum;
     lobes.specular /= sum;
     lobes.glass /= sum;
+    lobes.clearcoat /= sum;
   }
   return lobes;
 }
 
-std::optional<BsdfSample> sample_glass(const Bsdf& bsdf, const ShadingPoint& point, double nv,
-                                       double probability, Random& random) {
+std::optional<BsdfSample> sample_glass(const Bsdf& bsdf, const ShadingPoint& point,
+                                       const Lobes& lobes, Random& random) {
+  const double nv = lobes.nv;
   if (nv <= 0) return std::nullopt;
   const glm::dvec3& n = point.shading_normal;
   const double eta = index_behind(bsdf, point);
-  const glm::dvec3 weight((1 - bsdf.metallic) * bsdf.transmission / probability);
+  const glm::dvec3 weight((1 - lobes.lacquer) * (1 - bsdf.metallic) * bsdf.transmission /
+                          lobes.glass);
   if (random.uniform() < glass_reflectance(bsdf, point, nv)) {
     const glm::dvec3 wi = 2 * nv * n - point.wo;
     if (glm::dot(wi, point.geometric_normal) <= 0) return std::nullopt;
@@ -206,19 +217,22 @@ double fresnel_dielectric(double cos_incident, double eta) {
 }
 
 bool is_specular(const Bsdf& bsdf) {
-  return bsdf.metallic > 0 || bsdf.transmission > 0 || (bsdf.specular > 0 && bsdf.ior > 1);
+  return bsdf.metallic > 0 || bsdf.transmission > 0 || bsdf.clearcoat > 0 ||
+         (bsdf.specular > 0 && bsdf.ior > 1);
 }
 
 bool only_dirac(const Bsdf& bsdf) {
   const bool diffuse = bsdf.metallic < 1 && bsdf.transmission < 1;
   const bool rough = !bsdf.smooth && (diffuse || bsdf.metallic > 0);
   const bool glass = bsdf.metallic < 1 && bsdf.transmission > 0 && !bsdf.smooth_glass();
-  return !diffuse && !rough && !glass;
+  const bool lacquer = bsdf.clearcoat > 0 && !bsdf.smooth_clearcoat;
+  return !diffuse && !rough && !glass && !lacquer;
 }
 
 glm::dvec3 straight_through(const Bsdf& bsdf, const ShadingPoint& point) {
   const double nv = glm::dot(point.shading_normal, point.wo);
-  if (!bsdf.thin_walled || !bsdf.smooth_glass() || nv <= 0) return glm::dvec3(0);
+  const bool is_pane = bsdf.thin_walled && bsdf.smooth_glass() && bsdf.clearcoat <= 0;
+  if (!is_pane || nv <= 0) return glm::dvec3(0);
   return (1 - bsdf.metallic) * bsdf.transmission * (1 - glass_reflectance(bsdf, point, nv)) *
          bsdf.base_color;
 }
@@ -229,13 +243,13 @@ bool scatters_behind(const Bsdf& bsdf) {
 
 glm::dvec3 evaluate(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& wi) {
   const double nl = glm::dot(point.shading_normal, wi);
+  const Lobes lobes = lobes_of(bsdf, point);
   glm::dvec3 glass(0);
   if (scatters_behind(bsdf)) {
     glass = (1 - bsdf.metallic) * bsdf.transmission * rough_glass(bsdf, point, wi).value *
-            glass_tint(bsdf, point, nl < 0);
+            glass_tint(bsdf, point, nl < 0) * (1 - lobes.lacquer);
   }
   if (nl <= 0 || glm::dot(point.geometric_normal, wi) <= 0) return glass;
-  const Lobes lobes = lobes_of(bsdf, point);
   const double opaque = (1 - bsdf.metallic) * (1 - bsdf.transmission);
   glm::dvec3 f = opaque * (1 - lobes.plastic_fresnel) / pi * bsdf.base_color;
   if (!bsdf.smooth && lobes.nv > 0) {
@@ -244,6 +258,12 @@ glm::dvec3 evaluate(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec
     f += brdf *
          (opaque * lobes.plastic_fresnel + bsdf.metallic * conductor_gain(bsdf, lobes.nv) *
                                                schlick(bsdf.base_color, glm::dot(point.wo, h)));
+  }
+  f *= 1 - lobes.lacquer;
+  if (!bsdf.smooth_clearcoat && lobes.nv > 0) {
+    const glm::dvec3 h = glm::normalize(point.wo + wi);
+    f += lobes.lacquer *
+         ggx_brdf(nl, lobes.nv, glm::dot(point.shading_normal, h), bsdf.clearcoat_alpha);
   }
   return f * nl + glass;
 }
@@ -258,6 +278,11 @@ double pdf(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& wi) {
     const glm::dvec3 h = glm::normalize(point.wo + wi);
     sum += lobes.specular * ggx_pdf(lobes.nv, glm::dot(point.shading_normal, h), bsdf.alpha);
   }
+  if (!bsdf.smooth_clearcoat && lobes.clearcoat > 0) {
+    const glm::dvec3 h = glm::normalize(point.wo + wi);
+    sum += lobes.clearcoat *
+           ggx_pdf(lobes.nv, glm::dot(point.shading_normal, h), bsdf.clearcoat_alpha);
+  }
   return sum;
 }
 
@@ -265,7 +290,7 @@ std::optional<BsdfSample> sample(const Bsdf& bsdf, const ShadingPoint& point, Ra
   const Lobes lobes = lobes_of(bsdf, point);
   const double choice = random.uniform();
   if (choice < lobes.glass && bsdf.smooth_glass()) {
-    return sample_glass(bsdf, point, lobes.nv, lobes.glass, random);
+    return sample_glass(bsdf, point, lobes, random);
   }
   const glm::dvec3& n = point.shading_normal;
   const Frame frame(n);
@@ -282,10 +307,19 @@ std::optional<BsdfSample> sample(const Bsdf& bsdf, const ShadingPoint& point, Ra
       const double opaque = (1 - bsdf.metallic) * (1 - bsdf.transmission);
       const glm::dvec3 weight =
           opaque * lobes.plastic_fresnel + bsdf.metallic * schlick(bsdf.base_color, lobes.nv);
-      return BsdfSample{wi, weight / lobes.specular, 0, true};
+      return BsdfSample{wi, (1 - lobes.lacquer) * weight / lobes.specular, 0, true};
     }
     const glm::dvec3 wo = frame.local(point.wo);
     const glm::dvec3 h = sample_visible_normal(wo, bsdf.alpha, random.uniform2());
+    wi = frame.world(2 * glm::dot(wo, h) * h - wo);
+  } else if (choice < lobes.glass + lobes.specular + lobes.clearcoat) {
+    if (bsdf.smooth_clearcoat) {
+      wi = 2 * lobes.nv * n - point.wo;
+      if (glm::dot(wi, point.geometric_normal) <= 0) return std::nullopt;
+      return BsdfSample{wi, glm::dvec3(lobes.lacquer / lobes.clearcoat), 0, true};
+    }
+    const glm::dvec3 wo = frame.local(point.wo);
+    const glm::dvec3 h = sample_visible_normal(wo, bsdf.clearcoat_alpha, random.uniform2());
     wi = frame.world(2 * glm::dot(wo, h) * h - wo);
   } else if (lobes.diffuse > 0) {
     const glm::dvec2 u = random.uniform2();

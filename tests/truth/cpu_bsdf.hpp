@@ -18,6 +18,9 @@ struct Bsdf {
   double ior = 1.5;
   double transmission = 0;
   bool thin_walled = true;
+  double clearcoat = 0;  // weight of a coat of lacquer above all else
+  double clearcoat_alpha = 0;
+  bool smooth_clearcoat = true;  // its reflection is a Dirac delta
 
   bool smooth_glass() const { return smooth || ior < 1.001; }  // too little bent to blur
 };

@@ -59,6 +59,10 @@ Bsdf bsdf_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2
   b.ior = m.ior;
   b.transmission = m.transmission;
   b.thin_walled = m.thin_walled;
+  b.clearcoat = m.clearcoat;
+  const double lacquer = m.clearcoat_roughness;
+  b.clearcoat_alpha = lacquer * lacquer;
+  b.smooth_clearcoat = b.clearcoat_alpha <= specular_roughness;
   return b;
 }
 

@@ -263,7 +263,8 @@ glm::dvec3 radiance(const World& world, Ray ray, Random& random, double& first_d
 
     const Vertex& vertex = *met;
     const bool ends = depth == world.options.max_depth;
-    if (ends && straight_through(vertex.bsdf, vertex.point) == glm::dvec3(0)) return sum;
+    const bool is_pane = straight_through(vertex.bsdf, vertex.point) != glm::dvec3(0);
+    if (ends && !is_pane) return sum;
     const glm::dvec3 arriving = throughput * transmittance(at_hit, hit->distance);
     if (!ends && !only_dirac(vertex.bsdf))
       sum += arriving * direct_light(world, vertex, at_hit, random);
@@ -272,7 +273,7 @@ glm::dvec3 radiance(const World& world, Ray ray, Random& random, double& first_d
     if (!next) return sum;
     // To go straight through a pane is no event: the ray, and what competes with it, stay as they
     // are.
-    if (next->dirac && next->wi == -vertex.point.wo) {
+    if (is_pane && next->dirac && next->wi == -vertex.point.wo) {
       throughput *= next->weight;
       passed = hit;
       continue;

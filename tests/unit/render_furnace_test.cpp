@@ -94,6 +94,35 @@ TEST(Furnace, RoughConductorsReflectTheirCompensatedAlbedo) {
   }
 }
 
+scene::Material lacquered(scene::Material below, float roughness) {
+  below.clearcoat = 0.8f;
+  below.clearcoat_roughness = roughness;
+  return below;
+}
+
+// On black, lacquer shows its own reflection; on white, what it does not reflect comes back, so
+// that nothing is lost but what single scattering loses in rough lacquer.
+TEST(Furnace, LacquerReflectsItsShareAndLeavesTheRest) {
+  for (const double angle : {0.1, 1.2}) {
+    const double cosine = std::cos(angle), eta = 1.5;
+    const double behind = std::sqrt(1 - (1 - cosine * cosine) / (eta * eta));
+    const double parallel = (eta * cosine - behind) / (eta * cosine + behind);
+    const double across = (cosine - eta * behind) / (cosine + eta * behind);
+    const double share = 0.8 * 0.5 * (parallel * parallel + across * across);
+    const View black = tilted_plane(lacquered(diffuse(glm::vec3(0)), 0), angle);
+    // The angle varies by 5e-4 over the picture; the slope of the reflectance is below 2.
+    EXPECT_NEAR(mean_mixed(render_clean(black, 1).layers), share, 1e-3);
+    for (const scene::Material& white : {diffuse(glm::vec3(1)), metal(glm::vec3(1), 0)}) {
+      const Rendered smooth = render_clean(tilted_plane(lacquered(white, 0), angle), 16);
+      EXPECT_NEAR(mean_mixed(smooth.layers), 1, tolerance(smooth.layers));
+    }
+    const Rendered rough =
+        render_clean(tilted_plane(lacquered(diffuse(glm::vec3(1)), 0.5f), angle), 16);
+    EXPECT_NEAR(mean_mixed(rough.layers), 1 - share + share * ggx_albedo(cosine, 0.25, 1),
+                tolerance(rough.layers) + 1e-4);
+  }
+}
+
 scene::Material rough_glass(float ior, float roughness, bool thin_walled) {
   scene::Material material = glass(ior);
   material.roughness = roughness;

@@ -32,9 +32,9 @@ class GltfFiles : public GltfTest {
 
 TEST_F(GltfFiles, RefusesRequiredExtensionsAndNotesUsedOnes) {
   gltf.root("a", gltf.triangle_mesh());
-  gltf.json["extensionsUsed"] = {"KHR_materials_clearcoat", "KHR_materials_ior"};
+  gltf.json["extensionsUsed"] = {"KHR_materials_iridescence", "KHR_materials_ior"};
   EXPECT_THAT(load().notes, ElementsAre((directory / "test.gltf").string() +
-                                        ": the extension \"KHR_materials_clearcoat\" is not "
+                                        ": the extension \"KHR_materials_iridescence\" is not "
                                         "supported; ignored"));
   gltf.json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
   EXPECT_EQ(error(), (directory / "test.gltf").string() +

@@ -129,6 +129,18 @@ TEST_F(GltfMaterials, ColourInsideOfGlassIsPerMetre) {
   EXPECT_TRUE(std::isfinite(sigma.b) && sigma.b > 100);  // black is finite, and leaves nothing
 }
 
+TEST_F(GltfMaterials, ReadsLacquer) {
+  const Json lacquer = {{"clearcoatFactor", 0.5}, {"clearcoatRoughnessFactor", 0.25}};
+  const scene::Material m = loaded({{"extensions", {{"KHR_materials_clearcoat", lacquer}}}});
+  EXPECT_EQ(m.clearcoat, 0.5f);
+  EXPECT_EQ(m.clearcoat_roughness, 0.25f);
+  Json textured = lacquer;
+  textured["clearcoatTexture"] = {{"index", 0}};
+  use({{"name", "car"}, {"extensions", {{"KHR_materials_clearcoat", textured}}}});
+  EXPECT_THAT(load().notes,
+              Contains(HasSubstr("\"car\": the textures of its clear coat are not supported")));
+}
+
 TEST_F(GltfMaterials, BringsNumbersIntoRangeWithANote) {
   use({{"name", "odd"},
        {"pbrMetallicRoughness",
