@@ -15,7 +15,7 @@ namespace previz::truth {
 namespace truth_picture_test {
 
 constexpr int judged_frame = 0;
-constexpr int samples = 64;
+constexpr int samples = 32;
 
 // A part of the picture, in whole blocks of the measures.
 struct Part {
@@ -121,7 +121,7 @@ EstimatedFrame with_gains(const TruthFrame& truth, EstimatedFrame estimate, floa
   return composited(truth, std::move(estimate));
 }
 
-// Row "paired" of the bounds, meant for 256 samples, is widened by what chance adds at 8
+// Row "paired" of the bounds, meant for 256 samples, is widened by what chance adds at 32
 // (README.md, "Few samples"); that is measured by a second picture with other random numbers, which
 // must hold the same bounds. Both seeds are fixed, so the figures are those of one throw.
 //
