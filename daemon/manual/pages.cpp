@@ -62,9 +62,9 @@ carrier: A thing that is moved by hand, such as a stick or a tray, with a tag on
 composite: The finished picture: the plate with the virtual objects, their shadows and their light.
 difference: The light that the virtual objects add to the real set or take from it.
 film camera: The camera whose picture is composited; the table [observer] of a set file.
+keep: To write what buttons have changed into the set file.
 lamp: A light source: one that was found in the light camera's picture ("found 1"), or one that the set file declares.
 layer: One of the pictures that an EXR file consists of, such as mask or depth.
-keep: To write what buttons have changed into the set file.
 light camera: The fisheye that looks at the lamps and measures the light on the set.
 live: The mode in which every frame is composited as it comes.
 mixed world: The set as the composite shows it, with the virtual objects and lamps.

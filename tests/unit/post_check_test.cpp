@@ -132,7 +132,8 @@ TEST_F(Check, AgreesWithTheRendererThatSolidBlendingNeedsNoAlpha) {
 }
 
 TEST_F(Check, SaysWhatIsColouredInside) {
-  write("a.gltf", triangle(R"("name": "bottle", "extensions": {
+  write("a.gltf",
+        triangle(R"("name": "bottle", "pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": {
     "KHR_materials_transmission": {"transmissionFactor": 1},
     "KHR_materials_volume": {"thicknessFactor": 0.01, "attenuationColor": [0, 1, 0],
                              "attenuationDistance": 0.1}})"));
