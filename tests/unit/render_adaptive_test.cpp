@@ -235,7 +235,7 @@ TEST(Adaptive, StoppingAtAnErrorLosesNoLight) {
     for (const glm::vec3& value : renderer.layers().composite) sum += value.r + value.g + value.b;
     group.sums.push_back(sum);
   };
-  for (std::uint32_t seed = 1; seed <= 64; ++seed) add(adaptive, quality(8, 0.1), seed);
+  for (std::uint32_t seed = 1; seed <= 64; ++seed) add(adaptive, quality(8, 0.3), seed);
   for (std::uint32_t seed = 101; seed <= 116; ++seed) add(even, quality(256, 0), seed);
   const double standard_error =
       std::sqrt(even.squared_standard_error() + adaptive.squared_standard_error());
