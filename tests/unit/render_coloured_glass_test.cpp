@@ -164,8 +164,8 @@ void expect_floor_lit_through_slab(double lamp_z) {
   view.calibration = pinhole(8, 8, 0.4);
   view.world_from_camera = look_at({0, -0.1, 0.28}, {0, 0, 0});
   set::Estimation estimation = up_to_depth(3);
-  estimation.photons = 200;           // a pixel; some reach the floor
-  estimation.photon_radius_px = 0.5;  // of a twentieth of the slab's radius of 0.58 m
+  estimation.photons = 400;  // a pixel; some reach the floor
+  estimation.photon_radius_px = 1;
   glm::dvec3 expected(0), sum(0), squares(0);
   const PinholeIntrinsics& k = view.calibration.intrinsics;
   const glm::dvec3 eye(view.world_from_camera[3]);
@@ -193,9 +193,9 @@ void expect_floor_lit_through_slab(double lamp_z) {
   for (int c = 0; c < 3; ++c) {
     const double error = std::sqrt((squares[c] - sum[c] * sum[c]) / (scrambles - 1.0));
     EXPECT_LT(error, 0.02 * expected[c]) << "too noisy to say anything";
-    // Photons are gathered over 15 mm, which is off by r^2 / 12 of the irradiance's Laplacian: that
-    // is -6 / h^2 of it for a lamp at the height h, and -2 sigma t / h^2 for the slab, together
-    // 35 / m^2 or 7e-4.
+    // Photons are gathered over a pixel, 15 mm of the floor, which is off by r^2 / 12 of the
+    // irradiance's Laplacian: that is -6 / h^2 of it for a lamp at the height h, and -2 sigma t /
+    // h^2 for the slab, together 35 / m^2 or 7e-4.
     EXPECT_NEAR(sum[c], expected[c], 4 * error + 1e-3 * expected[c]) << "channel " << c;
   }
 }
