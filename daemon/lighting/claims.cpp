@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
+#include <numeric>
 
 #include "daemon/lighting/luminance.hpp"
 
@@ -38,6 +39,55 @@ void widen(std::uint32_t label, int texels, int size, std::vector<std::uint32_t>
   for (int i = 0; i < texels; ++i) front = grow(front, size, labels);
 }
 
+// The texels of a claim.
+struct Covered {
+  std::vector<std::uint32_t> texels;
+  std::uint32_t middle = 0;  // the texel nearest to the claim's centre
+  double cosine = -2;        // of the angle between them
+};
+
+std::vector<Covered> covered_by(const std::vector<Claim>& claims, int size,
+                                const FromCamera& from_camera) {
+  std::vector<Covered> covered(claims.size());
+  for (int j = 0; j < size; ++j)
+    for (int i = 0; i < size; ++i) {
+      const auto direction = from_camera(glm::dvec3(texel_direction(size, i, j)));
+      if (!direction) continue;
+      const auto t = static_cast<std::uint32_t>(j * size + i);
+      for (std::size_t c = 0; c < claims.size(); ++c) {
+        const double cosine = glm::dot(*direction, claims[c].centre);
+        if (cosine > covered[c].cosine) covered[c].cosine = cosine, covered[c].middle = t;
+        if (claims[c].covers(*direction)) covered[c].texels.push_back(t);
+      }
+    }
+  // A lamp smaller than a texel covers no texel's centre; it is in the nearest one, if that is
+  // seen.
+  const double at_most = std::max(outline_margin_rad, texel_width_rad(size));
+  for (Covered& claim : covered)
+    if (claim.texels.empty() && claim.cosine >= std::cos(at_most))
+      claim.texels.push_back(claim.middle);
+  return covered;
+}
+
+// Gives a region that others surround its ring in them; one that has the whole map to itself has no
+// light that exceeds anything, and becomes empty.
+void give_inner_ring(std::uint32_t label, const EnvironmentMap& map, BrightRegion& region) {
+  std::vector<std::uint32_t> labels(map.radiance.size(), no_region);
+  for (const std::uint32_t t : region.texels) labels[t] = label;
+  std::vector<std::uint32_t> front = region.texels;
+  glm::dvec3 sum(0);
+  double count = 0;
+  for (int i = 0; i < claim_ring_texels; ++i) {
+    front = grow(front, map.size, labels);
+    for (const std::uint32_t t : front) sum += glm::dvec3(map.radiance[t]);
+    count += static_cast<double>(front.size());
+  }
+  if (count > 0)
+    region.ring = sum / count;
+  else
+    region.texels.clear();
+}
+
 }  // namespace
 
 bool Claim::covers(const glm::dvec3& direction) const {
@@ -51,25 +101,18 @@ Claims::Claims(const std::vector<Claim>& claims, int size, const FromCamera& fro
     : claims_(claims), from_camera_(from_camera), size_(size) {
   if (claims.empty()) return;
   labels_.assign(static_cast<std::size_t>(size) * static_cast<std::size_t>(size), no_region);
-  std::vector<double> nearest(claims.size(), -2);
-  std::vector<std::size_t> middle(claims.size());
-  for (std::size_t t = 0; t < labels_.size(); ++t) {
-    const int i = static_cast<int>(t) % size, j = static_cast<int>(t) / size;
-    const auto direction = from_camera(glm::dvec3(texel_direction(size, i, j)));
-    if (!direction) continue;
-    for (std::uint32_t c = 0; c < claims.size(); ++c) {
-      const double cosine = glm::dot(*direction, claims[c].centre);
-      if (cosine > nearest[c]) nearest[c] = cosine, middle[c] = t;
-      if (labels_[t] == no_region && claims[c].covers(*direction)) labels_[t] = c;
-    }
-  }
+  const std::vector<Covered> covered = covered_by(claims, size, from_camera);
+  std::vector<std::uint32_t> narrowest_first(claims.size());
+  std::iota(narrowest_first.begin(), narrowest_first.end(), 0u);
+  std::ranges::stable_sort(narrowest_first, {},
+                           [&](std::uint32_t c) { return covered[c].texels.size(); });
+  for (const std::uint32_t c : narrowest_first)
+    for (const std::uint32_t t : covered[c].texels)
+      if (labels_[t] == no_region) labels_[t] = c;
   const int margin = std::max(
       blur_texels, static_cast<int>(std::ceil(outline_margin_rad / texel_width_rad(size))));
-  for (std::uint32_t c = 0; c < claims.size(); ++c) {
-    // A lamp smaller than a texel covers no texel's centre.
-    if (nearest[c] > -2 && labels_[middle[c]] == no_region) labels_[middle[c]] = c;
+  for (std::uint32_t c = 0; c < claims.size(); ++c)
     if (claims[c].cone_rad == 0) widen(c, margin, size, labels_);
-  }
 }
 
 // Returns the region of each claim in this map, with its ring.
@@ -114,8 +157,12 @@ std::vector<BrightRegion> Claims::regions(const EnvironmentMap& map,
       ++in_ring[labels[t]];
     }
   }
-  for (std::size_t c = 0; c < result.size(); ++c)
-    if (in_ring[c] > 0) result[c].ring /= static_cast<double>(in_ring[c]);
+  for (std::size_t c = 0; c < result.size(); ++c) {
+    if (in_ring[c] > 0)
+      result[c].ring /= static_cast<double>(in_ring[c]);
+    else
+      give_inner_ring(static_cast<std::uint32_t>(c), map, result[c]);
+  }
   return result;
 }
 
@@ -138,10 +185,12 @@ void Claims::mark(std::vector<Source>& sources) const {
     const auto direction = from_camera_ ? from_camera_(source.direction) : source.direction;
     if (!direction) continue;
     const auto covers = [&](const Claim& claim) {
-      // A lamp's light can have its middle beside a narrow outline; half its width is allowed for.
+      // A lamp's light can have its middle beside a narrow outline, or beside a lamp without a
+      // size; half its width is allowed for.
+      const bool may_be_beside = claim.cone_rad == 0 || !claim.has_size;
       return claim.covers(*direction) ||
-             (claim.cone_rad == 0 && glm::dot(*direction, claim.centre) >=
-                                         std::cos(outline_margin_rad + angular_radius(source)));
+             (may_be_beside && glm::dot(*direction, claim.centre) >=
+                                   std::cos(outline_margin_rad + angular_radius(source)));
     };
     const auto claim = std::ranges::find_if(claims_, covers);
     if (claim != claims_.end()) source.claim = static_cast<int>(claim - claims_.begin());

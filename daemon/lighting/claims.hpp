@@ -43,18 +43,20 @@ using FromCamera = std::function<std::optional<glm::dvec3>(const glm::dvec3& map
 class Claims {
  public:
   Claims() = default;
-  // `size` is the side of the maps in texels. Where claims overlap, the first one counts. An
-  // outline gets its margin, at least the two texels over which a lens blurs it.
+  // `size` is the side of the maps in texels. Where claims overlap, the one that covers fewer
+  // texels counts. An outline gets its margin, at least the two texels over which a lens blurs it.
+  // A lamp that the light camera cannot see (from_camera) claims nothing.
   Claims(const std::vector<Claim>& claims, int size, const FromCamera& from_camera);
 
   bool empty() const { return claims_.empty(); }
   const std::vector<Claim>& all() const { return claims_; }
 
   // Takes the light of every claim out of the map and returns it as sources with Source::claim set;
-  // one claim can have several, or none. Light is what exceeds the mean of the ring around the
-  // claim, which also fills the hole: sources and map together keep the flux. A bright region most
-  // of whose light lies within a claim belongs to it as a whole, because a measured place is never
-  // quite the lamp's; so does the one at the middle of a lamp without a size.
+  // one claim can have several, or none; none if there is no ring around it. Light is what exceeds
+  // the mean of the ring around the claim, which also fills the hole: sources and map together keep
+  // the flux. A bright region most of whose light lies within a claim belongs to it as a whole,
+  // because a measured place is never quite the lamp's; so does the one at the middle of a lamp
+  // without a size.
   std::vector<Source> take_out(EnvironmentMap& map, const set::LightSources& settings) const;
 
   // Marks the sources whose direction lies in a claim, for light that has no map: a recorded one.

@@ -112,15 +112,31 @@ glm::dvec3 angles_of(const glm::dmat3& rotation) {
 
 namespace {
 
+// Returns the names of the states that changes of found lamps mean, by the names of the changes.
+std::map<std::string, std::string> states_meant(const session::SceneState& state,
+                                                const set::Set& set, const Edits& edits) {
+  std::vector<std::string> changed;
+  std::vector<glm::dvec3> towards;
+  for (const auto& [name, edit] : edits.lights)
+    if (edit.found_towards) changed.push_back(name), towards.push_back(*edit.found_towards);
+  std::vector<FoundLamp> known;
+  for (const auto& [name, lamp] : state.lights)
+    if (lamp && !is_declared_lamp(set, name)) known.push_back({name, -lamp->direction});
+  std::map<std::string, std::string> meant;
+  const auto pairs = lamps_meant(towards, known);
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    if (pairs[i]) meant[changed[i]] = known[*pairs[i]].name;
+  return meant;
+}
+
 // Returns the state of the lamp that a change means: as it is in `state`, or else as the set has
 // it.
 session::LightState& state_of_edited(const std::string& name, const LightEdit& edit,
+                                     const std::map<std::string, std::string>& meant,
                                      const set::Set& set, session::SceneState& state) {
   if (edit.found_towards) {
-    for (auto& [other, lamp] : state.lights)
-      if (lamp && !is_declared_lamp(set, other) &&
-          is_same_lamp(-lamp->direction, *edit.found_towards, 0))
-        return *lamp;
+    if (const auto known = meant.find(name); known != meant.end())
+      return *state.lights[known->second];
     std::string free = name;
     while (state.lights.contains(free)) free += '+';
     session::LightState& lamp = state.lights[free].emplace();
@@ -144,11 +160,12 @@ session::SceneState with_edits(session::SceneState state, const set::Set& set, c
     const auto [now, is_new] = state.objects.try_emplace(name, object->world_from_file);
     if (now->second) now->second = edited(*now->second, edit);
   }
+  const std::map<std::string, std::string> meant = states_meant(state, set, edits);
   for (const auto& [name, edit] : edits.lights) {
     const auto is_nowhere = state.lights.find(name);
     if (is_nowhere != state.lights.end() && !is_nowhere->second) continue;
     if (edit.found_towards || is_declared_lamp(set, name))
-      relight(edit, state_of_edited(name, edit, set, state));
+      relight(edit, state_of_edited(name, edit, meant, set, state));
   }
   return state;
 }

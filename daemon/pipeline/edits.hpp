@@ -25,9 +25,13 @@ struct ObjectEdit {
 struct LightEdit {
   double stops = 0;  // brightness in the mixed world, factors of two
   double warm_stops = 0, green_stops = 0;
-  // A lamp that was found in the light: the direction towards it, which says which one is meant.
+  // A lamp that was found in the light: the direction towards it in the light's map, which says
+  // which one is meant.
   std::optional<glm::dvec3> found_towards = {};
-  double found_radius_rad = 0;  // its angular radius, when it was changed last
+  // The same lamp as seen from the light camera, when it was changed last: a unit vector towards
+  // it, and its angular radius.
+  glm::dvec3 found_from_camera{0, 0, 1};
+  double found_radius_rad = 0;
 
   friend bool operator==(const LightEdit&, const LightEdit&) = default;
 };

@@ -4,7 +4,12 @@
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <glm/vector_relational.hpp>
 #include <numbers>
+#include <utility>
+
+#include "drivers/error.hpp"
 
 namespace previz::pipeline {
 namespace {
@@ -25,13 +30,28 @@ constexpr std::array<glm::uvec3, 12> box_sides = {{{0, 1, 3},
                                                    {1, 3, 7},
                                                    {1, 7, 5}}};
 
-std::vector<glm::dvec3> box_outline(const scene::Instance& instance, const scene::Mesh& mesh,
-                                    const glm::dvec3& seen_from) {
-  glm::dvec3 least(mesh.positions.front()), most = least;
+struct Box {
+  glm::dvec3 least, most;
+};
+
+Box box_around(const scene::Mesh& mesh) {
+  Box box{glm::dvec3(mesh.positions.front()), glm::dvec3(mesh.positions.front())};
   for (const glm::vec3& position : mesh.positions) {
-    least = glm::min(least, glm::dvec3(position));
-    most = glm::max(most, glm::dvec3(position));
+    box.least = glm::min(box.least, glm::dvec3(position));
+    box.most = glm::max(box.most, glm::dvec3(position));
   }
+  return box;
+}
+
+bool is_around(const Box& box, const scene::Instance& instance, const glm::dvec3& place) {
+  const glm::dvec3 at(glm::inverse(instance.world_from_object) * glm::dvec4(place, 1));
+  return glm::all(glm::greaterThanEqual(at, box.least)) &&
+         glm::all(glm::lessThanEqual(at, box.most));
+}
+
+std::vector<glm::dvec3> box_outline(const scene::Instance& instance, const Box& box,
+                                    const glm::dvec3& seen_from) {
+  const auto& [least, most] = box;
   std::array<glm::dvec3, 8> corners;
   for (int i = 0; i < 8; ++i) {
     const glm::dvec3 corner((i & 1) != 0 ? most.x : least.x, (i & 2) != 0 ? most.y : least.y,
@@ -94,12 +114,26 @@ Claim claim_of(const set::Light& light, const glm::dvec3& seen_from) {
   return claim;
 }
 
+void add_trouble(const set::Object& object, const char* why, LampClaims& result) {
+  std::string what =
+      "the light of \"" + object.name + "\" is not taken out of the light around the set: " + why;
+  if (std::ranges::find(result.troubles, what) == result.troubles.end())
+    result.troubles.push_back(std::move(what));
+}
+
+// Returns whether a real object that shines moves, and so cannot be taken out where it is; one that
+// an animation moves is noted.
+bool moves(const set::Object& object, LampClaims& result) {
+  if (!object.animation.empty()) add_trouble(object, "an animation moves it", result);
+  return !object.carrier.empty() || !object.animation.empty();
+}
+
 void claim_glowing_objects(const set::Set& set, const scene::Scene& scene,
                            const glm::dvec3& seen_from, LampClaims& result) {
   for (std::size_t i = 0; i < scene.lights.size(); ++i) {
     const std::uint32_t object = scene.light_objects[i];
     if (object == scene::no_object || scene.lights[i].gain_real == 0 ||
-        !set.objects[object].carrier.empty())
+        moves(set.objects[object], result))
       continue;
     result.claims.push_back(claim_of(scene.lights[i], seen_from));
     result.claims.back().lamp = set.objects[object].name;
@@ -108,11 +142,16 @@ void claim_glowing_objects(const set::Set& set, const scene::Scene& scene,
   for (const scene::Instance& instance : scene.instances) {
     const set::Object& object = set.objects[instance.object];
     const bool is_real = (instance.presence & scene::world_real) != 0;
-    if (!is_real || !object.carrier.empty() || !scene::emits(scene.materials[instance.material]))
+    if (!is_real || !scene::emits(scene.materials[instance.material]) || moves(object, result))
       continue;
+    const Box box = box_around(scene.meshes[instance.mesh]);
+    if (is_around(box, instance, seen_from)) {
+      add_trouble(object, "it is around the light camera", result);
+      continue;
+    }
     Claim claim;
     claim.lamp = object.name;
-    claim.outline = box_outline(instance, scene.meshes[instance.mesh], seen_from);
+    claim.outline = box_outline(instance, box, seen_from);
     glm::dvec3 middle(0);
     for (const glm::dvec3& corner : claim.outline)
       middle += corner / static_cast<double>(claim.outline.size());
@@ -127,9 +166,11 @@ void claim_glowing_objects(const set::Set& set, const scene::Scene& scene,
 LampClaims claims_of(const set::Set& set, const scene::Scene* scene, const glm::dvec3& seen_from) {
   LampClaims result;
   for (const set::CapturedLamp& lamp : set.captured_lamps) {
-    const glm::dvec3 direction =
-        lamp.position ? glm::normalize(*lamp.position - seen_from) : lamp.direction;
-    result.claims.push_back({lamp.name, direction, lamp.cone_rad, {}});
+    const glm::dvec3 to_lamp = lamp.position ? *lamp.position - seen_from : lamp.direction;
+    if (glm::length(to_lamp) == 0)
+      throw Error(set.file.string() + ": captured_light \"" + lamp.name +
+                  "\": position_m is where the light camera stands");
+    result.claims.push_back({lamp.name, glm::normalize(to_lamp), lamp.cone_rad, {}});
   }
   for (std::size_t i = 0; i < set.lights.size(); ++i) {
     if (!set.lights[i].captured) continue;

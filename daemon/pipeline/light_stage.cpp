@@ -79,6 +79,7 @@ LightStage::LightStage(const set::Set& set, std::optional<LightCameraCalibration
 
 void LightStage::claim_lamps(const set::Set& set, const scene::Scene* scene, int map_size) {
   claimed_ = claims_of(set, scene, camera_place_);
+  troubles_.insert(troubles_.end(), claimed_.troubles.begin(), claimed_.troubles.end());
   const auto from_camera = [room = room_, from = seen_from_, camera = camera_place_](
                                const glm::dvec3& direction) -> std::optional<glm::dvec3> {
     const auto distance = room ? room->distance(from, direction) : std::nullopt;
@@ -198,11 +199,16 @@ void LightStage::measure_declared(Light& light) const {
     if (index != no_light) {
       const set::Light& lamp = lights_[index];
       const std::optional<glm::dvec3> emission = emission_for(lamp, flux, camera_place_);
-      if (lamp.measured && emission) light.emissions[lamp.name] = *emission / lamp.gain_real;
+      if (lamp.measured)
+        light.emissions[lamp.name] = emission.value_or(glm::dvec3(0)) / lamp.gain_real;
       if (lamp.measured && !emission)
         note +=
             "; it cannot be measured by that, because it does not shine towards the light "
-            "camera";
+            "camera, and is dark until the set file gives its emission";
+      else if (lamp.measured && flux == glm::dvec3(0))
+        note +=
+            "; no lamp is seen there, and it is dark until one is or the set file gives its "
+            "emission";
       else if (emission)
         note += fmt::format("; that is an emission of {:.3g} {:.3g} {:.3g}", emission->r,
                             emission->g, emission->b);
@@ -215,6 +221,7 @@ LightPtr LightStage::placed(lighting::Lighting lighting, std::vector<std::uint64
                             session::CapturedLight record,
                             std::shared_ptr<ImageLamps> image_lamps) const {
   Light light;
+  light.camera_place = camera_place_;
   for (const lighting::Source& source : lighting.sources) add_lamps(source, light.lamps);
   light.encoded = render::encode_environment(lighting.environment);
   light.lighting = std::move(lighting);

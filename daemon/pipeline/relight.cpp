@@ -9,9 +9,10 @@
 namespace previz::pipeline {
 namespace {
 
-// A found lamp farther than this from where it was changed is another lamp.
+// A found lamp farther than this from where it was changed is another lamp. A wide one's middle
+// wanders with what is cut off at its edge, and by about its radius when it is found in two parts.
 constexpr double least_reach_rad = 0.052;  // 3 degrees
-constexpr double reach_in_radii = 4;       // as SourceTracker follows it
+constexpr double reach_in_radii = 1.5;
 
 double angle_between(const glm::dvec3& a, const glm::dvec3& b) {
   return std::acos(std::clamp(glm::dot(a, b), -1.0, 1.0));
@@ -22,18 +23,39 @@ bool is_captured(const set::Set& set, const std::string& name) {
          set.captured_lamps.end();
 }
 
-// Returns the index of the found lamp that a state of this direction means.
-std::optional<std::size_t> lamp_meant(const std::vector<set::Light>& lamps,
-                                      const glm::dvec3& direction) {
-  std::optional<std::size_t> nearest;
-  double least = 4;
+// The states of found lamps, and the lamps that they mean.
+struct Meant {
+  std::vector<const session::LightState*> states;
+  std::vector<std::optional<std::size_t>> lamps;  // of each state: index into the lamps
+  std::vector<std::string> names;                 // of each state
+};
+
+FoundLamp found_lamp(const set::Light& lamp) {
+  return {lamp.name, -lamp.direction, lamp.angular_radius_rad};
+}
+
+// Pairs the states of found lamps with `lamps`, of which those that the set declares do not count.
+Meant meant_by(const session::SceneState& state, const set::Set& set,
+               const std::vector<set::Light>& lamps) {
+  Meant meant;
+  std::vector<glm::dvec3> towards;
+  for (const auto& [name, lamp] : state.lights) {
+    if (!lamp || is_declared_lamp(set, name)) continue;
+    meant.states.push_back(&*lamp);
+    meant.names.push_back(name);
+    towards.push_back(-lamp->direction);
+  }
+  std::vector<FoundLamp> found;
+  std::vector<std::size_t> places;
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     if (lamps[i].captured) continue;
-    const double angle = angle_between(lamps[i].direction, direction);
-    if (angle < least && is_same_lamp(lamps[i].direction, direction, lamps[i].angular_radius_rad))
-      least = angle, nearest = i;
+    found.push_back(found_lamp(lamps[i]));
+    places.push_back(i);
   }
-  return nearest;
+  meant.lamps = lamps_meant(towards, found);
+  for (std::optional<std::size_t>& lamp : meant.lamps)
+    if (lamp) lamp = places[*lamp];
+  return meant;
 }
 
 void relight_found(set::Light& lamp, const session::LightState& state) {
@@ -49,8 +71,28 @@ bool is_declared_lamp(const set::Set& set, const std::string& name) {
              set.captured_lamps.end();
 }
 
-bool is_same_lamp(const glm::dvec3& known, const glm::dvec3& direction, double radius_rad) {
-  return angle_between(known, direction) <= std::max(least_reach_rad, reach_in_radii * radius_rad);
+std::vector<std::optional<std::size_t>> lamps_meant(const std::vector<glm::dvec3>& directions,
+                                                    const std::vector<FoundLamp>& lamps) {
+  struct Pair {
+    double angle;
+    std::size_t direction, lamp;
+  };
+  std::vector<Pair> pairs;
+  for (std::size_t d = 0; d < directions.size(); ++d)
+    for (std::size_t l = 0; l < lamps.size(); ++l) {
+      const double angle = angle_between(directions[d], lamps[l].direction);
+      if (angle <= std::max(least_reach_rad, reach_in_radii * lamps[l].radius_rad))
+        pairs.push_back({angle, d, l});
+    }
+  std::ranges::stable_sort(pairs, {}, &Pair::angle);
+  std::vector<std::optional<std::size_t>> meant(directions.size());
+  std::vector<bool> is_taken(lamps.size());
+  for (const Pair& pair : pairs) {
+    if (meant[pair.direction] || is_taken[pair.lamp]) continue;
+    meant[pair.direction] = pair.lamp;
+    is_taken[pair.lamp] = true;
+  }
+  return meant;
 }
 
 std::vector<FoundLamp> found_lamps(const Light& light) {
@@ -59,7 +101,15 @@ std::vector<FoundLamp> found_lamps(const Light& light) {
     for (const set::Light& lamp : lamps) {
       const bool is_known = std::ranges::find(found, lamp.name, &FoundLamp::name) != found.end();
       if (lamp.captured || is_known) continue;
-      found.push_back({lamp.name, -lamp.direction, lamp.angular_radius_rad});
+      FoundLamp& one = found.emplace_back(found_lamp(lamp));
+      one.from_camera = one.direction;
+      one.radius_from_camera_rad = one.radius_rad;
+      if (lamp.type != set::LightType::sphere) continue;
+      const glm::dvec3 to_lamp = lamp.position - light.camera_place;
+      const double distance = glm::length(to_lamp);
+      if (!(distance > lamp.radius_m)) continue;
+      one.from_camera = to_lamp / distance;
+      one.radius_from_camera_rad = std::asin(lamp.radius_m / distance);
     }
   };
   add(light.lamps);
@@ -75,11 +125,11 @@ LightPtr with_lamps_parted(const LightPtr& light, const set::Set& set,
   if (!light || !light->image_lamps) return light;
   const ImageLamps& all = *light->image_lamps;
   std::vector<bool> wanted(all.texels.size());
-  for (const auto& [name, lamp] : state.lights) {
-    if (!lamp || is_declared_lamp(set, name)) continue;
-    if (const auto meant = lamp_meant(all.lamps, lamp->direction))
-      wanted[static_cast<std::size_t>(all.regions[*meant])] = true;
-  }
+  std::vector<set::Light> lamps = light->lamps;  // those that are parted already, and the others
+  const std::size_t first = lamps.size();
+  lamps.insert(lamps.end(), all.lamps.begin(), all.lamps.end());
+  for (const std::optional<std::size_t>& lamp : meant_by(state, set, lamps).lamps)
+    if (lamp && *lamp >= first) wanted[static_cast<std::size_t>(all.regions[*lamp - first])] = true;
   if (std::ranges::none_of(wanted, [](bool is_wanted) { return is_wanted; })) return light;
   auto parted = std::make_shared<Light>(*light);
   auto left = std::make_shared<ImageLamps>(all);
@@ -102,16 +152,13 @@ LightPtr with_lamps_parted(const LightPtr& light, const set::Set& set,
 std::vector<set::Light> relit(const Light& light, const set::Set& set,
                               const session::SceneState& state) {
   std::vector<set::Light> lamps = light.lamps;
-  for (const auto& [name, changed] : state.lights) {
-    if (!changed) continue;
-    if (is_captured(set, name)) {
+  for (const auto& [name, changed] : state.lights)
+    if (changed && is_captured(set, name))
       for (set::Light& lamp : lamps)
         if (lamp.captured && lamp.name == name) relight_found(lamp, *changed);
-    } else if (!is_declared_lamp(set, name)) {
-      if (const auto meant = lamp_meant(lamps, changed->direction))
-        relight_found(lamps[*meant], *changed);
-    }
-  }
+  const Meant meant = meant_by(state, set, lamps);
+  for (std::size_t i = 0; i < meant.states.size(); ++i)
+    if (meant.lamps[i]) relight_found(lamps[*meant.lamps[i]], *meant.states[i]);
   return lamps;
 }
 
@@ -125,11 +172,10 @@ LampStates lamp_states_beside(const session::SceneState& state, const set::Set& 
 
 std::set<std::string> unmatched(const Light& light, const set::Set& set,
                                 const session::SceneState& state) {
+  const Meant meant = meant_by(state, set, light.lamps);
   std::set<std::string> names;
-  for (const auto& [name, lamp] : lamp_states_beside(state, set)) {
-    const bool is_found = lamp && lamp_meant(light.lamps, lamp->direction);
-    if (!is_found && !is_captured(set, name)) names.insert(name);
-  }
+  for (std::size_t i = 0; i < meant.names.size(); ++i)
+    if (!meant.lamps[i]) names.insert(meant.names[i]);
   return names;
 }
 

@@ -17,8 +17,11 @@ namespace previz::pipeline {
 // A lamp that was found in the light camera's picture, for those who may change it.
 struct FoundLamp {
   std::string name;               // "found 1"; the same from light frame to light frame
-  glm::dvec3 direction{0, 0, 1};  // unit, towards it
+  glm::dvec3 direction{0, 0, 1};  // unit, towards it in the light's map
   double radius_rad = 0;
+  // The same as seen from the light camera, which with a room is not the map's viewpoint.
+  glm::dvec3 from_camera{0, 0, 1};
+  double radius_from_camera_rad = 0;
 
   friend bool operator==(const FoundLamp&, const FoundLamp&) = default;
 };
@@ -30,19 +33,20 @@ std::vector<FoundLamp> found_lamps(const Light& light);
 // Returns whether the set file itself has a lamp of this name.
 bool is_declared_lamp(const set::Set& set, const std::string& name);
 
-// Returns whether a lamp that is found towards `direction` (unit) is the one that was towards
-// `known`.
-bool is_same_lamp(const glm::dvec3& known, const glm::dvec3& direction, double radius_rad);
+// Returns for each direction (unit, where a lamp was when it was changed) the index of the lamp
+// that is meant, if there is one near enough. The nearest are paired first, and no lamp is meant
+// twice.
+std::vector<std::optional<std::size_t>> lamps_meant(const std::vector<glm::dvec3>& directions,
+                                                    const std::vector<FoundLamp>& lamps);
 
 // Returns the light with the found lamps that the state changes as lamps of their own. It is the
-// same light if it has them already, which is so unless the whole image lights the set.
+// same light if it has them already, or has no image that they could still be part of.
 LightPtr with_lamps_parted(const LightPtr& light, const set::Set& set,
                            const session::SceneState& state);
 
 // Returns the light's lamps as the state has them, for render::Renderer::set_sources. A lamp of the
 // set is meant by its name. Any other is meant by its direction, away from the lamp, because the
-// number of a found lamp differs from one run to the next: it is the lamp that is nearest to it,
-// unless none is near.
+// number of a found lamp differs from one run to the next (lamps_meant).
 std::vector<set::Light> relit(const Light& light, const set::Set& set,
                               const session::SceneState& state);
 

@@ -132,15 +132,18 @@ void RenderStage::light(const Shot& shot) {
                   !light->lamps.empty();
   if (has_sources_) renderer_.set_sources(relit(*light, set_, shot.scene));
   is_measured_anew_ |= give_emissions(*light, set_, scene_.lights);
-  unmatched_ = unmatched(*light, set_, shot.scene);
+  std::set<std::string> missing = unmatched(*light, set_, shot.scene);
+  for (const std::string& name : missing)
+    if (!unmatched_.contains(name) && options_.note)
+      options_.note("the lamp \"" + name + "\" that was changed is not found in the light now");
+  unmatched_ = std::move(missing);
   light_ = shot.light;
   relit_ = std::move(changed);
 }
 
 void RenderStage::place(const session::SceneState& state) {
   session::SceneState known = state;
-  for (const auto& [name, lamp] : relit_)
-    if (!unmatched_.contains(name)) known.lights.erase(name);
+  for (const auto& [name, lamp] : relit_) known.lights.erase(name);
   const scene::Placement placement = scene::place(scene_, set_, known);
   for (const std::string& what : placement.unknown)
     if (unknown_.insert(what).second && options_.note) options_.note(what);

@@ -36,6 +36,7 @@ struct Light {
   // Emission of the set's lamps that are as bright as the light camera sees them, by name.
   std::map<std::string, glm::dvec3> emissions;
   render::EncodedEnvironment encoded;    // made in advance, so that no frame waits for it
+  glm::dvec3 camera_place{0};            // where the light camera stands; world, metres
   std::vector<std::uint64_t> sequences;  // empty: an environment given as a file
   session::CapturedLight record;         // the form in which a take carries the light
 };

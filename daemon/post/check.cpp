@@ -260,7 +260,7 @@ void print_lights(const set::Set& set, const scene::Scene& scene, std::ostream& 
   for (const auto& lamp : set.captured_lamps)
     print(lamp.name,
           words("within ", lamp.cone_rad * 180 / std::numbers::pi,
-                " degrees in the light around the set"),
+                " degrees of where it is in the light around the set"),
           lamp.gain_mixed, 1, lamp.tint, "; taken out of it");
 }
 

@@ -60,29 +60,49 @@ std::vector<std::string> Controls::lights() const {
 }
 
 std::string Controls::selected_light() const {
+  if (!light_.empty()) return light_;
   const std::vector<std::string> names = lights();
-  if (names.empty() || std::ranges::find(names, light_) != names.end()) return light_;
-  return names.front();
+  return names.empty() ? "" : names.front();
 }
 
 void Controls::use_found(std::vector<pipeline::FoundLamp> found) {
+  std::vector<std::string> changed;
+  std::vector<glm::dvec3> towards;
+  for (const auto& [name, edit] : edits().lights)
+    if (edit.found_towards) changed.push_back(name), towards.push_back(*edit.found_towards);
+  // A lamp that was changed keeps the name of its change, whatever number it has now, and no other
+  // lamp gets that name.
+  std::vector<bool> is_named(found.size());
+  const auto meant = pipeline::lamps_meant(towards, found);
+  for (std::size_t i = 0; i < meant.size(); ++i)
+    if (meant[i]) {
+      found[*meant[i]].name = changed[i];
+      is_named[*meant[i]] = true;
+    }
   std::vector<std::string> taken = set_lights_;
-  for (pipeline::FoundLamp& lamp : found) {
-    // A lamp that was changed keeps the name of its change, whatever number it has now.
-    const auto known = std::ranges::find_if(edits().lights, [&](const auto& entry) {
-      return entry.second.found_towards &&
-             pipeline::is_same_lamp(*entry.second.found_towards, lamp.direction, lamp.radius_rad);
-    });
-    if (known != edits().lights.end()) lamp.name = known->first;
-    const auto is_taken = [&] { return std::ranges::find(taken, lamp.name) != taken.end(); };
-    for (int number = 1; is_taken(); ++number) lamp.name = "found " + std::to_string(number);
-    taken.push_back(lamp.name);
+  taken.insert(taken.end(), changed.begin(), changed.end());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (is_named[i]) continue;
+    std::string& name = found[i].name;
+    const auto is_taken = [&] { return std::ranges::find(taken, name) != taken.end(); };
+    for (int number = 1; is_taken(); ++number) name = "found " + std::to_string(number);
+    taken.push_back(name);
   }
   std::ranges::stable_sort(found, {}, [](const pipeline::FoundLamp& lamp) {
     return std::pair(lamp.name.size(), lamp.name);  // by number
   });
   // A selected lamp that is gone for a moment stays selected, if only by its name.
   found_ = std::move(found);
+}
+
+// Returns why the selected lamp cannot be changed, if it cannot.
+std::optional<Outcome> Controls::no_lamp() const {
+  const std::string name = selected_light();
+  if (name.empty()) return none_of("lamp");
+  const std::vector<std::string> names = lights();
+  const bool is_there = std::ranges::find(names, name) != names.end();
+  if (is_there || edits().lights.contains(name)) return std::nullopt;
+  return Outcome{name + " is not found in the light now", true, {}};
 }
 
 // Returns the change of the selected lamp; a found one is meant by its direction.
@@ -92,7 +112,8 @@ pipeline::LightEdit& Controls::light_edit() {
   const auto found = std::ranges::find(found_, name, &pipeline::FoundLamp::name);
   if (found != found_.end()) {
     if (!edit.found_towards) edit.found_towards = found->direction;
-    edit.found_radius_rad = found->radius_rad;
+    edit.found_from_camera = found->from_camera;
+    edit.found_radius_rad = found->radius_from_camera_rad;
   }
   return edit;
 }
@@ -286,20 +307,24 @@ Outcome Controls::apply(const set::HoldAnimations&) {
 Outcome Controls::apply(const set::SelectLight& effect) {
   const std::vector<std::string> names = lights();
   if (names.empty()) return none_of("lamp");
-  const auto at = std::ranges::find(names, selected_light()) - names.begin();
-  light_ = names[around(static_cast<std::size_t>(at), effect.next, names.size())];
+  const auto at = std::ranges::find(names, selected_light());
+  // From a lamp that is gone it goes on with the first or the last.
+  const std::size_t from = at != names.end() ? static_cast<std::size_t>(at - names.begin())
+                           : effect.next > 0 ? names.size() - 1
+                                             : 0;
+  light_ = names[around(from, effect.next, names.size())];
   return {"lamp: " + selected_light(), false, {}};
 }
 
 Outcome Controls::apply(const set::DimLight& effect) {
-  if (lights().empty()) return none_of("lamp");
+  if (auto refused = no_lamp()) return *refused;
   double& stops = light_edit().stops;
   stops += effect.steps * control_.light_step_stops;
   return {fmt::format("{} {:+.2f} stops", selected_light(), stops), false, {}};
 }
 
 Outcome Controls::apply(const set::TintLight& effect) {
-  if (lights().empty()) return none_of("lamp");
+  if (auto refused = no_lamp()) return *refused;
   pipeline::LightEdit& edit = light_edit();
   edit.warm_stops += effect.warmer * control_.tint_step_stops;
   edit.green_stops += effect.greener * control_.tint_step_stops;
@@ -310,7 +335,7 @@ Outcome Controls::apply(const set::TintLight& effect) {
 }
 
 Outcome Controls::apply(const set::ResetLight&) {
-  if (lights().empty()) return none_of("lamp");
+  if (auto refused = no_lamp()) return *refused;
   edits().lights.erase(selected_light());
   return {
       selected_light() + " is back as in the " + (look_.of_take ? "take" : "set file"), false, {}};

@@ -110,6 +110,7 @@ class Controls {
   pipeline::Edits& edits() { return look_.of_take ? look_.take_edits : look_.edits; }
   const pipeline::Edits& edits() const { return look_.of_take ? look_.take_edits : look_.edits; }
   std::vector<std::string> lights() const;
+  std::optional<Outcome> no_lamp() const;
   pipeline::LightEdit& light_edit();
 
   const set::Control control_;
@@ -118,7 +119,9 @@ class Controls {
   std::vector<pipeline::FoundLamp> found_;
   const bool is_animated_;
   std::size_t object_ = 0;
-  std::string light_;  // the selected lamp; empty: the first there is
+  // The selected lamp, which stays so while it is not found in the light; empty: the first there
+  // is.
+  std::string light_;
   Look look_;
 };
 

@@ -1,6 +1,7 @@
 #include "daemon/rig/kept_edits.hpp"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -25,12 +26,12 @@ std::string printed(const glm::dvec3& v, double steps) {
   return '[' + printed(v.x, steps) + ", " + printed(v.y, steps) + ", " + printed(v.z, steps) + ']';
 }
 
-// Gains and tints are kept to 1e-6, a millionth of a stop.
+// Gains and tints are kept to seven digits, however small they are.
 std::string printed(double value) {
-  return printed(value, 1e6);
+  return codec::print_number(std::stod(fmt::format("{:.7g}", value)));
 }
 std::string printed(const glm::dvec3& v) {
-  return printed(v, 1e6);
+  return '[' + printed(v.x) + ", " + printed(v.y) + ", " + printed(v.z) + ']';
 }
 
 std::string printed(const glm::dmat4& m) {
@@ -70,7 +71,7 @@ void put_lamp(const char* tables, std::size_t index, double gain_mixed, const gl
 std::string captured_table(const std::string& name, const pipeline::LightEdit& edit) {
   const double cone_deg = std::min(60.0, 1.2 * edit.found_radius_rad * per_degree + 1.5);
   return "[[captured_light]]\nname = " + codec::quote(name) +
-         "\ndirection = " + printed(*edit.found_towards) +
+         "\ndirection = " + printed(edit.found_from_camera, metre_steps) +
          "\ncone_deg = " + printed(cone_deg, degree_steps) +
          "\ngain_mixed = " + printed(std::exp2(edit.stops)) +
          "\ntint = " + printed(pipeline::tint(edit)) + "\n";
@@ -101,12 +102,16 @@ std::filesystem::path keep_beside(const std::filesystem::path& file) {
   for (int number = 1;; ++number) {
     const std::filesystem::path copy = file.string() + '.' + std::to_string(number) + ".old";
     if (std::filesystem::exists(copy)) continue;
-    {
-      const session::OpenFile written(copy, O_WRONLY | O_CREAT | O_EXCL);
+    const session::OpenFile written(copy, O_WRONLY | O_CREAT | O_EXCL);
+    try {
       written.append(content);
       written.sync();
+      std::filesystem::permissions(copy, std::filesystem::status(file).permissions());
+    } catch (...) {  // half a copy is none
+      std::error_code stays;
+      std::filesystem::remove(copy, stays);
+      throw;
     }
-    std::filesystem::permissions(copy, std::filesystem::status(file).permissions());
     return copy;
   }
 }

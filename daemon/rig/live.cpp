@@ -141,6 +141,9 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
         loop.on_signal(SIGHUP, [&] { rig->perform(*set::find_action("reload_set"), "SIGHUP"); });
     rig->run();
     sets.leave(rig->controls().look().edits);
+    if (sets.has_next() && rig->controls().look().take_edits != pipeline::Edits{})
+      reports({report::Severity::warning, "review",
+               "what was changed in the take ends with this reading of the set file"});
     if (!sets.has_next()) service::stopping();
     rig->on_change({});
     bus.reset();

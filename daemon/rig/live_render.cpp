@@ -57,6 +57,7 @@ std::optional<Shot> LiveRender::next_picture() {
     const std::shared_ptr<const Look> look = look_.get();
     save_refined(*look);
     if (look->state.mode != Mode::refine || look->refinements != refinements_) refining_ = false;
+    if (!look->of_take) good_of_take_.reset();
     refinements_ = look->refinements;
     std::optional<Shot> shot =
         look->state.mode == Mode::refine ? refine_round(*look) : wait_for_frame(*look);
@@ -66,12 +67,11 @@ std::optional<Shot> LiveRender::next_picture() {
 }
 
 std::optional<Shot> LiveRender::refine_round(const Look& look) {
+  if (!good_of(look)) return wait_for_frame(look);
   while (channels_.tracked.try_pop()) metrics_.dropped("render", "refining");
-  if (refining_ && refined_edits_ != edits_of_good(look)) {  // P14: moved while it is refined
-    refining_ = false;
-  }
+  if (refining_ && refined_edits_ != edits_of(look)) refining_ = false;  // P14: moved meanwhile
   if (!refining_ && !begin_refinement(look)) return std::nullopt;
-  Shot& shot = *good_;
+  Shot& shot = *good_of(look);
   if (shot.samples >= most_samples) {  // the finished picture stays on the screen
     std::this_thread::sleep_for(patience);
     return refined_;
@@ -96,8 +96,9 @@ std::optional<Shot> LiveRender::refine_round(const Look& look) {
 
 // Each round doubles the samples, but takes at most about a second, so that the crew sees the
 // picture improve.
-int LiveRender::next_round(const Look& look) const {
-  const int wanted = good_->samples == 0 ? look.samples : std::min(good_->samples, most_round);
+int LiveRender::next_round(const Look& look) {
+  const int done = good_of(look)->samples;
+  const int wanted = done == 0 ? look.samples : std::min(done, most_round);
   if (!(sample_s_ > 0)) return 1;  // one sample measures the pace
   return std::clamp(static_cast<int>(round_s / sample_s_), 1, wanted);
 }
@@ -105,27 +106,26 @@ int LiveRender::next_round(const Look& look) const {
 // A refinement has full size, whatever the preview's: it shows the picture that `previzd render`
 // makes.
 bool LiveRender::begin_refinement(const Look& look) {
-  if (!good_) return false;
-  Shot& shot = *good_;
+  Shot& shot = *good_of(look);
   refined_.reset();
   shot.samples = 0;
   // Things may have moved since the frame was captured: in standby, or without a camera or tags.
-  shot.scene = scene_of_good(look);
+  shot.scene = look.of_take ? pipeline::with_edits(recorded_, set_, look.take_edits)
+                            : pipeline::scene_state(set_, look.edits, shot.motion);
   stage_->fill_layers(true);
   stage_->use(look.estimator);
   stage_->resize(1);
   refining_ = stage_->begin(shot);
-  refined_edits_ = edits_of_good(look);
+  refined_edits_ = edits_of(look);
   return refining_;
 }
 
-const pipeline::Edits& LiveRender::edits_of_good(const Look& look) const {
-  return good_recorded_ ? look.take_edits : look.edits;
+std::optional<Shot>& LiveRender::good_of(const Look& look) {
+  return look.of_take ? good_of_take_ : good_;
 }
 
-session::SceneState LiveRender::scene_of_good(const Look& look) const {
-  return good_recorded_ ? pipeline::with_edits(*good_recorded_, set_, look.take_edits)
-                        : pipeline::scene_state(set_, look.edits, good_->motion);
+const pipeline::Edits& LiveRender::edits_of(const Look& look) {
+  return look.of_take ? look.take_edits : look.edits;
 }
 
 void LiveRender::publish_found(const pipeline::LightPtr& light) {
@@ -135,7 +135,7 @@ void LiveRender::publish_found(const pipeline::LightPtr& light) {
 }
 
 std::optional<Shot> LiveRender::wait_for_frame(const Look& look) {
-  const bool review = look.state.mode == Mode::review;
+  const bool review = look.of_take;
   std::optional<Shot> shot = (review ? channels_.reviewed : channels_.tracked).pop_for(patience);
   if (review && channels_.tracked.try_pop()) metrics_.dropped("render", "review");
   if (!shot) return std::nullopt;
@@ -169,7 +169,7 @@ Shot LiveRender::render(const Look& look, Shot shot) {
   stage_->fill_layers(snapshot);
   stage_->resize(governed ? governor_->scale() : set_.quality.scale);
   // A reviewed frame was not captured now, so its loss is not counted.
-  const bool captured = look.state.mode != Mode::review;
+  const bool captured = !look.of_take;
   // The crew's changes go on top of what was recorded, never in its place.
   std::optional<session::SceneState> recorded;
   if (!captured)
@@ -201,7 +201,7 @@ Shot LiveRender::render(const Look& look, Shot shot) {
 
 // Keeps the frame with its pose, light and scene, but without the rendered picture.
 void LiveRender::keep_as_good(const Shot& shot, std::optional<session::SceneState> recorded) {
-  if (!good_) inbox_.post(Event::good_frame);
+  if (!good_ && !good_of_take_) inbox_.post(Event::good_frame);
   Shot good;
   good.index = shot.index;
   good.frame = shot.frame;
@@ -213,8 +213,8 @@ void LiveRender::keep_as_good(const Shot& shot, std::optional<session::SceneStat
   good.scene = shot.scene;
   good.tracking_done = true;
   good.frozen = true;
-  good_ = std::move(good);
-  good_recorded_ = std::move(recorded);
+  (recorded ? good_of_take_ : good_) = std::move(good);
+  if (recorded) recorded_ = std::move(*recorded);
 }
 
 // Saves the picture that was on the screen when the button went down, even if the press ended the

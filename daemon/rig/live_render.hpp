@@ -51,13 +51,13 @@ class LiveRender {
   void save_refined(const Look& look);
   void save(const pipeline::Shot& shot);
   std::optional<pipeline::Shot> refine_round(const Look& look);
-  int next_round(const Look& look) const;
+  int next_round(const Look& look);
   bool begin_refinement(const Look& look);
   std::optional<pipeline::Shot> wait_for_frame(const Look& look);
   pipeline::Shot render(const Look& look, pipeline::Shot shot);
   void keep_as_good(const pipeline::Shot& shot, std::optional<session::SceneState> recorded);
-  const pipeline::Edits& edits_of_good(const Look& look) const;
-  session::SceneState scene_of_good(const Look& look) const;
+  std::optional<pipeline::Shot>& good_of(const Look& look);
+  static const pipeline::Edits& edits_of(const Look& look);
   void publish_found(const pipeline::LightPtr& light);
 
   const set::Set& set_;
@@ -68,9 +68,9 @@ class LiveRender {
   const std::stop_token stop_;
   pipeline::RenderStage* stage_ = nullptr;
   std::optional<pipeline::Governor> governor_;
-  std::optional<pipeline::Shot> good_;  // last shot with pose and light: its frame only
-  // The scene that good_ was recorded with, if it is a frame of a take and not of the rig.
-  std::optional<session::SceneState> good_recorded_;
+  // The last shots with pose and light, of the rig and of the take in review: their frames only.
+  std::optional<pipeline::Shot> good_, good_of_take_;
+  session::SceneState recorded_;           // the scene that good_of_take_ was recorded with
   pipeline::LightPtr found_in_;            // the light that the found lamps were published of
   std::optional<pipeline::Shot> refined_;  // result of the last round, with layers
   bool refining_ = false;

@@ -81,26 +81,32 @@ std::optional<std::string> SetKeeper::keep(const pipeline::Edits& edits) {
     if (session::read_file(target) != running_.text)
       return refused(file.string() + " was changed since it was read; load it again first");
     const std::string text = with_edits(running_.text, running_.set, edits);
-    set::parse_set(text, file);
+    if (text == running_.text)
+      return refused("the changes come to nothing; " + file.string() + " stays as it is");
+    scene::load_scene(set::parse_set(text, file));  // so that it can be loaded
     const std::filesystem::path old = keep_beside(target);
     session::replace_file(target, text);
-    std::filesystem::permissions(target, std::filesystem::status(old).permissions());
+    changes_.kept = Kept{running_.text, edits};
     reports_(
         {Severity::info, "keep", file.string() + " has the changes; as it was: " + old.string()});
   } catch (const std::exception& error) {
     return refused(error.what());
   }
-  std::optional<std::string> why_not = change(0);
-  are_kept_ = !why_not;
-  return why_not;
+  return change(0);
 }
 
-// Keeps the changes that were made to a set that is read again; those to another set end with it.
+// Keeps the changes that were made to a set that is read again; those to another set end with it,
+// and those that its file has by now are not made twice.
 void SetKeeper::carry_edits() {
   const bool is_same = before_ && before_->set.file == running_.set.file;
-  if (!is_same || std::exchange(are_kept_, false)) edits_ = {};
-  are_kept_ = false;
-  for (const std::string& name : pipeline::drop_unknown(edits_, running_.set))
+  auto& [edits, kept] = changes_;
+  const bool are_in_file = is_same && kept && running_.text != kept->text_before;
+  if (are_in_file && edits != kept->edits)
+    reports_({Severity::warning, "keep",
+              "what buttons changed after the changes were kept is dropped: " +
+                  running_.set.file.string() + " was read again"});
+  if (!is_same || are_in_file) changes_ = {};
+  for (const std::string& name : pipeline::drop_unknown(edits, running_.set))
     reports_({Severity::warning, "",
               "\"" + name +
                   "\" was changed by buttons and is no longer in the set; the change is "
@@ -114,6 +120,7 @@ void SetKeeper::run(LoadedSet set) {
 
 void SetKeeper::begin_next() {
   before_ = std::move(running_);
+  changes_before_ = changes_;
   run(*std::exchange(next_, std::nullopt));
   carry_edits();
 }
@@ -125,6 +132,7 @@ bool SetKeeper::go_back(const std::string& why) {
   // The same file is not tried again until it changes again.
   if (before_->set.file == running_.set.file) before_->changed = running_.changed;
   run(*std::exchange(before_, std::nullopt));
+  changes_ = std::move(changes_before_);
   return true;
 }
 

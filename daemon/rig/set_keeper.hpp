@@ -64,12 +64,13 @@ class SetKeeper {
 
   // The changes to begin the running set with: those with which its last run ended (leave()), if it
   // was the same file. Changes of what the file no longer has are dropped and reported.
-  const pipeline::Edits& edits() const { return edits_; }
-  void leave(pipeline::Edits edits) { edits_ = std::move(edits); }
+  const pipeline::Edits& edits() const { return changes_.edits; }
+  void leave(pipeline::Edits edits) { changes_.edits = std::move(edits); }
 
   // Writes the changes into the running set's file, keeps the old file beside it, and reads it
-  // again, as change(0) does; the next run begins without changes. Returns why not, in one line, if
-  // the file was changed meanwhile or cannot be written; it is then as it was.
+  // again, as change(0) does; a run of what was written begins without changes. Returns why not, in
+  // one line, if the file was changed meanwhile, would not load or cannot be written; it is then as
+  // it was.
   std::optional<std::string> keep(const pipeline::Edits& edits);
 
   // Makes the next set the running one; has_next() must hold.
@@ -79,6 +80,17 @@ class SetKeeper {
   bool go_back(const std::string& why);
 
  private:
+  // What keep() wrote into the running set's file.
+  struct Kept {
+    std::string text_before;
+    pipeline::Edits edits;
+  };
+  // Those to the running set.
+  struct Changes {
+    pipeline::Edits edits;
+    std::optional<Kept> kept;
+  };
+
   void run(LoadedSet set);
   void carry_edits();
 
@@ -87,8 +99,7 @@ class SetKeeper {
   LoadedSet running_;
   SetFileWatch file_;
   std::optional<LoadedSet> next_, before_;
-  pipeline::Edits edits_;
-  bool are_kept_ = false;  // the next set has the edits in its file
+  Changes changes_, changes_before_;
 };
 
 }  // namespace previz::rig

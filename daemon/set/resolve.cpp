@@ -333,7 +333,8 @@ class Resolver {
     if (!light.captured)
       exclude(table, {"cone_deg"}, "goes with captured = true only; leave it out");
     light.measured = light.captured && !table.has("emission");
-    if (!light.captured && !table.has("emission"))
+    const bool is_in_a_map = is_filmed || draft_.environment;
+    if ((!light.captured || !is_in_a_map) && !table.has("emission"))
       problem(table, "emission",
               "is missing; allowed: 3 numbers, at least 0, like [10.0, 9.5, 8.0]");
   }

@@ -201,7 +201,7 @@ Keys light_keys(LightDraft& d) {
 Keys captured_lamp_keys(CapturedLamp& l) {
   return {
       {"name", &l.name, plain, "Name used in messages and by the buttons; each at most once, and not that of a [[light]].", required("\"window\"")},
-      {"direction", &l.direction, plain, "Direction from the light camera towards the lamp. Required unless position_m is given.", optional("[0.71, 0.33, 0.62]")},
+      {"direction", &l.direction, plain, "Direction from the light camera towards the lamp, by the axes of the set, also where there is a room. Required unless position_m is given.", optional("[0.71, 0.33, 0.62]")},
       {"position_m", &l.position, m, "Instead of direction: the lamp's place, from which its light then comes.", optional("[1.2, 0.4, 2.3]")},
       {"cone_deg", &l.cone_rad, deg.above(0, 60), "Half angle of the cone that holds the whole lamp; what is brighter in it than at its edge is the lamp's light.", required("6.0")},
       {"gain_mixed", &l.gain_mixed, plain.at_least(0), "Brightness in the composite: 1 as it is, 0 off, 0.3 dimmed to 30 %."},

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <openssl/evp.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
@@ -21,6 +22,15 @@ namespace {
 
 [[noreturn]] void fail(const std::filesystem::path& file, const char* what) {
   throw Error(file.string() + ": " + what + ": " + std::strerror(errno));
+}
+
+// Gives a draft the owner and the mode of the file that it is to replace. Only root may give a file
+// away, so that a refusal is no error.
+void keep_owner(const std::filesystem::path& file, const OpenFile& draft) {
+  struct stat known {};
+  if (::stat(file.c_str(), &known) != 0) return;
+  [[maybe_unused]] const int refused = ::fchown(draft.get(), known.st_uid, known.st_gid);
+  if (::fchmod(draft.get(), known.st_mode & 07777) != 0) fail(file, "cannot be given its mode");
 }
 
 }  // namespace
@@ -50,12 +60,16 @@ void replace_file(const std::filesystem::path& file, const std::string& content)
   const std::filesystem::path draft = file.string() + ".part";
   {
     const OpenFile written(draft, O_WRONLY | O_CREAT | O_TRUNC);
+    keep_owner(file, written);
     written.append(content);
     written.sync();
   }
   if (std::rename(draft.c_str(), file.c_str()) != 0) fail(file, "cannot be replaced");
-  const OpenFile directory(file.parent_path(), O_RDONLY | O_DIRECTORY);
-  ::fsync(directory.get());  // the rename itself; not every file system can, and then need not
+  // The rename itself; not every file system can, and then need not.
+  const int directory = ::open(file.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (directory < 0) return;
+  ::fsync(directory);
+  ::close(directory);
 }
 
 std::string read_file(const std::filesystem::path& file) {

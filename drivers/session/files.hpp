@@ -36,7 +36,8 @@ class LineFile {
   OpenFile file_;
 };
 
-// Replaces the file's content at once: a crash leaves the old or the new, never a part.
+// Replaces the file's content at once: a crash leaves the old or the new, never a part. The mode
+// stays, and the owner where the system lets it.
 void replace_file(const std::filesystem::path& file, const std::string& content);
 // Returns the whole file; throws previz::Error naming it.
 std::string read_file(const std::filesystem::path& file);

@@ -152,7 +152,7 @@ TEST(DeclaredLamp, ThatShinesElsewhereIsNotMeasured) {
   set.lights[0].type = set::LightType::spot;
   set.lights[0].direction = key;
   const LightPtr light = light_of(set);
-  EXPECT_TRUE(light->emissions.empty());
+  EXPECT_EQ(light->emissions.at("key"), glm::dvec3(0)) << "no brightness is made up";
   EXPECT_TRUE(std::ranges::any_of(light->lighting.report.notes, [](const std::string& note) {
     return note.find("does not shine towards the light camera") != std::string::npos;
   }));
@@ -183,6 +183,14 @@ TEST(DeclaredLamp, AsideOfItsPlaceIsTakenWhole) {
   expect_near(taken, 2 * pi * (1 - std::cos(radius)) * glm::dvec3(39.8, 34.8, 24.8), 0.02);
 }
 
+set::CapturedLamp captured_key() {
+  set::CapturedLamp lamp;
+  lamp.name = "window";
+  lamp.direction = key;
+  lamp.cone_rad = 7 * degree;
+  return lamp;
+}
+
 TEST(DeclaredLamp, OfARemovedObjectTakesItsLightAlong) {
   scene::Scene scene;
   scene::Mesh mesh;
@@ -208,19 +216,37 @@ TEST(DeclaredLamp, OfARemovedObjectTakesItsLightAlong) {
   const LightPtr light = light_of(set, &scene);
   const lighting::EnvironmentMap& map = light->lighting.environment;
   EXPECT_LT(map.radiance[lighting::texel_index(map.size, glm::vec3(key))].g, 0.21);
-  // A virtual one is not in the light camera's picture.
+  // A virtual one is not in the light camera's picture; one around the camera covers all of it, and
+  // one that moves is not where the file has it.
+  const auto expect_nothing_is_taken = [&] {
+    const LightPtr other = light_of(set, &scene);
+    EXPECT_EQ(other->lighting.environment.radiance,
+              light_of(set_with())->lighting.environment.radiance);
+  };
   scene.instances[0].presence = scene::world_mixed;
-  const LightPtr other = light_of(set, &scene);
-  EXPECT_EQ(other->lighting.environment.radiance,
-            light_of(set_with())->lighting.environment.radiance);
+  expect_nothing_is_taken();
+  scene.instances[0].presence = scene::world_real;
+  set.objects[0].animation = "swing";
+  expect_nothing_is_taken();
+  set.objects[0].animation.clear();
+  for (glm::vec3& corner : scene.meshes[0].positions) corner *= 30;
+  expect_nothing_is_taken();
+  EXPECT_EQ(claims_of(set, &scene, place).troubles,
+            std::vector<std::string>{"the light of \"ugly lamp\" is not taken out of the light "
+                                     "around the set: it is around the light camera"});
 }
 
-set::CapturedLamp captured_key() {
-  set::CapturedLamp lamp;
-  lamp.name = "window";
-  lamp.direction = key;
-  lamp.cone_rad = 7 * degree;
-  return lamp;
+// A narrow lamp in the middle of a wide claim is its own.
+TEST(DeclaredLamp, InsideAWiderClaimIsItsOwn) {
+  set::Set set = set_with();
+  set.captured_lamps = {captured_key()};
+  set.captured_lamps[0].cone_rad = 20 * degree;
+  set.lights = {real_sphere()};
+  const LightPtr light = light_of(set);
+  expect_near(light->emissions.at("key"), {40, 35, 25}, 0.02);
+  // What is left of the wide one is noise above the mean of its ring.
+  EXPECT_LT(irradiance_of(relit(*light, set, {}), true, key).g,
+            0.01 * irradiance_of(set.lights[0], light->emissions.at("key"), key).g);
 }
 
 // Dimmed to a third, the mixed world's light falls by two thirds of the lamp's, and the real
@@ -337,6 +363,35 @@ TEST(FoundLamp, IsTakenOutOfTheImageOnceItIsChanged) {
       lighting::texel_index(light->lighting.environment.size, glm::vec3(fill));
   EXPECT_EQ(parted->lighting.environment.radiance[there],
             light->lighting.environment.radiance[there]);
+}
+
+// With a room the map is seen from the stage; a set file has the light camera's directions.
+TEST(FoundLamp, IsKnownAsTheLightCameraSeesIt) {
+  set::Set set = set_with();
+  set::Room& room = set.lighting.room.emplace();
+  room.size_m = {6, 5, 4};
+  room.world_from_room[3] = glm::dvec4(place, 1);
+  room.seen_from = place + glm::dvec3(0.5, -0.4, -0.3);
+  const LightPtr light = light_of(set);
+  const std::vector<FoundLamp> found = found_lamps(*light);
+  ASSERT_EQ(found.size(), 2u);
+  for (const FoundLamp& lamp : found) {
+    const glm::dvec3 known = glm::dot(lamp.from_camera, key) > 0.5 ? key : fill;
+    EXPECT_GT(glm::dot(lamp.from_camera, known), std::cos(0.5 * degree)) << lamp.name;
+    EXPECT_LT(glm::dot(lamp.direction, known), std::cos(5 * degree)) << lamp.name;
+  }
+}
+
+// What is meant is the nearest, and no lamp twice.
+TEST(FoundLamp, IsMeantOnce) {
+  const std::vector<FoundLamp> lamps = {{"found 1", towards(0, 40), 3 * degree},
+                                        {"found 2", towards(6, 40), 3 * degree}};
+  using Meant = std::vector<std::optional<std::size_t>>;
+  EXPECT_EQ(lamps_meant({towards(5, 40), towards(4, 40)}, lamps), (Meant{1, 0}));
+  EXPECT_EQ(lamps_meant({towards(4, 40), towards(5, 40)}, {lamps[1]}), (Meant{{}, 0}));
+  // One that is switched off does not hand its change to a window beside it.
+  EXPECT_EQ(lamps_meant({towards(0, 40)}, {{"found 1", towards(40, 40), 10 * degree}}),
+            (Meant{std::nullopt}));
 }
 
 // Noise of the frames, other lamps, lamps that were off for a while: the name stays.

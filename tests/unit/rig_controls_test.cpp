@@ -187,6 +187,52 @@ TEST(Controls, AChangedLampKeepsItsName) {
   EXPECT_EQ(desk("previous_light").said, "lamp: found 1") << "the other one has another name";
 }
 
+// Two tubes side by side, each within reach of the other.
+TEST(Controls, NeighboursAreNotTakenForEachOther) {
+  const auto lamp = [](const char* name, double angle) {
+    return pipeline::FoundLamp{name, {std::cos(angle), std::sin(angle), 0}, 0.05};
+  };
+  const pipeline::FoundLamp a = lamp("found 1", 0), b = lamp("found 2", 0.1);
+  Desk desk;
+  desk.controls.use_found({a, b});
+  desk("previous_light");
+  EXPECT_EQ(desk("light_down").said, "found 2 -0.33 stops");
+  desk.controls.use_found({a, b});
+  EXPECT_EQ(desk("light_down").said, "found 2 -0.67 stops");
+  EXPECT_EQ(desk("previous_light").said, "lamp: found 1");
+  desk("light_up");
+  const auto& edits = desk.controls.look().edits.lights;
+  ASSERT_EQ(edits.size(), 2u);
+  EXPECT_EQ(edits.at("found 1").found_towards, a.direction);
+  EXPECT_EQ(edits.at("found 2").found_towards, b.direction);
+}
+
+// A new lamp does not inherit the change of one that is off by its number.
+TEST(Controls, ANewLampHasNotTheNameOfAChangedOne) {
+  Desk desk;
+  desk.controls.use_found({first});
+  desk("previous_light");
+  desk("light_down");  // found 1
+  desk.controls.use_found({{"found 1", second.direction, 0.05}});
+  EXPECT_EQ(desk("light_down").said, "found 1 -0.67 stops") << "it is off, and its change goes on";
+  EXPECT_EQ(desk("next_light").said, "lamp: key");
+  EXPECT_EQ(desk("previous_light").said, "lamp: found 2");
+  desk("light_down");
+  EXPECT_EQ(desk.controls.look().edits.lights.at("found 2").found_towards, second.direction);
+}
+
+TEST(Controls, ALampThatIsGoneIsNotChangedNorAnotherInItsPlace) {
+  Desk desk;
+  desk.controls.use_found({first});
+  desk("previous_light");
+  desk.controls.use_found({});
+  const Outcome outcome = desk("light_down");
+  EXPECT_TRUE(outcome.refused);
+  EXPECT_EQ(outcome.said, "found 1 is not found in the light now");
+  EXPECT_TRUE(desk.controls.look().edits.lights.empty());
+  EXPECT_EQ(desk("next_light").said, "lamp: key");
+}
+
 TEST(Controls, AFoundLampHasNoNameOfTheSets) {
   set::Set set = stage();
   set.captured_lamps.push_back({"found 1", {0, 0, 1}, {}, 0.1});

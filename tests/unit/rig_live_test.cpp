@@ -465,6 +465,15 @@ TEST_F(RigLive, ATakeInReviewIsChangedOnTopOfItsRecord) {
     EXPECT_NEAR(place_of(live, "card").x, 0.02, 1e-12);
     EXPECT_NEAR(place_of(live, "card").z, 0, 1e-12);
     EXPECT_FALSE(live.shot.scene.lights.contains("key"));
+
+    // What is refined from standby is the rig's picture, not the take's.
+    press("review");
+    until([&](const Shown& s) { return in_review(s); });
+    press("standby");
+    press("refine");
+    const Shown again = until([](const Shown& s) { return s.shot.frozen; });
+    EXPECT_FALSE(again.look.of_take);
+    EXPECT_NEAR(place_of(again, "card").x, 0.02, 1e-12);
   });
 }
 

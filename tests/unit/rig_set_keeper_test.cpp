@@ -151,6 +151,57 @@ TEST_F(SetKeeperTest, KeepsChangesInTheFileAndTheOldOneBesideIt) {
   EXPECT_EQ(session::read_file(folder_ / "b.toml.2.old"), expected);
 }
 
+// The set could not start: what the crew has placed in the old one is still there.
+TEST_F(SetKeeperTest, GoesBackWithItsChanges) {
+  write("b.toml", stage);
+  write("c.toml", "");
+  SetKeeper sets = keeper();
+  ASSERT_EQ(sets.change(1), std::nullopt);
+  sets.leave(a_stop_down("key"));
+  sets.begin_next();
+  EXPECT_EQ(sets.edits(), pipeline::Edits{});
+  ASSERT_TRUE(sets.go_back("there is no camera"));
+  EXPECT_EQ(sets.edits(), a_stop_down("key"));
+}
+
+// The set with the changes could not start, and its file was read again later, changed by hand.
+TEST_F(SetKeeperTest, ChangesInTheFileAreNotMadeTwice) {
+  write("b.toml", stage);
+  SetKeeper sets = keeper();
+  ASSERT_EQ(sets.keep(a_stop_down("key")), std::nullopt);
+  sets.leave(a_stop_down("key"));
+  sets.begin_next();
+  ASSERT_TRUE(sets.go_back("there is no camera"));
+  EXPECT_EQ(sets.edits(), a_stop_down("key")) << "the running set does not have them";
+  write("b.toml", session::read_file(folder_ / "b.toml") + "# by hand\n");
+  ASSERT_EQ(sets.change(0), std::nullopt);
+  sets.leave(a_stop_down("key"));
+  sets.begin_next();
+  EXPECT_EQ(sets.edits(), pipeline::Edits{});
+  EXPECT_FALSE(says("is dropped"));
+}
+
+TEST_F(SetKeeperTest, KeptFilesStayTheirOwners) {
+  write("b.toml", stage);
+  const auto mode = std::filesystem::perms::owner_read | std::filesystem::perms::owner_write |
+                    std::filesystem::perms::group_write;
+  std::filesystem::permissions(folder_ / "b.toml", mode);
+  SetKeeper sets = keeper();
+  ASSERT_EQ(sets.keep(a_stop_down("key")), std::nullopt);
+  EXPECT_EQ(std::filesystem::status(folder_ / "b.toml").permissions(), mode);
+}
+
+TEST_F(SetKeeperTest, ChangesThatComeToNothingAreNotWritten) {
+  write("b.toml", stage);
+  SetKeeper sets = keeper();
+  pipeline::Edits edits;
+  edits.lights["key"].stops = 0;
+  const std::optional<std::string> why_not = sets.keep(edits);
+  ASSERT_TRUE(why_not);
+  EXPECT_NE(why_not->find("come to nothing"), std::string::npos) << *why_not;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "b.toml.1.old"));
+}
+
 TEST_F(SetKeeperTest, KeepsNothingOverAChangedFile) {
   write("b.toml", stage);
   SetKeeper sets = keeper();
