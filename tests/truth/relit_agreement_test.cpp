@@ -122,9 +122,9 @@ Pictures by_renderer(const View& view, const Parted& light, set::Estimator estim
 }
 
 truth::Scrambles by_cpu(const View& view, const lighting::EnvironmentMap& map,
-                        std::vector<set::Light> its_lamps, std::uint32_t world) {
+                        const std::vector<set::Light>& its_lamps, std::uint32_t world) {
   scene::Scene scene = view.scene;
-  for (set::Light& lamp : its_lamps) {
+  for (const set::Light& lamp : its_lamps) {
     scene.lights.push_back(lamp);
     scene.light_objects.push_back(scene::no_object);
   }
