@@ -40,6 +40,7 @@ std::uint32_t presence_bits(set::Presence presence) {
 struct MeshUse {
   const Instance& instance;   // the node's
   glm::dmat4 node_from_copy;  // EXT_mesh_gpu_instancing
+  bool is_first;              // of the node's copies
   glm::dmat4 world_from_file;
   const NodeDeformation& deforms;
 };
@@ -51,7 +52,8 @@ struct GltfFile::Loader {
         budget(limits),
         notes(file),
         model(read_gltf(path, notes)),
-        materials(model, file, scene, notes, budget) {
+        materials(model, file, scene, notes, budget),
+        file_nodes(model, file) {
     const auto ignored = [&](std::size_t count, const char* what) {
       if (count > 0) notes.add("has " + std::to_string(count) + " " + what + "; ignored");
     };
@@ -78,6 +80,7 @@ struct GltfFile::Loader {
   Notes notes;
   tinygltf::Model model;
   GltfMaterials materials;
+  FileNodes file_nodes;
   std::map<MeshSource, std::optional<std::uint32_t>> meshes;  // nothing for an empty mesh
   // Instances that the node added last takes along, and where they are in it.
   std::vector<std::pair<std::uint32_t, glm::dmat4>> carried;
@@ -101,12 +104,16 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
       const std::string where = file + ": " + node_name(model, placed.node);
       if (static_cast<std::size_t>(node.mesh) >= model.meshes.size())
         throw Error(where + ": there is no mesh " + std::to_string(node.mesh));
-      NodeDeformation deforms = read_node_deformation(model, placed.node, where,
+      NodeDeformation deforms = read_node_deformation(model, placed.node, where, file_nodes, budget,
                                                       played ? &*played : nullptr, animation.nodes);
       deforms.deformation.object = object_index;
-      for (const glm::dmat4& node_from_copy : node_from_copies(model, node, where))
+      const std::vector<glm::dmat4> copies = node_from_copies(model, node, where);
+      if (deforms.is_skinned && copies.size() > 1)
+        notes.add(node_name(model, placed.node) + ": a skin places its mesh; of its " +
+                  std::to_string(copies.size()) + " copies one is kept");
+      for (std::size_t i = 0; i < copies.size(); ++i)
         add_mesh(placed,
-                 {instance, node_from_copy, object.world_from_file * z_up_from_y_up, deforms});
+                 {instance, copies[i], i == 0, object.world_from_file * z_up_from_y_up, deforms});
     }
     add_light(placed, instance.world_from_object, instance.presence);
     if (!played) continue;
@@ -162,6 +169,7 @@ bool GltfFile::Loader::add_primitive(const tinygltf::Primitive& primitive, const
                                      const std::string& name, const std::string& suffix,
                                      const std::string& what) {
   const bool is_skinned = follows_joints(primitive, use.deforms);
+  if (is_skinned && !use.is_first) return true;  // a skin would put it where the first copy is
   Instance instance = use.instance;
   instance.world_from_object =
       is_skinned ? use.world_from_file : instance.world_from_object * use.node_from_copy;

@@ -23,15 +23,21 @@ int attribute_of(const std::map<std::string, int>& attributes, const std::string
 }
 
 std::vector<Deformation::Joint> read_joints(const tinygltf::Model& model, int index,
-                                            const std::string& where) {
+                                            const std::string& where, FileNodes& nodes,
+                                            Budget& budget) {
   if (index_of(index) >= model.skins.size())
     throw Error(where + ": there is no skin " + std::to_string(index));
   const tinygltf::Skin& skin = model.skins[index_of(index)];
   const std::string what = where + ": skin " + std::to_string(index);
   if (skin.joints.empty() || skin.joints.size() > std::numeric_limits<std::uint16_t>::max())
     throw Error(what + ": has " + std::to_string(skin.joints.size()) + " joints");
+  budget.add_joints(skin.joints.size(), what);
   std::vector<Deformation::Joint> joints(skin.joints.size());
   if (skin.inverseBindMatrices >= 0) {
+    // There may be more matrices than joints, and all of them are read.
+    const std::string at = what + ", inverse bind matrices";
+    const std::uint64_t count = element_count(model, skin.inverseBindMatrices, at);
+    if (count > joints.size()) budget.add_joints(count - joints.size(), at);
     const std::vector<glm::dmat4> matrices =
         read_mat4s(model, skin.inverseBindMatrices, what + ", inverse bind matrices");
     if (matrices.size() < joints.size())
@@ -42,7 +48,6 @@ std::vector<Deformation::Joint> read_joints(const tinygltf::Model& model, int in
         throw Error(what + ": inverse bind matrix " + std::to_string(i) + " is not finite");
     }
   }
-  const FileNodes nodes(model, where);
   for (std::size_t i = 0; i < joints.size(); ++i) {
     if (skin.joints[i] < 0 || index_of(skin.joints[i]) >= model.nodes.size())
       throw Error(what + ": there is no node " + std::to_string(skin.joints[i]));
@@ -122,14 +127,15 @@ void read_influences(const tinygltf::Model& model, const MeshSource& source,
 }  // namespace
 
 NodeDeformation read_node_deformation(const tinygltf::Model& model, int index,
-                                      const std::string& where, GltfAnimation* played,
+                                      const std::string& where, FileNodes& file_nodes,
+                                      Budget& budget, GltfAnimation* played,
                                       std::vector<AnimatedNode>& nodes) {
   const tinygltf::Node& node = model.nodes[index_of(index)];
   NodeDeformation result;
   Deformation& deformation = result.deformation;
   if (node.skin >= 0) {
     result.is_skinned = true;
-    deformation.joints = read_joints(model, node.skin, where);
+    deformation.joints = read_joints(model, node.skin, where, file_nodes, budget);
     for (std::size_t i = 0; played && i < deformation.joints.size(); ++i) {
       deformation.joints[i].node = played->use(model.skins[index_of(node.skin)].joints[i], nodes);
       result.is_skin_moved |= deformation.joints[i].node != no_node;

@@ -8,6 +8,7 @@
 
 #include "daemon/scene/gltf_animation.hpp"
 #include "daemon/scene/gltf_mesh.hpp"
+#include "daemon/scene/gltf_nodes.hpp"
 #include "daemon/scene/load_log.hpp"
 #include "daemon/scene/scene.hpp"
 
@@ -25,7 +26,8 @@ struct NodeDeformation {
 // it moves are added to `nodes`. Throws previz::Error beginning with `where` for a skin, a joint or
 // a matrix that is not there or makes no sense.
 NodeDeformation read_node_deformation(const tinygltf::Model& model, int node,
-                                      const std::string& where, GltfAnimation* played,
+                                      const std::string& where, FileNodes& file_nodes,
+                                      Budget& budget, GltfAnimation* played,
                                       std::vector<AnimatedNode>& nodes);
 
 // Returns whether the node's skin moves the primitive. If not, the node itself places it.

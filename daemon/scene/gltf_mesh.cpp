@@ -262,6 +262,8 @@ std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& so
   Mesh mesh;
   const std::uint64_t count = element_count(model, source.positions, where + ", positions");
   budget.add_vertices(count, where);
+  const std::uint64_t deformed = source.targets.size() + source.influences.size();
+  budget.add_deformed(count * deformed, where);
   mesh.positions = read_vec3s(model, source.positions, where + ", positions");
   mesh.triangles = read_triangles(model, source, count, where, what, notes, budget);
   if (source.normals >= 0) mesh.normals = read_vec3s(model, source.normals, where + ", normals");
@@ -280,8 +282,11 @@ std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& so
     drop_unused_vertices(mesh);
     repair_normals(mesh, what, notes);
   } else {
-    if (3 * mesh.triangles.size() > count)
-      budget.add_vertices(3 * mesh.triangles.size() - count, where);
+    if (3 * mesh.triangles.size() > count) {
+      const std::uint64_t more = 3 * mesh.triangles.size() - count;
+      budget.add_vertices(more, where);
+      budget.add_deformed(more * deformed, where);
+    }
     set_flat_normals(mesh);
   }
   if (mesh.undeformed.is_empty()) return mesh;

@@ -112,17 +112,26 @@ std::vector<int> parents_of(const tinygltf::Model& model, const std::string& fil
   return parents;
 }
 
-glm::dmat4 FileNodes::file_from_node(int node) const {
-  glm::dmat4 file_from_node(1.0);
-  std::size_t above = 0;
-  for (int at = node; at >= 0; at = parents_[static_cast<std::size_t>(at)]) {
-    if (above++ == parents_.size())
-      throw Error(where_ + ": " + node_name(model_, at) + " is its own ancestor");
-    const tinygltf::Node& given = model_.nodes[static_cast<std::size_t>(at)];
-    file_from_node = transform_of(given, where_ + ": " + node_name(model_, at)).parent_from_node *
-                     file_from_node;
+glm::dmat4 FileNodes::file_from_node(int node) {
+  if (parents_.empty()) {
+    parents_ = parents_of(model_, file_);
+    places_.resize(parents_.size());
   }
-  return file_from_node;
+  std::vector<std::size_t> above;  // the node and its ancestors, up to one whose place is known
+  int at = node;
+  while (at >= 0 && !places_[static_cast<std::size_t>(at)]) {
+    if (above.size() == parents_.size())
+      throw Error(file_ + ": " + node_name(model_, at) + " is its own ancestor");
+    above.push_back(static_cast<std::size_t>(at));
+    at = parents_[above.back()];
+  }
+  glm::dmat4 place = at >= 0 ? *places_[static_cast<std::size_t>(at)] : glm::dmat4(1);
+  for (auto next = above.rbegin(); next != above.rend(); ++next) {
+    const std::string where = file_ + ": " + node_name(model_, static_cast<int>(*next));
+    place *= transform_of(model_.nodes[*next], where).parent_from_node;
+    places_[*next] = place;
+  }
+  return place;
 }
 
 std::string node_name(const tinygltf::Model& model, int node) {

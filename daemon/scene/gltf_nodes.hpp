@@ -6,7 +6,9 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/scene/load_log.hpp"
@@ -43,18 +45,19 @@ std::vector<glm::dmat4> node_from_copies(const tinygltf::Model& model, const tin
 // a child does not exist or has two parents.
 std::vector<int> parents_of(const tinygltf::Model& model, const std::string& file);
 
-// The places of a file's nodes at rest, also of those that no scene has.
+// The places of a file's nodes at rest, also of those that no scene has. Each is found once.
 class FileNodes {
  public:
-  // `where` begins the messages of the previz::Errors thrown.
-  FileNodes(const tinygltf::Model& model, std::string where)
-      : model_(model), where_(std::move(where)), parents_(parents_of(model, where_)) {}
-  glm::dmat4 file_from_node(int node) const;
+  FileNodes(const tinygltf::Model& model, std::string file)
+      : model_(model), file_(std::move(file)) {}
+  // Throws previz::Error naming the file if the nodes are no tree. The node must exist.
+  glm::dmat4 file_from_node(int node);
 
  private:
   const tinygltf::Model& model_;
-  std::string where_;
-  std::vector<int> parents_;
+  std::string file_;
+  std::vector<int> parents_;  // empty before the first use
+  std::vector<std::optional<glm::dmat4>> places_;
 };
 
 // Returns a name for messages: "node 3 "cow"".

@@ -48,4 +48,12 @@ void Budget::add_texels(std::uint64_t count, const std::string& where) {
   scene::add(texels_, count, max_texels, "texels", where);
 }
 
+void Budget::add_deformed(std::uint64_t count, const std::string& where) {
+  scene::add(deformed_, count, max_deformed, "vertices of morph targets and sets of joints", where);
+}
+
+void Budget::add_joints(std::uint64_t count, const std::string& where) {
+  scene::add(joints_, count, max_joints, "joints", where);
+}
+
 }  // namespace previz::scene

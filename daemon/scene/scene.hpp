@@ -130,6 +130,9 @@ struct Size {
 inline constexpr std::uint64_t max_triangles = 1ull << 26;  // unique ones; also for vertices
 inline constexpr std::uint64_t max_instances = 1ull << 20;
 inline constexpr std::uint64_t max_texels = 1ull << 27;  // of all textures together
+// Vertices of all morph targets and of all sets of four joints that vertices follow.
+inline constexpr std::uint64_t max_deformed = 1ull << 26;
+inline constexpr std::uint64_t max_joints = 1ull << 20;  // of the skins of all nodes
 inline constexpr int max_texture_side = 16384;
 inline constexpr std::uint64_t max_file_bytes = 0xffffffffull;  // glTF binary's own limit
 
