@@ -17,8 +17,9 @@ glm::dmat4 blended(const Undeformed& mesh, std::size_t vertex, const Shape& shap
   for (std::uint32_t i = 0; i < mesh.influences_per_vertex; ++i) {
     const Influence& influence = mesh.influences[vertex * mesh.influences_per_vertex + i];
     for (int k = 0; k < 4; ++k)
-      sum += static_cast<double>(influence.weights[k]) *
-             shape.joints[influence.joints[static_cast<std::size_t>(k)]];
+      if (influence.weights[k] != 0)
+        sum += static_cast<double>(influence.weights[k]) *
+               shape.joints[influence.joints[static_cast<std::size_t>(k)]];
   }
   return sum;
 }
@@ -27,6 +28,13 @@ glm::dmat4 blended(const Undeformed& mesh, std::size_t vertex, const Shape& shap
 // the determinant, and it exists where the inverse does not.
 glm::dmat3 cofactors(const glm::dmat3& m) {
   return {glm::cross(m[1], m[2]), glm::cross(m[2], m[0]), glm::cross(m[0], m[1])};
+}
+
+double farthest_coordinate(std::span<const glm::vec3> vectors) {
+  float largest = 0;
+  for (const glm::vec3& v : vectors)
+    largest = std::max({largest, std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+  return static_cast<double>(largest);
 }
 
 glm::dvec3 unit_or_up(const glm::dvec3& v) {
@@ -81,9 +89,29 @@ Shape shape_at(const Deformation& deformation, const Animation& animation,
   return shape;
 }
 
-bool is_finite(const Shape& shape) {
-  return std::ranges::all_of(shape.weights, [](double w) { return std::isfinite(w); }) &&
-         std::ranges::all_of(shape.joints, [](const glm::dmat4& m) { return is_finite(m); });
+Extent extent_of(const Undeformed& mesh) {
+  Extent extent{farthest_coordinate(mesh.positions), {}};
+  for (const MorphTarget& target : mesh.targets)
+    extent.targets.push_back(farthest_coordinate(target.positions));
+  return extent;
+}
+
+bool can_be_shown(const Shape& shape, const Extent& extent) {
+  // Up to this coordinate, squares and products stay finite in single precision.
+  constexpr double most = 1e15;
+  double coordinate = extent.vertices;
+  for (std::size_t i = 0; i < shape.weights.size(); ++i) {
+    if (!(std::abs(shape.weights[i]) <= most)) return false;
+    if (i < extent.targets.size()) coordinate += std::abs(shape.weights[i]) * extent.targets[i];
+  }
+  double largest = 0;
+  for (const glm::dmat4& joint : shape.joints)
+    for (int i = 0; i < 16; ++i) {
+      const double size = std::abs(joint[i / 4][i % 4]);
+      if (!(size <= most)) return false;
+      largest = std::max(largest, size);
+    }
+  return coordinate <= most && largest * (3 * coordinate + 1) <= most;
 }
 
 DeformedVertices deformed(const Undeformed& mesh, const Shape& shape) {

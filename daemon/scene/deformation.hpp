@@ -57,6 +57,12 @@ struct WeightChannel {
 // Returns the weights at a time, as vector_at() does. The channel must not be empty.
 std::vector<double> weights_at(const WeightChannel& channel, std::size_t targets, double time_s);
 
+// The largest coordinate of a mesh before it is deformed, and of what each target adds.
+struct Extent {
+  double vertices = 0;
+  std::vector<double> targets;
+};
+
 // A mesh whose shape is animated; one instance shows it. The object space of a skinned instance is
 // that of the file, because its node's own transform has no effect (glTF 2.0, 3.7.3.3).
 struct Deformation {
@@ -70,6 +76,7 @@ struct Deformation {
   std::vector<double> weights;           // of the morph targets at rest
   WeightChannel weight_channel;
   std::vector<Joint> joints;
+  Extent extent;
 };
 
 // Returns the shape of the file as it is, with nothing played.
@@ -79,8 +86,11 @@ Shape shape_at_rest(const Deformation& deformation);
 Shape shape_at(const Deformation& deformation, const Animation& animation,
                std::span<const glm::dmat4> world_from_nodes, double time_s);
 
-// Returns whether every number of the shape is finite.
-bool is_finite(const Shape& shape);
+// Returns the extent of a mesh's vertices and of its targets.
+Extent extent_of(const Undeformed& mesh);
+// Returns whether every number of the shape, and every vertex of a mesh of this extent in it, stays
+// below 1e15, where nothing overflows in single precision. A shape that is not finite does not.
+bool can_be_shown(const Shape& shape, const Extent& extent);
 
 struct DeformedVertices {
   std::vector<glm::vec3> positions, normals;

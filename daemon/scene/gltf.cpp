@@ -212,14 +212,17 @@ std::optional<std::uint32_t> GltfFile::Loader::add_deformed(const tinygltf::Prim
   const bool moves = (!source.influences.empty() && deforms.is_skin_moved) ||
                      (!source.targets.empty() && deforms.are_weights_moved);
   if (!moves && !keep_shape(*mesh, what, notes)) return {};
-  if (!has_usable_positions(*mesh))
+  Deformation deformation = deforms.deformation;
+  if (moves) deformation.extent = extent_of(mesh->undeformed);
+  if (!has_usable_positions(*mesh) ||
+      (moves && !can_be_shown(shape_at_rest(deformation), deformation.extent)))
     throw Error(file + ": " + what + ": its joints or targets take vertices beyond 1e15 at rest");
   const auto index = static_cast<std::uint32_t>(scene.meshes.size());
   scene.meshes.push_back(std::move(*mesh));
   if (!moves) return index;
-  scene.deformations.push_back(deforms.deformation);
-  scene.deformations.back().mesh = index;
-  scene.deformations.back().instance = static_cast<std::uint32_t>(scene.instances.size());
+  deformation.mesh = index;
+  deformation.instance = static_cast<std::uint32_t>(scene.instances.size());
+  scene.deformations.push_back(std::move(deformation));
   return index;
 }
 

@@ -5,6 +5,7 @@
 #include <glm/matrix.hpp>
 
 #include "daemon/scene/transform.hpp"
+#include "daemon/set/problems.hpp"
 
 namespace previz::scene {
 namespace {
@@ -33,17 +34,22 @@ void put_out(set::Light& light) {
   light.gain_mixed = light.gain_real = 0;
 }
 
-// Moves everything to its place in the animation. An instance that is flattened is not seen.
+// Moves everything to its place in the animation. An instance that is flattened, or whose shape is
+// past all numbers, is not seen.
 void play(const Scene& scene, const Animation& animation, double time_s, Placement& placement) {
   const std::vector<glm::dmat4> now = world_from_nodes(animation, time_s);
   for (std::size_t i = 0; i < scene.deformations.size(); ++i) {
     const Deformation& deformation = scene.deformations[i];
     if (deformation.object != animation.object) continue;
     placement.shapes[i] = shape_at(deformation, animation, now, time_s);
-    if (!is_finite(placement.shapes[i])) {
-      placement.shapes[i] = shape_at_rest(deformation);
-      placement.instances[deformation.instance].presence = 0;
-    }
+    if (can_be_shown(placement.shapes[i], deformation.extent)) continue;
+    placement.shapes[i] = shape_at_rest(deformation);
+    Instance& instance = placement.instances[deformation.instance];
+    instance.presence = 0;
+    placement.unknown.push_back("\"" + set::printable(instance.name) +
+                                "\" has no shape that can be shown at some times of its animation: "
+                                "its joints or targets take vertices beyond 1e15; it is not shown "
+                                "then");
   }
   for (const Animation::Use& use : animation.instances) {
     Instance& instance = placement.instances[use.what];

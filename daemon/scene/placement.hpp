@@ -15,8 +15,9 @@ namespace previz::scene {
 struct Placement {
   std::vector<Instance> instances;
   std::vector<set::Light> lights;
-  std::vector<Shape> shapes;         // of Scene::deformations, in their order
-  std::vector<std::string> unknown;  // names in the state that the set lacks, in plain words
+  std::vector<Shape> shapes;  // of Scene::deformations, in their order
+  // In plain words: names in the state that the set lacks, and what has no shape to be shown in.
+  std::vector<std::string> unknown;
 };
 
 // `scene` is load_scene(set). An object takes its own lamps along. Whatever the state does not name

@@ -3,6 +3,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "daemon/scene/bvh_refit.hpp"
 #include "daemon/scene/gltf.hpp"
 #include "daemon/scene/placement.hpp"
 #include "tests/support/gltf_test.hpp"
@@ -172,15 +173,102 @@ TEST_F(GltfDeformations, CubicWeightsAreHermites) {
   EXPECT_EQ(weights_at(step, 2, 3), (std::vector<double>{3, 7}));
 }
 
-// A shape that is not finite hides its instance, as a flattened one is hidden.
-TEST_F(GltfDeformations, AShapeOfNoNumbersIsNotSeen) {
+// A shape that is not finite, or is past what single precision holds, hides its instance, as a
+// flattened one is hidden, and the placement says so. That holds for joints that no vertex follows
+// as well, because all of them are uploaded.
+TEST_F(GltfDeformations, AShapeThatCannotBeShownIsNotSeen) {
+  skinned();
+  bow();
+  gltf.json["skins"][0]["joints"].push_back(1);
+  gltf.json["skins"][0].erase("inverseBindMatrices");
+  const Scene sound = load();
+  session::SceneState state;
+  state.animation_s = 1;
+  EXPECT_EQ(place(sound, {}, state).instances[0].presence, sound.instances[0].presence);
+  EXPECT_THAT(place(sound, {}, state).unknown, IsEmpty());
+  for (const double far : {HUGE_VAL, 1e300, 1e18}) {
+    for (const std::size_t joint : {1, 2}) {
+      Scene scene = sound;
+      scene.deformations[0].joints[joint].joint_from_mesh[3].x = far;
+      const Placement placement = place(scene, {}, state);
+      EXPECT_EQ(placement.instances[0].presence, 0u) << far;
+      EXPECT_THAT(placement.unknown, Contains(HasSubstr("\"figure\" has no shape")));
+    }
+  }
+}
+
+// Every number may be shown, but not what it makes of a tip that is 2 m high.
+TEST_F(GltfDeformations, AShapeThatReachesTooFarIsNotSeen) {
   skinned();
   bow();
   Scene scene = load();
-  scene.deformations[0].joints[1].joint_from_mesh[3].x = HUGE_VAL;
+  scene.deformations[0].joints[1].joint_from_mesh[1].y = 9e14;
   session::SceneState state;
   state.animation_s = 1;
-  EXPECT_EQ(place(scene, {}, state).instances[0].presence, 0u);
+  const Placement placement = place(scene, {}, state);
+  EXPECT_EQ(placement.instances[0].presence, 0u);
+  EXPECT_THAT(placement.unknown, Contains(HasSubstr("\"figure\" has no shape")));
+}
+
+// A joint may be anywhere if the weights of its vertices make up for it, but the bounds of the mesh
+// are made of the joints alone.
+TEST_F(GltfDeformations, ABoundPastAllNumbersIsRefusedAtRest) {
+  skinned();
+  bow();
+  gltf.json["nodes"][1]["translation"] = {1e20, 0, 0};
+  gltf.json["nodes"][2]["translation"] = {-1e20, 2, 0};
+  const std::vector<unsigned char> both = {0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0};
+  Json& attributes = gltf.json["meshes"][0]["primitives"][0]["attributes"];
+  attributes["JOINTS_0"] = gltf.accessor(gltf.view(both), bytes, "VEC4", 3);
+  attributes["WEIGHTS_0"] = vec4s({{1e-12f, 1, 0, 0}, {1e-12f, 1, 0, 0}, {1e-12f, 1, 0, 0}});
+  EXPECT_THAT(error(), HasSubstr("beyond 1e15 at rest"));
+}
+
+// What a few bytes can ask for: as many vertices as an accessor without data may have, times as
+// many targets or sets of joints as one likes.
+TEST_F(GltfDeformations, TargetsAndSetsAreCountedBeforeTheyAreRead) {
+  const std::size_t vertices = 1u << 22;
+  const int zeros =
+      gltf.add("accessors", {{"componentType", floats}, {"type", "VEC3"}, {"count", vertices}});
+  const int zeros4 =
+      gltf.add("accessors", {{"componentType", floats}, {"type", "VEC4"}, {"count", vertices}});
+  Json primitive = {{"attributes", {{"POSITION", zeros}, {"NORMAL", zeros}}},
+                    {"indices", gltf.indices({0, 1, 2})}};
+  for (int target = 0; target < 17; ++target) primitive["targets"].push_back({{"POSITION", 99}});
+  gltf.root("face", gltf.mesh(primitive));
+  gltf.json["meshes"][0]["weights"] = std::vector<double>(17, 1);
+  EXPECT_THAT(error(),
+              HasSubstr("more than 67108864 vertices of morph targets and sets of joints"));
+
+  gltf.json["meshes"][0].erase("weights");
+  gltf.json["meshes"][0]["primitives"][0].erase("targets");
+  for (int set = 0; set < 17; ++set) {
+    Json& attributes = gltf.json["meshes"][0]["primitives"][0]["attributes"];
+    attributes["JOINTS_" + std::to_string(set)] = zeros4;
+    attributes["WEIGHTS_" + std::to_string(set)] = 99;
+  }
+  gltf.json["skins"] = {{{"joints", {0}}}};
+  gltf.json["nodes"][0]["skin"] = 0;
+  EXPECT_THAT(error(),
+              HasSubstr("more than 67108864 vertices of morph targets and sets of joints"));
+}
+
+TEST_F(GltfDeformations, JointsAreCountedForEveryNodeThatHasThem) {
+  skinned();
+  gltf.json["skins"][0] = {{"joints", std::vector<int>(65535, 1)}};
+  for (int node = 0; node < 17; ++node) gltf.root("copy", 0, {{"skin", 0}});
+  EXPECT_THAT(error(), HasSubstr("more than 1048576 joints"));
+}
+
+// A skin places its mesh, so that all copies of the node would lie in one place.
+TEST_F(GltfDeformations, OfASkinsCopiesOneIsKept) {
+  skinned();
+  gltf.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"] =
+      gltf.positions({{1, 0, 0}, {2, 0, 0}, {3, 0, 0}});
+  gltf.json["extensionsUsed"] = {"EXT_mesh_gpu_instancing"};
+  const Scene scene = load();
+  EXPECT_EQ(scene.instances.size(), 1u);
+  EXPECT_THAT(scene.notes, Contains(HasSubstr("a skin places its mesh; of its 3 copies one is")));
 }
 
 TEST_F(GltfDeformations, AreRefusedWhereTheyMakeNoSense) {
@@ -213,6 +301,15 @@ TEST_F(GltfDeformations, AreRefusedWhereTheyMakeNoSense) {
   gltf.json = face;
   gltf.json["meshes"][0]["primitives"][0]["targets"].erase(1);
   EXPECT_THAT(error(), HasSubstr("4 numbers for 2 times and 1 morph targets"));
+}
+
+// The primitive of a hit has 24 bits.
+TEST(DeformingPairs, PastTheirNumberAreRefused) {
+  Mesh mesh;
+  mesh.name = "crowd";
+  mesh.positions = mesh.undeformed.positions = corners;
+  mesh.triangles.resize((1u << 24) + 1, {0, 1, 2});
+  EXPECT_THROW(deforming_pairs(mesh), Error);
 }
 
 }  // namespace scene_gltf_deformation_test
