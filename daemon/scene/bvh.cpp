@@ -87,10 +87,14 @@ int grid_exponent_of(const Aabb& bounds) {
   return grid_exponent(extent_of(bounds));
 }
 
-MeshBvh build_mesh_bvh(const Mesh& mesh, BvhQuality quality) {
+void check_triangles(const Mesh& mesh) {
   if (mesh.triangles.size() > most_triangles)
     throw Error("scene: mesh \"" + mesh.name + "\" has " + std::to_string(mesh.triangles.size()) +
                 " triangles; at most " + std::to_string(most_triangles) + " are allowed");
+}
+
+MeshBvh build_mesh_bvh(const Mesh& mesh, BvhQuality quality) {
+  check_triangles(mesh);
   MeshBvh bvh;
   Triangles triangles = usable_triangles(mesh);
   bvh.dropped_triangles =

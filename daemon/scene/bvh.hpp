@@ -68,6 +68,9 @@ struct TopBvh {
 std::size_t top_bvh_texels(std::size_t instance_count);
 TopBvh build_top_bvh(std::span<const TopInstance> instances);
 
+// Throws previz::Error if the mesh has more than 2^24 triangles.
+void check_triangles(const Mesh& mesh);
+
 // Returns the exponent of the grid of a tree with these bounds: MeshBvh::grid_exponent.
 int grid_exponent_of(const Aabb& bounds);
 

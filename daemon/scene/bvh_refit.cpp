@@ -115,6 +115,7 @@ bool is_empty(const Aabb& box) {
 }  // namespace
 
 std::vector<DeformingPair> deforming_pairs(const Mesh& mesh) {
+  check_triangles(mesh);
   const std::vector<std::uint32_t> first = first_alike(mesh.undeformed);
   std::vector<std::array<glm::vec3, 3>> corners;
   std::vector<std::array<std::uint32_t, 3>> places;

@@ -24,7 +24,8 @@ struct DeformingPair {
 };
 
 // Joins the triangles of a mesh to pairs, in the shape that it has now. Vertices count as one only
-// if they stay together in every shape. Triangles with a bad index are left out.
+// if they stay together in every shape. Triangles with a bad index are left out. Throws
+// previz::Error past 2^24 triangles.
 std::vector<DeformingPair> deforming_pairs(const Mesh& mesh);
 
 // What is done to a tree so that it follows its vertices.
@@ -39,7 +40,7 @@ struct RefittableBvh {
   RefitPlan plan;
 };
 
-// Builds a tree above the pairs for these positions. Throws previz::Error past 2^24 triangles.
+// Builds a tree above the pairs for these positions.
 RefittableBvh build_refittable_bvh(std::span<const DeformingPair> pairs,
                                    std::span<const glm::vec3> positions);
 
