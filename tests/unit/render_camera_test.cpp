@@ -207,6 +207,9 @@ TEST(CameraRadiance, WhatCannotBeMeasuredIsTracedAndCounted) {
   expect_traced(view, plate_of([](int, int) { return glm::dvec3(1, white, 1); }));
   view.scene.materials[0] = plastic(glm::vec3(albedo), 0.3f);
   expect_traced(view, gray);
+  view.scene.materials[0] = plastic(glm::vec3(albedo), 0.5f);
+  view.scene.materials[0].clearcoat = 1;  // it mirrors what is above the floor
+  expect_traced(view, gray);
   view.scene.materials[0] = emitter(glm::vec3(0));
   view.scene.materials[0].emission_texture = scene::no_texture;
   view.scene.materials[0].specular = 1;
