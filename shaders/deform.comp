@@ -20,7 +20,9 @@ struct Rows {
   vec4 x, y, z;
 };
 
+// A joint of no weight may be anywhere: it names what an unused influence does.
 void add_joint(inout Rows sum, uint joint, float weight) {
+  if (weight == 0.0) return;
   const uint first = 3u * (deform.first_joint + joint);
   sum.x += weight * joint_rows[first];
   sum.y += weight * joint_rows[first + 1u];

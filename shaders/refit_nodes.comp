@@ -49,8 +49,9 @@ void main() {
     ivec3 last = ivec3(0);
     if ((there & (1u << slot)) != 0u) {
       const GpuRefitBox box = refit_boxes[refit.first_box + 8u * block + slot];
-      first = (whole_below(box.low) - origin) >> exponent;
-      last = (whole_above(box.high) - origin + (ivec3(1) << exponent) - 1) >> exponent;
+      // The bounds of a plane hold for all numbers; others would spill into the planes beside it.
+      first = clamp((whole_below(box.low) - origin) >> exponent, 0, 255);
+      last = clamp((whole_above(box.high) - origin + (ivec3(1) << exponent) - 1) >> exponent, 0, 255);
     }
     const uint shift = 8u * (slot & 3u);
     for (int axis = 0; axis < 3; ++axis) {

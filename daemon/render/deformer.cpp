@@ -38,6 +38,12 @@ double half_area(const glm::vec3& low, const glm::vec3& high) {
   return size.x * size.y + size.y * size.z + size.z * size.x;
 }
 
+// Returns the cost with which later shapes of a tree are compared: 0 where the shape that it was
+// built for has no surface, by which a cost is measured.
+double cost_of(const scene::MeshBvh& bvh) {
+  return half_area(bvh.bounds.low, bvh.bounds.high) > 0 ? bvh.sah_cost : 0;
+}
+
 // Positions that no ray could hit (daemon/scene/bvh.cpp) are not put into a tree.
 bool can_be_traced(const scene::Aabb& bounds) {
   for (int axis = 0; axis < 3; ++axis)
@@ -61,7 +67,7 @@ scene::MeshBvh Deformer::add(const scene::Scene& scene, const scene::Deformation
   mesh.reach = scene::reach_of(from, deformation.joints.size());
   scene::RefittableBvh built = scene::build_refittable_bvh(mesh.pairs, from.positions);
   mesh.plan = std::move(built.plan);
-  mesh.built_cost = built.bvh.sah_cost;
+  mesh.built_cost = cost_of(built.bvh);
   const auto blocks = static_cast<std::uint32_t>(
       std::ceil(spare_room * record_count(built.bvh) / records_per_block));
   mesh.room = blocks * records_per_block;
@@ -94,7 +100,6 @@ void Deformer::upload_undeformed() {
   std::vector<glm::vec4> undeformed;
   std::vector<gpu::GpuInfluence> influences;
   std::vector<gpu::GpuMorphOffset> offsets;
-  std::uint32_t joints = 0, weights = 0;
   for (Mesh& mesh : meshes_) {
     const scene::Undeformed& from = *mesh.undeformed;
     mesh.push = {.vertices = static_cast<std::uint32_t>(from.positions.size()),
@@ -102,9 +107,9 @@ void Deformer::upload_undeformed() {
                  .first_undeformed = static_cast<std::uint32_t>(undeformed.size() / 2),
                  .influences_per_vertex = from.influences_per_vertex,
                  .first_influence = static_cast<std::uint32_t>(influences.size()),
-                 .first_joint = joints,
+                 .first_joint = 0,  // see upload_shapes()
                  .first_offset = static_cast<std::uint32_t>(offsets.size()),
-                 .first_weight = weights,
+                 .first_weight = 0,
                  .weights = 0,
                  .flat_normals = from.flat ? 1u : 0u};
     for (std::size_t v = 0; v < from.positions.size(); ++v) {
@@ -117,8 +122,6 @@ void Deformer::upload_undeformed() {
       for (std::size_t v = 0; v < from.positions.size(); ++v)
         offsets.push_back(
             {target.positions[v], target.normals.empty() ? glm::vec3(0) : target.normals[v]});
-    joints += static_cast<std::uint32_t>(mesh.reach.joints.size());
-    weights += static_cast<std::uint32_t>(from.targets.size());
   }
   upload_storage(device_, undeformed_, undeformed);
   upload_storage(device_, influences_, influences);
@@ -138,11 +141,14 @@ void Deformer::upload_plans() {
   upload_storage(device_, nodes_, nodes);
 }
 
-// Uploads the joints and the weights of all meshes. Targets of no weight are left out.
+// Uploads the joints and the weights of all meshes that have a shape yet. Targets of no weight are
+// left out.
 void Deformer::upload_shapes() {
   std::vector<glm::vec4> rows;
   std::vector<gpu::GpuMorphWeight> weights;
   for (Mesh& mesh : meshes_) {
+    if (!mesh.shape) continue;
+    mesh.push.first_joint = static_cast<std::uint32_t>(rows.size() / 3);
     for (const glm::dmat4& m : mesh.shape->joints)
       for (int row = 0; row < 3; ++row)
         rows.emplace_back(m[0][row], m[1][row], m[2][row], m[3][row]);
@@ -230,14 +236,15 @@ void Deformer::take_better_trees(std::span<Mesh* const> meshes, Buffer& bvh) {
       continue;
     scene::RefittableBvh better = mesh->better.get();
     if (record_count(better.bvh) > mesh->room) {
-      mesh->built_cost *= most_growth;  // the next one is not tried before it is worse still
+      // The next one is not tried before it is worse still.
+      mesh->built_cost = most_growth * std::max(mesh->built_cost, cost_of(better.bvh));
       continue;
     }
     upload_bytes(
         device_, bvh, std::as_bytes(std::span(better.bvh.texels)),
         std::size_t{mesh->place.first_record} * scene::texels_per_record * sizeof(glm::uvec4));
     mesh->plan = std::move(better.plan);
-    mesh->built_cost = better.bvh.sah_cost;
+    mesh->built_cost = cost_of(better.bvh);
     is_taken = true;
     ++rebuilt_;
   }

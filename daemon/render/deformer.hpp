@@ -35,8 +35,13 @@ class Deformer {
   // stay valid until the next clear().
   void upload(std::vector<Place> places);
 
-  // Gives each mesh that was added its shape, in the scene's buffers.
+  // Gives each mesh that was added its shape, in the scene's buffers. A mesh whose bounds would be
+  // past what can be traced keeps the shape that it has.
   void deform(std::span<const scene::Shape> shapes, Buffer& bvh, const Buffer& vertices);
+  // Returns whether the mesh that was added as number i has this shape.
+  bool has_shape(std::size_t i, const scene::Shape& shape) const {
+    return meshes_[i].shape == shape;
+  }
 
   // Returns how many trees were built anew since clear().
   std::uint64_t rebuilt() const { return rebuilt_; }

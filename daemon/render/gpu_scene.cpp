@@ -102,7 +102,7 @@ void GpuScene::deform(const std::vector<scene::Shape>& shapes) {
         bounding_sphere(places_[deformation.mesh].bvh.bounds, instance.world_from_object);
     // Light samples are taken on the CPU's copy.
     scene::Mesh& mesh = scene_.meshes[deformation.mesh];
-    if (scene::emits(scene_.materials[instance.material]))
+    if (scene::emits(scene_.materials[instance.material]) && deformer_.has_shape(i, shapes[i]))
       mesh.positions = scene::deformed(mesh.undeformed, shapes[i]).positions;
   }
   find_bounds(moved_spheres(spheres_, instances_as_set_, scene_.instances));
@@ -151,12 +151,24 @@ void GpuScene::upload_meshes() {
   upload_texels(device_, bvh_, bvh, vk::Format::eR32G32B32A32Uint);
   upload_texels(device_, vertices_, vertices, vk::Format::eR32G32B32A32Sfloat);
   upload_texels(device_, triangles_, triangles, vk::Format::eR32G32B32A32Uint);
+  if (!scene_.deformations.empty()) check_deforming();
   std::vector<Deformer::Place> deformed;
   for (const scene::Deformation& deformation : scene_.deformations) {
     MeshPlace& place = places_[deformation.mesh];
     deformed.push_back({&place.bvh, place.first_record, place.first_vertex});
   }
   deformer_.upload(std::move(deformed));
+}
+
+// What deforms is written through storage buffers, which may be smaller than the texel buffers that
+// all meshes are read from.
+void GpuScene::check_deforming() const {
+  const vk::DeviceSize most = device_.limits().maxStorageBufferRange;
+  for (const Buffer* buffer : {&bvh_, &vertices_})
+    if (buffer->size > most)
+      throw Error("Vulkan: with meshes that deform, the scene's trees and vertices may have " +
+                  std::to_string(most) + " bytes each on " + device_.name() + ", but here are " +
+                  std::to_string(buffer->size) + "; reduce the scene or play no animation");
 }
 
 void GpuScene::upload_materials(double specular_alpha) {

@@ -58,6 +58,7 @@ class GpuScene {
   };
 
   void upload_meshes();
+  void check_deforming() const;
   void upload_materials(double specular_alpha);
   void upload_textures();
   void find_emitters();

@@ -5,6 +5,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "daemon/render/deformer.hpp"
+#include "drivers/error.hpp"
 #include "tests/support/bvh_decode.hpp"
 #include "tests/support/figure.hpp"
 #include "tests/support/render_fixture.hpp"
@@ -167,6 +168,23 @@ TEST(Deforming, FlatMeshesStayFlatAndNormalsFollowAStretch) {
   expect_tree_follows(limb);
 }
 
+// A joint that no vertex follows may be anywhere, past single precision too: unused influences name
+// some joint with a weight of 0.
+TEST(Deforming, AJointOfNoWeightHasNoEffect) {
+  scene::Scene scene = limb_alone();
+  for (scene::Influence& influence : scene.meshes[0].undeformed.influences)
+    influence.joints[2] = joints;
+  scene::Deformation& limb = scene.deformations[0];
+  limb.joints.push_back({});
+  Alone alone(scene);
+  scene::Shape shape = bent_limb(limb, 0.3);
+  shape.joints[joints] = glm::dmat4(1e300);
+  alone.deform(shape);
+  shape.joints[joints] = glm::dmat4(1);
+  expect_shape(alone, shape);
+  expect_tree_follows(alone);
+}
+
 // Refitted in the shape that it was built for, a tree is the one that was built, to the last bit:
 // its boxes are as tight as the builder's.
 TEST(Deforming, ATreeInItsOwnShapeIsTheBuilders) {
@@ -215,9 +233,32 @@ TEST(Deforming, ABadTreeIsBuiltAnewAndChangesNoPicture) {
     renderer.deform({bent_limb(limb, 1.3 + 1e-3 * (tries % 2))});
   EXPECT_EQ(renderer.counters().rebuilt_trees, 1u) << tries << " shapes";
   picture(1.0);
+  EXPECT_EQ(renderer.counters().rebuilt_trees, 1u) << "since the first picture was begun";
   const render::Layers after = picture(1.3);
   EXPECT_EQ(before.mixed, after.mixed);
   EXPECT_EQ(before.depth, after.depth);
+}
+
+// Folded up at rest, a mesh has no surface by which the cost of its tree could be judged. The tree
+// that was built there is replaced once there is a surface.
+TEST(Deforming, ATreeOfNoSurfaceIsBuiltAnew) {
+  View view;
+  view.scene = limb_alone(24, 12);
+  scene::Deformation& limb = view.scene.deformations[0];
+  for (scene::Deformation::Joint& joint : limb.joints)
+    joint.file_from_joint = glm::scale(joint.file_from_joint, glm::dvec3(0));
+  view.scene.meshes[0].positions =
+      scene::deformed(view.scene.meshes[0].undeformed, scene::shape_at_rest(limb)).positions;
+  view.environment = uniform_environment(glm::vec3(1));
+  view.calibration = pinhole(16, 16, 0.9);
+  SetRenderer renderer(view);
+  int tries = 0;
+  for (; renderer.counters().rebuilt_trees == 0 && tries < 2000; ++tries)
+    renderer.deform({bent_limb(limb, 1e-3 * (tries % 2))});
+  EXPECT_EQ(renderer.counters().rebuilt_trees, 1u) << tries << " shapes";
+  // The new tree is as good as any, and is kept.
+  for (int i = 0; i < 50; ++i) renderer.deform({bent_limb(limb, 1e-3 * (i % 2))});
+  EXPECT_EQ(renderer.counters().rebuilt_trees, 1u);
 }
 
 // A limb and a ball on a floor between walls, which hold them in every shape, so that the extent of
@@ -243,14 +284,15 @@ View figures(std::uint32_t presence) {
   return view;
 }
 
-// What the picture shows of surfaces is the same but for rounding; where a silhouette runs through
-// the sample the two may differ.
-TEST(Deforming, ShowsWhatTheSameMeshesShowInTheirShapeForGood) {
-  const View moving = figures(scene::world_both);
-  const std::vector<scene::Shape> shapes = {bent_limb(moving.scene.deformations[0], 0.25),
-                                            {{0.8}, {}}};
+struct BothWays {
+  render::Layers by_gpu, for_good;
+};
+
+// What a view shows in some shapes, and what the same meshes show in other shapes for good.
+BothWays pictures(const View& moving, const std::vector<scene::Shape>& shapes,
+                  const std::vector<scene::Shape>& shapes_for_good) {
   View still = moving;
-  still.scene = posed(moving.scene, shapes);
+  still.scene = posed(moving.scene, shapes_for_good);
   SetRenderer by_gpu(moving), for_good(still);
   by_gpu.deform(shapes);
   by_gpu.begin({{}, 1.0, moving.world_from_camera});
@@ -258,15 +300,62 @@ TEST(Deforming, ShowsWhatTheSameMeshesShowInTheirShapeForGood) {
   by_gpu.render(4);
   for_good.render(4);
   expect_clean(by_gpu.counters());
-  const render::Layers a = by_gpu.layers(), b = for_good.layers();
+  return {by_gpu.layers(), for_good.layers()};
+}
+
+// What the picture shows of surfaces is the same but for rounding; where a silhouette runs through
+// the sample the two may differ.
+void expect_same_surfaces(const BothWays& both) {
+  const render::Layers &a = both.by_gpu, &b = both.for_good;
   int differing = 0;
   for (std::size_t i = 0; i < a.depth.size(); ++i)
     // 2 m away, positions that are rounded by 1e-6 m and normals by 4e-6.
     differing +=
         std::abs(a.depth[i] - b.depth[i]) > 1e-5f || glm::length(a.normal[i] - b.normal[i]) > 1e-4f;
   EXPECT_LE(differing, 2) << "of " << a.depth.size() << " pixels";
+}
+
+TEST(Deforming, ShowsWhatTheSameMeshesShowInTheirShapeForGood) {
+  const View moving = figures(scene::world_both);
+  const std::vector<scene::Shape> shapes = {bent_limb(moving.scene.deformations[0], 0.25),
+                                            {{0.8}, {}}};
+  const auto both = pictures(moving, shapes, shapes);
+  expect_same_surfaces(both);
+  const render::Layers &a = both.by_gpu, &b = both.for_good;
   const glm::dvec3 shown = mean(a.mixed), expected = mean(b.mixed);
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(shown[c], expected[c], 2e-3 * expected[c]);
+}
+
+// A mesh whose bounds are past all numbers keeps its shape, at rest already, and moves nothing of
+// the others' joints.
+TEST(Deforming, AShapeThatCannotBeTracedChangesNoOther) {
+  View view = figures(scene::world_both);
+  glm::dmat4 placed(1);
+  placed[3] = {0.1, 0.4, -1.4, 1};
+  add_limb(view.scene, limb_mesh(24, 16, joints), joints, 1, placed);
+  const scene::Shape upright = bent_limb(view.scene.deformations[0], 0);
+  const scene::Shape bent = bent_limb(view.scene.deformations[0], 0.25);
+  view.scene.deformations[0].joints[0].file_from_joint[3].x = 1e25;
+  const scene::Shape impossible = scene::shape_at_rest(view.scene.deformations[0]);
+  expect_same_surfaces(
+      pictures(view, {impossible, {{0.8}, {}}, bent}, {upright, {{0.8}, {}}, bent}));
+}
+
+// Shaders read the vertices as texels, of which there may be more than a storage buffer holds, as
+// which they are written. 32 bytes a vertex.
+TEST(Deforming, NeedsVerticesThatFitIntoAStorageBuffer) {
+  const std::uint64_t most = shared_device()->limits().maxStorageBufferRange;
+  if (most > (1u << 28)) GTEST_SKIP() << "a mesh of " << most << " bytes is too large for a test";
+  scene::Scene scene = limb_alone();
+  scene::Mesh large = rectangle_mesh({1, 1});
+  large.positions.resize(most / 32, glm::vec3(0));
+  large.normals.resize(most / 32, glm::vec3(0, 0, 1));
+  large.uvs.clear();
+  add_instance(scene, add_mesh(scene, large), 0);
+  render::Renderer renderer(shared_device(), {}, pinhole(16, 16, 0.9));
+  EXPECT_THROW(renderer.set_scene(scene), Error);
+  scene.deformations.clear();
+  EXPECT_NO_THROW(renderer.set_scene(scene));
 }
 
 // A lamp that deforms is sampled where it is.
