@@ -120,6 +120,7 @@ float plane_error(GpuInstance instance, vec3 edge1, vec3 edge2) {
   const vec3 e1 = transform_vector(instance.world_from_object, edge1);
   const vec3 e2 = transform_vector(instance.world_from_object, edge2);
   const float size = max(length(e1), length(e2));
+  if (size == 0.0) return 0.0;
   const float doubled_area = length(cross(e1 / size, e2 / size));  // over size^2
   return 8.0 * 5.9604645e-8 * size * clamp(1.0 / doubled_area, 1.0, MOST_ASPECT);
 }
@@ -257,7 +258,10 @@ Surface make_surface(GpuHit hit, vec3 direction) {
   // The face normal is scaled first, because its length is an area, which underflows for small
   // triangles.
   const float face_scale = max(max(abs(face.x), abs(face.y)), abs(face.z));
-  const vec3 outward = normalize(transform_normal(instance.object_from_world, face / face_scale));
+  // A mesh that deforms may collapse a triangle to a line, which faces whoever looks at it.
+  const vec3 outward =
+      face_scale > 0.0 ? normalize(transform_normal(instance.object_from_world, face / face_scale))
+                       : s.wo;
   s.entering = dot(outward, s.wo) >= 0.0;
   s.geometric_normal = s.entering ? outward : -outward;
   const vec3 bound = position_error(instance, object_bound, s.position);
