@@ -6,10 +6,6 @@
 
 #include "shaders/lib/alpha.glsl"
 
-// After a fork, a ray resumes just before the hit at which the worlds parted. It cannot meet that
-// surface again, since the surface is not in its world.
-const float RESUME_BEFORE = 0.9999;
-
 void main() {
   if (gl_GlobalInvocationID.x >= control.active_count) return;
   const uint path = queue[active_queue_index(gl_GlobalInvocationID.x)];
@@ -19,8 +15,7 @@ void main() {
   const bool leaves_surface = path_depth(bits) > 0u && origin.w == 0.0;
   const uvec2 source =
       leaves_surface ? uvec2(hits[path].instance, hits[path].primitive) : TRACE_FROM_NOWHERE;
-  const bool is_behind = has_feature(FEATURE_PANES) && (bits & PATH_BEHIND) != 0u;
-  const float t_min = is_behind ? origin.w : origin.w * RESUME_BEFORE;
+  const float t_min = path_is_behind(bits) ? origin.w : origin.w * RESUME_BEFORE;
   Hit hit;
   const bool found = closest_met(origin.xyz, ray_direction[path].xyz, t_min, 3.4e38,
                                  path_worlds(bits), source, hit);

@@ -29,8 +29,7 @@ Flight load_flight(uint path) {
   const vec4 flux = path_throughput[path];
   const uint bits = floatBitsToUint(flux.w);
   return Flight(origin.xyz, origin.w, direction.xyz, direction.w, flux.rgb, path_worlds(bits),
-                path_depth(bits), path_medium(bits),
-                has_feature(FEATURE_PANES) ? path_passes(bits) : 0u, false);
+                path_depth(bits), path_medium(bits), path_passes(bits), path_is_behind(bits));
 }
 
 void store_flight(Flight f, uint path) {
@@ -138,6 +137,7 @@ uint meet_surface(inout Flight f, Surface s, GpuHit hit, vec2 random) {
   }
   f.origin = offset_origin(s, wi);
   f.t_min = 0.0;
+  f.is_behind = false;
   f.direction = wi;
   f.medium = medium_beyond(f.medium, s, wi);
   // After the last allowed vertex a photon ends, because one that stayed later would never be
@@ -169,7 +169,7 @@ void main() {
       if (presence != f.worlds) {
         Flight other = f;
         other.worlds = f.worlds & ~presence;
-        other.t_min = hit.t;
+        other.t_min = forked_t_min(f.t_min, hit.t, other.is_behind);
         forked = path ^ 1u;
         store_flight(other, forked);
         f.worlds = presence;

@@ -44,7 +44,7 @@ Path load_path(uint index) {
               (has_feature(FEATURE_DIFFERENCE) || has_feature(FEATURE_CAMERA)) &&
                   (bits & PATH_DIFFERENCE) != 0u,
               has_feature(FEATURE_CAMERA) && (bits & PATH_LANDED) != 0u, path_medium(bits),
-              has_feature(FEATURE_PANES) ? path_passes(bits) : 0u, false);
+              path_passes(bits), path_is_behind(bits));
 }
 
 void store_path(Path p, uint index) {
@@ -270,6 +270,7 @@ bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, vec2
   }
   p.origin = offset_origin(s, direction);
   p.t_min = 0.0;
+  p.is_behind = false;
   p.direction = direction;
   p.medium = medium_beyond(p.medium, s, direction);
   p.pdf = pdf;
@@ -297,7 +298,7 @@ bool pass_pane(inout Path p, Surface s, GpuHit hit) {
 void fork(Path p, uint other_worlds, float t_hit, out uint forked) {
   forked = p.landed ? 2u * slot_count() + p.slot : p.index ^ 1u;
   p.worlds = other_worlds;
-  p.t_min = t_hit;
+  p.t_min = forked_t_min(p.t_min, t_hit, p.is_behind);
   store_path(p, forked);
 }
 

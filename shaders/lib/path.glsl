@@ -67,7 +67,12 @@ uint next_queue_index(uint i) { return (1u - control.queue_side) * (queue.length
 
 uint path_worlds(uint bits) { return bits & PATH_WORLDS_MASK; }
 uint path_depth(uint bits) { return (bits >> PATH_DEPTH_SHIFT) & 0xffu; }
-uint path_passes(uint bits) { return (bits >> PATH_PASSES_SHIFT) & 0xfu; }
+uint path_passes(uint bits) {
+  return has_feature(FEATURE_PANES) ? (bits >> PATH_PASSES_SHIFT) & 0xfu : 0u;
+}
+bool path_is_behind(uint bits) {
+  return has_feature(FEATURE_PANES) && (bits & PATH_BEHIND) != 0u;
+}
 
 // Returns the number of slots for whose paths there is room.
 uint slot_count() {
@@ -76,6 +81,17 @@ uint slot_count() {
 uint path_slot(uint path) {
   return has_feature(FEATURE_CAMERA) && path >= 2u * slot_count() ? path - 2u * slot_count()
                                                                   : path >> 1;
+}
+
+// After a fork, a ray resumes just before the hit at which the worlds parted. It cannot meet that
+// surface again, since the surface is not in its world.
+const float RESUME_BEFORE = 0.9999;
+
+// Returns the t_min of a ray that forks at a hit. A ray that has passed a pane just before the hit
+// goes on behind the pane, which it would pass twice otherwise.
+float forked_t_min(float t_min, float t_hit, inout bool is_behind) {
+  is_behind = is_behind && t_min > t_hit * RESUME_BEFORE;
+  return is_behind ? t_min : t_hit;
 }
 
 // The factors by which light is scaled in each world.

@@ -131,6 +131,28 @@ TEST(Pane, MirrorsTheFloorBelowIt) {
               4 * standard_error_of_pixels(result.layers) / expected + 2e-3);
 }
 
+// Of the real world a virtual wall close behind a pane takes nothing: a ray that forks at the wall
+// goes on behind the pane, through which it has passed already.
+TEST(Pane, IsPassedOnceByARayThatForksCloseBehindIt) {
+  View view;
+  view.environment = uniform_environment(glm::vec3(1));
+  view.calibration = pinhole(16, 16, 0.3);
+  view.world_from_camera = look_at({0, 0, 1}, {0, 0, 0});
+  const auto wall = add_mesh(view.scene, rectangle_mesh({4, 4}));
+  add_instance(view.scene, wall, add_material(view.scene, pane(1.5f, tint)));
+  glm::dmat4 behind(1);
+  behind[3].z = -5e-5;  // of the ray's length, which is 1
+  add_instance(view.scene, wall, add_material(view.scene, diffuse(glm::vec3(0))), behind,
+               scene::world_mixed);
+  const Rendered result = render_clean(view, 64, up_to_depth(1));
+  const double through = transmittance(1, 1.5);
+  const double error = standard_error_of_pixels(result.layers) + 2e-3;
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_NEAR(mean(result.layers.real)[c], tint[c] * through + 1 - through, 4 * error);
+    EXPECT_NEAR(mean(result.layers.mixed)[c], 1 - through, 4 * error);
+  }
+}
+
 // A mirror beside the floor, and the lamp in a bubble of tinted air that bends nothing: direct
 // light and the mirror's image, which photons bring, are dimmed by the tint to the last photon's
 // noise.
