@@ -123,6 +123,15 @@ bool is_rough(Lobes l) {
 // Lacquer has this index of refraction (KHR_materials_clearcoat).
 const float CLEARCOAT_IOR = 1.5;
 
+// Returns the share that lacquer of the weight 1 reflects. It lies on the outside of solid glass, so
+// that from inside, too, the direction outside counts: a path that leaves loses what a photon loses
+// that enters. Where nothing leaves, all is reflected.
+float lacquer_reflectance(Surface s, float cos_o) {
+  if (s.transmission > 0.0 && !s.thin_walled && !s.entering)
+    cos_o = sqrt(max(0.0, 1.0 - (1.0 - cos_o * cos_o) * s.ior * s.ior));
+  return fresnel_dielectric(cos_o, CLEARCOAT_IOR);
+}
+
 // The p_* sum to 1, in proportion to the lobes' luminance, or are all 0 on a black surface.
 Lobes make_lobes(Surface s) {
   Lobes l;
@@ -159,7 +168,7 @@ Lobes make_lobes(Surface s) {
   l.clear = 0.0;
   l.smooth_clear = false;
   if (has_feature(FEATURE_CLEARCOAT) && s.clearcoat > 0.0) {
-    l.clear = s.clearcoat * fresnel_dielectric(nv, CLEARCOAT_IOR);
+    l.clear = s.clearcoat * lacquer_reflectance(s, nv);
     l.smooth_clear = s.clearcoat_alpha <= frame.specular_alpha;
     // What the lacquer does not reflect is left for what is below it.
     const float below = 1.0 - l.clear;

@@ -166,7 +166,11 @@ Lobes lobes_of(const Bsdf& bsdf, const ShadingPoint& point) {
     lobes.specular =
         opaque * lobes.plastic_fresnel + bsdf.metallic * mean(schlick(bsdf.base_color, lobes.nv));
   }
-  lobes.lacquer = bsdf.clearcoat * fresnel_dielectric(std::clamp(lobes.nv, 0.0, 1.0), 1.5);
+  // On the outside of solid glass; from inside, too, the direction outside counts.
+  double outside = std::clamp(lobes.nv, 0.0, 1.0);
+  if (bsdf.transmission > 0 && !bsdf.thin_walled && !point.outside)
+    outside = std::sqrt(std::max(0.0, 1 - (1 - outside * outside) * bsdf.ior * bsdf.ior));
+  lobes.lacquer = bsdf.clearcoat * fresnel_dielectric(outside, 1.5);
   const double below = 1 - lobes.lacquer;
   lobes.diffuse *= below;
   lobes.specular *= below;

@@ -326,6 +326,7 @@ View glass_and_lacquer() {
   scene::Material jelly = glass(1.3f);
   jelly.attenuation_color = {0.8f, 0.2f, 0.3f};
   jelly.attenuation_distance_m = 0.2f;
+  jelly.clearcoat = 0.8f;
   scene::Material frosted = glass(1.5f);
   frosted.roughness = 0.5f;
   frosted.attenuation_color = {0.2f, 0.6f, 0.9f};
