@@ -76,6 +76,8 @@ std::string to_json(const FinishedFrame& frame) {
   json["dropped_not_finite"] = frame.counters.dropped_not_finite;
   json["dropped_negative"] = frame.counters.dropped_negative;
   json["stopped_in_layers"] = frame.counters.stopped_in_layers;
+  if (frame.counters.unfinished > 0) json["unfinished"] = frame.counters.unfinished;
+  if (frame.counters.rebuilt_trees > 0) json["rebuilt_trees"] = frame.counters.rebuilt_trees;
   if (frame.counters.measured + frame.counters.unmeasured > 0) {
     json["measured"] = frame.counters.measured;
     json["unmeasured"] = frame.counters.unmeasured;
@@ -111,6 +113,8 @@ FinishedFrame from_json(const std::string& line) {
   frame.counters.dropped_not_finite = json.at("dropped_not_finite");
   frame.counters.dropped_negative = json.at("dropped_negative");
   frame.counters.stopped_in_layers = json.value("stopped_in_layers", std::uint64_t{0});
+  frame.counters.unfinished = json.value("unfinished", std::uint64_t{0});
+  frame.counters.rebuilt_trees = json.value("rebuilt_trees", std::uint64_t{0});
   frame.counters.measured = json.value("measured", std::uint64_t{0});
   frame.counters.unmeasured = json.value("unmeasured", std::uint64_t{0});
   return frame;

@@ -119,6 +119,7 @@ std::string dropped_text(const render::Counters& counters) {
   add(counters.dropped_not_finite, " samples not finite");
   add(counters.dropped_negative, " samples negative");
   add(counters.stopped_in_layers, " rays stopped by the last of too many transparent surfaces");
+  add(counters.unfinished, " paths cut off before their end");
   return text;
 }
 

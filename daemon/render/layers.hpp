@@ -37,7 +37,7 @@ struct Counters {
   // surfaces that had to be traced.
   std::uint64_t measured = 0;
   std::uint64_t unmeasured = 0;
-  // Trees of meshes that deform that were built anew, since the scene was set.
+  // Trees of meshes that deform that were built anew since the frame before was begun.
   std::uint64_t rebuilt_trees = 0;
 };
 

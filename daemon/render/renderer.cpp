@@ -66,6 +66,7 @@ struct Renderer::Impl {
   FrameInput frame;
   std::optional<lighting::Response> response;
   std::int64_t samples = 0;
+  std::uint64_t trees_now = 0, trees_before = 0;  // rebuilt up to this frame's begin and the last's
 };
 
 void Renderer::Impl::resize() {
@@ -153,6 +154,7 @@ Renderer::~Renderer() = default;
 void Renderer::set_scene(const scene::Scene& scene) {
   impl_->scene.set_scene(scene, impl_->estimation.specular_roughness);
   impl_->has_scene = true;
+  impl_->trees_now = impl_->trees_before = 0;
 }
 
 void Renderer::set_environment(const lighting::EnvironmentMap& environment,
@@ -213,6 +215,7 @@ void Renderer::begin(FrameInput frame) {
     r.presenter.reset();
   }
   r.samples = 0;
+  r.trees_before = std::exchange(r.trees_now, r.scene.rebuilt_trees());
   r.upload_plate();
   r.scene.place(glm::dvec3(r.frame.world_from_camera[3]));
   r.upload_frame();
@@ -315,7 +318,7 @@ Counters Renderer::counters() const {
   counters.unfinished = control.unfinished;
   counters.measured = wide(control.measured_high, control.measured_low);
   counters.unmeasured = wide(control.unmeasured_high, control.unmeasured_low);
-  counters.rebuilt_trees = impl_->scene.rebuilt_trees();
+  counters.rebuilt_trees = impl_->scene.rebuilt_trees() - impl_->trees_before;
   return counters;
 }
 

@@ -268,12 +268,17 @@ void count_picture(const Shot& shot, pipeline::Metrics& metrics, report::Reports
     reports(report::once({Severity::warning, "plate untouched", shot.untouched}));
   }
   const render::Counters& counters = shot.counters;
-  if (counters.dropped_not_finite + counters.dropped_negative + counters.stopped_in_layers == 0)
+  if (counters.rebuilt_trees > 0)
+    metrics.count("trees of deforming meshes built anew", counters.rebuilt_trees);
+  if (counters.dropped_not_finite + counters.dropped_negative + counters.stopped_in_layers +
+          counters.unfinished ==
+      0)
     return;
   metrics.count("samples not finite", counters.dropped_not_finite);
   metrics.count("samples negative", counters.dropped_negative);
   metrics.count("rays stopped by the last of too many transparent surfaces",
                 counters.stopped_in_layers);
+  metrics.count("paths cut off before their end", counters.unfinished);
 }
 
 LivePipeline::LivePipeline(Parts parts, std::stop_token stop)

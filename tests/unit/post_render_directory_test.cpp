@@ -49,6 +49,8 @@ pipeline::Shot sample_shot(std::uint64_t index) {
   layers.depth.resize(width * height);
   shot.layers = std::make_shared<const render::Layers>(layers);
   shot.counters.rays = 1234;
+  shot.counters.unfinished = 5;
+  shot.counters.rebuilt_trees = 2;
   shot.whole = true;
   return shot;
 }
@@ -86,6 +88,8 @@ TEST_F(RenderDirectoryTest, WritesNumberedFilesAndALineAFrame) {
   EXPECT_EQ(record->light_sources[0], sample_shot(7).light->lighting.sources[0]);
   EXPECT_EQ(record->light_dropped_share, 0.25);
   EXPECT_EQ(record->counters.rays, 1234u);
+  EXPECT_EQ(record->counters.unfinished, 5u);
+  EXPECT_EQ(record->counters.rebuilt_trees, 2u);
 }
 
 TEST_F(RenderDirectoryTest, UntouchedFrameSaysWhyAndHasNoPose) {

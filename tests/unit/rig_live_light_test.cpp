@@ -93,10 +93,14 @@ TEST(CountPicture, WhatIsOddIsCountedAndReportedOnce) {
   EXPECT_TRUE(metrics.snapshot(1).counts.empty());
   shot.untouched = "pose lost: no tag in the picture";
   shot.counters.dropped_negative = 3;
+  shot.counters.unfinished = 2;
+  shot.counters.rebuilt_trees = 1;
   for (int times = 0; times < 2; ++times) count_picture(shot, metrics, reports);
   EXPECT_EQ(metrics.snapshot(1).counts.at("plate untouched: " + shot.untouched), 2u);
   EXPECT_EQ(metrics.snapshot(1).counts.at("samples negative"), 6u);
   EXPECT_EQ(metrics.snapshot(1).counts.at("samples not finite"), 0u);
+  EXPECT_EQ(metrics.snapshot(1).counts.at("paths cut off before their end"), 4u);
+  EXPECT_EQ(metrics.snapshot(1).counts.at("trees of deforming meshes built anew"), 2u);
   EXPECT_EQ(log.str(), "plate untouched: pose lost: no tag in the picture\n");
 }
 

@@ -74,6 +74,7 @@ render::Counters MethodRun::counters() const {
     sum.dropped_not_finite += one.dropped_not_finite;
     sum.dropped_negative += one.dropped_negative;
     sum.stopped_in_layers += one.stopped_in_layers;
+    sum.unfinished += one.unfinished;
   }
   return sum;
 }
