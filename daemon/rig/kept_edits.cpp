@@ -100,7 +100,7 @@ std::string with_edits(const std::string& text, const set::Set& set, const pipel
 std::filesystem::path keep_beside(const std::filesystem::path& file) {
   const std::string content = session::read_file(file);
   for (int number = 1;; ++number) {
-    const std::filesystem::path copy = file.string() + '.' + std::to_string(number) + ".old";
+    std::filesystem::path copy = file.string() + '.' + std::to_string(number) + ".old";
     if (std::filesystem::exists(copy)) continue;
     const session::OpenFile written(copy, O_WRONLY | O_CREAT | O_EXCL);
     try {
