@@ -71,10 +71,13 @@ void main() {
   vec3 gains;  // of an error of the change in the composite
   for (uint i = 0u; i < 3u; ++i)
     gains[i] = mix(gain(camera.radiance[i], real[i], camera.variance[i]), 1.0, mask);
-  highlights[index] = highlight_bits(composite - show.white, gains * gains * variance);
+  const uint bits = highlight_bits(composite - show.white, gains * gains * variance);
+  highlights[index] = bits;
   signals[index] = vec4(min(change / show.white, vec3(DENOISE_MOST_WHITES)),
                         depth > 0.0 ? 1.0 / depth : 0.0);
   variances[index] =
       vec4(min(variance, vec3(show.most_variance)) / (show.white * show.white), 0.0);
-  surfaces[index] = vec4(hits > 0.0 ? sums.normal.xyz / hits : vec3(0.0), mask);
+  // What is shown as it is on a real surface, a caustic, does not brighten its neighbours too.
+  surfaces[index] = vec4(hits > 0.0 ? sums.normal.xyz / hits : vec3(0.0),
+                         bits != 0u && mask == 0.0 ? DENOISE_HIGHLIGHT : mask);
 }

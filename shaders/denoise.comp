@@ -81,7 +81,7 @@ void main() {
       const Pixel there = load_pixel(at + off);
       float weight = SPLINE[abs(x)] * SPLINE[abs(y)];
       if (x != 0 || y != 0) {
-        if (!are_alike(here, there)) continue;
+        if (!are_alike(here, there, off)) continue;
         const float foretold = here.inverse_depth + dot(slope, vec2(off));
         float distance = guide_distance(guide, load_guide(at + off), scale) +
                          surface_distance(here, there, foretold);

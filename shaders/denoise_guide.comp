@@ -25,7 +25,7 @@ void main() {
       const ivec2 off = int(denoise.step) * ivec2(x, y);
       if (!is_inside(at + off)) continue;
       const Pixel there = load_pixel(at + off);
-      if (!are_alike(here, there)) continue;
+      if (!are_alike(here, there, off)) continue;
       const float foretold = here.inverse_depth + dot(slope, vec2(off));
       const float weight = exp(-surface_distance(here, there, foretold));
       change += weight * (there.signal - here.signal);

@@ -18,7 +18,7 @@ vec3 mean_variance(ivec2 at, Pixel here) {
     for (int x = -1; x <= 1; ++x) {
       if (!is_inside(at + ivec2(x, y))) continue;
       const Pixel there = load_pixel(at + ivec2(x, y));
-      if (!are_alike(here, there)) continue;
+      if (!are_alike(here, there, ivec2(x, y))) continue;
       sum += there.variance;
       count += 1.0;
     }
@@ -34,7 +34,7 @@ vec3 variance_of_neighbours(ivec2 at, Pixel here) {
     for (int x = -reach; x <= reach; ++x) {
       if (!is_inside(at + ivec2(x, y))) continue;
       const Pixel there = load_pixel(at + ivec2(x, y));
-      if (!are_alike(here, there)) continue;
+      if (!are_alike(here, there, ivec2(x, y))) continue;
       const vec3 off = there.signal - here.signal;
       sum += off;
       square += off * off;

@@ -5,6 +5,7 @@
 
 #include "daemon/render/each_pixel.hpp"
 #include "shaders/denoise.spv.h"
+#include "shaders/denoise_edges.spv.h"
 #include "shaders/denoise_guide.spv.h"
 #include "shaders/denoise_variance.spv.h"
 #include "shaders/lib/render_shared.h"
@@ -15,9 +16,10 @@ namespace {
 // The transform has four levels, with steps of 1, 2, 4 and 8 pixels.
 constexpr int wavelet_levels = 4;
 // A row's result depends on this many rows above and below it: at every level two steps and one
-// more of the guide, and the neighbours that give the variance. A slope comes from nearer rows.
-constexpr int reach =
-    3 * ((1 << wavelet_levels) - 1) + static_cast<int>(gpu::DENOISE_VARIANCE_REACH);
+// more of the guide, the neighbours that give the variance, and those of an edge. A slope comes
+// from nearer rows.
+constexpr int reach = 3 * ((1 << wavelet_levels) - 1) +
+                      static_cast<int>(gpu::DENOISE_VARIANCE_REACH + gpu::DENOISE_EDGE_REACH);
 static_assert(gpu::DENOISE_VARIANCE_REACH >= 2);
 
 }  // namespace
@@ -36,7 +38,8 @@ Denoiser::Denoiser(Device& device, std::size_t most_pixels)
       most_pixels_(most_pixels),
       variance_pass_(device, "denoise_variance", denoise_variance_spv),
       guide_pass_(device, "denoise_guide", denoise_guide_spv),
-      level_pass_(device, "denoise", denoise_spv) {}
+      level_pass_(device, "denoise", denoise_spv),
+      edge_pass_(device, "denoise_edges", denoise_edges_spv) {}
 
 void Denoiser::reserve(std::size_t pixels, bool companions) {
   filters_companions_ = companions;
@@ -64,10 +67,10 @@ void Denoiser::reserve(std::size_t pixels, bool companions) {
   }
 }
 
-// Each pass writes to the other side, starting from side 0; the variance pass is the first. It
-// leaves the companions where they are.
-constexpr int result_side = (1 + wavelet_levels) % 2;
-constexpr int companions_side = wavelet_levels % 2;
+// Each pass writes to the other side, starting from side 0: the variance pass, the levels, the edge
+// pass. The first leaves the companions where they are.
+constexpr int result_side = (1 + wavelet_levels + 1) % 2;
+constexpr int companions_side = (wavelet_levels + 1) % 2;
 
 const Buffer& Denoiser::denoised_signal() const {
   return signal_[result_side];
@@ -104,8 +107,10 @@ void Denoiser::record(const vk::raii::CommandBuffer& commands, int width, int ro
     constants.step = 1u << level;
     run(guide_pass_);
     run(level_pass_);
-    companion = 1 - companion;
+    if (filters_companions_) companion = 1 - companion;
   }
+  side = 1 - side;
+  run(edge_pass_);
 }
 
 std::vector<Denoiser::Band> Denoiser::bands(int width, int height) const {

@@ -70,7 +70,7 @@ class Denoiser {
   std::size_t pixels_ = 0;
   std::size_t companion_pixels_ = 0;  // that both sides of the companions have room for
   bool filters_companions_ = false;
-  Kernel variance_pass_, guide_pass_, level_pass_;
+  Kernel variance_pass_, guide_pass_, level_pass_, edge_pass_;
   // A pass reads one side and writes the other.
   Buffer signal_[2], variance_[2], uncovered_[2], real_[2];
   Buffer surface_, guide_, guide_variance_;

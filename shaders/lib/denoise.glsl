@@ -15,12 +15,11 @@ layout(scalar, push_constant) uniform Denoise { GpuDenoise denoise; };
 // 1 / depth (0: none).
 uniform textureBuffer signals;
 uniform textureBuffer variances;  // of the signal, to be multiplied by the fourth component
-uniform textureBuffer surfaces;   // normal, mean(M)
+uniform textureBuffer surfaces;   // normal, mean(M) or DENOISE_HIGHLIGHT
 
-// A neighbour's weight has fallen to 1 / e at a difference of the mask of MASK_SCALE, at a squared
-// chord between the normals of NORMAL_SCALE, or where the inverse depth is off what the surface's
+// A neighbour's weight has fallen to 1 / e at a squared chord between the normals of NORMAL_SCALE,
+// or where the inverse depth is off what the surface's
 // slope predicts by a share of DEPTH_SCALE.
-const float MASK_SCALE = 0.05;
 const float NORMAL_SCALE = 0.1;
 const float DEPTH_SCALE = 0.03;
 
@@ -48,10 +47,16 @@ Pixel load_pixel(ivec2 at) {
   return Pixel(signal.rgb, signal.w, variance.rgb, variance.w, surface.xyz, surface.w);
 }
 
-// The difference Lm - Lr is never blended with a virtual object that covers it, nor a hit with a
-// miss.
-bool are_alike(Pixel a, Pixel b) {
-  return (a.cover > 0.0) == (b.cover > 0.0) && (a.inverse_depth > 0.0) == (b.inverse_depth > 0.0);
+// Returns whether a virtual object covers the pixel in part.
+bool is_edge(Pixel pixel) { return pixel.cover > 0.0 && pixel.cover < 1.0; }
+
+// Returns whether two pixels `off` apart may be blended. The difference Lm - Lr never is with a
+// virtual object that covers it, nor a hit with a miss, nor anything with a highlight. An edge,
+// which has some of both, is left to denoise_edges.comp.
+bool are_alike(Pixel a, Pixel b, ivec2 off) {
+  if (off == ivec2(0)) return true;
+  return a.cover == b.cover && !is_edge(a) &&
+         (a.inverse_depth > 0.0) == (b.inverse_depth > 0.0);
 }
 
 // Returns the change of the inverse depth from pixel to pixel, which is constant over a plane. It
@@ -81,12 +86,11 @@ vec2 inverse_depth_slopes(ivec2 at, float here) {
 // Returns the squared distance of two pixels as parts of one surface, in units of the scales above.
 // `foretold` is the inverse depth of b by the slope at a.
 float surface_distance(Pixel a, Pixel b, float foretold) {
-  const float mask = (a.cover - b.cover) / MASK_SCALE;
   const vec3 chord = a.normal - b.normal;
   const float depth = a.inverse_depth > 0.0
                           ? (b.inverse_depth - foretold) / (DEPTH_SCALE * a.inverse_depth)
                           : 0.0;
-  return mask * mask + dot(chord, chord) / NORMAL_SCALE + depth * depth;
+  return dot(chord, chord) / NORMAL_SCALE + depth * depth;
 }
 
 #endif

@@ -23,6 +23,10 @@ PREVIZ_CONST uint DENOISE_VARIANCE_REACH = 3u;
 // What a pixel changes is filtered up to this many times the sensor's white. Brighter light, such as
 // a mirrored lamp that few samples meet, would spread over all its neighbours.
 PREVIZ_CONST float DENOISE_MOST_WHITES = 4.0f;
+// Stands for the mask of a pixel that the denoiser leaves as it is.
+PREVIZ_CONST float DENOISE_HIGHLIGHT = 2.0f;
+// An edge's pixels are compared with those this far around them.
+PREVIZ_CONST uint DENOISE_EDGE_REACH = 2u;
 // A channel counts as white from this share of the sensor's white on, a step of 8 bits below it.
 PREVIZ_CONST float NEARLY_WHITE = 0.99f;
 

@@ -55,15 +55,32 @@ inline Plate present(std::span<const gpu::GpuPixel> pixels, const Plate& plate,
   return render::Presenter(*shared_device(), response).present(what, denoiser);
 }
 
-// The denoiser's input, as shaders/composite.comp makes it. Where a pixel is partly covered, its
-// uncovered part is taken to be that share of the difference.
+// The uncovered part of each pixel's change, which no layer has.
+inline std::vector<glm::vec3> uncovered_of(std::span<const gpu::GpuPixel> pixels) {
+  std::vector<glm::vec3> uncovered;
+  for (const gpu::GpuPixel& p : pixels)
+    uncovered.push_back(glm::vec3(p.uncovered_high + p.uncovered_low) /
+                        (p.square_high.w + p.square_low.w));
+  return uncovered;
+}
+
+inline bool is_caustic(const render::Layers& layers, std::size_t i) {
+  bool is_one = false;
+  for (int c = 0; c < 3; ++c)
+    is_one |= layers.composite[i][c] - static_cast<float>(layers.white) >
+              2 * std::sqrt(layers.variance[i][c]);
+  return is_one && layers.samples > 1 && layers.mask[i] == 0;
+}
+
+// The denoiser's input, as shaders/composite.comp makes it. Where `uncovered` (uncovered_of) is
+// empty, it is taken to be a partly covered pixel's share of the difference.
 struct DenoiserInput {
   std::vector<glm::vec4> signal, variance, surface, uncovered, real;
 };
 
 // Makes the input of pixels [first, last).
 inline DenoiserInput denoiser_input(const render::Layers& layers, std::size_t first,
-                                    std::size_t last) {
+                                    std::size_t last, std::span<const glm::vec3> uncovered = {}) {
   DenoiserInput input;
   const auto white = static_cast<float>(layers.white);
   const float most_variance = render::most_variance(white, layers.samples);
@@ -73,8 +90,10 @@ inline DenoiserInput denoiser_input(const render::Layers& layers, std::size_t fi
     input.signal.emplace_back(glm::min(change / white, gpu::DENOISE_MOST_WHITES),
                               layers.depth[i] > 0 ? 1 / layers.depth[i] : 0);
     input.variance.emplace_back(glm::min(layers.variance[i], most_variance) / (white * white), 0);
-    input.surface.emplace_back(layers.normal[i], mask);
-    input.uncovered.emplace_back((1 - mask) * layers.diff[i] / white, 0);
+    input.surface.emplace_back(layers.normal[i],
+                               is_caustic(layers, i) ? gpu::DENOISE_HIGHLIGHT : mask);
+    const glm::vec3 own = uncovered.empty() ? (1 - mask) * layers.diff[i] : uncovered[i];
+    input.uncovered.emplace_back(own / white, 0);
     input.real.emplace_back(layers.real[i] / white, 0);
   }
   return input;
@@ -82,15 +101,15 @@ inline DenoiserInput denoiser_input(const render::Layers& layers, std::size_t fi
 
 // Removes noise from the layers. The change of the composite is taken from `mixed` and `diff`.
 inline void denoise(render::Denoiser& denoiser, render::Layers& layers,
-                    const render::PlateRadiance& plate = {},
-                    const render::CompositeRule& rule = {}) {
+                    const render::PlateRadiance& plate = {}, const render::CompositeRule& rule = {},
+                    std::span<const glm::vec3> uncovered = {}) {
   render::Device& device = *shared_device();
   const render::Layers raw = layers;
   const auto width = static_cast<std::size_t>(layers.width);
   for (const render::Denoiser::Band& band : denoiser.bands(layers.width, layers.height)) {
     const std::size_t top = static_cast<std::size_t>(band.top) * width;
     const std::size_t bottom = static_cast<std::size_t>(band.bottom) * width;
-    const DenoiserInput input = denoiser_input(raw, top, bottom);
+    const DenoiserInput input = denoiser_input(raw, top, bottom, uncovered);
     denoiser.reserve(bottom - top, true);
     const auto upload = [&](render::Buffer& buffer, const std::vector<glm::vec4>& texels) {
       render::upload_bytes(device, buffer, std::as_bytes(std::span(texels)));

@@ -348,6 +348,58 @@ TEST(Denoise, LeavesARealSurfaceBesideAVirtualOneBitForBit) {
   EXPECT_LT(spread(clean, [&](int x, int) { return covered(x); }).variance, 0.01 / 20);
 }
 
+// The edge of a virtual wall before a real one, one pixel wide: each of its pixels is met by four
+// samples, so that its light is raw where its neighbours' is not. It becomes the mixture of both
+// sides by its own share.
+TEST(Denoise, MixesAnEdgeOfItsSidesByItsOwnShare) {
+  constexpr double object = 0.7, behind = -0.2, sigma = 0.1;
+  constexpr int edge = width / 2;
+  const auto share = [](int y) { return 0.2f + 0.6f * static_cast<float>(y) / height; };
+  auto noise = noise_around(0, sigma);
+  render::Layers raw = wall([](int, int) { return glm::vec3(0); }, sigma * sigma);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const auto i = static_cast<std::size_t>(y) * width + x;
+      const float mask = x < edge ? 1.0f : x > edge ? 0.0f : share(y);
+      raw.mask[i] = mask;
+      raw.mixed[i] = glm::vec3(object) + noise(x, y);
+      raw.diff[i] = glm::vec3(behind) + (x > edge ? noise(x, y) : glm::vec3(0));
+    }
+  const std::vector<double> camera(3 * raw.composite.size(), 0.5);
+  const render::Layers clean = denoised(raw, plate_of(camera));
+  double before = 0, after = 0, bias = 0;
+  for (int y = 0; y < height; ++y) {
+    const auto i = static_cast<std::size_t>(y) * width + edge;
+    const double m = raw.mask[i], expected = m * object + (1 - m) * (behind + 0.5);
+    const double was = m * raw.mixed[i].r + (1 - m) * (raw.diff[i].r + 0.5);
+    before += std::pow(was - expected, 2);
+    after += std::pow(clean.composite[i].r - expected, 2);
+    bias += (clean.composite[i].r - expected) / height;
+  }
+  // Of 25 pixels around, the object has the light of 10 without noise and half of 5 with it.
+  EXPECT_LT(after, before / 10);
+  EXPECT_LT(std::abs(bias), 4 * sigma / std::sqrt(10.0 * height));
+}
+
+// What is no noise stays: a bright rim on the edge that every sample meets.
+TEST(Denoise, LeavesTheRimOfAnEdge) {
+  constexpr int edge = width / 2;
+  render::Layers raw = wall([](int, int) { return glm::vec3(0); }, 1e-6);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      const auto i = static_cast<std::size_t>(y) * width + x;
+      raw.mask[i] = x < edge ? 1.0f : x > edge ? 0.0f : 0.5f;
+      raw.mixed[i] = glm::vec3(x == edge ? 0.9f : 0.3f);
+      raw.diff[i] = glm::vec3(0);
+    }
+  const render::Layers clean =
+      denoised(raw, plate_of(std::vector<double>(3 * raw.composite.size(), 0.5)));
+  for (int y = 0; y < height; ++y) {
+    const auto i = static_cast<std::size_t>(y) * width + edge;
+    EXPECT_NEAR(clean.composite[i].r, 0.5 * 0.9 + 0.5 * 0.5, 0.001);
+  }
+}
+
 TEST(Denoise, ChangesNoOtherLayerAndNoUntouchedPlate) {
   RandomScene options;
   options.width = 70;

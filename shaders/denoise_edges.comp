@@ -1,0 +1,112 @@
+// Takes noise out of pixels that a virtual object covers in part, which the levels of the transform
+// blend with nothing. Such a pixel is mean(M) of the object's light and the rest of the change
+// behind it; both are taken from the pixels around it, and the share stays the pixel's own, so that
+// edges stay as sharp as they are. The surroundings count as far as noise explains what the pixels
+// of the edge are off them (shaders/README.md, "Denoising").
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_scalar_block_layout : require
+
+#include "shaders/lib/denoise.glsl"
+
+uniform textureBuffer uncovered;  // over white
+uniform textureBuffer reals;
+layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
+layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
+layout(scalar) writeonly buffer DenoisedUncovered { vec4 denoised_uncovered[]; };
+layout(scalar) writeonly buffer DenoisedReals { vec4 denoised_reals[]; };
+
+const int REACH = int(DENOISE_EDGE_REACH);
+
+// The change of a pixel: of the object that covers a share of it, and behind.
+struct Parts {
+  Pixel pixel;
+  vec3 covered;    // mean(M Lm)
+  vec3 uncovered;  // mean((1 - M)(Lm - Lr))
+};
+
+Parts load_parts(ivec2 at) {
+  Parts p;
+  p.pixel = load_pixel(at);
+  const vec3 own = min(texelFetch(uncovered, pixel_index(at)).rgb, DENOISE_MOST_WHITES);
+  p.uncovered = p.pixel.cover >= 1.0 ? vec3(0.0) : p.pixel.cover <= 0.0 ? p.pixel.signal : own;
+  p.covered = p.pixel.signal - p.uncovered;
+  return p;
+}
+
+// Light of the object where it covers all, and the change where nothing covers, as the mean of the
+// pixels around.
+struct Sides {
+  vec3 object, behind;
+  vec3 object_variance, behind_variance;
+};
+
+Sides sides_around(ivec2 at) {
+  Sides s = Sides(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
+  float object = 0.0;
+  float behind = 0.0;
+  for (int y = -REACH; y <= REACH; ++y)
+    for (int x = -REACH; x <= REACH; ++x) {
+      if (!is_inside(at + ivec2(x, y))) continue;
+      const Parts p = load_parts(at + ivec2(x, y));
+      const float cover = p.pixel.cover;
+      if (cover > 1.0) continue;  // a highlight
+      // The noise of a part is taken to be its share of the pixel's.
+      const vec3 variance = p.pixel.overlap * p.pixel.variance;
+      s.object += p.covered;
+      s.object_variance += cover * variance;
+      object += cover;
+      s.behind += p.uncovered;
+      s.behind_variance += (1.0 - cover) * variance;
+      behind += 1.0 - cover;
+    }
+  s.object /= object;
+  s.behind /= behind;
+  s.object_variance /= object * object;
+  s.behind_variance /= behind * behind;
+  return s;
+}
+
+// Returns how much of what the edge's pixels are off the sides' mixture is noise, from 0 to 1.
+float noise_share(ivec2 at, Sides s) {
+  vec3 expected = vec3(0.0);
+  vec3 found = vec3(0.0);
+  for (int y = -REACH; y <= REACH; ++y)
+    for (int x = -REACH; x <= REACH; ++x) {
+      if (!is_inside(at + ivec2(x, y))) continue;
+      const Pixel p = load_pixel(at + ivec2(x, y));
+      if (!is_edge(p)) continue;
+      const vec3 off = p.signal - mix(s.behind, s.object, p.cover);
+      expected += p.overlap * p.variance;
+      found += off * off;
+    }
+  const float off = found.r + found.g + found.b;
+  return off > 0.0 ? min((expected.r + expected.g + expected.b) / off, 1.0) : 0.0;
+}
+
+void main() {
+  const uint index = gl_GlobalInvocationID.x;
+  if (index >= denoise.width * denoise.height) return;
+  const ivec2 at = ivec2(index % denoise.width, index / denoise.width);
+  const Parts here = load_parts(at);
+  vec3 signal = here.pixel.signal;
+  vec3 own = texelFetch(uncovered, int(index)).rgb;
+  vec4 variance = vec4(here.pixel.variance, here.pixel.overlap);
+  const float cover = here.pixel.cover;
+  if (is_edge(here.pixel)) {
+    const Sides sides = sides_around(at);
+    const float share = noise_share(at, sides);
+    const vec3 behind = (1.0 - cover) * sides.behind;
+    signal = mix(signal, cover * sides.object + behind, share);
+    own = mix(own, behind, share);
+    const vec3 left = cover * cover * sides.object_variance +
+                      (1.0 - cover) * (1.0 - cover) * sides.behind_variance;
+    variance.rgb = (1.0 - share) * (1.0 - share) * variance.rgb +
+                   share * share * left / max(variance.w, 1e-6);
+  }
+  denoised_signals[index] = vec4(signal, here.pixel.inverse_depth);
+  denoised_variances[index] = variance;
+  if (denoise.has_companions == 0u) return;
+  denoised_uncovered[index] = vec4(own, 0.0);
+  denoised_reals[index] = texelFetch(reals, int(index));
+}
