@@ -77,7 +77,8 @@ void main() {
                         depth > 0.0 ? 1.0 / depth : 0.0);
   variances[index] =
       vec4(min(variance, vec3(show.most_variance)) / (show.white * show.white), 0.0);
-  // What is shown as it is on a real surface, a caustic, does not brighten its neighbours too.
+  // A highlight on a real surface, the core of a caustic, is shown as it is, and must not brighten
+  // its neighbours too.
   surfaces[index] = vec4(hits > 0.0 ? sums.normal.xyz / hits : vec3(0.0),
                          bits != 0u && mask == 0.0 ? DENOISE_HIGHLIGHT : mask);
 }

@@ -42,7 +42,7 @@ void main() {
   const ivec3 extent = whole_above(high) - origin;
   const ivec3 exponent =
       ivec3(cell_exponent(extent.x), cell_exponent(extent.y), cell_exponent(extent.z));
-  // Of an axis: the low planes of children 0..3 and 4..7, then the high ones.
+  // Each axis has the low planes of children 0..3 and 4..7, then the high ones.
   uvec4 planes[3] = uvec4[3](uvec4(0u), uvec4(0u), uvec4(0u));
   for (uint slot = 0u; slot < 8u; ++slot) {
     ivec3 first = ivec3(255);  // the box of an empty slot is inverted

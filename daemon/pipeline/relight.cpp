@@ -114,7 +114,7 @@ std::vector<FoundLamp> found_lamps(const Light& light) {
   };
   add(light.lamps);
   if (light.image_lamps) add(light.image_lamps->lamps);
-  // By number, so that the order does not depend on what is parted from the image.
+  // They are sorted by number, so that the order does not depend on what is parted from the image.
   std::ranges::stable_sort(
       found, {}, [](const FoundLamp& lamp) { return std::pair(lamp.name.size(), lamp.name); });
   return found;

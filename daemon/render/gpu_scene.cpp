@@ -160,8 +160,9 @@ void GpuScene::upload_meshes() {
   deformer_.upload(std::move(deformed));
 }
 
-// What deforms is written through storage buffers, which may be smaller than the texel buffers that
-// all meshes are read from.
+// Throws if the buffers of a scene with deforming meshes are too large: the shapes are written
+// through storage buffers, which may be smaller than the texel buffers that all meshes are read
+// from.
 void GpuScene::check_deforming() const {
   const vk::DeviceSize most = device_.limits().maxStorageBufferRange;
   for (const Buffer* buffer : {&bvh_, &vertices_})

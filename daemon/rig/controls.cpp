@@ -308,7 +308,7 @@ Outcome Controls::apply(const set::SelectLight& effect) {
   const std::vector<std::string> names = lights();
   if (names.empty()) return none_of("lamp");
   const auto at = std::ranges::find(names, selected_light());
-  // From a lamp that is gone it goes on with the first or the last.
+  // Behind a lamp that is gone comes the first, before it the last.
   const std::size_t from = at != names.end() ? static_cast<std::size_t>(at - names.begin())
                            : effect.next > 0 ? names.size() - 1
                                              : 0;

@@ -143,7 +143,7 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     sets.leave(rig->controls().look().edits);
     if (sets.has_next() && rig->controls().look().take_edits != pipeline::Edits{})
       reports({report::Severity::warning, "review",
-               "what was changed in the take ends with this reading of the set file"});
+               "what was changed in the take in review is dropped, because a set is read"});
     if (!sets.has_next()) service::stopping();
     rig->on_change({});
     bus.reset();

@@ -11,14 +11,25 @@ namespace previz::rig {
 
 using report::Severity;
 
-LoadedSet load_whole_set(const std::filesystem::path& file) {
+namespace {
+
+// Reads a set from the text of its file; `changed` is left open.
+LoadedSet loaded(std::string text, const std::filesystem::path& file) {
   LoadedSet loaded;
-  std::error_code missing;  // reading the file gives a better error
-  loaded.changed = std::filesystem::last_write_time(file, missing);
-  loaded.text = session::read_file(file);
-  loaded.set = set::parse_set(loaded.text, file);
+  loaded.set = set::parse_set(text, file);
+  loaded.text = std::move(text);
   loaded.scene = scene::load_scene(loaded.set);
   return loaded;
+}
+
+}  // namespace
+
+LoadedSet load_whole_set(const std::filesystem::path& file) {
+  std::error_code missing;  // reading the file gives a better error
+  const auto changed = std::filesystem::last_write_time(file, missing);
+  LoadedSet set = loaded(session::read_file(file), file);
+  set.changed = changed;
+  return set;
 }
 
 std::filesystem::path neighbour(const std::filesystem::path& file, int next) {
@@ -69,6 +80,7 @@ void SetKeeper::look_at_file() {
 }
 
 std::optional<std::string> SetKeeper::keep(const pipeline::Edits& edits) {
+  service::feed_watchdog();  // reading a large scene takes its time
   const std::filesystem::path& file = running_.set.file;
   const auto refused = [&](const std::string& why) {
     const std::string first = why.substr(0, why.find('\n'));
@@ -83,16 +95,20 @@ std::optional<std::string> SetKeeper::keep(const pipeline::Edits& edits) {
     const std::string text = with_edits(running_.text, running_.set, edits);
     if (text == running_.text)
       return refused("the changes come to nothing; " + file.string() + " stays as it is");
-    scene::load_scene(set::parse_set(text, file));  // so that it can be loaded
+    LoadedSet next = loaded(text, file);
     const std::filesystem::path old = keep_beside(target);
     session::replace_file(target, text);
     changes_.kept = Kept{running_.text, edits};
+    std::error_code missing;
+    next.changed = std::filesystem::last_write_time(file, missing);
+    override_set_(next.set);
+    next_ = std::move(next);
     reports_(
         {Severity::info, "keep", file.string() + " has the changes; as it was: " + old.string()});
   } catch (const std::exception& error) {
     return refused(error.what());
   }
-  return change(0);
+  return std::nullopt;
 }
 
 // Keeps the changes that were made to a set that is read again; those to another set end with it,

@@ -67,10 +67,9 @@ class SetKeeper {
   const pipeline::Edits& edits() const { return changes_.edits; }
   void leave(pipeline::Edits edits) { changes_.edits = std::move(edits); }
 
-  // Writes the changes into the running set's file, keeps the old file beside it, and reads it
-  // again, as change(0) does; a run of what was written begins without changes. Returns why not, in
-  // one line, if the file was changed meanwhile, would not load or cannot be written; it is then as
-  // it was.
+  // Writes the changes into the running set's file and keeps the old file beside it. The next set
+  // is then what was written, and its run begins without changes. Returns why not, in one line, if
+  // the file was changed meanwhile, would not load or cannot be written; it is then as it was.
   std::optional<std::string> keep(const pipeline::Edits& edits);
 
   // Makes the next set the running one; has_next() must hold.

@@ -28,7 +28,7 @@ struct DeformingPair {
 // previz::Error past 2^24 triangles.
 std::vector<DeformingPair> deforming_pairs(const Mesh& mesh);
 
-// What is done to a tree so that it follows its vertices.
+// The steps by which a tree follows its vertices.
 struct RefitPlan {
   std::vector<gpu::GpuRefitLeaf> leaves;
   std::vector<std::uint32_t> nodes;   // records of the nodes, the deepest level first

@@ -14,8 +14,8 @@
 
 namespace previz::scene {
 
-// What changes the shape of a node's mesh. Of the deformation only the weights, their channel and
-// the joints are set.
+// The influences that change the shape of a node's mesh. Only the weights, their channel and the
+// joints of `deformation` are set.
 struct NodeDeformation {
   Deformation deformation;
   bool is_skinned = false, is_skin_moved = false;

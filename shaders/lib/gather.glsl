@@ -88,7 +88,7 @@ void gather_cell(ivec3 cell, int level, float radius, Surface s, Lobes l, uint m
 GatheredPair gather_photons(Surface s, Lobes l, uint most_vertices, bool differing) {
   GatheredPair sum = GatheredPair(vec3(0.0), vec3(0.0));
   const float radius = photon_radius(s.position);
-  // What is on the disc may be nearer to the camera than its centre, or farther, by the radius.
+  // A photon on the disc may be nearer to the camera than its centre, or farther, by the radius.
   const int last_level = photon_level(radius * (1.0 + batch.photon_radius) * 1.0001);
   for (int level = photon_level(radius * (1.0 - batch.photon_radius) * 0.9999);
        level <= last_level; ++level) {

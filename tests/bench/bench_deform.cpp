@@ -9,6 +9,7 @@
 #include "drivers/error.hpp"
 #include "tests/bench/measure.hpp"
 #include "tests/bench/tracers/shapes.hpp"
+#include "tests/bench/view_from_above.hpp"
 #include "tests/support/figure.hpp"
 
 namespace previz::bench {
@@ -33,22 +34,9 @@ scene::Scene make_scene(const Options& options) {
 void run(const Options& options) {
   const auto device = render::open_device();
   const scene::Scene scene = make_scene(options);
-  ObserverCalibration calibration;
-  calibration.intrinsics = {options.width,
-                            options.height,
-                            1.0 * options.height,
-                            1.0 * options.height,
-                            0.5 * (options.width - 1),
-                            0.5 * (options.height - 1)};
-  set::Estimation estimation;
-  estimation.max_depth = 4;
-  render::Renderer renderer(device, estimation, calibration);
-  renderer.set_scene(scene);
-  renderer.set_environment({4, std::vector<glm::vec3>(16, glm::vec3(0.5f))},
-                           set::LightSampling::importance);
-  render::FrameInput frame;
-  // 3 m above, looking down.
-  frame.world_from_camera = {{1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}, {0, 0, 3, 1}};
+  const ViewFromAbove view(device, scene, options.width, options.height);
+  render::Renderer& renderer = *view.renderer;
+  const render::FrameInput& frame = view.frame;
 
   // [0]: nothing changed, [1]: the figure did. In CPU time: the machine may be busy.
   std::vector<double> placed_ms[2], whole_ms[2];

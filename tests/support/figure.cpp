@@ -21,6 +21,18 @@ scene::Influence influence_at(double height, int joints) {
           {1 - share, share, 0, 0}};
 }
 
+// Adds a mesh that deforms, at rest, and returns its index in Scene::deformations.
+std::uint32_t add_deforming(scene::Scene& scene, const scene::Mesh& mesh, std::uint32_t material,
+                            const glm::dmat4& world_from_object, std::uint32_t presence) {
+  scene::Deformation deformation;
+  deformation.mesh = add_mesh(scene, mesh);
+  deformation.instance =
+      add_instance(scene, deformation.mesh, material, world_from_object, presence);
+  deformation.object = scene.instances[deformation.instance].object;
+  scene.deformations.push_back(std::move(deformation));
+  return static_cast<std::uint32_t>(scene.deformations.size() - 1);
+}
+
 }  // namespace
 
 scene::Mesh limb_mesh(int rings, int segments, int joints) {
@@ -80,27 +92,17 @@ scene::Mesh squeezed_ball_mesh(double radius, int segments, int rings) {
 std::uint32_t add_limb(scene::Scene& scene, const scene::Mesh& mesh, int joints,
                        std::uint32_t material, const glm::dmat4& world_from_object,
                        std::uint32_t presence) {
-  scene::Deformation deformation;
-  deformation.mesh = add_mesh(scene, mesh);
-  deformation.instance =
-      add_instance(scene, deformation.mesh, material, world_from_object, presence);
-  deformation.object = scene.instances[deformation.instance].object;
-  deformation.joints = limb_joints(joints);
-  scene.deformations.push_back(std::move(deformation));
-  return static_cast<std::uint32_t>(scene.deformations.size() - 1);
+  const auto index = add_deforming(scene, mesh, material, world_from_object, presence);
+  scene.deformations[index].joints = limb_joints(joints);
+  return index;
 }
 
 std::uint32_t add_squeezed_ball(scene::Scene& scene, const scene::Mesh& mesh,
                                 std::uint32_t material, const glm::dmat4& world_from_object,
                                 std::uint32_t presence) {
-  scene::Deformation deformation;
-  deformation.mesh = add_mesh(scene, mesh);
-  deformation.instance =
-      add_instance(scene, deformation.mesh, material, world_from_object, presence);
-  deformation.object = scene.instances[deformation.instance].object;
-  deformation.weights = {0};
-  scene.deformations.push_back(std::move(deformation));
-  return static_cast<std::uint32_t>(scene.deformations.size() - 1);
+  const auto index = add_deforming(scene, mesh, material, world_from_object, presence);
+  scene.deformations[index].weights = {0};
+  return index;
 }
 
 scene::Shape bent_limb(const scene::Deformation& limb, double angle_rad) {

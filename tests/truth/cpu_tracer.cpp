@@ -124,8 +124,7 @@ glm::dvec3 light_through(const World& world, Ray ray, double distance) {
   return share;
 }
 
-// What fills the space that a ray crosses: the inside of a coloured solid, or null where it is
-// clear.
+// The space that a ray crosses is the inside of a coloured solid, or clear (null).
 using Medium = const scene::Material*;
 
 Medium inside_of(const World& world, std::uint32_t instance) {

@@ -207,18 +207,23 @@ scene::Texture holes() {
   return texture;
 }
 
-// Rough glass, solid and as a pane, white rough metal, normal maps on plastic and metal, a veil and
-// a glowing fence with holes; on a table in both worlds, under an environment with a bright side.
-View rough_materials() {
-  View view;
-  scene::Scene& scene = view.scene;
-  const auto add = [&](scene::Mesh mesh, const scene::Material& material, const glm::dvec3& at,
-                       std::uint32_t presence) {
+// Returns a function that puts a mesh of a material somewhere into the scene.
+auto adder_to(scene::Scene& scene) {
+  return [&scene](scene::Mesh mesh, const scene::Material& material, const glm::dvec3& at,
+                  std::uint32_t presence) {
     glm::dmat4 placed(1.0);
     placed[3] = glm::dvec4(at, 1);
     add_instance(scene, add_mesh(scene, std::move(mesh)), add_material(scene, material), placed,
                  presence);
   };
+}
+
+// Rough glass, solid and as a pane, white rough metal, normal maps on plastic and metal, a veil and
+// a glowing fence with holes; on a table in both worlds, under an environment with a bright side.
+View rough_materials() {
+  View view;
+  scene::Scene& scene = view.scene;
+  const auto add = adder_to(scene);
   scene::Material ball = glass(1.5f);
   ball.roughness = 0.4f;
   ball.base_color = {0.9f, 0.8f, 0.6f};
@@ -257,13 +262,7 @@ View rough_materials() {
 View panes() {
   View view;
   scene::Scene& scene = view.scene;
-  const auto add = [&](scene::Mesh mesh, const scene::Material& material, const glm::dvec3& at,
-                       std::uint32_t presence) {
-    glm::dmat4 placed(1.0);
-    placed[3] = glm::dvec4(at, 1);
-    add_instance(scene, add_mesh(scene, std::move(mesh)), add_material(scene, material), placed,
-                 presence);
-  };
+  const auto add = adder_to(scene);
   const auto pane = [](const glm::vec3& tint) {
     scene::Material material = glass(1.5f);
     material.thin_walled = true;
@@ -316,13 +315,7 @@ TEST(RoughMaterials, AgreeWithTheCpuTracer) {
 View glass_and_lacquer() {
   View view;
   scene::Scene& scene = view.scene;
-  const auto add = [&](scene::Mesh mesh, const scene::Material& material, const glm::dvec3& at,
-                       std::uint32_t presence) {
-    glm::dmat4 placed(1.0);
-    placed[3] = glm::dvec4(at, 1);
-    add_instance(scene, add_mesh(scene, std::move(mesh)), add_material(scene, material), placed,
-                 presence);
-  };
+  const auto add = adder_to(scene);
   scene::Material jelly = glass(1.3f);
   jelly.attenuation_color = {0.8f, 0.2f, 0.3f};
   jelly.attenuation_distance_m = 0.2f;

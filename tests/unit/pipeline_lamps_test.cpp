@@ -365,7 +365,8 @@ TEST(FoundLamp, IsTakenOutOfTheImageOnceItIsChanged) {
             light->lighting.environment.radiance[there]);
 }
 
-// With a room the map is seen from the stage; a set file has the light camera's directions.
+// The map of a set with a room is seen from the stage, but a set file has the light camera's
+// directions.
 TEST(FoundLamp, IsKnownAsTheLightCameraSeesIt) {
   set::Set set = set_with();
   set::Room& room = set.lighting.room.emplace();
@@ -382,7 +383,7 @@ TEST(FoundLamp, IsKnownAsTheLightCameraSeesIt) {
   }
 }
 
-// What is meant is the nearest, and no lamp twice.
+// A change means the lamp nearest to where it was made, and no two changes mean the same lamp.
 TEST(FoundLamp, IsMeantOnce) {
   const std::vector<FoundLamp> lamps = {{"found 1", towards(0, 40), 3 * degree},
                                         {"found 2", towards(6, 40), 3 * degree}};

@@ -67,7 +67,8 @@ scene::Scene ball_alone() {
 // A vertex is a sum of at most 8 products of numbers up to 2 m and of weights, each rounded to
 // 2^-24 of itself, with joints that are rounded, too: at most 16 roundings of 2.
 constexpr float position_rounding = 16 * 2 * 6e-8f;
-// Of a unit normal, made of as many, and of a difference of products of the rows.
+// A unit normal is off by this much: it is made of as many terms as a place, and of differences of
+// products of the rows.
 constexpr float normal_rounding = 64 * 6e-8f;
 
 void expect_shape(const Alone& alone, const scene::Shape& shape) {
@@ -288,7 +289,7 @@ struct BothWays {
   render::Layers by_gpu, for_good;
 };
 
-// What a view shows in some shapes, and what the same meshes show in other shapes for good.
+// Renders a view in some shapes, and again with meshes that have other shapes for good.
 BothWays pictures(const View& moving, const std::vector<scene::Shape>& shapes,
                   const std::vector<scene::Shape>& shapes_for_good) {
   View still = moving;

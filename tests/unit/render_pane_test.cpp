@@ -131,7 +131,7 @@ TEST(Pane, MirrorsTheFloorBelowIt) {
               4 * standard_error_of_pixels(result.layers) / expected + 2e-3);
 }
 
-// Of the real world a virtual wall close behind a pane takes nothing: a ray that forks at the wall
+// A virtual wall close behind a pane takes nothing of the real world: a ray that forks at the wall
 // goes on behind the pane, through which it has passed already.
 TEST(Pane, IsPassedOnceByARayThatForksCloseBehindIt) {
   View view;

@@ -224,8 +224,8 @@ TEST_F(GltfDeformations, ABoundPastAllNumbersIsRefusedAtRest) {
   EXPECT_THAT(error(), HasSubstr("beyond 1e15 at rest"));
 }
 
-// What a few bytes can ask for: as many vertices as an accessor without data may have, times as
-// many targets or sets of joints as one likes.
+// A few bytes can ask for as many vertices as an accessor without data may have, times as many
+// targets or sets of joints as one likes.
 TEST_F(GltfDeformations, TargetsAndSetsAreCountedBeforeTheyAreRead) {
   const std::size_t vertices = 1u << 22;
   const int zeros =
