@@ -30,6 +30,7 @@ struct Path {
   bool difference;  // light that is equal in both worlds need not be traced
   bool landed;      // see PATH_LANDED
   uint medium;      // see lib/medium.glsl
+  uint receiver;    // the packed normal of its last vertex (lib/light_tree.glsl)
   uint passes;      // panes that it met and passed
   bool is_behind;   // see PATH_BEHIND
 };
@@ -44,6 +45,7 @@ Path load_path(uint index) {
               (has_feature(FEATURE_DIFFERENCE) || has_feature(FEATURE_CAMERA)) &&
                   (bits & PATH_DIFFERENCE) != 0u,
               has_feature(FEATURE_CAMERA) && (bits & PATH_LANDED) != 0u, path_medium(bits),
+              has_feature(FEATURE_LIGHTS) ? path_receiver[index] : NO_NORMAL,
               path_passes(bits), path_is_behind(bits));
 }
 
@@ -55,6 +57,7 @@ void store_path(Path p, uint index) {
                     (p.is_behind ? PATH_BEHIND : 0u) | (p.passes << PATH_PASSES_SHIFT) |
                     (p.depth << PATH_DEPTH_SHIFT) | (p.medium << PATH_MEDIUM_SHIFT);
   path_throughput[index] = vec4(p.throughput, uintBitsToFloat(bits));
+  if (has_feature(FEATURE_LIGHTS)) path_receiver[index] = p.receiver;
 }
 
 // Returns whether light at the end of this path is a caustic: a lobe that is not Dirac has
@@ -78,6 +81,14 @@ float mis_weight(float pdf, float other) {
   return 1.0 / (1.0 + ratio * ratio);
 }
 
+// Returns the probability with which a light sample at the path's last vertex would have picked this
+// light; 0 if it had none.
+float selection_of(Path p, GpuLight light) {
+  if (p.pdf <= 0.0) return 0.0;
+  return (1.0 - frame.environment_selection) *
+         light_selection(light, make_receiver(p.origin, p.receiver));
+}
+
 // Adds the lights without a mesh that the ray crosses before its hit. They block nothing.
 void meet_lights(Path p, float t_hit) {
   for (uint i = 0u; i < frame.visible_light_count; ++i) {
@@ -86,7 +97,7 @@ void meet_lights(Path p, float t_hit) {
     float pdf;
     const float t = meet_light(lights[i], p.origin, p.direction, pdf);
     if (t < 0.0 || t <= p.t_min || t > t_hit) continue;
-    const float other = (1.0 - frame.environment_selection) * lights[i].selection * pdf;
+    const float other = selection_of(p, lights[i]) * pdf;
     receive(p, p.throughput * lights[i].emission * mis_weight(p.pdf, other) *
                    medium_transmittance(p.medium, t), gain);
   }
@@ -108,7 +119,7 @@ void meet_emission(Path p, Surface s, GpuHit hit) {
   if (has_feature(FEATURE_LIGHTS) && p.pdf > 0.0 && first != NO_INDEX) {
     const GpuLight light = lights[first + hit.primitive];
     const float pdf = triangle_pdf(light, p.direction, hit.t);
-    weight = mis_weight(p.pdf, (1.0 - frame.environment_selection) * light.selection * pdf);
+    weight = mis_weight(p.pdf, selection_of(p, light) * pdf);
   }
   receive(p, p.throughput * s.emission * weight, EQUAL_GAIN);
 }
@@ -176,18 +187,30 @@ bool sample_direction(Technique t, Surface s, Lobes l, vec2 u, float choice, out
   return true;
 }
 
-// Samples the environment or a light as seen from a point; `selection` is the probability with
-// which it was picked.
-bool choose_light(vec3 point, vec2 u, out LightSample light, out float selection) {
-  light = LightSample(vec3(0.0), 3.4e38, vec3(0.0), 0.0, EQUAL_GAIN);
+// Picks the environment, for which the result is ENVIRONMENT, or a light that may shine on the vertex,
+// with the probability `selection`; u.x is stretched. NO_INDEX: there is none.
+const uint ENVIRONMENT = 0xfffffffeu;
+
+uint choose_light(Path p, Surface s, Sampler random, inout float u, out float selection) {
   selection = frame.environment_selection;
-  if (has_feature(FEATURE_LIGHTS) && !choose(u.x, selection)) {
-    if (frame.light_count == 0u) return false;
-    const uint index = pick_light(u.x);
-    selection = (1.0 - selection) * lights[index].selection;
-    return sample_light(lights[index], point, u, light);
+  if (has_feature(FEATURE_LIGHTS) && !choose(u, selection)) {
+    if (frame.light_count == 0u) return NO_INDEX;
+    vec2 lamp = vec2(0.0);
+    if (frame.light_count > FEW_LIGHTS) lamp = sample_2d(random, PAIR_LAMP + p.depth);
+    float among_lights;
+    const uint index = select_light(make_receiver(s.position, p.receiver), u, lamp, among_lights);
+    selection = (1.0 - selection) * among_lights;
+    return index;
   }
-  if (!has_feature(FEATURE_ENVIRONMENT_SAMPLING)) return false;
+  return has_feature(FEATURE_ENVIRONMENT_SAMPLING) ? ENVIRONMENT : NO_INDEX;
+}
+
+// Samples what was chosen as seen from a point; false if it does not shine there.
+bool sample_chosen(uint chosen, vec3 point, vec2 u, out LightSample light) {
+  light = LightSample(vec3(0.0), 3.4e38, vec3(0.0), 0.0, EQUAL_GAIN);
+  if (chosen == NO_INDEX) return false;
+  if (has_feature(FEATURE_LIGHTS) && chosen != ENVIRONMENT)
+    return sample_light(lights[chosen], point, u, light);
   light.direction = environment_sample(u, light.pdf);
   light.radiance = environment_radiance(light.direction);
   return true;
@@ -196,18 +219,19 @@ bool choose_light(vec3 point, vec2 u, out LightSample light, out float selection
 // Makes the shadow ray of one light sample, which carries the pair of radiances that the sample
 // brings to the worlds if nothing blocks it. Returns false if there is nothing to trace.
 bool light_ray(Path p, Surface s, Lobes l, Technique t, Sampler random, out GpuShadowRay ray) {
-  const vec2 u = sample_2d(random, vertex_pair(PAIR_LIGHT, p.depth));
+  vec2 u = sample_2d(random, vertex_pair(PAIR_LIGHT, p.depth));
   LightSample light;
   float selection;
+  const uint chosen = choose_light(p, s, random, u.x, selection);
   // The light is sampled from the very point at which the shadow ray starts; otherwise the ray
   // could end behind the light. Only rough glass also receives light on the side away from the
   // viewer.
   ray.origin = offset_origin(s, s.geometric_normal);
-  if (!choose_light(ray.origin, u, light, selection)) return false;
+  if (!sample_chosen(chosen, ray.origin, u, light)) return false;
   if (has_feature(FEATURE_TRANSMISSION) && has_rough_glass(l) &&
       dot(light.direction, s.geometric_normal) < 0.0) {
     ray.origin = offset_origin(s, -s.geometric_normal);
-    if (!choose_light(ray.origin, u, light, selection)) return false;
+    if (!sample_chosen(chosen, ray.origin, u, light)) return false;
   }
   float bsdf_pdf;
   const vec3 value = bsdf_evaluate(s, l, light.direction, bsdf_pdf);
@@ -368,6 +392,9 @@ void shade_vertex(inout Path p, Surface s, out GpuShadowRay ray, out bool lit, o
   Lobes l = make_lobes(s);
   if (has_feature(FEATURE_PANES)) l = without_passing(s, l, pane_transmittance(s));
   const Technique t = make_technique(p, s, l);
+  if (has_feature(FEATURE_LIGHTS))
+    p.receiver = has_feature(FEATURE_TRANSMISSION) && has_rough_glass(l) ? NO_NORMAL
+                                                                         : pack_normal(s.normal);
   if (has_feature(FEATURE_PHOTONS)) meet_photons(p, s, l);
   lit = light_ray(p, s, l, t, random, ray);
   scattered = scatter(p, s, l, t, random, chance);

@@ -19,6 +19,10 @@ constexpr double least_disc_rad = 1e-6;
 // another, is left to luck.
 constexpr double even_share = 0.1;
 
+// This share of the samples of lamps in the tree is taken by power. The tree does not know what
+// stands in the light: the lamps that it favours may be hidden.
+constexpr double rest_of_tree = 0.1;
+
 std::uint32_t gpu_type(set::LightType type) {
   switch (type) {
     case set::LightType::point:
@@ -35,27 +39,31 @@ std::uint32_t gpu_type(set::LightType type) {
   return gpu::LIGHT_POINT;
 }
 
-// The power is that of the world and the channel in which the lamp's gain is largest, so that what
-// changes in a single channel is sampled, too.
-double power(const gpu::GpuLight& light, double scene_radius) {
+// The emission is that of the world and the channel in which the lamp's gain is largest, so that
+// what changes in a single channel is sampled, too.
+double emitted(const gpu::GpuLight& light) {
   const double emission = (light.emission.r + light.emission.g + light.emission.b) / 3.0;
   const glm::vec3 gains = glm::max(light.gain_mixed, light.gain_real);
-  const double gain = std::max({gains.r, gains.g, gains.b});
+  return std::max({gains.r, gains.g, gains.b}) * emission;
+}
+
+double power(const gpu::GpuLight& light, double scene_radius) {
+  const double brightness = emitted(light);
   const double area = glm::length(glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v)));
   const double disc = pi * scene_radius * scene_radius;
   switch (light.type) {
     case gpu::LIGHT_POINT:
-      return gain * emission * 4 * pi;
+      return brightness * 4 * pi;
     case gpu::LIGHT_SPOT:
-      return gain * emission * 2 * pi * (1 - light.cos_outer);
+      return brightness * 2 * pi * (1 - light.cos_outer);
     case gpu::LIGHT_DIRECTIONAL:
-      return gain * emission * disc * (light.cone_sr > 0 ? light.cone_sr : 1);
+      return brightness * disc * (light.cone_sr > 0 ? light.cone_sr : 1);
     case gpu::LIGHT_RECTANGLE:
-      return gain * emission * pi * area;
+      return brightness * pi * area;
     case gpu::LIGHT_SPHERE:
-      return gain * emission * pi * 4 * pi * light.radius * light.radius;
+      return brightness * pi * 4 * pi * light.radius * light.radius;
     default:
-      return gain * emission * pi * area;  // triangle: half the area, both sides
+      return brightness * pi * area;  // triangle: half the area, both sides
   }
 }
 
@@ -153,19 +161,30 @@ std::vector<gpu::GpuLight> encode_emitter(const scene::Instance& instance, const
   return result;
 }
 
-double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius) {
+double intensity(const gpu::GpuLight& light) {
+  const double area = glm::length(glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v)));
+  double seen = 1;
+  if (light.type == gpu::LIGHT_RECTANGLE) seen = area;
+  if (light.type == gpu::LIGHT_TRIANGLE) seen = area / 2;
+  if (light.type == gpu::LIGHT_SPHERE) seen = pi * light.radius * light.radius;
+  return emitted(light) * seen;
+}
+
+double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius,
+                       const Weights& weights) {
   double total = 0;
   std::size_t shining = 0;
-  for (const gpu::GpuLight& light : lights) {
-    const double watts = power(light, scene_radius);
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    const double watts = power(lights[i], scene_radius) * weights.of(i);
     if (!(watts > 0)) continue;  // black, or a triangle whose power is NaN
     total += watts;
     ++shining;
   }
   double sum = 0;
   float below = 0;
-  for (gpu::GpuLight& light : lights) {
-    const double watts = power(light, scene_radius);
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    gpu::GpuLight& light = lights[i];
+    const double watts = power(light, scene_radius) * weights.of(i);
     if (watts > 0)
       sum += (1 - even_share) * watts / total + even_share / static_cast<double>(shining);
     light.cdf = std::min(static_cast<float>(sum), 1.0f);
@@ -176,10 +195,34 @@ double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius) 
   return total;
 }
 
-double spread_of(const std::vector<gpu::GpuLight>& lights, double scene_radius) {
+float select_by_tree(std::vector<gpu::GpuLight>& lights) {
+  const auto in_tree = [](const gpu::GpuLight& light) { return light.leaf != gpu::NO_INDEX; };
+  double share = 0;
+  for (const gpu::GpuLight& light : lights)
+    if (in_tree(light)) share += (1 - rest_of_tree) * light.selection;
+  if (std::ranges::count_if(lights, in_tree) < 2) share = 0;
+  const auto tree_share = static_cast<float>(share);
+  double sum = 0, total = 0;
+  const auto rest = [&](const gpu::GpuLight& light) {
+    return in_tree(light) && share > 0 ? rest_of_tree * light.selection : 1.0 * light.selection;
+  };
+  for (const gpu::GpuLight& light : lights) total += rest(light);
+  float below = 0;
+  for (gpu::GpuLight& light : lights) {
+    sum += rest(light);
+    light.rest_cdf = total > 0 ? std::min(static_cast<float>(sum / total), 1.0f) : 0.0f;
+    light.rest_selection = (1 - tree_share) * (light.rest_cdf - below);
+    below = light.rest_cdf;
+  }
+  return tree_share;
+}
+
+double spread_of(const std::vector<gpu::GpuLight>& lights, double scene_radius,
+                 const Weights& weights) {
   double total = 0, information = 0;
-  for (const gpu::GpuLight& light : lights) {
-    const double watts = power(light, scene_radius);
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    const gpu::GpuLight& light = lights[i];
+    const double watts = power(light, scene_radius) * weights.of(i);
     if (!(watts > 0)) continue;
     total += watts;
     information += watts * std::log(watts / solid_angle(light, scene_radius));

@@ -23,14 +23,31 @@ std::vector<gpu::GpuLight> encode_emitter(const scene::Instance& instance, const
                                           const scene::Material& material,
                                           const glm::dvec3& camera_position);
 
+// What a light sends on the mean over its texture and alpha, over what it would send without them.
+struct Weights {
+  std::vector<double> values;  // empty: 1 for all
+  double of(std::size_t light) const { return values.empty() ? 1 : values[light]; }
+};
+
+// Returns what a lamp with a place sends along its brightest direction, as if it were a point
+// (W/sr, mean of the channels), with the largest of its gains.
+double intensity(const gpu::GpuLight& light);
+
 // Fills `selection` and `cdf`: nine tenths by the power that a light brings to a scene of this
 // radius (metres), one tenth evenly, nothing for black lights. Returns the sum of the powers (W per
 // channel, mean of the channels).
-double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius);
+double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius,
+                       const Weights& weights = {});
+
+// Fills `rest_selection` and `rest_cdf` of lights that have a `selection` and a `leaf`, and returns
+// the probability that a light sample takes the tree: a light outside the tree keeps its selection,
+// those in it share nine tenths of theirs by the tree. It is 0 for a tree of less than two.
+float select_by_tree(std::vector<gpu::GpuLight>& lights);
 
 // Returns the solid angle that the lights' power comes from, over 2 pi, as
 // EncodedEnvironment::spread; each light is taken to face the scene from a distance of one scene
 // radius. Returns 2 where no light shines.
-double spread_of(const std::vector<gpu::GpuLight>& lights, double scene_radius);
+double spread_of(const std::vector<gpu::GpuLight>& lights, double scene_radius,
+                 const Weights& weights = {});
 
 }  // namespace previz::render

@@ -10,6 +10,7 @@
 
 #include "daemon/render/albedo_table.hpp"
 #include "daemon/render/gpu_lights.hpp"
+#include "daemon/render/light_tree.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::render {
@@ -316,6 +317,9 @@ void GpuScene::upload_lights(const glm::dvec3& camera_position) {
       static_cast<std::uint32_t>(std::count_if(all_lamps.begin(), all_lamps.end(), can_be_seen));
   light_count_ = static_cast<std::uint32_t>(lights.size());
   light_power_ = select_by_power(lights, scene_radius_);
+  const LightTree tree = build_light_tree(lights, {});
+  tree_share_ = select_by_tree(lights);
+  tree_offset_ = glm::vec3(-tree.origin);
   light_spread_ = spread_of(lights, scene_radius_);
   lights_differ_ = std::any_of(lights.begin(), lights.end(), [](const auto& light) {
     return light.gain_mixed != light.gain_real;
@@ -326,6 +330,7 @@ void GpuScene::upload_lights(const glm::dvec3& camera_position) {
     next += static_cast<std::uint32_t>(scene_.meshes[scene_.instances[i].mesh].triangles.size());
   }
   upload_storage(device_, lights_, lights);
+  upload_storage(device_, light_tree_, tree.nodes);
 }
 
 Demand GpuScene::demand(const set::Estimation& estimation) const {
@@ -361,14 +366,25 @@ void GpuScene::describe(gpu::GpuFrame& frame, std::uint32_t features) const {
   frame.environment_spread = sampled ? static_cast<float>(environment_spread_) : 2.0f;
   frame.lamp_spread = static_cast<float>(light_spread_);
   const double all_power = environment_power + light_power_;
+  frame.tree_share = tree_share_;
+  frame.tree_offset = tree_offset_;
   frame.lamp_part = all_power > 0 ? static_cast<float>(light_power_ / all_power) : 0.0f;
 }
 
 Buffers GpuScene::buffers() const {
-  return {{"bvh", &bvh_},           {"vertices", &vertices_},       {"triangles", &triangles_},
-          {"texels", &texels_},     {"environment", &environment_}, {"importance", &importance_},
-          {"albedo", &albedo_},     {"instances", &instances_},     {"materials", &materials_},
-          {"textures", &textures_}, {"lights", &lights_},           {"bounds", &bounds_buffer_}};
+  return {{"bvh", &bvh_},
+          {"vertices", &vertices_},
+          {"triangles", &triangles_},
+          {"texels", &texels_},
+          {"environment", &environment_},
+          {"importance", &importance_},
+          {"albedo", &albedo_},
+          {"instances", &instances_},
+          {"materials", &materials_},
+          {"textures", &textures_},
+          {"lights", &lights_},
+          {"bounds", &bounds_buffer_},
+          {"light_tree", &light_tree_}};
 }
 
 }  // namespace previz::render

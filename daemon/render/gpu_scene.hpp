@@ -90,10 +90,12 @@ class GpuScene {
   set::LightSampling sampling_ = set::LightSampling::importance;
   std::uint32_t light_count_ = 0, visible_light_count_ = 0;
   double light_power_ = 0, light_spread_ = 2;
+  float tree_share_ = 0;
+  glm::vec3 tree_offset_{0.0f};
   bool lights_differ_ = false;  // between the worlds
 
   Buffer bvh_, vertices_, triangles_, texels_, environment_, importance_, albedo_, instances_,
-      materials_, textures_, lights_, bounds_buffer_;
+      materials_, textures_, lights_, light_tree_, bounds_buffer_;
 };
 
 }  // namespace previz::render

@@ -80,6 +80,7 @@ void Wavefront::create_paths() {
   ray_origin_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
   ray_direction_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
   throughput_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
+  receivers_ = create_storage_buffer(device_, paths * sizeof(std::uint32_t));
   hits_ = create_storage_buffer(device_, paths * sizeof(gpu::GpuHit));
   queue_ = create_storage_buffer(device_, 2 * paths * sizeof(std::uint32_t));
   shadow_rays_ = create_storage_buffer(device_, paths * sizeof(gpu::GpuShadowRay));
@@ -98,6 +99,7 @@ Buffers Wavefront::buffers_of(const Tile& tile) const {
   buffers.insert({{"ray_origin", &ray_origin_},
                   {"ray_direction", &ray_direction_},
                   {"path_throughput", &throughput_},
+                  {"path_receiver", &receivers_},
                   {"hits", &hits_},
                   {"queue", &queue_},
                   {"shadow_rays", &shadow_rays_},

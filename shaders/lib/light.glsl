@@ -3,6 +3,7 @@
 #define PREVIZ_LIGHT_GLSL
 
 #include "shaders/lib/bsdf.glsl"
+#include "shaders/lib/light_tree.glsl"
 #include "shaders/lib/path.glsl"
 
 layout(scalar) readonly buffer Lights { GpuLight lights[]; };
@@ -33,6 +34,47 @@ uint pick_light(inout float u) {
   const float below = low > 0u ? lights[low - 1u].cdf : 0.0;
   u = clamp((u - below) / max(lights[low].cdf - below, 1e-30), 0.0, 0.99999994);
   return low;
+}
+
+// The same by what the tree of lamps leaves.
+uint pick_rest(inout float u) {
+  uint low = 0u;
+  uint high = frame.light_count - 1u;
+  while (low < high) {
+    const uint middle = (low + high) >> 1;
+    if (u < lights[middle].rest_cdf) high = middle;
+    else low = middle + 1u;
+  }
+  const float below = low > 0u ? lights[low - 1u].rest_cdf : 0.0;
+  u = clamp((u - below) / max(lights[low].rest_cdf - below, 1e-30), 0.0, 0.99999994);
+  return low;
+}
+
+// Returns the probability with which a light sample for a receiver picks this light among all.
+float light_selection(GpuLight light, Receiver r) {
+  if (frame.tree_share <= 0.0 || light.leaf == NO_INDEX) return light.rest_selection;
+  return light.rest_selection + frame.tree_share * tree_probability(light.leaf, r);
+}
+
+// Picks a light for a receiver. `lamp` are random numbers of their own, for more than FEW_LIGHTS;
+// fewer are picked by u, which is stretched. Returns NO_INDEX if none shines there.
+uint select_light(Receiver r, inout float u, vec2 lamp, out float selection) {
+  const bool are_few = frame.light_count <= FEW_LIGHTS;
+  float way = are_few ? u : lamp.x;
+  const bool by_tree = frame.tree_share > 0.0 && choose(way, frame.tree_share);
+  float number = are_few ? way : lamp.y;
+  uint index;
+  if (by_tree) {
+    float probability;
+    index = descend_tree(r, number, are_few ? 0.0 : way * 5.9604645e-8, probability);
+    selection = frame.tree_share * probability;
+    if (index != NO_INDEX) selection += lights[index].rest_selection;
+  } else {
+    index = pick_rest(number);
+    selection = light_selection(lights[index], r);
+  }
+  if (are_few) u = number;
+  return index;
 }
 
 // Returns 1 - cos of the half angle under which a sphere is seen, without cancellation.

@@ -233,7 +233,29 @@ struct GpuLight {
   vec2 uv0, uv1, uv2;  // triangle: texture coordinates
   uint emission_texture;
   uint alpha_material;  // triangle: its alpha weakens the light; NO_INDEX if opaque
+  uint leaf;              // of LIGHT_TREE; NO_INDEX: the light is not in the tree
+  float rest_selection;   // probability that a light sample picks this light without the tree
+  float rest_cdf;         // the share of these up to and including this light
 };
+
+// A node of the tree of lamps (daemon/render/light_tree.hpp). The root is the first; the children of
+// a node are neighbours, the first at an even index.
+struct GpuLightNode {
+  vec3 center;           // of a sphere around the lamps, from the tree's origin
+  float radius_squared;
+  vec3 axis;             // of the directions in which they shine
+  float intensity;       // sum of their largest ones
+  float cos_spread;      // of the cone of their axes,
+  float least_cosine;    // and of the angle around these beyond which they do not shine
+  uint first;            // its first child; of a leaf: its light
+  uint links;            // LIGHT_NODE_*, and its parent
+};
+PREVIZ_CONST uint LIGHT_NODE_LEAF = 1u;
+PREVIZ_CONST uint LIGHT_NODE_TWO_SIDED = 2u;
+PREVIZ_CONST uint LIGHT_NODE_PARENT_SHIFT = 2u;
+// With so few lights a light sample picks by the numbers that choose the place on it; with more by
+// numbers of their own.
+PREVIZ_CONST uint FEW_LIGHTS = 4u;
 
 struct GpuFrame {
   vec4 world_from_camera[3];  // rows of the rotation; the camera is the origin
@@ -264,6 +286,8 @@ struct GpuFrame {
   vec2 focal_px, principal_px;  // of the observer's lens, OpenCV's convention
   vec3 radial;                  // k1, k2, k3
   vec2 tangential;              // p1, p2
+  float tree_share;             // probability that a light sample of a light takes the tree; 0: none
+  vec3 tree_offset;             // of the camera from the tree's origin
 };
 
 // Push constants of a batch: a part of the picture and a range of samples.
@@ -369,9 +393,10 @@ static_assert(sizeof(GpuInstance) == 112);
 static_assert(sizeof(GpuMaterial) == 104);
 static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
-static_assert(sizeof(GpuLight) == 144);
+static_assert(sizeof(GpuLight) == 156);
 static_assert(offsetof(GpuLight, uv0) == 112);
-static_assert(sizeof(GpuFrame) == 192);
+static_assert(sizeof(GpuFrame) == 208);
+static_assert(sizeof(GpuLightNode) == 48);
 static_assert(sizeof(GpuBatch) == 28);
 static_assert(sizeof(GpuPhoton) == 64);
 static_assert(sizeof(GpuPhotonBucket) == 8);

@@ -1,0 +1,126 @@
+// The tree of lamps: the lamp of a light sample is found by descending from the root, each time into
+// a child by its importance, a bound on what its lamps bring to the receiver (shaders/README.md, "The
+// tree of lamps"; daemon/render/light_tree.cpp builds it).
+#ifndef PREVIZ_LIGHT_TREE_GLSL
+#define PREVIZ_LIGHT_TREE_GLSL
+
+#include "shaders/lib/sampler.glsl"
+#include "shaders/lib/scene.glsl"
+
+layout(scalar) readonly buffer LightTree { GpuLightNode light_tree[]; };
+
+// What is known of a surface to which lamps shine. A receiver that takes light from behind, too, has
+// no normal, (0, 0, 0).
+struct Receiver {
+  vec3 position;  // from the tree's origin
+  vec3 normal;
+};
+
+// A path keeps the normal of its last vertex in 32 bits, for the weight of a lamp that it meets. This
+// is the code of no normal, which no normal has.
+const uint NO_NORMAL = 0x80008000u;
+
+// Maps a direction to the octahedron, of which the lower half is folded over the upper one, and its
+// square to two numbers of 16 bits.
+uint pack_normal(vec3 n) {
+  vec2 p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));
+  if (n.z < 0.0) p = (1.0 - abs(p.yx)) * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(p, vec2(0.0)));
+  return packSnorm2x16(p);
+}
+
+Receiver make_receiver(vec3 position, uint packed) {
+  Receiver r = Receiver(position + frame.tree_offset, vec3(0.0));
+  if (packed == NO_NORMAL) return r;
+  const vec2 p = unpackSnorm2x16(packed);
+  r.normal = vec3(p, 1.0 - abs(p.x) - abs(p.y));
+  if (r.normal.z < 0.0)
+    r.normal.xy = (1.0 - abs(p.yx)) * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(p, vec2(0.0)));
+  r.normal = normalize(r.normal);
+  return r;
+}
+
+// The packed normal may be turned by 2^-15 or so, and what lies in the plane of a receiver by its
+// rounding. Cosines down to this count as if light could arrive.
+const float LEAST_RECEIVED = -1e-3;
+// A bound is not smaller than this part of its largest value, as long as it is not 0.
+const float LEAST_BOUND = 0.01;
+const float MOST_IMPORTANCE = 1e37;
+
+// Returns cos(max(0, a - b)) of two angles between 0 and pi, given their cosines.
+float cosine_of_rest(float cos_a, float cos_b) {
+  if (cos_a >= cos_b) return 1.0;
+  return cos_a * cos_b + sqrt(max(0.0, (1.0 - cos_a * cos_a) * (1.0 - cos_b * cos_b)));
+}
+
+// Returns the intensity of a node's lamps times bounds on the cosines at lamp and receiver over the
+// squared distance, which counts as at least the radius of their sphere. 0 only if none can shine on
+// the receiver.
+float node_importance(GpuLightNode node, Receiver r) {
+  const vec3 to_node = node.center - r.position;
+  const float distance_squared = dot(to_node, to_node);
+  if (distance_squared <= node.radius_squared)
+    return min(node.intensity / max(node.radius_squared, 1e-30), MOST_IMPORTANCE);
+  const vec3 direction = to_node * inversesqrt(distance_squared);
+  const float cos_seen = sqrt(max(0.0, 1.0 - node.radius_squared / distance_squared));
+  float cos_lamp = clamp(-dot(node.axis, direction), -1.0, 1.0);
+  if ((node.links & LIGHT_NODE_TWO_SIDED) != 0u) cos_lamp = abs(cos_lamp);
+  const float sent = cosine_of_rest(cosine_of_rest(cos_lamp, node.cos_spread), cos_seen);
+  if (sent < node.least_cosine) return 0.0;
+  float result = node.intensity * max(sent, LEAST_BOUND);
+  if (r.normal != vec3(0.0)) {
+    const float received = cosine_of_rest(clamp(dot(direction, r.normal), -1.0, 1.0), cos_seen);
+    if (received < LEAST_RECEIVED) return 0.0;
+    result *= max(received, LEAST_BOUND);
+  }
+  return min(result / max(distance_squared, 1e-30), MOST_IMPORTANCE);
+}
+
+// Returns the importance of a node as the sum of its children's, which a receiver among the lamps needs:
+// it tells lamps nearby from a great many on the other side of the same sphere.
+float branch_importance(uint index, Receiver r) {
+  const GpuLightNode node = light_tree[index];
+  if ((node.links & LIGHT_NODE_LEAF) != 0u) return node_importance(node, r);
+  return node_importance(light_tree[node.first], r) + node_importance(light_tree[node.first + 1u], r);
+}
+
+// Returns the probability of the first of two children, below 0 if neither can shine on the receiver.
+float first_probability(uint first, Receiver r) {
+  const float a = branch_importance(first, r);
+  const float both = a + branch_importance(first + 1u, r);
+  return both > 0.0 ? a / both : -1.0;
+}
+
+// Descends to a lamp by a random number, which is stretched for each decision; `finer` continues it
+// below its last bit. Returns NO_INDEX, with probability 0, where all lamps are turned away.
+uint descend_tree(Receiver r, inout float u, float finer, out float probability) {
+  probability = 1.0;
+  GpuLightNode node = light_tree[0];
+  while ((node.links & LIGHT_NODE_LEAF) == 0u) {
+    const float first = first_probability(node.first, r);
+    if (first < 0.0) {
+      probability = 0.0;
+      return NO_INDEX;
+    }
+    const bool is_first = first >= 1.0 || u + finer < first;
+    const float share = is_first ? first : 1.0 - first;
+    u = clamp((is_first ? u : u - first) / share, 0.0, 0.99999994);
+    finer /= share;
+    probability *= share;
+    node = light_tree[is_first ? node.first : node.first + 1u];
+  }
+  return node.first;
+}
+
+// Returns the probability with which descend_tree() finds the lamp of this leaf.
+float tree_probability(uint leaf, Receiver r) {
+  float probability = 1.0;
+  while (leaf != 0u) {
+    const float first = first_probability(leaf & ~1u, r);
+    if (first < 0.0) return 0.0;
+    probability *= (leaf & 1u) == 0u ? first : 1.0 - first;
+    leaf = light_tree[leaf].links >> LIGHT_NODE_PARENT_SHIFT;
+  }
+  return probability;
+}
+
+#endif
