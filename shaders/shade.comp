@@ -89,17 +89,28 @@ float selection_of(Path p, GpuLight light) {
          light_selection(light, make_receiver(p.origin, p.receiver));
 }
 
+// Adds a light without a mesh if the ray crosses it before its hit.
+void cross_light(Path p, uint index, float t_hit) {
+  const GpuLight light = light_at(index);
+  const Gain gain = gain_of(light);
+  if (cancels(p, gain)) return;
+  float pdf;
+  const float t = meet_light(light, p.origin, p.direction, pdf);
+  if (t < 0.0 || t <= p.t_min || t > t_hit) return;
+  const float other = selection_of(p, light) * pdf;
+  receive(p, p.throughput * light.emission * mis_weight(p.pdf, other) *
+                 medium_transmittance(p.medium, t), gain);
+}
+
 // Adds the lights without a mesh that the ray crosses before its hit. They block nothing.
 void meet_lights(Path p, float t_hit) {
-  for (uint i = 0u; i < frame.visible_light_count; ++i) {
-    const Gain gain = gain_of(lights[i]);
-    if (cancels(p, gain)) continue;
-    float pdf;
-    const float t = meet_light(lights[i], p.origin, p.direction, pdf);
-    if (t < 0.0 || t <= p.t_min || t > t_hit) continue;
-    const float other = selection_of(p, lights[i]) * pdf;
-    receive(p, p.throughput * lights[i].emission * mis_weight(p.pdf, other) *
-                   medium_transmittance(p.medium, t), gain);
+  const bool are_few = frame.visible_light_count <= FEW_LIGHTS;
+  const uint tried = are_few ? frame.visible_light_count : frame.distant_light_count;
+  for (uint i = 0u; i < tried; ++i) cross_light(p, i, t_hit);
+  uint node = are_few ? NO_INDEX : 0u;
+  while (node != NO_INDEX) {
+    const uint index = next_crossed(node, p.origin + frame.tree_offset, p.direction, t_hit);
+    if (index != NO_INDEX) cross_light(p, index, t_hit);
   }
 }
 
@@ -210,7 +221,7 @@ bool sample_chosen(uint chosen, vec3 point, vec2 u, out LightSample light) {
   light = LightSample(vec3(0.0), 3.4e38, vec3(0.0), 0.0, EQUAL_GAIN);
   if (chosen == NO_INDEX) return false;
   if (has_feature(FEATURE_LIGHTS) && chosen != ENVIRONMENT)
-    return sample_light(lights[chosen], point, u, light);
+    return sample_light(light_at(chosen), point, u, light);
   light.direction = environment_sample(u, light.pdf);
   light.radiance = environment_radiance(light.direction);
   return true;

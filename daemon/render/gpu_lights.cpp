@@ -92,10 +92,9 @@ bool can_be_seen(const set::Light& light) {
          has_disc(light);
 }
 
-gpu::GpuLight encode_light(const set::Light& light, const glm::dvec3& camera_position) {
+void append_lamp(PlacedLights& to, const set::Light& light) {
   gpu::GpuLight result{};
   result.type = gpu_type(light.type);
-  result.position = glm::vec3(light.position - camera_position);
   result.direction = glm::vec3(glm::normalize(light.direction));
   result.emission = glm::vec3(light.emission);
   result.gain_mixed = glm::vec3(light.gain_mixed * light.tint);
@@ -120,18 +119,22 @@ gpu::GpuLight encode_light(const set::Light& light, const glm::dvec3& camera_pos
     // This is the disc's radiance that gives the stated irradiance on a plane facing it.
     result.emission = glm::vec3(light.emission / (pi * sine * sine));
   }
-  return result;
+  to.lights.push_back(result);
+  to.positions.push_back(light.position);
+  to.weights.values.push_back(1);
 }
 
-std::vector<gpu::GpuLight> encode_emitter(const scene::Instance& instance, const scene::Mesh& mesh,
-                                          const scene::Material& material,
-                                          const glm::dvec3& camera_position) {
-  std::vector<gpu::GpuLight> result;
-  result.reserve(mesh.triangles.size());
+void append_emitter(PlacedLights& to, const scene::Instance& instance, const scene::Mesh& mesh,
+                    const scene::Material& material, const std::vector<double>& weights) {
   const auto world = [&](std::uint32_t vertex) {
     const glm::dvec4 p(glm::dvec3(mesh.positions[vertex]), 1.0);
-    return glm::dvec3(instance.world_from_object * p) - camera_position;
+    return glm::dvec3(instance.world_from_object * p);
   };
+  std::vector<double>& all_weights = to.weights.values;
+  if (weights.empty())
+    all_weights.insert(all_weights.end(), mesh.triangles.size(), 1);
+  else
+    all_weights.insert(all_weights.end(), weights.begin(), weights.end());
   for (const glm::uvec3& triangle : mesh.triangles) {
     gpu::GpuLight light{};
     light.type = gpu::LIGHT_TRIANGLE;
@@ -140,7 +143,6 @@ std::vector<gpu::GpuLight> encode_emitter(const scene::Instance& instance, const
     const glm::dvec3 v = world(triangle.z) - v0;
     const glm::dvec3 normal = glm::cross(u, v);
     const double doubled_area = glm::length(normal);
-    light.position = glm::vec3(v0);
     light.edge_u = glm::vec3(u);
     light.edge_v = glm::vec3(v);
     light.direction =
@@ -156,9 +158,9 @@ std::vector<gpu::GpuLight> encode_emitter(const scene::Instance& instance, const
       light.uv1 = mesh.uvs[triangle.y];
       light.uv2 = mesh.uvs[triangle.z];
     }
-    result.push_back(light);
+    to.lights.push_back(light);
+    to.positions.push_back(v0);
   }
-  return result;
 }
 
 double intensity(const gpu::GpuLight& light) {

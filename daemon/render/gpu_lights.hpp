@@ -1,6 +1,5 @@
-// Encodes lights in the layout that the shaders sample: positions relative to the camera, powers,
-// and the probability of picking each (shaders/README.md, "Light" and "Direct light and its
-// weights").
+// Encodes lights in the layout that the shaders sample, with the probability of picking each
+// (shaders/README.md, "Light" and "Direct light and its weights").
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -16,18 +15,25 @@ namespace previz::render {
 // directional light whose disc is wider than single precision can tell from a point.
 bool can_be_seen(const set::Light& light);
 
-gpu::GpuLight encode_light(const set::Light& light, const glm::dvec3& camera_position);
-
-// Returns one light per triangle of the mesh, in the mesh's order.
-std::vector<gpu::GpuLight> encode_emitter(const scene::Instance& instance, const scene::Mesh& mesh,
-                                          const scene::Material& material,
-                                          const glm::dvec3& camera_position);
-
 // What a light sends on the mean over its texture and alpha, over what it would send without them.
 struct Weights {
   std::vector<double> values;  // empty: 1 for all
   double of(std::size_t light) const { return values.empty() ? 1 : values[light]; }
 };
+
+// Lights in the layout of the shaders, but for their places, which depend on the camera there.
+struct PlacedLights {
+  std::vector<gpu::GpuLight> lights;
+  std::vector<glm::dvec3> positions;  // what becomes GpuLight::position; world, metres
+  Weights weights;                    // one for each light
+};
+
+void append_lamp(PlacedLights& to, const set::Light& light);
+
+// Appends one light per triangle of the mesh, in the mesh's order. `weights` are those of
+// emission_weights(), and may be empty.
+void append_emitter(PlacedLights& to, const scene::Instance& instance, const scene::Mesh& mesh,
+                    const scene::Material& material, const std::vector<double>& weights);
 
 // Returns what a lamp with a place sends along its brightest direction, as if it were a point
 // (W/sr, mean of the channels), with the largest of its gains.

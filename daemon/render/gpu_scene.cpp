@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
 #include <glm/gtc/packing.hpp>
 #include <map>
 #include <numbers>
@@ -10,7 +12,6 @@
 
 #include "daemon/render/albedo_table.hpp"
 #include "daemon/render/gpu_lights.hpp"
-#include "daemon/render/light_tree.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::render {
@@ -82,7 +83,7 @@ void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha) {
   upload_meshes();
   upload_materials(specular_alpha);
   upload_textures();
-  find_emitters();
+  lights_.set_scene(scene_);
   spheres_ = bounding_spheres(scene_);
   instances_as_set_ = scene_.instances;
   std::vector<scene::Shape> at_rest;
@@ -103,8 +104,10 @@ void GpuScene::deform(const std::vector<scene::Shape>& shapes) {
         bounding_sphere(places_[deformation.mesh].bvh.bounds, instance.world_from_object);
     // Light samples are taken on the CPU's copy.
     scene::Mesh& mesh = scene_.meshes[deformation.mesh];
-    if (scene::emits(scene_.materials[instance.material]) && deformer_.has_shape(i, shapes[i]))
+    if (scene::emits(scene_.materials[instance.material]) && deformer_.has_shape(i, shapes[i])) {
       mesh.positions = scene::deformed(mesh.undeformed, shapes[i]).positions;
+      lights_.reshape(scene_, deformation.instance);
+    }
   }
   find_bounds(moved_spheres(spheres_, instances_as_set_, scene_.instances));
 }
@@ -219,13 +222,6 @@ void GpuScene::upload_textures() {
   upload_texels(device_, texels_, texels, vk::Format::eR32G32Uint);
 }
 
-void GpuScene::find_emitters() {
-  emitters_.clear();
-  first_light_.assign(scene_.instances.size(), gpu::NO_INDEX);
-  for (std::uint32_t i = 0; i < scene_.instances.size(); ++i)
-    if (scene::emits(scene_.materials[scene_.instances[i].material])) emitters_.push_back(i);
-}
-
 void GpuScene::set_environment(const EncodedEnvironment& encoded, set::LightSampling sampling) {
   environment_size_ = encoded.size;
   environment_levels_ = encoded.levels;
@@ -241,8 +237,9 @@ void GpuScene::set_sources(std::vector<set::Light> sources) {
 }
 
 void GpuScene::place(const glm::dvec3& camera_position) {
-  find_extent(camera_position);
-  upload_lights(camera_position);
+  find_extent();
+  lights_.place(scene_, lamps(), scene_radius_, camera_position);
+  seen_from_ = camera_position;
   upload_instances(camera_position);
   upload_bounds(camera_position);
 }
@@ -255,18 +252,26 @@ void GpuScene::upload_bounds(const glm::dvec3& camera_position) {
   upload_storage(device_, bounds_buffer_, bounds);
 }
 
-void GpuScene::find_extent(const glm::dvec3& camera_position) {
-  scene::Aabb all;
+// The extent does not depend on the camera, to the last bit, so that lights need not be weighed
+// anew when only the camera moves.
+void GpuScene::find_extent() {
+  glm::dvec3 low(1e300), high(-1e300);
   for (const scene::Instance& instance : scene_.instances) {
-    const scene::Aabb bounds =
-        scene::transform_bounds(places_[instance.mesh].bvh.bounds,
-                                relative_to(instance.world_from_object, camera_position));
-    all.low = glm::min(all.low, bounds.low);
-    all.high = glm::max(all.high, bounds.high);
+    const scene::Aabb& bounds = places_[instance.mesh].bvh.bounds;
+    if (!(bounds.low.x <= bounds.high.x)) continue;  // nothing is in it
+    const glm::dmat4& world = instance.world_from_object;
+    const glm::dvec3 center(
+        world * glm::dvec4(0.5 * (glm::dvec3(bounds.low) + glm::dvec3(bounds.high)), 1.0));
+    const glm::dvec3 half = 0.5 * (glm::dvec3(bounds.high) - glm::dvec3(bounds.low));
+    const glm::dvec3 reach = glm::abs(glm::dvec3(world[0])) * half.x +
+                             glm::abs(glm::dvec3(world[1])) * half.y +
+                             glm::abs(glm::dvec3(world[2])) * half.z;
+    low = glm::min(low, center - reach);
+    high = glm::max(high, center + reach);
   }
-  if (!(all.low.x <= all.high.x)) return;  // there is nothing
-  scene_radius_ = 0.5 * glm::length(glm::dvec3(all.high - all.low));
-  scene_center_ = 0.5f * (all.low + all.high);
+  if (!(low.x <= high.x)) return;  // there is nothing
+  scene_radius_ = 0.5 * glm::length(high - low);
+  scene_center_ = 0.5 * (low + high);
 }
 
 void GpuScene::upload_instances(const glm::dvec3& camera_position) {
@@ -281,7 +286,7 @@ void GpuScene::upload_instances(const glm::dvec3& camera_position) {
     set_rows(record.object_from_world, glm::inverse(world));
     record.material = instance.material;
     record.first_triangle = place.first_triangle;
-    record.first_light = first_light_[i];
+    record.first_light = lights_.first_light(i);
     record.presence = instance.presence;
     instances.push_back(record);
     top.push_back({&place.bvh, place.first_record, instance.presence, world});
@@ -294,43 +299,11 @@ void GpuScene::upload_instances(const glm::dvec3& camera_position) {
 std::vector<set::Light> GpuScene::lamps() const {
   std::vector<set::Light> result = scene_.lights;
   if (sources_) append(result, *sources_);
-  std::stable_partition(result.begin(), result.end(), can_be_seen);
-  return result;
-}
-
-std::vector<gpu::GpuLight> GpuScene::placed_lights(const std::vector<set::Light>& all_lamps,
-                                                   const glm::dvec3& camera_position) const {
-  std::vector<gpu::GpuLight> lights;
-  for (const set::Light& lamp : all_lamps) lights.push_back(encode_light(lamp, camera_position));
-  for (const std::uint32_t i : emitters_) {
-    const scene::Instance& instance = scene_.instances[i];
-    append(lights, encode_emitter(instance, scene_.meshes[instance.mesh],
-                                  scene_.materials[instance.material], camera_position));
-  }
-  return lights;
-}
-
-void GpuScene::upload_lights(const glm::dvec3& camera_position) {
-  const std::vector<set::Light> all_lamps = lamps();
-  std::vector<gpu::GpuLight> lights = placed_lights(all_lamps, camera_position);
-  visible_light_count_ =
-      static_cast<std::uint32_t>(std::count_if(all_lamps.begin(), all_lamps.end(), can_be_seen));
-  light_count_ = static_cast<std::uint32_t>(lights.size());
-  light_power_ = select_by_power(lights, scene_radius_);
-  const LightTree tree = build_light_tree(lights, {});
-  tree_share_ = select_by_tree(lights);
-  tree_offset_ = glm::vec3(-tree.origin);
-  light_spread_ = spread_of(lights, scene_radius_);
-  lights_differ_ = std::any_of(lights.begin(), lights.end(), [](const auto& light) {
-    return light.gain_mixed != light.gain_real;
+  const auto end = std::stable_partition(result.begin(), result.end(), can_be_seen);
+  std::stable_partition(result.begin(), end, [](const set::Light& lamp) {
+    return lamp.type == set::LightType::directional;
   });
-  auto next = static_cast<std::uint32_t>(all_lamps.size());
-  for (const std::uint32_t i : emitters_) {
-    first_light_[i] = next;
-    next += static_cast<std::uint32_t>(scene_.meshes[scene_.instances[i].mesh].triangles.size());
-  }
-  upload_storage(device_, lights_, lights);
-  upload_storage(device_, light_tree_, tree.nodes);
+  return result;
 }
 
 Demand GpuScene::demand(const set::Estimation& estimation) const {
@@ -338,20 +311,19 @@ Demand GpuScene::demand(const set::Estimation& estimation) const {
   demand.light_sampling = sampling_;
   demand.shines_around = environment_mean_ > 0;
   demand.finds_lamps = sources_.has_value();
-  demand.lamps_shine = light_power_ > 0;
+  demand.lamps_shine = lights_.power() > 0;
   return demand;
 }
 
 void GpuScene::describe(gpu::GpuFrame& frame, std::uint32_t features) const {
   frame.environment_size = environment_size_;
   frame.environment_levels = environment_levels_;
-  frame.light_count = light_count_;
-  frame.visible_light_count = visible_light_count_;
+  lights_.describe(frame);
   frame.bound_count = static_cast<std::uint32_t>(difference_bounds_.size());
   // Lamps that differ bring a difference everywhere, near objects or not.
-  frame.difference_roulette = lights_differ_ ? 0.0f : 2.0f;
+  frame.difference_roulette = lights_.differ() ? 0.0f : 2.0f;
   frame.specular_bound_count = static_cast<std::uint32_t>(specular_bounds_.size());
-  frame.scene_center = scene_center_;
+  frame.scene_center = glm::vec3(scene_center_ - seen_from_);
   // The radius is slightly wider, so that rounding leaves no surface outside.
   frame.scene_radius = static_cast<float>(scene_radius_ * 1.001);
   // Light samples are divided by power. The power of distant light is what crosses the scene's
@@ -359,32 +331,23 @@ void GpuScene::describe(gpu::GpuFrame& frame, std::uint32_t features) const {
   const double disc = std::numbers::pi * scene_radius_ * scene_radius_;
   const double environment_power = 4 * std::numbers::pi * environment_mean_ * disc;
   const bool sampled = (features & gpu::FEATURE_ENVIRONMENT_SAMPLING) != 0;
-  const double share = environment_share(environment_power, light_power_);
+  const double share = environment_share(environment_power, lights_.power());
   frame.environment_selection = sampled ? static_cast<float>(share) : 0.0f;
   frame.photon_environment = static_cast<float>(share);
   // Light that light samples do not look for counts as if it came from everywhere.
   frame.environment_spread = sampled ? static_cast<float>(environment_spread_) : 2.0f;
-  frame.lamp_spread = static_cast<float>(light_spread_);
-  const double all_power = environment_power + light_power_;
-  frame.tree_share = tree_share_;
-  frame.tree_offset = tree_offset_;
-  frame.lamp_part = all_power > 0 ? static_cast<float>(light_power_ / all_power) : 0.0f;
+  const double all_power = environment_power + lights_.power();
+  frame.lamp_part = all_power > 0 ? static_cast<float>(lights_.power() / all_power) : 0.0f;
 }
 
 Buffers GpuScene::buffers() const {
-  return {{"bvh", &bvh_},
-          {"vertices", &vertices_},
-          {"triangles", &triangles_},
-          {"texels", &texels_},
-          {"environment", &environment_},
-          {"importance", &importance_},
-          {"albedo", &albedo_},
-          {"instances", &instances_},
-          {"materials", &materials_},
-          {"textures", &textures_},
-          {"lights", &lights_},
-          {"bounds", &bounds_buffer_},
-          {"light_tree", &light_tree_}};
+  Buffers buffers{
+      {"bvh", &bvh_},           {"vertices", &vertices_},       {"triangles", &triangles_},
+      {"texels", &texels_},     {"environment", &environment_}, {"importance", &importance_},
+      {"albedo", &albedo_},     {"instances", &instances_},     {"materials", &materials_},
+      {"textures", &textures_}, {"bounds", &bounds_buffer_}};
+  lights_.add_to(buffers);
+  return buffers;
 }
 
 }  // namespace previz::render

@@ -13,6 +13,7 @@
 #include "daemon/render/feature.hpp"
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/kernel.hpp"
+#include "daemon/render/scene_lights.hpp"
 #include "daemon/scene/bvh.hpp"
 #include "daemon/scene/scene.hpp"
 #include "shaders/lib/render_shared.h"
@@ -21,7 +22,7 @@ namespace previz::render {
 
 class GpuScene {
  public:
-  explicit GpuScene(Device& device) : device_(device), deformer_(device) {}
+  explicit GpuScene(Device& device) : device_(device), deformer_(device), lights_(device) {}
 
   // Builds the meshes' BVHs and uploads everything that does not depend on the camera.
   // Surfaces are perfect mirrors where their GGX alpha is at most `specular_alpha`.
@@ -35,6 +36,8 @@ class GpuScene {
   void deform(const std::vector<scene::Shape>& shapes);
   // Returns how many trees of meshes that deform were built anew since set_scene().
   std::uint64_t rebuilt_trees() const { return deformer_.rebuilt(); }
+  // Returns how often the lights were encoded.
+  std::uint64_t encoded_lights() const { return lights_.encoded(); }
   // Sets lamps beside the scene's own, which may change from frame to frame.
   void set_sources(std::vector<set::Light> sources);
   // Uploads instances, top level and lights relative to `camera_position` (world, metres).
@@ -61,13 +64,9 @@ class GpuScene {
   void check_deforming() const;
   void upload_materials(double specular_alpha);
   void upload_textures();
-  void find_emitters();
   void find_bounds(const Spheres& spheres);
-  std::vector<set::Light> lamps() const;  // scene lamps and sources; visible ones first
-  std::vector<gpu::GpuLight> placed_lights(const std::vector<set::Light>& all_lamps,
-                                           const glm::dvec3& camera_position) const;
-  void find_extent(const glm::dvec3& camera_position);
-  void upload_lights(const glm::dvec3& camera_position);
+  std::vector<set::Light> lamps() const;  // of scene and sources, as SceneLights
+  void find_extent();
   void upload_instances(const glm::dvec3& camera_position);
   void upload_bounds(const glm::dvec3& camera_position);
 
@@ -80,22 +79,17 @@ class GpuScene {
   std::optional<std::vector<set::Light>> sources_;  // absent: set_sources() was never called
   std::vector<MeshPlace> places_;
   Deformer deformer_;
-  std::vector<std::uint32_t> first_light_;  // by instance; NO_INDEX: not an emitter
-  std::vector<std::uint32_t> emitters_;     // instances that emit, in the order of their lights
+  SceneLights lights_;
   Bounds difference_bounds_, specular_bounds_;
-  glm::vec3 scene_center_{0.0f};  // of the instances' bounds, relative to the camera
+  glm::dvec3 scene_center_{0.0};  // of the instances' bounds; world, metres
+  glm::dvec3 seen_from_{0.0};     // the camera's place of the last place()
   double scene_radius_ = 1;
   std::uint32_t environment_size_ = 1, environment_levels_ = 0;
   double environment_mean_ = 0, environment_spread_ = 2;
   set::LightSampling sampling_ = set::LightSampling::importance;
-  std::uint32_t light_count_ = 0, visible_light_count_ = 0;
-  double light_power_ = 0, light_spread_ = 2;
-  float tree_share_ = 0;
-  glm::vec3 tree_offset_{0.0f};
-  bool lights_differ_ = false;  // between the worlds
 
   Buffer bvh_, vertices_, triangles_, texels_, environment_, importance_, albedo_, instances_,
-      materials_, textures_, lights_, light_tree_, bounds_buffer_;
+      materials_, textures_, bounds_buffer_;
 };
 
 }  // namespace previz::render

@@ -2,7 +2,9 @@
 // is taken (shaders/README.md, "The tree of lamps").
 #pragma once
 
+#include <cstdint>
 #include <glm/vec3.hpp>
+#include <span>
 #include <vector>
 
 #include "daemon/render/gpu_lights.hpp"
@@ -10,13 +12,32 @@
 
 namespace previz::render {
 
+// Which lamps are together: nodes, the root first, each before its children, which are neighbours.
+struct LightBranch {
+  std::uint32_t first;  // its first child; of a leaf: a lamp
+  bool is_leaf;
+};
+using LightShape = std::vector<LightBranch>;
+
+// Returns how to group the triangles of a mesh that emits; `lights` are these, where the mesh is
+// not moved. It is empty if none shines.
+LightShape shape_of_emitter(const PlacedLights& lights);
+
+// The triangles of an emissive mesh, which keep their shape wherever the mesh is.
+struct LightGroup {
+  std::uint32_t first_light;
+  const LightShape* shape;
+};
+
 struct LightTree {
   std::vector<gpu::GpuLightNode>
       nodes;               // the root first; one that nobody reads where there is none
-  glm::dvec3 origin{0.0};  // from which the nodes' places count
+  glm::dvec3 origin{0.0};  // from which the nodes' places count; world, metres
 };
 
-// Builds the tree of the lamps with a place and a power, and sets GpuLight::leaf of all lights.
-LightTree build_light_tree(std::vector<gpu::GpuLight>& lights, const Weights& weights);
+// Builds the tree of the first `lamps` lights and of the groups, and sets GpuLight::leaf of all
+// lights. What has no place or no power is left out.
+LightTree build_light_tree(PlacedLights& lights, std::size_t lamps,
+                           std::span<const LightGroup> groups);
 
 }  // namespace previz::render

@@ -319,6 +319,7 @@ Counters Renderer::counters() const {
   counters.measured = wide(control.measured_high, control.measured_low);
   counters.unmeasured = wide(control.unmeasured_high, control.unmeasured_low);
   counters.rebuilt_trees = impl_->scene.rebuilt_trees() - impl_->trees_before;
+  counters.encoded_lights = impl_->scene.encoded_lights();
   return counters;
 }
 

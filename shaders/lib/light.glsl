@@ -7,6 +7,13 @@
 #include "shaders/lib/path.glsl"
 
 layout(scalar) readonly buffer Lights { GpuLight lights[]; };
+layout(scalar) readonly buffer LightPositions { vec3 light_positions[]; };  // of each light
+
+GpuLight light_at(uint index) {
+  GpuLight light = lights[index];
+  light.position = light_positions[index];
+  return light;
+}
 
 Gain gain_of(GpuLight light) { return Gain(light.gain_mixed, light.gain_real); }
 

@@ -123,4 +123,35 @@ float tree_probability(uint leaf, Receiver r) {
   return probability;
 }
 
+// Returns whether a ray may meet a lamp of a node before t_hit. The sphere is a little wider for the
+// rounding of the ray.
+bool crosses(GpuLightNode node, vec3 origin, vec3 direction, float t_hit) {
+  const vec3 to_node = node.center - origin;
+  const float along = dot(to_node, direction);
+  const vec3 off = to_node - along * direction;
+  const float squared = 1.001 * node.radius_squared + 1e-12 * dot(to_node, to_node);
+  const float radius = sqrt(squared);
+  return dot(off, off) <= squared && along >= -radius && along - radius <= t_hit;
+}
+
+// Returns the next light with an extent, and no mesh, that a ray may meet; NO_INDEX at the end. `node`
+// is where the walk stands, at first 0. The links to the parents lead on, without a stack: behind a
+// first child comes the second one, behind the second what comes behind its parent.
+uint next_crossed(inout uint node, vec3 origin, vec3 direction, float t_hit) {
+  while (node != NO_INDEX) {
+    const GpuLightNode n = light_tree[node];
+    const bool crossed =
+        (n.links & LIGHT_NODE_VISIBLE) != 0u && crosses(n, origin, direction, t_hit);
+    const bool is_leaf = (n.links & LIGHT_NODE_LEAF) != 0u;
+    if (crossed && !is_leaf) {
+      node = n.first;
+      continue;
+    }
+    while ((node & 1u) != 0u) node = light_tree[node].links >> LIGHT_NODE_PARENT_SHIFT;
+    node = node == 0u ? NO_INDEX : node + 1u;
+    if (crossed) return n.first;
+  }
+  return NO_INDEX;
+}
+
 #endif

@@ -163,7 +163,7 @@ Emission emit_photon(Sampler random) {
     selection = environment;
   } else {
     const uint index = pick_light(choice.x);
-    e = emit_light(lights[index], random, choice);
+    e = emit_light(light_at(index), random, choice);
     selection = (1.0 - environment) * lights[index].selection;
   }
   e.flux /= selection;

@@ -214,7 +214,8 @@ PREVIZ_CONST uint LIGHT_RECTANGLE = 3u;
 PREVIZ_CONST uint LIGHT_SPHERE = 4u;
 PREVIZ_CONST uint LIGHT_TRIANGLE = 5u;
 
-// A light in camera-relative world space.
+// A light in camera-relative world space. Its position is in a buffer of its own, because it changes
+// with the camera, and is put here by light_at().
 struct GpuLight {
   vec3 position;   // point, spot, sphere centre, rectangle centre, triangle's first vertex
   uint type;
@@ -252,9 +253,10 @@ struct GpuLightNode {
 };
 PREVIZ_CONST uint LIGHT_NODE_LEAF = 1u;
 PREVIZ_CONST uint LIGHT_NODE_TWO_SIDED = 2u;
-PREVIZ_CONST uint LIGHT_NODE_PARENT_SHIFT = 2u;
-// With so few lights a light sample picks by the numbers that choose the place on it; with more by
-// numbers of their own.
+PREVIZ_CONST uint LIGHT_NODE_VISIBLE = 4u;  // some lamp has an extent and no mesh
+PREVIZ_CONST uint LIGHT_NODE_PARENT_SHIFT = 3u;
+// With so few lights a light sample picks by the numbers that choose the place on it, and a ray tries
+// all that it could see; with more there are numbers for the lamp alone, and a walk over the tree.
 PREVIZ_CONST uint FEW_LIGHTS = 4u;
 
 struct GpuFrame {
@@ -288,6 +290,7 @@ struct GpuFrame {
   vec2 tangential;              // p1, p2
   float tree_share;             // probability that a light sample of a light takes the tree; 0: none
   vec3 tree_offset;             // of the camera from the tree's origin
+  uint distant_light_count;     // the first of the visible lights: discs at infinity
 };
 
 // Push constants of a batch: a part of the picture and a range of samples.
@@ -395,7 +398,7 @@ static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
 static_assert(sizeof(GpuLight) == 156);
 static_assert(offsetof(GpuLight, uv0) == 112);
-static_assert(sizeof(GpuFrame) == 208);
+static_assert(sizeof(GpuFrame) == 212);
 static_assert(sizeof(GpuLightNode) == 48);
 static_assert(sizeof(GpuBatch) == 28);
 static_assert(sizeof(GpuPhoton) == 64);

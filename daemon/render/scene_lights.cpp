@@ -1,0 +1,145 @@
+#include "daemon/render/scene_lights.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "daemon/render/emission_weights.hpp"
+
+namespace previz::render {
+namespace {
+
+// Lights have no padding, so that equal ones have equal bytes.
+static_assert(sizeof(gpu::GpuLight) == 156);
+
+// Lights are weighed for a radius of this many steps an octave, so that they stay as they are while
+// an object at the rim of the scene moves.
+constexpr double radius_steps = 16;
+
+double stepped(double radius) {
+  return radius > 0 ? std::exp2(std::round(std::log2(radius) * radius_steps) / radius_steps)
+                    : radius;
+}
+
+bool have_equal_bytes(const std::vector<gpu::GpuLight>& a, const std::vector<gpu::GpuLight>& b) {
+  return a.size() == b.size() &&
+         (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(a[0])) == 0);
+}
+
+}  // namespace
+
+void SceneLights::set_scene(const scene::Scene& scene) {
+  state_.reset();
+  emitters_.clear();
+  first_light_.assign(scene.instances.size(), gpu::NO_INDEX);
+  for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
+    const scene::Material& material = scene.materials[scene.instances[i].material];
+    if (!scene::emits(material)) continue;
+    Emitter emitter{i, emission_weights(scene, scene.instances[i]), {}};
+    shape(emitter, scene);
+    emitters_.push_back(std::move(emitter));
+  }
+}
+
+void SceneLights::shape(Emitter& emitter, const scene::Scene& scene) {
+  scene::Instance unmoved = scene.instances[emitter.instance];
+  unmoved.world_from_object = glm::dmat4(1.0);
+  unmoved.presence = scene::world_both;
+  PlacedLights alone;
+  append_emitter(alone, unmoved, scene.meshes[unmoved.mesh], scene.materials[unmoved.material],
+                 emitter.weights);
+  emitter.shape = shape_of_emitter(alone);
+}
+
+void SceneLights::reshape(const scene::Scene& scene, std::uint32_t instance) {
+  ++shapes_;
+  for (Emitter& emitter : emitters_)
+    if (emitter.instance == instance) shape(emitter, scene);
+}
+
+SceneLights::State SceneLights::state_of(const scene::Scene& scene,
+                                         const std::vector<set::Light>& lamps,
+                                         double scene_radius) const {
+  State state{{}, {}, {}, shapes_, stepped(scene_radius)};
+  for (const set::Light& lamp : lamps) append_lamp(state.lamps, lamp);
+  for (const Emitter& emitter : emitters_) {
+    state.places.push_back(scene.instances[emitter.instance].world_from_object);
+    state.presences.push_back(scene.instances[emitter.instance].presence);
+  }
+  return state;
+}
+
+bool SceneLights::are_equal(const State& a, const State& b) {
+  return have_equal_bytes(a.lamps.lights, b.lamps.lights) &&
+         a.lamps.positions == b.lamps.positions && a.places == b.places &&
+         a.presences == b.presences && a.shapes == b.shapes && a.scene_radius == b.scene_radius;
+}
+
+void SceneLights::place(const scene::Scene& scene, const std::vector<set::Light>& lamps,
+                        double scene_radius, const glm::dvec3& camera_position) {
+  State state = state_of(scene, lamps, scene_radius);
+  const bool is_new = !state_ || !are_equal(*state_, state);
+  if (is_new) {
+    visible_count_ =
+        static_cast<std::uint32_t>(std::count_if(lamps.begin(), lamps.end(), can_be_seen));
+    distant_count_ = static_cast<std::uint32_t>(
+        std::count_if(lamps.begin(), lamps.end(), [](const set::Light& lamp) {
+          return can_be_seen(lamp) && lamp.type == set::LightType::directional;
+        }));
+    state_ = std::move(state);
+    encode(scene);
+  }
+  if (is_new || camera_position != seen_from_) upload_positions(camera_position);
+}
+
+void SceneLights::encode(const scene::Scene& scene) {
+  ++encoded_;
+  PlacedLights all = state_->lamps;
+  const std::size_t lamps = all.lights.size();
+  std::vector<LightGroup> groups;
+  for (const Emitter& emitter : emitters_) {
+    const scene::Instance& instance = scene.instances[emitter.instance];
+    const auto first = static_cast<std::uint32_t>(all.lights.size());
+    first_light_[emitter.instance] = first;
+    groups.push_back({first, &emitter.shape});
+    append_emitter(all, instance, scene.meshes[instance.mesh], scene.materials[instance.material],
+                   emitter.weights);
+  }
+  count_ = static_cast<std::uint32_t>(all.lights.size());
+  power_ = select_by_power(all.lights, state_->scene_radius, all.weights);
+  spread_ = spread_of(all.lights, state_->scene_radius, all.weights);
+  const LightTree tree = build_light_tree(all, lamps, groups);
+  tree_share_ = select_by_tree(all.lights);
+  tree_origin_ = tree.origin;
+  differ_ = std::any_of(all.lights.begin(), all.lights.end(), [](const gpu::GpuLight& light) {
+    return light.gain_mixed != light.gain_real;
+  });
+  upload_storage(device_, lights_, all.lights);
+  upload_storage(device_, light_tree_, tree.nodes);
+  positions_ = std::move(all.positions);
+}
+
+void SceneLights::upload_positions(const glm::dvec3& camera_position) {
+  seen_from_ = camera_position;
+  std::vector<glm::vec3> positions;
+  positions.reserve(positions_.size());
+  for (const glm::dvec3& position : positions_) positions.emplace_back(position - camera_position);
+  upload_storage(device_, light_positions_, positions);
+}
+
+void SceneLights::describe(gpu::GpuFrame& frame) const {
+  frame.light_count = count_;
+  frame.visible_light_count = visible_count_;
+  frame.distant_light_count = distant_count_;
+  frame.lamp_spread = static_cast<float>(spread_);
+  frame.tree_share = tree_share_;
+  frame.tree_offset = glm::vec3(seen_from_ - tree_origin_);
+}
+
+void SceneLights::add_to(Buffers& buffers) const {
+  buffers.insert(
+      {{"lights", &lights_}, {"light_positions", &light_positions_}, {"light_tree", &light_tree_}});
+}
+
+}  // namespace previz::render
