@@ -45,7 +45,7 @@ Path load_path(uint index) {
               (has_feature(FEATURE_DIFFERENCE) || has_feature(FEATURE_CAMERA)) &&
                   (bits & PATH_DIFFERENCE) != 0u,
               has_feature(FEATURE_CAMERA) && (bits & PATH_LANDED) != 0u, path_medium(bits),
-              has_feature(FEATURE_LIGHTS) ? path_receiver[index] : NO_NORMAL,
+              has_feature(FEATURE_MANY_LIGHTS) ? path_receiver[index] : NO_NORMAL,
               path_passes(bits), path_is_behind(bits));
 }
 
@@ -57,7 +57,7 @@ void store_path(Path p, uint index) {
                     (p.is_behind ? PATH_BEHIND : 0u) | (p.passes << PATH_PASSES_SHIFT) |
                     (p.depth << PATH_DEPTH_SHIFT) | (p.medium << PATH_MEDIUM_SHIFT);
   path_throughput[index] = vec4(p.throughput, uintBitsToFloat(bits));
-  if (has_feature(FEATURE_LIGHTS)) path_receiver[index] = p.receiver;
+  if (has_feature(FEATURE_MANY_LIGHTS)) path_receiver[index] = p.receiver;
 }
 
 // Returns whether light at the end of this path is a caustic: a lobe that is not Dirac has
@@ -104,11 +104,11 @@ void cross_light(Path p, uint index, float t_hit) {
 
 // Adds the lights without a mesh that the ray crosses before its hit. They block nothing.
 void meet_lights(Path p, float t_hit) {
-  const bool are_few = frame.visible_light_count <= FEW_LIGHTS;
-  const uint tried = are_few ? frame.visible_light_count : frame.distant_light_count;
+  const bool by_tree = has_tree() && frame.visible_light_count > FEW_LIGHTS;
+  const uint tried = by_tree ? frame.distant_light_count : frame.visible_light_count;
   for (uint i = 0u; i < tried; ++i) cross_light(p, i, t_hit);
-  uint node = are_few ? NO_INDEX : 0u;
-  while (node != NO_INDEX) {
+  uint node = by_tree ? 0u : NO_INDEX;
+  while (has_feature(FEATURE_MANY_LIGHTS) && node != NO_INDEX) {
     const uint index = next_crossed(node, p.origin + frame.tree_offset, p.direction, t_hit);
     if (index != NO_INDEX) cross_light(p, index, t_hit);
   }
@@ -206,10 +206,15 @@ uint choose_light(Path p, Surface s, Sampler random, inout float u, out float se
   selection = frame.environment_selection;
   if (has_feature(FEATURE_LIGHTS) && !choose(u, selection)) {
     if (frame.light_count == 0u) return NO_INDEX;
-    vec2 lamp = vec2(0.0);
-    if (frame.light_count > FEW_LIGHTS) lamp = sample_2d(random, PAIR_LAMP + p.depth);
+    uint index;
     float among_lights;
-    const uint index = select_light(make_receiver(s.position, p.receiver), u, lamp, among_lights);
+    if (has_tree()) {
+      const vec2 lamp = sample_2d(random, PAIR_LAMP + p.depth);
+      index = select_light(make_receiver(s.position, p.receiver), lamp, among_lights);
+    } else {
+      index = pick_light(u);
+      among_lights = lights[index].selection;
+    }
     selection = (1.0 - selection) * among_lights;
     return index;
   }
@@ -403,7 +408,7 @@ void shade_vertex(inout Path p, Surface s, out GpuShadowRay ray, out bool lit, o
   Lobes l = make_lobes(s);
   if (has_feature(FEATURE_PANES)) l = without_passing(s, l, pane_transmittance(s));
   const Technique t = make_technique(p, s, l);
-  if (has_feature(FEATURE_LIGHTS))
+  if (has_feature(FEATURE_MANY_LIGHTS))
     p.receiver = has_feature(FEATURE_TRANSMISSION) && has_rough_glass(l) ? NO_NORMAL
                                                                          : pack_normal(s.normal);
   if (has_feature(FEATURE_PHOTONS)) meet_photons(p, s, l);

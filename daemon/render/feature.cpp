@@ -69,7 +69,7 @@ bool lamps_shine(const Scene& scene) {
          });
 }
 
-constexpr std::array<Feature, 23> feature_table = {{
+constexpr std::array<Feature, 24> feature_table = {{
     {.name = "two worlds",
      .bit = gpu::FEATURE_FORKS,
      .can_be_carried = true,
@@ -201,6 +201,12 @@ constexpr std::array<Feature, 23> feature_table = {{
          },
      .used = "a lamp has a size, so it can be seen and reflected",
      .left_out = "no lamp has a size, so none can be seen or reflected"},
+    {.name = "many lamps",
+     .bit = gpu::FEATURE_MANY_LIGHTS,
+     .can_be_carried = true,
+     .in_frame = [](bool, const Demand& d) { return are_many(d.scene); },
+     .used = "a point is lit by those of many lamps that are near and turned to it",
+     .left_out = "the lamps are so few that each is looked for everywhere"},
     {.name = "glowing surfaces",
      .in_material = glows,
      .used = "a surface gives off light",

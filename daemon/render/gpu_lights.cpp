@@ -92,6 +92,14 @@ bool can_be_seen(const set::Light& light) {
          has_disc(light);
 }
 
+bool are_many(const scene::Scene& scene) {
+  std::size_t count = scene.lights.size();
+  for (const scene::Instance& instance : scene.instances)
+    if (scene::emits(scene.materials[instance.material]))
+      count += scene.meshes[instance.mesh].triangles.size();
+  return count > gpu::FEW_LIGHTS;
+}
+
 void append_lamp(PlacedLights& to, const set::Light& light) {
   gpu::GpuLight result{};
   result.type = gpu_type(light.type);

@@ -109,14 +109,16 @@ void SceneLights::encode(const scene::Scene& scene) {
   count_ = static_cast<std::uint32_t>(all.lights.size());
   power_ = select_by_power(all.lights, state_->scene_radius, all.weights);
   spread_ = spread_of(all.lights, state_->scene_radius, all.weights);
-  const LightTree tree = build_light_tree(all, lamps, groups);
+  const bool has_tree = are_many(scene);
+  if (!has_tree) groups.clear();
+  const LightTree tree = build_light_tree(all, has_tree ? lamps : 0, groups);
   tree_share_ = select_by_tree(all.lights);
   tree_origin_ = tree.origin;
   differ_ = std::any_of(all.lights.begin(), all.lights.end(), [](const gpu::GpuLight& light) {
     return light.gain_mixed != light.gain_real;
   });
   upload_storage(device_, lights_, all.lights);
-  upload_storage(device_, light_tree_, tree.nodes);
+  upload_texels(device_, light_tree_, tree.nodes, vk::Format::eR32G32B32A32Uint);
   positions_ = std::move(all.positions);
 }
 

@@ -57,30 +57,30 @@ uint pick_rest(inout float u) {
   return low;
 }
 
+bool has_tree() { return has_feature(FEATURE_MANY_LIGHTS) && frame.tree_share > 0.0; }
+
 // Returns the probability with which a light sample for a receiver picks this light among all.
 float light_selection(GpuLight light, Receiver r) {
-  if (frame.tree_share <= 0.0 || light.leaf == NO_INDEX) return light.rest_selection;
-  return light.rest_selection + frame.tree_share * tree_probability(light.leaf, r);
+  if (!has_tree()) return light.selection;
+  float probability = 0.0;
+  if (light.leaf != NO_INDEX) descend_tree(r, light.leaf, 0.0, 0.0, probability);
+  return light.rest_selection + frame.tree_share * probability;
 }
 
-// Picks a light for a receiver. `lamp` are random numbers of their own, for more than FEW_LIGHTS;
-// fewer are picked by u, which is stretched. Returns NO_INDEX if none shines there.
-uint select_light(Receiver r, inout float u, vec2 lamp, out float selection) {
-  const bool are_few = frame.light_count <= FEW_LIGHTS;
-  float way = are_few ? u : lamp.x;
-  const bool by_tree = frame.tree_share > 0.0 && choose(way, frame.tree_share);
-  float number = are_few ? way : lamp.y;
-  uint index;
-  if (by_tree) {
-    float probability;
-    index = descend_tree(r, number, are_few ? 0.0 : way * 5.9604645e-8, probability);
-    selection = frame.tree_share * probability;
-    if (index != NO_INDEX) selection += lights[index].rest_selection;
-  } else {
-    index = pick_rest(number);
-    selection = light_selection(lights[index], r);
-  }
-  if (are_few) u = number;
+// Picks a light for a receiver among many, by random numbers of their own. Returns NO_INDEX if none
+// shines there. One descent serves both those that take the tree and those that ask it for the
+// probability of the lamp that they have.
+uint select_light(Receiver r, vec2 lamp, out float selection) {
+  const bool by_tree = choose(lamp.x, frame.tree_share);
+  const uint picked = by_tree ? NO_INDEX : pick_rest(lamp.y);
+  const uint wanted = by_tree ? NO_INDEX : lights[picked].leaf;
+  float probability = 0.0;
+  uint found = NO_INDEX;
+  if (by_tree || wanted != NO_INDEX)
+    found = descend_tree(r, wanted, lamp.y, lamp.x * 5.9604645e-8, probability);
+  const uint index = by_tree ? found : picked;
+  selection = frame.tree_share * probability;
+  if (index != NO_INDEX) selection += lights[index].rest_selection;
   return index;
 }
 

@@ -7,7 +7,17 @@
 #include "shaders/lib/sampler.glsl"
 #include "shaders/lib/scene.glsl"
 
-layout(scalar) readonly buffer LightTree { GpuLightNode light_tree[]; };
+// Of GpuLightNode, three texels each, because texel buffers are read faster on lavapipe.
+uniform utextureBuffer light_tree;
+
+GpuLightNode light_node(uint index) {
+  const int first = 3 * int(index);
+  const uvec4 a = texelFetch(light_tree, first);
+  const uvec4 b = texelFetch(light_tree, first + 1);
+  const uvec4 c = texelFetch(light_tree, first + 2);
+  return GpuLightNode(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), uintBitsToFloat(b.xyz),
+                      uintBitsToFloat(b.w), uintBitsToFloat(c.x), uintBitsToFloat(c.y), c.z, c.w);
+}
 
 // What is known of a surface to which lamps shine. A receiver that takes light from behind, too, has
 // no normal, (0, 0, 0).
@@ -78,9 +88,9 @@ float node_importance(GpuLightNode node, Receiver r) {
 // Returns the importance of a node as the sum of its children's, which a receiver among the lamps needs:
 // it tells lamps nearby from a great many on the other side of the same sphere.
 float branch_importance(uint index, Receiver r) {
-  const GpuLightNode node = light_tree[index];
+  const GpuLightNode node = light_node(index);
   if ((node.links & LIGHT_NODE_LEAF) != 0u) return node_importance(node, r);
-  return node_importance(light_tree[node.first], r) + node_importance(light_tree[node.first + 1u], r);
+  return node_importance(light_node(node.first), r) + node_importance(light_node(node.first + 1u), r);
 }
 
 // Returns the probability of the first of two children, below 0 if neither can shine on the receiver.
@@ -90,37 +100,37 @@ float first_probability(uint first, Receiver r) {
   return both > 0.0 ? a / both : -1.0;
 }
 
+// Returns whether a leaf is the second of two children, or below it. The nodes below the first child
+// lie before those below the second one.
+bool is_below_second(uint leaf, uint first) {
+  if (leaf <= first + 1u) return leaf == first + 1u;
+  const GpuLightNode second = light_node(first + 1u);
+  return (second.links & LIGHT_NODE_LEAF) == 0u && leaf >= second.first;
+}
+
 // Descends to a lamp by a random number, which is stretched for each decision; `finer` continues it
-// below its last bit. Returns NO_INDEX, with probability 0, where all lamps are turned away.
-uint descend_tree(Receiver r, inout float u, float finer, out float probability) {
+// below its last bit. If a leaf is `wanted`, which NO_INDEX is not, it descends to that one. In
+// `probability` is that of finding this lamp by chance; 0 where all lamps are turned away, for which
+// the result is NO_INDEX.
+uint descend_tree(Receiver r, uint wanted, float u, float finer, out float probability) {
   probability = 1.0;
-  GpuLightNode node = light_tree[0];
+  GpuLightNode node = light_node(0);
   while ((node.links & LIGHT_NODE_LEAF) == 0u) {
     const float first = first_probability(node.first, r);
     if (first < 0.0) {
       probability = 0.0;
       return NO_INDEX;
     }
-    const bool is_first = first >= 1.0 || u + finer < first;
+    const bool is_first = wanted == NO_INDEX ? first >= 1.0 || u + finer < first
+                                             : !is_below_second(wanted, node.first);
     const float share = is_first ? first : 1.0 - first;
+    probability *= share;
+    if (share <= 0.0) return NO_INDEX;
     u = clamp((is_first ? u : u - first) / share, 0.0, 0.99999994);
     finer /= share;
-    probability *= share;
-    node = light_tree[is_first ? node.first : node.first + 1u];
+    node = light_node(is_first ? node.first : node.first + 1u);
   }
   return node.first;
-}
-
-// Returns the probability with which descend_tree() finds the lamp of this leaf.
-float tree_probability(uint leaf, Receiver r) {
-  float probability = 1.0;
-  while (leaf != 0u) {
-    const float first = first_probability(leaf & ~1u, r);
-    if (first < 0.0) return 0.0;
-    probability *= (leaf & 1u) == 0u ? first : 1.0 - first;
-    leaf = light_tree[leaf].links >> LIGHT_NODE_PARENT_SHIFT;
-  }
-  return probability;
 }
 
 // Returns whether a ray may meet a lamp of a node before t_hit. The sphere is a little wider for the
@@ -139,7 +149,7 @@ bool crosses(GpuLightNode node, vec3 origin, vec3 direction, float t_hit) {
 // first child comes the second one, behind the second what comes behind its parent.
 uint next_crossed(inout uint node, vec3 origin, vec3 direction, float t_hit) {
   while (node != NO_INDEX) {
-    const GpuLightNode n = light_tree[node];
+    const GpuLightNode n = light_node(node);
     const bool crossed =
         (n.links & LIGHT_NODE_VISIBLE) != 0u && crosses(n, origin, direction, t_hit);
     const bool is_leaf = (n.links & LIGHT_NODE_LEAF) != 0u;
@@ -147,7 +157,7 @@ uint next_crossed(inout uint node, vec3 origin, vec3 direction, float t_hit) {
       node = n.first;
       continue;
     }
-    while ((node & 1u) != 0u) node = light_tree[node].links >> LIGHT_NODE_PARENT_SHIFT;
+    while ((node & 1u) != 0u) node = light_node(node).links >> LIGHT_NODE_PARENT_SHIFT;
     node = node == 0u ? NO_INDEX : node + 1u;
     if (crossed) return n.first;
   }

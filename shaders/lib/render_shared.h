@@ -66,6 +66,7 @@ PREVIZ_CONST uint FEATURE_PANES = 16384u;  // any smooth thin wall through which
 PREVIZ_CONST uint FEATURE_CAMERA = 8192u;  // the plate gives the radiance of points that it shows
 PREVIZ_CONST uint FEATURE_ATTENUATION = 32768u;  // clear solids that take light away inside
 PREVIZ_CONST uint FEATURE_CLEARCOAT = 65536u;  // a coat of lacquer above the base material
+PREVIZ_CONST uint FEATURE_MANY_LIGHTS = 131072u;  // more than FEW_LIGHTS: they are chosen by a tree
 
 // These bits are a path's state.
 PREVIZ_CONST uint PATH_WORLDS_MASK = 3u;      // WORLD_*
@@ -255,8 +256,7 @@ PREVIZ_CONST uint LIGHT_NODE_LEAF = 1u;
 PREVIZ_CONST uint LIGHT_NODE_TWO_SIDED = 2u;
 PREVIZ_CONST uint LIGHT_NODE_VISIBLE = 4u;  // some lamp has an extent and no mesh
 PREVIZ_CONST uint LIGHT_NODE_PARENT_SHIFT = 3u;
-// With so few lights a light sample picks by the numbers that choose the place on it, and a ray tries
-// all that it could see; with more there are numbers for the lamp alone, and a walk over the tree.
+// So few lights are chosen by power alone, and a ray tries all that it could see; a tree pays for more.
 PREVIZ_CONST uint FEW_LIGHTS = 4u;
 
 struct GpuFrame {

@@ -114,6 +114,16 @@ TEST_F(Features, ReadMaterials) {
   EXPECT_FALSE(needs("lamps in view"));  // found as surfaces
 }
 
+TEST_F(Features, ManyLampsAreFiveOrGlowingTriangles) {
+  for (int i = 0; i < 4; ++i) scene.lights.push_back(lamp(set::LightType::point));
+  EXPECT_FALSE(needs("many lamps"));
+  scene.lights.push_back(lamp(set::LightType::point));
+  EXPECT_TRUE(needs("many lamps"));
+  scene.lights.clear();
+  add(emitter({1, 1, 1}));  // a box has twelve
+  EXPECT_TRUE(needs("many lamps"));
+}
+
 TEST_F(Features, GlassIsColouredWhereItsInsideTakesLightAway) {
   scene::Material bottle = glass(1.5f);
   bottle.attenuation_distance_m = 0.1f;
