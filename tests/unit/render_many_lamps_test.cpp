@@ -197,6 +197,34 @@ TEST(ManyLamps, MayCoincideBeBlackOrDiffer) {
   EXPECT_NEAR(of_diff.mean, diff, 4 * of_diff.error + 1e-3 * std::abs(diff));
 }
 
+// A scene a thousand times as large or as small, or a kilometre away, with lamps that are brighter
+// by the square of its size: the same light, and as noisy. The deviation may differ by its own
+// error and by that of a choice among lamps whose places are rounded to 6e-5 m, a kilometre away.
+TEST(ManyLamps, AreChosenAlikeAtAnySizeAndPlace) {
+  const std::vector<set::Light> lamps = both(near_lamps(), far_lamps(60));
+  const Noise here = noise_of(lit_by(lamps), up_to_depth(1), 8);
+  const auto placed = [&](double size, const glm::dvec3& at) {
+    View view = lit_by(lamps);
+    for (set::Light& light : view.scene.lights) {
+      light.position = at + size * light.position;
+      light.width_m *= size;
+      light.height_m *= size;
+      if (light.type != set::LightType::rectangle) light.emission *= size * size;
+    }
+    const glm::dmat4 place = glm::scale(glm::translate(glm::dmat4(1), at), glm::dvec3(size));
+    for (scene::Instance& instance : view.scene.instances)
+      instance.world_from_object = place * instance.world_from_object;
+    view.world_from_camera[3] = place * view.world_from_camera[3];
+    const Noise noise = noise_of(view, up_to_depth(1), 8);
+    EXPECT_NEAR(noise.mean, here.mean, 4 * std::hypot(noise.error, here.error) + 1e-3 * here.mean);
+    EXPECT_NEAR(noise.deviation / here.deviation, 1,
+                4 * std::hypot(noise.accuracy, here.accuracy) + 0.01);
+  };
+  placed(1e-3, glm::dvec3(0));
+  placed(1e3, glm::dvec3(0));
+  placed(1, glm::dvec3(1000, -300, 20));
+}
+
 // Inside a ball of 1280 triangles that shine with 1 and reflect a half, radiance is 1 + 1/2 + 1/4
 // of paths of two bounces, whatever their directions: what light samples and paths that meet a
 // triangle bring is weighed by the same choice of a lamp.
