@@ -18,8 +18,8 @@ constexpr int wavelet_levels = 4;
 // A row's result depends on this many rows above and below it: at every level two steps and one
 // more of the guide, the neighbours that give the variance, and those of an edge. A slope comes
 // from nearer rows.
-constexpr int reach = 3 * ((1 << wavelet_levels) - 1) +
-                      static_cast<int>(gpu::DENOISE_VARIANCE_REACH + gpu::DENOISE_EDGE_REACH);
+constexpr int band_margin = 3 * ((1 << wavelet_levels) - 1) +
+                            static_cast<int>(gpu::DENOISE_VARIANCE_REACH + gpu::DENOISE_EDGE_REACH);
 static_assert(gpu::DENOISE_VARIANCE_REACH >= 2);
 
 }  // namespace
@@ -117,13 +117,14 @@ std::vector<Denoiser::Band> Denoiser::bands(int width, int height) const {
   const auto fitting = static_cast<int>(std::min<std::size_t>(
       most_pixels_ / static_cast<std::size_t>(width), static_cast<std::size_t>(height)));
   if (fitting == height) return {{0, height, 0, height}};
-  // A band has at least `reach` rows, even if they do not fit: a smaller one would consist mostly
-  // of margin that its neighbours compute as well.
-  const int rows = std::max(fitting - 2 * reach, reach);
+  // A band has at least `band_margin` rows, even if they do not fit: a smaller one would consist
+  // mostly of margin that its neighbours compute as well.
+  const int rows = std::max(fitting - 2 * band_margin, band_margin);
   std::vector<Band> bands;
   for (int first = 0; first < height; first += rows) {
     const int last = std::min(first + rows, height);
-    bands.push_back({first, last, std::max(first - reach, 0), std::min(last + reach, height)});
+    bands.push_back(
+        {first, last, std::max(first - band_margin, 0), std::min(last + band_margin, height)});
   }
   return bands;
 }

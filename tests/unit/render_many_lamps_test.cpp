@@ -364,7 +364,8 @@ TEST(ManyLamps, AreSeenAsEachByItself) {
   for (int i = 0; i < 60; ++i) {
     set::Light light = lamp(i % 2 == 0 ? set::LightType::sphere : set::LightType::rectangle,
                             glm::dvec3(1 + 0.1 * i));
-    light.position = {0.4 * (i % 10) - 1.8, 2 + 0.3 * (i % 7), 0.5 * (i / 10) - 1.2};
+    const int row = i / 10;
+    light.position = {0.4 * (i % 10) - 1.8, 2 + 0.3 * (i % 7), 0.5 * row - 1.2};
     light.radius_m = 0.15;
     light.direction = {0, -1, 0.1};
     light.up = {0, 0, 1};
