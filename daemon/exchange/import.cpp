@@ -13,6 +13,7 @@
 #include "daemon/exchange/import_description.hpp"
 #include "daemon/scene/assets.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 #include "drivers/session/session.hpp"
 
 namespace previz::exchange {
@@ -53,6 +54,7 @@ class Draft {
     fs::rename(path_, target_, failure);
     if (failure) throw Error(target_.string() + ": cannot be made: " + failure.message());
     path_.clear();
+    session::sync_names(target_.parent_path());
   }
 
  private:

@@ -8,6 +8,7 @@
 #include <system_error>
 
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::output {
 
@@ -25,6 +26,7 @@ void finish(const std::filesystem::path& unfinished, const std::filesystem::path
   std::error_code code;
   std::filesystem::rename(unfinished, path, code);
   if (code) throw Error(path.string() + ": cannot be put in place: " + code.message());
+  session::sync_names(path.parent_path());
 }
 
 void write_whole(const std::filesystem::path& path,

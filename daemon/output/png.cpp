@@ -1,7 +1,9 @@
 #include "daemon/output/png.hpp"
 
+#include <fcntl.h>
 #include <png.h>
 
+#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <memory>
@@ -10,6 +12,7 @@
 
 #include "daemon/output/file.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::output {
 namespace {
@@ -32,8 +35,8 @@ struct FileCloser {
 };
 using FilePtr = std::unique_ptr<std::FILE, FileCloser>;
 
-FilePtr open(const std::filesystem::path& path, const char* mode) {
-  FilePtr file(std::fopen(path.c_str(), mode));
+FilePtr open(const std::filesystem::path& path) {
+  FilePtr file(std::fopen(path.c_str(), "rb"));
   if (!file) throw Error(path.string() + ": cannot be opened: " + std::strerror(errno));
   return file;
 }
@@ -60,11 +63,28 @@ std::vector<png_bytep> row_pointers(std::vector<png_byte>& bytes, int height) {
   return rows;
 }
 
+// The file that libpng writes to.
+struct Written {
+  session::OpenFile file;
+  std::string failure;
+};
+
+void append(png_structp png, png_bytep bytes, std::size_t count) {
+  auto* written = static_cast<Written*>(png_get_io_ptr(png));
+  try {
+    written->file.append({reinterpret_cast<const char*>(bytes), count});
+  } catch (const Error& error) {
+    written->failure = error.what();
+  }
+  if (!written->failure.empty()) png_error(png, written->failure.c_str());
+}
+
+void flush(png_structp) {}
+
 // This function holds nothing that needs a destructor, so that libpng may jump out of it.
-bool encode(png_structp png, png_infop info, std::FILE* file, const Plate& picture,
-            png_bytepp rows) {
+bool encode(png_structp png, png_infop info, Written* file, const Plate& picture, png_bytepp rows) {
   if (setjmp(png_jmpbuf(png))) return false;
-  png_init_io(png, file);
+  png_set_write_fn(png, file, append, flush);
   png_set_IHDR(png, info, static_cast<png_uint_32>(picture.width),
                static_cast<png_uint_32>(picture.height), picture.bits, PNG_COLOR_TYPE_RGB,
                PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
@@ -124,18 +144,17 @@ void write_png(const std::filesystem::path& path, const Plate& picture) {
   std::vector<png_byte> bytes = to_bytes(picture);
   std::vector<png_bytep> rows = row_pointers(bytes, picture.height);
   write_whole(path, [&](const std::filesystem::path& unfinished) {
-    FilePtr file = open(unfinished, "wb");
+    Written file{session::OpenFile(unfinished, O_WRONLY | O_CREAT | O_TRUNC), ""};
     PngError error;
     Writer writer(error);
-    if (!encode(writer.png, writer.info, file.get(), picture, rows.data()))
-      throw Error(path.string() + ": cannot be written: " + error.message);
-    if (std::fclose(file.release()) != 0)
-      throw Error(path.string() + ": cannot be written: " + std::strerror(errno));
+    if (!encode(writer.png, writer.info, &file, picture, rows.data()))
+      throw Error(file.failure.empty() ? path.string() + ": cannot be written: " + error.message
+                                       : file.failure);
   });
 }
 
 Plate read_png(const std::filesystem::path& path) {
-  FilePtr file = open(path, "rb");
+  FilePtr file = open(path);
   PngError error;
   Reader reader(error);
   if (!read_header(reader.png, reader.info, file.get()))

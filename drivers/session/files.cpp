@@ -56,20 +56,37 @@ void OpenFile::sync() const {
 LineFile::LineFile(const std::filesystem::path& file)
     : file_(file, O_WRONLY | O_CREAT | O_EXCL | O_APPEND) {}
 
+void sync_names(const std::filesystem::path& folder) {
+  const OpenFile open(folder.empty() ? "." : folder, O_RDONLY | O_DIRECTORY);
+  const bool is_synced = ::fsync(open.get()) == 0 || errno == EINVAL || errno == EROFS;
+  if (!is_synced) fail(folder, "its names cannot be brought to the disk");
+}
+
+void make_folders(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> missing;
+  std::error_code failure;
+  for (std::filesystem::path at = std::filesystem::absolute(folder).lexically_normal();
+       !std::filesystem::exists(at, failure) && at.has_relative_path(); at = at.parent_path())
+    missing.push_back(at);
+  std::filesystem::create_directories(folder, failure);
+  if (failure) throw Error(folder.string() + ": cannot be made a directory: " + failure.message());
+  for (const std::filesystem::path& made : missing) sync_names(made.parent_path());
+}
+
 void replace_file(const std::filesystem::path& file, const std::string& content) {
   const std::filesystem::path draft = file.string() + ".part";
-  {
+  try {
     const OpenFile written(draft, O_WRONLY | O_CREAT | O_TRUNC);
     keep_owner(file, written);
     written.append(content);
     written.sync();
+    if (std::rename(draft.c_str(), file.c_str()) != 0) fail(file, "cannot be replaced");
+  } catch (const Error&) {
+    std::error_code ignored;
+    std::filesystem::remove(draft, ignored);
+    throw;
   }
-  if (std::rename(draft.c_str(), file.c_str()) != 0) fail(file, "cannot be replaced");
-  // The rename itself; not every file system can, and then need not.
-  const int directory = ::open(file.parent_path().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (directory < 0) return;
-  ::fsync(directory);
-  ::close(directory);
+  sync_names(file.parent_path());
 }
 
 std::string read_file(const std::filesystem::path& file) {

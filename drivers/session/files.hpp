@@ -36,8 +36,16 @@ class LineFile {
   OpenFile file_;
 };
 
-// Replaces the file's content at once: a crash leaves the old or the new, never a part. The mode
-// stays, and the owner where the system lets it.
+// Waits until the names in a folder are on the medium, as fsync(2) of a file does not. File systems
+// that cannot do it need not. Throws previz::Error.
+void sync_names(const std::filesystem::path& folder);
+// Makes a folder and those above it that are missing; their names are then on the medium. Throws
+// previz::Error.
+void make_folders(const std::filesystem::path& folder);
+
+// Replaces the file's content at once: a crash or a power cut leaves the old or the new, never a
+// part, and after the return the new. The mode stays, and the owner where the system lets it.
+// Throws previz::Error; the old content then stays.
 void replace_file(const std::filesystem::path& file, const std::string& content);
 // Returns the whole file; throws previz::Error naming it.
 std::string read_file(const std::filesystem::path& file);

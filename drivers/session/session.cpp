@@ -1,7 +1,9 @@
 // A session on disk:
 //
 //   SESSION/
-//     session.toml    format version, name, clock; per stream its pixel format, size and, once the
+//     session.toml    format version, name, clock; whether it was closed, by what fault it ended,
+//     and
+//                     what did not reach the disk; per stream its pixel format, size and, once the
 //                     session is closed, its number of frames; calibrations; the asset map; the set
 //                     file verbatim. Replaced as a whole, never edited in place.
 //     observer.mkv    FFV1 level 3, every frame a key frame, slice checksums, a Matroska cluster a
@@ -39,6 +41,25 @@ void check_assets(Session& session) {
   }
 }
 
+void read_end(const SessionFile& file, Session& session) {
+  const auto miss = [&](const std::string& what) {
+    session.missing.push_back("session.toml: " + what);
+  };
+  if (!file.fault.empty())
+    miss("the recording ended by a fault (" + file.fault +
+         "); what came after the last whole frame is lost");
+  else if (!file.closed)
+    miss(
+        "the recording was not closed (power cut, crash, or still recording); what "
+        "came after the last whole frame, at most about a second, is lost");
+  const auto left_out = [&](std::uint64_t count, const std::string& what) {
+    if (count > 0) miss(std::to_string(count) + " " + what + " did not reach the disk in time");
+  };
+  left_out(file.lost.frames, "frames of the cameras");
+  left_out(file.lost.shown, "pictures that were shown");
+  left_out(file.lost.records, "lines of tracking, buttons and events");
+}
+
 void read_track(Session& session) {
   Lines<TrackRecord> lines = read_track_lines(session.directory / "track.jsonl");
   session.track = std::move(lines.records);
@@ -55,10 +76,7 @@ Session open_session(const std::filesystem::path& directory) {
     throw Error(directory.string() + ": is not a session; it holds no session.toml");
   const SessionFile file = parse_session_toml(read_file(toml), toml);
   Session session{directory, file.info, {}, {}};
-  if (!file.closed)
-    session.missing.push_back(
-        "session.toml: the recording was not closed (power cut, crash, or still recording); what "
-        "came after the last whole frame, at most about a second, is lost");
+  read_end(file, session);
   check_assets(session);
   read_track(session);
   return session;

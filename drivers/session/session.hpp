@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -32,6 +33,15 @@ struct TakeInfo {
   bool good = false;  // the crew's choice
 
   friend bool operator==(const TakeInfo&, const TakeInfo&) = default;
+};
+
+// What was offered for recording and did not reach the disk.
+struct Losses {
+  std::uint64_t frames = 0;   // of either camera
+  std::uint64_t shown = 0;    // pictures that were shown
+  std::uint64_t records = 0;  // tracking, buttons and events
+
+  friend bool operator==(const Losses&, const Losses&) = default;
 };
 
 // session.toml. `set_text` is the set file verbatim; `set_name` the file name to use in errors.
@@ -153,13 +163,15 @@ std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& s
 // Writes a session directory; every call leaves a readable session behind. FFV1 in Matroska,
 // lossless; streams open at their first frame. Throws previz::Error naming the file on failure. A
 // frame has reached the kernel when write() returns: a process killed at any time loses at most the
-// frame it was writing. About once a second write() also waits until all is on the disk
-// (fdatasync): a power cut loses about the last second. Call it from a thread that may wait. Not
-// thread-safe.
+// frame it was writing. About once a second write() also waits until all is on the disk, the files'
+// names included: a power cut loses about the last second. Once a call has failed because of the
+// disk, nothing can be added, and the session is never marked as closed: what the disk has is not
+// known. Call it from a thread that may wait. Not thread-safe.
 class SessionWriter {
  public:
-  // The directory must not exist or be empty.
-  SessionWriter(const std::filesystem::path& directory, const SessionInfo& info);
+  // The directory must not exist or be empty. All is on the disk at least this often.
+  SessionWriter(const std::filesystem::path& directory, const SessionInfo& info,
+                std::chrono::nanoseconds sync_interval = std::chrono::seconds(1));
   ~SessionWriter();
   SessionWriter(const SessionWriter&) = delete;
   SessionWriter& operator=(const SessionWriter&) = delete;
@@ -174,12 +186,23 @@ class SessionWriter {
   void set_take(const TakeInfo& take);  // replaces session.toml
   // Copies a file into assets/ under its content hash and maps `as_written` to it.
   void add_asset(const std::string& as_written, const std::filesystem::path& file);
-  void close();  // flushes and finishes the files; the destructor does it too, without throwing
+  // Says what is not in the session; it is written when the session ends.
+  void set_lost(const Losses& lost);
+  // Flushes and finishes the files. The destructor does it too, without throwing.
+  void close();
+  // Ends the session as it is, not closed, with this reason in session.toml, where the disk lets
+  // it. Does nothing if the session has ended. Never throws previz::Error.
+  void abandon(const std::string& fault);
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+// Brings a session that was cut off into order: writes into its session.toml that, unless it is
+// there already, and returns how many frames of the observer it has; nothing if there was nothing to
+// do. Does not read the videos. Throws previz::Error as open_session() does.
+std::optional<std::uint64_t> salvage(const std::filesystem::path& directory);
 
 // Changes the take that a finished session describes. Throws previz::Error naming the file.
 void change_take(const std::filesystem::path& directory,

@@ -158,6 +158,21 @@ std::string stream_toml(const std::string& source, const StreamFormat& stream) {
   return text;
 }
 
+struct LossKey {
+  const char* key;
+  std::uint64_t Losses::*count;
+};
+constexpr LossKey loss_keys[] = {{"lost_frames", &Losses::frames},
+                                 {"lost_shown", &Losses::shown},
+                                 {"lost_records", &Losses::records}};
+
+std::string losses_toml(const Losses& lost) {
+  std::string text;
+  for (const auto& [key, count] : loss_keys)
+    if (lost.*count > 0) text += std::string(key) + " = " + std::to_string(lost.*count) + "\n";
+  return text;
+}
+
 std::string take_toml(const TakeInfo& take) {
   return "\n[take]  # as on the board\n" + line("number", take.number) +
          "slate = " + quote(take.slate) + "\ntimecode = " + quote(take.timecode) +
@@ -255,6 +270,17 @@ StreamFormat parse_stream(const Place& place) {
   return stream;
 }
 
+Losses parse_losses(const Place& place) {
+  Losses lost;
+  for (const auto& [key, count] : loss_keys) {
+    if (!place.table.contains(key)) continue;
+    const auto value = place.get<std::int64_t>(key, "a count");
+    if (value < 0) place.fail(key, "must not be negative");
+    lost.*count = static_cast<std::uint64_t>(value);
+  }
+  return lost;
+}
+
 TakeInfo parse_take(const Place& place) {
   TakeInfo take;
   const auto number = place.get<std::int64_t>("number", "a whole number");
@@ -289,6 +315,8 @@ std::string to_toml(const SessionFile& file) {
   text += "name = " + quote(file.info.name) + "\nclock = " + quote(file.info.clock) + "\n";
   text += std::string("closed = ") + (file.closed ? "true" : "false") +
           "  # false: still recording, or the recording was cut off\n";
+  if (!file.fault.empty()) text += "fault = " + quote(file.fault) + "\n";
+  text += losses_toml(file.lost);
   for (const auto& [source, stream] : file.streams) text += stream_toml(source, stream);
   if (file.info.observer) text += observer_toml(*file.info.observer);
   if (file.info.light) text += light_toml(*file.info.light);
@@ -324,6 +352,8 @@ SessionFile parse_session_toml(const std::string& text, const std::filesystem::p
   file.info.name = top.text("name");
   file.info.clock = top.text("clock");
   file.closed = top.get<bool>("closed", "true or false");
+  if (root.contains("fault")) file.fault = top.text("fault");
+  file.lost = parse_losses(top);
   for (const char* source : {"observer", "light", "composite"}) {
     if (!top.find(source)) continue;
     const Place place = top.inner(source);

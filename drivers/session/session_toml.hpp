@@ -25,6 +25,8 @@ struct SessionFile {
   SessionInfo info;
   std::map<std::string, StreamFormat> streams;  // by source
   bool closed = false;                          // the recording came to an orderly end
+  std::string fault;                            // why it did not, where that is known
+  Losses lost;
 };
 
 // Throws previz::Error if a name or path is not UTF-8. The set's text may be any bytes.

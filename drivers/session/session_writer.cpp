@@ -14,8 +14,6 @@
 namespace previz::session {
 namespace {
 
-constexpr std::chrono::seconds sync_interval{1};
-
 struct StreamWriter {
   VideoWriter video;
   LineFile lines;
@@ -66,10 +64,7 @@ std::string text(const StreamFormat& format) {
 }
 
 void make_empty_directory(const std::filesystem::path& directory) {
-  std::error_code failure;
-  std::filesystem::create_directories(directory, failure);
-  if (failure)
-    throw Error(directory.string() + ": cannot be made a directory: " + failure.message());
+  make_folders(directory);
   if (!std::filesystem::is_empty(directory))
     throw Error(directory.string() + ": is not empty; a session needs a directory of its own");
 }
@@ -78,14 +73,29 @@ void make_empty_directory(const std::filesystem::path& directory) {
 
 struct SessionWriter::Impl {
   std::filesystem::path directory;
+  std::chrono::nanoseconds sync_interval{};
   SessionFile file;
   std::map<std::string, StreamWriter> streams;
   std::unique_ptr<LineFile> track, events;
   std::chrono::steady_clock::time_point synced = std::chrono::steady_clock::now();
-  bool closed = false;
+  bool ended = false;
 
   void check_open() const {
-    if (closed) throw Error(directory.string() + ": the session is closed; nothing can be added");
+    if (ended) throw Error(directory.string() + ": the session is closed; nothing can be added");
+    if (!file.fault.empty())
+      throw Error(directory.string() + ": nothing can be added after " + file.fault);
+  }
+
+  // Runs what uses the disk, and keeps its failure in mind. After a failed write or sync the kernel
+  // may take for written what is not, and further calls succeed: so the first failure is the end.
+  template <typename Action>
+  decltype(auto) using_disk(const Action& action) {
+    try {
+      return action();
+    } catch (const std::exception& error) {
+      if (file.fault.empty()) file.fault = error.what();
+      throw;
+    }
   }
 
   void write_toml() const { replace_file(directory / "session.toml", to_toml(file)); }
@@ -95,7 +105,10 @@ struct SessionWriter::Impl {
     const StreamFormat format{frame.format, frame.width, frame.height, {}, frame.bayer};
     file.streams[frame.source] = format;
     write_toml();
-    return streams.try_emplace(frame.source, directory, frame.source, format).first->second;
+    StreamWriter& stream =
+        streams.try_emplace(frame.source, directory, frame.source, format).first->second;
+    sync_names(directory);
+    return stream;
   }
 
   void sync() {
@@ -108,9 +121,14 @@ struct SessionWriter::Impl {
   // The file opens at its first line.
   void append(std::unique_ptr<LineFile>& lines, const char* name, const std::string& line) {
     check_open();
-    if (!lines) lines = std::make_unique<LineFile>(directory / name);
-    lines->append(line);
-    sync_when_due();
+    using_disk([&] {
+      if (!lines) {
+        lines = std::make_unique<LineFile>(directory / name);
+        sync_names(directory);
+      }
+      lines->append(line);
+      sync_when_due();
+    });
   }
 
   void sync_when_due() {
@@ -118,21 +136,38 @@ struct SessionWriter::Impl {
   }
 
   void close() {
-    if (closed) return;
-    closed = true;
-    for (auto& [source, stream] : streams) {
-      stream.video.finish();
-      file.streams[source].frames = stream.frames;
+    if (ended) return;
+    if (!file.fault.empty()) return abandon(file.fault);
+    using_disk([&] {
+      for (auto& [source, stream] : streams) {
+        stream.video.finish();
+        file.streams[source].frames = stream.frames;
+      }
+      sync();
+      file.closed = true;
+      write_toml();
+      ended = true;
+    });
+  }
+
+  void abandon(const std::string& fault) {
+    if (ended) return;
+    ended = true;
+    file.closed = false;
+    file.fault = fault;
+    try {
+      write_toml();
+    } catch (const Error&) {
+      // Without the reason it is still a session that was not closed.
     }
-    sync();
-    file.closed = true;
-    write_toml();
   }
 };
 
-SessionWriter::SessionWriter(const std::filesystem::path& directory, const SessionInfo& info)
+SessionWriter::SessionWriter(const std::filesystem::path& directory, const SessionInfo& info,
+                             std::chrono::nanoseconds sync_interval)
     : impl_(std::make_unique<Impl>()) {
   impl_->directory = directory;
+  impl_->sync_interval = sync_interval;
   impl_->file.info = info;
   make_empty_directory(directory);
   impl_->write_toml();
@@ -141,9 +176,8 @@ SessionWriter::SessionWriter(const std::filesystem::path& directory, const Sessi
 SessionWriter::~SessionWriter() {
   try {
     impl_->close();
-  } catch (const std::exception&) {
-    // session.toml then says that the session was not closed; whoever wants the reason calls
-    // close().
+  } catch (const std::exception& error) {
+    impl_->abandon(error.what());  // whoever wants to know calls close()
   }
 }
 
@@ -151,7 +185,10 @@ void SessionWriter::write(const Frame& frame) {
   impl_->check_open();
   check(frame);
   const auto found = impl_->streams.find(frame.source);
-  StreamWriter& stream = found == impl_->streams.end() ? impl_->open(frame) : found->second;
+  StreamWriter& stream =
+      found == impl_->streams.end()
+          ? impl_->using_disk([&]() -> StreamWriter& { return impl_->open(frame); })
+          : found->second;
   const StreamFormat& format = impl_->file.streams.at(frame.source);
   if (frame.format != format.format || frame.bayer != format.bayer || frame.width != format.width ||
       frame.height != format.height)
@@ -159,8 +196,10 @@ void SessionWriter::write(const Frame& frame) {
                 std::to_string(frame.sequence) + " is " +
                 text(StreamFormat{frame.format, frame.width, frame.height, {}, frame.bayer}) +
                 "; the stream is " + text(format) + " from its first frame on");
-  stream.write(frame);
-  impl_->sync_when_due();
+  impl_->using_disk([&] {
+    stream.write(frame);
+    impl_->sync_when_due();
+  });
 }
 
 void SessionWriter::write(const TrackRecord& record) {
@@ -178,32 +217,56 @@ void SessionWriter::write_event(std::int64_t timestamp_ns, const std::string& wh
 void SessionWriter::set_take(const TakeInfo& take) {
   impl_->check_open();
   impl_->file.info.take = take;
-  impl_->write_toml();
+  impl_->using_disk([&] { impl_->write_toml(); });
 }
 
 void SessionWriter::add_asset(const std::string& as_written, const std::filesystem::path& file) {
   impl_->check_open();
   const std::string path = "assets/" + sha256_of(file) + file.extension().string();
   const std::filesystem::path target = impl_->directory / path;
-  try {
-    std::filesystem::create_directories(target.parent_path());
-    if (!std::filesystem::exists(target)) {
-      const std::filesystem::path draft = target.string() + ".part";
-      std::filesystem::copy_file(file, draft, std::filesystem::copy_options::overwrite_existing);
-      std::filesystem::permissions(draft, std::filesystem::perms::owner_write,
-                                   std::filesystem::perm_options::add);
-      OpenFile(draft, O_RDONLY).sync();
-      std::filesystem::rename(draft, target);
+  impl_->using_disk([&] {
+    try {
+      make_folders(target.parent_path());
+      if (!std::filesystem::exists(target)) {
+        const std::filesystem::path draft = target.string() + ".part";
+        std::filesystem::copy_file(file, draft, std::filesystem::copy_options::overwrite_existing);
+        std::filesystem::permissions(draft, std::filesystem::perms::owner_write,
+                                     std::filesystem::perm_options::add);
+        OpenFile(draft, O_RDONLY).sync();
+        std::filesystem::rename(draft, target);
+        sync_names(target.parent_path());
+      }
+    } catch (const std::filesystem::filesystem_error& error) {
+      throw Error(file.string() + ": cannot be copied into the session: " + error.code().message());
     }
-  } catch (const std::filesystem::filesystem_error& error) {
-    throw Error(file.string() + ": cannot be copied into the session: " + error.code().message());
-  }
-  impl_->file.info.assets[as_written] = path;
-  impl_->write_toml();
+    impl_->file.info.assets[as_written] = path;
+    impl_->write_toml();
+  });
+}
+
+void SessionWriter::set_lost(const Losses& lost) {
+  impl_->file.lost = lost;
 }
 
 void SessionWriter::close() {
   impl_->close();
+}
+
+void SessionWriter::abandon(const std::string& fault) {
+  impl_->abandon(fault);
+}
+
+std::optional<std::uint64_t> salvage(const std::filesystem::path& directory) {
+  const std::filesystem::path toml = directory / "session.toml";
+  if (!std::filesystem::exists(toml)) return std::nullopt;
+  SessionFile file = parse_session_toml(read_file(toml), toml);
+  if (file.closed || !file.fault.empty()) return std::nullopt;
+  const std::filesystem::path lines = directory / "observer.jsonl";
+  const std::uint64_t frames =
+      std::filesystem::exists(lines) ? read_frame_lines(lines).records.size() : 0;
+  file.fault = "it was cut off by a crash or a power cut";
+  replace_file(toml, to_toml(file));
+  return frames;
 }
 
 void change_take(const std::filesystem::path& directory,

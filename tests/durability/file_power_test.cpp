@@ -1,0 +1,131 @@
+// Files that are whole or not there, on disks that lose power and that fail.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <random>
+
+#include "daemon/output/exr.hpp"
+#include "daemon/output/file.hpp"
+#include "daemon/output/png.hpp"
+#include "daemon/output/video.hpp"
+#include "daemon/render/composite.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "tests/durability/faulty_disk.hpp"
+#include "tests/support/session_fixture.hpp"
+
+namespace previz::test {
+namespace file_power_test {
+
+using session::content_of;
+using session::TemporaryDirectory;
+
+constexpr int width = 24, height = 16;
+
+Plate picture(int seed) {
+  Plate plate{width, height, 16, {}};
+  std::mt19937 random(static_cast<std::uint32_t>(seed));
+  for (int i = 0; i < 3 * width * height; ++i)
+    plate.samples.push_back(static_cast<std::uint16_t>(random()));
+  return plate;
+}
+
+// A way to write a file.
+struct Kind {
+  const char* name;
+  std::function<void(const std::filesystem::path& folder)> write;
+  const char* file;  // its name
+  bool replaces;     // it was there before, with `before` in it
+};
+constexpr char before[] = "as it was";
+
+std::vector<Kind> kinds() {
+  return {
+      {"PNG", [](const auto& folder) { output::write_png(folder / "a.png", picture(1)); }, "a.png",
+       false},
+      {"EXR",
+       [](const auto& folder) {
+         const render::Layers layers = render::make_layers(width, height, 1);
+         output::write_exr(folder / "a.exr", layers, {});
+       },
+       "a.exr", false},
+      {"video",
+       [](const auto& folder) {
+         output::VideoWriter video(folder / "a", width, height, output::review_codecs().front());
+         for (int i = 0; i < 3; ++i) video.write(picture(i), i * 40'000'000);
+         video.close();
+       },
+       "a.mp4", false},
+      {"text",
+       [](const auto& folder) {
+         session::replace_file(folder / "set.toml", std::string(5000, 'x'));
+       },
+       "set.toml", true},
+  };
+}
+
+// Everybody who looks finds the whole file, or what was there before.
+TEST(Files, AreWholeOrNotThereAfterAPowerCut) {
+  for (const Kind& kind : kinds()) {
+    const TemporaryDirectory folder, elsewhere;
+    FaultyDisk disk(folder.path());
+    if (kind.replaces) session::replace_file(folder / kind.file, before);
+    const std::size_t begun = disk.calls();
+    kind.write(folder.path());
+    const std::string whole = content_of(folder / kind.file);
+    for (std::size_t cut = begun; cut <= disk.calls(); ++cut)
+      for (const AfterPowerCut kept : power_cuts) {
+        SCOPED_TRACE(std::string(kind.name) + ", cut before call " + std::to_string(cut) + " (" +
+                     disk.describe(cut) + "), kept " + std::to_string(static_cast<int>(kept)));
+        disk.restore(cut, kept, elsewhere / "after");
+        const std::filesystem::path file = elsewhere / "after" / kind.file;
+        const bool exists = std::filesystem::exists(file);
+        const std::string found = exists ? content_of(file) : "";
+        const bool is_as_before = kind.replaces ? found == before : !exists;
+        EXPECT_TRUE(found == whole || is_as_before);
+        EXPECT_TRUE(found == whole || cut < disk.calls()) << "it was said to be written";
+      }
+  }
+}
+
+class EveryCallOfAFile : public ::testing::TestWithParam<DiskFault> {};
+INSTANTIATE_TEST_SUITE_P(Fails, EveryCallOfAFile,
+                         ::testing::Values(DiskFault::io_error, DiskFault::no_space,
+                                           DiskFault::short_write));
+
+TEST_P(EveryCallOfAFile, LeavesTheFileWholeOrNotThereAndSaysSo) {
+  for (const Kind& kind : kinds()) {
+    std::string whole;
+    {
+      const TemporaryDirectory folder;
+      kind.write(folder.path());
+      whole = content_of(folder / kind.file);
+    }
+    for (std::size_t call = 0;; ++call) {
+      const TemporaryDirectory folder;
+      FaultyDisk disk(folder.path());
+      if (kind.replaces) session::replace_file(folder / kind.file, before);
+      const std::size_t begun = disk.calls();
+      disk.fail(begun + call, GetParam());
+      std::string fault;
+      try {
+        kind.write(folder.path());
+      } catch (const Error& error) {
+        fault = error.what();
+      }
+      SCOPED_TRACE(std::string(kind.name) + ", call " + std::to_string(call) + ", " +
+                   disk.describe(begun + call) + ", " + fault);
+      const bool exists = std::filesystem::exists(folder / kind.file);
+      const std::string found = exists ? content_of(folder / kind.file) : "";
+      const bool is_as_before = kind.replaces ? found == before : !exists;
+      EXPECT_TRUE(found == whole || is_as_before);
+      EXPECT_TRUE(found == whole || !fault.empty()) << "it was said to be written";
+      EXPECT_TRUE(fault.empty() || fault.find(folder.path().string()) != std::string::npos)
+          << "the error names no file";
+      if (begun + call >= disk.calls()) break;
+    }
+  }
+}
+
+}  // namespace file_power_test
+}  // namespace previz::test

@@ -1,0 +1,180 @@
+// Sessions on disks that lose power and that fail: what was acknowledged is there, and nothing is
+// taken for whole that is not.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+
+#include "daemon/output/recorder.hpp"
+#include "drivers/error.hpp"
+#include "tests/durability/faulty_disk.hpp"
+#include "tests/support/session_fixture.hpp"
+#include "tests/support/wait_until.hpp"
+
+namespace previz::test {
+namespace session_power_test {
+
+using session::is_frame;
+using session::noise_frame;
+using session::SessionWriter;
+using session::TemporaryDirectory;
+using session::write_content;
+
+constexpr int frames = 4;
+
+session::TrackRecord track_of(std::uint64_t frame) {
+  session::TrackRecord record;
+  record.frame = frame;
+  record.timestamp_ns = static_cast<std::int64_t>(frame);
+  return record;
+}
+
+// Writes a session with two streams, a track, an event and an asset. `done` is called after each
+// frame of the observer and, with `frames`, once more after closing.
+void write_session(const std::filesystem::path& directory, const std::filesystem::path& asset,
+                   const std::function<void(int)>& done) {
+  SessionWriter writer(directory, {}, std::chrono::nanoseconds(0));
+  writer.add_asset("a.glb", asset);
+  for (int i = 0; i < frames; ++i) {
+    writer.write(noise_frame("observer", i, PixelFormat::rgb8, 24, 18));
+    done(i);
+    writer.write(noise_frame("light", i, PixelFormat::rgb8, 16, 16));
+    writer.write(track_of(i));
+    writer.write_event(i, "something happened");
+  }
+  writer.close();
+  done(frames);
+}
+
+// Returns how many frames of the observer can be read, each compared bit for bit; nothing where
+// there is no session.
+std::optional<int> frames_in(const std::filesystem::path& directory, bool& closed) {
+  if (!std::filesystem::exists(directory / "session.toml")) return std::nullopt;
+  session::Session session = session::open_session(directory);
+  const auto stream = session::open_stream(session, "observer");
+  closed = session.missing.empty();
+  if (!stream) return 0;
+  for (std::size_t i = 0; i < stream->records().size(); ++i)
+    EXPECT_TRUE(is_frame(*stream->read(i), i)) << i;
+  return static_cast<int>(stream->records().size());
+}
+
+// Every frame whose write() had returned is there, whatever the disk keeps of the rest: all is
+// synced by every call here, and about once a second on a rig.
+TEST(PowerCut, LosesNoFrameThatWasAcknowledged) {
+  const TemporaryDirectory folder, elsewhere;
+  write_content(elsewhere / "asset.glb", "a model");
+  FaultyDisk disk(folder.path());
+  std::vector<std::size_t> acknowledged;  // calls when frame i was, and when the session was closed
+  write_session(folder / "takes" / "one", elsewhere / "asset.glb",
+                [&](int) { acknowledged.push_back(disk.calls()); });
+  ASSERT_GT(disk.calls(), 50u);
+  for (std::size_t cut = 0; cut <= disk.calls(); ++cut)
+    for (const AfterPowerCut kept : power_cuts) {
+      SCOPED_TRACE("cut before call " + std::to_string(cut) + " (" + disk.describe(cut) +
+                   "), kept " + std::to_string(static_cast<int>(kept)));
+      disk.restore(cut, kept, elsewhere / "after");
+      const auto promised = static_cast<int>(
+          std::ranges::count_if(acknowledged, [&](std::size_t calls) { return calls <= cut; }));
+      bool closed = false;
+      const std::optional<int> there = frames_in(elsewhere / "after" / "takes" / "one", closed);
+      EXPECT_GE(there.value_or(0), std::min(promised, frames));
+      EXPECT_TRUE(!closed || there == frames) << "closed, and something is missing";
+      EXPECT_TRUE(closed || promised <= frames) << "it was said to be closed";
+    }
+}
+
+// Each call to the disk in turn fails, or writes less than it was given.
+class EveryCall : public ::testing::TestWithParam<DiskFault> {};
+INSTANTIATE_TEST_SUITE_P(Fails, EveryCall,
+                         ::testing::Values(DiskFault::io_error, DiskFault::no_space,
+                                           DiskFault::short_write));
+
+TEST_P(EveryCall, OfASessionThatFailsIsAnErrorAndTheSessionIsNotClosed) {
+  const TemporaryDirectory elsewhere;
+  write_content(elsewhere / "asset.glb", "a model");
+  for (std::size_t call = 0;; ++call) {
+    const TemporaryDirectory folder;
+    FaultyDisk disk(folder.path());
+    disk.fail(call, GetParam());
+    int acknowledged = 0;
+    std::string fault;
+    try {
+      write_session(folder / "one", elsewhere / "asset.glb", [&](int i) { acknowledged = i + 1; });
+    } catch (const Error& error) {
+      fault = error.what();
+    }
+    SCOPED_TRACE("call " + std::to_string(call) + ", " + disk.describe(call) + ", " + fault);
+    bool closed = false;
+    const std::optional<int> there = frames_in(folder / "one", closed);
+    EXPECT_GE(there.value_or(0), std::min(acknowledged, frames));
+    EXPECT_EQ(closed, fault.empty());
+    // What a failed sync was to keep may be lost from the medium, whatever the kernel says later.
+    for (const AfterPowerCut kept : power_cuts) {
+      disk.restore(disk.calls(), kept, elsewhere / "after");
+      const std::optional<int> after = frames_in(elsewhere / "after" / "one", closed);
+      EXPECT_GE(after.value_or(0), std::min(acknowledged, frames));
+      EXPECT_EQ(closed, fault.empty()) << static_cast<int>(kept);
+    }
+    if (call >= disk.calls()) break;  // no call was left to fail
+  }
+}
+
+// A rig's recorder: the fault is reported, frames on the disk are counted, and the next take is
+// whole.
+TEST_P(EveryCall, OfARecorderThatFailsEndsTheTakeAndNotTheNext) {
+  const auto picture = [](int i) {
+    return std::make_shared<Frame>(noise_frame("observer", i, PixelFormat::rgb8, 24, 18));
+  };
+  for (std::size_t call = 0;; ++call) {
+    const TemporaryDirectory folder;
+    FaultyDisk disk(folder.path());
+    disk.fail(call, GetParam());
+    output::RecorderOptions options;
+    options.take.directory = folder / "takes";
+    options.take.info.take = session::TakeInfo{0, "1", "", 25, "", false};
+    options.preroll_s = 0;
+    options.reserve_bytes = 0;
+    options.free_bytes = [] { return std::uint64_t{1'000'000'000}; };
+    output::RecorderStatus first, second;
+    {
+      output::Recorder recorder(std::move(options));
+      const auto record = [&](int from) {
+        const std::uint64_t takes = recorder.status().finished_takes;
+        const std::uint64_t failures = recorder.status().failures;
+        recorder.start();
+        for (int i = from; i < from + frames; ++i) {
+          const FramePtr frame = picture(i);
+          session::TrackRecord track;  // without it the end of a take waits for it
+          track.timestamp_ns = frame->timestamp_ns;
+          recorder.offer(frame);
+          recorder.offer(track);
+        }
+        recorder.stop();
+        EXPECT_TRUE(wait_until("the take is over", [&] {
+          const output::RecorderStatus status = recorder.status();
+          return status.finished_takes > takes || status.failures > failures;
+        }));
+        return recorder.status();
+      };
+      first = record(0);
+      second = record(frames);
+    }
+    SCOPED_TRACE("call " + std::to_string(call) + ", " + disk.describe(call) + ", " + first.fault);
+    EXPECT_EQ(first.failures + second.failures > 0, !(first.fault + second.fault).empty());
+    bool closed = false;
+    if (first.failures > 0 && std::filesystem::exists(first.directory / "session.toml")) {
+      EXPECT_GE(frames_in(first.directory, closed).value_or(0), static_cast<int>(first.frames));
+      EXPECT_FALSE(closed);
+    }
+    if (first.failures > 0) {
+      EXPECT_EQ(second.failures, first.failures) << second.fault;
+      EXPECT_EQ(second.frames, static_cast<std::uint64_t>(frames));
+    }
+    if (call >= disk.calls()) break;
+  }
+}
+
+}  // namespace session_power_test
+}  // namespace previz::test
