@@ -4,8 +4,10 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/output/recording_wish.hpp"
 #include "drivers/bracket.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::output {
 
@@ -20,6 +22,8 @@ constexpr std::chrono::milliseconds track_patience{500};
 constexpr std::chrono::seconds disk_interval{1};
 // A frame may be offered so long after its capture.
 constexpr std::chrono::seconds late{1};
+// A disk that takes longer for one thing is reported.
+constexpr std::chrono::seconds silence{2};
 
 std::string megabytes(std::uint64_t bytes) {
   return std::to_string(bytes / 1'000'000) + " MB";
@@ -32,22 +36,38 @@ Recorder::Recorder(RecorderOptions options) : options_(std::move(options)) {
 }
 
 Recorder::~Recorder() {
-  stop();
   {
     const std::lock_guard lock(mutex_);
+    if (status_.recording) enqueue_stop(false);
     quit_ = true;
   }
   filled_.notify_one();
   thread_.join();
 }
 
+// About what an entry takes of memory. What begins and ends takes takes nothing, as it must not be
+// left out.
 std::uint64_t Recorder::bytes_of(const Entry& entry) {
-  const auto* captured = std::get_if<Captured>(&entry);
-  return captured ? captured->frame->bytes.size() : 0;
+  if (const auto* captured = std::get_if<Captured>(&entry)) return captured->frame->bytes.size();
+  if (const auto* event = std::get_if<Event>(&entry)) return sizeof(Entry) + event->what.size();
+  if (const auto* button = std::get_if<ButtonEvent>(&entry))
+    return sizeof(Entry) + button->button.size();
+  const auto* record = std::get_if<session::TrackRecord>(&entry);
+  if (!record) return 0;
+  constexpr std::uint64_t of_a_name = 128;  // of a node of a map and its key
+  std::uint64_t bytes = sizeof(Entry) + record->tags.size() * sizeof(int);
+  bytes += record->scene.objects.size() * (of_a_name + sizeof(glm::dmat4));
+  bytes += record->scene.lights.size() * (of_a_name + sizeof(session::LightState));
+  bytes += record->carriers.size() * (of_a_name + sizeof(session::CarrierState));
+  if (const auto& light = record->captured_light)
+    bytes += light->sources.size() * sizeof(session::CapturedSource) +
+             light->ambient.size() * sizeof(glm::vec3);
+  return bytes;
 }
 
 void Recorder::offer(const FramePtr& frame) {
   const Captured captured{frame};
+  bool is_first_dropped = false, is_silent = false;
   {
     const std::lock_guard lock(mutex_);
     if (!status_.recording) {
@@ -55,14 +75,23 @@ void Recorder::offer(const FramePtr& frame) {
       ring_.emplace_back(captured);
       return trim_ring();
     }
+    is_silent = has_new_silence();
     if (frame->source == "light") remember_light(captured);
     if (queued_bytes_ + bytes_of(captured) <= options_.queue_bytes) {
       if (frame->source == "observer") last_frame_ns_ = frame->timestamp_ns;
-      return enqueue(captured);
+      enqueue(captured);
+    } else {
+      is_first_dropped = ++status_.dropped == 1;
     }
-    if (++status_.dropped > 1) return;
   }
-  note(Severity::warning, "the disk is too slow; frames are left out");
+  if (is_silent)
+    note(Severity::warning, "the disk does not answer; what is recorded waits in memory");
+  if (is_first_dropped) note(Severity::warning, "the disk is too slow; frames are left out");
+}
+
+bool Recorder::has_new_silence() {
+  if (silence_noted_ || !handling_since_ || Clock::now() - *handling_since_ < silence) return false;
+  return silence_noted_ = true;
 }
 
 void Recorder::offer_shown(const FramePtr& frame) {
@@ -95,24 +124,38 @@ void Recorder::forget_lights_unlike(const Frame& frame) {
 void Recorder::offer(const session::TrackRecord& record) {
   const std::lock_guard lock(mutex_);
   if (status_.recording || (late_tracks_ && record.timestamp_ns <= last_frame_ns_))
-    return enqueue(record);
+    return enqueue_record(record);
   ring_.emplace_back(record);
+  ring_bytes_ += bytes_of(ring_.back());
+  while (ring_bytes_ > options_.queue_bytes / 2) forget_first_of_ring();
 }
 
 void Recorder::offer(const ButtonEvent& event) {
   const std::lock_guard lock(mutex_);
-  if (status_.recording) enqueue(event);
+  if (status_.recording) enqueue_record(event);
 }
 
 void Recorder::offer_event(std::int64_t timestamp_ns, const std::string& what) {
   const std::lock_guard lock(mutex_);
-  if (status_.recording) enqueue(Event{timestamp_ns, what});
+  if (status_.recording) enqueue_record(Event{timestamp_ns, what});
 }
 
 void Recorder::enqueue(Entry entry) {
   queued_bytes_ += bytes_of(entry);
   queue_.push_back(std::move(entry));
   filled_.notify_one();
+}
+
+// Frames fill the queue first, so that a disk that is a little too slow loses no tracking.
+void Recorder::enqueue_record(Entry entry) {
+  if (queued_bytes_ + bytes_of(entry) <= options_.queue_bytes + options_.queue_bytes / 8)
+    enqueue(std::move(entry));
+  else
+    ++status_.dropped_records;
+}
+
+session::Losses Recorder::lost() const {
+  return {status_.dropped, status_.dropped_shown, status_.dropped_records};
 }
 
 // Drops the ring's oldest entries, counting time from its newest frame. A full ring must fit the
@@ -151,7 +194,7 @@ void Recorder::start() {
   if (status_.recording) return;
   status_.recording = true;
   late_tracks_ = false;
-  status_.dropped = status_.dropped_shown = status_.frames = 0;
+  status_.dropped = status_.dropped_shown = status_.dropped_records = status_.frames = 0;
   status_.seconds = 0;
   status_.fault.clear();
   enqueue(Start{});
@@ -177,10 +220,13 @@ void Recorder::start() {
 
 void Recorder::stop() {
   const std::lock_guard lock(mutex_);
-  if (!status_.recording) return;
+  if (status_.recording) enqueue_stop(true);
+}
+
+void Recorder::enqueue_stop(bool is_wished) {
   status_.recording = false;
   late_tracks_ = true;
-  enqueue(Stop{});
+  enqueue(Stop{lost(), is_wished});
 }
 
 void Recorder::mark_good() {
@@ -190,7 +236,10 @@ void Recorder::mark_good() {
 
 RecorderStatus Recorder::status() const {
   const std::lock_guard lock(mutex_);
-  return status_;
+  RecorderStatus status = status_;
+  if (handling_since_)
+    status.disk_silent_s = std::chrono::duration<double>(Clock::now() - *handling_since_).count();
+  return status;
 }
 
 void Recorder::note(Severity severity, const std::string& what) const {
@@ -201,11 +250,7 @@ void Recorder::run() {
   std::unique_lock lock(mutex_);
   for (;;) {
     const auto something = [this] { return !queue_.empty() || quit_; };
-    if (end_at_)
-      filled_.wait_until(lock, *end_at_, something);
-    else
-      filled_.wait(lock, something);
-    if (queue_.empty() && !quit_ && !(end_at_ && Clock::now() >= *end_at_)) continue;
+    filled_.wait_until(lock, end_at_.value_or(looked_ + disk_interval), something);
     const bool finished = queue_.empty();
     std::optional<Entry> entry;
     if (!finished) {
@@ -214,22 +259,33 @@ void Recorder::run() {
       queued_bytes_ -= bytes_of(*entry);
     }
     const bool leave = quit_ && finished;
+    handling_since_ = Clock::now();
     lock.unlock();
+    if (!looked_for_interruption_ && !take_) look_for_interruption();
     try {
       if (entry) handle(*entry);
-      if (end_at_ && (finished || take_->track_is_complete())) end_take();
+      const bool is_over = end_at_ && (leave || Clock::now() >= *end_at_);
+      if (is_over || (end_at_ && take_->track_is_complete())) end_take(stopped_lost_);
       if (take_ && Clock::now() - checked_ >= disk_interval) check_disk();
     } catch (const std::exception& error) {
       fail(error.what());
     }
+    look_at_disk();
     lock.lock();
+    const bool answers_again = std::exchange(silence_noted_, false);
+    handling_since_.reset();
+    if (answers_again) {
+      lock.unlock();
+      note(Severity::info, "the disk answers again");
+      lock.lock();
+    }
     if (leave) return;
   }
 }
 
 void Recorder::handle(Entry& entry) {
   if (std::holds_alternative<Start>(entry)) {
-    if (end_at_) end_take();
+    end_last_take();
     begin_take();
   } else if (std::holds_alternative<MarkGood>(entry)) {
     const std::filesystem::path last = status().directory;
@@ -241,8 +297,10 @@ void Recorder::handle(Entry& entry) {
          last.empty() ? "there is no take to mark" : last.filename().string() + " is marked good");
   } else if (!take_) {
     return;  // the take has failed meanwhile
-  } else if (std::holds_alternative<Stop>(entry)) {
+  } else if (const auto* stop = std::get_if<Stop>(&entry)) {
     end_at_ = Clock::now() + track_patience;
+    stopped_lost_ = stop->lost;
+    was_stopped_ = stop->is_wished;
   } else if (const auto* captured = std::get_if<Captured>(&entry)) {
     write(*captured);
   } else if (const auto* record = std::get_if<session::TrackRecord>(&entry)) {
@@ -264,7 +322,12 @@ void Recorder::write(const Captured& captured) {
     note(Severity::warning, "the " + captured.frame->source + " camera changed its format; " +
                                 take_->directory().filename().string() +
                                 " ends and the next take begins");
-    end_take();
+    session::Losses so_far;
+    {
+      const std::lock_guard lock(mutex_);
+      so_far = lost();
+    }
+    end_take(so_far);
     begin_take();
   }
   take_->write(*captured.frame, captured.at);
@@ -279,13 +342,77 @@ void Recorder::write(const Captured& captured) {
 void Recorder::begin_take() {
   check_disk();
   take_ = std::make_unique<TakeWriter>(options_.take);
+  try {
+    output::keep_wish(options_.take.directory, take_->directory().filename().string());
+  } catch (const Error& error) {
+    note(Severity::warning,
+         std::string("after a restart it would not go on by itself: ") + error.what());
+  }
   const std::lock_guard lock(mutex_);
   status_.directory = take_->directory();
   status_.number = take_->number();
 }
 
-void Recorder::end_take() {
+void Recorder::drop_wish() {
+  try {
+    output::drop_wish(options_.take.directory);
+  } catch (const Error& error) {
+    note(Severity::warning,
+         std::string("after a restart it would begin by itself: ") + error.what());
+  }
+}
+
+// What the last process left: the wish to record, and takes that it could not end.
+void Recorder::look_for_interruption() {
+  try {
+    if (!std::filesystem::is_directory(options_.take.directory)) return;  // not yet
+    looked_for_interruption_ = true;
+    std::vector<std::filesystem::path> takes;
+    for (const auto& entry : std::filesystem::directory_iterator(options_.take.directory))
+      if (entry.is_directory()) takes.push_back(entry.path());
+    std::ranges::sort(takes);
+    for (const std::filesystem::path& take : takes) salvage(take);
+    std::optional<std::string> interrupted = kept_wish(options_.take.directory);
+    const std::lock_guard lock(mutex_);
+    status_.interrupted = std::move(interrupted);
+  } catch (const std::exception& error) {
+    note(Severity::warning, std::string("takes from before cannot be looked at: ") + error.what());
+  }
+}
+
+void Recorder::salvage(const std::filesystem::path& take) {
+  try {
+    const std::optional<std::uint64_t> frames = session::salvage(take);
+    if (!frames) return;
+    const std::lock_guard lock(mutex_);
+    status_.salvaged.push_back(take.filename().string() + " was cut off; it has " +
+                               std::to_string(*frames) + " frames");
+  } catch (const std::exception& error) {
+    note(Severity::warning, std::string("a take from before cannot be read: ") + error.what());
+  }
+}
+
+// Ends the take that waits for its tracks when the next one begins. What goes wrong with it is no
+// reason not to begin.
+void Recorder::end_last_take() {
+  try {
+    if (end_at_) end_take(stopped_lost_);
+  } catch (const std::exception& error) {
+    {
+      const std::lock_guard lock(mutex_);
+      count_failure(error.what());
+    }
+    leave_take(error.what());
+  }
+  attributed_ = {};
+  was_stopped_ = false;
+}
+
+void Recorder::end_take(const session::Losses& lost) {
   end_at_.reset();
+  take_->set_lost({lost.frames - attributed_.frames, lost.shown - attributed_.shown,
+                   lost.records - attributed_.records});
+  attributed_ = lost;
   take_->close();
   const std::unique_ptr<TakeWriter> take = std::move(take_);
   {
@@ -293,15 +420,12 @@ void Recorder::end_take() {
     if (take->observer_frames() > 0) ++status_.finished_takes;
     if (!status_.recording) late_tracks_ = false;
   }
+  if (was_stopped_) drop_wish();
   note(Severity::info, take->directory().filename().string() + " has " +
                            std::to_string(take->observer_frames()) + " frames");
 }
 
-// Leaves the files as they are: a session that was not closed opens up to its last whole frame.
 void Recorder::fail(const std::string& why) {
-  end_at_.reset();
-  const bool any = take_ && take_->observer_frames() > 0;
-  take_.reset();
   {
     const std::lock_guard lock(mutex_);
     for (; !queue_.empty() && !std::holds_alternative<Start>(queue_.front()); queue_.pop_front()) {
@@ -309,19 +433,37 @@ void Recorder::fail(const std::string& why) {
       if (std::holds_alternative<Captured>(queue_.front())) ++status_.dropped;
     }
     if (queue_.empty()) status_.recording = late_tracks_ = false;
-    status_.fault = why;
-    ++status_.failures;
-    if (any) ++status_.finished_takes;
+    if (take_) take_->set_lost(lost());
+    count_failure(why);
   }
+  leave_take(why);
+  drop_wish();
+}
+
+void Recorder::count_failure(const std::string& why) {
+  status_.fault = why;
+  ++status_.failures;
+  if (take_ && take_->observer_frames() > 0) ++status_.finished_takes;
+}
+
+// Leaves the files as they are: a session that was not closed opens up to its last whole frame.
+void Recorder::leave_take(const std::string& why) {
+  end_at_.reset();
+  if (take_) take_->abandon(why);
+  take_.reset();
   if (options_.note) options_.note({Severity::error, "recording ended", why});
 }
 
 // Ends the take properly while there is still room on the disk.
 void Recorder::check_disk() {
   checked_ = Clock::now();
-  std::filesystem::create_directories(options_.take.directory);
+  session::make_folders(options_.take.directory);
   const std::uint64_t free = free_on_disk();
   if (free >= options_.reserve_bytes) return;
+  if (take_) {
+    const std::lock_guard lock(mutex_);
+    take_->set_lost(lost());
+  }
   if (take_) take_->close();
   throw Error(options_.take.directory.string() + ": the disk is almost full, " + megabytes(free) +
               " are left and " + megabytes(options_.reserve_bytes) +
@@ -337,13 +479,23 @@ std::uint64_t Recorder::free_on_disk() const {
   return std::filesystem::space(folder).available;
 }
 
-std::optional<std::uint64_t> Recorder::free_bytes() const {
+void Recorder::look_at_disk() {
+  if (Clock::now() - looked_ < disk_interval) return;
+  looked_ = Clock::now();
+  std::optional<std::uint64_t> left;
   try {
     const std::uint64_t free = free_on_disk();
-    return free - std::min(free, options_.reserve_bytes);
+    left = free - std::min(free, options_.reserve_bytes);
   } catch (const std::filesystem::filesystem_error&) {
-    return std::nullopt;
+    // The disk cannot say.
   }
+  const std::lock_guard lock(mutex_);
+  free_bytes_ = left;
+}
+
+std::optional<std::uint64_t> Recorder::free_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return free_bytes_;
 }
 
 }  // namespace previz::output

@@ -15,6 +15,7 @@
 #include <string>
 #include <thread>
 #include <variant>
+#include <vector>
 
 #include "daemon/output/take_writer.hpp"
 #include "daemon/report/report.hpp"
@@ -27,7 +28,9 @@ namespace previz::output {
 struct RecorderOptions {
   TakeTemplate take;
   double preroll_s = 2;
-  std::uint64_t queue_bytes = 1'000'000'000;        // room for frames; the ring gets at most half
+  // Room for frames, of which the ring gets at most half; tracking, buttons and events may take an
+  // eighth more.
+  std::uint64_t queue_bytes = 1'000'000'000;
   std::uint64_t reserve_bytes = 500'000'000;        // a take ends before less than this is free
   std::function<void(const report::Report&)> note;  // called from any thread
   std::function<std::uint64_t()> free_bytes;        // of the disk; empty: asks the file system
@@ -37,13 +40,21 @@ struct RecorderStatus {
   bool recording = false;
   std::filesystem::path directory;  // the running take's or the last one's; empty: none yet
   int number = 0;
-  std::uint64_t frames = 0;          // observer frames of the take on disk
-  double seconds = 0;                // from the first to the last of them
-  std::uint64_t dropped = 0;         // frames of either camera that did not reach the disk
-  std::uint64_t dropped_shown = 0;   // shown pictures that did not reach the disk
-  std::uint64_t finished_takes = 0;  // since the start; takes without a frame do not count
-  std::uint64_t failures = 0;        // takes that ended by an error
-  std::string fault;                 // cause of the last failure; empty once another take begins
+  std::uint64_t frames = 0;           // observer frames of the take on disk
+  double seconds = 0;                 // from the first to the last of them
+  std::uint64_t dropped = 0;          // frames of either camera that did not reach the disk
+  std::uint64_t dropped_shown = 0;    // shown pictures that did not reach the disk
+  std::uint64_t dropped_records = 0;  // lines of tracking, buttons and events that did not
+  double disk_silent_s = 0;           // for how long the disk has not answered a write
+  std::uint64_t finished_takes = 0;   // since the start; takes without a frame do not count
+  std::uint64_t failures = 0;         // takes that ended by an error
+  std::string fault;                  // cause of the last failure; empty once another take begins
+  // The take that was being recorded when the last process ended, if it was not ended by anybody;
+  // known about when the folder of takes is there.
+  std::optional<std::string> interrupted;
+  // Takes that were cut off and are in order again, in words: "12A_take003 was cut off; it has 250
+  // frames".
+  std::vector<std::string> salvaged;
 };
 
 // No call here waits for the disk, and all may come from any thread. SessionWriter bounds what can
@@ -52,7 +63,8 @@ struct RecorderStatus {
 class Recorder {
  public:
   explicit Recorder(RecorderOptions options);
-  ~Recorder();  // finishes the running take
+  // Finishes the running take. That it was being recorded is remembered in the folder of takes.
+  ~Recorder();
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
@@ -72,8 +84,8 @@ class Recorder {
   void mark_good();  // marks the running take, else the last
 
   RecorderStatus status() const;
-  // Returns how much of the disk takes may still use, without the reserve; nothing if the disk
-  // cannot say.
+  // Returns how much of the disk takes may still use, without the reserve, as it was about a second
+  // ago; nothing if the disk cannot say.
   std::optional<std::uint64_t> free_bytes() const;
 
  private:
@@ -88,7 +100,10 @@ class Recorder {
     std::string what;
   };
   struct Start {};
-  struct Stop {};
+  struct Stop {
+    session::Losses lost;  // of the take that ends
+    bool is_wished;        // by somebody; otherwise the process ends
+  };
   struct MarkGood {};
   using Entry =
       std::variant<Captured, session::TrackRecord, ButtonEvent, Event, Start, Stop, MarkGood>;
@@ -96,6 +111,11 @@ class Recorder {
   static std::uint64_t bytes_of(const Entry& entry);
   // Call these with the lock held.
   void enqueue(Entry entry);
+  void enqueue_record(Entry entry);  // or counts it as lost
+  void enqueue_stop(bool is_wished);
+  void count_failure(const std::string& why);
+  session::Losses lost() const;
+  bool has_new_silence();  // of the disk, that nobody was told of
   void trim_ring();
   void forget_first_of_ring();
   void forget_what_is_long_ago();
@@ -106,9 +126,15 @@ class Recorder {
   void handle(Entry& entry);
   void write(const Captured& captured);
   void begin_take();
-  void end_take();  // properly, not by a failure
-  void fail(const std::string& why);
+  void end_last_take();
+  void end_take(const session::Losses& lost);  // properly, not by a failure
+  void fail(const std::string& why);           // ends the take and leaves out what is queued of it
+  void leave_take(const std::string& why);
   void check_disk();
+  void look_at_disk();  // for free_bytes()
+  void look_for_interruption();
+  void salvage(const std::filesystem::path& take);
+  void drop_wish();
   std::uint64_t free_on_disk() const;
   void note(report::Severity severity, const std::string& what) const;
 
@@ -127,13 +153,20 @@ class Recorder {
   bool late_tracks_ = false;  // true: tracks may still arrive for the take that was stopped last
   bool quit_ = false;
   RecorderStatus status_;
+  std::optional<std::uint64_t> free_bytes_;
+  std::optional<std::chrono::steady_clock::time_point> handling_since_;  // by the writer thread
+  bool silence_noted_ = false;
 
   // Only the writer thread uses these.
   std::unique_ptr<TakeWriter> take_;
   std::int64_t take_begins_ns_ = 0;                              // time of its first observer frame
   std::optional<std::chrono::steady_clock::time_point> end_at_;  // stopped; waits for its tracks
-  std::chrono::steady_clock::time_point checked_;
-  std::jthread thread_;  // last: it uses all of the above
+  session::Losses stopped_lost_;                                 // of the take that waits
+  session::Losses attributed_;  // of the losses since the start, those of takes that have ended
+  std::chrono::steady_clock::time_point checked_, looked_;
+  bool looked_for_interruption_ = false;
+  bool was_stopped_ = false;  // the take that waits was ended by somebody
+  std::jthread thread_;       // last: it uses all of the above
 };
 
 }  // namespace previz::output

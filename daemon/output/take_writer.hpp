@@ -54,6 +54,8 @@ class TakeWriter {
   }
   void mark_good();
   void close() { writer_.close(); }
+  void set_lost(const session::Losses& lost) { writer_.set_lost(lost); }
+  void abandon(const std::string& fault) { writer_.abandon(fault); }  // never throws previz::Error
 
   const std::filesystem::path& directory() const { return directory_; }
   int number() const { return take_.number; }

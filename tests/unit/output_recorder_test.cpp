@@ -7,6 +7,8 @@
 
 #include <atomic>
 #include <csignal>
+#include <mutex>
+#include <optional>
 #include <thread>
 
 #include "drivers/bracket.hpp"
@@ -170,12 +172,18 @@ TEST(Recorder, TellsTheTimeOfATakeAndTheRoomThatIsLeft) {
   std::atomic<std::uint64_t> free = 700;
   RecorderOptions options = options_in(directory / "not/made/yet");
   options.reserve_bytes = 200;
-  EXPECT_GT(Recorder(options).free_bytes().value(), 0u);  // of the disk it will be made on
+  const auto has_room = [](const Recorder& recorder, std::uint64_t bytes) {
+    return wait_until("the room is known", [&] { return recorder.free_bytes() == bytes; });
+  };
+  {
+    const Recorder recorder(options);  // of the disk it will be made on
+    EXPECT_TRUE(wait_until("it is known", [&] { return recorder.free_bytes().value_or(0) > 0; }));
+  }
   options.free_bytes = [&] { return free.load(); };
   Recorder recorder(std::move(options));
-  EXPECT_EQ(recorder.free_bytes(), 500u);
+  EXPECT_TRUE(has_room(recorder, 500));
   free = 100;
-  EXPECT_EQ(recorder.free_bytes(), 0u);
+  EXPECT_TRUE(has_room(recorder, 0));
   free = 700;
   recorder.start();
   for (const std::uint64_t i : {10, 11, 12, 13}) recorder.offer(picture(i));
@@ -442,6 +450,94 @@ TEST(RecorderDeath, AKilledProcessKeepsEveryFrameThatItCounted) {
   EXPECT_GE(there.size(), report.counted);
   EXPECT_GE(there.back() + 25, report.offered);
   EXPECT_TRUE(mentions(session::open_session(directory / "12A_take001").missing, "not closed"));
+
+  // The next process knows that it was recording, and brings the take into order.
+  {
+    Recorder recorder(options_in(directory.path()));
+    ASSERT_TRUE(
+        wait_until("it is known", [&] { return recorder.status().interrupted.has_value(); }));
+    const RecorderStatus status = recorder.status();
+    EXPECT_EQ(status.interrupted, "12A_take001");
+    ASSERT_EQ(status.salvaged.size(), 1u);
+    EXPECT_EQ(status.salvaged[0],
+              "12A_take001 was cut off; it has " + std::to_string(there.size()) + " frames");
+    recorder.start();
+    recorder.offer(picture(0));
+  }
+  EXPECT_TRUE(mentions(session::open_session(directory / "12A_take001").missing, "was cut off"));
+  EXPECT_EQ(frames_of(directory / "12A_take001"), there);
+  EXPECT_EQ(frames_of(directory / "12A_take002"), count_from(0, 0));
+}
+
+// Whether the recorder of a new process finds that a take was being recorded.
+std::optional<std::string> interrupted_in(const std::filesystem::path& directory) {
+  const Recorder recorder(options_in(directory));
+  EXPECT_TRUE(wait_until("it has looked", [&] { return recorder.free_bytes().has_value(); }));
+  EXPECT_THAT(recorder.status().salvaged, testing::IsEmpty());
+  return recorder.status().interrupted;
+}
+
+TEST(Recorder, RemembersThatItWasRecordingUntilSomebodyEndsIt) {
+  const TemporaryDirectory directory;
+  EXPECT_EQ(interrupted_in(directory.path()), std::nullopt);
+  {
+    Recorder recorder(options_in(directory.path()));
+    recorder.start();
+    recorder.offer(picture(0));
+  }  // as for an upgrade: the take is closed, and nobody has ended the recording
+  EXPECT_TRUE(session::open_session(directory / "12A_take001").missing.empty());
+  EXPECT_EQ(interrupted_in(directory.path()), "12A_take001");
+  {
+    Recorder recorder(options_in(directory.path()));
+    recorder.start();
+    recorder.offer(picture(0));
+    recorder.stop();
+  }
+  EXPECT_EQ(interrupted_in(directory.path()), std::nullopt);
+}
+
+// A disk that hangs: it is reported, what waits is bounded in bytes, whatever it is, and what is
+// left out is counted in the take.
+TEST(Recorder, OfADiskThatHangsKeepsAQueueOfBoundedSizeAndSaysSo) {
+  const TemporaryDirectory directory;
+  std::mutex hangs;
+  std::atomic<int> silences = 0;
+  RecorderOptions options = options_in(directory.path());
+  options.queue_bytes = 100'000;
+  options.free_bytes = [&] {  // the writer asks the disk once a second
+    const std::lock_guard lock(hangs);
+    return std::uint64_t{1'000'000'000};
+  };
+  options.note = [&](const report::Report& report) {
+    silences += report.text.find("does not answer") != std::string::npos;
+  };
+  session::TrackRecord with_light = track_of(0);
+  with_light.captured_light.emplace();
+  with_light.captured_light->ambient.resize(4096);  // 49 KB
+  std::uint64_t dropped = 0, dropped_records = 0;
+  {
+    Recorder recorder(std::move(options));
+    recorder.start();
+    recorder.offer(picture(0));
+    ASSERT_TRUE(wait_until("the take is begun", [&] { return recorder.status().frames == 1; }));
+    hangs.lock();
+    for (std::uint64_t i = 1; recorder.status().disk_silent_s < 2.5; ++i) {
+      recorder.offer(picture(i));
+      recorder.offer(with_light);
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    hangs.unlock();
+    dropped = recorder.status().dropped;
+    dropped_records = recorder.status().dropped_records;
+    // 100 kB hold 43 pictures of 32x24x3 bytes, and with an eighth more two records.
+    EXPECT_GT(dropped, 0u);
+    EXPECT_GT(dropped_records, 50u);
+    EXPECT_EQ(silences, 1);
+    recorder.stop();
+  }
+  const session::Session session = session::open_session(directory / "12A_take001");
+  EXPECT_TRUE(mentions(session.missing, std::to_string(dropped) + " frames of the cameras"));
+  EXPECT_TRUE(mentions(session.missing, std::to_string(dropped_records) + " lines of tracking"));
 }
 
 }  // namespace output_recorder_test
