@@ -181,6 +181,10 @@ Outcome Controls::apply(const set::MarkGood&) {
   return {"take marked good", false, Request::mark_good};
 }
 
+Outcome Controls::apply(const set::Acknowledge&) {
+  return {"noted", false, Request::acknowledge};
+}
+
 Outcome Controls::apply(const set::Snapshot&) {
   return snapshot(look_.state.mode == Mode::refine ? &Look::refined_snapshots : &Look::snapshots);
 }

@@ -40,6 +40,7 @@ enum class Request {
   start_take,
   stop_take,
   mark_good,
+  acknowledge,
   reload_set,
   keep_edits,
   next_set,
@@ -85,6 +86,7 @@ class Controls {
   Outcome apply(const set::ToMode& effect);
   Outcome apply(const set::Record& effect);
   Outcome apply(const set::MarkGood& effect);
+  Outcome apply(const set::Acknowledge& effect);
   Outcome apply(const set::Snapshot& effect);
   Outcome apply(const set::ReloadSet& effect);
   Outcome apply(const set::KeepEdits& effect);

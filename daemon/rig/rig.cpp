@@ -17,7 +17,8 @@ namespace {
 
 constexpr std::chrono::milliseconds tick_interval{20};
 constexpr int ticks_a_second = 50;
-constexpr int ticks_a_page = 5;  // the overlay is updated once in so many ticks
+constexpr int ticks_a_page = 5;               // the overlay is updated once in so many ticks
+constexpr const char* cut_off = "recording";  // source of the trouble that a take was cut off
 
 output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& cameras,
                                    Reports& reports) {
@@ -182,9 +183,13 @@ std::optional<std::string> Rig::carry_out(Request request) {
       break;
     case Request::stop_take:
       recorder_.stop();
+      parts_.reports.settle(cut_off);
       break;
     case Request::mark_good:
       recorder_.mark_good();
+      break;
+    case Request::acknowledge:
+      parts_.reports.settle(cut_off);
       break;
     case Request::reload_set:
       return change_set(0);
@@ -221,7 +226,10 @@ void Rig::take_inbox() {
     else
       apply(outcome, "rig");
   }
-  if (inbox_.finished()) parts_.loop.exit();
+  if (!inbox_.finished()) return;
+  // A recording that is played has ended; a restart is no reason to end what is recorded.
+  if (!parts_.stop.stop_requested()) recorder_.stop();
+  parts_.loop.exit();
 }
 
 void Rig::tick() {
@@ -243,13 +251,26 @@ void Rig::look_at_recorder() {
                             const std::string& said, Severity severity) {
     if (now == known) return;
     known = now;
-    controls_.happened(event);
+    // A take that is lost while the next one runs does not end that one.
+    if (event != Event::recorder_failed || !status.recording) controls_.happened(event);
     apply({said, false, {}}, "recorder", severity);
   };
   announce(failures_, status.failures, Event::recorder_failed, "take ended, " + status.fault,
            Severity::error);
   announce(finished_takes_, status.finished_takes, Event::take_finished,
            "take " + status.directory.filename().string() + " is finished", Severity::info);
+  for (; salvaged_ < status.salvaged.size(); ++salvaged_)
+    apply({status.salvaged[salvaged_], false, {}}, "recorder", Severity::warning);
+  if (status.interrupted && !std::exchange(has_resumed_, true)) resume(*status.interrupted);
+}
+
+// A recording that nobody ended goes on in the next take, and the crew is told so until somebody
+// says that he has seen it.
+void Rig::resume(const std::string& take) {
+  if (!controls_.look().state.recording) apply(controls_.happened(Event::record_on), "recorder");
+  const std::string what = take + " was cut off; recording goes on in the next take";
+  apply({what, false, {}}, "recorder", Severity::error);
+  parts_.reports.show(report::lasting(cut_off, what));
 }
 
 void Rig::show_facts() {

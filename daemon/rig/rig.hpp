@@ -66,6 +66,7 @@ class Rig {
   void take_inbox();
   void tick();
   void look_at_recorder();
+  void resume(const std::string& take);
   void feed_watchdog();
   void show_facts();
   // Carries out the outcome's request, announces the result and returns it.
@@ -86,6 +87,8 @@ class Rig {
   output::Recorder recorder_;
   std::optional<ButtonDesk> desk_;  // always there once the rig is made
   std::uint64_t finished_takes_ = 0, failures_ = 0;
+  std::size_t salvaged_ = 0;  // takes of RecorderStatus::salvaged that were announced
+  bool has_resumed_ = false;
   int ticks_ = 0;
   Progress progress_;  // when the watchdog was last fed
   std::unique_ptr<Review> review_;

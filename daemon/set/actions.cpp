@@ -14,6 +14,7 @@ constexpr Action action_table[] = {
     {"standby", "Switch the picture off but keep the cameras open; press again for live.", ToMode{Mode::standby}},
     {"record", "Start a take; press again to end it.", Record{}},
     {"mark_good", "Mark the running take, or the last one, as good.", MarkGood{}},
+    {"acknowledge", "Take note that a recording was cut off; the alarm goes away.", Acknowledge{}},
     {"snapshot", "Write the shown picture as EXR and PNG.", Snapshot{}},
     {"reload_set", "Load the set file again; if it has a mistake, the old one stays in force.", ReloadSet{}},
     {"keep", "Write the objects' places and the lamps' brightness and colour, as buttons have changed them, into the set file; the old file stays beside it.", KeepEdits{}},

@@ -24,6 +24,7 @@ struct ToMode {  // enters the mode, or leaves it for live
 };
 struct Record {};  // starts a take, or stops it
 struct MarkGood {};
+struct Acknowledge {};
 struct Snapshot {};
 struct ReloadSet {};
 struct KeepEdits {};  // writes what buttons have changed into the set file
@@ -67,10 +68,10 @@ struct ChangeExposure {
 };
 
 using Effect =
-    std::variant<ToMode, Record, MarkGood, Snapshot, ReloadSet, KeepEdits, OtherSet, ChangeSamples,
-                 NextEstimator, NextLightMode, NextView, ToggleOsd, SelectObject, MoveObject,
-                 TurnObject, ScaleObject, ResetObject, PlayAnimations, HoldAnimations, SelectLight,
-                 DimLight, TintLight, ResetLight, ChangeExposure>;
+    std::variant<ToMode, Record, MarkGood, Acknowledge, Snapshot, ReloadSet, KeepEdits, OtherSet,
+                 ChangeSamples, NextEstimator, NextLightMode, NextView, ToggleOsd, SelectObject,
+                 MoveObject, TurnObject, ScaleObject, ResetObject, PlayAnimations, HoldAnimations,
+                 SelectLight, DimLight, TintLight, ResetLight, ChangeExposure>;
 
 struct Action {
   const char* name;

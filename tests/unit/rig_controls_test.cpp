@@ -287,6 +287,7 @@ TEST(Controls, RecordingAsksForATakeAndForItsEnd) {
   EXPECT_TRUE(desk("next_set").refused);
   EXPECT_TRUE(desk("standby").refused);
   EXPECT_EQ(desk("mark_good").request, Request::mark_good);
+  EXPECT_EQ(desk("acknowledge").request, Request::acknowledge);
   EXPECT_EQ(desk("record").request, Request::stop_take);
   EXPECT_EQ(desk("reload_set").request, Request::reload_set);
   EXPECT_EQ(desk("next_set").request, Request::next_set);

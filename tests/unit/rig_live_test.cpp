@@ -421,6 +421,36 @@ TEST_F(RigLive, TheWatchdogIsFedOnlyWhileFramesAdvance) {
   systemd.until("STOPPING=1");
 }
 
+// A restart in the middle of a take, as for an upgrade: the new process records on by itself, and says
+// so on the display until somebody has taken note.
+TEST_F(RigLive, RecordsOnAfterARestartUntilSomebodyEndsIt) {
+  write_set();
+  int before = 0;  // pictures of the runs before
+  const auto until_recorded = [&](bool recording) {
+    until([&](const Shown& s) {
+      return s.count > before + 3 && s.look.state.recording == recording && s.shot.samples == 2;
+    });
+  };
+  run([&] {
+    press("record");
+    until_recorded(true);
+  });
+  before = shown_.count;
+  run([&] {
+    until_said("12A_take001 was cut off; recording goes on in the next take");
+    until_recorded(true);
+    press("acknowledge");
+    until_said("button acknowledge: noted");
+    press("record");
+    until_said("12A_take002 is finished");
+  });
+  EXPECT_TRUE(session::open_session(directory_ / "takes/12A_take001").missing.empty());
+  EXPECT_GT(session::open_session(directory_ / "takes/12A_take002").track.size(), 0u);
+  before = shown_.count;
+  run([&] { until_recorded(false); });
+  EXPECT_FALSE(std::filesystem::exists(directory_ / "takes/12A_take003"));
+}
+
 TEST(Progress, EveryStageWithSomethingToDoMustDoIt) {
   const Progress start;
   const auto with = [](auto change) {

@@ -90,6 +90,7 @@ constexpr Line transcript[] = {
     {"snapshot", "button snapshot: live", "Mode=live", "LIVE"},  // any button ends a refinement
     {nullptr, "button snapshot: snapshot"},
     {"mark_good", "button mark_good: take marked good"},
+    {"acknowledge", "button acknowledge: noted"},
     {"record", "button record: recording ended", "Recording=no"},
     {nullptr, "recorder: take 12A_take001 is finished"},
     {"review", "button review: review", "Mode=review", "REVIEW"},
