@@ -15,6 +15,7 @@ layout(scalar) writeonly buffer Variances { vec4 variances[]; };
 layout(scalar) writeonly buffer Surfaces { vec4 surfaces[]; };
 layout(scalar) writeonly buffer Uncovered { vec4 uncovered[]; };
 layout(scalar) writeonly buffer Reals { vec4 reals[]; };
+layout(scalar) writeonly buffer Albedos { uvec2 albedos[]; };  // halves
 // For each pixel of the band, the bits of channels that are brighter than white by more than chance
 // (bit 0: red).
 layout(scalar) writeonly buffer Highlights { uint highlights[]; };
@@ -44,6 +45,19 @@ uint highlight_bits(vec3 above_white, vec3 variance) {
   return bits;
 }
 
+// The least albedo that a pixel's light is divided by.
+const float LEAST_ALBEDO = 0.02;
+
+// Returns the albedo of what the pixel shows, as halves keep it. An edge has two, and a pixel of a
+// scene without textures has none, for which the result is 1.
+uvec2 albedo_of(GpuPixel sums, float mask) {
+  const bool is_edge = mask > 0.0 && mask < 1.0;
+  vec3 albedo = vec3(1.0);
+  if (!is_edge && sums.normal.w > 0.0 && any(greaterThan(sums.albedo.rgb, vec3(0.0))))
+    albedo = max(sums.albedo.rgb / sums.normal.w, LEAST_ALBEDO);
+  return uvec2(packHalf2x16(albedo.rg), packHalf2x16(vec2(albedo.b, 0.0)));
+}
+
 void main() {
   if (gl_GlobalInvocationID.x >= show.count) return;
   const GpuPixel sums = pixels[show.in_tile + gl_GlobalInvocationID.x];
@@ -62,8 +76,11 @@ void main() {
   const vec3 real = own.w > 0.0 ? camera.radiance : traced;
   const vec3 composite = compose(camera, Estimate(change, mask, own.rgb, real));
   composites[index] = vec4(composite, mask);
-  uncovered[index] = vec4(own.rgb / show.white, 0.0);
-  reals[index] = vec4(real / show.white, 0.0);
+  const uvec2 halves = albedo_of(sums, mask);
+  const vec3 albedo = vec3(unpackHalf2x16(halves.x), unpackHalf2x16(halves.y).x);
+  albedos[index] = halves;
+  uncovered[index] = vec4(own.rgb / show.white / albedo, 0.0);
+  reals[index] = vec4(real / show.white / albedo, 0.0);
 
   const float hits = sums.normal.w;
   const float depth = hits > 0.0 ? diff.w * samples / hits : 0.0;
@@ -73,10 +90,10 @@ void main() {
     gains[i] = mix(gain(camera.radiance[i], real[i], camera.variance[i]), 1.0, mask);
   const uint bits = highlight_bits(composite - show.white, gains * gains * variance);
   highlights[index] = bits;
-  signals[index] = vec4(min(change / show.white, vec3(DENOISE_MOST_WHITES)),
+  signals[index] = vec4(min(change / show.white, vec3(DENOISE_MOST_WHITES)) / albedo,
                         depth > 0.0 ? 1.0 / depth : 0.0);
-  variances[index] =
-      vec4(min(variance, vec3(show.most_variance)) / (show.white * show.white), 0.0);
+  variances[index] = vec4(min(variance, vec3(show.most_variance)) / (show.white * show.white) /
+                              (albedo * albedo), 0.0);
   // A highlight on a real surface, the core of a caustic, is shown as it is, and must not brighten
   // its neighbours too.
   surfaces[index] = vec4(hits > 0.0 ? sums.normal.xyz / hits : vec3(0.0),

@@ -12,7 +12,7 @@
 // denoise_guide.comp makes the guide and its variance.
 uniform textureBuffer guides;
 uniform textureBuffer guide_variances;
-// The uncovered part of the change and mean(Lr), over white, get the signal's weights.
+// The uncovered part of the change and mean(Lr), over white and albedo, get the signal's weights.
 uniform textureBuffer uncovered;
 uniform textureBuffer reals;
 layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };

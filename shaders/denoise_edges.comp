@@ -1,5 +1,6 @@
-// Takes noise out of pixels that a virtual object covers in part, which the levels of the transform
-// blend with nothing. Such a pixel is mean(M) of the object's light and the rest of the change
+// Puts the albedo of surfaces back, which was divided out before the levels of the transform, and
+// takes noise out of pixels that a virtual object covers in part, which the levels blend with
+// nothing. Such a pixel is mean(M) of the object's light and the rest of the change
 // behind it; both are taken from the pixels around it, and the share stays the pixel's own, so that
 // edges stay as sharp as they are. The surroundings count as far as noise explains what the pixels
 // of the edge are off them (shaders/README.md, "Denoising").
@@ -9,8 +10,9 @@
 
 #include "shaders/lib/denoise.glsl"
 
-uniform textureBuffer uncovered;  // over white
+uniform textureBuffer uncovered;  // over white and albedo
 uniform textureBuffer reals;
+uniform textureBuffer albedos;  // RGBA16F
 layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
 layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
 layout(scalar) writeonly buffer DenoisedUncovered { vec4 denoised_uncovered[]; };
@@ -25,10 +27,23 @@ struct Parts {
   vec3 uncovered;  // mean((1 - M)(Lm - Lr))
 };
 
+vec3 albedo_at(ivec2 at) { return texelFetch(albedos, pixel_index(at)).rgb; }
+
+// Returns the pixel with its albedo.
+Pixel load_lit(ivec2 at) {
+  Pixel p = load_pixel(at);
+  const vec3 albedo = albedo_at(at);
+  p.signal *= albedo;
+  p.variance *= albedo * albedo;
+  return p;
+}
+
+vec3 uncovered_at(ivec2 at) { return texelFetch(uncovered, pixel_index(at)).rgb * albedo_at(at); }
+
 Parts load_parts(ivec2 at) {
   Parts p;
-  p.pixel = load_pixel(at);
-  const vec3 own = min(texelFetch(uncovered, pixel_index(at)).rgb, DENOISE_MOST_WHITES);
+  p.pixel = load_lit(at);
+  const vec3 own = min(uncovered_at(at), DENOISE_MOST_WHITES);
   p.uncovered = p.pixel.cover >= 1.0 ? vec3(0.0) : p.pixel.cover <= 0.0 ? p.pixel.signal : own;
   p.covered = p.pixel.signal - p.uncovered;
   return p;
@@ -74,7 +89,7 @@ float noise_share(ivec2 at, Sides s) {
   for (int y = -REACH; y <= REACH; ++y)
     for (int x = -REACH; x <= REACH; ++x) {
       if (!is_inside(at + ivec2(x, y))) continue;
-      const Pixel p = load_pixel(at + ivec2(x, y));
+      const Pixel p = load_lit(at + ivec2(x, y));
       if (!is_edge(p)) continue;
       const vec3 off = p.signal - mix(s.behind, s.object, p.cover);
       expected += p.overlap * p.variance;
@@ -90,7 +105,7 @@ void main() {
   const ivec2 at = ivec2(index % denoise.width, index / denoise.width);
   const Parts here = load_parts(at);
   vec3 signal = here.pixel.signal;
-  vec3 own = texelFetch(uncovered, int(index)).rgb;
+  vec3 own = uncovered_at(at);
   vec4 variance = vec4(here.pixel.variance, here.pixel.overlap);
   const float cover = here.pixel.cover;
   if (is_edge(here.pixel)) {
@@ -108,5 +123,5 @@ void main() {
   denoised_variances[index] = variance;
   if (denoise.has_companions == 0u) return;
   denoised_uncovered[index] = vec4(own, 0.0);
-  denoised_reals[index] = texelFetch(reals, int(index));
+  denoised_reals[index] = vec4(texelFetch(reals, int(index)).rgb * albedo_at(at), 0.0);
 }

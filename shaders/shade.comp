@@ -388,12 +388,25 @@ bool meet_measured(inout Path p, Surface s, GpuHit hit) {
   return false;
 }
 
-// Stores normal and depth of the mixed world's first surface.
+// What paint and plastic reflect at their surface, beside their colour, from the directions around.
+const float MEAN_REFLECTANCE = 0.1;
+
+// Returns how bright a surface is: what of white light around it comes back, and what it emits over
+// the sensor's white.
+vec3 brightness_of(Surface s) {
+  const vec3 reflected = s.base_color + s.specular * (1.0 - s.metallic) * MEAN_REFLECTANCE;
+  return min(reflected + frame.exposure * s.emission, DENOISE_MOST_WHITES);
+}
+
+// Stores normal, depth and albedo of the mixed world's first surface.
 void write_aov(Path p, Surface s, float t) {
   const vec3 axis = vec3(frame.world_from_camera[0].z, frame.world_from_camera[1].z,
                          frame.world_from_camera[2].z);
   const vec3 position = p.origin + t * p.direction;
   sample_aov[p.slot] = vec4(s.normal, dot(position, axis));
+  if (!has_feature(FEATURE_TEXTURES)) return;
+  const vec3 albedo = brightness_of(s);
+  sample_albedo[p.slot] = uvec2(packHalf2x16(albedo.rg), packHalf2x16(vec2(albedo.b, 0.0)));
 }
 
 // Adds the light of photons at a vertex, samples a light and the next direction. With `lit`, `ray`

@@ -53,6 +53,8 @@ void Denoiser::reserve(std::size_t pixels, bool companions) {
       variance_[side] = texels(pixels);
     }
     for (Buffer* other : {&surface_, &guide_, &guide_variance_}) *other = texels(pixels);
+    albedo_ = create_texel_buffer(device_, pixels * 4 * sizeof(std::uint16_t),
+                                  vk::Format::eR16G16B16A16Sfloat);
     // composite.comp and present.comp use side 0 of the companions, filtered or not.
     uncovered_[0] = texels(pixels);
     real_[0] = texels(pixels);
@@ -91,6 +93,7 @@ void Denoiser::record(const vk::raii::CommandBuffer& commands, int width, int ro
     const Buffers buffers{{"signals", &signal_[side]},
                           {"variances", &variance_[side]},
                           {"surfaces", &surface_},
+                          {"albedos", &albedo_},
                           {"guides", &guide_},
                           {"guide_variances", &guide_variance_},
                           {"uncovered", &uncovered_[companion]},

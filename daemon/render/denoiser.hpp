@@ -23,8 +23,8 @@ float most_variance(float white, std::int64_t samples);
 
 class Denoiser {
  public:
-  // Works on about `most_pixels` at once, in bands of whole rows, at 144 bytes of device memory per
-  // pixel, and 176 with companions.
+  // Works on about `most_pixels` at once, in bands of whole rows, at 152 bytes of device memory per
+  // pixel, and 184 with companions.
   explicit Denoiser(Device& device, std::size_t most_pixels = most_band_pixels);
 
   // A band: given rows [top, bottom) as input, rows [first, last) of the output are right.
@@ -37,8 +37,8 @@ class Denoiser {
   // composite needs where the rule is not additive or the plate is clipped.
   void reserve(std::size_t pixels, bool companions);
 
-  // The input buffers have one vec4 per pixel in the layout of shaders/lib/denoise.glsl;
-  // shaders/composite.comp fills them from the samples.
+  // The input buffers have one vec4 per pixel in the layout of shaders/lib/denoise.glsl, but for
+  // the albedo, which has four halves; shaders/composite.comp fills them from the samples.
   //
   // A change of more than DENOISE_MOST_WHITES counts as that much, and its variance accordingly
   // (most_variance()). Otherwise the image of a lamp in a mirror, met by one sample of many,
@@ -49,6 +49,7 @@ class Denoiser {
   Buffer& surface() { return surface_; }
   Buffer& uncovered() { return uncovered_[0]; }
   Buffer& real() { return real_[0]; }
+  Buffer& albedo() { return albedo_; }
   // Records the passes over this many rows. `single_sample` says that pixels do not know their
   // variance.
   void record(const vk::raii::CommandBuffer& commands, int width, int rows, bool single_sample);
@@ -73,7 +74,7 @@ class Denoiser {
   Kernel variance_pass_, guide_pass_, level_pass_, edge_pass_;
   // A pass reads one side and writes the other.
   Buffer signal_[2], variance_[2], uncovered_[2], real_[2];
-  Buffer surface_, guide_, guide_variance_;
+  Buffer surface_, albedo_, guide_, guide_variance_;
 };
 
 }  // namespace previz::render

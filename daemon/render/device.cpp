@@ -309,6 +309,7 @@ vk::DeviceSize texel_bytes_of(vk::Format format) {
       return 4;
     case vk::Format::eR32G32Sfloat:
     case vk::Format::eR32G32Uint:
+    case vk::Format::eR16G16B16A16Sfloat:
       return 8;
     case vk::Format::eR32G32B32A32Sfloat:
     case vk::Format::eR32G32B32A32Uint:

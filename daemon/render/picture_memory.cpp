@@ -21,9 +21,11 @@ constexpr std::uint64_t layer_bytes =
 // A pixel of the plate and of the shown picture is three samples.
 constexpr std::uint64_t plate_bytes = 3 * sizeof(std::uint16_t);
 
-// A pixel of a band takes eleven arrays of four floats in the denoiser (denoiser.hpp) and one in
-// the presenter (presenter.hpp), a word of flags, and its part of the shown picture.
-constexpr std::uint64_t band_bytes = 12 * 4 * sizeof(float) + sizeof(std::uint32_t) + plate_bytes;
+// A pixel of a band takes eleven arrays of four floats and one of four halves in the denoiser
+// (denoiser.hpp), one of four floats in the presenter (presenter.hpp), a word of flags, and its
+// part of the shown picture.
+constexpr std::uint64_t band_bytes =
+    12 * 4 * sizeof(float) + 4 * sizeof(std::uint16_t) + sizeof(std::uint32_t) + plate_bytes;
 
 std::uint64_t rays_of(int width, int height) {
   return (static_cast<std::uint64_t>(width) + 1) * (static_cast<std::uint64_t>(height) + 1);

@@ -92,6 +92,7 @@ void Presenter::composite(const ToPresent& what, const Denoiser::Band& band, gpu
                           {"signals", &denoiser.signal()},
                           {"variances", &denoiser.variance()},
                           {"surfaces", &denoiser.surface()},
+                          {"albedos", &denoiser.albedo()},
                           {"uncovered", &denoiser.uncovered()},
                           {"reals", &denoiser.real()}};
     device_.submit([&](const vk::raii::CommandBuffer& commands) {

@@ -104,6 +104,7 @@ void Renderer::Impl::upload_frame() {
   gpu_frame.specular_alpha = static_cast<float>(estimation.specular_roughness);
   gpu_frame.bound_share = static_cast<float>(estimation.difference_sampling);
   gpu_frame.photon_count = photons();
+  gpu_frame.exposure = static_cast<float>(frame.exposure);
   gpu_frame.clip_from = is_clipped ? response->clipping().from : gpu::NO_INDEX;
   scene.describe(gpu_frame, needed());
   upload_storage(*device, frame_buffer, std::vector{gpu_frame});

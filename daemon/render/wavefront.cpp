@@ -89,6 +89,7 @@ void Wavefront::create_paths() {
   sample_landed_ =
       create_storage_buffer(device_, (paths_a_slot_ > 2 ? slots_ : 1) * sizeof(gpu::vec4));
   sample_aov_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
+  sample_albedo_ = create_storage_buffer(device_, slots_ * sizeof(gpu::uvec2));
   limits_ = create_storage_buffer(
       device_, sizeof(std::uint32_t) * sampled_blocks(width_) * sampled_blocks(height_));
   control_ = create_indirect_buffer(device_, sizeof(gpu::GpuControl));
@@ -107,6 +108,7 @@ Buffers Wavefront::buffers_of(const Tile& tile) const {
                   {"sample_real", &sample_real_},
                   {"sample_landed", &sample_landed_},
                   {"sample_aov", &sample_aov_},
+                  {"sample_albedo", &sample_albedo_},
                   {"control", &control_},
                   {"limits", &limits_},
                   {"pixels", &tile.pixels}});

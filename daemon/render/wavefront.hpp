@@ -85,7 +85,7 @@ class Wavefront {
   std::optional<std::uint32_t> features_;  // of the kernels, once they are made
   Kernel generate_, advance_, extend_, shade_, prepare_shadow_, shadow_, accumulate_;
   Buffer ray_origin_, ray_direction_, throughput_, receivers_, hits_, queue_, shadow_rays_,
-      sample_mixed_, sample_real_, sample_landed_, sample_aov_, limits_, control_;
+      sample_mixed_, sample_real_, sample_landed_, sample_aov_, sample_albedo_, limits_, control_;
 };
 
 }  // namespace previz::render

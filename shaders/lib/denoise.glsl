@@ -11,8 +11,8 @@
 layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(scalar, push_constant) uniform Denoise { GpuDenoise denoise; };
-// RGBA32F, width * height: the signal (the change of the composite) over the sensor's white,
-// 1 / depth (0: none).
+// RGBA32F, width * height: the signal (the change of the composite) over the sensor's white and over
+// the surface's albedo, 1 / depth (0: none).
 uniform textureBuffer signals;
 uniform textureBuffer variances;  // of the signal, to be multiplied by the fourth component
 uniform textureBuffer surfaces;   // normal, mean(M) or DENOISE_HIGHLIGHT

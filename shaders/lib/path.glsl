@@ -20,6 +20,10 @@ layout(scalar) buffer Mixed { vec4 sample_mixed[]; };           // of a slot: Lm
 layout(scalar) buffer Real { vec4 sample_real[]; };             // of a slot: Lr, one of SAMPLE_*
 layout(scalar) buffer Landed { vec4 sample_landed[]; };         // of a slot: the real part of PATH_LANDED
 layout(scalar) buffer Aov { vec4 sample_aov[]; };               // of a slot: normal, depth (0: no hit)
+// Of a slot, for the denoiser (shaders/README.md, "Denoising"): how bright the mixed world's first
+// surface is in white light, and what it emits over the sensor's white; four halves of words. 0: no
+// hit. It is kept with FEATURE_TEXTURES.
+layout(scalar) buffer Albedo { uvec2 sample_albedo[]; };
 layout(scalar) buffer Control { GpuControl control; };
 layout(scalar) readonly buffer Limits { uint limits[]; };       // of a block of the picture, row-major:
                                                                 // how many samples its pixels get

@@ -134,6 +134,7 @@ struct GpuPixel {
   vec4 square_high;  // squares, for the variance: of Lm where M = 1, of Lm - Lr where M = 0;
   vec4 square_low;   // w: number of samples
   vec4 normal;      // sum of normals; w: number of samples that hit a surface
+  vec4 albedo;      // sum of albedos (lib/path.glsl); 0 without FEATURE_TEXTURES
 };
 
 // The first surface of the real world at the middle of a pixel.
@@ -288,6 +289,7 @@ struct GpuFrame {
   vec2 focal_px, principal_px;  // of the observer's lens, OpenCV's convention
   vec3 radial;                  // k1, k2, k3
   vec2 tangential;              // p1, p2
+  float exposure;               // signal over radiance
   float tree_share;             // probability that a light sample of a light takes the tree; 0: none
   vec3 tree_offset;             // of the camera from the tree's origin
   uint distant_light_count;     // the first of the visible lights: discs at infinity
@@ -390,7 +392,7 @@ static_assert(sizeof(GpuDenoise) == 20);
 static_assert(sizeof(GpuShow) == 60);
 static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 56);
-static_assert(sizeof(GpuPixel) == 144);
+static_assert(sizeof(GpuPixel) == 160);
 static_assert(sizeof(GpuControl) == 96);
 static_assert(sizeof(GpuInstance) == 112);
 static_assert(sizeof(GpuMaterial) == 104);
@@ -398,7 +400,7 @@ static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
 static_assert(sizeof(GpuLight) == 156);
 static_assert(offsetof(GpuLight, uv0) == 112);
-static_assert(sizeof(GpuFrame) == 212);
+static_assert(sizeof(GpuFrame) == 216);
 static_assert(sizeof(GpuLightNode) == 48);
 static_assert(sizeof(GpuBatch) == 28);
 static_assert(sizeof(GpuPhoton) == 64);

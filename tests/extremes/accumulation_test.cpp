@@ -19,7 +19,7 @@ class Accumulator {
   explicit Accumulator(Device& device)
       : device_(device), kernel_(device, "accumulate", accumulate_spv, {0}) {
     const vk::DeviceSize samples = slots * sizeof(gpu::vec4);
-    for (Buffer* buffer : {&mixed_, &real_, &landed_, &aov_})
+    for (Buffer* buffer : {&mixed_, &real_, &landed_, &aov_, &albedo_})
       *buffer = render::create_storage_buffer(device, samples);
     render::upload_storage(device, pixels_, std::vector<gpu::GpuPixel>(1));
     render::upload_storage(device, control_, std::vector<gpu::GpuControl>(1));
@@ -36,10 +36,10 @@ class Accumulator {
     render::upload_bytes(device_, mixed_, std::as_bytes(std::span(spread(mixed))));
     render::upload_bytes(device_, real_, std::as_bytes(std::span(spread(real))));
     const gpu::GpuBatch batch{0, 0, 1, 1, 0, static_cast<std::uint32_t>(mixed.size()), 0};
-    const render::Buffers buffers{{"frame", &frame_},      {"sample_mixed", &mixed_},
-                                  {"sample_real", &real_}, {"sample_landed", &landed_},
-                                  {"sample_aov", &aov_},   {"control", &control_},
-                                  {"pixels", &pixels_},    {"limits", &limits_}};
+    const render::Buffers buffers{
+        {"frame", &frame_},          {"sample_mixed", &mixed_}, {"sample_real", &real_},
+        {"sample_landed", &landed_}, {"sample_aov", &aov_},     {"sample_albedo", &albedo_},
+        {"control", &control_},      {"pixels", &pixels_},      {"limits", &limits_}};
     device_.submit([&](const vk::raii::CommandBuffer& commands) {
       kernel_.dispatch({commands, batch, buffers}, 1);
     });
@@ -69,7 +69,7 @@ class Accumulator {
 
   Device& device_;
   render::Kernel kernel_;
-  Buffer mixed_, real_, landed_, aov_, pixels_, control_, limits_, frame_;
+  Buffer mixed_, real_, landed_, aov_, albedo_, pixels_, control_, limits_, frame_;
   std::vector<gpu::vec4> staging_;
 };
 

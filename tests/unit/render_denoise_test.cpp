@@ -1,5 +1,6 @@
 // Noise taken out of a composite: as much as its variance foretells, and nothing of what is no
 // noise.
+#include <numbers>
 #include <random>
 
 #include "tests/support/pixels_by_hand.hpp"
@@ -427,6 +428,62 @@ TEST(Denoise, ChangesNoOtherLayerAndNoUntouchedPlate) {
     EXPECT_EQ(clean.diff, raw.diff);
     EXPECT_EQ(clean.mask, raw.mask);
   }
+}
+
+// A virtual wall with stripes from dark to bright, eight pixels wide, whose one sample a pixel
+// comes from one of two panels of light. Its albedo is known, so that the light on it comes out as
+// clean as on the same wall in the stripes' mean grey. What is left is that a sample's albedo is
+// that of a point of its pixel: a stripe of period 8 and amplitude a has a slope of at most 2 pi a
+// / 8 a pixel, and on average over stripes and pixels a standard deviation of 2 pi a / 8 / sqrt(2)
+// / sqrt(12).
+TEST(Denoise, KeepsTheTextureOfAnObject) {
+  constexpr int columns = 128, rows = 96;
+  constexpr double mean_albedo = 0.5, amplitude = 0.4, period_px = 8;
+  const auto wall_with = [](bool stripes) {
+    View view;
+    scene::Texture texture;
+    texture.width = 4 * columns;
+    texture.height = 1;
+    for (int x = 0; x < texture.width; ++x) {
+      const double phase = 2 * std::numbers::pi * (x + 0.5) / 4 / period_px;
+      const double albedo = mean_albedo + (stripes ? amplitude * std::sin(phase) : 0);
+      texture.texels.emplace_back(glm::vec3(static_cast<float>(albedo)), 1.0f);
+    }
+    scene::Material paint = diffuse(glm::vec3(1));
+    paint.base_color_texture = add_texture(view.scene, texture);
+    // Two metres before a camera that sees two metres: the texture is as wide as the picture.
+    add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({2, 2})),
+                 add_material(view.scene, paint), glm::dmat4(1), scene::world_mixed);
+    for (const double side : {-1.0, 1.0}) {
+      set::Light panel = lamp(set::LightType::rectangle, glm::dvec3(2));
+      panel.position = {2 * side, 0, 3};
+      view.scene.lights.push_back(panel);
+    }
+    view.environment = uniform_environment(glm::vec3(0));
+    view.calibration = pinhole(columns, rows, 2 * std::atan(0.5));
+    view.world_from_camera = look_at({0, 0, 2}, {0, 0, 0});
+    return view;
+  };
+  const auto error_of = [](const View& view) {
+    SetRenderer renderer(view, up_to_depth(1));
+    const auto render = [&](int samples, std::uint32_t seed) {
+      renderer.begin({{}, 1.0, view.world_from_camera, seed});
+      renderer.render(samples);
+      expect_clean(renderer.counters());
+      return renderer.layers();
+    };
+    const render::Layers truth = render(1024, 9);
+    render::Layers clean = render(1, 1);
+    renderer.show(true, &clean);
+    double square = 0;
+    for (std::size_t i = 0; i < truth.composite.size(); ++i)
+      square += std::pow(clean.composite[i].g - truth.composite[i].g, 2);
+    return std::sqrt(square / columns / rows) / mean(truth.composite).g;
+  };
+  const double plain = error_of(wall_with(false));
+  const double within =
+      2 * std::numbers::pi * amplitude / period_px / std::sqrt(24.0) / mean_albedo;
+  EXPECT_LT(error_of(wall_with(true)), 1.2 * std::hypot(plain, within)) << plain << ", " << within;
 }
 
 // On rendered sets, against many samples: nearer to the truth, and with more samples nearer still.
