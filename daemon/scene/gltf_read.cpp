@@ -21,6 +21,22 @@ constexpr std::array known_extensions = {
     "KHR_materials_ior",          "KHR_materials_specular",
     "KHR_materials_transmission", "KHR_materials_volume",
     "KHR_mesh_quantization",      "KHR_texture_transform"};
+
+// What will look different where an extension of materials is ignored.
+struct Ignored {
+  std::string_view extension;
+  std::string_view difference;
+};
+constexpr std::array ignored_extensions = {
+    Ignored{"KHR_materials_diffuse_transmission",
+            "leaves, paper and lampshades are dark where light comes from behind them"},
+    Ignored{"KHR_materials_dispersion", "glass does not split light into its colours"},
+    Ignored{"KHR_materials_iridescence",
+            "soap bubbles and films of oil do not change colour with the angle of view"},
+    Ignored{"KHR_materials_pbrSpecularGlossiness",
+            "colours and gloss are those of the material without it"},
+    Ignored{"KHR_materials_unlit",
+            "what should have one colour in any light is lit like all else"}};
 constexpr int max_json_depth = 128;
 
 // Joins the lines of a tinygltf message.
@@ -127,6 +143,22 @@ std::string remedy_for(const std::string& name) {
   return "";
 }
 
+// Returns what looks different without an extension, and on which materials; "" if that is not
+// known.
+std::string difference_without(const std::string& extension, const tinygltf::Model& model) {
+  constexpr std::size_t most_named = 3;
+  std::string result, materials;
+  const auto* const known = std::ranges::find(ignored_extensions, extension, &Ignored::extension);
+  if (known != ignored_extensions.end()) result.append(": ").append(known->difference);
+  std::size_t count = 0;
+  for (const tinygltf::Material& material : model.materials) {
+    if (!material.extensions.contains(extension) || ++count > most_named) continue;
+    materials += (count > 1 ? ", \"" : "\"") + set::printable(material.name) + '"';
+  }
+  if (count > most_named) materials += " and " + std::to_string(count - most_named) + " more";
+  return count > 0 ? result + " (materials: " + materials + ")" : result;
+}
+
 void check_extensions(const tinygltf::Model& model, const std::string& file, Notes& notes) {
   const auto is_known = [](const std::string& name) {
     return std::find(known_extensions.begin(), known_extensions.end(), name) !=
@@ -138,7 +170,8 @@ void check_extensions(const tinygltf::Model& model, const std::string& file, Not
                   "\", which is not supported" + remedy_for(name));
   for (const std::string& name : model.extensionsUsed)
     if (!is_known(name))
-      notes.add("the extension \"" + set::printable(name) + "\" is not supported; ignored");
+      notes.add("the extension \"" + set::printable(name) + "\" is not supported; ignored" +
+                difference_without(name, model));
 }
 
 }  // namespace

@@ -33,9 +33,22 @@ class GltfFiles : public GltfTest {
 TEST_F(GltfFiles, RefusesRequiredExtensionsAndNotesUsedOnes) {
   gltf.root("a", gltf.triangle_mesh());
   gltf.json["extensionsUsed"] = {"KHR_materials_iridescence", "KHR_materials_ior"};
-  EXPECT_THAT(load().notes, ElementsAre((directory / "test.gltf").string() +
-                                        ": the extension \"KHR_materials_iridescence\" is not "
-                                        "supported; ignored"));
+  const std::string note = (directory / "test.gltf").string() +
+                           ": the extension \"KHR_materials_iridescence\" is not supported; "
+                           "ignored: soap bubbles and films of oil do not change colour with the "
+                           "angle of view";
+  EXPECT_THAT(load().notes, ElementsAre(note));
+  for (const char* name : {"bubble", "oil", "beetle", "shell", "peacock"})
+    gltf.add("materials",
+             {{"name", name},
+              {"extensions", {{"KHR_materials_iridescence", {{"iridescenceFactor", 1}}}}}});
+  EXPECT_THAT(load().notes,
+              ElementsAre(note + " (materials: \"bubble\", \"oil\", \"beetle\" and 2 more)"));
+  gltf.json["extensionsUsed"] = {"KHR_materials_dispersion", "KHR_materials_diffuse_transmission",
+                                 "EXT_of_someone"};
+  EXPECT_THAT(load().notes, ElementsAre(HasSubstr("glass does not split light into its colours"),
+                                        HasSubstr("lampshades are dark where light comes from"),
+                                        HasSubstr("\"EXT_of_someone\" is not supported; ignored")));
   gltf.json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
   EXPECT_EQ(error(), (directory / "test.gltf").string() +
                          ": requires the extension \"KHR_draco_mesh_compression\", which is not "
