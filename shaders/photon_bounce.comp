@@ -63,6 +63,7 @@ bool sample_dirac(Surface s, Lobes l, vec3 through, float p_mirror, float choice
     if (!sample_glass(s, fresh, wi, weight)) return false;
     if (!s.thin_walled && dot(wi, s.geometric_normal) < 0.0)
       weight = s.entering ? vec3(1.0 / (s.ior * s.ior)) : s.base_color * (s.ior * s.ior);
+    if (has_sheen(s)) l = under_sheen(s, l, wi);
     weight *= l.glass / (1.0 - p_mirror);
   }
   // The geometric normal decides how light spreads over a surface, but the interpolated one defines

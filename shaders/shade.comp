@@ -357,12 +357,14 @@ const float LEAST_MATT_ALPHA = 0.25;
 const float MOST_COAT = 0.1;
 
 bool is_matt(Surface s) {
+  if (has_sheen(s)) return false;
   if (!is_specular(s)) return true;
   if (s.metallic > 0.0 || s.transmission > 0.0 || s.alpha < LEAST_MATT_ALPHA) return false;
   if (has_feature(FEATURE_CLEARCOAT) && s.clearcoat > 0.0) return false;  // lacquer
   const vec3 to_camera = -normalize(s.position);  // the camera is the origin
   const float least_cosine = min(dot(s.normal, s.wo), dot(s.normal, to_camera));
-  return least_cosine > 0.0 && s.specular * fresnel_dielectric(least_cosine, s.ior) <= MOST_COAT;
+  vec3 color;
+  return least_cosine > 0.0 && coat_reflectance(s, least_cosine, color) <= MOST_COAT;
 }
 
 // Uses the camera's measurement at a diffuse real surface that the plate shows (shaders/README.md,

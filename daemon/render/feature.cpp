@@ -23,6 +23,11 @@ bool reflects(const Material& m, const Scene&, double) {
   return m.metallic > 0 || (opaque_part && m.specular > 0 && m.ior > 1);
 }
 
+bool has_coat_color(const Material& m, const Scene&, double) {
+  const bool opaque_part = m.metallic < 1 && m.transmission < 1;
+  return opaque_part && m.specular > 0 && m.ior > 1 && m.specular_color != glm::vec3(1);
+}
+
 bool glows(const Material& m, const Scene&, double) {
   return scene::emits(m);
 }
@@ -69,7 +74,7 @@ bool lamps_shine(const Scene& scene) {
          });
 }
 
-constexpr std::array<Feature, 24> feature_table = {{
+constexpr std::array<Feature, 27> feature_table = {{
     {.name = "two worlds",
      .bit = gpu::FEATURE_FORKS,
      .can_be_carried = true,
@@ -110,6 +115,27 @@ constexpr std::array<Feature, 24> feature_table = {{
      .in_material = reflects,
      .used = "a surface reflects: metal, or the sheen of paint or plastic",
      .left_out = "every surface is matt"},
+    {.name = "coloured gloss",
+     .bit = gpu::FEATURE_COAT_COLOR,
+     .can_be_carried = true,
+     .in_material = has_coat_color,
+     .used = "paint or plastic reflects in a colour of its own",
+     .left_out = "paint and plastic reflect all colours alike"},
+    {.name = "brushed metal",
+     .bit = gpu::FEATURE_ANISOTROPY,
+     .can_be_carried = true,
+     .in_material =
+         [](const Material& m, const Scene& scene, double alpha) {
+           return scene::is_anisotropic(m) && reflects(m, scene, alpha);
+         },
+     .used = "a surface draws highlights out in one direction, as brushed metal does",
+     .left_out = "no surface draws highlights out in one direction"},
+    {.name = "cloth",
+     .bit = gpu::FEATURE_SHEEN,
+     .can_be_carried = true,
+     .in_material = [](const Material& m, const Scene&, double) { return scene::has_sheen(m); },
+     .used = "a surface has the soft shine of cloth where it is seen from the side",
+     .left_out = "no surface shines as cloth does"},
     {.name = "lacquer",
      .bit = gpu::FEATURE_CLEARCOAT,
      .can_be_carried = true,
@@ -131,8 +157,8 @@ constexpr std::array<Feature, 24> feature_table = {{
      .can_be_carried = true,
      .in_material =
          [](const Material& m, const Scene& scene, double alpha) {
-           return m.thin_walled && m.clearcoat <= 0 && scene::transmits(m) &&
-                  scene::can_be_dirac(scene, m, alpha);
+           return m.thin_walled && m.clearcoat <= 0 && !scene::has_sheen(m) &&
+                  scene::transmits(m) && scene::can_be_dirac(scene, m, alpha);
          },
      .used = "light goes straight through thin panes of smooth glass",
      .left_out = "no object is a thin pane of smooth glass"},

@@ -8,6 +8,7 @@
 #include <glm/gtc/packing.hpp>
 #include <map>
 #include <numbers>
+#include <tuple>
 #include <utility>
 
 #include "daemon/render/albedo_table.hpp"
@@ -36,30 +37,56 @@ double environment_share(double environment_power, double light_power) {
   return std::clamp(environment_power / (environment_power + light_power), 0.1, 0.9);
 }
 
-// Concatenates the albedo tables: reflection's first, if anything is rough, then those of each
-// glass.
+// Concatenates the albedo tables: reflection's first, if anything is rough or has sheen, then that
+// of sheen, then those of each glass and of each anisotropic metal.
 struct AlbedoTables {
   std::vector<float> values{1};  // a placeholder that no shader reads
   std::map<float, std::uint32_t> of_ior;
+  // By strength, roughness, and whether a texture makes it smoother.
+  std::map<std::tuple<float, float, bool>, std::uint32_t> of_anisotropy;
+
+  explicit AlbedoTables(bool has_sheen) {
+    if (!has_sheen) return;
+    values = reflection_albedo();
+    add(sheen_albedo());
+  }
 
   std::uint32_t first_of(const scene::Material& m, double specular_alpha) {
-    const double alpha = static_cast<double>(m.roughness) * m.roughness;
     const bool glass = scene::transmits(m);
-    if (alpha <= specular_alpha || !(glass || m.metallic > 0)) return 0;
+    // The shader's sum is in floats.
+    const bool is_mirror = scene::widest_alpha(m, m.roughness) <= specular_alpha * (1 - 1e-5);
+    if (is_mirror || !(glass || m.metallic > 0)) return 0;
     if (values.size() == 1) values = reflection_albedo();
+    if (scene::is_anisotropic(m)) return first_of_anisotropy(m);
     if (!glass || m.thin_walled || m.ior < gpu::LEAST_ROUGH_IOR) return 0;
-    constexpr std::size_t table_size = std::size_t{gpu::ALBEDO_SIDE} * gpu::ALBEDO_SIDE;
-    const auto [at, is_new] =
-        of_ior.try_emplace(m.ior, static_cast<std::uint32_t>(values.size() / table_size));
-    if (is_new) {
-      for (const double eta : {1.0 * m.ior, 1.0 / m.ior}) {
-        const AlbedoTable table = refraction_albedo(eta);
-        values.insert(values.end(), table.begin(), table.end());
-      }
-    }
+    const auto [at, is_new] = of_ior.try_emplace(m.ior, next());
+    if (is_new)
+      for (const double eta : {1.0 * m.ior, 1.0 / m.ior}) add(refraction_albedo(eta));
     return at->second;
   }
+
+ private:
+  std::uint32_t first_of_anisotropy(const scene::Material& m) {
+    const bool varies = m.metallic_roughness_texture != scene::no_texture;
+    const auto [at, is_new] =
+        of_anisotropy.try_emplace({m.anisotropy, m.roughness, varies}, next());
+    if (is_new) add(anisotropic_albedo(m.anisotropy, varies ? 0.0 : m.roughness, m.roughness));
+    return at->second;
+  }
+
+  std::uint32_t next() const {
+    constexpr std::size_t table_size = std::size_t{gpu::ALBEDO_SIDE} * gpu::ALBEDO_SIDE;
+    return static_cast<std::uint32_t>(values.size() / table_size);
+  }
+  void add(const AlbedoTable& tables) { values.insert(values.end(), tables.begin(), tables.end()); }
 };
+
+// Returns the direction of an anisotropy times its strength, as the shaders want it.
+glm::vec2 anisotropy_of(const scene::Material& m) {
+  if (!scene::is_anisotropic(m)) return glm::vec2(0);
+  return m.anisotropy *
+         glm::vec2(std::cos(m.anisotropy_rotation_rad), std::sin(m.anisotropy_rotation_rad));
+}
 
 // A path has so many bits to say which medium it is in.
 void check_medium(const scene::Material& material, std::size_t index) {
@@ -178,7 +205,7 @@ void GpuScene::check_deforming() const {
 
 void GpuScene::upload_materials(double specular_alpha) {
   std::vector<gpu::GpuMaterial> materials;
-  AlbedoTables albedo;
+  AlbedoTables albedo(std::ranges::any_of(scene_.materials, scene::has_sheen));
   for (const scene::Material& m : scene_.materials) {
     check_medium(m, materials.size());
     materials.push_back({.base_color = m.base_color,
@@ -200,7 +227,11 @@ void GpuScene::upload_materials(double specular_alpha) {
                          .albedo_table = albedo.first_of(m, specular_alpha),
                          .attenuation = scene::attenuation_per_m(m),
                          .clearcoat = m.clearcoat,
-                         .clearcoat_roughness = m.clearcoat_roughness});
+                         .clearcoat_roughness = m.clearcoat_roughness,
+                         .sheen_color = m.sheen_color,
+                         .sheen_roughness = std::max(m.sheen_roughness, gpu::LEAST_SHEEN_ROUGHNESS),
+                         .anisotropy = anisotropy_of(m),
+                         .specular_color = m.specular_color});
   }
   upload_storage(device_, materials_, materials);
   upload_texels(device_, albedo_, albedo.values, vk::Format::eR32Sfloat);

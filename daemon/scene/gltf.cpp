@@ -181,6 +181,9 @@ bool GltfFile::Loader::add_primitive(const tinygltf::Primitive& primitive, const
   if (material.is_textured && source.uvs < 0)
     notes.add(what + ": has no TEXCOORD_" + std::to_string(material.mapping.set) +
               " for its textures; they are read at (0, 0)");
+  if (is_anisotropic(scene.materials[material.index]) && source.uvs < 0)
+    notes.add(what + ": has no TEXCOORD_" + std::to_string(material.mapping.set) +
+              " that says which way its anisotropy runs; any way is taken");
   const auto index = static_cast<std::uint32_t>(scene.instances.size());
   const auto mesh = is_skinned || !source.targets.empty()
                         ? add_deformed(primitive, source, name + suffix, what, use.deforms)

@@ -1,5 +1,6 @@
 #include "daemon/scene/gltf_material.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -8,6 +9,7 @@
 #include "daemon/scene/gltf_value.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
+#include "shaders/lib/render_shared.h"
 
 namespace previz::scene {
 namespace {
@@ -122,9 +124,11 @@ void GltfMaterials::read_extensions(const tinygltf::Material& given, const std::
   const tinygltf::Value specular = extension(given.extensions, "KHR_materials_specular");
   material.specular =
       within(number(specular, "specularFactor", 1), 0, 1, what + ": specularFactor", notes_);
-  if (numbers(specular, "specularColorFactor", {1, 1, 1}) != std::vector<double>{1, 1, 1} ||
-      specular.Has("specularTexture") || specular.Has("specularColorTexture"))
-    notes_.add(what + ": only specularFactor of KHR_materials_specular is used");
+  material.specular_color =
+      color_within(numbers(specular, "specularColorFactor", {1, 1, 1}),
+                   std::numeric_limits<float>::max(), what + ": specularColorFactor", notes_);
+  if (specular.Has("specularTexture") || specular.Has("specularColorTexture"))
+    notes_.add(what + ": the textures of KHR_materials_specular are not supported; left out");
 
   const tinygltf::Value transmission = extension(given.extensions, "KHR_materials_transmission");
   material.transmission = within(number(transmission, "transmissionFactor", 0), 0, 1,
@@ -142,6 +146,11 @@ void GltfMaterials::read_extensions(const tinygltf::Material& given, const std::
   else if (distance_m <= 0)
     notes_.add(what + ": attenuationDistance must be greater than 0; taken as infinite");
 
+  read_sheen(given, what, material);
+  read_anisotropy(given, what, material);
+  if (material.transmission > 0 && material.specular_color != glm::vec3(1))
+    notes_.add(what + ": specularColorFactor does not colour the reflection of glass");
+
   const tinygltf::Value lacquer = extension(given.extensions, "KHR_materials_clearcoat");
   material.clearcoat =
       within(number(lacquer, "clearcoatFactor", 0), 0, 1, what + ": clearcoatFactor", notes_);
@@ -153,6 +162,35 @@ void GltfMaterials::read_extensions(const tinygltf::Material& given, const std::
     notes_.add(what + ": the textures of its clear coat are not supported; left out");
   if (material.clearcoat > 0 && given.normalTexture.index >= 0)
     notes_.add(what + ": its clear coat follows its normal texture");
+}
+
+void GltfMaterials::read_sheen(const tinygltf::Material& given, const std::string& what,
+                               Material& material) {
+  const tinygltf::Value sheen = extension(given.extensions, "KHR_materials_sheen");
+  material.sheen_color = color_within(numbers(sheen, "sheenColorFactor", {0, 0, 0}), 1,
+                                      what + ": sheenColorFactor", notes_);
+  const float roughness = within(number(sheen, "sheenRoughnessFactor", 0), 0, 1,
+                                 what + ": sheenRoughnessFactor", notes_);
+  material.sheen_roughness = std::max(roughness, gpu::LEAST_SHEEN_ROUGHNESS);
+  if (!has_sheen(material)) return;
+  if (roughness < material.sheen_roughness)
+    notes_.add(what + ": its sheenRoughnessFactor is taken as 0.07, the least that is supported");
+  if (sheen.Has("sheenColorTexture") || sheen.Has("sheenRoughnessTexture"))
+    notes_.add(what + ": the textures of its sheen are not supported; left out");
+}
+
+void GltfMaterials::read_anisotropy(const tinygltf::Material& given, const std::string& what,
+                                    Material& material) {
+  const tinygltf::Value anisotropy = extension(given.extensions, "KHR_materials_anisotropy");
+  material.anisotropy = within(number(anisotropy, "anisotropyStrength", 0), 0, 1,
+                               what + ": anisotropyStrength", notes_);
+  material.anisotropy_rotation_rad = within(number(anisotropy, "anisotropyRotation", 0), -1e3, 1e3,
+                                            what + ": anisotropyRotation", notes_);
+  if (material.anisotropy <= 0) return;
+  if (anisotropy.Has("anisotropyTexture"))
+    notes_.add(what + ": the texture of its anisotropy is not supported; left out");
+  if (!is_anisotropic(material))
+    notes_.add(what + ": as it lets light through, its anisotropy is left out");
 }
 
 }  // namespace previz::scene

@@ -43,6 +43,9 @@ class GltfMaterials {
   UsedMaterial read(const tinygltf::Material& given, const std::string& what);
   void read_extensions(const tinygltf::Material& given, const std::string& what,
                        Material& material);
+  void read_sheen(const tinygltf::Material& given, const std::string& what, Material& material);
+  void read_anisotropy(const tinygltf::Material& given, const std::string& what,
+                       Material& material);
 
   const tinygltf::Model& model_;
   std::string file_;

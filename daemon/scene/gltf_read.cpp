@@ -15,12 +15,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array known_extensions = {
-    "EXT_mesh_gpu_instancing",    "KHR_lights_punctual",
-    "KHR_materials_clearcoat",    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",          "KHR_materials_specular",
-    "KHR_materials_transmission", "KHR_materials_volume",
-    "KHR_mesh_quantization",      "KHR_texture_transform"};
+constexpr std::array known_extensions = {"EXT_mesh_gpu_instancing",
+                                         "KHR_lights_punctual",
+                                         "KHR_materials_anisotropy",
+                                         "KHR_materials_clearcoat",
+                                         "KHR_materials_emissive_strength",
+                                         "KHR_materials_ior",
+                                         "KHR_materials_sheen",
+                                         "KHR_materials_specular",
+                                         "KHR_materials_transmission",
+                                         "KHR_materials_volume",
+                                         "KHR_mesh_quantization",
+                                         "KHR_texture_transform"};
 
 // What will look different where an extension of materials is ignored.
 struct Ignored {

@@ -98,6 +98,21 @@ glm::vec3 attenuation_per_m(const Material& m) {
   return result;
 }
 
+bool has_sheen(const Material& m) {
+  return m.sheen_color.r > 0 || m.sheen_color.g > 0 || m.sheen_color.b > 0;
+}
+
+bool is_anisotropic(const Material& m) {
+  return m.anisotropy > 0 && m.transmission <= 0;
+}
+
+double widest_alpha(const Material& m, double roughness) {
+  const double alpha = roughness * roughness;
+  if (!is_anisotropic(m)) return alpha;
+  const double strength = m.anisotropy;
+  return std::max<double>(std::lerp(alpha, 1.0, strength * strength), gpu::LEAST_ANISOTROPIC_ALPHA);
+}
+
 bool can_be_dirac(const Scene& scene, const Material& m, double specular_alpha) {
   const bool glass = transmits(m);
   if (glass && m.ior < gpu::LEAST_ROUGH_IOR) return true;
@@ -106,7 +121,8 @@ bool can_be_dirac(const Scene& scene, const Material& m, double specular_alpha) 
   if (!glass && !(m.metallic > 0) && !(m.specular > 0 && m.ior > 1)) return false;
   const double roughness =
       m.roughness * least_roughness_factor(scene, m.metallic_roughness_texture);
-  return roughness * roughness <= specular_alpha * (1 + 1e-5);  // the shader's sum is in floats
+  // The shader's sum is in floats.
+  return widest_alpha(m, roughness) <= specular_alpha * (1 + 1e-5);
 }
 
 Size size_of(const Scene& scene) {

@@ -67,6 +67,9 @@ struct Material {
   float metallic = 0;       // 0..1
   float roughness = 1;      // perceptual, 0..1; alpha = roughness^2
   float specular = 1;       // KHR_materials_specular.specularFactor, 0..1
+  // KHR_materials_specular.specularColorFactor, >= 0: factor of the reflectance at normal incidence
+  // of paint and plastic
+  glm::vec3 specular_color{1};
   float ior = 1.5f;         // KHR_materials_ior, >= 1
   float transmission = 0;   // KHR_materials_transmission, 0..1
   bool thin_walled = true;  // false where KHR_materials_volume gives a thickness > 0
@@ -82,6 +85,12 @@ struct Material {
   float attenuation_distance_m = std::numeric_limits<float>::infinity();
   float clearcoat = 0;            // KHR_materials_clearcoat, 0..1: lacquer above all else
   float clearcoat_roughness = 0;  // perceptual, 0..1
+  glm::vec3 sheen_color{0};       // KHR_materials_sheen, 0..1: fibres of cloth above the rest
+  float sheen_roughness = 0;      // perceptual, 0..1
+  // KHR_materials_anisotropy: the strength, 0..1, with which reflections are widened along the
+  // texture's +X, and by how much that direction is turned towards its +Y.
+  float anisotropy = 0;
+  float anisotropy_rotation_rad = 0;
   std::uint32_t normal_texture = no_texture;  // tangent space, +Y up, along the uvs
   float normal_scale = 1;
 };
@@ -154,6 +163,16 @@ bool attenuates(const Material& material);
 // Returns how much of each channel the inside takes away per metre: exp(-result * metres) is left.
 // The result is 0 where nothing is taken away or nothing gets in.
 glm::vec3 attenuation_per_m(const Material& material);
+
+bool has_sheen(const Material& material);
+
+// Returns whether reflections are wider along one direction. What lets light through is left as it
+// is, rough glass in all directions alike.
+bool is_anisotropic(const Material& material);
+
+// Returns the GGX alpha of reflections at this roughness, in the direction in which they are
+// widest.
+double widest_alpha(const Material& material, double roughness);
 
 // Returns whether light can leave a surface of this material without blur: clear glass, and metal,
 // glass, a coat or lacquer whose GGX alpha is somewhere at or below `specular_alpha`

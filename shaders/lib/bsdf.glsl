@@ -1,15 +1,13 @@
-// Scattering at a surface: Lambert, GGX reflection (dielectric coat and conductor) and glass. The
-// definitions are in tests/truth/README.md, "The model of the reference tracer", which an
-// independent CPU tracer follows as well.
+// Scattering at a surface: Lambert, GGX reflection (dielectric coat and conductor), glass, sheen
+// and lacquer. The definitions are in tests/truth/README.md, "The model of the reference tracer",
+// which an independent CPU tracer follows as well.
 #ifndef PREVIZ_BSDF_GLSL
 #define PREVIZ_BSDF_GLSL
 
+#include "shaders/lib/albedo_table.glsl"
 #include "shaders/lib/sampler.glsl"
 #include "shaders/lib/scene.glsl"
-
-// R32F, tables of ALBEDO_SIDE^2 (daemon/render/albedo_table.hpp): the reflection's, then for each
-// rough glass one seen from outside and one from inside.
-uniform textureBuffer albedo;
+#include "shaders/lib/sheen.glsl"
 
 float luminance(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
 
@@ -31,16 +29,6 @@ vec3 fresnel_schlick(vec3 f0, float cos_i) {
   return f0 + (vec3(1.0) - f0) * (m2 * m2 * m);
 }
 
-// Returns an orthonormal basis whose third vector is n (Duff et al. 2017, "Building an Orthonormal
-// Basis, Revisited").
-mat3 make_frame(vec3 n) {
-  const float side = n.z >= 0.0 ? 1.0 : -1.0;
-  const float a = -1.0 / (side + n.z);
-  const float b = n.x * n.y * a;
-  return mat3(vec3(1.0 + side * n.x * n.x * a, side * b, -side * n.x),
-              vec3(b, side + n.y * n.y * a, -n.y), n);
-}
-
 // Returns a uniformly distributed point of the unit disc.
 vec2 sample_disc(vec2 u) {
   const float r = sqrt(u.x);
@@ -52,6 +40,13 @@ vec2 sample_disc(vec2 u) {
 vec3 sample_cosine(vec2 u) {
   const vec2 d = sample_disc(u);
   return vec3(d, sqrt(max(0.0, 1.0 - u.x)));
+}
+
+// Returns a direction around +z with the density 1 / (2 pi).
+vec3 sample_hemisphere(vec2 u) {
+  const float r = sqrt(max(0.0, 1.0 - u.x * u.x));
+  const float phi = 2.0 * PI * u.y;
+  return vec3(r * cos(phi), r * sin(phi), u.x);
 }
 
 // The GGX density of half vectors (Walter et al. 2007), in the local frame whose z is the normal.
@@ -67,9 +62,20 @@ float ggx_lambda(vec3 w, float alpha) {
   return 0.5 * (sqrt(1.0 + alpha * alpha * tan2) - 1.0);
 }
 
+// The same for widths along x and y that differ (Heitz 2014, "Anisotropy").
+float ggx_density(vec3 h, vec2 alpha) {
+  const vec2 slope = h.xy / alpha;
+  const float d = dot(slope, slope) + h.z * h.z;
+  return 1.0 / (PI * alpha.x * alpha.y * d * d);
+}
+float ggx_lambda(vec3 w, vec2 alpha) {
+  const vec2 stretched = w.xy * alpha;
+  return 0.5 * (sqrt(1.0 + dot(stretched, stretched) / (w.z * w.z)) - 1.0);
+}
+
 // Returns a half vector distributed as the visible normals are (Dupuy and Benyoub 2023, "Sampling
 // Visible GGX Normals with Spherical Caps").
-vec3 sample_ggx(vec3 wo, float alpha, vec2 u) {
+vec3 sample_ggx(vec3 wo, vec2 alpha, vec2 u) {
   const vec3 stretched = normalize(vec3(wo.xy * alpha, wo.z));
   const float phi = 2.0 * PI * u.x;
   const float z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
@@ -78,33 +84,22 @@ vec3 sample_ggx(vec3 wo, float alpha, vec2 u) {
   return normalize(vec3(cap.xy * alpha, cap.z));
 }
 
-// Returns the share of light that single scattering reflects, seen under this cosine. The table is
-// interpolated bilinearly (daemon/render/albedo_table.hpp).
-float single_scatter_albedo(uint table, float cos_o, float alpha) {
-  const float last = float(ALBEDO_SIDE - 1u);
-  const vec2 at = sqrt(clamp(vec2(cos_o, alpha), vec2(0.0), vec2(1.0))) * last;
-  const vec2 low = min(floor(at), vec2(last - 1.0));
-  const vec2 f = at - low;
-  const int first = int(table * ALBEDO_SIDE * ALBEDO_SIDE + uint(low.y) * ALBEDO_SIDE + uint(low.x));
-  const int side = int(ALBEDO_SIDE);
-  const float below =
-      mix(texelFetch(albedo, first).r, texelFetch(albedo, first + 1).r, f.x);
-  const float above =
-      mix(texelFetch(albedo, first + side).r, texelFetch(albedo, first + side + 1).r, f.x);
-  return mix(below, above, f.y);
-}
+vec3 sample_ggx(vec3 wo, float alpha, vec2 u) { return sample_ggx(wo, vec2(alpha), u); }
 
 // The lobes of a surface seen from wo: their weights, and the probability of sampling each.
 struct Lobes {
   vec3 diffuse;         // albedo
-  float coat;           // weight of the white dielectric reflection
+  float coat;           // weight of the dielectric reflection, in its strongest channel
+  vec3 coat_color;      // the channels' share of it
   vec3 conductor;       // reflectance at normal incidence times its weight
   float conductor_weight;
   vec3 conductor_gain;  // returns the energy that single scattering loses
   float glass;
   float glass_gain;
+  vec3 sheen;           // weight of the fibres' reflection
+  float below_sheen;    // what fibres on the viewer's side leave for the lobes below them
   float clear;          // weight of the reflection of a coat of lacquer above all else
-  float p_diffuse, p_reflection, p_glass, p_clear;
+  float p_diffuse, p_reflection, p_glass, p_sheen, p_clear;
   bool smooth_reflection;  // the reflection is a Dirac delta
   bool smooth_glass;
   bool smooth_clear;
@@ -116,8 +111,10 @@ bool has_rough_glass(Lobes l) { return l.p_glass > 0.0 && !l.smooth_glass; }
 bool has_rough_clear(Lobes l) {
   return has_feature(FEATURE_CLEARCOAT) && l.p_clear > 0.0 && !l.smooth_clear;
 }
+bool has_sheen(Lobes l) { return has_feature(FEATURE_SHEEN) && l.p_sheen > 0.0; }
 bool is_rough(Lobes l) {
-  return l.p_diffuse > 0.0 || has_rough_reflection(l) || has_rough_glass(l) || has_rough_clear(l);
+  return l.p_diffuse > 0.0 || has_rough_reflection(l) || has_rough_glass(l) || has_sheen(l) ||
+         has_rough_clear(l);
 }
 
 // Lacquer has this index of refraction (KHR_materials_clearcoat).
@@ -132,12 +129,38 @@ float lacquer_reflectance(Surface s, float cos_o) {
   return fresnel_dielectric(cos_o, CLEARCOAT_IOR);
 }
 
+// Returns the reflectance of a coat of paint or plastic in its strongest channel, and in `color`
+// that of every channel over it. The colour is a factor at normal incidence
+// (KHR_materials_specular) and fades towards grazing, as Fresnel's reflectance departs from that at
+// normal incidence.
+float coat_reflectance(Surface s, float cos_o, out vec3 color) {
+  const float white = fresnel_dielectric(cos_o, s.ior);
+  color = vec3(1.0);
+  if (!has_coat_color(s)) return s.specular * white;
+  const float root = (s.ior - 1.0) / (s.ior + 1.0);
+  const float f0 = root * root;
+  const float towards_white = max((white - f0) / (1.0 - f0), 0.0);
+  const vec3 colored = mix(min(f0 * s.specular_color, vec3(1.0)), vec3(1.0), towards_white);
+  const float strongest = max(max(colored.r, colored.g), colored.b);
+  if (strongest > 0.0) color = colored / strongest;
+  return s.specular * strongest;
+}
+
+// Returns the share of light that the reflection of a conductor with the reflectance 1 keeps, seen
+// from wo.
+float reflection_albedo(Surface s, float cos_o) {
+  if (!is_anisotropic(s)) return single_scatter_albedo(0u, cos_o, s.alpha);
+  const vec2 across = vec2(dot(s.tangent, s.wo), dot(cross(s.normal, s.tangent), s.wo));
+  return anisotropic_albedo(s.albedo_table, across, cos_o, s.alpha);
+}
+
 // The p_* sum to 1, in proportion to the lobes' luminance, or are all 0 on a black surface.
 Lobes make_lobes(Surface s) {
   Lobes l;
   const float nv = abs(dot(s.normal, s.wo));
   const float opaque = (1.0 - s.metallic) * (1.0 - s.transmission);
   l.coat = 0.0;
+  l.coat_color = vec3(1.0);
   l.conductor = vec3(0.0);
   l.conductor_weight = 0.0;
   l.conductor_gain = vec3(1.0);
@@ -146,15 +169,16 @@ Lobes make_lobes(Surface s) {
   l.glass_gain = 1.0;
   float reflection = 0.0;
   if (has_feature(FEATURE_GLOSSY)) {
-    if (opaque > 0.0 && s.specular > 0.0) l.coat = s.specular * fresnel_dielectric(nv, s.ior);
+    if (opaque > 0.0 && s.specular > 0.0) l.coat = coat_reflectance(s, nv, l.coat_color);
     l.conductor_weight = s.metallic;
     l.conductor = s.base_color;
-    l.smooth_reflection = s.alpha <= frame.specular_alpha;
+    l.smooth_reflection = s.tangent_alpha <= frame.specular_alpha;
     reflection = opaque * l.coat;
+    if (has_coat_color(s)) reflection *= luminance(l.coat_color);
     if (s.metallic > 0.0) {
       reflection += s.metallic * luminance(fresnel_schlick(s.base_color, nv));
       if (!l.smooth_reflection)
-        l.conductor_gain += s.base_color * (1.0 / single_scatter_albedo(0u, nv, s.alpha) - 1.0);
+        l.conductor_gain += s.base_color * (1.0 / reflection_albedo(s, nv) - 1.0);
     }
   }
   l.diffuse = opaque * (1.0 - l.coat) * s.base_color;
@@ -164,6 +188,16 @@ Lobes make_lobes(Surface s) {
     l.smooth_glass = s.alpha <= frame.specular_alpha || s.ior < LEAST_ROUGH_IOR;
     const uint table = s.thin_walled ? 0u : s.albedo_table + (s.entering ? 0u : 1u);
     if (!l.smooth_glass) l.glass_gain = 1.0 / single_scatter_albedo(table, nv, s.alpha);
+  }
+  l.sheen = vec3(0.0);
+  l.below_sheen = 1.0;
+  float sheen = 0.0;
+  if (has_sheen_towards(s, s.wo)) {
+    l.below_sheen = left_by_sheen(s, s.wo);
+    const float share = sheen_albedo(s, nv);
+    // Behind the plane of the shading normal only Lambert's lobe is left.
+    if (dot(s.normal, s.wo) > 0.0) l.sheen = s.sheen_color / max(share, 1.0);
+    sheen = luminance(l.sheen) * share;
   }
   l.clear = 0.0;
   l.smooth_clear = false;
@@ -176,29 +210,38 @@ Lobes make_lobes(Surface s) {
     l.coat *= below;
     l.conductor_weight *= below;
     l.glass *= below;
+    l.sheen *= below;
+    sheen *= below;
     reflection *= below;
   }
   const float diffuse = luminance(l.diffuse);
-  float total = diffuse + reflection + l.glass;
+  float base = diffuse + reflection + l.glass;
+  if (has_feature(FEATURE_SHEEN)) base *= l.below_sheen;
+  float total = base;
+  if (has_feature(FEATURE_SHEEN)) total += sheen;
   if (has_feature(FEATURE_CLEARCOAT)) total += l.clear;
   const float scale = total > 0.0 ? 1.0 / total : 0.0;
+  const float base_scale = has_feature(FEATURE_SHEEN) ? l.below_sheen * scale : scale;
   l.p_clear = l.clear * scale;
-  l.p_diffuse = diffuse * scale;
-  l.p_reflection = reflection * scale;
-  l.p_glass = l.glass * scale;
+  l.p_sheen = sheen * scale;
+  l.p_diffuse = diffuse * base_scale;
+  l.p_reflection = reflection * base_scale;
+  l.p_glass = l.glass * base_scale;
   return l;
 }
 
 // Returns the colour of the reflection, coat and conductor together, for this cosine between the
 // half vector and the light.
 vec3 reflection_color(Lobes l, float cos_half) {
-  return vec3(l.coat) +
+  const vec3 coat = has_feature(FEATURE_COAT_COLOR) ? l.coat * l.coat_color : vec3(l.coat);
+  return coat +
          l.conductor_weight * l.conductor_gain * fresnel_schlick(l.conductor, cos_half);
 }
 
 // Returns the colour of all reflections that are Dirac deltas.
 vec3 mirror_color(Lobes l, float cos_o) {
-  const vec3 color = l.smooth_reflection ? reflection_color(l, cos_o) : vec3(0.0);
+  vec3 color = l.smooth_reflection ? reflection_color(l, cos_o) : vec3(0.0);
+  if (has_feature(FEATURE_SHEEN)) color *= l.below_sheen;
   return has_feature(FEATURE_CLEARCOAT) && l.smooth_clear ? color + l.clear : color;
 }
 
@@ -249,6 +292,20 @@ void add_transmission(Surface s, Lobes l, vec3 o, vec3 i, inout vec3 value, inou
   pdf += l.p_glass * density / (1.0 + lambda_o);
 }
 
+// The local frame of the lobes: an anisotropic reflection is wider along its x.
+mat3 lobe_frame(Surface s) {
+  if (!is_anisotropic(s)) return make_frame(s.normal);
+  return mat3(s.tangent, cross(s.normal, s.tangent), s.normal);
+}
+vec2 lobe_widths(Surface s) { return vec2(s.tangent_alpha, s.alpha); }
+
+float reflection_density(Surface s, vec3 h) {
+  return is_anisotropic(s) ? ggx_density(h, lobe_widths(s)) : ggx_density(h, s.alpha);
+}
+float reflection_lambda(Surface s, vec3 w) {
+  return is_anisotropic(s) ? ggx_lambda(w, lobe_widths(s)) : ggx_lambda(w, s.alpha);
+}
+
 // Adds f * cos and the density of the rough reflection of coat, conductor and glass together.
 void add_reflection(Surface s, Lobes l, vec3 o, vec3 i, inout vec3 value, inout float pdf) {
   const vec3 h = normalize(o + i);
@@ -264,10 +321,27 @@ void add_reflection(Surface s, Lobes l, vec3 o, vec3 i, inout vec3 value, inout 
     color += l.glass * l.glass_gain * reflectance;
     probability += l.p_glass * reflectance;
   }
-  const float density = ggx_density(h, s.alpha) / (4.0 * o.z);
-  const float lambda_o = ggx_lambda(o, s.alpha);
-  value += color * (density / (1.0 + lambda_o + ggx_lambda(i, s.alpha)));
+  const float density = reflection_density(s, h) / (4.0 * o.z);
+  const float lambda_o = reflection_lambda(s, o);
+  value += color * (density / (1.0 + lambda_o + reflection_lambda(s, i)));
   pdf += probability * density / (1.0 + lambda_o);
+}
+
+// Adds f * cos and the density of sheen.
+void add_sheen(Surface s, Lobes l, vec3 wi, inout vec3 value, inout float pdf) {
+  value += l.sheen * (sheen_value(s, wi) / max(sheen_albedo(s, dot(wi, s.normal)), 1.0));
+  pdf += l.p_sheen / (2.0 * PI);
+}
+
+// Returns the lobes with what sheen leaves of them for light from wi. Both directions count alike,
+// so that photons lose what paths lose.
+Lobes under_sheen(Surface s, Lobes l, vec3 wi) {
+  const float left = min(l.below_sheen, left_by_sheen(s, wi));
+  l.diffuse *= left;
+  l.coat *= left;
+  l.conductor_weight *= left;
+  l.glass *= left;
+  return l;
 }
 
 // Adds f * cos and the density of rough lacquer.
@@ -285,15 +359,17 @@ vec3 bsdf_evaluate(Surface s, Lobes l, vec3 wi, out float pdf) {
   pdf = 0.0;
   vec3 value = vec3(0.0);
   const bool reflects = reflects_to(s, wi);
+  if (has_sheen(s)) l = under_sheen(s, l, wi);
   if (reflects) {
     const float cos_i = dot(wi, s.normal);
     value = l.diffuse * (cos_i / PI);
     pdf = l.p_diffuse * (cos_i / PI);
   }
+  if (reflects && has_sheen(l)) add_sheen(s, l, wi, value, pdf);
   const bool glass = has_feature(FEATURE_TRANSMISSION) && has_rough_glass(l);
   const bool base = glass || (has_feature(FEATURE_GLOSSY) && has_rough_reflection(l));
   if (!base && !has_rough_clear(l)) return value;
-  const mat3 local = make_frame(s.normal);
+  const mat3 local = lobe_frame(s);
   const vec3 o = s.wo * local;
   if (o.z <= 0.0) return value;
   if (reflects && has_rough_clear(l)) add_clearcoat(s, l, o, wi * local, value, pdf);
@@ -356,6 +432,9 @@ bool bsdf_sample(Surface s, Lobes l, vec2 u, float choice, out vec3 wi, out vec3
   weight = vec3(0.0);
   if (choose(u.x, l.p_diffuse)) {
     wi = make_frame(s.normal) * sample_cosine(u);
+  } else if (has_sheen(l) &&
+             choose(u.x, l.p_sheen / (l.p_sheen + l.p_clear + l.p_glass + l.p_reflection))) {
+    wi = make_frame(s.normal) * sample_hemisphere(u);
   } else if (has_feature(FEATURE_CLEARCOAT) && l.p_clear > 0.0 &&
              choose(u.x, l.p_clear / (l.p_clear + l.p_glass + l.p_reflection))) {
     const float cos_o = dot(s.normal, s.wo);
@@ -373,6 +452,7 @@ bool bsdf_sample(Surface s, Lobes l, vec2 u, float choice, out vec3 wi, out vec3
              choose(u.x, l.p_glass / (l.p_glass + l.p_reflection))) {
     if (l.smooth_glass) {
       if (!sample_glass(s, u.x, wi, weight)) return false;
+      if (has_sheen(s)) l = under_sheen(s, l, wi);
       weight *= l.glass / l.p_glass;
       return true;
     }
@@ -383,11 +463,12 @@ bool bsdf_sample(Surface s, Lobes l, vec2 u, float choice, out vec3 wi, out vec3
     if (l.smooth_reflection) {
       wi = 2.0 * cos_o * s.normal - s.wo;
       weight = reflection_color(l, cos_o) / l.p_reflection;
+      if (has_feature(FEATURE_SHEEN)) weight *= l.below_sheen;
       return reflects_to(s, wi);
     }
-    const mat3 local = make_frame(s.normal);
+    const mat3 local = lobe_frame(s);
     const vec3 o = s.wo * local;
-    const vec3 h = sample_ggx(o, s.alpha, u);
+    const vec3 h = sample_ggx(o, lobe_widths(s), u);
     wi = local * (2.0 * dot(o, h) * h - o);
   } else {
     return false;

@@ -30,8 +30,8 @@ bool may_be_pane(uint material) {
 vec3 pane_transmittance(Surface s) {
   const bool smooth_wall = s.alpha <= frame.specular_alpha || s.ior < LEAST_ROUGH_IOR;
   const float cos_o = dot(s.normal, s.wo);
-  const bool lacquered = has_feature(FEATURE_CLEARCOAT) && s.clearcoat > 0.0;
-  if (!s.thin_walled || !smooth_wall || lacquered || cos_o <= 0.0) return vec3(0.0);
+  const bool coated = (has_feature(FEATURE_CLEARCOAT) && s.clearcoat > 0.0) || has_sheen(s);
+  if (!s.thin_walled || !smooth_wall || coated || cos_o <= 0.0) return vec3(0.0);
   const float glass = (1.0 - s.metallic) * s.transmission;
   return clamp(glass * (1.0 - glass_reflectance(s, cos_o)) * s.base_color, 0.0, 1.0);
 }

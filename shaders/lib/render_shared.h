@@ -12,6 +12,14 @@ namespace previz::gpu {
 
 // A table of daemon/render/albedo_table.hpp has this many texels on each side.
 PREVIZ_CONST uint ALBEDO_SIDE = 32u;
+// The place of sheen's table among them, where any surface has sheen.
+PREVIZ_CONST uint ALBEDO_SHEEN = 1u;
+// An anisotropic reflection has so many tables, each for another azimuth of the viewer.
+PREVIZ_CONST uint ANISOTROPIC_TABLES = 9u;
+// The lobe of smoother sheen is narrower than its table resolves.
+PREVIZ_CONST float LEAST_SHEEN_ROUGHNESS = 0.07f;
+// The GGX alpha of an anisotropic reflection is at least this in any direction.
+PREVIZ_CONST float LEAST_ANISOTROPIC_ALPHA = 1e-3f;
 // Glass below this index of refraction is treated as smooth, since it bends light too little for
 // its roughness to show.
 PREVIZ_CONST float LEAST_ROUGH_IOR = 1.001f;
@@ -67,6 +75,9 @@ PREVIZ_CONST uint FEATURE_CAMERA = 8192u;  // the plate gives the radiance of po
 PREVIZ_CONST uint FEATURE_ATTENUATION = 32768u;  // clear solids that take light away inside
 PREVIZ_CONST uint FEATURE_CLEARCOAT = 65536u;  // a coat of lacquer above the base material
 PREVIZ_CONST uint FEATURE_MANY_LIGHTS = 131072u;  // more than FEW_LIGHTS: they are chosen by a tree
+PREVIZ_CONST uint FEATURE_SHEEN = 262144u;        // fibres of cloth above the base material
+PREVIZ_CONST uint FEATURE_ANISOTROPY = 524288u;   // reflections that are wider along one direction
+PREVIZ_CONST uint FEATURE_COAT_COLOR = 1048576u;  // paint or plastic whose reflection has a colour
 
 // These bits are a path's state.
 PREVIZ_CONST uint PATH_WORLDS_MASK = 3u;      // WORLD_*
@@ -186,10 +197,16 @@ struct GpuMaterial {
   uint alpha_mode;    // ALPHA_*
   float alpha;
   float alpha_cutoff;
-  uint albedo_table;  // rough glass: its table seen from outside; the next is from inside
+  uint albedo_table;  // rough glass: its table seen from outside; the next is from inside.
+                      // Anisotropic metal: the first of its ANISOTROPIC_TABLES
   vec3 attenuation;   // inside, per metre; 0: clear, or nothing gets in
   float clearcoat;
   float clearcoat_roughness;
+  vec3 sheen_color;
+  float sheen_roughness;
+  vec2 anisotropy;      // in which direction of the texture the reflection is wider, times the
+                        // strength; 0: in none
+  vec3 specular_color;  // factor of the coat's reflectance at normal incidence
 };
 
 // glTF's alpha modes: the surface is all there, or there where its alpha reaches the cutoff, or its
@@ -395,7 +412,7 @@ static_assert(sizeof(GpuShadowRay) == 56);
 static_assert(sizeof(GpuPixel) == 160);
 static_assert(sizeof(GpuControl) == 96);
 static_assert(sizeof(GpuInstance) == 112);
-static_assert(sizeof(GpuMaterial) == 104);
+static_assert(sizeof(GpuMaterial) == 140);
 static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 24);
 static_assert(sizeof(GpuLight) == 156);

@@ -38,6 +38,11 @@ struct Surface {
   vec3 emission;
   float clearcoat;        // weight of a coat of lacquer above all else
   float clearcoat_alpha;
+  vec3 sheen_color;       // of fibres above the base material; black: there are none
+  float sheen_roughness;
+  vec3 tangent;           // where is_anisotropic(): unit, across the normal
+  float tangent_alpha;    // GGX width along the tangent; alpha is that across it
+  vec3 specular_color;    // factor of the coat's reflectance at normal incidence
   uint medium;            // behind the surface, where that is a coloured solid (lib/medium.glsl)
 };
 
@@ -137,9 +142,11 @@ struct Triangle {
 // A mapped normal that dips below the surface is lifted above it by this much.
 const float LEAST_NORMAL_LIFT = 1e-3;
 
-// Applies the normal texture. The tangent frame follows the triangle's own texture coordinates, as
-// glTF prescribes where no tangents are given, but is not smoothed over the vertices.
-vec3 map_normal(GpuInstance instance, GpuMaterial m, Triangle t, vec2 uv, vec3 normal, vec3 outward) {
+// Finds the directions of +X and +Y of a texture around a normal. They follow the triangle's own
+// texture coordinates, as glTF prescribes where no tangents are given, but are not smoothed over
+// the vertices. Returns false if the coordinates give no direction.
+bool texture_frame(GpuInstance instance, Triangle t, vec3 normal, out vec3 tangent,
+                   out vec3 bitangent) {
   const vec2 along1 = vec2(t.p1.w, t.n1.w) - vec2(t.p0.w, t.n0.w);
   const vec2 along2 = vec2(t.p2.w, t.n2.w) - vec2(t.p0.w, t.n0.w);
   const vec3 edge1 = transform_vector(instance.world_from_object, t.p1.xyz - t.p0.xyz);
@@ -150,11 +157,20 @@ vec3 map_normal(GpuInstance instance, GpuMaterial m, Triangle t, vec2 uv, vec3 n
   const vec3 along_v = side * (edge2 * along1.x - edge1 * along2.x);
   const vec3 across = along_u - normal * dot(normal, along_u);
   const float across_squared = dot(across, across);
-  if (area == 0.0 || !(across_squared > 0.0)) return normal;
-  const vec3 tangent = across * inversesqrt(across_squared);
+  tangent = vec3(0.0);
+  bitangent = vec3(0.0);
+  if (area == 0.0 || !(across_squared > 0.0)) return false;
+  tangent = across * inversesqrt(across_squared);
   const vec3 turned = cross(normal, tangent);
-  // v runs down the texture, while +Y of a normal map points up.
-  const vec3 bitangent = dot(turned, along_v) < 0.0 ? turned : -turned;
+  // v runs down the texture, while +Y points up.
+  bitangent = dot(turned, along_v) < 0.0 ? turned : -turned;
+  return true;
+}
+
+// Applies the normal texture.
+vec3 map_normal(GpuInstance instance, GpuMaterial m, Triangle t, vec2 uv, vec3 normal, vec3 outward) {
+  vec3 tangent, bitangent;
+  if (!texture_frame(instance, t, normal, tangent, bitangent)) return normal;
   vec3 mapped = sample_texture(m.normal_texture, uv).xyz * 2.0 - 1.0;
   mapped.xy *= m.normal_scale;
   mapped = tangent * mapped.x + bitangent * mapped.y + normal * mapped.z;
@@ -163,6 +179,34 @@ vec3 map_normal(GpuInstance instance, GpuMaterial m, Triangle t, vec2 uv, vec3 n
   mapped *= inversesqrt(mapped_squared);
   mapped += outward * max(0.0, LEAST_NORMAL_LIFT - dot(mapped, outward));
   return normalize(mapped);
+}
+
+// Returns an orthonormal basis whose third vector is n (Duff et al. 2017, "Building an Orthonormal
+// Basis, Revisited").
+mat3 make_frame(vec3 n) {
+  const float side = n.z >= 0.0 ? 1.0 : -1.0;
+  const float a = -1.0 / (side + n.z);
+  const float b = n.x * n.y * a;
+  return mat3(vec3(1.0 + side * n.x * n.x * a, side * b, -side * n.x),
+              vec3(b, side + n.y * n.y * a, -n.y), n);
+}
+
+// Returns the direction of the material's anisotropy in world space, around the interpolated
+// normal; 0 where there is none.
+vec3 anisotropic_direction(GpuInstance instance, Triangle t, vec3 normal) {
+  const vec2 direction = materials[instance.material].anisotropy;
+  vec3 tangent, bitangent;
+  if (all(equal(direction, vec2(0.0))) || !texture_frame(instance, t, normal, tangent, bitangent))
+    return vec3(0.0);
+  return tangent * direction.x + bitangent * direction.y;
+}
+
+// Returns the unit vector across the normal that is nearest to a direction; any if the direction is
+// 0 or along the normal.
+vec3 tangent_near(vec3 direction, vec3 normal) {
+  const vec3 across = direction - normal * dot(normal, direction);
+  const float across_squared = dot(across, across);
+  return across_squared > 0.0 ? across * inversesqrt(across_squared) : make_frame(normal)[0];
 }
 
 // Returns the share of a surface that is there, by the alpha of its material.
@@ -209,12 +253,34 @@ void apply_material(inout Surface s, uint material, vec2 uv) {
   s.alpha = roughness * roughness;
   s.clearcoat = has_feature(FEATURE_CLEARCOAT) ? m.clearcoat : 0.0;
   s.clearcoat_alpha = m.clearcoat_roughness * m.clearcoat_roughness;
+  s.sheen_color = has_feature(FEATURE_SHEEN) ? m.sheen_color : vec3(0.0);
+  s.sheen_roughness = m.sheen_roughness;
+  s.specular_color = has_feature(FEATURE_COAT_COLOR) ? m.specular_color : vec3(1.0);
+  s.tangent_alpha = s.alpha;
+  if (has_feature(FEATURE_ANISOTROPY) && any(notEqual(m.anisotropy, vec2(0.0)))) {
+    s.tangent_alpha = mix(s.alpha, 1.0, dot(m.anisotropy, m.anisotropy));
+    s.alpha = max(s.alpha, LEAST_ANISOTROPIC_ALPHA);
+    s.tangent_alpha = max(s.tangent_alpha, s.alpha);
+  }
   s.medium = 0u;
   if (has_feature(FEATURE_ATTENUATION) && any(greaterThan(m.attenuation, vec3(0.0))))
     s.medium = material + 1u;
 }
 
-// Returns whether the surface has any reflecting or refracting lobe, rough or smooth.
+bool is_anisotropic(Surface s) {
+  return has_feature(FEATURE_ANISOTROPY) && s.tangent_alpha > s.alpha;
+}
+
+bool has_coat_color(Surface s) {
+  return has_feature(FEATURE_COAT_COLOR) && any(notEqual(s.specular_color, vec3(1.0)));
+}
+
+bool has_sheen(Surface s) {
+  return has_feature(FEATURE_SHEEN) && any(greaterThan(s.sheen_color, vec3(0.0)));
+}
+
+// Returns whether the surface has any reflecting or refracting lobe, rough or smooth. Sheen is
+// none: it has no mirror direction.
 bool is_specular(Surface s) {
   return s.metallic > 0.0 || s.transmission > 0.0 || (s.specular > 0.0 && s.ior > 1.0) ||
          (has_feature(FEATURE_CLEARCOAT) && s.clearcoat > 0.0);
@@ -271,6 +337,8 @@ Surface make_surface(GpuHit hit, vec3 direction) {
                                               n0.xyz * b.x + n1.xyz * b.y + n2.xyz * b.z);
   const float length_squared = dot(smooth_normal, smooth_normal);
   s.normal = length_squared > 0.0 ? smooth_normal * inversesqrt(length_squared) : outward;
+  if (has_feature(FEATURE_ANISOTROPY))
+    s.tangent = anisotropic_direction(instance, Triangle(p0, p1, p2, n0, n1, n2), s.normal);
   const vec2 uv = triangle_uv(p0, n0, p1, n1, p2, n2, b);
   if (has_feature(FEATURE_NORMAL_MAPS) && materials[instance.material].normal_texture != NO_INDEX)
     s.normal = map_normal(instance, materials[instance.material],
@@ -278,6 +346,7 @@ Surface make_surface(GpuHit hit, vec3 direction) {
   if (dot(s.normal, s.geometric_normal) < 0.0) s.normal = -s.normal;
   apply_material(s, instance.material, uv);
   if (is_specular(s)) s.normal = mirroring_normal(s.normal, s.geometric_normal, s.wo);
+  if (is_anisotropic(s)) s.tangent = tangent_near(s.tangent, s.normal);
   return s;
 }
 

@@ -80,6 +80,17 @@ GltfWriter sample() {
          {"KHR_materials_ior", {{"ior", 1.5}}},
          {"KHR_materials_volume", {{"thicknessFactor", 0.1}, {"attenuationDistance", 2}}},
          {"KHR_materials_emissive_strength", {{"emissiveStrength", 3}}}}}});
+  gltf.add(
+      "materials",
+      {{"name", "cloth"},
+       {"extensions",
+        {{"KHR_materials_sheen",
+          {{"sheenColorFactor", {0.5, 1, 0.25}}, {"sheenRoughnessFactor", 0.5}}},
+         {"KHR_materials_anisotropy", {{"anisotropyStrength", 0.5}, {"anisotropyRotation", 1}}},
+         {"KHR_materials_specular",
+          {{"specularFactor", 0.5}, {"specularColorFactor", {1, 0.5, 2}}}},
+         {"KHR_materials_clearcoat",
+          {{"clearcoatFactor", 0.5}, {"clearcoatRoughnessFactor", 0.25}}}}}});
   const int positions =
       gltf.positions({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5f, 0.5f, 1}});
   const int sparse_indices = gltf.view(GltfWriter::bytes_of(std::vector<std::uint16_t>{4}));
@@ -96,7 +107,8 @@ GltfWriter sample() {
       gltf.values<std::uint16_t>(5123, "SCALAR", {0, 2, 1, 0, 3, 2, 0, 1, 4, 1, 2, 4});
   const int pyramid =
       gltf.mesh({{"attributes", attributes}, {"indices", indices}, {"material", 0}}, "pyramid");
-  const int strip = gltf.mesh({{"attributes", {{"POSITION", positions}}}, {"mode", 5}}, "strip");
+  const int strip =
+      gltf.mesh({{"attributes", {{"POSITION", positions}}}, {"mode", 5}, {"material", 1}}, "strip");
   gltf.json["extensionsUsed"] = {"KHR_lights_punctual", "KHR_texture_transform"};
   gltf.json["extensions"]["KHR_lights_punctual"]["lights"] = {
       {{"type", "spot"}, {"intensity", 5}, {"spot", {{"outerConeAngle", 0.5}}}}};
@@ -231,6 +243,13 @@ void expect_sound(const scene::Scene& scene) {
   for (const scene::Material& m : scene.materials) {
     ASSERT_TRUE(m.ior >= 1 && m.roughness >= 0 && m.roughness <= 1 && m.alpha >= 0 && m.alpha <= 1);
     ASSERT_TRUE(std::isfinite(m.emission.x + m.emission.y + m.emission.z));
+    ASSERT_TRUE(m.clearcoat >= 0 && m.clearcoat <= 1 && m.anisotropy >= 0 && m.anisotropy <= 1);
+    ASSERT_TRUE(m.sheen_roughness > 0 && m.sheen_roughness <= 1);
+    ASSERT_TRUE(std::isfinite(m.anisotropy_rotation_rad));
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_TRUE(m.sheen_color[i] >= 0 && m.sheen_color[i] <= 1 && m.specular_color[i] >= 0);
+      ASSERT_TRUE(std::isfinite(m.specular_color[i]));
+    }
     for (const std::uint32_t texture :
          {m.base_color_texture, m.metallic_roughness_texture, m.emission_texture, m.normal_texture})
       ASSERT_TRUE(texture == scene::no_texture || texture < scene.textures.size());

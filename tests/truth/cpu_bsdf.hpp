@@ -12,15 +12,19 @@ namespace previz::truth {
 struct Bsdf {
   glm::dvec3 base_color{1};
   double metallic = 0;
-  double alpha = 1;     // GGX width, roughness^2
-  bool smooth = false;  // alpha at or below the threshold: the specular lobe is a Dirac delta
+  double alpha = 1;        // GGX width, roughness^2
+  double alpha_along = 1;  // of the reflection, along ShadingPoint::tangent: alpha or more
+  bool smooth = false;     // alpha at or below the threshold: the specular lobe is a Dirac delta
   double specular = 1;
+  glm::dvec3 specular_color{1};  // times the plastic's reflectance at normal incidence
   double ior = 1.5;
   double transmission = 0;
   bool thin_walled = true;
   double clearcoat = 0;  // weight of a coat of lacquer above all else
   double clearcoat_alpha = 0;
-  bool smooth_clearcoat = true;  // its reflection is a Dirac delta
+  bool smooth_clearcoat = true;   // its reflection is a Dirac delta
+  glm::dvec3 sheen_color{0};      // of fibres above the base material
+  double sheen_roughness = 0.07;  // that or more
 
   bool smooth_glass() const { return smooth || ior < 1.001; }  // too little bent to blur
 };
@@ -30,7 +34,8 @@ struct ShadingPoint {
   glm::dvec3 geometric_normal{0, 0, 1};
   glm::dvec3 shading_normal{0, 0, 1};
   glm::dvec3 wo{0, 0, 1};
-  bool outside = true;  // the viewer is on the side the triangle's winding faces
+  bool outside = true;          // the viewer is on the side the triangle's winding faces
+  glm::dvec3 tangent{1, 0, 0};  // across the shading normal
 };
 
 struct BsdfSample {
@@ -56,6 +61,8 @@ bool scatters_behind(const Bsdf& bsdf);
 bool is_specular(const Bsdf& bsdf);
 // True where evaluate() is zero everywhere.
 bool only_dirac(const Bsdf& bsdf);
+// Lambda of sheen (Conty Estevez and Kulla 2017).
+double sheen_lambda(double cosine, double alpha);
 // The share of light that goes straight through a smooth thin wall; 0 of anything else.
 glm::dvec3 straight_through(const Bsdf& bsdf, const ShadingPoint& point);
 

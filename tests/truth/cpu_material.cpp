@@ -7,6 +7,7 @@
 #include <glm/mat2x2.hpp>
 #include <glm/matrix.hpp>
 #include <glm/vec4.hpp>
+#include <optional>
 
 namespace previz::truth {
 namespace {
@@ -53,9 +54,15 @@ Bsdf bsdf_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2
   Bsdf b;
   b.base_color = glm::dvec3(m.base_color) * glm::dvec3(look_up(scene, m.base_color_texture, uv));
   b.metallic = m.metallic * metallic_roughness.z;
-  b.alpha = roughness * roughness;
-  b.smooth = b.alpha <= specular_roughness;
+  b.alpha = b.alpha_along = roughness * roughness;
+  if (m.anisotropy > 0 && m.transmission <= 0) {
+    const double widened = static_cast<double>(m.anisotropy) * m.anisotropy;
+    b.alpha_along = std::max(1e-3, widened + (1 - widened) * b.alpha);
+    b.alpha = std::max(1e-3, b.alpha);
+  }
+  b.smooth = b.alpha_along <= specular_roughness;
   b.specular = m.specular;
+  b.specular_color = m.specular_color;
   b.ior = m.ior;
   b.transmission = m.transmission;
   b.thin_walled = m.thin_walled;
@@ -63,19 +70,27 @@ Bsdf bsdf_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2
   const double lacquer = m.clearcoat_roughness;
   b.clearcoat_alpha = lacquer * lacquer;
   b.smooth_clearcoat = b.clearcoat_alpha <= specular_roughness;
+  b.sheen_color = m.sheen_color;
+  b.sheen_roughness = std::max(0.07, static_cast<double>(m.sheen_roughness));
   return b;
 }
 
-glm::dvec3 normal_at(const scene::Scene& scene, const Geometry& geometry, const Hit& hit) {
-  const scene::Instance& instance = scene.instances[hit.instance];
-  const scene::Material& m = scene.materials[instance.material];
-  const scene::Mesh& mesh = scene.meshes[instance.mesh];
-  if (m.normal_texture == scene::no_texture || mesh.uvs.empty()) return hit.shading_normal;
+namespace {
+
+// The directions of a texture's +X and +Y around the interpolated normal.
+struct TextureAxes {
+  glm::dvec3 x, y;
+};
+
+std::optional<TextureAxes> texture_axes(const scene::Scene& scene, const Geometry& geometry,
+                                        const Hit& hit) {
+  const scene::Mesh& mesh = scene.meshes[scene.instances[hit.instance].mesh];
+  if (mesh.uvs.empty()) return std::nullopt;
   const glm::uvec3 corner = mesh.triangles[hit.triangle];
   const glm::dvec2 uv0 = mesh.uvs[corner.x];
   const glm::dmat2 uv_of_edges(glm::dvec2(mesh.uvs[corner.y]) - uv0,
                                glm::dvec2(mesh.uvs[corner.z]) - uv0);
-  if (glm::determinant(uv_of_edges) == 0) return hit.shading_normal;
+  if (glm::determinant(uv_of_edges) == 0) return std::nullopt;
   const glm::dmat2 edges_of_uv = glm::inverse(uv_of_edges);
   const Triangle t = geometry.triangle(hit.instance, hit.triangle);
   const auto along = [&](int axis) {
@@ -85,9 +100,29 @@ glm::dvec3 normal_at(const scene::Scene& scene, const Geometry& geometry, const 
   const glm::dvec3 tangent = glm::normalize(along(0) - n * glm::dot(n, along(0)));
   glm::dvec3 up = glm::cross(n, tangent);
   if (glm::dot(up, along(1)) > 0) up = -up;  // v runs down the picture
+  return TextureAxes{tangent, up};
+}
+
+}  // namespace
+
+glm::dvec3 anisotropy_at(const scene::Scene& scene, const Geometry& geometry, const Hit& hit) {
+  const scene::Material& m = scene.materials[scene.instances[hit.instance].material];
+  if (m.anisotropy <= 0) return glm::dvec3(0);
+  const auto axes = texture_axes(scene, geometry, hit);
+  if (!axes) return glm::dvec3(0);
+  const double turned = m.anisotropy_rotation_rad;
+  return std::cos(turned) * axes->x + std::sin(turned) * axes->y;
+}
+
+glm::dvec3 normal_at(const scene::Scene& scene, const Geometry& geometry, const Hit& hit) {
+  const scene::Material& m = scene.materials[scene.instances[hit.instance].material];
+  if (m.normal_texture == scene::no_texture) return hit.shading_normal;
+  const auto axes = texture_axes(scene, geometry, hit);
+  if (!axes) return hit.shading_normal;
   const glm::dvec3 texel = 2.0 * glm::dvec3(look_up(scene, m.normal_texture, hit.uv)) - 1.0;
-  const glm::dvec3 mapped = glm::normalize(
-      static_cast<double>(m.normal_scale) * (texel.x * tangent + texel.y * up) + texel.z * n);
+  const glm::dvec3 mapped =
+      glm::normalize(static_cast<double>(m.normal_scale) * (texel.x * axes->x + texel.y * axes->y) +
+                     texel.z * hit.shading_normal);
   // One that dips below the surface is lifted onto it.
   const double lift = std::max(0.0, 1e-3 - glm::dot(mapped, hit.geometric_normal));
   return glm::normalize(mapped + lift * hit.geometric_normal);

@@ -15,6 +15,9 @@ Bsdf bsdf_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2
              double specular_roughness);
 // The shading normal after the normal texture, if the material has one; on the side of the winding.
 glm::dvec3 normal_at(const scene::Scene& scene, const Geometry& geometry, const Hit& hit);
+// The direction in which the material's reflection is wider, in the world; 0 where the texture
+// coordinates give none.
+glm::dvec3 anisotropy_at(const scene::Scene& scene, const Geometry& geometry, const Hit& hit);
 // The share of the surface that is there.
 double coverage_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2& uv);
 glm::dvec3 emission_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2& uv);

@@ -98,13 +98,25 @@ glm::dvec3 mirroring_normal(const glm::dvec3& normal, const glm::dvec3& geometri
   return glm::normalize(wo + glm::normalize(mirrored + (least - height) * geometric_normal));
 }
 
+// The direction across the normal that is nearest to the one given; x of the frame of Duff et al.
+// (2017) where that is 0.
+glm::dvec3 tangent_near(const glm::dvec3& direction, const glm::dvec3& n) {
+  const glm::dvec3 across = direction - n * glm::dot(n, direction);
+  if (glm::length(across) > 0) return glm::normalize(across);
+  const double sign = std::copysign(1.0, n.z);
+  return {1 - sign * n.x * n.x / (sign + n.z), -sign * n.x * n.y / (sign + n.z), -sign * n.x};
+}
+
 Vertex vertex_at(const World& world, const Hit& hit, const glm::dvec3& wo) {
   const double side = glm::dot(hit.geometric_normal, wo) < 0 ? -1 : 1;
   const Bsdf bsdf = bsdf_at(world.scene, hit.instance, hit.uv, world.options.specular_roughness);
   const glm::dvec3 geometric_normal = side * hit.geometric_normal;
   glm::dvec3 normal = side * normal_at(world.scene, world.geometry, hit);
   if (is_specular(bsdf)) normal = mirroring_normal(normal, geometric_normal, wo);
-  return {hit, bsdf, {geometric_normal, normal, wo, side > 0}};
+  ShadingPoint point{geometric_normal, normal, wo, side > 0};
+  if (bsdf.alpha_along > bsdf.alpha)
+    point.tangent = tangent_near(anisotropy_at(world.scene, world.geometry, hit), normal);
+  return {hit, bsdf, point};
 }
 
 // The share of light that comes this far along the ray: what alpha leaves of it, and panes.

@@ -358,6 +358,70 @@ TEST(GlassAndLacquer, HaveTheSameDifferenceByBothEstimators) {
   expect_same_difference(glass_and_lacquer(), 16, true);
 }
 
+// Sheen above paint, a mirror, solid and rough glass, a pane and below lacquer; brushed metal and
+// brushed plastic with bumps, also where no texture coordinates say which way; coloured gloss.
+View cloth_and_brushed_metal() {
+  View view;
+  scene::Scene& scene = view.scene;
+  const auto add = adder_to(scene);
+  const auto under_sheen = [](scene::Material material, const glm::vec3& color, float roughness) {
+    material.sheen_color = color;
+    material.sheen_roughness = roughness;
+    return material;
+  };
+  const auto brushed = [](scene::Material material, float strength, float rotation) {
+    material.anisotropy = strength;
+    material.anisotropy_rotation_rad = rotation;
+    return material;
+  };
+  const glm::vec3 white(1);
+  add(rectangle_mesh({3, 3}), under_sheen(diffuse({0.5f, 0.4f, 0.3f}), {0.3f, 0.5f, 0.9f}, 0.5f),
+      {0, 0, 0}, scene::world_both);
+  add(uv_sphere_mesh(0.2, 48, 24), brushed(metal({0.9f, 0.7f, 0.4f}, 0.3f), 0.7f, 0.5f),
+      {-0.6, -0.2, 0.2}, scene::world_mixed);
+  add(icosphere_mesh(0.15, 3), brushed(metal(white, 0.4f), 0.8f, 0), {-0.2, 0.5, 0.15},
+      scene::world_both);
+  scene::Material bumpy = brushed(plastic({0.2f, 0.5f, 0.7f}, 0.4f), 0.9f, -1);
+  bumpy.normal_texture = add_texture(scene, bumps());
+  add(box_mesh({0.3, 0.3, 0.3}), bumpy, {0.7, 0.3, 0.15}, scene::world_both);
+  add(uv_sphere_mesh(0.2, 48, 24), under_sheen(metal(white, 0), {0.7f, 0.7f, 0.2f}, 0.3f),
+      {0.3, -0.2, 0.2}, scene::world_mixed);
+  add(uv_sphere_mesh(0.15, 48, 24), under_sheen(glass(1.4f), {0.9f, 0.5f, 0.5f}, 0.8f),
+      {-0.1, -0.6, 0.15}, scene::world_mixed);
+  scene::Material frosted = glass(1.5f);
+  frosted.roughness = 0.5f;
+  add(box_mesh({0.25, 0.25, 0.25}), under_sheen(frosted, white, 0.4f), {0.7, -0.4, 0.13},
+      scene::world_mixed);
+  scene::Material pane = glass(1.5f);
+  pane.thin_walled = true;
+  pane.base_color = {0.9f, 0.8f, 0.7f};
+  add(box_mesh({0.5, 0.004, 0.4}), under_sheen(pane, {0.8f, 0.8f, 0.8f}, 0.6f), {0.3, 0.7, 0.2},
+      scene::world_real);
+  scene::Material seat = under_sheen(plastic({0.6f, 0.1f, 0.1f}, 0.5f), {0.9f, 0.9f, 0.6f}, 0.7f);
+  seat.clearcoat = 0.6f;
+  seat.clearcoat_roughness = 0.4f;
+  add(box_mesh({0.3, 0.2, 0.2}), seat, {-0.8, 0.4, 0.1}, scene::world_both);
+  scene::Material gloss = plastic({0.05f, 0.05f, 0.05f}, 0.3f, 2.0f);
+  gloss.specular_color = {1.5f, 0.3f, 0.1f};
+  add(uv_sphere_mesh(0.12, 48, 24), gloss, {0.2, 0.3, 0.12}, scene::world_mixed);
+  scene.lights.push_back(lamp(set::LightType::sphere, glm::dvec3(6, 5, 4)));
+  scene.lights.back().position = {-0.5, -0.8, 1.2};
+  scene.lights.back().radius_m = 0.25;
+  view.environment = uniform_environment(glm::vec3(0.3f, 0.4f, 0.5f), 8);
+  for (int i = 0; i < 6; ++i) view.environment.radiance[static_cast<std::size_t>(9 + i)] *= 6.0f;
+  view.calibration = pinhole(48, 32, 0.8);
+  view.world_from_camera = look_at({0.4, -2, 1.0}, {0, 0, 0.15});
+  return view;
+}
+
+TEST(ClothAndBrushedMetal, AgreeWithTheCpuTracer) {
+  expect_agreement(cloth_and_brushed_metal(), 16, true);
+}
+
+TEST(ClothAndBrushedMetal, HaveTheSameDifferenceByBothEstimators) {
+  expect_same_difference(cloth_and_brushed_metal(), 16, true);
+}
+
 // A limb and a ball that change their shape, one in both worlds and one virtual, on a table.
 View figures() {
   View view;

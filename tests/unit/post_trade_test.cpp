@@ -101,9 +101,10 @@ TEST_F(Trade, PartsThatNobodyNeedsChangeNoPixel) {
     EXPECT_FALSE(method.points.back().pareto) << "is no choice";
   }
   EXPECT_EQ(carried, (std::vector<std::string>{
-                         "parts lens", "parts lacquer", "parts refraction", "parts panes",
-                         "parts coloured glass", "parts textures", "parts normal maps",
-                         "parts alpha", "parts lamps", "parts lamps in view", "parts many lamps"}));
+                         "parts lens", "parts coloured gloss", "parts brushed metal", "parts cloth",
+                         "parts lacquer", "parts refraction", "parts panes", "parts coloured glass",
+                         "parts textures", "parts normal maps", "parts alpha", "parts lamps",
+                         "parts lamps in view", "parts many lamps"}));
 }
 
 TEST_F(Trade, RefusesWhatCannotBeTraded) {

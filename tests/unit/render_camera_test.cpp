@@ -210,6 +210,12 @@ TEST(CameraRadiance, WhatCannotBeMeasuredIsTracedAndCounted) {
   view.scene.materials[0] = plastic(glm::vec3(albedo), 0.5f);
   view.scene.materials[0].clearcoat = 1;  // it mirrors what is above the floor
   expect_traced(view, gray);
+  view.scene.materials[0] = diffuse(glm::vec3(albedo));
+  view.scene.materials[0].sheen_color = glm::vec3(0.5f);  // it shines where seen from the side
+  expect_traced(view, gray);
+  view.scene.materials[0] = plastic(glm::vec3(albedo), 0.5f);
+  view.scene.materials[0].specular_color = glm::vec3(4);
+  expect_traced(view, gray);
   view.scene.materials[0] = emitter(glm::vec3(0));
   view.scene.materials[0].emission_texture = scene::no_texture;
   view.scene.materials[0].specular = 1;

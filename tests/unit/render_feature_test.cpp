@@ -162,6 +162,46 @@ TEST_F(Features, ThereIsGlossWhereACoatOrMetalReflects) {
   EXPECT_TRUE(needs("gloss"));
 }
 
+TEST_F(Features, ReadLayersAndBrushStrokes) {
+  add(plastic({1, 1, 1}, 0.3f));
+  EXPECT_FALSE(needs("cloth") || needs("brushed metal") || needs("coloured gloss"));
+  scene::Material cloth = diffuse({1, 1, 1});
+  cloth.sheen_color = {0, 0.1f, 0};
+  add(cloth);
+  EXPECT_TRUE(needs("cloth"));
+  scene::Material brushed = diffuse({1, 1, 1});
+  brushed.anisotropy = 0.5f;
+  add(brushed);
+  EXPECT_FALSE(needs("brushed metal"));  // it does not reflect
+  brushed = glass(1.5f);
+  brushed.anisotropy = 0.5f;
+  add(brushed);
+  EXPECT_FALSE(needs("brushed metal"));  // what lets light through is left as it is
+  brushed = metal({1, 1, 1}, 0.3f);
+  brushed.anisotropy = 0.5f;
+  add(brushed);
+  EXPECT_TRUE(needs("brushed metal"));
+  scene::Material gloss = metal({1, 1, 1}, 0.3f);
+  gloss.specular_color = {1, 0, 0};
+  add(gloss);
+  EXPECT_FALSE(needs("coloured gloss"));  // metal has no coat
+  gloss.metallic = 0;
+  add(gloss);
+  EXPECT_TRUE(needs("coloured gloss"));
+}
+
+// A pane that fibres stand on is no clear view.
+TEST_F(Features, APaneWithSheenIsNone) {
+  scene::Material pane = glass(1.5f);
+  pane.thin_walled = true;
+  pane.sheen_color = {0.5f, 0.5f, 0.5f};
+  add(pane);
+  EXPECT_FALSE(needs("panes"));
+  pane.sheen_color = {0, 0, 0};
+  add(pane);
+  EXPECT_TRUE(needs("panes"));
+}
+
 TEST_F(Features, TexturesAreThoseOfMaterialsInUse) {
   scene::Texture texture;
   texture.width = texture.height = 1;

@@ -39,6 +39,9 @@ TEST_F(GltfMaterials, DefaultsAreGltfs) {
     EXPECT_EQ(m.metallic, 1);
     EXPECT_EQ(m.roughness, 1);
     EXPECT_EQ(m.specular, 1);
+    EXPECT_EQ(m.specular_color, glm::vec3(1));
+    EXPECT_EQ(m.sheen_color, glm::vec3(0));
+    EXPECT_EQ(m.anisotropy, 0);
     EXPECT_EQ(m.ior, 1.5f);
     EXPECT_EQ(m.transmission, 0);
     EXPECT_TRUE(m.thin_walled);
@@ -139,6 +142,70 @@ TEST_F(GltfMaterials, ReadsLacquer) {
   use({{"name", "car"}, {"extensions", {{"KHR_materials_clearcoat", textured}}}});
   EXPECT_THAT(load().notes,
               Contains(HasSubstr("\"car\": the textures of its clear coat are not supported")));
+}
+
+TEST_F(GltfMaterials, ReadsSheen) {
+  const auto sheen_of = [](Json sheen) {
+    return Json{{"name", "velvet"}, {"extensions", {{"KHR_materials_sheen", std::move(sheen)}}}};
+  };
+  const scene::Material m =
+      loaded(sheen_of({{"sheenColorFactor", {0.25, 0.5, 1}}, {"sheenRoughnessFactor", 0.375}}));
+  EXPECT_EQ(m.sheen_color, glm::vec3(0.25f, 0.5f, 1));
+  EXPECT_EQ(m.sheen_roughness, 0.375f);
+  EXPECT_TRUE(scene::has_sheen(m));
+  use(sheen_of({{"sheenRoughnessFactor", 0.5}}));
+  EXPECT_FALSE(scene::has_sheen(load().materials.at(1)));
+  EXPECT_THAT(load().notes, IsEmpty());
+  use(sheen_of({{"sheenColorFactor", {0, 2, 0}}, {"sheenColorTexture", {{"index", 0}}}}));
+  EXPECT_THAT(load().notes,
+              ElementsAre(HasSubstr("\"velvet\": sheenColorFactor is out of range"),
+                          HasSubstr("\"velvet\": its sheenRoughnessFactor is taken as 0.07"),
+                          HasSubstr("\"velvet\": the textures of its sheen are not supported")));
+}
+
+TEST_F(GltfMaterials, ReadsAnisotropy) {
+  const auto anisotropy_of = [](Json anisotropy) {
+    return Json{{"name", "pan"},
+                {"extensions", {{"KHR_materials_anisotropy", std::move(anisotropy)}}}};
+  };
+  const scene::Material m =
+      loaded(anisotropy_of({{"anisotropyStrength", 0.5}, {"anisotropyRotation", -1.25}}));
+  EXPECT_EQ(m.anisotropy, 0.5f);
+  EXPECT_EQ(m.anisotropy_rotation_rad, -1.25f);
+  EXPECT_TRUE(scene::is_anisotropic(m));
+  // alpha = lerp(0.25, 1, 0.5^2)
+  EXPECT_DOUBLE_EQ(scene::widest_alpha(m, 0.5), 0.4375);
+  EXPECT_THAT(load().notes, IsEmpty());
+  Json textured = anisotropy_of({{"anisotropyStrength", 1}, {"anisotropyTexture", {{"index", 0}}}});
+  textured["extensions"]["KHR_materials_transmission"] = {{"transmissionFactor", 0.5}};
+  use(textured);
+  const int pan = gltf.add("materials", anisotropy_of({{"anisotropyStrength", 1}}));
+  gltf.root("plain", gltf.triangle_mesh(pan));
+  const scene::Scene scene = load();
+  EXPECT_FALSE(scene::is_anisotropic(scene.materials.at(1)));
+  EXPECT_THAT(
+      scene.notes,
+      ElementsAre(HasSubstr("\"pan\": the texture of its anisotropy is not supported"),
+                  HasSubstr("\"pan\": as it lets light through, its anisotropy is left out"),
+                  HasSubstr("has no TEXCOORD_0 that says which way its anisotropy runs")));
+}
+
+TEST_F(GltfMaterials, ReadsTheColourOfGloss) {
+  const auto gloss_of = [](Json specular) {
+    return Json{{"name", "lipstick"},
+                {"extensions", {{"KHR_materials_specular", std::move(specular)}}}};
+  };
+  EXPECT_EQ(loaded(gloss_of({{"specularColorFactor", {4, 0.5, 0}}})).specular_color,
+            glm::vec3(4, 0.5f, 0));
+  EXPECT_THAT(load().notes, IsEmpty());
+  Json glass = gloss_of({{"specularColorFactor", {1, 0, 0}}, {"specularTexture", {{"index", 0}}}});
+  glass["extensions"]["KHR_materials_transmission"] = {{"transmissionFactor", 1}};
+  use(glass);
+  EXPECT_THAT(
+      load().notes,
+      ElementsAre(
+          HasSubstr("\"lipstick\": the textures of KHR_materials_specular are not supported"),
+          HasSubstr("specularColorFactor does not colour the reflection of glass")));
 }
 
 TEST_F(GltfMaterials, BringsNumbersIntoRangeWithANote) {
