@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
+#include <iterator>
 #include <numbers>
 
 #include "daemon/pipeline/relight.hpp"
@@ -65,11 +66,13 @@ session::SceneState scene_state(const set::Set& set, const Edits& edits, const M
   for (const set::Object& object : set.objects) {
     const auto edit = edits.objects.find(object.name);
     const bool is_edited = edit != edits.objects.end();
-    if (!is_edited && object.carrier.empty()) continue;
+    if (is_edited && edit->second.variant) state.variants[object.name] = *edit->second.variant;
+    const bool is_moved = is_edited && !edit->second.is_of_look_alone();
+    if (!is_moved && object.carrier.empty()) continue;
     std::optional<glm::dmat4>& now = state.objects[object.name];
     now = world_from(object.carrier, motion.carriers);
     if (now)
-      *now *= is_edited ? edited(object.world_from_file, edit->second) : object.world_from_file;
+      *now *= is_moved ? edited(object.world_from_file, edit->second) : object.world_from_file;
   }
   for (const set::Light& light : set.lights) {
     const auto edit = edits.lights.find(light.name);
@@ -157,6 +160,8 @@ session::SceneState with_edits(session::SceneState state, const set::Set& set, c
   for (const auto& [name, edit] : edits.objects) {
     const auto object = std::ranges::find(set.objects, name, &set::Object::name);
     if (object == set.objects.end()) continue;
+    if (edit.variant) state.variants[name] = *edit.variant;
+    if (edit.is_of_look_alone()) continue;
     const auto [now, is_new] = state.objects.try_emplace(name, object->world_from_file);
     if (now->second) now->second = edited(*now->second, edit);
   }
@@ -184,6 +189,27 @@ std::vector<std::string> drop_unknown(Edits& edits, const set::Set& set) {
     if (!is_there) unknown.push_back(entry.first);
     return !is_there;
   });
+  return unknown;
+}
+
+std::vector<std::string> drop_unknown_variants(Edits& edits, const set::Set& set,
+                                               const scene::Scene& scene) {
+  std::vector<std::string> unknown;
+  const auto has = [&](const std::string& name, const std::string& variant) {
+    const auto object = std::ranges::find(set.objects, name, &set::Object::name);
+    const scene::Variants* known =
+        scene::variants_of(scene, static_cast<std::size_t>(object - set.objects.begin()));
+    return known && std::ranges::find(known->names, variant) != known->names.end();
+  };
+  for (auto at = edits.objects.begin(); at != edits.objects.end();) {
+    auto& [name, edit] = *at;
+    const bool is_unknown = edit.variant && !edit.variant->empty() && !has(name, *edit.variant);
+    if (is_unknown) {
+      unknown.push_back("\"" + *edit.variant + "\" of \"" + name + "\"");
+      edit.variant.reset();
+    }
+    at = is_unknown && edit == ObjectEdit{} ? edits.objects.erase(at) : std::next(at);
+  }
   return unknown;
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/session/session.hpp"
 
@@ -19,6 +20,11 @@ struct ObjectEdit {
   glm::dvec3 offset_m{0};
   glm::dmat3 turn{1};  // about the object's origin
   double scale = 1;
+  // The variant of its materials that it is shown in; absent: the one that it has.
+  std::optional<std::string> variant = {};
+
+  // Returns whether nothing but the variant is changed.
+  bool is_of_look_alone() const { return variant && *this == ObjectEdit{.variant = variant}; }
 
   friend bool operator==(const ObjectEdit&, const ObjectEdit&) = default;
 };
@@ -70,5 +76,10 @@ session::SceneState with_edits(session::SceneState state, const set::Set& set, c
 
 // Removes the changes of objects and lamps that the set does not have, and returns their names.
 std::vector<std::string> drop_unknown(Edits& edits, const set::Set& set);
+
+// Removes the changes to variants that the files of objects do not have, and returns them in words.
+// `scene` is the set's.
+std::vector<std::string> drop_unknown_variants(Edits& edits, const set::Set& set,
+                                               const scene::Scene& scene);
 
 }  // namespace previz::pipeline

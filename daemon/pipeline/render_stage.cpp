@@ -54,6 +54,7 @@ RenderStage::RenderStage(std::shared_ptr<render::Device> device, const set::Set&
   scene_.light_objects = scene.light_objects;
   scene_.animations = scene.animations;
   scene_.deformations = scene.deformations;
+  scene_.variants = scene.variants;
 }
 
 void RenderStage::operator()(Shot& shot) {

@@ -19,7 +19,8 @@ lighting::Triangles file_triangles(const set::Room& room) {
                                .world_from_file = room.world_from_room,
                                .nodes = {},
                                .carrier = {},
-                               .animation = {}});
+                               .animation = {},
+                               .variant = {}});
   const scene::Scene scene = scene::load_scene(only_room);
   lighting::Triangles triangles;
   for (const scene::Instance& instance : scene.instances) {

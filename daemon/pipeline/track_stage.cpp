@@ -76,6 +76,7 @@ void TrackStage::place(Shot& shot, const session::TrackRecord* record) const {
   if (!record) return;
   for (const auto& [name, where] : record->scene.objects) shot.scene.objects[name] = where;
   for (const auto& [name, light] : record->scene.lights) shot.scene.lights[name] = light;
+  shot.scene.variants = record->scene.variants;
 }
 
 }  // namespace previz::pipeline

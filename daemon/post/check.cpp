@@ -19,6 +19,7 @@
 #include "daemon/render/picture_memory.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/names.hpp"
+#include "daemon/set/problems.hpp"
 #include "daemon/set/set.hpp"
 #include "daemon/tracking/trackers.hpp"
 #include "drivers/error.hpp"
@@ -220,7 +221,19 @@ void print_objects(const set::Set& set, const scene::Scene& scene, std::ostream&
     const auto& object = set.objects[i];
     out << "  " << object.name << ": " << set::name_of(object.presence) << ", "
         << plural(triangles[i], "triangle") << " in " << plural(instances[i], "instance")
-        << ", from " << object.file_as_written << '\n';
+        << ", from " << object.file_as_written;
+    if (!object.variant.empty())
+      out << ", in its variant \"" << set::printable(object.variant) << '"';
+    out << '\n';
+    const scene::Variants* variants = scene::variants_of(scene, i);
+    if (!variants) continue;
+    out << "    its variants, for the buttons:";
+    const char* separator = " ";
+    for (const std::string& name : variants->names) {
+      out << separator << '"' << set::printable(name) << '"';
+      separator = ", ";
+    }
+    out << '\n';
   }
 }
 

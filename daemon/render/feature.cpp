@@ -68,10 +68,7 @@ bool lamps_shine(const Scene& scene) {
     const glm::dvec3& e = light.emission;
     return (light.gain_mixed > 0 || light.gain_real > 0) && std::max({e.r, e.g, e.b}) > 0;
   };
-  return std::ranges::any_of(scene.lights, shines) ||
-         std::ranges::any_of(scene.instances, [&](const scene::Instance& instance) {
-           return scene::emits(scene.materials[instance.material]);
-         });
+  return std::ranges::any_of(scene.lights, shines) || scene::may_glow(scene);
 }
 
 constexpr std::array<Feature, 27> feature_table = {{
@@ -280,14 +277,14 @@ std::span<const Feature> features() {
 MaterialFeatures material_features(const Scene& scene, double specular_alpha) {
   MaterialFeatures result;
   std::vector<bool> seen(scene.materials.size());
-  for (const scene::Instance& instance : scene.instances) {
-    if (seen[instance.material] || !can_be_hit(scene.meshes[instance.mesh])) continue;
-    seen[instance.material] = true;
-    const Material& material = scene.materials[instance.material];
+  scene::for_each_look(scene, [&](std::uint32_t mesh, std::uint32_t index) {
+    if (seen[index] || !can_be_hit(scene.meshes[mesh])) return;
+    seen[index] = true;
+    const Material& material = scene.materials[index];
     for (std::size_t row = 0; row < feature_table.size(); ++row)
       if (!result[row] && feature_table[row].in_material)
         result[row] = feature_table[row].in_material(material, scene, specular_alpha);
-  }
+  });
   return result;
 }
 

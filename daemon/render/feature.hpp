@@ -51,8 +51,9 @@ struct Feature {
 std::span<const Feature> features();
 
 // Returns which rows the materials of the scene ask for. Only materials of instances count,
-// including instances that are in neither world: when a lost carrier's object comes back, no
-// pipeline must be compiled for it. May read every texel.
+// including instances that are in neither world, and the materials of all their variants: when a
+// lost carrier's object comes back, or an object gets another look, no pipeline must be compiled
+// for it. May read every texel.
 MaterialFeatures material_features(const scene::Scene& scene, double specular_alpha);
 
 // `feature` is a row of features().

@@ -93,10 +93,16 @@ bool can_be_seen(const set::Light& light) {
 }
 
 bool are_many(const scene::Scene& scene) {
-  std::size_t count = scene.lights.size();
+  std::vector<bool> glows;
   for (const scene::Instance& instance : scene.instances)
-    if (scene::emits(scene.materials[instance.material]))
-      count += scene.meshes[instance.mesh].triangles.size();
+    glows.push_back(scene::emits(scene.materials[instance.material]));
+  for (const scene::Variants& variants : scene.variants)
+    for (const scene::Variants::Part& part : variants.parts)
+      for (const scene::Variants::Look& look : part.looks)
+        if (scene::emits(scene.materials[look.material])) glows[part.instance] = true;
+  std::size_t count = scene.lights.size();
+  for (std::size_t i = 0; i < glows.size(); ++i)
+    if (glows[i]) count += scene.meshes[scene.instances[i].mesh].triangles.size();
   return count > gpu::FEW_LIGHTS;
 }
 

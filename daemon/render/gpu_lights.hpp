@@ -16,8 +16,9 @@ namespace previz::render {
 bool can_be_seen(const set::Light& light);
 
 // Returns whether the lamps and emissive triangles of a scene are more than gpu::FEW_LIGHTS, so
-// that light samples choose them by a tree. Lamps found in the light around the set do not count:
-// they come and go, and no pipeline is compiled for that.
+// that light samples choose them by a tree. An instance counts if it glows in one of its variants,
+// and lamps found in the light around the set do not count: they come and go, and no pipeline is
+// compiled for that.
 bool are_many(const scene::Scene& scene);
 
 // What a light sends on the mean over its texture and alpha, over what it would send without them.

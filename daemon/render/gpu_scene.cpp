@@ -96,6 +96,14 @@ void check_medium(const scene::Material& material, std::size_t index) {
                 " can be");
 }
 
+bool glows_in_a_variant(const scene::Scene& scene) {
+  for (const scene::Variants& variants : scene.variants)
+    for (const scene::Variants::Part& part : variants.parts)
+      for (const scene::Variants::Look& look : part.looks)
+        if (scene::emits(scene.materials[look.material])) return true;
+  return false;
+}
+
 template <typename T>
 void append(std::vector<T>& to, const std::vector<T>& from) {
   to.insert(to.end(), from.begin(), from.end());
@@ -105,8 +113,10 @@ void append(std::vector<T>& to, const std::vector<T>& from) {
 
 void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha) {
   scene_ = scene;
+  shapes_.clear();
   specular_alpha_ = specular_alpha;
   material_features_ = material_features(scene_, specular_alpha);
+  glows_in_a_variant_ = glows_in_a_variant(scene_);
   upload_meshes();
   upload_materials(specular_alpha);
   upload_textures();
@@ -124,26 +134,45 @@ void GpuScene::deform(const std::vector<scene::Shape>& shapes) {
   assert(shapes.size() == scene_.deformations.size());
   if (shapes.empty()) return;
   deformer_.deform(shapes, bvh_, vertices_);
+  shapes_ = shapes;
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     const scene::Deformation& deformation = scene_.deformations[i];
     const scene::Instance& instance = instances_as_set_[deformation.instance];
     spheres_[deformation.instance] =
         bounding_sphere(places_[deformation.mesh].bvh.bounds, instance.world_from_object);
-    // Light samples are taken on the CPU's copy.
-    scene::Mesh& mesh = scene_.meshes[deformation.mesh];
-    if (scene::emits(scene_.materials[instance.material]) && deformer_.has_shape(i, shapes[i])) {
-      mesh.positions = scene::deformed(mesh.undeformed, shapes[i]).positions;
-      lights_.reshape(scene_, deformation.instance);
-    }
+    if (shape_emitter(i)) lights_.reshape(scene_, deformation.instance);
   }
   find_bounds(moved_spheres(spheres_, instances_as_set_, scene_.instances));
+}
+
+// Gives the CPU's copy of a mesh that emits its shape, because light samples are taken on it.
+// Returns false if it does not emit, or does not have the shape.
+bool GpuScene::shape_emitter(std::size_t deformation) {
+  const scene::Deformation& deforms = scene_.deformations[deformation];
+  const scene::Instance& instance = scene_.instances[deforms.instance];
+  if (!scene::emits(scene_.materials[instance.material]) ||
+      !deformer_.has_shape(deformation, shapes_[deformation]))
+    return false;
+  scene::Mesh& mesh = scene_.meshes[deforms.mesh];
+  mesh.positions = scene::deformed(mesh.undeformed, shapes_[deformation]).positions;
+  return true;
 }
 
 void GpuScene::move(const std::vector<scene::Instance>& instances,
                     const std::vector<set::Light>& lights) {
   assert(instances.size() == scene_.instances.size());
+  bool glows_otherwise = false;
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    const std::uint32_t before = scene_.instances[i].material, now = instances[i].material;
+    glows_otherwise |= before != now && (scene::emits(scene_.materials[before]) ||
+                                         scene::emits(scene_.materials[now]));
+  }
   scene_.instances = instances;
   scene_.lights = lights;
+  if (glows_otherwise) {
+    for (std::size_t i = 0; i < shapes_.size(); ++i) shape_emitter(i);
+    lights_.set_scene(scene_);
+  }
   find_bounds(moved_spheres(spheres_, instances_as_set_, scene_.instances));
 }
 
@@ -153,6 +182,7 @@ void GpuScene::find_bounds(const Spheres& spheres) {
 }
 
 void GpuScene::upload_meshes() {
+  work_.trees += scene_.meshes.size();
   std::vector<glm::uvec4> bvh(scene::top_bvh_texels(scene_.instances.size()));
   std::vector<glm::vec4> vertices;
   std::vector<glm::uvec4> triangles;
@@ -204,6 +234,7 @@ void GpuScene::check_deforming() const {
 }
 
 void GpuScene::upload_materials(double specular_alpha) {
+  ++work_.materials;
   std::vector<gpu::GpuMaterial> materials;
   AlbedoTables albedo(std::ranges::any_of(scene_.materials, scene::has_sheen));
   for (const scene::Material& m : scene_.materials) {
@@ -238,6 +269,7 @@ void GpuScene::upload_materials(double specular_alpha) {
 }
 
 void GpuScene::upload_textures() {
+  ++work_.textures;
   std::vector<gpu::GpuTexture> textures;
   std::vector<glm::uvec2> texels;
   for (const scene::Texture& t : scene_.textures) {
@@ -342,7 +374,7 @@ Demand GpuScene::demand(const set::Estimation& estimation) const {
   demand.light_sampling = sampling_;
   demand.shines_around = environment_mean_ > 0;
   demand.finds_lamps = sources_.has_value();
-  demand.lamps_shine = lights_.power() > 0;
+  demand.lamps_shine = lights_.power() > 0 || glows_in_a_variant_;
   return demand;
 }
 

@@ -24,16 +24,24 @@ class GpuScene {
  public:
   explicit GpuScene(Device& device) : device_(device), deformer_(device), lights_(device) {}
 
+  // How often something was made or uploaded since this object was made.
+  struct Work {
+    std::uint64_t trees = 0;  // of meshes, but for those that deforming takes
+    std::uint64_t materials = 0, textures = 0;
+  };
+
   // Builds the meshes' BVHs and uploads everything that does not depend on the camera.
   // Surfaces are perfect mirrors where their GGX alpha is at most `specular_alpha`.
   void set_scene(const scene::Scene& scene, double specular_alpha);
   void set_environment(const EncodedEnvironment& encoded, set::LightSampling sampling);
-  // Puts the same meshes and materials at other places, under other lamps. Only the top level is
-  // rebuilt, by the next place(). The number of instances must stay the same.
+  // Puts the same meshes at other places, with other looks of theirs (scene::Variants), under other
+  // lamps. Only the top level is rebuilt, by the next place(); emissive triangles are found anew if
+  // what glows has changed. The number of instances must stay the same.
   void move(const std::vector<scene::Instance>& instances, const std::vector<set::Light>& lights);
   // Gives the meshes that deform their shapes, those of Scene::deformations in their order. The
   // meshes stay in the shape at rest until the first call.
   void deform(const std::vector<scene::Shape>& shapes);
+  const Work& work() const { return work_; }
   // Returns how many trees of meshes that deform were built anew since set_scene().
   std::uint64_t rebuilt_trees() const { return deformer_.rebuilt(); }
   // Returns how often the lights were encoded.
@@ -65,16 +73,20 @@ class GpuScene {
   void upload_materials(double specular_alpha);
   void upload_textures();
   void find_bounds(const Spheres& spheres);
+  bool shape_emitter(std::size_t deformation);
   std::vector<set::Light> lamps() const;  // of scene and sources, as SceneLights
   void find_extent();
   void upload_instances(const glm::dvec3& camera_position);
   void upload_bounds(const glm::dvec3& camera_position);
 
   Device& device_;
+  Work work_;
   scene::Scene scene_;
   double specular_alpha_ = 0;
   MaterialFeatures material_features_;
+  bool glows_in_a_variant_ = false;                 // some instance does
   std::vector<scene::Instance> instances_as_set_;   // as set_scene() got them
+  std::vector<scene::Shape> shapes_;                // as deform() got them last
   Spheres spheres_;                                 // of instances_as_set_
   std::optional<std::vector<set::Light>> sources_;  // absent: set_sources() was never called
   std::vector<MeshPlace> places_;

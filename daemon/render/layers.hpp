@@ -41,6 +41,9 @@ struct Counters {
   std::uint64_t rebuilt_trees = 0;
   // How often the lamps and emissive triangles were encoded: once, and whenever one has changed.
   std::uint64_t encoded_lights = 0;
+  // Since the renderer was made: trees of meshes that were built as scenes were set, and how often
+  // all materials, and all textures, were uploaded.
+  std::uint64_t built_trees = 0, uploaded_materials = 0, uploaded_textures = 0;
 };
 
 }  // namespace previz::render

@@ -321,6 +321,10 @@ Counters Renderer::counters() const {
   counters.unmeasured = wide(control.unmeasured_high, control.unmeasured_low);
   counters.rebuilt_trees = impl_->scene.rebuilt_trees() - impl_->trees_before;
   counters.encoded_lights = impl_->scene.encoded_lights();
+  const GpuScene::Work& work = impl_->scene.work();
+  counters.built_trees = work.trees;
+  counters.uploaded_materials = work.materials;
+  counters.uploaded_textures = work.textures;
   return counters;
 }
 

@@ -35,7 +35,9 @@ class Renderer {
   // Uploads the scene; may be called between any two frames (P13). Nothing is precomputed beyond
   // BVHs.
   void set_scene(const scene::Scene& scene);
-  // Moves the instances and changes the lamps of the scene last set; no mesh's BVH is rebuilt.
+  // Moves the instances, gives them other looks (scene::Variants) and changes the lamps of the
+  // scene last set. No mesh's BVH is rebuilt, and no pipeline is compiled for a look: the materials
+  // of all variants are there, and so is what they require.
   void move(const std::vector<scene::Instance>& instances, const std::vector<set::Light>& lights);
   // Gives the meshes that deform their shapes, those of Scene::deformations in their order. Until
   // the first call after set_scene() they have those at rest.

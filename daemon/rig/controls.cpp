@@ -11,6 +11,7 @@
 #include <variant>
 
 #include "daemon/set/names.hpp"
+#include "daemon/set/problems.hpp"
 
 namespace previz::rig {
 namespace {
@@ -33,12 +34,18 @@ Outcome none_of(const char* what) {
 
 }  // namespace
 
-Controls::Controls(const set::Set& set, pipeline::Edits edits)
+Controls::Controls(const set::Set& set, pipeline::Edits edits, const scene::Scene& scene)
     : control_(set.control),
       is_animated_(std::ranges::any_of(
           set.objects, [](const set::Object& object) { return !object.animation.empty(); })) {
   for (const set::Object& object : set.objects)
     if (object.presence == set::Presence::virtual_object) objects_.push_back(object.name);
+  for (const scene::Variants& variants : scene.variants) {
+    const set::Object& object = set.objects[variants.object];
+    Looks looks{variants.names, variants.own, object.variant};
+    if (looks.own.empty()) looks.names.insert(looks.names.begin(), "");
+    looks_.emplace(object.name, std::move(looks));
+  }
   for (const set::Light& light : set.lights) set_lights_.push_back(light.name);
   for (const set::CapturedLamp& lamp : set.captured_lamps) set_lights_.push_back(lamp.name);
   look_.edits = std::move(edits);
@@ -284,6 +291,35 @@ Outcome Controls::apply(const set::ScaleObject& effect) {
   double& scale = edits().objects[selected_object()].scale;
   scale *= effect.steps > 0 ? control_.scale_step : 1 / control_.scale_step;
   return {fmt::format("{} at {:.3g} of its size", selected_object(), scale), false, {}};
+}
+
+// Returns the name of the look that an object with looks is shown in.
+std::string Controls::variant_shown(const std::string& object) const {
+  const Looks& looks = looks_.at(object);
+  std::string shown = looks.as_set;
+  const auto recorded = recorded_variants_.find(object);
+  if (look_.of_take && recorded != recorded_variants_.end()) shown = recorded->second;
+  const auto edit = edits().objects.find(object);
+  if (edit != edits().objects.end() && edit->second.variant) shown = *edit->second.variant;
+  return shown.empty() ? looks.own : shown;
+}
+
+Outcome Controls::apply(const set::ChangeVariant& effect) {
+  if (objects_.empty()) return none_of("virtual object");
+  const std::string object = selected_object();
+  const auto looks = looks_.find(object);
+  if (looks == looks_.end()) return {object + " has no variants in its file", true, {}};
+  const std::vector<std::string>& names = looks->second.names;
+  const auto at = std::ranges::find(names, variant_shown(object));
+  // A take may have been recorded in a variant that the file no longer has.
+  const std::size_t index = at == names.end() ? 0
+                                              : around(static_cast<std::size_t>(at - names.begin()),
+                                                       effect.next, names.size());
+  edits().objects[object].variant = names[index];
+  const std::string named = names[index].empty()
+                                ? "as its file has it"
+                                : "variant \"" + set::printable(names[index]) + '"';
+  return {fmt::format("{}: {} ({} of {})", object, named, index + 1, names.size()), false, {}};
 }
 
 Outcome Controls::apply(const set::ResetObject&) {

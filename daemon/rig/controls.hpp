@@ -2,14 +2,17 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/pipeline/edits.hpp"
 #include "daemon/pipeline/relight.hpp"
 #include "daemon/render/views.hpp"
 #include "daemon/rig/mode.hpp"
+#include "daemon/scene/scene.hpp"
 #include "daemon/set/actions.hpp"
 #include "daemon/set/set.hpp"
 
@@ -58,8 +61,9 @@ inline constexpr int sample_steps[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 50};
 
 class Controls {
  public:
-  // `edits` are those that were made before the set was read again.
-  explicit Controls(const set::Set& set, pipeline::Edits edits = {});
+  // `edits` are those that were made before the set was read again; `scene` is the set's.
+  explicit Controls(const set::Set& set, pipeline::Edits edits = {},
+                    const scene::Scene& scene = {});
 
   const Look& look() const { return look_; }
   // Both return a name such as "vase", or nothing if the set has none.
@@ -69,6 +73,11 @@ class Controls {
   // Takes the lamps that were found in the light of the shown picture. They can be selected after
   // the set's own, under names that stay theirs as long as they are changed.
   void use_found(std::vector<pipeline::FoundLamp> found);
+
+  // Takes the variants, by object, that the frame of the take in review was recorded with.
+  void use_recorded(std::map<std::string, std::string> variants) {
+    recorded_variants_ = std::move(variants);
+  }
 
   // Performs an action that D-Bus, previzctl or a press asks for. `ended_refinement` means that the
   // press itself has ended a refinement, which the action then concerns.
@@ -100,6 +109,7 @@ class Controls {
   Outcome apply(const set::MoveObject& effect);
   Outcome apply(const set::TurnObject& effect);
   Outcome apply(const set::ScaleObject& effect);
+  Outcome apply(const set::ChangeVariant& effect);
   Outcome apply(const set::ResetObject& effect);
   Outcome apply(const set::PlayAnimations& effect);
   Outcome apply(const set::HoldAnimations& effect);
@@ -111,12 +121,22 @@ class Controls {
 
   pipeline::Edits& edits() { return look_.of_take ? look_.take_edits : look_.edits; }
   const pipeline::Edits& edits() const { return look_.of_take ? look_.take_edits : look_.edits; }
+  std::string variant_shown(const std::string& object) const;
   std::vector<std::string> lights() const;
   std::optional<Outcome> no_lamp() const;
   pipeline::LightEdit& light_edit();
 
   const set::Control control_;
+  // The looks that an object can be shown in, in the order of the buttons.
+  struct Looks {
+    std::vector<std::string> names;  // "" is the file as it is, where no variant looks like that
+    std::string own;                 // the one that the file has without a variant
+    std::string as_set;              // "" may stand for `own`
+  };
+
   std::vector<std::string> objects_;  // names of the virtual objects
+  std::map<std::string, Looks> looks_;
+  std::map<std::string, std::string> recorded_variants_;
   std::vector<std::string> set_lights_;
   std::vector<pipeline::FoundLamp> found_;
   const bool is_animated_;

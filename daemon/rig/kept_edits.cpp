@@ -47,6 +47,8 @@ std::string printed(const glm::dmat4& m) {
 
 void put_object(std::size_t index, const set::Object& object, const pipeline::ObjectEdit& edit,
                 set::FileEdit& file) {
+  if (edit.variant) file.put("object", index, "variant", codec::quote(*edit.variant));
+  if (edit.is_of_look_alone()) return;
   const glm::dmat4 placed = pipeline::edited(object.world_from_file, edit);
   if (file.has("object", index, "world_from_file"))
     return file.put("object", index, "world_from_file", printed(placed));

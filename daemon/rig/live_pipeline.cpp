@@ -80,6 +80,7 @@ struct LivePipeline::Impl {
 
   pipeline::Mailbox<Shot> seen, tracked, reviewed, rendered;
   pipeline::Newest<std::vector<pipeline::FoundLamp>> found{{}};
+  pipeline::Newest<std::map<std::string, std::string>> recorded_variants{{}};
   pipeline::BoundedQueue<Shot> snapshots{4};  // closed by the render thread, or at a stop
   std::stop_callback<std::function<void()>> close_snapshots{stop_source.get_token(),
                                                             [this] { snapshots.close(); }};
@@ -96,7 +97,8 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
       light({parts.set, parts.scene, parts.look, parts.reports, parts.metrics},
             pipeline::light_calibration(parts.set, parts.cameras.recorded.info), calibration),
       live_render(parts.set, parts.look, parts.inbox, parts.metrics,
-                  {tracked, reviewed, snapshots, found}, stop_source.get_token()),
+                  {tracked, reviewed, snapshots, found, recorded_variants},
+                  stop_source.get_token()),
       gpu_keeper(gpu(), {parts.reports, parts.metrics, stop_source.get_token()}) {
   if (light.needs_frames() && !parts.cameras.light)
     throw Error(parts.set.file.string() +
@@ -299,6 +301,10 @@ pipeline::Mailbox<Shot>& LivePipeline::reviewed() {
 
 std::vector<pipeline::FoundLamp> LivePipeline::found_lamps() const {
   return *impl_->found.get();
+}
+
+std::map<std::string, std::string> LivePipeline::recorded_variants() const {
+  return *impl_->recorded_variants.get();
 }
 
 }  // namespace previz::rig

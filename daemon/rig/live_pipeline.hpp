@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <stop_token>
 #include <string>
@@ -53,6 +54,8 @@ class LivePipeline {
   pipeline::Mailbox<pipeline::Shot>& reviewed();  // a review pushes its frames here
   // Returns the lamps that were found in the light of the last picture.
   std::vector<pipeline::FoundLamp> found_lamps() const;
+  // Returns the variants, by object, that the last picture of a take in review was recorded with.
+  std::map<std::string, std::string> recorded_variants() const;
 
  private:
   struct Impl;

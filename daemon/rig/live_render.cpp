@@ -172,6 +172,8 @@ Shot LiveRender::render(const Look& look, Shot shot) {
   const bool captured = !look.of_take;
   // The crew's changes go on top of what was recorded, never in its place.
   std::optional<session::SceneState> recorded;
+  if (!captured && shot.scene.variants != *channels_.recorded_variants.get())
+    channels_.recorded_variants.set(shot.scene.variants);
   if (!captured)
     recorded = std::exchange(shot.scene, pipeline::with_edits(shot.scene, set_, look.take_edits));
   publish_found(shot.light);

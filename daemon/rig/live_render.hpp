@@ -5,8 +5,10 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <stop_token>
+#include <string>
 
 #include "daemon/pipeline/channel.hpp"
 #include "daemon/pipeline/governor.hpp"
@@ -25,6 +27,8 @@ class LiveRender {
     pipeline::Mailbox<pipeline::Shot>& reviewed;                // a take's, with their light
     pipeline::BoundedQueue<pipeline::Shot>& snapshots;          // output, with layers
     pipeline::Newest<std::vector<pipeline::FoundLamp>>& found;  // output, of the last light
+    // Output: the variants, by object, that the last reviewed frame was recorded with.
+    pipeline::Newest<std::map<std::string, std::string>>& recorded_variants;
   };
 
   // The stage that renders must ask interrupted() whether it is cancelled.

@@ -71,7 +71,7 @@ Rig::Rig(Parts parts)
     : parts_(std::move(parts)),
       loaded_(parts_.sets.running()),
       cameras_(open_cameras(loaded_.set, parts_.loop_cameras, watch_usb(parts_.reports))),
-      controls_(loaded_.set, parts_.sets.edits()),
+      controls_(loaded_.set, parts_.sets.edits(), loaded_.scene),
       look_(controls_.look()),
       recorder_(recorder_options(loaded_, cameras_, parts_.reports)),
       pipeline_(
@@ -116,7 +116,7 @@ ButtonDesk::Asks Rig::asks_of_buttons() {
     return true;
   };
   asks.act = [this](const set::Action& action, const std::string& button, bool ended_refinement) {
-    controls_.use_found(pipeline_.found_lamps());
+    know_picture();
     apply(controls_.perform(action, ended_refinement), "button " + button);
   };
   return asks;
@@ -134,8 +134,14 @@ void Rig::run() {
   if (!parts_.sets.has_next()) pipeline_.wait();
 }
 
-Outcome Rig::perform(const set::Action& action, const std::string& by) {
+// Gives the controls what is known of the shown picture alone.
+void Rig::know_picture() {
   controls_.use_found(pipeline_.found_lamps());
+  controls_.use_recorded(pipeline_.recorded_variants());
+}
+
+Outcome Rig::perform(const set::Action& action, const std::string& by) {
+  know_picture();
   return apply(controls_.perform(action), by);
 }
 

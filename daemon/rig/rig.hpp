@@ -63,6 +63,7 @@ class Rig {
 
  private:
   ButtonDesk::Asks asks_of_buttons();
+  void know_picture();
   void take_inbox();
   void tick();
   void look_at_recorder();

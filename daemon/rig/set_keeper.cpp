@@ -127,6 +127,11 @@ void SetKeeper::carry_edits() {
               "\"" + name +
                   "\" was changed by buttons and is no longer in the set; the change is "
                   "dropped"});
+  for (const std::string& variant :
+       pipeline::drop_unknown_variants(edits, running_.set, running_.scene))
+    reports_({Severity::warning, "",
+              "the variant " + variant +
+                  " was chosen by buttons and is no longer in its file; the choice is dropped"});
 }
 
 void SetKeeper::run(LoadedSet set) {

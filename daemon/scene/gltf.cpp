@@ -15,6 +15,7 @@
 #include "daemon/scene/gltf_nodes.hpp"
 #include "daemon/scene/gltf_read.hpp"
 #include "daemon/scene/gltf_value.hpp"
+#include "daemon/scene/gltf_variants.hpp"
 #include "daemon/scene/transform.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
@@ -53,6 +54,7 @@ struct GltfFile::Loader {
         notes(file),
         model(read_gltf(path, notes)),
         materials(model, file, scene, notes, budget),
+        variants(model, file, notes),
         file_nodes(model, file) {
     const auto ignored = [&](std::size_t count, const char* what) {
       if (count > 0) notes.add("has " + std::to_string(count) + " " + what + "; ignored");
@@ -64,6 +66,11 @@ struct GltfFile::Loader {
   void add_mesh(const PlacedNode& placed, const MeshUse& use);
   bool add_primitive(const tinygltf::Primitive& primitive, const MeshUse& use,
                      const std::string& name, const std::string& suffix, const std::string& what);
+  void add_looks(const tinygltf::Primitive& primitive, const std::vector<int>& worn,
+                 const MeshSource& source, const std::string& what);
+  void note_missing_uvs(const UsedMaterial& material, const MeshSource& source,
+                        const std::string& what);
+  void keep_looks(std::uint32_t object_index);
   void add_light(const PlacedNode& placed, const glm::dmat4& world_from_node,
                  std::uint32_t presence);
   std::optional<std::uint32_t> use_mesh(const tinygltf::Primitive& primitive,
@@ -80,14 +87,20 @@ struct GltfFile::Loader {
   Notes notes;
   tinygltf::Model model;
   GltfMaterials materials;
+  GltfVariants variants;
   FileNodes file_nodes;
   std::map<MeshSource, std::optional<std::uint32_t>> meshes;  // nothing for an empty mesh
   // Instances that the node added last takes along, and where they are in it.
   std::vector<std::pair<std::uint32_t, glm::dmat4>> carried;
+  // Of the object that is being added.
+  std::size_t look = 0;  // as GltfVariants::look_of()
+  std::vector<Variants::Part> parts;
 };
 
 void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index) {
   const std::size_t before = scene.instances.size() + scene.lights.size();
+  look = variants.look_of(object.variant);
+  parts.clear();
   std::optional<GltfAnimation> played;
   if (!object.animation.empty()) played.emplace(model, object.animation, file, notes);
   Animation animation;
@@ -124,6 +137,7 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
     for (auto i = first_light; i < scene.lights.size(); ++i)
       animation.lights.push_back({i, moved, glm::dmat4(1)});
   }
+  keep_looks(object_index);
   if (!played && !model.animations.empty())
     notes.add("object \"" + set::printable(object.name) + "\" plays none of its " +
               std::to_string(model.animations.size()) + " animations");
@@ -175,15 +189,11 @@ bool GltfFile::Loader::add_primitive(const tinygltf::Primitive& primitive, const
       is_skinned ? use.world_from_file : instance.world_from_object * use.node_from_copy;
   if (!is_invertible(instance.world_from_object)) return false;
 
-  const UsedMaterial material = materials.use(primitive.material);
+  const std::vector<int> worn = variants.materials(primitive, what);
+  const UsedMaterial material = materials.use(worn.size() > 1 ? worn[look] : worn[0]);
   MeshSource source = mesh_source(primitive, material.mapping);
   add_deformation(primitive, use.deforms, file + ": " + what, source);
-  if (material.is_textured && source.uvs < 0)
-    notes.add(what + ": has no TEXCOORD_" + std::to_string(material.mapping.set) +
-              " for its textures; they are read at (0, 0)");
-  if (is_anisotropic(scene.materials[material.index]) && source.uvs < 0)
-    notes.add(what + ": has no TEXCOORD_" + std::to_string(material.mapping.set) +
-              " that says which way its anisotropy runs; any way is taken");
+  note_missing_uvs(material, source, what);
   const auto index = static_cast<std::uint32_t>(scene.instances.size());
   const auto mesh = is_skinned || !source.targets.empty()
                         ? add_deformed(primitive, source, name + suffix, what, use.deforms)
@@ -195,7 +205,60 @@ bool GltfFile::Loader::add_primitive(const tinygltf::Primitive& primitive, const
   instance.material = material.index;
   if (!is_skinned) carried.emplace_back(index, use.node_from_copy);
   scene.instances.push_back(std::move(instance));
+  if (worn.size() > 1 && use.instance.presence == world_mixed)
+    add_looks(primitive, worn, source, what);
   return true;
+}
+
+// Loads the looks of the instance that was added last. Where a look's texture coordinates differ
+// from those of the mesh, it has a copy of the mesh; a mesh that deforms has no copies.
+void GltfFile::Loader::add_looks(const tinygltf::Primitive& primitive, const std::vector<int>& worn,
+                                 const MeshSource& source, const std::string& what) {
+  const auto index = static_cast<std::uint32_t>(scene.instances.size() - 1);
+  const Variants::Look own{scene.instances[index].mesh, scene.instances[index].material};
+  const bool deforms = !source.targets.empty() || !source.influences.empty();
+  Variants::Part& part = parts.emplace_back(Variants::Part{index, {}});
+  for (const int material : worn) {
+    const UsedMaterial used = materials.use(material);
+    Variants::Look look_then{own.mesh, used.index};
+    if (used.is_textured && used.mapping != source.mapping) {
+      if (deforms) {
+        look_then.material = own.material;
+        notes.add(what +
+                  ": deforms, and one of its variants maps textures otherwise; there it "
+                  "keeps its own material");
+      } else {
+        const MeshSource mapped = mesh_source(primitive, used.mapping);
+        const std::string name = scene.meshes[own.mesh].name;
+        look_then.mesh = use_mesh(primitive, mapped, name, what).value_or(own.mesh);
+        note_missing_uvs(used, mapped, what);
+      }
+    } else if (used.index != own.material) {
+      note_missing_uvs(used, source, what);
+    }
+    part.looks.push_back(look_then);
+  }
+}
+
+void GltfFile::Loader::note_missing_uvs(const UsedMaterial& material, const MeshSource& source,
+                                        const std::string& what) {
+  if (material.is_textured && source.uvs < 0)
+    notes.add(what + ": has no TEXCOORD_" + std::to_string(material.mapping.set) +
+              " for its textures; they are read at (0, 0)");
+  if (is_anisotropic(scene.materials[material.index]) && source.uvs < 0)
+    notes.add(what + ": has no TEXCOORD_" + std::to_string(material.mapping.set) +
+              " that says which way its anisotropy runs; any way is taken");
+}
+
+void GltfFile::Loader::keep_looks(std::uint32_t object_index) {
+  if (parts.empty()) return;
+  Variants kept{object_index, variants.names(), "", std::move(parts)};
+  for (std::size_t i = 0; i < kept.names.size() && kept.own.empty(); ++i)
+    if (std::ranges::all_of(kept.parts, [&](const Variants::Part& part) {
+          return part.looks[i + 1] == part.looks[0];
+        }))
+      kept.own = kept.names[i];
+  scene.variants.push_back(std::move(kept));
 }
 
 // Every instance of a mesh that deforms has a mesh of its own.

@@ -24,8 +24,9 @@ class GltfFile {
 
   // Puts the nodes that the object asks for, and their descendants, into the scene as instances and
   // lights of set object `index`. Throws previz::Error where the object asks for a node that the
-  // file's scene lacks (naming the most similar name that it has), where the nodes are no tree,
-  // and where accessors, indices or images are out of range.
+  // file's scene lacks (naming the most similar name that it has) or for a variant that it lacks
+  // (naming those that it has), where the nodes are no tree, and where accessors, indices or images
+  // are out of range.
   void add(const set::Object& object, std::uint32_t index);
 
   // Returns what was left out or not understood so far, ready to print.

@@ -24,6 +24,7 @@ constexpr std::array known_extensions = {"EXT_mesh_gpu_instancing",
                                          "KHR_materials_sheen",
                                          "KHR_materials_specular",
                                          "KHR_materials_transmission",
+                                         "KHR_materials_variants",
                                          "KHR_materials_volume",
                                          "KHR_mesh_quantization",
                                          "KHR_texture_transform"};

@@ -106,6 +106,15 @@ Placement place(const Scene& scene, const set::Set& set, const session::SceneSta
     else if (*world_from_file != found->world_from_file)
       move_object(scene, index, *world_from_file * glm::inverse(found->world_from_file), placement);
   }
+  for (const auto& [name, variant] : state.variants) {
+    const auto found = std::ranges::find(set.objects, name, &set::Object::name);
+    const auto index = static_cast<std::size_t>(found - set.objects.begin());
+    const Variants* variants = found == set.objects.end() ? nullptr : variants_of(scene, index);
+    if (variants && show_variant(*variants, variant, placement.instances)) continue;
+    if (!variants && variant.empty() && found != set.objects.end()) continue;
+    placement.unknown.push_back("object \"" + name + "\" was shown as its variant \"" +
+                                set::printable(variant) + "\"; it has none such");
+  }
   // The set's own lamps are the last of the scene's.
   const std::size_t first = scene.lights.size() - set.lights.size();
   for (const auto& [name, light] : state.lights) {

@@ -73,8 +73,36 @@ Scene load_scene(const set::Set& set) {
   return scene;
 }
 
+const Variants* variants_of(const Scene& scene, std::size_t object) {
+  const auto found = std::ranges::find(scene.variants, object, &Variants::object);
+  return found == scene.variants.end() ? nullptr : &*found;
+}
+
+bool show_variant(const Variants& variants, const std::string& name,
+                  std::vector<Instance>& instances) {
+  std::size_t look = 0;
+  if (!name.empty()) {
+    const auto found = std::ranges::find(variants.names, name);
+    if (found == variants.names.end()) return false;
+    look = 1 + static_cast<std::size_t>(found - variants.names.begin());
+  }
+  for (const Variants::Part& part : variants.parts) {
+    instances[part.instance].mesh = part.looks[look].mesh;
+    instances[part.instance].material = part.looks[look].material;
+  }
+  return true;
+}
+
 bool emits(const Material& m) {
   return m.emission.r > 0 || m.emission.g > 0 || m.emission.b > 0;
+}
+
+bool may_glow(const Scene& scene) {
+  bool glows = false;
+  for_each_look(scene, [&](std::uint32_t, std::uint32_t material) {
+    glows = glows || emits(scene.materials[material]);
+  });
+  return glows;
 }
 
 bool transmits(const Material& m) {

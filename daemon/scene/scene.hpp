@@ -106,6 +106,24 @@ struct Texture {
   bool nearest = false;  // magnification filter
 };
 
+// The looks that an object's file names (KHR_materials_variants). They are loaded with the scene,
+// so that changing from one to another loads nothing.
+struct Variants {
+  struct Look {
+    std::uint32_t mesh = 0;  // the instance's, or a copy with other texture coordinates
+    std::uint32_t material = 0;
+    friend bool operator==(const Look&, const Look&) = default;
+  };
+  struct Part {
+    std::uint32_t instance = 0;
+    std::vector<Look> looks;  // without a variant, then in each variant
+  };
+  std::uint32_t object = 0;        // index of the set's [[object]]
+  std::vector<std::string> names;  // not empty; no two are alike
+  std::string own;                 // the variant that looks as the file does without one; may be ""
+  std::vector<Part> parts;
+};
+
 struct Scene {
   std::vector<Mesh> meshes;
   std::vector<Instance> instances;
@@ -121,6 +139,7 @@ struct Scene {
   std::vector<std::uint32_t> light_objects;
   std::vector<Animation> animations;      // at most one per object
   std::vector<Deformation> deformations;  // of the meshes whose shape an animation changes
+  std::vector<Variants> variants;         // of virtual objects: only they are changed by buttons
   // Notes about what was dropped or not understood while loading, in plain words (counted, never
   // silent).
   std::vector<std::string> notes;
@@ -152,7 +171,27 @@ inline constexpr std::uint64_t max_file_bytes = 0xffffffffull;  // glTF binary's
 // real objects' materials; a surface that no real object has is an error too.
 Scene load_scene(const set::Set& set);
 
+// Returns the looks of the object with this index; null if it has no variants.
+const Variants* variants_of(const Scene& scene, std::size_t object);
+
+// Gives the instances of an object the look of a variant; "" is the look that the file has without
+// one. Returns false, and changes nothing, if there is no variant of this name.
+bool show_variant(const Variants& variants, const std::string& name,
+                  std::vector<Instance>& instances);
+
+// Calls `visit(mesh, material)` for every look that an instance of the scene has or can be given.
+template <typename Visit>
+void for_each_look(const Scene& scene, Visit visit) {
+  for (const Instance& instance : scene.instances) visit(instance.mesh, instance.material);
+  for (const Variants& variants : scene.variants)
+    for (const Variants::Part& part : variants.parts)
+      for (const Variants::Look& look : part.looks) visit(look.mesh, look.material);
+}
+
 bool emits(const Material& material);
+
+// Returns whether an instance emits, or does in one of its variants.
+bool may_glow(const Scene& scene);
 
 // Returns whether any part of this material lets light through: a texture can take metal away.
 bool transmits(const Material& material);

@@ -50,6 +50,9 @@ struct TurnObject {
 struct ScaleObject {
   int steps = 1;
 };
+struct ChangeVariant {
+  int next = 1;  // moves along the variants of the selected object's materials
+};
 struct ResetObject {};
 struct PlayAnimations {};  // starts them from the beginning
 struct HoldAnimations {};  // pauses them, or lets them go on
@@ -70,8 +73,8 @@ struct ChangeExposure {
 using Effect =
     std::variant<ToMode, Record, MarkGood, Acknowledge, Snapshot, ReloadSet, KeepEdits, OtherSet,
                  ChangeSamples, NextEstimator, NextLightMode, NextView, ToggleOsd, SelectObject,
-                 MoveObject, TurnObject, ScaleObject, ResetObject, PlayAnimations, HoldAnimations,
-                 SelectLight, DimLight, TintLight, ResetLight, ChangeExposure>;
+                 MoveObject, TurnObject, ScaleObject, ChangeVariant, ResetObject, PlayAnimations,
+                 HoldAnimations, SelectLight, DimLight, TintLight, ResetLight, ChangeExposure>;
 
 struct Action {
   const char* name;

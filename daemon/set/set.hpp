@@ -79,6 +79,7 @@ struct Object {
   std::string carrier;             // carrier that it is fixed to; empty: fixed in the world
   std::string animation;           // name of the file's animation to play; empty: none
   bool loops = true;               // the animation restarts when it ends
+  std::string variant;             // of the file's materials; empty: those without a variant
 };
 
 enum class LightType { point, spot, directional, rectangle, sphere };

@@ -159,6 +159,7 @@ Keys object_keys(ObjectDraft& o) {
       {"nodes", &o.object.nodes, plain, "Names of the glTF nodes to use; empty: the whole file."},
       {"animation", &o.object.animation, plain, "Name of the animation in the file that is played (nodes, joints of skins and weights of morph targets), in the time of the pictures. Default: nothing moves.", optional("\"walk\"")},
       {"loops", &o.object.loops, plain, "The animation starts again at its end; false: it stops there."},
+      {"variant", &o.object.variant, plain, "Name of the variant of its materials that the object is shown in (KHR_materials_variants); \"\" is the file as it is without one. The action next_variant steps through the variants of a virtual object.", optional("\"blue\"")},
       {"position_m", &o.pose.position, m, "Position of the file's origin in the world.", optional("[0.2, 0.1, 0.0]")},
       {"rotation_deg", &o.pose.rotation, deg, "Rotation about world X, then Y, then Z, applied before the position.", optional("[0.0, 0.0, 45.0]")},
       {"scale", &o.scale, plain.above(0, 1e6), "Scale factor, applied before the rotation."},

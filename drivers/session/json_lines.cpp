@@ -71,6 +71,10 @@ void get(const Json& json, bool& value) {
   json.get_to(value);
 }
 
+void get(const Json& json, std::string& value) {
+  json.get_to(value);
+}
+
 template <std::size_t N>
 void get(const Json& json, std::array<double, N>& values) {
   if (!json.is_array() || json.size() != N) throw std::invalid_argument("wrong length");
@@ -176,6 +180,7 @@ TrackRecord parse_track_line(const Json& json) {
   get(json.at("tags"), record.tags);
   get_members(json, "objects", record.scene.objects);
   get_members(json, "lights", record.scene.lights);
+  get_members(json, "variants", record.scene.variants);
   get_members(json, "carriers", record.carriers);
   if (json.contains("animation_s")) get(json.at("animation_s"), record.scene.animation_s.emplace());
   if (json.contains("captured_light"))
@@ -255,6 +260,7 @@ std::string to_line(const TrackRecord& record) {
   for (const auto& [name, world_from_file] : record.scene.objects)
     json["objects"][name] = json_of(world_from_file);
   for (const auto& [name, light] : record.scene.lights) json["lights"][name] = json_of(light);
+  for (const auto& [name, variant] : record.scene.variants) json["variants"][name] = variant;
   for (const auto& [name, carrier] : record.carriers) json["carriers"][name] = json_of(carrier);
   if (record.scene.animation_s)
     json["animation_s"] = finite(*record.scene.animation_s, "animation_s");

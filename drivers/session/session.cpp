@@ -15,7 +15,7 @@
 //     light.mkv, light.jsonl   likewise; a bracket is consecutive frames
 //     track.jsonl     a line a frame: frame, timestamp_ns, tracked, tags; if tracked also
 //                     world_from_camera (16 numbers, row-major) and covariance (36 numbers);
-//                     objects and lights that are not as the set has them
+//                     objects, lights and variants of objects that are not as the set has them
 //     events.jsonl    a line an event, in order of arrival: timestamp_ns and what happened; of a
 //                     button: button (its name), pressed; of all else: event, in words
 //     assets/         files of the set, named by the SHA-256 of their content

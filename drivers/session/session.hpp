@@ -65,11 +65,14 @@ struct LightState {
 
   friend bool operator==(const LightState&, const LightState&) = default;
 };
-// Everything that was moved or relit, by name; what is as the set file has it is left out.
+// Everything that was moved, relit or given other materials, by name; what is as the set file has
+// it is left out.
 struct SceneState {
   // Each is world_from_file; nothing: its carrier was not found yet, and the object is nowhere.
   std::map<std::string, std::optional<glm::dmat4>> objects;
   std::map<std::string, std::optional<LightState>> lights;
+  // The variant of its materials that an object is shown in; "" is its file as it is without one.
+  std::map<std::string, std::string> variants = {};
   std::optional<double> animation_s;  // time in the animations; absent: nothing is animated
 
   friend bool operator==(const SceneState&, const SceneState&) = default;

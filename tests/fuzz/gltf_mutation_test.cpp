@@ -91,6 +91,7 @@ GltfWriter sample() {
           {{"specularFactor", 0.5}, {"specularColorFactor", {1, 0.5, 2}}}},
          {"KHR_materials_clearcoat",
           {{"clearcoatFactor", 0.5}, {"clearcoatRoughnessFactor", 0.25}}}}}});
+  gltf.add("materials", {{"name", "night"}, {"emissiveFactor", {0, 0, 1}}});
   const int positions =
       gltf.positions({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5f, 0.5f, 1}});
   const int sparse_indices = gltf.view(GltfWriter::bytes_of(std::vector<std::uint16_t>{4}));
@@ -105,11 +106,17 @@ GltfWriter sample() {
       {"TEXCOORD_0", gltf.uvs({{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0.5f, 0.5f}})}};
   const int indices =
       gltf.values<std::uint16_t>(5123, "SCALAR", {0, 2, 1, 0, 3, 2, 0, 1, 4, 1, 2, 4});
-  const int pyramid =
-      gltf.mesh({{"attributes", attributes}, {"indices", indices}, {"material", 0}}, "pyramid");
+  const Json looks = {
+      {"KHR_materials_variants", {{"mappings", {{{"material", 2}, {"variants", {0, 1}}}}}}}};
+  gltf.json["extensions"]["KHR_materials_variants"]["variants"] = {{{"name", "day"}},
+                                                                   {{"name", "night"}}};
+  const int pyramid = gltf.mesh(
+      {{"attributes", attributes}, {"indices", indices}, {"material", 0}, {"extensions", looks}},
+      "pyramid");
   const int strip =
       gltf.mesh({{"attributes", {{"POSITION", positions}}}, {"mode", 5}, {"material", 1}}, "strip");
-  gltf.json["extensionsUsed"] = {"KHR_lights_punctual", "KHR_texture_transform"};
+  gltf.json["extensionsUsed"] = {"KHR_lights_punctual", "KHR_materials_variants",
+                                 "KHR_texture_transform"};
   gltf.json["extensions"]["KHR_lights_punctual"]["lights"] = {
       {{"type", "spot"}, {"intensity", 5}, {"spot", {{"outerConeAngle", 0.5}}}}};
   const int child =
@@ -240,6 +247,15 @@ void expect_sound(const scene::Scene& scene) {
     const double determinant = glm::determinant(glm::dmat3(instance.world_from_object));
     ASSERT_TRUE(std::isfinite(determinant) && determinant != 0);
   }
+  scene::for_each_look(scene, [&](std::uint32_t mesh, std::uint32_t material) {
+    ASSERT_LT(mesh, scene.meshes.size());
+    ASSERT_LT(material, scene.materials.size());
+  });
+  for (const scene::Variants& variants : scene.variants)
+    for (const scene::Variants::Part& part : variants.parts) {
+      ASSERT_LT(part.instance, scene.instances.size());
+      ASSERT_EQ(part.looks.size(), variants.names.size() + 1);
+    }
   for (const scene::Material& m : scene.materials) {
     ASSERT_TRUE(m.ior >= 1 && m.roughness >= 0 && m.roughness <= 1 && m.alpha >= 0 && m.alpha <= 1);
     ASSERT_TRUE(std::isfinite(m.emission.x + m.emission.y + m.emission.z));

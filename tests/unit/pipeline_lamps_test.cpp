@@ -212,7 +212,8 @@ TEST(DeclaredLamp, OfARemovedObjectTakesItsLightAlong) {
                          .world_from_file = glm::dmat4(1),
                          .nodes = {},
                          .carrier = {},
-                         .animation = {}});
+                         .animation = {},
+                         .variant = {}});
   const LightPtr light = light_of(set, &scene);
   const lighting::EnvironmentMap& map = light->lighting.environment;
   EXPECT_LT(map.radiance[lighting::texel_index(map.size, glm::vec3(key))].g, 0.21);

@@ -115,6 +115,25 @@ samples = 1500
   expect_said("the observer has no calibration here");
 }
 
+// One of a virtual object is chosen by the set, and all are there for the buttons.
+TEST_F(Check, NamesTheVariantsOfAnObject) {
+  std::string file = triangle(R"("name": "matt"}, {"name": "gold", "emissiveFactor": [1, 1, 0])");
+  const std::string plain = R"("material": 0})";
+  file.replace(file.find(plain), plain.size(), R"("material": 0, "extensions":
+    {"KHR_materials_variants": {"mappings": [{"material": 1, "variants": [1]}]}}})");
+  file.insert(1, R"("extensionsUsed": ["KHR_materials_variants"], "extensions":
+    {"KHR_materials_variants": {"variants": [{"name": "by day"}, {"name": "by night"}]}}, )");
+  write("a.gltf", file);
+  const std::string object = "[[object]]\nname='a'\nfile='a.gltf'\npresence='virtual'\n";
+  ASSERT_EQ(check(object + "variant='by night'\n"), 0) << said_;
+  expect_said("from a.gltf, in its variant \"by night\"\n");
+  expect_said("its variants, for the buttons: \"by day\", \"by night\"\n");
+  ASSERT_EQ(check(object), 0) << said_;
+  expect_used("glowing surfaces: a surface gives off light");  // it may, at the press of a button
+  EXPECT_EQ(check(object + "variant='at noon'\n"), 1);
+  expect_said("a.gltf: there is no variant \"at noon\"; it has \"by day\", \"by night\"");
+}
+
 // A material may be of a kind that lets light through and let none through: the renderer then
 // leaves alpha out (`Alpha.is_left_out_where_every_texel_is_opaque`), and that is what is said.
 TEST_F(Check, AgreesWithTheRendererThatSolidBlendingNeedsNoAlpha) {

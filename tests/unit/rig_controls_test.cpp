@@ -106,6 +106,83 @@ TEST(Controls, TurningAndScalingAreAboutTheObjectsOrigin) {
   EXPECT_TRUE(desk.scene().objects.empty());
 }
 
+// The vase's file looks in none of its variants as it does without one, the bird's as in "wet".
+TEST(Controls, StepsThroughTheVariantsOfTheSelectedObject) {
+  scene::Scene painted;
+  painted.variants = {{1, {"red", "blue"}, "", {}}, {2, {"dry", "wet"}, "wet", {}}};
+  const set::Set set = stage();
+  Controls controls(set, {}, painted);
+  const auto press = [&](const char* action) {
+    return controls.perform(*set::find_action(action)).said;
+  };
+  const auto shown = [&](const std::string& object) {
+    return pipeline::scene_state(set, controls.look().edits).variants.at(object);
+  };
+  EXPECT_EQ(press("next_variant"), "vase: variant \"red\" (2 of 3)");
+  EXPECT_EQ(shown("vase"), "red");
+  EXPECT_TRUE(pipeline::scene_state(set, controls.look().edits).objects.empty()) << "not moved";
+  EXPECT_EQ(press("next_variant"), "vase: variant \"blue\" (3 of 3)");
+  EXPECT_EQ(press("next_variant"), "vase: as its file has it (1 of 3)");
+  EXPECT_EQ(shown("vase"), "");
+  EXPECT_EQ(press("previous_variant"), "vase: variant \"blue\" (3 of 3)");
+  press("next_object");
+  EXPECT_EQ(press("next_variant"), "bird: variant \"dry\" (1 of 2)") << "it was shown as if wet";
+  EXPECT_EQ(press("next_variant"), "bird: variant \"wet\" (2 of 2)");
+  press("reset_object");
+  EXPECT_FALSE(pipeline::scene_state(set, controls.look().edits).variants.contains("bird"));
+  EXPECT_EQ(shown("vase"), "blue");
+}
+
+TEST(Controls, AnObjectWithoutVariantsHasNoNext) {
+  Desk desk;
+  const Outcome outcome = desk("next_variant");
+  EXPECT_TRUE(outcome.refused);
+  EXPECT_EQ(outcome.said, "vase has no variants in its file");
+}
+
+// What is stepped from is what is seen: the take's own variant, and on top of it what was chosen in
+// the review.
+TEST(Controls, InAReviewVariantsAreSteppedFromThoseOfTheTake) {
+  scene::Scene painted;
+  painted.variants = {{1, {"red", "green", "blue"}, "red", {}}};
+  const set::Set set = stage();
+  Controls controls(set, {}, painted);
+  const auto press = [&](const char* action) {
+    return controls.perform(*set::find_action(action)).said;
+  };
+  press("next_variant");
+  EXPECT_EQ(controls.look().edits.objects.at("vase").variant, "green");
+  controls.happened(Event::good_frame);
+  controls.happened(Event::take_finished);
+  press("review");
+  ASSERT_TRUE(controls.look().of_take);
+  EXPECT_EQ(press("previous_variant"), "vase: variant \"blue\" (3 of 3)") << "the set's was red";
+  press("reset_object");
+  controls.use_recorded({{"vase", "green"}});
+  EXPECT_EQ(press("next_variant"), "vase: variant \"blue\" (3 of 3)");
+  session::SceneState recorded;
+  recorded.variants["vase"] = "green";
+  const session::SceneState state = pipeline::with_edits(recorded, set, controls.look().take_edits);
+  EXPECT_EQ(state.variants.at("vase"), "blue");
+  EXPECT_TRUE(state.objects.empty());
+  EXPECT_EQ(controls.look().edits.objects.at("vase").variant, "green") << "the live picture's";
+}
+
+TEST(Controls, VariantsThatTheFilesNoLongerHaveAreDropped) {
+  const set::Set set = stage();
+  scene::Scene painted;
+  painted.variants = {{1, {"red"}, "", {}}};
+  pipeline::Edits edits;
+  edits.objects["vase"].variant = "red";
+  edits.objects["bird"].variant = "wet";
+  EXPECT_EQ(pipeline::drop_unknown_variants(edits, set, painted),
+            std::vector<std::string>{"\"wet\" of \"bird\""});
+  EXPECT_EQ(edits.objects.size(), 1u);
+  edits.objects["vase"].scale = 2;
+  EXPECT_EQ(pipeline::drop_unknown_variants(edits, set, {}).size(), 1u);
+  EXPECT_EQ(edits.objects.at("vase"), pipeline::ObjectEdit{.scale = 2}) << "its size is kept";
+}
+
 TEST(Controls, OppositeStepsComeBack) {
   const char* pairs[][2] = {{"move_left", "move_right"},      {"move_back", "move_forward"},
                             {"move_up", "move_down"},         {"turn_left", "turn_right"},

@@ -119,6 +119,21 @@ TEST_F(KeptEdits, OnlyTheChangedKeysAreWritten) {
   EXPECT_EQ(kept(edits), expected);
 }
 
+// A variant is a key of its own: the place stays as it is written, also as a matrix.
+TEST_F(KeptEdits, AVariantIsWrittenAlone) {
+  pipeline::Edits edits;
+  edits.objects["vase"].variant = "";
+  edits.objects["bird"].variant = "in \"gold\"";
+  std::string expected = stage;
+  for (const auto& [last, more] : {std::pair("scale = 2", "\nvariant = \"\""),
+                                   std::pair("[0, 0, 0, 1]]", "\nvariant = \"in \\\"gold\\\"\"")})
+    expected.insert(expected.find(last) + std::string(last).size(), more);
+  EXPECT_EQ(kept(edits), expected);
+  const set::Set after = parse(kept(edits));
+  EXPECT_EQ(after.objects[0].variant, "");
+  EXPECT_EQ(after.objects[1].variant, "in \"gold\"");
+}
+
 TEST_F(KeptEdits, ALampIsAsItWasShown) {
   pipeline::Edits edits;
   for (const char* name : {"key", "window"}) {

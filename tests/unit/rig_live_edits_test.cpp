@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "drivers/session/files.hpp"
+#include "tests/support/gltf_writer.hpp"
 #include "tests/support/live_rig.hpp"
 
 namespace previz::rig {
@@ -133,6 +134,90 @@ TEST_F(RigLive, ChangesOutlastTheSetAndAreKeptInItsFile) {
   const set::Set set = set::load_set(file);
   EXPECT_NEAR(glm::dvec3(set.objects[1].world_from_file[3]).x, 0.01, 1e-9);
   EXPECT_NEAR(set.lights[0].gain_mixed, std::exp2(-1.0 / 3), 1e-6);
+}
+
+// The card, in grey, black and as a lamp.
+void write_card_with_variants(const std::filesystem::path& file) {
+  test::GltfWriter gltf;
+  const auto paper = [&](double grey, double glow) {
+    return gltf.add("materials",
+                    {{"pbrMetallicRoughness",
+                      {{"baseColorFactor", {grey, grey, grey, 1}},
+                       {"metallicFactor", 0.0},
+                       {"roughnessFactor", 1.0}}},
+                     {"emissiveFactor", {glow, glow, glow}},
+                     {"extensions", {{"KHR_materials_specular", {{"specularFactor", 0.0}}}}}});
+  };
+  const int grey = paper(0.5, 0), black = paper(0, 0), lamp = paper(0, 1);
+  gltf.json["extensionsUsed"] = {"KHR_materials_specular", "KHR_materials_variants"};
+  gltf.json["extensions"]["KHR_materials_variants"]["variants"] = {
+      {{"name", "grey"}}, {{"name", "black"}}, {{"name", "lamp"}}};
+  const int positions = gltf.positions(
+      {{-0.15f, 0.1f, 0.15f}, {0.15f, 0.1f, 0.15f}, {0.15f, 0.1f, -0.15f}, {-0.15f, 0.1f, -0.15f}});
+  gltf.root("card", gltf.mesh({{"attributes", {{"POSITION", positions}}},
+                               {"indices", gltf.indices({0, 1, 2, 0, 2, 3})},
+                               {"material", grey},
+                               {"extensions",
+                                {{"KHR_materials_variants",
+                                  {{"mappings",
+                                    {{{"material", grey}, {"variants", {0}}},
+                                     {{"material", black}, {"variants", {1}}},
+                                     {{"material", lamp}, {"variants", {2}}}}}}}}}}));
+  gltf.save(file);
+}
+
+// A variant is chosen by a button, recorded, rendered from the take as it was shown, changed in the
+// review and kept in the set file; no tree is built for any of it.
+TEST_F(RigLive, VariantsAreShownRecordedReviewedAndKept) {
+  write_set();
+  write_card_with_variants(directory_ / "card.gltf");
+  const auto variant_of = [](const Shown& s) {
+    const auto found = s.shot.scene.variants.find("card");
+    return found == s.shot.scene.variants.end() ? "-" : found->second;
+  };
+  Shown taken;
+  run([&] {
+    const Shown before = until([](const Shown& s) { return s.shot.samples == 2; });
+    press("next_variant");
+    const Shown black = until([&](const Shown& s) { return variant_of(s) == "black"; });
+    press("record");
+    taken = until([&](const Shown& s) { return s.look.state.recording && s.shot.samples == 2; });
+    until([&](const Shown& s) {  // the presses below fall into its review
+      return s.shot.frame->timestamp_ns > taken.shot.frame->timestamp_ns + 4'000'000'000;
+    });
+    press("record");
+    until_said("12A_take001 is finished");
+    press("next_variant");
+    const Shown lamp = until([&](const Shown& s) { return variant_of(s) == "lamp"; });
+    EXPECT_EQ(lamp.shot.counters.built_trees, before.shot.counters.built_trees);
+    EXPECT_EQ(lamp.shot.counters.uploaded_materials, before.shot.counters.uploaded_materials);
+
+    press("review");
+    const auto reviewed = [&](const Shown& s) {
+      return s.look.state.mode == Mode::review && s.shot.samples == 2 && !s.shot.frozen;
+    };
+    until([&](const Shown& s) { return reviewed(s) && variant_of(s) == "black"; });
+    press("previous_variant");
+    until([&](const Shown& s) { return reviewed(s) && variant_of(s) == "grey"; });
+    press("live");
+    until(
+        [&](const Shown& s) { return s.look.state.mode == Mode::live && variant_of(s) == "lamp"; });
+    press("keep");
+    until_said("set.toml has the changes");
+    until([&](const Shown& s) {
+      return s.look.edits == pipeline::Edits{} && s.shot.samples == 2 && variant_of(s) == "-";
+    });
+  });
+  EXPECT_EQ(set::load_set(directory_ / "set.toml").objects[1].variant, "lamp");
+  EXPECT_GT(count_said("card: variant \"black\" (2 of 3)"), 0);
+  const session::Session take = session::open_session(directory_ / "takes/12A_take001");
+  EXPECT_EQ(take.track.back().scene.variants.at("card"), "black");
+  const render::Layers post =
+      rendered(directory_ / "takes/12A_take001", taken.shot.frame->timestamp_ns, 2);
+  // The middle of the picture shows the card, which is black.
+  const std::size_t middle = post.mixed.size() / 2 + static_cast<std::size_t>(post.width) / 2;
+  EXPECT_GT(post.mask[middle], 0.99f);
+  EXPECT_EQ(post.mixed[middle], glm::vec3(0));
 }
 
 // What is moved while no picture is made is where it was put when the frozen one is refined.

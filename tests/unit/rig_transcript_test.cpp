@@ -71,6 +71,8 @@ constexpr Line transcript[] = {
     {"roll_left", "button roll_left: card turned to +0.0 +0.0 +0.0 degrees"},
     {"scale_up", "button scale_up: card at 1.05 of its size"},
     {"scale_down", "button scale_down: card at 1 of its size"},
+    {"next_variant", "button next_variant: card has no variants in its file (refused)", "", "card has no variants in its file"},
+    {"previous_variant", "button previous_variant: card has no variants in its file (refused)", "", "card has no variants in its file"},
     {"reset_object", "button reset_object: card is back where the set file has it"},
     {"play", "button play: this set has no animation (refused)", "", "this set has no animation"},
     {"hold", "button hold: this set has no animation (refused)", "", "this set has no animation"},

@@ -155,6 +155,30 @@ TEST(Placement, ALampThatTheSetTintsKeepsItsTintUnlessTheStateSaysOtherwise) {
   EXPECT_EQ(place(stage.scene, stage.set, state).lights[1].tint, glm::dvec3(1));
 }
 
+// Of the torch's two instances one is lacquered in the variant.
+TEST(Placement, AVariantIsOfTheMaterialsOfItsObjectAlone) {
+  Stage stage;
+  stage.scene.variants = {{1, {"lacquered"}, "", {{2, {{0, 4}, {3, 5}}}}}};
+  stage.scene.instances[2].material = 4;
+  session::SceneState state;
+  state.variants["torch"] = "lacquered";
+  Placement placement = place(stage.scene, stage.set, state);
+  EXPECT_TRUE(placement.unknown.empty());
+  EXPECT_EQ(placement.instances[2].material, 5u);
+  EXPECT_EQ(placement.instances[2].mesh, 3u);
+  EXPECT_EQ(placement.instances[1].material, 0u);
+  EXPECT_EQ(placement.instances[2].world_from_object, stage.scene.instances[2].world_from_object);
+  state.variants["torch"] = "";
+  EXPECT_EQ(place(stage.scene, stage.set, state).instances[2].material, 4u);
+  state.variants["torch"] = "gilded";
+  state.variants["vase"] = "gilded";
+  placement = place(stage.scene, stage.set, state);
+  EXPECT_EQ(placement.instances[2].material, 4u);
+  ASSERT_EQ(placement.unknown.size(), 2u);
+  EXPECT_EQ(placement.unknown[0],
+            "object \"torch\" was shown as its variant \"gilded\"; it has none such");
+}
+
 TEST(Placement, NamesTheSetHasNotAreTold) {
   const Stage stage;
   session::SceneState state;
