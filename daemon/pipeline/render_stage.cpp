@@ -47,8 +47,13 @@ RenderStage::RenderStage(std::shared_ptr<render::Device> device, const set::Set&
     : set_(set),
       calibration_(calibration),
       options_(std::move(options)),
-      renderer_(std::move(device), set.estimation, scaled(calibration, options_.scale)) {
-  renderer_.set_scene(scene);
+      renderer_(std::move(options_.renderer)) {
+  const ObserverCalibration picture = scaled(calibration, options_.scale);
+  if (renderer_)
+    renderer_->begin_set(set.estimation, picture);
+  else
+    renderer_ = std::make_shared<render::Renderer>(std::move(device), set.estimation, picture);
+  renderer_->set_scene(scene);
   scene_.instances = scene.instances;
   scene_.lights = scene.lights;
   scene_.light_objects = scene.light_objects;
@@ -61,7 +66,7 @@ void RenderStage::operator()(Shot& shot) {
   const auto start = std::chrono::steady_clock::now();
   if (!begin(shot)) return;
   const Refined refined = refine(
-      renderer_, set_.quality, [&] { return cancelled(); },
+      *renderer_, set_.quality, [&] { return cancelled(); },
       [&](int samples) {
         if (options_.progress) options_.progress(shot, samples);
       });
@@ -84,28 +89,28 @@ bool RenderStage::begin(Shot& shot) {
 
   light(shot);
   if (placed_ != shot.scene || is_measured_anew_) place(shot.scene);
-  renderer_.begin({std::move(plate), exposure_of(shot), shot.track.pose->world_from_camera});
+  renderer_->begin({std::move(plate), exposure_of(shot), shot.track.pose->world_from_camera});
   return true;
 }
 
 bool RenderStage::add_samples(int samples) {
-  renderer_.render(samples, [&] { return cancelled(); });
+  renderer_->render(samples, [&] { return cancelled(); });
   return !cancelled();
 }
 
 void RenderStage::finish(Shot& shot) {
   shot.whole = true;
-  shot.counters = renderer_.counters();
+  shot.counters = renderer_->counters();
   const bool composite = view_ == render::View::composite;
   if (composite && !options_.layers) {
-    shot.picture = std::make_shared<const Plate>(renderer_.show(set_.quality.denoise));
+    shot.picture = std::make_shared<const Plate>(renderer_->show(set_.quality.denoise));
     return;
   }
-  const auto layers = std::make_shared<render::Layers>(renderer_.layers());
+  const auto layers = std::make_shared<render::Layers>(renderer_->layers());
   if (options_.layers) error_ = render::estimate_error(*layers).picture;
   Plate picture;
   if (composite || set_.quality.denoise)
-    picture = renderer_.show(set_.quality.denoise, layers.get());
+    picture = renderer_->show(set_.quality.denoise, layers.get());
   if (!composite) picture = picture_of(view_, *layers, *response_, exposure_of(shot));
   shot.picture = std::make_shared<const Plate>(std::move(picture));
   if (options_.layers) shot.layers = layers;
@@ -113,7 +118,7 @@ void RenderStage::finish(Shot& shot) {
 
 void RenderStage::resize(double scale) {
   if (scale == options_.scale) return;
-  renderer_.resize(scaled(calibration_, scale));
+  renderer_->resize(scaled(calibration_, scale));
   options_.scale = scale;
 }
 
@@ -126,12 +131,12 @@ void RenderStage::light(const Shot& shot) {
   LampStates changed = lamp_states_beside(shot.scene, set_);
   if (light_ == shot.light && changed == relit_) return;
   const LightPtr light = with_lamps_parted(shot.light, set_, shot.scene);
-  renderer_.set_environment(light->encoded, set_.lighting.sampling);
+  renderer_->set_environment(light->encoded, set_.lighting.sampling);
   // The light mode can change live, and lamps come and go: once there were lamps, the renderer must
   // also be given none.
   has_sources_ |= set_.lighting.mode != set::LightMode::image || !set_.captured_lamps.empty() ||
                   !light->lamps.empty();
-  if (has_sources_) renderer_.set_sources(relit(*light, set_, shot.scene));
+  if (has_sources_) renderer_->set_sources(relit(*light, set_, shot.scene));
   is_measured_anew_ |= give_emissions(*light, set_, scene_.lights);
   std::set<std::string> missing = unmatched(*light, set_, shot.scene);
   for (const std::string& name : missing)
@@ -148,8 +153,8 @@ void RenderStage::place(const session::SceneState& state) {
   const scene::Placement placement = scene::place(scene_, set_, known);
   for (const std::string& what : placement.unknown)
     if (unknown_.insert(what).second && options_.note) options_.note(what);
-  renderer_.deform(placement.shapes);
-  renderer_.move(placement.instances, placement.lights);
+  renderer_->deform(placement.shapes);
+  renderer_->move(placement.instances, placement.lights);
   placed_ = state;
   is_measured_anew_ = false;
 }

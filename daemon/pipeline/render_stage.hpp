@@ -20,6 +20,8 @@ namespace previz::pipeline {
 
 struct RenderStageOptions {
   bool layers = false;  // fill shot.layers
+  // Renders in place of a new one; what of its scene the set has too is kept. May be null.
+  std::shared_ptr<render::Renderer> renderer = {};
   double scale = 1;  // size of everything a shot gets, over the observer's size (preview_size.hpp)
   std::function<bool()> cancelled;
   std::function<void(const Shot&, int samples_done)> progress;  // a few times per frame
@@ -50,10 +52,13 @@ class RenderStage {
   // known well enough.
   double error() const { return error_; }
 
+  // Returns what renders, to be used by the stage of another set once this one has ended.
+  const std::shared_ptr<render::Renderer>& renderer() const { return renderer_; }
+
   // use() and resize() take effect with the next begin(). `scale` is as in the options; a new one
   // costs new buffers, but no new scene.
   void use(const set::Quality& quality) { set_.quality = quality; }
-  void use(set::Estimator estimator) { renderer_.use(estimator); }
+  void use(set::Estimator estimator) { renderer_->use(estimator); }
   void resize(double scale);
   // show() and fill_layers() take effect with the next finish().
   void show(render::View view) { view_ = view; }
@@ -72,7 +77,7 @@ class RenderStage {
   std::optional<lighting::Response> response_;  // for the last plate's bit depth
   RenderStageOptions options_;
   render::View view_ = render::View::composite;
-  render::Renderer renderer_;
+  std::shared_ptr<render::Renderer> renderer_;  // never null
   double error_ = 0;
   scene::Scene scene_;          // as in the set; what place() needs of it
   session::SceneState placed_;  // what the renderer holds

@@ -112,14 +112,17 @@ void append(std::vector<T>& to, const std::vector<T>& from) {
 }  // namespace
 
 void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha) {
+  const bool has_meshes = has_scene_ && scene::have_same_geometry(scene_, scene);
+  const bool has_textures = has_scene_ && scene_.textures == scene.textures;
+  has_scene_ = false;  // until all of it is there
   scene_ = scene;
   shapes_.clear();
   specular_alpha_ = specular_alpha;
   material_features_ = material_features(scene_, specular_alpha);
   glows_in_a_variant_ = glows_in_a_variant(scene_);
-  upload_meshes();
+  if (!has_meshes) upload_meshes();
   upload_materials(specular_alpha);
-  upload_textures();
+  if (!has_textures) upload_textures();
   lights_.set_scene(scene_);
   spheres_ = bounding_spheres(scene_);
   instances_as_set_ = scene_.instances;
@@ -128,6 +131,7 @@ void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha) {
     at_rest.push_back(scene::shape_at_rest(deformation));
   deform(at_rest);
   find_bounds(spheres_);
+  has_scene_ = true;
 }
 
 void GpuScene::deform(const std::vector<scene::Shape>& shapes) {
@@ -182,6 +186,8 @@ void GpuScene::find_bounds(const Spheres& spheres) {
 }
 
 void GpuScene::upload_meshes() {
+  // The memory of another scene is free for this one.
+  for (Buffer* buffer : {&bvh_, &vertices_, &triangles_}) *buffer = {};
   work_.trees += scene_.meshes.size();
   std::vector<glm::uvec4> bvh(scene::top_bvh_texels(scene_.instances.size()));
   std::vector<glm::vec4> vertices;
@@ -270,6 +276,7 @@ void GpuScene::upload_materials(double specular_alpha) {
 
 void GpuScene::upload_textures() {
   ++work_.textures;
+  texels_ = {};
   std::vector<gpu::GpuTexture> textures;
   std::vector<glm::uvec2> texels;
   for (const scene::Texture& t : scene_.textures) {
@@ -295,7 +302,7 @@ void GpuScene::set_environment(const EncodedEnvironment& encoded, set::LightSamp
   upload_texels(device_, importance_, encoded.importance, vk::Format::eR32G32B32A32Sfloat);
 }
 
-void GpuScene::set_sources(std::vector<set::Light> sources) {
+void GpuScene::set_sources(std::optional<std::vector<set::Light>> sources) {
   sources_ = std::move(sources);
 }
 

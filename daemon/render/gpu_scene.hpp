@@ -30,8 +30,9 @@ class GpuScene {
     std::uint64_t materials = 0, textures = 0;
   };
 
-  // Builds the meshes' BVHs and uploads everything that does not depend on the camera.
-  // Surfaces are perfect mirrors where their GGX alpha is at most `specular_alpha`.
+  // Builds the meshes' BVHs and uploads everything that does not depend on the camera. What is
+  // equal to what the scene before had, of trees with their vertices and of textures, stays where
+  // it is. Surfaces are perfect mirrors where their GGX alpha is at most `specular_alpha`.
   void set_scene(const scene::Scene& scene, double specular_alpha);
   void set_environment(const EncodedEnvironment& encoded, set::LightSampling sampling);
   // Puts the same meshes at other places, with other looks of theirs (scene::Variants), under other
@@ -42,12 +43,13 @@ class GpuScene {
   // meshes stay in the shape at rest until the first call.
   void deform(const std::vector<scene::Shape>& shapes);
   const Work& work() const { return work_; }
-  // Returns how many trees of meshes that deform were built anew since set_scene().
+  // Returns how many trees of meshes that deform were built anew since these meshes were set.
   std::uint64_t rebuilt_trees() const { return deformer_.rebuilt(); }
   // Returns how often the lights were encoded.
   std::uint64_t encoded_lights() const { return lights_.encoded(); }
-  // Sets lamps beside the scene's own, which may change from frame to frame.
-  void set_sources(std::vector<set::Light> sources);
+  // Sets lamps beside the scene's own, which may change from frame to frame; absent: there are
+  // never any.
+  void set_sources(std::optional<std::vector<set::Light>> sources);
   // Uploads instances, top level and lights relative to `camera_position` (world, metres).
   void place(const glm::dvec3& camera_position);
 
@@ -80,6 +82,7 @@ class GpuScene {
   void upload_bounds(const glm::dvec3& camera_position);
 
   Device& device_;
+  bool has_scene_ = false;
   Work work_;
   scene::Scene scene_;
   double specular_alpha_ = 0;
@@ -88,7 +91,7 @@ class GpuScene {
   std::vector<scene::Instance> instances_as_set_;   // as set_scene() got them
   std::vector<scene::Shape> shapes_;                // as deform() got them last
   Spheres spheres_;                                 // of instances_as_set_
-  std::optional<std::vector<set::Light>> sources_;  // absent: set_sources() was never called
+  std::optional<std::vector<set::Light>> sources_;  // absent: there are never any
   std::vector<MeshPlace> places_;
   Deformer deformer_;
   SceneLights lights_;

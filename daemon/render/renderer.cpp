@@ -39,6 +39,7 @@ struct Renderer::Impl {
   }
 
   void resize();
+  void upload_rays();
 
   void upload_frame();
   std::uint32_t photons() const;  // a pass
@@ -74,7 +75,11 @@ void Renderer::Impl::resize() {
   wavefront.reset();  // frees the old memory before the new is allocated
   wavefront.emplace(*device, picture.width, picture.height,
                     estimation.real_radiance == set::RealRadiance::camera ? 3 : 2);
-  upload_texels(*device, rays, corner_rays(picture), vk::Format::eR32G32Sfloat);
+  upload_rays();
+}
+
+void Renderer::Impl::upload_rays() {
+  upload_texels(*device, rays, corner_rays(calibration.intrinsics), vk::Format::eR32G32Sfloat);
 }
 
 void Renderer::Impl::upload_frame() {
@@ -155,7 +160,29 @@ Renderer::~Renderer() = default;
 void Renderer::set_scene(const scene::Scene& scene) {
   impl_->scene.set_scene(scene, impl_->estimation.specular_roughness);
   impl_->has_scene = true;
-  impl_->trees_now = impl_->trees_before = 0;
+  impl_->trees_now = impl_->trees_before = impl_->scene.rebuilt_trees();
+}
+
+void Renderer::begin_set(const set::Estimation& estimation,
+                         const ObserverCalibration& calibration) {
+  check_size(*impl_->device, calibration.intrinsics);
+  Impl& r = *impl_;
+  const PinholeIntrinsics &before = r.calibration.intrinsics, &now = calibration.intrinsics;
+  const bool has_room = r.wavefront && before.width == now.width && before.height == now.height &&
+                        r.estimation.real_radiance == estimation.real_radiance;
+  r.estimation = estimation;
+  r.calibration = calibration;
+  r.scene.set_sources(std::nullopt);
+  r.has_scene = r.has_environment = false;
+  r.carried = 0;
+  r.frame = {};
+  r.samples = 0;
+  r.response.reset();
+  r.presenter.reset();
+  if (has_room)  // the pipelines stay, if they are those that the set needs
+    r.upload_rays();
+  else
+    r.resize();
 }
 
 void Renderer::set_environment(const lighting::EnvironmentMap& environment,

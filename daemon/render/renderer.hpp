@@ -32,8 +32,13 @@ class Renderer {
            const ObserverCalibration& calibration);
   ~Renderer();
 
+  // Makes a renderer as good as new for another set, but for what set_scene() can keep of its
+  // scene.
+  void begin_set(const set::Estimation& estimation, const ObserverCalibration& calibration);
+
   // Uploads the scene; may be called between any two frames (P13). Nothing is precomputed beyond
-  // BVHs.
+  // BVHs. Meshes, or textures, that are all equal to those of the scene before are kept as they
+  // are, so that a scene in which only materials are different costs an upload of these.
   void set_scene(const scene::Scene& scene);
   // Moves the instances, gives them other looks (scene::Variants) and changes the lamps of the
   // scene last set. No mesh's BVH is rebuilt, and no pipeline is compiled for a look: the materials

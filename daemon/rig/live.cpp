@@ -107,6 +107,7 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
   SetKeeper sets(
       options.set_file, [&](set::Set& set) { override_set(set, options); }, reports);
   const std::shared_ptr<render::Device> device = render::open_device(options.device);
+  std::shared_ptr<render::Renderer> renderer;  // goes from set to set
   CrewScreen screen(reports, metrics, options.on_screen);
   for (;;) {
     reports.begin_set();
@@ -123,8 +124,9 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     try {
       files.emplace(set.output.directory, metrics_json, reports);
       screen.use(set);
-      rig = std::make_unique<Rig>(Rig::Parts{loop, sets, reports, metrics, device, show, show_facts,
-                                             options.buttons, options.loop, options.stop});
+      rig = std::make_unique<Rig>(Rig::Parts{loop, sets, reports, metrics, device, renderer, show,
+                                             show_facts, options.buttons, options.loop,
+                                             options.stop});
     } catch (const std::exception& error) {
       if (!sets.go_back(error.what())) throw;
       continue;

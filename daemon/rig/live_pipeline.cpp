@@ -124,22 +124,32 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
 void LivePipeline::Impl::make_render_stage() {
   render_stage.emplace(
       parts.device, parts.set, calibration, parts.scene,
-      pipeline::RenderStageOptions{.scale = parts.set.quality.scale,
+      pipeline::RenderStageOptions{.renderer = std::exchange(parts.renderer, nullptr),
+                                   .scale = parts.set.quality.scale,
                                    .cancelled = [this] { return live_render.interrupted(); },
                                    .progress = {},
                                    .note =
                                        [this](const std::string& what) {
                                          parts.reports(report::once({Severity::warning, "", what}));
                                        }});
+  parts.renderer = render_stage->renderer();
   live_render.use(*render_stage);
 }
 
 GpuKeeper::Gpu LivePipeline::Impl::gpu() {
   return {.is_open = [this] { return render::is_open(*parts.device); },
-          .open = [this] { render::reopen_device(*parts.device); },
+          .open =
+              [this] {
+                parts.renderer.reset();  // it is of the device that was lost
+                render::reopen_device(*parts.device);
+              },
           .name = [this] { return render::device_name(*parts.device); },
           .build = [this] { make_render_stage(); },
-          .drop = [this] { render_stage.reset(); }};
+          .drop =
+              [this] {
+                render_stage.reset();
+                parts.renderer.reset();
+              }};
 }
 
 CameraSource LivePipeline::Impl::source(std::stop_token stop, Camera& camera,

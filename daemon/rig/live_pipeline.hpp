@@ -32,6 +32,7 @@ class LivePipeline {
     Cameras& cameras;
     const scene::Scene& scene;
     std::shared_ptr<render::Device> device;
+    std::shared_ptr<render::Renderer>& renderer;  // the set's before, then this one's; may be null
     output::Recorder& recorder;
     const pipeline::Newest<Look>& look;
     Inbox& inbox;

@@ -79,6 +79,7 @@ Rig::Rig(Parts parts)
            .cameras = cameras_,
            .scene = loaded_.scene,
            .device = parts_.device,
+           .renderer = parts_.renderer,
            .recorder = recorder_,
            .look = look_,
            .inbox = inbox_,

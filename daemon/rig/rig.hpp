@@ -35,6 +35,7 @@ class Rig {
     report::Reports& reports;
     pipeline::Metrics& metrics;
     std::shared_ptr<render::Device> device;
+    std::shared_ptr<render::Renderer>& renderer;            // as LivePipeline's
     std::function<void(pipeline::Shot, const Look&)> show;  // on the pipeline's last thread
     std::function<void(RigFacts)> show_facts;               // facts for the overlay
     std::function<std::vector<std::unique_ptr<Buttons>>()> more_buttons;  // may be empty

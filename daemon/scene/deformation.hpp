@@ -17,6 +17,7 @@ namespace previz::scene {
 // A morph target: what is added to each vertex, times the target's weight. `normals` may be empty.
 struct MorphTarget {
   std::vector<glm::vec3> positions, normals;
+  friend bool operator==(const MorphTarget&, const MorphTarget&) = default;
 };
 
 // Up to four joints that a vertex follows. A vertex's weights are not negative, and their sum over
@@ -36,6 +37,7 @@ struct Undeformed {
   std::uint32_t influences_per_vertex = 0;  // 0: there is no skin
   std::vector<Influence> influences;        // those of a vertex together
   bool is_empty() const { return targets.empty() && influences.empty(); }
+  friend bool operator==(const Undeformed&, const Undeformed&) = default;
 };
 
 // The shape of one mesh: a weight for each morph target, and for each joint the transform that
@@ -61,6 +63,7 @@ std::vector<double> weights_at(const WeightChannel& channel, std::size_t targets
 struct Extent {
   double vertices = 0;
   std::vector<double> targets;
+  friend bool operator==(const Extent&, const Extent&) = default;
 };
 
 // A mesh whose shape is animated; one instance shows it. The object space of a skinned instance is
@@ -70,6 +73,7 @@ struct Deformation {
     glm::dmat4 joint_from_mesh{1.0};  // inverse bind matrix
     glm::dmat4 file_from_joint{1.0};  // at rest
     std::uint32_t node = no_node;     // of the object's animation; no_node: it stands still
+    friend bool operator==(const Joint&, const Joint&) = default;
   };
   std::uint32_t mesh = 0, instance = 0;  // in the scene
   std::uint32_t object = 0;              // in the set

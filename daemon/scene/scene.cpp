@@ -46,6 +46,18 @@ void apply(const set::Surface& surface, const std::string& set_file, Scene& scen
                 surface.material + "\"; there are " + (known.empty() ? "none" : known));
 }
 
+// The shape at rest of a mesh that deforms follows from what it is before, and from its
+// deformation.
+bool are_same_mesh(const Mesh& a, const Mesh& b) {
+  if (a.triangles != b.triangles || a.uvs != b.uvs || a.undeformed != b.undeformed) return false;
+  return !a.undeformed.is_empty() || (a.positions == b.positions && a.normals == b.normals);
+}
+
+bool deform_alike(const Deformation& a, const Deformation& b) {
+  return a.mesh == b.mesh && a.instance == b.instance && a.weights == b.weights &&
+         a.joints == b.joints && a.extent == b.extent;
+}
+
 }  // namespace
 
 Scene load_scene(const set::Set& set) {
@@ -151,6 +163,12 @@ bool can_be_dirac(const Scene& scene, const Material& m, double specular_alpha) 
       m.roughness * least_roughness_factor(scene, m.metallic_roughness_texture);
   // The shader's sum is in floats.
   return widest_alpha(m, roughness) <= specular_alpha * (1 + 1e-5);
+}
+
+bool have_same_geometry(const Scene& a, const Scene& b) {
+  return a.instances.size() == b.instances.size() &&
+         std::ranges::equal(a.meshes, b.meshes, are_same_mesh) &&
+         std::ranges::equal(a.deformations, b.deformations, deform_alike);
 }
 
 Size size_of(const Scene& scene) {

@@ -104,6 +104,7 @@ struct Texture {
   std::vector<glm::vec4> texels;  // row-major, first row is v = 0 (glTF's top)
   Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
   bool nearest = false;  // magnification filter
+  friend bool operator==(const Texture&, const Texture&) = default;
 };
 
 // The looks that an object's file names (KHR_materials_variants). They are loaded with the scene,
@@ -219,5 +220,9 @@ double widest_alpha(const Material& material, double roughness);
 bool can_be_dirac(const Scene& scene, const Material& material, double specular_alpha);
 
 Size size_of(const Scene& scene);
+
+// Returns whether two scenes have the same meshes, which are deformed alike, in as many instances:
+// they then have the same trees.
+bool have_same_geometry(const Scene& a, const Scene& b);
 
 }  // namespace previz::scene

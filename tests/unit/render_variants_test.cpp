@@ -81,6 +81,47 @@ TEST(Variants, AreShownWithoutATreeAnUploadOrAPipeline) {
   }
 }
 
+// Set anew with other materials, as a set file that was read again: trees, vertices and textures
+// stay, and the picture is that of a new renderer.
+TEST(Variants, ASceneWithOtherMaterialsKeepsItsTrees) {
+  Stage stage;
+  SetRenderer renderer(stage.view, up_to_depth(4));
+  picture_of(renderer, stage.view);
+  const auto set_again = [&](const View& view) {
+    renderer.begin_set(up_to_depth(4), view.calibration);
+    renderer.set_scene(view.scene);
+    renderer.set_environment(view.environment, set::LightSampling::importance);
+    const Picture again = picture_of(renderer, view);
+    SetRenderer fresh(view, up_to_depth(4));
+    EXPECT_EQ(picture_of(fresh, view).mixed, again.mixed);
+    return again.counters;
+  };
+  View repainted = stage.view;
+  repainted.scene.materials[0].base_color = {0.9f, 0.1f, 0.1f};
+  render::Counters counters = set_again(repainted);
+  EXPECT_EQ(counters.built_trees, 2u);
+  EXPECT_EQ(counters.uploaded_materials, 2u);
+  EXPECT_EQ(counters.uploaded_textures, 1u);
+  EXPECT_EQ(counters.encoded_lights, 2u);
+
+  repainted.scene.materials[0].emission = {1, 2, 3};  // the table is a lamp
+  EXPECT_EQ(set_again(repainted).built_trees, 2u);
+
+  scene::Texture texture;
+  texture.width = texture.height = 1;
+  texture.texels = {glm::vec4(0.5f)};
+  repainted.scene.materials[0].base_color_texture = add_texture(repainted.scene, texture);
+  counters = set_again(repainted);
+  EXPECT_EQ(counters.built_trees, 2u);
+  EXPECT_EQ(counters.uploaded_textures, 2u);
+
+  repainted.scene.meshes[1].positions[0].z += 0.01f;
+  EXPECT_EQ(set_again(repainted).built_trees, 4u) << "a vertex has moved";
+  repainted.scene.instances.push_back(repainted.scene.instances[1]);
+  repainted.scene.instances.back().world_from_object[3].x = 0.5;
+  EXPECT_EQ(set_again(repainted).built_trees, 6u) << "there is one more instance";
+}
+
 // What a variant needs is in the pipelines from the start.
 TEST(Variants, AreAskedForTheirFeatures) {
   const Stage stage;

@@ -204,9 +204,12 @@ TEST_F(RigLive, VariantsAreShownRecordedReviewedAndKept) {
         [&](const Shown& s) { return s.look.state.mode == Mode::live && variant_of(s) == "lamp"; });
     press("keep");
     until_said("set.toml has the changes");
-    until([&](const Shown& s) {
+    const Shown kept = until([&](const Shown& s) {
       return s.look.edits == pipeline::Edits{} && s.shot.samples == 2 && variant_of(s) == "-";
     });
+    EXPECT_EQ(kept.shot.counters.built_trees, before.shot.counters.built_trees)
+        << "the set was read again";
+    EXPECT_GT(kept.shot.counters.uploaded_materials, before.shot.counters.uploaded_materials);
   });
   EXPECT_EQ(set::load_set(directory_ / "set.toml").objects[1].variant, "lamp");
   EXPECT_GT(count_said("card: variant \"black\" (2 of 3)"), 0);
@@ -218,6 +221,24 @@ TEST_F(RigLive, VariantsAreShownRecordedReviewedAndKept) {
   const std::size_t middle = post.mixed.size() / 2 + static_cast<std::size_t>(post.width) / 2;
   EXPECT_GT(post.mask[middle], 0.99f);
   EXPECT_EQ(post.mixed[middle], glm::vec3(0));
+}
+
+// Reading a set again in which nothing but a colour is new builds no tree.
+TEST_F(RigLive, AColourThatIsNewInTheSetBuildsNoTree) {
+  write_set();
+  const std::filesystem::path file = directory_ / "set.toml";
+  run([&] {
+    const Shown before = until([](const Shown& s) { return s.shot.samples == 2; });
+    std::string other = session::read_file(file);
+    other += "[[surface]]\nmaterial = \"paper\"\nalbedo = [0.1, 0.2, 0.3]\n";
+    other.replace(other.find("samples = 2"), 11, "samples = 4");
+    std::ofstream(file) << other;
+    press("reload_set");
+    const Shown after = until([](const Shown& s) { return s.shot.samples == 4; });
+    EXPECT_EQ(after.shot.counters.built_trees, before.shot.counters.built_trees);
+    EXPECT_EQ(after.shot.counters.uploaded_textures, before.shot.counters.uploaded_textures);
+    EXPECT_EQ(after.shot.counters.uploaded_materials, before.shot.counters.uploaded_materials + 1);
+  });
 }
 
 // What is moved while no picture is made is where it was put when the frozen one is refined.
