@@ -175,7 +175,7 @@ void main() {
         store_flight(other, forked);
         f.worlds = presence;
       }
-      const Surface s = make_surface(hit, f.direction);
+      const Surface s = make_surface(hit, f.direction, 0.0);
       outcome = meet_surface(f, s, hit, sample_2d(photon_sampler(path >> 1), PAIR_BOUNCE + f.vertices));
       if (outcome == FLIGHT_STAYS) store_photon(path, f, s);
       if (outcome == FLIGHT_GOES_ON) store_flight(f, path);

@@ -400,12 +400,29 @@ vec3 brightness_of(Surface s) {
   return min(reflected + frame.exposure * s.emission, DENOISE_MOST_WHITES);
 }
 
-// Stores normal, depth and albedo of the mixed world's first surface.
-void write_aov(Path p, Surface s, float t) {
+// Returns how far along the camera's axis a point of the path lies.
+float depth_of(Path p, float t) {
   const vec3 axis = vec3(frame.world_from_camera[0].z, frame.world_from_camera[1].z,
                          frame.world_from_camera[2].z);
-  const vec3 position = p.origin + t * p.direction;
-  sample_aov[p.slot] = vec4(s.normal, dot(position, axis));
+  return dot(p.origin + t * p.direction, axis);
+}
+
+// Returns the area, across the path, over which a sample looks up textures at a distance along it: its
+// share of the pixel or of the lobe (shaders/README.md, "Textures"). It is 0 behind a mirror.
+float footprint_of(Path p, float t) {
+  if (!has_feature(FEATURE_FILTERED_TEXTURES)) return 0.0;
+  const float side = 1.0 / float(slot_sample(p.slot) + 1u);
+  const float share = side * side;
+  if (p.depth == 0u) {
+    const float depth = depth_of(p, t);
+    return share * depth * depth / (frame.focal_px.x * frame.focal_px.y);
+  }
+  return p.pdf > 0.0 ? share * t * t / p.pdf : 0.0;
+}
+
+// Stores normal, depth and albedo of the mixed world's first surface.
+void write_aov(Path p, Surface s, float t) {
+  sample_aov[p.slot] = vec4(s.normal, depth_of(p, t));
   if (!has_feature(FEATURE_TEXTURES)) return;
   const vec3 albedo = brightness_of(s);
   sample_albedo[p.slot] = uvec2(packHalf2x16(albedo.rg), packHalf2x16(vec2(albedo.b, 0.0)));
@@ -454,7 +471,7 @@ void main() {
         fork(p, p.worlds & ~presence, hit.t, forked);
         p.worlds = presence;
       }
-      const Surface s = make_surface(hit, p.direction);
+      const Surface s = make_surface(hit, p.direction, footprint_of(p, hit.t));
       if (p.depth == 0u && (p.worlds & WORLD_MIXED) != 0u) write_aov(p, s, hit.t);
       if (has_feature(FEATURE_PANES) && pass_pane(p, s, hit)) {
         scattered = p.passes <= MOST_PASSES;

@@ -304,8 +304,10 @@ void print_costs(const set::Set& set, std::uint32_t needed, const scene::Size& s
                  std::ostream& out) {
   // These are the bytes a vertex, triangle and texel in lib/render_shared.h's buffers; a tree of
   // pairs takes about one record of 64 bytes a triangle.
+  // Levels of textures take a third more.
+  const double a_texel = (needed & gpu::FEATURE_FILTERED_TEXTURES) != 0 ? 8.0 * 4 / 3 : 8.0;
   const double scene_bytes =
-      32.0 * size.vertices + (16.0 + 64.0) * size.triangles + 8.0 * size.texels;
+      32.0 * size.vertices + (16.0 + 64.0) * size.triangles + a_texel * size.texels;
   constexpr double mebibyte = 1024.0 * 1024.0;
   constexpr auto any_number = std::numeric_limits<std::uint32_t>::max();
   out << "\na frame costs\n";

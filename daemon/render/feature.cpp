@@ -71,7 +71,7 @@ bool lamps_shine(const Scene& scene) {
   return std::ranges::any_of(scene.lights, shines) || scene::may_glow(scene);
 }
 
-constexpr std::array<Feature, 27> feature_table = {{
+constexpr std::array<Feature, 28> feature_table = {{
     {.name = "two worlds",
      .bit = gpu::FEATURE_FORKS,
      .can_be_carried = true,
@@ -193,6 +193,18 @@ constexpr std::array<Feature, 27> feature_table = {{
          },
      .used = "a surface has its colour or detail from an image",
      .left_out = "no surface has its colour or detail from an image"},
+    {.name = "filtered textures",
+     .bit = gpu::FEATURE_FILTERED_TEXTURES,
+     .in_material =
+         [](const Material& m, const Scene&, double) {
+           return is_textured(m.base_color_texture) || is_textured(m.metallic_roughness_texture) ||
+                  is_textured(m.emission_texture);
+         },
+     .in_frame = [](bool textured,
+                    const Demand& d) { return textured && d.estimation.filter_textures; },
+     .used = "images on surfaces are averaged over the area that a sample stands for",
+     .left_out = "no image is averaged over the area that a sample stands for, or the set does not "
+                 "ask for it"},
     {.name = "normal maps",
      .bit = gpu::FEATURE_NORMAL_MAPS,
      .can_be_carried = true,

@@ -13,6 +13,7 @@
 
 #include "daemon/render/albedo_table.hpp"
 #include "daemon/render/gpu_lights.hpp"
+#include "daemon/render/mip_levels.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::render {
@@ -111,13 +112,15 @@ void append(std::vector<T>& to, const std::vector<T>& from) {
 
 }  // namespace
 
-void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha) {
+void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha, bool filters_textures) {
   const bool has_meshes = has_scene_ && scene::have_same_geometry(scene_, scene);
-  const bool has_textures = has_scene_ && scene_.textures == scene.textures;
+  const bool has_textures =
+      has_scene_ && filters_textures_ == filters_textures && scene_.textures == scene.textures;
   has_scene_ = false;  // until all of it is there
   scene_ = scene;
   shapes_.clear();
   specular_alpha_ = specular_alpha;
+  filters_textures_ = filters_textures;
   material_features_ = material_features(scene_, specular_alpha);
   glows_in_a_variant_ = glows_in_a_variant(scene_);
   if (!has_meshes) upload_meshes();
@@ -243,7 +246,8 @@ void GpuScene::upload_materials(double specular_alpha) {
   ++work_.materials;
   std::vector<gpu::GpuMaterial> materials;
   AlbedoTables albedo(std::ranges::any_of(scene_.materials, scene::has_sheen));
-  for (const scene::Material& m : scene_.materials) {
+  for (const scene::Material& material : scene_.materials) {
+    const scene::Material m = as_read(material);
     check_medium(m, materials.size());
     materials.push_back({.base_color = m.base_color,
                          .metallic = m.metallic,
@@ -274,20 +278,51 @@ void GpuScene::upload_materials(double specular_alpha) {
   upload_texels(device_, albedo_, albedo.values, vk::Format::eR32Sfloat);
 }
 
+// Returns the material with the textures as it reads them: where they are filtered they are there
+// twice, first without levels, then with them. Where a texel decides what a surface is, there or a
+// hole, rough or a mirror, it is read as it is, because a mean would be neither.
+scene::Material GpuScene::as_read(const scene::Material& material) const {
+  scene::Material m = material;
+  if (!filters_textures_) return m;
+  const auto filter = [&](std::uint32_t& texture) {
+    if (texture != scene::no_texture) texture += static_cast<std::uint32_t>(scene_.textures.size());
+  };
+  if (m.alpha_mode == scene::AlphaMode::opaque) filter(m.base_color_texture);
+  if (!scene::can_be_dirac(scene_, material, specular_alpha_)) filter(m.metallic_roughness_texture);
+  filter(m.emission_texture);
+  return m;
+}
+
 void GpuScene::upload_textures() {
   ++work_.textures;
   texels_ = {};
-  std::vector<gpu::GpuTexture> textures;
+  std::vector<gpu::GpuTexture> textures, levels;
   std::vector<glm::uvec2> texels;
+  const auto add = [&](const std::vector<glm::vec4>& values) {
+    for (const glm::vec4& texel : values)
+      texels.emplace_back(glm::packHalf2x16(glm::vec2(texel.x, texel.y)),
+                          glm::packHalf2x16(glm::vec2(texel.z, texel.w)));
+  };
   for (const scene::Texture& t : scene_.textures) {
     textures.push_back({static_cast<std::uint32_t>(texels.size()),
                         static_cast<std::uint32_t>(t.width), static_cast<std::uint32_t>(t.height),
                         static_cast<std::uint32_t>(t.wrap_u), static_cast<std::uint32_t>(t.wrap_v),
-                        t.nearest ? 1u : 0u});
-    for (const glm::vec4& texel : t.texels)
-      texels.emplace_back(glm::packHalf2x16(glm::vec2(texel.x, texel.y)),
-                          glm::packHalf2x16(glm::vec2(texel.z, texel.w)));
+                        t.nearest ? 1u : 0u, 0u, 0u});
+    add(t.texels);
   }
+  for (std::size_t i = 0; filters_textures_ && i < scene_.textures.size(); ++i) {
+    gpu::GpuTexture texture = textures[i];
+    texture.first_level = static_cast<std::uint32_t>(2 * scene_.textures.size() + levels.size());
+    for (const MipLevel& level : mip_levels(scene_.textures[i])) {
+      ++texture.levels;
+      levels.push_back(
+          {static_cast<std::uint32_t>(texels.size()), static_cast<std::uint32_t>(level.width),
+           static_cast<std::uint32_t>(level.height), texture.wrap_u, texture.wrap_v, 0u, 0u, 0u});
+      add(level.texels);
+    }
+    textures.push_back(texture);
+  }
+  append(textures, levels);
   upload_storage(device_, textures_, textures);
   upload_texels(device_, texels_, texels, vk::Format::eR32G32Uint);
 }

@@ -32,8 +32,9 @@ class GpuScene {
 
   // Builds the meshes' BVHs and uploads everything that does not depend on the camera. What is
   // equal to what the scene before had, of trees with their vertices and of textures, stays where
-  // it is. Surfaces are perfect mirrors where their GGX alpha is at most `specular_alpha`.
-  void set_scene(const scene::Scene& scene, double specular_alpha);
+  // it is. Surfaces are perfect mirrors where their GGX alpha is at most `specular_alpha`; with
+  // `filters_textures` there are levels of textures.
+  void set_scene(const scene::Scene& scene, double specular_alpha, bool filters_textures);
   void set_environment(const EncodedEnvironment& encoded, set::LightSampling sampling);
   // Puts the same meshes at other places, with other looks of theirs (scene::Variants), under other
   // lamps. Only the top level is rebuilt, by the next place(); emissive triangles are found anew if
@@ -73,6 +74,7 @@ class GpuScene {
   void upload_meshes();
   void check_deforming() const;
   void upload_materials(double specular_alpha);
+  scene::Material as_read(const scene::Material& material) const;
   void upload_textures();
   void find_bounds(const Spheres& spheres);
   bool shape_emitter(std::size_t deformation);
@@ -86,6 +88,7 @@ class GpuScene {
   Work work_;
   scene::Scene scene_;
   double specular_alpha_ = 0;
+  bool filters_textures_ = false;
   MaterialFeatures material_features_;
   bool glows_in_a_variant_ = false;                 // some instance does
   std::vector<scene::Instance> instances_as_set_;   // as set_scene() got them

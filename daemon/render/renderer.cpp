@@ -158,7 +158,8 @@ Renderer::Renderer(std::shared_ptr<Device> device, const set::Estimation& estima
 Renderer::~Renderer() = default;
 
 void Renderer::set_scene(const scene::Scene& scene) {
-  impl_->scene.set_scene(scene, impl_->estimation.specular_roughness);
+  impl_->scene.set_scene(scene, impl_->estimation.specular_roughness,
+                         impl_->estimation.filter_textures);
   impl_->has_scene = true;
   impl_->trees_now = impl_->trees_before = impl_->scene.rebuilt_trees();
 }

@@ -110,7 +110,7 @@ Texture GltfTextures::decode(int index, Encoding encoding) {
                 "; a side is at most " + std::to_string(max_texture_side));
   const std::size_t texels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   if (texels / max_texels_a_byte > bytes.size()) throw Error(where + ": is cut short");
-  budget_.add_texels(texels, where);
+  budget_.add_texture(width, height, where);
 
   Texture texture;
   texture.name = given.empty() ? "image " + std::to_string(index) : given;

@@ -1,5 +1,7 @@
 #include "daemon/scene/load_log.hpp"
 
+#include <algorithm>
+
 #include "daemon/scene/scene.hpp"
 #include "drivers/error.hpp"
 
@@ -44,7 +46,16 @@ void Budget::add_instance(const std::string& where) {
   scene::add(instances_, 1, max_instances, "instances", where);
 }
 
-void Budget::add_texels(std::uint64_t count, const std::string& where) {
+void Budget::add_texture(int width, int height, const std::string& where) {
+  const auto texels = [](int w, int h) {
+    return static_cast<std::uint64_t>(w) * static_cast<std::uint64_t>(h);
+  };
+  std::uint64_t count = texels(width, height);
+  while (has_levels_ && (width > 1 || height > 1)) {
+    width = std::max(width / 2, 1);
+    height = std::max(height / 2, 1);
+    count += texels(width, height);
+  }
   scene::add(texels_, count, max_texels, "texels", where);
 }
 

@@ -27,16 +27,19 @@ class Notes {
 // previz::Error, which says which limit would be passed.
 class Budget {
  public:
+  // With `has_levels` a texture counts with all its levels (daemon/render/mip_levels.hpp).
+  explicit Budget(bool has_levels = false) : has_levels_(has_levels) {}
   void add_vertices(std::uint64_t count, const std::string& where);
   void add_triangles(std::uint64_t count, const std::string& where);
   void add_instance(const std::string& where);
-  void add_texels(std::uint64_t count, const std::string& where);
+  void add_texture(int width, int height, const std::string& where);
   // Counts the vertices of one mesh once for each morph target and each set of joints.
   void add_deformed(std::uint64_t count, const std::string& where);
   // Counts the joints of a skin for each node that has it.
   void add_joints(std::uint64_t count, const std::string& where);
 
  private:
+  bool has_levels_;
   std::uint64_t vertices_ = 0, triangles_ = 0, instances_ = 0, texels_ = 0;
   std::uint64_t deformed_ = 0, joints_ = 0;
 };

@@ -62,7 +62,7 @@ bool deform_alike(const Deformation& a, const Deformation& b) {
 
 Scene load_scene(const set::Set& set) {
   Scene scene;
-  Budget budget;
+  Budget budget(set.estimation.filter_textures);
   std::map<std::filesystem::path, std::unique_ptr<GltfFile>> files;
   std::vector<const GltfFile*> in_order;
   for (std::size_t i = 0; i < set.objects.size(); ++i) {

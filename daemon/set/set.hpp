@@ -206,6 +206,7 @@ struct Estimation {
   Caustics caustics = Caustics::photons;  // how light reaches rough surfaces via mirrors and glass
   double photons = 0.1;                   // photons per pass (sample) and pixel of the picture
   double photon_radius_px = 2;            // in the first pass
+  bool filter_textures = false;  // over the footprint of a sample, which shrinks with their number
 
   friend bool operator==(const Estimation&, const Estimation&) = default;
 };

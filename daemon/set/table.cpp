@@ -262,6 +262,7 @@ Keys estimator_keys(Estimation& e) {
       {"caustics", &e.caustics, plain, "Light that falls onto rough surfaces by way of mirrors and glass. \"photons\": soft at first, then sharper. \"traced\": by paths that happen to find it, noisy. \"none\": left out."},
       {"photons", &e.photons, plain.within(0.001, 10), "With caustics = \"photons\": photons per sample and pixel; at least 1024 per sample in all."},
       {"photon_radius_px", &e.photon_radius_px, plain.within(0.1, 100), "Blur of caustics in the first sample: radius over which photons are averaged, in pixels. It shrinks with every sample."},
+      {"filter_textures", &e.filter_textures, plain, "Averages colour, roughness and glow of textures over the area that a sample stands for, which calms fine patterns seen from afar at a few samples a pixel. The area shrinks with every sample. Takes a third more memory for textures."},
   };
 }
 

@@ -74,6 +74,7 @@ PREVIZ_CONST uint FEATURE_PANES = 16384u;  // any smooth thin wall through which
 PREVIZ_CONST uint FEATURE_CAMERA = 8192u;  // the plate gives the radiance of points that it shows
 PREVIZ_CONST uint FEATURE_ATTENUATION = 32768u;  // clear solids that take light away inside
 PREVIZ_CONST uint FEATURE_CLEARCOAT = 65536u;  // a coat of lacquer above the base material
+PREVIZ_CONST uint FEATURE_FILTERED_TEXTURES = 8388608u;  // looked up over a sample's footprint
 PREVIZ_CONST uint FEATURE_MANY_LIGHTS = 131072u;  // more than FEW_LIGHTS: they are chosen by a tree
 PREVIZ_CONST uint FEATURE_SHEEN = 262144u;        // fibres of cloth above the base material
 PREVIZ_CONST uint FEATURE_ANISOTROPY = 524288u;   // reflections that are wider along one direction
@@ -224,6 +225,8 @@ struct GpuTexture {
   uint width, height;
   uint wrap_u, wrap_v;
   uint nearest;
+  uint levels;        // beyond this one: means over ever larger areas, textures of their own
+  uint first_level;   // the first of them, in TEXTURES
 };
 
 PREVIZ_CONST uint LIGHT_POINT = 0u;
@@ -414,7 +417,7 @@ static_assert(sizeof(GpuControl) == 96);
 static_assert(sizeof(GpuInstance) == 112);
 static_assert(sizeof(GpuMaterial) == 140);
 static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
-static_assert(sizeof(GpuTexture) == 24);
+static_assert(sizeof(GpuTexture) == 32);
 static_assert(sizeof(GpuLight) == 156);
 static_assert(offsetof(GpuLight, uv0) == 112);
 static_assert(sizeof(GpuFrame) == 216);

@@ -82,6 +82,21 @@ vec4 sample_texture(uint index, vec2 uv) {
              mix(fetch_texel(t, ivec2(x0, y1)), fetch_texel(t, ivec2(x1, y1)), f.x), f.y);
 }
 
+// Looks up a texture's mean over a footprint of this area (in the units of uv), which takes so many of
+// its texels: between the two levels whose texels are next in size. A footprint of less than a texel
+// is a point.
+vec4 sample_footprint(uint index, vec2 uv, float area) {
+  if (!has_feature(FEATURE_FILTERED_TEXTURES)) return sample_texture(index, uv);
+  const uint levels = textures[index].levels;
+  const float taken = area * float(textures[index].width) * float(textures[index].height);
+  if (levels == 0u || !(taken > 1.0)) return sample_texture(index, uv);
+  const float level = min(0.5 * log2(taken), float(levels));
+  const uint fine = min(uint(level), levels - 1u);
+  const uint first = textures[index].first_level;
+  return mix(sample_texture(fine == 0u ? index : first + fine - 1u, uv),
+             sample_texture(first + fine, uv), level - float(fine));
+}
+
 vec3 transform_point(vec4 rows[3], vec3 p) {
   return vec3(dot(rows[0].xyz, p) + rows[0].w, dot(rows[1].xyz, p) + rows[1].w,
               dot(rows[2].xyz, p) + rows[2].w);
@@ -229,7 +244,22 @@ vec2 hit_uv(uint instance, uint primitive, vec2 barycentrics) {
   return uv;
 }
 
-void apply_material(inout Surface s, uint material, vec2 uv) {
+// Returns the area in uv of a triangle's footprint of this area in the world; 0 of a triangle that has
+// none. Seen at a slant a footprint is as long as it would be at this cosine at most.
+const float LEAST_FOOTPRINT_COSINE = 0.25;
+
+float footprint_in_uv(GpuInstance instance, Triangle t, float cosine, float footprint) {
+  const vec2 along1 = vec2(t.p1.w, t.n1.w) - vec2(t.p0.w, t.n0.w);
+  const vec2 along2 = vec2(t.p2.w, t.n2.w) - vec2(t.p0.w, t.n0.w);
+  const vec3 edge1 = transform_vector(instance.world_from_object, t.p1.xyz - t.p0.xyz);
+  const vec3 edge2 = transform_vector(instance.world_from_object, t.p2.xyz - t.p0.xyz);
+  const float area = length(cross(edge1, edge2)) * max(cosine, LEAST_FOOTPRINT_COSINE);
+  const float in_uv = abs(along1.x * along2.y - along2.x * along1.y);
+  return area > 0.0 ? footprint * in_uv / area : 0.0;
+}
+
+// `footprint` is an area in uv.
+void apply_material(inout Surface s, uint material, vec2 uv, float footprint) {
   const GpuMaterial m = materials[material];
   s.base_color = m.base_color;
   s.metallic = m.metallic;
@@ -242,13 +272,14 @@ void apply_material(inout Surface s, uint material, vec2 uv) {
   s.emission = m.emission;
   if (has_feature(FEATURE_TEXTURES)) {
     if (m.base_color_texture != NO_INDEX)
-      s.base_color *= sample_texture(m.base_color_texture, uv).rgb;
+      s.base_color *= sample_footprint(m.base_color_texture, uv, footprint).rgb;
     if (m.metallic_roughness_texture != NO_INDEX) {
-      const vec4 t = sample_texture(m.metallic_roughness_texture, uv);
+      const vec4 t = sample_footprint(m.metallic_roughness_texture, uv, footprint);
       roughness *= t.g;
       s.metallic *= t.b;
     }
-    if (m.emission_texture != NO_INDEX) s.emission *= sample_texture(m.emission_texture, uv).rgb;
+    if (m.emission_texture != NO_INDEX)
+      s.emission *= sample_footprint(m.emission_texture, uv, footprint).rgb;
   }
   s.alpha = roughness * roughness;
   s.clearcoat = has_feature(FEATURE_CLEARCOAT) ? m.clearcoat : 0.0;
@@ -302,9 +333,10 @@ vec3 mirroring_normal(vec3 normal, vec3 geometric_normal, vec3 wo) {
   return length_squared > 0.0 ? half_way * inversesqrt(length_squared) : geometric_normal;
 }
 
-// Makes the surface at a hit of a ray with this direction. The hit's barycentrics are the weights
-// of the triangle's second and third vertex.
-Surface make_surface(GpuHit hit, vec3 direction) {
+// Makes the surface at a hit of a ray with this direction, for a sample whose footprint has this area
+// across the ray (0: a point). The hit's barycentrics are the weights of the triangle's second and
+// third vertex.
+Surface make_surface(GpuHit hit, vec3 direction, float footprint) {
   const GpuInstance instance = instances[hit.instance];
   const uvec3 index = texelFetch(triangles, int(instance.first_triangle + hit.primitive)).xyz;
   const vec4 p0 = texelFetch(vertices, int(2u * index.x));
@@ -344,7 +376,10 @@ Surface make_surface(GpuHit hit, vec3 direction) {
     s.normal = map_normal(instance, materials[instance.material],
                           Triangle(p0, p1, p2, n0, n1, n2), uv, s.normal, outward);
   if (dot(s.normal, s.geometric_normal) < 0.0) s.normal = -s.normal;
-  apply_material(s, instance.material, uv);
+  if (has_feature(FEATURE_FILTERED_TEXTURES) && footprint > 0.0)
+    footprint = footprint_in_uv(instance, Triangle(p0, p1, p2, n0, n1, n2),
+                                dot(s.geometric_normal, s.wo), footprint);
+  apply_material(s, instance.material, uv, footprint);
   if (is_specular(s)) s.normal = mirroring_normal(s.normal, s.geometric_normal, s.wo);
   if (is_anisotropic(s)) s.tangent = tangent_near(s.tangent, s.normal);
   return s;

@@ -215,6 +215,24 @@ TEST_F(Features, TexturesAreThoseOfMaterialsInUse) {
   EXPECT_TRUE(needs("normal maps"));
 }
 
+TEST_F(Features, TexturesAreFilteredWhereTheSetAsksForIt) {
+  scene::Texture texture;
+  texture.width = texture.height = 1;
+  texture.texels = {{1, 1, 1, 1}};
+  scene::Material material = diffuse({1, 1, 1});
+  set.estimation.filter_textures = true;
+  add(material);
+  EXPECT_FALSE(needs("filtered textures"));
+  material.normal_texture = add_texture(scene, texture);
+  add(material);
+  EXPECT_FALSE(needs("filtered textures"));  // normals are not filtered
+  material.base_color_texture = material.normal_texture;
+  add(material);
+  EXPECT_TRUE(needs("filtered textures"));
+  set.estimation.filter_textures = false;
+  EXPECT_FALSE(needs("filtered textures"));
+}
+
 TEST_F(Features, PhotonsNeedAClearInterface) {
   scene::Material material = glass(1.5f);
   material.roughness = 0.3f;

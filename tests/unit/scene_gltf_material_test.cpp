@@ -3,6 +3,7 @@
 #include <limits>
 #include <numbers>
 
+#include "daemon/scene/load_log.hpp"
 #include "tests/support/gltf_test.hpp"
 
 namespace previz::test {
@@ -388,6 +389,15 @@ TEST_F(GltfMaterials, LeavesOutTexturesInFormatsOfExtensions) {
   EXPECT_EQ(scene.materials.at(0).base_color_texture, scene::no_texture);
   EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("\"EXT_texture_webp\" is not supported; ignored"),
                                        HasSubstr("texture 0: has no PNG or JPEG image; left out")));
+}
+
+// The levels of 2^27 texels have a third more.
+TEST(TextureBudget, CountsTheLevelsOfTexturesThatAreFiltered) {
+  scene::Budget(false).add_texture(16384, 8192, "here");
+  EXPECT_THROW(scene::Budget(true).add_texture(16384, 8192, "here"), Error);
+  scene::Budget budget(true);
+  for (int i = 0; i < 2; ++i) budget.add_texture(8192, 4096, "here");
+  EXPECT_THROW(budget.add_texture(8192, 4096, "here"), Error);
 }
 
 }  // namespace scene_gltf_material_test
