@@ -1,5 +1,6 @@
-// Makes files that are whole or not there, also after a power cut: each is written beside its place,
-// synced, then renamed into it, and its name is synced. (For text that is already in memory use session::replace_file.)
+// Makes files that are whole or not there, also after a power cut: each is written beside its
+// place, synced, then renamed into it, and its name is synced. (For text that is already in memory
+// use session::replace_file.)
 #pragma once
 
 #include <filesystem>

@@ -203,8 +203,8 @@ class SessionWriter {
 };
 
 // Brings a session that was cut off into order: writes into its session.toml that, unless it is
-// there already, and returns how many frames of the observer it has; nothing if there was nothing to
-// do. Does not read the videos. Throws previz::Error as open_session() does.
+// there already, and returns how many frames of the observer it has; nothing if there was nothing
+// to do. Does not read the videos. Throws previz::Error as open_session() does.
 std::optional<std::uint64_t> salvage(const std::filesystem::path& directory);
 
 // Changes the take that a finished session describes. Throws previz::Error naming the file.

@@ -421,8 +421,8 @@ TEST_F(RigLive, TheWatchdogIsFedOnlyWhileFramesAdvance) {
   systemd.until("STOPPING=1");
 }
 
-// A restart in the middle of a take, as for an upgrade: the new process records on by itself, and says
-// so on the display until somebody has taken note.
+// A restart in the middle of a take, as for an upgrade: the new process records on by itself, and
+// says so on the display until somebody has taken note.
 TEST_F(RigLive, RecordsOnAfterARestartUntilSomebodyEndsIt) {
   write_set();
   int before = 0;  // pictures of the runs before
