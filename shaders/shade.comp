@@ -423,7 +423,7 @@ float footprint_of(Path p, float t) {
 // Stores normal, depth and albedo of the mixed world's first surface.
 void write_aov(Path p, Surface s, float t) {
   sample_aov[p.slot] = vec4(s.normal, depth_of(p, t));
-  if (!has_feature(FEATURE_TEXTURES)) return;
+  if (!has_feature(FEATURE_TEXTURES) || frame.keeps_albedo == 0u) return;
   const vec3 albedo = brightness_of(s);
   sample_albedo[p.slot] = uvec2(packHalf2x16(albedo.rg), packHalf2x16(vec2(albedo.b, 0.0)));
 }

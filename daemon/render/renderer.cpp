@@ -110,6 +110,7 @@ void Renderer::Impl::upload_frame() {
   gpu_frame.bound_share = static_cast<float>(estimation.difference_sampling);
   gpu_frame.photon_count = photons();
   gpu_frame.exposure = static_cast<float>(frame.exposure);
+  gpu_frame.keeps_albedo = (needed() & gpu::FEATURE_TEXTURES) != 0 ? 1 : 0;
   gpu_frame.clip_from = is_clipped ? response->clipping().from : gpu::NO_INDEX;
   scene.describe(gpu_frame, needed());
   upload_storage(*device, frame_buffer, std::vector{gpu_frame});

@@ -310,6 +310,7 @@ struct GpuFrame {
   vec3 radial;                  // k1, k2, k3
   vec2 tangential;              // p1, p2
   float exposure;               // signal over radiance
+  uint keeps_albedo;            // 1: the scene has textures, which the denoiser divides by
   float tree_share;             // probability that a light sample of a light takes the tree; 0: none
   vec3 tree_offset;             // of the camera from the tree's origin
   uint distant_light_count;     // the first of the visible lights: discs at infinity
@@ -420,7 +421,7 @@ static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 32);
 static_assert(sizeof(GpuLight) == 156);
 static_assert(offsetof(GpuLight, uv0) == 112);
-static_assert(sizeof(GpuFrame) == 216);
+static_assert(sizeof(GpuFrame) == 220);
 static_assert(sizeof(GpuLightNode) == 48);
 static_assert(sizeof(GpuBatch) == 28);
 static_assert(sizeof(GpuPhoton) == 64);
