@@ -5,6 +5,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
+#include "shaders/lib/halves.glsl"
 #include "shaders/lib/show.glsl"
 
 layout(scalar) readonly buffer Pixels { GpuPixel pixels[]; };  // of a tile
@@ -15,7 +16,7 @@ layout(scalar) writeonly buffer Variances { vec4 variances[]; };
 layout(scalar) writeonly buffer Surfaces { vec4 surfaces[]; };
 layout(scalar) writeonly buffer Uncovered { vec4 uncovered[]; };
 layout(scalar) writeonly buffer Reals { vec4 reals[]; };
-layout(scalar) writeonly buffer Albedos { uvec2 albedos[]; };  // halves
+layout(scalar) writeonly buffer Albedos { uvec2 albedos[]; };  // as lib/halves.glsl
 // For each pixel of the band, the bits of channels that are brighter than white by more than chance
 // (bit 0: red).
 layout(scalar) writeonly buffer Highlights { uint highlights[]; };
@@ -55,7 +56,7 @@ uvec2 albedo_of(GpuPixel sums, float mask) {
   vec3 albedo = vec3(1.0);
   if (!is_edge && sums.normal.w > 0.0 && any(greaterThan(sums.albedo.rgb, vec3(0.0))))
     albedo = max(sums.albedo.rgb / sums.normal.w, LEAST_ALBEDO);
-  return uvec2(packHalf2x16(albedo.rg), packHalf2x16(vec2(albedo.b, 0.0)));
+  return pack_halves(albedo);
 }
 
 void main() {
@@ -77,7 +78,7 @@ void main() {
   const vec3 composite = compose(camera, Estimate(change, mask, own.rgb, real));
   composites[index] = vec4(composite, mask);
   const uvec2 halves = albedo_of(sums, mask);
-  const vec3 albedo = vec3(unpackHalf2x16(halves.x), unpackHalf2x16(halves.y).x);
+  const vec3 albedo = unpack_halves(halves);  // what is divided by is what is multiplied with
   albedos[index] = halves;
   uncovered[index] = vec4(own.rgb / show.white / albedo, 0.0);
   reals[index] = vec4(real / show.white / albedo, 0.0);

@@ -212,7 +212,7 @@ uint choose_light(Path p, Surface s, Sampler random, inout float u, out float se
       const vec2 lamp = sample_2d(random, PAIR_LAMP + p.depth);
       index = select_light(make_receiver(s.position, p.receiver), lamp, among_lights);
     } else {
-      index = pick_light(u);
+      index = pick_light(u, false);
       among_lights = lights[index].selection;
     }
     selection = (1.0 - selection) * among_lights;
@@ -390,7 +390,8 @@ bool meet_measured(inout Path p, Surface s, GpuHit hit) {
   return false;
 }
 
-// What paint and plastic reflect at their surface, beside their colour, from the directions around.
+// Paint and plastic reflect about this share of the light around at their surface, beside their
+// colour.
 const float MEAN_REFLECTANCE = 0.1;
 
 // Returns how bright a surface is: what of white light around it comes back, and what it emits over
@@ -424,8 +425,7 @@ float footprint_of(Path p, float t) {
 void write_aov(Path p, Surface s, float t) {
   sample_aov[p.slot] = vec4(s.normal, depth_of(p, t));
   if (!has_feature(FEATURE_TEXTURES) || frame.keeps_albedo == 0u) return;
-  const vec3 albedo = brightness_of(s);
-  sample_albedo[p.slot] = uvec2(packHalf2x16(albedo.rg), packHalf2x16(vec2(albedo.b, 0.0)));
+  sample_albedo[p.slot] = pack_halves(brightness_of(s));
 }
 
 // Adds the light of photons at a vertex, samples a light and the next direction. With `lit`, `ray`

@@ -45,8 +45,8 @@ Recorder::~Recorder() {
   thread_.join();
 }
 
-// About what an entry takes of memory. What begins and ends takes takes nothing, as it must not be
-// left out.
+// Returns about how much memory an entry takes. An entry that begins or ends a take counts as 0, so
+// that it is never left out.
 std::uint64_t Recorder::bytes_of(const Entry& entry) {
   if (const auto* captured = std::get_if<Captured>(&entry)) return captured->frame->bytes.size();
   if (const auto* event = std::get_if<Event>(&entry)) return sizeof(Entry) + event->what.size();
@@ -81,7 +81,8 @@ void Recorder::offer(const FramePtr& frame) {
       if (frame->source == "observer") last_frame_ns_ = frame->timestamp_ns;
       enqueue(captured);
     } else {
-      is_first_dropped = ++status_.dropped == 1;
+      count_as_lost(captured);
+      is_first_dropped = status_.lost.frames == 1;
     }
   }
   if (is_silent)
@@ -100,7 +101,8 @@ void Recorder::offer_shown(const FramePtr& frame) {
     const std::lock_guard lock(mutex_);
     if (!status_.recording) return;
     if (queued_bytes_ + bytes_of(captured) <= options_.queue_bytes / 2) return enqueue(captured);
-    if (++status_.dropped_shown > 1) return;
+    count_as_lost(captured);
+    if (status_.lost.shown > 1) return;
   }
   note(Severity::warning, "the disk is too slow; pictures that were shown are left out");
 }
@@ -151,11 +153,14 @@ void Recorder::enqueue_record(Entry entry) {
   if (queued_bytes_ + bytes_of(entry) <= options_.queue_bytes + options_.queue_bytes / 8)
     enqueue(std::move(entry));
   else
-    ++status_.dropped_records;
+    count_as_lost(entry);
 }
 
-session::Losses Recorder::lost() const {
-  return {status_.dropped, status_.dropped_shown, status_.dropped_records};
+void Recorder::count_as_lost(const Entry& entry) {
+  if (const auto* captured = std::get_if<Captured>(&entry))
+    ++(captured->frame->source == "composite" ? status_.lost.shown : status_.lost.frames);
+  else if (bytes_of(entry) > 0)
+    ++status_.lost.records;
 }
 
 // Drops the ring's oldest entries, counting time from its newest frame. A full ring must fit the
@@ -194,7 +199,8 @@ void Recorder::start() {
   if (status_.recording) return;
   status_.recording = true;
   late_tracks_ = false;
-  status_.dropped = status_.dropped_shown = status_.dropped_records = status_.frames = 0;
+  status_.lost = {};
+  status_.frames = 0;
   status_.seconds = 0;
   status_.fault.clear();
   enqueue(Start{});
@@ -226,7 +232,7 @@ void Recorder::stop() {
 void Recorder::enqueue_stop(bool is_wished) {
   status_.recording = false;
   late_tracks_ = true;
-  enqueue(Stop{lost(), is_wished});
+  enqueue(Stop{status_.lost, is_wished});
 }
 
 void Recorder::mark_good() {
@@ -315,7 +321,7 @@ void Recorder::handle(Entry& entry) {
 void Recorder::write(const Captured& captured) {
   if (!take_->fits(*captured.frame) && captured.frame->source == "composite") {
     const std::lock_guard lock(mutex_);  // forgets lights from before the camera's format changed
-    ++status_.dropped_shown;
+    ++status_.lost.shown;
     return;
   }
   if (!take_->fits(*captured.frame)) {
@@ -325,7 +331,7 @@ void Recorder::write(const Captured& captured) {
     session::Losses so_far;
     {
       const std::lock_guard lock(mutex_);
-      so_far = lost();
+      so_far = status_.lost;
     }
     end_take(so_far);
     begin_take();
@@ -362,11 +368,11 @@ void Recorder::drop_wish() {
   }
 }
 
-// What the last process left: the wish to record, and takes that it could not end.
+// Looks for what the last process left: the wish to record, and takes that it could not end.
 void Recorder::look_for_interruption() {
   try {
-    if (!std::filesystem::is_directory(options_.take.directory)) return;  // not yet
-    looked_for_interruption_ = true;
+    looked_for_interruption_ = std::filesystem::exists(options_.take.directory);
+    if (!looked_for_interruption_) return;
     std::vector<std::filesystem::path> takes;
     for (const auto& entry : std::filesystem::directory_iterator(options_.take.directory))
       if (entry.is_directory()) takes.push_back(entry.path());
@@ -376,6 +382,7 @@ void Recorder::look_for_interruption() {
     const std::lock_guard lock(mutex_);
     status_.interrupted = std::move(interrupted);
   } catch (const std::exception& error) {
+    looked_for_interruption_ = true;  // once, and not each second
     note(Severity::warning, std::string("takes from before cannot be looked at: ") + error.what());
   }
 }
@@ -430,10 +437,10 @@ void Recorder::fail(const std::string& why) {
     const std::lock_guard lock(mutex_);
     for (; !queue_.empty() && !std::holds_alternative<Start>(queue_.front()); queue_.pop_front()) {
       queued_bytes_ -= bytes_of(queue_.front());
-      if (std::holds_alternative<Captured>(queue_.front())) ++status_.dropped;
+      count_as_lost(queue_.front());
     }
     if (queue_.empty()) status_.recording = late_tracks_ = false;
-    if (take_) take_->set_lost(lost());
+    if (take_) take_->set_lost(status_.lost);
     count_failure(why);
   }
   leave_take(why);
@@ -462,7 +469,7 @@ void Recorder::check_disk() {
   if (free >= options_.reserve_bytes) return;
   if (take_) {
     const std::lock_guard lock(mutex_);
-    take_->set_lost(lost());
+    take_->set_lost(status_.lost);
   }
   if (take_) take_->close();
   throw Error(options_.take.directory.string() + ": the disk is almost full, " + megabytes(free) +

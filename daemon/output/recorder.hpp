@@ -40,15 +40,13 @@ struct RecorderStatus {
   bool recording = false;
   std::filesystem::path directory;  // the running take's or the last one's; empty: none yet
   int number = 0;
-  std::uint64_t frames = 0;           // observer frames of the take on disk
-  double seconds = 0;                 // from the first to the last of them
-  std::uint64_t dropped = 0;          // frames of either camera that did not reach the disk
-  std::uint64_t dropped_shown = 0;    // shown pictures that did not reach the disk
-  std::uint64_t dropped_records = 0;  // lines of tracking, buttons and events that did not
-  double disk_silent_s = 0;           // for how long the disk has not answered a write
-  std::uint64_t finished_takes = 0;   // since the start; takes without a frame do not count
-  std::uint64_t failures = 0;         // takes that ended by an error
-  std::string fault;                  // cause of the last failure; empty once another take begins
+  std::uint64_t frames = 0;          // observer frames of the take on disk
+  double seconds = 0;                // from the first to the last of them
+  session::Losses lost;              // since the take began
+  double disk_silent_s = 0;          // for how long the disk has not answered a write
+  std::uint64_t finished_takes = 0;  // since the start; takes without a frame do not count
+  std::uint64_t failures = 0;        // takes that ended by an error
+  std::string fault;                 // cause of the last failure; empty once another take begins
   // The take that was being recorded when the last process ended, if it was not ended by anybody;
   // known about when the folder of takes is there.
   std::optional<std::string> interrupted;
@@ -114,7 +112,7 @@ class Recorder {
   void enqueue_record(Entry entry);  // or counts it as lost
   void enqueue_stop(bool is_wished);
   void count_failure(const std::string& why);
-  session::Losses lost() const;
+  void count_as_lost(const Entry& entry);
   bool has_new_silence();  // of the disk, that nobody was told of
   void trim_ring();
   void forget_first_of_ring();

@@ -8,7 +8,8 @@ namespace previz::render {
 namespace {
 
 constexpr int most_points_a_side = 8;
-// Of the mean over the mesh, and of the whole.
+// No triangle weighs less than this share of its mesh's mean, nor than this share of what it would
+// send without texture and alpha.
 constexpr double least_of_mean = 0.1, least_weight = 1e-4;
 constexpr float furthest_uv = 65536;  // beyond it single precision cannot resolve texels
 

@@ -1,5 +1,5 @@
-// How much of its material's light each triangle of an emissive mesh sends, by its texture and its
-// alpha, so that a light sample finds the bright parts of a wall of screens.
+// Weighs the triangles of an emissive mesh by how much of their material's light they send, through
+// texture and alpha, so that a light sample finds the bright parts of a wall of screens.
 #pragma once
 
 #include <vector>

@@ -43,7 +43,7 @@ double environment_share(double environment_power, double light_power) {
 struct AlbedoTables {
   std::vector<float> values{1};  // a placeholder that no shader reads
   std::map<float, std::uint32_t> of_ior;
-  // By strength, roughness, and whether a texture makes it smoother.
+  // Keys: strength, roughness, and whether a texture makes it smoother.
   std::map<std::tuple<float, float, bool>, std::uint32_t> of_anisotropy;
 
   explicit AlbedoTables(bool has_sheen) {
@@ -97,14 +97,6 @@ void check_medium(const scene::Material& material, std::size_t index) {
                 " can be");
 }
 
-bool glows_in_a_variant(const scene::Scene& scene) {
-  for (const scene::Variants& variants : scene.variants)
-    for (const scene::Variants::Part& part : variants.parts)
-      for (const scene::Variants::Look& look : part.looks)
-        if (scene::emits(scene.materials[look.material])) return true;
-  return false;
-}
-
 template <typename T>
 void append(std::vector<T>& to, const std::vector<T>& from) {
   to.insert(to.end(), from.begin(), from.end());
@@ -122,7 +114,7 @@ void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha, bool 
   specular_alpha_ = specular_alpha;
   filters_textures_ = filters_textures;
   material_features_ = material_features(scene_, specular_alpha);
-  glows_in_a_variant_ = glows_in_a_variant(scene_);
+  may_glow_ = scene::may_glow(scene_);
   if (!has_meshes) upload_meshes();
   upload_materials(specular_alpha);
   if (!has_textures) upload_textures();
@@ -416,7 +408,7 @@ Demand GpuScene::demand(const set::Estimation& estimation) const {
   demand.light_sampling = sampling_;
   demand.shines_around = environment_mean_ > 0;
   demand.finds_lamps = sources_.has_value();
-  demand.lamps_shine = lights_.power() > 0 || glows_in_a_variant_;
+  demand.lamps_shine = lights_.power() > 0 || may_glow_;
   return demand;
 }
 

@@ -24,7 +24,7 @@ class GpuScene {
  public:
   explicit GpuScene(Device& device) : device_(device), deformer_(device), lights_(device) {}
 
-  // How often something was made or uploaded since this object was made.
+  // Counts what was built or uploaded since this object was made.
   struct Work {
     std::uint64_t trees = 0;  // of meshes, but for those that deforming takes
     std::uint64_t materials = 0, textures = 0;
@@ -90,7 +90,7 @@ class GpuScene {
   double specular_alpha_ = 0;
   bool filters_textures_ = false;
   MaterialFeatures material_features_;
-  bool glows_in_a_variant_ = false;                 // some instance does
+  bool may_glow_ = false;                           // some instance does, or would in a variant
   std::vector<scene::Instance> instances_as_set_;   // as set_scene() got them
   std::vector<scene::Shape> shapes_;                // as deform() got them last
   Spheres spheres_;                                 // of instances_as_set_

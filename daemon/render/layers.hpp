@@ -39,7 +39,8 @@ struct Counters {
   std::uint64_t unmeasured = 0;
   // Trees of meshes that deform that were built anew since the frame before was begun.
   std::uint64_t rebuilt_trees = 0;
-  // How often the lamps and emissive triangles were encoded: once, and whenever one has changed.
+  // Counts how often the lamps and emissive triangles were encoded: once, and whenever one has
+  // changed.
   std::uint64_t encoded_lights = 0;
   // Since the renderer was made: trees of meshes that were built as scenes were set, and how often
   // all materials, and all textures, were uploaded.

@@ -12,7 +12,8 @@
 
 namespace previz::render {
 
-// Which lamps are together: nodes, the root first, each before its children, which are neighbours.
+// One node of the order in which lamps are grouped. A LightShape lists them with the root first and
+// each before its children, which stand beside each other.
 struct LightBranch {
   std::uint32_t first;  // its first child; of a leaf: a lamp
   bool is_leaf;

@@ -16,7 +16,7 @@ struct Covered {
 std::vector<Covered> coverage_of(int from, int to) {
   std::vector<Covered> result;
   for (int i = 0; i < to; ++i) {
-    // In integers: texel j covers [j, j + 1] * to, the wider one [i, i + 1] * from.
+    // Lengths are integers: texel j covers [j, j + 1] * to, the wider one [i, i + 1] * from.
     const int low = i * from / to, high = ((i + 1) * from + to - 1) / to;
     Covered covered{static_cast<std::size_t>(low), {}};
     for (int j = low; j < high; ++j) {

@@ -33,9 +33,8 @@ class SceneLights {
 
   // Returns the index of the first of an instance's lights; NO_INDEX if it does not emit.
   std::uint32_t first_light(std::size_t instance) const { return first_light_[instance]; }
-  double power() const { return power_; }    // W per channel, mean of the channels
-  double spread() const { return spread_; }  // of spread_of()
-  bool differ() const { return differ_; }    // between the worlds
+  double power() const { return power_; }  // W per channel, mean of the channels
+  bool differ() const { return differ_; }  // between the worlds
   // Returns how often lights were encoded since this object was made.
   std::uint64_t encoded() const { return encoded_; }
 

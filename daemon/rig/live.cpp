@@ -57,7 +57,7 @@ control::Status status_of(const Rig& rig, const set::Set& set, const report::Rep
           look.state.recording,
           recorder.directory.filename().string(),
           recorder.frames,
-          recorder.dropped,
+          recorder.lost.frames,
           recorder.fault,
           look.state.camera_lost,
           look.samples,

@@ -145,11 +145,7 @@ GpuKeeper::Gpu LivePipeline::Impl::gpu() {
               },
           .name = [this] { return render::device_name(*parts.device); },
           .build = [this] { make_render_stage(); },
-          .drop =
-              [this] {
-                render_stage.reset();
-                parts.renderer.reset();
-              }};
+          .drop = [this] { render_stage.reset(); }};
 }
 
 CameraSource LivePipeline::Impl::source(std::stop_token stop, Camera& camera,

@@ -15,6 +15,7 @@ using output::OsdTone;
 using tracking::TrackStatus;
 
 constexpr std::uint64_t little_space = 10'000'000'000;  // bytes, besides the reserve
+constexpr double long_silence_s = 2;                      // of a disk
 
 // "1 tag", "2 tags"
 std::string counted(int number, const char* noun) {
@@ -90,10 +91,11 @@ void add_notices(const RigFacts& rig, const PictureFacts* picture, OsdPage& page
     page.notices.push_back({"film camera: no picture", OsdTone::alarm});
   if (!rig.recorder_fault.empty())
     page.notices.push_back({"recording ended: " + rig.recorder_fault, OsdTone::alarm});
-  if (rig.frames_lost > 0)
+  if (rig.disk_silent_s >= long_silence_s)
     page.notices.push_back(
-        {fmt::format("{} frames missing from the take: the disk is too slow", rig.frames_lost),
-         OsdTone::alarm});
+        {fmt::format("the disk has not answered for {:.0f} s", rig.disk_silent_s), OsdTone::alarm});
+  for (const std::string& lost : session::words_of(rig.lost))
+    page.notices.push_back({"missing from the take: " + lost, OsdTone::alarm});
   if (!picture && !rig.look.state.camera_lost)
     page.notices.push_back({"waiting for the film camera", OsdTone::warning});
   if (picture && !picture->untouched.empty())

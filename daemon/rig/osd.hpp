@@ -11,6 +11,7 @@
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/report/report.hpp"
 #include "daemon/rig/controls.hpp"
+#include "drivers/session/session.hpp"
 
 namespace previz::rig {
 
@@ -37,7 +38,8 @@ struct RigFacts {
   Look look;
   std::string take;       // name of the take that is being recorded
   double recorded_s = 0;  // its length so far
-  std::uint64_t frames_lost = 0;
+  session::Losses lost;       // since the take began
+  double disk_silent_s = 0;   // for how long the disk has not answered a write
   std::string recorder_fault;
   std::optional<std::uint64_t> free_bytes;  // for takes, without the reserve; none: not known
   std::vector<report::Notice> news;         // actions of buttons and of the rig, oldest first

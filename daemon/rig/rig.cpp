@@ -287,7 +287,8 @@ void Rig::show_facts() {
   facts.look = controls_.look();
   facts.take = recorder.directory.filename().string();
   facts.recorded_s = recorder.seconds;
-  facts.frames_lost = recorder.dropped;
+  facts.lost = recorder.lost;
+  facts.disk_silent_s = recorder.disk_silent_s;
   facts.recorder_fault = recorder.fault;
   facts.free_bytes = free_bytes_;
   facts.news = parts_.reports.news();

@@ -92,7 +92,7 @@ struct GltfFile::Loader {
   std::map<MeshSource, std::optional<std::uint32_t>> meshes;  // nothing for an empty mesh
   // Instances that the node added last takes along, and where they are in it.
   std::vector<std::pair<std::uint32_t, glm::dmat4>> carried;
-  // Of the object that is being added.
+  // These two are of the object that is being added.
   std::size_t look = 0;  // as GltfVariants::look_of()
   std::vector<Variants::Part> parts;
 };

@@ -174,7 +174,9 @@ void GltfMaterials::read_sheen(const tinygltf::Material& given, const std::strin
   material.sheen_roughness = std::max(roughness, gpu::LEAST_SHEEN_ROUGHNESS);
   if (!has_sheen(material)) return;
   if (roughness < material.sheen_roughness)
-    notes_.add(what + ": its sheenRoughnessFactor is taken as 0.07, the least that is supported");
+    notes_.add(what + ": its sheenRoughnessFactor is taken as " +
+               std::to_string(gpu::LEAST_SHEEN_ROUGHNESS).substr(0, 4) +
+               ", the least that is supported");
   if (sheen.Has("sheenColorTexture") || sheen.Has("sheenRoughnessTexture"))
     notes_.add(what + ": the textures of its sheen are not supported; left out");
 }

@@ -29,7 +29,7 @@ constexpr std::array known_extensions = {"EXT_mesh_gpu_instancing",
                                          "KHR_mesh_quantization",
                                          "KHR_texture_transform"};
 
-// What will look different where an extension of materials is ignored.
+// An extension of materials that is ignored, and what will look different for it.
 struct Ignored {
   std::string_view extension;
   std::string_view difference;

@@ -1,11 +1,10 @@
 // A session on disk:
 //
 //   SESSION/
-//     session.toml    format version, name, clock; whether it was closed, by what fault it ended,
-//     and
-//                     what did not reach the disk; per stream its pixel format, size and, once the
-//                     session is closed, its number of frames; calibrations; the asset map; the set
-//                     file verbatim. Replaced as a whole, never edited in place.
+//     session.toml    format version, name, clock; whether it was closed, by what fault it ended
+//                     and what did not reach the disk; per stream its pixel format, size and, once
+//                     the session is closed, its number of frames; calibrations; the asset map; the
+//                     set file verbatim. Replaced as a whole, never edited in place.
 //     observer.mkv    FFV1 level 3, every frame a key frame, slice checksums, a Matroska cluster a
 //                     frame: RGB (8 or 16 bit), gray (8 or 16 bit) or 4:2:2 Y'CbCr. Matroska times
 //                     are milliseconds from the first frame, strictly increasing.
@@ -52,12 +51,7 @@ void read_end(const SessionFile& file, Session& session) {
     miss(
         "the recording was not closed (power cut, crash, or still recording); what "
         "came after the last whole frame, at most about a second, is lost");
-  const auto left_out = [&](std::uint64_t count, const std::string& what) {
-    if (count > 0) miss(std::to_string(count) + " " + what + " did not reach the disk in time");
-  };
-  left_out(file.lost.frames, "frames of the cameras");
-  left_out(file.lost.shown, "pictures that were shown");
-  left_out(file.lost.records, "lines of tracking, buttons and events");
+  for (const std::string& what : words_of(file.lost)) miss(what + " did not reach the disk in time");
 }
 
 void read_track(Session& session) {
@@ -69,6 +63,17 @@ void read_track(Session& session) {
 }
 
 }  // namespace
+
+std::vector<std::string> words_of(const Losses& lost) {
+  std::vector<std::string> words;
+  const auto add = [&](std::uint64_t count, const char* what) {
+    if (count > 0) words.push_back(std::to_string(count) + " " + what);
+  };
+  add(lost.frames, "frames of the cameras");
+  add(lost.shown, "pictures that were shown");
+  add(lost.records, "lines of tracking, buttons and events");
+  return words;
+}
 
 Session open_session(const std::filesystem::path& directory) {
   const std::filesystem::path toml = directory / "session.toml";

@@ -39,10 +39,13 @@ struct TakeInfo {
 struct Losses {
   std::uint64_t frames = 0;   // of either camera
   std::uint64_t shown = 0;    // pictures that were shown
-  std::uint64_t records = 0;  // tracking, buttons and events
+  std::uint64_t records = 0;  // lines of tracking, buttons and events
 
   friend bool operator==(const Losses&, const Losses&) = default;
 };
+
+// Returns what was lost: "12 frames of the cameras", "3 pictures that were shown". Empty: nothing.
+std::vector<std::string> words_of(const Losses& lost);
 
 // session.toml. `set_text` is the set file verbatim; `set_name` the file name to use in errors.
 struct SessionInfo {

@@ -29,8 +29,9 @@ float single_scatter_albedo(uint table, float cos_o, float alpha) {
   return interpolate_albedo(table, sqrt(clamp(vec2(cos_o, alpha), vec2(0.0), vec2(1.0))));
 }
 
-// The same of an anisotropic reflection; `across` is the viewer's direction across the normal,
-// along the wider and the narrower direction, and `alpha` the width along the narrower one.
+// Returns the albedo of an anisotropic reflection without its further bounces; `across` is the
+// viewer's direction across the normal, along the wider and the narrower direction, and `alpha` the
+// width along the narrower one.
 float anisotropic_albedo(uint first_table, vec2 across, float cos_o, float alpha) {
   const float last = float(ANISOTROPIC_TABLES - 1u);
   const float size = length(across);

@@ -62,7 +62,7 @@ float ggx_lambda(vec3 w, float alpha) {
   return 0.5 * (sqrt(1.0 + alpha * alpha * tan2) - 1.0);
 }
 
-// The same for widths along x and y that differ (Heitz 2014, "Anisotropy").
+// GGX's density of facets whose widths along x and y differ (Heitz 2014, "Anisotropy").
 float ggx_density(vec3 h, vec2 alpha) {
   const vec2 slope = h.xy / alpha;
   const float d = dot(slope, slope) + h.z * h.z;

@@ -29,31 +29,23 @@ struct LightSample {
 // surface.
 const float SHADOW_END = 0.9999;
 
-// Picks a light by its selection probability; the rest of u is stretched to [0, 1).
-uint pick_light(inout float u) {
-  uint low = 0u;
-  uint high = frame.light_count - 1u;
-  while (low < high) {
-    const uint middle = (low + high) >> 1;
-    if (u < lights[middle].cdf) high = middle;
-    else low = middle + 1u;
-  }
-  const float below = low > 0u ? lights[low - 1u].cdf : 0.0;
-  u = clamp((u - below) / max(lights[low].cdf - below, 1e-30), 0.0, 0.99999994);
-  return low;
+// The probability that a light or one before it is picked: among all lights, or among what the tree
+// of lamps leaves to be picked without it.
+float cdf_of(uint index, bool beside_tree) {
+  return beside_tree ? lights[index].rest_cdf : lights[index].cdf;
 }
 
-// The same by what the tree of lamps leaves.
-uint pick_rest(inout float u) {
+// Picks a light by cdf_of(); the rest of u is stretched to [0, 1).
+uint pick_light(inout float u, bool beside_tree) {
   uint low = 0u;
   uint high = frame.light_count - 1u;
   while (low < high) {
     const uint middle = (low + high) >> 1;
-    if (u < lights[middle].rest_cdf) high = middle;
+    if (u < cdf_of(middle, beside_tree)) high = middle;
     else low = middle + 1u;
   }
-  const float below = low > 0u ? lights[low - 1u].rest_cdf : 0.0;
-  u = clamp((u - below) / max(lights[low].rest_cdf - below, 1e-30), 0.0, 0.99999994);
+  const float below = low > 0u ? cdf_of(low - 1u, beside_tree) : 0.0;
+  u = clamp((u - below) / max(cdf_of(low, beside_tree) - below, 1e-30), 0.0, 0.99999994);
   return low;
 }
 
@@ -72,7 +64,7 @@ float light_selection(GpuLight light, Receiver r) {
 // probability of the lamp that they have.
 uint select_light(Receiver r, vec2 lamp, out float selection) {
   const bool by_tree = choose(lamp.x, frame.tree_share);
-  const uint picked = by_tree ? NO_INDEX : pick_rest(lamp.y);
+  const uint picked = by_tree ? NO_INDEX : pick_light(lamp.y, true);
   const uint wanted = by_tree ? NO_INDEX : lights[picked].leaf;
   float probability = 0.0;
   uint found = NO_INDEX;

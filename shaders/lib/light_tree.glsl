@@ -7,7 +7,7 @@
 #include "shaders/lib/sampler.glsl"
 #include "shaders/lib/scene.glsl"
 
-// Of GpuLightNode, three texels each, because texel buffers are read faster on lavapipe.
+// The tree's nodes, three texels to a GpuLightNode; lavapipe reads texel buffers faster.
 uniform utextureBuffer light_tree;
 
 GpuLightNode light_node(uint index) {
@@ -19,8 +19,8 @@ GpuLightNode light_node(uint index) {
                       uintBitsToFloat(b.w), uintBitsToFloat(c.x), uintBitsToFloat(c.y), c.z, c.w);
 }
 
-// What is known of a surface to which lamps shine. A receiver that takes light from behind, too, has
-// no normal, (0, 0, 0).
+// A point of a surface on which lamps shine. A receiver that takes light from behind, too, has no
+// normal, (0, 0, 0).
 struct Receiver {
   vec3 position;  // from the tree's origin
   vec3 normal;

@@ -4,6 +4,7 @@
 #define PREVIZ_PATH_GLSL
 
 #include "shaders/lib/batch.glsl"
+#include "shaders/lib/halves.glsl"
 #include "shaders/lib/scene.glsl"
 
 // A slot is one sample of one pixel. It has two paths, because a path can fork once: path 2 slot, and
@@ -20,9 +21,9 @@ layout(scalar) buffer Mixed { vec4 sample_mixed[]; };           // of a slot: Lm
 layout(scalar) buffer Real { vec4 sample_real[]; };             // of a slot: Lr, one of SAMPLE_*
 layout(scalar) buffer Landed { vec4 sample_landed[]; };         // of a slot: the real part of PATH_LANDED
 layout(scalar) buffer Aov { vec4 sample_aov[]; };               // of a slot: normal, depth (0: no hit)
-// Of a slot, for the denoiser (shaders/README.md, "Denoising"): how bright the mixed world's first
-// surface is in white light, and what it emits over the sensor's white; four halves of words. 0: no
-// hit. It is kept with FEATURE_TEXTURES.
+// The denoiser's albedo of a slot (shaders/README.md, "Denoising"): how bright the mixed world's first
+// surface is in white light, and what it emits over the sensor's white (lib/halves.glsl). 0: no hit.
+// It is kept with FEATURE_TEXTURES.
 layout(scalar) buffer Albedo { uvec2 sample_albedo[]; };
 layout(scalar) buffer Control { GpuControl control; };
 layout(scalar) readonly buffer Limits { uint limits[]; };       // of a block of the picture, row-major:

@@ -162,7 +162,7 @@ Emission emit_photon(Sampler random) {
     e = emit_environment(random, choice);
     selection = environment;
   } else {
-    const uint index = pick_light(choice.x);
+    const uint index = pick_light(choice.x, false);
     e = emit_light(light_at(index), random, choice);
     selection = (1.0 - environment) * lights[index].selection;
   }

@@ -74,11 +74,11 @@ PREVIZ_CONST uint FEATURE_PANES = 16384u;  // any smooth thin wall through which
 PREVIZ_CONST uint FEATURE_CAMERA = 8192u;  // the plate gives the radiance of points that it shows
 PREVIZ_CONST uint FEATURE_ATTENUATION = 32768u;  // clear solids that take light away inside
 PREVIZ_CONST uint FEATURE_CLEARCOAT = 65536u;  // a coat of lacquer above the base material
-PREVIZ_CONST uint FEATURE_FILTERED_TEXTURES = 8388608u;  // looked up over a sample's footprint
 PREVIZ_CONST uint FEATURE_MANY_LIGHTS = 131072u;  // more than FEW_LIGHTS: they are chosen by a tree
 PREVIZ_CONST uint FEATURE_SHEEN = 262144u;        // fibres of cloth above the base material
 PREVIZ_CONST uint FEATURE_ANISOTROPY = 524288u;   // reflections that are wider along one direction
 PREVIZ_CONST uint FEATURE_COAT_COLOR = 1048576u;  // paint or plastic whose reflection has a colour
+PREVIZ_CONST uint FEATURE_FILTERED_TEXTURES = 2097152u;  // looked up over a sample's footprint
 
 // These bits are a path's state.
 PREVIZ_CONST uint PATH_WORLDS_MASK = 3u;      // WORLD_*

@@ -102,8 +102,8 @@ const uint PAIR_SCATTER = 3u;   // which technique and lobe, and the direction
 const uint PAIR_CHANCE = 4u;    // x: roulette, y: whether rough glass reflects
 const uint PAIRS_PER_VERTEX = 3u;
 
-// With FEATURE_MANY_LIGHTS each vertex has one more, which lies beyond all others. x: whether the tree
-// of lamps is taken, y: which lamp.
+// With FEATURE_MANY_LIGHTS each vertex has one more pair, which lies beyond all others. x: whether the
+// tree of lamps is taken, y: which lamp.
 const uint PAIR_LAMP = 1u << 16;
 
 uint vertex_pair(uint pair, uint depth) { return pair + PAIRS_PER_VERTEX * depth; }

@@ -177,8 +177,8 @@ Function* real(const char* name) {
   return reinterpret_cast<Function*>(::dlsym(RTLD_NEXT, name));
 }
 
-int open_noted(const char* name, const char* path, int flags, mode_t mode) {
-  const auto call = real<int(const char*, int, ...)>(name);
+int open_noted(const char* path, int flags, mode_t mode) {
+  const auto call = real<int(const char*, int, ...)>("open64");
   const std::lock_guard lock(disk().mutex);
   const std::optional<Place> place = place_of(path);
   if (!place) {
@@ -361,14 +361,14 @@ int open(const char* path, int flags, ...) {
   va_start(rest, flags);
   const auto mode = static_cast<mode_t>(va_arg(rest, int));
   va_end(rest);
-  return previz::test::open_noted("open", path, flags, mode);
+  return previz::test::open_noted(path, flags, mode);
 }
 int open64(const char* path, int flags, ...) {
   va_list rest;
   va_start(rest, flags);
   const auto mode = static_cast<mode_t>(va_arg(rest, int));
   va_end(rest);
-  return previz::test::open_noted("open64", path, flags, mode);
+  return previz::test::open_noted(path, flags, mode);
 }
 
 // A stream's descriptor is opened here, so that it is known to the calls below.
@@ -380,7 +380,7 @@ FILE* fopen(const char* path, const char* mode) {
   if (wanted[0] == 'a') flags |= O_CREAT | O_APPEND;
   if (wanted.find('e') != std::string_view::npos) flags |= O_CLOEXEC;
   if (wanted.find('x') != std::string_view::npos) flags |= O_EXCL;
-  const int descriptor = previz::test::open_noted("open64", path, flags, 0666);
+  const int descriptor = previz::test::open_noted(path, flags, 0666);
   return descriptor < 0 ? nullptr : ::fdopen(descriptor, mode);
 }
 FILE* fopen64(const char* path, const char* mode) {

@@ -47,16 +47,16 @@ void write_session(const std::filesystem::path& directory, const std::filesystem
   done(frames);
 }
 
-// Returns how many frames of the observer can be read, each compared bit for bit; nothing where
-// there is no session.
-std::optional<int> frames_in(const std::filesystem::path& directory, bool& closed) {
+// Returns how many frames of the observer can be read, each compared bit for bit with those from
+// `first` on; nothing where there is no session.
+std::optional<int> frames_in(const std::filesystem::path& directory, bool& closed, int first = 0) {
   if (!std::filesystem::exists(directory / "session.toml")) return std::nullopt;
   session::Session session = session::open_session(directory);
   const auto stream = session::open_stream(session, "observer");
   closed = session.missing.empty();
   if (!stream) return 0;
   for (std::size_t i = 0; i < stream->records().size(); ++i)
-    EXPECT_TRUE(is_frame(*stream->read(i), i)) << i;
+    EXPECT_TRUE(is_frame(*stream->read(i), first + i)) << i;
   return static_cast<int>(stream->records().size());
 }
 
@@ -172,6 +172,15 @@ TEST_P(EveryCall, OfARecorderThatFailsEndsTheTakeAndNotTheNext) {
       EXPECT_EQ(second.failures, first.failures) << second.fault;
       // One more came between the takes, and stands in the ring.
       EXPECT_GE(second.frames, static_cast<std::uint64_t>(frames));
+    }
+    if (second.failures == first.failures) {
+      const int begin = 2 * frames - static_cast<int>(second.frames);
+      EXPECT_EQ(frames_in(second.directory, closed, begin), static_cast<int>(second.frames));
+      EXPECT_TRUE(closed);
+    }
+    if (first.failures == 0) {
+      EXPECT_EQ(frames_in(first.directory, closed), frames);
+      EXPECT_TRUE(closed);
     }
     if (call >= disk.calls()) break;
   }

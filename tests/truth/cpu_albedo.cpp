@@ -90,7 +90,7 @@ glm::dvec3 local_direction(double cosine, double azimuth) {
   return {sine * std::cos(azimuth), sine * std::sin(azimuth), cosine};
 }
 
-// By the midpoint rule over slopes, as share_at().
+// Integrates by the midpoint rule over slopes, as share_at() does.
 double anisotropic_share_at(const glm::dvec3& o, const glm::dvec2& alpha, int rings) {
   const int spokes = 2 * rings;
   const double masked = 0.5 * (1 + smith_root(o, alpha) / o.z);  // 1 + lambda

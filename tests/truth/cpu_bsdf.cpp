@@ -133,8 +133,8 @@ glm::dvec3 conductor_gain(const Bsdf& bsdf, const ShadingPoint& point) {
   return 1.0 + bsdf.base_color * (1 / share - 1);
 }
 
-// What plastic reflects: a colour at normal incidence, which fades as Fresnel's reflectance departs
-// from that at normal incidence.
+// Returns the reflectance of plastic: a colour at normal incidence, which fades as Fresnel's
+// reflectance departs from that at normal incidence.
 glm::dvec3 plastic_reflectance(const Bsdf& bsdf, double cosine) {
   const double white = fresnel_dielectric(std::clamp(cosine, 0.0, 1.0), bsdf.ior);
   if (bsdf.specular_color == glm::dvec3(1)) return glm::dvec3(bsdf.specular * white);
@@ -155,14 +155,14 @@ bool has_sheen_towards(const Bsdf& bsdf, const ShadingPoint& point, const glm::d
   return has_sheen(bsdf) && (!solid || viewers_side == point.outside);
 }
 
-// What fibres leave of light in one direction for what is below them.
+// Returns the share of light in one direction that fibres leave for what is below them.
 double left_by_sheen(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& w) {
   if (!has_sheen_towards(bsdf, point, w)) return 1;
   const double cosine = std::abs(glm::dot(w, point.shading_normal));
   return 1 - strongest(bsdf.sheen_color) * std::min(1.0, sheen_share(cosine, bsdf.sheen_roughness));
 }
 
-// Of light from wi to wo, whichever direction leaves less.
+// Returns the share that is left of light from wi to wo: that of the direction which leaves less.
 double under_sheen(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& wi) {
   return std::min(left_by_sheen(bsdf, point, point.wo), left_by_sheen(bsdf, point, wi));
 }

@@ -307,8 +307,8 @@ TEST(Recorder, ASlowDiskCostsFramesThatAreCounted) {
     status = recorder.status();
   }
   EXPECT_EQ(frames_of(directory / "12A_take001").size(), status.frames);
-  EXPECT_EQ(status.frames + status.dropped, offered);
-  EXPECT_GT(status.dropped, 0u);
+  EXPECT_EQ(status.frames + status.lost.frames, offered);
+  EXPECT_GT(status.lost.frames, 0u);
   EXPECT_TRUE(mentions(notes, "too slow"));
   EXPECT_EQ(status.failures, 0u);
 }
@@ -469,7 +469,7 @@ TEST(RecorderDeath, AKilledProcessKeepsEveryFrameThatItCounted) {
   EXPECT_EQ(frames_of(directory / "12A_take002"), count_from(0, 0));
 }
 
-// Whether the recorder of a new process finds that a take was being recorded.
+// Returns the take that the recorder of a new process finds cut off, if any.
 std::optional<std::string> interrupted_in(const std::filesystem::path& directory) {
   const Recorder recorder(options_in(directory));
   EXPECT_TRUE(wait_until("it has looked", [&] { return recorder.free_bytes().has_value(); }));
@@ -514,7 +514,7 @@ TEST(Recorder, OfADiskThatHangsKeepsAQueueOfBoundedSizeAndSaysSo) {
   session::TrackRecord with_light = track_of(0);
   with_light.captured_light.emplace();
   with_light.captured_light->ambient.resize(4096);  // 49 KB
-  std::uint64_t dropped = 0, dropped_records = 0;
+  session::Losses lost;
   {
     Recorder recorder(std::move(options));
     recorder.start();
@@ -524,20 +524,19 @@ TEST(Recorder, OfADiskThatHangsKeepsAQueueOfBoundedSizeAndSaysSo) {
     for (std::uint64_t i = 1; recorder.status().disk_silent_s < 2.5; ++i) {
       recorder.offer(picture(i));
       recorder.offer(with_light);
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));  // as a camera at 50 Hz offers
     }
     hangs.unlock();
-    dropped = recorder.status().dropped;
-    dropped_records = recorder.status().dropped_records;
+    lost = recorder.status().lost;
     // 100 kB hold 43 pictures of 32x24x3 bytes, and with an eighth more two records.
-    EXPECT_GT(dropped, 0u);
-    EXPECT_GT(dropped_records, 50u);
+    EXPECT_GT(lost.frames, 0u);
+    EXPECT_GT(lost.records, 50u);
     EXPECT_EQ(silences, 1);
     recorder.stop();
   }
   const session::Session session = session::open_session(directory / "12A_take001");
-  EXPECT_TRUE(mentions(session.missing, std::to_string(dropped) + " frames of the cameras"));
-  EXPECT_TRUE(mentions(session.missing, std::to_string(dropped_records) + " lines of tracking"));
+  for (const std::string& words : session::words_of(lost))
+    EXPECT_TRUE(mentions(session.missing, words)) << words;
 }
 
 }  // namespace output_recorder_test

@@ -10,6 +10,14 @@ namespace render_denoise_test {
 
 constexpr int width = 96, height = 80;
 
+render::Layers render_with(SetRenderer& renderer, const View& view, int samples,
+                           std::uint32_t seed) {
+  renderer.begin({{}, 1.0, view.world_from_camera, seed});
+  renderer.render(samples);
+  expect_clean(renderer.counters());
+  return renderer.layers();
+}
+
 // A flat wall that covers the whole picture.
 render::Layers wall(const std::function<glm::vec3(int x, int y)>& radiance, double variance = 0,
                     double white = 1) {
@@ -466,14 +474,8 @@ TEST(Denoise, KeepsTheTextureOfAnObject) {
   };
   const auto error_of = [](const View& view) {
     SetRenderer renderer(view, up_to_depth(1));
-    const auto render = [&](int samples, std::uint32_t seed) {
-      renderer.begin({{}, 1.0, view.world_from_camera, seed});
-      renderer.render(samples);
-      expect_clean(renderer.counters());
-      return renderer.layers();
-    };
-    const render::Layers truth = render(1024, 9);
-    render::Layers clean = render(1, 1);
+    const render::Layers truth = render_with(renderer, view, 256, 9);
+    render::Layers clean = render_with(renderer, view, 1, 1);
     renderer.show(true, &clean);
     double square = 0;
     for (std::size_t i = 0; i < truth.composite.size(); ++i)
@@ -497,13 +499,7 @@ TEST(Denoise, BringsARenderedPictureNearerToItsLimit) {
   for (const unsigned seed : {2u, 3u}) {
     const View view = random_scene(seed, options);
     SetRenderer renderer(view);
-    const auto render = [&](int samples, std::uint32_t random) {
-      renderer.begin({{}, 1.0, view.world_from_camera, random});
-      renderer.render(samples);
-      expect_clean(renderer.counters());
-      return renderer.layers();
-    };
-    const render::Layers limit = render(512, 99);
+    const render::Layers limit = render_with(renderer, view, 512, 99);
     const auto error = [&](const render::Layers& layers) {
       double sum = 0;
       for (std::size_t i = 0; i < layers.composite.size(); ++i) {
@@ -515,7 +511,7 @@ TEST(Denoise, BringsARenderedPictureNearerToItsLimit) {
     };
     double before = 1e9;
     for (const int samples : {1, 4, 16}) {
-      const render::Layers raw = render(samples, 1);
+      const render::Layers raw = render_with(renderer, view, samples, 1);
       render::Layers clean = raw;
       renderer.show(true, &clean);
       EXPECT_LT(error(clean), std::sqrt(0.9) * error(raw)) << seed << ", " << samples << " samples";

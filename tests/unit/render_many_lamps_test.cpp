@@ -30,8 +30,8 @@ std::vector<set::Light> near_lamps() {
   return lamps;
 }
 
-// As many as bright lamps far away: points, spots and panels that face the other way, and panels
-// below the floor.
+// Returns lamps that are as bright and far away: points, spots and panels that face the other way,
+// and panels below the floor.
 std::vector<set::Light> far_lamps(int count) {
   std::vector<set::Light> lamps;
   for (int i = 0; i < count; ++i) {

@@ -126,15 +126,26 @@ TEST(OsdWords, FaultsInPlainWordsAndWhatAButtonDid) {
   rig.troubles = {report::lasting("film camera", "was unplugged; it is opened anew"),
                   report::passing("light camera", "is stalled")};
   rig.recorder_fault = "the disk is almost full";
-  rig.frames_lost = 12;
+  rig.lost = {.frames = 12, .shown = 0, .records = 3};
+  rig.disk_silent_s = 5.2;
   rig.news.push_back({report::Severity::warning, "", "still recording; end the take first"});
   EXPECT_EQ(osd_page(rig, &picture, pace).notices,
             (Texts{{"film camera: was unplugged; it is opened anew", OsdTone::alarm},
                    {"light camera: is stalled", OsdTone::alarm},
                    {"recording ended: the disk is almost full", OsdTone::alarm},
-                   {"12 frames missing from the take: the disk is too slow", OsdTone::alarm},
+                   {"the disk has not answered for 5 s", OsdTone::alarm},
+                   {"missing from the take: 12 frames of the cameras", OsdTone::alarm},
+                   {"missing from the take: 3 lines of tracking, buttons and events",
+                    OsdTone::alarm},
                    {moved},
                    {"still recording; end the take first", OsdTone::warning}}));
+}
+
+TEST(OsdWords, ADiskThatAnswersWithinTwoSecondsIsNoNews) {
+  const PictureFacts picture = tracked();
+  RigFacts rig = in(Mode::live);
+  rig.disk_silent_s = 1.9;
+  EXPECT_TRUE(osd_page(rig, &picture, pace).notices.empty());
 }
 
 TEST(OsdWords, BeforeTheFirstPicture) {

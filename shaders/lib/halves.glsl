@@ -1,0 +1,11 @@
+// Three numbers as halves of words.
+#ifndef PREVIZ_HALVES_GLSL
+#define PREVIZ_HALVES_GLSL
+
+uvec2 pack_halves(vec3 v) { return uvec2(packHalf2x16(v.rg), packHalf2x16(vec2(v.b, 0.0))); }
+
+vec3 unpack_halves(uvec2 halves) {
+  return vec3(unpackHalf2x16(halves.x), unpackHalf2x16(halves.y).x);
+}
+
+#endif
