@@ -1,13 +1,16 @@
 #include "daemon/output/recorder.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cinttypes>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
 #include <utility>
 #include <vector>
 
-#include "daemon/output/recording_wish.hpp"
 #include "drivers/bracket.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/files.hpp"
 
 namespace previz::output {
 
@@ -25,13 +28,26 @@ constexpr std::chrono::seconds late{1};
 // A disk that takes longer for one thing is reported.
 constexpr std::chrono::seconds silence{2};
 
-std::string megabytes(std::uint64_t bytes) {
-  return std::to_string(bytes / 1'000'000) + " MB";
+std::string megabytes(double bytes) {
+  return std::to_string(std::lround(1e-6 * bytes)) + " MB";
 }
 
 }  // namespace
 
-Recorder::Recorder(RecorderOptions options) : options_(std::move(options)) {
+std::uint64_t default_queue_bytes() {
+  constexpr std::uint64_t least = 256'000'000;
+  std::ifstream file("/proc/meminfo");
+  for (std::string line; std::getline(file, line);) {
+    std::uint64_t kib = 0;
+    if (std::sscanf(line.c_str(), "MemAvailable: %" SCNu64 " kB", &kib) == 1)
+      return std::max(least, kib * 1024 / 4);
+  }
+  return least;
+}
+
+Recorder::Recorder(RecorderOptions options)
+    : options_(std::move(options)),
+      folders_(options_.take.folders, options_.reserve_bytes, options_.free_bytes) {
   thread_ = std::jthread([this] { run(); });
 }
 
@@ -69,11 +85,14 @@ void Recorder::offer(const FramePtr& frame) {
   const Captured captured{frame};
   bool is_first_dropped = false, is_silent = false;
   {
-    const std::lock_guard lock(mutex_);
+    std::unique_lock lock(mutex_);
     if (!status_.recording) {
       ring_bytes_ += bytes_of(captured);
       ring_.emplace_back(captured);
-      return trim_ring();
+      if (!trim_ring() || std::exchange(short_preroll_noted_, true)) return;
+      const double kept_s = ring_length_s();
+      lock.unlock();
+      return note_short_preroll(kept_s);
     }
     is_silent = has_new_silence();
     if (frame->source == "light") remember_light(captured);
@@ -164,16 +183,43 @@ void Recorder::count_as_lost(const Entry& entry) {
 }
 
 // Drops the ring's oldest entries, counting time from its newest frame. A full ring must fit the
-// queue with room to spare.
-void Recorder::trim_ring() {
+// queue with room to spare. Returns whether frames were dropped only because it was full.
+bool Recorder::trim_ring() {
   const std::int64_t newest = std::get<Captured>(ring_.back()).frame->timestamp_ns;
   const auto keep_ns = static_cast<std::int64_t>(options_.preroll_s * 1e9);
+  bool is_short = false;
   while (!ring_.empty()) {
     const auto* captured = std::get_if<Captured>(&ring_.front());
     const bool old = !captured || newest - captured->frame->timestamp_ns > keep_ns;
     if (!old && ring_bytes_ <= options_.queue_bytes / 2) break;
+    is_short = is_short || !old;
     forget_first_of_ring();
   }
+  return is_short;
+}
+
+// Returns the time from the oldest frame of the ring to the newest.
+double Recorder::ring_length_s() const {
+  std::optional<std::int64_t> first, last;
+  for (const Entry& entry : ring_)
+    if (const auto* captured = std::get_if<Captured>(&entry)) {
+      last = captured->frame->timestamp_ns;
+      if (!first) first = last;
+    }
+  return first ? 1e-9 * static_cast<double>(*last - *first) : 0;
+}
+
+void Recorder::note_short_preroll(double kept_s) const {
+  if (!options_.note) return;
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(),
+                "a take begins %.1f s before the button, and not %.1f s: the memory for it is full "
+                "(recording.queue_mb)",
+                kept_s, options_.preroll_s);
+  options_.note({.severity = Severity::warning,
+                 .source = "recording",
+                 .text = text.data(),
+                 .notice = report::Notice{Severity::warning, "", text.data()}});
 }
 
 void Recorder::forget_first_of_ring() {
@@ -268,16 +314,13 @@ void Recorder::run() {
     handling_since_ = Clock::now();
     lock.unlock();
     if (!looked_for_interruption_ && !take_) look_for_interruption();
-    try {
-      if (entry) handle(*entry);
-      const bool is_over = end_at_ && (leave || Clock::now() >= *end_at_);
-      if (is_over || (end_at_ && take_->track_is_complete())) end_take(stopped_lost_);
-      if (take_ && Clock::now() - checked_ >= disk_interval) check_disk();
-    } catch (const std::exception& error) {
-      fail(error.what());
-    }
+    serve(entry, leave);
     look_at_disk();
     lock.lock();
+    if (entry) {
+      queued_bytes_ += bytes_of(*entry);
+      queue_.push_front(std::move(*entry));
+    }
     const bool answers_again = std::exchange(silence_noted_, false);
     handling_since_.reset();
     if (answers_again) {
@@ -289,9 +332,26 @@ void Recorder::run() {
   }
 }
 
+// Handles an entry and whatever else is due. What is left of `entry` could not be written, and
+// waits for the next disk.
+void Recorder::serve(std::optional<Entry>& entry, bool is_last) {
+  try {
+    if (entry) handle(*entry);
+    entry.reset();
+    const bool is_over = end_at_ && (is_last || Clock::now() >= *end_at_);
+    if (is_over || (end_at_ && take_->track_is_complete())) end_take(stopped_lost_);
+    if (take_ && Clock::now() - checked_ >= disk_interval) check_disk();
+  } catch (const std::exception& error) {
+    if (goes_on_elsewhere(error.what())) return;
+    fail(error.what());
+    entry.reset();
+  }
+}
+
 void Recorder::handle(Entry& entry) {
   if (std::holds_alternative<Start>(entry)) {
     end_last_take();
+    folders_.forgive_all();
     begin_take();
   } else if (std::holds_alternative<MarkGood>(entry)) {
     const std::filesystem::path last = status().directory;
@@ -328,13 +388,7 @@ void Recorder::write(const Captured& captured) {
     note(Severity::warning, "the " + captured.frame->source + " camera changed its format; " +
                                 take_->directory().filename().string() +
                                 " ends and the next take begins");
-    session::Losses so_far;
-    {
-      const std::lock_guard lock(mutex_);
-      so_far = status_.lost;
-    }
-    end_take(so_far);
-    begin_take();
+    begin_next_take();
   }
   take_->write(*captured.frame, captured.at);
   if (captured.frame->source != "observer") return;
@@ -345,11 +399,30 @@ void Recorder::write(const Captured& captured) {
   status_.seconds = 1e-9 * static_cast<double>(now_ns - take_begins_ns_);
 }
 
+// Ends the running take in order and goes on in the next one, without a frame between them.
+void Recorder::begin_next_take() {
+  session::Losses so_far;
+  {
+    const std::lock_guard lock(mutex_);
+    so_far = status_.lost;
+  }
+  end_take(so_far);
+  begin_take();
+}
+
 void Recorder::begin_take() {
-  check_disk();
-  take_ = std::make_unique<TakeWriter>(options_.take);
+  while (!take_) {
+    const std::filesystem::path folder = folders_.choose();
+    try {
+      take_ = std::make_unique<TakeWriter>(options_.take, folder);
+    } catch (const std::exception& error) {
+      if (!folders_.give_up(folder)) throw;
+      note(Severity::error, std::string("the next disk is taken: ") + error.what());
+    }
+  }
+  checked_ = Clock::now();
   try {
-    output::keep_wish(options_.take.directory, take_->directory().filename().string());
+    TakeFolders::keep_wish(take_->directory());
   } catch (const Error& error) {
     note(Severity::warning,
          std::string("after a restart it would not go on by itself: ") + error.what());
@@ -361,7 +434,7 @@ void Recorder::begin_take() {
 
 void Recorder::drop_wish() {
   try {
-    output::drop_wish(options_.take.directory);
+    folders_.drop_wish();
   } catch (const Error& error) {
     note(Severity::warning,
          std::string("after a restart it would begin by itself: ") + error.what());
@@ -371,14 +444,18 @@ void Recorder::drop_wish() {
 // Looks for what the last process left: the wish to record, and takes that it could not end.
 void Recorder::look_for_interruption() {
   try {
-    looked_for_interruption_ = std::filesystem::exists(options_.take.directory);
+    looked_for_interruption_ = std::ranges::any_of(
+        folders_.all(), [](const auto& folder) { return std::filesystem::exists(folder); });
     if (!looked_for_interruption_) return;
     std::vector<std::filesystem::path> takes;
-    for (const auto& entry : std::filesystem::directory_iterator(options_.take.directory))
-      if (entry.is_directory()) takes.push_back(entry.path());
-    std::ranges::sort(takes);
+    for (const std::filesystem::path& folder : folders_.all()) {
+      if (!std::filesystem::exists(folder)) continue;
+      for (const auto& entry : std::filesystem::directory_iterator(folder))
+        if (entry.is_directory()) takes.push_back(entry.path());
+    }
+    std::ranges::sort(takes, {}, [](const auto& take) { return take.filename(); });
     for (const std::filesystem::path& take : takes) salvage(take);
-    std::optional<std::string> interrupted = kept_wish(options_.take.directory);
+    std::optional<std::string> interrupted = folders_.kept_wish();
     const std::lock_guard lock(mutex_);
     status_.interrupted = std::move(interrupted);
   } catch (const std::exception& error) {
@@ -417,19 +494,49 @@ void Recorder::end_last_take() {
 
 void Recorder::end_take(const session::Losses& lost) {
   end_at_.reset();
-  take_->set_lost({lost.frames - attributed_.frames, lost.shown - attributed_.shown,
-                   lost.records - attributed_.records});
-  attributed_ = lost;
+  attribute(lost);
   take_->close();
-  const std::unique_ptr<TakeWriter> take = std::move(take_);
   {
     const std::lock_guard lock(mutex_);
-    if (take->observer_frames() > 0) ++status_.finished_takes;
+    count_finished();
     if (!status_.recording) late_tracks_ = false;
   }
   if (was_stopped_) drop_wish();
-  note(Severity::info, take->directory().filename().string() + " has " +
-                           std::to_string(take->observer_frames()) + " frames");
+  note(Severity::info, take_->directory().filename().string() + " has " +
+                           std::to_string(take_->observer_frames()) + " frames");
+  take_.reset();
+}
+
+void Recorder::attribute(const session::Losses& lost) {
+  take_->set_lost({lost.frames - attributed_.frames, lost.shown - attributed_.shown,
+                   lost.records - attributed_.records});
+  attributed_ = lost;
+}
+
+// After a failure of the running take's disk: leaves that take and begins the next one on the next
+// disk, if there is one. Returns whether it goes on.
+bool Recorder::goes_on_elsewhere(const std::string& why) {
+  if (!take_ || end_at_) return false;
+  const std::filesystem::path failed = take_->directory();
+  if (!folders_.give_up(failed.parent_path())) return false;
+  session::Losses so_far;
+  {
+    const std::lock_guard lock(mutex_);
+    so_far = status_.lost;
+    count_finished();
+  }
+  attribute(so_far);
+  take_->abandon(why);
+  take_.reset();
+  try {
+    begin_take();
+  } catch (const std::exception& error) {
+    note(Severity::error, std::string("recording cannot go on elsewhere: ") + error.what());
+    return false;
+  }
+  note(Severity::error, failed.filename().string() + " ended: " + why + "; recording goes on in " +
+                            take_->directory().string());
+  return true;
 }
 
 void Recorder::fail(const std::string& why) {
@@ -440,7 +547,7 @@ void Recorder::fail(const std::string& why) {
       count_as_lost(queue_.front());
     }
     if (queue_.empty()) status_.recording = late_tracks_ = false;
-    if (take_) take_->set_lost(status_.lost);
+    if (take_) attribute(status_.lost);
     count_failure(why);
   }
   leave_take(why);
@@ -450,7 +557,13 @@ void Recorder::fail(const std::string& why) {
 void Recorder::count_failure(const std::string& why) {
   status_.fault = why;
   ++status_.failures;
-  if (take_ && take_->observer_frames() > 0) ++status_.finished_takes;
+  count_finished();
+}
+
+void Recorder::count_finished() {
+  if (!take_ || take_->observer_frames() == 0) return;
+  ++status_.finished_takes;
+  status_.finished = take_->directory().filename().string();
 }
 
 // Leaves the files as they are: a session that was not closed opens up to its last whole frame.
@@ -461,43 +574,48 @@ void Recorder::leave_take(const std::string& why) {
   if (options_.note) options_.note({Severity::error, "recording ended", why});
 }
 
-// Ends the take properly while there is still room on the disk.
+// Ends the take properly while there is still room on its disk, and goes on where there is more.
 void Recorder::check_disk() {
   checked_ = Clock::now();
-  session::make_folders(options_.take.directory);
-  const std::uint64_t free = free_on_disk();
-  if (free >= options_.reserve_bytes) return;
-  if (take_) {
-    const std::lock_guard lock(mutex_);
-    take_->set_lost(status_.lost);
-  }
-  if (take_) take_->close();
-  throw Error(options_.take.directory.string() + ": the disk is almost full, " + megabytes(free) +
-              " are left and " + megabytes(options_.reserve_bytes) +
-              " are kept free (recording.reserve_mb)");
-}
-
-// If the directory is not there yet, this asks the disk on which it will be made.
-std::uint64_t Recorder::free_on_disk() const {
-  if (options_.free_bytes) return options_.free_bytes();
-  std::filesystem::path folder = std::filesystem::absolute(options_.take.directory);
-  while (!std::filesystem::exists(folder) && folder.has_relative_path())
-    folder = folder.parent_path();
-  return std::filesystem::space(folder).available;
+  const std::filesystem::path full = take_->directory();
+  if (end_at_ || folders_.has_room(full.parent_path())) return;
+  begin_next_take();
+  note(Severity::warning, "the disk of " + full.filename().string() +
+                              " is almost full; recording goes on in " +
+                              take_->directory().string());
 }
 
 void Recorder::look_at_disk() {
   if (Clock::now() - looked_ < disk_interval) return;
   looked_ = Clock::now();
-  std::optional<std::uint64_t> left;
-  try {
-    const std::uint64_t free = free_on_disk();
-    left = free - std::min(free, options_.reserve_bytes);
-  } catch (const std::filesystem::filesystem_error&) {
-    // The disk cannot say.
-  }
+  if (options_.measures_disk && !take_ && !has_compared_speeds_) compare_speeds();
+  const std::optional<std::uint64_t> left = folders_.free_bytes();
   const std::lock_guard lock(mutex_);
   free_bytes_ = left;
+}
+
+// Compares what the cameras deliver, by the ring, with what the disk takes. FFV1 packs pictures of
+// a camera to about half.
+void Recorder::compare_speeds() {
+  constexpr double packed = 0.5, least_length_s = 0.5;
+  double rate = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    const double length_s = ring_length_s();
+    if (status_.recording || length_s <= 0) return;
+    if (length_s < std::min(least_length_s, 0.5 * options_.preroll_s)) return;
+    rate = static_cast<double>(ring_bytes_) / length_s;
+  }
+  has_compared_speeds_ = true;
+  try {
+    const std::optional<double> speed = folders_.measure_speed();
+    if (!speed || *speed > packed * rate) return;
+    note(Severity::warning, "the disk takes " + megabytes(*speed) +
+                                " a second, and the cameras deliver " + megabytes(rate) +
+                                ": takes will lack frames");
+  } catch (const std::exception& error) {
+    note(Severity::warning, std::string("the disk's speed is not known: ") + error.what());
+  }
 }
 
 std::optional<std::uint64_t> Recorder::free_bytes() const {

@@ -17,6 +17,7 @@
 #include <variant>
 #include <vector>
 
+#include "daemon/output/take_folders.hpp"
 #include "daemon/output/take_writer.hpp"
 #include "daemon/report/report.hpp"
 #include "drivers/buttons.hpp"
@@ -33,8 +34,13 @@ struct RecorderOptions {
   std::uint64_t queue_bytes = 1'000'000'000;
   std::uint64_t reserve_bytes = 500'000'000;        // a take ends before less than this is free
   std::function<void(const report::Report&)> note;  // called from any thread
-  std::function<std::uint64_t()> free_bytes;        // of the disk; empty: asks the file system
+  TakeFolders::FreeBytes free_bytes;                // empty: the file system is asked
+  bool measures_disk = false;  // whether the disk's speed is measured before the first take
 };
+
+// Returns a quarter of the memory that is free now, in bytes: room for what is recorded on a
+// machine that has other things to do.
+std::uint64_t default_queue_bytes();
 
 struct RecorderStatus {
   bool recording = false;
@@ -45,6 +51,7 @@ struct RecorderStatus {
   session::Losses lost;              // since the take began
   double disk_silent_s = 0;          // for how long the disk has not answered a write
   std::uint64_t finished_takes = 0;  // since the start; takes without a frame do not count
+  std::string finished;              // name of the take that finished last
   std::uint64_t failures = 0;        // takes that ended by an error
   std::string fault;                 // cause of the last failure; empty once another take begins
   // The take that was being recorded when the last process ended, if it was not ended by anybody;
@@ -57,7 +64,9 @@ struct RecorderStatus {
 
 // No call here waits for the disk, and all may come from any thread. SessionWriter bounds what can
 // be lost: at most the frame in hand if the process dies, about the last second if the power fails.
-// An error of the disk ends the take, with everything so far readable, but nothing else.
+// An error of the disk ends the take, with everything so far readable, but nothing else. A full or
+// failing disk ends the take, too, and the next one begins at once on the next disk, if there is
+// one.
 class Recorder {
  public:
   explicit Recorder(RecorderOptions options);
@@ -112,29 +121,36 @@ class Recorder {
   void enqueue_record(Entry entry);  // or counts it as lost
   void enqueue_stop(bool is_wished);
   void count_failure(const std::string& why);
+  void count_finished();  // the take that ends, in order or not
   void count_as_lost(const Entry& entry);
   bool has_new_silence();  // of the disk, that nobody was told of
-  void trim_ring();
+  bool trim_ring();
+  double ring_length_s() const;
   void forget_first_of_ring();
   void forget_what_is_long_ago();
   void remember_light(const Captured& captured);
   void forget_lights_unlike(const Frame& frame);  // lights of another format fit no take with it
   // Call these on the writer thread, without the lock.
   void run();
+  void serve(std::optional<Entry>& entry, bool is_last);
   void handle(Entry& entry);
   void write(const Captured& captured);
   void begin_take();
+  void begin_next_take();
   void end_last_take();
-  void end_take(const session::Losses& lost);  // properly, not by a failure
-  void fail(const std::string& why);           // ends the take and leaves out what is queued of it
+  void end_take(const session::Losses& lost);   // properly, not by a failure
+  void attribute(const session::Losses& lost);  // to the running take, as far as no take has them
+  bool goes_on_elsewhere(const std::string& why);
+  void fail(const std::string& why);  // ends the take and leaves out what is queued of it
   void leave_take(const std::string& why);
   void check_disk();
   void look_at_disk();  // for free_bytes()
+  void compare_speeds();
   void look_for_interruption();
   void salvage(const std::filesystem::path& take);
   void drop_wish();
-  std::uint64_t free_on_disk() const;
   void note(report::Severity severity, const std::string& what) const;
+  void note_short_preroll(double kept_s) const;
 
   const RecorderOptions options_;
 
@@ -154,14 +170,17 @@ class Recorder {
   std::optional<std::uint64_t> free_bytes_;
   std::optional<std::chrono::steady_clock::time_point> handling_since_;  // by the writer thread
   bool silence_noted_ = false;
+  bool short_preroll_noted_ = false;
 
   // Only the writer thread uses these.
+  TakeFolders folders_;
   std::unique_ptr<TakeWriter> take_;
   std::int64_t take_begins_ns_ = 0;                              // time of its first observer frame
   std::optional<std::chrono::steady_clock::time_point> end_at_;  // stopped; waits for its tracks
   session::Losses stopped_lost_;                                 // of the take that waits
   session::Losses attributed_;  // of the losses since the start, those of takes that have ended
   std::chrono::steady_clock::time_point checked_, looked_;
+  bool has_compared_speeds_ = false;
   bool looked_for_interruption_ = false;
   bool was_stopped_ = false;  // the take that waits was ended by somebody
   std::jthread thread_;       // last: it uses all of the above

@@ -13,9 +13,12 @@
 namespace previz::output {
 namespace {
 
+// A folder with a higher number is none of a take.
+constexpr int highest_take = 999'999;
+
 session::TakeInfo numbered(const TakeTemplate& take) {
   session::TakeInfo info = take.info.take.value_or(session::TakeInfo{});
-  info.number = next_take_number(take.directory, info.slate);
+  info.number = next_take_number(take.folders, info.slate);
   return info;
 }
 
@@ -64,25 +67,28 @@ std::string take_name(const std::string& slate, int number) {
   return name + "_take" + digits.data();
 }
 
-int next_take_number(const std::filesystem::path& directory, const std::string& slate) {
+int next_take_number(const std::vector<std::filesystem::path>& folders, const std::string& slate) {
   std::string stem = take_name(slate, 0);
   stem.resize(stem.size() - 3);
   int highest = 0;
-  std::error_code none_yet;
-  for (const auto& entry : std::filesystem::directory_iterator(directory, none_yet)) {
-    const std::string name = entry.path().filename().string();
-    if (!name.starts_with(stem)) continue;
-    int number = 0;
-    const char* end = name.data() + name.size();
-    const auto [stop, code] = std::from_chars(name.data() + stem.size(), end, number);
-    if (code == std::errc{} && stop == end) highest = std::max(highest, number);
+  for (const std::filesystem::path& folder : folders) {
+    std::error_code none_yet;
+    for (const auto& entry : std::filesystem::directory_iterator(folder, none_yet)) {
+      const std::string name = entry.path().filename().string();
+      if (!name.starts_with(stem)) continue;
+      int number = 0;
+      const char* end = name.data() + name.size();
+      const auto [stop, code] = std::from_chars(name.data() + stem.size(), end, number);
+      const bool is_number = code == std::errc{} && stop == end && number <= highest_take;
+      if (is_number) highest = std::max(highest, number);
+    }
   }
   return highest + 1;
 }
 
-TakeWriter::TakeWriter(const TakeTemplate& take)
+TakeWriter::TakeWriter(const TakeTemplate& take, const std::filesystem::path& folder)
     : take_(numbered(take)),
-      directory_(take.directory / take_name(take_.slate, take_.number)),
+      directory_(folder / take_name(take_.slate, take_.number)),
       writer_(directory_, session_info(take, take_)) {
   for (const auto& [as_written, file] : take.assets) writer_.add_asset(as_written, file);
 }

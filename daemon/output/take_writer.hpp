@@ -18,8 +18,8 @@ namespace previz::output {
 
 // The common beginning of all takes of a set.
 struct TakeTemplate {
-  std::filesystem::path directory;  // parent of the takes
-  session::SessionInfo info;        // calibrations, set; take: slate, notes and timecode_fps
+  std::vector<std::filesystem::path> folders;  // of takes, each perhaps on a disk of its own
+  session::SessionInfo info;  // calibrations, set; take: slate, notes and timecode_fps
   std::vector<std::pair<std::string, std::filesystem::path>> assets;
 };
 
@@ -31,15 +31,15 @@ std::string timecode_of(std::chrono::system_clock::time_point time, double fps);
 // Returns "12A_take007" for slate "12A". Characters that a file system cannot hold, or a shell
 // breaks on, become "_".
 std::string take_name(const std::string& slate, int number);
-// Returns one more than the highest number of the slate's takes in the directory; 1 if there is
-// none.
-int next_take_number(const std::filesystem::path& directory, const std::string& slate);
+// Returns one more than the highest number of the slate's takes in the folders; 1 if there is none.
+int next_take_number(const std::vector<std::filesystem::path>& folders, const std::string& slate);
 
 // Every function throws previz::Error naming the file; data written before stays readable.
 class TakeWriter {
  public:
-  // Makes the directory under the next free number and copies the assets.
-  explicit TakeWriter(const TakeTemplate& take);
+  // Makes the take's directory in this folder, under the number next to those of all folders, and
+  // copies the assets.
+  TakeWriter(const TakeTemplate& take, const std::filesystem::path& folder);
 
   // Returns whether the frame has the format and size of its stream.
   bool fits(const Frame& frame) const;

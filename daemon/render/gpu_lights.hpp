@@ -21,7 +21,8 @@ bool can_be_seen(const set::Light& light);
 // compiled for that.
 bool are_many(const scene::Scene& scene);
 
-// For each light the share of its light that passes its texture and alpha, on average over its area.
+// For each light the share of its light that passes its texture and alpha, on average over its
+// area.
 struct Weights {
   std::vector<double> values;  // empty: 1 for all
   double of(std::size_t light) const { return values.empty() ? 1 : values[light]; }

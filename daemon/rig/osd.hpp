@@ -36,10 +36,10 @@ struct Pace {
 // Facts about the rig apart from the picture.
 struct RigFacts {
   Look look;
-  std::string take;       // name of the take that is being recorded
-  double recorded_s = 0;  // its length so far
-  session::Losses lost;       // since the take began
-  double disk_silent_s = 0;   // for how long the disk has not answered a write
+  std::string take;          // name of the take that is being recorded
+  double recorded_s = 0;     // its length so far
+  session::Losses lost;      // since the take began
+  double disk_silent_s = 0;  // for how long the disk has not answered a write
   std::string recorder_fault;
   std::optional<std::uint64_t> free_bytes;  // for takes, without the reserve; none: not known
   std::vector<report::Notice> news;         // actions of buttons and of the rig, oldest first

@@ -24,7 +24,8 @@ output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& camer
                                    Reports& reports) {
   const set::Set& set = loaded.set;
   output::TakeTemplate take;
-  take.directory = set.recording.directory;
+  take.folders = {set.recording.directory};
+  if (set.recording.second_directory) take.folders.push_back(*set.recording.second_directory);
   take.info.set_name = set.file.filename().string();
   take.info.set_text = loaded.text;
   take.info.observer = pipeline::observer_calibration(set, cameras.recorded.info);
@@ -49,8 +50,10 @@ output::RecorderOptions recorder_options(const LoadedSet& loaded, const Cameras&
   output::RecorderOptions options;
   options.take = take_template(loaded, cameras, reports);
   options.preroll_s = recording.preroll_s;
-  options.queue_bytes = static_cast<std::uint64_t>(recording.queue_mb * 1e6);
+  options.queue_bytes = recording.queue_mb ? static_cast<std::uint64_t>(*recording.queue_mb * 1e6)
+                                           : output::default_queue_bytes();
   options.reserve_bytes = static_cast<std::uint64_t>(recording.reserve_mb * 1e6);
+  options.measures_disk = true;
   options.note = [&reports](const report::Report& report) { reports(report); };
   return options;
 }
@@ -265,7 +268,7 @@ void Rig::look_at_recorder() {
   announce(failures_, status.failures, Event::recorder_failed, "take ended, " + status.fault,
            Severity::error);
   announce(finished_takes_, status.finished_takes, Event::take_finished,
-           "take " + status.directory.filename().string() + " is finished", Severity::info);
+           "take " + status.finished + " is finished", Severity::info);
   for (; salvaged_ < status.salvaged.size(); ++salvaged_)
     apply({status.salvaged[salvaged_], false, {}}, "recorder", Severity::warning);
   if (status.interrupted && !std::exchange(has_resumed_, true)) resume(*status.interrupted);

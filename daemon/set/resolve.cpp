@@ -51,6 +51,7 @@ class Resolver {
     contacts();
     display();
     set_.recording.directory = located(set_.recording.directory);
+    if (auto& second = set_.recording.second_directory) second = located(*second);
     set_.output.directory = located(set_.output.directory);
   }
 

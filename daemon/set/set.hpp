@@ -244,11 +244,12 @@ struct Control {
 
 struct Recording {
   std::filesystem::path directory = "takes";
-  std::string slate;        // scene and shot, as on the board; empty: the set's name
-  std::string notes;        // written into every take
-  double preroll_s = 2;     // length kept in memory and put in front of a take
-  double queue_mb = 1024;   // limit of the frames that wait for a slow disk
-  double reserve_mb = 512;  // free disk space at which a take ends
+  std::optional<std::filesystem::path> second_directory;  // on another disk
+  std::string slate;               // scene and shot, as on the board; empty: the set's name
+  std::string notes;               // written into every take
+  double preroll_s = 2;            // length kept in memory and put in front of a take
+  std::optional<double> queue_mb;  // limit of what is kept in memory; absent: by free memory
+  double reserve_mb = 512;         // free disk space at which a take ends
   double timecode_fps = 25;
   bool composite = false;  // the shown picture is recorded too
 };

@@ -309,10 +309,11 @@ Keys control_keys(Control& c) {
 Keys recording_keys(Recording& r) {
   return {
       {"directory", &r.directory, plain, "Folder for takes; each gets a folder of its own: SLATE_take001 and so on."},
+      {"second_directory", &r.second_directory, plain, "Folder on another disk, in which a recording goes on when the disk of `directory` is full or fails. Takes are numbered through both. Default: the recording ends.", optional("\"/media/second/takes\"")},
       {"slate", &r.slate, plain, "Scene and shot, as on the slate. Default: the set's name.", optional("\"12A\"")},
       {"notes", &r.notes, plain, "Notes that are written into every take.", optional("\"second unit, 35 mm\"")},
       {"preroll_s", &r.preroll_s, seconds.within(0, 60), "A take begins this long before the button was pressed; the frames are kept in memory until then."},
-      {"queue_mb", &r.queue_mb, megabytes.within(1, 1e6), "Memory for frames that wait for a slow disk. Frames that do not fit are dropped, counted and reported."},
+      {"queue_mb", &r.queue_mb, megabytes.within(1, 1e6), "Memory for frames that wait for the disk, half of it for those before the button. Frames that do not fit are dropped, counted and reported. Default: a quarter of the memory that is free at the start.", optional("1024.0")},
       {"reserve_mb", &r.reserve_mb, megabytes.within(1, 1e9), "A take is ended properly before less disk space than this is left."},
       {"timecode_fps", &r.timecode_fps, plain.within(1, 240), "Frames per second of the timecode (time of day)."},
       {"composite", &r.composite, plain, "Also record the composite that was shown, without overlay: composite.mkv, lossless, for viewing the take elsewhere."},

@@ -51,7 +51,8 @@ void read_end(const SessionFile& file, Session& session) {
     miss(
         "the recording was not closed (power cut, crash, or still recording); what "
         "came after the last whole frame, at most about a second, is lost");
-  for (const std::string& what : words_of(file.lost)) miss(what + " did not reach the disk in time");
+  for (const std::string& what : words_of(file.lost))
+    miss(what + " did not reach the disk in time");
 }
 
 void read_track(Session& session) {

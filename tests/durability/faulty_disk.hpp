@@ -20,7 +20,8 @@ enum class DiskFault {
   short_write,  // half of the bytes are written, which is no error
 };
 
-// The states in which a power cut may leave a disk. POSIX allows each of these, and file systems do them.
+// The states in which a power cut may leave a disk. POSIX allows each of these, and file systems do
+// them.
 enum class AfterPowerCut {
   what_was_synced,  // a file's bytes by its own fsync, its name by its folder's
   names,            // all names, but of the files' bytes only those that were synced

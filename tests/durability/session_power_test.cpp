@@ -132,11 +132,11 @@ TEST_P(EveryCall, OfARecorderThatFailsEndsTheTakeAndNotTheNext) {
     FaultyDisk disk(folder.path());
     disk.fail(call, GetParam());
     output::RecorderOptions options;
-    options.take.directory = folder / "takes";
+    options.take.folders = {folder / "takes"};
     options.take.info.take = session::TakeInfo{0, "1", "", 25, "", false};
     options.preroll_s = 0;
     options.reserve_bytes = 0;
-    options.free_bytes = [] { return std::uint64_t{1'000'000'000}; };
+    options.free_bytes = [](const auto&) { return std::uint64_t{1'000'000'000}; };
     output::RecorderStatus first, second;
     {
       output::Recorder recorder(std::move(options));
@@ -182,6 +182,53 @@ TEST_P(EveryCall, OfARecorderThatFailsEndsTheTakeAndNotTheNext) {
       EXPECT_EQ(frames_in(first.directory, closed), frames);
       EXPECT_TRUE(closed);
     }
+    if (call >= disk.calls()) break;
+  }
+}
+
+// With a second disk the recording goes on there, and every frame that was offered is in one of the
+// takes: the frame with which the disk failed, too.
+TEST_P(EveryCall, OfTheFirstOfTwoDisksThatFailsLosesNoFrame) {
+  const TemporaryDirectory elsewhere;
+  for (std::size_t call = 0;; ++call) {
+    const TemporaryDirectory folder;
+    FaultyDisk disk(folder.path());
+    disk.fail(call, GetParam());
+    const std::filesystem::path second = elsewhere / std::to_string(call);
+    output::RecorderOptions options;
+    options.take.folders = {folder / "takes", second};
+    options.take.info.take = session::TakeInfo{0, "1", "", 25, "", false};
+    options.preroll_s = 0;
+    options.reserve_bytes = 0;
+    options.free_bytes = [](const auto&) { return std::uint64_t{1'000'000'000}; };
+    std::string faults;
+    {
+      output::Recorder recorder(std::move(options));
+      recorder.start();
+      for (int i = 0; i < frames; ++i) {
+        const auto frame =
+            std::make_shared<Frame>(noise_frame("observer", i, PixelFormat::rgb8, 24, 18));
+        session::TrackRecord track;
+        track.timestamp_ns = frame->timestamp_ns;
+        recorder.offer(frame);
+        recorder.offer(track);
+      }
+      recorder.stop();
+      EXPECT_TRUE(wait_until("it is over", [&] {
+        const output::RecorderStatus status = recorder.status();
+        return status.failures > 0 ||
+               (!status.recording && status.frames > 0 && !status.finished.empty());
+      }));
+      faults = recorder.status().fault;
+    }
+    SCOPED_TRACE("call " + std::to_string(call) + ", " + disk.describe(call) + ", " + faults);
+    bool closed = false;
+    const int in_first = frames_in(folder / "takes/1_take001", closed).value_or(0);
+    int in_second = 0;
+    for (const char* take : {"1_take001", "1_take002"})
+      if (std::filesystem::exists(second / take / "session.toml"))
+        in_second += frames_in(second / take, closed, in_first).value_or(0);
+    EXPECT_EQ(in_first + in_second, frames);
     if (call >= disk.calls()) break;
   }
 }

@@ -42,7 +42,7 @@ session::TrackRecord track_of(std::uint64_t index) {
 
 RecorderOptions options_in(const std::filesystem::path& directory) {
   RecorderOptions options;
-  options.take.directory = directory;
+  options.take.folders = {directory};
   options.take.info.take = session::TakeInfo{0, "12A", "", 25, "rain", false};
   options.preroll_s = 0;
   options.reserve_bytes = 0;
@@ -179,7 +179,7 @@ TEST(Recorder, TellsTheTimeOfATakeAndTheRoomThatIsLeft) {
     const Recorder recorder(options);  // of the disk it will be made on
     EXPECT_TRUE(wait_until("it is known", [&] { return recorder.free_bytes().value_or(0) > 0; }));
   }
-  options.free_bytes = [&] { return free.load(); };
+  options.free_bytes = [&](const auto&) { return free.load(); };
   Recorder recorder(std::move(options));
   EXPECT_TRUE(has_room(recorder, 500));
   free = 100;
@@ -318,7 +318,7 @@ TEST(Recorder, AnAlmostFullDiskEndsTheTakeInOrder) {
   RecorderOptions options = options_in(directory.path());
   options.reserve_bytes = 100;
   std::atomic<std::uint64_t> free = 1000;
-  options.free_bytes = [&] { return free.load(); };
+  options.free_bytes = [&](const auto&) { return free.load(); };
   Recorder recorder(std::move(options));
   recorder.start();
   std::uint64_t next = 0;
@@ -504,7 +504,7 @@ TEST(Recorder, OfADiskThatHangsKeepsAQueueOfBoundedSizeAndSaysSo) {
   std::atomic<int> silences = 0;
   RecorderOptions options = options_in(directory.path());
   options.queue_bytes = 100'000;
-  options.free_bytes = [&] {  // the writer asks the disk once a second
+  options.free_bytes = [&](const auto&) {  // the writer asks the disk once a second
     const std::lock_guard lock(hangs);
     return std::uint64_t{1'000'000'000};
   };

@@ -70,8 +70,8 @@ TEST(AlbedoTable, OfSheenInterpolatesWithinItsBound) {
   }
 }
 
-// Brushed metal as it is found, at the end of the scale, where facets along the brush strokes shadow
-// each other most, and as narrow across them as the renderer makes a smooth one.
+// Brushed metal as it is found, at the end of the scale, where facets along the brush strokes
+// shadow each other most, and as narrow across them as the renderer makes a smooth one.
 TEST(AlbedoTable, OfAnisotropyInterpolatesWithinItsBound) {
   struct Case {
     double strength, roughness, bound;

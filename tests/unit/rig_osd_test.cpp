@@ -129,16 +129,16 @@ TEST(OsdWords, FaultsInPlainWordsAndWhatAButtonDid) {
   rig.lost = {.frames = 12, .shown = 0, .records = 3};
   rig.disk_silent_s = 5.2;
   rig.news.push_back({report::Severity::warning, "", "still recording; end the take first"});
-  EXPECT_EQ(osd_page(rig, &picture, pace).notices,
-            (Texts{{"film camera: was unplugged; it is opened anew", OsdTone::alarm},
-                   {"light camera: is stalled", OsdTone::alarm},
-                   {"recording ended: the disk is almost full", OsdTone::alarm},
-                   {"the disk has not answered for 5 s", OsdTone::alarm},
-                   {"missing from the take: 12 frames of the cameras", OsdTone::alarm},
-                   {"missing from the take: 3 lines of tracking, buttons and events",
-                    OsdTone::alarm},
-                   {moved},
-                   {"still recording; end the take first", OsdTone::warning}}));
+  EXPECT_EQ(
+      osd_page(rig, &picture, pace).notices,
+      (Texts{{"film camera: was unplugged; it is opened anew", OsdTone::alarm},
+             {"light camera: is stalled", OsdTone::alarm},
+             {"recording ended: the disk is almost full", OsdTone::alarm},
+             {"the disk has not answered for 5 s", OsdTone::alarm},
+             {"missing from the take: 12 frames of the cameras", OsdTone::alarm},
+             {"missing from the take: 3 lines of tracking, buttons and events", OsdTone::alarm},
+             {moved},
+             {"still recording; end the take first", OsdTone::warning}}));
 }
 
 TEST(OsdWords, ADiskThatAnswersWithinTwoSecondsIsNoNews) {

@@ -1,0 +1,151 @@
+#include "daemon/output/take_folders.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <chrono>
+#include <random>
+#include <system_error>
+#include <utility>
+
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+
+namespace previz::output {
+namespace {
+
+std::filesystem::path wish_in(const std::filesystem::path& folder) {
+  return folder / ".recording";
+}
+
+std::string megabytes(std::uint64_t bytes) {
+  return std::to_string(bytes / 1'000'000) + " MB";
+}
+
+// Returns the folder, or where it will be made the folder above it.
+std::filesystem::path existing(const std::filesystem::path& folder) {
+  std::filesystem::path above = std::filesystem::absolute(folder);
+  while (!std::filesystem::exists(above) && above.has_relative_path()) above = above.parent_path();
+  return above;
+}
+
+dev_t disk_of(const std::filesystem::path& folder) {
+  struct stat status {};
+  return ::stat(existing(folder).c_str(), &status) == 0 ? status.st_dev : 0;
+}
+
+}  // namespace
+
+TakeFolders::TakeFolders(std::vector<std::filesystem::path> folders, std::uint64_t reserve_bytes,
+                         FreeBytes free_bytes)
+    : folders_(std::move(folders)),
+      reserve_bytes_(reserve_bytes),
+      free_bytes_(std::move(free_bytes)) {}
+
+std::filesystem::path TakeFolders::choose() {
+  std::string why_none;
+  for (const std::filesystem::path& folder : folders_) {
+    std::string why;
+    try {
+      if (given_up_.contains(folder)) throw Error(folder.string() + ": its disk failed");
+      session::make_folders(folder);
+      why = why_full(folder);
+      if (why.empty()) return folder;
+    } catch (const std::exception& error) {
+      why = error.what();
+    }
+    why_none += (why_none.empty() ? "" : "; ") + why;
+  }
+  throw Error(why_none);
+}
+
+bool TakeFolders::has_room(const std::filesystem::path& folder) const {
+  return why_full(folder).empty();
+}
+
+std::string TakeFolders::why_full(const std::filesystem::path& folder) const {
+  const std::uint64_t free = free_on_disk_of(folder);
+  if (free >= reserve_bytes_) return {};
+  return folder.string() + ": the disk is almost full, " + megabytes(free) + " are left and " +
+         megabytes(reserve_bytes_) + " are kept free (recording.reserve_mb)";
+}
+
+bool TakeFolders::give_up(const std::filesystem::path& folder) {
+  given_up_.insert(folder);
+  return given_up_.size() < folders_.size();
+}
+
+std::optional<double> TakeFolders::measure_speed() {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::size_t piece = 4'000'000, most = 64'000'000;
+  constexpr std::chrono::milliseconds long_enough{500};
+  const std::filesystem::path folder = choose();
+  if (free_on_disk_of(folder) < reserve_bytes_ + 2 * most) return std::nullopt;
+  std::string bytes(piece, '\0');  // noise, which no disk can make smaller
+  std::minstd_rand random(1);
+  for (char& byte : bytes) byte = static_cast<char>(random());
+  const std::filesystem::path file = folder / ".speed";
+  std::size_t written = 0;
+  const Clock::time_point begin = Clock::now();
+  {
+    const session::OpenFile probe(file, O_WRONLY | O_CREAT | O_TRUNC);
+    std::filesystem::remove(file);  // it goes when it is closed, or the process ends
+    for (; written < most && Clock::now() - begin < long_enough; written += piece) {
+      probe.append(bytes);
+      probe.sync();
+    }
+  }
+  return static_cast<double>(written) / std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+std::optional<std::uint64_t> TakeFolders::free_bytes() const {
+  std::optional<std::uint64_t> sum;
+  std::set<dev_t> counted;
+  for (const std::filesystem::path& folder : folders_) {
+    try {
+      const std::uint64_t free = free_on_disk_of(folder);
+      if (!counted.insert(disk_of(folder)).second) continue;
+      sum = sum.value_or(0) + free - std::min(free, reserve_bytes_);
+    } catch (const std::filesystem::filesystem_error&) {
+      // This disk cannot say.
+    }
+  }
+  return sum;
+}
+
+std::uint64_t TakeFolders::free_on_disk_of(const std::filesystem::path& folder) const {
+  return free_bytes_ ? free_bytes_(folder) : std::filesystem::space(existing(folder)).available;
+}
+
+void TakeFolders::keep_wish(const std::filesystem::path& take) {
+  session::replace_file(wish_in(take.parent_path()), take.filename().string() + "\n");
+}
+
+void TakeFolders::drop_wish() const {
+  std::string faults;
+  for (const std::filesystem::path& folder : folders_) {
+    std::error_code failure;
+    const bool was_there = std::filesystem::remove(wish_in(folder), failure);
+    if (failure)
+      faults += wish_in(folder).string() + ": cannot be removed: " + failure.message() + "; ";
+    if (was_there) session::sync_names(folder);
+  }
+  if (!faults.empty()) throw Error(faults.substr(0, faults.size() - 2));
+}
+
+std::optional<std::string> TakeFolders::kept_wish() const {
+  std::optional<std::string> newest;
+  std::filesystem::file_time_type newest_time{};
+  for (const std::filesystem::path& folder : folders_) {
+    std::error_code none;
+    const auto time = std::filesystem::last_write_time(wish_in(folder), none);
+    if (none || (newest && time < newest_time)) continue;
+    newest = session::read_file(wish_in(folder));
+    while (!newest->empty() && newest->back() == '\n') newest->pop_back();
+    newest_time = time;
+  }
+  return newest;
+}
+
+}  // namespace previz::output
