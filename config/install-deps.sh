@@ -5,7 +5,7 @@ set -euo pipefail
 
 packages=(
   # tools
-  cmake ninja-build g++ ccache pkg-config git glslang-tools clang-format clang-tidy
+  cmake ninja-build g++ ccache pkg-config git glslang-tools spirv-tools clang-format clang-tidy
   # Vulkan: loader, Mesa's drivers (with a CPU one) and the validation layer the tests switch on
   libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers
   # pictures and video

@@ -52,12 +52,12 @@ class Device {
 
   // Returns what `compile` made for the same SPIR-V and constants before, or calls it: compiling
   // may take longer than a picture, and a renderer that is made anew mostly wants what the last one
-  // had. The 128 programs that were wanted last are kept; a reopened device has none. `spirv` is
+  // had. The 256 programs that were wanted last are kept; a reopened device has none. `spirv` is
   // known by its address and must stay there.
   std::shared_ptr<const Program> program(
       const std::uint32_t* spirv, std::span<const std::uint32_t> constants,
       const std::function<std::shared_ptr<const Program>()>& compile);
-  static constexpr std::size_t most_programs = 128;
+  static constexpr std::size_t most_programs = 256;
 
  private:
   struct Compiled {

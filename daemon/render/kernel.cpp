@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "daemon/render/spirv.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::render {
@@ -11,115 +12,23 @@ namespace {
 constexpr auto compute = vk::PipelineBindPoint::eCompute;
 constexpr auto compute_stage = vk::ShaderStageFlagBits::eCompute;
 
-// The few SPIR-V enumerants that describe a kernel (Khronos, "SPIR-V Specification", 3.32
-// Instructions and the tables before it).
-enum Op : std::uint32_t {
-  op_name = 5,
-  op_member_name = 6,
-  op_execution_mode = 16,
-  op_type_pointer = 32,
-  op_constant = 43,
-  op_variable = 59,
-  op_load = 61,
-  op_access_chain = 65,
-  op_array_length = 68,
-  op_decorate = 71,
-  op_execution_mode_id = 331
-};
-constexpr std::uint32_t spirv_header_words = 5;
-constexpr std::uint32_t mode_local_size = 17, mode_local_size_id = 38;
-constexpr std::uint32_t decoration_binding = 33;
-constexpr std::uint32_t storage_uniform_constant = 0, storage_storage_buffer = 12;
-
-// Everything that a module says about one of its ids.
-struct SpirvId {
-  const char* name = "";
-  const char* first_member = "";  // of a block
-  std::uint32_t pointee = 0;      // of a pointer's type: the type that it points to
-  std::uint32_t type = 0, storage = 0, binding = 0;  // of a variable
-  std::uint32_t value = 0;                           // of a constant
-  bool is_used = false;
-};
-
-// A variable's name is its own or, where a block without an instance name declares it, that of the
-// block's first member. Variables that are declared in a header and not used here have no binding
-// of their own: the compiler leaves all of them at 0.
-void reflect(std::span<const std::uint32_t> spirv, Program& program) {
-  std::vector<SpirvId> ids(spirv[3]);
-  std::vector<std::uint32_t> variables;
-  std::uint32_t group_size_id = 0;
-  for (std::size_t at = spirv_header_words; at < spirv.size(); at += spirv[at] >> 16) {
-    const std::uint32_t* const operands = &spirv[at + 1];
-    const auto text = [&](int i) { return reinterpret_cast<const char*>(operands + i); };
-    switch (spirv[at] & 0xffff) {
-      case op_name:
-        ids[operands[0]].name = text(1);
-        break;
-      case op_member_name:
-        if (operands[1] == 0) ids[operands[0]].first_member = text(2);
-        break;
-      case op_execution_mode:
-        if (operands[1] == mode_local_size) program.group_size = operands[2];
-        break;
-      case op_execution_mode_id:
-        if (operands[1] == mode_local_size_id) group_size_id = operands[2];
-        break;
-      case op_decorate:
-        if (operands[1] == decoration_binding) ids[operands[0]].binding = operands[2];
-        break;
-      case op_type_pointer:
-        ids[operands[0]].pointee = operands[2];
-        break;
-      case op_constant:
-        ids[operands[1]].value = operands[2];
-        break;
-      case op_variable:
-        ids[operands[1]].type = operands[0];
-        ids[operands[1]].storage = operands[2];
-        variables.push_back(operands[1]);
-        break;
-      case op_load:
-      case op_access_chain:
-      case op_array_length:
-        ids[operands[2]].is_used = true;
-        break;
-      default:
-        break;
-    }
-  }
-  if (group_size_id != 0) program.group_size = ids[group_size_id].value;
-  for (const std::uint32_t id : variables) {
-    const SpirvId& variable = ids[id];
-    const bool is_storage = variable.storage == storage_storage_buffer;
-    if (!variable.is_used || !(is_storage || variable.storage == storage_uniform_constant))
-      continue;
-    const char* own = variable.name;
-    program.bindings.push_back({*own != 0 ? own : ids[ids[variable.type].pointee].first_member,
-                                variable.binding,
-                                is_storage ? vk::DescriptorType::eStorageBuffer
-                                           : vk::DescriptorType::eUniformTexelBuffer});
-  }
-}
-
-std::shared_ptr<const Program> compile(const Device& device, std::span<const std::uint32_t> spirv,
-                                       std::span<const std::uint32_t> constants) {
+std::shared_ptr<const Program> compile(const Device& device, const SpirvInfo& info,
+                                       const std::vector<std::uint32_t>& spirv) {
   const auto program = std::make_shared<Program>();
-  reflect(spirv, *program);
+  program->group_size = info.group_size;
   std::vector<vk::DescriptorSetLayoutBinding> bindings;
-  for (const Program::Binding& binding : program->bindings)
-    bindings.emplace_back(binding.number, binding.type, 1, compute_stage);
+  for (const SpirvInfo::Binding& binding : info.bindings) {
+    const vk::DescriptorType type = binding.is_storage ? vk::DescriptorType::eStorageBuffer
+                                                       : vk::DescriptorType::eUniformTexelBuffer;
+    program->bindings.push_back({binding.name, binding.number, type});
+    bindings.emplace_back(binding.number, type, 1, compute_stage);
+  }
   program->set_layout = vk::raii::DescriptorSetLayout(device.vk(), {{}, bindings});
   const vk::PushConstantRange push(compute_stage, 0, Push::most_bytes);
   program->layout = vk::raii::PipelineLayout(device.vk(), {{}, *program->set_layout, push});
 
-  const vk::raii::ShaderModule module(device.vk(), {{}, spirv.size_bytes(), spirv.data()});
-  std::vector<vk::SpecializationMapEntry> entries;
-  for (std::uint32_t i = 0; i < constants.size(); ++i) entries.emplace_back(i, 4 * i, 4);
-  const vk::SpecializationInfo specialization(static_cast<std::uint32_t>(entries.size()),
-                                              entries.data(), constants.size_bytes(),
-                                              constants.data());
-  const vk::PipelineShaderStageCreateInfo stage({}, compute_stage, *module, "main",
-                                                &specialization);
+  const vk::raii::ShaderModule module(device.vk(), {{}, spirv});
+  const vk::PipelineShaderStageCreateInfo stage({}, compute_stage, *module, "main");
   program->pipeline = vk::raii::Pipeline(
       device.vk(), nullptr, vk::ComputePipelineCreateInfo({}, stage, *program->layout));
   return program;
@@ -129,9 +38,13 @@ std::shared_ptr<const Program> compile(const Device& device, std::span<const std
 
 Kernel::Kernel(Device& device, const char* name, std::span<const std::uint32_t> spirv,
                std::initializer_list<std::uint32_t> constants)
-    : device_(&device), name_(name), program_(device.program(spirv.data(), constants, [&] {
-        return compile(device, spirv, constants);
-      })) {}
+    : device_(&device), name_(name) {
+  const SpirvInfo info = describe_spirv(spirv);
+  std::vector<std::uint32_t> values = constants;
+  if (!values.empty()) values.front() &= info.asked_bits;
+  program_ = device.program(spirv.data(), values,
+                            [&] { return compile(device, info, specialise_spirv(spirv, values)); });
+}
 
 Kernel::BoundSet Kernel::create_set() const {
   std::vector<vk::DescriptorPoolSize> sizes;

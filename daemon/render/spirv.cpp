@@ -1,0 +1,150 @@
+#include "daemon/render/spirv.hpp"
+
+#include <algorithm>
+#include <spirv-tools/optimizer.hpp>
+#include <unordered_map>
+
+#include "drivers/error.hpp"
+
+namespace previz::render {
+namespace {
+
+// The few SPIR-V enumerants that describe a kernel (Khronos, "SPIR-V Specification", 3.32
+// Instructions and the tables before it).
+enum Op : std::uint32_t {
+  op_name = 5,
+  op_member_name = 6,
+  op_execution_mode = 16,
+  op_type_pointer = 32,
+  op_constant = 43,
+  op_spec_constant = 50,
+  op_spec_constant_op = 52,
+  op_variable = 59,
+  op_load = 61,
+  op_access_chain = 65,
+  op_array_length = 68,
+  op_decorate = 71,
+  op_bitwise_and = 199,
+  op_execution_mode_id = 331
+};
+constexpr std::uint32_t spirv_header_words = 5;
+constexpr std::uint32_t mode_local_size = 17, mode_local_size_id = 38;
+constexpr std::uint32_t decoration_spec_id = 1, decoration_binding = 33;
+constexpr std::uint32_t storage_uniform_constant = 0, storage_storage_buffer = 12;
+
+// Everything that a module says about one of its ids.
+struct SpirvId {
+  const char* name = "";
+  const char* first_member = "";  // of a block
+  std::uint32_t pointee = 0;      // of a pointer's type: the type that it points to
+  std::uint32_t type = 0, storage = 0, binding = 0;  // of a variable
+  std::uint32_t value = 0;                           // of a constant
+  bool is_used = false;
+};
+
+// Returns the constants with which specialisation constant 0 is masked; all bits if it is used in
+// any other way.
+std::uint32_t asked_bits(std::span<const std::uint32_t> spirv, const std::vector<SpirvId>& ids,
+                         std::uint32_t constant) {
+  if (constant == 0) return 0;
+  std::uint32_t bits = 0;
+  for (std::size_t at = spirv_header_words; at < spirv.size(); at += spirv[at] >> 16) {
+    const std::uint32_t op = spirv[at] & 0xffff;
+    if (op == op_name || op == op_decorate || op == op_constant || op == op_spec_constant) continue;
+    const std::span<const std::uint32_t> operands = spirv.subspan(at + 1, (spirv[at] >> 16) - 1);
+    if (std::ranges::find(operands, constant) == operands.end()) continue;
+    const bool is_mask =
+        op == op_bitwise_and || (op == op_spec_constant_op && operands[2] == op_bitwise_and);
+    if (!is_mask) return ~0u;
+    const auto [a, b] = std::pair(operands[operands.size() - 2], operands.back());
+    bits |= ids[a == constant ? b : a].value;
+  }
+  return bits;
+}
+
+}  // namespace
+
+// A variable's name is its own or, where a block without an instance name declares it, that of the
+// block's first member. Variables that are declared in a header and not used here have no binding
+// of their own: the compiler leaves all of them at 0.
+SpirvInfo describe_spirv(std::span<const std::uint32_t> spirv) {
+  SpirvInfo info;
+  std::vector<SpirvId> ids(spirv[3]);
+  std::vector<std::uint32_t> variables;
+  std::uint32_t group_size_id = 0, feature_id = 0;
+  for (std::size_t at = spirv_header_words; at < spirv.size(); at += spirv[at] >> 16) {
+    const std::uint32_t* const operands = &spirv[at + 1];
+    const auto text = [&](int i) { return reinterpret_cast<const char*>(operands + i); };
+    switch (spirv[at] & 0xffff) {
+      case op_name:
+        ids[operands[0]].name = text(1);
+        break;
+      case op_member_name:
+        if (operands[1] == 0) ids[operands[0]].first_member = text(2);
+        break;
+      case op_execution_mode:
+        if (operands[1] == mode_local_size) info.group_size = operands[2];
+        break;
+      case op_execution_mode_id:
+        if (operands[1] == mode_local_size_id) group_size_id = operands[2];
+        break;
+      case op_decorate:
+        if (operands[1] == decoration_binding) ids[operands[0]].binding = operands[2];
+        if (operands[1] == decoration_spec_id && operands[2] == 0) feature_id = operands[0];
+        break;
+      case op_type_pointer:
+        ids[operands[0]].pointee = operands[2];
+        break;
+      case op_constant:
+        ids[operands[1]].value = operands[2];
+        break;
+      case op_variable:
+        ids[operands[1]].type = operands[0];
+        ids[operands[1]].storage = operands[2];
+        variables.push_back(operands[1]);
+        break;
+      case op_load:
+      case op_access_chain:
+      case op_array_length:
+        ids[operands[2]].is_used = true;
+        break;
+      default:
+        break;
+    }
+  }
+  if (group_size_id != 0) info.group_size = ids[group_size_id].value;
+  for (const std::uint32_t id : variables) {
+    const SpirvId& variable = ids[id];
+    const bool is_storage = variable.storage == storage_storage_buffer;
+    if (!variable.is_used || !(is_storage || variable.storage == storage_uniform_constant))
+      continue;
+    const char* own = variable.name;
+    info.bindings.push_back({*own != 0 ? own : ids[ids[variable.type].pointee].first_member,
+                             variable.binding, is_storage});
+  }
+  info.asked_bits = asked_bits(spirv, ids, feature_id);
+  return info;
+}
+
+std::vector<std::uint32_t> specialise_spirv(std::span<const std::uint32_t> spirv,
+                                            std::span<const std::uint32_t> constants) {
+  std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> values;
+  for (std::uint32_t i = 0; i < constants.size(); ++i) values[i] = {constants[i]};
+  std::string complaint;
+  spvtools::Optimizer optimizer(SPV_ENV_VULKAN_1_3);
+  optimizer.SetMessageConsumer([&](spv_message_level_t, const char*, const spv_position_t&,
+                                   const char* message) { complaint = message; });
+  optimizer.RegisterPass(spvtools::CreateSetSpecConstantDefaultValuePass(values))
+      .RegisterPass(spvtools::CreateFreezeSpecConstantValuePass())
+      .RegisterPass(spvtools::CreateFoldSpecConstantOpAndCompositePass())
+      .RegisterPass(spvtools::CreateCCPPass())
+      .RegisterPass(spvtools::CreateDeadBranchElimPass());
+  spvtools::OptimizerOptions options;
+  options.set_run_validator(false);  // the validation layer looks at the result
+  std::vector<std::uint32_t> result;
+  if (!optimizer.Run(spirv.data(), spirv.size(), &result, options))
+    throw Error("Vulkan: a shader cannot be specialised: " + complaint);
+  return result;
+}
+
+}  // namespace previz::render

@@ -1,0 +1,34 @@
+// Reads what a SPIR-V module says about itself, and leaves out of it what its specialisation
+// constants switch off.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace previz::render {
+
+struct SpirvInfo {
+  struct Binding {
+    std::string name;  // as the shader calls the buffer
+    std::uint32_t number;
+    bool is_storage;  // a storage buffer; otherwise a uniform texel buffer
+  };
+  std::vector<Binding> bindings;  // of the buffers that the module uses
+  std::uint32_t group_size = 1;
+  // The bits of specialisation constant 0 that the module asks about; the others make no
+  // difference.
+  std::uint32_t asked_bits = 0;
+};
+
+// `spirv` is a valid module with one entry point, whose names were not stripped.
+SpirvInfo describe_spirv(std::span<const std::uint32_t> spirv);
+
+// Returns the module with the value constants[i] in place of specialisation constant i, without the
+// branches that are never taken then. Drivers inline and optimise a whole module before they look
+// at its constants, which takes a multiple of the time. Throws previz::Error if SPIRV-Tools cannot.
+std::vector<std::uint32_t> specialise_spirv(std::span<const std::uint32_t> spirv,
+                                            std::span<const std::uint32_t> constants);
+
+}  // namespace previz::render
