@@ -445,7 +445,7 @@ TEST(Denoise, ChangesNoOtherLayerAndNoUntouchedPlate) {
 // / 8 a pixel, and on average over stripes and pixels a standard deviation of 2 pi a / 8 / sqrt(2)
 // / sqrt(12).
 TEST(Denoise, KeepsTheTextureOfAnObject) {
-  constexpr int columns = 128, rows = 96;
+  constexpr int columns = 64, rows = 48;
   constexpr double mean_albedo = 0.5, amplitude = 0.4, period_px = 8;
   const auto wall_with = [](bool stripes) {
     View view;
@@ -474,7 +474,7 @@ TEST(Denoise, KeepsTheTextureOfAnObject) {
   };
   const auto error_of = [](const View& view) {
     SetRenderer renderer(view, up_to_depth(1));
-    const render::Layers truth = render_with(renderer, view, 256, 9);
+    const render::Layers truth = render_with(renderer, view, 128, 9);
     render::Layers clean = render_with(renderer, view, 1, 1);
     renderer.show(true, &clean);
     double square = 0;

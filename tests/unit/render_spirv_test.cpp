@@ -1,0 +1,78 @@
+// What a SPIR-V module says about itself, and what is left of it when features are switched off.
+#include "daemon/render/spirv.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+
+#include "daemon/render/kernel.hpp"
+#include "shaders/extend.spv.h"
+#include "shaders/generate.spv.h"
+#include "shaders/lib/render_shared.h"
+#include "shaders/refit_nodes.spv.h"
+#include "shaders/shade.spv.h"
+#include "tests/support/render_fixture.hpp"
+
+namespace previz::test {
+namespace render_spirv_test {
+
+using render::describe_spirv;
+using render::specialise_spirv;
+using render::SpirvInfo;
+
+constexpr std::uint32_t every_feature = (gpu::FEATURE_FILTERED_TEXTURES << 1) - 1;
+
+TEST(Spirv, NamesTheBuffersThatAreUsed) {
+  const SpirvInfo info = describe_spirv(generate_spv);
+  EXPECT_EQ(info.group_size, gpu::WORKGROUP_SIZE);
+  const auto has = [&](const std::string& name, bool is_storage) {
+    return std::ranges::any_of(info.bindings, [&](const SpirvInfo::Binding& binding) {
+      return binding.name == name && binding.is_storage == is_storage;
+    });
+  };
+  EXPECT_TRUE(has("control", true));
+  EXPECT_FALSE(has("vertices", false));  // declared in a header, and not used by this pass
+  const SpirvInfo shade = describe_spirv(shade_spv);
+  EXPECT_TRUE(std::ranges::any_of(shade.bindings, [](const SpirvInfo::Binding& binding) {
+    return binding.name == "vertices" && !binding.is_storage;
+  }));
+}
+
+TEST(Spirv, KnowsTheFeaturesThatAPassAsksAbout) {
+  EXPECT_EQ(describe_spirv(refit_nodes_spv).asked_bits, 0u);
+  const std::uint32_t extend = describe_spirv(extend_spv).asked_bits;
+  EXPECT_EQ(extend & ~every_feature, 0u);
+  EXPECT_NE(extend & gpu::FEATURE_ALPHA, 0u);
+  EXPECT_EQ(extend & gpu::FEATURE_SHEEN, 0u);  // rays meet fibres as they meet anything
+  const std::uint32_t shade = describe_spirv(shade_spv).asked_bits;
+  EXPECT_EQ(shade & ~every_feature, 0u);
+  for (const std::uint32_t bit : {gpu::FEATURE_GLOSSY, gpu::FEATURE_SHEEN, gpu::FEATURE_PHOTONS})
+    EXPECT_NE(shade & bit, 0u) << bit;
+}
+
+// The path tracer's heaviest pass, for a scene of plain paint: the driver gets a quarter of it.
+TEST(Spirv, LeavesOutWhatIsSwitchedOff) {
+  const std::array<std::uint32_t, 1> none = {0}, all = {every_feature};
+  const std::size_t whole = specialise_spirv(shade_spv, all).size();
+  const std::size_t plain = specialise_spirv(shade_spv, none).size();
+  EXPECT_LT(4 * plain, whole);
+  EXPECT_EQ(specialise_spirv(shade_spv, none), specialise_spirv(shade_spv, none));
+}
+
+TEST(Spirv, APassIsCompiledOnceForFeaturesThatItDoesNotAskAbout) {
+  const std::uint32_t asked = describe_spirv(extend_spv).asked_bits;
+  ASSERT_NE(asked & gpu::FEATURE_ALPHA, 0u);
+  const render::Kernel kernel(*shared_device(), "extend", extend_spv,
+                              {gpu::FEATURE_ALPHA | gpu::FEATURE_SHEEN});
+  const std::array<std::uint32_t, 1> masked = {gpu::FEATURE_ALPHA};
+  const auto compiled = shared_device()->program(extend_spv, masked, [] {
+    ADD_FAILURE() << "it is compiled again";
+    return std::make_shared<const render::Program>();
+  });
+  EXPECT_FALSE(compiled->bindings.empty());
+  EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
+}
+
+}  // namespace render_spirv_test
+}  // namespace previz::test
