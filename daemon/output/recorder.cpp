@@ -343,8 +343,12 @@ void Recorder::serve(std::optional<Entry>& entry, bool is_last) {
     if (take_ && Clock::now() - checked_ >= disk_interval) check_disk();
   } catch (const std::exception& error) {
     if (goes_on_elsewhere(error.what())) return;
-    fail(error.what());
+    if (entry) {
+      const std::lock_guard lock(mutex_);
+      count_as_lost(*entry);
+    }
     entry.reset();
+    fail(error.what());
   }
 }
 
