@@ -47,7 +47,9 @@ std::uint64_t default_queue_bytes() {
 
 Recorder::Recorder(RecorderOptions options)
     : options_(std::move(options)),
-      folders_(options_.take.folders, options_.reserve_bytes, options_.free_bytes) {
+      folders_(options_.take.folders, options_.reserve_bytes, options_.free_bytes),
+      assets_(folders_.all().front() / ".assets", options_.take.assets,
+              [this](const std::string& what) { note(Severity::warning, what); }) {
   thread_ = std::jthread([this] { run(); });
 }
 
@@ -338,6 +340,7 @@ void Recorder::serve(std::optional<Entry>& entry, bool is_last) {
   try {
     if (entry) handle(*entry);
     entry.reset();
+    if (take_ && assets_.is_ready()) add_assets();
     const bool is_over = end_at_ && (is_last || Clock::now() >= *end_at_);
     if (is_over || (end_at_ && take_->track_is_complete())) end_take(stopped_lost_);
     if (take_ && Clock::now() - checked_ >= disk_interval) check_disk();
@@ -425,6 +428,7 @@ void Recorder::begin_take() {
     }
   }
   checked_ = Clock::now();
+  lacks_assets_ = !options_.take.assets.empty();
   try {
     TakeFolders::keep_wish(take_->directory());
   } catch (const Error& error) {
@@ -434,6 +438,10 @@ void Recorder::begin_take() {
   const std::lock_guard lock(mutex_);
   status_.directory = take_->directory();
   status_.number = take_->number();
+}
+
+void Recorder::add_assets() {
+  if (std::exchange(lacks_assets_, false)) take_->add_assets(assets_.files());
 }
 
 void Recorder::drop_wish() {
@@ -499,6 +507,7 @@ void Recorder::end_last_take() {
 void Recorder::end_take(const session::Losses& lost) {
   end_at_.reset();
   attribute(lost);
+  add_assets();
   take_->close();
   {
     const std::lock_guard lock(mutex_);

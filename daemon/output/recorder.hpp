@@ -17,6 +17,7 @@
 #include <variant>
 #include <vector>
 
+#include "daemon/output/asset_store.hpp"
 #include "daemon/output/take_folders.hpp"
 #include "daemon/output/take_writer.hpp"
 #include "daemon/report/report.hpp"
@@ -137,6 +138,7 @@ class Recorder {
   void write(const Captured& captured);
   void begin_take();
   void begin_next_take();
+  void add_assets();  // to the running take, if it lacks them; waits for them
   void end_last_take();
   void end_take(const session::Losses& lost);   // properly, not by a failure
   void attribute(const session::Losses& lost);  // to the running take, as far as no take has them
@@ -174,6 +176,8 @@ class Recorder {
 
   // Only the writer thread uses these.
   TakeFolders folders_;
+  AssetStore assets_;
+  bool lacks_assets_ = false;  // the running take, because they are still being copied
   std::unique_ptr<TakeWriter> take_;
   std::int64_t take_begins_ns_ = 0;                              // time of its first observer frame
   std::optional<std::chrono::steady_clock::time_point> end_at_;  // stopped; waits for its tracks

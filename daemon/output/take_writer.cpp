@@ -89,9 +89,7 @@ int next_take_number(const std::vector<std::filesystem::path>& folders, const st
 TakeWriter::TakeWriter(const TakeTemplate& take, const std::filesystem::path& folder)
     : take_(numbered(take)),
       directory_(folder / take_name(take_.slate, take_.number)),
-      writer_(directory_, session_info(take, take_)) {
-  for (const auto& [as_written, file] : take.assets) writer_.add_asset(as_written, file);
-}
+      writer_(directory_, session_info(take, take_)) {}
 
 bool TakeWriter::fits(const Frame& frame) const {
   const auto found = formats_.find(frame.source);

@@ -37,8 +37,7 @@ int next_take_number(const std::vector<std::filesystem::path>& folders, const st
 // Every function throws previz::Error naming the file; data written before stays readable.
 class TakeWriter {
  public:
-  // Makes the take's directory in this folder, under the number next to those of all folders, and
-  // copies the assets.
+  // Makes the take's directory in this folder, under the number next to those of all folders.
   TakeWriter(const TakeTemplate& take, const std::filesystem::path& folder);
 
   // Returns whether the frame has the format and size of its stream.
@@ -53,6 +52,7 @@ class TakeWriter {
     writer_.write_event(timestamp_ns, what);
   }
   void mark_good();
+  void add_assets(const std::vector<session::StoredFile>& files) { writer_.add_assets(files); }
   void close() { writer_.close(); }
   void set_lost(const session::Losses& lost) { writer_.set_lost(lost); }
   void abandon(const std::string& fault) { writer_.abandon(fault); }  // never throws previz::Error

@@ -166,6 +166,12 @@ Session open_session(const std::filesystem::path& directory);
 // and never shown.
 std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& source);
 
+// A file that is kept under the hash of its content: SHA256.glb.
+struct StoredFile {
+  std::string as_written;  // how the set names it
+  std::filesystem::path file;
+};
+
 // Writes a session directory; every call leaves a readable session behind. FFV1 in Matroska,
 // lossless; streams open at their first frame. Throws previz::Error naming the file on failure. A
 // frame has reached the kernel when write() returns: a process killed at any time loses at most the
@@ -192,6 +198,8 @@ class SessionWriter {
   void set_take(const TakeInfo& take);  // replaces session.toml
   // Copies a file into assets/ under its content hash and maps `as_written` to it.
   void add_asset(const std::string& as_written, const std::filesystem::path& file);
+  // The same for stored files, by hard links where the file system can, else by copies.
+  void add_assets(const std::vector<StoredFile>& files);
   // Says what is not in the session; it is written when the session ends.
   void set_lost(const Losses& lost);
   // Flushes and finishes the files. The destructor does it too, without throwing.

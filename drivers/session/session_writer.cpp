@@ -118,6 +118,32 @@ struct SessionWriter::Impl {
     synced = std::chrono::steady_clock::now();
   }
 
+  void add_asset(const std::string& as_written, const std::filesystem::path& from,
+                 const std::string& name, bool may_link) {
+    const std::filesystem::path target = directory / "assets" / name;
+    try {
+      make_folders(target.parent_path());
+      if (!std::filesystem::exists(target)) {
+        std::error_code cannot_link = std::make_error_code(std::errc::not_supported);
+        if (may_link) std::filesystem::create_hard_link(from, target, cannot_link);
+        if (cannot_link) copy(from, target);
+        sync_names(target.parent_path());
+      }
+    } catch (const std::filesystem::filesystem_error& error) {
+      throw Error(from.string() + ": cannot be copied into the session: " + error.code().message());
+    }
+    file.info.assets[as_written] = "assets/" + name;
+  }
+
+  static void copy(const std::filesystem::path& from, const std::filesystem::path& target) {
+    const std::filesystem::path draft = target.string() + ".part";
+    std::filesystem::copy_file(from, draft, std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::permissions(draft, std::filesystem::perms::owner_write,
+                                 std::filesystem::perm_options::add);
+    OpenFile(draft, O_RDONLY).sync();
+    std::filesystem::rename(draft, target);
+  }
+
   // The file opens at its first line.
   void append(std::unique_ptr<LineFile>& lines, const char* name, const std::string& line) {
     check_open();
@@ -222,24 +248,19 @@ void SessionWriter::set_take(const TakeInfo& take) {
 
 void SessionWriter::add_asset(const std::string& as_written, const std::filesystem::path& file) {
   impl_->check_open();
-  const std::string path = "assets/" + sha256_of(file) + file.extension().string();
-  const std::filesystem::path target = impl_->directory / path;
+  const std::string name = sha256_of(file) + file.extension().string();
   impl_->using_disk([&] {
-    try {
-      make_folders(target.parent_path());
-      if (!std::filesystem::exists(target)) {
-        const std::filesystem::path draft = target.string() + ".part";
-        std::filesystem::copy_file(file, draft, std::filesystem::copy_options::overwrite_existing);
-        std::filesystem::permissions(draft, std::filesystem::perms::owner_write,
-                                     std::filesystem::perm_options::add);
-        OpenFile(draft, O_RDONLY).sync();
-        std::filesystem::rename(draft, target);
-        sync_names(target.parent_path());
-      }
-    } catch (const std::filesystem::filesystem_error& error) {
-      throw Error(file.string() + ": cannot be copied into the session: " + error.code().message());
-    }
-    impl_->file.info.assets[as_written] = path;
+    impl_->add_asset(as_written, file, name, false);
+    impl_->write_toml();
+  });
+}
+
+void SessionWriter::add_assets(const std::vector<StoredFile>& files) {
+  impl_->check_open();
+  if (files.empty()) return;
+  impl_->using_disk([&] {
+    for (const StoredFile& stored : files)
+      impl_->add_asset(stored.as_written, stored.file, stored.file.filename().string(), true);
     impl_->write_toml();
   });
 }

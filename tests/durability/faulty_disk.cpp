@@ -36,7 +36,7 @@ struct State {
 };
 
 struct Call {
-  enum class Kind { make, write, resize, sync, forget, rename, remove, refused };
+  enum class Kind { make, write, resize, sync, forget, rename, link, remove, refused };
   Kind kind;
   std::size_t node = 0;    // that is made, written, resized, synced
   std::size_t folder = 0;  // that holds the name
@@ -81,6 +81,9 @@ void apply(State& state, const Call& call) {
       state.now[call.new_folder].entries[call.new_name] = node;
       return;
     }
+    case Call::Kind::link:
+      state.now[call.folder].entries[call.name] = call.node;
+      return;
     case Call::Kind::remove:
       state.now[call.folder].entries.erase(call.name);
       return;
@@ -309,8 +312,8 @@ std::size_t FaultyDisk::calls() const {
 }
 
 std::string FaultyDisk::describe(std::size_t call) const {
-  constexpr const char* kinds[] = {"make",         "write",  "resize", "sync",
-                                   "sync in vain", "rename", "remove", "refused"};
+  constexpr const char* kinds[] = {"make",   "write", "resize", "sync",   "sync in vain",
+                                   "rename", "link",  "remove", "refused"};
   const std::lock_guard lock(disk().mutex);
   if (call >= disk().calls.size()) return "after the last call";
   const Call& c = disk().calls[call];
@@ -446,6 +449,16 @@ int rename(const char* from, const char* to) noexcept {
                 .name = source.name,
                 .new_folder = target.folder,
                 .new_name = target.name};
+  });
+}
+
+int link(const char* from, const char* to) noexcept {
+  const auto forward = [&] { return real<int(const char*, const char*)>("link")(from, to); };
+  return change_noted(to, forward, [&](const Place& target) {
+    return Call{.kind = Call::Kind::link,
+                .node = previz::test::place_of(from).value().node.value(),
+                .folder = target.folder,
+                .name = target.name};
   });
 }
 

@@ -6,8 +6,10 @@
 #include <functional>
 #include <optional>
 
+#include "daemon/output/asset_store.hpp"
 #include "daemon/output/recorder.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 #include "tests/durability/faulty_disk.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/wait_until.hpp"
@@ -82,6 +84,33 @@ TEST(PowerCut, LosesNoFrameThatWasAcknowledged) {
       EXPECT_GE(there.value_or(0), std::min(promised, frames));
       EXPECT_TRUE(!closed || there == frames) << "closed, and something is missing";
       EXPECT_TRUE(closed || promised <= frames) << "it was said to be closed";
+    }
+}
+
+// A session that names an asset has it, whole: it is on the medium before the session names it.
+TEST(PowerCut, LeavesALinkedAssetWhereTheSessionNamesIt) {
+  const TemporaryDirectory folder, elsewhere;
+  write_content(elsewhere / "asset.glb", "a model");
+  FaultyDisk disk(folder.path());
+  output::AssetStore store(folder / "store", {{"a.glb", elsewhere / "asset.glb"}},
+                           [](const std::string& what) { ADD_FAILURE() << what; });
+  SessionWriter writer(folder / "one", {}, std::chrono::nanoseconds(0));
+  writer.add_assets(store.files());
+  const std::size_t acknowledged = disk.calls();
+  writer.close();
+  for (std::size_t cut = 0; cut <= disk.calls(); ++cut)
+    for (const AfterPowerCut kept : power_cuts) {
+      SCOPED_TRACE("cut before call " + std::to_string(cut) + " (" + disk.describe(cut) +
+                   "), kept " + std::to_string(static_cast<int>(kept)));
+      disk.restore(cut, kept, elsewhere / "after");
+      std::size_t assets = 0;
+      if (std::filesystem::exists(elsewhere / "after/one/session.toml")) {
+        const session::Session session = session::open_session(elsewhere / "after/one");
+        assets = session.info.assets.size();
+        for (const auto& [as_written, file] : session.info.assets)
+          EXPECT_EQ(session::read_file(session.directory / file), "a model");
+      }
+      EXPECT_TRUE(assets == 1 || cut < acknowledged);
     }
 }
 
