@@ -28,18 +28,28 @@ class FrameOrder {
     return sequence_ += forward;
   }
 
-  // Returns the stamp, strictly increasing and at most the arrival; drivers without monotonic
-  // stamps get the arrival.
+  // Returns the stamp, strictly increasing and at most the arrival. The arrival stands in for the
+  // stamp of a driver that has no monotonic stamps, whose stamps stand still, or who stamps a frame
+  // with a time long ago.
   std::int64_t time_of(std::optional<std::int64_t> stamp_ns, std::int64_t arrival_ns) {
     if (!stamp_ns) ++counters_["frames without a time stamp of the kernel"];
-    const std::int64_t time_ns = std::min(arrival_ns, stamp_ns.value_or(arrival_ns));
+    const bool cannot_be =
+        stamp_ns && (*stamp_ns == last_stamp_ns_ || *stamp_ns < arrival_ns - oldest_ns);
+    if (cannot_be) ++counters_["frames whose time stamp cannot be"];
+    if (stamp_ns) last_stamp_ns_ = stamp_ns;
+    const std::int64_t time_ns =
+        std::min(arrival_ns, cannot_be ? arrival_ns : stamp_ns.value_or(arrival_ns));
     return last_time_ns_ = std::max(time_ns, last_time_ns_ + 1);
   }
 
  private:
+  // All of a device's buffers are filled sooner than that, so that none of them can be older.
+  static constexpr std::int64_t oldest_ns = 10'000'000'000;
+
   DeviceCounters& counters_;
   std::optional<std::uint32_t> device_sequence_;
   std::uint64_t sequence_ = 0;
+  std::optional<std::int64_t> last_stamp_ns_;
   std::int64_t last_time_ns_ = 0;
 };
 

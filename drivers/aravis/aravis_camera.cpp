@@ -11,6 +11,7 @@
 #include "drivers/clock_map.hpp"
 #include "drivers/exposure_ledger.hpp"
 #include "drivers/host_clock.hpp"
+#include "drivers/other_clock.hpp"
 
 namespace previz {
 namespace {
@@ -22,10 +23,6 @@ using aravis::Owned;
 constexpr int buffers_in_flight = 16;
 // Many cameras latch an exposure for the next frame but one.
 constexpr int latch_frames = 2;
-
-std::int64_t time_of_day_ns() {
-  return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 
 // Block ids of GigE Vision 1.x have 16 bits and leave out 0; later ones have 64 bits.
 class SequenceCounter {
@@ -125,6 +122,7 @@ class AravisCamera final : public Camera {
       arv_stream_push_buffer(stream_.get(), buffer);
       triggered_ = false;
       if (frame) return frame;
+      if (std::chrono::steady_clock::now() >= deadline) return NoFrame{};
     }
   }
 
@@ -143,6 +141,9 @@ class AravisCamera final : public Camera {
 
   DeviceCounters counters() const override {
     DeviceCounters all = counters_;
+    all["steps of the time of day"] = time_of_day_.steps();
+    all["arrivals left out of the clock's map"] = clock_.left_out();
+    all["maps of the clock begun anew"] = clock_.begun_anew();
     add_stream_counters(all);
     return all;
   }
@@ -150,7 +151,9 @@ class AravisCamera final : public Camera {
  private:
   // Returns the frame of a filled buffer; null, and counted, if it is not whole.
   FramePtr take(ArvBuffer& buffer) {
-    const std::int64_t arrival_ns = arrival_of(buffer);
+    // Aravis stamps a buffer's first packet with the time of day.
+    const std::int64_t arrival_ns = time_of_day_.to_monotonic(
+        static_cast<std::int64_t>(arv_buffer_get_system_timestamp(&buffer)));
     if (const char* damage = damage_of(buffer)) return left_out(damage);
     auto frame = std::make_shared<Frame>();
     std::size_t size = 0;
@@ -202,14 +205,6 @@ class AravisCamera final : public Camera {
     return as_agreed ? nullptr : "frames of another format";
   }
 
-  // Aravis stamps a buffer's first packet with the time of day; the difference to now is the same
-  // on every clock.
-  static std::int64_t arrival_of(ArvBuffer& buffer) {
-    const std::int64_t age_ns =
-        time_of_day_ns() - static_cast<std::int64_t>(arv_buffer_get_system_timestamp(&buffer));
-    return monotonic_ns() - std::clamp<std::int64_t>(age_ns, 0, 10'000'000'000);
-  }
-
   std::optional<Exposure> exposure_of(ArvBuffer& buffer, std::int64_t timestamp_ns) {
     const std::optional<Exposure> by_time = ledger_.of_frame(timestamp_ns);
     if (!chunks_ || !arv_buffer_has_chunks(&buffer)) return by_time;
@@ -243,6 +238,7 @@ class AravisCamera final : public Camera {
   Owned<ArvStream> stream_;  // null: not streaming
   bool triggered_ = false;   // by software; no frame has answered yet
   SequenceCounter sequence_;
+  OtherClock time_of_day_{read_beside_monotonic(CLOCK_REALTIME)};
   ClockMap clock_;
   ExposureLedger ledger_;
   DeviceCounters counters_;

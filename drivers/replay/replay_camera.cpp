@@ -13,13 +13,7 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-// Recorded times can be anything; arithmetic on them wraps rather than overflows.
-std::int64_t sum(std::int64_t a, std::int64_t b) {
-  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
-}
-std::int64_t difference(std::int64_t a, std::int64_t b) {
-  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
-}
+// Recorded times can be anything; see wrapping_sum().
 std::int64_t product(std::int64_t a, std::int64_t b) {
   return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) * static_cast<std::uint64_t>(b));
 }
@@ -90,13 +84,13 @@ class ReplayCamera final : public Camera {
   std::int64_t shift_ns() const { return product(at_->lap, lap_ns()); }
 
   std::int64_t timestamp_ns(std::size_t index) const {
-    return sum(stream_->records()[index].timestamp_ns, shift_ns());
+    return wrapping_sum(stream_->records()[index].timestamp_ns, shift_ns());
   }
 
   HostClock::Time due_time() const {
     constexpr double one_year_ns = 366.0 * 86'400e9;
-    const auto elapsed_ns =
-        static_cast<double>(difference(timestamp_ns(at_->index), options_.origin->timestamp_ns));
+    const auto elapsed_ns = static_cast<double>(
+        wrapping_difference(timestamp_ns(at_->index), options_.origin->timestamp_ns));
     const double wait_ns = std::clamp(elapsed_ns / options_.speed, -one_year_ns, one_year_ns);
     return options_.origin->due + nanoseconds(static_cast<std::int64_t>(wait_ns));
   }
@@ -154,8 +148,8 @@ class ReplayCamera final : public Camera {
   FramePtr on_this_lap(FramePtr recorded) const {
     if (at_->lap == 0) return recorded;
     auto frame = std::make_shared<Frame>(*recorded);
-    frame->timestamp_ns = sum(frame->timestamp_ns, shift_ns());
-    frame->arrival_ns = sum(frame->arrival_ns, shift_ns());
+    frame->timestamp_ns = wrapping_sum(frame->timestamp_ns, shift_ns());
+    frame->arrival_ns = wrapping_sum(frame->arrival_ns, shift_ns());
     frame->sequence += static_cast<std::uint64_t>(at_->lap) * lap_sequence();
     return frame;
   }
@@ -176,9 +170,10 @@ class ReplayCamera final : public Camera {
 
 // A lap is the frames' span and one mean interval.
 std::int64_t replay_lap_ns(std::span<const session::FrameRecord> records) {
-  const std::int64_t span = difference(records.back().timestamp_ns, records.front().timestamp_ns);
+  const std::int64_t span =
+      wrapping_difference(records.back().timestamp_ns, records.front().timestamp_ns);
   const auto intervals = static_cast<std::int64_t>(records.size() - 1);
-  return intervals > 0 ? sum(span, span / intervals) : 1'000'000'000;
+  return intervals > 0 ? wrapping_sum(span, span / intervals) : 1'000'000'000;
 }
 
 std::unique_ptr<Camera> replay(std::shared_ptr<session::StreamReader> stream, std::string name,
