@@ -5,6 +5,7 @@
 #include <jpeglib.h>
 
 #include <array>
+#include <string_view>
 
 #include "drivers/convert/convert.hpp"
 
@@ -33,52 +34,99 @@ struct Reports {
     if (level < 0 && decoder->err->msg_code != JWRN_EXTRANEOUS_DATA) of(decoder).note(decoder);
   }
 
+  static void too_many_scans(j_common_ptr decoder) {
+    Reports& reports = of(decoder);
+    constexpr std::string_view why = "it has too many scans";
+    why.copy(reports.text.data(), why.size());
+    reports.damaged = true;
+    std::longjmp(reports.escape, 1);
+  }
+
   void note(j_common_ptr decoder) {
     if (!damaged) decoder->err->format_message(decoder, text.data());
     damaged = true;
   }
 };
 
-// Returns false with reports.damaged set, or without it if header and expectation differ.
-bool decode(jpeg_decompress_struct& decoder, Reports& reports, std::span<const std::uint8_t> jpeg,
-            int width, int height, std::vector<std::uint8_t>& rgb) {
-  if (setjmp(reports.escape)) return false;
-  jpeg_create_decompress(&decoder);
-  jpeg_mem_src(&decoder, jpeg.data(), jpeg.size());
-  jpeg_read_header(&decoder, TRUE);
-  if (decoder.image_width != static_cast<JDIMENSION>(width) ||
-      decoder.image_height != static_cast<JDIMENSION>(height))
-    return false;
-  decoder.out_color_space = JCS_RGB;
-  decoder.dct_method = JDCT_ISLOW;
-  jpeg_start_decompress(&decoder);
-  while (decoder.output_scanline < decoder.output_height) {
-    JSAMPROW row = &rgb[std::size_t{3} * decoder.output_scanline * decoder.output_width];
-    jpeg_read_scanlines(&decoder, &row, 1);
+// libjpeg's own progressive pictures have ten scans. Each scan costs as much time as a picture, and
+// a hostile one may have thousands in a few bytes.
+constexpr int most_scans = 20;
+
+// Every block of 8x8 pixels takes a bit at least, so that a picture has no more pixels than this
+// for each byte, whatever its header claims.
+constexpr std::size_t most_pixels_of_a_byte = 8 * 64;
+
+class JpegDecoder {
+ public:
+  explicit JpegDecoder(std::span<const std::uint8_t> jpeg) : jpeg_(jpeg) {
+    decoder_.err = jpeg_std_error(&reports_.manager);
+    reports_.manager.error_exit = Reports::fatal;
+    reports_.manager.emit_message = Reports::emit;
+    progress_.progress_monitor = [](j_common_ptr common) {
+      if (reinterpret_cast<j_decompress_ptr>(common)->input_scan_number > most_scans)
+        Reports::too_many_scans(common);
+    };
   }
-  jpeg_finish_decompress(&decoder);
-  return !reports.damaged;
+  ~JpegDecoder() { jpeg_destroy_decompress(&decoder_); }
+  JpegDecoder(const JpegDecoder&) = delete;
+  JpegDecoder& operator=(const JpegDecoder&) = delete;
+
+  std::string damage() const { return reports_.text.data(); }
+  std::size_t width() const { return decoder_.image_width; }
+  std::size_t height() const { return decoder_.image_height; }
+
+  // These two return false where the picture is damaged.
+  bool read_header() {
+    if (setjmp(reports_.escape)) return false;
+    jpeg_create_decompress(&decoder_);
+    decoder_.progress = &progress_;
+    jpeg_mem_src(&decoder_, jpeg_.data(), jpeg_.size());
+    jpeg_read_header(&decoder_, TRUE);
+    return true;
+  }
+  bool read_picture(std::uint8_t* rgb) {
+    if (setjmp(reports_.escape)) return false;
+    decoder_.out_color_space = JCS_RGB;
+    decoder_.dct_method = JDCT_ISLOW;
+    jpeg_start_decompress(&decoder_);
+    while (decoder_.output_scanline < decoder_.output_height) {
+      JSAMPROW row = rgb + std::size_t{3} * decoder_.output_scanline * decoder_.output_width;
+      jpeg_read_scanlines(&decoder_, &row, 1);
+    }
+    jpeg_finish_decompress(&decoder_);
+    return !reports_.damaged;
+  }
+
+ private:
+  const std::span<const std::uint8_t> jpeg_;
+  jpeg_decompress_struct decoder_{};
+  jpeg_progress_mgr progress_{};
+  Reports reports_{};
+};
+
+std::string size_text(std::size_t width, std::size_t height) {
+  return std::to_string(width) + "x" + std::to_string(height);
 }
 
 }  // namespace
 
+// Memory for the picture is only asked for once its header is as agreed and its data can be that of
+// so large a picture.
 std::optional<std::string> decode_jpeg(std::span<const std::uint8_t> jpeg, int width, int height,
                                        std::vector<std::uint8_t>& rgb) {
   if (jpeg.empty()) return "is empty";
-  rgb.resize(std::size_t{3} * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  jpeg_decompress_struct decoder{};
-  Reports reports{};
-  decoder.err = jpeg_std_error(&reports.manager);
-  reports.manager.error_exit = Reports::fatal;
-  reports.manager.emit_message = Reports::emit;
-  const bool whole = decode(decoder, reports, jpeg, width, height, rgb);
-  const std::string size =
-      std::to_string(decoder.image_width) + "x" + std::to_string(decoder.image_height);
-  jpeg_destroy_decompress(&decoder);
-  if (whole) return std::nullopt;
-  if (reports.damaged) return std::string("is a damaged JPEG: ") + reports.text.data();
-  return "is a JPEG of " + size + " pixels; " + std::to_string(width) + "x" +
-         std::to_string(height) + " was agreed";
+  JpegDecoder decoder(jpeg);
+  if (!decoder.read_header()) return "is a damaged JPEG: " + decoder.damage();
+  const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height);
+  if (decoder.width() != w || decoder.height() != h)
+    return "is a JPEG of " + size_text(decoder.width(), decoder.height()) + " pixels; " +
+           size_text(w, h) + " was agreed";
+  if (w * h / most_pixels_of_a_byte > jpeg.size())
+    return "is a JPEG of " + std::to_string(jpeg.size()) + " bytes, too few for " +
+           size_text(w, h) + " pixels";
+  rgb.resize(3 * w * h);
+  if (!decoder.read_picture(rgb.data())) return "is a damaged JPEG: " + decoder.damage();
+  return std::nullopt;
 }
 
 }  // namespace previz::convert

@@ -5,6 +5,7 @@
 // jpeglib.h needs what <cstdio> declares.
 #include <jpeglib.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <memory>
@@ -20,7 +21,9 @@ using Bytes = std::vector<std::uint8_t>;
 constexpr WireFormat mjpeg{Layout::mjpeg, 8, Packing::words, YuvMatrix::bt601, YuvRange::full};
 
 // As webcams send them: 4:2:2, the standard Huffman tables left out where `abbreviated`.
-Bytes jpeg_of(int width, int height, const Bytes& rgb, bool abbreviated = false) {
+// Where `scans` is not empty, the picture is a progressive one of these scans.
+Bytes jpeg_of(int width, int height, const Bytes& rgb, bool abbreviated = false,
+              const std::vector<jpeg_scan_info>& scans = {}) {
   jpeg_compress_struct encoder{};
   jpeg_error_mgr errors{};
   encoder.err = jpeg_std_error(&errors);
@@ -39,6 +42,10 @@ Bytes jpeg_of(int width, int height, const Bytes& rgb, bool abbreviated = false)
   if (abbreviated)
     for (int i = 0; i < 2; ++i)
       encoder.dc_huff_tbl_ptrs[i]->sent_table = encoder.ac_huff_tbl_ptrs[i]->sent_table = TRUE;
+  if (!scans.empty()) {
+    encoder.scan_info = scans.data();
+    encoder.num_scans = static_cast<int>(scans.size());
+  }
   jpeg_start_compress(&encoder, abbreviated ? FALSE : TRUE);
   for (int y = 0; y < height; ++y) {
     auto* row = const_cast<JSAMPLE*>(&rgb[std::size_t{3} * static_cast<std::size_t>(y * width)]);
@@ -112,6 +119,47 @@ TEST(Mjpeg, APictureOfAnotherSizeIsRefused) {
   Frame frame;
   EXPECT_EQ(convert({mjpeg, 32, 48, 0, jpeg}, frame).value_or(""),
             "is a JPEG of 48x32 pixels; 32x48 was agreed");
+}
+
+// A scan of the mean of every block, then `bands` scans of the other coefficients of the
+// brightness, and one of each colour.
+std::vector<jpeg_scan_info> progressive(int bands) {
+  std::vector<jpeg_scan_info> scans{{3, {0, 1, 2, 0}, 0, 0, 0, 0}};
+  for (int i = 0; i < bands; ++i)
+    scans.push_back({1, {0, 0, 0, 0}, i + 1, i + 1 < bands ? i + 1 : 63, 0, 0});
+  for (const int colour : {1, 2}) scans.push_back({1, {colour, 0, 0, 0}, 1, 63, 0, 0});
+  return scans;
+}
+
+TEST(Mjpeg, ProgressivePicturesOfTooManyScansAreRefused) {
+  const Bytes rgb = noise(48, 32);
+  Frame plain, in_scans;
+  ASSERT_FALSE(convert({mjpeg, 48, 32, 0, jpeg_of(48, 32, rgb)}, plain));
+  ASSERT_FALSE(convert({mjpeg, 48, 32, 0, jpeg_of(48, 32, rgb, false, progressive(17))}, in_scans));
+  EXPECT_EQ(in_scans.bytes, plain.bytes);  // of 20 scans
+  Frame none;
+  for (const int bands : {18, 63}) {
+    const Bytes jpeg = jpeg_of(48, 32, rgb, false, progressive(bands));
+    EXPECT_EQ(convert({mjpeg, 48, 32, 0, jpeg}, none).value_or(""),
+              "is a damaged JPEG: it has too many scans");
+  }
+  EXPECT_TRUE(none.bytes.empty());
+}
+
+// Whatever a device or a header claims, memory is asked for only once the data can be of that size.
+TEST(Mjpeg, ClaimsOfHugePicturesTakeNoMemory) {
+  Bytes jpeg = jpeg_of(48, 32, noise(48, 32)), rgb;
+  EXPECT_EQ(decode_jpeg(jpeg, 65535, 65535, rgb).value_or(""),
+            "is a JPEG of 48x32 pixels; 65535x65535 was agreed");
+  EXPECT_EQ(rgb.capacity(), 0u);
+  constexpr std::array<std::uint8_t, 2> start_of_frame{0xff, 0xc0};
+  const auto found = std::ranges::search(jpeg, start_of_frame);
+  ASSERT_FALSE(found.empty());
+  std::fill_n(found.begin() + 5, 4, 0xff);  // height and width, after length and precision
+  EXPECT_EQ(
+      decode_jpeg(jpeg, 65535, 65535, rgb).value_or(""),
+      "is a JPEG of " + std::to_string(jpeg.size()) + " bytes, too few for 65535x65535 pixels");
+  EXPECT_EQ(rgb.capacity(), 0u);
 }
 
 TEST(Mjpeg, DamageDoesNoHarm) {
