@@ -14,7 +14,7 @@ ButtonDesk::ButtonDesk(const std::vector<set::Button>& mapped, std::vector<Devic
     : mapped_(mapped), parts_(parts), asks_(std::move(asks)), presses_(mapped) {
   for (Device& device : devices) {
     pipeline::DeviceCounts counts(parts_.metrics, device.buttons->name());
-    devices_.push_back({std::move(device), std::move(counts), nullptr});
+    devices_.push_back({std::move(device), std::move(counts), nullptr, 0});
   }
   for (Watched& watched : devices_)
     watched.watch =
@@ -23,7 +23,8 @@ ButtonDesk::ButtonDesk(const std::vector<set::Button>& mapped, std::vector<Devic
 
 void ButtonDesk::read(Watched& watched) {
   Buttons& buttons = *watched.device.buttons;
-  while (asks_.listens()) {
+  for (int events = 0; events < most_events_a_turn; ++events) {
+    if (!asks_.listens()) return;
     std::optional<ButtonsEvent> event = buttons.next();
     if (!event) return;
     bool over = std::holds_alternative<EndOfStream>(*event);
@@ -41,6 +42,7 @@ void ButtonDesk::read(Watched& watched) {
     }
     if (over) return watched.watch.reset();
   }
+  ++watched.full_turns;
 }
 
 void ButtonDesk::edge(const ButtonEvent& event) {
@@ -67,7 +69,12 @@ void ButtonDesk::tick(std::int64_t now_ns) {
 }
 
 void ButtonDesk::count() {
-  for (Watched& watched : devices_) watched.counts.update(watched.device.buttons->counters());
+  for (Watched& watched : devices_) {
+    DeviceCounters counters = watched.device.buttons->counters();
+    if (watched.full_turns > 0)
+      counters["turns with more events than are read at once"] = watched.full_turns;
+    watched.counts.update(counters);
+  }
 }
 
 std::vector<ButtonDesk::Device> open_button_devices(

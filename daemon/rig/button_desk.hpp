@@ -22,6 +22,10 @@ namespace previz::rig {
 
 class ButtonDesk {
  public:
+  // A device that always has another event must not keep the loop from its other work: what is not
+  // read in one turn of the loop waits for the next one.
+  static constexpr int most_events_a_turn = 16;
+
   struct Device {
     std::unique_ptr<Buttons> buttons;
     std::int64_t clock_offset_ns = 0;  // the cameras' clock minus the device's
@@ -58,6 +62,7 @@ class ButtonDesk {
     Device device;
     pipeline::DeviceCounts counts;
     std::unique_ptr<EventLoop::Watch> watch;
+    std::uint64_t full_turns = 0;  // after which more events may have waited
   };
 
   void read(Watched& watched);

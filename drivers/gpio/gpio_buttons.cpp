@@ -12,6 +12,7 @@
 #include <deque>
 #include <list>
 #include <optional>
+#include <utility>
 
 #include "drivers/debouncer.hpp"
 #include "drivers/descriptor.hpp"
@@ -23,6 +24,10 @@ namespace {
 
 constexpr std::int64_t second_ns = 1'000'000'000;
 constexpr const char* consumer = "previzd";
+// A contact that chatters faster than it is read must not hold up whoever reads it.
+constexpr int most_edges_at_once = 64;
+// The kernel keeps as many edges of a line, and drops those that follow.
+constexpr int edges_kept = 16;
 
 struct CloseChip {
   void operator()(gpiod_chip* chip) const { gpiod_chip_close(chip); }  // also releases its lines
@@ -83,7 +88,7 @@ class GpioButtons final : public Buttons {
     for (const std::string& name : names) {
       const ContactWiring wiring = settings.wiring_of(name);
       lines_.push_back({name, contact_of(name).line, request_flags(wiring), nullptr,
-                        Debouncer(static_cast<std::int64_t>(1e9 * wiring.debounce_s))});
+                        Debouncer(static_cast<std::int64_t>(1e9 * wiring.debounce_s)), 0, 0});
     }
     watch(timer_.get());
     arm();
@@ -95,14 +100,20 @@ class GpioButtons final : public Buttons {
 
   std::optional<ButtonsEvent> next() override {
     if (!chip_ && monotonic_ns() >= retry_ns_) open();
-    for (Line& line : lines_) {
-      if (line.debouncer.settle(monotonic_ns())) push_edge(line);
-      read(line);
+    if (events_.empty()) {
+      for (Line& line : lines_) {
+        if (line.debouncer.settle(monotonic_ns())) push_edge(line);
+        read(line);
+        look_for_babble(line);
+      }
     }
-    arm();
-    if (events_.empty()) return std::nullopt;
+    if (events_.empty()) {
+      arm();
+      return std::nullopt;
+    }
     ButtonsEvent event = std::move(events_.front());
     events_.pop_front();
+    arm();
     return event;
   }
 
@@ -113,6 +124,7 @@ class GpioButtons final : public Buttons {
     int request_flags;
     gpiod_line* line;  // owned by chip_; null while it is not there
     Debouncer debouncer;
+    std::uint64_t times_babbled = 0, presses_left_out = 0;  // as counted so far
   };
 
   void watch(int descriptor) {
@@ -154,12 +166,30 @@ class GpioButtons final : public Buttons {
 
   void read(Line& line) {
     constexpr timespec at_once{0, 0};
-    while (line.line && gpiod_line_event_wait(line.line, &at_once) == 1) {
+    int edges = 0;
+    while (line.line && edges < most_edges_at_once &&
+           gpiod_line_event_wait(line.line, &at_once) == 1) {
       gpiod_line_event edge{};
       if (gpiod_line_event_read(line.line, &edge) != 0) return lose(std::strerror(errno));
       if (line.debouncer.edge(edge.event_type == GPIOD_LINE_EVENT_RISING_EDGE, edge_ns(edge.ts)))
         push_edge(line);
+      ++edges;
     }
+    if (edges >= edges_kept) see_level(line);
+  }
+
+  // The last edge may be among those that the kernel dropped.
+  void see_level(Line& line) {
+    const int level = gpiod_line_get_value(line.line);
+    if (level >= 0 && line.debouncer.edge(level == 1, monotonic_ns())) push_edge(line);
+  }
+
+  void look_for_babble(Line& line) {
+    const Debouncer& contact = line.debouncer;
+    counters_[presses_babbled] += contact.presses_left_out() - line.presses_left_out;
+    line.presses_left_out = contact.presses_left_out();
+    if (std::exchange(line.times_babbled, contact.times_babbled()) != contact.times_babbled())
+      events_.emplace_back(babbling(device_, line.name));
   }
 
   void lose(const std::string& why) {
@@ -204,7 +234,7 @@ class GpioButtons final : public Buttons {
   std::string refusal_;  // trouble last reported
   std::list<Line> lines_;
   std::deque<ButtonsEvent> events_;
-  DeviceCounters counters_{{"opened", 0}, {"not opened", 0}, {"lost", 0}};
+  DeviceCounters counters_{{"opened", 0}, {"not opened", 0}, {"lost", 0}, {presses_babbled, 0}};
 };
 
 std::string or_empty(const char* text) {

@@ -8,13 +8,13 @@
 #include <charconv>
 #include <condition_variable>
 #include <cstring>
-#include <deque>
 #include <functional>
 #include <map>
 #include <mutex>
 #include <optional>
 #include <thread>
 
+#include "drivers/button_queue.hpp"
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
 #include "drivers/hid/backend.hpp"
@@ -26,6 +26,7 @@ namespace {
 constexpr int poll_ms = 100;  // how late a stop may be noticed
 constexpr std::chrono::seconds retry_interval{1};
 constexpr const char* cut_short = "reports too short for a button";
+constexpr const char* not_taken = "events left out, which nobody took in time";
 
 struct DeviceName {
   unsigned short vendor = 0, product = 0;
@@ -97,13 +98,11 @@ class HidButtons final : public Buttons {
 
   std::optional<ButtonsEvent> next() override {
     const std::lock_guard lock(mutex_);
-    if (events_.empty()) {
+    std::optional<ButtonsEvent> event = events_.pop();
+    if (!event) {
       eventfd_t ignored = 0;
       eventfd_read(signal_.get(), &ignored);
-      return std::nullopt;
     }
-    ButtonsEvent event = std::move(events_.front());
-    events_.pop_front();
     return event;
   }
 
@@ -135,28 +134,32 @@ class HidButtons final : public Buttons {
     while (!stop.stop_requested()) {
       const int size = device.read(report, poll_ms);
       if (size < 0) return;
-      if (size == 0) continue;
-      const std::uint64_t short_before = reader_.reports_cut_short();
-      count("reports");
-      for (ButtonEvent& event :
-           reader_.read({report.data(), static_cast<std::size_t>(size)}, monotonic_ns()))
-        push(std::move(event));
-      if (reader_.reports_cut_short() == short_before) continue;
-      count(cut_short);
-      if (short_before == 0)
-        push(DeviceTrouble{device_, "sends reports of " + std::to_string(size) +
-                                        " bytes, too short for a button of the set"});
+      if (size > 0) take({report.data(), static_cast<std::size_t>(size)});
     }
   }
 
-  void count(const std::string& what) {
+  void take(std::span<const std::uint8_t> report) {
+    const std::uint64_t short_before = reader_.reports_cut_short();
+    const std::uint64_t left_out_before = reader_.presses_left_out();
+    count("reports");
+    for (ButtonEvent& event : reader_.read(report, monotonic_ns())) push(std::move(event));
+    count(presses_babbled, reader_.presses_left_out() - left_out_before);
+    for (const std::string& button : reader_.take_babblers()) push(babbling(device_, button));
+    if (reader_.reports_cut_short() == short_before) return;
+    count(cut_short);
+    if (short_before == 0)
+      push(DeviceTrouble{device_, "sends reports of " + std::to_string(report.size()) +
+                                      " bytes, too short for a button of the set"});
+  }
+
+  void count(const std::string& what, std::uint64_t by = 1) {
     const std::lock_guard lock(mutex_);
-    ++counters_[what];
+    counters_[what] += by;
   }
 
   void push(ButtonsEvent event) {
     const std::lock_guard lock(mutex_);
-    events_.push_back(std::move(event));
+    if (!events_.push(std::move(event))) ++counters_[not_taken];
     eventfd_write(signal_.get(), 1);
   }
 
@@ -166,9 +169,9 @@ class HidButtons final : public Buttons {
   OwnedDescriptor signal_;
   mutable std::mutex mutex_;
   std::condition_variable_any wake_;
-  std::deque<ButtonsEvent> events_;
-  DeviceCounters counters_{
-      {"opened", 0}, {"not opened", 0}, {"lost", 0}, {"reports", 0}, {cut_short, 0}};
+  ButtonQueue events_;
+  DeviceCounters counters_{{"opened", 0},  {"not opened", 0},    {"lost", 0},   {"reports", 0},
+                           {cut_short, 0}, {presses_babbled, 0}, {not_taken, 0}};
   std::jthread thread_;
 };
 
@@ -178,7 +181,7 @@ namespace hid {
 
 ReportReader::ReportReader(const std::vector<std::string>& names) {
   for (const std::string& name : names)
-    buttons_.push_back({name, parse_selector(name.substr(name.rfind(':') + 1)), false});
+    buttons_.push_back({name, parse_selector(name.substr(name.rfind(':') + 1)), false, false, {}});
 }
 
 std::vector<ButtonEvent> ReportReader::read(std::span<const std::uint8_t> report,
@@ -191,17 +194,29 @@ std::vector<ButtonEvent> ReportReader::read(std::span<const std::uint8_t> report
   }
   for (Button& button : buttons_) {
     if (!button.selector.speaks(report)) continue;
-    const bool pressed = button.selector.pressed(report);
+    const bool down = button.selector.pressed(report);
+    if (std::exchange(button.down, down) == down) continue;
+    const bool pressed = down && counts(button, time_ns);
     if (std::exchange(button.pressed, pressed) != pressed)
       events.push_back({button.name, pressed, time_ns});
   }
   return events;
 }
 
+bool ReportReader::counts(Button& button, std::int64_t time_ns) {
+  const PressLimit::Verdict verdict = button.limit.judge(time_ns);
+  if (verdict == PressLimit::Verdict::counts) return true;
+  if (verdict == PressLimit::Verdict::begins_to_babble) babblers_.push_back(button.name);
+  ++presses_left_out_;
+  return false;
+}
+
 std::vector<ButtonEvent> ReportReader::release_all(std::int64_t time_ns) {
   std::vector<ButtonEvent> events;
-  for (Button& button : buttons_)
+  for (Button& button : buttons_) {
+    button.down = false;
     if (std::exchange(button.pressed, false)) events.push_back({button.name, false, time_ns});
+  }
   return events;
 }
 

@@ -10,10 +10,12 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string_view>
 
 #include "drivers/button_drivers.hpp"
+#include "drivers/button_queue.hpp"
 #include "drivers/debouncer.hpp"
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
@@ -62,6 +64,71 @@ TEST(DebouncerTest, WithoutAWindowEveryEdgeCounts) {
   EXPECT_FALSE(contact.edge(false, 3));
 }
 
+// 50 presses a second, each of 10 ms, then one after a second and a half.
+TEST(DebouncerTest, AContactThatBabblesIsLeftOutUntilItIsQuiet) {
+  constexpr std::int64_t ms = 1'000'000;
+  Debouncer contact(5 * ms);
+  std::size_t presses = 0, releases = 0;
+  for (std::int64_t time = 0; time < 3000 * ms; time += 20 * ms) {
+    contact.settle(time);
+    if (contact.edge(true, time)) ++presses;
+    contact.settle(time + 5 * ms);
+    if (contact.edge(false, time + 10 * ms)) ++releases;
+  }
+  EXPECT_EQ(presses, PressLimit::most_presses);
+  EXPECT_EQ(releases, PressLimit::most_presses);
+  EXPECT_FALSE(contact.pressed());
+  EXPECT_EQ(contact.presses_left_out(), 150 - PressLimit::most_presses);
+  EXPECT_EQ(contact.times_babbled(), 1u);
+  EXPECT_TRUE(contact.edge(true, 4500 * ms));
+  EXPECT_TRUE(contact.pressed());
+}
+
+TEST(DebouncerTest, AContactThatEndsItsBabblingClosedIsReleased) {
+  Debouncer contact(0);
+  std::int64_t time = 0;
+  for (std::size_t i = 0; i < PressLimit::most_presses + 1; ++i) {
+    if (i > 0) contact.edge(false, ++time);
+    contact.edge(true, ++time);
+  }
+  EXPECT_FALSE(contact.pressed());
+  EXPECT_FALSE(contact.settle(time + 10 * PressLimit::period_ns));
+  EXPECT_FALSE(contact.edge(true, time + 10 * PressLimit::period_ns));  // closed all the time
+  EXPECT_FALSE(contact.edge(false, time + 11 * PressLimit::period_ns));
+  EXPECT_TRUE(contact.edge(true, time + 12 * PressLimit::period_ns));
+}
+
+// A hand does not: the fastest that the limit allows, for ten seconds.
+TEST(DebouncerTest, AHandIsNeverLeftOut) {
+  Debouncer contact(5'000'000);
+  constexpr std::int64_t apart = PressLimit::period_ns / std::int64_t{PressLimit::most_presses};
+  for (std::int64_t time = 0; time < 10 * PressLimit::period_ns; time += apart) {
+    EXPECT_TRUE(contact.edge(true, time)) << time;
+    EXPECT_TRUE(contact.edge(false, time + apart / 2)) << time;
+  }
+  EXPECT_EQ(contact.presses_left_out(), 0u);
+}
+
+// ---- events that nobody takes
+
+TEST(ButtonQueueTest, LeavesOutPressesWithTheirReleasesOnceItIsFull) {
+  ButtonQueue queue;
+  EXPECT_TRUE(queue.push(ButtonEvent{"held", true, 0}));
+  for (std::size_t i = 1; i < ButtonQueue::most; ++i)
+    EXPECT_TRUE(queue.push(DeviceTrouble{"pad", "is wet"}));
+  EXPECT_FALSE(queue.push(ButtonEvent{"late", true, 1}));
+  EXPECT_FALSE(queue.push(DeviceTrouble{"pad", "is wet"}));
+  EXPECT_FALSE(queue.push(ButtonEvent{"late", false, 2}));
+  EXPECT_TRUE(queue.push(ButtonEvent{"held", false, 3}));
+  for (std::size_t i = 0; i < ButtonQueue::most; ++i) EXPECT_TRUE(queue.pop());
+  const std::optional<ButtonsEvent> last = queue.pop();
+  ASSERT_TRUE(last);
+  EXPECT_EQ(std::get<ButtonEvent>(*last), (ButtonEvent{"held", false, 3}));
+  EXPECT_FALSE(queue.pop());
+  EXPECT_TRUE(queue.push(ButtonEvent{"late", true, 4}));
+  EXPECT_TRUE(queue.push(ButtonEvent{"late", false, 5}));
+}
+
 // ---- reports
 
 TEST(HidSelector, ReadsBitsAndValues) {
@@ -96,6 +163,31 @@ TEST(HidReports, BecomeEdges) {
   EXPECT_THAT(reader.read(Report{2}, 12), ElementsAre(ButtonEvent{"hid:1:1:0.0", false, 12},
                                                       ButtonEvent{"hid:1:1:0.1", true, 12}));
   EXPECT_THAT(reader.release_all(13), ElementsAre(ButtonEvent{"hid:1:1:0.1", false, 13}));
+}
+
+// A thousand reports a second, each of which changes two buttons. A third one, of a hand, comes
+// through.
+TEST(HidReports, OfAHostilePadAreLeftOut) {
+  hid::ReportReader reader({"hid:1:1:0.0", "hid:1:1:0.1", "hid:1:1:0.2"});
+  std::map<std::string, std::size_t> presses, edges;
+  std::vector<std::string> babblers;
+  for (std::int64_t i = 0; i < 10'000; ++i) {
+    const auto held = static_cast<std::uint8_t>((i % 2 ? 3 : 0) | (i / 500 % 2 ? 4 : 0));
+    for (const ButtonEvent& event : reader.read(Report{held}, i * 1'000'000)) {
+      presses[event.button] += event.pressed ? 1 : 0;
+      ++edges[event.button];
+    }
+    for (const std::string& button : reader.take_babblers()) babblers.push_back(button);
+  }
+  for (const char* button : {"hid:1:1:0.0", "hid:1:1:0.1"}) {
+    EXPECT_EQ(presses[button], PressLimit::most_presses);
+    EXPECT_EQ(edges[button], 2 * PressLimit::most_presses);
+  }
+  EXPECT_EQ(edges["hid:1:1:0.2"], 19u);  // every half second from the first one on
+  EXPECT_THAT(babblers, ElementsAre("hid:1:1:0.0", "hid:1:1:0.1"));
+  EXPECT_EQ(reader.presses_left_out(), 2 * (5000 - PressLimit::most_presses));
+  EXPECT_THAT(reader.release_all(10'000'000'000),
+              ElementsAre(ButtonEvent{"hid:1:1:0.2", false, 10'000'000'000}));
 }
 
 TEST(HidReports, OfAnyLengthDoNoHarm) {

@@ -27,6 +27,23 @@ class BrokenPad final : public Buttons {
   OwnedDescriptor descriptor_{eventfd(1, EFD_CLOEXEC | EFD_NONBLOCK)};
 };
 
+// A button that is pushed and released without end.
+class BabblingPad final : public Buttons {
+ public:
+  std::string name() const override { return "wet"; }
+  int fd() const override { return descriptor_.get(); }
+  std::optional<ButtonsEvent> next() override {
+    pressed_ = !pressed_;
+    return ButtonEvent{"red", pressed_, ++taken_};
+  }
+  DeviceCounters counters() const override { return {}; }
+
+ private:
+  bool pressed_ = false;
+  std::int64_t taken_ = 0;
+  OwnedDescriptor descriptor_{eventfd(1, EFD_CLOEXEC | EFD_NONBLOCK)};
+};
+
 class ButtonDeskTest : public testing::Test {
  protected:
   // Reads what waits now; the timer ends the loop.
@@ -45,6 +62,7 @@ class ButtonDeskTest : public testing::Test {
     };
     EventLoop loop;
     ButtonDesk desk(mapped, std::move(devices), {loop, reports_, metrics_}, asks);
+    const auto ticks = loop.every(std::chrono::milliseconds(1), [&] { ++ticks_; });
     const auto timer = loop.every(std::chrono::milliseconds(50), [&] { loop.exit(); });
     loop.run();
     desk.count();
@@ -60,6 +78,7 @@ class ButtonDeskTest : public testing::Test {
   pipeline::Metrics metrics_;
   test::Hand hand_;
   bool listens_ = true, refining_ = false;
+  int ticks_ = 0;
 };
 
 TEST_F(ButtonDeskTest, AsksForTheActionOfAPressInTheCamerasClock) {
@@ -99,6 +118,27 @@ TEST_F(ButtonDeskTest, ALostDeviceIsReportedAndReadNoMore) {
   ASSERT_EQ(reports_.troubles().size(), 1u);
   EXPECT_EQ(reports_.troubles()[0], report::lasting("pad", "was unplugged"));
   EXPECT_EQ(metrics_.snapshot(1).devices.at("pad").at("lost"), 1u);
+}
+
+// The loop's timers go on. (Without an end to a turn, this test would never end.)
+TEST_F(ButtonDeskTest, ADeviceThatAlwaysHasAnotherEventDoesNotStopTheLoop) {
+  std::vector<ButtonDesk::Device> devices;
+  devices.push_back({std::make_unique<BabblingPad>(), 0});
+  run(std::move(devices));
+  EXPECT_GT(ticks_, 1);
+  const DeviceCounters counted = metrics_.snapshot(1).devices.at("wet");
+  EXPECT_GT(counted.at("turns with more events than are read at once"), 1u);
+}
+
+TEST_F(ButtonDeskTest, MoreEventsThanOneTurnReadsAllCome) {
+  for (int i = 0; i < 3 * ButtonDesk::most_events_a_turn; ++i) hand_.press("red");
+  run(hand(0));
+  const std::string said = said_.str();
+  std::size_t records = 0;
+  for (std::size_t at = said.find("record"); at != std::string::npos;
+       at = said.find("record", at + 1))
+    ++records;
+  EXPECT_EQ(records, 3u * ButtonDesk::most_events_a_turn);
 }
 
 }  // namespace rig_button_desk_test
