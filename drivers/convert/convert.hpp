@@ -53,6 +53,9 @@ struct WirePicture {
   std::span<const std::uint8_t> bytes;  // may be more than the picture needs
 };
 
+// No picture is larger, as it comes or as it is delivered: 16384x16384 pixels of four bytes.
+constexpr std::size_t most_picture_bytes = std::size_t{1} << 30;
+
 // Returns the format that a picture is converted to: gray8 or gray16, also for Bayer, whose samples
 // stay a mosaic; rgb8 or rgb16; yuv422p8 for 4:2:2 that is coded in the same way (BT.709, limited
 // range), whose samples then stay unchanged. Samples of 9 to 15 bits become 16 bits of full range,

@@ -13,6 +13,7 @@
 #include <cstring>
 #include <deque>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <regex>
 
@@ -126,6 +127,75 @@ convert::WireFormat wire_format(const Known& known, const std::optional<lc::Colo
   return wire;
 }
 
+// Takes what libcamera's thread reports of a camera. A signal of libcamera 0.0.3 may be
+// disconnected only while nobody emits it: it copies its list of receivers and calls them
+// afterwards, and would call one that was deleted meanwhile. A mailbox is therefore never
+// disconnected. The camera's signals own it, and every opening of the same camera uses the same
+// one.
+class Mailbox {
+ public:
+  // Accepts requests that come back from now on.
+  void open() {
+    const std::lock_guard lock(mutex_);
+    is_open_ = true;
+  }
+  // Forgets requests that came back, and those that still will.
+  void close() {
+    const std::lock_guard lock(mutex_);
+    is_open_ = false;
+    done_.clear();
+  }
+  bool unplugged() const {
+    const std::lock_guard lock(mutex_);
+    return unplugged_;
+  }
+  // Returns the next request that came back; null after the time-out, or if the camera is gone.
+  lc::Request* wait(std::chrono::milliseconds timeout) {
+    std::unique_lock lock(mutex_);
+    wake_.wait_for(lock, timeout, [this] { return unplugged_ || !done_.empty(); });
+    if (unplugged_ || done_.empty()) return nullptr;
+    lc::Request* request = done_.front();
+    done_.pop_front();
+    return request;
+  }
+
+  // These two run on libcamera's thread.
+  void completed(lc::Request* request) {
+    const std::lock_guard lock(mutex_);
+    if (!is_open_) return;
+    done_.push_back(request);
+    wake_.notify_one();
+  }
+  void disconnected() {
+    const std::lock_guard lock(mutex_);
+    unplugged_ = true;
+    wake_.notify_one();
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  bool is_open_ = false, unplugged_ = false;
+  std::deque<lc::Request*> done_;
+};
+
+// Returns the camera's mailbox, which is made when the camera is opened for the first time. A
+// camera that was unplugged and is back is another camera to libcamera.
+std::shared_ptr<Mailbox> mailbox_of(const std::shared_ptr<lc::Camera>& camera) {
+  static std::mutex mutex;
+  static std::map<std::weak_ptr<lc::Camera>, std::weak_ptr<Mailbox>, std::owner_less<>> mailboxes;
+  const std::lock_guard lock(mutex);
+  std::erase_if(mailboxes, [](const auto& entry) { return entry.first.expired(); });
+  if (const auto found = mailboxes.find(camera); found != mailboxes.end())
+    return found->second.lock();
+  const auto mailbox = std::make_shared<Mailbox>();
+  camera->requestCompleted.connect(
+      mailbox.get(), [mailbox](lc::Request* request) { mailbox->completed(request); });
+  camera->disconnected.connect(mailbox.get(), [mailbox] { mailbox->disconnected(); });
+  mailboxes.emplace(camera, mailbox);
+  return mailbox;
+}
+
 // Maps a file of a buffer for reading.
 class MappedFile {
  public:
@@ -202,6 +272,7 @@ struct Device::Impl {
   explicit Impl(const CameraSettings& its_settings) : settings(its_settings) {
     find();
     acquire();
+    mailbox = mailbox_of(camera);
     try {
       agree();
       allocate();
@@ -209,14 +280,8 @@ struct Device::Impl {
       release();
       throw;
     }
-    camera->requestCompleted.connect(this, &Impl::completed);
-    camera->disconnected.connect(this, &Impl::disconnected);
   }
-  ~Impl() {
-    camera->requestCompleted.disconnect(this);
-    camera->disconnected.disconnect(this);
-    release();
-  }
+  ~Impl() { release(); }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
@@ -301,6 +366,11 @@ struct Device::Impl {
                      convert::bayer_pattern(agreed.wire)};
     const std::size_t least =
         convert::picture_bytes(agreed.wire, agreed.format.width, agreed.format.height);
+    const std::size_t delivered =
+        frame_bytes(agreed.format.format, agreed.format.width, agreed.format.height);
+    if (std::max(least, delivered) > convert::most_picture_bytes)
+      refuse("says its pictures are " + config.size.toString() + " pixels, which is more than " +
+             std::to_string(convert::most_picture_bytes) + " bytes");
     if (config.frameSize < least)
       refuse("says that a frame is " + std::to_string(config.frameSize) +
              " bytes; its picture is " + std::to_string(least));
@@ -353,18 +423,6 @@ struct Device::Impl {
     return controls;
   }
 
-  // Runs on libcamera's thread.
-  void completed(lc::Request* request) {
-    const std::lock_guard lock(mutex);
-    done.push_back(request);
-    wake.notify_one();
-  }
-  void disconnected() {
-    const std::lock_guard lock(mutex);
-    unplugged = true;
-    wake.notify_one();
-  }
-
   Completed outcome_of(lc::Request& request) const {
     Completed completed;
     completed.buffer = request.cookie();
@@ -403,11 +461,7 @@ struct Device::Impl {
   Agreed agreed;
   bool streaming = false;
   std::vector<std::unique_ptr<lc::Request>> requests;  // by buffer; while streaming
-
-  std::mutex mutex;  // guards the members below
-  std::condition_variable wake;
-  std::deque<lc::Request*> done;
-  bool unplugged = false;
+  std::shared_ptr<Mailbox> mailbox;
 };
 
 Device::Device(const CameraSettings& settings) : impl_(std::make_unique<Impl>(settings)) {}
@@ -422,8 +476,7 @@ bool Device::streaming() const {
   return impl_->streaming;
 }
 bool Device::unplugged() const {
-  const std::lock_guard lock(impl_->mutex);
-  return impl_->unplugged;
+  return impl_->mailbox->unplugged();
 }
 
 void Device::start(const std::optional<Exposure>& exposure) {
@@ -437,6 +490,7 @@ void Device::start(const std::optional<Exposure>& exposure) {
     impl_->requests.push_back(std::move(request));
   }
   const lc::ControlList controls = impl_->starting_controls(exposure);
+  impl_->mailbox->open();
   const int error = impl_->camera->start(&controls);
   if (error < 0) impl_->requests.clear();
   impl_->check(error, "cannot start");
@@ -448,18 +502,13 @@ void Device::start(const std::optional<Exposure>& exposure) {
 void Device::stop() {
   if (!std::exchange(impl_->streaming, false)) return;
   impl_->camera->stop();  // gives every request back
-  const std::lock_guard lock(impl_->mutex);
-  impl_->done.clear();
+  impl_->mailbox->close();
   impl_->requests.clear();
 }
 
 std::optional<Completed> Device::wait(std::chrono::milliseconds timeout) {
-  std::unique_lock lock(impl_->mutex);
-  impl_->wake.wait_for(lock, timeout, [this] { return impl_->unplugged || !impl_->done.empty(); });
-  if (impl_->unplugged || impl_->done.empty()) return std::nullopt;
-  lc::Request* request = impl_->done.front();
-  impl_->done.pop_front();
-  return impl_->outcome_of(*request);
+  lc::Request* request = impl_->mailbox->wait(timeout);
+  return request ? std::optional(impl_->outcome_of(*request)) : std::nullopt;
 }
 
 Exposure Device::possible(const Exposure& wanted) const {

@@ -44,7 +44,7 @@ struct Completed {
   std::size_t buffer = 0;
   Fate fate = Fate::given_up;
   std::uint32_t sequence = 0;        // the kernel's
-  std::int64_t timestamp_ns = 0;     // CLOCK_MONOTONIC; 0 where there is none
+  std::int64_t timestamp_ns = 0;     // CLOCK_MONOTONIC or CLOCK_BOOTTIME; 0 where there is none
   std::optional<double> exposure_s;  // as the camera reports it; UVC cameras do not
   double gain = 1;                   // known only with exposure_s
   bool overfull = false;             // claims to hold more than the buffer can

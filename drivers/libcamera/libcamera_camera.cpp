@@ -7,6 +7,8 @@
 #include "drivers/frame_order.hpp"
 #include "drivers/host_clock.hpp"
 #include "drivers/libcamera/device.hpp"
+#include "drivers/other_clock.hpp"
+#include "drivers/patience.hpp"
 
 namespace previz {
 namespace {
@@ -45,19 +47,9 @@ class LibcameraCamera final : public Camera {
   CameraEvent next(std::chrono::milliseconds timeout) override {
     if (!lost_.empty()) return DeviceTrouble{name(), lost_, true};
     if (!device_.streaming()) return NoFrame{};
-    const auto deadline = std::chrono::steady_clock::now() + timeout;
-    for (;;) {
-      const auto left =
-          std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
-      const std::optional<Completed> completed =
-          device_.wait(std::max(left, std::chrono::milliseconds(0)));
-      if (device_.unplugged()) lost_ = "was unplugged";
-      if (!lost_.empty()) return DeviceTrouble{name(), lost_, true};
-      if (!completed) return NoFrame{};
-      FramePtr frame = read(*completed);
-      queue_again(completed->buffer);
-      if (frame) return frame;
-    }
+    return wait_patiently({}, timeout, [this](std::chrono::nanoseconds left) {
+      return attempt(std::chrono::ceil<std::chrono::milliseconds>(left));
+    });
   }
 
   bool set_exposure(double exposure_s, double gain) override {
@@ -70,6 +62,18 @@ class LibcameraCamera final : public Camera {
   }
 
  private:
+  // Waits for a buffer; returns nothing for one without a whole frame.
+  std::optional<CameraEvent> attempt(std::chrono::milliseconds left) {
+    const std::optional<Completed> completed = device_.wait(left);
+    if (device_.unplugged()) lost_ = "was unplugged";
+    if (!lost_.empty()) return DeviceTrouble{name(), lost_, true};
+    if (!completed) return NoFrame{};
+    FramePtr frame = read(*completed);
+    queue_again(completed->buffer);
+    if (!frame) return std::nullopt;
+    return frame;
+  }
+
   // Queues a buffer again; a new exposure goes with the next request.
   void queue_again(std::size_t buffer) {
     const bool changed = std::exchange(changed_, false);
@@ -96,9 +100,10 @@ class LibcameraCamera final : public Camera {
     frame->source = settings_.source;
     frame->sequence = sequence;
     frame->arrival_ns = arrival_ns;
-    const bool stamped = completed.timestamp_ns > 0;
-    frame->timestamp_ns =
-        order_.time_of(stamped ? std::optional(completed.timestamp_ns) : std::nullopt, arrival_ns);
+    std::optional<std::int64_t> stamp_ns;
+    if (completed.timestamp_ns > 0)
+      stamp_ns = sensor_time_ns(boottime_, completed.timestamp_ns, arrival_ns);
+    frame->timestamp_ns = order_.time_of(stamp_ns, arrival_ns);
     const std::optional<Exposure> exposure = exposure_of(completed, frame->timestamp_ns);
     if (!exposure) return left_out("frames between two exposures");
     apply_exposure(*frame, *exposure, settings_.responsivity);
@@ -139,6 +144,7 @@ class LibcameraCamera final : public Camera {
   std::vector<std::uint8_t> joined_;
   std::string lost_;  // why nothing more comes; empty while all is well
   DeviceCounters counters_;
+  OtherClock boottime_{read_beside_monotonic(CLOCK_BOOTTIME)};
   FrameOrder order_;
 };
 

@@ -14,6 +14,7 @@ namespace {
 constexpr double exposure_step_s = 100e-6;  // the unit of V4L2_CID_EXPOSURE_ABSOLUTE
 // A driver that never ends its lists must not hold us for ever.
 constexpr std::uint32_t most_entries = 1000;
+constexpr double most_rate_hz = 100'000;
 
 // Returns the bounds of a control; none if the node has no such control, or not now.
 std::optional<v4l2_queryctrl> query(Node& node, std::uint32_t id) {
@@ -139,6 +140,22 @@ class Configuration {
     agreed_.stride = wire->layout == convert::Layout::mjpeg ? 0 : picture.bytesperline;
     agreed_.format = {convert::delivered_format(*wire), static_cast<int>(picture.width),
                       static_cast<int>(picture.height), 0, convert::bayer_pattern(*wire)};
+    check_sizes();
+  }
+
+  // A device may claim anything, and memory is asked for by what it claims.
+  void check_sizes() {
+    const auto& [format, width, height, rate_hz, bayer] = agreed_.format;
+    const std::size_t row = convert::row_bytes(agreed_.wire, width);
+    if (agreed_.stride != 0 && agreed_.stride < row)
+      refuse("says that its rows are " + std::to_string(agreed_.stride) + " bytes; " +
+             std::to_string(row) + " are needed");
+    agreed_.least_bytes = convert::picture_bytes(agreed_.wire, width, height, agreed_.stride);
+    const std::size_t bytes = std::max(agreed_.least_bytes, frame_bytes(format, width, height));
+    if (bytes > convert::most_picture_bytes)
+      refuse("says its pictures are " + std::to_string(width) + "x" + std::to_string(height) +
+             " pixels and " + std::to_string(bytes) + " bytes; " +
+             std::to_string(convert::most_picture_bytes) + " bytes are the most");
   }
 
   static std::string size_text(std::uint32_t width, std::uint32_t height) {
@@ -176,15 +193,15 @@ class Configuration {
     parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     v4l2_fract& period = parameters.parm.capture.timeperframe;
     if (settings_.rate_hz) {
-      if (!(*settings_.rate_hz > 0 && *settings_.rate_hz <= 100'000))
+      if (!(*settings_.rate_hz > 0 && *settings_.rate_hz <= most_rate_hz))
         refuse("a rate of " + std::to_string(*settings_.rate_hz) + " Hz is not possible");
       period = {1000, static_cast<std::uint32_t>(std::lround(1000 * *settings_.rate_hz))};
       check(node_.control(VIDIOC_S_PARM, &parameters), "its rate cannot be set");
     } else if (node_.control(VIDIOC_G_PARM, &parameters) != 0) {
       return;
     }
-    if (period.numerator > 0)
-      agreed_.format.rate_hz = double(period.denominator) / period.numerator;
+    const double rate_hz = period.numerator > 0 ? double(period.denominator) / period.numerator : 0;
+    if (rate_hz <= most_rate_hz) agreed_.format.rate_hz = rate_hz;  // otherwise it is not known
   }
 
   void agree_on_exposure() {
@@ -235,10 +252,11 @@ Agreed configure(Node& node, const CameraSettings& settings) {
 
 std::optional<double> set_exposure(Node& node, double exposure_s) {
   const std::optional<v4l2_queryctrl> bounds = query(node, V4L2_CID_EXPOSURE_ABSOLUTE);
-  if (!bounds || !(exposure_s > 0) || bounds->maximum < 1) return std::nullopt;
+  if (!bounds || !(exposure_s > 0)) return std::nullopt;
+  const std::int32_t least = std::max(1, bounds->minimum);
+  if (bounds->maximum < least) return std::nullopt;
   const double steps = std::clamp(std::round(exposure_s / exposure_step_s),
-                                  static_cast<double>(std::max(1, bounds->minimum)),
-                                  static_cast<double>(std::max(1, bounds->maximum)));
+                                  static_cast<double>(least), static_cast<double>(bounds->maximum));
   if (!write(node, V4L2_CID_EXPOSURE_ABSOLUTE, static_cast<std::int32_t>(steps)))
     return std::nullopt;
   const std::optional<std::int32_t> made = read(node, V4L2_CID_EXPOSURE_ABSOLUTE);

@@ -18,8 +18,9 @@ namespace previz::v4l2 {
 struct Agreed {
   CameraFormat format;
   convert::WireFormat wire;
-  std::size_t stride = 0;  // bytes of a row; 0 for mjpeg
-  Exposure exposure;       // 0 s if the node does not report it
+  std::size_t stride = 0;       // bytes of a row; 0 for mjpeg
+  std::size_t least_bytes = 0;  // of a whole picture; 0 for mjpeg, whose pictures vary
+  Exposure exposure;            // 0 s if the node does not report it
   bool drives_exposure = false;
 };
 

@@ -90,8 +90,10 @@ std::optional<convert::WireFormat> wire_format(const v4l2_pix_format& format) {
 
 std::string fourcc_name(std::uint32_t fourcc) {
   std::string name;
-  for (int shift = 0; shift < 32; shift += 8)
-    name += static_cast<char>(fourcc >> shift & (shift == 24 ? 0x7f : 0xff));
+  for (int shift = 0; shift < 32; shift += 8) {
+    const std::uint32_t byte = fourcc >> shift & (shift == 24 ? 0x7f : 0xff);
+    name += byte >= 0x20 && byte < 0x7f ? static_cast<char>(byte) : '?';  // it goes into messages
+  }
   while (name.ends_with(' ')) name.pop_back();
   return fourcc >> 31 ? name + "-BE" : name;
 }

@@ -30,7 +30,7 @@ class KernelNode final : public Node {
   }
 
   bool wait(std::chrono::milliseconds timeout) override {
-    pollfd fd{descriptor_.get(), POLLIN, 0};
+    pollfd fd{descriptor_.get(), POLLIN | POLLPRI, 0};
     return ::poll(&fd, 1, static_cast<int>(timeout.count())) > 0;
   }
 

@@ -17,7 +17,8 @@ class Node {
   // Calls ioctl(2), and again while signals interrupt it. Returns 0 or an errno.
   virtual int control(unsigned long request, void* argument) = 0;
 
-  // Waits until a buffer can be dequeued, or something is wrong; returns false after the time-out.
+  // Waits until a buffer or an event can be dequeued, or something is wrong; returns false after
+  // the time-out.
   virtual bool wait(std::chrono::milliseconds timeout) = 0;
 
   // Maps a buffer for reading, until unmap() or the node's end. Returns nothing, with errno set, on

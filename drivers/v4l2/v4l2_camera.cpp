@@ -10,6 +10,7 @@
 #include "drivers/error.hpp"
 #include "drivers/frame_order.hpp"
 #include "drivers/host_clock.hpp"
+#include "drivers/patience.hpp"
 #include "drivers/v4l2/configure.hpp"
 #include "drivers/v4l2/find.hpp"
 
@@ -21,6 +22,7 @@ constexpr std::uint32_t buffers_wanted = 8;
 constexpr int v4l2_settle_frames = 4;
 // A device that answers every call with an I/O error is gone, whatever it calls itself.
 constexpr int errors_until_lost = 10;
+constexpr int most_events = 16;
 
 std::int64_t to_ns(const timeval& time) {
   return std::int64_t{time.tv_sec} * 1'000'000'000 + std::int64_t{time.tv_usec} * 1000;
@@ -36,8 +38,9 @@ v4l2_buffer empty_buffer(std::uint32_t index) {
 
 class V4l2Camera final : public Camera {
  public:
-  V4l2Camera(std::unique_ptr<v4l2::Node> node, const CameraSettings& settings)
+  V4l2Camera(std::unique_ptr<v4l2::Node> node, const CameraSettings& settings, HostClock clock)
       : settings_(settings),
+        clock_(std::move(clock)),
         node_(std::move(node)),
         agreed_(v4l2::configure(*node_, settings)),
         ledger_(agreed_.exposure, v4l2_settle_frames),
@@ -64,6 +67,9 @@ class V4l2Camera final : public Camera {
       release_buffers();
       throw;
     }
+    v4l2_event_subscription changes{};
+    changes.type = V4L2_EVENT_SOURCE_CHANGE;
+    has_events_ = node_->control(VIDIOC_SUBSCRIBE_EVENT, &changes) == 0;
     streaming_ = true;
     errors_ = 0;
     order_.restart();
@@ -81,43 +87,66 @@ class V4l2Camera final : public Camera {
   CameraEvent next(std::chrono::milliseconds timeout) override {
     if (!lost_.empty()) return DeviceTrouble{name(), lost_, true};
     if (!streaming_) return NoFrame{};
-    const auto deadline = std::chrono::steady_clock::now() + timeout;
-    std::size_t late = 0;  // buffers without a frame after the deadline; those that wait are taken
-    for (;;) {
-      const auto left =
-          std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
-      if (!node_->wait(std::max(left, std::chrono::milliseconds(0)))) return NoFrame{};
-      v4l2_buffer buffer = empty_buffer(0);
-      const int error = node_->control(VIDIOC_DQBUF, &buffer);
-      if (error == 0) {
-        errors_ = 0;
-        if (FramePtr frame = take(buffer)) return frame;
-      } else if (error != EAGAIN) {
-        ++counters_["read errors"];
-        if (error != EIO || ++errors_ >= errors_until_lost) lost_ = lost_text(error);
-      }
-      if (!lost_.empty()) return DeviceTrouble{name(), lost_, true};
-      if (std::chrono::steady_clock::now() >= deadline &&
-          (error == EAGAIN || ++late >= memory_.size()))
-        return NoFrame{};
-    }
+    return wait_patiently(clock_, timeout, [this](std::chrono::nanoseconds left) {
+      return attempt(std::chrono::ceil<std::chrono::milliseconds>(left));
+    });
   }
 
   bool set_exposure(double exposure_s, double gain) override {
     if (!agreed_.drives_exposure || gain != 1) return false;
-    const std::int64_t before_ns = monotonic_ns();
+    const std::int64_t before_ns = now_ns();
     const std::optional<double> applied = v4l2::set_exposure(*node_, exposure_s);
     if (!applied) {
       ++counters_["exposures refused"];
       return false;
     }
-    ledger_.changed(before_ns, monotonic_ns(), {*applied, 1});
+    ledger_.changed(before_ns, now_ns(), {*applied, 1});
     return true;
   }
 
  private:
   void check(int error, const char* what) const {
     if (error != 0) throw Error(name() + ": " + what + ": " + std::strerror(error));
+  }
+
+  std::int64_t now_ns() const {
+    return std::chrono::nanoseconds(clock_.now().time_since_epoch()).count();
+  }
+
+  // Waits for a buffer; returns nothing for one without a whole frame.
+  std::optional<CameraEvent> attempt(std::chrono::milliseconds left) {
+    if (!node_->wait(left)) return NoFrame{};
+    look_for_events();
+    FramePtr frame = lost_.empty() ? dequeue() : nullptr;
+    if (frame) return frame;
+    if (!lost_.empty()) return DeviceTrouble{name(), lost_, true};
+    return std::nullopt;
+  }
+
+  FramePtr dequeue() {
+    v4l2_buffer buffer = empty_buffer(0);
+    const int error = node_->control(VIDIOC_DQBUF, &buffer);
+    if (error == EAGAIN) return nullptr;
+    if (error != 0) {
+      ++counters_["read errors"];
+      if (error != EIO || ++errors_ >= errors_until_lost) lost_ = lost_text(error);
+      return nullptr;
+    }
+    errors_ = 0;
+    return take(buffer);
+  }
+
+  // A source that changes its picture (another size on the cable of a grabber) stops the stream,
+  // and what still comes of it is of no use. The camera must be opened anew, with the new format.
+  void look_for_events() {
+    if (!has_events_) return;
+    v4l2_event event{};
+    // The kernel keeps a few events only.
+    for (int i = 0; i < most_events && node_->control(VIDIOC_DQEVENT, &event) == 0; ++i) {
+      const bool size_changed = event.type == V4L2_EVENT_SOURCE_CHANGE &&
+                                (event.u.src_change.changes & V4L2_EVENT_SRC_CH_RESOLUTION) != 0;
+      if (size_changed) lost_ = "has changed its picture";
+    }
   }
 
   static std::string lost_text(int error) {
@@ -132,17 +161,24 @@ class V4l2Camera final : public Camera {
     request.memory = V4L2_MEMORY_MMAP;
     check(node_->control(VIDIOC_REQBUFS, &request), "gives no buffers");
     if (request.count < 2) throw Error(name() + ": gives fewer than two buffers");
+    if (request.count > VIDEO_MAX_FRAME)
+      throw Error(name() + ": says that it gives " + std::to_string(request.count) +
+                  " buffers, which cannot be");
     for (std::uint32_t i = 0; i < request.count; ++i) {
       v4l2_buffer buffer = empty_buffer(i);
       check(node_->control(VIDIOC_QUERYBUF, &buffer), "does not describe its buffers");
-      memory_.push_back(node_->map(buffer.m.offset, buffer.length));
-      if (memory_.back().empty()) check(errno, "a buffer cannot be mapped");
+      if (buffer.length < agreed_.least_bytes)
+        throw Error(name() + ": gives buffers of " + std::to_string(buffer.length) +
+                    " bytes; a picture has " + std::to_string(agreed_.least_bytes));
+      const std::span<const std::uint8_t> memory = node_->map(buffer.m.offset, buffer.length);
+      if (memory.empty())
+        throw Error(name() + ": a buffer cannot be mapped: " + std::strerror(errno));
+      memory_.push_back(memory);
     }
   }
 
   void release_buffers() {
-    for (const std::span<const std::uint8_t> memory : memory_)
-      if (!memory.empty()) node_->unmap(memory);
+    for (const std::span<const std::uint8_t> memory : memory_) node_->unmap(memory);
     memory_.clear();
     v4l2_requestbuffers request{};
     request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -153,7 +189,7 @@ class V4l2Camera final : public Camera {
   // Returns the frame in a buffer and gives the buffer back to the kernel; null, and counted, if it
   // is not whole.
   FramePtr take(v4l2_buffer& buffer) {
-    const std::int64_t arrival_ns = monotonic_ns();
+    const std::int64_t arrival_ns = now_ns();
     if (buffer.index >= memory_.size()) return left_out("buffers that are none of ours");
     FramePtr frame = read(buffer, arrival_ns);
     v4l2_buffer again = empty_buffer(buffer.index);
@@ -194,22 +230,24 @@ class V4l2Camera final : public Camera {
   }
 
   const CameraSettings settings_;
+  const HostClock clock_;
   std::unique_ptr<v4l2::Node> node_;
   const v4l2::Agreed agreed_;
   ExposureLedger ledger_;
   std::vector<std::span<const std::uint8_t>> memory_;  // by buffer index; while streaming
   bool streaming_ = false;
-  std::string lost_;  // why nothing more comes; empty while all is well
-  int errors_ = 0;    // in a row
+  bool has_events_ = false;  // the node reports a change of its source
+  std::string lost_;         // why nothing more comes; empty while all is well
+  int errors_ = 0;           // in a row
   DeviceCounters counters_;
   FrameOrder order_;
 };
 
 }  // namespace
 
-std::unique_ptr<Camera> open_v4l2(std::unique_ptr<v4l2::Node> node,
-                                  const CameraSettings& settings) {
-  return std::make_unique<V4l2Camera>(std::move(node), settings);
+std::unique_ptr<Camera> open_v4l2(std::unique_ptr<v4l2::Node> node, const CameraSettings& settings,
+                                  HostClock clock) {
+  return std::make_unique<V4l2Camera>(std::move(node), settings, std::move(clock));
 }
 
 std::unique_ptr<Camera> open_v4l2(const CameraSettings& settings) {

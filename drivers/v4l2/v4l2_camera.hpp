@@ -8,6 +8,7 @@
 
 #include "drivers/camera.hpp"
 #include "drivers/camera_settings.hpp"
+#include "drivers/host_clock.hpp"
 #include "drivers/usb/usb.hpp"
 #include "drivers/v4l2/node.hpp"
 
@@ -25,6 +26,7 @@ std::vector<FoundCamera> find_v4l2();
 std::optional<usb::Place> usb_place_of_v4l2(const std::string& device);
 
 // Opens the camera on a node that is open already.
-std::unique_ptr<Camera> open_v4l2(std::unique_ptr<v4l2::Node> node, const CameraSettings& settings);
+std::unique_ptr<Camera> open_v4l2(std::unique_ptr<v4l2::Node> node, const CameraSettings& settings,
+                                  HostClock clock = {});
 
 }  // namespace previz

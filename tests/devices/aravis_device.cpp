@@ -71,6 +71,11 @@ class AravisDevice final : public DeviceUnderTest {
   }
 
   bool may_lose_frames() const override { return lost_ > 0; }
+  bool spoil() override {
+    if (triggered_) return false;  // no frame, no next trigger
+    g_object_set(camera_, "gvsp-lost-ratio", 0.5, nullptr);
+    return true;
+  }
 
   std::span<const Exposure> exposures() const override {
     static constexpr std::array<Exposure, 3> all{{{0.001, 1}, {0.004, 1}, {0.016, 1}}};

@@ -82,6 +82,22 @@ class CameraCompliance : public testing::TestWithParam<RegisteredDevice> {
     return std::nullopt;
   }
 
+  // Returns by how much a call for a frame lasts longer than it was allowed to, where no frame
+  // came: the median of some calls, which is not moved by those that the machine interrupted.
+  // Returns nothing where frames came always.
+  std::optional<std::chrono::duration<double>> overrun(Camera& camera, milliseconds asked) {
+    std::vector<std::chrono::duration<double>> in_vain;
+    for (int i = 0; i < 21; ++i) {
+      const auto begin = Clock::now();
+      if (std::holds_alternative<NoFrame>(camera.next(asked)))
+        in_vain.push_back(Clock::now() - begin - asked);
+    }
+    if (in_vain.empty()) return std::nullopt;
+    const auto middle = in_vain.begin() + static_cast<std::ptrdiff_t>(in_vain.size() / 2);
+    std::ranges::nth_element(in_vain, middle);
+    return *middle;
+  }
+
   std::unique_ptr<DeviceUnderTest> device_;
   FramePtr last_;
 };
@@ -189,6 +205,27 @@ TEST_P(CameraCompliance, DoesNotWaitWhereItIsAskedNotTo) {
   const auto middle = in_vain.begin() + static_cast<std::ptrdiff_t>(in_vain.size() / 2);
   std::ranges::nth_element(in_vain, middle);
   EXPECT_LT(middle->count(), 0.1 * frame.count());
+}
+
+// A camera waits in whole milliseconds, and may decode one frame more. That lasts no longer than a
+// frame, or the camera could not keep up with itself; one that does not say its rate is taken for
+// one of 60 Hz.
+TEST_P(CameraCompliance, ReturnsByItsDeadlineWhateverComes) {
+  const auto camera = device_->open();
+  camera->start();
+  ASSERT_NO_FATAL_FAILURE(take(*camera, 1));
+  const double rate_hz = camera->format().rate_hz > 0 ? camera->format().rate_hz : 60;
+  const std::chrono::duration<double> frame(1 / rate_hz), millisecond(0.001);
+  const auto half = std::chrono::floor<milliseconds>(frame / 2);
+  if (const auto over = overrun(*camera, half)) {
+    EXPECT_LT(*over, 0.1 * frame + millisecond);
+  }
+  if (!device_->spoil()) return;
+  for (const milliseconds asked : {half, milliseconds(100)}) {
+    if (const auto over = overrun(*camera, asked)) {
+      EXPECT_LT(*over, frame + millisecond) << asked.count();
+    }
+  }
 }
 
 TEST_P(CameraCompliance, ExposuresAppliedAreOnTheirFrames) {

@@ -33,6 +33,10 @@ class DeviceUnderTest {
   // Whether frames may be lost while somebody listens: on a bad network, under load.
   virtual bool may_lose_frames() const { return false; }
 
+  // Makes every frame, or most of them, come damaged from now on, one after the other. Returns
+  // false where this device cannot.
+  virtual bool spoil() { return false; }
+
   // Two exposures the device can take exactly; none where it cannot be driven.
   struct Exposure {
     double exposure_s;

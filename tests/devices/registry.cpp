@@ -15,6 +15,9 @@ std::span<const RegisteredDevice> registered_devices() {
         {"replay", false, true, make_replay},
         {"replay_at_four_times_the_speed", false, true, make_fast_replay},
         {"replay_as_fast_as_consumed", false, true, make_unpaced_replay},
+#ifdef PREVIZ_WITH_V4L2
+        {"v4l2_on_a_stand_in", true, true, make_v4l2_stand_in},
+#endif
 #ifdef PREVIZ_WITH_ARAVIS
         {"aravis", true, true, make_aravis},
         {"aravis_triggered_by_software", true, false, make_triggered_aravis},

@@ -8,15 +8,18 @@
 #include <chrono>
 #include <cstring>
 #include <deque>
+#include <functional>
 #include <map>
-#include <thread>
+#include <optional>
 #include <vector>
 
+#include "drivers/host_clock.hpp"
 #include "drivers/v4l2/node.hpp"
 
 namespace previz::v4l2 {
 
-// Outlives the node that stands on it, so that a test can look at it afterwards.
+// Outlives the node that stands on it, so that a test can look at it afterwards. Time is the test's
+// own, unless a test gives it the host's: it passes by waiting, and a little by each call.
 struct FakeDevice {
   // What it can.
   std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
@@ -31,6 +34,14 @@ struct FakeDevice {
   v4l2_fract period{1, 30};
   std::map<std::uint32_t, std::int32_t> values;
 
+  // What it makes of what it is asked.
+  std::optional<std::uint32_t> buffers_granted;  // none: as many as are asked for
+  std::uint32_t most_mapped = 1000;              // buffers that can be mapped
+  std::optional<std::uint32_t> buffer_length;    // none: sizeimage
+  std::function<void(v4l2_pix_format&)> format_made = [](v4l2_pix_format&) {};
+  std::optional<int> queues_until_error;  // so many buffers are queued; then ENOMEM
+  bool has_events = false;
+
   // Its buffers, and what it has sent.
   std::vector<std::vector<std::uint8_t>> memory;
   int mapped = 0;
@@ -39,14 +50,33 @@ struct FakeDevice {
   std::deque<v4l2_buffer> done;
   std::uint32_t sequence = 0;
   std::deque<int> dequeue_errors;  // given first
+  std::deque<v4l2_event> events;
+  bool subscribed = false;
   bool unplugged = false;
-  int damaged_frames = 0;  // so many come, one each time that somebody waits, after frame_interval
-  static constexpr std::chrono::milliseconds frame_interval{5};
+
+  // What it sends by itself, a frame each `frame_interval` from its start on.
+  int frames_to_come = 0;
+  std::function<void(FakeDevice&)> send_frame;  // the frame that is due at next_frame
+  std::chrono::nanoseconds frame_interval = std::chrono::milliseconds(5);
+  HostClock::Time next_frame{};
+  // Every buffer that is queued comes back at once, damaged.
+  bool damages_all = false;
+  std::chrono::nanoseconds dequeue_time{0};  // what the caller needs for such a buffer
+
+  // Its time.
+  std::int64_t now_ns = 1'000'000'000'000;
+  HostClock clock{[this] { return HostClock::Time(std::chrono::nanoseconds(now_ns)); },
+                  [this](HostClock::Time time) {
+                    now_ns = std::max<std::int64_t>(
+                        now_ns, std::chrono::nanoseconds(time.time_since_epoch()).count());
+                  }};
 
   // What was asked of it.
   int dequeued = 0;
   std::chrono::milliseconds waited_in_vain{0};  // in all
 
+  FakeDevice(const FakeDevice&) = delete;
+  FakeDevice& operator=(const FakeDevice&) = delete;
   FakeDevice() {
     picture.pixelformat = V4L2_PIX_FMT_YUYV;
     picture.width = 32;
@@ -90,25 +120,31 @@ class FakeNode final : public Node {
   explicit FakeNode(FakeDevice& device) : device_(device) {}
 
   bool wait(std::chrono::milliseconds timeout) override {
-    if (device_.unplugged || !device_.done.empty() || !device_.dequeue_errors.empty()) return true;
-    if (device_.damaged_frames > 0) {
-      --device_.damaged_frames;
-      std::this_thread::sleep_for(FakeDevice::frame_interval);
-      device_.send(0, 1, [](v4l2_buffer& buffer) { buffer.flags |= V4L2_BUF_FLAG_ERROR; });
+    const HostClock::Time end = device_.clock.now() + timeout;
+    send_due();
+    if (has_something()) return true;
+    if (device_.frames_to_come > 0 && device_.next_frame <= end) {
+      device_.clock.sleep_until(device_.next_frame);
+      send_due();
       return true;
     }
     device_.waited_in_vain += timeout;
-    std::this_thread::sleep_for(timeout);
+    device_.clock.sleep_until(end);
     return false;
   }
 
-  std::span<const std::uint8_t> map(std::size_t offset, std::size_t) override {
+  std::span<const std::uint8_t> map(std::size_t offset, std::size_t length) override {
+    if (device_.mapped >= static_cast<int>(device_.most_mapped) || length == 0) {
+      errno = length == 0 ? EINVAL : ENOMEM;
+      return {};
+    }
     ++device_.mapped;
     return device_.memory.at(offset);
   }
   void unmap(std::span<const std::uint8_t>) override { --device_.mapped; }
 
   int control(unsigned long request, void* argument) override {
+    device_.now_ns += 10'000;  // what a call takes
     if (device_.unplugged) return ENODEV;
     switch (request) {
       case VIDIOC_QUERYCAP:
@@ -140,6 +176,21 @@ class FakeNode final : public Node {
   }
 
  private:
+  bool has_something() const {
+    return device_.unplugged || device_.damages_all || !device_.done.empty() ||
+           !device_.dequeue_errors.empty() || (device_.subscribed && !device_.events.empty());
+  }
+
+  // Sends every frame that is due by now, as a camera does while nobody waits for it.
+  void send_due() {
+    const HostClock::Time now = device_.clock.now();
+    while (device_.streaming && device_.frames_to_come > 0 && device_.next_frame <= now) {
+      --device_.frames_to_come;
+      device_.send_frame(device_);
+      device_.next_frame += device_.frame_interval;
+    }
+  }
+
   int entry(v4l2_fmtdesc& description) const {
     if (description.index >= device_.formats.size()) return EINVAL;
     description.pixelformat = device_.formats[description.index];
@@ -162,6 +213,7 @@ class FakeNode final : public Node {
     wanted.bytesperline = 2 * wanted.width + device_.extra_stride;
     wanted.sizeimage = wanted.bytesperline * wanted.height;
     wanted.field = device_.field;
+    device_.format_made(wanted);
     device_.picture = wanted;
     return 0;
   }
@@ -194,28 +246,28 @@ class FakeNode final : public Node {
 
   int stream(unsigned long request, void* argument) {
     switch (request) {
-      case VIDIOC_REQBUFS: {
-        const std::uint32_t count = static_cast<v4l2_requestbuffers*>(argument)->count;
-        if (device_.mapped != 0) return EBUSY;
-        device_.memory.assign(count, std::vector<std::uint8_t>(device_.picture.sizeimage));
-        device_.queued.assign(count, false);
-        return 0;
-      }
+      case VIDIOC_REQBUFS:
+        return give(*static_cast<v4l2_requestbuffers*>(argument));
       case VIDIOC_QUERYBUF: {
         auto& buffer = *static_cast<v4l2_buffer*>(argument);
         buffer.m.offset = buffer.index;
-        buffer.length = device_.picture.sizeimage;
+        buffer.length = device_.buffer_length.value_or(device_.picture.sizeimage);
         return 0;
       }
-      case VIDIOC_QBUF: {
-        const std::uint32_t index = static_cast<v4l2_buffer*>(argument)->index;
-        if (index >= device_.queued.size() || device_.queued[index]) return EINVAL;
-        device_.queued[index] = true;
-        return 0;
-      }
+      case VIDIOC_QBUF:
+        return queue(static_cast<v4l2_buffer*>(argument)->index);
       case VIDIOC_STREAMON:
         device_.streaming = true;
         device_.sequence = 0;
+        device_.next_frame = device_.clock.now() + device_.frame_interval;
+        return 0;
+      case VIDIOC_SUBSCRIBE_EVENT:
+        device_.subscribed = device_.has_events;
+        return device_.has_events ? 0 : EINVAL;
+      case VIDIOC_DQEVENT:
+        if (!device_.subscribed || device_.events.empty()) return ENOENT;
+        *static_cast<v4l2_event*>(argument) = device_.events.front();
+        device_.events.pop_front();
         return 0;
       case VIDIOC_STREAMOFF:
         device_.streaming = false;
@@ -229,12 +281,33 @@ class FakeNode final : public Node {
     }
   }
 
+  // Of a claim that is more than can be, only what a test can have in memory is there.
+  int give(v4l2_requestbuffers& request) {
+    if (device_.mapped != 0) return EBUSY;
+    if (request.count > 0) request.count = device_.buffers_granted.value_or(request.count);
+    const std::size_t there = std::min<std::uint32_t>(request.count, 64);
+    device_.memory.assign(there, std::vector<std::uint8_t>(device_.picture.sizeimage));
+    device_.queued.assign(there, false);
+    return 0;
+  }
+
+  int queue(std::uint32_t index) {
+    if (index >= device_.queued.size() || device_.queued[index]) return EINVAL;
+    if (device_.queues_until_error && (*device_.queues_until_error)-- <= 0) return ENOMEM;
+    device_.queued[index] = true;
+    return 0;
+  }
+
   int dequeue(v4l2_buffer& buffer) {
     ++device_.dequeued;
     if (!device_.dequeue_errors.empty()) {
       const int error = device_.dequeue_errors.front();
       device_.dequeue_errors.pop_front();
       return error;
+    }
+    if (device_.damages_all) {
+      device_.clock.sleep_until(device_.clock.now() + device_.dequeue_time);
+      device_.send(0, 1, [](v4l2_buffer& damaged) { damaged.flags |= V4L2_BUF_FLAG_ERROR; });
     }
     if (device_.done.empty()) return EAGAIN;
     buffer = device_.done.front();
