@@ -54,6 +54,12 @@ inline int check(int code, const std::filesystem::path& file, const std::string&
   return code;
 }
 
+// Returns the name by which libav opens a file. libav takes a plain name with a colon in its first
+// part ("12:A/take/observer.mkv") for an address of some protocol.
+inline std::string url_of(const std::filesystem::path& file) {
+  return "file:" + file.string();
+}
+
 // Returns the CRC-32 of a packet's bytes (IEEE 802.3, as zlib's).
 inline std::uint32_t crc32(const AVPacket& packet) {
   return ~av_crc(av_crc_get_table(AV_CRC_32_IEEE_LE), ~0u, packet.data,

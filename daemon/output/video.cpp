@@ -110,16 +110,15 @@ VideoWriter::VideoWriter(const std::filesystem::path& stem, int width, int heigh
                 std::to_string(height) + " as " + codec.description);
 
   AVFormatContext* file = nullptr;
-  impl_->check(avformat_alloc_output_context2(&file, nullptr, codec.container.c_str(),
-                                              impl_->unfinished.c_str()),
+  const std::string url = av::url_of(impl_->unfinished);
+  impl_->check(avformat_alloc_output_context2(&file, nullptr, codec.container.c_str(), url.c_str()),
                "cannot be made");
   impl_->file.reset(file);
   impl_->stream = avformat_new_stream(file, nullptr);
   impl_->stream->time_base = video_clock;
   impl_->check(avcodec_parameters_from_context(impl_->stream->codecpar, impl_->encoder.get()),
                "cannot be made");
-  impl_->check(avio_open(&file->pb, impl_->unfinished.c_str(), AVIO_FLAG_WRITE),
-               "cannot be opened");
+  impl_->check(avio_open(&file->pb, url.c_str(), AVIO_FLAG_WRITE), "cannot be opened");
   impl_->check(avformat_write_header(file, nullptr), "cannot be written");
 
   impl_->frame->format = impl_->encoder->pix_fmt;

@@ -12,7 +12,7 @@ namespace {
 av::Demuxer open_demuxer(const std::filesystem::path& file) {
   AVFormatContext* context = nullptr;
   const AVInputFormat* matroska = av_find_input_format("matroska");
-  av::check(avformat_open_input(&context, file.c_str(), matroska, nullptr), file,
+  av::check(avformat_open_input(&context, av::url_of(file).c_str(), matroska, nullptr), file,
             "cannot be read as Matroska");
   // Packets are read as they are in the file: without a parser, and without invented times.
   context->flags |= AVFMT_FLAG_NOPARSE | AVFMT_FLAG_NOFILLIN;

@@ -54,7 +54,8 @@ av::Codec open_encoder(const StreamFormat& format, const std::filesystem::path& 
 
 av::Muxer open_muxer(const AVCodecContext& encoder, const std::filesystem::path& file) {
   AVFormatContext* context = nullptr;
-  av::check(avformat_alloc_output_context2(&context, nullptr, "matroska", file.c_str()), file,
+  const std::string url = av::url_of(file);
+  av::check(avformat_alloc_output_context2(&context, nullptr, "matroska", url.c_str()), file,
             "Matroska cannot be started");
   av::Muxer muxer(context);
   AVStream* stream = avformat_new_stream(context, nullptr);
@@ -62,7 +63,7 @@ av::Muxer open_muxer(const AVCodecContext& encoder, const std::filesystem::path&
   av::check(avcodec_parameters_from_context(stream->codecpar, &encoder), file, "cannot be set up");
   stream->time_base = encoder.time_base;
   context->flags |= AVFMT_FLAG_BITEXACT;  // the same frames make the same file
-  av::check(avio_open(&context->pb, file.c_str(), AVIO_FLAG_WRITE), file, "cannot be created");
+  av::check(avio_open(&context->pb, url.c_str(), AVIO_FLAG_WRITE), file, "cannot be created");
   av::check(avformat_write_header(context, nullptr), file, "its header cannot be written");
   return muxer;
 }

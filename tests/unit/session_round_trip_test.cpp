@@ -52,6 +52,23 @@ INSTANTIATE_TEST_SUITE_P(
                     Picture{PixelFormat::gray8, 37, 21}, Picture{PixelFormat::rgb8, 643, 481},
                     Picture{PixelFormat::gray16, 643, 481}));
 
+// To libav such a relative name is an address of the protocol "12".
+TEST(Session, AColonInARelativePathIsNoProtocol) {
+  const TemporaryDirectory directory;
+  struct Return {
+    std::filesystem::path to = std::filesystem::current_path();
+    ~Return() { std::filesystem::current_path(to); }
+  } const comes_back;
+  std::filesystem::current_path(directory.path());
+  write_small_session("12:A/take", 2);
+  Session session = open_session("12:A/take");
+  const auto stream = open_stream(session, "observer");
+  ASSERT_TRUE(stream);
+  EXPECT_EQ(stream->records().size(), 2u);
+  EXPECT_TRUE(is_frame(*stream->read(1), 1));
+  EXPECT_TRUE(std::filesystem::exists(directory / "12:A/take/observer.mkv"));
+}
+
 // As the sensor counted, with the pattern that makes colours of it.
 TEST(Session, ABayerMosaicComesBackBitForBit) {
   for (const PixelFormat format : {PixelFormat::gray8, PixelFormat::gray16}) {
