@@ -73,10 +73,11 @@ TEST(ClockMap, ADeviceThatStartsAnewIsMappedAnew) {
   EXPECT_EQ(map.to_host(1 * second + 33 * ms, 20 * second + 33 * ms), 20 * second + 33 * ms);
 }
 
-// A wall clock that was stepped while a frame was under way made its arrival that much too early.
+// A wall clock that was stepped while a frame was under way made its arrival that much too early:
+// by more than other delays differ, or only enough to be before the arrival of the frame before.
 // The bounds are those of FollowsAClockThatRunsFastOrSlow.
 TEST(ClockMap, OneArrivalFarTooEarlyMovesNoStamp) {
-  for (const std::int64_t mistake : {100 * ms, second, 10 * second}) {
+  for (const std::int64_t mistake : {45 * ms, 100 * ms, second, 10 * second}) {
     Device device{20e-6, 3 * ms};
     ClockMap map;
     for (int i = 0; i < 3600; ++i) {
@@ -103,6 +104,13 @@ TEST(ClockMap, AFirstArrivalFarTooEarlyIsFoundOut) {
       ASSERT_GE(host, device.host(i) + device.least) << i;
       ASSERT_LE(host, arrival) << i;
     }
+  }
+}
+
+TEST(ClockMap, ADeviceWithoutAClockHasTheTimesOfItsArrivals) {
+  ClockMap map;
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_EQ(map.to_host(0, second + i * 33 * ms), second + i * 33 * ms);
   }
 }
 
@@ -172,12 +180,14 @@ TEST(ClockMap, AHostileClockDoesNoHarm) {
 
 // ---- the host's own clocks
 
-// The host, whose other clock is stepped at given times. Reading a clock takes 50 ns.
+// The host, whose other clock is stepped at given times. Reading a clock takes 50 ns, and so does
+// what follows, unless something interrupts.
 struct SteppedHost {
   std::int64_t now = 100 * second;                             // CLOCK_MONOTONIC
   std::int64_t ahead = 1'700'000'000 * second;                 // of CLOCK_MONOTONIC
   std::vector<std::pair<std::int64_t, std::int64_t>> steps{};  // when and by how much, in order
   std::size_t done = 0;
+  std::int64_t interruption = 50;
 
   // Returns the other clock's time, which comes later with each call.
   std::int64_t other_at(std::int64_t time) {
@@ -189,7 +199,7 @@ struct SteppedHost {
       ClockReading reading;
       reading.before_ns = now;
       reading.other_ns = other_at(now += 50);
-      reading.after_ns = now += 50;
+      reading.after_ns = now += interruption;
       return reading;
     });
   }
@@ -224,6 +234,20 @@ TEST(OtherClockTest, AStampFromBeforeAStepIsOfNow) {
     host.now += 50 * ms;
     EXPECT_NEAR(double(other.to_monotonic(its_stamp) - later), 0, 100);
   }
+}
+
+// What another clock says about a time that is 10 ms wide is not used.
+TEST(OtherClockTest, AStampIsOfNowWhereReadingTheClocksWasInterrupted) {
+  SteppedHost host;
+  OtherClock other = host.other();
+  const std::int64_t taken = host.now + ms, stamp = host.other_at(taken);
+  host.now += 30 * ms;
+  host.interruption = 10 * ms;
+  const std::int64_t time = other.to_monotonic(stamp);
+  EXPECT_EQ(time, host.now);
+  host.interruption = 50;
+  EXPECT_NEAR(double(other.to_monotonic(stamp) - taken), 0, 100);
+  EXPECT_EQ(other.steps(), 0u);
 }
 
 TEST(OtherClockTest, ReadsTheClocksOfThisMachine) {
