@@ -538,6 +538,7 @@ TEST_F(V4l2Stream, EventsWithoutEndDoNotKeepFramesBack) {
   device_.events.assign(1000, v4l2_event{});
   device_.send(device_.now_ns, 1);
   EXPECT_TRUE(next());
+  EXPECT_FALSE(device_.events.empty());
 }
 
 TEST_F(V4l2Stream, ExposuresAreOnTheFramesThatSurelyHaveThem) {
