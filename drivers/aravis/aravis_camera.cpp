@@ -1,30 +1,99 @@
 #include "drivers/aravis/aravis_camera.hpp"
 
+#include <arpa/inet.h>
+
 #include <algorithm>
-#include <atomic>
+#include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
-#include "drivers/aravis/configure.hpp"
-#include "drivers/aravis/gobject.hpp"
 #include "drivers/aravis/pixel_formats.hpp"
+#include "drivers/aravis/receiver_process.hpp"
+#include "drivers/aravis/shared_buffers.hpp"
 #include "drivers/clock_map.hpp"
+#include "drivers/convert/convert.hpp"
 #include "drivers/exposure_ledger.hpp"
 #include "drivers/host_clock.hpp"
-#include "drivers/other_clock.hpp"
 
 namespace previz {
 namespace {
 
-using aravis::Failure;
-using aravis::Owned;
+using aravis::Kind;
+using aravis::Message;
+using aravis::Reach;
+using aravis::ReceiverProcess;
+using aravis::Writer;
+using std::chrono::milliseconds;
 
-// Buffers the receiver may fill while the pipeline is busy: at 60 Hz a quarter of a second.
-constexpr int buffers_in_flight = 16;
+// Buffers the receiver may fill while the pipeline is busy: at 60 Hz a quarter of a second. Of
+// large frames there are fewer, so that all of them together are a gibibyte at most.
+constexpr std::size_t most_buffers = 16, least_buffers = 4;
+constexpr std::int64_t most_buffer_bytes = std::int64_t{1} << 30;
+constexpr std::int64_t most_payload = most_buffer_bytes / least_buffers;
 // Many cameras latch an exposure for the next frame but one.
 constexpr int latch_frames = 2;
+// Aravis reads a camera's description, which may be a megabyte, in blocks of 512 bytes, and tries
+// packet sizes until one gets through.
+constexpr milliseconds time_to_open{10'000}, time_to_list{5'000}, time_to_answer{2'000};
 
-// Block ids of GigE Vision 1.x have 16 bits and leave out 0; later ones have 64 bits.
+bool is_address(const std::string& text) {
+  std::array<unsigned char, 16> ignored{};
+  return inet_pton(AF_INET, text.c_str(), ignored.data()) == 1;
+}
+
+// A camera that is not on the USB is looked for in the network, by a process that has no USB.
+Reach reach_of(const std::string& device) {
+  if (device.empty()) throw Error("an aravis camera needs its serial number or address");
+  return !is_address(device) && usb_place_of_aravis(device) ? Reach::usb : Reach::network;
+}
+
+// Returns whether radiance can be divided by an exposure.
+bool is_exposure(double exposure_s, double gain) {
+  return exposure_s > 0 && gain > 0 && std::isnormal(exposure_s * gain);
+}
+
+struct Agreed {
+  CameraFormat format;
+  convert::WireFormat wire;
+  std::uint32_t pfnc = 0;
+  std::size_t payload = 0;  // bytes of a buffer
+  Exposure exposure;
+  bool drives_exposure = false;
+};
+
+// Checks what the receiver says that it has agreed on with the camera. Throws previz::Error.
+Agreed checked(const aravis::Terms& terms) {
+  const std::optional<convert::WireFormat> wire = aravis::wire_format(terms.pfnc);
+  if (!wire) throw Error("its pixel format cannot be converted");
+  if (terms.width < 1 || terms.height < 1 || terms.width > 65535 || terms.height > 65535)
+    throw Error("says its pictures are " + std::to_string(terms.width) + "x" +
+                std::to_string(terms.height) + " pixels, which cannot be");
+  const auto least =
+      static_cast<std::int64_t>(convert::picture_bytes(*wire, terms.width, terms.height));
+  if (terms.payload < least || terms.payload > most_payload)
+    throw Error("says that a frame is " + std::to_string(terms.payload) +
+                " bytes; its picture is " + std::to_string(least) + ", and no more than " +
+                std::to_string(most_payload) + " are taken");
+  const bool unknown = terms.exposure_s == 0 && terms.gain == 1;
+  if (!unknown && !is_exposure(terms.exposure_s, terms.gain))
+    throw Error("says its exposure is one that cannot be");
+  Agreed agreed;
+  agreed.format.format = convert::delivered_format(*wire);
+  agreed.format.bayer = convert::bayer_pattern(*wire);
+  agreed.format.width = terms.width;
+  agreed.format.height = terms.height;
+  if (std::isfinite(terms.rate_hz) && terms.rate_hz > 0) agreed.format.rate_hz = terms.rate_hz;
+  agreed.wire = *wire;
+  agreed.pfnc = terms.pfnc;
+  agreed.payload = static_cast<std::size_t>(terms.payload);
+  agreed.exposure = {terms.exposure_s, terms.gain};
+  agreed.drives_exposure = terms.drives_exposure;
+  return agreed;
+}
+
+// Block ids of GigE Vision 1.x have 16 bits and leave out 0; later ones have 64 bits. A step that
+// no camera makes within a day counts as one frame.
 class SequenceCounter {
  public:
   void restart() { last_id_.reset(); }
@@ -39,7 +108,7 @@ class SequenceCounter {
         step = id + 0xffff - *last_id_;
     }
     last_id_ = id;
-    return sequence_ += step;
+    return sequence_ += step < 0x1000000 ? step : 1;
   }
 
  private:
@@ -47,25 +116,20 @@ class SequenceCounter {
   std::uint64_t sequence_ = 0;
 };
 
+// Aravis itself runs in a process of its own (receiver/), because it believes what any host of the
+// network sends. A frame makes no copy more than it would without: the receiver puts packets
+// together in memory that both share, and convert() reads from there.
 class AravisCamera final : public Camera {
  public:
   explicit AravisCamera(const CameraSettings& settings)
       : settings_(settings),
-        camera_(aravis::find_camera(settings.device)),
-        device_(arv_camera_get_device(camera_.get())),
-        agreed_(aravis::configure(*camera_, settings)),
-        ledger_(agreed_.exposure, latch_frames) {
-    if (agreed_.chunks) chunks_.reset(arv_camera_create_chunk_parser(camera_.get()));
-    lost_handler_ =
-        g_signal_connect(device_, "control-lost", G_CALLBACK(+[](ArvDevice*, gpointer self) {
-                           static_cast<AravisCamera*>(self)->control_lost_ = true;
-                         }),
-                         this);
-  }
+        receiver_(reach_of(settings.device)),
+        agreed_(open()),
+        ledger_(agreed_.exposure, latch_frames) {}
 
+  // A camera that is lost cannot be given back in order.
   ~AravisCamera() override {
-    stop();
-    g_signal_handler_disconnect(device_, lost_handler_);
+    if (trouble_) receiver_.give_up("lost its camera");
   }
   AravisCamera(const AravisCamera&) = delete;
   AravisCamera& operator=(const AravisCamera&) = delete;
@@ -74,64 +138,63 @@ class AravisCamera final : public Camera {
   CameraFormat format() const override { return agreed_.format; }
 
   void start() override {
-    if (stream_) return;
-    Failure failure;
-    stream_.reset(arv_camera_create_stream(camera_.get(), nullptr, nullptr, failure.out()));
-    if (!stream_) throw Error(name() + ": its stream cannot be opened: " + failure.text());
-    if (ARV_IS_GV_STREAM(stream_.get())) aravis::configure_gige_stream(*stream_, agreed_.payload);
-    for (int i = 0; i < buffers_in_flight; ++i)
-      arv_stream_push_buffer(stream_.get(), arv_buffer_new(agreed_.payload, nullptr));
+    if (buffers_) return;
+    const std::size_t buffers =
+        std::clamp(most_buffer_bytes / agreed_.payload, least_buffers, most_buffers);
+    buffers_.emplace(aravis::Ring{static_cast<std::uint32_t>(buffers), agreed_.payload});
     sequence_.restart();
     triggered_ = false;
-    arv_camera_start_acquisition(camera_.get(), failure.out());
-    if (failure.failed()) {
-      stream_.reset();
-      failure.check(name(), "cannot start");
+    last_frame_ns_ = monotonic_ns();
+    try {
+      receiver_.ask(Kind::start, Writer()(buffers_->ring()), time_to_answer,
+                    buffers_->descriptor());
+    } catch (const Error& error) {
+      buffers_.reset();
+      throw Error(named(error.what()));
     }
   }
 
-  // Destroys the stream with its buffers, so that none of them can come again.
   void stop() override {
-    if (!stream_) return;
-    Failure ignored;  // a camera that is gone cannot be stopped
-    if (!control_lost_) arv_camera_stop_acquisition(camera_.get(), ignored.out());
-    add_stream_counters(counters_);
-    stream_.reset();
+    if (!buffers_) return;
+    if (!receiver_.gone() && !trouble_) {
+      try {
+        receiver_.ask(Kind::stop, {}, time_to_answer);
+      } catch (const Error&) {  // a camera that is gone cannot be stopped
+      }
+    }
+    buffers_.reset();  // so that no frame is taken from what came before the answer
+    for (std::size_t i = 0; i < 2 * most_buffers; ++i)
+      if (const std::optional<Message> message = receiver_.next({})) handle(*message);
+    for (const auto& [name, count] : std::exchange(stream_counters_, {})) counters_[name] += count;
   }
 
-  CameraEvent next(std::chrono::milliseconds timeout) override {
-    if (control_lost_) return DeviceTrouble{name(), "does not answer any more", true};
-    if (!stream_) return NoFrame{};
-    if (agreed_.software_trigger && !triggered_) {
-      Failure failure;
-      arv_camera_software_trigger(camera_.get(), failure.out());
-      if (failure.failed())
-        return DeviceTrouble{name(), "cannot be triggered: " + failure.text(), true};
-      triggered_ = true;
+  CameraEvent next(milliseconds timeout) override {
+    const auto deadline = ReceiverProcess::Clock::now() + timeout;
+    if (!trouble_ && agreed_triggers() && buffers_ && !triggered_) trigger();
+    while (!trouble_) {
+      // Without a stream only whether the camera is still there is of interest.
+      std::optional<Message> message =
+          receiver_.next(buffers_ ? deadline : ReceiverProcess::Clock::time_point());
+      if (message) {
+        if (FramePtr frame = handle(*message)) return frame;
+      }
+      if (receiver_.gone()) lose_receiver();
+      if (trouble_) break;
+      if (ReceiverProcess::Clock::now() >= deadline || !buffers_) return NoFrame{};
     }
-    const auto deadline = std::chrono::steady_clock::now() + timeout;
-    for (;;) {
-      const auto left = std::chrono::duration_cast<std::chrono::microseconds>(
-          deadline - std::chrono::steady_clock::now());
-      ArvBuffer* buffer = left.count() > 0
-                              ? arv_stream_timeout_pop_buffer(
-                                    stream_.get(), static_cast<std::uint64_t>(left.count()))
-                              : arv_stream_try_pop_buffer(stream_.get());
-      if (!buffer) return NoFrame{};
-      FramePtr frame = take(*buffer);
-      arv_stream_push_buffer(stream_.get(), buffer);
-      triggered_ = false;
-      if (frame) return frame;
-      if (std::chrono::steady_clock::now() >= deadline) return NoFrame{};
-    }
+    return *trouble_;
   }
 
   bool set_exposure(double exposure_s, double gain) override {
-    if (control_lost_ || !agreed_.drives_exposure) return false;
+    if (trouble_ || receiver_.gone() || !agreed_.drives_exposure) return false;
+    const std::int64_t before_ns = monotonic_ns();
     try {
-      const std::int64_t before_ns = monotonic_ns();
-      const Exposure applied = aravis::set_exposure(*camera_, name(), {exposure_s, gain});
-      ledger_.changed(before_ns, monotonic_ns(), applied);
+      const Message answer = receiver_.ask(
+          Kind::expose, Writer()(aravis::ExposureWords{exposure_s, gain}), time_to_answer);
+      const auto applied = aravis::body_of<aravis::ExposureWords>(answer);
+      if (!applied || !is_exposure(applied->exposure_s, applied->gain))
+        throw Error("says its exposure is one that cannot be");
+      ledger_.changed(before_ns, monotonic_ns(), {applied->exposure_s, applied->gain});
       return true;
     } catch (const Error&) {
       ++counters_["exposures refused"];
@@ -141,40 +204,102 @@ class AravisCamera final : public Camera {
 
   DeviceCounters counters() const override {
     DeviceCounters all = counters_;
-    all["steps of the time of day"] = time_of_day_.steps();
-    all["arrivals left out of the clock's map"] = clock_.left_out();
-    all["maps of the clock begun anew"] = clock_.begun_anew();
-    add_stream_counters(all);
+    for (const auto& [name, count] : stream_counters_) all[name] += count;
     return all;
   }
 
  private:
-  // Returns the frame of a filled buffer; null, and counted, if it is not whole.
-  FramePtr take(ArvBuffer& buffer) {
-    // Aravis stamps a buffer's first packet with the time of day.
-    const std::int64_t arrival_ns = time_of_day_.to_monotonic(
-        static_cast<std::int64_t>(arv_buffer_get_system_timestamp(&buffer)));
-    if (const char* damage = damage_of(buffer)) return left_out(damage);
+  std::string named(const std::string& what) const {
+    return what.starts_with(name() + ": ") ? what : name() + ": " + what;
+  }
+
+  Agreed open() {
+    try {
+      Message answer = receiver_.ask(Kind::open, Writer()(aravis::Order{settings_}), time_to_open);
+      const auto terms = aravis::body_of<aravis::Terms>(answer);
+      if (!terms) throw Error("its receiver does not say what was agreed on");
+      if (answer.descriptor) receiver_.hold(std::move(answer.descriptor), terms->address);
+      return checked(*terms);
+    } catch (const Error& error) {
+      throw Error(named(error.what()));
+    }
+  }
+
+  bool agreed_triggers() const { return settings_.trigger == "software"; }
+
+  void trigger() {
+    try {
+      receiver_.ask(Kind::trigger, {}, time_to_answer);
+      triggered_ = true;
+    } catch (const Error& error) {
+      if (!receiver_.gone())
+        trouble_ = DeviceTrouble{name(), "cannot be triggered: " + std::string(error.what()), true};
+    }
+  }
+
+  void lose_receiver() {
+    trouble_ = DeviceTrouble{name(), receiver_.why_gone(), true};
+    if (!buffers_ || agreed_triggers()) return;
+    const double silent_s = 1e-9 * static_cast<double>(monotonic_ns() - last_frame_ns_);
+    counters_["frames lost with their receiver"] +=
+        static_cast<std::uint64_t>(std::max(0.0, silent_s) * std::min(agreed_.format.rate_hz, 1e4));
+  }
+
+  // Takes a message; returns the frame, if it is a whole one.
+  FramePtr handle(const Message& message) {
+    if (message.kind == Kind::lost) {
+      trouble_ = DeviceTrouble{name(), "does not answer any more", true};
+    } else if (message.kind == Kind::pulse) {
+      take_counters(message);
+    } else if (buffers_) {
+      const auto note = aravis::body_of<aravis::FrameNote>(message);
+      if (!note || note->buffer >= buffers_->ring().buffers) {
+        receiver_.give_up("names a buffer that there is not");
+        return nullptr;
+      }
+      FramePtr frame = take(*note);
+      receiver_.post(Kind::give_back, Writer()(note->buffer));
+      triggered_ = false;
+      if (frame) last_frame_ns_ = frame->arrival_ns;
+      return frame;
+    }
+    return nullptr;
+  }
+
+  // The names become keys of the status on the bus.
+  void take_counters(const Message& message) {
+    const auto pulse = aravis::body_of<aravis::Pulse>(message);
+    if (!pulse || pulse->counters.size() > 64) return receiver_.give_up("counts without sense");
+    for (const aravis::Counter& counter : pulse->counters)
+      if (counter.name.starts_with("stream ") && counter.name.size() < 64 &&
+          (stream_counters_.size() < 64 || stream_counters_.contains(counter.name)))
+        stream_counters_[aravis::printable(counter.name)] = counter.count;
+  }
+
+  // Returns the frame of a filled buffer; null, and counted, if it is not whole. The receiver could
+  // change the picture while it is read here; nothing but the picture depends on its bytes.
+  FramePtr take(const aravis::FrameNote& note) {
+    if (const char* damage = damage_of(note)) return left_out(damage);
+    const std::span<const std::uint8_t> buffer = buffers_->at(note.buffer);
+    if (note.row_padding < 0 || note.size > buffer.size() ||
+        note.offset > buffer.size() - note.size || note.size == 0)
+      return left_out("frames without a picture");
     auto frame = std::make_shared<Frame>();
-    std::size_t size = 0;
-    const auto* data = static_cast<const std::uint8_t*>(arv_buffer_get_image_data(&buffer, &size));
-    int padding = 0, ignored = 0;
-    arv_buffer_get_image_padding(&buffer, &padding, &ignored);
     const std::size_t row = convert::row_bytes(agreed_.wire, agreed_.format.width);
-    if (padding < 0 || !data) return left_out("frames without a picture");
-    if (convert::convert({agreed_.wire,
-                          agreed_.format.width,
-                          agreed_.format.height,
-                          row + static_cast<std::size_t>(padding),
-                          {data, size}},
+    if (convert::convert({agreed_.wire, agreed_.format.width, agreed_.format.height,
+                          row + static_cast<std::size_t>(note.row_padding),
+                          buffer.subspan(note.offset, note.size)},
                          *frame))
       return left_out("frames cut short");
     frame->source = settings_.source;
-    frame->sequence = sequence_.of(arv_buffer_get_frame_id(&buffer));
-    frame->arrival_ns = arrival_ns;
+    frame->sequence = sequence_.of(note.id);
+    const std::int64_t now_ns = monotonic_ns();
+    frame->arrival_ns = std::clamp(note.arrival_ns, now_ns - 10'000'000'000, now_ns);
+    // A time that a clock of nanoseconds since 1970 does not reach in this century is none.
+    const bool has_clock = note.device_ns >= 0 && note.device_ns < 4'000'000'000'000'000'000;
     frame->timestamp_ns =
-        clock_.to_host(static_cast<std::int64_t>(arv_buffer_get_timestamp(&buffer)), arrival_ns);
-    const std::optional<Exposure> exposure = exposure_of(buffer, frame->timestamp_ns);
+        clock_.to_host(has_clock ? note.device_ns : frame->arrival_ns, frame->arrival_ns);
+    const std::optional<Exposure> exposure = exposure_of(note, frame->timestamp_ns);
     if (!exposure) return left_out("frames between two exposures");
     apply_exposure(*frame, *exposure, settings_.responsivity);
     return frame;
@@ -186,68 +311,80 @@ class AravisCamera final : public Camera {
   }
 
   // Returns what keeps a buffer from being a picture as agreed; null if nothing does.
-  const char* damage_of(ArvBuffer& buffer) const {
-    switch (arv_buffer_get_status(&buffer)) {
-      case ARV_BUFFER_STATUS_SUCCESS:
+  const char* damage_of(const aravis::FrameNote& note) const {
+    const char* const other_format = "frames of another format";
+    switch (static_cast<aravis::Damage>(note.damage)) {
+      case aravis::Damage::none:
         break;
-      case ARV_BUFFER_STATUS_MISSING_PACKETS:
+      case aravis::Damage::packets_missing:
         return "frames with packets missing";
-      case ARV_BUFFER_STATUS_TIMEOUT:
+      case aravis::Damage::timed_out:
         return "frames that ended in a time-out";
-      case ARV_BUFFER_STATUS_SIZE_MISMATCH:
-        return "frames larger than agreed";
+      case aravis::Damage::too_large:
+        return other_format;
       default:
         return "frames given up by the receiver";
     }
-    const bool as_agreed = arv_buffer_get_image_pixel_format(&buffer) == agreed_.pfnc &&
-                           arv_buffer_get_image_width(&buffer) == agreed_.format.width &&
-                           arv_buffer_get_image_height(&buffer) == agreed_.format.height;
-    return as_agreed ? nullptr : "frames of another format";
+    const bool as_agreed = note.pfnc == agreed_.pfnc && note.width == agreed_.format.width &&
+                           note.height == agreed_.format.height;
+    return as_agreed ? nullptr : other_format;
   }
 
-  std::optional<Exposure> exposure_of(ArvBuffer& buffer, std::int64_t timestamp_ns) {
+  std::optional<Exposure> exposure_of(const aravis::FrameNote& note, std::int64_t timestamp_ns) {
     const std::optional<Exposure> by_time = ledger_.of_frame(timestamp_ns);
-    if (!chunks_ || !arv_buffer_has_chunks(&buffer)) return by_time;
-    Failure failure;
-    const double us = arv_chunk_parser_get_float_value(chunks_.get(), &buffer, "ChunkExposureTime",
-                                                       failure.out());
-    if (failure.failed() || !(us > 0)) return by_time;
-    const double gain_db =
-        arv_chunk_parser_get_float_value(chunks_.get(), &buffer, "ChunkGain", failure.out());
-    if (failure.failed())
-      return by_time ? std::optional(Exposure{1e-6 * us, by_time->gain}) : std::nullopt;
-    return Exposure{1e-6 * us, agreed_.gain_in_db ? std::pow(10.0, gain_db / 20.0) : 1.0};
-  }
-
-  // Adds all of Aravis' own counters, which depend on the kind of stream.
-  void add_stream_counters(DeviceCounters& counters) const {
-    if (!stream_) return;
-    for (unsigned i = 0; i < arv_stream_get_n_infos(stream_.get()); ++i)
-      if (arv_stream_get_info_type(stream_.get(), i) == G_TYPE_UINT64)
-        counters[aravis::counter_name(arv_stream_get_info_name(stream_.get(), i))] +=
-            arv_stream_get_info_uint64(stream_.get(), i);
+    if (!note.exposure_s) return by_time;
+    const double gain = note.exposure_gain.value_or(by_time ? by_time->gain : 0);
+    if (!is_exposure(*note.exposure_s, gain)) return by_time;
+    return Exposure{*note.exposure_s, gain};
   }
 
   const CameraSettings settings_;
-  Owned<ArvCamera> camera_;
-  ArvDevice* device_;  // owned by camera_
-  const aravis::Agreed agreed_;
-  Owned<ArvChunkParser> chunks_;  // null: frames do not carry their exposure
-  std::atomic<bool> control_lost_ = false;
-  gulong lost_handler_ = 0;
-  Owned<ArvStream> stream_;  // null: not streaming
-  bool triggered_ = false;   // by software; no frame has answered yet
+  ReceiverProcess receiver_;
+  const Agreed agreed_;
+  std::optional<aravis::SharedBuffers> buffers_;  // none: not streaming
+  std::optional<DeviceTrouble> trouble_;          // the camera is lost
+  bool triggered_ = false;                        // by software; no frame has answered yet
+  std::int64_t last_frame_ns_ = 0;
   SequenceCounter sequence_;
-  OtherClock time_of_day_{read_beside_monotonic(CLOCK_REALTIME)};
   ClockMap clock_;
   ExposureLedger ledger_;
   DeviceCounters counters_;
+  DeviceCounters stream_counters_;  // of this stream, as last reported
 };
 
 }  // namespace
 
 std::unique_ptr<Camera> open_aravis(const CameraSettings& settings) {
   return std::make_unique<AravisCamera>(settings);
+}
+
+// A process that may look at one of the two at a time; what keeps one from its answer is no reason
+// not to list the other.
+std::vector<FoundCamera> find_aravis() {
+  std::vector<FoundCamera> found;
+  for (const Reach reach : {Reach::network, Reach::usb}) {
+    ReceiverProcess receiver(reach);
+    std::optional<aravis::Listing> listing;
+    try {
+      listing = aravis::body_of<aravis::Listing>(receiver.ask(Kind::list, {}, time_to_list));
+    } catch (const Error&) {
+      continue;
+    }
+    if (!listing) continue;
+    for (const aravis::Listed& listed : listing->devices)
+      found.push_back({"aravis",
+                       aravis::printable(listed.serial.empty() ? listed.id : listed.serial),
+                       aravis::printable(listed.vendor + " " + listed.model + ", " +
+                                         listed.protocol + " at " + listed.address)});
+  }
+  return found;
+}
+
+// Finds USB3 Vision cameras only, because a network camera's serial number is on no USB.
+std::optional<usb::Place> usb_place_of_aravis(const std::string& device) {
+  if (const std::optional<usb::Place> place = usb::place_of_serial(device)) return place;
+  const std::size_t dash = device.rfind('-');  // an id ends in the serial
+  return dash == std::string::npos ? std::nullopt : usb::place_of_serial(device.substr(dash + 1));
 }
 
 }  // namespace previz

@@ -1,21 +1,15 @@
-#include "drivers/aravis/configure.hpp"
+#include "drivers/aravis/receiver/configure.hpp"
 
 #include <arpa/inet.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <mutex>
 
-#include "drivers/aravis/aravis_camera.hpp"
 #include "drivers/aravis/pixel_formats.hpp"
 
-namespace previz {
-namespace aravis {
+namespace previz::aravis {
 namespace {
-
-// A camera that describes a larger picture than this is broken.
-constexpr std::int64_t most_payload = std::int64_t{1} << 30;
 
 bool is_address(const std::string& text) {
   std::array<unsigned char, 16> ignored{};
@@ -73,16 +67,12 @@ class Configuration {
     }
     agreed_.pfnc = arv_camera_get_pixel_format(&camera_, failure_.out());
     check("pixel format");
-    const std::optional<convert::WireFormat> wire = wire_format(agreed_.pfnc);
-    if (!wire) {
+    if (!wire_format(agreed_.pfnc)) {
       const std::string name =
           or_nothing(arv_camera_get_pixel_format_as_string(&camera_, failure_.out()));
       refuse("its pixel format " + name + " cannot be converted; it has " + its_formats() +
              "; can be: " + known_formats());
     }
-    agreed_.wire = *wire;
-    agreed_.format.format = convert::delivered_format(*wire);
-    agreed_.format.bayer = convert::bayer_pattern(*wire);
   }
 
   std::string its_formats() {
@@ -105,10 +95,9 @@ class Configuration {
       check("picture size");
     }
     int x = 0, y = 0;
-    arv_camera_get_region(&camera_, &x, &y, &agreed_.format.width, &agreed_.format.height,
-                          failure_.out());
+    int &width = agreed_.width, &height = agreed_.height;
+    arv_camera_get_region(&camera_, &x, &y, &width, &height, failure_.out());
     check("picture size");
-    const auto& [format, width, height, rate, bayer] = agreed_.format;
     if (width < 1 || height < 1 || width > 65535 || height > 65535)
       refuse("says its pictures are " + std::to_string(width) + "x" + std::to_string(height) +
              " pixels, which cannot be");
@@ -130,8 +119,8 @@ class Configuration {
     arv_camera_clear_triggers(&camera_, failure_.out());
     check("triggers");
     if (!settings_.trigger) return;
-    agreed_.software_trigger = *settings_.trigger == "software";
-    const char* source = agreed_.software_trigger ? "Software" : settings_.trigger->c_str();
+    const bool by_software = *settings_.trigger == "software";
+    const char* source = by_software ? "Software" : settings_.trigger->c_str();
     arv_camera_set_trigger(&camera_, source, failure_.out());
     check("trigger \"" + *settings_.trigger + "\"");
   }
@@ -156,8 +145,7 @@ class Configuration {
       check("frame rate");
     }
     const double rate_hz = arv_camera_get_frame_rate(&camera_, failure_.out());
-    if (!failure_.failed() && std::isfinite(rate_hz) && rate_hz > 0)
-      agreed_.format.rate_hz = rate_hz;
+    if (!failure_.failed() && std::isfinite(rate_hz) && rate_hz > 0) agreed_.rate_hz = rate_hz;
   }
 
   void agree_on_exposure() {
@@ -234,15 +222,10 @@ class Configuration {
     check("packet size");
   }
 
+  // The driver decides whether it is large enough for the picture, and not too large.
   void agree_on_payload() {
-    const std::int64_t payload = arv_camera_get_payload(&camera_, failure_.out());
+    agreed_.payload = arv_camera_get_payload(&camera_, failure_.out());
     check("payload size");
-    const auto least = static_cast<std::int64_t>(
-        convert::picture_bytes(agreed_.wire, agreed_.format.width, agreed_.format.height));
-    if (payload < least || payload > most_payload)
-      refuse("says that a frame is " + std::to_string(payload) + " bytes; its picture is " +
-             std::to_string(least));
-    agreed_.payload = static_cast<std::size_t>(payload);
   }
 
   ArvCamera& camera_;
@@ -250,25 +233,6 @@ class Configuration {
   Failure failure_;
   Agreed agreed_;
 };
-
-struct Listed {
-  std::string id, address, serial, vendor, model, protocol;
-};
-
-// Aravis keeps one global device list; another thread that updated the list while looking for its
-// camera would free these entries.
-std::vector<Listed> list_devices() {
-  static std::mutex mutex;
-  const std::lock_guard lock(mutex);
-  arv_update_device_list();
-  std::vector<Listed> devices;
-  for (unsigned i = 0; i < arv_get_n_devices(); ++i)
-    devices.push_back({or_nothing(arv_get_device_id(i)), or_nothing(arv_get_device_address(i)),
-                       or_nothing(arv_get_device_serial_nbr(i)),
-                       or_nothing(arv_get_device_vendor(i)), or_nothing(arv_get_device_model(i)),
-                       or_nothing(arv_get_device_protocol(i))});
-  return devices;
-}
 
 Owned<ArvCamera> open_camera(const std::string& id, const std::string& device) {
   Failure failure;
@@ -278,6 +242,17 @@ Owned<ArvCamera> open_camera(const std::string& id, const std::string& device) {
 }
 
 }  // namespace
+
+std::vector<Listed> list_devices() {
+  arv_update_device_list();
+  std::vector<Listed> devices;
+  for (unsigned i = 0; i < arv_get_n_devices(); ++i)
+    devices.push_back({or_nothing(arv_get_device_id(i)), or_nothing(arv_get_device_address(i)),
+                       or_nothing(arv_get_device_serial_nbr(i)),
+                       or_nothing(arv_get_device_vendor(i)), or_nothing(arv_get_device_model(i)),
+                       or_nothing(arv_get_device_protocol(i))});
+  return devices;
+}
 
 Owned<ArvCamera> find_camera(const std::string& device) {
   if (device.empty()) throw Error("an aravis camera needs its serial number or address");
@@ -331,28 +306,10 @@ std::string counter_name(std::string aravis_name) {
 
 // A burst of a whole frame must fit between two runs of the receiver; the kernel cuts the size to
 // net.core.rmem_max.
-void configure_gige_stream(ArvStream& stream, std::size_t payload) {
-  const int size = static_cast<int>(std::clamp<std::size_t>(4 * payload, 1 << 20, 64 << 20));
+void configure_gige_stream(ArvStream& stream, std::int64_t payload) {
+  const int size = static_cast<int>(std::clamp<std::int64_t>(4 * payload, 1 << 20, 64 << 20));
   g_object_set(&stream, "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
                size, "packet-resend", ARV_GV_STREAM_PACKET_RESEND_ALWAYS, nullptr);
 }
 
-}  // namespace aravis
-
-std::vector<FoundCamera> find_aravis() {
-  std::vector<FoundCamera> found;
-  for (const aravis::Listed& listed : aravis::list_devices())
-    found.push_back(
-        {"aravis", listed.serial.empty() ? listed.id : listed.serial,
-         listed.vendor + " " + listed.model + ", " + listed.protocol + " at " + listed.address});
-  return found;
-}
-
-// Finds USB3 Vision cameras only, because a network camera's serial number is on no USB.
-std::optional<usb::Place> usb_place_of_aravis(const std::string& device) {
-  if (const std::optional<usb::Place> place = usb::place_of_serial(device)) return place;
-  const std::size_t dash = device.rfind('-');  // an id ends in the serial
-  return dash == std::string::npos ? std::nullopt : usb::place_of_serial(device.substr(dash + 1));
-}
-
-}  // namespace previz
+}  // namespace previz::aravis

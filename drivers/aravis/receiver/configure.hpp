@@ -1,30 +1,31 @@
-// Finds an Aravis camera and settles with it what it will send. Not for use outside the driver.
+// Finds an Aravis camera and settles with it what it will send.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <string>
+#include <vector>
 
-#include "drivers/aravis/gobject.hpp"
-#include "drivers/camera.hpp"
+#include "drivers/aravis/protocol.hpp"
+#include "drivers/aravis/receiver/gobject.hpp"
 #include "drivers/camera_settings.hpp"
-#include "drivers/convert/convert.hpp"
 #include "drivers/exposure_ledger.hpp"
 
 namespace previz::aravis {
 
-// The settings that the camera and the driver have agreed on.
+// The settings that the camera and the receiver have agreed on.
 struct Agreed {
-  CameraFormat format;
-  convert::WireFormat wire;
-  std::uint32_t pfnc = 0;   // PFNC code of the wire format
-  std::size_t payload = 0;  // bytes of a buffer
+  std::uint32_t pfnc = 0;  // PFNC code of the wire format
+  int width = 0, height = 0;
+  double rate_hz = 0;        // 0: unknown
+  std::int64_t payload = 0;  // bytes of a buffer, as the camera says
   Exposure exposure;
   bool drives_exposure = false;
   bool gain_in_db = false;
-  bool software_trigger = false;
   bool chunks = false;  // frames carry their exposure
 };
+
+// Searches the network or the USB, as this process may.
+std::vector<Listed> list_devices();
 
 // Throws previz::Error that names the device.
 Owned<ArvCamera> find_camera(const std::string& device);
@@ -41,6 +42,6 @@ Exposure set_exposure(ArvCamera& camera, const std::string& device, const Exposu
 // n_missing_packets.
 std::string counter_name(std::string aravis_name);
 
-void configure_gige_stream(ArvStream& stream, std::size_t payload);
+void configure_gige_stream(ArvStream& stream, std::int64_t payload);
 
 }  // namespace previz::aravis

@@ -1,0 +1,53 @@
+// A process that this one starts, and that never outlives it.
+#pragma once
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <filesystem>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "drivers/descriptor.hpp"
+
+namespace previz::aravis {
+
+// A program with no descriptors but one socket, no environment and no terminal. The thread that
+// starts it also waits for its end, so that it is a child of a thread that lives as long: the
+// program asks the kernel to be killed when that thread ends.
+class ChildProcess {
+ public:
+  // The descriptor under which the program has its socket.
+  static constexpr int its_socket = 3;
+
+  // Starts `program ARGUMENT PID`, where PID is this process's. Throws previz::Error.
+  ChildProcess(const std::filesystem::path& program, const std::string& argument,
+               OwnedDescriptor socket);
+  // Kills it if it still runs.
+  ~ChildProcess();
+  ChildProcess(const ChildProcess&) = delete;
+  ChildProcess& operator=(const ChildProcess&) = delete;
+
+  pid_t pid() const { return pid_; }
+  // Waits for its end; returns false if it still runs then.
+  bool ends_within(std::chrono::milliseconds time);
+  // Kills it and waits until it is gone; returns how it ended: "it was ended by signal 11
+  // (Segmentation fault)". If it had ended before, that is returned.
+  std::string end();
+
+ private:
+  void keep(const std::filesystem::path& program, const std::string& argument,
+            OwnedDescriptor socket);
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool started_ = false, ended_ = false;
+  pid_t pid_ = -1;
+  int error_ = 0;  // why it was not started
+  int status_ = 0;
+  std::thread keeper_;
+};
+
+}  // namespace previz::aravis

@@ -1,0 +1,30 @@
+// Lets the kernel drop the packets that Aravis must not see: those of other hosts than the camera,
+// and those that Aravis would take on trust and write or read beyond its memory.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "drivers/aravis/receiver/bpf.hpp"
+
+namespace previz::aravis {
+
+// Lets pass the packets of a stream that come from `camera` (IPv4, host order) and are what the
+// GigE Vision streaming protocol allows for pictures of `payload` bytes in packets of `packet_size`
+// bytes: leaders that are whole, payload that lies within the picture, and trailers. Aravis 0.8
+// allocates by the packet number of a trailer and copies to the place that a payload packet names.
+// Throws previz::Error if such packets hold nothing.
+bpf::Program stream_filter(std::uint32_t camera, std::int64_t packet_size, std::int64_t payload);
+
+// Lets pass answers of `camera` on the control channel. An answer that asks for more patience than
+// a second (PENDING_ACK) is dropped; Aravis 0.8 would wait as long as it says, up to weeks.
+bpf::Program control_filter(std::uint32_t camera);
+
+// Puts a filter on a UDP socket for good. Throws previz::Error.
+void attach(int socket, bpf::Program filter);
+
+// Returns the UDP socket of this process with that port, or, with port 0, the one that has no
+// filter yet; -1 if there is none. Aravis does not say which sockets it has.
+int udp_socket(std::uint16_t port);
+
+}  // namespace previz::aravis
