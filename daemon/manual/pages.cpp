@@ -95,8 +95,14 @@ const Chapter previzd_status{"EXIT STATUS", R"(
 128+N: Stopped by signal N. Finished frames are on disk, and a render that is called again continues there. (A rig that is stopped has done its work: 0.)
 )"};
 
+const Chapter previzd_cameras{"NETWORK CAMERAS", R"(
+A GigE Vision camera obeys whoever asks first and proves nothing of itself: any host that reaches the camera can take it over, and one that answers under its serial number or address is taken for it. Connect such cameras to a network port of the rig's computer that nothing else is connected to, without a router and without forwarding (`sysctl net.ipv4.ip_forward` is 0, `net.ipv4.conf.all.rp_filter` is 1), and name them in the set file by their addresses.
+What aravis cameras send is received by a process of its own for each camera, previzd-aravis. It can open no file and start no program, packets of other hosts and packets that are not whole do not reach it, and one that ends or does not answer is replaced: the camera is reported lost, and found again within two seconds. A take goes on meanwhile.
+)"};
+
 const Chapter previzd_files{"FILES", R"(
 /etc/previzd/set.toml: The set file that the service runs; as installed, a demonstration that needs no camera.
+/usr/libexec/previzd/previzd-aravis: Receives from one aravis camera; previzd starts it.
 /usr/share/previzd/demo: The take that the demonstration plays.
 /usr/share/doc/previzd/examples: A set file to start from, and a reference of every key.
 /var/lib/previzd: Takes and pictures, unless the set file says otherwise.
@@ -120,15 +126,15 @@ Chapter see_also(const std::string& pages) {
 }  // namespace
 
 std::vector<Page> man_pages() {
-  return {
-      {"previzd.8", man_page(previzd_commands(), 8,
-                             {service_chapter, examples_chapter, glossary_chapter, previzd_files,
-                              previzd_status, see_also("previzctl(1), previz-set(5)")})},
-      {"previzctl.1",
-       man_page(
-           previzctl_commands(), 1,
-           {{"ACTIONS", actions_text()}, previzctl_status, see_also("previzd(8), previz-set(5)")})},
-      {"previz-set.5", set_man_page(set_description, see_also("previzd(8), previzctl(1)"))}};
+  return {{"previzd.8",
+           man_page(previzd_commands(), 8,
+                    {service_chapter, examples_chapter, glossary_chapter, previzd_cameras,
+                     previzd_files, previzd_status, see_also("previzctl(1), previz-set(5)")})},
+          {"previzctl.1", man_page(previzctl_commands(), 1,
+                                   {{"ACTIONS", actions_text()},
+                                    previzctl_status,
+                                    see_also("previzd(8), previz-set(5)")})},
+          {"previz-set.5", set_man_page(set_description, see_also("previzd(8), previzctl(1)"))}};
 }
 
 std::vector<Page> bash_completions() {

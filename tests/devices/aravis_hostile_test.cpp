@@ -47,7 +47,7 @@ using Clock = std::chrono::steady_clock;
 constexpr const char* address = "127.0.0.1";
 constexpr const char* another = "127.0.0.9";
 constexpr std::uint32_t url_register = 0x200;  // where a camera says where its description is
-constexpr int width = 64, height = 48;  // three packets, a leader and a trailer
+constexpr int width = 64, height = 48;         // three packets, a leader and a trailer
 
 struct UnrefFake {
   void operator()(gpointer object) const { g_object_unref(object); }

@@ -74,7 +74,7 @@ for part in "${parts[@]}"; do
   mkdir -p "$share"
   case $part in
   drivers)
-    cp "$build/daemon/previzd" systemd/70-previzd.rules \
+    cp -r "$build/libexec" "$build/daemon/previzd" systemd/70-previzd.rules \
       "${suites[@]/#/$build/tests/devices/test_}" "$share/"
     ;;
   rig)

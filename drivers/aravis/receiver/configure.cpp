@@ -39,6 +39,8 @@ class Configuration {
       : camera_(camera), settings_(settings) {}
 
   Agreed agree() {
+    // A camera whose last receiver was killed may still stream, to where nobody listens.
+    arv_camera_stop_acquisition(&camera_, failure_.out());
     arv_camera_set_acquisition_mode(&camera_, ARV_ACQUISITION_MODE_CONTINUOUS, failure_.out());
     check("acquisition mode");
     agree_on_format();

@@ -15,10 +15,6 @@
 namespace previz::aravis {
 namespace {
 
-std::int64_t time_of_day_ns() {
-  return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
 // IPv4, host order; 0 for a camera that is on no network.
 std::uint32_t address_of(ArvCamera& camera) {
   if (!arv_camera_is_gv_device(&camera)) return 0;
@@ -142,7 +138,7 @@ void Device::stop() {
   const std::lock_guard lock(mutex_);
   for (const Filled& filled : filled_) g_object_unref(filled.buffer);
   filled_.clear();
-  begun_.clear();
+  begun_ns_.clear();
   mismatches_ = 0;
   for (ArvBuffer* buffer : std::exchange(lent_, {}))
     if (buffer) g_object_unref(buffer);
@@ -170,23 +166,25 @@ void Device::wake() const {
   if (write(event_.get(), &one, sizeof one) < 0) return;  // it is readable already
 }
 
-// On Aravis' thread, which stamps buffers with the time of day; what that was on the monotonic
-// clock is noted when a buffer is begun.
-void Device::on_stream(void* self_pointer, ArvStreamCallbackType type, ArvBuffer*) {
+// On Aravis' thread, which closes buffers in the order in which it begins them. Its own stamps are
+// of the wall clock, which may be set at any time.
+void Device::on_stream(void* self_pointer, ArvStreamCallbackType type, ArvBuffer* buffer) {
   auto& self = *static_cast<Device*>(self_pointer);
-  ArvStream* stream = self.filling_;
-  if (type == ARV_STREAM_CALLBACK_TYPE_START_BUFFER) {
-    if (self.begun_.size() == 64) self.begun_.pop_front();
-    self.begun_.push_back({monotonic_ns(), time_of_day_ns()});
-  } else if (type == ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE && stream) {
-    const bool is_too_large = self.more_mismatches(*stream);
-    while (ArvBuffer* done = arv_stream_try_pop_buffer(stream)) {
-      const std::int64_t arrival_ns = self.arrival_of(*done);
-      const std::lock_guard lock(self.mutex_);
-      self.filled_.push_back({done, arrival_ns, is_too_large});
-    }
-    self.wake();
+  if (type == ARV_STREAM_CALLBACK_TYPE_START_BUFFER) self.begun_ns_.push_back(monotonic_ns());
+  if (type != ARV_STREAM_CALLBACK_TYPE_BUFFER_DONE) return;
+  std::int64_t arrival_ns = monotonic_ns();
+  if (!self.begun_ns_.empty()) {
+    arrival_ns = self.begun_ns_.front();
+    self.begun_ns_.pop_front();
   }
+  ArvStream* stream = self.filling_;
+  if (!stream) return;
+  const bool is_too_large = self.more_mismatches(*stream);
+  while (ArvBuffer* done = arv_stream_try_pop_buffer(stream)) {
+    const std::lock_guard lock(self.mutex_);
+    self.filled_.push_back({done, done == buffer ? arrival_ns : monotonic_ns(), is_too_large});
+  }
+  self.wake();
 }
 
 // Returns whether packets that were too long for their picture came since the last call.
@@ -195,19 +193,6 @@ bool Device::more_mismatches(ArvStream& stream) {
   if (ARV_IS_GV_STREAM(&stream))
     mismatches_ = arv_stream_get_info_uint64_by_name(&stream, "n_size_mismatch_errors");
   return mismatches_ != before;
-}
-
-// Returns when the buffer was begun: the moment whose time of day is nearest to its stamp. The two
-// are microseconds apart; where they are not, the wall clock was set between them, and the buffer
-// counts as begun when it was done.
-std::int64_t Device::arrival_of(ArvBuffer& buffer) const {
-  const auto stamp_ns = static_cast<std::int64_t>(arv_buffer_get_system_timestamp(&buffer));
-  const auto distance = [&](const Begun& begun) {
-    return std::abs(begun.time_of_day_ns - stamp_ns);
-  };
-  const auto nearest = std::ranges::min_element(begun_, {}, distance);
-  const bool is_it = nearest != begun_.end() && distance(*nearest) < 10'000'000;
-  return is_it ? nearest->monotonic_ns : monotonic_ns();
 }
 
 std::vector<FrameNote> Device::filled() {

@@ -52,16 +52,12 @@ class Device {
     std::int64_t arrival_ns;
     bool is_too_large;
   };
-  struct Begun {
-    std::int64_t monotonic_ns, time_of_day_ns;
-  };
 
   static void on_stream(void* self, ArvStreamCallbackType type, ArvBuffer* buffer);
   void wake() const;
   void begin_stream();
   void filter_stream();
   bool more_mismatches(ArvStream& stream);
-  std::int64_t arrival_of(ArvBuffer& buffer) const;
   FrameNote note_of(const Filled& filled);
   void add_chunk_exposure(ArvBuffer& buffer, FrameNote& note);
 
@@ -78,7 +74,8 @@ class Device {
   std::atomic<ArvStream*> filling_ = nullptr;  // what Aravis' thread may use; stream_, or null
   std::mutex mutex_;                           // of filled_
   std::vector<Filled> filled_;
-  std::deque<Begun> begun_;       // Aravis' thread only
+  // When buffers were begun that are not done yet; Aravis' thread only.
+  std::deque<std::int64_t> begun_ns_;
   std::uint64_t mismatches_ = 0;  // Aravis' thread only, while it streams
   std::vector<ArvBuffer*> lent_;  // buffers that the driver has, by their number; otherwise null
   Owned<ArvStream> stream_;       // destroyed first: it ends Aravis' thread
