@@ -192,8 +192,10 @@ class AravisCamera final : public Camera {
       const Message answer = receiver_.ask(
           Kind::expose, Writer()(aravis::ExposureWords{exposure_s, gain}), time_to_answer);
       const auto applied = aravis::body_of<aravis::ExposureWords>(answer);
-      if (!applied || !is_exposure(applied->exposure_s, applied->gain))
-        throw Error("says its exposure is one that cannot be");
+      if (!applied || !is_exposure(applied->exposure_s, applied->gain)) {
+        receiver_.give_up("says an exposure that cannot be");
+        return false;
+      }
       ledger_.changed(before_ns, monotonic_ns(), {applied->exposure_s, applied->gain});
       return true;
     } catch (const Error&) {

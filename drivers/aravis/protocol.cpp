@@ -41,7 +41,7 @@ Received receive(int socket, Message& message) {
   header.msg_iov = parts.data();
   header.msg_iovlen = parts.size();
   header.msg_control = control.data();
-  header.msg_controllen = control.size();
+  header.msg_controllen = CMSG_LEN(sizeof(int));  // with its padding, two descriptors would fit
   ssize_t size = 0;
   do size = recvmsg(socket, &header, MSG_DONTWAIT | MSG_CMSG_CLOEXEC);
   while (size < 0 && errno == EINTR);

@@ -312,6 +312,13 @@ TEST_F(HostileNetwork, ADescriptionThatIsAFileOfThisMachineIsRefused) {
   }
 }
 
+TEST_F(HostileNetwork, CamerasAreFoundByProcessesOfTheirOwn) {
+  std::string found;
+  for (const FoundCamera& camera : camera_driver("aravis").find())
+    found += camera.device + ", " + camera.description + "\n";
+  EXPECT_THAT(found, HasSubstr("previz-hostile, Aravis Fake, GigEVision at 127.0.0.1"));
+}
+
 // The camera that stands behind a lifeline is back within two seconds, its receiver being another.
 class LostReceiver : public HostileNetwork, public testing::WithParamInterface<int> {};
 
@@ -436,6 +443,23 @@ TEST(Receiver, MessagesOfAnyBytesAreReadWithinThem) {
   EXPECT_EQ(aravis::body_of<aravis::FrameNote>(message)->exposure_s, 0.5);
   message.bytes.pop_back();
   EXPECT_FALSE(aravis::body_of<aravis::FrameNote>(message));
+}
+
+// Whatever is on this machine's USB, its sandbox leaves libusb what it needs to look.
+TEST(Receiver, LooksForCamerasOnTheUsb) {
+  aravis::ReceiverProcess receiver(aravis::Reach::usb);
+  const aravis::Message answer = receiver.ask(aravis::Kind::list, {}, seconds(5));
+  EXPECT_TRUE(aravis::body_of<aravis::Listing>(answer));
+  EXPECT_FALSE(receiver.gone());
+}
+
+// A request that is none is refused, and the process goes on.
+TEST(Receiver, RefusesWhatItCannotDo) {
+  aravis::ReceiverProcess receiver(aravis::Reach::network);
+  for (const aravis::Kind kind : {aravis::Kind::start, aravis::Kind::stop, aravis::Kind::expose,
+                                  aravis::Kind::trigger, static_cast<aravis::Kind>(999)})
+    EXPECT_THROW(receiver.ask(kind, {}, seconds(5)), Error);
+  EXPECT_FALSE(receiver.gone()) << receiver.why_gone();
 }
 
 TEST(Receiver, TextOfForeignOriginIsPrintable) {
