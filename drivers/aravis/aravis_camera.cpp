@@ -4,8 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <cstdint>
+#include <memory>
 #include <optional>
+#include <span>
+#include <string>
 #include <utility>
 
 #include "drivers/aravis/pixel_formats.hpp"
@@ -13,6 +18,7 @@
 #include "drivers/aravis/shared_buffers.hpp"
 #include "drivers/clock_map.hpp"
 #include "drivers/convert/convert.hpp"
+#include "drivers/error.hpp"
 #include "drivers/exposure_ledger.hpp"
 #include "drivers/host_clock.hpp"
 

@@ -139,7 +139,8 @@ Program files(bool usb) {
       on(SYS_openat,
          all({argument(2), when(BPF_JSET, O_CREAT | O_TRUNC | O_APPEND, refuse(EACCES)), allow})),
       allowed(SYS_newfstatat, SYS_fstat, SYS_statx, SYS_readlinkat, SYS_faccessat, SYS_getdents64,
-              SYS_lseek, SYS_pread64, SYS_fstatfs, SYS_timerfd_create, SYS_timerfd_settime),
+              SYS_lseek, SYS_pread64, SYS_statfs, SYS_fstatfs, SYS_timerfd_create,
+              SYS_timerfd_settime),
   });
 }
 
