@@ -6,7 +6,9 @@
 #include <cerrno>
 #include <cstring>
 #include <deque>
+#include <exception>
 #include <map>
+#include <string_view>
 #include <vector>
 
 #include "daemon/set/names.hpp"
@@ -16,9 +18,64 @@ namespace previz::control {
 namespace {
 
 constexpr const char* refused_error = "org.previz.Error.Refused";
+constexpr const char* failed_error = "org.previz.Error.Failed";
 
 void check(int result, const std::string& what) {
   if (result < 0) throw Error("D-Bus: " + what + ": " + std::strerror(-result));
+}
+
+// Returns the number of bytes of the UTF-8 character (RFC 3629) at the text's beginning; 0 if there
+// is none.
+std::size_t utf8_length(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char first = byte(0);
+  if (first < 0x80) return 1;
+  const std::size_t length = first < 0xc2 ? 0 : first < 0xe0 ? 2 : first < 0xf0 ? 3 : 4;
+  if (length == 0 || first > 0xf4 || text.size() < length) return 0;
+  for (std::size_t i = 1; i < length; ++i)
+    if ((byte(i) & 0xc0) != 0x80) return 0;
+  const bool is_overlong = (first == 0xe0 && byte(1) < 0xa0) || (first == 0xf0 && byte(1) < 0x90);
+  const bool is_surrogate = first == 0xed && byte(1) > 0x9f;
+  const bool is_beyond_unicode = first == 0xf4 && byte(1) > 0x8f;
+  return is_overlong || is_surrogate || is_beyond_unicode ? 0 : length;
+}
+
+// Returns the text as it may go on the bus, which disconnects whoever sends anything but UTF-8; the
+// name of a file or a device may be anything.
+std::string on_the_bus(std::string_view text) {
+  std::string result;
+  while (!text.empty()) {
+    const std::size_t length = text[0] == '\0' ? 0 : utf8_length(text);
+    result += length == 0 ? "?" : text.substr(0, length);
+    text.remove_prefix(length == 0 ? 1 : length);
+  }
+  return result;
+}
+
+int failed(sd_bus_error* error, const char* why) noexcept {
+  try {
+    return sd_bus_error_set(error, failed_error, on_the_bus(why).c_str());
+  } catch (...) {
+    return sd_bus_error_set(error, failed_error, "there is no memory left");
+  }
+}
+
+// Calls a handler of sd-bus. An exception must not pass through C code; the caller gets it as an
+// error in reply.
+template <class Handler>
+int guarded(sd_bus_error* error, Handler&& handler) noexcept {
+  try {
+    return handler();
+  } catch (const std::exception& thrown) {
+    return failed(error, thrown.what());
+  } catch (...) {
+    return failed(error, "something was thrown that is no error");
+  }
+}
+
+template <int (*Method)(sd_bus_message*, Verbs&)>
+int method(sd_bus_message* call, void* verbs, sd_bus_error* error) {
+  return guarded(error, [&] { return Method(call, *static_cast<Verbs*>(verbs)); });
 }
 
 struct Property {
@@ -33,7 +90,7 @@ int append_value(sd_bus_message* message, const Status& status) {
   const auto& value = status.*Member;
   using T = std::remove_cvref_t<decltype(value)>;
   if constexpr (std::is_same_v<T, std::string>) {
-    return sd_bus_message_append(message, "s", value.c_str());
+    return sd_bus_message_append(message, "s", on_the_bus(value).c_str());
   } else if constexpr (std::is_same_v<T, bool>) {
     return sd_bus_message_append(message, "b", int{value});
   } else if constexpr (std::is_same_v<T, std::uint64_t>) {
@@ -68,52 +125,52 @@ constexpr Property properties[] = {
 };
 
 int answer_with(sd_bus_message* call, const Answer& answer) {
-  return answer.refused ? sd_bus_reply_method_errorf(call, refused_error, "%s", answer.said.c_str())
-                        : sd_bus_reply_method_return(call, "s", answer.said.c_str());
+  const std::string said = on_the_bus(answer.said);
+  return answer.refused ? sd_bus_reply_method_errorf(call, refused_error, "%s", said.c_str())
+                        : sd_bus_reply_method_return(call, "s", said.c_str());
 }
 
 int invalid(sd_bus_message* call, const std::string& what) {
-  return sd_bus_reply_method_errorf(call, SD_BUS_ERROR_INVALID_ARGS, "%s", what.c_str());
+  return sd_bus_reply_method_errorf(call, SD_BUS_ERROR_INVALID_ARGS, "%s",
+                                    on_the_bus(what).c_str());
 }
 
-int on_action(sd_bus_message* call, void* data, sd_bus_error*) {
+int on_action(sd_bus_message* call, Verbs& verbs) {
   const char* name = nullptr;
   if (const int result = sd_bus_message_read(call, "s", &name); result < 0) return result;
   const set::Action* action = set::find_action(name);
   if (!action) return invalid(call, std::string("there is no action \"") + name + "\"");
-  return answer_with(call, static_cast<Verbs*>(data)->perform(*action));
+  return answer_with(call, verbs.perform(*action));
 }
 
 // Performs an action that was called by its own method, whose name says which action it is.
-int on_own_method(sd_bus_message* call, void* data, sd_bus_error*) {
+int on_own_method(sd_bus_message* call, Verbs& verbs) {
   const std::string member = sd_bus_message_get_member(call);
   for (const set::Action& action : set::actions())
-    if (method_name(action.name) == member)
-      return answer_with(call, static_cast<Verbs*>(data)->perform(action));
+    if (method_name(action.name) == member) return answer_with(call, verbs.perform(action));
   return invalid(call, member);
 }
 
-int on_set_mode(sd_bus_message* call, void* data, sd_bus_error*) {
+int on_set_mode(sd_bus_message* call, Verbs& verbs) {
   const char* wanted = nullptr;
   if (const int result = sd_bus_message_read(call, "s", &wanted); result < 0) return result;
   for (const auto& [name, mode] : set::names(set::Mode{}))
-    if (std::strcmp(name, wanted) == 0)
-      return answer_with(call, static_cast<Verbs*>(data)->go(mode));
+    if (std::strcmp(name, wanted) == 0) return answer_with(call, verbs.go(mode));
   return invalid(call, std::string("there is no mode \"") + wanted +
                            "\"; allowed: standby, live, refine, review");
 }
 
-int on_record(sd_bus_message* call, void* data, sd_bus_error*) {
+int on_record(sd_bus_message* call, Verbs& verbs) {
   int on = 0;
   if (const int result = sd_bus_message_read(call, "b", &on); result < 0) return result;
-  return answer_with(call, static_cast<Verbs*>(data)->record(on != 0));
+  return answer_with(call, verbs.record(on != 0));
 }
 
-int on_metrics(sd_bus_message* call, void* data, sd_bus_error*) {
-  return sd_bus_reply_method_return(call, "s", static_cast<Verbs*>(data)->metrics().c_str());
+int on_metrics(sd_bus_message* call, Verbs& verbs) {
+  return sd_bus_reply_method_return(call, "s", on_the_bus(verbs.metrics()).c_str());
 }
 
-int on_actions(sd_bus_message* call, void*, sd_bus_error*) {
+int on_actions(sd_bus_message* call, Verbs&) {
   sd_bus_message* reply = nullptr;
   int result = sd_bus_message_new_method_return(call, &reply);
   if (result >= 0) result = sd_bus_message_open_container(reply, 'a', "(ss)");
@@ -125,12 +182,14 @@ int on_actions(sd_bus_message* call, void*, sd_bus_error*) {
   return result;
 }
 
-int on_get(sd_bus*, const char*, const char*, const char* name, sd_bus_message* reply, void* data,
-           sd_bus_error*) {
-  for (const Property& property : properties)
-    if (std::strcmp(property.name, name) == 0)
-      return property.append(reply, static_cast<Verbs*>(data)->status());
-  return -ENOENT;
+int on_get(sd_bus*, const char*, const char*, const char* name, sd_bus_message* reply, void* verbs,
+           sd_bus_error* error) {
+  return guarded(error, [&] {
+    for (const Property& property : properties)
+      if (std::strcmp(property.name, name) == 0)
+        return property.append(reply, static_cast<Verbs*>(verbs)->status());
+    return -ENOENT;
+  });
 }
 
 }  // namespace
@@ -175,16 +234,21 @@ struct Bus::Impl {
 
   void fill_table() {
     table.push_back(SD_BUS_VTABLE_START(0));
-    table.push_back(SD_BUS_METHOD("Action", "s", "s", on_action, SD_BUS_VTABLE_UNPRIVILEGED));
-    table.push_back(SD_BUS_METHOD("SetMode", "s", "s", on_set_mode, SD_BUS_VTABLE_UNPRIVILEGED));
-    table.push_back(SD_BUS_METHOD("Record", "b", "s", on_record, SD_BUS_VTABLE_UNPRIVILEGED));
-    table.push_back(SD_BUS_METHOD("Metrics", "", "s", on_metrics, SD_BUS_VTABLE_UNPRIVILEGED));
-    table.push_back(SD_BUS_METHOD("Actions", "", "a(ss)", on_actions, SD_BUS_VTABLE_UNPRIVILEGED));
+    table.push_back(
+        SD_BUS_METHOD("Action", "s", "s", method<on_action>, SD_BUS_VTABLE_UNPRIVILEGED));
+    table.push_back(
+        SD_BUS_METHOD("SetMode", "s", "s", method<on_set_mode>, SD_BUS_VTABLE_UNPRIVILEGED));
+    table.push_back(
+        SD_BUS_METHOD("Record", "b", "s", method<on_record>, SD_BUS_VTABLE_UNPRIVILEGED));
+    table.push_back(
+        SD_BUS_METHOD("Metrics", "", "s", method<on_metrics>, SD_BUS_VTABLE_UNPRIVILEGED));
+    table.push_back(
+        SD_BUS_METHOD("Actions", "", "a(ss)", method<on_actions>, SD_BUS_VTABLE_UNPRIVILEGED));
     for (const set::Action& action : set::actions()) {
       const std::string& name = names.emplace_back(method_name(action.name));
       if (name == "Record") continue;  // Record(b) takes on or off instead
       table.push_back(
-          SD_BUS_METHOD(name.c_str(), "", "s", on_own_method, SD_BUS_VTABLE_UNPRIVILEGED));
+          SD_BUS_METHOD(name.c_str(), "", "s", method<on_own_method>, SD_BUS_VTABLE_UNPRIVILEGED));
     }
     for (const Property& property : properties)
       table.push_back(SD_BUS_PROPERTY(property.name, property.type, on_get, 0,
@@ -195,6 +259,10 @@ struct Bus::Impl {
 
 Bus::Bus(sd_event* loop, Verbs verbs) : impl_(std::make_unique<Impl>(loop, std::move(verbs))) {}
 Bus::~Bus() = default;
+
+bool Bus::is_open() const {
+  return sd_bus_is_open(impl_->bus) > 0;
+}
 
 void Bus::changed() {
   const Status now = impl_->verbs.status();

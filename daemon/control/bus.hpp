@@ -48,6 +48,7 @@ std::string method_name(const std::string& action);
 
 // Serves the methods: one for each action; Action(s), SetMode(s) and Record(b), which also return
 // what the rig answers or the error org.previz.Error.Refused; Actions() -> a(ss); Metrics() -> s.
+// What a verb throws goes to the caller as org.previz.Error.Failed.
 class Bus {
  public:
   // Connects to the system bus ($DBUS_SYSTEM_BUS_ADDRESS); the event loop serves it. Throws
@@ -57,7 +58,8 @@ class Bus {
   Bus(const Bus&) = delete;
   Bus& operator=(const Bus&) = delete;
 
-  void changed();  // signals the properties that have changed
+  void changed();        // signals the properties that have changed
+  bool is_open() const;  // false once the bus has gone
 
  private:
   struct Impl;

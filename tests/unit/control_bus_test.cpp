@@ -12,6 +12,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -43,6 +44,7 @@ class RigOnTheBus : public testing::Test {
     sd_event_new(&event_);
     Verbs verbs;
     verbs.perform = [this](const set::Action& action) {
+      fall_if(fallen_ == "perform");
       status_.message = action.name;
       rig_->changed();
       return Answer{action.name, std::string(action.name) == "standby"};
@@ -55,8 +57,14 @@ class RigOnTheBus : public testing::Test {
       status_.recording = on;
       return Answer{on ? "recording" : "recording ended"};
     };
-    verbs.status = [this] { return status_; };
-    verbs.metrics = [] { return std::string("{}"); };
+    verbs.status = [this] {
+      fall_if(fallen_ == "status");
+      return status_;
+    };
+    verbs.metrics = [this] {
+      fall_if(fallen_ == "metrics");
+      return std::string("{}");
+    };
     rig_ = std::make_unique<Bus>(event_, std::move(verbs));
     loop_ = std::thread([this] {
       while (!quit_) sd_event_run(event_, 10'000);
@@ -81,6 +89,10 @@ class RigOnTheBus : public testing::Test {
     status.set = "desk";
     return status;
   }
+  static void fall_if(bool falls) {
+    if (falls) throw std::runtime_error("lamp fell down");
+  }
+  std::string fallen_;  // the verb that throws
   Status status_ = first_status();
   std::unique_ptr<Bus> rig_;
   std::atomic<bool> quit_ = false;
@@ -114,6 +126,29 @@ TEST_F(RigOnTheBus, WhatIsRefusedOrUnknownIsSaidAndFails) {
   EXPECT_EQ(unknown.status, 1);
   EXPECT_NE(unknown.out.find("\"make_coffee\""), std::string::npos);
   EXPECT_EQ(previzctl("mode faster").status, 2);
+}
+
+// An exception that passes through sd-bus, which is C, is undefined behaviour, and mostly the end.
+TEST_F(RigOnTheBus, WhatAVerbThrowsIsAnErrorInReplyAndTheRigGoesOn) {
+  for (const auto& [verb, call] :
+       {std::pair("perform", "action move_left"), {"metrics", "metrics"}, {"status", "status"}}) {
+    fallen_ = verb;
+    const Said said = previzctl(call);
+    EXPECT_EQ(said.status, 1) << said.out;
+    EXPECT_NE(said.out.find("lamp fell down"), std::string::npos) << said.out;
+    fallen_.clear();
+    EXPECT_EQ(previzctl("action move_left").out, "move_left\n");
+  }
+}
+
+// The bus disconnects whoever sends anything else.
+TEST_F(RigOnTheBus, WhatIsNotUtf8IsSentWithoutIt) {
+  status_.set = "d\xc3\xa4sk \xff\xc3";
+  EXPECT_NE(previzctl("status").out.find("Set: d\xc3\xa4sk ??\n"), std::string::npos)
+      << previzctl("status").out;
+  status_.set = "\xed\xa0\x80 \xf4\x90\x80\x80 \xc0\xaf \xf0\x9f\x8e\xac";
+  EXPECT_NE(previzctl("status").out.find("Set: ??? ???? ?? \xf0\x9f\x8e\xac\n"), std::string::npos)
+      << previzctl("status").out;
 }
 
 // Every action of the table has its own method, and a change its signal.
