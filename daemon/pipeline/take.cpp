@@ -20,9 +20,9 @@ std::optional<LightCameraCalibration> light_calibration(const set::Set& set,
 }
 
 Take open_take(const std::filesystem::path& session_directory,
-               const std::optional<std::filesystem::path>& set_file) {
+               const std::optional<std::filesystem::path>& set_file, const std::stop_token& stop) {
   Take take;
-  take.session = session::open_session(session_directory);
+  take.session = session::open_session(session_directory, stop);
   std::vector<std::pair<std::string, std::filesystem::path>> assets;
   for (const auto& [as_written, stored] : take.session.info.assets)
     if (!set_file || !std::filesystem::exists(set_file->parent_path() / as_written))
@@ -40,8 +40,8 @@ Take open_take(const std::filesystem::path& session_directory,
   take.observer = observer_calibration(take.set, take.session.info);
   take.set.observer.calibration = take.observer;
   take.light = light_calibration(take.set, take.session.info);
-  take.observer_stream = session::open_stream(take.session, "observer");
-  take.light_stream = session::open_stream(take.session, "light");
+  take.observer_stream = session::open_stream(take.session, "observer", stop);
+  take.light_stream = session::open_stream(take.session, "light", stop);
   if (!take.observer_stream || take.observer_stream->records().empty())
     throw Error(session_directory.string() + ": the session has no observer frames");
   return take;

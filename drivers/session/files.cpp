@@ -97,7 +97,7 @@ std::string read_file(const std::filesystem::path& file) {
   return content;
 }
 
-std::string sha256_of(const std::filesystem::path& file) {
+std::string sha256_of(const std::filesystem::path& file, const std::stop_token& stop) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream) fail(file, "cannot be opened");
   const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(),
@@ -107,6 +107,8 @@ std::string sha256_of(const std::filesystem::path& file) {
   bool good = context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1;
   std::vector<char> block(1 << 20);
   while (good && stream) {
+    if (stop.stop_requested())
+      throw Error(file.string() + ": was left, because reading it is to end");
     stream.read(block.data(), static_cast<std::streamsize>(block.size()));
     good = EVP_DigestUpdate(context.get(), block.data(), stream.gcount()) == 1;
   }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <string_view>
 
@@ -50,7 +51,7 @@ void replace_file(const std::filesystem::path& file, const std::string& content)
 // Returns the whole file; throws previz::Error naming it.
 std::string read_file(const std::filesystem::path& file);
 // Returns the SHA-256 of the file's content, 64 lower-case hexadecimal digits.
-std::string sha256_of(const std::filesystem::path& file);
+std::string sha256_of(const std::filesystem::path& file, const std::stop_token& stop = {});
 // Base64 with padding, on one line (RFC 4648).
 std::string base64(std::span<const std::byte> bytes);
 

@@ -29,13 +29,13 @@
 namespace previz::session {
 namespace {
 
-void check_assets(Session& session) {
+void check_assets(Session& session, const std::stop_token& stop) {
   for (const auto& [as_written, path] : session.info.assets) {
     const std::filesystem::path file = session.directory / path;
     const std::string named = path + " (" + as_written + ")";
     if (!std::filesystem::is_regular_file(file))
       session.missing.push_back(named + ": the file is missing");
-    else if (sha256_of(file) != file.stem())
+    else if (sha256_of(file, stop) != file.stem())
       session.missing.push_back(named + ": the file was changed since it was recorded");
   }
 }
@@ -76,14 +76,14 @@ std::vector<std::string> words_of(const Losses& lost) {
   return words;
 }
 
-Session open_session(const std::filesystem::path& directory) {
+Session open_session(const std::filesystem::path& directory, const std::stop_token& stop) {
   const std::filesystem::path toml = directory / "session.toml";
   if (!std::filesystem::exists(toml))
     throw Error(directory.string() + ": is not a session; it holds no session.toml");
   const SessionFile file = parse_session_toml(read_file(toml), toml);
   Session session{directory, file.info, {}, {}};
   read_end(file, session);
-  check_assets(session);
+  check_assets(session, stop);
   read_track(session);
   return session;
 }

@@ -12,6 +12,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -158,13 +159,15 @@ struct Session {
 };
 
 // Throws previz::Error naming the file (and line) if session.toml cannot be understood. Checks the
-// assets' content hashes, and with them reads the assets once.
-Session open_session(const std::filesystem::path& directory);
+// assets' content hashes, and with them reads the assets once. That, as the reading of
+// open_stream(), may take minutes; a stop ends it with previz::Error.
+Session open_session(const std::filesystem::path& directory, const std::stop_token& stop = {});
 // Opens the stream `source`: "observer", "light" or "composite" (what was shown). Returns null if
 // the session has no such stream. What is missing of the stream is appended to session.missing.
 // Reads the video once from end to end, so that a damaged picture is known here (packet checksums)
 // and never shown.
-std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& source);
+std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& source,
+                                          const std::stop_token& stop = {});
 
 // A file that is kept under the hash of its content: SHA256.glb.
 struct StoredFile {

@@ -126,7 +126,8 @@ std::unique_ptr<VideoReader> open_video(const std::filesystem::path& file,
 
 }  // namespace
 
-std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& source) {
+std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& source,
+                                          const std::stop_token& stop) {
   const std::filesystem::path toml = session.directory / "session.toml";
   const SessionFile file = parse_session_toml(read_file(toml), toml);
   const std::filesystem::path video_file = session.directory / (source + ".mkv");
@@ -140,7 +141,7 @@ std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& s
   }
   std::unique_ptr<VideoReader> video = open_video(video_file, declared->second, session.missing);
   std::vector<VideoReader::PacketInfo> packets;
-  if (video) packets = video->scan();
+  if (video) packets = video->scan(stop);
 
   if (!std::filesystem::exists(line_file))
     session.missing.push_back(source + ".jsonl: the file is missing");

@@ -105,9 +105,13 @@ VideoReader::VideoReader(const std::filesystem::path& file, const StreamFormat& 
 
 VideoReader::~VideoReader() = default;
 
-std::vector<VideoReader::PacketInfo> VideoReader::scan() {
+std::vector<VideoReader::PacketInfo> VideoReader::scan(const std::stop_token& stop) {
   std::vector<PacketInfo> packets;
-  while (impl_->next_packet()) packets.push_back({impl_->time_ms(), av::crc32(*impl_->packet)});
+  while (impl_->next_packet()) {
+    if (stop.stop_requested())
+      throw Error(impl_->file.string() + ": was left, because reading it is to end");
+    packets.push_back({impl_->time_ms(), av::crc32(*impl_->packet)});
+  }
   impl_->rewind();
   return packets;
 }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <stop_token>
 #include <vector>
 
 #include "drivers/session/session_toml.hpp"
@@ -22,8 +23,9 @@ class VideoReader {
   VideoReader(const std::filesystem::path& file, const StreamFormat& format);
   ~VideoReader();
 
-  // Returns every packet that can be found, in file order. Reads the file once from end to end.
-  std::vector<PacketInfo> scan();
+  // Returns every packet that can be found, in file order. Reads the file once from end to end; a
+  // stop ends that with previz::Error.
+  std::vector<PacketInfo> scan(const std::stop_token& stop = {});
   // Returns Frame::bytes of the packet; packets read in order need no seeking. Throws previz::Error
   // naming the file and the time if the packet, or a whole picture in it, is not there.
   std::vector<std::uint8_t> read(const PacketInfo& packet);

@@ -127,5 +127,26 @@ TEST_F(TakeShotsTest, AFrameIsConvertedOnce) {
   EXPECT_EQ(plate_of(shot), plate);
 }
 
+// A take of hours is read as a whole before its first picture, and nobody may have to wait for
+// that.
+TEST_F(TakeShotsTest, AStopEndsTheReadingOfATake) {
+  std::stop_source stop;
+  stop.request_stop();
+  const auto read = [&](const std::filesystem::path& session) -> std::string {
+    try {
+      open_take(session, {}, stop.get_token());
+      return "it was read";
+    } catch (const Error& error) {
+      return error.what();
+    }
+  };
+  EXPECT_NE(read(directory_ / "session").find(".gltf: was left, because reading it is to end"),
+            std::string::npos)
+      << read(directory_ / "session");
+  std::filesystem::remove_all(directory_ / "session/assets");  // the video is read next
+  EXPECT_NE(read(directory_ / "session").find("observer.mkv: was left, because"), std::string::npos)
+      << read(directory_ / "session");
+}
+
 }  // namespace pipeline_take_shots_test
 }  // namespace previz::pipeline
