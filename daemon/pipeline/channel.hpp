@@ -1,5 +1,5 @@
 // Passes values between threads, through a mailbox (newest value only), a bounded queue (never
-// drops), or a published value that stays.
+// drops), a queue of recent values (never waits), or a published value that stays.
 #pragma once
 
 #include <chrono>
@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -159,6 +160,81 @@ class BoundedQueue final : public Channel<T> {
   mutable std::mutex mutex_;
   std::condition_variable filled_, room_;
   std::deque<T> values_;
+  bool closed_ = false;
+};
+
+// The channel for values that are all wanted, of a writer that must not wait: once more than
+// `fewest` values wait that weigh more than `most_weight` together, the oldest are dropped and
+// counted.
+template <class T>
+class RecentQueue final : public Channel<T> {
+ public:
+  using Weight = std::function<std::uint64_t(const T&)>;
+  RecentQueue(std::size_t fewest, std::uint64_t most_weight, Weight weight)
+      : fewest_(fewest), most_weight_(most_weight), weight_(std::move(weight)) {}
+
+  bool push(T value) override {
+    {
+      const std::lock_guard lock(mutex_);
+      if (closed_) return false;
+      weighs_ += weight_(value);
+      values_.push_back(std::move(value));
+      while (values_.size() > fewest_ && weighs_ > most_weight_) {
+        take_first();
+        ++dropped_;
+      }
+    }
+    filled_.notify_one();
+    return true;
+  }
+
+  std::optional<T> pop() override {
+    std::unique_lock lock(mutex_);
+    filled_.wait(lock, [this] { return !values_.empty() || closed_; });
+    return take_first();
+  }
+
+  std::optional<T> try_pop() override {
+    const std::lock_guard lock(mutex_);
+    return take_first();
+  }
+
+  void close() override { close(false); }
+  void abandon() override { close(true); }
+
+  std::uint64_t dropped() const override {
+    const std::lock_guard lock(mutex_);
+    return dropped_;
+  }
+
+ private:
+  std::optional<T> take_first() {
+    if (values_.empty()) return std::nullopt;
+    std::optional<T> value = std::move(values_.front());
+    values_.pop_front();
+    weighs_ -= weight_(*value);
+    return value;
+  }
+
+  void close(bool empty) {
+    {
+      const std::lock_guard lock(mutex_);
+      closed_ = true;
+      if (empty) {
+        values_.clear();
+        weighs_ = 0;
+      }
+    }
+    filled_.notify_all();
+  }
+
+  const std::size_t fewest_;
+  const std::uint64_t most_weight_;
+  const Weight weight_;
+  mutable std::mutex mutex_;
+  std::condition_variable filled_;
+  std::deque<T> values_;
+  std::uint64_t weighs_ = 0, dropped_ = 0;
   bool closed_ = false;
 };
 

@@ -11,6 +11,7 @@
 #include "daemon/pipeline/channel.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/pipeline/stages.hpp"
+#include "drivers/bracket.hpp"
 
 namespace previz::pipeline {
 
@@ -33,7 +34,10 @@ class LightFeed {
   using Estimate =
       std::function<LightPtr(std::vector<LightFrame>, const std::optional<ObserverView>&)>;
 
-  // Adds the two stages "light camera" and "lighting". `stages` ends before this object.
+  // Adds the two stages "light camera" and "lighting". `stages` ends before this object. The source
+  // is asked for the next frame at once, however slow the estimate is, because its frames are
+  // recorded as well: what an estimate cannot keep up with is dropped, the oldest first, and
+  // counted.
   void start(StageThreads& stages, Source source, Estimate estimate);
 
   // Each of the two may be called from any one thread, and neither waits. newest() is null until
@@ -42,8 +46,11 @@ class LightFeed {
   LightPtr newest();
 
  private:
-  // Every exposure of a bracket counts, so light frames queue; the estimate takes all that wait.
-  BoundedQueue<LightFrame> frames_{16};
+  // Every exposure of a bracket counts, so light frames queue; the estimate takes all that wait. A
+  // whole bracket may always wait, and more of it in up to 256 MB.
+  RecentQueue<LightFrame> frames_{most_exposures, 256'000'000, [](const LightFrame& waiting) {
+                                    return std::uint64_t{waiting.frame->bytes.size()};
+                                  }};
   Mailbox<ObserverView> views_;
   Mailbox<LightPtr> lights_;
   LightPtr newest_;

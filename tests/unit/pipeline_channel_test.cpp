@@ -99,5 +99,26 @@ TEST(Channel, AbandoningWakesAReader) {
   reader.join();
 }
 
+TEST(RecentQueue, DropsTheOldestOnceTooManyWeighTooMuchAndNeverWaits) {
+  RecentQueue<int> queue(2, 10, [](int weight) { return static_cast<std::uint64_t>(weight); });
+  for (const int weight : {3, 3, 3}) EXPECT_TRUE(queue.push(weight));  // more than two, and light
+  EXPECT_EQ(queue.dropped(), 0u);
+  EXPECT_TRUE(queue.push(5));  // 14 together
+  EXPECT_EQ(queue.dropped(), 2u);
+  EXPECT_TRUE(queue.push(100));  // two may wait, whatever they weigh
+  EXPECT_EQ(queue.dropped(), 3u);
+  EXPECT_EQ(queue.try_pop(), 5);
+  EXPECT_EQ(queue.pop(), 100);
+  EXPECT_EQ(queue.try_pop(), std::nullopt);
+  for (int i = 0; i < 5; ++i)
+    EXPECT_TRUE(queue.push(2)) << "what was taken weighs nothing any more";
+  EXPECT_EQ(queue.dropped(), 3u);
+  queue.close();
+  EXPECT_FALSE(queue.push(1));
+  EXPECT_EQ(queue.pop(), 2);
+  queue.abandon();
+  EXPECT_EQ(queue.pop(), std::nullopt);
+}
+
 }  // namespace pipeline_channel_test
 }  // namespace previz::pipeline

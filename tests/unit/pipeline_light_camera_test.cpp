@@ -341,5 +341,48 @@ TEST(LightFeed, TheEstimateTakesAllThatWaits) {
   for (std::size_t i = 0; i < taken.size(); ++i) EXPECT_EQ(taken[i], i);
 }
 
+// The light camera's frames are recorded as they are taken, so that nothing may hold up their
+// thread: here an estimate that ends only when the camera has ended. What waits meanwhile is
+// bounded by its bytes, and what is left out is counted.
+TEST(LightFeed, ASlowEstimateHoldsUpNoLightFrame) {
+  constexpr std::uint64_t frames = 400;
+  Metrics metrics;
+  LightFeed feed;
+  std::promise<void> begun, all_taken;
+  std::atomic<bool> waited_in_vain = false;
+  std::uint64_t estimates = 0, estimated = 0, last = 0;
+  {
+    Frame large;
+    large.bytes.resize(1'000'000);
+    const auto frame = std::make_shared<const Frame>(std::move(large));
+    StageThreads stages(metrics, {});
+    feed.start(
+        stages,
+        [&, next = std::uint64_t{0}]() mutable -> std::optional<LightFrame> {
+          if (next == 1) begun.get_future().wait();
+          if (next < frames) return LightFrame{frame, next++};
+          all_taken.set_value();
+          return std::nullopt;
+        },
+        [&, gate = all_taken.get_future().share()](const std::vector<LightFrame>& waiting,
+                                                   const std::optional<ObserverView>&) {
+          if (++estimates == 1) begun.set_value();
+          if (gate.wait_for(std::chrono::minutes(1)) != std::future_status::ready)
+            waited_in_vain = true;
+          estimated += waiting.size();
+          last = waiting.back().index;
+          return std::make_shared<const Light>();
+        });
+    stages.wait();
+  }
+  EXPECT_FALSE(waited_in_vain);
+  EXPECT_EQ(metrics.snapshot(1).stages.at("light camera").frames, frames);
+  // The first frame, and 256 MB of those after it.
+  EXPECT_EQ(estimated, 1 + 256u);
+  EXPECT_EQ(metrics.snapshot(1).stages.at("lighting").dropped.at("newer frame"),
+            frames - estimated);
+  EXPECT_EQ(last, frames - 1);
+}
+
 }  // namespace pipeline_light_camera_test
 }  // namespace previz::pipeline
