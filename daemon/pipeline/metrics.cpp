@@ -75,7 +75,8 @@ std::string to_json(const MetricsSnapshot& snapshot) {
   json["counts"] = snapshot.counts;
   json["devices"] = snapshot.devices;
   json["latency_s"] = {{"p50", snapshot.latency_p50_s}, {"p99", snapshot.latency_p99_s}};
-  return json.dump(2) + "\n";
+  // A device's name, or what a tracker has read, need not be UTF-8.
+  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace previz::pipeline

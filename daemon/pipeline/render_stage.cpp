@@ -79,7 +79,13 @@ void RenderStage::operator()(Shot& shot) {
 
 bool RenderStage::begin(Shot& shot) {
   shot.whole = false;
-  PlatePtr plate = sized_plate_of(shot);
+  PlatePtr plate = plate_of(shot);
+  if (!response_ || response_->bits() != plate->bits)
+    response_.emplace(calibration_.response, plate->bits);
+  if (options_.passes_other_sizes)
+    if (std::optional<std::string> why = why_other_size(*plate))
+      return pass_through(shot, std::move(plate), *std::move(why)), false;
+  plate = sized(std::move(plate));
   const auto untouched = [&](std::string reason) {
     pass_through(shot, std::move(plate), std::move(reason));
     return false;
@@ -159,16 +165,17 @@ void RenderStage::place(const session::SceneState& state) {
   is_measured_anew_ = false;
 }
 
-PlatePtr RenderStage::sized_plate_of(Shot& shot) {
-  const PlatePtr& plate = plate_of(shot);
-  if (!response_ || response_->bits() != plate->bits)
-    response_.emplace(calibration_.response, plate->bits);
-  if (options_.scale == 1) return plate;
+std::optional<std::string> RenderStage::why_other_size(const Plate& plate) const {
   const PinholeIntrinsics& lens = calibration_.intrinsics;
-  if (plate->width != lens.width || plate->height != lens.height)
-    throw Error("observer: a frame of " + std::to_string(plate->width) + "x" +
-                std::to_string(plate->height) + " does not fit the calibration's " +
-                std::to_string(lens.width) + "x" + std::to_string(lens.height));
+  if (plate.width == lens.width && plate.height == lens.height) return std::nullopt;
+  return "observer: a frame of " + std::to_string(plate.width) + "x" +
+         std::to_string(plate.height) + " does not fit the calibration's " +
+         std::to_string(lens.width) + "x" + std::to_string(lens.height);
+}
+
+PlatePtr RenderStage::sized(PlatePtr plate) const {
+  if (options_.scale == 1) return plate;
+  if (const std::optional<std::string> why = why_other_size(*plate)) throw Error(*why);
   return std::make_shared<const Plate>(scaled(*plate, options_.scale, *response_));
 }
 

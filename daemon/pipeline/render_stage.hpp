@@ -23,6 +23,9 @@ struct RenderStageOptions {
   // Renders in place of a new one; what of its scene the set has too is kept. May be null.
   std::shared_ptr<render::Renderer> renderer = {};
   double scale = 1;  // size of everything a shot gets, over the observer's size (preview_size.hpp)
+  // A frame of another size than the calibration's passes through untouched, as from a camera that
+  // was exchanged; otherwise it is an error, as in a take, all of whose frames would be like it.
+  bool passes_other_sizes = false;
   std::function<bool()> cancelled;
   std::function<void(const Shot&, int samples_done)> progress;  // a few times per frame
   std::function<void(const std::string&)> note;                 // each message once
@@ -69,7 +72,8 @@ class RenderStage {
   double exposure_of(const Shot& shot) const;
   void light(const Shot& shot);
   void place(const session::SceneState& state);
-  PlatePtr sized_plate_of(Shot& shot);
+  std::optional<std::string> why_other_size(const Plate& plate) const;
+  PlatePtr sized(PlatePtr plate) const;
   void pass_through(Shot& shot, PlatePtr plate, std::string reason) const;
 
   set::Set set_;

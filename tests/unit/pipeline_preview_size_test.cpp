@@ -8,6 +8,7 @@
 
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/take.hpp"
+#include "drivers/error.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -127,6 +128,42 @@ Shot card(double scale, bool denoise) {
   EXPECT_EQ(shot.picture->width, shot.layers->width);
   shot.error = stage.error();
   return shot;
+}
+
+// A camera that was exchanged may have another size; in a take, all frames have one.
+TEST(RenderStageSize, AFrameOfAnotherSizePassesThroughWhereThatIsWantedAndIsAnErrorElsewhere) {
+  const test::TemporaryDirectory directory;
+  test::write_small_take(directory.path());
+  const Take take = open_take(directory / "session", directory / "set.toml");
+  for (const double scale : {1.0, 0.5})
+    for (const bool passes : {true, false}) {
+      RenderStageOptions options;
+      options.scale = scale;
+      options.passes_other_sizes = passes;
+      RenderStage stage(render::open_device(), take.set, take.observer, scene::load_scene(take.set),
+                        options);
+      Frame frame = test::small_take_frame(1);
+      frame.width = 64;
+      frame.height = 48;
+      frame.bytes.resize(frame_bytes(frame.format, frame.width, frame.height));
+      Shot shot;
+      shot.frame = std::make_shared<Frame>(std::move(frame));
+      shot.light = std::make_shared<const Light>(light_from_aside());
+      shot.track.pose.emplace();
+      if (!passes) {
+        EXPECT_THROW(stage(shot), Error) << scale;
+        continue;
+      }
+      stage(shot);
+      EXPECT_EQ(shot.untouched, "observer: a frame of 64x48 does not fit the calibration's 48x36");
+      EXPECT_TRUE(shot.whole);
+      EXPECT_EQ(shot.picture->samples, to_plate(*shot.frame).samples) << scale;
+      shot.frame = std::make_shared<Frame>(test::small_take_frame(1));  // the old one is back
+      shot.plate.reset();
+      shot.untouched.clear();
+      stage(shot);
+      EXPECT_EQ(shot.untouched, "");
+    }
 }
 
 render::Layers render_card(double scale) {
