@@ -54,10 +54,14 @@ Recorder::Recorder(RecorderOptions options)
 }
 
 Recorder::~Recorder() {
+  finish();
+}
+
+void Recorder::finish() {
   {
     const std::lock_guard lock(mutex_);
+    if (std::exchange(quit_, true)) return;
     if (status_.recording) enqueue_stop(false);
-    quit_ = true;
   }
   filled_.notify_one();
   thread_.join();

@@ -63,18 +63,21 @@ struct RecorderStatus {
   std::vector<std::string> salvaged;
 };
 
-// No call here waits for the disk, and all may come from any thread. SessionWriter bounds what can
-// be lost: at most the frame in hand if the process dies, about the last second if the power fails.
-// An error of the disk ends the take, with everything so far readable, but nothing else. A full or
-// failing disk ends the take, too, and the next one begins at once on the next disk, if there is
-// one.
+// No call here but finish() waits for the disk, and all may come from any thread. SessionWriter
+// bounds what can be lost: at most the frame in hand if the process dies, about the last second if
+// the power fails. An error of the disk ends the take, with everything so far readable, but nothing
+// else. A full or failing disk ends the take, too, and the next one begins at once on the next disk,
+// if there is one.
 class Recorder {
  public:
   explicit Recorder(RecorderOptions options);
-  // Finishes the running take. That it was being recorded is remembered in the folder of takes.
-  ~Recorder();
+  ~Recorder();  // finish()
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
+
+  // Finishes the running take and waits until all of it is on the disk. That it was being recorded
+  // is remembered in the folder of takes. Nothing that is offered from then on is recorded.
+  void finish();
 
   // Takes every frame of either camera, recording or not. A frame that does not fit the queue is
   // dropped and counted. A frame of another format or size begins the next take.

@@ -496,6 +496,22 @@ TEST(Recorder, RemembersThatItWasRecordingUntilSomebodyEndsIt) {
   EXPECT_EQ(interrupted_in(directory.path()), std::nullopt);
 }
 
+// The rig finishes its recorder before it gives back its devices, which still deliver.
+TEST(Recorder, HasEverythingOnTheDiskOnceItIsFinishedAndTakesNothingAfterThat) {
+  const TemporaryDirectory directory;
+  Recorder recorder(options_in(directory.path()));
+  recorder.start();
+  for (int i = 0; i < 3; ++i) recorder.offer(picture(i));
+  recorder.finish();
+  const std::filesystem::path take = directory / "12A_take001";
+  EXPECT_TRUE(session::open_session(take).missing.empty());
+  recorder.offer(picture(3));
+  recorder.offer(track_of(3));
+  recorder.finish();
+  EXPECT_EQ(frames_of(take), count_from(0, 2));
+  EXPECT_FALSE(recorder.status().recording);
+}
+
 // A disk that hangs: it is reported, what waits is bounded in bytes, whatever it is, and what is
 // left out is counted in the take.
 TEST(Recorder, OfADiskThatHangsKeepsAQueueOfBoundedSizeAndSaysSo) {
