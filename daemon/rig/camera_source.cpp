@@ -1,6 +1,8 @@
 #include "daemon/rig/camera_source.hpp"
 
 #include <cmath>
+#include <exception>
+#include <thread>
 #include <utility>
 #include <variant>
 
@@ -11,31 +13,52 @@ CameraSource::CameraSource(Camera& camera, std::string stage, std::string crews_
       stage_(std::move(stage)),
       crews_name_(std::move(crews_name)),
       parts_(std::move(parts)),
-      counts_(parts_.metrics, stage_) {}
+      counts_(parts_.kept.metrics, stage_),
+      pulse_(parts_.kept.liveness, stage_) {}
 
 FramePtr CameraSource::next() {
-  const std::chrono::duration<double> silence(parts_.silence_s);
-  while (!parts_.stop.stop_requested()) {
-    CameraEvent event = camera_.next(std::chrono::milliseconds(100));
-    counts_.update(camera_.counters());
-    if (std::holds_alternative<EndOfStream>(event)) return nullptr;
-    if (const auto* what = std::get_if<DeviceTrouble>(&event)) {
-      trouble(*what);
-    } else if (auto* frame = std::get_if<FramePtr>(&event)) {
-      arrived(**frame);
-      return std::move(*frame);
-    }
-    if (std::chrono::steady_clock::now() - last_ > silence) lose();
-  }
+  while (!parts_.stop.stop_requested() && !has_ended_)
+    if (FramePtr frame = ask()) return frame;
   return nullptr;
 }
 
+FramePtr CameraSource::ask() {
+  const std::chrono::duration<double> silence(parts_.silence_s);
+  FramePtr frame;
+  try {
+    pulse_.begin(parts_.kept.patience.camera);
+    CameraEvent event = camera_.next(std::chrono::milliseconds(100));
+    pulse_.wait();
+    if (auto* captured = std::get_if<FramePtr>(&event)) frame = std::move(*captured);
+    has_ended_ = std::holds_alternative<EndOfStream>(event);
+    counts_.update(camera_.counters());
+    if (has_ended_) return nullptr;
+    if (const auto* what = std::get_if<DeviceTrouble>(&event)) trouble(*what);
+    if (frame) arrived(*frame);
+    if (!frame && std::chrono::steady_clock::now() - last_ > silence) lose();
+  } catch (const std::exception& error) {
+    failed(error.what());
+  }
+  return frame;
+}
+
+void CameraSource::failed(const char* why) {
+  pulse_.wait();
+  try {
+    trouble({camera_.name(), std::string("has failed: ") + why + "; it is asked again", false});
+  } catch (const std::exception&) {
+    // Memory may be short; what is asked again will be reported again.
+  }
+  // Without a growing delay, because what the camera delivers is recorded.
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+}
+
 void CameraSource::trouble(const DeviceTrouble& trouble) {
-  parts_.reports(report::once({.severity = report::Severity::error,
-                               .source = trouble.device,
-                               .text = trouble.what,
-                               .notice = report::lasting(crews_name_, trouble.what)}));
-  parts_.metrics.count(stage_ + ": device trouble");
+  parts_.kept.reports(report::once({.severity = report::Severity::error,
+                                    .source = trouble.device,
+                                    .text = trouble.what,
+                                    .notice = report::lasting(crews_name_, trouble.what)}));
+  parts_.kept.metrics.count(stage_ + ": device trouble");
   if (trouble.lost) lose();
 }
 
@@ -45,10 +68,10 @@ void CameraSource::lose() {
 }
 
 void CameraSource::arrived(const Frame& frame) {
-  parts_.reports.settle(crews_name_);
+  parts_.kept.reports.settle(crews_name_);
   if (std::exchange(lost_, false) && parts_.presence) parts_.presence(false);
   if (last_sequence_ && frame.sequence > *last_sequence_ + 1)
-    parts_.metrics.dropped(stage_, "by the device", frame.sequence - *last_sequence_ - 1);
+    parts_.kept.metrics.dropped(stage_, "by the device", frame.sequence - *last_sequence_ - 1);
   last_sequence_ = frame.sequence;
   last_ = std::chrono::steady_clock::now();
   exposure_s_ = frame.exposure_s;
@@ -57,7 +80,7 @@ void CameraSource::arrived(const Frame& frame) {
 
 void CameraSource::change_exposure(double stops) {
   if (!(exposure_s_ > 0) || !camera_.set_exposure(exposure_s_ * std::exp2(stops), gain_))
-    parts_.reports(report::once(
+    parts_.kept.reports(report::once(
         {report::Severity::warning, camera_.name(), "its exposure cannot be driven from here"}));
 }
 

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "daemon/pipeline/metrics.hpp"
-#include "daemon/report/reports.hpp"
+#include "daemon/pipeline/stage_keeper.hpp"
 #include "drivers/camera.hpp"
 
 namespace previz::rig {
@@ -19,8 +19,7 @@ class CameraSource {
  public:
   struct Parts {  // references outlive the source
     std::stop_token stop;
-    report::Reports& reports;
-    pipeline::Metrics& metrics;
+    pipeline::StageKeeper::Parts kept;
     double silence_s;  // a camera counts as lost when it says so, or sends nothing for so long
     std::function<void(bool lost)> presence;  // called when that changes; may be empty
   };
@@ -28,12 +27,15 @@ class CameraSource {
   CameraSource(Camera& camera, std::string stage, std::string crews_name, Parts parts);
 
   // Waits for the next frame; returns null at the end of the stream, or once a stop is requested.
+  // What the driver throws counts as trouble of the device, which is asked again.
   FramePtr next();
 
   // Sets an exposure that is longer or shorter than the last frame's by so many stops.
   void change_exposure(double stops);
 
  private:
+  FramePtr ask();
+  void failed(const char* why);
   void trouble(const DeviceTrouble& trouble);
   void lose();
   void arrived(const Frame& frame);
@@ -42,6 +44,8 @@ class CameraSource {
   const std::string stage_, crews_name_;
   Parts parts_;
   pipeline::DeviceCounts counts_;
+  pipeline::Liveness::Pulse pulse_;
+  bool has_ended_ = false;
   bool lost_ = false;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   std::optional<std::uint64_t> last_sequence_;

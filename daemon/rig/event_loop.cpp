@@ -18,8 +18,11 @@ void check(int result, const char* what) {
 
 class Source final : public EventLoop::Watch {
  public:
-  Source(sd_event* event, EventLoop::Callback callback)
-      : event_(event), callback_(std::make_shared<EventLoop::Callback>(std::move(callback))) {}
+  Source(sd_event* event, EventLoop::Callback callback,
+         std::shared_ptr<const EventLoop::OnFault> on_fault)
+      : event_(event),
+        callback_(std::make_shared<EventLoop::Callback>(std::move(callback))),
+        on_fault_(std::move(on_fault)) {}
   ~Source() override {
     sd_event_source_set_enabled(source_, SD_EVENT_OFF);
     sd_event_source_unref(source_);
@@ -29,12 +32,19 @@ class Source final : public EventLoop::Watch {
   sd_event_source* get() const { return source_; }
   std::uint64_t interval_us = 0;
 
-  // An exception must not pass through C code, so it is kept for run() to rethrow.
+  // An exception must not pass through C code, so it is handed to whoever wants it, or kept for
+  // run() to rethrow.
   int call() {
     const std::shared_ptr<EventLoop::Callback> alive = callback_;
+    const std::shared_ptr<const EventLoop::OnFault> on_fault = on_fault_;
     sd_event* const event = event_;
     try {
-      (*alive)();
+      try {
+        (*alive)();
+      } catch (const std::exception& error) {
+        if (!*on_fault) throw;
+        (*on_fault)(error);
+      }
     } catch (...) {
       failure = std::current_exception();
       sd_event_exit(event, 1);
@@ -47,6 +57,7 @@ class Source final : public EventLoop::Watch {
  private:
   sd_event* event_;
   std::shared_ptr<EventLoop::Callback> callback_;
+  std::shared_ptr<const EventLoop::OnFault> on_fault_;
   sd_event_source* source_ = nullptr;
 };
 thread_local std::exception_ptr Source::failure;
@@ -66,7 +77,8 @@ int on_time(sd_event_source* timer, std::uint64_t, void* data) {
 
 }  // namespace
 
-EventLoop::EventLoop() {
+EventLoop::EventLoop(OnFault on_fault)
+    : on_fault_(std::make_shared<const OnFault>(std::move(on_fault))) {
   check(sd_event_new(&event_), "cannot be made");
 }
 
@@ -75,7 +87,7 @@ EventLoop::~EventLoop() {
 }
 
 std::unique_ptr<EventLoop::Watch> EventLoop::on_readable(int descriptor, Callback callback) {
-  auto source = std::make_unique<Source>(event_, std::move(callback));
+  auto source = std::make_unique<Source>(event_, std::move(callback), on_fault_);
   check(sd_event_add_io(event_, source->out(), descriptor, EPOLLIN, on_io, source.get()),
         "a descriptor cannot be watched");
   return source;
@@ -83,7 +95,7 @@ std::unique_ptr<EventLoop::Watch> EventLoop::on_readable(int descriptor, Callbac
 
 std::unique_ptr<EventLoop::Watch> EventLoop::every(std::chrono::milliseconds interval,
                                                    Callback callback) {
-  auto source = std::make_unique<Source>(event_, std::move(callback));
+  auto source = std::make_unique<Source>(event_, std::move(callback), on_fault_);
   source->interval_us = static_cast<std::uint64_t>(std::chrono::microseconds(interval).count());
   check(sd_event_add_time_relative(event_, source->out(), CLOCK_MONOTONIC, source->interval_us,
                                    1000, on_time, source.get()),
@@ -92,7 +104,7 @@ std::unique_ptr<EventLoop::Watch> EventLoop::every(std::chrono::milliseconds int
 }
 
 std::unique_ptr<EventLoop::Watch> EventLoop::on_signal(int signal, Callback callback) {
-  auto source = std::make_unique<Source>(event_, std::move(callback));
+  auto source = std::make_unique<Source>(event_, std::move(callback), on_fault_);
   check(sd_event_add_signal(event_, source->out(), signal, on_signal_info, source.get()),
         "a signal cannot be watched");
   return source;

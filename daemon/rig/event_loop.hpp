@@ -4,6 +4,7 @@
 #include <sys/types.h>
 
 #include <chrono>
+#include <exception>
 #include <functional>
 #include <memory>
 
@@ -19,9 +20,13 @@ class EventLoop {
     virtual ~Watch() = default;
   };
   using Callback = std::function<void()>;
+  using OnFault = std::function<void(const std::exception&)>;
 
+  // `on_fault` is called with what a callback has thrown, and the loop goes on. Without it an
+  // exception in a callback ends run(), which rethrows it.
+  //
   // The constructor and the functions below throw previz::Error if the system refuses.
-  EventLoop();
+  explicit EventLoop(OnFault on_fault = {});
   ~EventLoop();
   EventLoop(const EventLoop&) = delete;
   EventLoop& operator=(const EventLoop&) = delete;
@@ -32,13 +37,14 @@ class EventLoop {
   // The signal must be blocked in every thread.
   std::unique_ptr<Watch> on_signal(int signal, Callback callback);
 
-  // Runs until exit(). An exception in a callback ends run(), which rethrows it.
+  // Runs until exit().
   void run();
   void exit();
 
   sd_event* handle() const { return event_; }
 
  private:
+  const std::shared_ptr<const OnFault> on_fault_;
   sd_event* event_ = nullptr;
 };
 

@@ -2,9 +2,10 @@
 
 #include <chrono>
 #include <csignal>
+#include <thread>
 #include <utility>
 
-#include "daemon/control/bus.hpp"
+#include "daemon/rig/bus_link.hpp"
 #include "daemon/rig/event_loop.hpp"
 #include "daemon/rig/live_files.hpp"
 #include "daemon/rig/rig.hpp"
@@ -27,14 +28,13 @@ void override_set(set::Set& set, const LiveOptions& options) {
 // The screen stays open from one set to the next if both describe it alike.
 class CrewScreen {
  public:
-  CrewScreen(report::Reports& reports, pipeline::Metrics& metrics,
-             decltype(LiveOptions::on_screen) on_screen)
-      : reports_(reports), metrics_(metrics), on_screen_(std::move(on_screen)) {}
+  CrewScreen(pipeline::StageKeeper::Parts kept, decltype(LiveOptions::on_screen) on_screen)
+      : kept_(std::move(kept)), on_screen_(std::move(on_screen)) {}
 
   void use(const set::Set& set) {
     if (screen_ && set.display == used_ && set.output.directory == directory_) return;
     screen_.reset();  // before another opens the same display
-    screen_.emplace(set, Screen::Parts{reports_, metrics_, set.output.directory, on_screen_});
+    screen_.emplace(set, Screen::Parts{kept_, set.output.directory, on_screen_});
     used_ = set.display;
     directory_ = set.output.directory;
   }
@@ -42,8 +42,7 @@ class CrewScreen {
   Screen* operator->() { return &*screen_; }
 
  private:
-  report::Reports& reports_;
-  pipeline::Metrics& metrics_;
+  const pipeline::StageKeeper::Parts kept_;
   const decltype(LiveOptions::on_screen) on_screen_;
   std::optional<Screen> screen_;
   set::Display used_;
@@ -98,6 +97,15 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
   sigaddset(&hangup, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &hangup, nullptr);
   pipeline::Metrics metrics;
+  pipeline::Liveness liveness;
+  pipeline::Liveness::Pulse pulse(liveness, "main loop");
+  pulse.begin(options.patience.set);
+  Service service(liveness, reports);
+  const pipeline::StageKeeper::Parts kept{.reports = reports,
+                                          .metrics = metrics,
+                                          .liveness = liveness,
+                                          .patience = options.patience,
+                                          .rehearse = options.rehearse};
   const auto start = std::chrono::steady_clock::now();
   const auto snapshot = [&] {
     const std::chrono::duration<double> since = std::chrono::steady_clock::now() - start;
@@ -108,11 +116,16 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
       options.set_file, [&](set::Set& set) { override_set(set, options); }, reports);
   const std::shared_ptr<render::Device> device = render::open_device(options.device);
   std::shared_ptr<render::Renderer> renderer;  // goes from set to set
-  CrewScreen screen(reports, metrics, options.on_screen);
+  CrewScreen screen(kept, options.on_screen);
   for (;;) {
     reports.begin_set();
     const set::Set& set = sets.running().set;
-    EventLoop loop;
+    EventLoop loop([&](const std::exception& error) {
+      metrics.count("main loop: failed");
+      reports(report::once({report::Severity::error, "main loop", error.what()}));
+      // What fails again at once leaves time for the rest.
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    });
     std::optional<LiveFiles> files;
     const auto show = [&](pipeline::Shot shot, const Look& look) {
       if (options.on_shown) options.on_shown(shot, look);
@@ -124,9 +137,9 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     try {
       files.emplace(set.output.directory, metrics_json, reports);
       screen.use(set);
-      rig = std::make_unique<Rig>(Rig::Parts{loop, sets, reports, metrics, device, renderer, show,
-                                             show_facts, options.buttons, options.loop,
-                                             options.stop});
+      rig = std::make_unique<Rig>(Rig::Parts{loop, sets, kept, service, pulse, device, renderer,
+                                             show, show_facts, options.buttons,
+                                             options.around_cameras, options.loop, options.stop});
     } catch (const std::exception& error) {
       if (!sets.go_back(error.what())) throw;
       continue;
@@ -134,9 +147,9 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     reports({report::Severity::info, "",
              "live on " + render::device_name(*device) + ", set \"" + set.name + "\", " +
                  std::to_string(set.quality.samples) + " samples a frame"});
-    std::optional<control::Bus> bus;
+    std::optional<BusLink> bus;
     if (options.bus) {
-      bus.emplace(loop.handle(), verbs_of(*rig, set, reports, metrics_json));
+      bus.emplace(loop, verbs_of(*rig, set, reports, metrics_json), kept);
       rig->on_change([&] { bus->changed(); });
     }
     const auto reload =
@@ -146,7 +159,6 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     if (sets.has_next() && rig->controls().look().take_edits != pipeline::Edits{})
       reports({report::Severity::warning, "review",
                "what was changed in the take in review is dropped, because a set is read"});
-    if (!sets.has_next()) service::stopping();
     rig->on_change({});
     bus.reset();
     rig.reset();

@@ -10,10 +10,12 @@
 #include <vector>
 
 #include "daemon/output/osd_page.hpp"
+#include "daemon/pipeline/liveness.hpp"
 #include "daemon/pipeline/metrics.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/render/renderer.hpp"
 #include "daemon/report/reports.hpp"
+#include "daemon/rig/cameras.hpp"
 #include "daemon/rig/controls.hpp"
 #include "drivers/buttons.hpp"
 
@@ -24,11 +26,16 @@ struct LiveOptions {
   std::optional<int> samples;                      // quality.samples
   std::optional<std::filesystem::path> directory;  // output.directory
   bool loop = false;                               // replayed cameras start again at their end
-  bool bus = false;                                // org.previz.Rig1 on the system bus
+  bool bus = false;  // org.previz.Rig1 on the system bus, when there is one
   render::DeviceOptions device;
   std::stop_token stop;
+  pipeline::Patience patience = {};  // until a thread counts as hung
   // Opens devices besides those the set names, for tests.
   std::function<std::vector<std::unique_ptr<Buttons>>()> buttons;
+  // Called with a set's cameras before they are used, for tests, which may put others around them.
+  std::function<void(Cameras&)> around_cameras;
+  // As StageKeeper's, for tests.
+  std::function<void(const std::string&)> rehearse;
   // Called with every picture as it goes to the display, on the pipeline's last thread.
   std::function<void(const pipeline::Shot&, const Look&)> on_shown;
   // Called with every screenful as it is read back, and the overlay's words, on the display's
@@ -39,8 +46,9 @@ struct LiveOptions {
 // Runs until the observer's stream ends or a stop is requested. Buttons act as the set says;
 // changes of the set file take effect. About once a second, and at the end, the newest picture is
 // written to DIR/picture.png and the metrics to DIR/metrics.json. A frame whose pose is lost, or
-// that comes before the first light, shows its plate untouched. Throws previz::Error on anything
-// that keeps the rig from running.
+// that comes before the first light, shows its plate untouched. A stage that fails is reported,
+// counted and begun anew while the rig goes on (live_pipeline.hpp). Throws previz::Error on
+// anything that keeps the rig from running.
 pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& reports);
 
 }  // namespace previz::rig

@@ -39,7 +39,7 @@ void LiveFiles::write(const Plate* picture) const {
   try {
     if (picture) output::write_png(directory_ / "picture.png", *picture);
     session::replace_file(directory_ / "metrics.json", metrics_());
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {
     reports_(report::once({report::Severity::error, "", error.what()}));
   }
 }

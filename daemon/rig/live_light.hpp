@@ -10,6 +10,7 @@
 #include "daemon/pipeline/light_feed.hpp"
 #include "daemon/pipeline/light_stage.hpp"
 #include "daemon/pipeline/metrics.hpp"
+#include "daemon/pipeline/stage_keeper.hpp"
 #include "daemon/report/reports.hpp"
 #include "daemon/rig/controls.hpp"
 
@@ -21,8 +22,7 @@ class LiveLight {
     const set::Set& set;
     const scene::Scene& scene;
     const pipeline::Newest<Look>& look;
-    report::Reports& reports;
-    pipeline::Metrics& metrics;
+    pipeline::StageKeeper::Parts kept;
   };
 
   // Throws previz::Error as pipeline::LightStage does.
@@ -30,16 +30,18 @@ class LiveLight {
             const ObserverCalibration& observer);
 
   // True if the light is made from the light camera's frames.
-  bool needs_frames() const { return stage_.needs_frames(); }
+  bool needs_frames() const { return needs_frames_; }
 
   // Holds the first light back until a whole bracket was seen; see LightStage::await_bracket().
-  void await_bracket(std::size_t exposures) { stage_.await_bracket(exposures); }
+  void await_bracket(std::size_t exposures) { stage_->await_bracket(exposures); }
 
   // Adds the stages of the light camera. `next_frame` waits for the next frame; null ends the
-  // stream. Frames are taken even if lighting does not need them, because they may be recorded.
+  // stream. Frames are taken even if lighting does not need them, because they may be recorded, and
+  // never wait for an estimate. An estimate that fails leaves the light as it was.
   void start(pipeline::StageThreads& stages, std::function<FramePtr()> next_frame);
 
   // Returns the newest light for a tracked shot, without waiting. The tracking stage calls it.
+  // Where the set gives the light, it may throw what the light stage does.
   pipeline::LightPtr light_for(const pipeline::Shot& shot, set::LightMode mode);
   // Lets the film camera's picture fill in what the light camera cannot see, if the set asks for
   // that.
@@ -49,8 +51,16 @@ class LiveLight {
   pipeline::LightPtr estimate(std::vector<pipeline::LightFrame> frames,
                               const std::optional<pipeline::ObserverView>& view);
 
+  void update(std::vector<pipeline::LightFrame>& frames,
+              const std::optional<pipeline::ObserverView>& view);
+
   const Parts parts_;
-  pipeline::LightStage stage_;
+  const std::function<void()> make_stage_;
+  // One thread alone uses it: lighting if it needs frames, and tracking if it does not.
+  std::optional<pipeline::LightStage> stage_;
+  const bool needs_frames_, needs_observer_;
+  const int observer_width_, observer_height_;
+  pipeline::StageKeeper keeper_;
   pipeline::LightFeed feed_;
   pipeline::LightPtr last_;  // the last estimate
 };

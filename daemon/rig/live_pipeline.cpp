@@ -50,15 +50,20 @@ struct LivePipeline::Impl {
   void observer_stages();
   void output_stages();
   GpuKeeper::Gpu gpu();
+  void make_track_stage();
   void make_render_stage();
+  void drop_render_stage();
+  void begin_rendering_anew();
   std::optional<Shot> capture();
   Shot track(Shot shot);
+  void offer_track(Shot& shot, const pipeline::Edits& edits);
+  std::optional<Shot> next_picture();
   void report_carriers(const Shot& shot);
   void show(Shot shot);
   void record_shown(const Shot& shot);
-  CameraSource source(std::stop_token stop, Camera& camera, const set::CameraWish& wish,
-                      const char* stage, const char* crews_name,
-                      std::function<void(bool)> presence);
+  std::unique_ptr<CameraSource> source(std::stop_token stop, Camera& camera,
+                                       const set::CameraWish& wish, const char* stage,
+                                       const char* crews_name, std::function<void(bool)> presence);
   void record_captured(const FramePtr& frame);
 
   Parts parts;
@@ -67,13 +72,24 @@ struct LivePipeline::Impl {
   std::stop_callback<std::function<void()>> stop_light{stop_source.get_token(),
                                                        [this] { light_stop.request_stop(); }};
   const ObserverCalibration calibration;
-  pipeline::TrackStage track_stage;
+  std::optional<pipeline::TrackStage> track_stage;
   pipeline::AnimationClock animation_clock;
   LiveLight light;
   LiveRender live_render;
   std::optional<pipeline::RenderStage> render_stage;
   GpuKeeper gpu_keeper;
-  std::optional<CameraSource> observer;
+  int begun_anew = 0;  // renderers since the last picture, beside the first
+  // Each belongs to the thread of its stage; tracking has the two in the middle, the display two.
+  pipeline::StageKeeper demosaicing{"conversion", parts.kept, &pipeline::Patience::stage};
+  pipeline::StageKeeper tracking{"tracking", parts.kept, &pipeline::Patience::stage,
+                                 [this] { make_track_stage(); }};
+  pipeline::StageKeeper lighting{"light of the picture", parts.kept, &pipeline::Patience::stage};
+  pipeline::StageKeeper rendering{"render", parts.kept, &pipeline::Patience::render,
+                                  [this] { begin_rendering_anew(); }};
+  pipeline::StageKeeper keeping_shown{"pictures in the take", parts.kept,
+                                      &pipeline::Patience::stage};
+  pipeline::StageKeeper displaying{"display", parts.kept, &pipeline::Patience::stage};
+  std::unique_ptr<CameraSource> observer, light_camera;
   std::uint64_t next_index = 0;
   std::uint64_t shown_frames = 0;
   int exposure_steps = 0;  // steps of Look::exposure_steps done so far
@@ -93,19 +109,20 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
     : parts(std::move(the_parts)),
       stop_from_outside(std::move(stop), [this] { stop_source.request_stop(); }),
       calibration(pipeline::observer_calibration(parts.set, parts.cameras.recorded.info)),
-      track_stage(parts.set, calibration, parts.cameras.recorded.track, 0, parts.cameras.lap_ns),
-      light({parts.set, parts.scene, parts.look, parts.reports, parts.metrics},
+      light({parts.set, parts.scene, parts.look, parts.kept},
             pipeline::light_calibration(parts.set, parts.cameras.recorded.info), calibration),
-      live_render(parts.set, parts.look, parts.inbox, parts.metrics,
+      live_render(parts.set, parts.look, parts.inbox, parts.kept.metrics,
                   {tracked, reviewed, snapshots, found, recorded_variants},
                   stop_source.get_token()),
-      gpu_keeper(gpu(), {parts.reports, parts.metrics, stop_source.get_token()}) {
+      gpu_keeper(gpu(), {parts.kept.reports, parts.kept.metrics, stop_source.get_token()}) {
   if (light.needs_frames() && !parts.cameras.light)
     throw Error(parts.set.file.string() +
                 ": lighting: the set has neither a light camera nor lighting.environment");
   light.await_bracket(parts.cameras.light_exposures);
+  make_track_stage();
   gpu_keeper.start();
-  stages.emplace(parts.metrics, stop_source.get_token(), [this] { stop_source.request_stop(); });
+  stages.emplace(parts.kept.metrics, stop_source.get_token(),
+                 [this] { stop_source.request_stop(); });
   if (parts.cameras.light) light_stages();
   observer_stages();
   output_stages();
@@ -116,24 +133,44 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
       failure = std::current_exception();
     }
     live_render.count_dropped();
-    if (tracked.try_pop()) parts.metrics.dropped("render", "stopped");
+    if (tracked.try_pop()) parts.kept.metrics.dropped("render", "stopped");
     parts.inbox.finish();
   });
 }
 
+void LivePipeline::Impl::make_track_stage() {
+  track_stage.emplace(parts.set, calibration, parts.cameras.recorded.track, 0,
+                      parts.cameras.lap_ns);
+}
+
 void LivePipeline::Impl::make_render_stage() {
-  render_stage.emplace(
-      parts.device, parts.set, calibration, parts.scene,
-      pipeline::RenderStageOptions{.renderer = std::exchange(parts.renderer, nullptr),
-                                   .scale = parts.set.quality.scale,
-                                   .cancelled = [this] { return live_render.interrupted(); },
-                                   .progress = {},
-                                   .note =
-                                       [this](const std::string& what) {
-                                         parts.reports(report::once({Severity::warning, "", what}));
-                                       }});
+  render_stage.emplace(parts.device, parts.set, calibration, parts.scene,
+                       pipeline::RenderStageOptions{
+                           .renderer = std::exchange(parts.renderer, nullptr),
+                           .scale = parts.set.quality.scale,
+                           .passes_other_sizes = true,
+                           .cancelled = [this] { return live_render.interrupted(); },
+                           .progress = {},
+                           .note =
+                               [this](const std::string& what) {
+                                 parts.kept.reports(report::once({Severity::warning, "", what}));
+                               }});
   parts.renderer = render_stage->renderer();
   live_render.use(*render_stage);
+}
+
+void LivePipeline::Impl::drop_render_stage() {
+  live_render.use_none();
+  render_stage.reset();
+  parts.renderer.reset();
+}
+
+// A renderer that fails again is made on a device that was opened anew.
+void LivePipeline::Impl::begin_rendering_anew() {
+  rendering.waits();  // as long as the device is gone
+  drop_render_stage();
+  if (++begun_anew > 1) gpu().open();
+  gpu_keeper.start();
 }
 
 GpuKeeper::Gpu LivePipeline::Impl::gpu() {
@@ -145,47 +182,69 @@ GpuKeeper::Gpu LivePipeline::Impl::gpu() {
               },
           .name = [this] { return render::device_name(*parts.device); },
           .build = [this] { make_render_stage(); },
-          .drop = [this] { render_stage.reset(); }};
+          .drop = [this] { drop_render_stage(); }};
 }
 
-CameraSource LivePipeline::Impl::source(std::stop_token stop, Camera& camera,
-                                        const set::CameraWish& wish, const char* stage,
-                                        const char* crews_name,
-                                        std::function<void(bool)> presence) {
-  return {
-      camera,
-      stage,
-      crews_name,
-      {std::move(stop), parts.reports, parts.metrics, wish.stall_timeout_s, std::move(presence)}};
+std::unique_ptr<CameraSource> LivePipeline::Impl::source(std::stop_token stop, Camera& camera,
+                                                         const set::CameraWish& wish,
+                                                         const char* stage, const char* crews_name,
+                                                         std::function<void(bool)> presence) {
+  return std::make_unique<CameraSource>(
+      camera, stage, crews_name,
+      CameraSource::Parts{std::move(stop), parts.kept, wish.stall_timeout_s, std::move(presence)});
 }
 
 void LivePipeline::Impl::record_captured(const FramePtr& frame) {
-  if (parts.look.get()->state.mode != Mode::standby) parts.recorder.offer(frame);
+  try {
+    if (parts.look.get()->state.mode != Mode::standby) parts.recorder.offer(frame);
+  } catch (const std::exception& error) {  // there is no memory for it
+    parts.kept.metrics.dropped("recorder", "failed");
+    parts.kept.reports(report::once({Severity::error, "recorder", error.what()}));
+  }
 }
 
 void LivePipeline::Impl::light_stages() {
-  light.start(*stages, [this, camera = source(light_stop.get_token(), *parts.cameras.light,
-                                              parts.set.light_camera.camera, "light camera",
-                                              "light camera", {})]() mutable {
-    FramePtr frame = camera.next();
+  light_camera = source(light_stop.get_token(), *parts.cameras.light, parts.set.light_camera.camera,
+                        "light camera", "light camera", {});
+  light.start(*stages, [this] {
+    FramePtr frame = light_camera->next();
     if (frame) record_captured(frame);
     return frame;
   });
 }
 
 void LivePipeline::Impl::observer_stages() {
-  observer.emplace(source(stop_source.get_token(), *parts.cameras.observer,
-                          parts.set.observer.camera, "observer", "film camera", [this](bool lost) {
-                            parts.inbox.post(lost ? Event::camera_lost : Event::camera_back);
-                          }));
+  observer = source(stop_source.get_token(), *parts.cameras.observer, parts.set.observer.camera,
+                    "observer", "film camera", [this](bool lost) {
+                      parts.inbox.post(lost ? Event::camera_lost : Event::camera_back);
+                    });
   stages->source("observer", seen, [this] { return capture(); });
   stages->stage("tracking", seen, tracked, [this](Shot shot) { return track(std::move(shot)); });
   stages->source(rendered, [this] {  // LiveRender counts what it renders
-    std::optional<Shot> shot =
-        live_render.next([this](const render::DeviceLost& lost) { return gpu_keeper.renew(lost); });
+    std::optional<Shot> shot = next_picture();
     if (!shot) snapshots.close();
     return shot;
   });
+}
+
+// While the renderer is made anew, the crew sees the plate.
+std::optional<Shot> LivePipeline::Impl::next_picture() {
+  const auto renew = [this](const render::DeviceLost& lost) {
+    rendering.waits();  // as long as the device is gone
+    return gpu_keeper.renew(lost);
+  };
+  for (;;) {
+    std::optional<Shot> shot;
+    const bool is_well = rendering.attempt([&] {
+      shot = live_render.next(renew);
+      if (shot) begun_anew = 0;
+    });
+    if (!is_well) {
+      drop_render_stage();
+      shot = live_render.next_plate("the renderer has failed");
+    }
+    if (shot || live_render.finished()) return shot;
+  }
 }
 
 std::optional<Shot> LivePipeline::Impl::capture() {
@@ -194,30 +253,30 @@ std::optional<Shot> LivePipeline::Impl::capture() {
     observer->change_exposure((wanted - exposure_steps) * parts.set.control.exposure_step_stops);
   exposure_steps = wanted;
 
-  Shot shot;
-  shot.frame = observer->next();
-  if (!shot.frame) {
-    light_stop.request_stop();  // without the observer there is nothing to light
-    return std::nullopt;
+  while (FramePtr frame = observer->next()) {
+    Shot shot;
+    shot.index = next_index++;
+    shot.arrived = std::chrono::steady_clock::now();
+    record_captured(frame);
+    if (demosaicing.attempt([&] { shot.frame = demosaiced(frame); })) return shot;  // once for all
+    parts.kept.metrics.worked("observer", 0);
+    parts.kept.metrics.dropped("tracking", "not converted");
   }
-  shot.index = next_index++;
-  shot.arrived = std::chrono::steady_clock::now();
-  record_captured(shot.frame);
-  shot.frame = demosaiced(shot.frame);  // once for all later stages
-  return shot;
+  light_stop.request_stop();  // without the observer there is nothing to light
+  return std::nullopt;
 }
 
 void LivePipeline::Impl::report_carriers(const Shot& shot) {
-  for (const std::string& trouble : track_stage.troubles()) {
-    parts.reports(report::once({Severity::warning, "", trouble}));
-    parts.metrics.count("carrier not found");
+  for (const std::string& trouble : track_stage->troubles()) {
+    parts.kept.reports(report::once({Severity::warning, "", trouble}));
+    parts.kept.metrics.count("carrier not found");
   }
   for (const set::Carrier& carrier : parts.set.tracking.carriers) {
     const auto where = shot.motion.carriers.find(carrier.name);
     if (where != shot.motion.carriers.end() && !where->second.tags.empty())
-      parts.reports.settle(carrier.name);
+      parts.kept.reports.settle(carrier.name);
     else
-      parts.reports.show(report::lasting(carrier.name, "is not in the picture"));
+      parts.kept.reports.show(report::lasting(carrier.name, "is not in the picture"));
   }
 }
 
@@ -226,17 +285,36 @@ Shot LivePipeline::Impl::track(Shot shot) {
   const double animation_s =
       animation_clock.at(shot.frame->timestamp_ns, look->plays, look->animations_held);
   if (!tracks(look->state)) {
-    parts.metrics.count("frames that tracking rested");
+    parts.kept.metrics.count("frames that tracking rested");
     return shot;
   }
-  track_stage(shot);
+  const bool is_tracked = tracking.attempt([&] {
+    (*track_stage)(shot);
+    report_carriers(shot);
+  });
+  if (!is_tracked) {
+    shot.track = {};
+    shot.track.reason = "tracking has failed";
+    shot.motion = {};
+    shot.tracking_done = true;
+  }
   shot.motion.animation_s = animation_s;
-  report_carriers(shot);
-  shot.light = light.light_for(shot, look->light_mode);
-  light.see_observer(shot);
-  shot.scene = pipeline::scene_state(parts.set, look->edits, shot.motion);
-  parts.recorder.offer(track_record_of(shot));
+  lighting.attempt([&] {
+    shot.light = light.light_for(shot, look->light_mode);
+    light.see_observer(shot);
+  });
+  offer_track(shot, look->edits);
   return shot;
+}
+
+void LivePipeline::Impl::offer_track(Shot& shot, const pipeline::Edits& edits) {
+  try {
+    shot.scene = pipeline::scene_state(parts.set, edits, shot.motion);
+    parts.recorder.offer(track_record_of(shot));
+  } catch (const std::exception& error) {
+    parts.kept.metrics.count("lines of tracking that failed");
+    parts.kept.reports(report::once({Severity::error, "tracking", error.what()}));
+  }
 }
 
 void LivePipeline::Impl::output_stages() {
@@ -245,9 +323,9 @@ void LivePipeline::Impl::output_stages() {
   set.observer.calibration = calibration;
   stages->sink("snapshot", snapshots, [this, set = std::move(set)](const Shot& shot) {
     try {
-      parts.reports({Severity::info, "snapshot", write_snapshot(shot, set).string()});
-    } catch (const Error& error) {
-      parts.reports({Severity::error, "snapshot", error.what()});
+      parts.kept.reports({Severity::info, "snapshot", write_snapshot(shot, set).string()});
+    } catch (const std::exception& error) {
+      parts.kept.reports({Severity::error, "snapshot", error.what()});
     }
   });
 }
@@ -255,10 +333,13 @@ void LivePipeline::Impl::output_stages() {
 // This runs on the display thread, so that the render thread need not make the recorder's frame of
 // each picture.
 void LivePipeline::Impl::show(Shot shot) {
-  if (!shot.whole) return parts.metrics.dropped("display", "stopped while rendering");
-  count_picture(shot, parts.metrics, parts.reports);
-  record_shown(shot);
-  parts.show(std::move(shot));
+  if (!shot.whole) return parts.kept.metrics.dropped("display", "stopped while rendering");
+  keeping_shown.attempt([&] { record_shown(shot); });
+  const bool is_shown = displaying.attempt([&] {
+    count_picture(shot, parts.kept.metrics, parts.kept.reports);
+    parts.show(std::move(shot));
+  });
+  if (!is_shown) parts.kept.metrics.dropped("display", "failed");
 }
 
 // A review shows another take than the one that is being recorded.

@@ -1,5 +1,15 @@
 // Runs the rig's stages for one set: cameras, tracking, lighting, rendering and display, each on a
 // thread of its own, with mailboxes between them and the recorder beside them.
+//
+// What the cameras deliver goes to the recorder first, on the camera's own thread, before any stage
+// sees it. Every other stage works under a StageKeeper: what it throws is reported, the stage rests
+// and begins anew, and frames meanwhile pass it by (a picture without a pose, the light as it was,
+// the plate alone). None of it ends the rig or a take. The stages stay in one process with the
+// recorder: a process of the recorder's own would also outlive a crash of a graphics driver, but
+// every frame would have to be handed over through shared memory, at up to a gigabyte a second, and
+// the two would need a protocol, an order to start in and one to die in. What cannot be caught
+// here, a crash or a hang, costs a take the frame in hand (the file system has the others), and the
+// next process records on at once.
 #pragma once
 
 #include <functional>
@@ -12,6 +22,7 @@
 #include "daemon/pipeline/channel.hpp"
 #include "daemon/pipeline/metrics.hpp"
 #include "daemon/pipeline/shot.hpp"
+#include "daemon/pipeline/stage_keeper.hpp"
 #include "daemon/render/renderer.hpp"
 #include "daemon/report/reports.hpp"
 #include "daemon/rig/cameras.hpp"
@@ -36,8 +47,7 @@ class LivePipeline {
     output::Recorder& recorder;
     const pipeline::Newest<Look>& look;
     Inbox& inbox;
-    report::Reports& reports;
-    pipeline::Metrics& metrics;
+    pipeline::StageKeeper::Parts kept;
     std::function<void(pipeline::Shot)> show;  // on the display's thread
   };
 
@@ -48,8 +58,8 @@ class LivePipeline {
   LivePipeline(const LivePipeline&) = delete;
   LivePipeline& operator=(const LivePipeline&) = delete;
 
-  // Waits for every stage to end, after Inbox::finish, then rethrows the exception of the first
-  // stage that failed.
+  // Waits for every stage to end, after Inbox::finish, then rethrows the first exception that no
+  // keeper has caught.
   void wait();
 
   pipeline::Mailbox<pipeline::Shot>& reviewed();  // a review pushes its frames here

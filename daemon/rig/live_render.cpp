@@ -1,6 +1,7 @@
 #include "daemon/rig/live_render.hpp"
 
 #include <algorithm>
+#include <exception>
 #include <thread>
 #include <utility>
 
@@ -39,31 +40,52 @@ bool LiveRender::interrupted() const {
   return stop_.stop_requested() || (refining_ && look_.get()->state.mode != Mode::refine);
 }
 
+void LiveRender::use_none() {
+  stage_ = nullptr;
+  refining_ = false;
+  refined_.reset();
+}
+
+bool LiveRender::finished() const {
+  return channels_.tracked.finished() || (!stage_ && stop_.stop_requested());
+}
+
 std::optional<Shot> LiveRender::next(const std::function<bool(const render::DeviceLost&)>& renew) {
-  for (;;) {
-    try {
-      return next_picture();
-    } catch (const render::DeviceLost& lost) {
-      refining_ = false;
-      refined_.reset();
-      if (!renew(lost)) return std::nullopt;
-    }
+  try {
+    return next_picture();
+  } catch (const render::DeviceLost& lost) {
+    use_none();
+    renew(lost);
+    return std::nullopt;
   }
 }
 
 std::optional<Shot> LiveRender::next_picture() {
-  for (;;) {
-    count_dropped();
-    const std::shared_ptr<const Look> look = look_.get();
-    save_refined(*look);
-    if (look->state.mode != Mode::refine || look->refinements != refinements_) refining_ = false;
-    if (!look->of_take) good_of_take_.reset();
-    refinements_ = look->refinements;
-    std::optional<Shot> shot =
-        look->state.mode == Mode::refine ? refine_round(*look) : wait_for_frame(*look);
-    if (shot) return shot;
-    if (channels_.tracked.finished()) return std::nullopt;
+  if (!stage_) return std::nullopt;  // a stop came before the device was there again
+  count_dropped();
+  const std::shared_ptr<const Look> look = look_.get();
+  save_refined(*look);
+  if (look->state.mode != Mode::refine || look->refinements != refinements_) refining_ = false;
+  if (!look->of_take) good_of_take_.reset();
+  refinements_ = look->refinements;
+  return look->state.mode == Mode::refine ? refine_round(*look) : wait_for_frame(*look);
+}
+
+std::optional<Shot> LiveRender::next_plate(const std::string& untouched) {
+  count_dropped();
+  const std::shared_ptr<const Look> look = look_.get();
+  std::optional<Shot> shot = take_frame(*look);
+  if (!shot) return std::nullopt;
+  try {
+    shot->picture = plate_of(*shot);
+  } catch (const std::exception&) {
+    if (!look->of_take) metrics_.dropped("render", "failed");
+    return std::nullopt;
   }
+  shot->untouched = untouched;
+  shot->whole = true;
+  if (!look->of_take) metrics_.worked("render", 0);
+  return shot;
 }
 
 std::optional<Shot> LiveRender::refine_round(const Look& look) {
@@ -135,6 +157,12 @@ void LiveRender::publish_found(const pipeline::LightPtr& light) {
 }
 
 std::optional<Shot> LiveRender::wait_for_frame(const Look& look) {
+  std::optional<Shot> shot = take_frame(look);
+  if (!shot) return std::nullopt;
+  return render(look, *std::move(shot));
+}
+
+std::optional<Shot> LiveRender::take_frame(const Look& look) {
   const bool review = look.of_take;
   std::optional<Shot> shot = (review ? channels_.reviewed : channels_.tracked).pop_for(patience);
   if (review && channels_.tracked.try_pop()) metrics_.dropped("render", "review");
@@ -147,7 +175,7 @@ std::optional<Shot> LiveRender::wait_for_frame(const Look& look) {
     metrics_.dropped("render", "refining");
     return std::nullopt;
   }
-  return render(look, std::move(*shot));
+  return shot;
 }
 
 Shot LiveRender::render(const Look& look, Shot shot) {
@@ -163,11 +191,6 @@ Shot LiveRender::render(const Look& look, Shot shot) {
   // If a refinement ended before its first round, this picture is the only one to save for it.
   const bool of_live = look.snapshots > snapshots_;
   const bool snapshot = of_live || look.refined_snapshots > refined_snapshots_;
-  stage_->use(quality);
-  stage_->use(look.estimator);
-  stage_->show(look.view);
-  stage_->fill_layers(snapshot);
-  stage_->resize(governed ? governor_->scale() : set_.quality.scale);
   // A reviewed frame was not captured now, so its loss is not counted.
   const bool captured = !look.of_take;
   // The crew's changes go on top of what was recorded, never in its place.
@@ -176,11 +199,19 @@ Shot LiveRender::render(const Look& look, Shot shot) {
     channels_.recorded_variants.set(shot.scene.variants);
   if (!captured)
     recorded = std::exchange(shot.scene, pipeline::with_edits(shot.scene, set_, look.take_edits));
-  publish_found(shot.light);
   try {
+    publish_found(shot.light);
+    stage_->use(quality);
+    stage_->use(look.estimator);
+    stage_->show(look.view);
+    stage_->fill_layers(snapshot);
+    stage_->resize(governed ? governor_->scale() : set_.quality.scale);
     (*stage_)(shot);
   } catch (const render::DeviceLost&) {
     if (captured) metrics_.dropped("render", "device lost");
+    throw;
+  } catch (...) {
+    if (captured) metrics_.dropped("render", "failed");
     throw;
   }
   const double took = seconds_since(begin);

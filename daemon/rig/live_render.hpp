@@ -36,14 +36,23 @@ class LiveRender {
              pipeline::Metrics& metrics, Channels channels, std::stop_token stop);
 
   void use(pipeline::RenderStage& stage) { stage_ = &stage; }
+  // Forgets a stage that has failed, and the refinement that it was at; there is none until use().
+  void use_none();
 
-  // Returns the next picture to show, or nothing once the camera's frames have ended. If the device
-  // is lost, `renew` is called; it returns true once there is another stage to use(), and false if
-  // a stop came first. A refinement starts with the preview's samples, and each round doubles them,
-  // by at most 64 samples and about a second's worth.
+  // Returns the next picture to show, or nothing if none came within a moment. There must be a
+  // stage to use(). If the device is lost, `renew` is called; it returns true once there is another
+  // stage, and false if a stop came first. Any other exception of the stage is passed on; the frame
+  // is counted as dropped. A refinement starts with the preview's samples, and each round doubles
+  // them, by at most 64 samples and about a second's worth.
   std::optional<pipeline::Shot> next(const std::function<bool(const render::DeviceLost&)>& renew);
+  // Returns the next frame with its plate for a picture, untouched for this reason, where there is
+  // no stage; nothing if none came within a moment.
+  std::optional<pipeline::Shot> next_plate(const std::string& untouched);
+  // Returns true once nothing will ever come.
+  bool finished() const;
 
-  // Counts the frames that newer ones replaced since the last call; next() does so too.
+  // Counts the frames that newer ones replaced since the last call; next() and next_plate() do so
+  // too.
   void count_dropped() { drops_.update(); }
 
   // Returns true if the picture that is being rendered is no longer wanted. Call it from the render
@@ -58,6 +67,7 @@ class LiveRender {
   int next_round(const Look& look);
   bool begin_refinement(const Look& look);
   std::optional<pipeline::Shot> wait_for_frame(const Look& look);
+  std::optional<pipeline::Shot> take_frame(const Look& look);
   pipeline::Shot render(const Look& look, pipeline::Shot shot);
   void keep_as_good(const pipeline::Shot& shot, std::optional<session::SceneState> recorded);
   std::optional<pipeline::Shot>& good_of(const Look& look);

@@ -16,7 +16,7 @@ namespace {
 
 void play(const std::stop_token& stop, const std::filesystem::path& directory, const LoadedSet& set,
           pipeline::Mailbox<pipeline::Shot>& out, Reports& reports) {
-  pipeline::Take take = pipeline::open_take(directory, {});
+  pipeline::Take take = pipeline::open_take(directory, {}, stop);
   if (take.set_text != set.text)
     throw Error(directory.string() + ": was recorded with another set; run that one to review it");
   for (const std::string& what : take.session.missing)
@@ -41,7 +41,7 @@ Review::Review(std::filesystem::path take, const LoadedSet& set,
         try {
           play(stop, take, set, out, reports);
         } catch (const std::exception& error) {
-          reports({Severity::error, "review", error.what()});
+          if (!stop.stop_requested()) reports({Severity::error, "review", error.what()});
         }
         if (!stop.stop_requested()) inbox.post(Event::review_ended);
         done_ = true;

@@ -22,7 +22,9 @@ class Review {
   Review(std::filesystem::path take, const LoadedSet& set, pipeline::Mailbox<pipeline::Shot>& out,
          Inbox& inbox, report::Reports& reports);
 
+  // Ends it soon, whatever it is at: a take is read as a whole before its first picture.
   void stop() { thread_.request_stop(); }
+  bool is_stopped() const { return thread_.get_stop_token().stop_requested(); }
   bool done() const { return done_; }  // true: the destructor does not wait
 
  private:

@@ -1,6 +1,8 @@
 #include "daemon/rig/rig.hpp"
 
 #include <chrono>
+#include <future>
+#include <system_error>
 #include <utility>
 
 #include "daemon/pipeline/take.hpp"
@@ -19,6 +21,12 @@ constexpr std::chrono::milliseconds tick_interval{20};
 constexpr int ticks_a_second = 50;
 constexpr int ticks_a_page = 5;               // the overlay is updated once in so many ticks
 constexpr const char* cut_off = "recording";  // source of the trouble that a take was cut off
+// A set that is read within this time is answered for at once; the loop waits for it.
+constexpr std::chrono::milliseconds prompt{200};
+// What the stages have in hand when a stop comes is recorded if they end within this time.
+constexpr std::chrono::milliseconds pipeline_patience{2000};
+// A disk that does not answer for longer than this is not waited for when the rig ends.
+constexpr double longest_disk_silence_s = 90;
 
 output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& cameras,
                                    Reports& reports) {
@@ -58,6 +66,12 @@ output::RecorderOptions recorder_options(const LoadedSet& loaded, const Cameras&
   return options;
 }
 
+Cameras open_cameras_of(const LoadedSet& loaded, const Rig::Parts& parts, Usb usb) {
+  Cameras cameras = open_cameras(loaded.set, parts.loop_cameras, usb);
+  if (parts.around_cameras) parts.around_cameras(cameras);
+  return cameras;
+}
+
 // If the USB cannot be watched, cameras are still found, but only when the next attempt is due.
 Usb watch_usb(Reports& reports) {
   try {
@@ -73,10 +87,10 @@ Usb watch_usb(Reports& reports) {
 Rig::Rig(Parts parts)
     : parts_(std::move(parts)),
       loaded_(parts_.sets.running()),
-      cameras_(open_cameras(loaded_.set, parts_.loop_cameras, watch_usb(parts_.reports))),
+      cameras_(open_cameras_of(loaded_, parts_, watch_usb(parts_.kept.reports))),
       controls_(loaded_.set, parts_.sets.edits(), loaded_.scene),
       look_(controls_.look()),
-      recorder_(recorder_options(loaded_, cameras_, parts_.reports)),
+      recorder_(recorder_options(loaded_, cameras_, parts_.kept.reports)),
       pipeline_(
           {.set = loaded_.set,
            .cameras = cameras_,
@@ -86,23 +100,22 @@ Rig::Rig(Parts parts)
            .recorder = recorder_,
            .look = look_,
            .inbox = inbox_,
-           .reports = parts_.reports,
-           .metrics = parts_.metrics,
+           .kept = parts_.kept,
            .show = [this](pipeline::Shot shot) { parts_.show(std::move(shot), *look_.get()); }},
           parts_.stop) {
   for (const std::string& what : loaded_.scene.notes)
-    parts_.reports(report::once({Severity::warning, "scene", what}));
-  desk_.emplace(loaded_.set.buttons,
-                open_button_devices(loaded_.set, cameras_, parts_.more_buttons),
-                ButtonDesk::Parts{parts_.loop, parts_.reports, parts_.metrics}, asks_of_buttons());
+    parts_.kept.reports(report::once({Severity::warning, "scene", what}));
+  desk_.emplace(
+      loaded_.set.buttons, open_button_devices(loaded_.set, cameras_, parts_.more_buttons),
+      ButtonDesk::Parts{parts_.loop, parts_.kept.reports, parts_.kept.metrics}, asks_of_buttons());
   free_bytes_ = recorder_.free_bytes();
   show_facts();
 }
 
-// Reviews must end before the pipeline, because they push their frames into it.
+// The review must end before the pipeline, because it pushes its frames into it.
 Rig::~Rig() {
+  close_take();
   review_.reset();
-  ended_reviews_.clear();
 }
 
 ButtonDesk::Asks Rig::asks_of_buttons() {
@@ -129,13 +142,29 @@ ButtonDesk::Asks Rig::asks_of_buttons() {
 void Rig::run() {
   const auto inbox_watch = parts_.loop.on_readable(inbox_.fd(), [this] { take_inbox(); });
   const auto timer = parts_.loop.every(tick_interval, [this] { tick(); });
-  std::unique_ptr<EventLoop::Watch> watchdog;
-  if (const auto interval = service::watchdog_interval())
-    watchdog = parts_.loop.every(*interval, [this] { feed_watchdog(); });
-  service::ready("set \"" + loaded_.set.name + "\"");
-  service::feed_watchdog();  // reading a set again takes long
+  parts_.service.ready("set \"" + loaded_.set.name + "\"");
   parts_.loop.run();
+  if (!parts_.sets.has_next()) parts_.service.stopping();
+  close_take();
   if (!parts_.sets.has_next()) pipeline_.wait();
+}
+
+// Closes the take before any device is given back, because a device may hang. While the disk takes
+// what is queued, systemd is asked for more time.
+void Rig::close_take() {
+  if (std::exchange(is_take_closed_, true)) return;
+  const pipeline::Patience& patience = parts_.kept.patience;
+  const auto until_ended = parts_.sets.has_next() ? patience.set : patience.ending;
+  parts_.pulse.begin(until_ended);
+  const auto finish = [this] { recorder_.finish(); };
+  std::future<void> finished;
+  try {
+    finished = std::async(std::launch::async, finish);
+  } catch (const std::system_error&) {  // there is no thread for it
+    return finish();
+  }
+  while (finished.wait_for(std::chrono::milliseconds(200)) != std::future_status::ready)
+    if (recorder_.status().disk_silent_s < longest_disk_silence_s) parts_.pulse.begin(until_ended);
 }
 
 // Gives the controls what is known of the shown picture alone.
@@ -155,8 +184,10 @@ Outcome Rig::wish(Event event, const std::string& by) {
 
 Outcome Rig::apply(Outcome outcome, const std::string& by, Severity severity) {
   if (outcome.request) {
-    if (std::optional<std::string> why_not = carry_out(*outcome.request))
+    if (std::optional<std::string> why_not = carry_out(*outcome.request, by))
       outcome = {*std::move(why_not), true, {}};
+    else if (outcome.request == Request::keep_edits && parts_.sets.is_reading())
+      outcome.said = "changes are being kept in the set file";
   }
   publish_look();  // after the request, so that a take exists before its first shown picture
   if (outcome.refused) severity = Severity::warning;
@@ -164,10 +195,11 @@ Outcome Rig::apply(Outcome outcome, const std::string& by, Severity severity) {
   // The mode has its own place on the display and needs no notice.
   if (outcome.said != set::name_of(controls_.look().state.mode))
     report.notice = {outcome.refused ? Severity::warning : Severity::info, "", outcome.said};
-  parts_.reports.announce(report);
+  parts_.kept.reports.announce(report);
+  announced_ = parts_.kept.reports.announced();
   const std::string line = line_of(report);
   recorder_.offer_event(now_ns(), line);
-  service::status(line);
+  parts_.service.status(line);
   show_facts();
   if (changed_) changed_();
   return outcome;
@@ -175,51 +207,72 @@ Outcome Rig::apply(Outcome outcome, const std::string& by, Severity severity) {
 
 void Rig::publish_look() {
   look_.set(controls_.look());
-  const bool review = controls_.look().state.mode == Mode::review;
-  if (review && !review_) {
-    pipeline_.reviewed().try_pop();
-    review_ = std::make_unique<Review>(recorder_.status().directory, loaded_, pipeline_.reviewed(),
-                                       inbox_, parts_.reports);
-  } else if (!review && review_) {
-    review_->stop();
-    ended_reviews_.push_back(std::move(review_));
-  }
+  look_at_review();
 }
 
-std::optional<std::string> Rig::carry_out(Request request) {
+// Begins and ends the review as the mode says. One that is to end may take a moment to do so; the
+// next one waits for that.
+void Rig::look_at_review() {
+  const bool is_wanted = controls_.look().state.mode == Mode::review;
+  if (review_ && !is_wanted) review_->stop();
+  if (review_ && review_->is_stopped() && review_->done()) review_.reset();
+  if (!is_wanted || review_) return;
+  pipeline_.reviewed().try_pop();
+  review_ = std::make_unique<Review>(recorder_.status().directory, loaded_, pipeline_.reviewed(),
+                                     inbox_, parts_.kept.reports);
+}
+
+std::optional<std::string> Rig::carry_out(Request request, const std::string& by) {
   switch (request) {
     case Request::start_take:
       recorder_.start();
       break;
     case Request::stop_take:
       recorder_.stop();
-      parts_.reports.settle(cut_off);
+      parts_.kept.reports.settle(cut_off);
       break;
     case Request::mark_good:
       recorder_.mark_good();
       break;
     case Request::acknowledge:
-      parts_.reports.settle(cut_off);
+      parts_.kept.reports.settle(cut_off);
       break;
     case Request::reload_set:
-      return change_set(0);
-    case Request::keep_edits: {
-      std::optional<std::string> why_not = parts_.sets.keep(controls_.look().edits);
-      if (!why_not) parts_.loop.exit();
-      return why_not;
-    }
+      return read_set([&] { parts_.sets.begin_change(0); }, by);
+    case Request::keep_edits:
+      return read_set([&] { parts_.sets.begin_keep(controls_.look().edits); }, by);
     case Request::next_set:
-      return change_set(1);
+      return read_set([&] { parts_.sets.begin_change(1); }, by);
     case Request::previous_set:
-      return change_set(-1);
+      return read_set([&] { parts_.sets.begin_change(-1); }, by);
   }
   return std::nullopt;
 }
 
-std::optional<std::string> Rig::change_set(int next) {
-  std::optional<std::string> why_not = parts_.sets.change(next);
-  if (!why_not) parts_.loop.exit();
-  return why_not;
+// A set that is read at once, as most are, or is found wrong at once is answered for at once.
+std::optional<std::string> Rig::read_set(const std::function<void()>& begin,
+                                         const std::string& by) {
+  if (parts_.sets.is_reading() || parts_.sets.has_next()) return "a set is being read already";
+  begin();
+  reading_for_ = by;
+  return take_set(prompt);
+}
+
+// Goes over to the set that was read, if it is there by then. Returns why it does not, in one line.
+std::optional<std::string> Rig::take_set(std::chrono::milliseconds patience) {
+  const std::optional<SetKeeper::Ended> ended = parts_.sets.finish(patience);
+  if (!ended) return std::nullopt;
+  if (ended->why_not) return ended->why_not;
+  if (controls_.look().state.recording)
+    return parts_.sets.drop_next("recording began while another one was read");
+  parts_.loop.exit();
+  return std::nullopt;
+}
+
+void Rig::look_at_set() {
+  if (!parts_.sets.is_reading()) return;
+  const std::optional<std::string> why_not = take_set(std::chrono::milliseconds(0));
+  if (why_not && !reading_for_.empty()) apply({*why_not, true, {}}, reading_for_);
 }
 
 void Rig::take_inbox() {
@@ -243,16 +296,38 @@ void Rig::take_inbox() {
 }
 
 void Rig::tick() {
+  parts_.pulse.begin(parts_.kept.patience.loop);
+  leave_if_stopped();
   desk_->tick(now_ns());
   look_at_recorder();
-  std::erase_if(ended_reviews_, [](const auto& review) { return review->done(); });
+  look_at_set();
+  look_at_review();
+  announce_faults();
   if (++ticks_ % ticks_a_second == 0) {
     desk_->count();
-    if (!controls_.look().state.recording) parts_.sets.look_at_file();
-    if (parts_.sets.has_next()) parts_.loop.exit();
+    if (!controls_.look().state.recording && !parts_.sets.is_reading()) {
+      reading_for_.clear();
+      parts_.sets.look_at_file();
+    }
     free_bytes_ = recorder_.free_bytes();
   }
   if (ticks_ % ticks_a_page == 0) show_facts();
+}
+
+// A pipeline that has ended leaves the loop through the inbox. One that does not end, because a
+// device hangs, must not keep the take open.
+void Rig::leave_if_stopped() {
+  if (!parts_.stop.stop_requested()) return;
+  const auto now = std::chrono::steady_clock::now();
+  if (!stopped_) stopped_ = now;
+  if (now - *stopped_ > pipeline_patience) parts_.loop.exit();
+}
+
+// The stages announce from their own threads what has failed.
+void Rig::announce_faults() {
+  const std::string announced = parts_.kept.reports.announced();
+  if (std::exchange(announced_, announced) == announced) return;
+  if (changed_) changed_();
 }
 
 void Rig::look_at_recorder() {
@@ -280,7 +355,7 @@ void Rig::resume(const std::string& take) {
   if (!controls_.look().state.recording) apply(controls_.happened(Event::record_on), "recorder");
   const std::string what = take + " was cut off; recording goes on in the next take";
   apply({what, false, {}}, "recorder", Severity::error);
-  parts_.reports.show(report::lasting(cut_off, what));
+  parts_.kept.reports.show(report::lasting(cut_off, what));
 }
 
 void Rig::show_facts() {
@@ -294,17 +369,9 @@ void Rig::show_facts() {
   facts.disk_silent_s = recorder.disk_silent_s;
   facts.recorder_fault = recorder.fault;
   facts.free_bytes = free_bytes_;
-  facts.news = parts_.reports.news();
-  facts.troubles = parts_.reports.troubles();
+  facts.news = parts_.kept.reports.news();
+  facts.troubles = parts_.kept.reports.troubles();
   parts_.show_facts(std::move(facts));
-}
-
-void Rig::feed_watchdog() {
-  const bool has_screen = loaded_.set.display.driver != set::no_driver;
-  const Progress now = progress_of(parts_.metrics.snapshot(0), controls_.look().state, has_screen);
-  if (!advances(progress_, now)) return;
-  progress_ = now;
-  service::feed_watchdog();
 }
 
 std::int64_t Rig::now_ns() const {

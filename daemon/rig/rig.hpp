@@ -2,6 +2,7 @@
 // recorder, and carries out what buttons and bus ask for. It runs on the main thread's event loop.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -32,25 +33,28 @@ class Rig {
   struct Parts {  // outlive the rig
     EventLoop& loop;
     SetKeeper& sets;  // the rig runs its running set
-    report::Reports& reports;
-    pipeline::Metrics& metrics;
+    pipeline::StageKeeper::Parts kept;
+    Service& service;
+    pipeline::Liveness::Pulse& pulse;  // the main thread's
     std::shared_ptr<render::Device> device;
     std::shared_ptr<render::Renderer>& renderer;            // as LivePipeline's
     std::function<void(pipeline::Shot, const Look&)> show;  // on the pipeline's last thread
     std::function<void(RigFacts)> show_facts;               // facts for the overlay
     std::function<std::vector<std::unique_ptr<Buttons>>()> more_buttons;  // may be empty
+    std::function<void(Cameras&)> around_cameras;  // as LiveOptions'; may be empty
     bool loop_cameras = false;
     std::stop_token stop;
   };
 
   // Opens the devices and starts; throws previz::Error on anything that keeps the set from running.
   explicit Rig(Parts parts);
-  ~Rig();
+  ~Rig();  // closes the take, then gives back the devices
   Rig(const Rig&) = delete;
   Rig& operator=(const Rig&) = delete;
 
-  // Runs until the observer's stream ends, a stop is requested, or SetKeeper::has_next(). Throws
-  // what a stage threw.
+  // Runs until the observer's stream ends, a stop is requested, or SetKeeper::has_next(). The take
+  // is closed first at the end, whatever devices do, then the pipeline is waited for. Throws what
+  // no stage's keeper has caught.
   void run();
 
   // Call both on the loop's thread. `by` names who asks, for the log and the take: "button red".
@@ -67,16 +71,21 @@ class Rig {
   void know_picture();
   void take_inbox();
   void tick();
+  void leave_if_stopped();
+  void look_at_set();
+  void look_at_review();
+  void announce_faults();
+  void close_take();
   void look_at_recorder();
   void resume(const std::string& take);
-  void feed_watchdog();
   void show_facts();
   // Carries out the outcome's request, announces the result and returns it.
   Outcome apply(Outcome outcome, const std::string& by,
                 report::Severity severity = report::Severity::info);
-  // Returns why the request was not carried out, or nothing if it was.
-  std::optional<std::string> carry_out(Request request);
-  std::optional<std::string> change_set(int next);
+  // Returns why the request was not carried out, or nothing if it was or will be.
+  std::optional<std::string> carry_out(Request request, const std::string& by);
+  std::optional<std::string> read_set(const std::function<void()>& begin, const std::string& by);
+  std::optional<std::string> take_set(std::chrono::milliseconds patience);
   void publish_look();
   std::int64_t now_ns() const;  // the cameras' clock
 
@@ -92,9 +101,11 @@ class Rig {
   std::size_t salvaged_ = 0;  // takes of RecorderStatus::salvaged that were announced
   bool has_resumed_ = false;
   int ticks_ = 0;
-  Progress progress_;  // when the watchdog was last fed
-  std::unique_ptr<Review> review_;
-  std::vector<std::unique_ptr<Review>> ended_reviews_;
+  std::optional<std::chrono::steady_clock::time_point> stopped_;  // when the stop was noticed
+  bool is_take_closed_ = false;
+  std::string reading_for_;  // who wants the set that is being read; empty: its file has changed
+  std::string announced_;    // the last announcement that the bus knows of
+  std::unique_ptr<Review> review_;  // at most one, even if it takes long to end
   std::function<void()> changed_;
   std::optional<std::uint64_t> free_bytes_;
   LivePipeline pipeline_;  // last: its threads use all of the above

@@ -88,7 +88,8 @@ struct Screen::Impl {
   }
 
   void run();
-  void look_after(std::optional<Picture> newest);
+  void look_after(std::optional<Picture>& newest);
+  void begin_anew();
   void put(const output::OsdPage& next, bool fresh);
   Screenful compose(const DisplayMode& mode, const output::OsdPage& next);
   void was_shown(const Shown& shown, bool fresh);
@@ -111,6 +112,8 @@ struct Screen::Impl {
   bool up_to_date = false;  // the screen shows `picture` and `page`
   bool dark = false;
   Clock::time_point written;
+  pipeline::StageKeeper keeper{"screen", parts.kept, &pipeline::Patience::stage,
+                               [this] { begin_anew(); }};
   std::jthread thread;
 };
 
@@ -124,23 +127,33 @@ Screen::Impl::Impl(const set::Set& set, Parts the_parts)
 }
 
 void Screen::Impl::run() {
-  pipeline::DropCount drops(parts.metrics, "screen", pictures);
+  pipeline::DropCount drops(parts.kept.metrics, "screen", pictures);
   while (!pictures.finished()) {
-    look_after(pictures.pop_for(words_interval));
+    std::optional<Picture> newest = pictures.pop_for(words_interval);
+    const bool has_picture = newest.has_value();
+    if (!keeper.attempt([&] { look_after(newest); }) && has_picture)
+      parts.kept.metrics.dropped("screen", "failed");
     drops.update();
   }
   life.close();
 }
 
-void Screen::Impl::look_after(std::optional<Picture> newest) {
+void Screen::Impl::begin_anew() {
+  life.close();
+  painter.reset();
+  overlays.clear();
+  up_to_date = dark = false;
+}
+
+void Screen::Impl::look_after(std::optional<Picture>& newest) {
   const std::shared_ptr<const RigFacts> facts = rig.get();
   const bool fresh = newest.has_value();
   if (fresh) picture = std::move(newest);
   if (facts->look.state.mode == Mode::standby) {
-    if (fresh) parts.metrics.dropped("screen", "standby");
+    if (fresh) parts.kept.metrics.dropped("screen", "standby");
     if (!std::exchange(dark, true)) {
       life.release();
-      parts.metrics.count("screen: released");
+      parts.kept.metrics.count("screen: released");
     }
     up_to_date = false;
     return;
@@ -160,14 +173,15 @@ void Screen::Impl::put(const output::OsdPage& next, bool fresh) {
     page = next;
     was_shown(std::get<Shown>(*event), fresh);
     if (fresh)
-      parts.metrics.worked("screen", std::chrono::duration<double>(Clock::now() - begin).count());
+      parts.kept.metrics.worked("screen",
+                                std::chrono::duration<double>(Clock::now() - begin).count());
     return;
   }
-  if (fresh) parts.metrics.dropped("screen", "no display");
+  if (fresh) parts.kept.metrics.dropped("screen", "no display");
   if (!event) return;
   const DeviceTrouble& trouble = std::get<DeviceTrouble>(*event);
-  parts.metrics.count("screen: device trouble");
-  parts.reports({report::Severity::error, trouble.device, trouble.what});
+  parts.kept.metrics.count("screen: device trouble");
+  parts.kept.reports({report::Severity::error, trouble.device, trouble.what});
 }
 
 Screenful Screen::Impl::compose(const DisplayMode& mode, const output::OsdPage& next) {
@@ -182,7 +196,7 @@ Screenful Screen::Impl::compose(const DisplayMode& mode, const output::OsdPage& 
 void Screen::Impl::was_shown(const Shown& shown, bool fresh) {
   if (fresh && !picture->frozen) {
     const double latency_s = picture->latency_s(shown.timestamp_ns);
-    parts.metrics.shown(latency_s);
+    parts.kept.metrics.shown(latency_s);
     pace.shown(shown.timestamp_ns, latency_s);
   }
   read_back();
@@ -195,12 +209,12 @@ void Screen::Impl::read_back() {
   try {
     output::write_png(parts.directory / "screen.png", life.display()->read_back());
   } catch (const Error& error) {
-    parts.reports(report::once({report::Severity::error, "", error.what()}));
+    parts.kept.reports(report::once({report::Severity::error, "", error.what()}));
   }
 }
 
 Screen::Screen(const set::Set& set, Parts parts)
-    : metrics_(parts.metrics),
+    : metrics_(parts.kept.metrics),
       impl_(set.display.driver == set::no_driver ? nullptr
                                                  : std::make_unique<Impl>(set, std::move(parts))) {}
 

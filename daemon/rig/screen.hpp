@@ -8,22 +8,21 @@
 #include "daemon/output/osd_page.hpp"
 #include "daemon/pipeline/metrics.hpp"
 #include "daemon/pipeline/shot.hpp"
-#include "daemon/report/reports.hpp"
+#include "daemon/pipeline/stage_keeper.hpp"
 #include "daemon/rig/osd.hpp"
 #include "daemon/set/set.hpp"
 
 namespace previz::rig {
 
 // The display is opened when it is there and again when it comes back; meanwhile pictures are
-// counted as dropped. In standby the screen is dark and free for other programs. A display that is
-// read back (headless) is written to DIR/screen.png about once a second. Latency counts from a
-// frame's capture to the time at which the display reports it visible, or to show() if the set has
-// no display.
+// counted as dropped. What else fails makes the display begin anew. In standby the screen is dark
+// and free for other programs. A display that is read back (headless) is written to DIR/screen.png
+// about once a second. Latency counts from a frame's capture to the time at which the display
+// reports it visible, or to show() if the set has no display.
 class Screen {
  public:
   struct Parts {  // outlive the screen
-    report::Reports& reports;
-    pipeline::Metrics& metrics;
+    pipeline::StageKeeper::Parts kept;
     std::filesystem::path directory;
     // Called with every screenful as it is read back, and the words in it; may be empty.
     std::function<void(const Plate&, const output::OsdPage&)> on_screen;

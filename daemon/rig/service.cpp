@@ -3,66 +3,71 @@
 #include <systemd/sd-daemon.h>
 
 #include <algorithm>
+#include <condition_variable>
+#include <cstdint>
+#include <mutex>
+#include <stop_token>
+#include <vector>
 
 namespace previz::rig {
+namespace {
 
-Progress progress_of(const pipeline::MetricsSnapshot& metrics, const State& state,
-                     bool has_screen) {
-  const auto frames_of = [&](const char* stage) {
-    const auto found = metrics.stages.find(stage);
-    return found == metrics.stages.end() ? 0 : found->second.frames;
-  };
-  const auto count_of = [&](const char* event) {
-    const auto found = metrics.counts.find(event);
-    return found == metrics.counts.end() ? 0 : found->second;
-  };
-  // A picture that was dropped because there was no display does not mean that the screen hangs.
-  std::uint64_t screened = frames_of("screen");
-  if (const auto screen = metrics.stages.find("screen"); screen != metrics.stages.end())
-    for (const auto& [cause, dropped] : screen->second.dropped) screened += dropped;
-  const bool no_device = count_of("device lost") > count_of("device opened again");
-  return {.captured = frames_of("observer"),
-          .shown = frames_of("display"),
-          .screened = screened,
-          .lights = frames_of("light camera"),
-          .light_estimates = frames_of("lighting"),
-          .has_screen = has_screen,
-          .camera_lost = state.camera_lost,
-          .dark = state.mode == Mode::standby || no_device};
+// What is asked for at a time while the rig starts or stops; asked again in every interval.
+constexpr const char* more_time = "EXTEND_TIMEOUT_USEC=15000000";
+
+// A quarter of WatchdogSec=, or a second where there is no watchdog: sd_watchdog_enabled(3)
+// recommends at most a half, and a busy machine may be late by one interval.
+std::chrono::milliseconds interval() {
+  std::uint64_t microseconds = 0;
+  if (sd_watchdog_enabled(0, &microseconds) <= 0) return std::chrono::seconds(1);
+  return std::chrono::milliseconds(std::clamp<std::uint64_t>(microseconds / 4000, 1, 5000));
 }
 
-bool advances(const Progress& before, const Progress& now) {
-  const bool captures = now.camera_lost || now.captured > before.captured;
-  const bool idle = now.camera_lost || now.dark;
-  const bool shows = idle || now.shown > before.shown;
-  const bool screens = idle || !now.has_screen || now.screened > before.screened;
-  const bool lights = now.lights == before.lights || now.light_estimates > before.light_estimates;
-  return captures && shows && screens && lights;
+}  // namespace
+
+Service::Service(const pipeline::Liveness& liveness, report::Reports& reports)
+    : liveness_(liveness), reports_(reports) {
+  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
-namespace service {
+Service::~Service() = default;
 
-void ready(const std::string& status) {
-  sd_notify(0, ("READY=1\nSTATUS=" + status).c_str());
+void Service::run(const std::stop_token& stop) {
+  std::mutex mutex;
+  std::condition_variable_any ended;
+  std::unique_lock lock(mutex);
+  while (!stop.stop_requested()) {
+    try {
+      const std::vector<std::string> hung = liveness_.hung();
+      if (hung.empty()) sd_notify(0, is_running_ ? "WATCHDOG=1" : more_time);
+      report_hung(hung);
+    } catch (const std::exception&) {
+      // There is no memory; the watchdog is fed the next time, or somebody must restart the rig.
+    }
+    ended.wait_for(lock, stop, interval(), [] { return false; });
+  }
 }
 
-void status(const std::string& status) {
+void Service::report_hung(const std::vector<std::string>& hung) {
+  std::string names;
+  for (const std::string& name : hung) names += (names.empty() ? "" : ", ") + name;
+  if (names == reported_) return;
+  reported_ = names;
+  if (!names.empty()) reports_({report::Severity::error, "", "does not answer any more: " + names});
+}
+
+void Service::ready(const std::string& status) {
+  is_running_ = true;
+  sd_notify(0, ("READY=1\nWATCHDOG=1\nSTATUS=" + status).c_str());
+}
+
+void Service::status(const std::string& status) {
   sd_notify(0, ("STATUS=" + status).c_str());
 }
 
-void stopping() {
+void Service::stopping() {
+  is_running_ = false;
   sd_notify(0, "STOPPING=1");
 }
 
-void feed_watchdog() {
-  sd_notify(0, "WATCHDOG=1");
-}
-
-std::optional<std::chrono::milliseconds> watchdog_interval() {
-  std::uint64_t microseconds = 0;
-  if (sd_watchdog_enabled(0, &microseconds) <= 0) return std::nullopt;
-  return std::chrono::milliseconds(std::max<std::uint64_t>(microseconds / 4000, 1));
-}
-
-}  // namespace service
 }  // namespace previz::rig

@@ -1,41 +1,45 @@
-// Reports to systemd: that the rig is ready, that it stops, and that frames advance.
+// Reports to systemd: that the rig is ready, that it stops, and that its threads are live.
 #pragma once
 
-#include <chrono>
-#include <cstdint>
-#include <optional>
+#include <atomic>
+#include <stop_token>
 #include <string>
+#include <thread>
+#include <vector>
 
-#include "daemon/pipeline/metrics.hpp"
-#include "daemon/rig/mode.hpp"
+#include "daemon/pipeline/liveness.hpp"
+#include "daemon/report/reports.hpp"
 
 namespace previz::rig {
 
-// How far the pipeline has come.
-struct Progress {
-  std::uint64_t captured = 0, shown = 0;          // observer frames; pictures
-  std::uint64_t screened = 0;                     // pictures the screen showed or failed to show
-  std::uint64_t lights = 0, light_estimates = 0;  // light frames; estimates from them
-  bool has_screen = false;
-  bool camera_lost = false, dark = false;  // dark: standby, or the GPU is lost
-};
-Progress progress_of(const pipeline::MetricsSnapshot& metrics, const State& state, bool has_screen);
-
-// Returns true if every part with work to do has progressed: cameras that are there deliver frames,
-// the frames are shown (but not in standby), on the screen too if there is one, and light frames
-// become estimates. A rig that waits for its camera or opens its GPU again counts as well.
-bool advances(const Progress& before, const Progress& now);
-
 // Talks to systemd's notification socket; outside systemd every call does nothing. See
 // sd_notify(3), sd_watchdog_enabled(3).
-namespace service {
-void ready(const std::string& status);
-void status(const std::string& status);
-void stopping();
-void feed_watchdog();
-// Returns a quarter of WatchdogSec=: sd_watchdog_enabled recommends a half, but frames that are
-// late by one interval should not yet end the service. Returns nothing if there is no watchdog.
-std::optional<std::chrono::milliseconds> watchdog_interval();
-}  // namespace service
+//
+// A thread of its own feeds systemd's watchdog for as long as no thread that must be live is hung.
+// Frames do not matter: a camera that is silent, a picture that takes minutes or a scene that is
+// being read are no reason for a restart. The recorder's thread is not among those that must be
+// live, because a disk that hangs would hang for the next process, too, and what waits in memory
+// for it would be lost. While the rig starts or ends, the same thread asks for more time.
+class Service {
+ public:
+  Service(const pipeline::Liveness& liveness, report::Reports& reports);  // both outlive it
+  ~Service();
+  Service(const Service&) = delete;
+  Service& operator=(const Service&) = delete;
+
+  void ready(const std::string& status);
+  void status(const std::string& status);
+  void stopping();
+
+ private:
+  void run(const std::stop_token& stop);
+  void report_hung(const std::vector<std::string>& hung);
+
+  const pipeline::Liveness& liveness_;
+  report::Reports& reports_;
+  std::atomic<bool> is_running_ = false;  // neither starting nor stopping
+  std::string reported_;                  // the threads that were reported as hung
+  std::jthread thread_;
+};
 
 }  // namespace previz::rig

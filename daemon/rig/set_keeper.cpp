@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "daemon/rig/kept_edits.hpp"
-#include "daemon/rig/service.hpp"
+#include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::rig {
@@ -55,60 +55,83 @@ SetKeeper::SetKeeper(const std::filesystem::path& file, std::function<void(set::
   override_set_(running_.set);
 }
 
-std::optional<std::string> SetKeeper::change(int next) {
-  service::feed_watchdog();  // reading a large scene takes its time
+void SetKeeper::begin(std::function<Read()> read,
+                      std::function<std::string(const std::string&)> refused) {
+  refused_ = std::move(refused);
   try {
-    const std::filesystem::path& file = running_.set.file;
-    next_ = load_whole_set(next == 0 ? file : neighbour(file, next));
-    override_set_(next_->set);
-    return std::nullopt;
-  } catch (const std::exception& error) {
-    const std::string what = error.what();
-    const std::string first = what.substr(0, what.find('\n'));
-    reports_({Severity::error, "", what + "\nthe set stays as it was", "",
-              report::passing("the set stays as it was", first)});
-    return "the set stays as it was: " + first;
+    reading_ = std::async(std::launch::async, read);
+  } catch (const std::exception&) {  // there is no thread for it
+    reading_ = std::async(std::launch::deferred, std::move(read));
   }
 }
 
+std::optional<SetKeeper::Ended> SetKeeper::finish(std::chrono::milliseconds patience) {
+  if (reading_.wait_for(patience) == std::future_status::timeout) return std::nullopt;
+  try {
+    Read read = reading_.get();
+    override_set_(read.set.set);
+    next_ = std::move(read.set);
+    if (!read.kept) return Ended{};
+    changes_.kept = std::move(read.kept);
+    reports_({Severity::info, "keep",
+              next_->set.file.string() + " has the changes; as it was: " + read.kept_beside});
+    return Ended{};
+  } catch (const std::exception& error) {
+    next_.reset();
+    return Ended{refused_(error.what())};
+  }
+}
+
+std::string SetKeeper::drop_next(const std::string& why) {
+  if (next_ && next_->set.file == running_.set.file) file_ = SetFileWatch(running_.changed);
+  next_.reset();
+  reports_({Severity::warning, "", "the set stays as it was: " + why});
+  return "the set stays as it was: " + why;
+}
+
+void SetKeeper::begin_change(int next) {
+  begin(
+      [file = running_.set.file, next] {
+        return Read{load_whole_set(next == 0 ? file : neighbour(file, next)), {}, {}};
+      },
+      [this](const std::string& what) {
+        const std::string first = what.substr(0, what.find('\n'));
+        reports_({Severity::error, "", what + "\nthe set stays as it was", "",
+                  report::passing("the set stays as it was", first)});
+        return "the set stays as it was: " + first;
+      });
+}
+
 void SetKeeper::look_at_file() {
+  if (is_reading()) return;
   std::error_code gone;
   const auto time = std::filesystem::last_write_time(running_.set.file, gone);
   if (gone || !file_.is_changed(time)) return;
   reports_({Severity::info, running_.set.file.string(), "the file has changed"});
-  change(0);
+  begin_change(0);
 }
 
-std::optional<std::string> SetKeeper::keep(const pipeline::Edits& edits) {
-  service::feed_watchdog();  // reading a large scene takes its time
-  const std::filesystem::path& file = running_.set.file;
-  const auto refused = [&](const std::string& why) {
-    const std::string first = why.substr(0, why.find('\n'));
-    reports_({Severity::error, "keep", why});
-    return "not kept: " + first;
-  };
-  try {
+void SetKeeper::begin_keep(const pipeline::Edits& edits) {
+  const auto write = [set = running_.set, text_before = running_.text, edits] {
+    const std::filesystem::path& file = set.file;
     // What a symbolic link leads to is written, not the link.
     const std::filesystem::path target = std::filesystem::canonical(file);
-    if (session::read_file(target) != running_.text)
-      return refused(file.string() + " was changed since it was read; load it again first");
-    const std::string text = with_edits(running_.text, running_.set, edits);
-    if (text == running_.text)
-      return refused("the changes come to nothing; " + file.string() + " stays as it is");
-    LoadedSet next = loaded(text, file);
-    const std::filesystem::path old = keep_beside(target);
+    if (session::read_file(target) != text_before)
+      throw Error(file.string() + " was changed since it was read; load it again first");
+    const std::string text = with_edits(text_before, set, edits);
+    if (text == text_before)
+      throw Error("the changes come to nothing; " + file.string() + " stays as it is");
+    Read read{loaded(text, file), Kept{text_before, edits}, {}};
+    read.kept_beside = keep_beside(target).string();
     session::replace_file(target, text);
-    changes_.kept = Kept{running_.text, edits};
     std::error_code missing;
-    next.changed = std::filesystem::last_write_time(file, missing);
-    override_set_(next.set);
-    next_ = std::move(next);
-    reports_(
-        {Severity::info, "keep", file.string() + " has the changes; as it was: " + old.string()});
-  } catch (const std::exception& error) {
-    return refused(error.what());
-  }
-  return std::nullopt;
+    read.set.changed = std::filesystem::last_write_time(file, missing);
+    return read;
+  };
+  begin(write, [this](const std::string& why) {
+    reports_({Severity::error, "keep", why});
+    return "not kept: " + why.substr(0, why.find('\n'));
+  });
 }
 
 // Keeps the changes that were made to a set that is read again; those to another set end with it,

@@ -1,9 +1,12 @@
 // Keeps the set that runs, the one that is to run next and the one to go back to, so that a faulty
-// set never replaces a running one, and what buttons have changed since the set was written.
+// set never replaces a running one, and what buttons have changed since the set was written. Sets
+// are read on a thread of their own, because a large scene takes long.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <functional>
+#include <future>
 #include <optional>
 #include <string>
 #include <utility>
@@ -56,21 +59,30 @@ class SetKeeper {
   const LoadedSet& running() const { return running_; }
   bool has_next() const { return next_.has_value(); }
 
-  // Reads the set file `next` places on in the folder; with 0, the running one again. Afterwards
-  // has_next() is true, or the reason why not is returned in one line and reported in full.
-  std::optional<std::string> change(int next);
-  // Reads the running set's file again if it has changed. Call it once a second.
+  // Begins to read the set file `next` places on in the folder; with 0, the running one again.
+  void begin_change(int next);
+  // Begins to read the running set's file again if it has changed. Call it once a second.
   void look_at_file();
+  // Begins to write the changes into the running set's file; the old file is kept beside it. The
+  // next set is then what was written, and its run begins without changes. They are not written if
+  // the file was changed meanwhile, would not load or cannot be written; it is then as it was.
+  void begin_keep(const pipeline::Edits& edits);
+
+  // Nothing may be begun while something is being read.
+  bool is_reading() const { return reading_.valid(); }
+  // Waits at most so long for what was begun. Returns nothing while it goes on. Once it has ended,
+  // has_next() is true, or `why_not` is the reason in one line, which was reported in full.
+  struct Ended {
+    std::optional<std::string> why_not;
+  };
+  std::optional<Ended> finish(std::chrono::milliseconds patience);
+  // Drops the next set and reports why. If it is the running one, changed, it is read again later.
+  std::string drop_next(const std::string& why);
 
   // The changes to begin the running set with: those with which its last run ended (leave()), if it
   // was the same file. Changes of what the file no longer has are dropped and reported.
   const pipeline::Edits& edits() const { return changes_.edits; }
   void leave(pipeline::Edits edits) { changes_.edits = std::move(edits); }
-
-  // Writes the changes into the running set's file and keeps the old file beside it. The next set
-  // is then what was written, and its run begins without changes. Returns why not, in one line, if
-  // the file was changed meanwhile, would not load or cannot be written; it is then as it was.
-  std::optional<std::string> keep(const pipeline::Edits& edits);
 
   // Makes the next set the running one; has_next() must hold.
   void begin_next();
@@ -90,6 +102,14 @@ class SetKeeper {
     std::optional<Kept> kept;
   };
 
+  // A set that was read, and what is to be done with it.
+  struct Read {
+    LoadedSet set;
+    std::optional<Kept> kept;  // what was written
+    std::string kept_beside;   // the old file
+  };
+
+  void begin(std::function<Read()> read, std::function<std::string(const std::string&)> refused);
   void run(LoadedSet set);
   void carry_edits();
 
@@ -99,6 +119,8 @@ class SetKeeper {
   SetFileWatch file_;
   std::optional<LoadedSet> next_, before_;
   Changes changes_, changes_before_;
+  std::function<std::string(const std::string&)> refused_;  // reports why a reading has failed
+  std::future<Read> reading_;  // last: its thread uses none of the above
 };
 
 }  // namespace previz::rig

@@ -58,10 +58,11 @@ class RigLive : public testing::Test {
   }
 
   std::function<void()> while_shown_ = [] {};  // on the display's thread
+  rig::LiveOptions options_;
 
   // Runs the daemon, looping the take, until the script has ended.
   void run(const std::function<void()>& script) {
-    rig::LiveOptions options;
+    rig::LiveOptions options = options_;
     options.on_shown = [&](const pipeline::Shot& shot, const rig::Look& look) {
       std::unique_lock lock(mutex_);
       shown_ = {shot, look, shown_.count + 1};

@@ -19,36 +19,44 @@ class PrivateBus {
   // Everybody may do everything on the bus, unless a `policy` is given: a file such as packages
   // install for the system's bus, which says who may do what.
   explicit PrivateBus(const std::filesystem::path& policy = {}) {
-    const std::string address = "unix:path=" + (directory_ / "bus").string();
-    std::string configuration = "--session";
     if (!policy.empty()) {
-      configuration = "--config-file=" + (directory_ / "system.conf").string();
-      std::ofstream(directory_ / "system.conf") << system_bus(address, policy);
+      configuration_ = "--config-file=" + (directory_ / "system.conf").string();
+      std::ofstream(directory_ / "system.conf") << system_bus(address_, policy);
       std::filesystem::permissions(directory_.path(), std::filesystem::perms{0755});
     }
+    start();
+    setenv("DBUS_SYSTEM_BUS_ADDRESS", address_.c_str(), 1);
+  }
+  ~PrivateBus() {
+    stop();
+    unsetenv("DBUS_SYSTEM_BUS_ADDRESS");
+  }
+  PrivateBus(const PrivateBus&) = delete;
+  PrivateBus& operator=(const PrivateBus&) = delete;
+
+  void start() {
     int ready[2];
     if (pipe(ready) != 0) return;
     child_ = fork();
     if (child_ == 0) {
       const std::string print = "--print-address=" + std::to_string(ready[1]);
-      execlp("dbus-daemon", "dbus-daemon", configuration.c_str(), "--nofork", "--nopidfile",
-             ("--address=" + address).c_str(), print.c_str(), nullptr);
+      execlp("dbus-daemon", "dbus-daemon", configuration_.c_str(), "--nofork", "--nopidfile",
+             ("--address=" + address_).c_str(), print.c_str(), nullptr);
       _exit(127);
     }
     close(ready[1]);
     char byte = 0;
     running_ = read(ready[0], &byte, 1) == 1;  // nothing where it could not be started
     close(ready[0]);
-    setenv("DBUS_SYSTEM_BUS_ADDRESS", address.c_str(), 1);
   }
-  ~PrivateBus() {
+  void stop() {
+    if (child_ <= 0) return;
     kill(child_, SIGTERM);
     waitpid(child_, nullptr, 0);
-    unsetenv("DBUS_SYSTEM_BUS_ADDRESS");
+    child_ = -1;
+    running_ = false;
+    std::filesystem::remove(directory_ / "bus");
   }
-  PrivateBus(const PrivateBus&) = delete;
-  PrivateBus& operator=(const PrivateBus&) = delete;
-
   bool running() const { return running_; }
 
  private:
@@ -67,6 +75,8 @@ class PrivateBus {
   }
 
   TemporaryDirectory directory_;
+  const std::string address_ = "unix:path=" + (directory_ / "bus").string();
+  std::string configuration_ = "--session";
   pid_t child_ = -1;
   bool running_ = false;
 };

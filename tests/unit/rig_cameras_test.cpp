@@ -117,10 +117,11 @@ TEST_F(RigCameras, WhatADeviceCountsIsInTheMetrics) {
   std::ostringstream out;
   report::Reports reports(report::lines_to(out));
   pipeline::Metrics metrics;
+  pipeline::Liveness liveness;
   for (int loaded = 1; loaded <= 2; ++loaded) {
     const Cameras cameras = open_cameras(set, /*loop=*/true);
     CameraSource source(*cameras.observer, "observer", "film camera",
-                        {{}, reports, metrics, 1.0, {}});
+                        {{}, {reports, metrics, liveness}, 1.0, {}});
     for (int i = 0; i < 4; ++i) ASSERT_TRUE(source.next());
     const pipeline::MetricsSnapshot snapshot = metrics.snapshot(1);
     const DeviceCounters& counted = snapshot.devices.at("observer");

@@ -15,7 +15,7 @@ class LiveLightTest : public testing::Test {
  protected:
   LiveLightTest() { set_.file = "stage.toml"; }
 
-  LiveLight::Parts parts() { return {set_, scene_, look_, reports_, metrics_}; }
+  LiveLight::Parts parts() { return {set_, scene_, look_, {reports_, metrics_, liveness_}}; }
   static LightCameraCalibration camera() {
     LightCameraCalibration camera = test::fisheye_camera(32);
     camera.world_from_camera = test::looking(0, 90);
@@ -44,6 +44,7 @@ class LiveLightTest : public testing::Test {
   std::ostringstream log_;
   report::Reports reports_{report::lines_to(log_)};
   pipeline::Metrics metrics_;
+  pipeline::Liveness liveness_;
 };
 
 TEST_F(LiveLightTest, IsMadeOfTheLightCamerasFrames) {

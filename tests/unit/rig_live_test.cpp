@@ -3,13 +3,8 @@
 #include "daemon/rig/live.hpp"
 
 #include <gtest/gtest.h>
-#include <poll.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <condition_variable>
 #include <fstream>
 #include <mutex>
@@ -20,8 +15,6 @@
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/post/render.hpp"
-#include "daemon/rig/service.hpp"
-#include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/live_rig.hpp"
@@ -358,69 +351,6 @@ TEST_F(RigLive, ARecordedTakePressesItsButtonsAgain) {
   EXPECT_GT(session::open_stream(session, "observer")->records().size(), 0u);
 }
 
-// systemd's end of the notification socket.
-class NotifySocket {
- public:
-  explicit NotifySocket(const std::filesystem::path& path)
-      : descriptor_(socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    path.string().copy(address.sun_path, sizeof address.sun_path - 1);
-    EXPECT_EQ(bind(descriptor_.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-    setenv("NOTIFY_SOCKET", path.c_str(), 1);
-    setenv("WATCHDOG_USEC", "200000", 1);
-  }
-  ~NotifySocket() {
-    unsetenv("NOTIFY_SOCKET");
-    unsetenv("WATCHDOG_USEC");
-  }
-  // The next message; empty where none came within the time.
-  std::string next(int milliseconds) {
-    pollfd poll_one{descriptor_.get(), POLLIN, 0};
-    if (poll(&poll_one, 1, milliseconds) != 1) return "";
-    std::array<char, 1024> text{};
-    const ssize_t size = recv(descriptor_.get(), text.data(), text.size(), 0);
-    return {text.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
-  }
-  void until(const std::string& words) {
-    for (std::string said = next(60'000); said.find(words) == std::string::npos;
-         said = next(60'000))
-      if (said.empty()) throw test::WaitedInVain("systemd is not sent " + words);
-  }
-
- private:
-  OwnedDescriptor descriptor_;
-};
-
-// A display that hangs: the camera goes on, and the watchdog starves although the loop is alive.
-TEST_F(RigLive, TheWatchdogIsFedOnlyWhileFramesAdvance) {
-  write_set();
-  NotifySocket systemd(directory_ / "notify");
-  std::mutex gate;
-  while_shown_ = [&] { const std::lock_guard wait(gate); };
-  run([&] {
-    systemd.until("READY=1");
-    systemd.until("WATCHDOG=1");
-    {
-      const std::lock_guard hang(gate);
-      std::this_thread::sleep_for(std::chrono::milliseconds(500));  // what was under way is over
-      while (!systemd.next(0).empty()) continue;
-      press("samples_up");  // the loop answers
-      systemd.until("STATUS=button samples_up");
-      // A loop that was held up over that half second had frames to report after this answer;
-      // after the next one it had not.
-      press("samples_down");
-      systemd.until("STATUS=button samples_down");
-      bool fed = false;
-      for (std::string said = "STATUS"; !fed && !said.empty(); said = systemd.next(500))
-        fed = said.find("WATCHDOG=1") != std::string::npos;
-      EXPECT_FALSE(fed);
-    }
-    systemd.until("WATCHDOG=1");
-  });
-  systemd.until("STOPPING=1");
-}
-
 // A restart in the middle of a take, as for an upgrade: the new process records on by itself, and
 // says so on the display until somebody has taken note.
 TEST_F(RigLive, RecordsOnAfterARestartUntilSomebodyEndsIt) {
@@ -449,27 +379,6 @@ TEST_F(RigLive, RecordsOnAfterARestartUntilSomebodyEndsIt) {
   before = shown_.count;
   run([&] { until_recorded(false); });
   EXPECT_FALSE(std::filesystem::exists(directory_ / "takes/12A_take003"));
-}
-
-TEST(Progress, EveryStageWithSomethingToDoMustDoIt) {
-  const Progress start;
-  const auto with = [](auto change) {
-    Progress now{.captured = 10, .shown = 10, .screened = 10, .lights = 3, .light_estimates = 1};
-    now.has_screen = true;
-    change(now);
-    return now;
-  };
-  EXPECT_TRUE(advances(start, with([](Progress&) {})));
-  EXPECT_FALSE(advances(start, with([](Progress& p) { p.captured = 0; })));
-  EXPECT_FALSE(advances(start, with([](Progress& p) { p.shown = 0; })));
-  EXPECT_FALSE(advances(start, with([](Progress& p) { p.screened = 0; })));
-  EXPECT_TRUE(advances(start, with([](Progress& p) { p.screened = 0, p.has_screen = false; })));
-  EXPECT_FALSE(advances(start, with([](Progress& p) { p.light_estimates = 0; })));
-  EXPECT_TRUE(advances(start, with([](Progress& p) { p.lights = p.light_estimates = 0; })));
-  EXPECT_TRUE(advances(start, with([](Progress& p) { p.shown = p.screened = 0, p.dark = true; })));
-  EXPECT_TRUE(advances(start, with([](Progress& p) {
-                         p.captured = p.shown = p.screened = 0, p.camera_lost = true;
-                       })));
 }
 
 }  // namespace rig_live_test

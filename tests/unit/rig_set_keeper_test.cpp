@@ -2,6 +2,7 @@
 #include "daemon/rig/set_keeper.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <fstream>
 #include <sstream>
@@ -9,9 +10,25 @@
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/wait_until.hpp"
 
 namespace previz::rig {
 namespace rig_set_keeper_test {
+
+// What is begun ends sooner or later.
+std::optional<std::string> ended(SetKeeper& sets) {
+  const std::optional<SetKeeper::Ended> ended = sets.finish(test::longest_wait);
+  EXPECT_TRUE(ended) << "it never ended";
+  return ended ? ended->why_not : std::nullopt;
+}
+std::optional<std::string> change(SetKeeper& sets, int next) {
+  sets.begin_change(next);
+  return ended(sets);
+}
+std::optional<std::string> keep(SetKeeper& sets, const pipeline::Edits& edits) {
+  sets.begin_keep(edits);
+  return ended(sets);
+}
 
 class SetKeeperTest : public testing::Test {
  protected:
@@ -37,14 +54,14 @@ TEST_F(SetKeeperTest, ChangesToTheNeighbourAndRoundTheEndWithTheSameOverrides) {
   SetKeeper sets = keeper();
   EXPECT_EQ(sets.running().set.name, "b");
   for (const char* expected : {"c", "a", "b"}) {
-    EXPECT_EQ(sets.change(1), std::nullopt);
+    EXPECT_EQ(change(sets, 1), std::nullopt);
     ASSERT_TRUE(sets.has_next());
     sets.begin_next();
     EXPECT_FALSE(sets.has_next());
     EXPECT_EQ(sets.running().set.name, expected);
     EXPECT_EQ(sets.running().set.quality.samples, 7);
   }
-  sets.change(-1);
+  change(sets, -1);
   sets.begin_next();
   EXPECT_EQ(sets.running().set.name, "a");
 }
@@ -53,7 +70,7 @@ TEST_F(SetKeeperTest, ASetWithAFaultLeavesTheOldOneAndSaysWhy) {
   write("b.toml", "set.name = \"good\"\n");
   SetKeeper sets = keeper();
   write("b.toml", "set.name = 3\n");
-  const std::optional<std::string> why_not = sets.change(0);
+  const std::optional<std::string> why_not = change(sets, 0);
   ASSERT_TRUE(why_not);
   EXPECT_EQ(why_not->find("the set stays as it was: "), 0u);
   EXPECT_NE(why_not->find("b.toml:1:12: set.name: "), std::string::npos) << *why_not;
@@ -72,14 +89,17 @@ TEST_F(SetKeeperTest, AFileThatHasChangedAndRestsIsReadAgain) {
   sets.look_at_file();
   write("b.toml", "set.name = \"new\"\n");
   sets.look_at_file();
-  EXPECT_FALSE(sets.has_next());  // it may still be being written
+  EXPECT_FALSE(sets.is_reading());  // it may still be being written
   sets.look_at_file();
+  ASSERT_TRUE(sets.is_reading());
+  EXPECT_EQ(ended(sets), std::nullopt);
   ASSERT_TRUE(sets.has_next());
   EXPECT_TRUE(says("b.toml: the file has changed")) << log_.str();
   sets.begin_next();
   EXPECT_EQ(sets.running().set.name, "new");
   sets.look_at_file();
   sets.look_at_file();
+  EXPECT_FALSE(sets.is_reading());
   EXPECT_FALSE(sets.has_next());
 }
 
@@ -88,15 +108,51 @@ TEST_F(SetKeeperTest, ASetThatDoesNotStartIsTriedOnce) {
   SetKeeper sets = keeper();
   EXPECT_FALSE(sets.go_back("there is no camera"));  // nothing ran before the first one
   write("b.toml", "set.name = \"new\"\n");
-  sets.change(0);
+  change(sets, 0);
   sets.begin_next();
   EXPECT_TRUE(sets.go_back("there is no camera"));
   EXPECT_EQ(sets.running().set.name, "old");
   EXPECT_TRUE(says("there is no camera\nback to the set as it was: ")) << log_.str();
   sets.look_at_file();
   sets.look_at_file();
+  EXPECT_FALSE(sets.is_reading());
   EXPECT_FALSE(sets.has_next());
   EXPECT_FALSE(sets.go_back("nor is there one now"));
+}
+
+// Nobody waits for a set that takes long to be read: here until the other end of a pipe is written.
+TEST_F(SetKeeperTest, ReadsOnAThreadOfItsOwn) {
+  write("b.toml", "set.name = \"old\"\n");
+  SetKeeper sets = keeper();
+  std::filesystem::remove(folder_ / "b.toml");
+  ASSERT_EQ(mkfifo((folder_ / "b.toml").c_str(), 0600), 0);
+  sets.begin_change(0);
+  EXPECT_TRUE(sets.is_reading());
+  EXPECT_FALSE(sets.finish(std::chrono::milliseconds(0)));
+  EXPECT_FALSE(sets.has_next());
+  EXPECT_EQ(sets.running().set.name, "old");
+  std::ofstream(folder_ / "b.toml") << "set.name = \"new\"\n";
+  EXPECT_EQ(ended(sets), std::nullopt);
+  EXPECT_FALSE(sets.is_reading());
+  ASSERT_TRUE(sets.has_next());
+  sets.begin_next();
+  EXPECT_EQ(sets.running().set.name, "new");
+}
+
+TEST_F(SetKeeperTest, AChangedSetThatIsDroppedIsReadAgain) {
+  write("b.toml", "set.name = \"old\"\n");
+  SetKeeper sets = keeper();
+  write("b.toml", "set.name = \"new\"\n");
+  for (int times = 0; times < 2; ++times) {
+    sets.look_at_file();
+    EXPECT_FALSE(sets.is_reading());
+    sets.look_at_file();
+    ASSERT_TRUE(sets.is_reading());
+    EXPECT_EQ(ended(sets), std::nullopt);
+    EXPECT_EQ(sets.drop_next("a take runs"), "the set stays as it was: a take runs");
+    EXPECT_FALSE(sets.has_next());
+  }
+  EXPECT_TRUE(says("the set stays as it was: a take runs\n")) << log_.str();
 }
 
 constexpr const char* stage = R"(# The desk.
@@ -122,13 +178,13 @@ TEST_F(SetKeeperTest, ChangesOutlastTheSameFileAndNoOther) {
   pipeline::Edits edits = a_stop_down("key");
   edits.lights["gone"].stops = 1;
   edits.objects["vase"].scale = 2;
-  sets.change(0);
+  change(sets, 0);
   sets.leave(edits);
   sets.begin_next();
   EXPECT_EQ(sets.edits(), a_stop_down("key"));
   EXPECT_TRUE(says("\"gone\" was changed by buttons and is no longer in the set"));
   EXPECT_TRUE(says("\"vase\" was changed by buttons and is no longer in the set"));
-  sets.change(1);
+  change(sets, 1);
   sets.begin_next();
   EXPECT_EQ(sets.edits(), pipeline::Edits{});
 }
@@ -136,7 +192,7 @@ TEST_F(SetKeeperTest, ChangesOutlastTheSameFileAndNoOther) {
 TEST_F(SetKeeperTest, KeepsChangesInTheFileAndTheOldOneBesideIt) {
   write("b.toml", stage);
   SetKeeper sets = keeper();
-  ASSERT_EQ(sets.keep(a_stop_down("key")), std::nullopt);
+  ASSERT_EQ(keep(sets, a_stop_down("key")), std::nullopt);
   std::string expected = stage;
   expected.replace(expected.find("0.5 "), 4, "0.25 ");
   EXPECT_EQ(session::read_file(folder_ / "b.toml"), expected);
@@ -146,7 +202,7 @@ TEST_F(SetKeeperTest, KeepsChangesInTheFileAndTheOldOneBesideIt) {
   sets.begin_next();
   EXPECT_EQ(sets.edits(), pipeline::Edits{}) << "changed twice";
   EXPECT_EQ(sets.running().set.lights[0].gain_mixed, 0.25);
-  ASSERT_EQ(sets.keep(a_stop_down("key")), std::nullopt);
+  ASSERT_EQ(keep(sets, a_stop_down("key")), std::nullopt);
   EXPECT_EQ(session::read_file(folder_ / "b.toml.1.old"), stage);
   EXPECT_EQ(session::read_file(folder_ / "b.toml.2.old"), expected);
 }
@@ -156,7 +212,7 @@ TEST_F(SetKeeperTest, GoesBackWithItsChanges) {
   write("b.toml", stage);
   write("c.toml", "");
   SetKeeper sets = keeper();
-  ASSERT_EQ(sets.change(1), std::nullopt);
+  ASSERT_EQ(change(sets, 1), std::nullopt);
   sets.leave(a_stop_down("key"));
   sets.begin_next();
   EXPECT_EQ(sets.edits(), pipeline::Edits{});
@@ -168,13 +224,13 @@ TEST_F(SetKeeperTest, GoesBackWithItsChanges) {
 TEST_F(SetKeeperTest, ChangesInTheFileAreNotMadeTwice) {
   write("b.toml", stage);
   SetKeeper sets = keeper();
-  ASSERT_EQ(sets.keep(a_stop_down("key")), std::nullopt);
+  ASSERT_EQ(keep(sets, a_stop_down("key")), std::nullopt);
   sets.leave(a_stop_down("key"));
   sets.begin_next();
   ASSERT_TRUE(sets.go_back("there is no camera"));
   EXPECT_EQ(sets.edits(), a_stop_down("key")) << "the running set does not have them";
   write("b.toml", session::read_file(folder_ / "b.toml") + "# by hand\n");
-  ASSERT_EQ(sets.change(0), std::nullopt);
+  ASSERT_EQ(change(sets, 0), std::nullopt);
   sets.leave(a_stop_down("key"));
   sets.begin_next();
   EXPECT_EQ(sets.edits(), pipeline::Edits{});
@@ -187,7 +243,7 @@ TEST_F(SetKeeperTest, KeptFilesStayTheirOwners) {
                     std::filesystem::perms::group_write;
   std::filesystem::permissions(folder_ / "b.toml", mode);
   SetKeeper sets = keeper();
-  ASSERT_EQ(sets.keep(a_stop_down("key")), std::nullopt);
+  ASSERT_EQ(keep(sets, a_stop_down("key")), std::nullopt);
   EXPECT_EQ(std::filesystem::status(folder_ / "b.toml").permissions(), mode);
 }
 
@@ -196,7 +252,7 @@ TEST_F(SetKeeperTest, ChangesThatComeToNothingAreNotWritten) {
   SetKeeper sets = keeper();
   pipeline::Edits edits;
   edits.lights["key"].stops = 0;
-  const std::optional<std::string> why_not = sets.keep(edits);
+  const std::optional<std::string> why_not = keep(sets, edits);
   ASSERT_TRUE(why_not);
   EXPECT_NE(why_not->find("come to nothing"), std::string::npos) << *why_not;
   EXPECT_FALSE(std::filesystem::exists(folder_ / "b.toml.1.old"));
@@ -206,7 +262,7 @@ TEST_F(SetKeeperTest, KeepsNothingOverAChangedFile) {
   write("b.toml", stage);
   SetKeeper sets = keeper();
   write("b.toml", std::string(stage) + "# by hand\n");
-  const std::optional<std::string> why_not = sets.keep(a_stop_down("key"));
+  const std::optional<std::string> why_not = keep(sets, a_stop_down("key"));
   ASSERT_TRUE(why_not);
   EXPECT_NE(why_not->find("was changed since it was read"), std::string::npos) << *why_not;
   EXPECT_EQ(session::read_file(folder_ / "b.toml"), std::string(stage) + "# by hand\n");
@@ -220,7 +276,7 @@ TEST_F(SetKeeperTest, KeepsNothingWhereItMayNotWrite) {
   for (const char* number : {"1", "2"})
     std::filesystem::create_directory(folder_ / (std::string("b.toml.") + number + ".old"));
   std::filesystem::create_directory(folder_ / "b.toml.part");
-  const std::optional<std::string> why_not = sets.keep(a_stop_down("key"));
+  const std::optional<std::string> why_not = keep(sets, a_stop_down("key"));
   ASSERT_TRUE(why_not);
   EXPECT_NE(why_not->find("not kept: "), std::string::npos) << *why_not;
   EXPECT_NE(why_not->find("b.toml.part"), std::string::npos) << *why_not;
