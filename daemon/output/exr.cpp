@@ -13,6 +13,7 @@
 #include <ImfOutputFile.h>
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
+#include <ImfTestFile.h>
 
 #include <algorithm>
 #include <array>
@@ -175,6 +176,19 @@ void require_whole(const std::filesystem::path& path, const render::Layers& laye
       throw Error(path.string() + ": layer " + layer.channel + " does not fill the picture");
 }
 
+// Returns the number of pixels of a data window, which must be one that write_exr writes.
+std::size_t pixels_of(const std::filesystem::path& path, const Imath::Box2i& window) {
+  const bool begins_at_0 = window.min.x == 0 && window.min.y == 0;
+  const std::int64_t width = std::int64_t{window.max.x} + 1,
+                     height = std::int64_t{window.max.y} + 1;
+  if (!begins_at_0 || width < 1 || height < 1 ||
+      width > static_cast<std::int64_t>(most_pixels) / height)
+    throw Error(path.string() + ": its data window from " + std::to_string(window.min.x) + ", " +
+                std::to_string(window.min.y) + " to " + std::to_string(window.max.x) + ", " +
+                std::to_string(window.max.y) + " does not begin at 0, 0, or is empty or too large");
+  return static_cast<std::size_t>(width * height);
+}
+
 }  // namespace
 
 ExrMetadata exr_metadata(const render::Layers& layers, const Frame& frame,
@@ -219,12 +233,14 @@ void write_exr(const std::filesystem::path& path, const render::Layers& layers,
 
 render::Layers read_exr(const std::filesystem::path& path) {
   try {
+    bool is_tiled = false, is_deep = false, has_parts = false;
+    if (!Imf::isOpenExrFile(path.c_str(), is_tiled, is_deep, has_parts) || is_deep || has_parts)
+      throw Error(path.string() + ": is no EXR file of one flat picture");
     Imf::InputFile file(path.c_str());
-    const Imath::Box2i window = file.header().dataWindow();
+    const std::size_t pixels = pixels_of(path, file.header().dataWindow());
     render::Layers layers;
-    layers.width = window.max.x - window.min.x + 1;
-    layers.height = window.max.y - window.min.y + 1;
-    const std::size_t pixels = std::size_t(layers.width) * std::size_t(layers.height);
+    layers.width = file.header().dataWindow().max.x + 1;
+    layers.height = file.header().dataWindow().max.y + 1;
     for (const ColorLayer& layer : color_layers) (layers.*layer.values).resize(pixels);
     for (const ScalarLayer& layer : scalar_layers) (layers.*layer.values).resize(pixels);
 
@@ -238,7 +254,7 @@ render::Layers read_exr(const std::filesystem::path& path) {
             file.header().findTypedAttribute<Imf::IntAttribute>("previz.denoised"))
       layers.denoised = denoised->value() != 0;
     file.setFrameBuffer(buffer);
-    file.readPixels(window.min.y, window.max.y);
+    file.readPixels(0, layers.height - 1);
     return layers;
   } catch (const Error&) {
     throw;

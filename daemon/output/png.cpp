@@ -137,20 +137,21 @@ struct Reader {
 
 }  // namespace
 
-void write_png(const std::filesystem::path& path, const Plate& picture) {
+void write_png(const std::filesystem::path& path, const Plate& picture, Sync sync) {
   if (picture.width < 1 || picture.height < 1 || (picture.bits != 8 && picture.bits != 16) ||
       picture.samples.size() != 3 * std::size_t(picture.width) * std::size_t(picture.height))
     throw Error(path.string() + ": the picture is not RGB of 8 or 16 bits, or not whole");
   std::vector<png_byte> bytes = to_bytes(picture);
   std::vector<png_bytep> rows = row_pointers(bytes, picture.height);
-  write_whole(path, [&](const std::filesystem::path& unfinished) {
+  const auto write = [&](const std::filesystem::path& unfinished) {
     Written file{session::OpenFile(unfinished, O_WRONLY | O_CREAT | O_TRUNC), ""};
     PngError error;
     Writer writer(error);
     if (!encode(writer.png, writer.info, &file, picture, rows.data()))
       throw Error(file.failure.empty() ? path.string() + ": cannot be written: " + error.message
                                        : file.failure);
-  });
+  };
+  write_whole(path, write, sync);
 }
 
 Plate read_png(const std::filesystem::path& path) {
@@ -163,7 +164,11 @@ Plate read_png(const std::filesystem::path& path) {
   picture.width = static_cast<int>(png_get_image_width(reader.png, reader.info));
   picture.height = static_cast<int>(png_get_image_height(reader.png, reader.info));
   picture.bits = png_get_bit_depth(reader.png, reader.info);
-  const std::size_t samples = 3 * std::size_t(picture.width) * std::size_t(picture.height);
+  const std::size_t pixels = std::size_t(picture.width) * std::size_t(picture.height);
+  if (pixels > most_pixels)
+    throw Error(path.string() + ": has " + std::to_string(pixels) + " pixels; at most " +
+                std::to_string(most_pixels) + " are read");
+  const std::size_t samples = 3 * pixels;
   std::vector<png_byte> bytes(samples * (picture.bits == 16 ? 2 : 1));
   std::vector<png_bytep> rows = row_pointers(bytes, picture.height);
   if (!read_rows(reader.png, rows.data()))

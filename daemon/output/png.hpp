@@ -3,13 +3,14 @@
 
 #include <filesystem>
 
+#include "daemon/output/file.hpp"
 #include "drivers/frame.hpp"
 
 namespace previz::output {
 
-// Writes a picture without loss; the file appears whole or not at all. Throws previz::Error naming
-// the file.
-void write_png(const std::filesystem::path& path, const Plate& picture);
+// Writes a picture without loss; the file appears whole or not at all, and without `sync` perhaps
+// not at all after a power cut. Throws previz::Error naming the file.
+void write_png(const std::filesystem::path& path, const Plate& picture, Sync sync = Sync::yes);
 
 // Reads an RGB, RGBA or gray PNG of 8 or 16 bits; alpha is dropped, gray is repeated. Throws
 // previz::Error naming the file and what is wrong with it.

@@ -214,5 +214,32 @@ TEST(WriteWhole, LeavesNothingWhenTheWriterThrows) {
   EXPECT_FALSE(std::filesystem::exists(unfinished_name(directory / "a.txt")));
 }
 
+// A data window that lies elsewhere, or claims more pixels than anybody has, is refused before
+// anything is read into memory that was made for it.
+TEST(Exr, ADataWindowThatDoesNotBeginAtZeroIsRefused) {
+  const TemporaryDirectory directory;
+  const render::Layers layers = sample_layers(4, 4);
+  const auto window_of = [&](int min_x, int min_y, int max_x, int max_y) {
+    const auto path = directory / "window.exr";
+    write_exr(path, layers, {});
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    std::string bytes(std::filesystem::file_size(path), '\0');
+    file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    const std::string name("dataWindow\0box2i\0\x10\0\0\0", 21);
+    const std::size_t at = bytes.find(name);
+    EXPECT_NE(at, std::string::npos);
+    file.seekp(static_cast<std::streamoff>(at + name.size()));
+    for (const int value : {min_x, min_y, max_x, max_y})
+      file.write(reinterpret_cast<const char*>(&value), 4);
+    file.close();
+    return path;
+  };
+  EXPECT_NO_THROW(read_exr(window_of(0, 0, 3, 3)));
+  EXPECT_THROW(read_exr(window_of(-2, -2, 1, 1)), Error);
+  EXPECT_THROW(read_exr(window_of(2, 2, 5, 5)), Error);
+  EXPECT_THROW(read_exr(window_of(5, 5, 2, 2)), Error);
+  EXPECT_THROW(read_exr(window_of(0, 0, 1 << 30, 1 << 30)), Error);
+}
+
 }  // namespace output_exr_test
 }  // namespace previz::output
