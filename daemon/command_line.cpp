@@ -21,10 +21,16 @@ void add_device_options(CLI::App& command, render::DeviceOptions& device) {
                    "Log the messages of Vulkan's validation layer");
 }
 
+void add_any_paths(CLI::App& command, bool& any_paths) {
+  command.add_flag("--any-paths", any_paths,
+                   "Let the session's own set name files and folders outside of the session");
+}
+
 void add_render(CLI::App& app, post::RenderOptions& options) {
   CLI::App& command = *app.add_subcommand("render", "Composite every frame of a recorded session");
   command.add_option("session", options.session, "Session directory")->required();
   command.add_option("--set", options.set_file, "Set file, instead of the session's own");
+  add_any_paths(command, options.any_paths);
   command.add_option_function<std::string>(
       "--frames", [&](const std::string& text) { options.frames = post::parse_frame_range(text); },
       "Observer frames: 7, 3-9 or 3- (default: all)");
@@ -102,6 +108,7 @@ void add_export(CLI::App& app, exchange::ExportOptions& options) {
       *app.add_subcommand("export", "Write a take's camera for USD and Nuke, with its scene");
   command.add_option("session", options.session, "Session directory")->required();
   command.add_option("directory", options.directory, "Directory for the files")->required();
+  add_any_paths(command, options.any_paths);
 }
 
 void add_trade(CLI::App& app, trade::TradeOptions& options) {

@@ -5,8 +5,10 @@
 #include <charconv>
 #include <cmath>
 #include <glm/trigonometric.hpp>
+#include <map>
 #include <numbers>
 #include <ostream>
+#include <set>
 
 #include "daemon/pipeline/take.hpp"
 #include "drivers/error.hpp"
@@ -81,6 +83,23 @@ std::string distortion_words(const PinholeIntrinsics& i) {
          number_text(i.k3);
 }
 
+// Returns the files of the set's objects, each once, with names of their own in one folder.
+std::map<std::filesystem::path, std::string> exported_names(const set::Set& set) {
+  std::map<std::filesystem::path, std::string> names;
+  std::set<std::string> used{"camera.usda", "camera.chan"};
+  for (const set::Object& object : set.objects) {
+    if (names.contains(object.file)) continue;
+    const std::filesystem::path written = std::filesystem::path(object.file_as_written).filename();
+    const bool is_name = !written.empty() && written != "." && written != "..";
+    const std::filesystem::path wanted = is_name ? written : object.file.filename();
+    std::string name = wanted.string();
+    for (int number = 2; !used.insert(name).second; ++number)
+      name = wanted.stem().string() + "_" + std::to_string(number) + wanted.extension().string();
+    names[object.file] = name;
+  }
+  return names;
+}
+
 }  // namespace
 
 CameraTrack camera_track(const session::Session& session,
@@ -146,7 +165,7 @@ std::string to_chan(const CameraTrack& track) {
 }
 
 void export_take(const ExportOptions& options, std::ostream& out) {
-  const pipeline::Take take = pipeline::open_take(options.session, {});
+  const pipeline::Take take = pipeline::open_take(options.session, {}, options.any_paths);
   for (const std::string& what : take.session.missing) out << "session: " << what << std::endl;
   const CameraTrack track =
       camera_track(take.session, take.observer_stream->records(), take.observer);
@@ -156,11 +175,9 @@ void export_take(const ExportOptions& options, std::ostream& out) {
     throw Error(options.directory.string() + ": cannot be made: " + code.message());
   session::replace_file(options.directory / "camera.usda", to_usda(track));
   session::replace_file(options.directory / "camera.chan", to_chan(track));
-  for (const set::Object& object : take.set.objects) {
-    const std::filesystem::path to =
-        options.directory / std::filesystem::path(object.file_as_written).filename();
-    std::filesystem::copy_file(object.file, to, std::filesystem::copy_options::overwrite_existing,
-                               code);
+  for (const auto& [file, name] : exported_names(take.set)) {
+    const std::filesystem::path to = options.directory / name;
+    std::filesystem::copy_file(file, to, std::filesystem::copy_options::overwrite_existing, code);
     if (code) throw Error(to.string() + ": cannot be written: " + code.message());
   }
   out << options.directory.string() << ": camera.usda, camera.chan, " << track.keys.size()

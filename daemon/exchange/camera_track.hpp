@@ -52,9 +52,11 @@ glm::dvec3 zxy_degrees(const glm::dmat3& rotation);
 struct ExportOptions {
   std::filesystem::path session;
   std::filesystem::path directory;  // made if need be
+  bool any_paths = false;           // also files outside of the session that its set names
 };
-// Writes DIR/camera.usda, DIR/camera.chan and the set's glTF files, as `previzd export` does. Poses
-// are the take's; gaps in them are reported on `out`.
+// Writes DIR/camera.usda, DIR/camera.chan and the set's glTF files, as `previzd export` does; of
+// two files of one name, the second becomes NAME_2. Poses are the take's; gaps in them are reported
+// on `out`.
 void export_take(const ExportOptions& options, std::ostream& out);
 
 }  // namespace previz::exchange

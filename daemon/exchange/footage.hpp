@@ -1,6 +1,7 @@
 // Reads pictures from files, one after the other, in a format that a session can hold.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -29,6 +30,10 @@ class Footage {
   // Returns the conversions in plain words; they are known after the first picture.
   virtual std::vector<std::string> notes() const { return {}; }
 };
+
+// Footage of unknown origin is read by allow-lists of formats and decoders, and no picture of more
+// pixels than this: a small file can claim to hold any number.
+inline constexpr std::size_t most_pixels = std::size_t{1} << 28;
 
 std::unique_ptr<Footage> open_pictures(std::vector<std::filesystem::path> files);
 std::unique_ptr<Footage> open_video(const std::filesystem::path& file);

@@ -2,6 +2,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "daemon/exchange/footage.hpp"
+#include "daemon/exchange/picture_header.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::exchange {
@@ -30,10 +31,10 @@ class PictureFiles final : public Footage {
   std::optional<Picture> next() override {
     if (index_ == files_.size()) return std::nullopt;
     const std::string name = files_[index_++].string();
+    check_picture_file(name);
     // UNCHANGED keeps the bit depth and ignores EXIF's rotation.
     cv::Mat image = cv::imread(name, cv::IMREAD_UNCHANGED);
-    if (image.empty())
-      throw Error(name + ": cannot be read as a picture; allowed: PNG, JPEG, TIFF");
+    if (image.empty()) throw Error(name + ": cannot be read as a picture; it is damaged");
     const bool known_depth = image.depth() == CV_8U || image.depth() == CV_16U;
     if (!known_depth || image.channels() == 2 || image.channels() > 4)
       throw Error(name +

@@ -64,11 +64,41 @@ std::string describe(const AVFrame& frame) {
          (is_full_range(frame) ? ", full range" : ", limited range");
 }
 
+// What editors and cameras write. libav knows hundreds of further formats, among them play lists
+// that name other files and addresses of networks, and decoders that nobody looks after.
+constexpr const char* allowed_protocols = "file";
+constexpr const char* allowed_formats =
+    "mov,matroska,avi,mxf,mpegts,mpeg,ogg,nut,dv,gxf,asf,yuv4mpegpipe";
+constexpr const char* allowed_codecs =
+    "ffv1,prores,dnxhd,cfhd,h264,hevc,libdav1d,av1,vp8,vp9,mjpeg,png,jpeg2000,rawvideo,v210,v410,"
+    "r210,"
+    "dvvideo,mpeg1video,mpeg2video,mpeg4,theora,huffyuv,ffvhuff,utvideo,qtrle,wrapped_avframe";
+
+// Options for opening a file or a decoder, with the limits of what is read.
+class Limits {
+ public:
+  Limits() {
+    av_dict_set(&options_, "protocol_whitelist", allowed_protocols, 0);
+    av_dict_set(&options_, "format_whitelist", allowed_formats, 0);
+    av_dict_set(&options_, "codec_whitelist", allowed_codecs, 0);
+    av_dict_set_int(&options_, "max_pixels", static_cast<std::int64_t>(most_pixels), 0);
+  }
+  ~Limits() { av_dict_free(&options_); }
+  Limits(const Limits&) = delete;
+  Limits& operator=(const Limits&) = delete;
+  AVDictionary** get() { return &options_; }
+
+ private:
+  AVDictionary* options_ = nullptr;
+};
+
 class VideoFile final : public Footage {
  public:
   explicit VideoFile(const std::filesystem::path& file) : file_(file) {
     AVFormatContext* context = nullptr;
-    av::check(avformat_open_input(&context, file.c_str(), nullptr, nullptr), file,
+    // "file:" keeps a name with a colon from being taken for another protocol.
+    const std::string url = "file:" + std::filesystem::absolute(file).string();
+    av::check(avformat_open_input(&context, url.c_str(), nullptr, Limits().get()), file,
               "cannot be read as a video");
     demuxer_.reset(context);
     av::check(avformat_find_stream_info(context, nullptr), file, "cannot be read as a video");
@@ -80,7 +110,7 @@ class VideoFile final : public Footage {
               file, "cannot be decoded");
     decoder_->thread_count = 0;  // 0: one thread per core
     decoder_->err_recognition = AV_EF_EXPLODE;
-    av::check(avcodec_open2(decoder_.get(), codec, nullptr), file, "cannot be decoded");
+    av::check(avcodec_open2(decoder_.get(), codec, Limits().get()), file, "cannot be decoded");
   }
 
   std::optional<Picture> next() override {

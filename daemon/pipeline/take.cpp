@@ -20,7 +20,8 @@ std::optional<LightCameraCalibration> light_calibration(const set::Set& set,
 }
 
 Take open_take(const std::filesystem::path& session_directory,
-               const std::optional<std::filesystem::path>& set_file, const std::stop_token& stop) {
+               const std::optional<std::filesystem::path>& set_file, bool any_paths,
+               const std::stop_token& stop) {
   Take take;
   take.session = session::open_session(session_directory, stop);
   std::vector<std::pair<std::string, std::filesystem::path>> assets;
@@ -28,14 +29,16 @@ Take open_take(const std::filesystem::path& session_directory,
     if (!set_file || !std::filesystem::exists(set_file->parent_path() / as_written))
       assets.emplace_back(as_written, std::filesystem::absolute(session_directory / stored));
 
-  const std::filesystem::path name =
-      set_file.value_or(session_directory / take.session.info.set_name);
+  const std::filesystem::path name = set_file.value_or(
+      session_directory / std::filesystem::path(take.session.info.set_name).filename());
   take.set_text = set_file ? session::read_file(*set_file) : take.session.info.set_text;
   if (take.set_text.empty())
     throw Error(session_directory.string() +
                 ": the session carries no set file; name one with --set FILE");
   take.set = set::parse_set(take.set_text, name, assets,
-                            set_file ? set::Origin::crew : set::Origin::session);
+                            set_file    ? set::Origin::crew
+                            : any_paths ? set::Origin::trusted_session
+                                        : set::Origin::session);
 
   take.observer = observer_calibration(take.set, take.session.info);
   take.set.observer.calibration = take.observer;

@@ -26,11 +26,11 @@ struct Take {
 
 // Opens a take. `set_file` replaces the set that the session carries; a file that it names but that
 // is not beside it is taken from the session's assets if it is there. Calibration in the set
-// overrides the session's. Throws previz::Error if something cannot be read, or there are no
-// observer frames or no observer calibration. The whole take is read once, which a stop ends, also
-// with an error.
+// overrides the session's. The session's own set may name only files inside the session, unless
+// `any_paths`. Throws previz::Error if something cannot be read, or there are no observer frames or
+// no observer calibration. The whole take is read once, which a stop ends, also with an error.
 Take open_take(const std::filesystem::path& session_directory,
-               const std::optional<std::filesystem::path>& set_file,
+               const std::optional<std::filesystem::path>& set_file, bool any_paths = false,
                const std::stop_token& stop = {});
 
 // Returns the timestamp (ns) of the take's first observer frame.

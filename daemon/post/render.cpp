@@ -46,6 +46,15 @@ void override_set(set::Set& set, const RenderOptions& options) {
   if (options.video) set.output.video = *options.video;
 }
 
+// A session from elsewhere does not choose where files are written.
+void check_directory(const set::Set& set, const RenderOptions& options) {
+  const bool chosen = options.directory || options.set_file || options.any_paths;
+  if (!chosen && !session::lies_within(options.session, set.output.directory))
+    throw Error(
+        options.session.string() + ": its set writes into " + set.output.directory.string() +
+        ", outside the take's folder; name a folder with --out, or let it with --any-paths");
+}
+
 // Returns everything that decides what the pictures look like, as JSON that RenderDirectory
 // compares.
 std::string settings_of(const pipeline::Take& take, const set::Set& set) {
@@ -148,8 +157,9 @@ FrameRange parse_frame_range(const std::string& text) {
 }
 
 RenderReport render_session(const RenderOptions& options, std::ostream& out) {
-  pipeline::Take take = pipeline::open_take(options.session, options.set_file);
+  pipeline::Take take = pipeline::open_take(options.session, options.set_file, options.any_paths);
   override_set(take.set, options);
+  check_directory(take.set, options);
   const set::Set& set = take.set;
   const FrameRange range = range_of(options, take);
   RenderDirectory directory(set.output, settings_of(take, set), options.force);

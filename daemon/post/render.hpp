@@ -32,13 +32,15 @@ FrameRange parse_frame_range(const std::string& text);
 struct RenderOptions {
   std::filesystem::path session;
   std::optional<std::filesystem::path> set_file;  // instead of the one in the session
-  std::optional<FrameRange> frames;               // absent: all
-  std::optional<int> samples;                     // quality.samples
-  std::optional<double> error;                    // quality.error
-  std::optional<bool> adaptive;                   // quality.adaptive
-  std::optional<bool> denoise;                    // quality.denoise
-  std::optional<double> seconds;                  // quality.seconds
-  std::optional<std::uint32_t> seed;              // estimation.seed
+  // The session's own set may read and write outside of the session's folder.
+  bool any_paths = false;
+  std::optional<FrameRange> frames;   // absent: all
+  std::optional<int> samples;         // quality.samples
+  std::optional<double> error;        // quality.error
+  std::optional<bool> adaptive;       // quality.adaptive
+  std::optional<bool> denoise;        // quality.denoise
+  std::optional<double> seconds;      // quality.seconds
+  std::optional<std::uint32_t> seed;  // estimation.seed
   std::optional<set::Estimator> estimator;
   std::optional<std::filesystem::path> directory;  // output.directory
   std::optional<bool> exr, png, video;

@@ -13,6 +13,7 @@
 #include "drivers/calibration/read.hpp"
 #include "drivers/display_drivers.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::set {
 namespace {
@@ -77,7 +78,11 @@ class Resolver {
     for (const auto& [name, stand_in] : assets_)
       if (name == as_written.string()) path = located(stand_in);
     std::error_code error;
-    if (!fs::is_regular_file(path, error))
+    if (origin_ == Origin::session && !session::lies_within(folder_, path))
+      problem(table, key,
+              "lies outside the take's folder, and is not read; allowed: files of the take, or "
+              "--any-paths for a take that you trust");
+    else if (!fs::is_regular_file(path, error))
       problem(table, key,
               "there is no file " + path.string() +
                   "; allowed: a file that exists, its path relative to the folder of this file");

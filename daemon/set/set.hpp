@@ -212,13 +212,14 @@ struct Estimation {
 };
 
 struct Quality {
-  int samples = 16;       // per pixel and frame, 1..1'000'000
-  bool adaptive = false;  // noisy pixels get more, `samples` on average; not in the preview
-  bool denoise = true;    // denoises the composite, guided by its own variance
-  double error = 0;       // refines to this rms error over the picture's rms; 0: samples decide
-  double seconds = 0;     // time limit of a frame; 0: samples decide
-  double scale = 1.0;     // times the observer's resolution, preview only
-  double fps = 0;         // preview: kept by fewer samples, then pixels; 0: the others decide
+  int samples = 16;          // per pixel and frame, 1..1'000'000
+  bool adaptive = false;     // noisy pixels get more, `samples` on average; not in the preview
+  bool denoise = true;       // denoises the composite, guided by its own variance
+  double error = 0;          // refines to this rms error over the picture's rms; 0: samples decide
+  double seconds = 0;        // time limit of a frame; 0: samples decide
+  double scale = 1.0;        // times the observer's resolution, preview only
+  double fps = 0;            // preview: kept by fewer samples, then pixels; 0: the others decide
+  bool cpu_instead = false;  // live: the CPU draws while the GPU that was there is gone
 };
 
 // The kinds of press that an action can be bound to.
@@ -306,8 +307,10 @@ struct Set {
 };
 
 // Says where a set file comes from: the crew, who can mend it, or a session that was recorded with
-// it. Buttons that nobody can press are an error in the crew's files only.
-enum class Origin { crew, session };
+// it. Buttons that nobody can press are an error in the crew's files only. A session may come from
+// anywhere, so that its set is read as data: a file that it names must be in its own folder, unless
+// the crew trusts it.
+enum class Origin { crew, session, trusted_session };
 
 // Parses TOML text. `file` names it in errors, and its folder is what relative paths are relative
 // to; `assets` maps paths as the set writes them to paths that stand in for them (a session's

@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -87,6 +88,17 @@ void replace_file(const std::filesystem::path& file, const std::string& content)
     throw;
   }
   sync_names(file.parent_path());
+}
+
+bool lies_within(const std::filesystem::path& folder, const std::filesystem::path& file) {
+  std::error_code unknown;
+  const auto real_folder = std::filesystem::weakly_canonical(folder, unknown);
+  if (unknown) return false;
+  const auto real_file = std::filesystem::weakly_canonical(file, unknown);
+  if (unknown) return false;
+  // The path of a folder that ends in a slash has an empty last part.
+  const auto last = real_folder.has_filename() ? real_folder.end() : std::prev(real_folder.end());
+  return std::mismatch(real_folder.begin(), last, real_file.begin(), real_file.end()).first == last;
 }
 
 std::string read_file(const std::filesystem::path& file) {

@@ -48,6 +48,10 @@ void make_folders(const std::filesystem::path& folder);
 // part, and after the return the new. The mode stays, and the owner where the system lets it.
 // Throws previz::Error; the old content then stays.
 void replace_file(const std::filesystem::path& file, const std::string& content);
+// Returns whether a file, or the place of one that is not there, is inside the folder, wherever
+// links on the way to it lead.
+bool lies_within(const std::filesystem::path& folder, const std::filesystem::path& file);
+
 // Returns the whole file; throws previz::Error naming it.
 std::string read_file(const std::filesystem::path& file);
 // Returns the SHA-256 of the file's content, 64 lower-case hexadecimal digits.

@@ -29,7 +29,19 @@
 namespace previz::session {
 namespace {
 
+// A session from elsewhere may name any file; what is not in its folder is not its own.
+void forget_foreign_assets(Session& session) {
+  std::erase_if(session.info.assets, [&](const auto& asset) {
+    const bool is_own = lies_within(session.directory, session.directory / asset.second);
+    if (!is_own)
+      session.missing.push_back(asset.second + " (" + asset.first +
+                                "): lies outside the session, and is not read");
+    return !is_own;
+  });
+}
+
 void check_assets(Session& session, const std::stop_token& stop) {
+  forget_foreign_assets(session);
   for (const auto& [as_written, path] : session.info.assets) {
     const std::filesystem::path file = session.directory / path;
     const std::string named = path + " (" + as_written + ")";

@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <numeric>
+#include <random>
 
+#include "daemon/exchange/footage.hpp"
+#include "daemon/exchange/picture_header.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/import_fixture.hpp"
 
@@ -264,6 +268,70 @@ TEST(Import, DamagedFootageIsAnError) {
   session::write_content(shoot.folder() / "a.mp4", "no video");
   shoot.json["observer"] = {{"video", "a.mp4"}, {"fps", 25}, {"exposure", 1}};
   EXPECT_NE(shoot.error().find("a.mp4: cannot be read as a video"), std::string::npos);
+}
+
+// Formats that are not on the list are refused by what a file is, whatever it is called; a play
+// list and an address of a network are not followed.
+TEST(Import, FootageOfOtherFormatsIsRefused) {
+  Shoot shoot;
+  write_picture(shoot.folder() / "a.bmp", noise_picture(1, CV_8UC3, 16, 16));
+  std::filesystem::rename(shoot.folder() / "a.bmp", shoot.folder() / "a.png");
+  shoot.json["observer"]["pictures"] = {"a.png"};
+  EXPECT_NE(shoot.error().find("allowed: PNG, JPEG, TIFF"), std::string::npos) << shoot.error();
+
+  write_video(shoot.folder() / "real.mkv", "gray", {noise_bytes(512, 1)}, 32, 16, 25, false);
+  session::write_content(shoot.folder() / "list.mkv", "ffconcat version 1.0\nfile real.mkv\n");
+  session::write_content(shoot.folder() / "list.mp4",
+                         "#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nreal.mkv\n");
+  for (const char* name : {"list.mkv", "list.mp4", "concat:real.mkv", "http://127.0.0.1:1/a.mkv"}) {
+    shoot.json["observer"] = {{"video", name}, {"fps", 25}, {"exposure", 1}};
+    EXPECT_NE(shoot.error(), "") << name;
+  }
+  shoot.json["observer"] = {{"video", "real.mkv"}, {"fps", 25}, {"exposure", 1}};
+  EXPECT_EQ(shoot.error(), "");
+}
+
+// A name with a colon is a name, and no protocol.
+TEST(Import, AFileWithAColonIsRead) {
+  Shoot shoot;
+  write_video(shoot.folder() / "12:A.mkv", "gray", {noise_bytes(512, 1)}, 32, 16, 25, false);
+  shoot.json["observer"] = {{"video", "12:A.mkv"}, {"fps", 25}, {"exposure", 1}};
+  EXPECT_EQ(shoot.error(), "");
+}
+
+TEST(PictureHeader, HasTheSizeOfEveryKindThatIsAllowed) {
+  Shoot shoot;
+  for (const char* name : {"a.png", "a.jpg", "a.tiff"}) {
+    write_picture(shoot.folder() / name, noise_picture(1, CV_8UC3, 37, 21));
+    const std::optional<PictureSize> size = picture_size(session::read_file(shoot.folder() / name));
+    ASSERT_TRUE(size) << name;
+    EXPECT_EQ(size->width, 37u) << name;
+    EXPECT_EQ(size->height, 21u) << name;
+  }
+}
+
+// However a file is cut or changed, its header is read within its bytes.
+TEST(PictureHeader, OfDamagedFilesDoesNoHarm) {
+  Shoot shoot;
+  std::mt19937 random(7);
+  for (const char* name : {"a.png", "a.jpg", "a.tiff"}) {
+    write_picture(shoot.folder() / name, noise_picture(1, CV_8UC3, 16, 16));
+    const std::string whole = session::read_file(shoot.folder() / name);
+    for (std::size_t size = 0; size < whole.size(); ++size) {
+      std::string part(whole, 0, size);
+      EXPECT_NO_THROW(picture_size(part));
+      if (size > 4) part[4 + random() % (size - 4)] = static_cast<char>(random());
+      EXPECT_NO_THROW(picture_size(part));
+    }
+  }
+}
+
+TEST(PictureHeader, MorePixelsThanAnybodyHasAreRefused) {
+  Shoot shoot;
+  const auto file = shoot.folder() / "huge.png";
+  session::write_content(
+      file, std::string("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\x01\0\0\0\x01\0\0\x08\x02\0\0\0", 29));
+  EXPECT_THROW(check_picture_file(file), Error);
 }
 
 TEST(Import, TransparencyIsAnErrorUnlessThereIsNone) {

@@ -1,11 +1,13 @@
 // The tracked and lit shots of a recorded take.
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <set>
 #include <vector>
 
 #include "daemon/pipeline/take_shots.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -47,6 +49,31 @@ TEST_F(TakeShotsTest, EveryFrameComesOnceWithItsPoseAndItsLight) {
 
 TEST_F(TakeShotsTest, ATakeCanBeGoneThroughAgain) {
   EXPECT_EQ(all().size(), all().size());
+}
+
+// Whatever session.toml says, files outside of the session are not read as its assets.
+TEST_F(TakeShotsTest, ATakeCannotMakeForeignFilesItsAssets) {
+  const std::filesystem::path toml = directory_ / "session/session.toml";
+  std::string text = session::read_file(toml);
+  const std::size_t asset = text.find("\"assets/");
+  ASSERT_NE(asset, std::string::npos);
+  const std::size_t end = text.find('"', asset + 1);
+  text.replace(asset, end + 1 - asset, "\"../floor.gltf\"");
+  std::ofstream(toml) << text;
+  const session::Session read = session::open_session(directory_ / "session");
+  ASSERT_EQ(read.missing.size(), 1u);
+  EXPECT_NE(read.missing[0].find("lies outside the session"), std::string::npos) << read.missing[0];
+  EXPECT_EQ(read.info.assets.size(), 1u);
+}
+
+TEST_F(TakeShotsTest, ATakeIsReadInItsOwnFolderWhateverItsSetIsCalled) {
+  const std::filesystem::path toml = directory_ / "session/session.toml";
+  std::string text = session::read_file(toml);
+  const std::size_t name = text.find("\"set.toml\"");
+  ASSERT_NE(name, std::string::npos);
+  text.replace(name, 10, "\"../../set.toml\"");
+  std::ofstream(toml) << text;
+  EXPECT_EQ(open_take(directory_ / "session", {}).set.file, directory_ / "session/set.toml");
 }
 
 TEST_F(TakeShotsTest, FirstAndLastAreInTheRange) {

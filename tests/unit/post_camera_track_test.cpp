@@ -3,11 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <glm/gtc/matrix_transform.hpp>
 #include <regex>
 #include <sstream>
 
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::exchange {
 namespace post_camera_track_test {
@@ -119,6 +123,44 @@ TEST(CameraTrack, FramesThatWereNotTrackedHaveNoKey) {
   EXPECT_DOUBLE_EQ(track.fps, 20);
   session.track[1].tracked = false;
   EXPECT_THROW(camera_track(session, frames, {}), Error);
+}
+
+// A session in which `from` stands for what `to` says, wherever it is written.
+void rewrite(const std::filesystem::path& session, const std::string& from, const std::string& to) {
+  std::string text = session::read_file(session / "session.toml");
+  for (std::size_t at = text.find(from); at != std::string::npos;
+       at = text.find(from, at + to.size()))
+    text.replace(at, from.size(), to);
+  session::replace_file(session / "session.toml", text);
+}
+
+TEST(ExportTake, TwoFilesOfOneNameStayTwo) {
+  const test::TemporaryDirectory directory;
+  test::write_small_take(directory.path());
+  const std::string floor = session::read_file(directory / "floor.gltf");
+  const std::string card = session::read_file(directory / "card.gltf");
+  rewrite(directory / "session", "card.gltf", "props/floor.gltf");
+  std::ostringstream out;
+  export_take({directory / "session", directory / "out", false}, out);
+  EXPECT_EQ(session::read_file(directory / "out/floor.gltf"), floor);
+  EXPECT_EQ(session::read_file(directory / "out/floor_2.gltf"), card);
+}
+
+// What is exported is handed on: a take from elsewhere must not add files of the one who exports
+// it.
+TEST(ExportTake, CopiesNoForeignFile) {
+  const test::TemporaryDirectory directory;
+  test::write_small_take(directory.path());
+  session::replace_file(directory / "secret.gltf", session::read_file(directory / "card.gltf"));
+  rewrite(directory / "session", "\"card.gltf\"", "\"../secret.gltf\"");
+  rewrite(directory / "session", "\\\"card.gltf\\\"", "\\\"../secret.gltf\\\"");
+  // What the set names is no asset of the session any more.
+  rewrite(directory / "session", "\"../secret.gltf\" =", "\"other.gltf\" =");
+  std::ostringstream out;
+  EXPECT_THROW(export_take({directory / "session", directory / "out", false}, out), Error);
+  EXPECT_FALSE(std::filesystem::exists(directory / "out/secret.gltf"));
+  export_take({directory / "session", directory / "out", true}, out);
+  EXPECT_TRUE(std::filesystem::exists(directory / "out/secret.gltf"));
 }
 
 }  // namespace post_camera_track_test

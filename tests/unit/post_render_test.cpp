@@ -331,6 +331,20 @@ TEST_F(RenderSession, AnotherSetFileTakesTheSessionsAssetsWhereItHasNoOwn) {
   EXPECT_EQ(render(options).frames.size(), 1u);
 }
 
+// The set of a take from elsewhere does not choose a folder to write into; the crew does.
+TEST_F(RenderSession, ATakesOwnSetWritesNowhereElse) {
+  const std::filesystem::path elsewhere = directory_ / "elsewhere";
+  test::write_small_take(directory_.path(), true,
+                         "[output]\ndirectory = \"" + elsewhere.string() + "\"\n");
+  RenderOptions options;
+  options.session = directory_ / "session";
+  options.frames = FrameRange{1, 1};
+  EXPECT_THROW(render_session(options, out_), Error);
+  EXPECT_FALSE(std::filesystem::exists(elsewhere));
+  options.any_paths = true;
+  EXPECT_EQ(render_session(options, out_).directory, elsewhere);
+}
+
 TEST_F(RenderSession, ARangeBehindTheEndIsRefused) {
   test::write_small_take(directory_.path());
   RenderOptions options;

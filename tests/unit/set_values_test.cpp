@@ -143,6 +143,27 @@ TEST(SetValues, SetsOfSessionsMayNameButtonsThatNoDriverTakes) {
   EXPECT_EQ(set.buttons.at(0).name, "pedal:left");
 }
 
+// A take comes from anywhere: it names no file but its own, by whatever way, unless it is trusted.
+TEST(SetValues, SetsOfSessionsNameFilesOfTheirOwnFolderOnly) {
+  const test::TemporaryDirectory directory;
+  const std::filesystem::path take = directory / "take", outside = directory / "key.glb";
+  std::filesystem::create_directories(take / "assets");
+  for (const auto& file : {outside, take / "own.glb"}) std::ofstream(file) << "x";
+  std::filesystem::create_symlink(outside, take / "link.glb");
+  const auto parse_with = [&](const std::string& file, Origin origin) {
+    return parse_set("[[object]]\nname = 'a'\npresence = 'virtual'\nfile = '" + file + "'\n",
+                     take / "set.toml", {}, origin);
+  };
+  EXPECT_NO_THROW(parse_with("own.glb", Origin::session));
+  EXPECT_NO_THROW(parse_with("assets/../own.glb", Origin::session));
+  for (const std::string& file : {outside.string(), std::string("../key.glb"),
+                                  std::string("link.glb"), std::string("/dev/zero")})
+    EXPECT_THROW(parse_with(file, Origin::session), Error) << file;
+  for (const Origin trusted : {Origin::crew, Origin::trusted_session})
+    for (const std::string& file : {outside.string(), std::string("../key.glb")})
+      EXPECT_NO_THROW(parse_with(file, trusted)) << file;
+}
+
 TEST(SetValues, RotationTurnsAboutWorldXThenYThenZ) {
   const auto set =
       parse("[[tag]]\nid = 1\nsize_m = 0.1\nposition_m = [1, 2, 3]\nrotation_deg = [90, 0, 90]\n");
