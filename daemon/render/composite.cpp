@@ -137,7 +137,7 @@ void composite(Layers& layers, std::size_t first, std::span<const gpu::GpuPixel>
     const gpu::GpuPixel& sums = pixels[at];
     const std::size_t i = first + at;
     const Means m = means(sums);
-    glm::dvec3 camera, result, gains;  // gains: of an error in the change
+    glm::dvec3 camera{0}, result{0}, gains{0};  // gains: of an error in the change
     const glm::dvec3 change = m.mask * m.mixed + (1 - m.mask) * m.diff;
     // Where only the difference was traced, the camera's picture stands for the real world.
     const bool is_difference = m.difference_only > 0;
