@@ -90,11 +90,13 @@ void add_check(CLI::App& app, std::filesystem::path& set_or_session) {
   command.add_option("set", set_or_session, "Set file or session directory")->required();
 }
 
-void add_devices(CLI::App& app, bool& learn) {
+void add_devices(CLI::App& app, bool& learn, bool& rules) {
   CLI::App& command = *app.add_subcommand(
       "devices", "List cameras, buttons and screens by the names that a set file uses");
   command.add_flag("--learn", learn,
                    "Print the name of every button that is pressed, until Ctrl-C");
+  command.add_flag("--rules", rules,
+                   "Print the udev rules that let the service open pads, pedals and GPIO chips");
 }
 
 void add_import(CLI::App& app, exchange::ImportOptions& options) {
@@ -143,7 +145,7 @@ void add_commands(CLI::App& app, CommandLine& said) {
   add_render(app, said.render);
   add_run(app, said.run);
   add_check(app, said.check);
-  add_devices(app, said.learn);
+  add_devices(app, said.learn, said.rules);
   add_import(app, said.import_session);
   add_export(app, said.export_take);
   add_trade(app, said.trade);

@@ -19,7 +19,7 @@ struct CommandLine {
   post::RenderOptions render;
   rig::LiveOptions run;
   std::filesystem::path check;
-  bool learn = false;
+  bool learn = false, rules = false;  // of devices
   exchange::ImportOptions import_session;
   exchange::ExportOptions export_take;
   trade::TradeOptions trade;

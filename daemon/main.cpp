@@ -1,7 +1,8 @@
 // previzd parses the command line and runs the subcommand; it does nothing else.
 //
 // Exit status: 0 done; 1 an error, one line on standard error says which; 2 the command line cannot
-// be understood; 128 + N stopped by signal N (what was finished is on disk, and a render goes on
+// be understood; 75 the service wants to be started again, because another version was installed;
+// 128 + N stopped by signal N (what was finished is on disk, and a render goes on
 // there when it is called again).
 #include <unistd.h>
 
@@ -9,10 +10,12 @@
 #include <iostream>
 
 #include "daemon/command_line.hpp"
+#include "daemon/device_rules.hpp"
 #include "daemon/devices.hpp"
 #include "daemon/post/check.hpp"
 #include "daemon/report/log.hpp"
 #include "daemon/report/reports.hpp"
+#include "daemon/rig/service.hpp"
 #include "daemon/signals.hpp"
 #include "daemon/trade/page.hpp"
 #include "drivers/error.hpp"
@@ -30,7 +33,8 @@ void report_end(const std::exception& error) {
     std::cerr << "previzd: " << error.what() << std::endl;
 }
 
-int do_devices(bool learn, const StopOnSignal& stop) {
+int do_devices(bool learn, bool rules, const StopOnSignal& stop) {
+  if (rules) return print_device_rules(std::cout), 0;
   learn ? learn_buttons(std::cout, stop.token()) : list_devices(std::cout);
   return stop.received() ? 128 + stop.received() : 0;
 }
@@ -69,9 +73,12 @@ int do_trade(trade::TradeOptions& options, const StopOnSignal& stop) {
 int do_run(rig::LiveOptions& options, const StopOnSignal& stop) {
   options.stop = stop.token();
   report::Reports reports(report::log);
+  if (options.bus) options.replaced = [] { return rig::Service::program_was_replaced(); };
   const std::string metrics = to_json(rig::run_live(options, reports));
   if (!options.bus) std::cout << metrics;  // a service publishes them on the bus
-  return 0;                                // a rig runs until it is stopped
+  if (options.replaced && options.replaced() && stop.received() == 0)
+    return rig::Service::start_again;
+  return 0;  // a rig runs until it is stopped
 }
 
 }  // namespace
@@ -87,7 +94,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("check")) return post::check_set(said.check, std::cout);
     if (app.got_subcommand("calibrate"))
       return calibrate::do_calibrate(app, said.calibrate, std::cout);
-    if (app.got_subcommand("devices")) return do_devices(said.learn, stop);
+    if (app.got_subcommand("devices")) return do_devices(said.learn, said.rules, stop);
     if (app.got_subcommand("export")) return exchange::export_take(said.export_take, std::cout), 0;
     if (app.got_subcommand("import")) return do_import(said.import_session);
     if (app.got_subcommand("render")) return do_render(said.render, stop);

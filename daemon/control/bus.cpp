@@ -121,6 +121,7 @@ constexpr Property properties[] = {
     property<&Status::set>("Set", "s"),
     property<&Status::object>("Object", "s"),
     property<&Status::light>("Light", "s"),
+    property<&Status::device>("Device", "s"),
     property<&Status::message>("Message", "s"),
 };
 

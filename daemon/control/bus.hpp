@@ -27,6 +27,7 @@ struct Status {
   bool camera_lost = false;
   std::int32_t samples = 0;
   std::string set, object, light;  // names of the set, the selected object and the selected lamp
+  std::string device;              // that draws: "NVIDIA RTX 4000", "llvmpipe (CPU)"; empty: none
   std::string message;             // the last announcement
 };
 

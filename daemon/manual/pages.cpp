@@ -44,6 +44,7 @@ const Chapter examples_chapter{"EXAMPLES",
                                R"(
 previzd devices: Lists the cameras, buttons and screens that are plugged in, by the names that a set file uses.
 previzd devices --learn: Prints the name of every button that is pressed.
+previzd devices --rules: Prints the lines by which the service may open pads, pedals and GPIO chips, for /etc/udev/rules.d.
 previzd calibrate observer views --board charuco:7x5:30mm:22mm:5x5_100 --out lens.toml: Measures the film camera's lens from a folder of pictures of a board, and writes the tables for the set file.
 previzd calibrate light views --board charuco:7x5:30mm:22mm:5x5_100 --tags desk.toml: Measures the fisheye's lens, and finds where it stands by the set's tags.
 previzd check desk.toml: Lists every mistake in a set file, or what its scene asks of the renderer.
@@ -92,6 +93,7 @@ const Chapter previzd_status{"EXIT STATUS", R"(
 0: Done.
 1: An error; one line on standard error says which.
 2: The command line cannot be understood.
+75: The service ended after a take, because another version was installed meanwhile, and is started again.
 128+N: Stopped by signal N. Finished frames are on disk, and a render that is called again continues there. (A rig that is stopped has done its work: 0.)
 )"};
 
@@ -105,7 +107,9 @@ const Chapter previzd_files{"FILES", R"(
 /usr/libexec/previzd/previzd-aravis: Receives from one aravis camera; previzd starts it.
 /usr/share/previzd/demo: The take that the demonstration plays.
 /usr/share/doc/previzd/examples: A set file to start from, and a reference of every key.
-/var/lib/previzd: Takes and pictures, unless the set file says otherwise.
+/var/lib/previzd: Takes and snapshots, unless the set file says otherwise. The file graphics-device in it names the graphics card that the rig had last, which it waits for if it is missing; without the file, the CPU draws then.
+/run/previzd: The newest picture (picture.png) and metrics.json, of each second.
+/usr/share/doc/previzd/examples/takes-disk.conf, cameras.conf: How the service is changed for a disk of its own, and for cameras of known addresses.
 )"};
 
 const Chapter previzctl_status{"EXIT STATUS", R"(

@@ -77,16 +77,22 @@ std::string lacks(const vk::raii::PhysicalDevice& physical) {
 }  // namespace
 
 Device::Device(DeviceOptions options) : options_(std::move(options)) {
-  open();
+  open(true);
 }
 
-void Device::reopen() {
+void Device::reopen(bool cpu_instead) {
   close();
-  open();
+  open(cpu_instead || !had_gpu_);
+}
+
+void Device::publish(Drawing drawing) {
+  const std::lock_guard lock(drawing_mutex_);
+  drawing_ = std::move(drawing);
 }
 
 // The instance is closed too: a card that was gone has another physical device when it is back.
 void Device::close() {
+  publish({});
   programs_.clear();
   fence_.clear();
   commands_.clear();
@@ -114,11 +120,13 @@ std::shared_ptr<const Program> Device::program(
   return programs_.back().program;
 }
 
-void Device::open() {
+void Device::open(bool cpu_too) {
   try {
     create_instance(options_.validation);
-    pick_physical_device(options_.name);
+    pick_physical_device(options_.name, cpu_too);
     create_device();
+    publish({name_, is_cpu_, is_cpu_ && had_gpu_});
+    had_gpu_ |= !is_cpu_;
   } catch (const vk::SystemError& error) {
     throw Error(std::string("Vulkan: ") + error.what());
   }
@@ -149,13 +157,15 @@ void Device::create_instance(bool validation) {
   messenger_ = vk::raii::DebugUtilsMessengerEXT(instance_, info);
 }
 
-void Device::pick_physical_device(const std::string& wanted_name) {
+void Device::pick_physical_device(const std::string& wanted_name, bool cpu_too) {
   std::string found;
   int best = 1000;
   for (auto& physical : vk::raii::PhysicalDevices(instance_)) {
     const auto properties = physical.getProperties();
     const std::string name = properties.deviceName;
-    const std::string lack = lacks(physical);
+    std::string lack = lacks(physical);
+    const bool is_cpu = properties.deviceType == vk::PhysicalDeviceType::eCpu;
+    if (lack.empty() && is_cpu && !cpu_too) lack = "the CPU, while a GPU is waited for";
     found += "\n  " + name + (lack.empty() ? "" : " (" + lack + ")");
     if (!lack.empty() || name.find(wanted_name) == std::string::npos) continue;
     if (rank(properties.deviceType) >= best) continue;
@@ -163,7 +173,7 @@ void Device::pick_physical_device(const std::string& wanted_name) {
     physical_ = std::move(physical);
     name_ = name;
     limits_ = properties.limits;
-    is_cpu_ = properties.deviceType == vk::PhysicalDeviceType::eCpu;
+    is_cpu_ = is_cpu;
   }
   if (best == 1000)
     throw Error("Vulkan: no usable device" +
@@ -395,11 +405,27 @@ void record_clear(const vk::raii::CommandBuffer& commands,
 std::shared_ptr<Device> open_device(const DeviceOptions& options) {
   return std::make_shared<Device>(options);
 }
-void reopen_device(Device& device) {
-  device.reopen();
+std::shared_ptr<Device> awaited_gpu(const DeviceOptions& options) {
+  return std::make_shared<Device>(options, Device::Awaited{});
+}
+void reopen_device(Device& device, bool cpu_instead) {
+  device.reopen(cpu_instead);
 }
 bool is_open(const Device& device) {
   return device.is_open();
+}
+bool is_gpu(const Device& device) {
+  return device.is_open() && !device.is_cpu();
+}
+// Drivers add to a name in parentheses what nobody looks for on a screen: "llvmpipe (LLVM 15,
+// ...)".
+std::string drawing_device(const Device& device) {
+  const Device::Drawing drawing = device.drawing();
+  const std::string name = drawing.name.substr(0, drawing.name.find(" ("));
+  return name + (drawing.is_cpu ? " (CPU)" : "");
+}
+bool cpu_stands_in(const Device& device) {
+  return device.drawing().stands_in;
 }
 std::string device_name(const Device& device) {
   return device.name();

@@ -23,15 +23,28 @@ class Device {
  public:
   // Throws previz::Error saying what is missing and which devices were found.
   explicit Device(DeviceOptions options);
+  struct Awaited {};
+  // Opens nothing; reopen() opens a GPU.
+  Device(DeviceOptions options, Awaited) : options_(std::move(options)), had_gpu_(true) {}
   // Closes and opens the device again. Throws as the constructor does, and can be called again
-  // after that.
-  void reopen();
+  // after that. Where there was a GPU, a CPU device is taken only if `cpu_instead`: drivers list
+  // one while a GPU is being reset, and it would never be left.
+  void reopen(bool cpu_instead);
   bool is_open() const { return static_cast<bool>(*device_); }  // false after a reopen() that threw
 
   const vk::raii::Device& vk() const { return device_; }
   const std::string& name() const { return name_; }
   const vk::PhysicalDeviceLimits& limits() const { return limits_; }
   bool is_cpu() const { return is_cpu_; }
+  // What is open now; may be called on any thread.
+  struct Drawing {
+    std::string name;  // empty: nothing is open
+    bool is_cpu = false, stands_in = false;
+  };
+  Drawing drawing() const {
+    const std::lock_guard lock(drawing_mutex_);
+    return drawing_;
+  }
   // Returns how many bytes all buffers together may take: the device's own memory, or the
   // computer's for a CPU device.
   std::uint64_t memory_bytes() const;
@@ -66,10 +79,11 @@ class Device {
     std::shared_ptr<const Program> program;
   };
 
-  void open();
+  void open(bool cpu_too);
   void close();
+  void publish(Drawing drawing);
   void create_instance(bool validation);
-  void pick_physical_device(const std::string& wanted_name);
+  void pick_physical_device(const std::string& wanted_name, bool cpu_too);
   void create_device();
 
   const DeviceOptions options_;
@@ -84,6 +98,9 @@ class Device {
   std::string name_;
   vk::PhysicalDeviceLimits limits_;
   bool is_cpu_ = false;
+  bool had_gpu_ = false;  // since it was first opened
+  mutable std::mutex drawing_mutex_;
+  Drawing drawing_;
   vk::raii::Device device_{nullptr};
   vk::raii::Queue queue_{nullptr};
   vk::raii::CommandPool pool_{nullptr};

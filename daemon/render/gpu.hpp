@@ -25,11 +25,19 @@ class DeviceLost : public Error {
 
 class Device;  // daemon/render/device.hpp
 std::shared_ptr<Device> open_device(const DeviceOptions& options = {});
+// Returns a device that is not open yet: reopen_device() opens it once there is a GPU.
+std::shared_ptr<Device> awaited_gpu(const DeviceOptions& options = {});
 // Opens a lost device again, with the same options. Nothing that was created on the device may
-// still exist. Throws previz::Error while there is no device; it can be tried again.
-void reopen_device(Device& device);
+// still exist. Throws previz::Error while there is no device; it can be tried again. A device that
+// was a GPU, or was awaited as one, is followed by a CPU device only if `cpu_instead`.
+void reopen_device(Device& device, bool cpu_instead = false);
 bool is_open(const Device& device);  // false after a reopen_device() that threw
+bool is_gpu(const Device& device);   // and open
 std::string device_name(const Device& device);
+
+// What a device is at the moment, in the crew's words. These two may be called on any thread.
+std::string drawing_device(const Device& device);  // "llvmpipe (CPU)"; empty while there is none
+bool cpu_stands_in(const Device& device);          // a CPU device, where there was a GPU
 std::uint64_t validation_messages(const Device& device);
 
 }  // namespace previz::render

@@ -1,7 +1,6 @@
 #include "daemon/rig/gpu_keeper.hpp"
 
-#include <thread>
-#include <utility>
+#include <algorithm>
 
 namespace previz::rig {
 
@@ -13,37 +12,56 @@ constexpr const char* graphics_device = "graphics device";  // as the crew calls
 
 }  // namespace
 
+void GpuKeeper::say_lost(const std::string& what) {
+  parts_.reports({.severity = Severity::error,
+                  .source = "",
+                  .text = what + "; it is opened again",
+                  .notice = report::lasting(graphics_device, "is lost; it is opened again")});
+  parts_.metrics.count("device lost");
+  gpu_.drop();
+}
+
 void GpuKeeper::start() {
+  is_built_ = false;
   try {
     if (!gpu_.is_open()) gpu_.open();
+  } catch (const std::exception& error) {
+    return say_lost(error.what());
+  }
+  try {
     gpu_.build();
+    is_built_ = true;
   } catch (const render::DeviceLost& lost) {
-    if (!renew(lost)) throw;
+    say_lost(lost.what());
   }
 }
 
 bool GpuKeeper::renew(const render::DeviceLost& lost) {
-  parts_.reports({.severity = Severity::error,
-                  .source = "",
-                  .text = std::string(lost.what()) + "; it is opened again",
-                  .notice = report::lasting(graphics_device, "is lost; it is opened again")});
-  parts_.metrics.count("device lost");
-  gpu_.drop();
-  while (!parts_.stop.stop_requested()) {
+  is_built_ = false;
+  say_lost(lost.what());
+  return await();
+}
+
+bool GpuKeeper::await() {
+  std::chrono::milliseconds delay = parts_.patience;
+  while (!is_built_ && !parts_.stop.stop_requested()) {
     try {
       gpu_.open();
       gpu_.build();
+      is_built_ = true;
       parts_.reports.settle(graphics_device);
+      if (gpu_.stands_in())
+        parts_.reports.show(report::lasting(graphics_device, "is gone; the CPU draws, slowly"));
       parts_.metrics.count("device opened again");
       parts_.reports({Severity::info, "", "pictures again, on " + gpu_.name()});
-      return true;
     } catch (const std::exception& error) {
       parts_.reports(report::once({Severity::error, "", error.what()}));
       gpu_.drop();
-      std::this_thread::sleep_for(parts_.patience);
+      parts_.meanwhile(delay);
+      delay = std::min(2 * delay, parts_.longest_patience);
     }
   }
-  return false;
+  return is_built_;
 }
 
 }  // namespace previz::rig

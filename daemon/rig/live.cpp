@@ -5,8 +5,10 @@
 #include <thread>
 #include <utility>
 
+#include "daemon/control/inhibitor.hpp"
 #include "daemon/rig/bus_link.hpp"
 #include "daemon/rig/event_loop.hpp"
+#include "daemon/rig/graphics.hpp"
 #include "daemon/rig/live_files.hpp"
 #include "daemon/rig/rig.hpp"
 #include "daemon/rig/screen.hpp"
@@ -49,7 +51,8 @@ class CrewScreen {
   std::filesystem::path directory_;
 };
 
-control::Status status_of(const Rig& rig, const set::Set& set, const report::Reports& reports) {
+control::Status status_of(const Rig& rig, const set::Set& set, const render::Device& device,
+                          const report::Reports& reports) {
   const Look& look = rig.controls().look();
   const output::RecorderStatus recorder = rig.recorder_status();
   return {set::name_of(look.state.mode),
@@ -63,10 +66,12 @@ control::Status status_of(const Rig& rig, const set::Set& set, const report::Rep
           set.name,
           rig.controls().selected_object(),
           rig.controls().selected_light(),
+          render::drawing_device(device),
           reports.announced()};
 }
 
-control::Verbs verbs_of(Rig& rig, const set::Set& set, const report::Reports& reports,
+control::Verbs verbs_of(Rig& rig, const set::Set& set, const render::Device& device,
+                        const report::Reports& reports,
                         const std::function<std::string()>& metrics) {
   const auto answer = [](const Outcome& outcome) {
     return control::Answer{outcome.said, outcome.refused};
@@ -79,10 +84,33 @@ control::Verbs verbs_of(Rig& rig, const set::Set& set, const report::Reports& re
   verbs.record = [&rig, answer](bool on) {
     return answer(rig.wish(on ? Event::record_on : Event::record_off, "bus"));
   };
-  verbs.status = [&] { return status_of(rig, set, reports); };
+  verbs.status = [&] { return status_of(rig, set, device, reports); };
   verbs.metrics = metrics;
   return verbs;
 }
+
+// What follows from whether a take is being recorded: the machine stays on meanwhile, and a program
+// that was replaced meanwhile ends afterwards.
+class RecordingWatch {
+ public:
+  RecordingWatch(sd_event* loop, report::Reports& reports, std::function<void()> ended)
+      : inhibitor_(loop,
+                   [&reports](const std::string& what) {
+                     reports(report::once({report::Severity::warning, "", what}));
+                   }),
+        ended_(std::move(ended)) {}
+
+  void look(const Rig& rig) {
+    const bool recording = rig.controls().look().state.recording || rig.recorder_status().recording;
+    inhibitor_.hold(recording);
+    if (std::exchange(recorded_, recording) && !recording) ended_();
+  }
+
+ private:
+  control::Inhibitor inhibitor_;
+  const std::function<void()> ended_;
+  bool recorded_ = false;
+};
 
 }  // namespace
 
@@ -112,9 +140,17 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     return metrics.snapshot(since.count());
   };
   const auto metrics_json = [&] { return to_json(snapshot()); };
+  std::stop_source end;
+  const std::stop_callback end_from_outside(options.stop, [&end] { end.request_stop(); });
+  const auto end_if_replaced = [&] {
+    if (!options.replaced || !options.replaced()) return;
+    reports({report::Severity::info, "", "another version was installed, and is started now"});
+    end.request_stop();
+  };
   SetKeeper sets(
       options.set_file, [&](set::Set& set) { override_set(set, options); }, reports);
-  const std::shared_ptr<render::Device> device = render::open_device(options.device);
+  const std::shared_ptr<render::Device> device =
+      open_graphics(options.device, sets.running().set.quality.cpu_instead, reports);
   std::shared_ptr<render::Renderer> renderer;  // goes from set to set
   CrewScreen screen(kept, options.on_screen);
   for (;;) {
@@ -135,22 +171,28 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     const auto show_facts = [&](RigFacts facts) { screen->show(std::move(facts)); };
     std::unique_ptr<Rig> rig;
     try {
-      files.emplace(set.output.directory, metrics_json, reports);
+      files.emplace(options.directory ? *options.directory : live_directory(set.output.directory),
+                    metrics_json, reports);
       screen.use(set);
       rig = std::make_unique<Rig>(Rig::Parts{loop, sets, kept, service, pulse, device, renderer,
                                              show, show_facts, options.buttons,
-                                             options.around_cameras, options.loop, options.stop});
+                                             options.around_cameras, options.loop, end.get_token()});
     } catch (const std::exception& error) {
       if (!sets.go_back(error.what())) throw;
       continue;
     }
     reports({report::Severity::info, "",
-             "live on " + render::device_name(*device) + ", set \"" + set.name + "\", " +
+             "live on " + device_words(*device) + ", set \"" + set.name + "\", " +
                  std::to_string(set.quality.samples) + " samples a frame"});
     std::optional<BusLink> bus;
+    std::optional<RecordingWatch> watch;
     if (options.bus) {
-      bus.emplace(loop, verbs_of(*rig, set, reports, metrics_json), kept);
-      rig->on_change([&] { bus->changed(); });
+      watch.emplace(loop.handle(), reports, end_if_replaced);
+      bus.emplace(loop, verbs_of(*rig, set, *device, reports, metrics_json), kept);
+      rig->on_change([&] {
+        bus->changed();
+        watch->look(*rig);
+      });
     }
     const auto reload =
         loop.on_signal(SIGHUP, [&] { rig->perform(*set::find_action("reload_set"), "SIGHUP"); });
@@ -161,6 +203,7 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
                "what was changed in the take in review is dropped, because a set is read"});
     rig->on_change({});
     bus.reset();
+    watch.reset();
     rig.reset();
     if (!sets.has_next()) {
       screen.close();

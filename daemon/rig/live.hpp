@@ -30,6 +30,9 @@ struct LiveOptions {
   render::DeviceOptions device;
   std::stop_token stop;
   pipeline::Patience patience = {};  // until a thread counts as hung
+  // Returns whether another version of the program has been installed; may be empty. If so when a
+  // take ends, run_live ends too, so that an upgrade need not end a take.
+  std::function<bool()> replaced;
   // Opens devices besides those the set names, for tests.
   std::function<std::vector<std::unique_ptr<Buttons>>()> buttons;
   // Called with a set's cameras before they are used, for tests, which may put others around them.

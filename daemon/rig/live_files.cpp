@@ -1,12 +1,21 @@
 #include "daemon/rig/live_files.hpp"
 
-#include <chrono>
+#include <fcntl.h>
 
+#include <chrono>
+#include <cstdlib>
+
+#include "daemon/output/file.hpp"
 #include "daemon/output/png.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::rig {
+
+std::filesystem::path live_directory(const std::filesystem::path& otherwise) {
+  const char* runtime = std::getenv("RUNTIME_DIRECTORY");
+  return runtime && *runtime ? std::filesystem::path(runtime) : otherwise;
+}
 
 LiveFiles::LiveFiles(std::filesystem::path directory, std::function<std::string()> metrics,
                      report::Reports& reports)
@@ -37,8 +46,13 @@ void LiveFiles::run() {
 
 void LiveFiles::write(const Plate* picture) const {
   try {
-    if (picture) output::write_png(directory_ / "picture.png", *picture);
-    session::replace_file(directory_ / "metrics.json", metrics_());
+    // The next second replaces them, so that no disk is made to keep them.
+    using output::Sync;
+    if (picture) output::write_png(directory_ / "picture.png", *picture, Sync::no);
+    const auto write_metrics = [this](const std::filesystem::path& unfinished) {
+      session::OpenFile(unfinished, O_WRONLY | O_CREAT | O_TRUNC).append(metrics_());
+    };
+    output::write_whole(directory_ / "metrics.json", write_metrics, Sync::no);
   } catch (const std::exception& error) {
     reports_(report::once({report::Severity::error, "", error.what()}));
   }

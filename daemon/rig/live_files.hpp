@@ -14,6 +14,10 @@
 
 namespace previz::rig {
 
+// Returns the folder that systemd makes for a service in memory (RuntimeDirectory=), because a disk
+// would wear out by a picture each second; `otherwise` for a program that is no service.
+std::filesystem::path live_directory(const std::filesystem::path& otherwise);
+
 // A disk that does not take the files is reported but is no reason to stop.
 class LiveFiles {
  public:

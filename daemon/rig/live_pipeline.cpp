@@ -54,6 +54,7 @@ struct LivePipeline::Impl {
   void make_render_stage();
   void drop_render_stage();
   void begin_rendering_anew();
+  void show_plates(std::chrono::milliseconds time);
   std::optional<Shot> capture();
   Shot track(Shot shot);
   void offer_track(Shot& shot, const pipeline::Edits& edits);
@@ -114,7 +115,8 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
       live_render(parts.set, parts.look, parts.inbox, parts.kept.metrics,
                   {tracked, reviewed, snapshots, found, recorded_variants},
                   stop_source.get_token()),
-      gpu_keeper(gpu(), {parts.kept.reports, parts.kept.metrics, stop_source.get_token()}) {
+      gpu_keeper(gpu(), {parts.kept.reports, parts.kept.metrics, stop_source.get_token(),
+                         [this](std::chrono::milliseconds time) { show_plates(time); }}) {
   if (light.needs_frames() && !parts.cameras.light)
     throw Error(parts.set.file.string() +
                 ": lighting: the set has neither a light camera nor lighting.environment");
@@ -178,11 +180,25 @@ GpuKeeper::Gpu LivePipeline::Impl::gpu() {
           .open =
               [this] {
                 parts.renderer.reset();  // it is of the device that was lost
-                render::reopen_device(*parts.device);
+                render::reopen_device(*parts.device, parts.set.quality.cpu_instead);
               },
-          .name = [this] { return render::device_name(*parts.device); },
+          .name = [this] { return render::drawing_device(*parts.device); },
+          .stands_in = [this] { return render::cpu_stands_in(*parts.device); },
           .build = [this] { make_render_stage(); },
           .drop = [this] { drop_render_stage(); }};
+}
+
+// While there is no graphics device, the crew sees what the camera sees.
+void LivePipeline::Impl::show_plates(std::chrono::milliseconds time) {
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point end = Clock::now() + time;
+  const std::stop_token stop = stop_source.get_token();
+  while (!stop.stop_requested() && Clock::now() < end) {
+    if (std::optional<Shot> shot = live_render.next_plate("there is no graphics device"))
+      rendered.push(*std::move(shot));
+    else if (live_render.finished())
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));  // a stop comes soon
+  }
 }
 
 std::unique_ptr<CameraSource> LivePipeline::Impl::source(std::stop_token stop, Camera& camera,
@@ -236,6 +252,10 @@ std::optional<Shot> LivePipeline::Impl::next_picture() {
   for (;;) {
     std::optional<Shot> shot;
     const bool is_well = rendering.attempt([&] {
+      if (!gpu_keeper.is_built()) {
+        rendering.waits();  // as long as the device is gone
+        if (!gpu_keeper.await()) return;
+      }
       shot = live_render.next(renew);
       if (shot) begun_anew = 0;
     });

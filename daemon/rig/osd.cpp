@@ -133,6 +133,7 @@ OsdPage osd_page(const RigFacts& rig, const PictureFacts* picture, const Pace& p
   if (look.state.recording && !rig.take.empty()) page.top_left.push_back({rig.take});
   if (look.view != render::View::composite)
     page.top_left.push_back({std::string("view: ") + render::name_of(look.view), OsdTone::mode});
+  if (!rig.device.empty()) page.top_right.push_back({rig.device});
   if (rig.free_bytes) page.top_right.push_back(space(*rig.free_bytes));
   if (picture) {
     page.bottom_left.push_back({samples(*picture, look)});

@@ -41,6 +41,7 @@ struct RigFacts {
   session::Losses lost;      // since the take began
   double disk_silent_s = 0;  // for how long the disk has not answered a write
   std::string recorder_fault;
+  std::string device;                       // that draws; empty: none, or not known
   std::optional<std::uint64_t> free_bytes;  // for takes, without the reserve; none: not known
   std::vector<report::Notice> news;         // actions of buttons and of the rig, oldest first
   std::vector<report::Notice> troubles;     // troubles of devices

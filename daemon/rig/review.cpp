@@ -16,7 +16,7 @@ namespace {
 
 void play(const std::stop_token& stop, const std::filesystem::path& directory, const LoadedSet& set,
           pipeline::Mailbox<pipeline::Shot>& out, Reports& reports) {
-  pipeline::Take take = pipeline::open_take(directory, {}, stop);
+  pipeline::Take take = pipeline::open_take(directory, {}, false, stop);
   if (take.set_text != set.text)
     throw Error(directory.string() + ": was recorded with another set; run that one to review it");
   for (const std::string& what : take.session.missing)

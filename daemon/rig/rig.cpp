@@ -368,6 +368,7 @@ void Rig::show_facts() {
   facts.lost = recorder.lost;
   facts.disk_silent_s = recorder.disk_silent_s;
   facts.recorder_fault = recorder.fault;
+  facts.device = render::drawing_device(*parts_.device);
   facts.free_bytes = free_bytes_;
   facts.news = parts_.kept.reports.news();
   facts.troubles = parts_.kept.reports.troubles();

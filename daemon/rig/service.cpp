@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <condition_variable>
 #include <cstdint>
+#include <filesystem>
 #include <mutex>
 #include <stop_token>
+#include <system_error>
 #include <vector>
 
 namespace previz::rig {
@@ -68,6 +70,12 @@ void Service::status(const std::string& status) {
 void Service::stopping() {
   is_running_ = false;
   sd_notify(0, "STOPPING=1");
+}
+
+// See proc(5): the link's text then ends so.
+bool Service::program_was_replaced(const char* link) {
+  std::error_code unknown;
+  return std::filesystem::read_symlink(link, unknown).string().ends_with(" (deleted)");
 }
 
 }  // namespace previz::rig

@@ -31,6 +31,13 @@ class Service {
   void status(const std::string& status);
   void stopping();
 
+  // Returns whether the program's file was replaced or removed since the process began, as an
+  // upgrade does; `link` is where the kernel names the file.
+  static bool program_was_replaced(const char* link = "/proc/self/exe");
+  // The exit status of a daemon that wants to be started again as another version; the unit knows
+  // it.
+  static constexpr int start_again = 75;
+
  private:
   void run(const std::stop_token& stop);
   void report_hung(const std::vector<std::string>& hung);

@@ -1,30 +1,103 @@
 #include "daemon/rig/snapshots.hpp"
 
+#include <fcntl.h>
+#include <sys/stat.h>
+
+#include <algorithm>
 #include <array>
+#include <cerrno>
+#include <charconv>
 #include <cstdio>
+#include <optional>
+#include <system_error>
 
 #include "daemon/output/exr.hpp"
+#include "daemon/output/file.hpp"
 #include "daemon/output/png.hpp"
+#include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::rig {
+namespace {
 
-std::filesystem::path write_snapshot(const pipeline::Shot& shot, const set::Set& set) {
-  const auto with = [](std::filesystem::path stem, const char* extension) {
-    return stem += extension;
-  };
-  std::filesystem::path stem;
-  for (int number = 1;; ++number) {
-    std::array<char, 32> name{};
-    std::snprintf(name.data(), name.size(), "snapshot_%04d", number);
-    stem = set.output.directory / name.data();
-    if (!std::filesystem::exists(with(stem, ".exr")) &&
-        !std::filesystem::exists(with(stem, ".png")))
-      break;
+namespace fs = std::filesystem;
+
+constexpr std::string_view snapshot_prefix = "snapshot_";
+// An EXR has 20 floats a pixel, a PNG three samples of 16 bits; either may grow by compression that
+// finds nothing to compress.
+constexpr std::uint64_t most_bytes_a_pixel = 20 * sizeof(float) + 3 * sizeof(std::uint16_t) + 1;
+
+fs::path snapshot_file(fs::path stem, const char* extension) {
+  return stem += extension;
+}
+
+// Returns N of "snapshot_N" with anything after it; 0 of any other name.
+int number_of(const std::string& name) {
+  int number = 0;
+  if (!name.starts_with(snapshot_prefix)) return 0;
+  std::from_chars(name.data() + snapshot_prefix.size(), name.data() + name.size(), number);
+  return std::clamp(number, 0, 999'999'999);
+}
+
+// Returns the device of the file system on which a folder is, or would be made.
+std::optional<dev_t> disk_of(fs::path folder) {
+  struct stat known {};
+  folder = fs::absolute(folder);
+  while (::stat(folder.c_str(), &known) != 0) {
+    if (!folder.has_relative_path()) return std::nullopt;
+    folder = folder.parent_path();
   }
-  output::write_exr(with(stem, ".exr"), *shot.layers,
+  return known.st_dev;
+}
+
+}  // namespace
+
+fs::path claim_snapshot(const fs::path& folder) {
+  session::make_folders(folder);
+  int last = 0;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    last = std::max(last, number_of(entry.path().filename().string()));
+  for (int number = last + 1;; ++number) {
+    std::array<char, 32> name{};
+    std::snprintf(name.data(), name.size(), "%s%04d", snapshot_prefix.data(), number);
+    const fs::path stem = folder / name.data(), exr = snapshot_file(stem, ".exr");
+    const fs::path claim = output::unfinished_name(exr);
+    const OwnedDescriptor made(
+        ::open(claim.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+    if (!made && errno != EEXIST)
+      throw Error(claim.string() + ": cannot be made: " + std::generic_category().message(errno));
+    if (!made) continue;
+    // Somebody else may have finished this number after it was looked for.
+    if (!fs::exists(exr) && !fs::exists(snapshot_file(stem, ".png"))) return stem;
+    fs::remove(claim);
+  }
+}
+
+void check_space(const fs::path& folder, std::uint64_t bytes, const fs::path& takes,
+                 std::uint64_t reserve_bytes) {
+  std::error_code unknown;
+  const fs::space_info space = fs::space(folder, unknown);
+  if (unknown) return;  // whether there is room is then seen by writing
+  const bool same_disk = disk_of(folder) == disk_of(takes);
+  const std::uint64_t wanted = bytes + (same_disk ? reserve_bytes : 0);
+  if (space.available < wanted)
+    throw Error(folder.string() + ": no snapshot is written, because " +
+                std::to_string(space.available / 1'000'000) + " MB are free and " +
+                std::to_string(wanted / 1'000'000) + " are needed" +
+                (same_disk ? ", with recording.reserve_mb" : ""));
+}
+
+fs::path write_snapshot(const pipeline::Shot& shot, const set::Set& set) {
+  const fs::path& folder = set.output.directory;
+  session::make_folders(folder);
+  const std::uint64_t pixels = shot.layers->mask.size();
+  check_space(folder, pixels * most_bytes_a_pixel, set.recording.directory,
+              static_cast<std::uint64_t>(set.recording.reserve_mb * 1e6));
+  const fs::path stem = claim_snapshot(folder);
+  output::write_exr(snapshot_file(stem, ".exr"), *shot.layers,
                     output::exr_metadata(*shot.layers, *shot.frame, shot.track, set));
-  output::write_png(with(stem, ".png"), *shot.picture);
+  output::write_png(snapshot_file(stem, ".png"), *shot.picture);
   return stem;
 }
 

@@ -275,6 +275,7 @@ Keys quality_keys(Quality& q) {
       {"seconds", &q.seconds, plain.within(0, 86'400), "Adds samples for this long, where the picture needs them most; 0: a fixed number of samples."},
       {"scale", &q.scale, plain.within(0.01, 1), "Size of the preview, relative to the camera's picture; offline rendering is always full size."},
       {"fps", &q.fps, plain.within(0, 240), "Frame rate that the preview holds, by 1 to 50 samples, and then by a smaller picture (scale is the largest size); 0: the keys above decide."},
+      {"cpu_instead", &q.cpu_instead, plain, "Live, if the graphics card is gone: draws on the CPU, slowly, for as long as the set runs. Otherwise the plate is shown until the card is back. A rig that never had a card draws on the CPU anyway."},
   };
 }
 
@@ -333,7 +334,7 @@ Keys display_keys(Display& d) {
 
 Keys output_keys(Output& o) {
   return {
-      {"directory", &o.directory, plain, "Folder for rendered frames; live, for snapshots, picture.png and metrics.json."},
+      {"directory", &o.directory, plain, "Folder for rendered frames; live, for snapshots, picture.png and metrics.json (these two are in /run/previzd if the service runs)."},
       {"exr", &o.exr, plain, "Write a multi-layer EXR for each frame: composite, mixed, real, diff, mask, depth, normal, variance."},
       {"png", &o.png, plain, "Write a PNG for each frame, as the display shows it."},
       {"video", &o.video, plain, "Write a review video of the take."},

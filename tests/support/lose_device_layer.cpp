@@ -1,7 +1,9 @@
 // A Vulkan layer for tests: once the file named by PREVIZ_LOSE_DEVICE is there, the device that
 // next submits work is lost, as by its driver (Vulkan 1.3, 5.2.3): from then on it answers every
 // submit and every wait with VK_ERROR_DEVICE_LOST. The file is taken away; a device made after that
-// works. Loader and layer interface, version 2.
+// works. Where PREVIZ_HIDE_GPU names a file, the devices of the driver, whatever they are, say that
+// they are GPUs, and CPU devices while the file is there: as if a GPU were gone and only the CPU's
+// driver were left. Loader and layer interface, version 2.
 #include <unistd.h>
 #include <vulkan/vk_layer.h>
 #include <vulkan/vulkan.h>
@@ -19,6 +21,10 @@ struct Below {  // the layer or driver below this one, of an instance or a devic
   PFN_vkGetDeviceProcAddr device_address = nullptr;
   VkInstance instance = VK_NULL_HANDLE;
   VkDevice device = VK_NULL_HANDLE;
+  // Of an instance; they are asked for when it is made, since later the loader answers with the
+  // ones of this layer.
+  PFN_vkGetPhysicalDeviceProperties properties = nullptr;
+  PFN_vkGetPhysicalDeviceProperties2 properties2 = nullptr;
   bool is_lost = false;
 };
 
@@ -61,6 +67,9 @@ VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo* info,
   const VkResult result = create(info, allocator, instance);
   if (result != VK_SUCCESS) return result;
   next.instance = *instance;
+  next.properties = below<PFN_vkGetPhysicalDeviceProperties>(next, "vkGetPhysicalDeviceProperties");
+  next.properties2 =
+      below<PFN_vkGetPhysicalDeviceProperties2>(next, "vkGetPhysicalDeviceProperties2");
   const std::lock_guard lock(mutex);
   known[key_of(*instance)] = next;
   return result;
@@ -108,6 +117,25 @@ VKAPI_ATTR VkResult VKAPI_CALL wait_for_fences(VkDevice device, std::uint32_t co
   return below<PFN_vkWaitForFences>(link, "vkWaitForFences")(device, count, fences, all, timeout);
 }
 
+void disguise(VkPhysicalDeviceProperties& properties) {
+  const char* hidden = std::getenv("PREVIZ_HIDE_GPU");
+  if (hidden == nullptr) return;
+  properties.deviceType = access(hidden, F_OK) == 0 ? VK_PHYSICAL_DEVICE_TYPE_CPU
+                                                    : VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+}
+
+VKAPI_ATTR void VKAPI_CALL device_properties(VkPhysicalDevice physical,
+                                             VkPhysicalDeviceProperties* properties) {
+  below_of(physical, false).properties(physical, properties);
+  disguise(*properties);
+}
+
+VKAPI_ATTR void VKAPI_CALL device_properties2(VkPhysicalDevice physical,
+                                              VkPhysicalDeviceProperties2* properties) {
+  below_of(physical, false).properties2(physical, properties);
+  disguise(properties->properties);
+}
+
 PFN_vkVoidFunction own(const char* name);
 
 VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL device_address(VkDevice device, const char* name) {
@@ -126,6 +154,8 @@ PFN_vkVoidFunction own(const char* name) {
       {"vkGetInstanceProcAddr", reinterpret_cast<PFN_vkVoidFunction>(instance_address)},
       {"vkGetDeviceProcAddr", reinterpret_cast<PFN_vkVoidFunction>(device_address)},
       {"vkCreateInstance", reinterpret_cast<PFN_vkVoidFunction>(create_instance)},
+      {"vkGetPhysicalDeviceProperties", reinterpret_cast<PFN_vkVoidFunction>(device_properties)},
+      {"vkGetPhysicalDeviceProperties2", reinterpret_cast<PFN_vkVoidFunction>(device_properties2)},
       {"vkCreateDevice", reinterpret_cast<PFN_vkVoidFunction>(create_device)},
       {"vkQueueSubmit", reinterpret_cast<PFN_vkVoidFunction>(queue_submit)},
       {"vkWaitForFences", reinterpret_cast<PFN_vkVoidFunction>(wait_for_fences)}};

@@ -12,12 +12,16 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "tests/support/private_bus.hpp"
+#include "tests/support/temporary_directory.hpp"
 
 namespace previz::control {
 namespace control_bus_test {
@@ -182,33 +186,59 @@ TEST_F(RigOnTheBus, EveryActionIsAMethodAndEveryChangeASignal) {
   sd_bus_flush_close_unref(client);
 }
 
-// The policy that the package ships, on a bus that keeps to it. The rig and one caller are root,
-// the other caller is a user of no group. (That the group previz may needs an installed package.)
-class ShippedPolicy : public RigOnTheBus {
+// The policy that the package ships, for a group that there is on any machine instead of previz.
+class PolicyFile {
  protected:
-  ShippedPolicy() : RigOnTheBus(PREVIZ_SOURCE_DIR "/systemd/org.previz.Rig1.conf") {}
+  PolicyFile() {
+    std::string text = content_of(PREVIZ_SOURCE_DIR "/systemd/org.previz.Rig1.conf");
+    const std::string group = "group=\"previz\"";
+    text.replace(text.find(group), group.size(), std::string("group=\"") + member_group + '"');
+    std::ofstream(policy_) << text;
+  }
+  static std::string content_of(const std::filesystem::path& file) {
+    std::ifstream stream(file);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  static constexpr const char* member_group = "games";
+  const test::TemporaryDirectory folder_;
+  const std::filesystem::path policy_ = folder_ / "org.previz.Rig1.conf";
+};
+
+// A bus that keeps to the policy. The rig is root; callers are root, a user of no group, and the
+// same as a member of the group.
+class ShippedPolicy : private PolicyFile, public RigOnTheBus {
+ protected:
+  enum class Caller { root, nobody, member };
+
+  ShippedPolicy() : RigOnTheBus(policy_) {}
   void SetUp() override {
     if (geteuid() != 0) GTEST_SKIP() << "only root can be another user";
     RigOnTheBus::SetUp();
   }
 
-  // The name of the error that a call without arguments is answered with; empty where there is
-  // none. The policy is asked before anybody looks at the arguments.
-  static std::string error_of(const char* interface, const std::string& method, bool as_nobody) {
+  static bool become(Caller caller) {
+    constexpr uid_t nobody = 65534;
+    const ::group* members = getgrnam(member_group);
+    const gid_t groups[] = {members ? members->gr_gid : nobody};
+    const std::size_t count = caller == Caller::member ? 1 : 0;
+    return caller == Caller::root ||
+           (setgroups(count, groups) == 0 && setgid(nobody) == 0 && setuid(nobody) == 0);
+  }
+
+  // The name of the error that a call is answered with; empty where there is none. The policy is
+  // asked before anybody looks at the arguments, so that calls without them will do.
+  using Call = std::function<void(sd_bus*, sd_bus_error*)>;
+  static std::string error_of(Caller caller, const Call& call) {
     int answer[2];
     if (pipe(answer) != 0) return "no pipe";
     const pid_t child = fork();
     if (child == 0) {
-      constexpr uid_t nobody = 65534;
       std::string said = "the caller cannot be another user";
-      if (!as_nobody ||
-          (setgroups(0, nullptr) == 0 && setgid(nobody) == 0 && setuid(nobody) == 0)) {
+      if (become(caller)) {
         sd_bus* bus = nullptr;
         sd_bus_error error{};
         said = sd_bus_open_system(&bus) < 0 ? "the bus cannot be reached" : "";
-        if (bus)
-          sd_bus_call_method(bus, bus_name, object_path, interface, method.c_str(), &error, nullptr,
-                             nullptr);
+        if (bus) call(bus, &error);
         if (error.name) said = error.name;
       }
       const ssize_t written = write(answer[1], said.data(), said.size());
@@ -221,20 +251,41 @@ class ShippedPolicy : public RigOnTheBus {
     waitpid(child, nullptr, 0);
     return {text.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
   }
+  static std::string error_of(Caller caller, const char* interface, const std::string& method) {
+    return error_of(caller, [&](sd_bus* bus, sd_bus_error* error) {
+      sd_bus_call_method(bus, bus_name, object_path, interface, method.c_str(), error, nullptr,
+                         nullptr);
+    });
+  }
 };
 
-TEST_F(ShippedPolicy, NobodyElseMayOperateTheRigAndEverybodyMayLook) {
+TEST_F(ShippedPolicy, MembersAndRootMayOperateTheRigNobodyElseMayAndEverybodyMayLook) {
   std::vector<std::string> methods{"Action", "SetMode", "Record", "Metrics", "Actions"};
   for (const set::Action& action : set::actions()) methods.push_back(method_name(action.name));
   for (const std::string& method : methods) {
-    EXPECT_EQ(error_of(interface_name, method, true), SD_BUS_ERROR_ACCESS_DENIED) << method;
-    EXPECT_NE(error_of(interface_name, method, false), SD_BUS_ERROR_ACCESS_DENIED) << method;
+    EXPECT_EQ(error_of(Caller::nobody, interface_name, method), SD_BUS_ERROR_ACCESS_DENIED)
+        << method;
+    for (const Caller caller : {Caller::root, Caller::member})
+      EXPECT_NE(error_of(caller, interface_name, method), SD_BUS_ERROR_ACCESS_DENIED) << method;
   }
   constexpr const char* properties = "org.freedesktop.DBus.Properties";
-  EXPECT_EQ(error_of(properties, "Set", true), SD_BUS_ERROR_ACCESS_DENIED);
-  for (const char* method : {"Get", "GetAll"})  // for which the arguments are missing
-    EXPECT_EQ(error_of(properties, method, true), SD_BUS_ERROR_INVALID_ARGS) << method;
-  EXPECT_EQ(error_of("org.freedesktop.DBus.Introspectable", "Introspect", true), "");
+  EXPECT_EQ(error_of(Caller::nobody, properties, "Set"), SD_BUS_ERROR_ACCESS_DENIED);
+  for (const Caller caller : {Caller::nobody, Caller::member, Caller::root}) {
+    for (const char* method : {"Get", "GetAll"})  // for which the arguments are missing
+      EXPECT_EQ(error_of(caller, properties, method), SD_BUS_ERROR_INVALID_ARGS) << method;
+    EXPECT_EQ(error_of(caller, "org.freedesktop.DBus.Introspectable", "Introspect"), "");
+  }
+}
+
+// Who could own the name could pretend to be the rig.
+TEST_F(ShippedPolicy, OnlyTheServiceAndRootMayBeTheRig) {
+  const Call own = [](sd_bus* bus, sd_bus_error* error) {
+    sd_bus_call_method(bus, "org.freedesktop.DBus", "/org/freedesktop/DBus", "org.freedesktop.DBus",
+                       "RequestName", error, nullptr, "su", bus_name, 0u);
+  };
+  for (const Caller caller : {Caller::nobody, Caller::member})
+    EXPECT_EQ(error_of(caller, own), SD_BUS_ERROR_ACCESS_DENIED);
+  EXPECT_EQ(error_of(Caller::root, own), "");
 }
 
 TEST(BusWithoutARig, IsToldInPlainWords) {

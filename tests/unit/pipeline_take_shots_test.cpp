@@ -161,7 +161,7 @@ TEST_F(TakeShotsTest, AStopEndsTheReadingOfATake) {
   stop.request_stop();
   const auto read = [&](const std::filesystem::path& session) -> std::string {
     try {
-      open_take(session, {}, stop.get_token());
+      open_take(session, {}, false, stop.get_token());
       return "it was read";
     } catch (const Error& error) {
       return error.what();

@@ -26,12 +26,20 @@ class Display {
     const std::lock_guard lock(mutex_);
     ++shown_;
     recorded_ += look.state.recording && shot.samples > 0 ? 1 : 0;
+    rendered_ += shot.samples > 0 ? 1 : 0;
+    plates_ += shot.untouched == "there is no graphics device" ? 1 : 0;
     changed_.notify_all();
   }
   int recorded() const {
     const std::lock_guard lock(mutex_);
     return recorded_;
   }
+  int rendered() const {
+    const std::lock_guard lock(mutex_);
+    return rendered_;
+  }
+  void until_rendered(int more) { until_more(rendered_, more, "rendered pictures"); }
+  void until_plates(int more) { until_more(plates_, more, "plates"); }
   void until_recorded(int pictures) {
     std::unique_lock lock(mutex_);
     test::await(
@@ -40,10 +48,125 @@ class Display {
   }
 
  private:
+  void until_more(const int& count, int more, const char* of_what) {
+    std::unique_lock lock(mutex_);
+    const int wanted = count + more;
+    test::await(
+        changed_, lock, [&] { return count >= wanted; },
+        [&] { return std::to_string(count) + " " + of_what; });
+  }
+
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  int shown_ = 0, recorded_ = 0;
+  int shown_ = 0, recorded_ = 0, rendered_ = 0, plates_ = 0;
 };
+
+// Environment variables of this process while it lives.
+class Variable {
+ public:
+  Variable(const char* name, const std::filesystem::path& value) : name_(name) {
+    setenv(name, value.c_str(), 1);
+  }
+  ~Variable() { unsetenv(name_); }
+  Variable(const Variable&) = delete;
+  Variable& operator=(const Variable&) = delete;
+
+ private:
+  const char* name_;
+};
+
+// A rig whose GPU can be taken away and given back, for which only a CPU device is left meanwhile.
+class RigWithoutItsGpu : public testing::Test {
+ protected:
+  void SetUp() override { test::write_small_take(directory_.path(), true, more_of_set_); }
+  void hide_gpu() { std::ofstream(hidden_).put('x'); }
+  void give_gpu_back() { std::filesystem::remove(hidden_); }
+  void lose_device() {
+    std::ofstream(lose_).put('x');
+    display_.until_plates(1);
+  }
+  pipeline::MetricsSnapshot run(const std::function<void()>& crew) {
+    LiveOptions options;
+    options.on_shown = [&](const Shot& shot, const Look& look) { display_.show(shot, look); };
+    return test::run_crewed(std::move(options), directory_.path(), hand_, crew, out_);
+  }
+
+  std::string more_of_set_ =
+      "[recording]\nslate = \"1\"\nreserve_mb = 1\n" + test::button_for_every_action();
+  const test::TemporaryDirectory directory_;
+  const std::filesystem::path lose_ = directory_ / "lose", hidden_ = directory_ / "hidden";
+  const Variable lose_variable_{"PREVIZ_LOSE_DEVICE", lose_};
+  const Variable hide_variable_{"PREVIZ_HIDE_GPU", hidden_};
+  Display display_;
+  test::Hand hand_;
+  std::ostringstream out_;
+};
+
+TEST_F(RigWithoutItsGpu, ShowsPlatesAndRecordsUntilItIsBackAndTakesNoCpu) {
+  const pipeline::MetricsSnapshot metrics = run([&] {
+    display_.until_rendered(2);
+    hand_.press("record");
+    hide_gpu();
+    lose_device();
+    const int rendered = display_.rendered();
+    display_.until_plates(30);
+    EXPECT_EQ(display_.rendered(), rendered) << "the CPU has drawn";
+    give_gpu_back();
+    display_.until_rendered(3);
+    hand_.press("record");
+    display_.until_rendered(2);
+  });
+  EXPECT_EQ(metrics.counts.at("device lost"), 1u) << out_.str();
+  EXPECT_EQ(metrics.counts.at("device opened again"), 1u) << out_.str();
+  EXPECT_NE(out_.str().find("while a GPU is waited for"), std::string::npos) << out_.str();
+  EXPECT_EQ(test::accounted_for(metrics), metrics.stages.at("observer").frames);
+  session::Session take = session::open_session(directory_ / "takes/1_take001");
+  const auto stream = session::open_stream(take, "observer");
+  const auto& records = stream->records();
+  ASSERT_GT(records.size(), 30u);
+  for (std::size_t i = 0; i < records.size(); ++i)
+    EXPECT_EQ(records[i].sequence, records[0].sequence + i);
+}
+
+class RigWithCpuInstead : public RigWithoutItsGpu {
+ protected:
+  RigWithCpuInstead() { more_of_set_.insert(0, "cpu_instead = true\n"); }
+};
+
+TEST_F(RigWithCpuInstead, DrawsOnTheCpuBecauseTheSetSaysSo) {
+  run([&] {
+    display_.until_rendered(2);
+    hide_gpu();
+    std::ofstream(lose_).put('x');
+    while (std::filesystem::exists(lose_)) display_.until_rendered(1);
+    display_.until_rendered(3);
+  });
+  EXPECT_NE(out_.str().find("pictures again, on llvmpipe (CPU)"), std::string::npos) << out_.str();
+}
+
+// What the rig had is remembered: after a crash, and when the GPU's module comes later than the
+// service at boot.
+TEST_F(RigWithoutItsGpu, StartsWithoutItAndWaitsForItIfItHadOneBefore) {
+  const Variable state("STATE_DIRECTORY", directory_.path());
+  run([&] { display_.until_rendered(1); });
+  EXPECT_TRUE(std::filesystem::exists(directory_ / "graphics-device"));
+  hide_gpu();
+  run([&] {
+    display_.until_plates(5);
+    EXPECT_EQ(out_.str().find("live on llvmpipe (CPU)"), std::string::npos) << out_.str();
+    give_gpu_back();
+    display_.until_rendered(2);
+  });
+  EXPECT_NE(out_.str().find("live on no graphics device yet"), std::string::npos) << out_.str();
+}
+
+TEST_F(RigWithoutItsGpu, StartsOnTheCpuIfItNeverHadOne) {
+  const Variable state("STATE_DIRECTORY", directory_.path());
+  hide_gpu();
+  run([&] { display_.until_rendered(1); });
+  EXPECT_NE(out_.str().find("live on llvmpipe (CPU)"), std::string::npos) << out_.str();
+  EXPECT_FALSE(std::filesystem::exists(directory_ / "graphics-device"));
+}
 
 TEST(RigDeviceLost, PicturesComeBackAndTheTakeLacksNothing) {
   const test::TemporaryDirectory directory;

@@ -1,9 +1,11 @@
 // Losses of a graphics device that is made up, without a rig.
 #include "daemon/rig/gpu_keeper.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <sstream>
+#include <vector>
 
 #include "drivers/error.hpp"
 
@@ -26,17 +28,22 @@ class GpuKeeperTest : public testing::Test {
       throw Error("no device fits");
     };
     gpu.name = [] { return std::string("a GPU"); };
+    gpu.stands_in = [this] { return stands_in_; };
     gpu.build = [this] { calls_ += "build "; };
     gpu.drop = [this] { calls_ += "drop "; };
-    return {std::move(gpu), {reports_, metrics_, stop_.get_token(), std::chrono::milliseconds(1)}};
+    const auto meanwhile = [this](std::chrono::milliseconds time) {
+      waits_.push_back(time.count());
+    };
+    return {std::move(gpu), {reports_, metrics_, stop_.get_token(), meanwhile}};
   }
   std::uint64_t count_of(const std::string& event) const {
     const auto counts = metrics_.snapshot(1).counts;
     return counts.contains(event) ? counts.at(event) : 0;
   }
 
-  bool open_ = true, stops_ = false;
+  bool open_ = true, stops_ = false, stands_in_ = false;
   int refusals_ = 0;
+  std::vector<long> waits_;  // ms
   std::string calls_;
   std::ostringstream log_;
   report::Reports reports_{report::lines_to(log_)};
@@ -64,6 +71,35 @@ TEST_F(GpuKeeperTest, ALossIsReportedShownAndCountedUntilTheDeviceIsOpenAgain) {
   ASSERT_EQ(reports_.troubles().size(), 1u);  // long enough to be read
   EXPECT_EQ(line_of(reports_.troubles()[0]), "graphics device: is lost; it is opened again");
   EXPECT_FALSE(reports_.troubles()[0].lasts);
+}
+
+// A GPU that is being reset is back within seconds, one that is gone should cost little.
+TEST_F(GpuKeeperTest, TheTimeBetweenAttemptsGrows) {
+  refusals_ = 7;
+  EXPECT_TRUE(keeper().renew(render::DeviceLost("render: device lost")));
+  EXPECT_THAT(waits_, testing::ElementsAre(500, 1000, 2000, 4000, 8000, 8000, 8000));
+}
+
+TEST_F(GpuKeeperTest, WithoutADeviceTheSetStartsAndTheRenderThreadWaitsForIt) {
+  open_ = false;
+  refusals_ = 2;
+  GpuKeeper keeper = this->keeper();
+  keeper.start();
+  EXPECT_EQ(calls_, "open drop ");
+  EXPECT_TRUE(reports_.troubles().at(0).lasts);
+  EXPECT_TRUE(keeper.await());
+  EXPECT_EQ(calls_, "open drop open drop open build ");
+  EXPECT_TRUE(keeper.await());
+  EXPECT_EQ(calls_, "open drop open drop open build ");
+  EXPECT_EQ(count_of("device lost"), count_of("device opened again"));
+}
+
+TEST_F(GpuKeeperTest, ThatTheCpuStandsInStaysOnTheDisplay) {
+  stands_in_ = true;
+  EXPECT_TRUE(keeper().renew(render::DeviceLost("render: device lost")));
+  ASSERT_EQ(reports_.troubles().size(), 1u);
+  EXPECT_TRUE(reports_.troubles()[0].lasts);
+  EXPECT_EQ(line_of(reports_.troubles()[0]), "graphics device: is gone; the CPU draws, slowly");
 }
 
 TEST_F(GpuKeeperTest, AStopEndsTheAttempts) {

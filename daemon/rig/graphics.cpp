@@ -1,0 +1,69 @@
+#include "daemon/rig/graphics.hpp"
+
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+
+namespace previz::rig {
+namespace {
+
+std::optional<std::filesystem::path> memory_file() {
+  const char* folder = std::getenv("STATE_DIRECTORY");
+  if (!folder || *folder == '\0') return std::nullopt;
+  return std::filesystem::path(folder) / "graphics-device";
+}
+
+// Returns the GPU that the rig had; empty if none is known. A file that cannot be read is none.
+std::string remembered_gpu(const std::filesystem::path& memory) {
+  try {
+    const std::string name = session::read_file(memory);
+    return name.substr(0, name.find('\n'));
+  } catch (const Error&) {
+    return {};
+  }
+}
+
+void remember(const std::filesystem::path& memory, const std::string& gpu,
+              report::Reports& reports) {
+  if (remembered_gpu(memory) == gpu) return;
+  try {
+    session::replace_file(memory, gpu + "\n");
+  } catch (const Error& error) {
+    reports(report::once({report::Severity::warning, "", error.what()}));
+  }
+}
+
+}  // namespace
+
+std::shared_ptr<render::Device> open_graphics(const render::DeviceOptions& options,
+                                              bool cpu_instead, report::Reports& reports) {
+  const std::optional<std::filesystem::path> memory =
+      options.name.empty() ? memory_file() : std::nullopt;
+  const std::string had = memory ? remembered_gpu(*memory) : std::string();
+  if (had.empty()) {
+    const std::shared_ptr<render::Device> device = render::open_device(options);
+    if (memory && render::is_gpu(*device)) remember(*memory, render::device_name(*device), reports);
+    return device;
+  }
+  const std::shared_ptr<render::Device> device = render::awaited_gpu(options);
+  try {
+    render::reopen_device(*device, cpu_instead);
+    if (render::is_gpu(*device)) remember(*memory, render::device_name(*device), reports);
+  } catch (const Error& error) {
+    reports({report::Severity::error, "",
+             "the rig had the graphics device " + had +
+                 ", which is not there; it is waited for. If it is gone for good, remove " +
+                 memory->string() + ". " + error.what()});
+  }
+  return device;
+}
+
+std::string device_words(const render::Device& device) {
+  const std::string name = render::drawing_device(device);
+  return name.empty() ? "no graphics device yet" : name;
+}
+
+}  // namespace previz::rig

@@ -1,0 +1,68 @@
+// Snapshots number themselves, and leave takes their space.
+#include "daemon/rig/snapshots.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <mutex>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "drivers/error.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace previz::rig {
+namespace rig_snapshots_test {
+
+namespace fs = std::filesystem;
+
+TEST(Snapshots, HaveTheNumberAfterTheLast) {
+  const test::TemporaryDirectory directory;
+  EXPECT_EQ(claim_snapshot(directory / "new"), directory / "new/snapshot_0001");
+  for (const char* name :
+       {"snapshot_0007.exr", "snapshot_0009.png", "snapshot_x.exr", "other_99.exr"})
+    std::ofstream(directory / name);
+  EXPECT_EQ(claim_snapshot(directory.path()), directory / "snapshot_0010");
+  EXPECT_EQ(claim_snapshot(directory.path()), directory / "snapshot_0011");
+  std::ofstream(directory / "snapshot_12345.exr");
+  EXPECT_EQ(claim_snapshot(directory.path()), directory / "snapshot_12346");
+}
+
+// Every file that a claimer finishes stays the only one of its number.
+TEST(Snapshots, OfManyAtOnceHaveANumberEach) {
+  const test::TemporaryDirectory directory;
+  std::mutex mutex;
+  std::multiset<fs::path> claimed;
+  {
+    std::vector<std::jthread> claimers;
+    for (int i = 0; i < 4; ++i)
+      claimers.emplace_back([&] {
+        for (int times = 0; times < 25; ++times) {
+          const fs::path stem = claim_snapshot(directory.path());
+          fs::rename(stem.string() + ".exr.part", stem.string() + ".exr");
+          const std::lock_guard lock(mutex);
+          claimed.insert(stem);
+        }
+      });
+  }
+  EXPECT_EQ(claimed.size(), 100u);
+  EXPECT_EQ((std::set<fs::path>(claimed.begin(), claimed.end()).size()), 100u);
+}
+
+TEST(Snapshots, LeaveTheSpaceThatTakesKeepFree) {
+  const test::TemporaryDirectory directory;
+  const std::uint64_t free = fs::space(directory.path()).available;
+  const fs::path takes = directory / "takes";  // which is not there yet
+  EXPECT_NO_THROW(check_space(directory.path(), 1'000'000, takes, 0));
+  EXPECT_THROW(check_space(directory.path(), 1'000'000, takes, free), Error);
+  // The reserve is of the takes' own disk alone.
+  if (fs::exists("/dev/shm")) {
+    EXPECT_NO_THROW(check_space(directory.path(), 1'000'000, "/dev/shm/takes", free));
+  }
+  EXPECT_THROW(check_space(directory.path(), 2 * free, "/dev/shm/takes", 0), Error);
+}
+
+}  // namespace rig_snapshots_test
+}  // namespace previz::rig
