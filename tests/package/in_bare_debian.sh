@@ -25,6 +25,9 @@ systemctl is-enabled --quiet previzd.service || fail "the service is not enabled
 systemd-analyze verify --man=no previzd.service
 bash -c 'source /usr/share/bash-completion/completions/previzd; complete -p previzd' >/dev/null
 
+[[ -x /usr/lib/previzd/await-restart ]] || fail "nothing makes the service wait between starts"
+perl -c /etc/needrestart/conf.d/previzd.conf 2>/dev/null || fail "needrestart cannot read its file"
+
 step "the demonstration set renders"
 mkdir -m 777 pictures
 setpriv --reuid=previz --regid=previz --init-groups env XDG_CACHE_HOME=/tmp \

@@ -23,6 +23,8 @@ if [[ $version != "$logged" ]]; then
   echo "tests/package: the package is $version, systemd/package/debian/changelog says $logged" >&2
   exit 1
 fi
+dpkg-deb --raw-extract "$work/previzd.deb" "$work/unpacked"
+"$here/hardened.sh" "$work"/unpacked/usr/bin/previz{d,ctl}
 lintian --fail-on error --info "$work/previzd.deb"
 
 # The same package with a later version and another default set: what an upgrade brings.

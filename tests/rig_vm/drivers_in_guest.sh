@@ -13,6 +13,7 @@ suite() {
 }
 
 step "devices"
+groupadd --system previz # which the package makes
 cp 70-previzd.rules /etc/udev/rules.d/
 udevadm control --reload
 rig-devices vivid
@@ -52,12 +53,14 @@ for button in 1 2 3 4; do rig-devices press $button; done # low, for the tests' 
 suite buttons 'ButtonDevices.*-*Usb*'
 
 step "a pad on the USB that hidraw may not open, for one who may no more than the service"
-echo 'SUBSYSTEM=="hidraw", ATTRS{idVendor}=="1209", ATTRS{idProduct}=="0003", GROUP="root", MODE="0600"' \
-  >/etc/udev/rules.d/71-rig.rules
+cat >/etc/udev/rules.d/71-rig.rules <<'END'
+SUBSYSTEM=="hidraw", ATTRS{idVendor}=="1209", ATTRS{idProduct}=="0003", GROUP="root", MODE="0600"
+SUBSYSTEM=="usb", ENV{DEVTYPE}=="usb_device", ATTR{idVendor}=="1209", ATTR{idProduct}=="0003", GROUP="previz", MODE="0660"
+END
 udevadm control --reload
-udevadm trigger --settle --subsystem-match=hidraw
+udevadm trigger --settle --subsystem-match=hidraw --subsystem-match=usb
 export PREVIZ_TEST_USB_PAD=$PWD/pad/cable
-suite buttons '*Usb*' setpriv --reuid=nobody --regid=nogroup --groups=input
+suite buttons '*Usb*' setpriv --reuid=nobody --regid=nogroup --groups=previz
 
 step "the screen"
 export PREVIZ_TEST_SCREEN=Virtual-1

@@ -52,7 +52,17 @@ step "install: the service starts by itself"
 # Compiling the shaders alone, at the first frame, takes minutes here.
 printf '[Service]\nWatchdogSec=600\nTimeoutStartSec=600\nEnvironment=LP_NATIVE_VECTOR_WIDTH=128\n' \
   >/etc/systemd/system/previzd.service.d/slow.conf
+foreign=$(stat -c '%n %G %a' /dev/hidraw* /dev/gpiochip*)
 dpkg --force-confold --install previzd.deb || fail "the package does not install"
+udevadm settle
+[[ $(stat -c '%n %G %a' /dev/hidraw* /dev/gpiochip*) == "$foreign" ]] ||
+  fail "the package opened a button that nobody has named"
+# The crew names its pad and its chip.
+previzd devices --rules >rules.txt
+grep -E '"\*:1209:0001\.\*"|gpio-sim' rules.txt >/etc/udev/rules.d/71-previzd-buttons.rules
+udevadm control --reload
+udevadm trigger --settle --subsystem-match=hidraw --subsystem-match=gpio
+[[ $(stat -c %G /dev/hidraw* /dev/gpiochip* | sort -u) == *previz* ]] || fail "the printed rules open no button"
 systemctl is-active --quiet previzd || fail "the service does not run"
 [[ $(stat -c '%U %a' /var/lib/previzd) == "previz 750" ]] || fail "/var/lib/previzd is open to others"
 within 60 "the bus answers" status_is Set rig
@@ -82,6 +92,16 @@ for order in "mode live" "record on" "action move_left" "action reload_set" "set
 done
 "${as_nobody[@]}" --clear-groups previzctl status >/dev/null || fail "not everybody may look"
 "${as_nobody[@]}" --groups=previz previzctl mode live || fail "the group previz may not"
+# Every method, with an argument that none takes: who may call it hears of that, and nothing is done.
+wrong() { "$@" busctl call org.previz.Rig1 /org/previz/Rig1 org.previz.Rig1 "$method" u 0 2>&1; }
+methods=$(busctl --xml-interface introspect org.previz.Rig1 /org/previz/Rig1 |
+  sed -n '/<interface name="org.previz.Rig1">/,/<\/interface>/s/.*<method name="\([^"]*\)".*/\1/p')
+[[ $(wc -w <<<"$methods") -gt 40 ]] || fail "the rig has hardly a method: $methods"
+for method in $methods; do
+  [[ $(wrong "${as_nobody[@]}" --clear-groups) == *[Aa]ccess* ]] || fail "everybody may: $method"
+  [[ $(wrong "${as_nobody[@]}" --groups=previz) == *expecting* ]] || fail "the group previz may not: $method"
+  [[ $(wrong) == *expecting* ]] || fail "root may not: $method"
+done
 
 step "buttons: contacts and a pad"
 samples=$(status Samples)
@@ -147,13 +167,28 @@ take=/var/lib/previzd/takes/$(status Take)
 [[ -z $(status Fault) ]] || fail "the take ended by itself: $(status Fault)"
 frames=$(status TakeFrames)
 cp -r "$take" take
-cp /var/lib/previzd/picture.png .
+cp /run/previzd/picture.png .
 lines=$(wc -l <"$take/observer.jsonl")
 lights=$(wc -l <"$take/light.jsonl")
 echo "   $frames frames: $lines of the film camera, $lights of the light camera"
 [[ $lines -ge 5 && $lights -ge 1 ]] || fail "the take is not complete"
 grep -q '"record"\|button1' "$take/events.jsonl" || fail "the take has no event of the button"
 previzctl metrics >metrics.json
+
+step "an upgrade waits for the end of the take"
+main_pid() { systemctl show --property=MainPID --value previzd; }
+pid=$(main_pid)
+tap 1
+within 60 "a take runs" status_is Recording yes
+dpkg --force-confold --install previzd.deb || fail "the package is not upgraded"
+sleep 5
+[[ $(main_pid) == "$pid" ]] || fail "the upgrade ended the take"
+status_is Recording yes || fail "the upgrade ended the take"
+tap 1
+is_new() { [[ $(main_pid) -gt 0 && $(main_pid) != "$pid" ]] && systemctl is-active --quiet previzd; }
+within 300 "the new version starts when the take has ended" is_new
+within 300 "it shows frames" above '.stages.display.frames' 0
+status_is Recording no || fail "it records, although the take was ended"
 
 step "another light camera, by another set while the daemon runs"
 sed 's/^name = "rig"$/name = "other"/' rig_vivid.toml >/etc/previzd/set.toml
