@@ -127,5 +127,23 @@ TEST_P(EveryCallOfAFile, LeavesTheFileWholeOrNotThereAndSaysSo) {
   }
 }
 
+// What another file replaces a second later makes no disk wait, and still is whole or as before.
+TEST(Files, OfASecondAreNotSynced) {
+  const TemporaryDirectory directory;
+  const auto syncs_of = [&](const char* folder, output::Sync sync) {
+    std::filesystem::create_directory(directory / folder);
+    const FaultyDisk disk(directory / folder);
+    output::write_png(directory / folder / "a.png", picture(1), sync);
+    int syncs = 0;
+    for (std::size_t call = 0; call < disk.calls(); ++call)
+      syncs += disk.describe(call).find("sync") != std::string::npos ? 1 : 0;
+    EXPECT_GT(disk.calls(), 2u);
+    return syncs;
+  };
+  EXPECT_EQ(syncs_of("briefly", output::Sync::no), 0);
+  EXPECT_EQ(syncs_of("for_good", output::Sync::yes), 2);  // the file and its name
+  EXPECT_EQ(output::read_png(directory / "briefly/a.png").samples, picture(1).samples);
+}
+
 }  // namespace file_power_test
 }  // namespace previz::test

@@ -1,8 +1,9 @@
-// Snapshots number themselves, and leave takes their space.
+// Snapshots number themselves, and leave takes their space; where the live picture goes.
 #include "daemon/rig/snapshots.hpp"
 
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <mutex>
@@ -10,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "daemon/rig/live_files.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -62,6 +64,15 @@ TEST(Snapshots, LeaveTheSpaceThatTakesKeepFree) {
     EXPECT_NO_THROW(check_space(directory.path(), 1'000'000, "/dev/shm/takes", free));
   }
   EXPECT_THROW(check_space(directory.path(), 2 * free, "/dev/shm/takes", 0), Error);
+}
+
+// The picture of each second goes into memory where systemd has made a folder there.
+TEST(LiveFiles, OfAServiceAreInItsRuntimeDirectory) {
+  unsetenv("RUNTIME_DIRECTORY");
+  EXPECT_EQ(live_directory("/var/lib/out"), "/var/lib/out");
+  setenv("RUNTIME_DIRECTORY", "/run/previzd", 1);
+  EXPECT_EQ(live_directory("/var/lib/out"), "/run/previzd");
+  unsetenv("RUNTIME_DIRECTORY");
 }
 
 }  // namespace rig_snapshots_test
