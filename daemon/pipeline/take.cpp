@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/scene/assets.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 
@@ -39,6 +40,9 @@ Take open_take(const std::filesystem::path& session_directory,
                             set_file    ? set::Origin::crew
                             : any_paths ? set::Origin::trusted_session
                                         : set::Origin::session);
+
+  // A model of the take's own might name other files as its parts, for which this throws.
+  if (!set_file && !any_paths) static_cast<void>(scene::assets_of(take.set));
 
   take.observer = observer_calibration(take.set, take.session.info);
   take.set.observer.calibration = take.observer;

@@ -66,6 +66,15 @@ TEST_F(TakeShotsTest, ATakeCannotMakeForeignFilesItsAssets) {
   EXPECT_EQ(read.info.assets.size(), 1u);
 }
 
+// The session's own models may have no parts in other files.
+TEST_F(TakeShotsTest, ATakeCannotReadForeignFilesByWayOfItsModels) {
+  for (const auto& entry : std::filesystem::directory_iterator(directory_ / "session/assets"))
+    std::ofstream(entry.path()) << R"({"asset": {"version": "2.0"},
+                                       "buffers": [{"uri": "../../secret", "byteLength": 4}]})";
+  EXPECT_THROW(open_take(directory_ / "session", {}), Error);
+  EXPECT_NO_THROW(open_take(directory_ / "session", {}, true));
+}
+
 TEST_F(TakeShotsTest, ATakeIsReadInItsOwnFolderWhateverItsSetIsCalled) {
   const std::filesystem::path toml = directory_ / "session/session.toml";
   std::string text = session::read_file(toml);
