@@ -213,6 +213,8 @@ class AravisCamera final : public Camera {
   DeviceCounters counters() const override {
     DeviceCounters all = counters_;
     for (const auto& [name, count] : stream_counters_) all[name] += count;
+    all["arrivals left out of the clock's map"] = clock_.left_out();
+    all["maps of the clock begun anew"] = clock_.begun_anew();
     return all;
   }
 

@@ -18,4 +18,6 @@ for program in "$@"; do
   has "$symbols" ' _ZSt21__glibcxx_assert_fail' "checks no indices of vectors"
 done
 # Whether a function of the C library has a checked form depends on what a program calls.
-readelf --wide --dyn-syms "$@" | grep -q '__[a-z]*_chk@' || fail "no function of the C library is checked: no _FORTIFY_SOURCE"
+symbols=$(readelf --wide --dyn-syms "$@")
+grep -q '__[a-z]*_chk@' <<<"$symbols" ||
+  fail "no function of the C library is checked: no _FORTIFY_SOURCE"

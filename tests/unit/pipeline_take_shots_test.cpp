@@ -168,20 +168,22 @@ TEST_F(TakeShotsTest, AFrameIsConvertedOnce) {
 TEST_F(TakeShotsTest, AStopEndsTheReadingOfATake) {
   std::stop_source stop;
   stop.request_stop();
-  const auto read = [&](const std::filesystem::path& session) -> std::string {
+  const auto why = [](const auto& read) -> std::string {
     try {
-      open_take(session, {}, false, stop.get_token());
+      read();
       return "it was read";
     } catch (const Error& error) {
       return error.what();
     }
   };
-  EXPECT_NE(read(directory_ / "session").find(".gltf: was left, because reading it is to end"),
-            std::string::npos)
-      << read(directory_ / "session");
-  std::filesystem::remove_all(directory_ / "session/assets");  // the video is read next
-  EXPECT_NE(read(directory_ / "session").find("observer.mkv: was left, because"), std::string::npos)
-      << read(directory_ / "session");
+  const std::filesystem::path session = directory_ / "session";
+  const std::string asset = why([&] { open_take(session, {}, false, stop.get_token()); });
+  EXPECT_NE(asset.find(".gltf: was left, because reading it is to end"), std::string::npos)
+      << asset;
+  session::Session opened = session::open_session(session);
+  const std::string video =
+      why([&] { session::open_stream(opened, "observer", stop.get_token()); });
+  EXPECT_NE(video.find("observer.mkv: was left, because"), std::string::npos) << video;
 }
 
 }  // namespace pipeline_take_shots_test
