@@ -66,8 +66,8 @@ struct RecorderStatus {
 // No call here but finish() waits for the disk, and all may come from any thread. SessionWriter
 // bounds what can be lost: at most the frame in hand if the process dies, about the last second if
 // the power fails. An error of the disk ends the take, with everything so far readable, but nothing
-// else. A full or failing disk ends the take, too, and the next one begins at once on the next disk,
-// if there is one.
+// else. A full or failing disk ends the take, too, and the next one begins at once on the next
+// disk, if there is one.
 class Recorder {
  public:
   explicit Recorder(RecorderOptions options);

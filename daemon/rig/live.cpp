@@ -174,9 +174,9 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
       files.emplace(options.directory ? *options.directory : live_directory(set.output.directory),
                     metrics_json, reports);
       screen.use(set);
-      rig = std::make_unique<Rig>(Rig::Parts{loop, sets, kept, service, pulse, device, renderer,
-                                             show, show_facts, options.buttons,
-                                             options.around_cameras, options.loop, end.get_token()});
+      rig = std::make_unique<Rig>(
+          Rig::Parts{loop, sets, kept, service, pulse, device, renderer, show, show_facts,
+                     options.buttons, options.around_cameras, options.loop, end.get_token()});
     } catch (const std::exception& error) {
       if (!sets.go_back(error.what())) throw;
       continue;
