@@ -157,7 +157,7 @@ TEST(Programs, AreCompiledAnewForAReopenedDevice) {
       EXPECT_EQ(render::download<gpu::GpuControl>(device, buffer, 1).front().shadow_groups[0], 3u);
     }
     buffer = {};
-    if (opened == 0) device.reopen();
+    if (opened == 0) device.reopen(false);
   }
   EXPECT_EQ(device.validation_messages(), 0u);
 }
