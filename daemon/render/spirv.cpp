@@ -73,7 +73,7 @@ SpirvInfo describe_spirv(std::span<const std::uint32_t> spirv) {
   std::vector<std::uint32_t> variables;
   std::uint32_t group_size_id = 0, feature_id = 0;
   for (std::size_t at = spirv_header_words; at < spirv.size(); at += spirv[at] >> 16) {
-    const std::uint32_t* const operands = &spirv[at + 1];
+    const std::uint32_t* const operands = spirv.data() + at + 1;  // none of the last instruction
     const auto text = [&](int i) { return reinterpret_cast<const char*>(operands + i); };
     switch (spirv[at] & 0xffff) {
       case op_name:
