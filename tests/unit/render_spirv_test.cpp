@@ -44,7 +44,7 @@ TEST(Spirv, KnowsTheFeaturesThatAPassAsksAbout) {
   const std::uint32_t extend = describe_spirv(extend_spv).asked_bits;
   EXPECT_EQ(extend & ~every_feature, 0u);
   EXPECT_NE(extend & gpu::FEATURE_ALPHA, 0u);
-  EXPECT_EQ(extend & gpu::FEATURE_SHEEN, 0u);  // rays meet fibres as they meet anything
+  EXPECT_EQ(extend & gpu::FEATURE_PHOTONS, 0u);  // rays are traced alike with a map and without
   const std::uint32_t shade = describe_spirv(shade_spv).asked_bits;
   EXPECT_EQ(shade & ~every_feature, 0u);
   for (const std::uint32_t bit : {gpu::FEATURE_GLOSSY, gpu::FEATURE_SHEEN, gpu::FEATURE_PHOTONS})
@@ -64,7 +64,7 @@ TEST(Spirv, APassIsCompiledOnceForFeaturesThatItDoesNotAskAbout) {
   const std::uint32_t asked = describe_spirv(extend_spv).asked_bits;
   ASSERT_NE(asked & gpu::FEATURE_ALPHA, 0u);
   const render::Kernel kernel(*shared_device(), "extend", extend_spv,
-                              {gpu::FEATURE_ALPHA | gpu::FEATURE_SHEEN});
+                              {gpu::FEATURE_ALPHA | gpu::FEATURE_PHOTONS});
   const std::array<std::uint32_t, 1> masked = {gpu::FEATURE_ALPHA};
   const auto compiled = shared_device()->program(extend_spv, masked, [] {
     ADD_FAILURE() << "it is compiled again";
