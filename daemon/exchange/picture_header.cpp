@@ -69,8 +69,10 @@ std::optional<PictureSize> tiff_size(const HeaderBytes& bytes) {
     const std::uint64_t entry = *directory + 2 + 12 * i;
     const auto tag = bytes.number(entry, 2);
     if (tag != width_tag && tag != height_tag) continue;
+    std::optional<std::uint64_t>& length = *tag == width_tag ? width : height;
+    if (length) return std::nullopt;  // of two, libraries choose differently
     const std::size_t size = bytes.number(entry + 2, 2) == of_two_bytes ? 2 : 4;
-    (*tag == width_tag ? width : height) = bytes.number(entry + 8, size);
+    length = bytes.number(entry + 8, size);
   }
   return both(width, height);
 }

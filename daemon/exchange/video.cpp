@@ -4,6 +4,7 @@ extern "C" {
 }
 
 #include <array>
+#include <vector>
 
 #include "daemon/exchange/footage.hpp"
 #include "drivers/av.hpp"
@@ -101,7 +102,7 @@ class VideoFile final : public Footage {
     av::check(avformat_open_input(&context, url.c_str(), nullptr, Limits().get()), file,
               "cannot be read as a video");
     demuxer_.reset(context);
-    av::check(avformat_find_stream_info(context, nullptr), file, "cannot be read as a video");
+    probe(*context);
     const AVCodec* codec = nullptr;
     track_ = av::check(av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0), file,
                        "holds no video that can be decoded");
@@ -132,6 +133,16 @@ class VideoFile final : public Footage {
   std::vector<std::string> notes() const override { return notes_; }
 
  private:
+  // Looks into the streams, with decoders that have the limits, too.
+  void probe(AVFormatContext& context) const {
+    std::vector<Limits> limits(context.nb_streams);
+    std::vector<AVDictionary*> options;
+    for (Limits& of_stream : limits) options.push_back(*of_stream.get());
+    const int result = avformat_find_stream_info(&context, options.data());
+    for (std::size_t i = 0; i < limits.size(); ++i) *limits[i].get() = options[i];  // what is left
+    av::check(result, file_, "cannot be read as a video");
+  }
+
   // Returns false after the last frame.
   bool decode() {
     for (;;) {

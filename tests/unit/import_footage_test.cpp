@@ -326,6 +326,25 @@ TEST(PictureHeader, OfDamagedFilesDoesNoHarm) {
   }
 }
 
+// Of two widths, libtiff takes the first one, and others the last.
+TEST(PictureHeader, OfATiffWithTwoWidthsIsNone) {
+  const auto entry = [](char tag, char value) {
+    return std::string{tag, 1, 3, 0, 1, 0, 0, 0, value, 0, 0, 0};
+  };
+  const auto tiff = [](const std::vector<std::string>& entries) {
+    std::string file("II*\0\x08\0\0\0", 8);
+    file += {static_cast<char>(entries.size()), 0};
+    for (const std::string& e : entries) file += e;
+    return file + std::string(4, '\0');
+  };
+  const std::string wide = entry(0, 100), narrow = entry(0, 7), high = entry(1, 9);
+  const std::optional<PictureSize> size = picture_size(tiff({narrow, high}));
+  ASSERT_TRUE(size);
+  EXPECT_EQ(size->width, 7u);
+  EXPECT_EQ(size->height, 9u);
+  EXPECT_FALSE(picture_size(tiff({wide, narrow, high})));
+}
+
 TEST(PictureHeader, MorePixelsThanAnybodyHasAreRefused) {
   Shoot shoot;
   const auto file = shoot.folder() / "huge.png";
