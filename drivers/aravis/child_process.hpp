@@ -6,9 +6,11 @@
 #include <chrono>
 #include <condition_variable>
 #include <filesystem>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "drivers/descriptor.hpp"
 
@@ -22,31 +24,35 @@ class ChildProcess {
   // The descriptor under which the program has its socket.
   static constexpr int its_socket = 3;
 
-  // Starts `program ARGUMENT PID`, where PID is this process's. Throws previz::Error.
-  ChildProcess(const std::filesystem::path& program, const std::string& argument,
+  // Starts `program ARGUMENTS... PID`, where PID is this process's. Throws previz::Error.
+  ChildProcess(const std::filesystem::path& program, std::vector<std::string> arguments,
                OwnedDescriptor socket);
   // Kills it if it still runs.
   ~ChildProcess();
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
 
-  pid_t pid() const { return pid_; }
+  pid_t pid() const { return state_->pid; }
   // Waits for its end; returns false if it still runs then.
   bool ends_within(std::chrono::milliseconds time);
   // Kills it and waits until it is gone; returns how it ended: "it was ended by signal 11
-  // (Segmentation fault)". If it had ended before, that is returned.
+  // (Segmentation fault)". If it had ended before, that is returned. One that a device driver of
+  // the kernel holds up is waited for two seconds, and then left to its thread.
   std::string end();
 
  private:
-  void keep(const std::filesystem::path& program, const std::string& argument,
-            OwnedDescriptor socket);
+  struct State {
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool started = false, ended = false;
+    pid_t pid = -1;
+    int error = 0;  // why it was not started
+    int status = 0;
+  };
+  static void keep(const std::shared_ptr<State>& state, const std::filesystem::path& program,
+                   std::vector<std::string> arguments, OwnedDescriptor socket);
 
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  bool started_ = false, ended_ = false;
-  pid_t pid_ = -1;
-  int error_ = 0;  // why it was not started
-  int status_ = 0;
+  std::shared_ptr<State> state_ = std::make_shared<State>();
   std::thread keeper_;
 };
 

@@ -28,7 +28,7 @@ enum class Kind : std::uint32_t {
   give_back,
   // Answers.
   done,
-  refused,  // a text: why
+  refused,  // a text: why; every version has it in this place, for programs of two versions
   // Sent unasked.
   frame,  // FrameNote: a buffer was filled
   pulse,  // Pulse: the receiver is alive, and what its stream has counted

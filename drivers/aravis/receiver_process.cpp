@@ -10,6 +10,8 @@
 #include <cstring>
 #include <filesystem>
 #include <system_error>
+#include <utility>
+#include <vector>
 
 #include "drivers/error.hpp"
 
@@ -45,15 +47,29 @@ int time_left(ReceiverProcess::Clock::time_point until) {
   return static_cast<int>(std::clamp<std::int64_t>(left.count(), 0, 60'000));
 }
 
+// Returns why a process that has ended could not begin.
+std::optional<std::string> last_words(int socket) {
+  Message message;
+  while (receive(socket, message) == Received::message)
+    if (message.kind == Kind::refused)
+      if (const auto why = body_of<std::string>(message)) return "refuses: " + printable(*why);
+  return std::nullopt;
+}
+
 }  // namespace
 
-ReceiverProcess::ReceiverProcess(Reach reach) : heard_(Clock::now()) {
+ReceiverProcess::ReceiverProcess(Reach reach) : ReceiverProcess(reach, receiver_program()) {}
+
+ReceiverProcess::ReceiverProcess(Reach reach, const fs::path& program) : heard_(Clock::now()) {
   std::array<int, 2> ends{-1, -1};
   if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0)
     throw Error(std::string("a receiver gets no socket: ") + std::strerror(errno));
   socket_ = OwnedDescriptor(ends[0]);
+  OwnedDescriptor its_end(ends[1]);
   process_ = std::make_unique<ChildProcess>(
-      receiver_program(), reach == Reach::usb ? "usb" : "network", OwnedDescriptor(ends[1]));
+      program,
+      std::vector<std::string>{reach == Reach::usb ? "usb" : "network", PREVIZ_RECEIVER_MESSAGES},
+      std::move(its_end));
 }
 
 ReceiverProcess::~ReceiverProcess() {
@@ -68,13 +84,13 @@ Message ReceiverProcess::ask(Kind request, const Writer& body, milliseconds dead
                              int descriptor) {
   const Clock::time_point until = Clock::now() + deadline;
   if (!gone() && !send(socket_.get(), request, body, descriptor, false))
-    give_up("takes no requests");
+    give_up(last_words(socket_.get()).value_or("takes no requests"));
   Message message;
   while (!gone()) {
     const Received received = take(message, until);
     if (received == Received::closed) break;
     if (received == Received::nothing) {
-      give_up("does not answer within " + std::to_string(deadline.count()) + " ms");
+      give_up("does not answer for " + std::to_string(deadline.count()) + " ms");
     } else if (message.kind == Kind::done) {
       return message;
     } else if (message.kind == Kind::refused) {
@@ -82,6 +98,8 @@ Message ReceiverProcess::ask(Kind request, const Writer& body, milliseconds dead
       throw Error(why ? printable(*why) : "is refused without a reason");
     } else if (unasked_.size() == most_unasked) {
       give_up("sends more than it can have");
+    } else if (Clock::now() >= until) {
+      give_up("sends other things than an answer for " + std::to_string(deadline.count()) + " ms");
     } else {
       if (message.kind == Kind::pulse)  // only the newest is of use
         std::erase_if(unasked_, [](const Message& m) { return m.kind == Kind::pulse; });
@@ -119,6 +137,7 @@ Received ReceiverProcess::take(Message& message, Clock::time_point until) {
   for (;;) {
     const Received received = receive(socket_.get(), message);
     if (received == Received::message) heard_ = Clock::now();
+    if (message.kind != Kind::done) message.descriptor = {};  // nothing else brings one
     if (received == Received::closed) give_up("is not there any more");
     if (received != Received::nothing || Clock::now() >= until) return received;
     pollfd readable{socket_.get(), POLLIN, 0};

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -25,6 +26,8 @@ class ReceiverProcess {
 
   // Starts the process. Throws previz::Error if it is not installed or cannot be started.
   explicit ReceiverProcess(Reach reach);
+  // Starts another program in its place.
+  ReceiverProcess(Reach reach, const std::filesystem::path& program);
   // Lets the process give its camera back in order, for two seconds at most.
   ~ReceiverProcess();
   ReceiverProcess(const ReceiverProcess&) = delete;

@@ -7,6 +7,9 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <linux/netlink.h>
+#include <linux/sockios.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -24,7 +27,9 @@
 #include <thread>
 #include <vector>
 
+#include "drivers/aravis/child_process.hpp"
 #include "drivers/aravis/protocol.hpp"
+#include "drivers/aravis/receiver/sandbox.hpp"
 #include "drivers/aravis/receiver_process.hpp"
 #include "drivers/camera_drivers.hpp"
 #include "drivers/descriptor.hpp"
@@ -451,6 +456,81 @@ TEST(Receiver, LooksForCamerasOnTheUsb) {
   const aravis::Message answer = receiver.ask(aravis::Kind::list, {}, seconds(5));
   EXPECT_TRUE(aravis::body_of<aravis::Listing>(answer));
   EXPECT_FALSE(receiver.gone());
+}
+
+// A receiver that was taken over may say what it likes, but nobody waits for it.
+TEST(Receiver, ThatOnlyTalksIsEndedAtTheDeadline) {
+  aravis::ReceiverProcess receiver(aravis::Reach::network, PREVIZ_FLOODING_RECEIVER);
+  const auto descriptors = [] {
+    return std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator());
+  };
+  const auto before = descriptors();
+  const auto begin = Clock::now();
+  EXPECT_THAT([&] { receiver.ask(aravis::Kind::list, {}, milliseconds(300)); },
+              testing::ThrowsMessage<Error>(HasSubstr("for 300 ms")));
+  EXPECT_LT(Clock::now() - begin, seconds(3));
+  EXPECT_TRUE(receiver.gone());
+  EXPECT_LE(descriptors(), before);  // what it passed along is closed
+}
+
+TEST(Receiver, OfAnotherVersionIsRefused) {
+  int ends[2];
+  ASSERT_EQ(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends), 0);
+  const OwnedDescriptor socket(ends[0]);
+  aravis::ChildProcess process(PREVIZ_RECEIVER, {"network", "another"}, OwnedDescriptor(ends[1]));
+  ASSERT_TRUE(process.ends_within(seconds(5)));
+  aravis::Message message;
+  ASSERT_EQ(aravis::receive(socket.get(), message), aravis::Received::message);
+  EXPECT_EQ(message.kind, aravis::Kind::refused);
+  EXPECT_THAT(aravis::body_of<std::string>(message).value_or(""),
+              HasSubstr("another version of previzd"));
+}
+
+// Runs a call in a process that has entered the sandbox; returns 0, or the error that it had.
+template <class Call>
+int in_sandbox(bool usb, const Call& call) {
+  const pid_t child = fork();
+  if (child == 0) {
+    try {
+      aravis::enter_sandbox(usb);
+    } catch (const Error&) {
+      _exit(255);
+    }
+    _exit(call() < 0 ? errno : 0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
+TEST(Sandbox, HasUdpAndNoOtherSocketOfTheNetwork) {
+  const auto opened = [](bool usb, int family, int type, int protocol) {
+    return in_sandbox(usb, [=] { return ::socket(family, type, protocol); });
+  };
+  EXPECT_EQ(opened(false, AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0), 0);
+  EXPECT_EQ(opened(false, AF_INET, SOCK_STREAM, 0), ESOCKTNOSUPPORT);
+  EXPECT_EQ(opened(false, AF_INET, SOCK_RAW | SOCK_NONBLOCK, IPPROTO_UDP), ESOCKTNOSUPPORT);
+  EXPECT_EQ(opened(false, AF_UNIX, SOCK_DGRAM, 0), EAFNOSUPPORT);
+  EXPECT_EQ(opened(true, AF_INET, SOCK_DGRAM, 0), EAFNOSUPPORT);
+  for (const bool usb : {false, true}) {
+    EXPECT_EQ(opened(usb, AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_ROUTE), 0);
+    EXPECT_EQ(opened(usb, AF_NETLINK, SOCK_RAW, NETLINK_AUDIT), EPROTONOSUPPORT);
+  }
+}
+
+// The kernel sends a descriptor's owner any signal that was asked for.
+TEST(Sandbox, SignalsNobodyByWayOfADescriptor) {
+  int ends[2];
+  ASSERT_EQ(socketpair(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0, ends), 0);
+  const pid_t victim = getpid();
+  for (const bool usb : {false, true}) {
+    EXPECT_EQ(in_sandbox(usb, [&] { return fcntl(ends[0], F_SETFL, O_NONBLOCK); }), 0);
+    EXPECT_EQ(in_sandbox(usb, [&] { return fcntl(ends[0], F_SETOWN, victim); }), EPERM);
+    EXPECT_EQ(in_sandbox(usb, [&] { return fcntl(ends[0], F_SETSIG, SIGKILL); }), EPERM);
+    EXPECT_EQ(in_sandbox(usb, [&] { return ioctl(ends[0], FIOSETOWN, &victim); }), EPERM);
+  }
+  close(ends[0]);
+  close(ends[1]);
 }
 
 // A request that is none is refused, and the process goes on.

@@ -24,7 +24,7 @@ if [[ $version != "$logged" ]]; then
   exit 1
 fi
 dpkg-deb --raw-extract "$work/previzd.deb" "$work/unpacked"
-"$here/hardened.sh" "$work"/unpacked/usr/bin/previz{d,ctl}
+"$here/hardened.sh" "$work"/unpacked/usr/{bin/previz{d,ctl},libexec/previzd/previzd-aravis}
 lintian --fail-on error --info "$work/previzd.deb"
 
 # The same package with a later version and another default set: what an upgrade brings.

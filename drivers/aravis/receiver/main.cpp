@@ -141,13 +141,16 @@ class Service {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3) {
+  if (argc != 4) {
     std::fputs("previzd-aravis receives from a camera; previzd starts it.\n", stderr);
     return 2;
   }
   const bool usb = argv[1] == std::string("usb");
-  if (!limit_resources(std::atoi(argv[2]))) return 1;
+  if (!limit_resources(std::atoi(argv[3]))) return 1;
   try {
+    // A driver that runs on after an upgrade has messages that this program may not know.
+    if (argv[2] != std::string(PREVIZ_RECEIVER_MESSAGES))
+      throw Error("it is of another version of previzd than the one that runs; restart previzd");
     enter_sandbox(usb);
   } catch (const Error& error) {
     send(driver, Kind::refused, Writer()(std::string(error.what())), -1, false);

@@ -3,7 +3,9 @@
 #include <fcntl.h>
 #include <linux/audit.h>
 #include <linux/landlock.h>
+#include <linux/netlink.h>
 #include <linux/seccomp.h>
+#include <linux/sockios.h>
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -96,27 +98,41 @@ Program signals_and_time() {
 }
 
 Program sockets(bool usb) {
-  // With an address family that it is not, a socket is refused as one that the kernel lacks.
+  // Netlink lists the network's interfaces and reports what is plugged into the USB. What a socket
+  // may not be is refused as what the kernel lacks.
+  const Program netlink =
+      all({argument(2), when(BPF_JEQ, NETLINK_ROUTE, allow),
+           when(BPF_JEQ, NETLINK_KOBJECT_UEVENT, allow), refuse(EPROTONOSUPPORT)});
+  const Program datagrams =
+      all({argument(1), bpf::mask(~std::uint32_t{SOCK_CLOEXEC | SOCK_NONBLOCK}),
+           when(BPF_JEQ, SOCK_DGRAM, allow), refuse(ESOCKTNOSUPPORT)});
   const Program families =
-      all({argument(0), when(BPF_JEQ, AF_NETLINK, allow),
-           usb ? Program{} : when(BPF_JEQ, AF_INET, allow), refuse(EAFNOSUPPORT)});
+      all({argument(0), when(BPF_JEQ, AF_NETLINK, netlink),
+           usb ? Program{} : when(BPF_JEQ, AF_INET, datagrams), refuse(EAFNOSUPPORT)});
   const Program network_requests =  // of sockets: FIONREAD, FIONBIO, and SIOCGIF...
       all({argument(1), when(BPF_JEQ, 0x541b, allow), when(BPF_JEQ, 0x5421, allow),
            when_not(BPF_JGE, 0x8910, refuse(EPERM)), when(BPF_JGT, 0x8933, refuse(EPERM)), allow});
+  const Program usb_requests = all({argument(1), when(BPF_JEQ, FIOSETOWN, refuse(EPERM)),
+                                    when(BPF_JEQ, SIOCSPGRP, refuse(EPERM)), allow});
   return all({
       on(SYS_socket, families),
       allowed(SYS_bind, SYS_getsockname, SYS_getpeername, SYS_getsockopt, SYS_setsockopt,
               SYS_sendto, SYS_sendmsg, SYS_sendmmsg, SYS_recvfrom, SYS_recvmsg, SYS_recvmmsg,
               SYS_shutdown),
-      on(SYS_ioctl, usb ? allow : network_requests),
+      on(SYS_ioctl, usb ? usb_requests : network_requests),
   });
 }
 
+// A descriptor gets no owner, to whom the kernel would send any signal in this process's name.
 Program descriptors() {
+  const Program flags =
+      all({argument(1), when(BPF_JEQ, F_GETFD, allow), when(BPF_JEQ, F_SETFD, allow),
+           when(BPF_JEQ, F_GETFL, allow), when(BPF_JEQ, F_SETFL, allow),
+           when(BPF_JEQ, F_DUPFD_CLOEXEC, allow), refuse(EPERM)});
   return all({
-      allowed(SYS_read, SYS_write, SYS_readv, SYS_writev, SYS_close, SYS_fcntl, SYS_ppoll,
-              SYS_pselect6, SYS_eventfd2, SYS_pipe2, SYS_epoll_create1, SYS_epoll_ctl,
-              SYS_epoll_pwait),
+      on(SYS_fcntl, flags),
+      allowed(SYS_read, SYS_write, SYS_readv, SYS_writev, SYS_close, SYS_ppoll, SYS_pselect6,
+              SYS_eventfd2, SYS_pipe2, SYS_epoll_create1, SYS_epoll_ctl, SYS_epoll_pwait),
 #ifdef SYS_poll  // newer processors do without what was replaced
       allowed(SYS_poll, SYS_select, SYS_epoll_wait),
 #endif
