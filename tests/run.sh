@@ -1,14 +1,16 @@
 #!/usr/bin/env bash
-# Everything a change must pass. Installs what is missing, builds, runs the tests, runs those that
-# read foreign bytes or run in threads once more under AddressSanitizer and
-# UndefinedBehaviorSanitizer, and checks format and lint. Needs no GPU and nothing outside the
-# repository. Ends with one line that sums up, and with status 0 only if all of it passed.
+# Everything a change must pass. Installs what is missing, builds, runs the tests, those that read
+# foreign bytes or run in threads under AddressSanitizer and UndefinedBehaviorSanitizer, and checks
+# format and lint. Needs no GPU and nothing outside the repository. Ends with one line that sums up,
+# and with status 0 only if all of it passed.
 #
 #   tests/run.sh              the gate: release asan format lint
-#   tests/run.sh full         the gate, and then bench lint-all long asan-all tsan soak package rig_vm
+#   tests/run.sh full         the gate, with all tests in release, and then
+#                             bench lint-all long asan-all tsan soak package rig_vm
 #   tests/run.sh STEP...      only the named steps
 #
-#   release    builds everything but the benchmarks and soak, and runs the tests
+#   release    builds everything but the benchmarks and soak, and runs the tests; in the gate without
+#              those that asan has
 #   asan       the test programs marked SANITIZED (tests/CMakeLists.txt) under ASan and UBSan
 #   format     clang-format
 #   lint       clang-tidy, of targets that have changed since they last passed on this machine, the
@@ -30,7 +32,8 @@ jobs=$(nproc)
 export CCACHE_DEPEND=1  # a compiler cache that is empty needs no preprocessor of its own
 gate=(release asan format lint)
 steps=("$@")
-[[ ${#steps[@]} -gt 0 ]] || steps=("${gate[@]}")
+once=OFF
+[[ ${#steps[@]} -gt 0 ]] || { steps=("${gate[@]}") once=ON; }
 [[ ${steps[*]} != full ]] || steps=("${gate[@]}" bench lint-all long asan-all tsan soak package rig_vm)
 failures=()
 summaries=()
@@ -55,7 +58,10 @@ check() {
   return "$status"
 }
 
-build() { cmake --preset "$1" --log-level=WARNING && cmake --build --preset "$1" --parallel "$jobs"; }
+build() {
+  cmake --preset "$1" --log-level=WARNING -DPREVIZ_TESTS_ONCE="$once" &&
+    cmake --build --preset "$1" --parallel "$jobs"
+}
 
 # Prints the cases that CTest's log says were skipped, and fails if tests/skips.txt lacks one.
 check_skips() {
