@@ -18,13 +18,11 @@ using report::Severity;
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 // A stopped take waits so long for the tracking of its last frames.
 constexpr std::chrono::milliseconds track_patience{500};
 constexpr std::chrono::seconds disk_interval{1};
-// A frame may be offered so long after its capture.
-constexpr std::chrono::seconds late{1};
+// A take that ends is looked at so often.
+constexpr std::chrono::milliseconds ending_interval{10};
 // A disk that takes longer for one thing is reported.
 constexpr std::chrono::seconds silence{2};
 
@@ -47,9 +45,14 @@ std::uint64_t default_queue_bytes() {
 
 Recorder::Recorder(RecorderOptions options)
     : options_(std::move(options)),
+      queue_(options_.preroll_s, options_.queue_bytes),
       folders_(options_.take.folders, options_.reserve_bytes, options_.free_bytes),
-      assets_(folders_.all().front() / ".assets", options_.take.assets,
-              [this](const std::string& what) { note(Severity::warning, what); }) {
+      salvage_(options_.take.folders,
+               [this](const std::string& what) { note(Severity::warning, what); }) {
+  for (std::size_t i = 0; i < folders_.all().size(); ++i)
+    stores_.push_back(std::make_unique<AssetStore>(
+        folders_.all()[i] / ".assets", options_.take.assets,
+        [this](const std::string& what) { note(Severity::warning, what); }, folders_.room_of(i)));
   thread_ = std::jthread([this] { run(); });
 }
 
@@ -61,30 +64,11 @@ void Recorder::finish() {
   {
     const std::lock_guard lock(mutex_);
     if (std::exchange(quit_, true)) return;
-    if (status_.recording) enqueue_stop(false);
+    if (status_.recording) queue_.push_mark(RecordQueue::Stop{false});
+    status_.recording = false;
   }
   filled_.notify_one();
   thread_.join();
-}
-
-// Returns about how much memory an entry takes. An entry that begins or ends a take counts as 0, so
-// that it is never left out.
-std::uint64_t Recorder::bytes_of(const Entry& entry) {
-  if (const auto* captured = std::get_if<Captured>(&entry)) return captured->frame->bytes.size();
-  if (const auto* event = std::get_if<Event>(&entry)) return sizeof(Entry) + event->what.size();
-  if (const auto* button = std::get_if<ButtonEvent>(&entry))
-    return sizeof(Entry) + button->button.size();
-  const auto* record = std::get_if<session::TrackRecord>(&entry);
-  if (!record) return 0;
-  constexpr std::uint64_t of_a_name = 128;  // of a node of a map and its key
-  std::uint64_t bytes = sizeof(Entry) + record->tags.size() * sizeof(int);
-  bytes += record->scene.objects.size() * (of_a_name + sizeof(glm::dmat4));
-  bytes += record->scene.lights.size() * (of_a_name + sizeof(session::LightState));
-  bytes += record->carriers.size() * (of_a_name + sizeof(session::CarrierState));
-  if (const auto& light = record->captured_light)
-    bytes += light->sources.size() * sizeof(session::CapturedSource) +
-             light->ambient.size() * sizeof(glm::vec3);
-  return bytes;
 }
 
 void Recorder::offer(const FramePtr& frame) {
@@ -93,23 +77,18 @@ void Recorder::offer(const FramePtr& frame) {
   {
     std::unique_lock lock(mutex_);
     if (!status_.recording) {
-      ring_bytes_ += bytes_of(captured);
-      ring_.emplace_back(captured);
-      if (!trim_ring() || std::exchange(short_preroll_noted_, true)) return;
-      const double kept_s = ring_length_s();
+      if (!queue_.keep(captured) || std::exchange(short_preroll_noted_, true)) return;
+      const double kept_s = queue_.ring_length_s();
       lock.unlock();
       return note_short_preroll(kept_s);
     }
     is_silent = has_new_silence();
-    if (frame->source == "light") remember_light(captured);
-    if (queued_bytes_ + bytes_of(captured) <= options_.queue_bytes) {
-      if (frame->source == "observer") last_frame_ns_ = frame->timestamp_ns;
-      enqueue(captured);
-    } else {
-      count_as_lost(captured);
+    if (!queue_.push(captured)) {
+      count_as_lost(RecordQueue::loss_of(captured));
       is_first_dropped = status_.lost.frames == 1;
     }
   }
+  filled_.notify_one();
   if (is_silent)
     note(Severity::warning, "the disk does not answer; what is recorded waits in memory");
   if (is_first_dropped) note(Severity::warning, "the disk is too slow; frames are left out");
@@ -125,94 +104,38 @@ void Recorder::offer_shown(const FramePtr& frame) {
   {
     const std::lock_guard lock(mutex_);
     if (!status_.recording) return;
-    if (queued_bytes_ + bytes_of(captured) <= options_.queue_bytes / 2) return enqueue(captured);
-    count_as_lost(captured);
+    if (queue_.push_shown(captured)) return filled_.notify_one();
+    count_as_lost(RecordQueue::loss_of(captured));
     if (status_.lost.shown > 1) return;
   }
   note(Severity::warning, "the disk is too slow; pictures that were shown are left out");
 }
 
-void Recorder::remember_light(const Captured& captured) {
-  forget_lights_unlike(*captured.frame);
-  older_light_[exposure_step(captured.frame->exposure)] = captured;
-  if (older_light_.size() <= most_exposures) return;
-  older_light_.erase(std::ranges::min_element(
-      older_light_, {}, [](const auto& older) { return older.second.frame->timestamp_ns; }));
-}
-
-void Recorder::forget_lights_unlike(const Frame& frame) {
-  std::erase_if(older_light_, [&](const auto& older) {
-    const Frame& known = *older.second.frame;
-    return known.format != frame.format || known.bayer != frame.bayer ||
-           known.width != frame.width || known.height != frame.height;
-  });
-}
-
 void Recorder::offer(const session::TrackRecord& record) {
   const std::lock_guard lock(mutex_);
-  if (status_.recording || (late_tracks_ && record.timestamp_ns <= last_frame_ns_))
-    return enqueue_record(record);
-  ring_.emplace_back(record);
-  ring_bytes_ += bytes_of(ring_.back());
-  while (ring_bytes_ > options_.queue_bytes / 2) forget_first_of_ring();
+  if (status_.recording || (late_tracks_ && record.timestamp_ns <= queue_.last_frame_ns()))
+    return offer_record(record);
+  queue_.keep(record);
 }
 
 void Recorder::offer(const ButtonEvent& event) {
   const std::lock_guard lock(mutex_);
-  if (status_.recording) enqueue_record(event);
+  if (status_.recording) offer_record(event);
 }
 
 void Recorder::offer_event(std::int64_t timestamp_ns, const std::string& what) {
   const std::lock_guard lock(mutex_);
-  if (status_.recording) enqueue_record(Event{timestamp_ns, what});
+  if (status_.recording) offer_record(RecordQueue::Event{timestamp_ns, what});
 }
 
-void Recorder::enqueue(Entry entry) {
-  queued_bytes_ += bytes_of(entry);
-  queue_.push_back(std::move(entry));
+void Recorder::offer_record(Entry entry) {
+  const session::Losses loss = RecordQueue::loss_of(entry);
+  if (!queue_.push_record(std::move(entry))) return count_as_lost(loss);
   filled_.notify_one();
 }
 
-// Frames fill the queue first, so that a disk that is a little too slow loses no tracking.
-void Recorder::enqueue_record(Entry entry) {
-  if (queued_bytes_ + bytes_of(entry) <= options_.queue_bytes + options_.queue_bytes / 8)
-    enqueue(std::move(entry));
-  else
-    count_as_lost(entry);
-}
-
-void Recorder::count_as_lost(const Entry& entry) {
-  if (const auto* captured = std::get_if<Captured>(&entry))
-    ++(captured->frame->source == "composite" ? status_.lost.shown : status_.lost.frames);
-  else if (bytes_of(entry) > 0)
-    ++status_.lost.records;
-}
-
-// Drops the ring's oldest entries, counting time from its newest frame. A full ring must fit the
-// queue with room to spare. Returns whether frames were dropped only because it was full.
-bool Recorder::trim_ring() {
-  const std::int64_t newest = std::get<Captured>(ring_.back()).frame->timestamp_ns;
-  const auto keep_ns = static_cast<std::int64_t>(options_.preroll_s * 1e9);
-  bool is_short = false;
-  while (!ring_.empty()) {
-    const auto* captured = std::get_if<Captured>(&ring_.front());
-    const bool old = !captured || newest - captured->frame->timestamp_ns > keep_ns;
-    if (!old && ring_bytes_ <= options_.queue_bytes / 2) break;
-    is_short = is_short || !old;
-    forget_first_of_ring();
-  }
-  return is_short;
-}
-
-// Returns the time from the oldest frame of the ring to the newest.
-double Recorder::ring_length_s() const {
-  std::optional<std::int64_t> first, last;
-  for (const Entry& entry : ring_)
-    if (const auto* captured = std::get_if<Captured>(&entry)) {
-      last = captured->frame->timestamp_ns;
-      if (!first) first = last;
-    }
-  return first ? 1e-9 * static_cast<double>(*last - *first) : 0;
+void Recorder::count_as_lost(const session::Losses& loss) {
+  add(status_.lost, loss);
 }
 
 void Recorder::note_short_preroll(double kept_s) const {
@@ -228,68 +151,32 @@ void Recorder::note_short_preroll(double kept_s) const {
                  .notice = report::Notice{Severity::warning, "", text.data()}});
 }
 
-void Recorder::forget_first_of_ring() {
-  ring_bytes_ -= bytes_of(ring_.front());
-  const auto* captured = std::get_if<Captured>(&ring_.front());
-  if (captured && captured->frame->source == "light") remember_light(*captured);
-  ring_.pop_front();
-}
-
-// In standby, or while the camera is missing, nothing is offered, and the ring's entries become too
-// old.
-void Recorder::forget_what_is_long_ago() {
-  const auto keep = std::chrono::duration<double>(options_.preroll_s) + late;
-  const auto is_long_ago = [&](const Entry& entry) {
-    const auto* captured = std::get_if<Captured>(&entry);
-    return !captured || Clock::now() - captured->offered > keep;
-  };
-  while (!ring_.empty() && is_long_ago(ring_.front())) forget_first_of_ring();
-}
-
 void Recorder::start() {
   const std::lock_guard lock(mutex_);
   if (status_.recording) return;
+  ++starts_;
   status_.recording = true;
-  late_tracks_ = false;
   status_.lost = {};
   status_.frames = 0;
   status_.seconds = 0;
   status_.fault.clear();
-  enqueue(Start{});
-  forget_what_is_long_ago();
-  for (const Entry& entry : ring_)
-    if (const auto* captured = std::get_if<Captured>(&entry);
-        captured && captured->frame->source == "light")
-      forget_lights_unlike(*captured->frame);
-  std::vector<Captured> lights;
-  for (const auto& [step, light] : older_light_) lights.push_back(light);
-  std::ranges::sort(lights, {}, [](const Captured& c) { return c.frame->timestamp_ns; });
-  for (const Captured& light : lights) enqueue(light);
-  for (Entry& entry : ring_) {
-    if (const auto* captured = std::get_if<Captured>(&entry)) {
-      if (captured->frame->source == "observer") last_frame_ns_ = captured->frame->timestamp_ns;
-      if (captured->frame->source == "light") remember_light(*captured);
-    }
-    enqueue(std::move(entry));
-  }
-  ring_.clear();
-  ring_bytes_ = 0;
+  queue_.begin();
+  filled_.notify_one();
 }
 
 void Recorder::stop() {
   const std::lock_guard lock(mutex_);
-  if (status_.recording) enqueue_stop(true);
-}
-
-void Recorder::enqueue_stop(bool is_wished) {
+  if (!status_.recording) return;
   status_.recording = false;
   late_tracks_ = true;
-  enqueue(Stop{status_.lost, is_wished});
+  queue_.push_mark(RecordQueue::Stop{true});
+  filled_.notify_one();
 }
 
 void Recorder::mark_good() {
   const std::lock_guard lock(mutex_);
-  enqueue(MarkGood{});
+  queue_.push_mark(RecordQueue::MarkGood{});
+  filled_.notify_one();
 }
 
 RecorderStatus Recorder::status() const {
@@ -307,26 +194,19 @@ void Recorder::note(Severity severity, const std::string& what) const {
 void Recorder::run() {
   std::unique_lock lock(mutex_);
   for (;;) {
-    const auto something = [this] { return !queue_.empty() || quit_; };
-    filled_.wait_until(lock, end_at_.value_or(looked_ + disk_interval), something);
-    const bool finished = queue_.empty();
-    std::optional<Entry> entry;
-    if (!finished) {
-      entry = std::move(queue_.front());
-      queue_.pop_front();
-      queued_bytes_ -= bytes_of(*entry);
-    }
-    const bool leave = quit_ && finished;
+    const bool waits = !ending_.empty();
+    const auto due = waits ? Clock::now() + ending_interval : looked_ + disk_interval;
+    filled_.wait_until(lock, due, [&] { return !queue_.empty() || (quit_ && !waits); });
+    std::optional<Queued> next;
+    if (!queue_.empty()) next = queue_.pop();
+    const bool is_last = quit_ && !next;
     handling_since_ = Clock::now();
     lock.unlock();
-    if (!looked_for_interruption_ && !take_) look_for_interruption();
-    serve(entry, leave);
+    if (!take_ && ending_.empty()) look_for_interruption();
+    serve(next, is_last);
     look_at_disk();
     lock.lock();
-    if (entry) {
-      queued_bytes_ += bytes_of(*entry);
-      queue_.push_front(std::move(*entry));
-    }
+    if (next) queue_.give_back(std::move(*next));
     const bool answers_again = std::exchange(silence_noted_, false);
     handling_since_.reset();
     if (answers_again) {
@@ -334,118 +214,203 @@ void Recorder::run() {
       note(Severity::info, "the disk answers again");
       lock.lock();
     }
-    if (leave) return;
+    if (is_last && ending_.empty()) return;
   }
 }
 
-// Handles an entry and whatever else is due. What is left of `entry` could not be written, and
-// waits for the next disk.
-void Recorder::serve(std::optional<Entry>& entry, bool is_last) {
+// Handles an entry and whatever else is due. What is left of `next` could not be written, and waits
+// for the next disk.
+void Recorder::serve(std::optional<Queued>& next, bool is_last) {
   try {
-    if (entry) handle(*entry);
-    entry.reset();
-    if (take_ && assets_.is_ready()) add_assets();
-    const bool is_over = end_at_ && (is_last || Clock::now() >= *end_at_);
-    if (is_over || (end_at_ && take_->track_is_complete())) end_take(stopped_lost_);
+    if (next) handle(*next);
+    next.reset();
+    if (take_) name_assets(*take_, false);
     if (take_ && Clock::now() - checked_ >= disk_interval) check_disk();
   } catch (const std::exception& error) {
-    if (goes_on_elsewhere(error.what())) return;
-    if (entry) {
-      const std::lock_guard lock(mutex_);
-      count_as_lost(*entry);
+    const std::string why = error.what();
+    if (next && take_ && take_->writer->is_sound()) {
+      leave_out(next->entry, *take_, why);
+      next.reset();
+    } else if (!goes_on_elsewhere(why)) {
+      if (next) {
+        const std::lock_guard lock(mutex_);
+        const session::Losses loss = RecordQueue::loss_of(next->entry);
+        if (is_newest()) count_as_lost(loss);
+        if (take_) add(take_->lost, loss);
+      }
+      next.reset();
+      fail(why);
     }
-    entry.reset();
-    fail(error.what());
+  }
+  end_what_is_over(is_last);
+}
+
+void Recorder::handle(Queued& next) {
+  const Entry& entry = next.entry;
+  if (take_ || !ending_.empty())
+    add((take_ ? *take_ : ending_.back().take).lost, std::exchange(next.lost, {}));
+  if (std::holds_alternative<RecordQueue::Start>(entry)) {
+    {
+      const std::lock_guard lock(mutex_);
+      ++begun_;
+    }
+    folders_.forgive_all();
+    light_.clear();
+    begin_take(false);
+  } else if (std::holds_alternative<RecordQueue::MarkGood>(entry)) {
+    mark_last_good();
+  } else if (const auto* record = std::get_if<session::TrackRecord>(&entry)) {
+    write(*record);
+  } else if (!take_) {
+    return;  // the take has failed meanwhile
+  } else if (const auto* stop = std::get_if<RecordQueue::Stop>(&entry)) {
+    end_running_take();
+    if (stop->is_wished) drop_wish();
+  } else if (const auto* captured = std::get_if<Captured>(&entry)) {
+    write(*captured);
+  } else if (const auto* button = std::get_if<ButtonEvent>(&entry)) {
+    take_->writer->write(*button);
+  } else if (const auto* event = std::get_if<RecordQueue::Event>(&entry)) {
+    take_->writer->write_event(event->timestamp_ns, event->what);
   }
 }
 
-void Recorder::handle(Entry& entry) {
-  if (std::holds_alternative<Start>(entry)) {
-    end_last_take();
-    folders_.forgive_all();
-    begin_take();
-  } else if (std::holds_alternative<MarkGood>(entry)) {
-    const std::filesystem::path last = status().directory;
-    if (take_)
-      take_->mark_good();
-    else if (!last.empty())
-      session::change_take(last, [](session::TakeInfo& take) { take.good = true; });
-    note(Severity::info,
-         last.empty() ? "there is no take to mark" : last.filename().string() + " is marked good");
-  } else if (!take_) {
-    return;  // the take has failed meanwhile
-  } else if (const auto* stop = std::get_if<Stop>(&entry)) {
-    end_at_ = Clock::now() + track_patience;
-    stopped_lost_ = stop->lost;
-    was_stopped_ = stop->is_wished;
-  } else if (const auto* captured = std::get_if<Captured>(&entry)) {
-    write(*captured);
-  } else if (const auto* record = std::get_if<session::TrackRecord>(&entry)) {
-    take_->write(*record);
-  } else if (const auto* button = std::get_if<ButtonEvent>(&entry)) {
-    take_->write(*button);
-  } else if (const auto* event = std::get_if<Event>(&entry)) {
-    take_->write_event(event->timestamp_ns, event->what);
+void Recorder::mark_last_good() {
+  const std::filesystem::path last = status().directory;
+  if (take_) {
+    take_->writer->mark_good();
+  } else if (last.empty()) {
+    return note(Severity::info, "there is no take to mark");
+  } else {
+    try {
+      if (ending_.empty())
+        session::change_take(last, [](session::TakeInfo& take) { take.good = true; });
+      else
+        ending_.back().take.writer->mark_good();
+    } catch (const std::exception& error) {
+      return note(Severity::warning, std::string("it cannot be marked good: ") + error.what());
+    }
   }
+  note(Severity::info, last.filename().string() + " is marked good");
 }
 
 void Recorder::write(const Captured& captured) {
-  if (!take_->fits(*captured.frame) && captured.frame->source == "composite") {
-    const std::lock_guard lock(mutex_);  // forgets lights from before the camera's format changed
-    ++status_.lost.shown;
+  const Frame& frame = *captured.frame;
+  if (!take_->writer->fits(frame) && frame.source == "composite") {
+    add(take_->lost, {.frames = 0, .shown = 1, .records = 0});
+    const std::lock_guard lock(mutex_);
+    if (is_newest()) ++status_.lost.shown;
     return;
   }
-  if (!take_->fits(*captured.frame)) {
-    note(Severity::warning, "the " + captured.frame->source + " camera changed its format; " +
-                                take_->directory().filename().string() +
+  if (!take_->writer->fits(frame)) {
+    note(Severity::warning, "the " + frame.source + " camera changed its format; " +
+                                take_->writer->directory().filename().string() +
                                 " ends and the next take begins");
+    if (frame.source == "light") light_.forget_unlike(frame);
     begin_next_take();
   }
-  take_->write(*captured.frame, captured.at);
-  if (captured.frame->source != "observer") return;
-  const std::int64_t now_ns = captured.frame->timestamp_ns;
-  if (take_->observer_frames() == 1) take_begins_ns_ = now_ns;
+  take_->writer->write(frame, captured.at);
+  if (frame.source == "light") light_.remember(captured);
+  if (frame.source != "observer") return;
+  if (take_->writer->observer_frames() == 1) take_->begins_ns = frame.timestamp_ns;
   const std::lock_guard lock(mutex_);
-  status_.frames = take_->observer_frames();
-  status_.seconds = 1e-9 * static_cast<double>(now_ns - take_begins_ns_);
+  if (!is_newest()) return;
+  status_.frames = take_->writer->observer_frames();
+  status_.seconds = 1e-9 * static_cast<double>(frame.timestamp_ns - take_->begins_ns);
+}
+
+// A track goes to the take that has its frame, which may have been stopped meanwhile.
+void Recorder::write(const session::TrackRecord& record) {
+  const auto ending = std::ranges::find_if(
+      ending_, [&](const EndingTake& e) { return e.take.writer->has_frame_of(record); });
+  if (ending == ending_.end()) {
+    if (take_) take_->writer->write(record);
+    return;
+  }
+  try {
+    ending->take.writer->write(record);
+  } catch (const std::exception& error) {
+    Take& take = ending->take;
+    if (take.writer->is_sound())
+      leave_out(record, take, error.what());
+    else if (take.fault.empty())
+      take.fault = error.what();
+  }
+}
+
+void Recorder::leave_out(const Entry& entry, Take& take, const std::string& why) {
+  const session::Losses loss = RecordQueue::loss_of(entry);
+  add(take.lost, loss);
+  {
+    const std::lock_guard lock(mutex_);
+    if (is_newest()) count_as_lost(loss);
+  }
+  if (std::exchange(take.has_noted_odd, true)) return;
+  note(Severity::warning,
+       take.writer->directory().filename().string() + " lacks what cannot be recorded: " + why);
 }
 
 // Ends the running take in order and goes on in the next one, without a frame between them.
 void Recorder::begin_next_take() {
-  session::Losses so_far;
-  {
-    const std::lock_guard lock(mutex_);
-    so_far = status_.lost;
-  }
-  end_take(so_far);
-  begin_take();
+  end_running_take();
+  begin_take(true);
 }
 
-void Recorder::begin_take() {
+void Recorder::end_running_take() {
+  const Clock::time_point now = Clock::now();
+  ending_.push_back({std::move(*take_), now + track_patience, now + options_.asset_patience});
+  take_.reset();
+}
+
+void Recorder::begin_take(bool goes_on) {
+  const std::string slate = options_.take.info.take.value_or(session::TakeInfo{}).slate;
   while (!take_) {
-    const std::filesystem::path folder = folders_.choose();
+    const std::size_t folder = folders_.choose();
+    take_.emplace().folder = folder;
     try {
-      take_ = std::make_unique<TakeWriter>(options_.take, folder);
+      highest_number_ = next_take_number(folders_.all(), slate, highest_number_);
+      take_->writer =
+          std::make_unique<TakeWriter>(options_.take, folders_.all()[folder], highest_number_);
+      if (goes_on)
+        for (const Captured& light : light_.in_order())
+          take_->writer->write(*light.frame, light.at);
     } catch (const std::exception& error) {
-      if (!folders_.give_up(folder)) throw;
+      if (take_->writer) take_->writer->abandon(error.what());
+      take_.reset();
+      if (!folders_.give_up(folder, folders_.all()[folder].string() + ": its disk failed")) throw;
       note(Severity::error, std::string("the next disk is taken: ") + error.what());
     }
   }
+  const std::filesystem::path directory = take_->writer->directory();
   checked_ = Clock::now();
-  lacks_assets_ = !options_.take.assets.empty();
+  if (!options_.take.assets.empty()) take_->order = stores_[take_->folder]->deliver(directory);
   try {
-    TakeFolders::keep_wish(take_->directory());
+    TakeFolders::keep_wish(directory);
   } catch (const Error& error) {
     note(Severity::warning,
          std::string("after a restart it would not go on by itself: ") + error.what());
   }
   const std::lock_guard lock(mutex_);
-  status_.directory = take_->directory();
-  status_.number = take_->number();
+  status_.directory = directory;
+  status_.number = take_->writer->number();
 }
 
-void Recorder::add_assets() {
-  if (std::exchange(lacks_assets_, false)) take_->add_assets(assets_.files());
+void Recorder::name_assets(Take& take, bool is_last) {
+  if (!take.order) return;
+  std::optional<AssetStore::Delivered> delivered = take.order->result();
+  if (!delivered && !is_last) return;
+  if (!delivered)
+    delivered = stores_[take.folder]->undelivered("it was not copied by the end of the take");
+  take.order.reset();
+  for (const session::MissingAsset& asset : delivered->missing)
+    note(Severity::warning, take.writer->directory().filename().string() + " lacks " +
+                                asset.as_written + ": " + asset.why);
+  try {
+    take.writer->set_assets(delivered->assets, delivered->missing);
+  } catch (const std::exception& error) {
+    if (!take.writer->is_sound()) throw;
+    note(Severity::warning, std::string("the set's files cannot be named: ") + error.what());
+  }
 }
 
 void Recorder::drop_wish() {
@@ -457,155 +422,172 @@ void Recorder::drop_wish() {
   }
 }
 
-// Looks for what the last process left: the wish to record, and takes that it could not end.
+// Looks for what the last process left: the wish to record, and takes that it could not end. Once a
+// take was begun, an older wish is none.
 void Recorder::look_for_interruption() {
-  try {
-    looked_for_interruption_ = std::ranges::any_of(
-        folders_.all(), [](const auto& folder) { return std::filesystem::exists(folder); });
-    if (!looked_for_interruption_) return;
-    std::vector<std::filesystem::path> takes;
-    for (const std::filesystem::path& folder : folders_.all()) {
-      if (!std::filesystem::exists(folder)) continue;
-      for (const auto& entry : std::filesystem::directory_iterator(folder))
-        if (entry.is_directory()) takes.push_back(entry.path());
+  if (Clock::now() - looked_back_ < disk_interval) return;
+  looked_back_ = Clock::now();
+  std::vector<std::string> salvaged;
+  if (!salvage_.look(salvaged)) return;
+  std::optional<std::string> interrupted = folders_.kept_wish();
+  const std::lock_guard lock(mutex_);
+  for (std::string& take : salvaged) status_.salvaged.push_back(std::move(take));
+  if (begun_ == 0 && !status_.interrupted) status_.interrupted = std::move(interrupted);
+}
+
+// Ends the takes that have all they wait for, or have waited long enough.
+void Recorder::end_what_is_over(bool is_last, bool at_once) {
+  const Clock::time_point now = Clock::now();
+  for (auto ending = ending_.begin(); ending != ending_.end();) {
+    Take& take = ending->take;
+    const bool has_tracks =
+        is_last || take.writer->frames_without_track() == 0 || now >= ending->tracks_until;
+    const bool has_assets =
+        !take.order || take.order->result().has_value() || now >= ending->assets_until;
+    if (!at_once && !(has_tracks && has_assets)) {
+      ++ending;
+      continue;
     }
-    std::ranges::sort(takes, {}, [](const auto& take) { return take.filename(); });
-    for (const std::filesystem::path& take : takes) salvage(take);
-    std::optional<std::string> interrupted = folders_.kept_wish();
-    const std::lock_guard lock(mutex_);
-    status_.interrupted = std::move(interrupted);
-  } catch (const std::exception& error) {
-    looked_for_interruption_ = true;  // once, and not each second
-    note(Severity::warning, std::string("takes from before cannot be looked at: ") + error.what());
+    if (at_once && take.writer->has_track())
+      take.lost.records += take.writer->frames_without_track();
+    end(take);
+    ending = ending_.erase(ending);
   }
+  const std::lock_guard lock(mutex_);
+  if (!status_.recording && !take_ && ending_.empty() && queue_.empty()) late_tracks_ = false;
 }
 
-void Recorder::salvage(const std::filesystem::path& take) {
+// What goes wrong with a take that ends is that take's failure, and the recording's no more.
+void Recorder::end(Take& take) {
+  const std::string name = take.writer->directory().filename().string();
   try {
-    const std::optional<std::uint64_t> frames = session::salvage(take);
-    if (!frames) return;
-    const std::lock_guard lock(mutex_);
-    status_.salvaged.push_back(take.filename().string() + " was cut off; it has " +
-                               std::to_string(*frames) + " frames");
+    if (!take.fault.empty()) throw Error(take.fault);
+    name_assets(take, true);
+    take.writer->set_lost(take.lost);
+    take.writer->close();
   } catch (const std::exception& error) {
-    note(Severity::warning, std::string("a take from before cannot be read: ") + error.what());
-  }
-}
-
-// Ends the take that waits for its tracks when the next one begins. What goes wrong with it is no
-// reason not to begin.
-void Recorder::end_last_take() {
-  try {
-    if (end_at_) end_take(stopped_lost_);
-  } catch (const std::exception& error) {
+    abandon(take, error.what());
     {
       const std::lock_guard lock(mutex_);
+      count_finished(take);
       count_failure(error.what());
     }
-    leave_take(error.what());
+    return note(Severity::error, name + " could not be ended in order: " + error.what());
   }
-  attributed_ = {};
-  was_stopped_ = false;
-}
-
-void Recorder::end_take(const session::Losses& lost) {
-  end_at_.reset();
-  attribute(lost);
-  add_assets();
-  take_->close();
   {
     const std::lock_guard lock(mutex_);
-    count_finished();
-    if (!status_.recording) late_tracks_ = false;
+    count_finished(take);
   }
-  if (was_stopped_) drop_wish();
-  note(Severity::info, take_->directory().filename().string() + " has " +
-                           std::to_string(take_->observer_frames()) + " frames");
-  take_.reset();
-}
-
-void Recorder::attribute(const session::Losses& lost) {
-  take_->set_lost({lost.frames - attributed_.frames, lost.shown - attributed_.shown,
-                   lost.records - attributed_.records});
-  attributed_ = lost;
+  note(Severity::info, name + " has " + std::to_string(take.writer->observer_frames()) + " frames");
 }
 
 // After a failure of the running take's disk: leaves that take and begins the next one on the next
 // disk, if there is one. Returns whether it goes on.
 bool Recorder::goes_on_elsewhere(const std::string& why) {
-  if (!take_ || end_at_) return false;
-  const std::filesystem::path failed = take_->directory();
-  if (!folders_.give_up(failed.parent_path())) return false;
-  session::Losses so_far;
+  if (!take_) return false;
+  const std::filesystem::path folder = folders_.all()[take_->folder];
+  if (!folders_.give_up(take_->folder, folder.string() + ": its disk failed")) return false;
+  const std::string failed = take_->writer->directory().filename().string();
+  abandon(*take_, why);
   {
     const std::lock_guard lock(mutex_);
-    so_far = status_.lost;
-    count_finished();
+    count_finished(*take_);
   }
-  attribute(so_far);
-  take_->abandon(why);
   take_.reset();
   try {
-    begin_take();
+    begin_take(true);
   } catch (const std::exception& error) {
     note(Severity::error, std::string("recording cannot go on elsewhere: ") + error.what());
     return false;
   }
-  note(Severity::error, failed.filename().string() + " ended: " + why + "; recording goes on in " +
-                            take_->directory().string());
+  note(Severity::error,
+       failed + " ended: " + why + "; recording goes on in " + take_->writer->directory().string());
   return true;
 }
 
+// Leaves the files as they are: a session that was not closed opens up to its last whole frame.
+void Recorder::abandon(Take& take, const std::string& why) {
+  if (take.order) {
+    const AssetStore::Delivered delivered = take.order->result().value_or(
+        stores_[take.folder]->undelivered("the take ended before it was copied"));
+    take.writer->set_assets(delivered.assets, delivered.missing);
+  }
+  take.writer->set_lost(take.lost);
+  take.writer->abandon(why);
+}
+
 void Recorder::fail(const std::string& why) {
+  if (!take_) {
+    // The takes that are ending get the tracking that is there already, and wait for no more.
+    for (const session::TrackRecord& record : leave_out_queue()) write(record);
+    end_what_is_over(true, true);
+  }
+  const std::vector<session::TrackRecord> late = leave_out_queue();
   {
     const std::lock_guard lock(mutex_);
-    for (; !queue_.empty() && !std::holds_alternative<Start>(queue_.front()); queue_.pop_front()) {
-      queued_bytes_ -= bytes_of(queue_.front());
-      count_as_lost(queue_.front());
-    }
     if (queue_.empty()) status_.recording = late_tracks_ = false;
-    if (take_) attribute(status_.lost);
+    if (take_) count_finished(*take_);
     count_failure(why);
   }
-  leave_take(why);
+  if (take_) abandon(*take_, why);
+  take_.reset();
+  for (const session::TrackRecord& record : late) write(record);
+  if (options_.note) options_.note({Severity::error, "recording ended", why});
   drop_wish();
+}
+
+// Takes what is queued before the next start out of the queue, and counts it as lost. Returns the
+// tracks among it that takes which are ending wait for.
+std::vector<session::TrackRecord> Recorder::leave_out_queue() {
+  std::vector<session::TrackRecord> late;
+  const std::lock_guard lock(mutex_);
+  while (!queue_.empty() && !queue_.begins_a_take()) {
+    const Queued left = queue_.pop();
+    const auto* record = std::get_if<session::TrackRecord>(&left.entry);
+    const bool is_late = record && std::ranges::any_of(ending_, [&](const EndingTake& ending) {
+                           return ending.take.writer->has_frame_of(*record);
+                         });
+    if (is_late) late.push_back(*record);
+    const session::Losses loss = is_late ? session::Losses{} : RecordQueue::loss_of(left.entry);
+    if (is_newest()) count_as_lost(loss);
+    if (!take_) continue;
+    add(take_->lost, loss);
+    add(take_->lost, left.lost);
+  }
+  if (take_ && queue_.empty()) add(take_->lost, queue_.take_left_out());
+  return late;
 }
 
 void Recorder::count_failure(const std::string& why) {
   status_.fault = why;
   ++status_.failures;
-  count_finished();
 }
 
-void Recorder::count_finished() {
-  if (!take_ || take_->observer_frames() == 0) return;
+void Recorder::count_finished(const Take& take) {
+  if (take.writer->observer_frames() == 0) return;
   ++status_.finished_takes;
-  status_.finished = take_->directory().filename().string();
-}
-
-// Leaves the files as they are: a session that was not closed opens up to its last whole frame.
-void Recorder::leave_take(const std::string& why) {
-  end_at_.reset();
-  if (take_) take_->abandon(why);
-  take_.reset();
-  if (options_.note) options_.note({Severity::error, "recording ended", why});
+  status_.finished = take.writer->directory().filename().string();
 }
 
 // Ends the take properly while there is still room on its disk, and goes on where there is more.
+// The room that the end of the take gives back is no reason to begin there again.
 void Recorder::check_disk() {
   checked_ = Clock::now();
-  const std::filesystem::path full = take_->directory();
-  if (end_at_ || folders_.has_room(full.parent_path())) return;
+  const std::size_t folder = take_->folder;
+  const std::string full = folders_.why_full(folder);
+  if (full.empty()) return;
+  folders_.give_up(folder, full);
+  const std::string name = take_->writer->directory().filename().string();
   begin_next_take();
-  note(Severity::warning, "the disk of " + full.filename().string() +
-                              " is almost full; recording goes on in " +
-                              take_->directory().string());
+  note(Severity::warning, "the disk of " + name + " is almost full; recording goes on in " +
+                              take_->writer->directory().string());
 }
 
 void Recorder::look_at_disk() {
   if (Clock::now() - looked_ < disk_interval) return;
   looked_ = Clock::now();
-  if (options_.measures_disk && !take_ && !has_compared_speeds_) compare_speeds();
+  if (options_.measures_disk && !take_ && ending_.empty() && !has_compared_speeds_)
+    compare_speeds();
   const std::optional<std::uint64_t> left = folders_.free_bytes();
   const std::lock_guard lock(mutex_);
   free_bytes_ = left;
@@ -618,10 +600,10 @@ void Recorder::compare_speeds() {
   double rate = 0;
   {
     const std::lock_guard lock(mutex_);
-    const double length_s = ring_length_s();
+    const double length_s = queue_.ring_length_s();
     if (status_.recording || length_s <= 0) return;
     if (length_s < std::min(least_length_s, 0.5 * options_.preroll_s)) return;
-    rate = static_cast<double>(ring_bytes_) / length_s;
+    rate = static_cast<double>(queue_.ring_bytes()) / length_s;
   }
   has_compared_speeds_ = true;
   try {

@@ -5,19 +5,19 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <filesystem>
 #include <functional>
-#include <map>
+#include <list>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
-#include <variant>
 #include <vector>
 
 #include "daemon/output/asset_store.hpp"
+#include "daemon/output/record_queue.hpp"
+#include "daemon/output/salvage.hpp"
 #include "daemon/output/take_folders.hpp"
 #include "daemon/output/take_writer.hpp"
 #include "daemon/report/report.hpp"
@@ -37,6 +37,8 @@ struct RecorderOptions {
   std::function<void(const report::Report&)> note;  // called from any thread
   TakeFolders::FreeBytes free_bytes;                // empty: the file system is asked
   bool measures_disk = false;  // whether the disk's speed is measured before the first take
+  // A take that ends waits so long for files of the set that are still being copied.
+  std::chrono::milliseconds asset_patience{20'000};
 };
 
 // Returns a quarter of the memory that is free now, in bytes: room for what is recorded on a
@@ -67,7 +69,9 @@ struct RecorderStatus {
 // bounds what can be lost: at most the frame in hand if the process dies, about the last second if
 // the power fails. An error of the disk ends the take, with everything so far readable, but nothing
 // else. A full or failing disk ends the take, too, and the next one begins at once on the next
-// disk, if there is one.
+// disk, if there is one; that disk is then left alone until the next start(). What cannot be
+// recorded by its nature, such as a frame without an exposure, is left out and counted, and no file
+// of the set that is missing ends a take: the take says so.
 class Recorder {
  public:
   explicit Recorder(RecorderOptions options);
@@ -100,59 +104,57 @@ class Recorder {
   std::optional<std::uint64_t> free_bytes() const;
 
  private:
-  using WallClock = std::chrono::system_clock;
-  struct Captured {
-    FramePtr frame;
-    WallClock::time_point at = WallClock::now();
-    std::chrono::steady_clock::time_point offered = std::chrono::steady_clock::now();
-  };
-  struct Event {
-    std::int64_t timestamp_ns;
-    std::string what;
-  };
-  struct Start {};
-  struct Stop {
-    session::Losses lost;  // of the take that ends
-    bool is_wished;        // by somebody; otherwise the process ends
-  };
-  struct MarkGood {};
-  using Entry =
-      std::variant<Captured, session::TrackRecord, ButtonEvent, Event, Start, Stop, MarkGood>;
+  using Entry = RecordQueue::Entry;
+  using Queued = RecordQueue::Queued;
+  using Clock = std::chrono::steady_clock;
 
-  static std::uint64_t bytes_of(const Entry& entry);
+  // A take that is being written.
+  struct Take {
+    std::unique_ptr<TakeWriter> writer;
+    std::size_t folder = 0;                    // its index in TakeFolders
+    std::shared_ptr<AssetStore::Order> order;  // of its assets; null once it names them
+    session::Losses lost;                      // of what was offered for it
+    std::int64_t begins_ns = 0;                // time of its first observer frame
+    std::string fault;                         // what of its disk failed while it was ending
+    bool has_noted_odd = false;  // it was reported that something could not be recorded
+  };
+  // A take that gets no more frames: it waits for the tracking of its last ones and for its assets.
+  struct EndingTake {
+    Take take;
+    Clock::time_point tracks_until, assets_until;
+  };
+
   // Call these with the lock held.
-  void enqueue(Entry entry);
-  void enqueue_record(Entry entry);  // or counts it as lost
-  void enqueue_stop(bool is_wished);
+  void offer_record(Entry entry);  // or counts it as lost
+  void count_as_lost(const session::Losses& loss);
   void count_failure(const std::string& why);
-  void count_finished();  // the take that ends, in order or not
-  void count_as_lost(const Entry& entry);
-  bool has_new_silence();  // of the disk, that nobody was told of
-  bool trim_ring();
-  double ring_length_s() const;
-  void forget_first_of_ring();
-  void forget_what_is_long_ago();
-  void remember_light(const Captured& captured);
-  void forget_lights_unlike(const Frame& frame);  // lights of another format fit no take with it
+  void count_finished(const Take& take);  // in order or not
+  bool has_new_silence();                 // of the disk, that nobody was told of
+  // Returns whether no take was begun after the one that the writer thread works on: the status is
+  // that take's.
+  bool is_newest() const { return begun_ == starts_; }
   // Call these on the writer thread, without the lock.
   void run();
-  void serve(std::optional<Entry>& entry, bool is_last);
-  void handle(Entry& entry);
+  void serve(std::optional<Queued>& next, bool is_last);
+  void handle(Queued& next);
   void write(const Captured& captured);
-  void begin_take();
-  void begin_next_take();
-  void add_assets();  // to the running take, if it lacks them; waits for them
-  void end_last_take();
-  void end_take(const session::Losses& lost);   // properly, not by a failure
-  void attribute(const session::Losses& lost);  // to the running take, as far as no take has them
+  void write(const session::TrackRecord& record);
+  void leave_out(const Entry& entry, Take& take, const std::string& why);  // it cannot be recorded
+  void mark_last_good();
+  void begin_take(bool goes_on);  // from another take, which had its light before
+  void begin_next_take();         // and lets the running one end
+  void end_running_take();
+  void end_what_is_over(bool is_last, bool at_once = false);
+  void end(Take& take);
+  void name_assets(Take& take, bool is_last);  // in the running take, if they are there by now
   bool goes_on_elsewhere(const std::string& why);
   void fail(const std::string& why);  // ends the take and leaves out what is queued of it
-  void leave_take(const std::string& why);
+  std::vector<session::TrackRecord> leave_out_queue();
+  void abandon(Take& take, const std::string& why);
   void check_disk();
   void look_at_disk();  // for free_bytes()
   void compare_speeds();
   void look_for_interruption();
-  void salvage(const std::filesystem::path& take);
   void drop_wish();
   void note(report::Severity severity, const std::string& what) const;
   void note_short_preroll(double kept_s) const;
@@ -161,36 +163,28 @@ class Recorder {
 
   mutable std::mutex mutex_;
   std::condition_variable filled_;
-  std::deque<Entry> queue_;  // entries for the disk, in order
-  std::uint64_t queued_bytes_ = 0;
-  std::deque<Entry> ring_;  // entries while nothing is recorded
-  std::uint64_t ring_bytes_ = 0;
-  // The newest light frame of each exposure that is no longer in the ring (at most most_exposures,
-  // of one format), because a take begins with its light, however old.
-  std::map<long, Captured> older_light_;
-  std::int64_t last_frame_ns_ = 0;  // the last observer frame offered to the running take
-  bool late_tracks_ = false;  // true: tracks may still arrive for the take that was stopped last
+  RecordQueue queue_;
+  bool late_tracks_ = false;  // true: tracks may still arrive for takes that were stopped
   bool quit_ = false;
   RecorderStatus status_;
+  std::uint64_t starts_ = 0;  // calls of start() that began a take
+  std::uint64_t begun_ = 0;   // those of them that the writer thread has got to
   std::optional<std::uint64_t> free_bytes_;
-  std::optional<std::chrono::steady_clock::time_point> handling_since_;  // by the writer thread
+  std::optional<Clock::time_point> handling_since_;  // by the writer thread
   bool silence_noted_ = false;
   bool short_preroll_noted_ = false;
 
   // Only the writer thread uses these.
   TakeFolders folders_;
-  AssetStore assets_;
-  bool lacks_assets_ = false;  // the running take, because they are still being copied
-  std::unique_ptr<TakeWriter> take_;
-  std::int64_t take_begins_ns_ = 0;                              // time of its first observer frame
-  std::optional<std::chrono::steady_clock::time_point> end_at_;  // stopped; waits for its tracks
-  session::Losses stopped_lost_;                                 // of the take that waits
-  session::Losses attributed_;  // of the losses since the start, those of takes that have ended
-  std::chrono::steady_clock::time_point checked_, looked_;
+  std::vector<std::unique_ptr<AssetStore>> stores_;  // one in each folder
+  Salvage salvage_;
+  std::optional<Take> take_;
+  std::list<EndingTake> ending_;
+  NewestLight light_;       // that the running take has
+  int highest_number_ = 0;  // of the takes so far
+  Clock::time_point checked_, looked_, looked_back_;
   bool has_compared_speeds_ = false;
-  bool looked_for_interruption_ = false;
-  bool was_stopped_ = false;  // the take that waits was ended by somebody
-  std::jthread thread_;       // last: it uses all of the above
+  std::jthread thread_;  // last: it uses all of the above
 };
 
 }  // namespace previz::output

@@ -3,15 +3,18 @@
 // restart and an upgrade, that somebody wishes to record.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
 namespace previz::output {
+
+// Returns whether both folders are, or will be made, on one disk.
+bool are_on_one_disk(const std::filesystem::path& a, const std::filesystem::path& b);
 
 // Used by one thread, since every call may wait for a disk.
 class TakeFolders {
@@ -26,14 +29,18 @@ class TakeFolders {
 
   const std::vector<std::filesystem::path>& all() const { return folders_; }
 
-  // Makes the first folder that has room and is not given up, and returns it. Throws previz::Error
-  // that says of each folder why it cannot be used.
-  std::filesystem::path choose();
-  bool has_room(const std::filesystem::path& folder) const;
-  // Gives a folder up, because its disk failed, until forgive_all(). Returns whether another is
-  // left.
-  bool give_up(const std::filesystem::path& folder);
-  void forgive_all() { given_up_.clear(); }
+  // Makes the first folder that has room and is not given up, and returns its index. Throws
+  // previz::Error that says of each folder why it cannot be used.
+  std::size_t choose();
+  // Returns why a folder is full; empty: it has room.
+  std::string why_full(std::size_t folder) const;
+  // Gives a folder up until forgive_all(), because its disk failed or is full. Returns whether
+  // another is left.
+  bool give_up(std::size_t folder, const std::string& why);
+  void forgive_all();
+  // Returns a function that says whether so many bytes more leave a folder what is kept free; it
+  // may be called by any thread, and after the end of this.
+  std::function<bool(std::uint64_t bytes)> room_of(std::size_t folder) const;
 
   // Returns how much takes may still use of all disks, without the reserves; nothing if no disk can
   // say.
@@ -47,20 +54,17 @@ class TakeFolders {
   // Writes into the take's folder that it is being recorded. Throws previz::Error.
   static void keep_wish(const std::filesystem::path& take);
   // Removes what the folders remember: the recording was ended, or it cannot go on. Throws
-  // previz::Error if one of them cannot.
+  // previz::Error that names those that cannot; the others have forgotten it then.
   void drop_wish() const;
   // Returns the name of the take that was being recorded when the last process ended, if one was:
-  // the newest that a folder remembers.
+  // the newest that a folder remembers. A folder that cannot be read remembers nothing.
   std::optional<std::string> kept_wish() const;
 
  private:
-  std::uint64_t free_on_disk_of(const std::filesystem::path& folder) const;
-  std::string why_full(const std::filesystem::path& folder) const;  // empty: it has room
-
   const std::vector<std::filesystem::path> folders_;
   const std::uint64_t reserve_bytes_;
   const FreeBytes free_bytes_;
-  std::set<std::filesystem::path> given_up_;
+  std::vector<std::string> given_up_;  // why, for each folder; empty: it is not
 };
 
 }  // namespace previz::output

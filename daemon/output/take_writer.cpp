@@ -16,9 +16,9 @@ namespace {
 // A folder with a higher number is none of a take.
 constexpr int highest_take = 999'999;
 
-session::TakeInfo numbered(const TakeTemplate& take) {
+session::TakeInfo numbered(const TakeTemplate& take, int number) {
   session::TakeInfo info = take.info.take.value_or(session::TakeInfo{});
-  info.number = next_take_number(take.folders, info.slate);
+  info.number = number;
   return info;
 }
 
@@ -67,27 +67,31 @@ std::string take_name(const std::string& slate, int number) {
   return name + "_take" + digits.data();
 }
 
-int next_take_number(const std::vector<std::filesystem::path>& folders, const std::string& slate) {
+int next_take_number(const std::vector<std::filesystem::path>& folders, const std::string& slate,
+                     int used) {
   std::string stem = take_name(slate, 0);
   stem.resize(stem.size() - 3);
-  int highest = 0;
+  int highest = used;
   for (const std::filesystem::path& folder : folders) {
-    std::error_code none_yet;
-    for (const auto& entry : std::filesystem::directory_iterator(folder, none_yet)) {
-      const std::string name = entry.path().filename().string();
+    // A folder that is not there has no takes. One that cannot be read further, because its disk
+    // fails, is no reason not to record in another.
+    std::error_code unreadable;
+    for (std::filesystem::directory_iterator entry(folder, unreadable), end;
+         !unreadable && entry != end; entry.increment(unreadable)) {
+      const std::string name = entry->path().filename().string();
       if (!name.starts_with(stem)) continue;
       int number = 0;
-      const char* end = name.data() + name.size();
-      const auto [stop, code] = std::from_chars(name.data() + stem.size(), end, number);
-      const bool is_number = code == std::errc{} && stop == end && number <= highest_take;
+      const char* last = name.data() + name.size();
+      const auto [stop, code] = std::from_chars(name.data() + stem.size(), last, number);
+      const bool is_number = code == std::errc{} && stop == last && number <= highest_take;
       if (is_number) highest = std::max(highest, number);
     }
   }
   return highest + 1;
 }
 
-TakeWriter::TakeWriter(const TakeTemplate& take, const std::filesystem::path& folder)
-    : take_(numbered(take)),
+TakeWriter::TakeWriter(const TakeTemplate& take, const std::filesystem::path& folder, int number)
+    : take_(numbered(take, number)),
       directory_(folder / take_name(take_.slate, take_.number)),
       writer_(directory_, session_info(take, take_)) {}
 
@@ -109,6 +113,10 @@ void TakeWriter::write(const Frame& frame, std::chrono::system_clock::time_point
   writer_.write(frame);
   formats_.try_emplace(frame.source, format_of(frame));
   if (observer) frame_of_.emplace(frame.timestamp_ns, frame_of_.size());
+}
+
+bool TakeWriter::has_frame_of(const session::TrackRecord& record) const {
+  return frame_of_.contains(record.timestamp_ns);
 }
 
 void TakeWriter::write(session::TrackRecord record) {

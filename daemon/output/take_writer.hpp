@@ -31,28 +31,34 @@ std::string timecode_of(std::chrono::system_clock::time_point time, double fps);
 // Returns "12A_take007" for slate "12A". Characters that a file system cannot hold, or a shell
 // breaks on, become "_".
 std::string take_name(const std::string& slate, int number);
-// Returns one more than the highest number of the slate's takes in the folders; 1 if there is none.
-int next_take_number(const std::vector<std::filesystem::path>& folders, const std::string& slate);
+// Returns one more than the highest number of the slate's takes in the folders, as far as these can
+// be read, and more than `used`; 1 if there is none.
+int next_take_number(const std::vector<std::filesystem::path>& folders, const std::string& slate,
+                     int used = 0);
 
 // Every function throws previz::Error naming the file; data written before stays readable.
 class TakeWriter {
  public:
-  // Makes the take's directory in this folder, under the number next to those of all folders.
-  TakeWriter(const TakeTemplate& take, const std::filesystem::path& folder);
+  // Makes the take's directory in this folder, under this number.
+  TakeWriter(const TakeTemplate& take, const std::filesystem::path& folder, int number);
 
   // Returns whether the frame has the format and size of its stream.
   bool fits(const Frame& frame) const;
   // `captured` gives the take its timecode with the first observer frame.
   void write(const Frame& frame, std::chrono::system_clock::time_point captured);
-  // Writes the track of a frame that was written before, found by its time, in order; any other
-  // track is ignored.
+  // Returns whether this is the track of a frame that was written before, found by its time.
+  bool has_frame_of(const session::TrackRecord& record) const;
+  // Writes the track of a frame that was written before, in order; any other track is ignored.
   void write(session::TrackRecord record);
   void write(const ButtonEvent& event) { writer_.write(event); }
   void write_event(std::int64_t timestamp_ns, const std::string& what) {
     writer_.write_event(timestamp_ns, what);
   }
   void mark_good();
-  void add_assets(const std::vector<session::StoredFile>& files) { writer_.add_assets(files); }
+  void set_assets(const std::map<std::string, std::string>& assets,
+                  const std::vector<session::MissingAsset>& missing) {
+    writer_.set_assets(assets, missing);
+  }
   void close() { writer_.close(); }
   void set_lost(const session::Losses& lost) { writer_.set_lost(lost); }
   void abandon(const std::string& fault) { writer_.abandon(fault); }  // never throws previz::Error
@@ -60,8 +66,10 @@ class TakeWriter {
   const std::filesystem::path& directory() const { return directory_; }
   int number() const { return take_.number; }
   std::uint64_t observer_frames() const { return frame_of_.size(); }
-  // Returns true if the last observer frame has its line in the track.
-  bool track_is_complete() const { return next_track_ == frame_of_.size(); }
+  // Returns how many of the last observer frames have no line in the track.
+  std::uint64_t frames_without_track() const { return frame_of_.size() - next_track_; }
+  bool has_track() const { return next_track_ > 0; }
+  bool is_sound() const { return writer_.is_sound(); }
 
  private:
   struct Format {

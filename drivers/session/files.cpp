@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <openssl/evp.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -109,31 +110,66 @@ std::string read_file(const std::filesystem::path& file) {
   return content;
 }
 
-std::string sha256_of(const std::filesystem::path& file, const std::stop_token& stop) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) fail(file, "cannot be opened");
-  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(),
-                                                                        EVP_MD_CTX_free);
+void read_blocks(const std::filesystem::path& file, const std::function<bool()>& is_left,
+                 const std::function<void(std::string_view)>& pass_on) {
+  constexpr int patience_ms = 100;
+  // Without O_NONBLOCK the opening of a pipe waits for somebody who writes.
+  const OpenFile open(file, O_RDONLY | O_NONBLOCK);
+  std::vector<char> block(1 << 20);
+  for (;;) {
+    if (is_left()) throw Error(file.string() + ": was left, because reading it is to end");
+    pollfd waiting{open.get(), POLLIN, 0};
+    if (::poll(&waiting, 1, patience_ms) == 0) continue;
+    const ssize_t count = ::read(open.get(), block.data(), block.size());
+    if (count == 0) return;
+    if (count < 0 && (errno == EINTR || errno == EAGAIN)) continue;
+    if (count < 0) fail(file, "cannot be read");
+    pass_on({block.data(), static_cast<std::size_t>(count)});
+  }
+}
+
+struct Sha256::Context {
+  EVP_MD_CTX* of_libcrypto = EVP_MD_CTX_new();
+  Context() = default;
+  ~Context() { EVP_MD_CTX_free(of_libcrypto); }
+  Context(const Context&) = delete;
+  Context& operator=(const Context&) = delete;
+
+  static void check(bool good) {
+    if (!good) throw Error("libcrypto cannot compute a SHA-256");
+  }
+};
+
+Sha256::Sha256() : context_(std::make_unique<Context>()) {
+  EVP_MD_CTX* const context = context_->of_libcrypto;
+  Context::check(context && EVP_DigestInit_ex(context, EVP_sha256(), nullptr) == 1);
+}
+
+Sha256::~Sha256() = default;
+
+void Sha256::add(std::string_view bytes) {
+  Context::check(EVP_DigestUpdate(context_->of_libcrypto, bytes.data(), bytes.size()) == 1);
+}
+
+std::string Sha256::text() {
+  constexpr char digits[] = "0123456789abcdef";
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
   unsigned int size = 0;
-  bool good = context && EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr) == 1;
-  std::vector<char> block(1 << 20);
-  while (good && stream) {
-    if (stop.stop_requested())
-      throw Error(file.string() + ": was left, because reading it is to end");
-    stream.read(block.data(), static_cast<std::streamsize>(block.size()));
-    good = EVP_DigestUpdate(context.get(), block.data(), stream.gcount()) == 1;
-  }
-  if (stream.bad()) fail(file, "cannot be read");
-  if (!good || EVP_DigestFinal_ex(context.get(), digest.data(), &size) != 1)
-    throw Error(file.string() + ": libcrypto cannot compute its SHA-256");
+  Context::check(EVP_DigestFinal_ex(context_->of_libcrypto, digest.data(), &size) == 1);
   std::string text;
   for (unsigned int i = 0; i < size; ++i) {
-    constexpr char digits[] = "0123456789abcdef";
     text += digits[digest[i] >> 4];
     text += digits[digest[i] & 15];
   }
   return text;
+}
+
+std::string sha256_of(const std::filesystem::path& file, const std::stop_token& stop) {
+  Sha256 hash;
+  read_blocks(
+      file, [&] { return stop.stop_requested(); },
+      [&](std::string_view block) { hash.add(block); });
+  return hash.text();
 }
 
 std::string base64(std::span<const std::byte> bytes) {

@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
+#include <memory>
 #include <span>
 #include <stop_token>
 #include <string>
@@ -54,6 +56,27 @@ bool lies_within(const std::filesystem::path& folder, const std::filesystem::pat
 
 // Returns the whole file; throws previz::Error naming it.
 std::string read_file(const std::filesystem::path& file);
+// Passes the file's content on in blocks. `is_left` is asked between blocks, and a few times a
+// second while a pipe has nothing; where it returns true, previz::Error ends the reading. Throws
+// previz::Error naming the file.
+void read_blocks(const std::filesystem::path& file, const std::function<bool()>& is_left,
+                 const std::function<void(std::string_view)>& pass_on);
+
+// Computes a SHA-256 of what comes in pieces.
+class Sha256 {
+ public:
+  Sha256();  // throws previz::Error
+  ~Sha256();
+  Sha256(const Sha256&) = delete;
+  Sha256& operator=(const Sha256&) = delete;
+  void add(std::string_view bytes);
+  std::string text();  // 64 lower-case hexadecimal digits; nothing can be added after it
+
+ private:
+  struct Context;
+  const std::unique_ptr<Context> context_;
+};
+
 // Returns the SHA-256 of the file's content, 64 lower-case hexadecimal digits.
 std::string sha256_of(const std::filesystem::path& file, const std::stop_token& stop = {});
 // Base64 with padding, on one line (RFC 4648).

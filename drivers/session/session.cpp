@@ -3,8 +3,9 @@
 //   SESSION/
 //     session.toml    format version, name, clock; whether it was closed, by what fault it ended
 //                     and what did not reach the disk; per stream its pixel format, size and, once
-//                     the session is closed, its number of frames; calibrations; the asset map; the
-//                     set file verbatim. Replaced as a whole, never edited in place.
+//                     the session is closed, its number of frames; calibrations; the asset map, and
+//                     which assets are not here, what they were and why; the set file verbatim.
+//                     Replaced as a whole, never edited in place.
 //     observer.mkv    FFV1 level 3, every frame a key frame, slice checksums, a Matroska cluster a
 //                     frame: RGB (8 or 16 bit), gray (8 or 16 bit) or 4:2:2 Y'CbCr. Matroska times
 //                     are milliseconds from the first frame, strictly increasing.
@@ -42,6 +43,10 @@ void forget_foreign_assets(Session& session) {
 
 void check_assets(Session& session, const std::stop_token& stop) {
   forget_foreign_assets(session);
+  for (const auto& [as_written, file, sha256, why] : session.info.missing_assets)
+    session.missing.push_back(as_written + ": is not in the take, because " + why + "; it was " +
+                              file.string() +
+                              (sha256.empty() ? "" : " with the SHA-256 " + sha256));
   for (const auto& [as_written, path] : session.info.assets) {
     const std::filesystem::path file = session.directory / path;
     const std::string named = path + " (" + as_written + ")";

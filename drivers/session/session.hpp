@@ -48,6 +48,16 @@ struct Losses {
 // Returns what was lost: "12 frames of the cameras", "3 pictures that were shown". Empty: nothing.
 std::vector<std::string> words_of(const Losses& lost);
 
+// A file that the set needs and the session does not have.
+struct MissingAsset {
+  std::string as_written;      // how the set names it
+  std::filesystem::path file;  // where it was when the session was recorded
+  std::string sha256;          // of its content then; empty: that is not known
+  std::string why;
+
+  friend bool operator==(const MissingAsset&, const MissingAsset&) = default;
+};
+
 // session.toml. `set_text` is the set file verbatim; `set_name` the file name to use in errors.
 struct SessionInfo {
   std::string name;
@@ -58,6 +68,7 @@ struct SessionInfo {
   std::optional<LightCameraCalibration> light;
   // Paths as the set file writes them -> paths below the session ("assets/<sha256>.glb").
   std::map<std::string, std::string> assets;
+  std::vector<MissingAsset> missing_assets;
   std::optional<TakeInfo> take;  // recorded on a rig
 };
 
@@ -169,12 +180,6 @@ Session open_session(const std::filesystem::path& directory, const std::stop_tok
 std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& source,
                                           const std::stop_token& stop = {});
 
-// A file that is kept under the hash of its content: SHA256.glb.
-struct StoredFile {
-  std::string as_written;  // how the set names it
-  std::filesystem::path file;
-};
-
 // Writes a session directory; every call leaves a readable session behind. FFV1 in Matroska,
 // lossless; streams open at their first frame. Throws previz::Error naming the file on failure. A
 // frame has reached the kernel when write() returns: a process killed at any time loses at most the
@@ -201,10 +206,14 @@ class SessionWriter {
   void set_take(const TakeInfo& take);  // replaces session.toml
   // Copies a file into assets/ under its content hash and maps `as_written` to it.
   void add_asset(const std::string& as_written, const std::filesystem::path& file);
-  // The same for stored files, by hard links where the file system can, else by copies.
-  void add_assets(const std::vector<StoredFile>& files);
+  // Names the assets, which must be in the directory and on the disk, and those that are not there.
+  // In a session that has failed they are written when it is abandoned.
+  void set_assets(std::map<std::string, std::string> assets, std::vector<MissingAsset> missing);
   // Says what is not in the session; it is written when the session ends.
   void set_lost(const Losses& lost);
+  // Returns whether the disk has done all that was asked of it. Where it has, an exception of
+  // write() is about what was to be written, and the next can be written.
+  bool is_sound() const;
   // Flushes and finishes the files. The destructor does it too, without throwing.
   void close();
   // Ends the session as it is, not closed, with this reason in session.toml, where the disk lets

@@ -3,8 +3,11 @@
 #include <openssl/evp.h>
 
 #include <toml++/toml.h>
+#include <algorithm>
 #include <array>
 #include <charconv>
+#include <cstdint>
+#include <limits>
 #include <span>
 #include <stdexcept>
 #include <string_view>
@@ -71,6 +74,14 @@ bool reads_back(const std::string& assignment, const std::string& text) {
   } catch (const toml::parse_error&) {
     return false;
   }
+}
+
+// Returns the text, which may be the name of a file, as UTF-8: where it is not, every byte that is
+// not ASCII becomes a question mark.
+std::string in_utf8(std::string text) {
+  if (!reads_back("text = " + quote(text), text))
+    for (char& c : text) c = static_cast<unsigned char>(c) < 0x80 ? c : '?';
+  return text;
 }
 
 // Writes a set's text in the most readable form that preserves it byte for byte.
@@ -167,9 +178,22 @@ constexpr LossKey loss_keys[] = {{"lost_frames", &Losses::frames},
                                  {"lost_records", &Losses::records}};
 
 std::string losses_toml(const Losses& lost) {
+  constexpr std::uint64_t most = std::numeric_limits<std::int64_t>::max();  // of a TOML integer
   std::string text;
   for (const auto& [key, count] : loss_keys)
-    if (lost.*count > 0) text += std::string(key) + " = " + std::to_string(lost.*count) + "\n";
+    if (lost.*count > 0)
+      text += std::string(key) + " = " + std::to_string(std::min(lost.*count, most)) + "\n";
+  return text;
+}
+
+std::string missing_toml(const std::vector<MissingAsset>& missing) {
+  if (missing.empty()) return {};
+  std::string text = "\n[missing_assets]  # as the set writes them; not in this directory\n";
+  for (const MissingAsset& asset : missing) {
+    text += quote(asset.as_written) + " = {file = " + quote(in_utf8(asset.file.string()));
+    if (!asset.sha256.empty()) text += ", sha256 = " + quote(asset.sha256);
+    text += ", why = " + quote(in_utf8(asset.why)) + "}\n";
+  }
   return text;
 }
 
@@ -281,6 +305,18 @@ Losses parse_losses(const Place& place) {
   return lost;
 }
 
+std::vector<MissingAsset> parse_missing(const Place& place) {
+  std::vector<MissingAsset> missing;
+  for (const auto& [key, value] : place.table) {
+    const std::string as_written(key.str());
+    const Place asset = place.inner(as_written.c_str());
+    missing.push_back({as_written, asset.text("file"),
+                       asset.table.contains("sha256") ? asset.text("sha256") : "",
+                       asset.text("why")});
+  }
+  return missing;
+}
+
 TakeInfo parse_take(const Place& place) {
   TakeInfo take;
   const auto number = place.get<std::int64_t>("number", "a whole number");
@@ -324,6 +360,7 @@ std::string to_toml(const SessionFile& file) {
   text += "\n[assets]  # as the set writes them = where they are below this directory\n";
   for (const auto& [as_written, path] : file.info.assets)
     text += quote(as_written) + " = " + quote(path) + "\n";
+  text += missing_toml(file.info.missing_assets);
   text += "\n[set]\nname = " + quote(file.info.set_name) + "\n";
   text += text_assignment(file.info.set_text);
   try {
@@ -369,6 +406,8 @@ SessionFile parse_session_toml(const std::string& text, const std::filesystem::p
       top.inner("assets").fail(std::string(key.str()).c_str(), "must be a path");
     file.info.assets[std::string(key.str())] = value.value_or<std::string>("");
   }
+  if (top.find("missing_assets"))
+    file.info.missing_assets = parse_missing(top.inner("missing_assets"));
   if (top.find("take")) file.info.take = parse_take(top.inner("take"));
   parse_set(top.inner("set"), file.info);
   return file;

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
@@ -119,14 +120,12 @@ struct SessionWriter::Impl {
   }
 
   void add_asset(const std::string& as_written, const std::filesystem::path& from,
-                 const std::string& name, bool may_link) {
+                 const std::string& name) {
     const std::filesystem::path target = directory / "assets" / name;
     try {
       make_folders(target.parent_path());
       if (!std::filesystem::exists(target)) {
-        std::error_code cannot_link = std::make_error_code(std::errc::not_supported);
-        if (may_link) std::filesystem::create_hard_link(from, target, cannot_link);
-        if (cannot_link) copy(from, target);
+        copy(from, target);
         sync_names(target.parent_path());
       }
     } catch (const std::filesystem::filesystem_error& error) {
@@ -250,19 +249,24 @@ void SessionWriter::add_asset(const std::string& as_written, const std::filesyst
   impl_->check_open();
   const std::string name = sha256_of(file) + file.extension().string();
   impl_->using_disk([&] {
-    impl_->add_asset(as_written, file, name, false);
+    impl_->add_asset(as_written, file, name);
     impl_->write_toml();
   });
 }
 
-void SessionWriter::add_assets(const std::vector<StoredFile>& files) {
-  impl_->check_open();
-  if (files.empty()) return;
-  impl_->using_disk([&] {
-    for (const StoredFile& stored : files)
-      impl_->add_asset(stored.as_written, stored.file, stored.file.filename().string(), true);
-    impl_->write_toml();
-  });
+void SessionWriter::set_assets(std::map<std::string, std::string> assets,
+                               std::vector<MissingAsset> missing) {
+  SessionFile named = impl_->file;
+  named.info.assets = std::move(assets);
+  named.info.missing_assets = std::move(missing);
+  static_cast<void>(to_toml(named));  // throws here what is not about the disk
+  impl_->file = std::move(named);
+  if (impl_->ended || !is_sound()) return;
+  impl_->using_disk([&] { impl_->write_toml(); });
+}
+
+bool SessionWriter::is_sound() const {
+  return impl_->file.fault.empty();
 }
 
 void SessionWriter::set_lost(const Losses& lost) {

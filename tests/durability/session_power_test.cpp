@@ -95,7 +95,9 @@ TEST(PowerCut, LeavesALinkedAssetWhereTheSessionNamesIt) {
   output::AssetStore store(folder / "store", {{"a.glb", elsewhere / "asset.glb"}},
                            [](const std::string& what) { ADD_FAILURE() << what; });
   SessionWriter writer(folder / "one", {}, std::chrono::nanoseconds(0));
-  writer.add_assets(store.files());
+  const auto order = store.deliver(folder / "one");
+  ASSERT_TRUE(wait_until("it is there", [&] { return order->result().has_value(); }));
+  writer.set_assets(order->result()->assets, order->result()->missing);
   const std::size_t acknowledged = disk.calls();
   writer.close();
   for (std::size_t cut = 0; cut <= disk.calls(); ++cut)
@@ -215,51 +217,109 @@ TEST_P(EveryCall, OfARecorderThatFailsEndsTheTakeAndNotTheNext) {
   }
 }
 
+bool is_closed(const std::filesystem::path& take) {
+  return std::filesystem::exists(take / "session.toml") &&
+         session::content_of(take / "session.toml").find("closed = true") != std::string::npos;
+}
+
+// The recorder of two folders, the first of them perhaps on a disk that fails.
+output::RecorderOptions options_of(const std::filesystem::path& first,
+                                   const std::filesystem::path& second) {
+  output::RecorderOptions options;
+  options.take.folders = {first, second};
+  options.take.info.take = session::TakeInfo{0, "1", "", 25, "", false};
+  options.preroll_s = 0;
+  options.reserve_bytes = 0;
+  options.free_bytes = [](const auto&) { return std::uint64_t{1'000'000'000}; };
+  return options;
+}
+
+void offer(output::Recorder& recorder, int index) {
+  const auto frame =
+      std::make_shared<Frame>(noise_frame("observer", index, PixelFormat::rgb8, 24, 18));
+  session::TrackRecord track;
+  track.timestamp_ns = frame->timestamp_ns;
+  recorder.offer(frame);
+  recorder.offer(track);
+}
+
 // With a second disk the recording goes on there, and every frame that was offered is in one of the
-// takes: the frame with which the disk failed, too.
+// takes: the frame with which the disk failed, too. A disk that fails while a stopped take is ended
+// is that take's failure, and begins no other.
 TEST_P(EveryCall, OfTheFirstOfTwoDisksThatFailsLosesNoFrame) {
   const TemporaryDirectory elsewhere;
+  write_content(elsewhere / "asset.glb", "a model");
   for (std::size_t call = 0;; ++call) {
     const TemporaryDirectory folder;
     FaultyDisk disk(folder.path());
     disk.fail(call, GetParam());
     const std::filesystem::path second = elsewhere / std::to_string(call);
-    output::RecorderOptions options;
-    options.take.folders = {folder / "takes", second};
-    options.take.info.take = session::TakeInfo{0, "1", "", 25, "", false};
-    options.preroll_s = 0;
-    options.reserve_bytes = 0;
-    options.free_bytes = [](const auto&) { return std::uint64_t{1'000'000'000}; };
-    std::string faults;
+    output::RecorderOptions options = options_of(folder / "takes", second);
+    options.take.assets = {{"a.glb", elsewhere / "asset.glb"}};
+    output::RecorderStatus status;
     {
       output::Recorder recorder(std::move(options));
       recorder.start();
-      for (int i = 0; i < frames; ++i) {
-        const auto frame =
-            std::make_shared<Frame>(noise_frame("observer", i, PixelFormat::rgb8, 24, 18));
-        session::TrackRecord track;
-        track.timestamp_ns = frame->timestamp_ns;
-        recorder.offer(frame);
-        recorder.offer(track);
-      }
+      for (int i = 0; i < frames; ++i) offer(recorder, i);
       recorder.stop();
       EXPECT_TRUE(wait_until("it is over", [&] {
-        const output::RecorderStatus status = recorder.status();
-        return status.failures > 0 ||
-               (!status.recording && status.frames > 0 && !status.finished.empty());
+        const output::RecorderStatus now = recorder.status();
+        return now.failures > 0 || (!now.recording && now.frames > 0 && !now.finished.empty());
       }));
-      faults = recorder.status().fault;
+      recorder.finish();
+      status = recorder.status();
     }
-    SCOPED_TRACE("call " + std::to_string(call) + ", " + disk.describe(call) + ", " + faults);
+    SCOPED_TRACE("call " + std::to_string(call) + ", " + disk.describe(call) + ", " + status.fault);
     bool closed = false;
-    const int in_first = frames_in(folder / "takes/1_take001", closed).value_or(0);
+    const std::filesystem::path first = folder / "takes/1_take001";
+    const int in_first = frames_in(first, closed).value_or(0);
+    const bool is_first_closed = is_closed(first);  // perhaps without its asset
     int in_second = 0;
-    for (const char* take : {"1_take001", "1_take002"})
-      if (std::filesystem::exists(second / take / "session.toml"))
-        in_second += frames_in(second / take, closed, in_first).value_or(0);
+    bool goes_on = false;  // perhaps without a frame, where only the stop was left
+    for (const char* name : {"1_take001", "1_take002"}) {
+      const std::filesystem::path take = second / name;
+      if (!std::filesystem::exists(take)) continue;
+      const int there = frames_in(take, closed, in_first).value_or(0);
+      goes_on = true;
+      EXPECT_TRUE(closed);
+      in_second += there;
+    }
     EXPECT_EQ(in_first + in_second, frames);
+    EXPECT_FALSE(std::filesystem::exists(second / ".recording")) << "it would record on by itself";
+    EXPECT_EQ(status.failures, goes_on || is_first_closed ? 0u : 1u);
     if (call >= disk.calls()) break;
   }
+}
+
+// A folder that is named with a slash at its end is given up as any other.
+TEST(RecorderOfTwoDisks, GoesOnInTheSecondHoweverTheFirstIsNamed) {
+  for (const char* name : {"takes", "takes/"}) {
+    const TemporaryDirectory folder, elsewhere;
+    FaultyDisk disk(folder.path());
+    output::Recorder recorder(options_of(folder / name, elsewhere / "second"));
+    recorder.start();
+    offer(recorder, 0);
+    ASSERT_TRUE(wait_until("it is recorded", [&] { return recorder.status().frames == 1; }));
+    disk.fail(disk.calls() + 4, DiskFault::io_error);
+    for (int i = 1; i < frames; ++i) offer(recorder, i);
+    recorder.stop();
+    recorder.finish();
+    EXPECT_EQ(recorder.status().directory, elsewhere / "second/1_take002") << name;
+  }
+}
+
+// A folder that cannot forget that somebody records keeps no other from it.
+TEST(TakeFolders, OfWhichOneFailsForgetTheWishInTheOther) {
+  const TemporaryDirectory folder, elsewhere;
+  FaultyDisk disk(folder.path());
+  session::make_folders(elsewhere / "second");
+  session::make_folders(folder / "takes");
+  const output::TakeFolders folders({folder / "takes", elsewhere / "second"}, 0, {});
+  output::TakeFolders::keep_wish(folder / "takes/1_take001");
+  output::TakeFolders::keep_wish(elsewhere / "second/1_take002");
+  disk.fail(disk.calls() + 1, DiskFault::io_error);  // the file is removed, and its name not synced
+  EXPECT_THROW(folders.drop_wish(), Error);
+  EXPECT_EQ(folders.kept_wish(), std::nullopt);
 }
 
 }  // namespace session_power_test

@@ -30,18 +30,25 @@ std::vector<std::string> names_in(const std::filesystem::path& folder) {
   return names;
 }
 
+AssetStore::Delivered deliver(AssetStore& store, const std::filesystem::path& take) {
+  const auto order = store.deliver(take);
+  EXPECT_TRUE(wait_until("it is delivered", [&] { return order->result().has_value(); }));
+  return order->result().value_or(AssetStore::Delivered{});
+}
+
 TEST(AssetStore, KeepsEachContentOnceUnderItsHash) {
   const TemporaryDirectory directory;
   write_content(directory / "a.glb", "a model");
   write_content(directory / "same.glb", "a model");
   AssetStore store(directory / "store",
                    {{"a.glb", directory / "a.glb"}, {"same.glb", directory / "same.glb"}}, no_note);
-  const auto& files = store.files();
-  ASSERT_EQ(files.size(), 2u);
-  EXPECT_EQ(files[0].file, files[1].file);
-  EXPECT_EQ(files[0].file.stem(), session::sha256_of(directory / "a.glb"));
-  EXPECT_EQ(session::read_file(files[0].file), "a model");
-  EXPECT_EQ(names_in(directory / "store").size(), 1u);
+  const AssetStore::Delivered delivered = deliver(store, directory / "take");
+  const std::string name = session::sha256_of(directory / "a.glb") + ".glb";
+  EXPECT_EQ(delivered.assets, (std::map<std::string, std::string>{{"a.glb", "assets/" + name},
+                                                                  {"same.glb", "assets/" + name}}));
+  EXPECT_TRUE(delivered.missing.empty());
+  EXPECT_EQ(session::read_file(directory / "take/assets" / name), "a model");
+  EXPECT_EQ(names_in(directory / "store"), std::vector<std::string>{name});
 }
 
 TEST(AssetStore, NamesWhatCannotBeKeptAndKeepsTheRest) {
@@ -51,8 +58,11 @@ TEST(AssetStore, NamesWhatCannotBeKeptAndKeepsTheRest) {
   AssetStore store(directory / "store",
                    {{"a.glb", directory / "none.glb"}, {"b.glb", directory / "b.glb"}},
                    [&](const std::string& what) { notes.push_back(what); });
-  ASSERT_EQ(store.files().size(), 1u);
-  EXPECT_EQ(store.files()[0].as_written, "b.glb");
+  const AssetStore::Delivered delivered = deliver(store, directory / "take");
+  EXPECT_EQ(delivered.assets.size(), 1u);
+  EXPECT_TRUE(delivered.assets.contains("b.glb"));
+  ASSERT_EQ(delivered.missing.size(), 1u);
+  EXPECT_EQ(delivered.missing[0].as_written, "a.glb");
   ASSERT_EQ(notes.size(), 1u);
   EXPECT_TRUE(notes[0].starts_with("a.glb will not be in the takes: ")) << notes[0];
 }
@@ -64,7 +74,7 @@ TEST(AssetStore, RemovesWhatNoTakeAndNoSetNeeds) {
   write_content(directory / "store/taken.glb", "of a take");
   std::filesystem::create_hard_link(directory / "store/taken.glb", directory / "in_a_take.glb");
   AssetStore store(directory / "store", {}, no_note);
-  store.files();
+  deliver(store, directory / "take");
   EXPECT_EQ(names_in(directory / "store"), std::vector<std::string>{"taken.glb"});
 }
 

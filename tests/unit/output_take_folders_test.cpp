@@ -37,7 +37,7 @@ session::TrackRecord track_of(std::uint64_t index) {
 
 std::string refusal(TakeFolders& folders) {
   try {
-    return "chose " + folders.choose().string();
+    return "chose " + folders.all()[folders.choose()].string();
   } catch (const Error& error) {
     return error.what();
   }
@@ -48,13 +48,14 @@ TEST(TakeFolders, TheFirstThatHasRoomAndDidNotFailIsChosen) {
   const std::filesystem::path first = directory / "a/takes", second = directory / "b/takes";
   std::map<std::filesystem::path, std::uint64_t> free = {{first, plenty}, {second, plenty}};
   TakeFolders folders({first, second}, 5'000'000, [&](const auto& folder) { return free[folder]; });
-  EXPECT_EQ(folders.choose(), first);
+  EXPECT_EQ(folders.choose(), 0u);
   EXPECT_TRUE(std::filesystem::is_directory(first));
   EXPECT_FALSE(std::filesystem::exists(second));
   free[first] = 4'999'999;
-  EXPECT_EQ(folders.choose(), second);
+  EXPECT_EQ(folders.choose(), 1u);
   EXPECT_TRUE(std::filesystem::is_directory(second));
-  EXPECT_FALSE(folders.give_up(first) && folders.give_up(second));
+  EXPECT_TRUE(folders.give_up(0, first.string() + ": its disk failed"));
+  EXPECT_FALSE(folders.give_up(1, second.string() + ": its disk failed"));
   EXPECT_EQ(refusal(folders),
             first.string() + ": its disk failed; " + second.string() + ": its disk failed");
   folders.forgive_all();
@@ -71,8 +72,8 @@ TEST(TakeFolders, AFolderThatCannotBeMadeIsPassedOverByName) {
   const TemporaryDirectory directory;
   session::write_content(directory / "file", "no folder");
   TakeFolders folders({directory / "file/takes", directory / "b"}, 0, {});
-  EXPECT_EQ(folders.choose(), directory / "b");
-  folders.give_up(directory / "b");
+  EXPECT_EQ(folders.choose(), 1u);
+  folders.give_up(1, "its disk failed");
   EXPECT_NE(refusal(folders).find("file/takes"), std::string::npos) << refusal(folders);
 }
 
@@ -107,6 +108,13 @@ TEST(NextTakeNumber, CountsThroughAllFoldersAndIgnoresAbsurdNumbers) {
        {"a/12A_take003", "b/12A_take007", "b/12A_take2147483647", "a/12B_take009"})
     session::make_folders(directory / take);
   EXPECT_EQ(next_take_number({directory / "a", directory / "b", directory / "none"}, "12A"), 8);
+  EXPECT_EQ(next_take_number({directory / "a", directory / "b"}, "12A", 11), 12);
+}
+
+TEST(TakeFolders, AreOnOneDiskWhereTheFoldersAboveThemAre) {
+  const TemporaryDirectory directory;
+  EXPECT_TRUE(are_on_one_disk(directory / "not/made", directory / "yet"));
+  EXPECT_FALSE(are_on_one_disk(directory.path(), "/proc"));
 }
 
 // The recorder of two disks, and what it reports.
@@ -162,10 +170,11 @@ TEST(Recorder, OfTwoDisksGoesOnWithoutAGapWhenTheFirstIsFull) {
       return recorder.status().number == 2;
     }));
     offer();
+    ASSERT_TRUE(wait_until("the first take is finished",
+                           [&] { return recorder.status().finished == "12A_take001"; }));
     const RecorderStatus status = recorder.status();
     EXPECT_TRUE(status.recording);
     EXPECT_EQ(status.failures, 0u);
-    EXPECT_EQ(status.finished, "12A_take001");
   }
   const std::uint64_t in_first = frames_of(disks.directory / "first/12A_take001", 0);
   EXPECT_EQ(in_first + frames_of(disks.directory / "second/12A_take002", in_first), offered);

@@ -244,6 +244,21 @@ inverse_table = [0.0, 0.25, 1.0]
       << text;
 }
 
+TEST(SessionToml, WhatIsMissingComesBack) {
+  SessionFile file;
+  file.info.missing_assets = {
+      {"c.glb", "/set/c.glb", "", "it cannot be opened"},
+      {"models/a \"b\".glb", "/set/models/a.glb", std::string(64, 'a'), "the disk\nis full"}};
+  file.lost = {3, 2, 1};
+  EXPECT_EQ(through_toml(file).info.missing_assets, file.info.missing_assets);
+  EXPECT_EQ(through_toml(file).lost, file.lost);
+  // Names of files need not be UTF-8, and a count need not fit an integer of TOML.
+  file.info.missing_assets = {{"c.glb", "/set/\xff.glb", "", "why"}};
+  file.lost.frames = std::numeric_limits<std::uint64_t>::max();
+  EXPECT_EQ(through_toml(file).info.missing_assets[0].file, "/set/?.glb");
+  EXPECT_EQ(through_toml(file).lost.frames, std::uint64_t{INT64_MAX});
+}
+
 TEST(SessionToml, NamesMustBeText) {
   SessionFile file;
   file.info.name = "\xff";

@@ -1,0 +1,208 @@
+#include "daemon/output/record_queue.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "drivers/bracket.hpp"
+
+namespace previz::output {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+// A frame may be offered so long after its capture.
+constexpr std::chrono::seconds late{1};
+
+}  // namespace
+
+void NewestLight::remember(const Captured& captured) {
+  forget_unlike(*captured.frame);
+  by_exposure_[exposure_step(captured.frame->exposure)] = captured;
+  if (by_exposure_.size() <= most_exposures) return;
+  by_exposure_.erase(std::ranges::min_element(
+      by_exposure_, {}, [](const auto& older) { return older.second.frame->timestamp_ns; }));
+}
+
+void NewestLight::forget_unlike(const Frame& frame) {
+  std::erase_if(by_exposure_, [&](const auto& older) {
+    const Frame& known = *older.second.frame;
+    return known.format != frame.format || known.bayer != frame.bayer ||
+           known.width != frame.width || known.height != frame.height;
+  });
+}
+
+std::vector<Captured> NewestLight::in_order() const {
+  std::vector<Captured> lights;
+  for (const auto& [step, light] : by_exposure_) lights.push_back(light);
+  std::ranges::sort(lights, {}, [](const Captured& c) { return c.frame->timestamp_ns; });
+  return lights;
+}
+
+void add(session::Losses& to, const session::Losses& more) {
+  to.frames += more.frames;
+  to.shown += more.shown;
+  to.records += more.records;
+}
+
+// Returns about how much memory an entry takes. An entry that begins or ends a take counts as 0, so
+// that it is never left out.
+std::uint64_t RecordQueue::bytes_of(const Entry& entry) {
+  if (const auto* captured = std::get_if<Captured>(&entry)) return captured->frame->bytes.size();
+  if (const auto* event = std::get_if<Event>(&entry)) return sizeof(Entry) + event->what.size();
+  if (const auto* button = std::get_if<ButtonEvent>(&entry))
+    return sizeof(Entry) + button->button.size();
+  const auto* record = std::get_if<session::TrackRecord>(&entry);
+  if (!record) return 0;
+  constexpr std::uint64_t of_a_name = 128;  // of a node of a map and its key
+  std::uint64_t bytes = sizeof(Entry) + record->tags.size() * sizeof(int);
+  bytes += record->scene.objects.size() * (of_a_name + sizeof(glm::dmat4));
+  bytes += record->scene.lights.size() * (of_a_name + sizeof(session::LightState));
+  bytes += record->carriers.size() * (of_a_name + sizeof(session::CarrierState));
+  if (const auto& light = record->captured_light)
+    bytes += light->sources.size() * sizeof(session::CapturedSource) +
+             light->ambient.size() * sizeof(glm::vec3);
+  return bytes;
+}
+
+session::Losses RecordQueue::loss_of(const Entry& entry) {
+  if (const auto* captured = std::get_if<Captured>(&entry)) {
+    if (captured->frame->source == "composite") return {.shown = 1};
+    return {.frames = 1};
+  }
+  return bytes_of(entry) > 0 ? session::Losses{.records = 1} : session::Losses{};
+}
+
+bool RecordQueue::push_within(std::uint64_t room, Entry entry) {
+  const std::uint64_t bytes = bytes_of(entry);
+  if (bytes > 0 && queued_bytes_ + bytes > room) {
+    add(left_out_, loss_of(entry));
+    return false;
+  }
+  const auto* captured = std::get_if<Captured>(&entry);
+  if (captured && captured->frame->source == "observer")
+    last_frame_ns_ = captured->frame->timestamp_ns;
+  queued_bytes_ += bytes;
+  queue_.push_back({std::move(entry), std::exchange(left_out_, {})});
+  return true;
+}
+
+bool RecordQueue::push(const Captured& captured) {
+  if (captured.frame->source == "light") older_light_.remember(captured);
+  return push_within(bytes_, captured);
+}
+
+bool RecordQueue::push_shown(const Captured& captured) {
+  return push_within(bytes_ / 2, captured);
+}
+
+// Frames fill the queue first, so that a disk that is a little too slow loses no tracking.
+bool RecordQueue::push_record(Entry entry) {
+  return push_within(bytes_ + bytes_ / 8, std::move(entry));
+}
+
+void RecordQueue::push_mark(Entry entry) {
+  push_within(bytes_, std::move(entry));
+}
+
+bool RecordQueue::keep(const Captured& captured) {
+  ring_.emplace_back(captured);
+  ring_bytes_ += bytes_of(ring_.back());
+  return trim_ring();
+}
+
+void RecordQueue::keep(const session::TrackRecord& record) {
+  ring_.emplace_back(record);
+  ring_bytes_ += bytes_of(ring_.back());
+  while (ring_bytes_ > bytes_ / 2) forget_first_of_ring();
+}
+
+// Drops the ring's oldest entries, counting time from its newest frame. A full ring must fit the
+// queue with room to spare. Returns whether frames were dropped only because it was full.
+bool RecordQueue::trim_ring() {
+  const std::int64_t newest = std::get<Captured>(ring_.back()).frame->timestamp_ns;
+  const auto keep_ns = static_cast<std::int64_t>(preroll_s_ * 1e9);
+  bool is_short = false;
+  while (!ring_.empty()) {
+    const auto* captured = std::get_if<Captured>(&ring_.front());
+    const bool old = !captured || newest - captured->frame->timestamp_ns > keep_ns;
+    if (!old && ring_bytes_ <= bytes_ / 2) break;
+    is_short = is_short || !old;
+    forget_first_of_ring();
+  }
+  return is_short;
+}
+
+double RecordQueue::ring_length_s() const {
+  std::optional<std::int64_t> first, last;
+  for (const Entry& entry : ring_)
+    if (const auto* captured = std::get_if<Captured>(&entry)) {
+      last = captured->frame->timestamp_ns;
+      if (!first) first = last;
+    }
+  return first ? 1e-9 * static_cast<double>(*last - *first) : 0;
+}
+
+void RecordQueue::forget_first_of_ring() {
+  ring_bytes_ -= bytes_of(ring_.front());
+  const auto* captured = std::get_if<Captured>(&ring_.front());
+  if (captured && captured->frame->source == "light") older_light_.remember(*captured);
+  ring_.pop_front();
+}
+
+// In standby, or while the camera is missing, nothing is offered, and the ring's entries become too
+// old.
+void RecordQueue::forget_what_is_long_ago() {
+  const auto keep = std::chrono::duration<double>(preroll_s_) + late;
+  const auto is_long_ago = [&](const Entry& entry) {
+    const auto* captured = std::get_if<Captured>(&entry);
+    return !captured || SteadyClock::now() - captured->offered > keep;
+  };
+  while (!ring_.empty() && is_long_ago(ring_.front())) forget_first_of_ring();
+}
+
+void RecordQueue::begin() {
+  push_mark(Start{});
+  forget_what_is_long_ago();
+  const auto queue_always = [this](Entry entry) {
+    queued_bytes_ += bytes_of(entry);
+    queue_.push_back({std::move(entry), {}});
+  };
+  const auto light_of = [](const Entry& entry) -> const Captured* {
+    const auto* captured = std::get_if<Captured>(&entry);
+    return captured && captured->frame->source == "light" ? captured : nullptr;
+  };
+  for (const Entry& entry : ring_)
+    if (const Captured* light = light_of(entry)) older_light_.forget_unlike(*light->frame);
+  for (const Captured& light : older_light_.in_order()) queue_always(light);
+  for (Entry& entry : ring_) {
+    const auto* captured = std::get_if<Captured>(&entry);
+    if (captured && captured->frame->source == "observer")
+      last_frame_ns_ = captured->frame->timestamp_ns;
+    if (const Captured* light = light_of(entry)) older_light_.remember(*light);
+    queue_always(std::move(entry));
+  }
+  ring_.clear();
+  ring_bytes_ = 0;
+}
+
+bool RecordQueue::begins_a_take() const {
+  return !queue_.empty() && std::holds_alternative<Start>(queue_.front().entry);
+}
+
+RecordQueue::Queued RecordQueue::pop() {
+  Queued next = std::move(queue_.front());
+  queue_.pop_front();
+  queued_bytes_ -= bytes_of(next.entry);
+  return next;
+}
+
+session::Losses RecordQueue::take_left_out() {
+  return std::exchange(left_out_, {});
+}
+
+void RecordQueue::give_back(Queued queued) {
+  queued_bytes_ += bytes_of(queued.entry);
+  queue_.push_front(std::move(queued));
+}
+
+}  // namespace previz::output

@@ -1,0 +1,110 @@
+// What was offered for recording and is not on the disk yet: the bounded queue in front of the
+// disk, the ring that holds the time before the button press, and the light from before the ring.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "drivers/buttons.hpp"
+#include "drivers/frame.hpp"
+#include "drivers/session/session.hpp"
+
+namespace previz::output {
+
+// A frame and when it was offered.
+struct Captured {
+  FramePtr frame;
+  std::chrono::system_clock::time_point at = std::chrono::system_clock::now();
+  std::chrono::steady_clock::time_point offered = std::chrono::steady_clock::now();
+};
+
+// The newest light frame of each exposure (at most most_exposures, of one format), because a take
+// begins with its light, however old.
+class NewestLight {
+ public:
+  void remember(const Captured& captured);
+  void forget_unlike(const Frame& frame);  // lights of another format fit no take with this one
+  void clear() { by_exposure_.clear(); }
+  std::vector<Captured> in_order() const;  // of time
+
+ private:
+  std::map<long, Captured> by_exposure_;
+};
+
+void add(session::Losses& to, const session::Losses& more);
+
+// Not thread-safe; the recorder holds its lock.
+class RecordQueue {
+ public:
+  struct Event {
+    std::int64_t timestamp_ns;
+    std::string what;
+  };
+  struct Start {};
+  struct Stop {
+    bool is_wished;  // by somebody; otherwise the process ends
+  };
+  struct MarkGood {};
+  using Entry =
+      std::variant<Captured, session::TrackRecord, ButtonEvent, Event, Start, Stop, MarkGood>;
+  struct Queued {
+    Entry entry;
+    session::Losses lost;  // offered between the entry before and this one, and left out
+  };
+
+  // `bytes` is the room for frames, of which the ring gets at most half and pictures that were
+  // shown half; tracking, buttons and events may take an eighth more.
+  RecordQueue(double preroll_s, std::uint64_t bytes) : preroll_s_(preroll_s), bytes_(bytes) {}
+
+  // Returns the entry as a loss.
+  static session::Losses loss_of(const Entry& entry);
+
+  // These return false where there is no room: the entry is left out, and the next one says so.
+  bool push(const Captured& captured);
+  bool push_shown(const Captured& captured);
+  bool push_record(Entry entry);  // a line of tracking, a button or an event
+  void push_mark(Entry entry);    // a stop or a mark, for which there is always room
+
+  // Keep what is offered while nothing is recorded. Of a frame: returns whether others were dropped
+  // only because the ring was full.
+  bool keep(const Captured& captured);
+  void keep(const session::TrackRecord& record);
+  // Begins a take with the light from before the ring and what the ring holds.
+  void begin();
+
+  bool empty() const { return queue_.empty(); }
+  bool begins_a_take() const;  // the next entry does
+  Queued pop();
+  void give_back(Queued queued);    // the one that was popped last
+  session::Losses take_left_out();  // after the last entry; the next one does not say it then
+
+  double ring_length_s() const;  // from its oldest frame to its newest
+  std::uint64_t ring_bytes() const { return ring_bytes_; }
+  // Returns the time of the newest observer frame that was queued.
+  std::int64_t last_frame_ns() const { return last_frame_ns_; }
+
+ private:
+  static std::uint64_t bytes_of(const Entry& entry);
+  bool push_within(std::uint64_t room, Entry entry);
+  bool trim_ring();
+  void forget_first_of_ring();
+  void forget_what_is_long_ago();
+
+  const double preroll_s_;
+  const std::uint64_t bytes_;
+  std::deque<Queued> queue_;  // entries for the disk, in order
+  std::uint64_t queued_bytes_ = 0;
+  session::Losses left_out_;  // since the last entry of the queue
+  std::deque<Entry> ring_;    // entries while nothing is recorded
+  std::uint64_t ring_bytes_ = 0;
+  NewestLight older_light_;  // that is no longer in the ring
+  std::int64_t last_frame_ns_ = 0;
+};
+
+}  // namespace previz::output

@@ -1,0 +1,44 @@
+#include "daemon/output/salvage.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <system_error>
+
+#include "drivers/session/session.hpp"
+
+namespace previz::output {
+
+bool Salvage::look(std::vector<std::string>& salvaged) {
+  bool is_first = false;
+  std::vector<std::filesystem::path> takes;
+  for (std::size_t i = 0; i < folders_.size(); ++i) {
+    if (is_looked_at_[i]) continue;
+    try {
+      if (!std::filesystem::exists(folders_[i])) continue;
+      is_first = true;
+      is_looked_at_[i] = true;
+      for (const auto& entry : std::filesystem::directory_iterator(folders_[i]))
+        if (entry.is_directory()) takes.push_back(entry.path());
+    } catch (const std::filesystem::filesystem_error& error) {
+      is_looked_at_[i] = true;  // once, and not each second
+      note_("takes from before cannot be looked at: " + std::string(error.what()));
+    }
+  }
+  std::ranges::sort(takes, {}, [](const auto& take) { return take.filename(); });
+  for (const std::filesystem::path& take : takes) salvage(take, salvaged);
+  return is_first;
+}
+
+void Salvage::salvage(const std::filesystem::path& take, std::vector<std::string>& salvaged) const {
+  try {
+    const std::optional<std::uint64_t> frames = session::salvage(take);
+    if (frames)
+      salvaged.push_back(take.filename().string() + " was cut off; it has " +
+                         std::to_string(*frames) + " frames");
+  } catch (const std::exception& error) {
+    note_("a take from before cannot be read: " + std::string(error.what()));
+  }
+}
+
+}  // namespace previz::output
