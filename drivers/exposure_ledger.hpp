@@ -1,6 +1,7 @@
 // Works out which exposure applied to which frame of a device that does not report it.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -15,6 +16,11 @@ struct Exposure {
 
   friend bool operator==(const Exposure&, const Exposure&) = default;
 };
+
+// Returns whether radiance can be divided by an exposure.
+inline bool is_exposure(double exposure_s, double gain) {
+  return exposure_s > 0 && gain > 0 && std::isnormal(exposure_s * gain);
+}
 
 // A device applies a new exposure somewhere between the frame it is capturing when it is asked and
 // a few frames later. Earlier frames have the old exposure, later ones the new. In between nobody

@@ -54,11 +54,6 @@ Reach reach_of(const std::string& device) {
   return !is_address(device) && usb_place_of_aravis(device) ? Reach::usb : Reach::network;
 }
 
-// Returns whether radiance can be divided by an exposure.
-bool is_exposure(double exposure_s, double gain) {
-  return exposure_s > 0 && gain > 0 && std::isnormal(exposure_s * gain);
-}
-
 struct Agreed {
   CameraFormat format;
   convert::WireFormat wire;

@@ -117,7 +117,9 @@ class LibcameraCamera final : public Camera {
 
   std::optional<Exposure> exposure_of(const Completed& completed, std::int64_t timestamp_ns) {
     const std::optional<Exposure> by_time = ledger_.of_frame(timestamp_ns);
-    if (!completed.exposure_s) return by_time;
+    // Radiance cannot be divided by what a pipeline reports that has no gain yet.
+    if (!completed.exposure_s || !is_exposure(*completed.exposure_s, completed.gain))
+      return by_time;
     return Exposure{*completed.exposure_s, completed.gain};
   }
 
