@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "daemon/lighting/lighting.hpp"
+#include "daemon/output/take_folders.hpp"
 #include "daemon/pipeline/room_model.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/render/feature.hpp"
@@ -157,6 +158,15 @@ void remark_on_cameras(Checked& checked) {
   if (set.lighting.from == set::LightFrom::camera && !set.lighting.environment && !has_light_camera)
     checked.remarks.push_back(
         "no environment and no calibrated light camera here: the light must come with the session");
+}
+
+void remark_on_recording(Checked& checked) {
+  const set::Recording& recording = checked.set.recording;
+  if (recording.second_directory &&
+      output::are_on_one_disk(recording.directory, *recording.second_directory))
+    checked.remarks.push_back(
+        "recording.second_directory is on the disk of recording.directory now: where that is full "
+        "or fails, no recording can go on in it");
 }
 
 void remark_on_scene(Checked& checked, const scene::Scene& scene) {
@@ -358,6 +368,7 @@ int check_set(const fs::path& set_or_session, std::ostream& out) {
   if (!problems.empty()) return refuse(problems, out);
 
   remark_on_cameras(checked);
+  remark_on_recording(checked);
   remark_on_scene(checked, *scene);
   out << checked.set.name << " (" << checked.set.file.string() << ") is right\n";
   print_cameras(checked.set, out);

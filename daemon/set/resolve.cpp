@@ -51,9 +51,8 @@ class Resolver {
     buttons();
     contacts();
     display();
-    set_.recording.directory = located(set_.recording.directory);
-    if (auto& second = set_.recording.second_directory) second = located(*second);
-    set_.output.directory = located(set_.output.directory);
+    recording();
+    set_.output.directory = folder_at(set_.output.directory);
   }
 
  private:
@@ -69,6 +68,22 @@ class Resolver {
 
   fs::path located(const fs::path& as_written) const {
     return (folder_ / as_written).lexically_normal();
+  }
+
+  // Returns the path of a folder, without the slash that it may end in.
+  fs::path folder_at(const fs::path& as_written) const {
+    const fs::path folder = located(as_written);
+    return folder.has_filename() || folder == folder.root_path() ? folder : folder.parent_path();
+  }
+
+  void recording() {
+    set_.recording.directory = folder_at(set_.recording.directory);
+    auto& second = set_.recording.second_directory;
+    if (!second) return;
+    second = folder_at(*second);
+    if (second == set_.recording.directory)
+      problem(given("recording"), "second_directory",
+              "is the folder of recording.directory; allowed: a folder on another disk");
   }
 
   // Returns the path of a file that must exist. An asset replaces the file that the set names.

@@ -310,7 +310,7 @@ Keys control_keys(Control& c) {
 Keys recording_keys(Recording& r) {
   return {
       {"directory", &r.directory, plain, "Folder for takes; each gets a folder of its own: SLATE_take001 and so on."},
-      {"second_directory", &r.second_directory, plain, "Folder on another disk, in which a recording goes on when the disk of `directory` is full or fails. Takes are numbered through both. Default: the recording ends.", optional("\"/media/second/takes\"")},
+      {"second_directory", &r.second_directory, plain, "Folder on another disk, in which a recording goes on when the disk of `directory` is full or fails. Takes are numbered through both, and the set's files are kept in both. Default: the recording ends.", optional("\"/media/second/takes\"")},
       {"slate", &r.slate, plain, "Scene and shot, as on the slate. Default: the set's name.", optional("\"12A\"")},
       {"notes", &r.notes, plain, "Notes that are written into every take.", optional("\"second unit, 35 mm\"")},
       {"preroll_s", &r.preroll_s, seconds.within(0, 60), "A take begins this long before the button was pressed; the frames are kept in memory until then."},

@@ -65,6 +65,13 @@ class Check : public testing::Test {
   }
 };
 
+TEST_F(Check, RemarksThatBothFoldersOfTakesAreOnOneDisk) {
+  ASSERT_EQ(check("[recording]\nsecond_directory='more'\n"), 0) << said_;
+  expect_said("recording.second_directory is on the disk of recording.directory now");
+  ASSERT_EQ(check("[recording]\nsecond_directory='/proc/takes'\n"), 0) << said_;
+  EXPECT_EQ(said_.find("second_directory"), std::string::npos) << said_;
+}
+
 TEST_F(Check, DescribesWhatASetAsksFor) {
   write("table.gltf", triangle(R"("pbrMetallicRoughness": {"metallicFactor": 0})"));
   write("ring.gltf", triangle(R"("pbrMetallicRoughness": {"metallicFactor": 1})"));

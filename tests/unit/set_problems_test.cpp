@@ -237,6 +237,8 @@ const Mistake contradictions[] = {
     {"[light_camera]\ndriver='v4l2'\ndevice='c'\n[light_camera.camera]\nexposure_s=0.1\nbracket_s=["
      "0.1]\n",
      "5:1: light_camera.camera.exposure_s: does not go with bracket_s", ""},
+    {"[recording]\ndirectory='a/takes'\nsecond_directory='a/b/../takes/'\n",
+     "3:1: recording.second_directory: is the folder of recording.directory", "another disk"},
     {"[lighting]\nfrom='recording'\n", "2:1: lighting.from: a recording has", "mode = \"sources\""},
     {"[lighting]\nmode='hybrid'\nfrom='recording'\n", "2:1: lighting.mode: a recording has",
      "\"hybrid\""},

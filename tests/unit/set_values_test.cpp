@@ -33,6 +33,15 @@ TEST(SetValues, EmptyFileIsTheDefaults) {
   EXPECT_EQ(set.output.directory, "folder/out");
 }
 
+TEST(SetValues, AFolderIsTheSameWithASlashAtItsEnd) {
+  const auto set = parse(
+      "[recording]\ndirectory='takes/'\nsecond_directory='/second//takes/'\n"
+      "[output]\ndirectory='/'\n");
+  EXPECT_EQ(set.recording.directory, "folder/takes");
+  EXPECT_EQ(set.recording.second_directory, "/second/takes");
+  EXPECT_EQ(set.output.directory, "/");
+}
+
 TEST(SetValues, AreInUnitsOfTheStructs) {
   const auto set = parse(R"(
 [observer]
