@@ -1,9 +1,9 @@
 // previzd parses the command line and runs the subcommand; it does nothing else.
 //
 // Exit status: 0 done; 1 an error, one line on standard error says which; 2 the command line cannot
-// be understood; 75 the service wants to be started again, because another version was installed;
-// 128 + N stopped by signal N (what was finished is on disk, and a render goes on
-// there when it is called again).
+// be understood; 75 the service wants to be started again, because another version was installed,
+// or the driver of the graphics card was loaded; 128 + N stopped by signal N (what was finished is
+// on disk, and a render goes on there when it is called again).
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -73,10 +73,15 @@ int do_trade(trade::TradeOptions& options, const StopOnSignal& stop) {
 int do_run(rig::LiveOptions& options, const StopOnSignal& stop) {
   options.stop = stop.token();
   report::Reports reports(report::log);
-  if (options.bus) options.replaced = [] { return rig::Service::program_was_replaced(); };
+  if (options.bus) {
+    options.replaced = [] { return rig::Service::program_was_replaced(); };
+    options.has_new_devices = [kinds = rig::Service::device_kinds()] {
+      return rig::Service::device_kinds() != kinds;
+    };
+  }
   const std::string metrics = to_json(rig::run_live(options, reports));
   if (!options.bus) std::cout << metrics;  // a service publishes them on the bus
-  if (options.replaced && options.replaced() && stop.received() == 0)
+  if (options.bus && stop.received() == 0 && (options.replaced() || options.has_new_devices()))
     return rig::Service::start_again;
   return 0;  // a rig runs until it is stopped
 }

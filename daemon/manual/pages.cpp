@@ -93,7 +93,7 @@ const Chapter previzd_status{"EXIT STATUS", R"(
 0: Done.
 1: An error; one line on standard error says which.
 2: The command line cannot be understood.
-75: The service ended after a take, because another version was installed meanwhile, and is started again.
+75: The service ended after a take, because another version was installed meanwhile, or to open a graphics card whose driver was loaded after its start, and is started again.
 128+N: Stopped by signal N. Finished frames are on disk, and a render that is called again continues there. (A rig that is stopped has done its work: 0.)
 )"};
 

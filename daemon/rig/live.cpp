@@ -89,6 +89,10 @@ control::Verbs verbs_of(Rig& rig, const set::Set& set, const render::Device& dev
   return verbs;
 }
 
+bool is_recording(const Rig& rig) {
+  return rig.controls().look().state.recording || rig.recorder_status().recording;
+}
+
 // What follows from whether a take is being recorded: the machine stays on meanwhile, and a program
 // that was replaced meanwhile ends afterwards.
 class RecordingWatch {
@@ -101,7 +105,7 @@ class RecordingWatch {
         ended_(std::move(ended)) {}
 
   void look(const Rig& rig) {
-    const bool recording = rig.controls().look().state.recording || rig.recorder_status().recording;
+    const bool recording = is_recording(rig);
     inhibitor_.hold(recording);
     if (std::exchange(recorded_, recording) && !recording) ended_();
   }
@@ -196,6 +200,15 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     }
     const auto reload =
         loop.on_signal(SIGHUP, [&] { rig->perform(*set::find_action("reload_set"), "SIGHUP"); });
+    const auto end_if_barred = [&] {
+      if (!options.has_new_devices || !render::drawing_device(*device).empty() ||
+          is_recording(*rig) || !options.has_new_devices())
+        return;
+      reports({report::Severity::info, "",
+               "there are devices of a new kind; previzd starts again to open them"});
+      end.request_stop();
+    };
+    const auto drivers = loop.every(std::chrono::seconds(1), end_if_barred);
     rig->run();
     sets.leave(rig->controls().look().edits);
     if (sets.has_next() && rig->controls().look().take_edits != pipeline::Edits{})

@@ -33,6 +33,10 @@ struct LiveOptions {
   // Returns whether another version of the program has been installed; may be empty. If so when a
   // take ends, run_live ends too, so that an upgrade need not end a take.
   std::function<bool()> replaced;
+  // Returns whether the kernel has devices of a kind that was not there when the process began; may
+  // be empty. If so while there is no graphics device and no take is recorded, run_live ends,
+  // because a service cannot open what came later than itself.
+  std::function<bool()> has_new_devices;
   // Opens devices besides those the set names, for tests.
   std::function<std::vector<std::unique_ptr<Buttons>>()> buttons;
   // Called with a set's cameras before they are used, for tests, which may put others around them.

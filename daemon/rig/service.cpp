@@ -6,6 +6,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <mutex>
 #include <stop_token>
 #include <system_error>
@@ -76,6 +77,14 @@ void Service::stopping() {
 bool Service::program_was_replaced(const char* link) {
   std::error_code unknown;
   return std::filesystem::read_symlink(link, unknown).string().ends_with(" (deleted)");
+}
+
+// See proc(5): the kinds of block devices follow after an empty line.
+std::string Service::device_kinds(const char* file) {
+  std::string kinds;
+  std::ifstream list(file);
+  for (std::string line; std::getline(list, line) && !line.empty();) kinds += line + "\n";
+  return kinds;
 }
 
 }  // namespace previz::rig

@@ -34,8 +34,11 @@ class Service {
   // Returns whether the program's file was replaced or removed since the process began, as an
   // upgrade does; `link` is where the kernel names the file.
   static bool program_was_replaced(const char* link = "/proc/self/exe");
-  // The exit status of a daemon that wants to be started again as another version; the unit knows
-  // it.
+  // Returns the kernel's list of kinds of character devices, "226 drm" and so on; "" if it cannot
+  // be read. A service may open those that were there when it started (DeviceAllow= of the unit).
+  static std::string device_kinds(const char* file = "/proc/devices");
+  // The exit status of a daemon that wants to be started again, as another version or to open
+  // devices of a new kind; the unit knows it.
   static constexpr int start_again = 75;
 
  private:

@@ -15,6 +15,14 @@ for line in StartLimitIntervalSec=0 StateDirectoryMode=0750 CacheDirectoryMode=0
   RestartForceExitStatus=75 LockPersonality=yes ProtectHostname=yes RemoveIPC=yes UMask=0027; do
   grep -qx "$line" previzd.service || fail "previzd.service has no $line"
 done
+# systemd resolves a group of devices only as the service starts, and leaves out one whose module the
+# kernel has not loaded by then. So each module that makes one of the unit's groups is loaded before.
+for module in usbcore videodev mc hid drm nvidia nvidia_modeset nvidia_uvm; do
+  for key in Wants After; do
+    grep -q "^$key=.*modprobe@$module.service" previzd.service ||
+      fail "previzd.service does not load $module before it starts ($key=)"
+  done
+done
 if grep -q '^DeviceAllow=char-input\|^SupplementaryGroups=.*input' previzd.service; then
   fail "previzd.service may read keyboards"
 fi

@@ -2,6 +2,7 @@
 // come back, and the take has every frame.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <condition_variable>
 #include <cstdlib>
 #include <fstream>
@@ -11,6 +12,7 @@
 #include "daemon/rig/live.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/crewed_rig.hpp"
+#include "tests/support/live_rig.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -85,10 +87,14 @@ class RigWithoutItsGpu : public testing::Test {
     std::ofstream(lose_).put('x');
     display_.until_plates(1);
   }
+  bool said(const std::string& words) const {
+    return log_.text().find(words) != std::string::npos;
+  }
   pipeline::MetricsSnapshot run(const std::function<void()>& crew) {
-    LiveOptions options;
+    LiveOptions options = options_;
     options.on_shown = [&](const Shot& shot, const Look& look) { display_.show(shot, look); };
-    return test::run_crewed(std::move(options), directory_.path(), hand_, crew, out_);
+    std::ostream out(&log_);
+    return test::run_crewed(std::move(options), directory_.path(), hand_, crew, out);
   }
 
   std::string more_of_set_ =
@@ -99,7 +105,8 @@ class RigWithoutItsGpu : public testing::Test {
   const Variable hide_variable_{"PREVIZ_HIDE_GPU", hidden_};
   Display display_;
   test::Hand hand_;
-  std::ostringstream out_;
+  LiveOptions options_;
+  test::Log log_;
 };
 
 TEST_F(RigWithoutItsGpu, ShowsPlatesAndRecordsUntilItIsBackAndTakesNoCpu) {
@@ -116,9 +123,9 @@ TEST_F(RigWithoutItsGpu, ShowsPlatesAndRecordsUntilItIsBackAndTakesNoCpu) {
     hand_.press("record");
     display_.until_rendered(2);
   });
-  EXPECT_EQ(metrics.counts.at("device lost"), 1u) << out_.str();
-  EXPECT_EQ(metrics.counts.at("device opened again"), 1u) << out_.str();
-  EXPECT_NE(out_.str().find("while a GPU is waited for"), std::string::npos) << out_.str();
+  EXPECT_EQ(metrics.counts.at("device lost"), 1u) << log_.text();
+  EXPECT_EQ(metrics.counts.at("device opened again"), 1u) << log_.text();
+  EXPECT_NE(log_.text().find("while a GPU is waited for"), std::string::npos) << log_.text();
   EXPECT_EQ(test::accounted_for(metrics), metrics.stages.at("observer").frames);
   session::Session take = session::open_session(directory_ / "takes/1_take001");
   const auto stream = session::open_stream(take, "observer");
@@ -141,7 +148,7 @@ TEST_F(RigWithCpuInstead, DrawsOnTheCpuBecauseTheSetSaysSo) {
     while (std::filesystem::exists(lose_)) display_.until_rendered(1);
     display_.until_rendered(3);
   });
-  EXPECT_NE(out_.str().find("pictures again, on llvmpipe (CPU)"), std::string::npos) << out_.str();
+  EXPECT_NE(log_.text().find("pictures again, on llvmpipe (CPU)"), std::string::npos) << log_.text();
 }
 
 // What the rig had is remembered: after a crash, and when the GPU's module comes later than the
@@ -153,18 +160,44 @@ TEST_F(RigWithoutItsGpu, StartsWithoutItAndWaitsForItIfItHadOneBefore) {
   hide_gpu();
   run([&] {
     display_.until_plates(5);
-    EXPECT_EQ(out_.str().find("live on llvmpipe (CPU)"), std::string::npos) << out_.str();
+    EXPECT_EQ(log_.text().find("live on llvmpipe (CPU)"), std::string::npos) << log_.text();
     give_gpu_back();
     display_.until_rendered(2);
   });
-  EXPECT_NE(out_.str().find("live on no graphics device yet"), std::string::npos) << out_.str();
+  EXPECT_NE(log_.text().find("live on no graphics device yet"), std::string::npos) << log_.text();
+}
+
+// A service may not open a card whose module came after it: it is started again, but in no take.
+TEST_F(RigWithoutItsGpu, StartsAgainWhereTheModuleOfItsCardCameLaterThanItself) {
+  const Variable state("STATE_DIRECTORY", directory_.path());
+  run([&] { display_.until_rendered(1); });
+  hide_gpu();
+  std::atomic<bool> has_new_devices = false;
+  options_.has_new_devices = [&] { return has_new_devices.load(); };
+  run([&] {
+    display_.until_plates(1);
+    hand_.press("record");
+    test::must_come("a take begins", [&] { return said("button record: recording\n"); });
+    has_new_devices = true;
+    display_.until_plates(60);  // two seconds, in which it would end
+    EXPECT_FALSE(said("starts again to open them"));
+    hand_.press("record");
+    test::must_come("the rig starts again", [&] { return said("starts again to open them"); });
+  });
+  EXPECT_TRUE(session::open_session(directory_ / "takes/1_take001").missing.empty());
+}
+
+TEST_F(RigWithoutItsGpu, GoesOnThoughTheKernelHasNewDevicesWhereItsCardIsOpen) {
+  options_.has_new_devices = [] { return true; };
+  run([&] { display_.until_rendered(40); });
+  EXPECT_FALSE(said("starts again"));
 }
 
 TEST_F(RigWithoutItsGpu, StartsOnTheCpuIfItNeverHadOne) {
   const Variable state("STATE_DIRECTORY", directory_.path());
   hide_gpu();
   run([&] { display_.until_rendered(1); });
-  EXPECT_NE(out_.str().find("live on llvmpipe (CPU)"), std::string::npos) << out_.str();
+  EXPECT_NE(log_.text().find("live on llvmpipe (CPU)"), std::string::npos) << log_.text();
   EXPECT_FALSE(std::filesystem::exists(directory_ / "graphics-device"));
 }
 

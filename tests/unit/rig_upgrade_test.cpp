@@ -82,5 +82,18 @@ TEST(Upgrade, IsSeenByTheFileOfTheProgram) {
   EXPECT_TRUE(Service::program_was_replaced((directory / "gone").c_str()));
 }
 
+// What of /proc/devices a service may use is settled as it starts; proc(5) has the format.
+TEST(Upgrade, AKindOfDevicesThatIsNewIsSeenByTheKernelsList) {
+  EXPECT_NE(Service::device_kinds().find(" mem\n"), std::string::npos) << Service::device_kinds();
+  const test::TemporaryDirectory directory;
+  const std::string file = directory / "devices";
+  const std::string kinds = "Character devices:\n  1 mem\n226 drm\n";
+  std::ofstream(file) << kinds << "\nBlock devices:\n  7 loop\n";
+  EXPECT_EQ(Service::device_kinds(file.c_str()), kinds);
+  std::ofstream(file) << kinds << "\nBlock devices:\n  7 loop\n  8 sd\n";
+  EXPECT_EQ(Service::device_kinds(file.c_str()), kinds) << "a disk is no kind of devices to open";
+  EXPECT_EQ(Service::device_kinds((directory / "none").c_str()), "");
+}
+
 }  // namespace rig_upgrade_test
 }  // namespace previz::rig
