@@ -109,7 +109,7 @@ const Chapter previzd_files{"FILES", R"(
 /usr/share/doc/previzd/examples: A set file to start from, and a reference of every key.
 /var/lib/previzd: Takes and snapshots, unless the set file says otherwise. The file graphics-device in it names the graphics card that the rig had last, which it waits for if it is missing; without the file, the CPU draws then.
 /run/previzd: The newest picture (picture.png) and metrics.json, of each second.
-/usr/share/doc/previzd/examples/takes-disk.conf, cameras.conf: How the service is changed for a disk of its own, and for cameras of known addresses.
+/usr/share/doc/previzd/examples/takes-disk.conf, cameras.conf: How the service is changed for takes on disks of their own, and for cameras of known addresses.
 )"};
 
 const Chapter previzctl_status{"EXIT STATUS", R"(

@@ -1,6 +1,11 @@
 #include "daemon/rig/rig.hpp"
 
+#include <unistd.h>
+
+#include <cerrno>
 #include <chrono>
+#include <cstring>
+#include <filesystem>
 #include <future>
 #include <system_error>
 #include <utility>
@@ -72,6 +77,16 @@ Cameras open_cameras_of(const LoadedSet& loaded, const Rig::Parts& parts, Usb us
   return cameras;
 }
 
+// Returns why files cannot be made in a folder, or where it is to be made; empty if they can.
+std::string why_not_writable(const std::filesystem::path& folder) {
+  std::error_code unknown;
+  std::filesystem::path there = std::filesystem::absolute(folder);
+  while (!std::filesystem::exists(there, unknown) && there.has_relative_path())
+    there = there.parent_path();
+  if (!std::filesystem::is_directory(there, unknown)) return "it is no folder";
+  return access(there.c_str(), W_OK) == 0 ? "" : std::strerror(errno);
+}
+
 // If the USB cannot be watched, cameras are still found, but only when the next attempt is due.
 Usb watch_usb(Reports& reports) {
   try {
@@ -109,6 +124,7 @@ Rig::Rig(Parts parts)
       loaded_.set.buttons, open_button_devices(loaded_.set, cameras_, parts_.more_buttons),
       ButtonDesk::Parts{parts_.loop, parts_.kept.reports, parts_.kept.metrics}, asks_of_buttons());
   free_bytes_ = recorder_.free_bytes();
+  look_at_folders();
   show_facts();
 }
 
@@ -310,6 +326,7 @@ void Rig::tick() {
       parts_.sets.look_at_file();
     }
     free_bytes_ = recorder_.free_bytes();
+    look_at_folders();
   }
   if (ticks_ % ticks_a_page == 0) show_facts();
 }
@@ -328,6 +345,22 @@ void Rig::announce_faults() {
   const std::string announced = parts_.kept.reports.announced();
   if (std::exchange(announced_, announced) == announced) return;
   if (changed_) changed_();
+}
+
+// A folder is looked at before a take needs it, because the unit may not let the service write
+// there.
+void Rig::look_at_folders() {
+  const set::Recording& recording = loaded_.set.recording;
+  for (const auto& folder : {std::optional(recording.directory), recording.second_directory}) {
+    if (!folder) continue;
+    const std::string name = folder->string(), why_not = why_not_writable(*folder);
+    if (why_not.empty()) {
+      parts_.kept.reports.settle(name);
+      continue;
+    }
+    const std::string what = "takes cannot be written there: " + why_not;
+    parts_.kept.reports({Severity::error, name, what, name + what, report::lasting(name, what)});
+  }
 }
 
 void Rig::look_at_recorder() {

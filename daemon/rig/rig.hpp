@@ -76,6 +76,7 @@ class Rig {
   void look_at_review();
   void announce_faults();
   void close_take();
+  void look_at_folders();
   void look_at_recorder();
   void resume(const std::string& take);
   void show_facts();

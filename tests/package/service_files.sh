@@ -31,6 +31,16 @@ unknown=$(systemd-analyze verify --man=no ./previzd.service 2>&1 |
   grep -v 'is not executable: No such file' || true)
 [[ -z $unknown ]] || fail "previzd.service: $unknown"
 
+# The example for disks of takes: a dead one keeps neither the service from starting nor the other from
+# being used, and each may be written.
+disks=../config/takes-disk.conf
+for line in 'Wants=mnt-a.mount mnt-b.mount' 'After=mnt-a.mount mnt-b.mount' 'ReadWritePaths=-/mnt/a -/mnt/b'; do
+  grep -qx "$line" $disks || fail "takes-disk.conf has no $line"
+done
+if grep -q '^\(Requires\|RequiresMountsFor\|Requisite\|BindsTo\)=' $disks; then
+  fail "takes-disk.conf keeps the service from starting without a disk"
+fi
+
 # The daemon's program knows the status by the same number.
 grep -q 'int start_again = 75;' ../daemon/rig/service.hpp || fail "the daemon ends with another status than 75"
 

@@ -333,6 +333,22 @@ TEST_F(RigLive, ASetThatCannotStartIsTriedOnce) {
   });
 }
 
+// The second folder is needed in the middle of a take at the earliest, and is looked at before.
+TEST_F(RigLive, AFolderOfTakesThatCannotBeWrittenIsReportedBeforeATakeNeedsIt) {
+  write_set("second_directory = \"second/takes\"\n");
+  std::ofstream(directory_ / "second") << "a file where the disk's folder should be";
+  const std::string trouble =
+      (directory_ / "second/takes").string() + ": takes cannot be written there: it is no folder";
+  run([&] {
+    until_said(trouble);
+    press("record");
+    until([](const Shown& s) { return s.look.state.recording; });
+    press("record");
+    until_said("12A_take001 is finished");  // in the first folder
+  });
+  EXPECT_EQ(count_said("takes cannot be written there"), 1) << log_.text();
+}
+
 // The buttons of a replayed take are pressed again, at its own times.
 TEST_F(RigLive, ARecordedTakePressesItsButtonsAgain) {
   write_set("preroll_s = 0\n");
