@@ -30,9 +30,10 @@ class Inbox {
     eventfd_write(descriptor_.get(), 1);
   }
   // Call this when the pipeline has ended, with the observer's stream or by a stage's error.
-  void finish() {
+  void finish(bool by_error) {
     const std::lock_guard lock(mutex_);
     finished_ = true;
+    by_error_ = by_error;
     eventfd_write(descriptor_.get(), 1);
   }
 
@@ -46,11 +47,15 @@ class Inbox {
     const std::lock_guard lock(mutex_);
     return finished_;
   }
+  bool finished_by_error() const {
+    const std::lock_guard lock(mutex_);
+    return by_error_;
+  }
 
  private:
   mutable std::mutex mutex_;
   std::vector<Event> events_;
-  bool finished_ = false;
+  bool finished_ = false, by_error_ = false;
   OwnedDescriptor descriptor_;
 };
 

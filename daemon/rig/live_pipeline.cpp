@@ -136,7 +136,7 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
     }
     live_render.count_dropped();
     if (tracked.try_pop()) parts.kept.metrics.dropped("render", "stopped");
-    parts.inbox.finish();
+    parts.inbox.finish(failure != nullptr);
   });
 }
 

@@ -306,8 +306,9 @@ void Rig::take_inbox() {
       apply(outcome, "rig");
   }
   if (!inbox_.finished()) return;
-  // A recording that is played has ended; a restart is no reason to end what is recorded.
-  if (!parts_.stop.stop_requested()) recorder_.stop();
+  // A recording that is played has ended; a restart is no reason to end what is recorded, nor is an
+  // error, after which the next process records on.
+  if (!parts_.stop.stop_requested() && !inbox_.finished_by_error()) recorder_.stop();
   parts_.loop.exit();
 }
 

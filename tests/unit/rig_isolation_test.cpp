@@ -174,6 +174,33 @@ TEST_F(RigLive, ACameraThatThrowsIsAskedAgain) {
   unbroken(directory_ / "takes/12A_take001");
 }
 
+// What no keeper catches ends the rig, but not the recording: the next process records on.
+TEST_F(RigLive, AStageThatEndsTheRigDoesNotEndTheRecording) {
+  write_set();
+  std::atomic<bool> throws = false;
+  options_.around_cameras = [&](Cameras& cameras) {
+    test::put_around(cameras.observer, [&](CameraEvent event, Camera&) -> CameraEvent {
+      if (throws) throw 7;  // no error, as C++ libraries throw them
+      return event;
+    });
+  };
+  const std::filesystem::path takes = directory_ / "takes";
+  const auto script = [&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    press("record");
+    const int first = until([](const Shown& s) { return s.look.state.recording; }).count;
+    until([&](const Shown& s) { return s.count > first + 8; });
+    throws = true;
+    test::must_come("the take is closed", [&] {
+      const std::string text = session::read_file(takes / "12A_take001/session.toml");
+      return text.find("closed = true") != std::string::npos;
+    });
+  };
+  EXPECT_THROW(run(script), int);
+  EXPECT_GT(unbroken(takes / "12A_take001").size(), 4u);
+  EXPECT_TRUE(std::filesystem::exists(takes / ".recording"));
+}
+
 // The message bus is restarted, as by an upgrade of the system: the rig is on it again.
 TEST_F(RigLive, ABusThatIsRestartedIsJoinedAgain) {
   test::PrivateBus bus;
