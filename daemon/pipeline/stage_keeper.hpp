@@ -57,8 +57,10 @@ class StageKeeper {
     return false;
   }
 
-  // Call this within a piece of work where it waits for others; it may then take any time.
+  // Call this within a piece of work where it waits for others; it may then take any time, until it
+  // goes on.
   void waits() { pulse_.wait(); }
+  void goes_on() { pulse_.begin(patience_); }
 
  private:
   bool rests() const;

@@ -169,7 +169,6 @@ void LivePipeline::Impl::drop_render_stage() {
 
 // A renderer that fails again is made on a device that was opened anew.
 void LivePipeline::Impl::begin_rendering_anew() {
-  rendering.waits();  // as long as the device is gone
   drop_render_stage();
   if (++begun_anew > 1) gpu().open();
   gpu_keeper.start();
@@ -188,17 +187,20 @@ GpuKeeper::Gpu LivePipeline::Impl::gpu() {
           .drop = [this] { drop_render_stage(); }};
 }
 
-// While there is no graphics device, the crew sees what the camera sees.
+// While there is no graphics device, the crew sees what the camera sees. Only this may take any
+// time: a driver can hang in each attempt to open the device or to make the renderer.
 void LivePipeline::Impl::show_plates(std::chrono::milliseconds time) {
   using Clock = std::chrono::steady_clock;
   const Clock::time_point end = Clock::now() + time;
   const std::stop_token stop = stop_source.get_token();
+  rendering.waits();
   while (!stop.stop_requested() && Clock::now() < end) {
     if (std::optional<Shot> shot = live_render.next_plate("there is no graphics device"))
       rendered.push(*std::move(shot));
     else if (live_render.finished())
       std::this_thread::sleep_for(std::chrono::milliseconds(20));  // a stop comes soon
   }
+  rendering.goes_on();
 }
 
 std::unique_ptr<CameraSource> LivePipeline::Impl::source(std::stop_token stop, Camera& camera,
@@ -245,17 +247,12 @@ void LivePipeline::Impl::observer_stages() {
 
 // While the renderer is made anew, the crew sees the plate.
 std::optional<Shot> LivePipeline::Impl::next_picture() {
-  const auto renew = [this](const render::DeviceLost& lost) {
-    rendering.waits();  // as long as the device is gone
-    return gpu_keeper.renew(lost);
-  };
+  const auto renew = [this](const render::DeviceLost& lost) { return gpu_keeper.renew(lost); };
   for (;;) {
     std::optional<Shot> shot;
     const bool is_well = rendering.attempt([&] {
-      if (!gpu_keeper.is_built()) {
-        rendering.waits();  // as long as the device is gone
-        if (!gpu_keeper.await()) return;
-      }
+      if (!gpu_keeper.await()) return;
+      rendering.goes_on();
       shot = live_render.next(renew);
       if (shot) begun_anew = 0;
     });

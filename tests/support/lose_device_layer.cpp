@@ -3,7 +3,8 @@
 // submit and every wait with VK_ERROR_DEVICE_LOST. The file is taken away; a device made after that
 // works. Where PREVIZ_HIDE_GPU names a file, the devices of the driver, whatever they are, say that
 // they are GPUs, and CPU devices while the file is there: as if a GPU were gone and only the CPU's
-// driver were left. Loader and layer interface, version 2.
+// driver were left. While PREVIZ_HANG_DEVICE names a file that is there, no device is made, and who
+// asks for one waits. Loader and layer interface, version 2.
 #include <unistd.h>
 #include <vulkan/vk_layer.h>
 #include <vulkan/vulkan.h>
@@ -79,6 +80,8 @@ VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
                                              const VkDeviceCreateInfo* info,
                                              const VkAllocationCallbacks* allocator,
                                              VkDevice* device) {
+  const char* hang = std::getenv("PREVIZ_HANG_DEVICE");
+  while (hang != nullptr && access(hang, F_OK) == 0) usleep(10'000);
   const auto* link =
       take_link<VkLayerDeviceCreateInfo>(info, VK_STRUCTURE_TYPE_LOADER_DEVICE_CREATE_INFO);
   const std::lock_guard lock(mutex);

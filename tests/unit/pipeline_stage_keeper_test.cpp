@@ -132,6 +132,11 @@ TEST_F(StageKeeperTest, OnlyWorkThatTakesTooLongIsHung) {
     EXPECT_EQ(liveness_.hung(), std::vector<std::string>{"render"});
     keeper.waits();
     EXPECT_TRUE(liveness_.hung().empty());
+    now_ += std::chrono::hours(1);
+    keeper.goes_on();
+    EXPECT_TRUE(liveness_.hung().empty());
+    now_ += milliseconds(1001);
+    EXPECT_EQ(liveness_.hung(), std::vector<std::string>{"render"});
   });
   keeper.attempt(fail);
   now_ += std::chrono::hours(1);

@@ -87,9 +87,7 @@ class RigWithoutItsGpu : public testing::Test {
     std::ofstream(lose_).put('x');
     display_.until_plates(1);
   }
-  bool said(const std::string& words) const {
-    return log_.text().find(words) != std::string::npos;
-  }
+  bool said(const std::string& words) const { return log_.text().find(words) != std::string::npos; }
   pipeline::MetricsSnapshot run(const std::function<void()>& crew) {
     LiveOptions options = options_;
     options.on_shown = [&](const Shot& shot, const Look& look) { display_.show(shot, look); };
@@ -135,6 +133,27 @@ TEST_F(RigWithoutItsGpu, ShowsPlatesAndRecordsUntilItIsBackAndTakesNoCpu) {
     EXPECT_EQ(records[i].sequence, records[0].sequence + i);
 }
 
+// A driver may hang where the device is opened anew. That is no time in which it is waited for.
+TEST_F(RigWithoutItsGpu, IsKnownToHangWhereItHangsAsItIsOpened) {
+  const std::filesystem::path hang = directory_ / "hang";
+  const Variable variable("PREVIZ_HANG_DEVICE", hang);
+  options_.patience.render = std::chrono::seconds(4);
+  run([&] {
+    display_.until_rendered(2);
+    std::ofstream(hang).put('x');
+    std::ofstream(lose_).put('x');
+    test::must_come("the device is lost", [&] { return said("it is opened again"); });
+    const std::string before = log_.text();  // a slow machine may have missed a picture before
+    const auto is_known = [&] {
+      return log_.text().find("does not answer any more: render", before.size()) !=
+             std::string::npos;
+    };
+    EXPECT_TRUE(test::wait_until("the hang is reported", is_known, std::chrono::seconds(20)));
+    std::filesystem::remove(hang);
+    display_.until_rendered(2);
+  });
+}
+
 class RigWithCpuInstead : public RigWithoutItsGpu {
  protected:
   RigWithCpuInstead() { more_of_set_.insert(0, "cpu_instead = true\n"); }
@@ -148,7 +167,8 @@ TEST_F(RigWithCpuInstead, DrawsOnTheCpuBecauseTheSetSaysSo) {
     while (std::filesystem::exists(lose_)) display_.until_rendered(1);
     display_.until_rendered(3);
   });
-  EXPECT_NE(log_.text().find("pictures again, on llvmpipe (CPU)"), std::string::npos) << log_.text();
+  EXPECT_NE(log_.text().find("pictures again, on llvmpipe (CPU)"), std::string::npos)
+      << log_.text();
 }
 
 // What the rig had is remembered: after a crash, and when the GPU's module comes later than the
