@@ -130,9 +130,11 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
   pthread_sigmask(SIG_BLOCK, &hangup, nullptr);
   pipeline::Metrics metrics;
   pipeline::Liveness liveness;
-  pipeline::Liveness::Pulse pulse(liveness, "main loop");
+  pipeline::Liveness::Pulse pulse(liveness, Service::main_thread);
   pulse.begin(options.patience.set);
-  Service service(liveness, reports);
+  std::stop_source end;
+  const std::stop_callback end_from_outside(options.stop, [&end] { end.request_stop(); });
+  Service service(liveness, reports, end.get_token());
   const pipeline::StageKeeper::Parts kept{.reports = reports,
                                           .metrics = metrics,
                                           .liveness = liveness,
@@ -144,8 +146,6 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     return metrics.snapshot(since.count());
   };
   const auto metrics_json = [&] { return to_json(snapshot()); };
-  std::stop_source end;
-  const std::stop_callback end_from_outside(options.stop, [&end] { end.request_stop(); });
   const auto end_if_replaced = [&] {
     if (!options.replaced || !options.replaced()) return;
     reports({report::Severity::info, "", "another version was installed, and is started now"});
@@ -218,7 +218,8 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     bus.reset();
     watch.reset();
     rig.reset();
-    if (!sets.has_next()) {
+    if (!sets.has_next() || end.stop_requested()) {  // a stop may come with a set that was read
+      service.stopping();
       screen.close();
       return snapshot();
     }

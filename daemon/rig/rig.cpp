@@ -160,9 +160,14 @@ void Rig::run() {
   const auto timer = parts_.loop.every(tick_interval, [this] { tick(); });
   parts_.service.ready("set \"" + loaded_.set.name + "\"");
   parts_.loop.run();
-  if (!parts_.sets.has_next()) parts_.service.stopping();
+  if (ends()) parts_.service.stopping();
   close_take();
-  if (!parts_.sets.has_next()) pipeline_.wait();
+  if (ends()) pipeline_.wait();
+}
+
+// Another rig follows this one where a set was read, unless a stop came with it.
+bool Rig::ends() const {
+  return !parts_.sets.has_next() || parts_.stop.stop_requested();
 }
 
 // Closes the take before any device is given back, because a device may hang. While the disk takes
@@ -170,17 +175,20 @@ void Rig::run() {
 void Rig::close_take() {
   if (std::exchange(is_take_closed_, true)) return;
   const pipeline::Patience& patience = parts_.kept.patience;
-  const auto until_ended = parts_.sets.has_next() ? patience.set : patience.ending;
+  const auto until_ended = ends() ? patience.ending : patience.set;
   parts_.pulse.begin(until_ended);
+  parts_.service.closing_take(true);
   const auto finish = [this] { recorder_.finish(); };
   std::future<void> finished;
   try {
     finished = std::async(std::launch::async, finish);
   } catch (const std::system_error&) {  // there is no thread for it
-    return finish();
+    finish();
   }
-  while (finished.wait_for(std::chrono::milliseconds(200)) != std::future_status::ready)
+  while (finished.valid() &&
+         finished.wait_for(std::chrono::milliseconds(200)) != std::future_status::ready)
     if (recorder_.status().disk_silent_s < longest_disk_silence_s) parts_.pulse.begin(until_ended);
+  parts_.service.closing_take(false);
 }
 
 // Gives the controls what is known of the shown picture alone.

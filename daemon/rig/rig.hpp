@@ -72,6 +72,7 @@ class Rig {
   void take_inbox();
   void tick();
   void leave_if_stopped();
+  bool ends() const;
   void look_at_set();
   void look_at_review();
   void announce_faults();

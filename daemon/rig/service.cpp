@@ -10,6 +10,7 @@
 #include <mutex>
 #include <stop_token>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 namespace previz::rig {
@@ -28,27 +29,36 @@ std::chrono::milliseconds interval() {
 
 }  // namespace
 
-Service::Service(const pipeline::Liveness& liveness, report::Reports& reports)
-    : liveness_(liveness), reports_(reports) {
-  thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
+Service::Service(const pipeline::Liveness& liveness, report::Reports& reports, std::stop_token stop)
+    : liveness_(liveness), reports_(reports), stop_(std::move(stop)) {
+  thread_ = std::jthread([this](const std::stop_token& end) { run(end); });
 }
 
 Service::~Service() = default;
 
-void Service::run(const std::stop_token& stop) {
+void Service::run(const std::stop_token& end) {
   std::mutex mutex;
   std::condition_variable_any ended;
   std::unique_lock lock(mutex);
-  while (!stop.stop_requested()) {
+  while (!end.stop_requested()) {
     try {
       const std::vector<std::string> hung = liveness_.hung();
-      if (hung.empty()) sd_notify(0, is_running_ ? "WATCHDOG=1" : more_time);
+      feed(hung);
       report_hung(hung);
     } catch (const std::exception&) {
       // There is no memory; the watchdog is fed the next time, or somebody must restart the rig.
     }
-    ended.wait_for(lock, stop, interval(), [] { return false; });
+    ended.wait_for(lock, end, interval(), [] { return false; });
   }
+}
+
+void Service::feed(const std::vector<std::string>& hung) const {
+  const bool is_live = is_closing_take_ ? std::ranges::count(hung, main_thread) == 0 : hung.empty();
+  if (!is_live) return;
+  const Phase phase = phase_;
+  const bool is_to_stop = stop_.stop_requested() || phase == Phase::stopping;
+  if (phase == Phase::running) sd_notify(0, "WATCHDOG=1");
+  if (is_to_stop != (phase == Phase::starting)) sd_notify(0, more_time);
 }
 
 void Service::report_hung(const std::vector<std::string>& hung) {
@@ -60,7 +70,7 @@ void Service::report_hung(const std::vector<std::string>& hung) {
 }
 
 void Service::ready(const std::string& status) {
-  is_running_ = true;
+  phase_ = Phase::running;
   sd_notify(0, ("READY=1\nWATCHDOG=1\nSTATUS=" + status).c_str());
 }
 
@@ -69,7 +79,7 @@ void Service::status(const std::string& status) {
 }
 
 void Service::stopping() {
-  is_running_ = false;
+  phase_ = Phase::stopping;
   sd_notify(0, "STOPPING=1");
 }
 

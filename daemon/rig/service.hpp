@@ -19,10 +19,12 @@ namespace previz::rig {
 // Frames do not matter: a camera that is silent, a picture that takes minutes or a scene that is
 // being read are no reason for a restart. The recorder's thread is not among those that must be
 // live, because a disk that hangs would hang for the next process, too, and what waits in memory
-// for it would be lost. While the rig starts or ends, the same thread asks for more time.
+// for it would be lost. While the rig starts or ends, the same thread asks for more time, but none
+// to start what is to stop already.
 class Service {
  public:
-  Service(const pipeline::Liveness& liveness, report::Reports& reports);  // both outlive it
+  // The liveness and the reports outlive it; `stop` is asked whether the rig is to stop.
+  Service(const pipeline::Liveness& liveness, report::Reports& reports, std::stop_token stop);
   ~Service();
   Service(const Service&) = delete;
   Service& operator=(const Service&) = delete;
@@ -30,6 +32,10 @@ class Service {
   void ready(const std::string& status);
   void status(const std::string& status);
   void stopping();
+  // While a take is being closed, the main thread alone decides whether the rig is live: it waits
+  // for the disk, and what else hangs is no reason to end a process that writes a take.
+  void closing_take(bool is_closing) { is_closing_take_ = is_closing; }
+  static constexpr const char* main_thread = "main loop";  // its name in the liveness
 
   // Returns whether the program's file was replaced or removed since the process began, as an
   // upgrade does; `link` is where the kernel names the file.
@@ -42,13 +48,18 @@ class Service {
   static constexpr int start_again = 75;
 
  private:
-  void run(const std::stop_token& stop);
+  enum class Phase { starting, running, stopping };
+
+  void run(const std::stop_token& end);
+  void feed(const std::vector<std::string>& hung) const;
   void report_hung(const std::vector<std::string>& hung);
 
   const pipeline::Liveness& liveness_;
   report::Reports& reports_;
-  std::atomic<bool> is_running_ = false;  // neither starting nor stopping
-  std::string reported_;                  // the threads that were reported as hung
+  const std::stop_token stop_;
+  std::atomic<Phase> phase_ = Phase::starting;
+  std::atomic<bool> is_closing_take_ = false;
+  std::string reported_;  // the threads that were reported as hung
   std::jthread thread_;
 };
 

@@ -203,7 +203,7 @@ TEST(ServiceTest, AsksForMoreTimeUntilItIsReadyAndWhileItStops) {
   pipeline::Liveness liveness;
   pipeline::Liveness::Pulse pulse(liveness, "main loop");
   pulse.begin(std::chrono::hours(1));
-  Service service(liveness, reports);
+  Service service(liveness, reports, {});
   for (int times = 0; times < 3; ++times) systemd.until("EXTEND_TIMEOUT_USEC=");
   service.ready("set \"desk\"");
   systemd.until("READY=1");
@@ -216,6 +216,94 @@ TEST(ServiceTest, AsksForMoreTimeUntilItIsReadyAndWhileItStops) {
                   [&] { return log.str() == "does not answer any more: main loop\n"; });
   systemd.skip();
   EXPECT_EQ(systemd.next(300), "");
+}
+
+// A camera that hangs takes no time from the disk that takes what is queued.
+TEST(ServiceTest, WhileATakeIsClosedTheMainThreadAloneDecides) {
+  const test::TemporaryDirectory directory;
+  NotifySocket systemd(directory / "notify");
+  std::ostringstream log;
+  report::Reports reports(report::lines_to(log));
+  pipeline::Liveness liveness;
+  pipeline::Liveness::Pulse main(liveness, Service::main_thread), camera(liveness, "observer");
+  main.begin(std::chrono::hours(1));
+  camera.begin(std::chrono::milliseconds(-1));  // it hangs
+  Service service(liveness, reports, {});
+  service.ready("set \"desk\"");
+  systemd.until("READY=1");
+  systemd.skip();
+  EXPECT_EQ(systemd.next(300), "");
+  service.closing_take(true);  // another set was read
+  systemd.until("WATCHDOG=1");
+  service.stopping();
+  for (int times = 0; times < 3; ++times) systemd.until("EXTEND_TIMEOUT_USEC=");
+  service.closing_take(false);
+  systemd.next(100);
+  systemd.skip();
+  EXPECT_EQ(systemd.next(300), "");
+  service.closing_take(true);
+  systemd.until("EXTEND_TIMEOUT_USEC=");
+  main.begin(std::chrono::milliseconds(-1));  // it does not wait for the disk any more
+  systemd.next(100);
+  systemd.skip();
+  EXPECT_EQ(systemd.next(300), "");
+}
+
+// A start may be granted ten minutes, but none of them once it is to stop.
+TEST(ServiceTest, AsksForNoTimeToStartWhatIsToStop) {
+  const test::TemporaryDirectory directory;
+  NotifySocket systemd(directory / "notify");
+  std::ostringstream log;
+  report::Reports reports(report::lines_to(log));
+  pipeline::Liveness liveness;
+  std::stop_source stop;
+  Service service(liveness, reports, stop.get_token());
+  systemd.until("EXTEND_TIMEOUT_USEC=");
+  stop.request_stop();
+  systemd.next(100);
+  systemd.skip();
+  EXPECT_EQ(systemd.next(300), "");
+  service.stopping();
+  systemd.until("STOPPING=1");
+  systemd.until("EXTEND_TIMEOUT_USEC=");
+}
+
+// A camera whose giving back comes at the same time as a stop.
+class StoppingCamera final : public test::OtherCamera {
+ public:
+  StoppingCamera(std::unique_ptr<Camera> camera, std::stop_source& stop)
+      : OtherCamera(std::move(camera), [](CameraEvent event, Camera&) { return event; }),
+        stop_(stop) {}
+  ~StoppingCamera() override { stop_.request_stop(); }
+
+ private:
+  std::stop_source& stop_;
+};
+
+TEST_F(RigLive, AStopThatComesWithASetThatWasReadOpensNoDevicesForIt) {
+  write_set();
+  NotifySocket systemd(directory_ / "notify");
+  std::stop_source stop;
+  int opened = 0;
+  options_.set_file = directory_ / "set.toml";
+  options_.directory = directory_ / "live";
+  options_.loop = true;
+  options_.stop = stop.get_token();
+  options_.buttons = [&] {
+    std::vector<std::unique_ptr<Buttons>> buttons;
+    buttons.push_back(std::make_unique<test::Hand::Device>(hand_));
+    return buttons;
+  };
+  options_.around_cameras = [&](Cameras& cameras) {
+    ++opened;
+    cameras.observer = std::make_unique<StoppingCamera>(std::move(cameras.observer), stop);
+  };
+  press("reload_set");
+  std::ostream out(&log_);
+  report::Reports reports(report::lines_to(out));
+  run_live(options_, reports);
+  EXPECT_EQ(opened, 1) << log_.text();
+  systemd.until("STOPPING=1");
 }
 
 }  // namespace rig_watchdog_test
