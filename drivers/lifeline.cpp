@@ -1,6 +1,7 @@
 #include "drivers/lifeline.hpp"
 
 #include <algorithm>
+#include <exception>
 #include <utility>
 
 namespace previz {
@@ -49,17 +50,29 @@ CameraEvent Lifeline::next(milliseconds timeout) {
     }
     const HostClock::Time until = std::min(deadline, next_deadline());
     const auto wait = std::chrono::ceil<milliseconds>(until - clock_.now());
-    if (std::optional<CameraEvent> event = take(camera_->next(std::max(wait, milliseconds(0)))))
+    if (std::optional<CameraEvent> event = take(ask(std::max(wait, milliseconds(0)))))
       return *std::move(event);
     if (std::optional<CameraEvent> event = watch()) return *std::move(event);
   } while (clock_.now() < deadline);
   return NoFrame{};
 }
 
+// A driver that throws may do so at every call from then on: its device is opened anew.
+CameraEvent Lifeline::ask(milliseconds timeout) {
+  try {
+    return camera_->next(timeout);
+  } catch (const std::exception& error) {
+    return DeviceTrouble{name_, std::string("has failed: ") + error.what(), true};
+  }
+}
+
 std::optional<CameraEvent> Lifeline::open() {
   try {
     camera_ = open_();
-    if (exposure_) camera_->set_exposure(exposure_->exposure_s, exposure_->gain);
+    // One whose driver throws is forgotten, so that the next attempt is made without.
+    const std::optional<Wanted> wanted = std::exchange(exposure_, std::nullopt);
+    if (wanted) camera_->set_exposure(wanted->exposure_s, wanted->gain);
+    exposure_ = wanted;
     camera_->start();
   } catch (const std::exception& error) {
     return not_opened(error.what());

@@ -38,7 +38,7 @@ struct LifelineHooks {
 //
 // A camera that cannot be opened or stalls is reported once, and again only when the cause changes;
 // the event `lost` then carries the cause, without a second report. An EndOfStream of the device
-// ends this stream.
+// ends this stream. A device whose driver throws is lost.
 class Lifeline final : public Camera {
  public:
   // `name` stands in reports of trouble. Opens nothing yet.
@@ -61,6 +61,7 @@ class Lifeline final : public Camera {
 
  private:
   std::optional<CameraEvent> open();
+  CameraEvent ask(std::chrono::milliseconds timeout);
   std::optional<CameraEvent> take(CameraEvent event);
   FramePtr numbered(FramePtr frame);
   std::optional<CameraEvent> watch();

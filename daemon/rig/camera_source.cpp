@@ -23,7 +23,6 @@ FramePtr CameraSource::next() {
 }
 
 FramePtr CameraSource::ask() {
-  const std::chrono::duration<double> silence(parts_.silence_s);
   FramePtr frame;
   try {
     pulse_.begin(parts_.kept.patience.camera);
@@ -35,17 +34,23 @@ FramePtr CameraSource::ask() {
     if (has_ended_) return nullptr;
     if (const auto* what = std::get_if<DeviceTrouble>(&event)) trouble(*what);
     if (frame) arrived(*frame);
-    if (!frame && std::chrono::steady_clock::now() - last_ > silence) lose();
+    if (!frame) look_at_silence();
   } catch (const std::exception& error) {
-    failed(error.what());
+    failed(std::string("has failed: ") + error.what() + "; it is asked again");
   }
   return frame;
 }
 
-void CameraSource::failed(const char* why) {
+void CameraSource::look_at_silence() {
+  const std::chrono::duration<double> longest(parts_.silence_s);
+  if (std::chrono::steady_clock::now() - last_ > longest) lose();
+}
+
+void CameraSource::failed(const std::string& what) {
   pulse_.wait();
   try {
-    trouble({camera_.name(), std::string("has failed: ") + why + "; it is asked again", false});
+    trouble({camera_.name(), what, false});
+    look_at_silence();
   } catch (const std::exception&) {
     // Memory may be short; what is asked again will be reported again.
   }
@@ -79,9 +84,17 @@ void CameraSource::arrived(const Frame& frame) {
 }
 
 void CameraSource::change_exposure(double stops) {
-  if (!(exposure_s_ > 0) || !camera_.set_exposure(exposure_s_ * std::exp2(stops), gain_))
-    parts_.kept.reports(report::once(
-        {report::Severity::warning, camera_.name(), "its exposure cannot be driven from here"}));
+  try {
+    pulse_.begin(parts_.kept.patience.camera);
+    const bool is_driven =
+        exposure_s_ > 0 && camera_.set_exposure(exposure_s_ * std::exp2(stops), gain_);
+    pulse_.wait();
+    if (!is_driven)
+      parts_.kept.reports(report::once(
+          {report::Severity::warning, camera_.name(), "its exposure cannot be driven from here"}));
+  } catch (const std::exception& error) {
+    failed(std::string("its exposure cannot be set: ") + error.what());
+  }
 }
 
 }  // namespace previz::rig

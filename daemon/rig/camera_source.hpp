@@ -35,8 +35,9 @@ class CameraSource {
 
  private:
   FramePtr ask();
-  void failed(const char* why);
+  void failed(const std::string& what);
   void trouble(const DeviceTrouble& trouble);
+  void look_at_silence();
   void lose();
   void arrived(const Frame& frame);
 

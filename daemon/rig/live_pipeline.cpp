@@ -266,9 +266,8 @@ std::optional<Shot> LivePipeline::Impl::next_picture() {
 
 std::optional<Shot> LivePipeline::Impl::capture() {
   const int wanted = parts.look.get()->exposure_steps;
-  if (wanted != exposure_steps)
-    observer->change_exposure((wanted - exposure_steps) * parts.set.control.exposure_step_stops);
-  exposure_steps = wanted;
+  if (const int steps = wanted - std::exchange(exposure_steps, wanted); steps != 0)
+    observer->change_exposure(steps * parts.set.control.exposure_step_stops);
 
   while (FramePtr frame = observer->next()) {
     Shot shot;

@@ -167,6 +167,46 @@ TEST_F(LifelineTest, ADeviceMayComeBackWithAnotherFormat) {
   EXPECT_EQ(lifeline.format().height, 30);
 }
 
+// A driver that throws where an exposure is set, and at every call for a frame after some.
+class Throwing final : public Camera {
+ public:
+  Throwing(std::unique_ptr<Camera> camera, int good_calls)
+      : camera_(std::move(camera)), good_calls_(good_calls) {}
+  std::string name() const override { return camera_->name(); }
+  CameraFormat format() const override { return camera_->format(); }
+  void start() override { camera_->start(); }
+  void stop() override { camera_->stop(); }
+  CameraEvent next(milliseconds timeout) override {
+    if (good_calls_ == 0) throw Error("lamp fell down");
+    --good_calls_;
+    return camera_->next(timeout);
+  }
+  bool set_exposure(double, double) override { throw Error("lamp fell down"); }
+  DeviceCounters counters() const override { return camera_->counters(); }
+
+ private:
+  std::unique_ptr<Camera> camera_;
+  int good_calls_;
+};
+
+TEST_F(LifelineTest, ADeviceWhoseDriverThrowsIsOpenedAnew) {
+  int openings = 0;
+  Lifeline lifeline = started([&]() -> std::unique_ptr<Camera> {
+    if (++openings > 1) return take()();
+    return std::make_unique<Throwing>(take()(), 3);
+  });
+  EXPECT_EQ(story(lifeline, milliseconds(2000)), "f [has failed: lamp fell down; reopening it] f");
+  EXPECT_EQ(lifeline.counters().at("lost"), 1u);
+  EXPECT_EQ(lifeline.counters().at("returned"), 1u);
+}
+
+TEST_F(LifelineTest, AnExposureThatCannotBeSetKeepsNoDeviceFromBeingOpened) {
+  Lifeline lifeline = started([&] { return std::make_unique<Throwing>(take()(), 1000); });
+  EXPECT_TRUE(lifeline.set_exposure(0.25, 1));  // there is no device yet
+  EXPECT_EQ(story(lifeline, milliseconds(300)),
+            " [lamp fell down; tried again until it is there] f");
+}
+
 TEST_F(LifelineTest, SequenceNumbersIncreaseOverAllOpenings) {
   std::uint64_t openings = 0;
   Lifeline lifeline = started(with_faults(

@@ -6,12 +6,15 @@
 
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <thread>
 
 #include "daemon/rig/camera_source.hpp"
 #include "drivers/camera_drivers.hpp"
 #include "drivers/error.hpp"
+#include "tests/support/other_camera.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_take.hpp"
+#include "tests/support/wait_until.hpp"
 
 namespace previz::rig {
 namespace rig_cameras_test {
@@ -108,6 +111,35 @@ TEST_F(RigCameras, ACameraThatIsNotThereIsWaitedFor) {
   ASSERT_TRUE(std::holds_alternative<DeviceTrouble>(event));
   EXPECT_THAT(std::get<DeviceTrouble>(event).what, HasSubstr("tried again until it is there"));
   EXPECT_EQ(cameras.observer->counters().at("not opened"), 1u);
+}
+
+// Silence is what counts: whether a camera says nothing, or throws.
+TEST_F(RigCameras, ACameraThatThrowsAtEveryCallIsLost) {
+  Cameras cameras = open_cameras(replayed(), /*loop=*/true);
+  bool throws = false;
+  test::put_around(cameras.observer, [&](CameraEvent event, Camera&) -> CameraEvent {
+    if (throws) throw Error("lamp fell down");
+    return event;
+  });
+  std::ostringstream out;
+  report::Reports reports(report::lines_to(out));
+  pipeline::Metrics metrics;
+  pipeline::Liveness liveness;
+  std::stop_source stop;
+  bool is_lost = false;
+  CameraSource source(*cameras.observer, "observer", "film camera",
+                      {stop.get_token(), {reports, metrics, liveness}, 0.3, [&](bool lost) {
+                         is_lost = lost;
+                         stop.request_stop();
+                       }});
+  ASSERT_TRUE(source.next());
+  throws = true;
+  std::jthread limit([&](const std::stop_token& is_over) {
+    const auto has_ended = [&] { return is_over.stop_requested(); };
+    if (!test::wait_until("it has ended", has_ended, std::chrono::seconds(30))) stop.request_stop();
+  });
+  EXPECT_FALSE(source.next());
+  EXPECT_TRUE(is_lost);
 }
 
 // `previzctl metrics` prints them; they go on over sets that are loaded anew.

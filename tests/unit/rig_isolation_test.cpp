@@ -174,6 +174,40 @@ TEST_F(RigLive, ACameraThatThrowsIsAskedAgain) {
   unbroken(directory_ / "takes/12A_take001");
 }
 
+// A camera whose shutter time cannot be set, and whose driver throws rather than say so.
+class StubbornCamera final : public test::OtherCamera {
+ public:
+  explicit StubbornCamera(std::unique_ptr<Camera> camera)
+      : OtherCamera(std::move(camera), [](CameraEvent event, Camera&) -> CameraEvent {
+          const auto* captured = std::get_if<FramePtr>(&event);
+          if (!captured) return event;
+          auto frame = std::make_shared<Frame>(**captured);
+          frame->exposure_s = 0.01;
+          return FramePtr(std::move(frame));
+        }) {}
+  bool set_exposure(double, double) override { throw std::runtime_error("lamp fell down"); }
+};
+
+TEST_F(RigLive, ACameraThatThrowsWhereItsExposureIsSetIsAskedOnce) {
+  write_set();
+  options_.around_cameras = [&](Cameras& cameras) {
+    cameras.observer = std::make_unique<StubbornCamera>(std::move(cameras.observer));
+  };
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    press("record");
+    until([](const Shown& s) { return s.look.state.recording; });
+    press("exposure_up");
+    until_said("its exposure cannot be set: lamp fell down");
+    const int before = until([](const Shown&) { return true; }).count;
+    until([&](const Shown& s) { return s.count > before + 8; });
+    press("record");
+    until_said("12A_take001 is finished");
+  });
+  EXPECT_EQ(metrics_.counts.at("observer: device trouble"), 1u);
+  unbroken(directory_ / "takes/12A_take001");
+}
+
 // What no keeper catches ends the rig, but not the recording: the next process records on.
 TEST_F(RigLive, AStageThatEndsTheRigDoesNotEndTheRecording) {
   write_set();
