@@ -29,11 +29,18 @@ void GpuKeeper::start() {
     return say_lost(error.what());
   }
   try {
-    gpu_.build();
-    is_built_ = true;
+    build();
   } catch (const render::DeviceLost& lost) {
     say_lost(lost.what());
   }
+}
+
+void GpuKeeper::build() {
+  gpu_.build();
+  is_built_ = true;
+  parts_.reports.settle(graphics_device);
+  if (gpu_.stands_in())
+    parts_.reports.show(report::lasting(graphics_device, "is gone; the CPU draws, slowly"));
 }
 
 bool GpuKeeper::renew(const render::DeviceLost& lost) {
@@ -47,11 +54,7 @@ bool GpuKeeper::await() {
   while (!is_built_ && !parts_.stop.stop_requested()) {
     try {
       gpu_.open();
-      gpu_.build();
-      is_built_ = true;
-      parts_.reports.settle(graphics_device);
-      if (gpu_.stands_in())
-        parts_.reports.show(report::lasting(graphics_device, "is gone; the CPU draws, slowly"));
+      build();
       parts_.metrics.count("device opened again");
       parts_.reports({Severity::info, "", "pictures again, on " + gpu_.name()});
     } catch (const std::exception& error) {

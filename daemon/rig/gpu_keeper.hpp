@@ -47,6 +47,7 @@ class GpuKeeper {
 
  private:
   void say_lost(const std::string& what);
+  void build();
 
   const Gpu gpu_;
   const Parts parts_;

@@ -14,6 +14,7 @@ LiveLight::LiveLight(Parts parts, const std::optional<LightCameraCalibration>& c
     : parts_(std::move(parts)),
       make_stage_([this, calibration, observer] {
         stage_.emplace(parts_.set, calibration, observer, &parts_.scene);
+        stage_->await_bracket(bracket_);
       }),
       needs_frames_((make_stage_(), stage_->needs_frames())),
       needs_observer_(stage_->needs_observer()),

@@ -32,8 +32,12 @@ class LiveLight {
   // True if the light is made from the light camera's frames.
   bool needs_frames() const { return needs_frames_; }
 
-  // Holds the first light back until a whole bracket was seen; see LightStage::await_bracket().
-  void await_bracket(std::size_t exposures) { stage_->await_bracket(exposures); }
+  // Holds the first light back until a whole bracket was seen, also after a failure; see
+  // LightStage::await_bracket(). Call it before start().
+  void await_bracket(std::size_t exposures) {
+    bracket_ = exposures;
+    stage_->await_bracket(exposures);
+  }
 
   // Adds the stages of the light camera. `next_frame` waits for the next frame; null ends the
   // stream. Frames are taken even if lighting does not need them, because they may be recorded, and
@@ -55,6 +59,7 @@ class LiveLight {
               const std::optional<pipeline::ObserverView>& view);
 
   const Parts parts_;
+  std::size_t bracket_ = 1;  // exposures
   const std::function<void()> make_stage_;
   // One thread alone uses it: lighting if it needs frames, and tracking if it does not.
   std::optional<pipeline::LightStage> stage_;

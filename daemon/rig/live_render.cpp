@@ -74,7 +74,7 @@ std::optional<Shot> LiveRender::next_picture() {
 std::optional<Shot> LiveRender::next_plate(const std::string& untouched) {
   count_dropped();
   const std::shared_ptr<const Look> look = look_.get();
-  std::optional<Shot> shot = take_frame(*look);
+  std::optional<Shot> shot = take_frame(*look, /*is_to_be_rendered=*/false);
   if (!shot) return std::nullopt;
   try {
     shot->picture = plate_of(*shot);
@@ -84,8 +84,16 @@ std::optional<Shot> LiveRender::next_plate(const std::string& untouched) {
   }
   shot->untouched = untouched;
   shot->whole = true;
-  if (!look->of_take) metrics_.worked("render", 0);
+  count_shown(*look);
   return shot;
+}
+
+// A reviewed frame was not captured now.
+void LiveRender::count_shown(const Look& look) {
+  if (look.of_take)
+    metrics_.count("pictures reviewed");
+  else
+    metrics_.worked("render", 0);
 }
 
 std::optional<Shot> LiveRender::refine_round(const Look& look) {
@@ -157,12 +165,13 @@ void LiveRender::publish_found(const pipeline::LightPtr& light) {
 }
 
 std::optional<Shot> LiveRender::wait_for_frame(const Look& look) {
-  std::optional<Shot> shot = take_frame(look);
+  std::optional<Shot> shot = take_frame(look, /*is_to_be_rendered=*/true);
   if (!shot) return std::nullopt;
   return render(look, *std::move(shot));
 }
 
-std::optional<Shot> LiveRender::take_frame(const Look& look) {
+// A frame that came while tracking rested has neither pose nor light, and its plate all the same.
+std::optional<Shot> LiveRender::take_frame(const Look& look, bool is_to_be_rendered) {
   const bool review = look.of_take;
   std::optional<Shot> shot = (review ? channels_.reviewed : channels_.tracked).pop_for(patience);
   if (review && channels_.tracked.try_pop()) metrics_.dropped("render", "review");
@@ -171,7 +180,7 @@ std::optional<Shot> LiveRender::take_frame(const Look& look) {
     metrics_.dropped("render", "standby");
     return std::nullopt;
   }
-  if (!shot->tracking_done) {  // the shot came while tracking was paused
+  if (is_to_be_rendered && !shot->tracking_done) {
     metrics_.dropped("render", "refining");
     return std::nullopt;
   }
@@ -216,10 +225,7 @@ Shot LiveRender::render(const Look& look, Shot shot) {
   }
   const double took = seconds_since(begin);
   metrics_.busy("render", took);
-  if (captured)
-    metrics_.worked("render", 0);
-  else
-    metrics_.count("pictures reviewed");
+  count_shown(look);
   if (!shot.whole) return shot;
   if (shot.untouched.empty()) {
     keep_as_good(shot, std::move(recorded));

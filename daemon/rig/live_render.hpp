@@ -67,7 +67,8 @@ class LiveRender {
   int next_round(const Look& look);
   bool begin_refinement(const Look& look);
   std::optional<pipeline::Shot> wait_for_frame(const Look& look);
-  std::optional<pipeline::Shot> take_frame(const Look& look);
+  std::optional<pipeline::Shot> take_frame(const Look& look, bool is_to_be_rendered);
+  void count_shown(const Look& look);
   pipeline::Shot render(const Look& look, pipeline::Shot shot);
   void keep_as_good(const pipeline::Shot& shot, std::optional<session::SceneState> recorded);
   std::optional<pipeline::Shot>& good_of(const Look& look);

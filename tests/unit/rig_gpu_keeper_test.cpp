@@ -102,6 +102,17 @@ TEST_F(GpuKeeperTest, ThatTheCpuStandsInStaysOnTheDisplay) {
   EXPECT_EQ(line_of(reports_.troubles()[0]), "graphics device: is gone; the CPU draws, slowly");
 }
 
+// Also in the set that comes next, and where the CPU stands in from the start.
+TEST_F(GpuKeeperTest, ThatTheCpuStandsInIsShownFromTheStart) {
+  stands_in_ = true;
+  keeper().start();
+  ASSERT_EQ(reports_.troubles().size(), 1u);
+  EXPECT_EQ(line_of(reports_.troubles()[0]), "graphics device: is gone; the CPU draws, slowly");
+  stands_in_ = false;
+  keeper().start();
+  EXPECT_FALSE(reports_.troubles().at(0).lasts);
+}
+
 TEST_F(GpuKeeperTest, AStopEndsTheAttempts) {
   refusals_ = 1000;
   stops_ = true;

@@ -103,6 +103,30 @@ TEST_F(RigLive, TheCrewSeesThePlateWhileTheRendererIsMadeAnew) {
   EXPECT_EQ(test::accounted_for(metrics_), metrics_.stages.at("observer").frames);
 }
 
+// In a refinement tracking rests, and the plates are there all the same.
+TEST_F(RigLive, TheCrewSeesThePlateInARefinementWhoseRendererIsMadeAnew) {
+  write_set();
+  std::atomic<bool> fails = false;
+  options_.rehearse = [&](const std::string& part) {
+    if (part == "render" && fails) throw std::runtime_error("lamp fell down");
+  };
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    press("refine");
+    until_mode(Mode::refine);
+    until_counted("frames that tracking rested");
+    fails = true;
+    const auto is_plate = [](const Shown& s) {
+      return s.shot.untouched == "the renderer has failed" && s.look.state.mode == Mode::refine;
+    };
+    const int first = until(is_plate).count;
+    until([&](const Shown& s) { return s.count > first + 8 && is_plate(s); });
+    fails = false;
+    until([](const Shown& s) { return s.shot.frozen; });
+  });
+  EXPECT_EQ(test::accounted_for(metrics_), metrics_.stages.at("observer").frames);
+}
+
 // A camera is unplugged and another one of another size is plugged in, while the preview has half
 // the camera's size. The take ends with the one and the next begins with the other.
 TEST_F(RigLive, ACameraOfAnotherSizeBeginsTheNextTakeAndIsShownAsItIs) {

@@ -3,10 +3,16 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
+#include <functional>
 #include <sstream>
+#include <thread>
 
 #include "daemon/rig/live_pipeline.hpp"
+#include "drivers/error.hpp"
 #include "tests/support/lighting_pictures.hpp"
+#include "tests/support/wait_until.hpp"
 
 namespace previz::rig {
 namespace rig_live_light_test {
@@ -15,29 +21,46 @@ class LiveLightTest : public testing::Test {
  protected:
   LiveLightTest() { set_.file = "stage.toml"; }
 
-  LiveLight::Parts parts() { return {set_, scene_, look_, {reports_, metrics_, liveness_}}; }
+  LiveLight::Parts parts() {
+    return {set_,
+            scene_,
+            look_,
+            {.reports = reports_,
+             .metrics = metrics_,
+             .liveness = liveness_,
+             .rehearse =
+                 [this](const std::string&) {
+                   if (fails_.exchange(false)) throw Error("lamp fell down");
+                 },
+             .delays = {std::chrono::milliseconds(1), std::chrono::milliseconds(1)}}};
+  }
   static LightCameraCalibration camera() {
     LightCameraCalibration camera = test::fisheye_camera(32);
     camera.world_from_camera = test::looking(0, 90);
     return camera;
   }
-  static FramePtr grey(int size, std::uint64_t sequence) {
+  static FramePtr grey(int size, std::uint64_t sequence, double exposure = 1) {
     Frame frame = *test::make_frame(
-        size, size, 1,
+        size, size, exposure,
         std::vector<glm::dvec3>(std::size_t(size) * std::size_t(size), glm::dvec3(0.5)));
     frame.sequence = sequence;
     return std::make_shared<Frame>(std::move(frame));
   }
   // Runs the light camera's stages over these frames to their end; returns the light there is then.
-  pipeline::LightPtr run(LiveLight& light, std::vector<FramePtr> frames) {
+  pipeline::LightPtr run(
+      LiveLight& light, std::vector<FramePtr> frames,
+      const std::function<void(const Frame&)>& before = [](const Frame&) {}) {
     pipeline::StageThreads stages(metrics_, {});
-    light.start(stages, [frames = std::move(frames), next = std::size_t{0}]() mutable -> FramePtr {
-      return next < frames.size() ? frames[next++] : nullptr;
+    light.start(stages, [&, next = std::size_t{0}]() mutable -> FramePtr {
+      if (next == frames.size()) return nullptr;
+      before(*frames[next]);
+      return frames[next++];
     });
     stages.wait();
     return light.light_for({}, set::LightMode::image);
   }
 
+  std::atomic<bool> fails_ = false;  // the next estimate does
   set::Set set_;
   scene::Scene scene_;
   pipeline::Newest<Look> look_{Look{}};
@@ -66,6 +89,24 @@ TEST_F(LiveLightTest, AFrameThatCannotBeUsedIsReportedShownAndCounted) {
   ASSERT_EQ(reports_.troubles().size(), 1u);
   EXPECT_EQ(reports_.troubles()[0].source, "light");
   EXPECT_FALSE(reports_.troubles()[0].lasts);
+}
+
+// After a failure, too, the light of one exposure alone is not shown: it may be clipped or noise.
+TEST_F(LiveLightTest, AWholeBracketIsAwaitedAgainAfterAFailure) {
+  for (const std::size_t more : {1, 3}) {
+    std::vector<FramePtr> frames{grey(32, 1, 1), grey(32, 2, 0.25), grey(32, 3, 1), grey(32, 4, 4)};
+    frames.resize(1 + more);
+    LiveLight light(parts(), camera(), ObserverCalibration{});
+    light.await_bracket(3);
+    fails_ = true;
+    const pipeline::LightPtr seen = run(light, frames, [&](const Frame& next) {
+      if (next.sequence == 2)  // once the first estimate has failed, and the rest is over
+        EXPECT_TRUE(test::wait_until("it has failed", [&] { return !fails_; }));
+      if (next.sequence == 2) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    });
+    ASSERT_EQ(seen != nullptr, more == 3);
+    if (seen) EXPECT_EQ(seen->sequences.size(), 3u);
+  }
 }
 
 TEST_F(LiveLightTest, RestsWithTracking) {
