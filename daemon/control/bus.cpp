@@ -4,10 +4,12 @@
 
 #include <cctype>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <deque>
 #include <exception>
 #include <map>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -19,6 +21,8 @@ namespace {
 
 constexpr const char* refused_error = "org.previz.Error.Refused";
 constexpr const char* failed_error = "org.previz.Error.Failed";
+// Whoever connects waits at most so long for the bus to greet and to grant the name.
+constexpr std::chrono::seconds longest_answer{3};
 
 void check(int result, const std::string& what) {
   if (result < 0) throw Error("D-Bus: " + what + ": " + std::strerror(-result));
@@ -193,6 +197,17 @@ int on_get(sd_bus*, const char*, const char*, const char* name, sd_bus_message* 
   });
 }
 
+// Keeps what the bus answers to the wish for a name: 0, or why it is not granted.
+int on_name(sd_bus_message* message, void* kept, sd_bus_error*) {
+  constexpr std::uint32_t is_owner = 1;  // D-Bus specification, RequestName
+  std::uint32_t result = 0;
+  int refused = sd_bus_message_get_errno(message);
+  if (refused == 0 && sd_bus_message_read(message, "u", &result) < 0) refused = EBADMSG;
+  if (refused == 0 && result != is_owner) refused = EEXIST;
+  *static_cast<std::optional<int>*>(kept) = -refused;
+  return 0;
+}
+
 }  // namespace
 
 std::string method_name(const std::string& action) {
@@ -220,17 +235,36 @@ struct Bus::Impl {
       check(
           sd_bus_add_object_vtable(bus, nullptr, object_path, interface_name, table.data(), &verbs),
           "the interface is not accepted");
-      check(sd_bus_request_name(bus, bus_name, 0), std::string("the name ") + bus_name);
+      request_name();
       check(sd_bus_attach_event(bus, loop, SD_EVENT_PRIORITY_NORMAL), "no event loop");
     } catch (...) {
-      sd_bus_unref(bus);
+      sd_bus_close_unref(bus);
       throw;
     }
     published = verbs.status();
   }
   ~Impl() {
     sd_bus_detach_event(bus);
-    sd_bus_flush_close_unref(bus);
+    sd_bus_close_unref(bus);  // without a flush, which would wait for a bus that stands still
+  }
+
+  // sd-bus itself would wait for minutes for a bus that stands still.
+  void request_name() {
+    const std::string what = std::string("the name ") + bus_name;
+    const auto end = std::chrono::steady_clock::now() + longest_answer;
+    std::optional<int> answer;
+    check(sd_bus_request_name_async(bus, nullptr, bus_name, 0, on_name, &answer), what);
+    while (!answer) {
+      const int worked = sd_bus_process(bus, nullptr);
+      check(worked, what);
+      if (worked > 0) continue;
+      const auto left =
+          std::chrono::ceil<std::chrono::microseconds>(end - std::chrono::steady_clock::now());
+      if (left.count() <= 0) throw Error("D-Bus: the bus does not answer");
+      const int waited = sd_bus_wait(bus, static_cast<std::uint64_t>(left.count()));
+      if (waited != -EINTR) check(waited, what);
+    }
+    check(*answer, what);
   }
 
   void fill_table() {

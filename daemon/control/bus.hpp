@@ -53,7 +53,7 @@ std::string method_name(const std::string& action);
 class Bus {
  public:
   // Connects to the system bus ($DBUS_SYSTEM_BUS_ADDRESS); the event loop serves it. Throws
-  // previz::Error if there is no bus, or if it does not grant the name.
+  // previz::Error if there is no bus, or if it does not grant the name within three seconds.
   Bus(sd_event* loop, Verbs verbs);
   ~Bus();
   Bus(const Bus&) = delete;

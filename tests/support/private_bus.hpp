@@ -52,12 +52,16 @@ class PrivateBus {
   void stop() {
     if (child_ <= 0) return;
     kill(child_, SIGTERM);
+    go_on();
     waitpid(child_, nullptr, 0);
     child_ = -1;
     running_ = false;
     std::filesystem::remove(directory_ / "bus");
   }
   bool running() const { return running_; }
+  // It stands still, as under a debugger or on a disk that hangs, until it goes on.
+  void stand_still() const { kill(child_, SIGSTOP); }
+  void go_on() const { kill(child_, SIGCONT); }
 
  private:
   // What the system's bus has before any package's policy: signals and replies for all, and no

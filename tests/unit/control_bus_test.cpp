@@ -20,8 +20,10 @@
 #include <thread>
 #include <vector>
 
+#include "drivers/error.hpp"
 #include "tests/support/private_bus.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/wait_until.hpp"
 
 namespace previz::control {
 namespace control_bus_test {
@@ -298,6 +300,27 @@ TEST(BusWithoutARig, IsToldInPlainWords) {
               "previzctl: previzd does not answer: it is not running, or it is loading a set just "
               "now\n");
   }
+}
+
+// Whoever connects does so on the loop that answers buttons and feeds the watchdog.
+TEST(BusThatStandsStill, IsGivenUpSoon) {
+  const test::PrivateBus bus;
+  if (!bus.running()) GTEST_SKIP() << "dbus-daemon is not installed";
+  sd_event* event = nullptr;
+  sd_event_new(&event);
+  Verbs verbs;
+  verbs.status = [] { return Status{}; };
+  bus.stand_still();
+  std::jthread limit([&](const std::stop_token& is_given_up) {
+    const auto has_ended = [&] { return is_given_up.stop_requested(); };
+    EXPECT_TRUE(test::wait_until("it is given up", has_ended, std::chrono::seconds(15)));
+    bus.go_on();
+  });
+  EXPECT_THROW(Bus(event, verbs), Error);
+  limit.request_stop();
+  limit.join();
+  EXPECT_NO_THROW(Bus(event, verbs));
+  sd_event_unref(event);
 }
 
 TEST(RigWithoutABus, SaysSo) {
