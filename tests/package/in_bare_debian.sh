@@ -17,6 +17,7 @@ previzd --version
 previzd check "$(sed -n 's/^ExecStart=.* //p' /lib/systemd/system/previzd.service)"
 previzctl actions --names | grep -qx refine
 id previz | grep -q video || fail "the user previz may not open cameras"
+! id previz | grep -q input || fail "the user previz may read keyboards"
 # As the package makes it, and as systemd, which does not run here, keeps it from the first start on.
 [[ $(stat -c '%U %a' /var/lib/previzd) == "previz 750" ]] || fail "/var/lib/previzd: wrong owner"
 grep -qx StateDirectoryMode=0750 /lib/systemd/system/previzd.service || fail "the service would open /var/lib/previzd"
@@ -38,7 +39,9 @@ setpriv --reuid=previz --regid=previz --init-groups env XDG_CACHE_HOME=/tmp \
 step "upgrade, with a set that was changed"
 echo '# ours' >>/etc/previzd/set.toml
 systemctl disable --quiet previzd.service
+usermod --append --groups input previz # as earlier versions had it
 dpkg --force-confdef --install later.deb
+! id previz | grep -q input || fail "after the upgrade the user previz may still read keyboards"
 grep -qx '# ours' /etc/previzd/set.toml || fail "the upgrade lost the changed set"
 [[ -f /etc/previzd/set.toml.dpkg-dist ]] || fail "the later default set is not beside it"
 ! systemctl is-enabled --quiet previzd.service || fail "the upgrade enabled a disabled service"

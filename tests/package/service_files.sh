@@ -26,6 +26,7 @@ done
 if grep -q '^DeviceAllow=char-input\|^SupplementaryGroups=.*input' previzd.service; then
   fail "previzd.service may read keyboards"
 fi
+if grep -qw input previzd.sysusers; then fail "previzd.sysusers puts the user into the group of keyboards"; fi
 # systemd takes a key that it does not know for no error.
 unknown=$(systemd-analyze verify --man=no ./previzd.service 2>&1 |
   grep -v 'is not executable: No such file' || true)
