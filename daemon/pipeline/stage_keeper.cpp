@@ -21,6 +21,7 @@ bool StageKeeper::rests() const {
 }
 
 void StageKeeper::begin() {
+  has_worked_ = true;
   pulse_.begin(patience_);
   if (has_to_begin_anew_) {
     if (begin_anew_) begin_anew_();
@@ -34,6 +35,7 @@ void StageKeeper::begin() {
 // gone well for longer than the longest of them.
 void StageKeeper::went_well() {
   pulse_.wait();
+  if (!has_worked_) return;
   if (std::exchange(is_faulty_, false)) {
     parts_.reports.settle(name_);
     parts_.reports({Severity::info, name_, "works again"});

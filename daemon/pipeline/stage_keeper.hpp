@@ -61,6 +61,9 @@ class StageKeeper {
   // goes on.
   void waits() { pulse_.wait(); }
   void goes_on() { pulse_.begin(patience_); }
+  // Call this within a piece of work where there was nothing to do. A part that has failed does not
+  // count as working again by it.
+  void had_nothing_to_do() { has_worked_ = false; }
 
  private:
   bool rests() const;
@@ -74,6 +77,7 @@ class StageKeeper {
   const std::function<void()> begin_anew_;
   Liveness::Pulse pulse_;
   Backoff backoff_;
+  bool has_worked_ = true;  // in the last piece of work
   bool is_faulty_ = false;  // since the last failure no work has ended well
   bool has_to_begin_anew_ = false;
   std::optional<HostClock::Time> failed_at_;  // absent: the next failure counts as the first

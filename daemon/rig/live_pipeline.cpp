@@ -251,10 +251,11 @@ std::optional<Shot> LivePipeline::Impl::next_picture() {
   for (;;) {
     std::optional<Shot> shot;
     const bool is_well = rendering.attempt([&] {
-      if (!gpu_keeper.await()) return;
+      if (!gpu_keeper.await()) return rendering.had_nothing_to_do();
       rendering.goes_on();
       shot = live_render.next(renew);
-      if (shot) begun_anew = 0;
+      if (!shot) return rendering.had_nothing_to_do();
+      begun_anew = 0;
     });
     if (!is_well) {
       drop_render_stage();

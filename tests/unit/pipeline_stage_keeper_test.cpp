@@ -103,6 +103,21 @@ TEST_F(StageKeeperTest, WhatCannotBeBegunAnewIsTriedAgain) {
       << "the same failure is reported once";
 }
 
+// A camera that is silent just then brings no frame on which the part could show that it works.
+TEST_F(StageKeeperTest, APartThatHadNothingToDoDoesNotWorkAgain) {
+  StageKeeper keeper = this->keeper();
+  EXPECT_FALSE(keeper.attempt(fail));
+  now_ += milliseconds(1000);
+  EXPECT_TRUE(keeper.attempt([&] { keeper.had_nothing_to_do(); }));
+  EXPECT_EQ(count_of("render: begun anew"), 0u);
+  EXPECT_TRUE(reports_.troubles().at(0).lasts);
+  now_ += std::chrono::hours(1);
+  EXPECT_TRUE(liveness_.hung().empty()) << "it waits for the next work";
+  EXPECT_TRUE(keeper.attempt([] {}));
+  EXPECT_EQ(count_of("render: begun anew"), 1u);
+  EXPECT_FALSE(reports_.troubles().at(0).lasts);
+}
+
 TEST_F(StageKeeperTest, WhatIsThrownNeedBeNoError) {
   StageKeeper keeper = this->keeper();
   EXPECT_FALSE(keeper.attempt([] { throw 7; }));
