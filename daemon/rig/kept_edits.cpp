@@ -1,6 +1,5 @@
 #include "daemon/rig/kept_edits.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,7 +9,6 @@
 
 #include "daemon/set/file_edit.hpp"
 #include "drivers/keys/value.hpp"
-#include "drivers/session/files.hpp"
 
 namespace previz::rig {
 namespace {
@@ -97,25 +95,6 @@ std::string with_edits(const std::string& text, const set::Set& set, const pipel
   for (const auto& [name, edit] : edits.lights)
     if (edit.found_towards) file.append(captured_table(name, edit));
   return file.text();
-}
-
-std::filesystem::path keep_beside(const std::filesystem::path& file) {
-  const std::string content = session::read_file(file);
-  for (int number = 1;; ++number) {
-    std::filesystem::path copy = file.string() + '.' + std::to_string(number) + ".old";
-    if (std::filesystem::exists(copy)) continue;
-    const session::OpenFile written(copy, O_WRONLY | O_CREAT | O_EXCL);
-    try {
-      written.append(content);
-      written.sync();
-      std::filesystem::permissions(copy, std::filesystem::status(file).permissions());
-    } catch (...) {  // half a copy is none
-      std::error_code stays;
-      std::filesystem::remove(copy, stays);
-      throw;
-    }
-    return copy;
-  }
 }
 
 }  // namespace previz::rig

@@ -1,7 +1,6 @@
 // Writes what buttons have changed into the text of a set file.
 #pragma once
 
-#include <filesystem>
 #include <string>
 
 #include "daemon/pipeline/edits.hpp"
@@ -15,9 +14,5 @@ namespace previz::rig {
 // is what the text means. Lengths are rounded to a micrometre and angles to a ten-thousandth of a
 // degree. Throws previz::Error if the text cannot be changed.
 std::string with_edits(const std::string& text, const set::Set& set, const pipeline::Edits& edits);
-
-// Copies a file beside itself, as NAME.1.old or the next number that is free, and returns the copy.
-// Throws previz::Error naming the file that cannot be read or written.
-std::filesystem::path keep_beside(const std::filesystem::path& file);
 
 }  // namespace previz::rig

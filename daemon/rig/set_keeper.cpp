@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "daemon/rig/kept_edits.hpp"
+#include "daemon/set/file_edit.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 
@@ -122,7 +123,7 @@ void SetKeeper::begin_keep(const pipeline::Edits& edits) {
     if (text == text_before)
       throw Error("the changes come to nothing; " + file.string() + " stays as it is");
     Read read{loaded(text, file), Kept{text_before, edits}, {}};
-    read.kept_beside = keep_beside(target).string();
+    read.kept_beside = set::keep_beside(target).string();
     session::replace_file(target, text);
     std::error_code missing;
     read.set.changed = std::filesystem::last_write_time(file, missing);

@@ -1,9 +1,11 @@
 #include "daemon/set/file_edit.hpp"
 
+#include <fcntl.h>
 #include <toml++/toml.h>
 #include <algorithm>
 
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::set {
 namespace {
@@ -69,6 +71,19 @@ const FileEdit::Table& FileEdit::table(const std::string& tables, std::size_t in
   return found->second[index];
 }
 
+std::size_t FileEdit::count(const std::string& tables) const {
+  const auto found = tables_.find(tables);
+  return found == tables_.end() ? 0 : found->second.size();
+}
+
+std::optional<std::string> FileEdit::written(const std::string& tables, std::size_t index,
+                                             const std::string& key) const {
+  const Table& where = table(tables, index);
+  const auto known = where.values.find(key);
+  if (known == where.values.end()) return std::nullopt;
+  return text_.substr(known->second.begin, known->second.end - known->second.begin);
+}
+
 bool FileEdit::has(const std::string& tables, std::size_t index, const std::string& key) const {
   return table(tables, index).values.contains(key);
 }
@@ -97,6 +112,25 @@ std::string FileEdit::text() const {
   result += appended_;
   parsed(result);
   return result;
+}
+
+std::filesystem::path keep_beside(const std::filesystem::path& file) {
+  const std::string content = session::read_file(file);
+  for (int number = 1;; ++number) {
+    std::filesystem::path copy = file.string() + '.' + std::to_string(number) + ".old";
+    if (std::filesystem::exists(copy)) continue;
+    const session::OpenFile written(copy, O_WRONLY | O_CREAT | O_EXCL);
+    try {
+      written.append(content);
+      written.sync();
+      std::filesystem::permissions(copy, std::filesystem::status(file).permissions());
+    } catch (...) {  // half a copy is none
+      std::error_code stays;
+      std::filesystem::remove(copy, stays);
+      throw;
+    }
+    return copy;
+  }
 }
 
 }  // namespace previz::set

@@ -1,9 +1,11 @@
 // Changes values in the text of a set file and leaves everything else of it as it is: comments,
-// order, spaces.
+// order, spaces. Beside that it keeps the old file.
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,9 +17,15 @@ class FileEdit {
   // Throws previz::Error if `text` is not TOML.
   explicit FileEdit(std::string text);
 
+  // Returns the number of the file's [[tables]] of this name.
+  std::size_t count(const std::string& tables) const;
+
   // These concern the table number `index` (from 0) of the file's [[tables]] of this name. They
   // throw previz::Error if there is no such table, or if it is written in braces, {...}.
   bool has(const std::string& tables, std::size_t index, const std::string& key) const;
+  // Returns a key's value as the file writes it; nothing if the table lacks the key.
+  std::optional<std::string> written(const std::string& tables, std::size_t index,
+                                     const std::string& key) const;
   // Gives a key this value, written as TOML. A new key comes after the table's last one.
   void put(const std::string& tables, std::size_t index, const std::string& key,
            const std::string& value);
@@ -47,5 +55,9 @@ class FileEdit {
   };
   std::vector<Replacement> replacements_;
 };
+
+// Copies a file beside itself, as NAME.1.old or the next number that is free, and returns the copy.
+// Throws previz::Error naming the file that cannot be read or written.
+std::filesystem::path keep_beside(const std::filesystem::path& file);
 
 }  // namespace previz::set

@@ -31,6 +31,15 @@ TEST(FileEdit, WithoutAChangeIsTheText) {
   EXPECT_EQ(FileEdit(file).text(), file);
 }
 
+TEST(FileEdit, SaysWhatIsWritten) {
+  const FileEdit edit(file);
+  EXPECT_EQ(edit.count("object"), 2u);
+  EXPECT_EQ(edit.count("tag"), 0u);
+  EXPECT_EQ(edit.written("object", 0, "scale"), "2");
+  EXPECT_EQ(edit.written("object", 1, "name"), "'bird'");
+  EXPECT_EQ(edit.written("object", 1, "scale"), std::nullopt);
+}
+
 TEST(FileEdit, ReplacesTheValueAlone) {
   FileEdit edit(file);
   edit.put("object", 0, "position_m", "[1.0, 2.0, 3.0]");
