@@ -10,6 +10,7 @@ packages=(
   libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers
   # pictures and video
   libopencv-dev libopenexr-dev libimath-dev libpng-dev libexiv2-dev
+  libcairo2-dev
   libavformat-dev libavcodec-dev libavutil-dev libswscale-dev libjpeg62-turbo-dev
   # the display and its text
   libegl-dev libgles-dev libegl-mesa0 libgl1-mesa-dri libgbm-dev libdrm-dev libfreetype-dev libharfbuzz-dev
@@ -23,7 +24,7 @@ packages=(
   # main loop, service, D-Bus
   libsystemd-dev dbus-daemon
   # tests
-  libgtest-dev libgmock-dev libbenchmark-dev libusbredirparser-dev groff-base
+  libgtest-dev libgmock-dev libbenchmark-dev libusbredirparser-dev groff-base poppler-utils
   # package, and its test in a bare system
   dpkg-dev file lintian mmdebstrap systemd
 )

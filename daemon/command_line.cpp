@@ -150,6 +150,7 @@ void add_commands(CLI::App& app, CommandLine& said) {
   add_export(app, said.export_take);
   add_trade(app, said.trade);
   calibrate::add_calibrate(app, said.calibrate);
+  print::add_print(app, said.print);
 }
 
 }  // namespace previz

@@ -9,6 +9,7 @@
 #include "daemon/exchange/camera_track.hpp"
 #include "daemon/exchange/import.hpp"
 #include "daemon/post/render.hpp"
+#include "daemon/print/command_line.hpp"
 #include "daemon/rig/live.hpp"
 #include "daemon/trade/trade.hpp"
 
@@ -24,6 +25,7 @@ struct CommandLine {
   exchange::ExportOptions export_take;
   trade::TradeOptions trade;
   calibrate::Commands calibrate;
+  print::Commands print;
 };
 
 // Adds all subcommands and options to `app`, which writes what it parses into `said`; `said` must

@@ -102,6 +102,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("devices")) return do_devices(said.learn, said.rules, stop);
     if (app.got_subcommand("export")) return exchange::export_take(said.export_take, std::cout), 0;
     if (app.got_subcommand("import")) return do_import(said.import_session);
+    if (app.got_subcommand("print")) return print::do_print(app, said.print, std::cout);
     if (app.got_subcommand("render")) return do_render(said.render, stop);
     if (app.got_subcommand("trade")) return do_trade(said.trade, stop);
     return do_run(said.run, stop);

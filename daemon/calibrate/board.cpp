@@ -4,6 +4,7 @@
 #include <optional>
 #include <sstream>
 
+#include "daemon/calibrate/length.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::calibrate {
@@ -39,18 +40,8 @@ class BoardText {
     board.rows = whole_number(size.substr(cross + 1), "number of rows", least);
   }
   double length_m(std::size_t i, const std::string& what) const {
-    constexpr struct {
-      const char* unit;
-      double metres;
-    } units[] = {{"mm", 1e-3}, {"cm", 1e-2}, {"m", 1}, {"in", 0.0254}};
     const std::string& length = part(i, what);
-    double number = 0;
-    const char* const end = length.data() + length.size();
-    const auto read = std::from_chars(length.data(), end, number);
-    for (const auto& [unit, metres] : units)
-      if (read.ec == std::errc{} && std::string(read.ptr, end) == unit && number > 0 &&
-          number * metres < 100)
-        return number * metres;
+    if (const auto metres = parse_length(length)) return *metres;
     fail("has " + what + " \"" + length + "\"");
   }
 

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "daemon/calibrate/fisheye_tags.hpp"
+#include "daemon/calibrate/marker_dictionary.hpp"
 #include "daemon/tracking/photometry.hpp"
 #include "daemon/tracking/tag_detector.hpp"
 #include "drivers/error.hpp"
@@ -69,38 +70,10 @@ class ChessboardFinder final : public BoardFinder {
   tracking::Photometry photometry_;
 };
 
-cv::Ptr<cv::aruco::Dictionary> dictionary_by_name(const std::string& name) {
-  constexpr struct {
-    const char* name;
-    cv::aruco::PREDEFINED_DICTIONARY_NAME id;
-  } known[] = {
-      {"4x4_50", cv::aruco::DICT_4X4_50},   {"4x4_100", cv::aruco::DICT_4X4_100},
-      {"4x4_250", cv::aruco::DICT_4X4_250}, {"4x4_1000", cv::aruco::DICT_4X4_1000},
-      {"5x5_50", cv::aruco::DICT_5X5_50},   {"5x5_100", cv::aruco::DICT_5X5_100},
-      {"5x5_250", cv::aruco::DICT_5X5_250}, {"5x5_1000", cv::aruco::DICT_5X5_1000},
-      {"6x6_50", cv::aruco::DICT_6X6_50},   {"6x6_100", cv::aruco::DICT_6X6_100},
-      {"6x6_250", cv::aruco::DICT_6X6_250}, {"6x6_1000", cv::aruco::DICT_6X6_1000},
-      {"7x7_50", cv::aruco::DICT_7X7_50},   {"7x7_100", cv::aruco::DICT_7X7_100},
-      {"7x7_250", cv::aruco::DICT_7X7_250}, {"7x7_1000", cv::aruco::DICT_7X7_1000},
-  };
-  std::string names;
-  for (const auto& entry : known) {
-    if (name == entry.name) return cv::aruco::getPredefinedDictionary(entry.id);
-    add_to_list(names, entry.name);
-  }
-  throw Error("board: \"" + name + "\" is not a dictionary of markers; known are " + names);
-}
-
 class CharucoFinder final : public BoardFinder {
  public:
   CharucoFinder(const Board& board, const ResponseCurve& response)
-      : columns_(board.columns - 1),
-        dictionary_(dictionary_by_name(board.dictionary)),
-        photometry_(response) {
-    const int markers = board.columns * board.rows / 2;
-    if (markers > dictionary_->bytesList.rows)
-      throw Error("board: " + std::to_string(markers) + " markers are more than dictionary " +
-                  board.dictionary + " has");
+      : columns_(board.columns - 1), dictionary_(markers_of(board)), photometry_(response) {
     board_ = cv::aruco::CharucoBoard::create(board.columns, board.rows, float(board.square_m),
                                              float(board.marker_m), dictionary_);
   }

@@ -45,6 +45,8 @@ const Chapter examples_chapter{"EXAMPLES",
 previzd devices: Lists the cameras, buttons and screens that are plugged in, by the names that a set file uses.
 previzd devices --learn: Prints the name of every button that is pressed.
 previzd devices --rules: Prints the lines by which the service may open pads, pedals and GPIO chips, for /etc/udev/rules.d.
+previzd print board charuco:7x5:30mm:22mm:5x5_100 --out board.pdf: Draws a board for the calibration of the lenses, to be printed on A4 at 100 %.
+previzd print tags --ids 0-11 --size 80mm --out tags.pdf: Draws twelve tags with crop marks, and a ruler by which the printer's scale is checked.
 previzd calibrate observer views --board charuco:7x5:30mm:22mm:5x5_100 --out lens.toml: Measures the film camera's lens from a folder of pictures of a board, and writes the tables for the set file.
 previzd calibrate light views --board charuco:7x5:30mm:22mm:5x5_100 --tags desk.toml: Measures the fisheye's lens, and finds where it stands by the set's tags.
 previzd check desk.toml: Lists every mistake in a set file, or what its scene asks of the renderer.
@@ -130,15 +132,16 @@ Chapter see_also(const std::string& pages) {
 }  // namespace
 
 std::vector<Page> man_pages() {
-  return {{"previzd.8",
-           man_page(previzd_commands(), 8,
-                    {service_chapter, examples_chapter, glossary_chapter, previzd_cameras,
-                     previzd_files, previzd_status, see_also("previzctl(1), previz-set(5)")})},
-          {"previzctl.1", man_page(previzctl_commands(), 1,
-                                   {{"ACTIONS", actions_text()},
-                                    previzctl_status,
-                                    see_also("previzd(8), previz-set(5)")})},
-          {"previz-set.5", set_man_page(set_description, see_also("previzd(8), previzctl(1)"))}};
+  return {
+      {"previzd.8",
+       man_page(previzd_commands(), 8,
+                {service_chapter, examples_chapter, glossary_chapter, previzd_cameras,
+                 previzd_files, previzd_status, see_also("previzctl(1), previz-set(5)")})},
+      {"previzctl.1",
+       man_page(
+           previzctl_commands(), 1,
+           {{"ACTIONS", actions_text()}, previzctl_status, see_also("previzd(8), previz-set(5)")})},
+      {"previz-set.5", set_man_page(set_description, see_also("previzd(8), previzctl(1)"))}};
 }
 
 std::vector<Page> bash_completions() {
