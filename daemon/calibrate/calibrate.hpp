@@ -57,6 +57,19 @@ struct ThinLensOptions {
   std::optional<std::filesystem::path> table_file;
 };
 
+struct TagsOptions {
+  std::filesystem::path footage;                  // session, folder of pictures, or video
+  std::optional<std::filesystem::path> set_file;  // with the lens, and the tags that are known
+  std::string sizes;                              // "80mm,7:120mm"; go before the set's
+  std::optional<int> origin;  // the tag that defines the world; default: the set's first one seen
+  std::string distance;       // "0-3:1.234m"; empty: the tags' sizes give all lengths
+  std::string family;         // empty: the set's
+  int every = 0;              // uses every n-th picture; 0: as many as are useful
+  bool force = false;         // accept the map although pictures are missing
+  bool write = false;         // change the set file
+  std::optional<std::filesystem::path> table_file;
+};
+
 struct BalanceOptions {
   std::filesystem::path session;
   std::optional<std::filesystem::path> set_file;  // instead of the session's own
@@ -76,5 +89,6 @@ void calibrate_dark(const DarkOptions& options, std::ostream& out);
 void calibrate_vignetting(const VignettingOptions& options, std::ostream& out);
 void calibrate_lens(const ThinLensOptions& options, std::ostream& out);
 void calibrate_balance(const BalanceOptions& options, std::ostream& out);
+void calibrate_tags(const TagsOptions& options, std::ostream& out);
 
 }  // namespace previz::calibrate

@@ -103,10 +103,38 @@ void add_balance(CLI::App& calibrate, BalanceOptions& options) {
   command.add_option("--out", options.table_file, "File for the set file's tables");
 }
 
+void add_tags(CLI::App& calibrate, TagsOptions& options) {
+  CLI::App& command = *calibrate.add_subcommand(
+      "tags", "Where the tags are, from a walk with the film camera past all of them");
+  command.add_option("footage", options.footage, "Session, folder of pictures, or video")
+      ->required();
+  command.add_option("--set", options.set_file,
+                     "Set file with the film camera's lens, and with the tags that are known");
+  command.add_option("--size", options.sizes,
+                     "Side of the tags' black border, as measured: 80mm, or with those that "
+                     "differ 80mm,7:120mm (default: the set's)");
+  command.add_option(
+      "--origin", options.origin,
+      "Tag that defines the world: where the set has it, or else at the origin, face "
+      "up, X to its right (default: the set's first tag that is seen, or the lowest)");
+  command.add_option(
+      "--distance", options.distance,
+      "Distance between the middles of two tags, which gives all lengths: 0-3:1.234m "
+      "(default: the tags' sizes do)");
+  command.add_option("--family", options.family, "Tag family (default: the set's, or tag36h11)");
+  command.add_option("--every", options.every, "Look at every Nth picture only")
+      ->check(CLI::Range(1, 1'000'000));
+  command.add_option("--out", options.table_file, "File for the set file's tables");
+  command.add_flag("--write", options.write,
+                   "Write the tags into the set file; the old file is kept beside it");
+  command.add_flag("--force", options.force, "Accept the map although pictures are missing");
+}
+
 }  // namespace
 
 void add_calibrate(CLI::App& app, Commands& commands) {
-  CLI::App& command = *app.add_subcommand("calibrate", "Measure a camera; prints set file tables");
+  CLI::App& command = *app.add_subcommand(
+      "calibrate", "Measure a camera, or where the tags are; prints set file tables");
   command.require_subcommand(1);
   add_observer(command, commands.observer);
   add_light(command, commands.light);
@@ -115,6 +143,7 @@ void add_calibrate(CLI::App& app, Commands& commands) {
   add_vignetting(command, commands.vignetting);
   add_lens(command, commands.lens);
   add_balance(command, commands.balance);
+  add_tags(command, commands.tags);
 }
 
 int do_calibrate(const CLI::App& app, const Commands& commands, std::ostream& out) {
@@ -126,6 +155,7 @@ int do_calibrate(const CLI::App& app, const Commands& commands, std::ostream& ou
   if (command.got_subcommand("vignetting")) calibrate_vignetting(commands.vignetting, out);
   if (command.got_subcommand("lens")) calibrate_lens(commands.lens, out);
   if (command.got_subcommand("balance")) calibrate_balance(commands.balance, out);
+  if (command.got_subcommand("tags")) calibrate_tags(commands.tags, out);
   return 0;
 }
 

@@ -19,6 +19,7 @@ struct Commands {
   VignettingOptions vignetting;
   ThinLensOptions lens;
   BalanceOptions balance;
+  TagsOptions tags;
 };
 
 // Adds `calibrate` with its subcommands to `app`; `commands` must outlive it.

@@ -24,6 +24,17 @@ LightCameraCalibration light_sensor(const std::optional<std::filesystem::path>& 
   return {};
 }
 
+ObserverCalibration known_observer(const std::optional<std::filesystem::path>& set_file,
+                                   const std::filesystem::path& footage) {
+  if (set_file)
+    if (const auto calibration = set::load_set(*set_file).observer.calibration) return *calibration;
+  if (is_session(footage))
+    if (const auto calibration = session::open_session(footage).info.observer) return *calibration;
+  throw Error((set_file ? set_file->string() : footage.string()) +
+              ": observer.intrinsics: the film camera's lens is not known; name a set file by "
+              "--set that has the table, which `previzd calibrate observer` prints");
+}
+
 LightCameraCalibration known_light_camera(const set::Set& set,
                                           const std::filesystem::path& footage) {
   session::SessionInfo info;

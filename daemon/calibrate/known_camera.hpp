@@ -19,6 +19,11 @@ ResponseCurve response_of(const std::filesystem::path& footage, const std::strin
 LightCameraCalibration light_sensor(const std::optional<std::filesystem::path>& set_file,
                                     const std::filesystem::path& footage);
 
+// Returns the film camera of the set if it gives a lens, otherwise of the session. Throws
+// previz::Error if neither has a lens.
+ObserverCalibration known_observer(const std::optional<std::filesystem::path>& set_file,
+                                   const std::filesystem::path& footage);
+
 // Returns the set's light camera, otherwise the session's. Throws previz::Error if neither has a
 // lens.
 LightCameraCalibration known_light_camera(const set::Set& set,

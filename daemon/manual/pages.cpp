@@ -49,6 +49,7 @@ previzd print board charuco:7x5:30mm:22mm:5x5_100 --out board.pdf: Draws a board
 previzd print tags --ids 0-11 --size 80mm --out tags.pdf: Draws twelve tags with crop marks, and a ruler by which the printer's scale is checked.
 previzd calibrate observer views --board charuco:7x5:30mm:22mm:5x5_100 --out lens.toml: Measures the film camera's lens from a folder of pictures of a board, and writes the tables for the set file.
 previzd calibrate light views --board charuco:7x5:30mm:22mm:5x5_100 --tags desk.toml: Measures the fisheye's lens, and finds where it stands by the set's tags.
+previzd calibrate tags walk --set desk.toml --size 80mm --write: Finds where the tags are, from a walk with the film camera past all of them, and writes that into the set file.
 previzd check desk.toml: Lists every mistake in a set file, or what its scene asks of the renderer.
 previzd run desk.toml: Composites live. The rig's buttons, or previzctl, do the rest.
 previzd render takes/12A_take003 --out renders/12A_take003: Renders a take with the settings that it was recorded with. Called again, it continues where it stopped.
@@ -90,6 +91,13 @@ variant: One of the looks of an object that its file names, with materials of it
 virtual object: A thing that exists only in the composite.
 )",
                                true};
+
+const Chapter tags_chapter{"WHERE THE TAGS ARE", R"(
+Print tags at 100 %, measure the ruler on the sheet, and glue them onto something flat and stiff. Lay one on the floor or table where the origin of the set is to be, face up: it defines the world (or another, whose place the set file has).
+Film them with the film camera, at the zoom and focus of its calibration, slowly and with a short shutter time: walk around the set, from one side to the other, near and far, so that each picture shows two tags or more, and each tag is seen from at least four places. Nothing may be touched meanwhile.
+`previzd calibrate tags FOOTAGE --set SET --size 80mm` then lists each tag with how certain its place is. A tag that moved is named, with the pictures between which it did; one that is not as large as stated is measured; and what the walk lacks is said. A good map is certain to a millimetre and a tenth of a degree, with an rms below half a pixel.
+The size is that of the black border, from outer edge to outer edge, as measured on the paper. Better than the size of one tag is a tape across the whole set: with `--distance 0-7:2.345m` the distance between the middles of two tags gives all lengths.
+)"};
 
 const Chapter previzd_status{"EXIT STATUS", R"(
 0: Done.
@@ -135,7 +143,7 @@ std::vector<Page> man_pages() {
   return {
       {"previzd.8",
        man_page(previzd_commands(), 8,
-                {service_chapter, examples_chapter, glossary_chapter, previzd_cameras,
+                {service_chapter, examples_chapter, tags_chapter, glossary_chapter, previzd_cameras,
                  previzd_files, previzd_status, see_also("previzctl(1), previz-set(5)")})},
       {"previzctl.1",
        man_page(

@@ -1,0 +1,142 @@
+#include <fmt/ostream.h>
+
+#include <algorithm>
+#include <charconv>
+#include <glm/geometric.hpp>
+
+#include "daemon/calibrate/calibrate.hpp"
+#include "daemon/calibrate/known_camera.hpp"
+#include "daemon/calibrate/length.hpp"
+#include "daemon/calibrate/moved_tags.hpp"
+#include "daemon/calibrate/report.hpp"
+#include "daemon/calibrate/tag_survey.hpp"
+#include "daemon/calibrate/tag_tables.hpp"
+#include "daemon/calibrate/tag_walk.hpp"
+#include "daemon/set/file_edit.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+
+namespace previz::calibrate {
+namespace {
+
+constexpr double worth_a_word_m = 1e-3, worth_a_word_of_size = 2e-3;
+
+// "0-3:1.234m"
+StatedDistance parse_distance(const std::string& text) {
+  StatedDistance stated;
+  const char* const end = text.data() + text.size();
+  const auto a = std::from_chars(text.data(), end, stated.a);
+  if (a.ec == std::errc{} && a.ptr != end && *a.ptr == '-') {
+    const auto b = std::from_chars(a.ptr + 1, end, stated.b);
+    if (b.ec == std::errc{} && b.ptr != end && *b.ptr == ':' && stated.a != stated.b)
+      if (const auto metres = parse_length({b.ptr + 1, std::size_t(end - b.ptr - 1)})) {
+        stated.metres = *metres;
+        return stated;
+      }
+  }
+  throw Error("distance \"" + text +
+              "\" is not understood; allowed: 0-3:1.234m, the middles of tags 0 and 3 apart, in "
+              "mm, cm, m or in");
+}
+
+WalkOptions walk_options(const TagsOptions& options, const set::Set& set) {
+  WalkOptions walk;
+  walk.detector = {options.family.empty() ? set.tracking.family : options.family,
+                   set.tracking.min_margin, set.tracking.max_hamming};
+  walk.every = options.every;
+  for (const set::Tag& tag : set.tracking.tags) walk.sizes.by_id_m[tag.id] = tag.size_m;
+  const TagSizes given = parse_tag_sizes(options.sizes);
+  walk.sizes.common_m = given.common_m;
+  for (const auto& [id, size] : given.by_id_m) walk.sizes.by_id_m[id] = size;
+  for (const set::Carrier& carrier : set.tracking.carriers)
+    for (const set::Tag& tag : carrier.tags) walk.left_out.push_back(tag.id);
+  return walk;
+}
+
+TagSurveyOptions survey_options(const TagsOptions& options, const set::Set& set,
+                                const TagWalk& walk) {
+  TagSurveyOptions survey;
+  if (!options.distance.empty()) survey.stated = parse_distance(options.distance);
+  const auto in_set = std::ranges::find_if(set.tracking.tags, [&](const set::Tag& tag) {
+    return options.origin ? tag.id == *options.origin
+                          : std::ranges::find(walk.ids, tag.id) != walk.ids.end();
+  });
+  const bool known = in_set != set.tracking.tags.end();
+  survey.origin = options.origin.value_or(known ? in_set->id : walk.ids.front());
+  if (known) survey.world_from_origin = in_set->world_from_tag;
+  return survey;
+}
+
+void print_sizes(const TagSurvey& survey, std::ostream& out) {
+  for (const SurveyedTag& tag : survey.tags) {
+    const double size_m = tag.size_m / survey.size_factor;
+    if (std::abs(size_m / tag.stated_size_m - 1) > 1e-9)
+      fmt::print(
+          out,
+          "tag {} measures {:.2f} mm (certain to {:.2f} mm) beside the others, not {:.2f} mm "
+          "as stated: it is taken as measured\n",
+          tag.id, 1000 * size_m, 1000 * tag.size_sigma * size_m, 1000 * tag.stated_size_m);
+  }
+  if (std::abs(survey.size_factor - 1) > worth_a_word_of_size)
+    fmt::print(out,
+               "by the stated distance all tags are {:.2f} % of their stated size; were they "
+               "printed at 100 %?\n",
+               100 * survey.size_factor);
+}
+
+void print_survey(const TagSurvey& survey, const set::Set& set, std::ostream& out) {
+  for (const SurveyedTag& tag : survey.tags) {
+    fmt::print(out, "  tag {}: {} pictures from within {:.0f} degrees, rms {:.3f} px", tag.id,
+               tag.pictures, tag.views_rad / degree, tag.rms_px);
+    if (tag.position_sigma_m > 0)
+      fmt::print(out, "; certain to {:.2f} mm and {:.3f} degrees", 1000 * tag.position_sigma_m,
+                 tag.rotation_sigma_rad / degree);
+    const auto before = std::ranges::find(set.tracking.tags, tag.id, &set::Tag::id);
+    if (before != set.tracking.tags.end()) {
+      const double moved_m =
+          glm::distance(glm::dvec3(before->world_from_tag[3]), glm::dvec3(tag.world_from_tag[3]));
+      if (moved_m > worth_a_word_m)
+        fmt::print(out, "; {:.1f} mm from where the set had it", 1000 * moved_m);
+    }
+    out << '\n';
+  }
+  fmt::print(out,
+             "rms {:.3f} px over {} tags in {} pictures; {} of {} sightings left out; beside the "
+             "pictures' noise, corners are off by {:.3f} px\n",
+             survey.rms_px, survey.tags.size(), survey.pictures,
+             survey.sightings - survey.sightings_used, survey.sightings, survey.model_error_px);
+  print_sizes(survey, out);
+  for (const MovedTag& moved : survey.moved)
+    fmt::print(out, "tag {} did not stay in one place and is left out: {}\n", moved.id,
+               words_of(moved));
+}
+
+}  // namespace
+
+void calibrate_tags(const TagsOptions& options, std::ostream& out) {
+  if (options.write && !options.set_file)
+    throw Error("--write changes the set file that --set names; there is none");
+  set::Set set;
+  if (options.set_file) set = set::load_set(*options.set_file);
+  const ObserverCalibration camera = known_observer(options.set_file, options.footage);
+  const auto source = open_source(options.footage, "observer");
+  const TagWalk walk =
+      gather_walk(*source, camera.intrinsics, camera.response, walk_options(options, set),
+                  [&](const std::string& line) { out << line << '\n'; });
+  const TagSurveyOptions how = survey_options(options, set, walk);
+  const TagSurvey survey = survey_tags(walk, camera.intrinsics, how);
+  print_survey(survey, set, out);
+  std::vector<int> wanted;
+  for (const set::Tag& tag : set.tracking.tags) wanted.push_back(tag.id);
+  insist(missing_of_tags(survey, wanted, how.origin), options.force, out);
+  if (options.write) {
+    const std::string text = with_tags(session::read_file(*options.set_file), survey);
+    set::parse_set(text, *options.set_file);
+    const auto old = set::keep_beside(*options.set_file);
+    session::replace_file(*options.set_file, text);
+    fmt::print(out, "written into {}; as it was: {}\n", options.set_file->string(), old.string());
+  }
+  write_tables(tag_tables(survey), options.table_file, out);
+}
+
+}  // namespace previz::calibrate

@@ -1,0 +1,20 @@
+// Finds tags that did not stay in one place while the camera walked.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "daemon/calibrate/tag_survey.hpp"
+
+namespace previz::calibrate {
+
+// Returns the tag whose sightings are explained worst by one place, if there is one whose corners
+// moved by more than sighting_gate_px(): between two places, or without order. The cameras are
+// taken as they are.
+std::optional<MovedTag> most_moved_tag(const TagWalk& walk, const PinholeIntrinsics& lens,
+                                       const TagPlaces& places, double model_error_px);
+
+// "moved by 10.2 mm and 0.3 degrees between a.png and b.png"
+std::string words_of(const MovedTag& moved);
+
+}  // namespace previz::calibrate

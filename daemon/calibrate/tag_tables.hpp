@@ -1,0 +1,20 @@
+// Writes a map of tags as tables of a set file.
+#pragma once
+
+#include <string>
+
+#include "daemon/calibrate/tag_survey.hpp"
+
+namespace previz::calibrate {
+
+// Returns a [[tag]] table for each tag, with a comment that says how certain its place is. Lengths
+// are rounded to a micrometre and angles to a ten-thousandth of a degree.
+std::string tag_tables(const TagSurvey& survey);
+
+// Returns the set file's text with the tags' sizes and places in the tables that the file has for
+// them, in the form that each is written in (position_m and rotation_deg, corners_m, or
+// world_from_tag), and new tables for the others at the end. Everything else stays as it is. Throws
+// previz::Error if the text cannot be changed.
+std::string with_tags(const std::string& text, const TagSurvey& survey);
+
+}  // namespace previz::calibrate
