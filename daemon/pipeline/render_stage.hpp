@@ -58,8 +58,8 @@ class RenderStage {
   // Returns what renders, to be used by the stage of another set once this one has ended.
   const std::shared_ptr<render::Renderer>& renderer() const { return renderer_; }
 
-  // use() and resize() take effect with the next begin(). `scale` is as in the options; a new one
-  // costs new buffers, but no new scene.
+  // use() and resize() take effect with the next begin(). `scale` is as in the options; only
+  // one that is larger than all before it costs new buffers.
   void use(const set::Quality& quality) { set_.quality = quality; }
   void use(set::Estimator estimator) { renderer_->use(estimator); }
   void resize(double scale);

@@ -65,8 +65,9 @@ struct Shot {
   render::Counters counters;
   bool whole = false;  // false: interrupted before its last sample
   double render_s = 0;
-  double error = 0;     // Refined::error
-  int samples = 0;      // samples of the picture; 0: untouched
+  double error = 0;  // Refined::error
+  int samples = 0;   // samples of the picture; 0: untouched
+  int history = 0;   // earlier frames whose samples the picture shares; 0: it is of its own alone
   bool frozen = false;  // true: a round of refining one frame, not a new frame
 };
 

@@ -114,6 +114,7 @@ std::shared_ptr<const Program> Device::program(
   if (found != programs_.end()) {
     std::rotate(found, found + 1, programs_.end());
   } else {
+    ++made_programs_;
     programs_.push_back({spirv, {constants.begin(), constants.end()}, compile()});
     if (programs_.size() > most_programs) programs_.erase(programs_.begin());
   }
@@ -281,6 +282,7 @@ using Memory = vk::MemoryPropertyFlagBits;
 
 // Where device memory is host-visible anyway (a CPU device), it is mapped and no staging is needed.
 Buffer create_device_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags usage) {
+  device.count_buffer();
   const vk::MemoryPropertyFlags host = Memory::eHostVisible | Memory::eHostCoherent;
   if (!device.is_cpu()) return create_buffer(device, size, usage, Memory::eDeviceLocal, {});
   Buffer result = create_buffer(device, size, usage, host, Memory::eDeviceLocal);
@@ -399,6 +401,12 @@ void barrier(const vk::raii::CommandBuffer& commands) {
 void record_clear(const vk::raii::CommandBuffer& commands,
                   std::initializer_list<const Buffer*> buffers) {
   for (const Buffer* buffer : buffers) commands.fillBuffer(*buffer->buffer, 0, VK_WHOLE_SIZE, 0);
+  barrier(commands);
+}
+
+void record_clear(const vk::raii::CommandBuffer& commands, const Buffer& buffer,
+                  vk::DeviceSize bytes) {
+  commands.fillBuffer(*buffer.buffer, 0, bytes, 0);
   barrier(commands);
 }
 

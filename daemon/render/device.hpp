@@ -63,6 +63,15 @@ class Device {
   // The number of submissions so far, including the one that is being recorded.
   std::uint64_t submissions() const { return submissions_; }
 
+  // The buffers for shaders, and the programs, that were made so far, each of which may cost more
+  // time than a picture has.
+  struct Made {
+    std::uint64_t buffers = 0, programs = 0;
+    friend bool operator==(const Made&, const Made&) = default;
+  };
+  Made made() const { return {made_buffers_, made_programs_}; }
+  void count_buffer() { ++made_buffers_; }
+
   // Returns what `compile` made for the same SPIR-V and constants before, or calls it: compiling
   // may take longer than a picture, and a renderer that is made anew mostly wants what the last one
   // had. The 256 programs that were wanted last are kept; a reopened device has none. `spirv` is
@@ -91,6 +100,7 @@ class Device {
   std::atomic<std::uint64_t> validation_messages_ = 0;
   bool has_labels_ = false;
   std::uint64_t submissions_ = 0;
+  std::atomic<std::uint64_t> made_buffers_ = 0, made_programs_ = 0;
   vk::raii::Instance instance_{nullptr};
   vk::raii::DebugUtilsMessengerEXT messenger_{nullptr};
   vk::raii::PhysicalDevice physical_{nullptr};
@@ -168,6 +178,10 @@ std::vector<T> download(Device& device, const Buffer& buffer, std::size_t count)
 // Records commands that fill the buffers with zeros, and a barrier() after them.
 void record_clear(const vk::raii::CommandBuffer& commands,
                   std::initializer_list<const Buffer*> buffers);
+
+// Likewise for the first `bytes` of one buffer, a multiple of 4.
+void record_clear(const vk::raii::CommandBuffer& commands, const Buffer& buffer,
+                  vk::DeviceSize bytes);
 
 // Makes what earlier dispatches and transfers wrote visible to later dispatches (and their indirect
 // arguments) and transfers.

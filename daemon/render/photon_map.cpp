@@ -12,10 +12,11 @@
 namespace previz::render {
 
 void PhotonMap::resize(std::uint32_t photons) {
-  if (photons == photons_) return;
   photons_ = photons;
   // This must equal photon_bucket_count() of shaders/lib/photon_grid.glsl.
   bucket_count_ = std::bit_ceil(2 * photons);
+  if (photons <= room_) return;  // fewer photons use a part of the buffers
+  room_ = 0;                     // stays 0 if an allocation below throws
   const vk::DeviceSize slots = 2 * static_cast<vk::DeviceSize>(photons);
   photon_buffer_ = create_storage_buffer(device_, slots * sizeof(gpu::GpuPhoton));
   order_ = create_storage_buffer(device_, slots * sizeof(std::uint32_t));
@@ -25,6 +26,7 @@ void PhotonMap::resize(std::uint32_t photons) {
                                 vk::Format::eR32G32B32A32Sfloat);
   buckets_ = create_texel_buffer(device_, bucket_count_ * sizeof(gpu::GpuPhotonBucket),
                                  vk::Format::eR32G32Uint);
+  room_ = photons;
 }
 
 void PhotonMap::create_kernels(std::uint32_t features) {

@@ -13,8 +13,8 @@ class PhotonMap {
  public:
   explicit PhotonMap(Device& device) : device_(device) { resize(1); }
 
-  // (Re)creates the buffers if the number of photons per pass changes. `photons` is at least 1,
-  // even where no photons are used.
+  // Uses so many photons per pass; the buffers are made anew if there were never so many. `photons`
+  // is at least 1, even where no photons are used.
   void resize(std::uint32_t photons);
   void create_kernels(std::uint32_t features);
   // Adds the map's buffers, for the passes that read the map and for the passes below.
@@ -31,6 +31,7 @@ class PhotonMap {
   Device& device_;
   Kernel emit_, bounce_, share_out_, scatter_, sort_;
   std::uint32_t photons_ = 0, bucket_count_ = 0;
+  std::uint32_t room_ = 0;  // photons that the buffers have room for
   Buffer photon_buffer_, order_, filled_, control_, sorted_, buckets_;
 };
 

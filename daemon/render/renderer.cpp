@@ -35,10 +35,10 @@ struct Renderer::Impl {
         estimation(the_estimation),
         calibration(the_calibration),
         scene(*device) {
-    resize();
+    make_wavefront();
   }
 
-  void resize();
+  void make_wavefront();
   void upload_rays();
 
   void upload_frame();
@@ -70,7 +70,7 @@ struct Renderer::Impl {
   std::uint64_t trees_now = 0, trees_before = 0;  // rebuilt up to this frame's begin and the last's
 };
 
-void Renderer::Impl::resize() {
+void Renderer::Impl::make_wavefront() {
   const PinholeIntrinsics& picture = calibration.intrinsics;
   wavefront.reset();  // frees the old memory before the new is allocated
   wavefront.emplace(*device, picture.width, picture.height,
@@ -184,7 +184,7 @@ void Renderer::begin_set(const set::Estimation& estimation,
   if (has_room)  // the pipelines stay, if they are those that the set needs
     r.upload_rays();
   else
-    r.resize();
+    r.make_wavefront();
 }
 
 void Renderer::set_environment(const lighting::EnvironmentMap& environment,
@@ -213,7 +213,8 @@ void Renderer::use(set::Estimator estimator) {
 void Renderer::resize(const ObserverCalibration& calibration) {
   check_size(*impl_->device, calibration.intrinsics);
   impl_->calibration = calibration;
-  impl_->resize();
+  impl_->wavefront->resize(calibration.intrinsics.width, calibration.intrinsics.height);
+  impl_->upload_rays();
 }
 
 void Renderer::set_sources(std::vector<set::Light> sources) {

@@ -48,7 +48,8 @@ class Renderer {
   // the first call after set_scene() they have those at rest.
   void deform(const std::vector<scene::Shape>& shapes);
   // use() and resize() take effect at the next begin(): another estimator, or another picture size
-  // with its calibration. Scene and environment stay.
+  // with its calibration. Scene and environment stay, and so do pipelines and buffers: only a
+  // picture that is larger than all before it gets new buffers.
   void use(set::Estimator estimator);
   void resize(const ObserverCalibration& calibration);
   void set_environment(const lighting::EnvironmentMap& environment, set::LightSampling sampling);

@@ -48,35 +48,68 @@ Wavefront::Wavefront(Device& device, int width, int height, std::uint32_t paths_
     : device_(device),
       max_slots_(device.is_cpu() ? cpu_slots : gpu_slots),
       paths_a_slot_(paths_a_slot),
-      width_(width),
-      height_(height),
       photons_(device),
-      camera_(device) {
-  create_tiles(width, height);
+      camera_(device),
+      control_(create_indirect_buffer(device, sizeof(gpu::GpuControl))) {
+  resize(width, height);
+}
+
+void Wavefront::resize(int width, int height) {
+  width_ = width;
+  height_ = height;
+  create_tiles();
   create_paths();
 }
 
-void Wavefront::create_tiles(int width, int height) {
-  const auto columns = static_cast<std::uint32_t>(width);
-  const auto rows = static_cast<std::uint32_t>(height);
+vk::DeviceSize Wavefront::bytes_of(const Tile& tile) const {
+  return sizeof(gpu::GpuPixel) * vk::DeviceSize{tile.batch.width} * tile.batch.height;
+}
+
+// The bands have equal height, so that none is left with a few rows. There are as few as the slots
+// allow, or more if each of them then fits into the buffers that are there.
+void Wavefront::create_tiles() {
+  const auto columns = static_cast<std::uint32_t>(width_);
+  const auto rows = static_cast<std::uint32_t>(height_);
+  const auto divide = [&](std::uint32_t bands) {
+    const std::uint32_t band_rows = round_up((rows + bands - 1) / bands, block_height);
+    tiles_.clear();
+    for (std::uint32_t y = 0; y < rows; y += band_rows)
+      tiles_.push_back({{0, y, columns, std::min(band_rows, rows - y), 0, 0, 0}});
+  };
+  const auto fits = [&] {
+    for (std::size_t i = 0; i < tiles_.size(); ++i)
+      if (i >= pixels_.size() || pixels_[i].size < bytes_of(tiles_[i])) return false;
+    return true;
+  };
   const std::uint32_t row_slots = round_up(columns, block_width) * block_height;
   const std::uint32_t most_rows = std::max(max_slots_ / row_slots * block_height, block_height);
-  // The bands have equal height, so that none is left with a few rows.
-  const std::uint32_t bands = (rows + most_rows - 1) / most_rows;
-  const std::uint32_t band_rows = round_up((rows + bands - 1) / bands, block_height);
-  for (std::uint32_t y = 0; y < rows; y += band_rows) {
-    Tile tile;
-    tile.batch = {0, y, columns, std::min(band_rows, rows - y), 0, 0, 0};
-    tile.pixels = create_storage_buffer(
-        device_, sizeof(gpu::GpuPixel) * tile.batch.width * tile.batch.height);
-    tiles_.push_back(std::move(tile));
-  }
+  const std::uint32_t fewest = (rows + most_rows - 1) / most_rows;
+  std::uint32_t bands = fewest;
+  for (divide(bands); !fits() && bands < pixels_.size();) divide(++bands);
+  if (fits()) return;
+  divide(fewest);
+  pixels_.clear();  // frees the old memory before the new is allocated
+  for (const Tile& tile : tiles_) pixels_.push_back(create_storage_buffer(device_, bytes_of(tile)));
 }
 
 void Wavefront::create_paths() {
-  for (const Tile& tile : tiles_) slots_ = std::max(slots_, slots_of(tile.batch));
-  slots_ = std::max(slots_, max_slots_ / slots_ * slots_);
-  const vk::DeviceSize paths = paths_a_slot_ * static_cast<vk::DeviceSize>(slots_);
+  const vk::DeviceSize limits =
+      sizeof(std::uint32_t) * sampled_blocks(width_) * vk::DeviceSize{sampled_blocks(height_)};
+  if (limits_.size < limits) limits_ = create_storage_buffer(device_, limits);
+  std::uint32_t most = 0;
+  for (const Tile& tile : tiles_) most = std::max(most, slots_of(tile.batch));
+  const std::uint32_t slots = std::max(most, max_slots_ / most * most);
+  if (most > slots_) create_path_buffers(slots);
+  most_photons_ = std::min(slots, slots_);
+}
+
+void Wavefront::create_path_buffers(std::uint32_t slots) {
+  slots_ = 0;  // stays 0 if an allocation below throws
+  const vk::DeviceSize paths = paths_a_slot_ * static_cast<vk::DeviceSize>(slots);
+  for (Buffer* old :
+       {&ray_origin_, &ray_direction_, &throughput_, &receivers_, &hits_, &queue_, &shadow_rays_,
+        &sample_mixed_, &sample_real_, &sample_landed_, &sample_aov_, &sample_albedo_})
+    *old = Buffer{};  // frees the old memory before the new is allocated
   ray_origin_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
   ray_direction_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
   throughput_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
@@ -84,18 +117,16 @@ void Wavefront::create_paths() {
   hits_ = create_storage_buffer(device_, paths * sizeof(gpu::GpuHit));
   queue_ = create_storage_buffer(device_, 2 * paths * sizeof(std::uint32_t));
   shadow_rays_ = create_storage_buffer(device_, paths * sizeof(gpu::GpuShadowRay));
-  sample_mixed_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
-  sample_real_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
+  sample_mixed_ = create_storage_buffer(device_, slots * sizeof(gpu::vec4));
+  sample_real_ = create_storage_buffer(device_, slots * sizeof(gpu::vec4));
   sample_landed_ =
-      create_storage_buffer(device_, (paths_a_slot_ > 2 ? slots_ : 1) * sizeof(gpu::vec4));
-  sample_aov_ = create_storage_buffer(device_, slots_ * sizeof(gpu::vec4));
-  sample_albedo_ = create_storage_buffer(device_, slots_ * sizeof(gpu::uvec2));
-  limits_ = create_storage_buffer(
-      device_, sizeof(std::uint32_t) * sampled_blocks(width_) * sampled_blocks(height_));
-  control_ = create_indirect_buffer(device_, sizeof(gpu::GpuControl));
+      create_storage_buffer(device_, (paths_a_slot_ > 2 ? slots : 1) * sizeof(gpu::vec4));
+  sample_aov_ = create_storage_buffer(device_, slots * sizeof(gpu::vec4));
+  sample_albedo_ = create_storage_buffer(device_, slots * sizeof(gpu::uvec2));
+  slots_ = slots;
 }
 
-Buffers Wavefront::buffers_of(const Tile& tile) const {
+Buffers Wavefront::buffers_of(std::size_t tile) const {
   Buffers buffers = scene_;
   buffers.insert({{"ray_origin", &ray_origin_},
                   {"ray_direction", &ray_direction_},
@@ -111,7 +142,7 @@ Buffers Wavefront::buffers_of(const Tile& tile) const {
                   {"sample_albedo", &sample_albedo_},
                   {"control", &control_},
                   {"limits", &limits_},
-                  {"pixels", &tile.pixels}});
+                  {"pixels", &pixels_[tile]}});
   photons_.add_to(buffers);
   camera_.add_to(buffers);
   return buffers;
@@ -159,7 +190,8 @@ void Wavefront::clear() {
   control.shadow_groups[1] = control.shadow_groups[2] = 1;
   upload_bytes(device_, control_, std::as_bytes(std::span(&control, 1)));
   device_.submit([&](const vk::raii::CommandBuffer& commands) {
-    for (const Tile& tile : tiles_) record_clear(commands, {&tile.pixels});
+    for (std::size_t i = 0; i < tiles_.size(); ++i)
+      record_clear(commands, pixels_[i], bytes_of(tiles_[i]));
   });
 }
 
@@ -205,8 +237,9 @@ bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::u
                        const std::function<bool()>& cancelled) {
   if ((features_.value() & gpu::FEATURE_PHOTONS) != 0)
     return render_with_photons(first_sample, samples, max_depth, cancelled);
-  for (const Tile& tile : tiles_) {
-    const Buffers buffers = buffers_of(tile);
+  for (std::size_t i = 0; i < tiles_.size(); ++i) {
+    const Tile& tile = tiles_[i];
+    const Buffers buffers = buffers_of(i);
     const std::uint32_t at_once = std::max(slots_ / slots_of(tile.batch), 1u);
     const std::uint32_t end = std::min(first_sample + samples, tile.limit);
     for (std::uint32_t sample = first_sample; sample < end; sample += at_once) {
@@ -243,14 +276,15 @@ bool Wavefront::render_with_photons(std::uint32_t first_sample, std::uint32_t sa
       photons_owed_ -= 1;
       traced_radius_ = std::max(photon_radius_ * photon_radius_factor(sample), least_photon_radius);
     }
-    for (const Tile& tile : tiles_) {
+    for (std::size_t i = 0; i < tiles_.size(); ++i) {
+      const Tile& tile = tiles_[i];
       if (sample >= tile.limit) continue;
       if (cancelled && cancelled()) return false;
       gpu::GpuBatch batch = tile.batch;
       batch.first_sample = sample;
       batch.samples = 1;
       batch.photon_radius = static_cast<float>(traced_radius_);
-      const Buffers buffers = buffers_of(tile);
+      const Buffers buffers = buffers_of(i);
       device_.submit([&](const vk::raii::CommandBuffer& commands) {
         const Recording recording{commands, batch, buffers};
         if (trace_photons) record_photons(recording, max_depth);
@@ -269,7 +303,7 @@ void Wavefront::use_photons(std::uint32_t count, double radius) {
 
 void Wavefront::use_camera(const std::vector<glm::vec4>& plate) {
   camera_.upload(plate);
-  const Buffers buffers = buffers_of(tiles_.front());
+  const Buffers buffers = buffers_of(0);
   std::vector<gpu::GpuBatch> parts;
   for (const Tile& tile : tiles_) parts.push_back(tile.batch);
   device_.submit(
@@ -278,9 +312,9 @@ void Wavefront::use_camera(const std::vector<glm::vec4>& plate) {
 
 std::vector<Wavefront::Sums> Wavefront::sums() const {
   std::vector<Sums> result;
-  for (const Tile& tile : tiles_)
-    result.push_back(
-        {tile.pixels, static_cast<int>(tile.batch.y), static_cast<int>(tile.batch.height)});
+  for (std::size_t i = 0; i < tiles_.size(); ++i)
+    result.push_back({pixels_[i], static_cast<int>(tiles_[i].batch.y),
+                      static_cast<int>(tiles_[i].batch.height)});
   return result;
 }
 

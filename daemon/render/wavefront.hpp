@@ -22,13 +22,19 @@ class Wavefront {
   // `paths_a_slot` is 2, or 3 where FEATURE_CAMERA may be asked for, which forks once more.
   Wavefront(Device& device, int width, int height, std::uint32_t paths_a_slot);
 
+  // Makes room for a picture of another size; the next samples are to be preceded by a clear().
+  // Kernels stay, and so do buffers: only a picture that is larger than all before it gets new
+  // ones.
+  void resize(int width, int height);
+  std::uint32_t paths_a_slot() const { return paths_a_slot_; }
+
   // Uses the scene in these buffers, which must stay where they are, and the pipelines for
   // `features`.
   void use_scene(Buffers scene, std::uint32_t features);
   // Sets the photons per pass and the radius of the first pass, over the distance from the camera;
   // used where `features` has FEATURE_PHOTONS.
   void use_photons(std::uint32_t count, double radius);
-  std::uint32_t most_photons() const { return slots_; }
+  std::uint32_t most_photons() const { return most_photons_; }
   // Sets the camera's measurement, row-major (CameraMap::upload); used where `features` has
   // FEATURE_CAMERA.
   void use_camera(const std::vector<glm::vec4>& plate);
@@ -54,14 +60,15 @@ class Wavefront {
   struct Tile {
     gpu::GpuBatch batch;      // the tile's rectangle
     std::uint32_t limit = 0;  // the largest limit of its blocks
-    Buffer pixels;
   };
 
-  void create_tiles(int width, int height);
+  void create_tiles();
   void create_paths();
+  void create_path_buffers(std::uint32_t slots);
   void create_kernels(std::uint32_t features);
-  Buffers buffers_of(const Tile& tile) const;  // with the scene's and the maps'
-  std::uint32_t passes() const;                // rounds for panes that paths meet and pass
+  Buffers buffers_of(std::size_t tile) const;  // with the scene's and the maps'
+  vk::DeviceSize bytes_of(const Tile& tile) const;
+  std::uint32_t passes() const;  // rounds for panes that paths meet and pass
   double share_of(std::uint32_t sample) const;
   bool render_with_photons(std::uint32_t first_sample, std::uint32_t samples,
                            std::uint32_t max_depth, const std::function<bool()>& cancelled);
@@ -73,7 +80,8 @@ class Wavefront {
   Device& device_;
   std::uint32_t max_slots_, paths_a_slot_;
   std::uint32_t slots_ = 0;  // allocated
-  int width_, height_;
+  std::uint32_t most_photons_ = 0;
+  int width_ = 0, height_ = 0;
   PhotonMap photons_;
   CameraMap camera_;
   std::vector<std::uint32_t> sampled_until_;  // the limits of all blocks, sorted, least first
@@ -82,6 +90,7 @@ class Wavefront {
   double photons_owed_ = 0;                   // passes; photons are traced anew at 1
   Buffers scene_;
   std::vector<Tile> tiles_;
+  std::vector<Buffer> pixels_;  // of the tiles; those of smaller pictures may use a part of them
   std::optional<std::uint32_t> features_;  // of the kernels, once they are made
   Kernel generate_, advance_, extend_, shade_, prepare_shadow_, shadow_, accumulate_;
   Buffer ray_origin_, ray_direction_, throughput_, receivers_, hits_, queue_, shadow_rays_,

@@ -36,6 +36,8 @@ Outcome none_of(const char* what) {
 
 Controls::Controls(const set::Set& set, pipeline::Edits edits, const scene::Scene& scene)
     : control_(set.control),
+      fps_(set.quality.fps),
+      set_samples_(set.quality.samples),
       is_animated_(std::ranges::any_of(
           set.objects, [](const set::Object& object) { return !object.animation.empty(); })) {
   for (const set::Object& object : set.objects)
@@ -222,6 +224,7 @@ Outcome Controls::apply(const set::OtherSet& effect) {
 }
 
 Outcome Controls::apply(const set::ChangeSamples& effect) {
+  if (look_.governed && governed_samples_ > 0) look_.samples = governed_samples_;
   look_.governed = false;
   const int* const end = std::end(sample_steps);
   if (effect.next > 0) {
@@ -232,6 +235,13 @@ Outcome Controls::apply(const set::ChangeSamples& effect) {
     if (at != std::begin(sample_steps)) look_.samples = *(at - 1);
   }
   return {fmt::format("{} samples", look_.samples), false, {}};
+}
+
+Outcome Controls::apply(const set::HoldRate&) {
+  if (!(fps_ > 0)) return {"this set holds no frame rate", true, {}};
+  look_.governed = true;
+  look_.samples = set_samples_;
+  return {fmt::format("{:g} pictures a second are held", fps_), false, {}};
 }
 
 Outcome Controls::apply(const set::NextEstimator&) {

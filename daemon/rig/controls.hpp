@@ -79,6 +79,10 @@ class Controls {
     recorded_variants_ = std::move(variants);
   }
 
+  // Takes the samples per pixel that hold the set's frame rate, from which the buttons go on; 0:
+  // not known.
+  void use_governed(int samples) { governed_samples_ = samples; }
+
   // Performs an action that D-Bus, previzctl or a press asks for. `ended_refinement` means that the
   // press itself has ended a refinement, which the action then concerns.
   Outcome perform(const set::Action& action, bool ended_refinement = false);
@@ -101,6 +105,7 @@ class Controls {
   Outcome apply(const set::KeepEdits& effect);
   Outcome apply(const set::OtherSet& effect);
   Outcome apply(const set::ChangeSamples& effect);
+  Outcome apply(const set::HoldRate& effect);
   Outcome apply(const set::NextEstimator& effect);
   Outcome apply(const set::NextLightMode& effect);
   Outcome apply(const set::NextView& effect);
@@ -127,6 +132,9 @@ class Controls {
   pipeline::LightEdit& light_edit();
 
   const set::Control control_;
+  const double fps_;       // quality.fps
+  const int set_samples_;  // quality.samples
+  int governed_samples_ = 0;
   // The looks that an object can be shown in, in the order of the buttons.
   struct Looks {
     std::vector<std::string> names;  // "" is the file as it is, where no variant looks like that

@@ -62,7 +62,7 @@ control::Status status_of(const Rig& rig, const set::Set& set, const render::Dev
           recorder.lost.frames,
           recorder.fault,
           look.state.camera_lost,
-          look.samples,
+          rig.samples(),
           set.name,
           rig.controls().selected_object(),
           rig.controls().selected_light(),

@@ -33,7 +33,7 @@ LiveRender::LiveRender(const set::Set& set, const pipeline::Newest<Look>& look, 
       channels_(channels),
       stop_(std::move(stop)),
       drops_(metrics, "render", channels.tracked) {
-  if (set.quality.fps > 0) governor_.emplace(set.quality.fps, set.quality.scale);
+  if (set.quality.fps > 0) governor_.emplace(set.quality.fps, pipeline::preview_steps(set.quality));
 }
 
 bool LiveRender::interrupted() const {
@@ -143,6 +143,7 @@ bool LiveRender::begin_refinement(const Look& look) {
   shot.scene = look.of_take ? pipeline::with_edits(recorded_, set_, look.take_edits)
                             : pipeline::scene_state(set_, look.edits, shot.motion);
   stage_->fill_layers(true);
+  stage_->use(set_.quality);  // the preview's may be denoised otherwise
   stage_->use(look.estimator);
   stage_->resize(1);
   refining_ = stage_->begin(shot);
@@ -187,16 +188,25 @@ std::optional<Shot> LiveRender::take_frame(const Look& look, bool is_to_be_rende
   return shot;
 }
 
-Shot LiveRender::render(const Look& look, Shot shot) {
-  const auto begin = Clock::now();
-  const bool governed = look.governed && governor_;
-  set::Quality quality = set_.quality;
-  quality.samples = look.samples;
-  quality.adaptive = false;
-  if (governed) {
+// A number of samples that a button asks for keeps the size that the rate had brought about, so
+// that it changes the samples alone.
+double LiveRender::govern(const Look& look, set::Quality& quality) const {
+  if (!governor_) return set_.quality.scale;
+  const set::PreviewStep& step = governor_->step();
+  quality.denoise = step.denoise.value_or(quality.denoise);
+  if (look.governed) {
     quality.samples = governor_->samples();
     quality.error = quality.seconds = 0;
   }
+  return step.scale;
+}
+
+Shot LiveRender::render(const Look& look, Shot shot) {
+  const auto begin = Clock::now();
+  set::Quality quality = set_.quality;
+  quality.samples = look.samples;
+  quality.adaptive = false;
+  const double scale = govern(look, quality);
   // If a refinement ended before its first round, this picture is the only one to save for it.
   const bool of_live = look.snapshots > snapshots_;
   const bool snapshot = of_live || look.refined_snapshots > refined_snapshots_;
@@ -214,7 +224,7 @@ Shot LiveRender::render(const Look& look, Shot shot) {
     stage_->use(look.estimator);
     stage_->show(look.view);
     stage_->fill_layers(snapshot);
-    stage_->resize(governed ? governor_->scale() : set_.quality.scale);
+    stage_->resize(scale);
     (*stage_)(shot);
   } catch (const render::DeviceLost&) {
     if (captured) metrics_.dropped("render", "device lost");
@@ -229,7 +239,11 @@ Shot LiveRender::render(const Look& look, Shot shot) {
   if (!shot.whole) return shot;
   if (shot.untouched.empty()) {
     keep_as_good(shot, std::move(recorded));
-    if (governed) governor_->took(took);
+    if (look.governed && governor_) {
+      if (!is_first_ && !snapshot) governor_->took(took);
+      channels_.samples.set(governor_->samples());
+    }
+    is_first_ = false;
   }
   if (snapshot) {
     ++(of_live ? snapshots_ : refined_snapshots_);

@@ -27,6 +27,7 @@ class LiveRender {
     pipeline::Mailbox<pipeline::Shot>& reviewed;                // a take's, with their light
     pipeline::BoundedQueue<pipeline::Shot>& snapshots;          // output, with layers
     pipeline::Newest<std::vector<pipeline::FoundLamp>>& found;  // output, of the last light
+    pipeline::Newest<int>& samples;  // output, of the last picture while the rate is held
     // Output: the variants, by object, that the last reviewed frame was recorded with.
     pipeline::Newest<std::map<std::string, std::string>>& recorded_variants;
   };
@@ -35,7 +36,10 @@ class LiveRender {
   LiveRender(const set::Set& set, const pipeline::Newest<Look>& look, Inbox& inbox,
              pipeline::Metrics& metrics, Channels channels, std::stop_token stop);
 
-  void use(pipeline::RenderStage& stage) { stage_ = &stage; }
+  void use(pipeline::RenderStage& stage) {
+    stage_ = &stage;
+    is_first_ = true;
+  }
   // Forgets a stage that has failed, and the refinement that it was at; there is none until use().
   void use_none();
 
@@ -72,6 +76,9 @@ class LiveRender {
   pipeline::Shot render(const Look& look, pipeline::Shot shot);
   void keep_as_good(const pipeline::Shot& shot, std::optional<session::SceneState> recorded);
   std::optional<pipeline::Shot>& good_of(const Look& look);
+  // Puts what the governor has chosen into the quality, as far as the rate is held, and returns the
+  // size of the picture.
+  double govern(const Look& look, set::Quality& quality) const;
   static const pipeline::Edits& edits_of(const Look& look);
   void publish_found(const pipeline::LightPtr& light);
 
@@ -83,6 +90,7 @@ class LiveRender {
   const std::stop_token stop_;
   pipeline::RenderStage* stage_ = nullptr;
   std::optional<pipeline::Governor> governor_;
+  bool is_first_ = true;  // no picture came of the stage yet; the first one compiles its pipelines
   // The last shots with pose and light, of the rig and of the take in review: their frames only.
   std::optional<pipeline::Shot> good_, good_of_take_;
   session::SceneState recorded_;           // the scene that good_of_take_ was recorded with

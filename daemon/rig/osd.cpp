@@ -67,6 +67,8 @@ std::string samples(const PictureFacts& picture, const Look& look) {
   std::string text = counted(picture.samples, "sample");
   if (look.state.mode == Mode::refine && picture.error > 0)
     text += fmt::format(" · error {:.2g} %", 100 * picture.error);
+  if (picture.history > 0) text += " + " + counted(picture.history, "frame");
+  if (picture.width > 0) text += fmt::format(" · {}x{}", picture.width, picture.height);
   return text;
 }
 
@@ -111,6 +113,8 @@ void add_notices(const RigFacts& rig, const PictureFacts* picture, OsdPage& page
 PictureFacts facts_of(const pipeline::Shot& shot) {
   PictureFacts facts;
   facts.samples = shot.samples;
+  facts.history = shot.history;
+  if (shot.picture) facts.width = shot.picture->width, facts.height = shot.picture->height;
   facts.error = shot.error;
   facts.untouched = shot.untouched;
   facts.tracking = shot.track.status;

@@ -17,9 +17,11 @@ namespace previz::rig {
 
 // Facts about the picture on the screen.
 struct PictureFacts {
-  int samples = 0;        // per pixel; 0: the plate alone is shown
-  double error = 0;       // over the picture's mean radiance; 0: not estimated
-  std::string untouched;  // why the plate alone is shown; empty: it was rendered
+  int samples = 0;            // per pixel; 0: the plate alone is shown
+  int history = 0;            // earlier frames that the picture shares samples with
+  int width = 0, height = 0;  // of the rendered picture; 0: not shown
+  double error = 0;           // over the picture's mean radiance; 0: not estimated
+  std::string untouched;      // why the plate alone is shown; empty: it was rendered
   tracking::TrackStatus tracking = tracking::TrackStatus::lost;
   int tags = 0;             // used for the pose
   double deviation_mm = 0;  // standard deviation of the camera's position; 0: not known

@@ -195,6 +195,13 @@ void Rig::close_take() {
 void Rig::know_picture() {
   controls_.use_found(pipeline_.found_lamps());
   controls_.use_recorded(pipeline_.recorded_variants());
+  controls_.use_governed(pipeline_.governed_samples());
+}
+
+int Rig::samples() const {
+  const Look& look = controls_.look();
+  const int governed = pipeline_.governed_samples();
+  return look.governed && governed > 0 ? governed : look.samples;
 }
 
 Outcome Rig::perform(const set::Action& action, const std::string& by) {

@@ -62,6 +62,8 @@ class Rig {
   Outcome wish(Event event, const std::string& by);
 
   const Controls& controls() const { return controls_; }
+  // Returns the samples per pixel that the preview has now.
+  int samples() const;
   output::RecorderStatus recorder_status() const { return recorder_.status(); }
   // Called after controls, recorder or Reports::announced() have changed.
   void on_change(std::function<void()> changed) { changed_ = std::move(changed); }

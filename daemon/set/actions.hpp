@@ -34,6 +34,7 @@ struct OtherSet {     // loads the next set file by name in the running set's fo
 struct ChangeSamples {
   int next = 1;  // moves along 1, 2, 3, 4, 6 ... 50 samples per pixel
 };
+struct HoldRate {};  // gives samples and size back to quality.fps
 struct NextEstimator {};
 struct NextLightMode {};
 struct NextView {};
@@ -70,11 +71,11 @@ struct ChangeExposure {
   int steps = 1;
 };
 
-using Effect =
-    std::variant<ToMode, Record, MarkGood, Acknowledge, Snapshot, ReloadSet, KeepEdits, OtherSet,
-                 ChangeSamples, NextEstimator, NextLightMode, NextView, ToggleOsd, SelectObject,
-                 MoveObject, TurnObject, ScaleObject, ChangeVariant, ResetObject, PlayAnimations,
-                 HoldAnimations, SelectLight, DimLight, TintLight, ResetLight, ChangeExposure>;
+using Effect = std::variant<ToMode, Record, MarkGood, Acknowledge, Snapshot, ReloadSet, KeepEdits,
+                            OtherSet, ChangeSamples, HoldRate, NextEstimator, NextLightMode,
+                            NextView, ToggleOsd, SelectObject, MoveObject, TurnObject, ScaleObject,
+                            ChangeVariant, ResetObject, PlayAnimations, HoldAnimations, SelectLight,
+                            DimLight, TintLight, ResetLight, ChangeExposure>;
 
 struct Action {
   const char* name;

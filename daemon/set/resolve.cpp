@@ -48,6 +48,7 @@ class Resolver {
     captured_lamps();
     lighting();
     room();
+    for (const auto& [table, step] : draft_.preview_steps) set_.quality.steps.push_back(step);
     buttons();
     contacts();
     display();

@@ -211,15 +211,24 @@ struct Estimation {
   friend bool operator==(const Estimation&, const Estimation&) = default;
 };
 
+// One of the ways in which the preview may hold its rate: [[quality.preview]].
+struct PreviewStep {
+  int samples = 1;              // at least so many per pixel
+  double scale = 1;             // times the observer's resolution
+  std::optional<bool> denoise;  // absent: as quality.denoise
+
+  friend bool operator==(const PreviewStep&, const PreviewStep&) = default;
+};
 struct Quality {
-  int samples = 16;          // per pixel and frame, 1..1'000'000
-  bool adaptive = false;     // noisy pixels get more, `samples` on average; not in the preview
-  bool denoise = true;       // denoises the composite, guided by its own variance
-  double error = 0;          // refines to this rms error over the picture's rms; 0: samples decide
-  double seconds = 0;        // time limit of a frame; 0: samples decide
-  double scale = 1.0;        // times the observer's resolution, preview only
-  double fps = 0;            // preview: kept by fewer samples, then pixels; 0: the others decide
-  bool cpu_instead = false;  // live: the CPU draws while the GPU that was there is gone
+  int samples = 16;       // per pixel and frame, 1..1'000'000
+  bool adaptive = false;  // noisy pixels get more, `samples` on average; not in the preview
+  bool denoise = true;    // denoises the composite, guided by its own variance
+  double error = 0;       // refines to this rms error over the picture's rms; 0: samples decide
+  double seconds = 0;     // time limit of a frame; 0: samples decide
+  double scale = 1.0;     // times the observer's resolution, preview only
+  double fps = 0;         // preview: kept by fewer samples, then pixels; 0: the others decide
+  std::vector<PreviewStep> steps;  // how fps is held, best first; empty: scale, then ever smaller
+  bool cpu_instead = false;        // live: the CPU draws while the GPU that was there is gone
 };
 
 // The kinds of press that an action can be bound to.

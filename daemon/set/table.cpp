@@ -274,8 +274,16 @@ Keys quality_keys(Quality& q) {
       {"error", &q.error, plain.within(0, 1), "Adds samples wherever the estimated error is above this share of the picture's brightness; 0: a fixed number of samples."},
       {"seconds", &q.seconds, plain.within(0, 86'400), "Adds samples for this long, where the picture needs them most; 0: a fixed number of samples."},
       {"scale", &q.scale, plain.within(0.01, 1), "Size of the preview, relative to the camera's picture; offline rendering is always full size."},
-      {"fps", &q.fps, plain.within(0, 240), "Frame rate that the preview holds, by 1 to 50 samples, and then by a smaller picture (scale is the largest size); 0: the keys above decide."},
+      {"fps", &q.fps, plain.within(0, 240), "Frame rate that the preview holds, by 1 to 50 samples, and then by a smaller picture (scale is the largest size), or by the [[quality.preview]] tables; 0: the keys above decide."},
       {"cpu_instead", &q.cpu_instead, plain, "Live, if the graphics card is gone: draws on the CPU, slowly, for as long as the set runs. Otherwise the plate is shown until the card is back. A rig that never had a card draws on the CPU anyway."},
+  };
+}
+
+Keys preview_step_keys(PreviewStep& s) {
+  return {
+      {"samples", &s.samples, plain.within(1, 50), "The least number of samples per pixel; as many more as fit are taken."},
+      {"scale", &s.scale, plain.within(0.01, 1), "Size of the picture, relative to the camera's."},
+      {"denoise", &s.denoise, plain, "Whether noise is removed. Default: quality.denoise.", optional("true")},
   };
 }
 
@@ -384,6 +392,7 @@ std::vector<Section> sections(Draft& d) {
       once("lighting.sources", always, "How lamps are found in the light camera's picture, with mode = \"sources\" or \"hybrid\".", [&d] { return light_sources_keys(d.set.lighting.sources); }),
       once("estimator", always, "How light is simulated.", [&d] { return estimator_keys(d.set.estimation); }),
       once("quality", always, "How much time and noise a frame may have.", [&d] { return quality_keys(d.set.quality); }),
+      many("quality.preview", "What the preview may do to hold quality.fps; one table for each step, best first: the first one that fits is taken. `previzd trade` prints those that suit a set. Default: a sample at quality.scale, and then each time half as many pixels.", d.preview_steps, [](PreviewStepDraft& s) { return preview_step_keys(s.step); }),
       many("button", "What a button does; one table for each way to press it.", d.buttons, [](ButtonDraft& b) { return button_keys(b.button); }),
       many("gpio", "How buttons on GPIO lines are wired; one table for each chip or line that differs from the defaults below.", d.contacts, [](GpioDraft& g) { return gpio_keys(g.contact); }),
       once("control", always, "The step of each action.", [&d] { return control_keys(d.set.control); }),

@@ -67,6 +67,11 @@ struct CapturedLampDraft {
   CapturedLamp lamp;
 };
 
+struct PreviewStepDraft {
+  Given given;
+  PreviewStep step;
+};
+
 struct ButtonDraft {
   Given given;
   Button button;
@@ -94,6 +99,7 @@ struct Draft {
   std::vector<SurfaceDraft> surfaces;
   std::vector<LightDraft> lights;
   std::vector<CapturedLampDraft> captured_lamps;
+  std::vector<PreviewStepDraft> preview_steps;
   std::vector<ButtonDraft> buttons;
   std::vector<GpioDraft> contacts;
 };

@@ -76,6 +76,21 @@ TEST(Controls, ANumberOfSamplesEndsTheGovernor) {
   EXPECT_FALSE(controls.look().governed);
 }
 
+TEST(Controls, SamplesGoOnFromTheGovernorsNumberAndTheRateCanBeHadBack) {
+  set::Set set = stage();
+  set.quality.fps = 25;
+  Controls controls(set);
+  controls.use_governed(3);
+  EXPECT_EQ(controls.perform(*set::find_action("samples_up")).said, "4 samples");
+  controls.use_governed(9);  // of a picture before the press
+  EXPECT_EQ(controls.perform(*set::find_action("samples_down")).said, "3 samples");
+  EXPECT_EQ(controls.perform(*set::find_action("hold_rate")).said, "25 pictures a second are held");
+  EXPECT_TRUE(controls.look().governed);
+  EXPECT_EQ(controls.look().samples, set.quality.samples) << "a refinement begins with the set's";
+  set.quality.fps = 0;
+  EXPECT_TRUE(Controls(set).perform(*set::find_action("hold_rate")).refused);
+}
+
 TEST(Controls, OnlyVirtualObjectsAreMovedAndEachKeepsItsPlace) {
   Desk desk;
   EXPECT_EQ(desk.controls.selected_object(), "vase");

@@ -41,6 +41,17 @@ TEST(OsdWords, LivePreview) {
   EXPECT_TRUE(page.notices.empty());
 }
 
+TEST(OsdWords, SizeAndHistoryStandBesideTheSamples) {
+  PictureFacts picture = tracked();
+  picture.width = 1358;
+  picture.height = 764;
+  EXPECT_EQ(osd_page(in(Mode::live), &picture, pace).bottom_left.front(),
+            OsdText{"8 samples · 1358x764"});
+  picture.history = 12;
+  EXPECT_EQ(osd_page(in(Mode::live), &picture, pace).bottom_left.front(),
+            OsdText{"8 samples + 12 frames · 1358x764"});
+}
+
 TEST(OsdWords, RefiningTellsSamplesAndErrorInPlaceOfThePace) {
   PictureFacts picture = tracked();
   picture.samples = 256;

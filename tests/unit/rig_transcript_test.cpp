@@ -51,6 +51,7 @@ struct Line {
 constexpr Line transcript[] = {
     {"samples_up", "button samples_up: 3 samples", "Samples=3"},
     {"samples_down", "button samples_down: 2 samples", "Samples=2"},
+    {"hold_rate", "button hold_rate: this set holds no frame rate (refused)", "", "this set holds no frame rate"},
     {"estimator", "button estimator: estimator: difference"},
     {"light_mode", "button light_mode: light: sources"},
     {"debug_view", "button debug_view: view: mixed"},

@@ -42,6 +42,20 @@ TEST(SetValues, AFolderIsTheSameWithASlashAtItsEnd) {
   EXPECT_EQ(set.output.directory, "/");
 }
 
+TEST(SetValues, StepsOfThePreviewStayInTheirOrder) {
+  const auto set = parse(R"(
+[quality]
+fps = 25
+[[quality.preview]]
+samples = 4
+denoise = false
+[[quality.preview]]
+scale = 0.5
+)");
+  EXPECT_EQ(set.quality.fps, 25);
+  EXPECT_EQ(set.quality.steps, (std::vector<PreviewStep>{{4, 1, false}, {1, 0.5, {}}}));
+}
+
 TEST(SetValues, AreInUnitsOfTheStructs) {
   const auto set = parse(R"(
 [observer]
