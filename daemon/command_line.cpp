@@ -26,10 +26,18 @@ void add_any_paths(CLI::App& command, bool& any_paths) {
                    "Let the session's own set name files and folders outside of the session");
 }
 
+void add_with(CLI::App& command, std::optional<std::filesystem::path>& with) {
+  command.add_option(
+      "--with", with,
+      "File of quality, estimator and lighting keys that replace the set's, as trade "
+      "writes it");
+}
+
 void add_render(CLI::App& app, post::RenderOptions& options) {
   CLI::App& command = *app.add_subcommand("render", "Composite every frame of a recorded session");
   command.add_option("session", options.session, "Session directory")->required();
   command.add_option("--set", options.set_file, "Set file, instead of the session's own");
+  add_with(command, options.with);
   add_any_paths(command, options.any_paths);
   command.add_option_function<std::string>(
       "--frames", [&](const std::string& text) { options.frames = post::parse_frame_range(text); },
@@ -76,6 +84,7 @@ void add_run(CLI::App& app, rig::LiveOptions& options) {
   CLI::App& command =
       *app.add_subcommand("run", "Composite live, until the cameras stop or Ctrl-C is pressed");
   command.add_option("set", options.set_file, "Set file")->required();
+  add_with(command, options.with);
   command.add_option("--spp", options.samples, "Samples per pixel (default: quality.samples)")
       ->check(CLI::Range(1, 1'000'000));
   command.add_option("--out", options.directory, "Directory for picture.png and metrics.json");

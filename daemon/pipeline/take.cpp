@@ -22,7 +22,7 @@ std::optional<LightCameraCalibration> light_calibration(const set::Set& set,
 
 Take open_take(const std::filesystem::path& session_directory,
                const std::optional<std::filesystem::path>& set_file, bool any_paths,
-               const std::stop_token& stop) {
+               const std::stop_token& stop, const std::optional<set::Overlay>& with) {
   Take take;
   take.session = session::open_session(session_directory, stop);
   std::vector<std::pair<std::string, std::filesystem::path>> assets;
@@ -39,7 +39,8 @@ Take open_take(const std::filesystem::path& session_directory,
   take.set = set::parse_set(take.set_text, name, assets,
                             set_file    ? set::Origin::crew
                             : any_paths ? set::Origin::trusted_session
-                                        : set::Origin::session);
+                                        : set::Origin::session,
+                            with);
 
   // A model of the take's own might name other files as its parts, for which this throws.
   if (!set_file && !any_paths) static_cast<void>(scene::assets_of(take.set));

@@ -17,7 +17,7 @@ namespace previz::pipeline {
 struct Take {
   session::Session session;
   set::Set set;          // with the observer's calibration in force
-  std::string set_text;  // what `set` was read from
+  std::string set_text;  // what `set` was read from, without settings that replace its own
   ObserverCalibration observer;
   std::optional<LightCameraCalibration> light;  // absent: only an environment file can light it
   std::shared_ptr<session::StreamReader> observer_stream;  // never null
@@ -29,9 +29,10 @@ struct Take {
 // overrides the session's. The session's own set may name only files inside the session, unless
 // `any_paths`. Throws previz::Error if something cannot be read, or there are no observer frames or
 // no observer calibration. The whole take is read once, which a stop ends, also with an error.
+// `with` replaces settings of either set.
 Take open_take(const std::filesystem::path& session_directory,
                const std::optional<std::filesystem::path>& set_file, bool any_paths = false,
-               const std::stop_token& stop = {});
+               const std::stop_token& stop = {}, const std::optional<set::Overlay>& with = {});
 
 // Returns the timestamp (ns) of the take's first observer frame.
 std::int64_t start_of(const Take& take);

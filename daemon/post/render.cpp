@@ -57,7 +57,8 @@ void check_directory(const set::Set& set, const RenderOptions& options) {
 
 // Returns everything that decides what the pictures look like, as JSON that RenderDirectory
 // compares.
-std::string settings_of(const pipeline::Take& take, const set::Set& set) {
+std::string settings_of(const pipeline::Take& take, const set::Set& set,
+                        const std::optional<set::Overlay>& with) {
   nlohmann::ordered_json json;
   json["software"] = "previzd " PREVIZ_VERSION;
   json["session"] = take.session.info.name;
@@ -70,6 +71,7 @@ std::string settings_of(const pipeline::Take& take, const set::Set& set) {
   json["seed"] = set.estimation.seed;
   json["estimator"] = set::name_of(set.estimation.estimator);
   json["set"] = take.set_text;
+  if (with) json["with"] = with->text;
   for (const set::Object& object : set.objects)
     json["file " + object.file_as_written] = session::sha256_of(object.file);
   if (const auto& room = set.lighting.room; room && !room->size_m)
@@ -157,12 +159,15 @@ FrameRange parse_frame_range(const std::string& text) {
 }
 
 RenderReport render_session(const RenderOptions& options, std::ostream& out) {
-  pipeline::Take take = pipeline::open_take(options.session, options.set_file, options.any_paths);
+  std::optional<set::Overlay> with;
+  if (options.with) with = set::read_overlay(*options.with);
+  pipeline::Take take =
+      pipeline::open_take(options.session, options.set_file, options.any_paths, {}, with);
   override_set(take.set, options);
   check_directory(take.set, options);
   const set::Set& set = take.set;
   const FrameRange range = range_of(options, take);
-  RenderDirectory directory(set.output, settings_of(take, set), options.force);
+  RenderDirectory directory(set.output, settings_of(take, set, with), options.force);
 
   RenderReport report;
   report.directory = directory.path();

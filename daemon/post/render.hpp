@@ -32,6 +32,7 @@ FrameRange parse_frame_range(const std::string& text);
 struct RenderOptions {
   std::filesystem::path session;
   std::optional<std::filesystem::path> set_file;  // instead of the one in the session
+  std::optional<std::filesystem::path> with;      // replaces settings of either (set::Overlay)
   // The session's own set may read and write outside of the session's folder.
   bool any_paths = false;
   std::optional<FrameRange> frames;   // absent: all

@@ -152,7 +152,7 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     end.request_stop();
   };
   SetKeeper sets(
-      options.set_file, [&](set::Set& set) { override_set(set, options); }, reports);
+      options.set_file, [&](set::Set& set) { override_set(set, options); }, reports, options.with);
   const std::shared_ptr<render::Device> device =
       open_graphics(options.device, sets.running().set.quality.cpu_instead, reports);
   std::shared_ptr<render::Renderer> renderer;  // goes from set to set

@@ -23,6 +23,7 @@ namespace previz::rig {
 
 struct LiveOptions {
   std::filesystem::path set_file;
+  std::optional<std::filesystem::path> with;       // replaces settings of the set (set::Overlay)
   std::optional<int> samples;                      // quality.samples
   std::optional<std::filesystem::path> directory;  // output.directory
   bool loop = false;                               // replayed cameras start again at their end

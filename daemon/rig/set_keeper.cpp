@@ -15,9 +15,12 @@ using report::Severity;
 namespace {
 
 // Reads a set from the text of its file; `changed` is left open.
-LoadedSet loaded(std::string text, const std::filesystem::path& file) {
+LoadedSet loaded(std::string text, const std::filesystem::path& file,
+                 const std::optional<std::filesystem::path>& with) {
   LoadedSet loaded;
-  loaded.set = set::parse_set(text, file);
+  std::optional<set::Overlay> overlay;
+  if (with) overlay = set::read_overlay(*with);
+  loaded.set = set::parse_set(text, file, {}, set::Origin::crew, overlay);
   loaded.text = std::move(text);
   loaded.scene = scene::load_scene(loaded.set);
   return loaded;
@@ -25,10 +28,11 @@ LoadedSet loaded(std::string text, const std::filesystem::path& file) {
 
 }  // namespace
 
-LoadedSet load_whole_set(const std::filesystem::path& file) {
+LoadedSet load_whole_set(const std::filesystem::path& file,
+                         const std::optional<std::filesystem::path>& with) {
   std::error_code missing;  // reading the file gives a better error
   const auto changed = std::filesystem::last_write_time(file, missing);
-  LoadedSet set = loaded(session::read_file(file), file);
+  LoadedSet set = loaded(session::read_file(file), file, with);
   set.changed = changed;
   return set;
 }
@@ -48,10 +52,11 @@ std::filesystem::path neighbour(const std::filesystem::path& file, int next) {
 }
 
 SetKeeper::SetKeeper(const std::filesystem::path& file, std::function<void(set::Set&)> override_set,
-                     report::Reports& reports)
+                     report::Reports& reports, std::optional<std::filesystem::path> with)
     : override_set_(std::move(override_set)),
+      with_(std::move(with)),
       reports_(reports),
-      running_(load_whole_set(file)),
+      running_(load_whole_set(file, with_)),
       file_(running_.changed) {
   override_set_(running_.set);
 }
@@ -92,8 +97,8 @@ std::string SetKeeper::drop_next(const std::string& why) {
 
 void SetKeeper::begin_change(int next) {
   begin(
-      [file = running_.set.file, next] {
-        return Read{load_whole_set(next == 0 ? file : neighbour(file, next)), {}, {}};
+      [file = running_.set.file, next, with = with_] {
+        return Read{load_whole_set(next == 0 ? file : neighbour(file, next), with), {}, {}};
       },
       [this](const std::string& what) {
         const std::string first = what.substr(0, what.find('\n'));
@@ -113,7 +118,7 @@ void SetKeeper::look_at_file() {
 }
 
 void SetKeeper::begin_keep(const pipeline::Edits& edits) {
-  const auto write = [set = running_.set, text_before = running_.text, edits] {
+  const auto write = [set = running_.set, text_before = running_.text, edits, with = with_] {
     const std::filesystem::path& file = set.file;
     // What a symbolic link leads to is written, not the link.
     const std::filesystem::path target = std::filesystem::canonical(file);
@@ -122,7 +127,7 @@ void SetKeeper::begin_keep(const pipeline::Edits& edits) {
     const std::string text = with_edits(text_before, set, edits);
     if (text == text_before)
       throw Error("the changes come to nothing; " + file.string() + " stays as it is");
-    Read read{loaded(text, file), Kept{text_before, edits}, {}};
+    Read read{loaded(text, file, with), Kept{text_before, edits}, {}};
     read.kept_beside = set::keep_beside(target).string();
     session::replace_file(target, text);
     std::error_code missing;

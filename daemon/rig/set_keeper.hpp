@@ -43,7 +43,9 @@ class SetFileWatch {
 };
 
 // Reads a set with its scene. Throws previz::Error with every problem of the set or of the scene.
-LoadedSet load_whole_set(const std::filesystem::path& file);
+// The file `with` (set::Overlay) replaces settings of the set; it is read anew each time.
+LoadedSet load_whole_set(const std::filesystem::path& file,
+                         const std::optional<std::filesystem::path>& with = {});
 
 // Returns the set file `next` places after `file` among the .toml files of its folder, by name and
 // wrapping around.
@@ -52,9 +54,9 @@ std::filesystem::path neighbour(const std::filesystem::path& file, int next);
 class SetKeeper {
  public:
   // Reads the first set; throws previz::Error with all its problems. `override_set` is applied to
-  // every set that is to run. `reports` outlives the keeper.
+  // every set that is to run, and so is the file `with`. `reports` outlives the keeper.
   SetKeeper(const std::filesystem::path& file, std::function<void(set::Set&)> override_set,
-            report::Reports& reports);
+            report::Reports& reports, std::optional<std::filesystem::path> with = {});
 
   const LoadedSet& running() const { return running_; }
   bool has_next() const { return next_.has_value(); }
@@ -114,6 +116,7 @@ class SetKeeper {
   void carry_edits();
 
   const std::function<void(set::Set&)> override_set_;
+  const std::optional<std::filesystem::path> with_;
   report::Reports& reports_;
   LoadedSet running_;
   SetFileWatch file_;

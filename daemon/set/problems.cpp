@@ -12,6 +12,11 @@ void Problems::add(Position at, const std::string& key, const std::string& what)
   problems_.push_back({at, key, what});
 }
 
+void Problems::go_on_with(std::string file, std::uint32_t lines) {
+  next_file_ = std::move(file);
+  lines_ = lines;
+}
+
 void Problems::throw_if_any() const {
   if (problems_.empty()) return;
   auto sorted = problems_;
@@ -19,8 +24,11 @@ void Problems::throw_if_any() const {
   std::string message;
   for (const auto& [at, key, what] : sorted) {
     if (!message.empty()) message += '\n';
-    message += printable(file_) + ':' + std::to_string(at.line) + ':' + std::to_string(at.column) +
-               ": " + (key.empty() ? "" : printable(key) + ": ") + printable(what);
+    const bool is_next = lines_ && at.line > *lines_;
+    message += printable(is_next ? next_file_ : file_) + ':' +
+               std::to_string(is_next ? at.line - *lines_ : at.line) + ':' +
+               std::to_string(at.column) + ": " + (key.empty() ? "" : printable(key) + ": ") +
+               printable(what);
   }
   throw Error(message);
 }

@@ -2,6 +2,8 @@
 // lines.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +16,9 @@ using previz::printable;
 class Problems {
  public:
   explicit Problems(std::string file) : file_(std::move(file)) {}
+
+  // From now on a line after `lines` is one of this file, counted from there.
+  void go_on_with(std::string file, std::uint32_t lines);
 
   // `key` is the full path of the key or table at fault, "observer.lens.f_number"; `what` says what
   // is wrong and what is allowed.
@@ -28,7 +33,8 @@ class Problems {
     Position at;
     std::string key, what;
   };
-  std::string file_;
+  std::string file_, next_file_;
+  std::optional<std::uint32_t> lines_;  // of file_; absent: all
   std::vector<Problem> problems_;
 };
 

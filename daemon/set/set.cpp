@@ -115,21 +115,59 @@ class Reader {
 
 }  // namespace
 
-Set parse_set(const std::string& text, const std::filesystem::path& file, const Assets& assets,
-              Origin origin) {
-  Problems problems(file.string());
-  Draft draft;
+namespace {
+
+// Parses TOML text; throws previz::Error if it is none.
+toml::table parsed(const std::string& text, const std::string& file, Problems& problems) {
   try {
-    const toml::table root = toml::parse(text, file.string());
-    Reader(draft, problems).read(root, "");
+    return toml::parse(text, file);
   } catch (const toml::parse_error& error) {
     problems.add(position(error.source()), "",
                  "not valid TOML: " + std::string(error.description()));
     problems.throw_if_any();
+    throw;
   }
+}
+
+// Reads the overlay over what the draft has already. Its lines are counted on from those of the
+// set, so that a position says which of the files it is in.
+void read_over(Draft& draft, const Overlay& with, const std::string& text, Problems& problems) {
+  const auto lines = static_cast<std::uint32_t>(std::ranges::count(text, '\n') + 1);
+  problems.go_on_with(with.file.string(), lines);
+  toml::table root = parsed(std::string(lines, '\n') + with.text, with.file.string(), problems);
+  constexpr std::string_view allowed[] = {"quality", "estimator", "lighting"};
+  std::vector<std::string> others;
+  for (const auto& [name, node] : root)
+    if (std::ranges::find(allowed, name.str()) == std::end(allowed)) {
+      others.emplace_back(name.str());
+      problems.add(position(name.source()), others.back(),
+                   "belongs into the set file; allowed here: [quality], [[quality.preview]], "
+                   "[estimator] and [lighting]");
+    }
+  for (const std::string& name : others) root.erase(name);
+  if (root["quality"]["preview"]) draft.preview_steps.clear();
+  Reader(draft, problems).read(root, "");
+}
+
+}  // namespace
+
+Set parse_set(const std::string& text, const std::filesystem::path& file, const Assets& assets,
+              Origin origin, const std::optional<Overlay>& with) {
+  Problems problems(file.string());
+  Draft draft;
+  Reader(draft, problems).read(parsed(text, file.string(), problems), "");
+  if (with) read_over(draft, *with, text, problems);
   auto set = resolve(std::move(draft), file, assets, origin, problems);
   problems.throw_if_any();
   return set;
+}
+
+Overlay read_overlay(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream text;
+  if (!stream || !(text << stream.rdbuf()))
+    throw Error(file.string() + ": cannot be read; allowed: a file of settings (TOML)");
+  return {file, text.str()};
 }
 
 Set load_set(const std::filesystem::path& file) {

@@ -43,6 +43,12 @@ TEST(CommandLine, ARunTakesItsSamplesFromTheSetOrAsItIsAsked) {
   EXPECT_THROW(live_options("--spp many"), CLI::ParseError);
 }
 
+TEST(CommandLine, SettingsThatReplaceTheSetsAreAFile) {
+  EXPECT_FALSE(live_options("").with);
+  EXPECT_EQ(live_options("--with live.toml").with, "live.toml");
+  EXPECT_EQ(render_options("--with post.toml").with, "post.toml");
+}
+
 TEST(CommandLine, SaysBothSidesOfAChoice) {
   EXPECT_EQ(render_options("--adaptive").adaptive, true);
   EXPECT_EQ(render_options("--even").adaptive, false);

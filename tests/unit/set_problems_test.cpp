@@ -363,6 +363,25 @@ TEST(SetProblems, AreToldTogetherInTheOrderOfTheirLines) {
     EXPECT_TRUE(problems[i].starts_with(starts[i])) << problems[i];
 }
 
+TEST(SetProblems, OfAnOverlayNameItsFileAndItsLines) {
+  const auto problems = [](const std::string& own, const std::string& overlay) -> std::string {
+    try {
+      parse_set(own, "stage.toml", {}, Origin::crew, Overlay{"live.toml", overlay});
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  EXPECT_EQ(problems("[quality]\nsamples = 4", "[quality]\nsamples = 5\n"), "none");
+  const std::string two = problems("[quality]\nsamples = 0\n", "\n[quality]\nfps = -1\n");
+  EXPECT_TRUE(two.starts_with("stage.toml:2:11: quality.samples: 0 is not")) << two;
+  EXPECT_NE(two.find("\nlive.toml:3:7: quality.fps: -1 is not"), std::string::npos) << two;
+  EXPECT_TRUE(problems("", "[quality]\nfsp = 1\n").starts_with("live.toml:2:1: quality.fsp: "));
+  EXPECT_TRUE(problems("", "[quality\n").starts_with("live.toml:1:9: not valid TOML"));
+  const std::string other = problems("", "[[tag]]\nid = 1\n");
+  EXPECT_TRUE(other.starts_with("live.toml:1:3: tag: belongs into the set file")) << other;
+}
+
 TEST(SetProblems, NameAFileThatCannotBeRead) {
   try {
     load_set("no/such/stage.toml");

@@ -56,6 +56,28 @@ scale = 0.5
   EXPECT_EQ(set.quality.steps, (std::vector<PreviewStep>{{4, 1, false}, {1, 0.5, {}}}));
 }
 
+TEST(SetValues, AnOverlayReplacesKeysAndAllStepsTogether) {
+  const char* own = R"(
+[quality]
+fps = 25
+samples = 8
+[[quality.preview]]
+samples = 4
+[estimator]
+max_depth = 5
+)";
+  const Overlay with{"live.toml",
+                     "[quality]\nfps = 50\n[[quality.preview]]\nscale = 0.5\n"
+                     "[[quality.preview]]\nscale = 0.25\n[lighting]\nmode = 'hybrid'\n"};
+  const Set set = parse_set(own, "folder/stage.toml", {}, Origin::crew, with);
+  EXPECT_EQ(set.quality.fps, 50);
+  EXPECT_EQ(set.quality.samples, 8);
+  EXPECT_EQ(set.quality.steps, (std::vector<PreviewStep>{{1, 0.5, {}}, {1, 0.25, {}}}));
+  EXPECT_EQ(set.estimation.max_depth, 5);
+  EXPECT_EQ(set.lighting.mode, LightMode::hybrid);
+  EXPECT_EQ(set.file, "folder/stage.toml");
+}
+
 TEST(SetValues, AreInUnitsOfTheStructs) {
   const auto set = parse(R"(
 [observer]
