@@ -125,7 +125,18 @@ void add_export(CLI::App& app, exchange::ExportOptions& options) {
 void add_trade(CLI::App& app, trade::TradeOptions& options) {
   CLI::App& command =
       *app.add_subcommand("trade", "Measure what time buys on a set: a table and a page");
-  command.add_option("set", options.set_file, "Set file whose cameras are replayed")->required();
+  command
+      .add_option("set", options.source.set_or_session,
+                  "Session directory, or set file: the take in place of its cameras, or its newest")
+      ->required();
+  command.add_option("--set", options.source.set_file, "Set file, instead of the session's own");
+  add_any_paths(command, options.source.any_paths);
+  command.add_option("--fps", options.fps,
+                     "Pictures a second that live is to hold (default: quality.fps, or 25)");
+  command.add_option_function<std::string>(
+      "--error", [&](const std::string& text) { options.error = trade::parse_share(text); },
+      "Error that refining and rendering are to reach: 2% or 0.02 (default: 2%)");
+  options.answers = true;
   command.add_option("--frame", options.frame, "Observer frame (default: the first tracked)");
   command.add_option("--out", options.directory, "Directory for trade.csv and trade.html");
   command.add_option("--axes", options.axes, "What to vary (default: everything)")->delimiter(',');

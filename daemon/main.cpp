@@ -66,6 +66,9 @@ int do_trade(trade::TradeOptions& options, const StopOnSignal& stop) {
   std::cout << "\n";
   for (const trade::TradeFrontPoint& at : trade::listed_front_of(report))
     std::cout << trade::front_words(report, at) << "\n";
+  std::cout << "\n";
+  for (const trade::TradeAnswer& answer : report.answers)
+    std::cout << answer.use << ": " << answer.words << " (--with " << answer.file.string() << ")\n";
   std::cout << "\n" << report.csv.string() << "\n" << report.page.string() << std::endl;
   return 0;
 }

@@ -55,6 +55,9 @@ previzd run desk.toml: Composites live. The rig's buttons, or previzctl, do the 
 previzd render takes/12A_take003 --out renders/12A_take003: Renders a take with the settings that it was recorded with. Called again, it continues where it stopped.
 previzd render takes/12A_take003 --set relit.toml --spp 512 --frames 100-150 --out renders/relit: Renders a part of a take with other settings: other lamps, other objects, more samples.
 previzd trade desk.toml --axes estimator,depth: Measures what the estimator and the number of bounces cost and bring on this set.
+previzd trade takes/12A_take003 --set desk.toml --fps 25 --error 2% --out trade: Finds the settings that hold 25 pictures a second with the least error, and those that reach an error of 2 % in the least time.
+previzd run desk.toml --with trade/live.toml: Composites live with what the trade has found.
+previzd render takes/12A_take003 --with trade/post.toml: Renders with what the trade has found.
 previzd import frames.json sessions/desk: Makes a take of your own pictures or video.
 previzd export takes/12A_take003 camera: Writes the take's camera for USD and Nuke.
 )",

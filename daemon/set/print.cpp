@@ -1,6 +1,7 @@
 #include "daemon/set/print.hpp"
 
 #include <algorithm>
+#include <string_view>
 
 #include "daemon/set/table.hpp"
 
@@ -81,6 +82,33 @@ std::string balance_toml(const glm::dvec3& balance) {
   Draft draft;
   draft.set.lighting.balance = balance;
   return table_toml(std::move(draft), "lighting");
+}
+
+std::string overlay_toml(const Set& own, const Set& wanted) {
+  Draft before, after;
+  before.set = own;
+  after.set = wanted;
+  std::string text;
+  for (const char* path : {"quality", "estimator", "lighting"}) {
+    const auto old_keys = keys_of(before, path), keys = keys_of(after, path);
+    std::string lines;
+    for (std::size_t i = 0; i < keys.size(); ++i)
+      if (keys[i].print && keys[i].print() != old_keys[i].print())
+        lines += keys[i].name + " = " + keys[i].print() + '\n';
+    if (!lines.empty()) text += std::string("[") + path + "]\n" + lines + '\n';
+    if (std::string_view(path) != "quality") continue;
+    for (const PreviewStep& step : wanted.quality.steps) {
+      Draft draft;
+      const auto step_keys = keys_of(draft, "quality.preview");
+      draft.preview_steps.back().step = step;
+      text += "[[quality.preview]]\n";
+      for (const Key& key : step_keys)
+        if (const std::string value = key.print(); !value.empty())
+          text += key.name + " = " + value + '\n';
+      text += '\n';
+    }
+  }
+  return text;
 }
 
 std::string surface_toml(const Surface& surface) {

@@ -7,6 +7,7 @@
 #include "daemon/render/feature.hpp"
 #include "daemon/set/names.hpp"
 #include "drivers/error.hpp"
+#include "shaders/lib/render_shared.h"
 
 namespace previz::trade {
 namespace {
@@ -38,9 +39,10 @@ TradeAxis numbered(std::string name, std::string what, TradeSettings own,
   return axis;
 }
 
-// Light from a recording has no variants, because only its sources were recorded and no image.
+// Light that no light camera sees has no variants: of that from a recording only the sources are
+// known, and no image.
 TradeAxis light_modes(const set::Lighting& own) {
-  if (own.from == set::LightFrom::recording) return {"light_mode", "", {}, set::name_of(own.mode)};
+  if (own.from != set::LightFrom::camera) return {"light_mode", "", {}, set::name_of(own.mode)};
   return spelled(
       "light_mode", "how the light camera's picture lights the set",
       [](TradeSettings & s) -> auto& { return s.lighting.mode; });
@@ -54,6 +56,10 @@ TradeAxis left_out(std::uint32_t needed) {
       axis.variants.push_back(
           {feature.name, [bit = feature.bit](TradeSettings& s) { s.carried |= bit; }});
   return axis;
+}
+
+void drop(std::vector<TradeAxis>& axes, const std::string& name) {
+  std::erase_if(axes, [&](const TradeAxis& axis) { return axis.name == name; });
 }
 
 void keep_wanted(std::vector<TradeAxis>& axes, const std::vector<std::string>& wanted) {
@@ -72,7 +78,7 @@ void keep_wanted(std::vector<TradeAxis>& axes, const std::vector<std::string>& w
 }  // namespace
 
 std::vector<TradeAxis> trade_axes(const TradeSettings& own, std::uint32_t needed) {
-  return {
+  std::vector<TradeAxis> axes{
       spelled(
           "estimator", "tracing both worlds in full, or only how they differ",
           [](TradeSettings & s) -> auto& { return s.estimation.estimator; }),
@@ -122,6 +128,13 @@ std::vector<TradeAxis> trade_axes(const TradeSettings& own, std::uint32_t needed
        "aperture"},
       left_out(needed),
   };
+  // Without what an axis is about, all its variants are one.
+  if ((needed & gpu::FEATURE_PHOTONS) == 0) drop(axes, "caustics");
+  if ((needed & gpu::FEATURE_FORKS) == 0) drop(axes, "difference_sampling");
+  if (own.lighting.from == set::LightFrom::set && !own.lighting.environment)
+    for (const char* of_the_light_around : {"light_sampling", "light_resolution"})
+      drop(axes, of_the_light_around);
+  return axes;
 }
 
 TradePlan plan_trade(const TradeSettings& own, std::vector<TradeAxis> axes,

@@ -38,7 +38,9 @@ struct TradeAxis {
 };
 
 // Returns the axes that have something to trade on this set. `needed` holds the FEATURE_* bits that
-// its pipelines are made with.
+// its pipelines are made with, and FEATURE_PHOTONS if photons would find something, whatever the
+// set's caustics are: without a mirror or clear glass in the light they have no axis, and without
+// an object that is virtual or removed nothing is aimed at one.
 std::vector<TradeAxis> trade_axes(const TradeSettings& own, std::uint32_t needed);
 
 // The name of the axis whose variants carry features that are not needed. They must show the set's

@@ -12,13 +12,39 @@ namespace {
 
 namespace fs = std::filesystem;
 
-pipeline::Take open_replayed_take(const fs::path& set_file) {
+// Returns the folder of the take that was recorded last.
+fs::path newest_take(const set::Set& set) {
+  fs::path newest;
+  fs::file_time_type latest = fs::file_time_type::min();
+  std::error_code none;
+  for (const fs::directory_entry& entry : fs::directory_iterator(set.recording.directory, none)) {
+    const fs::path description = entry.path() / "session.toml";
+    std::error_code gone;
+    const auto time = fs::last_write_time(description, gone);
+    if (gone || time < latest) continue;
+    latest = time;
+    newest = entry.path();
+  }
+  if (newest.empty())
+    throw Error(set.file.string() +
+                ": observer: a trade needs a take; allowed: driver = \"replay\" with the session's "
+                "folder as device, or a take in " +
+                set.recording.directory.string() + ", or `previzd trade SESSION --set " +
+                set.file.filename().string() + "`");
+  return newest;
+}
+
+pipeline::Take open_traded_take(const TradeSource& source) {
+  if (fs::is_directory(source.set_or_session))
+    return pipeline::open_take(source.set_or_session, source.set_file, source.any_paths);
+  const fs::path& set_file = source.set_or_session;
+  if (source.set_file)
+    throw Error("--set " + source.set_file->string() + ": " + set_file.string() +
+                " is a set file, not a session");
   const set::Set set = set::load_set(set_file);
   const set::Observer& observer = set.observer;
   if (observer.driver != set::replay_driver || observer.device.empty())
-    throw Error(set_file.string() +
-                ": observer: a trade needs a take that is replayed; driver = \"replay\" and the "
-                "session's folder as device are allowed");
+    return pipeline::open_take(newest_take(set), set_file);
   pipeline::Take take = pipeline::open_take(observer.device, set_file);
   const set::LightCamera& light = set.light_camera;
   if (light.driver == set::replay_driver && !light.device.empty() &&
@@ -32,8 +58,8 @@ pipeline::Take open_replayed_take(const fs::path& set_file) {
 
 }  // namespace
 
-TradeFrame::TradeFrame(const fs::path& set_file, std::optional<std::uint64_t> index)
-    : take_(open_replayed_take(set_file)) {
+TradeFrame::TradeFrame(const TradeSource& source, std::optional<std::uint64_t> index)
+    : take_(open_traded_take(source)) {
   const std::size_t frames = take_.observer_stream->records().size();
   if (index && *index >= frames)
     throw Error(take_.session.directory.string() + ": --frame " + std::to_string(*index) +
@@ -71,6 +97,13 @@ double TradeFrame::exposure() const {
 PlatePtr TradeFrame::plate(double scale) const {
   if (scale == 1) return shot_.plate;
   return std::make_shared<const Plate>(pipeline::scaled(*shot_.plate, scale, *response_));
+}
+
+pipeline::Shot TradeFrame::shot(const set::Lighting& settings, const scene::Scene& scene) {
+  pipeline::Shot shot = shot_;
+  shot.plate.reset();  // its conversion is a part of each frame
+  shot.light = light(settings, scene);
+  return shot;
 }
 
 pipeline::LightPtr TradeFrame::light(const set::Lighting& settings, const scene::Scene& scene) {

@@ -19,11 +19,19 @@
 
 namespace previz::trade {
 
+// What is traded on: a session with its own set, or with another one; or a set file, whose take is
+// the one that replaces its film camera or, if it has a camera, the newest in recording.directory.
+struct TradeSource {
+  std::filesystem::path set_or_session;
+  std::optional<std::filesystem::path> set_file = {};  // for a session
+  bool any_paths = false;  // the session's own set may name files outside of the session
+};
+
 class TradeFrame {
  public:
-  // Takes frame `index` of the take that replaces the set's observer, or, if absent, the first with
-  // a pose and light. Throws previz::Error if there is none.
-  TradeFrame(const std::filesystem::path& set_file, std::optional<std::uint64_t> index);
+  // Takes frame `index` of the take, or, if absent, the first with a pose and light. Throws
+  // previz::Error if there is none.
+  TradeFrame(const TradeSource& source, std::optional<std::uint64_t> index);
 
   const set::Set& set() const { return take_.set; }
   std::uint64_t index() const { return shot_.index; }
@@ -32,6 +40,8 @@ class TradeFrame {
   const ObserverCalibration& calibration() const { return take_.observer; }
   const lighting::Response& response() const { return *response_; }
   PlatePtr plate(double scale) const;
+  // Returns the frame as the camera gave it, with its pose and this light, ready to be rendered.
+  pipeline::Shot shot(const set::Lighting& settings, const scene::Scene& scene);
   // Returns the light of the light frames before this frame with these settings, computed once for
   // each. Smoothing and tracked sources add nothing from earlier frames. Returns null if there are
   // no light frames.

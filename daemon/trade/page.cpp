@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
 #include <cstdio>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -100,6 +101,12 @@ std::string head_row(std::initializer_list<std::pair<const char*, bool>> columns
   return row + "</tr>\n";
 }
 
+std::string rate_words(double fps) {
+  char text[48];
+  std::snprintf(text, sizeof text, "%g pictures a second", fps);
+  return text;
+}
+
 std::string opening(const TradeReport& report) {
   const double share = 1.0 * report.width * report.height / report.full_width / report.full_height;
   std::string sizes = std::to_string(report.width) + " × " + std::to_string(report.height);
@@ -189,6 +196,36 @@ std::string front_section(const TradeReport& report) {
          "reference.</p>\n";
 }
 
+// What the set would get for what was asked, first of all: the answer is a file.
+std::string answers_section(const TradeReport& report) {
+  if (report.answers.empty()) return "";
+  std::string html =
+      "<h2>What you get</h2>\n<p>Asked for: " + escaped(rate_words(report.question.fps)) +
+      " live, and an error of " + share_words(report.question.error) +
+      " of a frozen or a rendered frame. Times are those of full-size frames, from the "
+      "camera's frame to the picture; finding the camera and showing the picture happen "
+      "at the same time.</p>\n<table>\n" +
+      head_row({{"for", false},
+                {"what you get", false},
+                {"a frame", true},
+                {"error", true},
+                {"file", false}});
+  for (const TradeAnswer& answer : report.answers)
+    html += (answer.is_met ? "<tr>" : "<tr class=\"bend\">") + cell(answer.use) +
+            cell(answer.words) + cell(time_words(answer.seconds), true) +
+            cell(std::isfinite(answer.error) ? share_words(answer.error) : "not known", true) +
+            cell(answer.use + ".toml") + "</tr>\n";
+  html += "</table>\n";
+  for (const TradeAnswer& answer : report.answers)
+    html += "<details><summary>" + escaped(answer.use) + ".toml</summary>\n<pre>" +
+            escaped(answer.toml) + "</pre></details>\n";
+  return html +
+         "<p class=\"soft\">Take a file with <code>previzd run SET --with live.toml</code> or "
+         "<code>previzd render SESSION --with post.toml</code>; a frozen frame that is refined has "
+         "the "
+         "settings of the live picture.</p>\n";
+}
+
 std::string corners_section(const TradeReport& report) {
   std::string html =
       "<h2>The fastest, the best, and the knee between them</h2>\n<p>Left: the picture. Right: "
@@ -246,6 +283,20 @@ std::string axis_section(const TradeReport& report, const TradePlan::Axis& axis)
          "</div>\n" + bias_sentence(report, axis);
 }
 
+// Photons are a part that this set may need: they are switched off to see what they cost.
+std::string photons_row(const TradeReport& report) {
+  const auto axis = std::ranges::find(report.plan.axes, "caustics", &TradePlan::Axis::name);
+  if (axis == report.plan.axes.end()) return "";
+  const auto time_of = [&](const char* variant) -> std::string {
+    const auto entry = std::ranges::find(axis->entries, variant, &TradePlan::Entry::variant);
+    return entry == axis->entries.end()
+               ? "not measured"
+               : time_words(report.methods[entry->method].points.back().seconds);
+  };
+  return "<tr>" + cell("photons, which caustics need") + cell(time_of("none"), true) +
+         cell(time_of("photons"), true) + cell("caustics", true) + "</tr>\n";
+}
+
 std::string parts_section(const TradeReport& report, const TradePlan::Axis& axis) {
   const TradePoint& own = report.methods.front().points.back();
   std::string html =
@@ -262,7 +313,8 @@ std::string parts_section(const TradeReport& report, const TradePlan::Axis& axis
             cell(time_words(method.points.back().seconds), true) +
             cell(std::to_string(*method.changed_pixels), true) + "</tr>\n";
   }
-  return html + "</table>\n<p class=\"soft\">" + samples_words(own.samples) + ".</p>\n";
+  return html + photons_row(report) + "</table>\n<p class=\"soft\">" + samples_words(own.samples) +
+         ".</p>\n";
 }
 
 std::string reading_section(const TradeReport& report) {
@@ -340,8 +392,8 @@ std::string trade_page(const TradeReport& report) {
       "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta "
       "name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
       escaped(report.set) + ": what time buys</title>\n<style>" + style +
-      "</style>\n</head>\n<body>\n" + opening(report) + front_section(report) +
-      corners_section(report);
+      "</style>\n</head>\n<body>\n" + opening(report) + answers_section(report) +
+      front_section(report) + corners_section(report);
   for (const TradePlan::Axis& axis : report.plan.axes)
     html += axis.name == parts_axis ? parts_section(report, axis) : axis_section(report, axis);
   return html + reading_section(report) + "</body>\n</html>\n";

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/trade/answer.hpp"
 #include "daemon/trade/axes.hpp"
 #include "daemon/trade/measure.hpp"
 #include "drivers/frame.hpp"
@@ -58,8 +59,10 @@ struct TradeReport {
   std::vector<TradeMethod> methods;  // as plan.methods
   std::vector<TradeCorner> corners;
   Plate reference;
-  std::filesystem::path csv, page;  // as written
-  bool interrupted = false;         // then nothing was written
+  TradeQuestion question;
+  std::vector<TradeAnswer> answers;  // empty: none was asked for
+  std::filesystem::path csv, page;   // as written
+  bool interrupted = false;          // then nothing was written
 
   const TradePoint& point(const TradeFrontPoint& at) const {
     return methods[at.method].points[at.point];

@@ -1,7 +1,9 @@
 #include "daemon/trade/trade.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
+#include <cmath>
 #include <numeric>
 #include <ostream>
 #include <utility>
@@ -10,11 +12,13 @@
 #include "daemon/pipeline/metrics.hpp"
 #include "daemon/pipeline/preview_size.hpp"
 #include "daemon/scene/scene.hpp"
+#include "daemon/set/problems.hpp"
 #include "daemon/trade/frame.hpp"
 #include "daemon/trade/method.hpp"
 #include "daemon/trade/page.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
+#include "shaders/lib/render_shared.h"
 
 namespace previz::trade {
 namespace {
@@ -59,6 +63,9 @@ class Sweep {
   void find_corners(output::ShareProgress& progress);
   TradeCorner corner(const std::string& name, const TradeFrontPoint& at) const;
   Plate displayed(const TradePicture& picture) const;
+  void find_answers(std::ostream& out);
+  double probe_error(const TradeSettings& settings, const Making& making);
+  PathCost probe_cost(const TradeSettings& settings, bool is_live);
   void stop_if_asked() const {
     if (options_.stop.stop_requested()) throw Stopped();
   }
@@ -77,6 +84,23 @@ class Sweep {
   std::vector<std::vector<Rounds>> rounds_;      // by method and point
   std::vector<std::vector<TradePicture>> best_;  // by method and round: at the most samples
   render::Layers own_;                           // the set's own, from the first round
+
+  // What the search for answers has measured already.
+  struct KnownError {
+    TradeSettings settings;
+    int samples;
+    double error;
+  };
+  struct KnownCost {
+    TradeSettings settings;
+    bool is_live;
+    PathCost cost;
+  };
+  std::vector<KnownError> known_errors_;
+  std::vector<KnownCost> known_costs_;
+  std::optional<MethodRenderer> probing_;  // with these settings
+  TradeSettings probed_;
+  std::uint32_t needed_ = 0;  // as searched_axes() wants it
 };
 
 Sweep::Sweep(const TradeOptions& options, TradeFrame& frame, std::ostream& out)
@@ -108,7 +132,15 @@ void Sweep::plan() {
   own.denoise = frame_.set().quality.denoise;
   MethodRenderer renderer(device_, frame_, scene_, own, options_.scale);
   renderer.begin(own.estimation.seed);
-  report_.plan = plan_trade(own, trade_axes(own, renderer.needed()), options_.axes);
+  needed_ = renderer.needed();
+  TradeSettings with_photons = own;
+  with_photons.estimation.caustics = set::Caustics::photons;
+  if (own != with_photons) {
+    MethodRenderer other(device_, frame_, scene_, with_photons, options_.scale);
+    other.begin(own.estimation.seed);
+    needed_ |= other.needed() & gpu::FEATURE_PHOTONS;
+  }
+  report_.plan = plan_trade(own, trade_axes(own, needed_), options_.axes);
 
   for (const TradePlan::Method& method : report_.plan.methods) {
     TradeMethod& measured = report_.methods.emplace_back();
@@ -147,6 +179,7 @@ TradeReport Sweep::run(std::ostream& out) {
     }
   conclude();
   find_corners(progress);
+  if (options_.answers) find_answers(out);
   return std::move(report_);
 }
 
@@ -260,10 +293,70 @@ Plate Sweep::displayed(const TradePicture& picture) const {
   return plate;
 }
 
+// The error of the picture with these settings, as the rms of the rounds.
+double Sweep::probe_error(const TradeSettings& settings, const Making& making) {
+  TradeSettings probed = settings;
+  probed.scale = making.scale;
+  probed.denoise = making.denoise;
+  probed.adaptive = false;
+  for (const KnownError& known : known_errors_)
+    if (known.samples == making.samples && known.settings == probed) return known.error;
+  if (!probing_ || !(probed_ == probed)) {
+    probing_.emplace(device_, frame_, scene_, probed, options_.scale);
+    probed_ = probed;
+  }
+  std::vector<TradeErrors> errors;
+  for (int round = 0; round < options_.rounds; ++round) {
+    stop_if_asked();
+    probing_->begin(seed(round));
+    probing_->render(making.samples);
+    errors.push_back(reference_->errors(at_sweep_size(probing_->picture())));
+  }
+  const double error = rms(errors).picture.value_or(0);
+  known_errors_.push_back({std::move(probed), making.samples, error});
+  return error;
+}
+
+PathCost Sweep::probe_cost(const TradeSettings& settings, bool is_live) {
+  for (const KnownCost& known : known_costs_)
+    if (known.is_live == is_live && known.settings == settings) return known.cost;
+  stop_if_asked();
+  PathTimer timer(device_, frame_, scene_, settings);
+  known_costs_.push_back({settings, is_live, PathCost(timer, is_live)});
+  return known_costs_.back().cost;
+}
+
+void Sweep::find_answers(std::ostream& out) {
+  const set::Quality& quality = frame_.set().quality;
+  report_.question.fps = options_.fps.value_or(quality.fps > 0 ? quality.fps : 25);
+  report_.question.error = options_.error.value_or(TradeQuestion().error);
+  const TradeSettings& own = report_.plan.methods.front().settings;
+  std::vector<TradeAxis> axes = searched_axes(own, needed_);
+  if (!options_.axes.empty())
+    std::erase_if(axes, [&](const TradeAxis& axis) {
+      return std::ranges::find(options_.axes, axis.name) == options_.axes.end();
+    });
+  report_.answers = answer(
+      report_.question, frame_.set(), own, axes,
+      {.error = [this](const TradeSettings& s, const Making& m) { return probe_error(s, m); },
+       .cost = [this](const TradeSettings& s, bool is_live) { return probe_cost(s, is_live); },
+       .step =
+           [&](const std::string& what) {
+             stop_if_asked();
+             out << "search, " << what << std::endl;
+           }});
+}
+
 // Checks the options before anything is rendered.
 TradeOptions checked(TradeOptions options) {
   if (!(options.scale > 0 && options.scale <= 1))
     throw Error("--scale " + std::to_string(options.scale) + ": must be above 0 and at most 1");
+  const auto check_positive = [](const char* name, const std::optional<double>& value) {
+    if (value && !(*value > 0 && std::isfinite(*value)))
+      throw Error(std::string(name) + " " + std::to_string(*value) + ": must be above 0");
+  };
+  check_positive("--fps", options.fps);
+  check_positive("--error", options.error);
   if (options.rounds < 1)
     throw Error("--rounds " + std::to_string(options.rounds) + ": must be at least 1");
   if (options.samples.empty()) throw Error("--samples: names no number of samples");
@@ -282,6 +375,14 @@ TradeOptions checked(TradeOptions options) {
   return options;
 }
 
+// The text of an answer's file, as it is also printed on the page.
+std::string answer_file(const TradeReport& report, const TradeAnswer& answer) {
+  return "# " + set::printable(report.set) + ", " + answer.use + ": " + answer.words +
+         ".\n# Found by `previzd trade` on " + report.device +
+         ". It takes the place of the set's own keys with --with " +
+         answer.file.filename().string() + "\n\n" + answer.toml;
+}
+
 fs::path made_directory(const fs::path& directory) {
   std::error_code code;
   fs::create_directories(directory, code);
@@ -293,9 +394,19 @@ fs::path made_directory(const fs::path& directory) {
 
 }  // namespace
 
+double parse_share(const std::string& text) {
+  const bool is_percent = text.ends_with('%');
+  const std::string digits = text.substr(0, text.size() - (is_percent ? 1 : 0));
+  double value = 0;
+  const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (digits.empty() || code != std::errc() || end != digits.data() + digits.size() || !(value > 0))
+    throw Error("--error " + text + ": write a share above 0, 2% or 0.02");
+  return is_percent ? value / 100 : value;
+}
+
 TradeReport run_trade(const TradeOptions& given, std::ostream& out) {
   const TradeOptions options = checked(given);
-  TradeFrame frame(options.set_file, options.frame);
+  TradeFrame frame(options.source, options.frame);
   const fs::path directory =
       made_directory(options.directory.value_or(frame.set().output.directory / "trade"));
   TradeReport report;
@@ -307,6 +418,10 @@ TradeReport run_trade(const TradeOptions& given, std::ostream& out) {
   }
   report.csv = directory / "trade.csv";
   report.page = directory / "trade.html";
+  for (TradeAnswer& answer : report.answers) {
+    answer.file = directory / (answer.use + ".toml");
+    session::replace_file(answer.file, answer_file(report, answer));
+  }
   session::replace_file(report.csv, trade_csv(report));
   session::replace_file(report.page, trade_page(report));
   return report;

@@ -12,12 +12,19 @@
 #include <vector>
 
 #include "daemon/render/renderer.hpp"
+#include "daemon/trade/frame.hpp"
 #include "daemon/trade/report.hpp"
 
 namespace previz::trade {
 
+// Reads "2%" or "0.02"; throws previz::Error saying what is allowed.
+double parse_share(const std::string& text);
+
 struct TradeOptions {
-  std::filesystem::path set_file;
+  TradeSource source;
+  // The rate and the error that are asked for; absent: quality.fps, or 25, and 2 %.
+  std::optional<double> fps, error;
+  bool answers = false;                            // search the settings for them
   std::optional<std::uint64_t> frame;              // absent: the first with a pose and light
   std::optional<std::filesystem::path> directory;  // absent: trade/ in the set's output directory
   double scale = 0.25;                             // of the observer's size, above 0 and at most 1
@@ -32,9 +39,11 @@ struct TradeOptions {
   std::stop_token stop;   // ends without a result
 };
 
-// Writes DIR/trade.csv and DIR/trade.html (page.hpp). Progress and notes go to `out`. Throws
-// previz::Error for a set without a replayed observer, a frame that is missing or was not tracked,
-// an impossible scale, a directory that is a file, or a picture with nothing virtual in it.
+// Writes DIR/trade.csv and DIR/trade.html (page.hpp), and, with answers, DIR/live.toml, refine.toml
+// and post.toml, which `previzd run` and `previzd render` take with --with. Progress and notes go
+// to `out`. Throws previz::Error for a set without a take (TradeSource), a frame that is missing or
+// was not tracked, an impossible scale, a directory that is a file, or a picture with nothing
+// virtual in it.
 TradeReport run_trade(const TradeOptions& options, std::ostream& out);
 
 }  // namespace previz::trade

@@ -64,6 +64,26 @@ TEST(TradeAxes, WhereThereIsNothingToTradeThereIsNoAxis) {
   EXPECT_TRUE(axis_named(with_lens, "lens"));
 }
 
+TEST(TradeAxes, TheFeaturesOfTheSceneDecideWhichThereAre) {
+  const auto names = [](const TradeSettings& own, std::uint32_t needed) {
+    std::vector<std::string> all;
+    for (const TradeAxis& axis : trade_axes(own, needed)) all.push_back(axis.name);
+    return all;
+  };
+  const auto has = [](const std::vector<std::string>& all, const char* name) {
+    return std::ranges::find(all, name) != all.end();
+  };
+  TradeSettings own;
+  EXPECT_TRUE(has(names(own, gpu::FEATURE_PHOTONS), "caustics"));
+  EXPECT_FALSE(has(names(own, gpu::FEATURE_FORKS), "caustics")) << "no mirror, no glass";
+  EXPECT_TRUE(has(names(own, gpu::FEATURE_FORKS), "difference_sampling"));
+  EXPECT_FALSE(has(names(own, gpu::FEATURE_PHOTONS), "difference_sampling")) << "nothing virtual";
+  EXPECT_TRUE(has(names(own, 0), "light_resolution"));
+  own.lighting.from = set::LightFrom::set;
+  EXPECT_FALSE(has(names(own, 0), "light_resolution")) << "lamps of the set alone";
+  EXPECT_FALSE(has(names(own, 0), "light_sampling"));
+}
+
 TEST(TradeAxes, CarriesEachFeatureThatIsNotNeededAndChangesNoPicture) {
   const std::uint32_t needed = gpu::FEATURE_GLOSSY | gpu::FEATURE_PHOTONS;
   const TradePlan plan = plan_trade({}, trade_axes({}, needed), {parts_axis});

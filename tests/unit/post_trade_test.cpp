@@ -20,7 +20,7 @@ class Trade : public testing::Test {
   // 32x24, as little as a sweep can be.
   TradeOptions options() const {
     TradeOptions options;
-    options.set_file = directory_ / "set.toml";
+    options.source.set_or_session = directory_ / "set.toml";
     options.directory = directory_ / "out";
     options.scale = 2.0 / 3;
     options.axes = {"estimator"};
@@ -107,6 +107,54 @@ TEST_F(Trade, PartsThatNobodyNeedsChangeNoPixel) {
                          "parts lamps in view", "parts many lamps"}));
 }
 
+TEST_F(Trade, AnswersWithFilesThatRunAndRenderTake) {
+  test::write_small_take(directory_.path());
+  TradeOptions asking = options();
+  asking.answers = true;
+  asking.fps = 2;
+  asking.error = 0.5;
+  const TradeReport report = run_trade(asking, out_);
+  ASSERT_EQ(report.answers.size(), 3u);
+  for (const TradeAnswer& answer : report.answers) {
+    SCOPED_TRACE(answer.use + ": " + answer.words + "\n" + answer.toml);
+    EXPECT_TRUE(answer.is_met);
+    EXPECT_GT(answer.seconds, 0);
+    EXPECT_EQ(answer.file, directory_ / "out" / (answer.use + ".toml"));
+    const std::filesystem::path file = directory_ / "set.toml";
+    const set::Set set = set::parse_set(session::read_file(file), file, {}, set::Origin::crew,
+                                        set::read_overlay(answer.file));
+    EXPECT_EQ(set.estimation.estimator, answer.settings.estimation.estimator);
+    if (answer.use == "live") {
+      EXPECT_EQ(set.quality.fps, 2);
+      EXPECT_LE(answer.seconds, 0.9 / 2);
+      EXPECT_FALSE(set.quality.steps.empty());
+    } else {
+      EXPECT_EQ(set.quality.samples, answer.making.samples);
+      EXPECT_EQ(set.quality.denoise, answer.making.denoise);
+    }
+  }
+  EXPECT_NE(session::read_file(report.page).find("What you get"), std::string::npos);
+}
+
+TEST_F(Trade, TakesASessionOrTheNewestTakeOfALiveSet) {
+  test::write_small_take(directory_.path());
+  const auto frame_of = [](const TradeSource& source) { return TradeFrame(source, {}).index(); };
+  EXPECT_EQ(frame_of({directory_ / "session"}), 1u);
+  EXPECT_EQ(frame_of({directory_ / "session", directory_ / "set.toml"}), 1u);
+  EXPECT_THROW(frame_of({directory_ / "set.toml", directory_ / "set.toml"}), Error);
+  rewrite_set("driver = \"replay\"\ndevice = \"session\"", "driver = \"none\"");
+  EXPECT_THROW(frame_of({directory_ / "set.toml"}), Error) << "it has no take";
+  std::ofstream(directory_ / "set.toml", std::ios::app) << "\n[recording]\ndirectory = \".\"\n";
+  EXPECT_EQ(frame_of({directory_ / "set.toml"}), 1u);
+}
+
+TEST_F(Trade, SharesAreWrittenInTwoWays) {
+  EXPECT_DOUBLE_EQ(parse_share("2%"), 0.02);
+  EXPECT_DOUBLE_EQ(parse_share("0.02"), 0.02);
+  for (const char* wrong : {"", "%", "0", "-1%", "two", "2 %"})
+    EXPECT_THROW(parse_share(wrong), Error) << wrong;
+}
+
 TEST_F(Trade, RefusesWhatCannotBeTraded) {
   test::write_small_take(directory_.path());
   TradeOptions wrong = options();
@@ -135,7 +183,7 @@ TEST_F(Trade, RefusesWhatCannotBeTraded) {
 TEST_F(Trade, RefusesASetWithoutAReplayedCamera) {
   test::write_small_take(directory_.path());
   rewrite_set("driver = \"replay\"\ndevice = \"session\"", "driver = \"none\"");
-  expect_refused(options(), "observer: a trade needs a take that is replayed");
+  expect_refused(options(), "observer: a trade needs a take; ");
 }
 
 TEST_F(Trade, RefusesAPictureWithNothingVirtualInIt) {

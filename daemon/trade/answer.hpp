@@ -1,0 +1,65 @@
+// Answers what a crew asks of the trade: which settings hold a frame rate with the least error, and
+// which reach an error in the least time. Combinations are searched from the set's own settings on,
+// one axis after the other, each time keeping what was found (coordinate descent).
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/trade/axes.hpp"
+#include "daemon/trade/frame.hpp"
+#include "daemon/trade/measure.hpp"
+#include "daemon/trade/path_timer.hpp"
+
+namespace previz::trade {
+
+struct TradeQuestion {
+  double fps = 25;      // that live is to hold, above 0
+  double error = 0.02;  // that refining and rendering are to reach, of the picture, above 0
+};
+
+// One of the three ways to use a set, with the settings that suit it.
+struct TradeAnswer {
+  std::string use;  // "live", "refine", "post"
+  TradeSettings settings;
+  Making making;       // live: the step that holds the rate
+  double seconds = 0;  // a frame, at full size
+  double error = 0;    // of the picture, as measured at the sweep's size
+  bool is_met = false;
+  std::string toml = {};            // set::overlay_toml()
+  std::string words = {};           // what it comes to, in a sentence
+  std::filesystem::path file = {};  // as written
+};
+
+// What the search asks of the sweep. `error` returns the error of the picture, made with the
+// settings in these samples at a scale relative to the sweep's size, as the rms of some rounds.
+struct TradeProbe {
+  std::function<double(const TradeSettings&, const Making&)> error;
+  std::function<PathCost(const TradeSettings&, bool is_live)> cost;
+  std::function<void(const std::string&)> step;  // called with what is searched next; may throw
+};
+
+// The axes on which settings are searched: those of the estimator and of the light. What is a
+// matter of the look or of the size is left as the set has it, or is a part of the preview's steps.
+std::vector<TradeAxis> searched_axes(const TradeSettings& own, std::uint32_t needed);
+
+// Returns the steps of a preview (set::Quality::steps), best first: of all samples, sizes and with
+// and without noise taken out, those to which no other is both cheaper and nearer to the truth.
+struct TradeStep {
+  Making making;
+  double seconds = 0, error = 0;
+};
+std::vector<TradeStep> best_steps(std::vector<TradeStep> all);
+
+// Returns the samples that bring the error of a picture down to `wanted`, given two errors at two
+// numbers of samples: error^2 = bias^2 + variance / samples. Returns 0 if no number does.
+int samples_for(double wanted, int few, double error_of_few, int many, double error_of_many);
+
+std::vector<TradeAnswer> answer(const TradeQuestion& question, const set::Set& set,
+                                const TradeSettings& own, const std::vector<TradeAxis>& axes,
+                                const TradeProbe& probe);
+
+}  // namespace previz::trade
