@@ -1,6 +1,7 @@
 // Prepares the variance for the denoiser. A few samples give a poor estimate of their variance, so
 // it is raised to the mean over the pixel's neighbours. A single sample gives none, so it is
-// estimated from how the neighbours' signals scatter.
+// estimated from how the neighbours' signals scatter. With history every pixel has a number of
+// samples of its own.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -43,12 +44,35 @@ vec3 variance_of_neighbours(ivec2 at, Pixel here) {
   return max(square / count - (sum / count) * (sum / count), vec3(0.0));
 }
 
+// A history of fewer samples does not know its variance.
+const float LEAST_KNOWING = 4.0;
+
+// Returns the variance of a pixel with history. history_show.comp leaves the number of its samples in
+// the place of the overlap. The neighbours of a young history may be older and scatter less, for
+// which their mean number of samples over the pixel's own makes up.
+vec3 variance_with_history(ivec2 at, Pixel here) {
+  if (here.overlap >= LEAST_KNOWING) return max(here.variance, mean_variance(at, here));
+  const int reach = int(DENOISE_VARIANCE_REACH);
+  float samples = 0.0;
+  float count = 0.0;
+  for (int y = -reach; y <= reach; ++y)
+    for (int x = -reach; x <= reach; ++x) {
+      if (!is_inside(at + ivec2(x, y))) continue;
+      const Pixel there = load_pixel(at + ivec2(x, y));
+      if (!are_alike(here, there, ivec2(x, y))) continue;
+      samples += there.overlap;
+      count += 1.0;
+    }
+  return variance_of_neighbours(at, here) * samples / (count * max(here.overlap, 1.0));
+}
+
 void main() {
   const uint index = gl_GlobalInvocationID.x;
   if (index >= denoise.width * denoise.height) return;
   const ivec2 at = ivec2(index % denoise.width, index / denoise.width);
   const Pixel here = load_pixel(at);
-  const vec3 variance = denoise.single_sample != 0u
+  const vec3 variance = denoise.has_history != 0u ? variance_with_history(at, here)
+                        : denoise.single_sample != 0u
                             ? variance_of_neighbours(at, here)
                             : max(here.variance, mean_variance(at, here));
   denoised_signals[index] = vec4(here.signal, here.inverse_depth);

@@ -95,7 +95,10 @@ bool RenderStage::begin(Shot& shot) {
 
   light(shot);
   if (placed_ != shot.scene || is_measured_anew_) place(shot.scene);
-  renderer_->begin({std::move(plate), exposure_of(shot), shot.track.pose->world_from_camera});
+  renderer_->begin({.plate = std::move(plate),
+                    .exposure = exposure_of(shot),
+                    .world_from_camera = shot.track.pose->world_from_camera,
+                    .accumulates = options_.accumulates && set_.quality.accumulate});
   return true;
 }
 

@@ -22,6 +22,8 @@ struct RenderStageOptions {
   bool layers = false;  // fill shot.layers
   // Renders in place of a new one; what of its scene the set has too is kept. May be null.
   std::shared_ptr<render::Renderer> renderer = {};
+  // Averages over frames where the set's quality asks for it. Otherwise every frame stands alone.
+  bool accumulates = false;
   double scale = 1;  // size of everything a shot gets, over the observer's size (preview_size.hpp)
   // A frame of another size than the calibration's passes through untouched, as from a camera that
   // was exchanged; otherwise it is an error, as in a take, all of whose frames would be like it.
@@ -39,7 +41,8 @@ class RenderStage {
               const ObserverCalibration& calibration, const scene::Scene& scene,
               RenderStageOptions options);
 
-  // Fills picture, layers, counters and untouched. Every frame uses the same random numbers (P8).
+  // Fills picture, layers, counters and untouched. Every frame uses the same random numbers (P8),
+  // unless frames are averaged.
   // This is begin(), the samples that the set's quality asks for, and finish().
   void operator()(Shot& shot);
 

@@ -85,9 +85,13 @@ const Buffer& Denoiser::denoised_real() const {
 }
 
 void Denoiser::record(const vk::raii::CommandBuffer& commands, int width, int rows,
-                      bool single_sample) {
-  gpu::GpuDenoise constants{static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(rows), 1,
-                            single_sample ? 1u : 0u, filters_companions_ ? 1u : 0u};
+                      bool single_sample, bool has_history) {
+  gpu::GpuDenoise constants{static_cast<std::uint32_t>(width),
+                            static_cast<std::uint32_t>(rows),
+                            1,
+                            single_sample && !has_history ? 1u : 0u,
+                            filters_companions_ ? 1u : 0u,
+                            has_history ? 1u : 0u};
   int side = 0, companion = 0;
   const auto run = [&](Kernel& pass) {
     const Buffers buffers{{"signals", &signal_[side]},

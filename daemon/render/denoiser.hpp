@@ -51,8 +51,10 @@ class Denoiser {
   Buffer& real() { return real_[0]; }
   Buffer& albedo() { return albedo_; }
   // Records the passes over this many rows. `single_sample` says that pixels do not know their
-  // variance.
-  void record(const vk::raii::CommandBuffer& commands, int width, int rows, bool single_sample);
+  // variance; with `has_history` the variance has the number of each pixel's samples in its fourth
+  // component, as shaders/history_show.comp leaves it.
+  void record(const vk::raii::CommandBuffer& commands, int width, int rows, bool single_sample,
+              bool has_history = false);
   // The buffers that hold the signal and its companions after the passes.
   const Buffer& denoised_signal() const;
   const Buffer& denoised_uncovered() const;

@@ -133,6 +133,7 @@ void GpuScene::deform(const std::vector<scene::Shape>& shapes) {
   assert(shapes.size() == scene_.deformations.size());
   if (shapes.empty()) return;
   deformer_.deform(shapes, bvh_, vertices_);
+  if (shapes != shapes_) ++shaped_;
   shapes_ = shapes;
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     const scene::Deformation& deformation = scene_.deformations[i];
@@ -391,6 +392,18 @@ void GpuScene::upload_instances(const glm::dvec3& camera_position) {
   const scene::TopBvh top_bvh = scene::build_top_bvh(top);
   upload_bytes(device_, bvh_, std::as_bytes(std::span(top_bvh.texels)));
   upload_storage(device_, instances_, instances);
+}
+
+std::vector<GpuScene::Stance> GpuScene::stances() const {
+  std::vector<Stance> result;
+  for (const scene::Instance& instance : scene_.instances) {
+    const scene::Aabb& bounds = places_[instance.mesh].bvh.bounds;
+    result.push_back({instance.world_from_object, bounds.low, bounds.high, instance.material,
+                      instance.presence, 0});
+  }
+  for (const scene::Deformation& deformation : scene_.deformations)
+    result[deformation.instance].shape = shaped_;
+  return result;
 }
 
 std::vector<set::Light> GpuScene::lamps() const {

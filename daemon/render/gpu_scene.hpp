@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
 #include <vector>
@@ -51,6 +52,17 @@ class GpuScene {
   // Sets lamps beside the scene's own, which may change from frame to frame; absent: there are
   // never any.
   void set_sources(std::optional<std::vector<set::Light>> sources);
+  // An instance as far as what is seen on it can be followed from frame to frame.
+  struct Stance {
+    glm::dmat4 world_from_object{1.0};
+    glm::vec3 low{0}, high{0};  // box around it, object space; empty where low > high
+    std::uint32_t material = 0, presence = 0;
+    std::uint64_t shape = 0;  // counts the shapes that it has had
+    friend bool operator==(const Stance&, const Stance&) = default;
+  };
+  std::vector<Stance> stances() const;
+  // Returns the lamps of the scene and the sources beside them.
+  std::vector<set::Light> lamps() const;
   // Uploads instances, top level and lights relative to `camera_position` (world, metres).
   void place(const glm::dvec3& camera_position);
 
@@ -78,7 +90,6 @@ class GpuScene {
   void upload_textures();
   void find_bounds(const Spheres& spheres);
   bool shape_emitter(std::size_t deformation);
-  std::vector<set::Light> lamps() const;  // of scene and sources, as SceneLights
   void find_extent();
   void upload_instances(const glm::dvec3& camera_position);
   void upload_bounds(const glm::dvec3& camera_position);
@@ -93,6 +104,7 @@ class GpuScene {
   bool may_glow_ = false;                           // some instance does, or would in a variant
   std::vector<scene::Instance> instances_as_set_;   // as set_scene() got them
   std::vector<scene::Shape> shapes_;                // as deform() got them last
+  std::uint64_t shaped_ = 0;                        // how often deform() got others
   Spheres spheres_;                                 // of instances_as_set_
   std::optional<std::vector<set::Light>> sources_;  // absent: there are never any
   std::vector<MeshPlace> places_;

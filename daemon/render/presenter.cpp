@@ -101,6 +101,19 @@ void Presenter::composite(const ToPresent& what, const Denoiser::Band& band, gpu
   }
 }
 
+// Adds the band to its past, and puts the result in its place.
+void Presenter::accumulate(const ToPresent& what, const Denoiser::Band& band,
+                           const gpu::GpuShow& constants, Denoiser& denoiser) {
+  const Buffers buffers{{"plate_samples", &what.plate},      {"signal_of", &signal_of_},
+                        {"composites", &composites_},        {"signals", &denoiser.signal()},
+                        {"variances", &denoiser.variance()}, {"surfaces", &denoiser.surface()},
+                        {"albedos", &denoiser.albedo()},     {"uncovered", &denoiser.uncovered()},
+                        {"reals", &denoiser.real()}};
+  device_.submit([&](const vk::raii::CommandBuffer& commands) {
+    what.history->record(commands, constants, what.width, band, buffers);
+  });
+}
+
 Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
                          const std::function<void(const Denoiser::Band&)>& after_band) {
   const auto width = static_cast<std::size_t>(what.width);
@@ -117,6 +130,7 @@ Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
     gpu::GpuShow constants = constants_of(what, bits_, clipping_);
     constants.in_picture = static_cast<std::uint32_t>(top);
     composite(what, band, constants, denoiser);
+    if (what.history) accumulate(what, band, constants, denoiser);
     constants.count = static_cast<std::uint32_t>(count);
     constants.in_band = static_cast<std::uint32_t>(first - top);
     const Buffers buffers{
@@ -131,7 +145,8 @@ Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
         {"picture", &picture_}};
     device_.submit([&](const vk::raii::CommandBuffer& commands) {
       if (what.denoise)
-        denoiser.record(commands, what.width, band.bottom - band.top, what.samples < 2);
+        denoiser.record(commands, what.width, band.bottom - band.top, what.samples < 2,
+                        what.history != nullptr);
       present_.dispatch({commands, constants, buffers}, (constants.count + 1) / 2);
     });
     download_bytes(

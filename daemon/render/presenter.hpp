@@ -10,6 +10,7 @@
 
 #include "daemon/render/composite.hpp"
 #include "daemon/render/denoiser.hpp"
+#include "daemon/render/history.hpp"
 #include "daemon/render/kernel.hpp"
 #include "daemon/render/wavefront.hpp"
 
@@ -26,6 +27,7 @@ struct ToPresent {
   CompositeRule rule;
   std::int64_t samples;  // the largest number that a pixel has
   bool denoise;
+  History* history = nullptr;  // what the frame is added to; null: it stands alone
 };
 
 class Presenter {
@@ -43,6 +45,8 @@ class Presenter {
   void reserve(std::size_t pixels);
   void composite(const ToPresent& what, const Denoiser::Band& band, gpu::GpuShow constants,
                  Denoiser& denoiser);
+  void accumulate(const ToPresent& what, const Denoiser::Band& band, const gpu::GpuShow& constants,
+                  Denoiser& denoiser);
 
   Device& device_;
   int bits_;

@@ -10,6 +10,7 @@
 #include "daemon/render/denoiser.hpp"
 #include "daemon/render/feature.hpp"
 #include "daemon/render/gpu_scene.hpp"
+#include "daemon/render/history.hpp"
 #include "daemon/render/photon_schedule.hpp"
 #include "daemon/render/picture_memory.hpp"
 #include "daemon/render/presenter.hpp"
@@ -51,6 +52,7 @@ struct Renderer::Impl {
   // Returns the plate as linear radiance; w is 0 where a channel is clipped.
   std::vector<glm::vec4> measured() const;
   void upload_plate();
+  void begin_accumulating();
 
   std::shared_ptr<Device> device;
   set::Estimation estimation;
@@ -59,6 +61,10 @@ struct Renderer::Impl {
   std::optional<Wavefront> wavefront;
   std::optional<Denoiser> denoiser;    // made when a picture is first shown
   std::optional<Presenter> presenter;  // likewise; made for the response
+  std::optional<History> history;      // made when a frame first accumulates
+  std::uint32_t past_samples = 0;      // of the frames that were accumulated before this one
+  Buffers scene_buffers;               // of the current frame
+  std::uint32_t features = 0;          // of the current frame
   Buffer rays, frame_buffer;
   Buffer plate;               // the camera's codes (shaders/lib/plate.glsl)
   bool is_clipped = false;    // some code of the plate may mean "at least so much light"
@@ -110,6 +116,7 @@ void Renderer::Impl::upload_frame() {
   gpu_frame.bound_share = static_cast<float>(estimation.difference_sampling);
   gpu_frame.photon_count = photons();
   gpu_frame.exposure = static_cast<float>(frame.exposure);
+  gpu_frame.past_samples = past_samples;
   gpu_frame.keeps_albedo = (needed() & gpu::FEATURE_TEXTURES) != 0 ? 1 : 0;
   gpu_frame.clip_from = is_clipped ? response->clipping().from : gpu::NO_INDEX;
   scene.describe(gpu_frame, needed());
@@ -151,6 +158,18 @@ void Renderer::Impl::upload_plate() {
   if (!codes.empty()) upload_bytes(*device, plate, std::as_bytes(std::span(codes)));
 }
 
+void Renderer::Impl::begin_accumulating() {
+  past_samples = frame.accumulates ? past_samples + static_cast<std::uint32_t>(samples) : 0;
+  if (!frame.accumulates) {
+    if (history) history->forget();
+    return;
+  }
+  if (!history) history.emplace(*device);
+  history->light_with(scene.lamps());
+  history->begin({calibration.intrinsics, frame.world_from_camera, 1 / frame.exposure},
+                 scene.stances());
+}
+
 Renderer::Renderer(std::shared_ptr<Device> device, const set::Estimation& estimation,
                    const ObserverCalibration& calibration) {
   check_size(*device, calibration.intrinsics);
@@ -161,6 +180,7 @@ Renderer::~Renderer() = default;
 void Renderer::set_scene(const scene::Scene& scene) {
   impl_->scene.set_scene(scene, impl_->estimation.specular_roughness,
                          impl_->estimation.filter_textures);
+  if (impl_->history) impl_->history->forget();
   impl_->has_scene = true;
   impl_->trees_now = impl_->trees_before = impl_->scene.rebuilt_trees();
 }
@@ -179,6 +199,8 @@ void Renderer::begin_set(const set::Estimation& estimation,
   r.carried = 0;
   r.frame = {};
   r.samples = 0;
+  r.past_samples = 0;
+  r.history.reset();
   r.response.reset();
   r.presenter.reset();
   if (has_room)  // the pipelines stay, if they are those that the set needs
@@ -194,6 +216,7 @@ void Renderer::set_environment(const lighting::EnvironmentMap& environment,
 
 void Renderer::set_environment(const EncodedEnvironment& environment, set::LightSampling sampling) {
   impl_->scene.set_environment(environment, sampling);
+  if (impl_->history) impl_->history->light_with(environment);
   impl_->has_environment = true;
 }
 
@@ -245,6 +268,7 @@ void Renderer::begin(FrameInput frame) {
     r.response.emplace(r.calibration.response, plate.bits);
     r.presenter.reset();
   }
+  r.begin_accumulating();
   r.samples = 0;
   r.trees_before = std::exchange(r.trees_now, r.scene.rebuilt_trees());
   r.upload_plate();
@@ -255,7 +279,8 @@ void Renderer::begin(FrameInput frame) {
   buffers["corner_rays"] = &r.rays;
   buffers["frame"] = &r.frame_buffer;
   buffers["plate_samples"] = &r.plate;
-  const std::uint32_t features = r.needed() | r.carried;
+  const std::uint32_t features = r.features = r.needed() | r.carried;
+  r.scene_buffers = buffers;
   if ((features & gpu::FEATURE_PHOTONS) != 0)
     r.wavefront->use_photons(r.photons(), r.estimation.photon_radius_px / lens.fx);
   r.wavefront->use_scene(std::move(buffers), features);
@@ -316,23 +341,31 @@ Plate Renderer::show(bool denoise, Layers* layers) {
   if (!r.denoiser) r.denoiser.emplace(*r.device);
   if (!r.presenter) r.presenter.emplace(*r.device, *r.response);
   const PinholeIntrinsics& lens = r.calibration.intrinsics;
-  const ToPresent what{r.wavefront->sums(),
-                       lens.width,
-                       lens.height,
-                       r.plate,
-                       !r.frame.plate->samples.empty(),
-                       r.is_clipped,
-                       r.frame.exposure,
-                       r.rule(),
-                       r.sampled(),
-                       denoise};
-  if (!denoise || !layers) return r.presenter->present(what, *r.denoiser);
+  ToPresent what{r.wavefront->sums(),
+                 lens.width,
+                 lens.height,
+                 r.plate,
+                 !r.frame.plate->samples.empty(),
+                 r.is_clipped,
+                 r.frame.exposure,
+                 r.rule(),
+                 r.sampled(),
+                 denoise};
+  std::optional<Plate> accumulated;
+  if (r.frame.accumulates && r.samples > 0) {
+    r.history->find_surfaces(r.scene_buffers, r.features, r.samples);
+    what.history = &*r.history;
+    accumulated = r.presenter->present(what, *r.denoiser);
+    what.history = nullptr;
+  }
+  if (!denoise || !layers)
+    return accumulated ? *std::move(accumulated) : r.presenter->present(what, *r.denoiser);
   const PlateRadiance plate = plate_radiance(*r.frame.plate, *r.response, r.frame.exposure);
   Plate picture = r.presenter->present(what, *r.denoiser, [&](const Denoiser::Band& band) {
     r.denoiser->read(band, *layers, plate, r.rule());
   });
   layers->denoised = true;
-  return picture;
+  return accumulated ? *std::move(accumulated) : picture;
 }
 
 Counters Renderer::counters() const {

@@ -24,6 +24,10 @@ struct FrameInput {
   double exposure = 1.0;                   // absolute, of this frame
   glm::dmat4 world_from_camera{1.0};       // OpenCV camera axes
   std::optional<std::uint32_t> seed = {};  // absent: the set's, the same in every frame (P8)
+  // What show() returns is averaged with the frames before, as far as they show the same
+  // (daemon/render/history.hpp). The frame's random numbers then follow those of the frames before.
+  // A frame that does not accumulate ends what was accumulated.
+  bool accumulates = false;
 };
 
 class Renderer {
@@ -82,10 +86,11 @@ class Renderer {
   // Returns the layers of the samples so far.
   Layers layers() const;
   // Returns the composite of the samples so far through exposure and response, as the display shows
-  // it: the plate's own bits where nothing virtual touches it. With `denoise`, noise is taken out
-  // of it (daemon/render/denoiser.hpp), and also out of the composite of `layers`, which must be
-  // those of the same samples; their variance is then the noise left. Throws previz::Error where
-  // the device has no memory for it.
+  // it: the plate's own bits where nothing virtual touches it. If the frame accumulates, the
+  // picture is the mean with those before; layers are always those of the frame alone. With
+  // `denoise`, noise is taken out of it (daemon/render/denoiser.hpp), and also out of the composite
+  // of `layers`, which must be those of the same samples; their variance is then the noise left.
+  // Throws previz::Error where the device has no memory for it.
   Plate show(bool denoise, Layers* layers = nullptr);
   Counters counters() const;
 

@@ -53,6 +53,7 @@ Controls::Controls(const set::Set& set, pipeline::Edits edits, const scene::Scen
   look_.edits = std::move(edits);
   look_.samples = set.quality.samples;
   look_.governed = set.quality.fps > 0;
+  look_.accumulates = set.quality.accumulate;
   look_.estimator = set.estimation.estimator;
   look_.light_mode = set.lighting.mode;
   look_.osd = set.display.osd;
@@ -242,6 +243,11 @@ Outcome Controls::apply(const set::HoldRate&) {
   look_.governed = true;
   look_.samples = set_samples_;
   return {fmt::format("{:g} pictures a second are held", fps_), false, {}};
+}
+
+Outcome Controls::apply(const set::ToggleAccumulation&) {
+  look_.accumulates = !look_.accumulates;
+  return {look_.accumulates ? "averaging over frames on" : "averaging over frames off", false, {}};
 }
 
 Outcome Controls::apply(const set::NextEstimator&) {

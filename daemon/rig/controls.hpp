@@ -22,7 +22,8 @@ namespace previz::rig {
 struct Look {
   State state;
   int samples = 16;
-  bool governed = false;  // quality.fps decides the samples until somebody asks for a number
+  bool governed = false;    // quality.fps decides the samples until somebody asks for a number
+  bool accumulates = true;  // averages over frames, live and in review
   set::Estimator estimator = set::Estimator::paired;
   set::LightMode light_mode = set::LightMode::image;
   render::View view = render::View::composite;
@@ -106,6 +107,7 @@ class Controls {
   Outcome apply(const set::OtherSet& effect);
   Outcome apply(const set::ChangeSamples& effect);
   Outcome apply(const set::HoldRate& effect);
+  Outcome apply(const set::ToggleAccumulation& effect);
   Outcome apply(const set::NextEstimator& effect);
   Outcome apply(const set::NextLightMode& effect);
   Outcome apply(const set::NextView& effect);

@@ -133,8 +133,8 @@ int LiveRender::next_round(const Look& look) {
   return std::clamp(static_cast<int>(round_s / sample_s_), 1, wanted);
 }
 
-// A refinement has full size, whatever the preview's: it shows the picture that `previzd render`
-// makes.
+// A refinement has full size, whatever the preview's, and stands alone: it shows the picture that
+// `previzd render` makes.
 bool LiveRender::begin_refinement(const Look& look) {
   Shot& shot = *good_of(look);
   refined_.reset();
@@ -143,7 +143,9 @@ bool LiveRender::begin_refinement(const Look& look) {
   shot.scene = look.of_take ? pipeline::with_edits(recorded_, set_, look.take_edits)
                             : pipeline::scene_state(set_, look.edits, shot.motion);
   stage_->fill_layers(true);
-  stage_->use(set_.quality);  // the preview's may be denoised otherwise
+  set::Quality quality = set_.quality;  // the preview's may be denoised otherwise
+  quality.accumulate = false;
+  stage_->use(quality);
   stage_->use(look.estimator);
   stage_->resize(1);
   refining_ = stage_->begin(shot);
@@ -206,6 +208,7 @@ Shot LiveRender::render(const Look& look, Shot shot) {
   set::Quality quality = set_.quality;
   quality.samples = look.samples;
   quality.adaptive = false;
+  quality.accumulate = look.accumulates;
   const double scale = govern(look, quality);
   // If a refinement ended before its first round, this picture is the only one to save for it.
   const bool of_live = look.snapshots > snapshots_;

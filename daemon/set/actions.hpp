@@ -35,6 +35,7 @@ struct ChangeSamples {
   int next = 1;  // moves along 1, 2, 3, 4, 6 ... 50 samples per pixel
 };
 struct HoldRate {};  // gives samples and size back to quality.fps
+struct ToggleAccumulation {};
 struct NextEstimator {};
 struct NextLightMode {};
 struct NextView {};
@@ -71,11 +72,12 @@ struct ChangeExposure {
   int steps = 1;
 };
 
-using Effect = std::variant<ToMode, Record, MarkGood, Acknowledge, Snapshot, ReloadSet, KeepEdits,
-                            OtherSet, ChangeSamples, HoldRate, NextEstimator, NextLightMode,
-                            NextView, ToggleOsd, SelectObject, MoveObject, TurnObject, ScaleObject,
-                            ChangeVariant, ResetObject, PlayAnimations, HoldAnimations, SelectLight,
-                            DimLight, TintLight, ResetLight, ChangeExposure>;
+using Effect =
+    std::variant<ToMode, Record, MarkGood, Acknowledge, Snapshot, ReloadSet, KeepEdits, OtherSet,
+                 ChangeSamples, HoldRate, ToggleAccumulation, NextEstimator, NextLightMode,
+                 NextView, ToggleOsd, SelectObject, MoveObject, TurnObject, ScaleObject,
+                 ChangeVariant, ResetObject, PlayAnimations, HoldAnimations, SelectLight, DimLight,
+                 TintLight, ResetLight, ChangeExposure>;
 
 struct Action {
   const char* name;

@@ -16,8 +16,9 @@ layout(scalar) buffer Buckets { GpuPhotonBucket buckets[]; };  // a power of two
 // passes as well. Both halves of a photon that forked share its numbers.
 Sampler photon_sampler(uint photon) {
   const uint passes = 4096u;
-  return make_sampler(frame.seed, uvec2(NO_INDEX, batch.first_sample / passes),
-                      (batch.first_sample % passes) * frame.photon_count + photon);
+  const uint pass = frame.past_samples + batch.first_sample;
+  return make_sampler(frame.seed, uvec2(NO_INDEX, pass / passes),
+                      (pass % passes) * frame.photon_count + photon);
 }
 
 // These are the dimension pairs of a photon.

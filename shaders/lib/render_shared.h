@@ -314,6 +314,7 @@ struct GpuFrame {
   float tree_share;             // probability that a light sample of a light takes the tree; 0: none
   vec3 tree_offset;             // of the camera from the tree's origin
   uint distant_light_count;     // the first of the visible lights: discs at infinity
+  uint past_samples;            // of earlier frames, after which the random numbers go on
 };
 
 // Push constants of a batch: a part of the picture and a range of samples.
@@ -330,6 +331,27 @@ struct GpuDenoise {
   uint step;            // pixels between neighbours
   uint single_sample;   // 1: pixels have one sample, and so no variance of their own
   uint has_companions;  // 1: `uncovered` and `reals` are filtered as well, with the same weights
+  uint has_history;     // 1: pixels have samples of earlier frames, as many as the history says
+};
+
+// Where an instance was in the frame before (daemon/render/history.hpp).
+struct GpuMotion {
+  vec4 before_from_now[3];  // rows; from the camera-relative world of this frame to that one's
+  uint is_known;            // 0: the instance has no history
+};
+
+// What the history's passes need beside the picture (shaders/README.md, "Accumulation over time").
+struct GpuHistory {
+  uint width, height;                // of this frame
+  uint width_before, height_before;
+  vec4 camera_from_world[3];         // rows of the rotation in the frame before
+  vec2 focal_px, principal_px;       // of the lens in the frame before, OpenCV's convention
+  vec3 radial;                       // k1, k2, k3
+  vec2 tangential;                   // p1, p2
+  float white_ratio;                 // the sensor's white in the frame before over this frame's
+  float samples;                     // that a pixel of this frame has
+  float most_samples;                // as which the history of any pixel counts; 0: there is none
+  uint is_still;                     // 1: no instance has moved
 };
 
 // Up to four joints that a vertex follows: scene::Influence.
@@ -409,7 +431,9 @@ struct GpuShow {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(GpuDenoise) == 20);
+static_assert(sizeof(GpuDenoise) == 24);
+static_assert(sizeof(GpuMotion) == 52);
+static_assert(sizeof(GpuHistory) == 116);
 static_assert(sizeof(GpuShow) == 60);
 static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 56);
@@ -421,7 +445,7 @@ static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 32);
 static_assert(sizeof(GpuLight) == 156);
 static_assert(offsetof(GpuLight, uv0) == 112);
-static_assert(sizeof(GpuFrame) == 220);
+static_assert(sizeof(GpuFrame) == 224);
 static_assert(sizeof(GpuLightNode) == 48);
 static_assert(sizeof(GpuBatch) == 28);
 static_assert(sizeof(GpuPhoton) == 64);

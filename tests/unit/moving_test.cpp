@@ -222,10 +222,11 @@ TEST_F(MovingTake, ARangeKnowsWhatCameBeforeIt) {
 }
 
 // P21: the rig records the take while it plays it; what is rendered of the recording with its poses
-// is bit for bit what the display showed.
+// is bit for bit what the display showed, where live does not average over frames.
 TEST_F(MovingTake, IsRenderedAsItWasShown) {
   const std::string more =
-      "[quality]\nsamples = 2\n[recording]\npreroll_s = 0\nslate = \"1\"\nreserve_mb = 1\n"
+      "[quality]\nsamples = 2\naccumulate = false\n[recording]\npreroll_s = 0\nslate = "
+      "\"1\"\nreserve_mb = 1\n"
       "[[object]]\nname = \"card\"\nfile = \"card.gltf\"\npresence = \"virtual\"\n"
       "position_m = [-0.1, 0, 0]\nanimation = \"sway\"\n"
       "[[button]]\nname = \"red\"\naction = \"record\"\n";

@@ -397,6 +397,17 @@ TEST(Controls, APushEndsARefinementBeforeItsKindIsKnown) {
   EXPECT_FALSE(desk.controls.pushed());
 }
 
+TEST(Controls, AveragingOverFramesIsTheSetsUntilItIsSwitched) {
+  Desk desk;
+  EXPECT_TRUE(desk.controls.look().accumulates);
+  EXPECT_EQ(desk("accumulate").said, "averaging over frames off");
+  EXPECT_FALSE(desk.controls.look().accumulates);
+  EXPECT_EQ(desk("accumulate").said, "averaging over frames on");
+  set::Set set;
+  set.quality.accumulate = false;
+  EXPECT_FALSE(Controls(set).look().accumulates);
+}
+
 TEST(Controls, EstimatorAndViewGoAround) {
   Desk desk;
   EXPECT_EQ(desk("estimator").said, "estimator: difference");

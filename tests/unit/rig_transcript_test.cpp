@@ -52,6 +52,8 @@ constexpr Line transcript[] = {
     {"samples_up", "button samples_up: 3 samples", "Samples=3"},
     {"samples_down", "button samples_down: 2 samples", "Samples=2"},
     {"hold_rate", "button hold_rate: this set holds no frame rate (refused)", "", "this set holds no frame rate"},
+    {"accumulate", "button accumulate: averaging over frames off"},
+    {"accumulate", "button accumulate: averaging over frames on"},
     {"estimator", "button estimator: estimator: difference"},
     {"light_mode", "button light_mode: light: sources"},
     {"debug_view", "button debug_view: view: mixed"},

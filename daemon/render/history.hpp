@@ -1,0 +1,83 @@
+// Accumulates over time what is added to the camera's picture: the difference of the worlds on real
+// surfaces and the radiance of virtual ones, each carried from frame to frame by its own motion
+// (shaders/README.md, "Accumulation over time"). The plate is never part of it.
+#pragma once
+
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "daemon/render/denoiser.hpp"
+#include "daemon/render/gpu_environment.hpp"
+#include "daemon/render/gpu_scene.hpp"
+#include "daemon/render/kernel.hpp"
+#include "drivers/calibration.hpp"
+
+namespace previz::render {
+
+class History {
+ public:
+  explicit History(Device& device);
+
+  // Forgets all frames so far.
+  void forget();
+  // Lets what was accumulated up to the next frame count as no more than this many frames: less
+  // than one where it is no longer true.
+  void shorten(double frames);
+  // Shorten it by how much the light around the set, or its lamps, differ from those that were
+  // given before.
+  void light_with(const EncodedEnvironment& environment);
+  void light_with(std::vector<set::Light> lamps);
+
+  // What a frame is seen by.
+  struct View {
+    PinholeIntrinsics lens;
+    glm::dmat4 world_from_camera{1.0};
+    double white = 1;  // radiance at which the sensor clips
+  };
+  // Begins a frame. What was accumulated up to the last frame that was shown is then the past. The
+  // past counts less the farther instances have moved over the picture since.
+  void begin(const View& view, std::vector<GpuScene::Stance> stances);
+  // Finds what each pixel of the frame shows. `scene` are the buffers of lib/scene.glsl with
+  // "frame", "corner_rays"; a second call for the same number of samples does nothing.
+  void find_surfaces(const Buffers& scene, std::uint32_t features, std::int64_t samples);
+  // Records the passes that add the frame to its past, and that put the result in the place of what
+  // composite.comp has made of a band. `constants` and `band_buffers` are present.comp's and
+  // composite.comp's.
+  void record(const vk::raii::CommandBuffer& commands, gpu::GpuShow constants, int width,
+              const Denoiser::Band& band, Buffers band_buffers);
+
+ private:
+  struct Frame {
+    View view;
+    std::vector<GpuScene::Stance> stances;
+    bool is_shown = false;
+    std::size_t pixels = 0;  // that the buffers have room for
+    Buffer places, things, lights, squares, uncovered, albedos;
+  };
+
+  void reserve(Frame& frame);
+  double frames_that_stay() const;
+  std::vector<gpu::GpuMotion> motions() const;
+  gpu::GpuHistory constants(std::int64_t samples) const;
+
+  Device& device_;
+  Kernel blend_, show_, surface_;
+  std::optional<std::uint32_t> features_;  // of surface_
+  Frame frames_[2];
+  int now_ = 0;                                                 // the other one is the past
+  std::optional<std::int64_t> samples_;                         // for which the surfaces were found
+  double shortened_ = std::numeric_limits<double>::infinity();  // for the next frame
+  double shortened_now_ = std::numeric_limits<double>::infinity();  // for this one
+  std::vector<glm::dvec3> environment_;                             // in cells; empty: not known
+  std::optional<std::vector<set::Light>> lamps_;
+  Buffer history_, motions_;
+};
+
+// Returns the share by which light differs: 0 for the same light, 1 and more for another one.
+double change_of_light(const std::vector<glm::dvec3>& before, const std::vector<glm::dvec3>& now);
+double change_of_lamps(const std::vector<set::Light>& before, const std::vector<set::Light>& now);
+
+}  // namespace previz::render

@@ -1,0 +1,241 @@
+// What is accumulated over frames: noise falls as the samples add up, a moving camera leaves values
+// where they were, and nothing that has changed is still seen.
+#include "daemon/render/history.hpp"
+
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "tests/support/pixels_by_hand.hpp"
+
+namespace previz::test {
+namespace render_history_test {
+
+constexpr int width = 64, height = 48;
+
+// A floor, and above it a virtual box, seen from the side; codes are linear in radiance.
+struct Stage {
+  View view;
+  std::uint32_t box = 0;
+
+  explicit Stage(const glm::vec3& sky) {
+    scene::Scene& scene = view.scene;
+    const std::uint32_t gray = add_material(scene, diffuse(glm::vec3(0.5f)));
+    add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
+    box = add_instance(scene, add_mesh(scene, box_mesh(glm::dvec3(0.4))), gray, at({0, 0, 0.3}),
+                       scene::world_mixed);
+    view.environment = uniform_environment(sky);
+    view.calibration = pinhole(width, height, 0.9);
+    view.calibration.response.kind = ResponseCurve::Kind::linear;
+    view.world_from_camera = look_at({0, -2, 1.4}, {0, 0, 0});
+  }
+  static glm::dmat4 at(const glm::dvec3& place) { return glm::translate(glm::dmat4(1.0), place); }
+};
+
+PlatePtr gray_plate() {
+  return std::make_shared<const Plate>(
+      Plate{width, height, 16, std::vector<std::uint16_t>(3 * width * height, 20000)});
+}
+
+Plate shown(SetRenderer& renderer, const glm::dmat4& world_from_camera, int samples,
+            bool accumulates, bool denoise = false) {
+  renderer.begin({.plate = gray_plate(),
+                  .exposure = 0.5,
+                  .world_from_camera = world_from_camera,
+                  .accumulates = accumulates});
+  renderer.render(samples);
+  expect_clean(renderer.counters());
+  return renderer.show(denoise);
+}
+
+// The rms over the picture of what a and b are off each other, over that of what b adds.
+double rms_between(const Plate& a, const Plate& b) {
+  double off = 0, added = 0;
+  for (std::size_t i = 0; i < a.samples.size(); ++i) {
+    off += std::pow(a.samples[i] - double(b.samples[i]), 2);
+    added += std::pow(b.samples[i] - 20000.0, 2);
+  }
+  return std::sqrt(off / added);
+}
+
+// Random numbers go on from frame to frame, so N frames of one sample, each with the weight 1 / N,
+// have the very samples of one frame of N. The means differ by rounding: N steps of 6e-8 each, of
+// values up to four times white, and the rounding of a code: one of 65536 codes at most. Only where
+// an edge is found late is a sample lost; so for nearly all pixels.
+TEST(History, OfAStillCameraHasTheSamplesOfOneLongFrame) {
+  const Stage stage(glm::vec3(0.4f));
+  for (const int samples : {1, 2}) {
+    SetRenderer frames(stage.view), whole(stage.view);
+    Plate picture;
+    const int count = 16 / samples;
+    for (int frame = 0; frame < count; ++frame)
+      picture = shown(frames, stage.view.world_from_camera, samples, true);
+    const Plate expected = shown(whole, stage.view.world_from_camera, 16, false);
+    int others = 0;
+    for (std::size_t i = 0; i < picture.samples.size(); ++i)
+      others += std::abs(picture.samples[i] - expected.samples[i]) > 1 ? 1 : 0;
+    EXPECT_LT(others, 0.02 * 3 * width * height) << samples << " samples a frame";
+  }
+}
+
+// Of 16 times as many samples noise is at most a quarter: less, because the samples of a sequence
+// are spread evenly. The reference's own noise, of 1024 samples, is an eighth of that.
+TEST(History, TakesNoiseAwayAsItsSamplesAddUp) {
+  const Stage stage(glm::vec3(0.4f));
+  SetRenderer renderer(stage.view), reference(stage.view);
+  const Plate truth = shown(reference, stage.view.world_from_camera, 1024, false);
+  const Plate first = shown(renderer, stage.view.world_from_camera, 1, true);
+  Plate last;
+  for (int frame = 1; frame < 16; ++frame)
+    last = shown(renderer, stage.view.world_from_camera, 1, true);
+  EXPECT_LT(rms_between(last, truth), rms_between(first, truth) / 4);
+}
+
+// Denoised, too: a moving camera must not add error, and the picture must be better than that of a
+// frame alone.
+TEST(History, OfAMovingCameraIsBetterThanAFrameAlone) {
+  const Stage stage(glm::vec3(0.4f));
+  SetRenderer moving(stage.view), alone(stage.view), reference(stage.view);
+  glm::dmat4 pose(1.0);
+  Plate last;
+  for (int frame = 0; frame < 12; ++frame) {
+    pose = look_at({0.01 * frame, -2, 1.4 + 0.004 * frame}, {0, 0, 0});
+    last = shown(moving, pose, 1, true, true);
+  }
+  const Plate truth = shown(reference, pose, 1024, false);
+  EXPECT_LT(rms_between(last, truth), 0.7 * rms_between(shown(alone, pose, 1, false, true), truth));
+}
+
+// A lamp that only the mixed world has lights the floor without noise, as no light is reflected
+// further. A sample lies somewhere in its pixel, and what is carried along is interpolated between
+// pixels, so what is shown lies between the extremes of the 3x3 pixels around, within the two codes
+// of rounding. Box and shadow are left out by looking past them.
+TEST(History, OfAMovingCameraKeepsValuesInTheirPlaces) {
+  Stage stage(glm::vec3(0));
+  set::Light added = lamp(set::LightType::point, glm::dvec3(3));
+  added.position = {0, 0, 3};
+  added.gain_mixed = 1;
+  added.gain_real = 0;
+  stage.view.scene.lights = {added};
+  stage.view.scene.instances[stage.box].world_from_object = Stage::at({0, 8, 0.3});
+  SetRenderer moving(stage.view, up_to_depth(1)), alone(stage.view, up_to_depth(1));
+  glm::dmat4 pose(1.0);
+  Plate last;
+  for (int frame = 0; frame < 20; ++frame) {
+    pose = look_at({0.013 * frame, -2, 1.4}, {0.02 * frame, -0.5, 0});
+    last = shown(moving, pose, 1, true);
+  }
+  const Plate expected = shown(alone, pose, 64, false);
+  for (int y = 1; y + 1 < height; ++y)
+    for (int x = 1; x + 1 < width; ++x) {
+      const auto green = [&](const Plate& picture, int off_x, int off_y) {
+        return picture.samples[static_cast<std::size_t>(3 * ((y + off_y) * width + x + off_x) + 1)];
+      };
+      int low = 65535, high = 0;
+      for (int off_y = -1; off_y <= 1; ++off_y)
+        for (int off_x = -1; off_x <= 1; ++off_x) {
+          low = std::min<int>(low, green(expected, off_x, off_y));
+          high = std::max<int>(high, green(expected, off_x, off_y));
+        }
+      ASSERT_GE(green(last, 0, 0), low - 2) << x << ", " << y;
+      ASSERT_LE(green(last, 0, 0), high + 2) << x << ", " << y;
+    }
+}
+
+TEST(History, LeavesThePlateBitForBitWhereNothingDiffers) {
+  RandomScene options;
+  options.width = 71;
+  options.height = 49;
+  options.virtual_objects = 0;
+  View view = random_scene(3, options);
+  for (const bool denoise : {false, true}) {
+    SetRenderer renderer(view);
+    for (int frame = 0; frame < 4; ++frame) {
+      const Plate plate = random_plate(71, 49, 8);
+      view.world_from_camera[3].x += 0.003;
+      renderer.begin({.plate = std::make_shared<const Plate>(plate),
+                      .exposure = 0.85,
+                      .world_from_camera = view.world_from_camera,
+                      .accumulates = true});
+      renderer.render(1);
+      EXPECT_EQ(renderer.show(denoise).samples, plate.samples) << frame;
+    }
+    expect_clean(renderer.counters());
+  }
+}
+
+// A frame alone, before, between and after frames that accumulate, is what it is without them.
+TEST(History, IsNotSeenInAFrameThatStandsAlone) {
+  const Stage stage(glm::vec3(0.4f));
+  SetRenderer with(stage.view), without(stage.view);
+  const Plate alone = shown(without, stage.view.world_from_camera, 2, false, true);
+  EXPECT_EQ(shown(with, stage.view.world_from_camera, 2, false, true).samples, alone.samples);
+  shown(with, stage.view.world_from_camera, 2, true, true);
+  shown(with, stage.view.world_from_camera, 2, true, true);
+  EXPECT_EQ(shown(with, stage.view.world_from_camera, 2, false, true).samples, alone.samples);
+}
+
+// The layers are the frame's own, and asking for them changes no picture. Showing a frame again
+// adds nothing to it.
+TEST(History, GivesTheSamePictureWithLayersAndWhenAskedAgain) {
+  const Stage stage(glm::vec3(0.4f));
+  SetRenderer renderer(stage.view);
+  for (int frame = 0; frame < 3; ++frame) {
+    const Plate picture = shown(renderer, stage.view.world_from_camera, 1, true, true);
+    render::Layers layers = renderer.layers();
+    EXPECT_EQ(renderer.show(true, &layers).samples, picture.samples);
+    EXPECT_EQ(renderer.show(true).samples, picture.samples);
+    EXPECT_TRUE(layers.denoised);
+  }
+}
+
+// A lamp, a shadow, and a jump of what throws it or of the lamp's brightness. Light comes straight
+// and is not reflected further, so a frame has no noise but at outlines. Where neither the old nor
+// the new outline is within a pixel, the first picture after the change is that of a renderer that
+// has never seen anything else; within rounding, which is 2 codes of what the last test has said.
+class HistoryAfter : public ::testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(AChange, HistoryAfter, ::testing::Values(0, 1, 2));
+
+TEST_P(HistoryAfter, AJumpOrASwitchShowsNoGhost) {
+  Stage stage(glm::vec3(0.2f));
+  set::Light key = lamp(set::LightType::point, glm::dvec3(3));
+  key.position = {1, 0, 3};
+  stage.view.scene.lights = {key};
+  SetRenderer renderer(stage.view, up_to_depth(1));
+  const glm::dmat4 pose = stage.view.world_from_camera;
+  for (int frame = 0; frame < 8; ++frame) shown(renderer, pose, 4, true);
+  std::vector<scene::Instance> instances = stage.view.scene.instances;
+  if (GetParam() == 0) instances[stage.box].world_from_object = Stage::at({-0.5, 0.3, 0.3});
+  if (GetParam() == 1) key.gain_mixed = 0.2;
+  renderer.move(instances, {key});
+  if (GetParam() == 2)
+    renderer.set_environment(uniform_environment(glm::vec3(0.02f)), set::LightSampling::importance);
+  const Plate first = shown(renderer, pose, 4, true);
+  if (GetParam() == 2) stage.view.environment = uniform_environment(glm::vec3(0.02f));
+  SetRenderer fresh(stage.view, up_to_depth(1));
+  fresh.move(instances, {key});
+  const Plate expected = shown(fresh, pose, 256, false);
+  const Plate noisy = shown(fresh, pose, 4, false);
+  // A ghost would be seen beside the noise of a frame.
+  EXPECT_LT(rms_between(first, expected), 1.3 * rms_between(noisy, expected));
+}
+
+// What moves a little shortens the past by how far it moves over the picture.
+TEST(History, OfTheLightIsComparedByWhatArrives) {
+  const std::vector<glm::dvec3> dark(256, glm::dvec3(0)), even(256, glm::dvec3(0.5));
+  std::vector<glm::dvec3> window = even;
+  window[3] = glm::dvec3(0.5 * 128);
+  EXPECT_EQ(render::change_of_light(even, even), 0);
+  EXPECT_EQ(render::change_of_light(dark, dark), 0);
+  EXPECT_EQ(render::change_of_light(dark, even), 1);
+  EXPECT_NEAR(render::change_of_light(even, window), 127.0 / 383, 1e-12);
+  set::Light key = lamp(set::LightType::point, glm::dvec3(3));
+  const std::vector<set::Light> one{key};
+  key.emission *= 0.75;
+  EXPECT_NEAR(render::change_of_lamps(one, {key}), 0.25, 1e-12);
+  EXPECT_EQ(render::change_of_lamps(one, one), 0);
+  EXPECT_EQ(render::change_of_lamps(one, {}), 1);
+  key.position.x += 0.05;
+  EXPECT_GT(render::change_of_lamps(one, {key}), 1);
+}
+
+}  // namespace render_history_test
+}  // namespace previz::test
