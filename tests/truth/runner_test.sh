@@ -23,6 +23,12 @@ for key in '"frames"' '"0012"' '"e_diff"' '"e_virtual"' '"e_mask"' '"psnr"' '"ss
 done
 grep -q '"untouched"' "$out/glass/metrics.json" && fail "the frame was not rendered"
 
+"$runner" "$set_dir" --live --frames 2 --out "$out" 2>"$out/message" && fail "frame 2 has no truth"
+"$runner" "$set_dir" --live --frames 0 --no-history --out "$out" || fail "a sequence must play"
+for key in '"flicker"' '"history": false' '"samples": 1' '"bias_diff"'; do
+  grep -q "$key" "$out/glass/metrics.json" || fail "metrics.json of a sequence has no $key"
+done
+
 status=0
 "$runner" "$set_dir" --spp 1 --frames 12 --bounds full --out "$out" || status=$?
 [ "$status" = 1 ] || fail "one sample cannot hold the bounds, but the exit status was $status"

@@ -1,5 +1,5 @@
-// Renders the truth frames of ground truth sets as `previzd render` would and says how far off they
-// are. tests/truth/run builds and calls it.
+// Renders the truth frames of ground truth sets as `previzd render` would, or plays their sequences
+// as live would show them, and says how far off they are. tests/truth/run builds and calls it.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -15,6 +15,7 @@
 #include "drivers/error.hpp"
 #include "tests/truth/compare.hpp"
 #include "tests/truth/comparison_sheet.hpp"
+#include "tests/truth/live_play.hpp"
 #include "tests/truth/truth_render.hpp"
 #include "tests/truth/truth_set.hpp"
 #include "tests/truth/truth_take.hpp"
@@ -33,6 +34,9 @@ struct Arguments {
   std::optional<std::string> bounds;
   std::vector<int> frames;  // empty: every truth frame
   double expose = 1;        // how many times as long the camera exposes
+  bool live = false, history = true;
+  int still = 0;  // frames with the camera at rest; 0: it moves as the set says
+  std::optional<int> samples;
 };
 
 struct JudgedFrame {
@@ -115,6 +119,63 @@ void print_row(const std::string& set, int frame, const JudgedFrame& judged) {
   std::fflush(stdout);
 }
 
+void write_metrics(const ordered_json& metrics, const fs::path& directory) {
+  std::ofstream file(directory / "metrics.json");
+  file << metrics.dump(2) << std::endl;
+  if (!file) throw Error((directory / "metrics.json").string() + ": cannot be written");
+}
+
+// Plays the set's sequence from its first frame to the last of `frames`, and judges what is shown.
+ordered_json play(const TruthSet& set, const std::vector<int>& frames, const Arguments& arguments,
+                  const fs::path& directory) {
+  LiveSettings settings;
+  settings.samples = arguments.samples.value_or(1);
+  settings.accumulates = arguments.history;
+  settings.device = arguments.render.device;
+  std::map<std::uint64_t, int> truths;
+  for (const int frame : frames) truths[session_index(set, frame)] = frame;
+  settings.last = truths.rbegin()->first;
+  settings.still = arguments.still;
+
+  ordered_json metrics;
+  metrics["frames"] = ordered_json::object();
+  std::optional<Flicker> flicker;
+  double square = 0, seconds = 0;
+  int count = 0, judged_frames = 0;
+  const auto begin = [&](const scene::Scene& scene, const ObserverCalibration& calibration) {
+    flicker.emplace(scene, calibration);
+  };
+  play_live(directory, settings, begin, [&](const LiveFrame& shown) {
+    flicker->add(shown);
+    seconds += shown.seconds;
+    ++count;
+    const auto found = truths.find(shown.index);
+    if (found == truths.end() || !shown.is_last) return;
+    const int frame = found->second;
+    const TruthFrame truth = load_truth_frame(set, frame);
+    const EstimatedFrame estimate = as_shown(truth, shown.picture);
+    JudgedFrame judged;
+    judged.measures = compare(truth, estimate);
+    judged.record.samples = settings.samples;
+    judged.record.render_s = shown.seconds;
+    output::write_png(directory / (frame_name(frame) + ".png"), shown.picture);
+    output::write_png(directory / (frame_name(frame) + "_compare.png"),
+                      comparison_sheet(truth, estimate));
+    print_row(set.name, frame, judged);
+    metrics["frames"][frame_name(frame)] = to_json(set, frame, judged);
+    square += std::pow(rms_of_difference(truth), 2);
+    ++judged_frames;
+  });
+  const double rms = std::sqrt(square / std::max(judged_frames, 1));
+  metrics["flicker"] = rms > 0 ? flicker->rms() / rms : 0.0;
+  metrics["seconds"] = seconds;
+  metrics["samples"] = settings.samples;
+  metrics["history"] = settings.accumulates;
+  std::printf("    flicker %.4f, %.2f s a frame\n", metrics["flicker"].get<double>(),
+              seconds / std::max(count, 1));
+  return metrics;
+}
+
 // True where every bound holds.
 bool run_set(const fs::path& path, const Arguments& arguments) {
   TruthSet set = load_truth_set(path);
@@ -133,6 +194,16 @@ bool run_set(const fs::path& path, const Arguments& arguments) {
   if (arguments.expose != 1) expose_longer(set, arguments.expose, directory / "plates");
   write_take(set, arguments.take, directory / "session");
 
+  const auto add_take = [&](ordered_json& metrics) {
+    metrics["light"] = arguments.take.light == LightFrom::truth ? "truth" : "captured";
+    metrics["pose"] = arguments.take.pose == PoseFrom::truth ? "truth" : "tracked";
+  };
+  if (arguments.live) {
+    ordered_json metrics = play(set, frames, arguments, directory);
+    add_take(metrics);
+    write_metrics(metrics, directory);
+    return true;
+  }
   ordered_json metrics;
   metrics["frames"] = ordered_json::object();
   double seconds = 0;
@@ -146,11 +217,8 @@ bool run_set(const fs::path& path, const Arguments& arguments) {
   }
   metrics["seconds"] = seconds;
   metrics["samples"] = arguments.render.samples;
-  metrics["light"] = arguments.take.light == LightFrom::truth ? "truth" : "captured";
-  metrics["pose"] = arguments.take.pose == PoseFrom::truth ? "truth" : "tracked";
-  std::ofstream file(directory / "metrics.json");
-  file << metrics.dump(2) << std::endl;
-  if (!file) throw Error((directory / "metrics.json").string() + ": cannot be written");
+  add_take(metrics);
+  write_metrics(metrics, directory);
   return held;
 }
 
@@ -175,8 +243,17 @@ int main(int argc, char** argv) {
   app.add_option("--pose", arguments.take.pose, "truth: the set's poses; tracked: by its tags")
       ->transform(CLI::Transformer(poses, CLI::ignore_case))
       ->type_name("truth|tracked");
-  app.add_option("--spp", arguments.render.samples, "samples per pixel [256]")
+  app.add_option("--spp", arguments.samples, "samples per pixel [256; with --live 1]")
       ->check(CLI::Range(1, 1000000));
+  CLI::Option* const live =
+      app.add_flag("--live", arguments.live,
+                   "play the sequence from its first frame as live would show it, and judge the "
+                   "pictures at the truth frames, denoised");
+  app.add_flag("!--no-history", arguments.history, "every frame stands alone")->needs(live);
+  app.add_option("--still", arguments.still,
+                 "with --live, show the last of the frames so many times, the camera at rest")
+      ->needs(live)
+      ->check(CLI::Range(1, 10000));
   app.add_flag("--adaptive", arguments.render.adaptive,
                "so many on average, where they bring most");
   app.add_flag("--denoise", arguments.render.denoise, "take noise out of the composite");
@@ -200,6 +277,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : 2;
   }
+  arguments.render.samples = arguments.samples.value_or(arguments.render.samples);
   try {
     print_header();
     bool held = true;
