@@ -107,13 +107,20 @@ std::string rate_words(double fps) {
   return text;
 }
 
+// Returns a ratio of 1 or more with two digits at least: "1.8", "12", "157".
+std::string times_words(double ratio) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), ratio < 9.95 ? "%.1f" : "%.0f", ratio);
+  return text.data();
+}
+
 std::string opening(const TradeReport& report) {
   const double share = 1.0 * report.width * report.height / report.full_width / report.full_height;
   std::string sizes = std::to_string(report.width) + " × " + std::to_string(report.height);
   if (share < 1)
     sizes += "; at the full " + std::to_string(report.full_width) + " × " +
              std::to_string(report.full_height) + " everything would take about " +
-             time_words(1 / share).substr(0, time_words(1 / share).find(' ')) + " times as long";
+             times_words(1 / share) + " times as long";
   return "<h1>What time buys on “" + escaped(report.set) + "”</h1>\n<p>Frame " +
          std::to_string(report.frame) +
          " of the take was rendered with the set's own settings, and then "

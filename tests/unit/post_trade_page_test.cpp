@@ -86,6 +86,17 @@ TEST(TradePage, TellsTheFrontInWords) {
   EXPECT_NE(trade_page(report).find("set's own picture by: 1, 13 %"), std::string::npos);
 }
 
+// 103 x 73 pixels are 156.6 times 8 x 6: a ratio, and no minutes and seconds.
+TEST(TradePage, SaysHowMuchLongerTheFullSizeTakes) {
+  TradeReport report = made_report();
+  report.full_width = 103;
+  report.full_height = 73;
+  EXPECT_NE(trade_page(report).find("would take about 157 times as long"), std::string::npos);
+  report.full_width = 12;
+  report.full_height = 7;
+  EXPECT_NE(trade_page(report).find("would take about 1.8 times as long"), std::string::npos);
+}
+
 TEST(TradePage, WhatPeopleNamedCannotBreakIt) {
   EXPECT_NE(trade_page(made_report()).find("desk &lt;1&gt; &amp; &quot;2&quot;"),
             std::string::npos);
