@@ -13,6 +13,10 @@ namespace {
 constexpr std::size_t least_pixels = 8;      // per tile
 constexpr double median_over_mean = 1.2533;  // of standard errors (Gaussian): sqrt(pi / 2)
 constexpr double sigma_over_mad = 1.4826;
+// What is known of a surface's albedo before anything is measured: colours that were chosen with
+// care are rarely off by more than a tenth. Without it, the surface with the most even light would
+// decide alone.
+constexpr double albedo_sigma = 0.1;
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
@@ -40,6 +44,51 @@ Location location(const std::vector<double>& values, double least_sigma) {
 }
 
 using Logs = std::vector<double>;
+
+// A value with a weight.
+struct Weighted {
+  double value = 0, weight = 1;
+};
+
+// Returns the median of weighted values, interpolated between the middles of their weights: of
+// equal weights it is median(), and of two values their weighted mean.
+double weighted_median(std::vector<Weighted> values) {
+  std::ranges::sort(values, {}, &Weighted::value);
+  double sum = 0;
+  for (const Weighted& one : values) sum += one.weight;
+  double before = 0, last_middle = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double middle = (before + 0.5 * values[i].weight) / sum;
+    if (middle >= 0.5) {
+      if (i == 0) return values[i].value;
+      const double share = (0.5 - last_middle) / (middle - last_middle);
+      return values[i - 1].value + share * (values[i].value - values[i - 1].value);
+    }
+    before += values[i].weight;
+    last_middle = middle;
+  }
+  return values.back().value;
+}
+
+// Locates values of which each has its own deviation, as location() does for values alike. The
+// number that counts is the sum of the weights over the largest: values that nobody can rely on
+// make the others neither more certain nor less.
+Location weighted_location(const std::vector<Weighted>& values, double least_sigma) {
+  Location at{weighted_median(values), least_sigma};
+  if (values.size() < 2) return at;
+  std::vector<Weighted> off;
+  double sum = 0, largest = 0;
+  for (const Weighted& one : values) {
+    off.push_back({std::abs(one.value - at.middle), one.weight});
+    sum += one.weight;
+    largest = std::max(largest, one.weight);
+  }
+  const double sigma =
+      median_over_mean * sigma_over_mad * weighted_median(off) / std::sqrt(sum / largest);
+  const double few = 1 / std::sqrt(2 * (double(values.size()) - 1));
+  at.sigma = std::max(least_sigma, sigma * (1 + few));
+  return at;
+}
 
 // Returns the medians of log(plate / rendered) of a channel, by tile.
 Logs tile_medians(const SurfacePixels& seen, std::uint32_t surface, int channel) {
@@ -107,14 +156,15 @@ Balance fit_balance(const SurfacePixels& seen, const std::vector<std::string>& r
                 "and is it in the picture?");
   mark_references(seen, references, balance.surfaces);
   for (int c = 0; c < 3; ++c) {
-    Logs logs;
+    std::vector<Weighted> logs;
     double least_sigma = HUGE_VAL;
     for (const SurfaceRatio& surface : balance.surfaces) {
       if (!surface.reference) continue;
-      logs.push_back(std::log(surface.ratio[c]));
+      const double variance = surface.sigma[c] * surface.sigma[c] + albedo_sigma * albedo_sigma;
+      logs.push_back({std::log(surface.ratio[c]), 1 / variance});
       least_sigma = std::min(least_sigma, surface.sigma[c]);
     }
-    const Location at = location(logs, least_sigma);
+    const Location at = weighted_location(logs, least_sigma);
     balance.scale[c] = std::exp(at.middle);
     balance.sigma[c] = at.sigma;
   }

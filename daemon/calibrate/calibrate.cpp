@@ -37,7 +37,9 @@ void plot(const LensOptions& options, const Views& views, const BundleFit& fit,
   out << "residual plot: " << options.residual_plot->string() << '\n';
 }
 
-FisheyeFit calibrate_fisheye(const LightOptions& options, std::ostream& out) {
+// Returns the lens's table, under a comment about what it lacks.
+std::string calibrate_fisheye(const LightOptions& options, LightCameraCalibration& camera,
+                              std::ostream& out) {
   Views views = gather(options, "light", {}, out);
   FisheyeFit fisheye = fit_fisheye(views);
   if (needs_lens(parse_board(options.board))) {
@@ -49,8 +51,18 @@ FisheyeFit calibrate_fisheye(const LightOptions& options, std::ostream& out) {
   fmt::print(out, "widest corner {:.1f} degrees off axis; trusted to {:.1f} degrees\n",
              fisheye.widest_corner_rad / degree, fisheye.intrinsics.max_angle_rad / degree);
   plot(options, views, fisheye.fit, fisheye.picture, out);
-  insist(missing_views(views, fisheye), options.force, out);
-  return fisheye;
+  camera.intrinsics = fisheye.intrinsics;
+  return insist(missing_views(views, fisheye), options.force, out) + set::intrinsics_toml(camera) +
+         "\n";
+}
+
+// Replaces a fit by one with as few parameters as little footage determines.
+void fit_by_few(const Views& views, ObserverFit& observer, std::ostream& out) {
+  observer = fit_observer_by_few(views);
+  out << "so few views determine one focal length and one coefficient of distortion at most; with "
+         "these alone:\n";
+  print_fit(views, observer.fit, few_observer_parameters, observer.picture, out);
+  if (const std::string why = why_useless(observer); !why.empty()) throw Error(why);
 }
 
 std::string pose_by_tags(const LightOptions& options, const set::Set& set,
@@ -86,10 +98,11 @@ void calibrate_observer(const LensOptions& options, std::ostream& out) {
   }
   print_fit(views, observer.fit, observer_parameters, observer.picture, out);
   plot(options, views, observer.fit, observer.picture, out);
-  insist(missing_views(views, observer), options.force, out);
+  const std::string doubts = insist(missing_views(views, observer), options.force, out);
+  if (has_few_views(views, observer)) fit_by_few(views, observer, out);
   ObserverCalibration calibration;
   calibration.intrinsics = observer.intrinsics;
-  write_tables(set::intrinsics_toml(calibration), options.table_file, out);
+  write_tables(doubts + set::intrinsics_toml(calibration), options.table_file, out);
 }
 
 void calibrate_light(const LightOptions& options, std::ostream& out) {
@@ -103,8 +116,7 @@ void calibrate_light(const LightOptions& options, std::ostream& out) {
   if (options.board.empty()) {
     camera = known_light_camera(*set, options.footage);
   } else {
-    camera.intrinsics = calibrate_fisheye(options, out).intrinsics;
-    tables = set::intrinsics_toml(camera) + "\n";
+    tables = calibrate_fisheye(options, camera, out);
   }
   tables += set ? pose_by_tags(options, *set, camera, out) : pose_by_hand;
   write_tables(tables, options.table_file, out);

@@ -13,6 +13,9 @@
 namespace previz::calibrate {
 namespace {
 
+// A balance that is less certain than this is no measurement: half a stop either way.
+constexpr double certain_stops = 0.5;
+
 // Correct metadata are accurate to a third of a stop, as shutters and aperture rings are.
 constexpr double stated_well_stops = 1.0 / 3;
 
@@ -20,18 +23,34 @@ std::string percent(const glm::dvec3& v) {
   return fmt::format("{:.1f} {:.1f} {:.1f} %", 100 * v.r, 100 * v.g, 100 * v.b);
 }
 
-void print_exposure(const Balance& balance, std::ostream& out) {
+// Returns what makes the balance no measurement, and what to do about it; empty: nothing.
+std::string doubt(const Balance& balance) {
+  const double sigma = exposure_error_sigma_stops(balance);
+  if (sigma < certain_stops) return {};
+  return fmt::format(
+      "THE BALANCE IS UNCERTAIN by {:.1f} stops, because the surfaces contradict each other: name "
+      "those whose colour is known with --reference, or put a grey card into the set and the model",
+      sigma);
+}
+
+void print_exposure(const Balance& balance, bool has_light_camera, std::ostream& out) {
   const double stops = exposure_error_stops(balance), sigma = exposure_error_sigma_stops(balance);
   if (std::abs(stops) < stated_well_stops || std::abs(stops) < 3 * sigma) {
-    fmt::print(out, "the exposures that the cameras state agree to {:+.2f} +- {:.2f} stops\n",
+    fmt::print(out, "{} to {:+.2f} +- {:.2f} stops\n",
+               has_light_camera ? "the exposures that the cameras state agree"
+                                : "the environment and the camera's exposure agree",
                stops, sigma);
     return;
   }
   fmt::print(out,
-             "THE EXPOSURES THAT THE CAMERAS STATE DISAGREE by {:.2f} +- {:.2f} stops: the light "
-             "camera's light comes out too {}. Check shutter, gain and responsivity of both; the "
+             "{} by {:.2f} +- {:.2f} stops: the light of the {} comes out too {}. Check {}; the "
              "balance below makes up for it.\n",
-             std::abs(stops), sigma, stops > 0 ? "dark" : "bright");
+             has_light_camera ? "THE EXPOSURES THAT THE CAMERAS STATE DISAGREE"
+                              : "THE ENVIRONMENT DOES NOT FIT THE CAMERA'S EXPOSURE",
+             std::abs(stops), sigma, has_light_camera ? "light camera" : "environment",
+             stops > 0 ? "dark" : "bright",
+             has_light_camera ? "shutter, gain and responsivity of both"
+                              : "its shutter, gain and responsivity, and the environment's unit");
 }
 
 // Returns the suggestion for one surface, as a table with its uncertainty, or a note if there is
@@ -76,8 +95,11 @@ void calibrate_balance(const BalanceOptions& options, std::ostream& out) {
       probe_surfaces(take, scene, render::open_device(options.device), probe);
   const Balance balance = fit_balance(seen, options.references);
   print_balance(seen, balance, out);
-  print_exposure(balance, out);
-  std::string tables = set::balance_toml(take.set.lighting.balance * balance.scale);
+  print_exposure(balance, !take.set.lighting.environment, out);
+  const std::string uncertain = doubt(balance);
+  if (!uncertain.empty()) fmt::print(out, "{}\n", uncertain);
+  std::string tables = uncertain.empty() ? "" : as_comment(uncertain);
+  tables += set::balance_toml(take.set.lighting.balance * balance.scale);
   for (const SurfaceRatio& surface : balance.surfaces)
     tables += fmt::format("\n{}", suggestion(surface, seen.surfaces[surface.surface], balance));
   write_tables(tables, options.table_file, out);

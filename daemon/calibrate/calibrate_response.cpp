@@ -1,6 +1,6 @@
 #include <fmt/ostream.h>
 
-#include <algorithm>
+#include <cmath>
 
 #include "daemon/calibrate/brackets.hpp"
 #include "daemon/calibrate/calibrate.hpp"
@@ -18,8 +18,9 @@ std::string codes(double error) {
 
 void print_response(const ResponseFit& fit, std::ostream& out) {
   fmt::print(out,
-             "{}: an exposure left out is predicted to {:.2f} codes of 255 (mean of medians)\n",
-             to_string(fit.method), fit.error_codes);
+             "{}: an exposure left out is predicted to {:.2f} codes of 255 (mean of medians); the "
+             "curve does not rise at {} of {} steps\n",
+             to_string(fit.method), fit.error_codes, fit.flat_steps, fit.brightest - fit.darkest);
   for (const LeftOut& one : fit.left_out)
     fmt::print(out, "  {}: exposure {:g}, median error of red, green, blue: {} {} {}\n", one.name,
                one.exposure, codes(one.error_codes[0]), codes(one.error_codes[1]),
@@ -47,7 +48,7 @@ void calibrate_response(const ResponseOptions& options, std::ostream& out) {
       fits.push_back(fit_response(bracket, method));
       print_response(fits.back(), out);
     }
-  const ResponseFit& best = *std::ranges::min_element(fits, {}, &ResponseFit::error_codes);
+  const ResponseFit& best = better_fit(fits);
   fmt::print(out, "taken: {}; codes {} to {} were seen\n", to_string(best.method), best.darkest,
              best.brightest);
   write_tables(

@@ -65,9 +65,9 @@ void calibrate_vignetting(const VignettingOptions& options, std::ostream& out) {
     fmt::print(out, "{}: {} pixels, {:.2f} % unexplained\n", picture.name, picture.samples.size(),
                100 * picture.rms);
   print_vignetting(fit, widest, out);
-  insist(missing_light(fit, widest), options.force, out);
+  const std::string doubts = insist(missing_light(fit, widest), options.force, out);
   camera.vignetting = fit.vignetting;
-  write_tables(set::intrinsics_toml(camera), options.table_file, out);
+  write_tables(doubts + set::intrinsics_toml(camera), options.table_file, out);
 }
 
 }  // namespace previz::calibrate

@@ -134,6 +134,27 @@ std::vector<std::string> missing_views(const Views& views, const ObserverFit& ob
   return missing;
 }
 
+bool has_few_views(const Views& views, const ObserverFit& observer) {
+  std::vector<std::string> missing;
+  miss_number(views, observer.fit, missing);
+  miss_tilt(observer.fit, missing);
+  return !missing.empty();
+}
+
+std::string why_useless(const ObserverFit& by_few) {
+  constexpr double certain_focal_length = 0.1;  // a tenth too near or too far is seen at once
+  const BundleFit& fit = by_few.fit;
+  const std::size_t used = fit.bundle.poses.size() - fit.views_left_out.size();
+  const double f = fit.bundle.lens[0], sigma = lens_sigma(fit)[0];
+  if (used > 1 && sigma < certain_focal_length * f) return {};
+  return "the focal length is not determined (" + number("%.0f", f) + " +- " +
+         number("%.0f", sigma) + " px, by " + std::to_string(used) +
+         (used == 1 ? " view" : " views") +
+         "), which --force does not change: film the board turned to the left and to the right, "
+         "and "
+         "tipped forwards and backwards";
+}
+
 std::vector<std::string> missing_views(const Views& views, const FisheyeFit& fisheye) {
   std::vector<std::string> missing;
   miss_number(views, fisheye.fit, missing);

@@ -26,7 +26,16 @@ namespace previz::calibrate {
 // The last rule is only checked if the others hold, because it depends on them.
 std::vector<std::string> missing_views(const Views& views, const ObserverFit& observer);
 
-// Returns the same for a fisheye, whose wide field provides the tilt: boards in a circle around
+// Returns whether the rules `number` or `tilt` are broken: then not even the focal length can be
+// told from the rest of the lens.
+bool has_few_views(const Views& views, const ObserverFit& observer);
+
+// Returns why a lens of few parameters cannot be taken even by force; empty if it can. Its focal
+// length must be certain to a tenth, and more than one view must have been used: a deviation that
+// follows from a single view trusts that the board was exactly flat.
+std::string why_useless(const ObserverFit& by_few);
+
+// missing_views() for a fisheye, whose wide field provides the tilt: boards in a circle around
 // the lens are seen from many sides.
 //   number    as above.
 //   circle    corners at 60 degrees off axis or more in at least 5 of 8 directions around it: half

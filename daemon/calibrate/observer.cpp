@@ -122,4 +122,32 @@ ObserverFit fit_observer(const Views& views) {
   return observer;
 }
 
+ObserverFit fit_observer_by_few(const Views& views) {
+  const auto lens_of = [&](std::span<const double> few) {
+    const double f = few[0];
+    return PinholeIntrinsics{.width = views.width,
+                             .height = views.height,
+                             .fx = f,
+                             .fy = f,
+                             .cx = 0.5 * (views.width - 1),
+                             .cy = 0.5 * (views.height - 1),
+                             .k1 = few[1]};
+  };
+  const Projection project = [&](std::span<const double> few,
+                                 const glm::dvec3& point) -> std::optional<glm::dvec2> {
+    if (!(point.z > 0)) return std::nullopt;
+    return distort(lens_of(few), {point.x / point.z, point.y / point.z});
+  };
+  Bundle start = started_lens(views);
+  start.lens = {start.lens[0], 0};
+  ObserverFit observer;
+  observer.fit = fit_bundle(views.views, start, project);
+  observer.intrinsics = lens_of(observer.fit.bundle.lens);
+  const std::vector<double> sigma = lens_sigma(observer.fit);
+  observer.sigma = {sigma[0], sigma[0], 0, 0, sigma[1], 0, 0, 0, 0};
+  observer.picture =
+      projection_uncertainty(observer.fit, project, picture_rays(observer.intrinsics));
+  return observer;
+}
+
 }  // namespace previz::calibrate

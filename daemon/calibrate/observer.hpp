@@ -27,6 +27,12 @@ struct ObserverFit {
 // decides whether they determine it well.
 ObserverFit fit_observer(const Views& views);
 
+// Fits one focal length and k1 alone, with the principal point in the picture's middle, as fewer
+// than 5 views or views without tilt cannot tell more. The fit's lens is in the order of
+// few_observer_parameters; `sigma` has both focal lengths and k1.
+inline constexpr std::array few_observer_parameters = {"f", "k1"};
+ObserverFit fit_observer_by_few(const Views& views);
+
 // Convert a bundle's parameters to a lens, and project by them.
 PinholeIntrinsics pinhole(std::span<const double> lens, int width, int height);
 std::optional<glm::dvec2> project_pinhole(std::span<const double> lens, const glm::dvec3& point);

@@ -3,6 +3,7 @@
 #include <fmt/ostream.h>
 
 #include <algorithm>
+#include <sstream>
 
 #include "daemon/calibrate/residual_plot.hpp"
 #include "drivers/error.hpp"
@@ -49,12 +50,32 @@ void print_fit(const Views& views, const BundleFit& fit, std::span<const char* c
   print_certainty(std::move(picture), out);
 }
 
-void insist(const std::vector<std::string>& missing, bool force, std::ostream& out) {
-  if (missing.empty()) return;
+std::string as_comment(const std::string& text) {
+  constexpr std::size_t longest = 100;
+  std::string comment;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line);
+    std::string row = "#";
+    for (std::string word; words >> word;) {
+      if (row.size() > 3 && row.size() + 1 + word.size() > longest) {
+        comment += row + "\n";
+        row = "#  ";
+      }
+      row += " " + word;
+    }
+    comment += row + "\n";
+  }
+  return comment;
+}
+
+std::string insist(const std::vector<std::string>& missing, bool force, std::ostream& out) {
+  if (missing.empty()) return {};
   std::string text = "these views are missing:";
   for (const std::string& what : missing) text += "\n  " + what;
   if (!force) throw Error(text + "\n(--force takes the calibration as it is)");
   fmt::print(out, "{}\n", text);
+  return as_comment("NOT TO BE RELIED ON: taken with --force although " + text);
 }
 
 void write_tables(const std::string& tables, const std::optional<std::filesystem::path>& file,

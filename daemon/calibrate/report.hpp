@@ -22,8 +22,12 @@ inline constexpr double degree = std::numbers::pi / 180;
 void print_fit(const Views& views, const BundleFit& fit, std::span<const char* const> names,
                std::vector<UncertainPixel> picture, std::ostream& out);
 
-// Throws previz::Error naming what is missing; with `force` it prints a note on `out` instead.
-void insist(const std::vector<std::string>& missing, bool force, std::ostream& out);
+// Throws previz::Error naming what is missing. With `force` it prints that on `out` instead, and
+// returns it as a comment for the table, which is empty if nothing is missing.
+std::string insist(const std::vector<std::string>& missing, bool force, std::ostream& out);
+
+// Returns the lines as a comment of a set file, each of at most about 100 characters.
+std::string as_comment(const std::string& text);
 
 // Writes the set file's tables to `out`, and to `file` if there is one.
 void write_tables(const std::string& tables, const std::optional<std::filesystem::path>& file,

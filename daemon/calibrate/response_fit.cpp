@@ -166,6 +166,18 @@ LeftOut predict(const Samples& samples, std::span<const BracketPicture> bracket,
   return result;
 }
 
+// Counts the steps of less than 1e-5 of the signal: a smooth curve of 256 codes over 10 stops rises
+// by a hundredth a step, and monotone_curve sets values that were equal 1e-7 apart.
+int flat_steps(const ResponseCurve& curve, int darkest, int brightest) {
+  constexpr double least_rise = 1e-5;
+  int flat = 0;
+  for (int code = darkest; code < brightest; ++code) {
+    const double here = curve.inverse_table[std::size_t(code)];
+    if (curve.inverse_table[std::size_t(code) + 1] < here * (1 + least_rise)) ++flat;
+  }
+  return flat;
+}
+
 double mean_error(const std::vector<LeftOut>& all) {
   double sum = 0;
   int count = 0;
@@ -231,7 +243,15 @@ ResponseFit fit_response(std::span<const BracketPicture> bracket, ResponseMethod
       if (code > 0) fit.darkest = std::min<int>(fit.darkest, code);
       if (code < 255) fit.brightest = std::max<int>(fit.brightest, code);
     }
+  fit.flat_steps = flat_steps(fit.curve, fit.darkest, fit.brightest);
   return fit;
+}
+
+const ResponseFit& better_fit(std::span<const ResponseFit> fits) {
+  return *std::ranges::min_element(fits, {}, [](const ResponseFit& fit) {
+    const double steps = std::max(1, fit.brightest - fit.darkest);
+    return fit.error_codes * (1 + fit.flat_steps / steps);
+  });
 }
 
 }  // namespace previz::calibrate

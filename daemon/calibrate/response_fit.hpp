@@ -28,6 +28,7 @@ struct ResponseFit {
   std::vector<LeftOut> left_out;
   double error_codes = 0;          // mean of left_out's medians
   int darkest = 0, brightest = 0;  // codes seen; beyond them the curve is only smooth
+  int flat_steps = 0;  // from one of these codes to the next, at which the curve does not rise
 };
 
 // Fits one curve for the three channels, whose scales (the white balance) a bracket cannot
@@ -40,6 +41,11 @@ struct ResponseFit {
 // violators) and scaled to run from 0 at code 0 to 1 at code 255. `bracket` is as read_bracket
 // returns it. Throws previz::Error if fewer than 100 pixels can be used.
 ResponseFit fit_response(std::span<const BracketPicture> bracket, ResponseMethod method);
+
+// Returns the better of fits to one bracket: that of the least error, where a curve that does not
+// rise over a share of its codes, and cannot tell their light apart, counts as that share worse.
+// There is at least one.
+const ResponseFit& better_fit(std::span<const ResponseFit> fits);
 
 // Returns a curve through 256 positive values that may not increase, in the form that a set file
 // takes: isotonic in the logarithm, strictly increasing from 0 to 1.

@@ -79,7 +79,6 @@ Views gather_views(PictureSource& source, BoardFinder& finder, const Board& boar
                   : std::to_string(corners.ids.size()) + " corners only, left out"));
     } else if (!is_new) {
       ++alike;
-      report(picture->name + ": as a view before it, left out");
     } else {
       report(picture->name + ": " + std::to_string(corners.ids.size()) + " corners");
       gathered.views.push_back(view_of(corners, board, picture->name));
@@ -88,7 +87,8 @@ Views gather_views(PictureSource& source, BoardFinder& finder, const Board& boar
   }
   if (gathered.views.empty())
     throw Error("the board is in none of the " + std::to_string(looked_at) +
-                " pictures looked at; is it the one that --board says, and wholly in view?");
+                " pictures looked at; is it the one that --board says, and wholly in view? (A "
+                "chessboard with tags at a few places only is none of the boards that are known.)");
   const std::size_t found = gathered.views.size();
   gathered.views = thinned(std::move(gathered.views), std::size_t(options.at_most));
   std::string said = std::to_string(looked_at) + " of " + std::to_string(index) +

@@ -32,8 +32,9 @@ struct GatherOptions {
 
 // Looks for the board in the pictures of a source. A picture is left out if it shows fewer than 6
 // corners, or nothing new: every corner lies within 2 % of the picture's diagonal of its place in a
-// view already taken. `report` gets one line for every picture examined. Throws previz::Error if
-// the pictures differ in size or the board is nowhere.
+// view already taken. `report` gets a line for every picture that is taken or shows no board, and
+// one that counts the others. Throws previz::Error if the pictures differ in size or the board is
+// nowhere.
 Views gather_views(PictureSource& source, BoardFinder& finder, const Board& board,
                    const GatherOptions& options,
                    const std::function<void(const std::string&)>& report);

@@ -22,8 +22,9 @@ namespace calibrate_balance_test {
 namespace fs = std::filesystem;
 
 // Surfaces seen in 12 tiles of 20 pixels, whose albedo is `wrong` times what the model says.
+// `uneven` is by how much the light of a surface differs from tile to tile.
 SurfacePixels make_pixels(const std::vector<double>& wrong, const glm::dvec3& scale,
-                          unsigned seed = 1) {
+                          unsigned seed = 1, const std::vector<double>& uneven = {}) {
   std::mt19937 random(seed);
   std::normal_distribution<double> noise(0, 1);
   SurfacePixels seen;
@@ -31,7 +32,8 @@ SurfacePixels make_pixels(const std::vector<double>& wrong, const glm::dvec3& sc
   for (std::uint32_t s = 0; s < wrong.size(); ++s) {
     seen.surfaces.push_back({"surface " + std::to_string(s), glm::dvec3(0.3)});
     for (std::uint32_t tile = 0; tile < 12; ++tile) {
-      const double of_tile = std::exp(0.02 * noise(random));  // light that is not quite right
+      const double of_tile = std::exp((uneven.empty() ? 0.02 : uneven[s]) *
+                                      noise(random));  // light that is not quite right
       for (int p = 0; p < 20; ++p) {
         SurfacePixel pixel{s, tile, {}, glm::dvec3(0.4)};
         pixel.plate = 0.4 * scale * wrong[s] * of_tile * std::exp(0.05 * noise(random));
@@ -63,6 +65,31 @@ TEST(BalanceFit, OneWrongAlbedoOfFourDoesNoHarm) {
   const AlbedoEstimate estimate =
       albedo_of(balance.surfaces[2], {"surface 2", glm::dvec3(0.3)}, balance);
   EXPECT_NEAR(estimate.albedo.g, 0.48, 4 * estimate.sigma.g);
+}
+
+// A wall under even light, and a floor that shadows leave known to a factor of two at best and that
+// is off by six: with equal weights the balance was their mean, and the wall's albedo came out
+// above
+// 1. Its weight is (0.1^2 + 0.02^2) / (0.1^2 + s^2) < 3 % of the wall's for a deviation s of 0.6 or
+// more, and moves the balance by less than 3 % of log 6.
+TEST(BalanceFit, ASurfaceThatIsHardlyKnownMovesNothing) {
+  const SurfacePixels seen = make_pixels({1, 1 / 6.0}, glm::dvec3(1.5), 3, {0.02, 2.5});
+  const Balance balance = fit_balance(seen, {});
+  ASSERT_GT(balance.surfaces[1].sigma.g, 0.6);
+  const double of_wall = std::log(balance.surfaces[0].ratio.g);
+  EXPECT_NEAR(std::log(balance.scale.g), of_wall, 0.03 * (std::log(6) + 3 * 0.6));
+  EXPECT_LT(albedo_of(balance.surfaces[0], {"wall", glm::dvec3(0.7)}, balance).albedo.g, 1);
+  // That the two contradict each other is not hidden, but is no factor of three either.
+  EXPECT_GT(balance.sigma.g, balance.surfaces[0].sigma.g);
+  EXPECT_LT(balance.sigma.g, 0.5);
+}
+
+// Surfaces that are known alike count alike, as they always did: the median of three and of four.
+TEST(BalanceFit, SurfacesKnownAlikeCountAlike) {
+  const Balance three = fit_balance(make_pixels({1, 2, 4}, glm::dvec3(1)), {});
+  EXPECT_NEAR(std::log(three.scale.g / 2), 0, 0.05);
+  const Balance four = fit_balance(make_pixels({1, 2, 4, 8}, glm::dvec3(1)), {});
+  EXPECT_NEAR(std::log(four.scale.g / std::sqrt(8.0)), 0, 0.05);
 }
 
 TEST(BalanceFit, ReferencesAloneCountWhereTheyAreNamed) {

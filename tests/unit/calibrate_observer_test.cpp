@@ -5,9 +5,11 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <opencv2/core.hpp>
+#include <sstream>
 
 #include "daemon/calibrate/coverage.hpp"
 #include "daemon/calibrate/observer.hpp"
+#include "daemon/calibrate/report.hpp"
 #include "daemon/calibrate/residual_plot.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"
@@ -237,6 +239,50 @@ TEST(ObserverCalibration, PlotsEveryCorner) {
   EXPECT_EQ(count("<rect class=\"bar\""), views.views.size());
   EXPECT_EQ(count("a&lt;b>&amp;c.png"), 1u);
   EXPECT_EQ(count("a<b>"), 0u);
+}
+
+// One frontal view, as a phone on a table: however small its stated deviation, no lens follows.
+TEST(ObserverByForce, OneViewGivesNoLens) {
+  const Views views = captured({Held{}});
+  EXPECT_TRUE(has_few_views(views, fit_observer(views)));
+  const std::string why = why_useless(fit_observer_by_few(views));
+  EXPECT_NE(why.find("by 1 view), which --force does not change: film the board turned"),
+            std::string::npos)
+      << why;
+}
+
+// Three tilted views: the nine parameters of the whole lens run away, and two do not. What the two
+// cannot express (a principal point 12 px off, k2) moves the focal length by a few per cent.
+TEST(ObserverByForce, ThreeViewsGiveAFocalLength) {
+  const Views views =
+      captured({{30, 0, 0, {0, 0, 0.3}}, {0, 35, 0, {0, 0, 0.3}}, {-30, -20, 0, {0.02, 0, 0.3}}});
+  EXPECT_TRUE(has_few_views(views, fit_observer(views)));
+  const ObserverFit few = fit_observer_by_few(views);
+  EXPECT_EQ(why_useless(few), "");
+  EXPECT_NEAR(few.intrinsics.fx / film_lens().fx, 1, 0.05);
+  EXPECT_EQ(few.intrinsics.fx, few.intrinsics.fy);
+  EXPECT_EQ(few.intrinsics.k3, 0);
+}
+
+TEST(ObserverByForce, ACarefulCaptureKeepsTheWholeLens) {
+  const Views views = captured(test::careful_capture());
+  EXPECT_FALSE(has_few_views(views, fit_observer(views)));
+}
+
+// The table is pasted into a set file and read there in a year: it says itself what it lacks.
+TEST(ObserverByForce, TheTableSaysWhatItLacks) {
+  std::ostringstream out;
+  EXPECT_EQ(insist({}, true, out), "");
+  const std::vector<std::string> missing{
+      "more views: 1 different ones can be used, 5 are needed and 20 are good"};
+  EXPECT_THROW(insist(missing, false, out), Error);
+  const std::string comment = insist(missing, true, out);
+  EXPECT_EQ(comment,
+            "# NOT TO BE RELIED ON: taken with --force although these views are missing:\n"
+            "# more views: 1 different ones can be used, 5 are needed and 20 are good\n");
+  const std::string word(120, 'a');
+  EXPECT_EQ(as_comment(word + " b"), "# " + word + "\n#   b\n");
+  EXPECT_NO_THROW(set::parse_set(comment + set::balance_toml({1, 1, 1}), "printed.toml"));
 }
 
 }  // namespace calibrate_observer_test

@@ -255,5 +255,27 @@ TEST(RealResponse, PredictsAnExposureThatWasLeftOut) {
   EXPECT_LT(film.error_codes, 8);
 }
 
+// Half of the first curve's steps are flat, as where a method finds each code by itself and the
+// pictures contradict each other: a hundredth less error is not worth that, a half is.
+TEST(ResponseFit, AStaircaseIsNotTakenForAHundredthLessError) {
+  ResponseFit stairs, smooth;
+  stairs.method = ResponseMethod::robertson;
+  stairs.error_codes = 7.76;
+  smooth.error_codes = 7.81;
+  stairs.brightest = smooth.brightest = 255;
+  stairs.flat_steps = 130;
+  const std::vector<ResponseFit> fits{smooth, stairs};
+  EXPECT_EQ(better_fit(fits).method, ResponseMethod::debevec);
+  std::vector<ResponseFit> clear = fits;
+  clear[1].error_codes = 3.9;
+  EXPECT_EQ(better_fit(clear).method, ResponseMethod::robertson);
+}
+
+TEST(ResponseFit, FlatStepsAreCounted) {
+  const ResponseFit smooth = fit_response(make_bracket(6, 1.5), ResponseMethod::debevec);
+  EXPECT_EQ(smooth.flat_steps, 0);
+  EXPECT_GT(smooth.brightest, smooth.darkest);
+}
+
 }  // namespace calibrate_response_test
 }  // namespace previz::calibrate
