@@ -116,6 +116,7 @@ constexpr Property property(const char* name, const char* type) {
 constexpr Property properties[] = {
     property<&Status::mode>("Mode", "s"),
     property<&Status::recording>("Recording", "b"),
+    property<&Status::writing>("Writing", "b"),
     property<&Status::take>("Take", "s"),
     property<&Status::take_frames>("TakeFrames", "t"),
     property<&Status::take_dropped>("TakeDropped", "t"),

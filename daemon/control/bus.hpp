@@ -21,7 +21,8 @@ inline constexpr const char* interface_name = "org.previz.Rig1";
 struct Status {
   std::string mode;  // "standby", "live", "refine", "review"
   bool recording = false;
-  std::string take;  // name of the running or the last take; empty: none yet
+  bool writing = false;  // the take is not whole on the disk yet, perhaps after recording ended
+  std::string take;      // name of the running or the last take; empty: none yet
   std::uint64_t take_frames = 0, take_dropped = 0;
   std::string fault;  // why the last take ended by itself
   bool camera_lost = false;

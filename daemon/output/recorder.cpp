@@ -182,6 +182,7 @@ void Recorder::mark_good() {
 RecorderStatus Recorder::status() const {
   const std::lock_guard lock(mutex_);
   RecorderStatus status = status_;
+  status.writing = status_.recording || writes_ || !queue_.empty();
   if (handling_since_)
     status.disk_silent_s = std::chrono::duration<double>(Clock::now() - *handling_since_).count();
   return status;
@@ -201,11 +202,13 @@ void Recorder::run() {
     if (!queue_.empty()) next = queue_.pop();
     const bool is_last = quit_ && !next;
     handling_since_ = Clock::now();
+    writes_ = take_ || !ending_.empty() || next;
     lock.unlock();
     if (!take_ && ending_.empty()) look_for_interruption();
     serve(next, is_last);
     look_at_disk();
     lock.lock();
+    writes_ = take_ || !ending_.empty();
     if (next) queue_.give_back(std::move(*next));
     const bool answers_again = std::exchange(silence_noted_, false);
     handling_since_.reset();

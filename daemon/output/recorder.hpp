@@ -47,6 +47,7 @@ std::uint64_t default_queue_bytes();
 
 struct RecorderStatus {
   bool recording = false;
+  bool writing = false;  // the take is not whole on the disk yet, perhaps after recording ended
   std::filesystem::path directory;  // the running take's or the last one's; empty: none yet
   int number = 0;
   std::uint64_t frames = 0;          // observer frames of the take on disk
@@ -171,6 +172,7 @@ class Recorder {
   std::uint64_t begun_ = 0;   // those of them that the writer thread has got to
   std::optional<std::uint64_t> free_bytes_;
   std::optional<Clock::time_point> handling_since_;  // by the writer thread
+  bool writes_ = false;  // the writer thread has a take, or an entry in hand
   bool silence_noted_ = false;
   bool short_preroll_noted_ = false;
 

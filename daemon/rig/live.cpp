@@ -57,6 +57,7 @@ control::Status status_of(const Rig& rig, const set::Set& set, const render::Dev
   const output::RecorderStatus recorder = rig.recorder_status();
   return {set::name_of(look.state.mode),
           look.state.recording,
+          recorder.writing,
           recorder.directory.filename().string(),
           recorder.frames,
           recorder.lost.frames,

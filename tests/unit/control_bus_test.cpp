@@ -89,6 +89,7 @@ class RigOnTheBus : public testing::Test {
   static Status first_status() {
     Status status;
     status.mode = "live";
+    status.writing = true;  // recording ended, and the disk is slow
     status.take = "12A_take003";
     status.take_frames = 120;
     status.samples = 16;
@@ -113,8 +114,9 @@ TEST(MethodName, IsTheActionInCamelCase) {
 TEST_F(RigOnTheBus, PrevizctlOperatesIt) {
   const Said status = previzctl("status");
   EXPECT_EQ(status.status, 0) << status.out;
-  for (const char* line : {"Mode: live\n", "Recording: no\n", "Take: 12A_take003\n",
-                           "TakeFrames: 120\n", "Samples: 16\n", "Set: desk\n"})
+  for (const char* line :
+       {"Mode: live\n", "Recording: no\n", "Writing: yes\n", "Take: 12A_take003\n",
+        "TakeFrames: 120\n", "Samples: 16\n", "Set: desk\n"})
     EXPECT_NE(status.out.find(line), std::string::npos) << status.out;
   EXPECT_EQ(previzctl("mode refine").out, "refine\n");
   EXPECT_EQ(previzctl("record on").out, "recording\n");

@@ -70,6 +70,24 @@ std::vector<std::uint64_t> count_from(std::uint64_t first, std::uint64_t last) {
   return numbers;
 }
 
+// Whoever takes the disk out after "recording ended" must be able to see that the take is whole.
+TEST(Recorder, SaysForHowLongATakeIsBeingWritten) {
+  const TemporaryDirectory directory;
+  Recorder recorder(options_in(directory.path()));
+  EXPECT_TRUE(wait_until([&] { return !recorder.status().writing; }));
+  recorder.start();
+  for (std::uint64_t i = 0; i < 40; ++i) recorder.offer(picture(i));
+  EXPECT_TRUE(recorder.status().writing);
+  recorder.stop();
+  // The disk has not taken the queue, and no track of the frames has come: they are waited for.
+  EXPECT_FALSE(recorder.status().recording);
+  EXPECT_TRUE(recorder.status().writing);
+  EXPECT_TRUE(wait_until([&] { return !recorder.status().writing; }));
+  const RecorderStatus status = recorder.status();
+  EXPECT_EQ(status.finished_takes, 1u);
+  EXPECT_TRUE(session::open_session(status.directory).missing.empty());
+}
+
 TEST(Timecode, CountsFramesOfTheNearestWholeRate) {
   using namespace std::chrono_literals;
   EXPECT_EQ(timecode(0s, 25), "00:00:00:00");
