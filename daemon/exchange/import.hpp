@@ -26,7 +26,7 @@
 //                 folder) are the pictures, unless `pictures` or `video` is given, which it then
 //                 lists in order. Columns timestamp_ns, exposure, exposure_s and gain stand for the
 //                 members below; other columns are not used.
-// observer, light - the times, exactly one of:
+// observer, light - the times, exactly one of (a video may have none, which means "container"):
 //   timestamps_ns list, one a frame, on the same clock for both cameras; or "container": the
 //                 times in the video itself, from start_ns on
 //   fps           frames per second; frame i is taken at start_ns + i / fps
@@ -35,7 +35,7 @@
 //   sort_by_time  true: the frames are put in the order of their times; otherwise times that do not
 //                 increase are an error. Not for videos.
 // observer, light - the exposures: a number for all, or a list with one a frame (or csv columns):
-//   exposure      absolute: picture signal = exposure * radiance; or
+//   exposure      absolute: picture signal = exposure * radiance; 1 if nobody knows it; or
 //   exposure_s    shutter time, with
 //   gain          linear, default 1: exposure = exposure_s * gain * response.responsivity
 // observer, light - the calibration, written as in the set file; may be left out if the set has it:

@@ -1,6 +1,8 @@
 #include "daemon/exchange/import_description.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -106,6 +108,13 @@ struct CameraMembers {
   }
 };
 
+bool is_video_name(const std::string& name) {
+  std::string ending = fs::path(name).extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  constexpr std::array endings = {".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v", ".mxf", ".mts"};
+  return std::ranges::find(endings, ending) != endings.end();
+}
+
 void read_pictures(const CameraMembers& camera, FootageDescription& footage) {
   const Members& m = camera.members;
   if (m.has("pictures") && m.has("video"))
@@ -114,6 +123,9 @@ void read_pictures(const CameraMembers& camera, FootageDescription& footage) {
     footage.video = camera.folder / m.read<std::string>("video");
     if (!fs::is_regular_file(footage.video))
       m.fail("video", "names " + footage.video.string() + ", which is not a file");
+  } else if (m.has("pictures") && m.value("pictures").is_string() &&
+             is_video_name(m.read<std::string>("pictures"))) {
+    m.fail("pictures", "names a video; write \"video\" in place of \"pictures\"");
   } else if (m.has("pictures") && m.value("pictures").is_string()) {
     footage.pictures = matching_files(camera.folder / m.read<std::string>("pictures"));
   } else if (m.has("pictures")) {
@@ -135,10 +147,16 @@ void read_times(const CameraMembers& camera, FootageDescription& footage) {
   const Members& m = camera.members;
   camera.exclude_both("timestamps_ns");
   const bool in_table = camera.in_table("timestamp_ns");
-  if (m.has("timestamps_ns") + m.has("fps") + in_table != 1)
-    m.fail("timestamps_ns",
-           "must be given in exactly one way: timestamps_ns, fps, or a csv with a "
-           "column timestamp_ns");
+  const int ways = m.has("timestamps_ns") + m.has("fps") + in_table;
+  const bool is_in_video = ways == 0 && !footage.video.empty();  // as "container"
+  if (ways == 0 && !is_in_video)
+    m.fail("fps",
+           "is missing: when the pictures were taken is not known; allowed: fps, timestamps_ns, or "
+           "a csv with a column timestamp_ns");
+  if (ways > 1)
+    m.fail(m.has("timestamps_ns") ? "timestamps_ns" : "fps",
+           "contradicts another member: the times must be given in exactly one way, by "
+           "timestamps_ns, fps, or a csv with a column timestamp_ns");
   if (m.has("start_ns"))
     footage.start_ns =
         m.read<std::int64_t>("start_ns", plain.within(0, static_cast<double>(latest_ns) / 2));
@@ -148,10 +166,10 @@ void read_times(const CameraMembers& camera, FootageDescription& footage) {
         [](std::int64_t ns) { return ns >= 0; });
   } else if (m.has("fps")) {
     footage.fps = m.read<double>("fps", plain.above(0, 1e6));
-  } else if (m.value("timestamps_ns").is_string()) {
+  } else if (!is_in_video && m.value("timestamps_ns").is_string()) {
     if (m.read<std::string>("timestamps_ns") != "container" || footage.video.empty())
       m.fail("timestamps_ns", "must be a list, or \"container\" for a video");
-  } else {
+  } else if (!is_in_video) {
     footage.timestamps_ns = m.read_list<std::int64_t>("timestamps_ns", not_negative);
     if (footage.timestamps_ns.empty()) m.fail("timestamps_ns", "is empty");
   }
@@ -205,7 +223,8 @@ void read_exposures(const CameraMembers& camera, double responsivity, FootageDes
   if (footage.exposure_s.empty())
     camera.members.fail("exposure",
                         "is missing; allowed: exposure, or exposure_s and gain; each a "
-                        "number above 0, a list with one a frame, or a csv column");
+                        "number above 0, a list with one a frame, or a csv column (if nobody knows "
+                        "it: 1, and the light of the set is then in units of the camera's white)");
   const std::vector<double> gain = footage.gain.empty() ? std::vector{1.0} : footage.gain;
   const std::size_t count = std::max(footage.exposure_s.size(), gain.size());
   for (std::size_t i = 0; i < count; ++i)

@@ -4,8 +4,10 @@
 #include <string.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <cstdint>
+#include <cstring>
 #include <fstream>
 #include <optional>
 #include <sstream>
@@ -113,7 +115,7 @@ std::vector<std::string> Table::column(const std::string& name) const {
 
 Table read_csv(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw Error(file.string() + ": cannot be opened");
+  if (!stream) throw Error(file.string() + ": cannot be opened: " + std::strerror(errno));
   Table table;
   table.file = file;
   std::string line;

@@ -1,6 +1,8 @@
 #include "daemon/exchange/json_members.hpp"
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <limits>
 
@@ -93,7 +95,7 @@ std::vector<Members> Members::objects(const std::string& key,
 
 Json read_json(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw Error(file.string() + ": cannot be opened");
+  if (!stream) throw Error(file.string() + ": cannot be opened: " + std::strerror(errno));
   try {
     return Json::parse(stream);
   } catch (const Json::exception& error) {

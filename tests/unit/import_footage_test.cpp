@@ -186,6 +186,15 @@ TEST(Import, AVideoOfBt709KeepsItsSamples) {
   }
 }
 
+TEST(Import, AVideoBringsItsOwnTimes) {
+  Shoot shoot;
+  write_video(shoot.folder() / "take.mkv", "gray", {noise_bytes(512, 1), noise_bytes(512, 2)}, 32,
+              16, 50, false);
+  shoot.json["observer"] = {{"video", "take.mkv"}, {"exposure", 1}};
+  ASSERT_EQ(shoot.error(), "");
+  EXPECT_EQ(open(shoot, "observer")->records().at(1).timestamp_ns, 20'000'000);
+}
+
 TEST(Import, AVideoOfRgbKeepsItsSamples) {
   Shoot shoot;
   const std::vector<std::uint8_t> rgb = noise_bytes(3 * 32 * 16, 1);
