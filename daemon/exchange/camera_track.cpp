@@ -4,12 +4,15 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <glm/trigonometric.hpp>
-#include <map>
 #include <numbers>
+#include <optional>
 #include <ostream>
 #include <set>
 
+#include "daemon/exchange/placed_model.hpp"
+#include "daemon/exchange/take_track.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
@@ -83,21 +86,100 @@ std::string distortion_words(const PinholeIntrinsics& i) {
          number_text(i.k3);
 }
 
-// Returns the files of the set's objects, each once, with names of their own in one folder.
-std::map<std::filesystem::path, std::string> exported_names(const set::Set& set) {
-  std::map<std::filesystem::path, std::string> names;
+// Says how far the picture's middle is from the optical axis.
+std::string chan_offset_words(const PinholeIntrinsics& i) {
+  std::array<char, 96> text{};
+  std::snprintf(text.data(), text.size(), "which is %+.1f, %+.1f px off the picture's middle",
+                i.cx + 0.5 - 0.5 * i.width, i.cy + 0.5 - 0.5 * i.height);
+  return text.data();
+}
+
+// Returns a file name for each of the set's objects, all different, in one folder.
+std::vector<std::string> exported_names(const set::Set& set) {
+  std::vector<std::string> names;
   std::set<std::string> used{"camera.usda", "camera.chan"};
   for (const set::Object& object : set.objects) {
-    if (names.contains(object.file)) continue;
     const std::filesystem::path written = std::filesystem::path(object.file_as_written).filename();
     const bool is_name = !written.empty() && written != "." && written != "..";
     const std::filesystem::path wanted = is_name ? written : object.file.filename();
     std::string name = wanted.string();
     for (int number = 2; !used.insert(name).second; ++number)
       name = wanted.stem().string() + "_" + std::to_string(number) + wanted.extension().string();
-    names[object.file] = name;
+    names.push_back(name);
   }
   return names;
+}
+
+bool can_be_solved(const set::Tracking& tracking) {
+  return tracking.enabled && !tracking.tags.empty();
+}
+
+// Finds the poses that the take has not, as rendering it does: live, frames are left out, and an
+// imported take has none.
+void solve_missing(pipeline::Take& take, std::ostream& out, const std::stop_token& stop) {
+  if (!can_be_solved(take.set.tracking)) return;
+  std::vector<session::TrackRecord>& track = take.session.track;
+  std::set<std::uint64_t> known;
+  for (const session::TrackRecord& record : track)
+    if (record.tracked) known.insert(record.frame);
+  if (known.size() == take.observer_stream->records().size()) return;
+  out << "finding the poses of " << take.observer_stream->records().size() - known.size()
+      << " frames" << std::endl;
+  const auto is_missing = [&](std::uint64_t frame) { return !known.contains(frame); };
+  const auto solved = track_frames(
+      take, is_missing, [](const std::string&) {}, stop);
+  if (stop.stop_requested())
+    throw Error(take.session.directory.string() + ": was not exported, because it is to end");
+  std::erase_if(track, [&](const auto& record) { return is_missing(record.frame); });
+  for (const TrackedFrame& frame : solved) track.push_back(frame.record);
+  std::ranges::sort(track, {}, &session::TrackRecord::frame);
+}
+
+// The places of an object over a take.
+struct ObjectPlaces {
+  std::optional<glm::dmat4> first;  // world_from_file; nothing: it is nowhere in the take
+  bool moves = false;
+};
+
+ObjectPlaces places_of(const set::Object& object, const std::vector<session::TrackRecord>& track) {
+  ObjectPlaces places;
+  for (const session::TrackRecord& record : track) {
+    const auto found = record.scene.objects.find(object.name);
+    std::optional<glm::dmat4> place;
+    if (found != record.scene.objects.end())
+      place = found->second;
+    else if (object.carrier.empty())
+      place = object.world_from_file;
+    if (!place) continue;
+    places.moves = places.moves || (places.first && *places.first != *place);
+    if (!places.first) places.first = place;
+  }
+  return places;
+}
+
+void export_scene(const pipeline::Take& take, const std::filesystem::path& directory,
+                  std::ostream& out) {
+  const std::vector<std::string> names = exported_names(take.set);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const set::Object& object = take.set.objects[i];
+    const ObjectPlaces places = places_of(object, take.session.track);
+    if (!places.first) {
+      out << "object \"" << object.name << "\" is left out: its carrier, \"" << object.carrier
+          << "\", is nowhere in the take" << std::endl;
+      continue;
+    }
+    std::string content = session::read_file(object.file);
+    try {
+      if (*places.first != glm::dmat4(1))
+        content = placed_model(content, object.name, *places.first);
+    } catch (const Error& error) {
+      throw Error(object.file.string() + ": " + error.what());
+    }
+    session::replace_file(directory / names[i], content);
+    out << "  " << names[i] << ": object \"" << object.name << "\", in its place"
+        << (places.moves ? " at the take's beginning (it moves later)" : "")
+        << (object.nodes.empty() ? "" : "; with the nodes that the set leaves out") << std::endl;
+  }
 }
 
 }  // namespace
@@ -109,8 +191,10 @@ CameraTrack camera_track(const session::Session& session,
   for (const session::TrackRecord& record : session.track)
     if (record.tracked) track.keys.push_back({record.frame, record.world_from_camera});
   if (track.keys.empty())
-    throw Error(session.directory.string() +
-                ": track.jsonl has no pose; there is no camera to export");
+    throw Error(
+        session.directory.string() +
+        ": no frame has a pose, so that there is no camera to export; `previzd track` says why, "
+        "and the set needs [[tag]] tables, or the take's import a track");
   if (frames.size() > 1)
     track.fps = static_cast<double>(frames.size() - 1) * 1e9 /
                 static_cast<double>(frames.back().timestamp_ns - frames.front().timestamp_ns);
@@ -165,8 +249,9 @@ std::string to_chan(const CameraTrack& track) {
 }
 
 void export_take(const ExportOptions& options, std::ostream& out) {
-  const pipeline::Take take = pipeline::open_take(options.session, {}, options.any_paths);
+  pipeline::Take take = pipeline::open_take(options.session, {}, options.any_paths, options.stop);
   for (const std::string& what : take.session.missing) out << "session: " << what << std::endl;
+  solve_missing(take, out, options.stop);
   const CameraTrack track =
       camera_track(take.session, take.observer_stream->records(), take.observer);
   std::error_code code;
@@ -175,15 +260,15 @@ void export_take(const ExportOptions& options, std::ostream& out) {
     throw Error(options.directory.string() + ": cannot be made: " + code.message());
   session::replace_file(options.directory / "camera.usda", to_usda(track));
   session::replace_file(options.directory / "camera.chan", to_chan(track));
-  for (const auto& [file, name] : exported_names(take.set)) {
-    const std::filesystem::path to = options.directory / name;
-    std::filesystem::copy_file(file, to, std::filesystem::copy_options::overwrite_existing, code);
-    if (code) throw Error(to.string() + ": cannot be written: " + code.message());
-  }
   out << options.directory.string() << ": camera.usda, camera.chan, " << track.keys.size()
       << " poses of " << track.frames << " frames";
-  if (track.keys.size() < track.frames) out << "; the others were not tracked and have none";
+  if (track.keys.size() < track.frames) out << "; the others have none (`previzd track` says why)";
   out << std::endl;
+  out << "  camera.chan: rotation order ZXY (set it in Blender, whose own is XYZ); it holds "
+         "neither "
+         "the distortion nor the principal point, "
+      << chan_offset_words(track.calibration.intrinsics) << std::endl;
+  export_scene(take, options.directory, out);
 }
 
 }  // namespace previz::exchange

@@ -6,6 +6,7 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <iosfwd>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -53,10 +54,12 @@ struct ExportOptions {
   std::filesystem::path session;
   std::filesystem::path directory;  // made if need be
   bool any_paths = false;           // also files outside of the session that its set names
+  std::stop_token stop = {};        // ends the search for poses, with previz::Error
 };
-// Writes DIR/camera.usda, DIR/camera.chan and the set's glTF files, as `previzd export` does; of
-// two files of one name, the second becomes NAME_2. Poses are the take's; gaps in them are reported
-// on `out`.
+// Writes DIR/camera.usda, DIR/camera.chan and the glTF file of each object, moved to where the set
+// and the take have it, as `previzd export` does; of two files of one name, the second becomes
+// NAME_2. Poses are the take's, and those that it has not are found by the set's tags, as rendering
+// does; gaps in them, and objects that move during the take, are reported on `out`.
 void export_take(const ExportOptions& options, std::ostream& out);
 
 }  // namespace previz::exchange
