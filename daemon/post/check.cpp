@@ -217,6 +217,15 @@ void print_tags(const set::Tracking& tracking, std::ostream& out) {
     separator = ", ";
   }
   out << '\n';
+  for (const set::Carrier& carrier : tracking.carriers) {
+    out << "  carrier " << carrier.name << ": " << plural(carrier.tags.size(), "tag");
+    separator = ": ";
+    for (const auto& tag : carrier.tags) {
+      out << separator << words(tag.id, " (", std::round(tag.size_m * 1e4) / 10, " mm)");
+      separator = ", ";
+    }
+    out << '\n';
+  }
 }
 
 void print_objects(const set::Set& set, const scene::Scene& scene, std::ostream& out) {
@@ -252,8 +261,9 @@ void print_lights(const set::Set& set, const scene::Scene& scene, std::ostream& 
   out << "\nlight\n  around the set: "
       << (lighting.environment                   ? "the picture " + lighting.environment_as_written
           : lighting.from == set::LightFrom::set ? std::string("none")
-          : lighting.from == set::LightFrom::recording
-              ? std::string("as the session recorded it")
+          : lighting.from == set::LightFrom::recording ? std::string("as the session recorded it")
+          : set.light_camera.driver == set::no_driver
+              ? std::string("what the session's light camera saw, if it has one; this set has none")
               : words("what the light camera sees; where it cannot see: ",
                       set::name_of(lighting.unseen)))
       << '\n';

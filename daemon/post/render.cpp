@@ -11,12 +11,14 @@
 #include <utility>
 
 #include "daemon/output/progress.hpp"
+#include "daemon/pipeline/preview_size.hpp"
 #include "daemon/pipeline/refinement.hpp"
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/stages.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/pipeline/take_shots.hpp"
 #include "daemon/post/render_directory.hpp"
+#include "daemon/post/render_folder.hpp"
 #include "daemon/report/report.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/names.hpp"
@@ -58,11 +60,12 @@ void check_directory(const set::Set& set, const RenderOptions& options) {
 // Returns everything that decides what the pictures look like, as JSON that RenderDirectory
 // compares.
 std::string settings_of(const pipeline::Take& take, const set::Set& set,
-                        const std::optional<set::Overlay>& with) {
+                        const std::optional<set::Overlay>& with, double scale) {
   nlohmann::ordered_json json;
   json["software"] = "previzd " PREVIZ_VERSION;
   json["session"] = take.session.info.name;
   json["session_start_ns"] = take.observer_stream->records().front().timestamp_ns;
+  json["scale"] = scale;
   json["samples"] = set.quality.samples;
   json["adaptive"] = set.quality.adaptive;
   json["denoise"] = set.quality.denoise;
@@ -165,9 +168,12 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
       pipeline::open_take(options.session, options.set_file, options.any_paths, {}, with);
   override_set(take.set, options);
   check_directory(take.set, options);
+  if (!options.directory)
+    take.set.output.directory = render_folder(options.session, take.session.info.take.has_value(),
+                                              take.set.output.directory);
   const set::Set& set = take.set;
   const FrameRange range = range_of(options, take);
-  RenderDirectory directory(set.output, settings_of(take, set, with), options.force);
+  RenderDirectory directory(set.output, settings_of(take, set, with, options.scale), options.force);
 
   RenderReport report;
   report.directory = directory.path();
@@ -203,6 +209,9 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
     report::Once light_notes;
     pipeline::RenderStageOptions render_options;
     render_options.layers = true;
+    render_options.scale = options.scale;
+    set::Set written = set;  // with the lens of the pictures, for what is written beside them
+    written.observer.calibration = pipeline::scaled(take.observer, options.scale);
     render_options.cancelled = [&] { return options.stop.stop_requested(); };
     render_options.progress = [&](const Shot& shot, int samples) {
       progress.sample(shot.index, samples, set.quality.samples, now_s());
@@ -226,7 +235,7 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
     });
     stages.sink("output", rendered, [&](const Shot& shot) {
       if (!shot.whole) return;
-      directory.write(shot, set);
+      directory.write(shot, written);
       if (const std::string dropped = dropped_text(shot.counters); !dropped.empty())
         progress.note("frame " + std::to_string(shot.index) + ": left out " + dropped);
       progress.frame_done(done_text(shot), now_s());

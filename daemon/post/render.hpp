@@ -36,6 +36,7 @@ struct RenderOptions {
   // The session's own set may read and write outside of the session's folder.
   bool any_paths = false;
   std::optional<FrameRange> frames;   // absent: all
+  double scale = 1;                   // of the pictures' size; above 0, at most 1
   std::optional<int> samples;         // quality.samples
   std::optional<double> error;        // quality.error
   std::optional<bool> adaptive;       // quality.adaptive
@@ -43,7 +44,8 @@ struct RenderOptions {
   std::optional<double> seconds;      // quality.seconds
   std::optional<std::uint32_t> seed;  // estimation.seed
   std::optional<set::Estimator> estimator;
-  std::optional<std::filesystem::path> directory;  // output.directory
+  // For the pictures of this take; absent: by output.directory, render_folder().
+  std::optional<std::filesystem::path> directory;
   std::optional<bool> exr, png, video;
   bool force = false;  // render frames again that are already there
   render::DeviceOptions device;

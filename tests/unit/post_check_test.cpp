@@ -72,6 +72,25 @@ TEST_F(Check, RemarksThatBothFoldersOfTakesAreOnOneDisk) {
   EXPECT_EQ(said_.find("second_directory"), std::string::npos) << said_;
 }
 
+// A light camera that the set does not have sees nothing.
+TEST_F(Check, NoLightCameraSeesNoLight) {
+  write("ring.gltf", triangle(R"("pbrMetallicRoughness": {"metallicFactor": 1})"));
+  ASSERT_EQ(check(R"(
+[set]
+name = "ring"
+[light_camera]
+driver = "none"
+[[object]]
+name = "ring"
+file = "ring.gltf"
+presence = "virtual"
+)"),
+            0)
+      << said_;
+  expect_said("light camera  none");
+  expect_said("around the set: what the session's light camera saw, if it has one");
+}
+
 TEST_F(Check, DescribesWhatASetAsksFor) {
   write("table.gltf", triangle(R"("pbrMetallicRoughness": {"metallicFactor": 0})"));
   write("ring.gltf", triangle(R"("pbrMetallicRoughness": {"metallicFactor": 1})"));
@@ -82,6 +101,10 @@ name = "ring on a table"
 id = 4
 size_m = 0.0805
 position_m = [0, 0, 0]
+[[tag]]
+id = 9
+size_m = 0.05
+carrier = "stick"
 [[object]]
 name = "table"
 file = "table.gltf"
@@ -104,6 +127,7 @@ samples = 1500
       << said_;
   expect_said("ring on a table (");
   expect_said("1 tag of family tag36h11: 4 (80.5 mm)");
+  expect_said("carrier stick: 1 tag: 9 (50 mm)");
   expect_said("table: phantom, 1 triangle in 1 instance, from table.gltf");
   expect_said("ring: virtual, 1 triangle in 1 instance, from ring.gltf");
   expect_said("spot: point, dimmed, gain 0.5 in the picture, 1 in the real scene");

@@ -270,6 +270,31 @@ TEST_F(RenderSession, ASecondRunSkipsWhatIsFinishedAndOtherSamplesAreRefused) {
 }
 
 // What a run leaves must not depend on where it was interrupted.
+// 24 x 18 of the 48 x 36 pixels: to look at a take quickly. It is another picture, not the same.
+TEST_F(RenderSession, ASmallerPictureIsAnotherOne) {
+  test::write_small_take(directory_.path());
+  RenderOptions options;
+  options.frames = FrameRange{small_take_lost, small_take_lost + 1};
+  options.scale = 0.5;
+  const RenderReport report = render(options);
+  ASSERT_EQ(report.frames.size(), 2u);
+  for (const char* name : {"0003", "0004"}) {
+    EXPECT_EQ(output::read_png(directory_ / ("out/" + std::string(name) + ".png")).width, 24);
+    const render::Layers layers =
+        output::read_exr(directory_ / ("out/" + std::string(name) + ".exr"));
+    EXPECT_EQ(layers.width, 24);
+    EXPECT_EQ(layers.height, 18);
+  }
+  options.scale = 1;
+  try {
+    render(options);
+    FAIL() << "pictures of two sizes in one folder";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("scale is 0.5 there and 1.0 now"), std::string::npos)
+        << error.what();
+  }
+}
+
 TEST_F(RenderSession, AStopLeavesWholeFramesAndTheNextRunEndsInTheSamePictures) {
   test::write_small_take(directory_.path());
   RenderOptions whole;

@@ -1,0 +1,75 @@
+#include "daemon/output/take_list.hpp"
+
+#include <string.h>
+
+#include <algorithm>
+
+#include "daemon/output/take_folders.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::output {
+namespace {
+
+bool is_take(const std::filesystem::path& directory) {
+  std::error_code unknown;
+  return std::filesystem::is_regular_file(directory / "session.toml", unknown);
+}
+
+// Returns whether the folder of the take remembers that the take is being recorded.
+bool is_remembered(const std::filesystem::path& take) {
+  const std::filesystem::path parent = std::filesystem::absolute(take).parent_path();
+  return TakeFolders({parent}, 0, {}).kept_wish() == take.filename().string();
+}
+
+ListedTake look_at(const std::filesystem::path& directory) {
+  ListedTake take;
+  take.directory = directory;
+  try {
+    take.summary = session::summary_of(directory);
+    const bool is_over = take.summary.closed || !take.summary.fault.empty();
+    take.may_be_in_recording = !is_over && is_remembered(directory);
+  } catch (const Error& error) {
+    take.fault = error.what();
+  }
+  for (const std::filesystem::path& file : session::own_files(directory)) {
+    std::error_code gone;
+    const std::uintmax_t size = std::filesystem::file_size(directory / file, gone);
+    if (!gone) take.bytes += size;
+  }
+  return take;
+}
+
+}  // namespace
+
+std::filesystem::path named(const std::filesystem::path& directory) {
+  const std::filesystem::path normal = directory.lexically_normal();
+  return normal.has_filename() || !normal.has_parent_path() ? normal : normal.parent_path();
+}
+
+ListedTake listed_take(const std::filesystem::path& directory) {
+  const std::filesystem::path take = named(directory);
+  if (is_take(take)) return look_at(take);
+  if (!std::filesystem::exists(take))
+    throw Error(take.string() + ": is not there; `previzd takes list` shows the takes there are");
+  const bool holds_takes = std::filesystem::is_directory(take) && !list_takes({take}).empty();
+  throw Error(take.string() + (holds_takes ? ": is a folder of takes; name the takes in it"
+                                           : ": is not a take; it holds no session.toml"));
+}
+
+std::vector<ListedTake> list_takes(const std::vector<std::filesystem::path>& folders) {
+  std::vector<ListedTake> takes;
+  for (const std::filesystem::path& folder : folders) {
+    std::vector<std::filesystem::path> names;
+    std::error_code failure;
+    for (const auto& entry : std::filesystem::directory_iterator(folder, failure))
+      if (is_take(entry.path())) names.push_back(entry.path().filename());
+    if (failure && failure != std::errc::no_such_file_or_directory)
+      throw Error(folder.string() + ": cannot be listed: " + failure.message());
+    std::ranges::sort(
+        names, [](const auto& a, const auto& b) { return ::strverscmp(a.c_str(), b.c_str()) < 0; });
+    for (const std::filesystem::path& name : names) takes.push_back(look_at(folder / name));
+  }
+  return takes;
+}
+
+}  // namespace previz::output

@@ -1,0 +1,168 @@
+#include "daemon/post/take_copy.hpp"
+
+#include <fcntl.h>
+#include <stdlib.h>
+
+#include <fstream>
+#include <map>
+#include <sstream>
+
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+
+namespace previz::post {
+namespace {
+
+namespace fs = std::filesystem;
+
+using Checksums = std::map<std::string, std::string>;  // of files, by their paths
+
+constexpr std::size_t hash_digits = 64;
+
+// A folder that is removed unless it gets its name.
+class CopyDraft {
+ public:
+  explicit CopyDraft(const fs::path& target) : target_(target) {
+    const fs::path folder = fs::absolute(target).parent_path();
+    std::string name = (folder / ("." + target.filename().string() + ".XXXXXX")).string();
+    if (!::mkdtemp(name.data())) throw Error(folder.string() + ": no folder can be made in it");
+    path_ = name;
+    fs::permissions(path_, fs::perms{0755});
+  }
+  ~CopyDraft() {
+    std::error_code ignored;
+    if (!path_.empty()) fs::remove_all(path_, ignored);
+  }
+  CopyDraft(const CopyDraft&) = delete;
+  CopyDraft& operator=(const CopyDraft&) = delete;
+
+  const fs::path& path() const { return path_; }
+  void complete() {
+    std::error_code failure;
+    fs::rename(path_, target_, failure);
+    if (failure) throw Error(target_.string() + ": cannot be made: " + failure.message());
+    path_.clear();
+    session::sync_names(fs::absolute(target_).parent_path());
+  }
+
+ private:
+  const fs::path target_;
+  fs::path path_;
+};
+
+std::string to_text(const Checksums& sums) {
+  std::string text;
+  for (const auto& [file, hash] : sums) text.append(hash).append("  ").append(file).append("\n");
+  return text;
+}
+
+Checksums read_checksums(const fs::path& file) {
+  Checksums sums;
+  std::istringstream lines(session::read_file(file));
+  int number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    const std::size_t path = hash_digits + 2;
+    if (line.size() <= path)
+      throw Error(file.string() + ":" + std::to_string(number) +
+                  ": is not a checksum and a file; copy the take again");
+    sums[line.substr(path)] = line.substr(0, hash_digits);
+  }
+  return sums;
+}
+
+// Copies a file and waits until it is on the medium, from where it is read again afterwards.
+void copy_synced(const fs::path& from, const fs::path& to, const std::stop_token& stop) {
+  std::ifstream source(from, std::ios::binary);
+  if (!source) throw Error(from.string() + ": cannot be opened");
+  const session::OpenFile copy(to, O_WRONLY | O_CREAT | O_EXCL);
+  std::string block(1 << 22, '\0');
+  while (source) {
+    if (stop.stop_requested())
+      throw Error(from.string() + ": was not copied, because it is to end");
+    source.read(block.data(), static_cast<std::streamsize>(block.size()));
+    copy.append({block.data(), static_cast<std::size_t>(source.gcount())});
+  }
+  if (source.bad()) throw Error(from.string() + ": cannot be read");
+  copy.sync();
+  ::posix_fadvise(copy.get(), 0, 0, POSIX_FADV_DONTNEED);
+}
+
+bool is_same_copy(const output::ListedTake& take, const fs::path& copy) {
+  const fs::path sums = copy / checksums_name;
+  if (!fs::is_regular_file(sums)) return false;
+  const Checksums known = read_checksums(sums);
+  const std::vector<fs::path> files = session::own_files(take.directory);
+  if (known.size() != files.size()) return false;
+  for (const fs::path& file : files) {
+    std::error_code gone;
+    if (!known.contains(file.string()) ||
+        fs::file_size(copy / file, gone) != fs::file_size(take.directory / file))
+      return false;
+  }
+  return known.at("session.toml") == session::sha256_of(take.directory / "session.toml");
+}
+
+void check_room(const output::ListedTake& take, const fs::path& folder) {
+  std::error_code unknown;
+  const fs::space_info space = fs::space(folder, unknown);
+  if (!unknown && space.available < take.bytes)
+    throw Error(folder.string() + ": has room for " + std::to_string(space.available / 1'000'000) +
+                " MB; " + take.directory.filename().string() + " has " +
+                std::to_string(take.bytes / 1'000'000) + " MB");
+}
+
+}  // namespace
+
+bool copy_take(const output::ListedTake& take, const fs::path& copy, const std::stop_token& stop) {
+  const fs::path folder = fs::absolute(copy).parent_path();
+  if (session::lies_within(take.directory, copy))
+    throw Error(copy.string() + ": lies in the take itself; name another folder");
+  if (fs::exists(copy)) {
+    if (is_same_copy(take, copy)) return false;
+    throw Error(copy.string() +
+                ": is there already, and is no copy of this take as it is now; copy into another "
+                "folder, or remove it");
+  }
+  check_room(take, folder);
+  CopyDraft draft(copy);
+  Checksums sums;
+  for (const fs::path& file : session::own_files(take.directory)) {
+    const fs::path from = take.directory / file, to = draft.path() / file;
+    fs::create_directories(to.parent_path());
+    copy_synced(from, to, stop);
+    const std::string hash = session::sha256_of(from, stop);
+    if (session::sha256_of(to, stop) != hash)
+      throw Error(copy.string() + ": " + file.string() +
+                  " reads back different from what was written; the disk fails, or its cable; no "
+                  "copy was made");
+    sums[file.string()] = hash;
+  }
+  session::replace_file(draft.path() / checksums_name, to_text(sums));
+  if (fs::exists(draft.path() / "assets")) session::sync_names(draft.path() / "assets");
+  draft.complete();
+  return true;
+}
+
+std::vector<std::string> checksum_faults(const fs::path& copy, const std::stop_token& stop) {
+  std::vector<std::string> faults;
+  if (!fs::is_regular_file(copy / checksums_name)) return faults;
+  for (const auto& [file, hash] : read_checksums(copy / checksums_name)) {
+    const fs::path path = copy / file;
+    if (!session::lies_within(copy, path))
+      faults.push_back(std::string(checksums_name) + ": " + file + " lies outside the take");
+    else if (!fs::is_regular_file(path))
+      faults.push_back(file + ": is missing; copy the take again");
+    else if (session::sha256_of(path, stop) != hash)
+      faults.push_back(file + ": was changed since it was copied; copy the take again");
+  }
+  return faults;
+}
+
+void write_checksum(const fs::path& copy, const std::string& file) {
+  Checksums sums = read_checksums(copy / checksums_name);
+  sums[file] = session::sha256_of(copy / file);
+  session::replace_file(copy / checksums_name, to_text(sums));
+}
+
+}  // namespace previz::post

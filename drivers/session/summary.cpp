@@ -1,0 +1,63 @@
+#include "drivers/session/summary.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "drivers/session/json_lines.hpp"
+#include "drivers/session/session_toml.hpp"
+
+namespace previz::session {
+namespace {
+
+constexpr std::array own_names = {"session.toml", "observer.mkv",    "observer.jsonl",
+                                  "light.mkv",    "light.jsonl",     "composite.mkv",
+                                  "track.jsonl",  "composite.jsonl", "events.jsonl"};
+
+// Assets are named by the SHA-256 of their content.
+bool is_asset_name(const std::filesystem::path& name) {
+  const std::string hash = name.stem().string();
+  return hash.size() == 64 && hash.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
+void add_own_files(const std::filesystem::path& directory, const std::filesystem::path& folder,
+                   std::vector<std::filesystem::path>& files) {
+  std::error_code failure;
+  for (const auto& entry : std::filesystem::directory_iterator(directory / folder, failure)) {
+    const std::filesystem::path name = entry.path().filename();
+    const bool is_own = folder.empty() ? std::ranges::find(own_names, name) != own_names.end()
+                                       : is_asset_name(name);
+    if (is_own && !entry.is_symlink() && entry.is_regular_file()) files.push_back(folder / name);
+  }
+  if (failure && failure != std::errc::no_such_file_or_directory)
+    throw Error((directory / folder).string() + ": cannot be listed: " + failure.message());
+}
+
+}  // namespace
+
+Summary summary_of(const std::filesystem::path& directory) {
+  const std::filesystem::path toml = directory / "session.toml";
+  if (!std::filesystem::exists(toml))
+    throw Error(directory.string() + ": is not a take; it holds no session.toml");
+  SessionFile file = parse_session_toml(read_file(toml), toml);
+  Summary summary{std::move(file.info), file.closed, file.fault, file.lost, 0, 0, 0};
+  const auto observer = read_frame_lines(directory / "observer.jsonl").records;
+  summary.frames = observer.size();
+  summary.light_frames = read_frame_lines(directory / "light.jsonl").records.size();
+  if (!observer.empty())
+    summary.seconds = 1e-9 * static_cast<double>(observer.back().record.timestamp_ns -
+                                                 observer.front().record.timestamp_ns);
+  return summary;
+}
+
+std::vector<std::filesystem::path> own_files(const std::filesystem::path& directory) {
+  std::vector<std::filesystem::path> files;
+  add_own_files(directory, {}, files);
+  if (!std::filesystem::is_symlink(directory / "assets")) add_own_files(directory, "assets", files);
+  std::ranges::sort(files);
+  return files;
+}
+
+}  // namespace previz::session
