@@ -33,15 +33,30 @@ void add_with(CLI::App& command, std::optional<std::filesystem::path>& with) {
       "writes it");
 }
 
-void add_render(CLI::App& app, post::RenderOptions& options) {
+void add_render(CLI::App& app, post::RenderOptions& options,
+                std::optional<post::WhichTakes>& takes) {
   CLI::App& command = *app.add_subcommand("render", "Composite every frame of a recorded session");
-  command.add_option("session", options.session, "Session directory")->required();
+  command
+      .add_option("session", options.session,
+                  "Session directory; with --good or --all a folder of takes")
+      ->required();
+  CLI::Option* good = command.add_flag_callback(
+      "--good", [&] { takes = post::WhichTakes::good; }, "Render every take that is marked good");
+  command
+      .add_flag_callback(
+          "--all", [&] { takes = post::WhichTakes::all; }, "Render every take of the folder")
+      ->excludes(good);
   command.add_option("--set", options.set_file, "Set file, instead of the session's own");
   add_with(command, options.with);
   add_any_paths(command, options.any_paths);
   command.add_option_function<std::string>(
       "--frames", [&](const std::string& text) { options.frames = post::parse_frame_range(text); },
       "Observer frames: 7, 3-9 or 3- (default: all)");
+  command
+      .add_option("--scale", options.scale,
+                  "Size of the pictures, relative to the film camera's; smaller is quicker")
+      ->check(CLI::Range(0.05, 1.0))
+      ->capture_default_str();
   command.add_option("--spp", options.samples, "Samples per pixel (default: quality.samples)")
       ->check(CLI::Range(1, 1'000'000));
   add_choice(command, "--adaptive,!--even", options.adaptive,
@@ -69,7 +84,10 @@ void add_render(CLI::App& app, post::RenderOptions& options) {
           },
           "Estimator (default: the set's)")
       ->check(CLI::IsMember({"paired", "difference"}));
-  command.add_option("--out", options.directory, "Directory for the pictures");
+  command.add_option(
+      "--out", options.directory,
+      "Directory for the pictures; with --good or --all for a folder a take (default: "
+      "by the set's output.directory, a folder a take)");
   command.add_flag_callback(
       "--no-exr", [&] { options.exr = false; }, "No EXR files");
   command.add_flag_callback(
@@ -122,6 +140,15 @@ void add_export(CLI::App& app, exchange::ExportOptions& options) {
   add_any_paths(command, options.any_paths);
 }
 
+void add_track(CLI::App& app, exchange::TrackOptions& options) {
+  CLI::App& command =
+      *app.add_subcommand("track", "Find the camera in every frame of a take, without rendering");
+  command.add_option("session", options.session, "Session directory")->required();
+  command.add_option("--set", options.set_file, "Set file, instead of the session's own");
+  command.add_option("--out", options.out, "File for the poses, a line of JSON a frame");
+  add_any_paths(command, options.any_paths);
+}
+
 void add_trade(CLI::App& app, trade::TradeOptions& options) {
   CLI::App& command =
       *app.add_subcommand("trade", "Measure what time buys on a set: a table and a page");
@@ -162,15 +189,17 @@ void add_commands(CLI::App& app, CommandLine& said) {
   app.add_option("--log-level", said.log_level, "The least severe of what goes to the log")
       ->check(CLI::IsMember({"info", "warning", "error"}))
       ->capture_default_str();
-  add_render(app, said.render);
+  add_render(app, said.render, said.render_takes);
   add_run(app, said.run);
   add_check(app, said.check);
   add_devices(app, said.learn, said.rules);
   add_import(app, said.import_session);
   add_export(app, said.export_take);
+  add_track(app, said.track);
   add_trade(app, said.trade);
   calibrate::add_calibrate(app, said.calibrate);
   print::add_print(app, said.print);
+  add_takes(app, said.takes);
 }
 
 }  // namespace previz

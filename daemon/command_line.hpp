@@ -3,14 +3,18 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "daemon/calibrate/command_line.hpp"
 #include "daemon/exchange/camera_track.hpp"
 #include "daemon/exchange/import.hpp"
+#include "daemon/exchange/take_track.hpp"
 #include "daemon/post/render.hpp"
+#include "daemon/post/render_takes.hpp"
 #include "daemon/print/command_line.hpp"
 #include "daemon/rig/live.hpp"
+#include "daemon/takes_command.hpp"
 #include "daemon/trade/trade.hpp"
 
 namespace previz {
@@ -18,14 +22,17 @@ namespace previz {
 struct CommandLine {
   std::string log_level = "info";
   post::RenderOptions render;
+  std::optional<post::WhichTakes> render_takes;  // of the folder that is named
   rig::LiveOptions run;
   std::filesystem::path check;
   bool learn = false, rules = false;  // of devices
   exchange::ImportOptions import_session;
   exchange::ExportOptions export_take;
+  exchange::TrackOptions track;
   trade::TradeOptions trade;
   calibrate::Commands calibrate;
   print::Commands print;
+  TakesCommands takes;
 };
 
 // Adds all subcommands and options to `app`, which writes what it parses into `said`; `said` must

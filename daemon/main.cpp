@@ -8,11 +8,13 @@
 
 #include <CLI/CLI.hpp>
 #include <iostream>
+#include <optional>
 
 #include "daemon/command_line.hpp"
 #include "daemon/device_rules.hpp"
 #include "daemon/devices.hpp"
 #include "daemon/post/check.hpp"
+#include "daemon/post/render_takes.hpp"
 #include "daemon/report/log.hpp"
 #include "daemon/report/reports.hpp"
 #include "daemon/rig/service.hpp"
@@ -39,6 +41,17 @@ int do_devices(bool learn, bool rules, const StopOnSignal& stop) {
   return stop.received() ? 128 + stop.received() : 0;
 }
 
+int do_export(exchange::ExportOptions& options, const StopOnSignal& stop) {
+  options.stop = stop.token();
+  exchange::export_take(options, std::cout);
+  return 0;
+}
+
+int do_track(exchange::TrackOptions& options, const StopOnSignal& stop) {
+  options.stop = stop.token();
+  return exchange::track_take(options, std::cout);
+}
+
 int do_import(const exchange::ImportOptions& options) {
   const exchange::ImportReport report = exchange::import_session(options);
   for (const std::string& note : report.notes) report::log({report::Severity::info, "", note});
@@ -48,9 +61,22 @@ int do_import(const exchange::ImportOptions& options) {
   return 0;
 }
 
-int do_render(post::RenderOptions& options, const StopOnSignal& stop) {
+int do_render_takes(const post::RenderOptions& options, post::WhichTakes which,
+                    const StopOnSignal& stop) {
+  const post::TakesReport report = post::render_takes(options, which, std::cout);
+  std::cout << report.rendered.size() << " takes rendered";
+  if (!report.failures.empty()) std::cout << ", " << report.failures.size() << " failed";
+  std::cout << (report.interrupted ? "; stopped, the same command goes on from here" : "")
+            << std::endl;
+  if (report.interrupted) return 128 + stop.received();
+  return report.failures.empty() ? 0 : 1;
+}
+
+int do_render(post::RenderOptions& options, std::optional<post::WhichTakes> which,
+              const StopOnSignal& stop) {
   options.stop = stop.token();
   options.terminal = isatty(STDOUT_FILENO) != 0;
+  if (which) return do_render_takes(options, *which, stop);
   const post::RenderReport report = post::render_session(options, std::cout);
   std::cout << report.directory.string() << ": " << report.frames.size() << " frames"
             << (report.interrupted ? "; stopped, the same command goes on from here" : "")
@@ -103,10 +129,12 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("calibrate"))
       return calibrate::do_calibrate(app, said.calibrate, std::cout);
     if (app.got_subcommand("devices")) return do_devices(said.learn, said.rules, stop);
-    if (app.got_subcommand("export")) return exchange::export_take(said.export_take, std::cout), 0;
+    if (app.got_subcommand("export")) return do_export(said.export_take, stop);
     if (app.got_subcommand("import")) return do_import(said.import_session);
     if (app.got_subcommand("print")) return print::do_print(app, said.print, std::cout);
-    if (app.got_subcommand("render")) return do_render(said.render, stop);
+    if (app.got_subcommand("render")) return do_render(said.render, said.render_takes, stop);
+    if (app.got_subcommand("takes")) return do_takes(app, said.takes, std::cout, stop.token());
+    if (app.got_subcommand("track")) return do_track(said.track, stop);
     if (app.got_subcommand("trade")) return do_trade(said.trade, stop);
     return do_run(said.run, stop);
   } catch (const CLI::ParseError& error) {

@@ -59,7 +59,13 @@ previzd trade takes/12A_take003 --set desk.toml --fps 25 --error 2% --out trade:
 previzd run desk.toml --with trade/live.toml: Composites live with what the trade has found.
 previzd render takes/12A_take003 --with trade/post.toml: Renders with what the trade has found.
 previzd import frames.json sessions/desk: Makes a take of your own pictures or video.
-previzd export takes/12A_take003 camera: Writes the take's camera for USD and Nuke.
+previzd takes list /var/lib/previzd/takes: Lists the takes: which are good, how long they are, what they lack, and how much of each is rendered.
+previzd takes mark takes/12A_take003: Marks a take as good, as the rig's action mark_good does; with --not the mark goes.
+previzd takes copy takes/12A_* --to /media/disk/day1: Copies takes, and reads the copies back. Each has its checksums in SHA256SUMS, for `previzd takes check` and for `sha256sum -c`.
+previzd takes delete takes/12A_take001: Deletes a take. A good one is deleted with --good only, and what is not the take's own stays.
+previzd render takes --good --out renders: Renders all good takes, each into a folder of its name.
+previzd track takes/12A_take003 --out poses.jsonl: Finds the camera in every frame without rendering, and says why it is lost where it is.
+previzd export takes/12A_take003 camera: Writes the take's camera for USD and Nuke, and each object where it stands.
 )",
                                true};
 
@@ -125,6 +131,20 @@ const Chapter previzd_files{"FILES", R"(
 /usr/share/doc/previzd/examples/takes-disk.conf, cameras.conf: How the service is changed for takes on disks of their own, and for cameras of known addresses.
 )"};
 
+// What is written beside the pictures, and what a take consists of.
+const Chapter previzd_formats{"FORMATS", R"(
+session.toml: In a take: its name, slate, number and timecode, whether it is good, the calibrations, what was lost, and the set file word for word.
+observer.mkv, light.mkv, composite.mkv: In a take: the cameras' pictures, and what was shown; lossless (FFV1). The lines of observer.jsonl and so on have the time and exposure of each frame.
+track.jsonl: In a take: the camera's pose in each frame that was tracked while it was shown, and what was moved, relit or carried; world_from_camera are 16 numbers, row by row.
+events.jsonl: In a take: buttons and whatever else happened, in order.
+assets: In a take: the files that the set names, each under the SHA-256 of its content.
+frames.jsonl: Beside rendered pictures, a line a frame: whether it was rendered or why not, samples, seconds, the camera's pose with its error in pixels and the tags it is from, and the light frames.
+render.json: Beside rendered pictures: the settings they were made with.
+poses.jsonl: Written by `previzd track --out`, a line a frame: frame, timestamp_ns, tracked; world_from_camera (4 rows of 4, metres, OpenCV axes, world Z up; as the track of FRAMES.json takes it), covariance, tags and reprojection_rms_px, or the reason why there is no pose; and carriers that were found.
+camera.chan: Written by `previzd export`: frame, position, rotation and vertical angle of view. The rotation order is ZXY, Nuke's own; Blender's import must be set to it. It holds neither the lens's distortion nor its principal point; camera.usda has both, the distortion in words.
+)",
+                              true};
+
 const Chapter previzctl_status{"EXIT STATUS", R"(
 0: Done.
 1: The rig refused, or no rig answers; one line on standard error says why.
@@ -143,16 +163,15 @@ Chapter see_also(const std::string& pages) {
 }  // namespace
 
 std::vector<Page> man_pages() {
-  return {
-      {"previzd.8",
-       man_page(previzd_commands(), 8,
-                {service_chapter, examples_chapter, tags_chapter, glossary_chapter, previzd_cameras,
-                 previzd_files, previzd_status, see_also("previzctl(1), previz-set(5)")})},
-      {"previzctl.1",
-       man_page(
-           previzctl_commands(), 1,
-           {{"ACTIONS", actions_text()}, previzctl_status, see_also("previzd(8), previz-set(5)")})},
-      {"previz-set.5", set_man_page(set_description, see_also("previzd(8), previzctl(1)"))}};
+  return {{"previzd.8", man_page(previzd_commands(), 8,
+                                 {service_chapter, examples_chapter, tags_chapter, glossary_chapter,
+                                  previzd_cameras, previzd_files, previzd_formats, previzd_status,
+                                  see_also("previzctl(1), previz-set(5)")})},
+          {"previzctl.1", man_page(previzctl_commands(), 1,
+                                   {{"ACTIONS", actions_text()},
+                                    previzctl_status,
+                                    see_also("previzd(8), previz-set(5)")})},
+          {"previz-set.5", set_man_page(set_description, see_also("previzd(8), previzctl(1)"))}};
 }
 
 std::vector<Page> bash_completions() {

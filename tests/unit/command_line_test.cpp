@@ -56,5 +56,33 @@ TEST(CommandLine, SaysBothSidesOfAChoice) {
   EXPECT_EQ(render_options("--noisy").denoise, false);
 }
 
+CommandLine parsed(const std::string& arguments) {
+  CLI::App app;
+  CommandLine said;
+  add_commands(app, said);
+  app.parse(arguments, false);
+  return said;
+}
+
+TEST(CommandLine, RendersGoodTakesOrAllButNotBoth) {
+  EXPECT_FALSE(parsed("render takes").render_takes);
+  EXPECT_EQ(parsed("render takes --good").render_takes, post::WhichTakes::good);
+  EXPECT_EQ(parsed("render takes --all").render_takes, post::WhichTakes::all);
+  EXPECT_THROW(parsed("render takes --all --good"), CLI::ParseError);
+  EXPECT_THROW(parsed("render take --scale 0"), CLI::ParseError);
+}
+
+// What changes or deletes takes is given them by name: nothing stands for "all".
+TEST(CommandLine, TakesAreNamed) {
+  for (const char* verb : {"list", "mark", "check", "delete", "copy --to disk"})
+    EXPECT_THROW(parsed(std::string("takes ") + verb), CLI::ParseError) << verb;
+  EXPECT_THROW(parsed("takes copy one"), CLI::ParseError);
+  EXPECT_THROW(parsed("takes"), CLI::ParseError);
+  const CommandLine copied = parsed("takes copy one two --to disk");
+  EXPECT_EQ(copied.takes.copied.takes, (post::Paths{"one", "two"}));
+  EXPECT_EQ(copied.takes.copied.folder, "disk");
+  EXPECT_FALSE(parsed("takes delete one").takes.also_good);
+}
+
 }  // namespace command_line_test
 }  // namespace previz
