@@ -65,10 +65,10 @@ std::string narrow(const wchar_t* text) {
   return narrow;
 }
 
-hid::Device open_device(const DeviceName& name) {
+hid::Device open_device(std::span<const hid::Backend> backends, const DeviceName& name) {
   const std::wstring serial(name.serial.begin(), name.serial.end());
   const std::lock_guard lock(hid::library_mutex());
-  for (const hid::Backend& backend : hid::backends())
+  for (const hid::Backend& backend : backends)
     if (hid_device* device =
             backend.open(name.vendor, name.product, serial.empty() ? nullptr : serial.c_str()))
       return {backend, device};
@@ -78,12 +78,13 @@ hid::Device open_device(const DeviceName& name) {
 // A thread reads the device, since hidapi has no descriptor to wait on.
 class HidButtons final : public Buttons {
  public:
-  HidButtons(std::string device, const std::vector<std::string>& names)
-      : device_(std::move(device)),
+  HidButtons(std::span<const hid::Backend> backends, std::string device,
+             const std::vector<std::string>& names)
+      : backends_(backends),
+        device_(std::move(device)),
         device_name_(parse_device(device_)),
         reader_(names),
         signal_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
-    hid::backends();  // throws here, not in the thread
     if (!signal_) throw Error(device_ + ": cannot be waited for: " + std::strerror(errno));
     thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   }
@@ -107,26 +108,52 @@ class HidButtons final : public Buttons {
   }
 
  private:
+  // Whatever fails, the daemon goes on, and the device is opened anew.
   void run(const std::stop_token& stop) {
-    bool reported = false;
     while (!stop.stop_requested()) {
-      const hid::Device device = open_device(device_name_);
-      count(device ? "opened" : "not opened");
-      if (device) {
-        count(std::string("opened through ") + device.backend());
-        reported = false;
-        read(device, stop);
-        if (stop.stop_requested()) return;
-        count("lost");
-        for (ButtonEvent& event : reader_.release_all(monotonic_ns())) push(std::move(event));
+      try {
+        use_device(stop);
+      } catch (const std::exception& error) {
+        fail(error.what());
+      } catch (...) {
+        fail("something was thrown that is no error");
       }
-      if (!std::exchange(reported, true))
-        push(DeviceTrouble{device_, device ? "was unplugged; looked for until it is back"
-                                           : "is not there, or may not be opened; looked for until "
-                                             "it is there"});
       std::unique_lock lock(mutex_);
       wake_.wait_for(lock, stop, retry_interval, [] { return false; });
     }
+  }
+
+  // Reads the device until it is lost, if it is there.
+  void use_device(const std::stop_token& stop) {
+    const hid::Device device = open_device(backends_, device_name_);
+    count(device ? "opened" : "not opened");
+    if (device) {
+      count(std::string("opened through ") + device.backend());
+      reported_ = false;
+      read(device, stop);
+      if (stop.stop_requested()) return;
+      count("lost");
+      release_all();
+    }
+    if (!std::exchange(reported_, true))
+      push(DeviceTrouble{device_, device ? "was unplugged; looked for until it is back"
+                                         : "is not there, or may not be opened; looked for until "
+                                           "it is there"});
+  }
+
+  // Where there is no memory even for that, the next try may report it.
+  void fail(const char* why) noexcept {
+    try {
+      count("failed");
+      release_all();
+      if (!std::exchange(reported_, true))
+        push(DeviceTrouble{device_, std::string("cannot be read: ") + why + "; opened anew"});
+    } catch (...) {
+    }
+  }
+
+  void release_all() {
+    for (ButtonEvent& event : reader_.release_all(monotonic_ns())) push(std::move(event));
   }
 
   void read(const hid::Device& device, const std::stop_token& stop) {
@@ -163,15 +190,17 @@ class HidButtons final : public Buttons {
     eventfd_write(signal_.get(), 1);
   }
 
+  const std::span<const hid::Backend> backends_;
   const std::string device_;
   const DeviceName device_name_;
   hid::ReportReader reader_;  // used by the thread only
+  bool reported_ = false;     // used by the thread only: the crew knows that there is no device
   OwnedDescriptor signal_;
   mutable std::mutex mutex_;
   std::condition_variable_any wake_;
   ButtonQueue events_;
-  DeviceCounters counters_{{"opened", 0},  {"not opened", 0},    {"lost", 0},   {"reports", 0},
-                           {cut_short, 0}, {presses_babbled, 0}, {not_taken, 0}};
+  DeviceCounters counters_{{"opened", 0},  {"not opened", 0}, {"lost", 0},          {"failed", 0},
+                           {"reports", 0}, {cut_short, 0},    {presses_babbled, 0}, {not_taken, 0}};
   std::jthread thread_;
 };
 
@@ -222,7 +251,7 @@ std::vector<ButtonEvent> ReportReader::release_all(std::int64_t time_ns) {
 
 void learn(const std::string& device, const std::function<bool()>& stop,
            const std::function<void(const std::string& name)>& pressed) {
-  const Device opened = open_device(parse_device(device));
+  const Device opened = open_device(backends(), parse_device(device));
   if (!opened) throw Error(device + ": may not be opened");
   std::array<unsigned char, 4096> report{};
   // The last reports by number and length; the first of a kind is compared with one in which
@@ -252,7 +281,13 @@ std::string hid_device_of(const std::string& name) {
 
 std::unique_ptr<Buttons> open_hid(const std::string& device, const std::vector<std::string>& names,
                                   const ButtonSettings&) {
-  return std::make_unique<HidButtons>(device, names);
+  return hid::open_through(hid::backends(), device, names);
+}
+
+std::unique_ptr<Buttons> hid::open_through(std::span<const Backend> backends,
+                                           const std::string& device,
+                                           const std::vector<std::string>& names) {
+  return std::make_unique<HidButtons>(backends, device, names);
 }
 
 std::vector<FoundButton> find_hid() {

@@ -30,6 +30,12 @@ std::string hid_device_of(const std::string& name);
 
 namespace hid {
 
+struct Backend;
+
+// Does as open_hid() through these back ends, which must outlive the buttons: a test has its own.
+std::unique_ptr<Buttons> open_through(std::span<const Backend> backends, const std::string& device,
+                                      const std::vector<std::string>& names);
+
 // Turns HID reports into button events. It needs no device, so that a test can use it alone.
 class ReportReader {
  public:

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
@@ -12,7 +13,10 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <span>
+#include <stdexcept>
 #include <string_view>
+#include <thread>
 
 #include "drivers/button_drivers.hpp"
 #include "drivers/button_queue.hpp"
@@ -20,6 +24,7 @@
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
 #include "drivers/gpio/gpio_buttons.hpp"
+#include "drivers/hid/backend.hpp"
 #include "drivers/hid/hid_buttons.hpp"
 #include "tests/devices/leftovers.hpp"
 #include "tests/devices/uhid_pad.hpp"
@@ -287,6 +292,39 @@ TEST(ButtonDevices, WhatIsNotThereIsToldOnceAndWaitedFor) {
     EXPECT_GE(buttons[0]->counters().at("not opened"), 1u);
     EXPECT_EQ(buttons[0]->counters().at("opened"), 0u);
   }
+}
+
+// A back end of HID whose device cannot be opened at first, then cannot be read, and then is
+// pressed: both failures are exceptions.
+struct FailingPad {
+  static inline std::atomic<int> opened = 0, reads = 0;
+
+  static hid_device* open(unsigned short, unsigned short, const wchar_t*) {
+    if (++opened == 1) throw std::runtime_error("no memory to open it");
+    return reinterpret_cast<hid_device*>(&opened);
+  }
+  static void close(hid_device*) {}
+  static int read(hid_device*, unsigned char* report, std::size_t, int) {
+    const int times = ++reads;
+    if (times == 2) throw std::runtime_error("no memory to read it");
+    if (times > 3) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    report[0] = 1;
+    return 1;
+  }
+};
+
+TEST(ButtonDevices, AnExceptionInAPadsThreadIsATroubleAndThePadIsOpenedAnew) {
+  const hid::Backend backend{"fake",           FailingPad::open, FailingPad::close,
+                             FailingPad::read, nullptr,          nullptr};
+  const std::string name = "hid:1209:0001:0.0";
+  const auto buttons = hid::open_through(std::span(&backend, 1), "hid:1209:0001", {name});
+  ASSERT_NO_FATAL_FAILURE(expect_trouble(*buttons, "no memory to open it"));
+  ASSERT_NO_FATAL_FAILURE(expect_edge(*buttons, name, true));
+  ASSERT_NO_FATAL_FAILURE(expect_edge(*buttons, name, false));  // released by the failure
+  ASSERT_NO_FATAL_FAILURE(expect_trouble(*buttons, "no memory to read it"));
+  ASSERT_NO_FATAL_FAILURE(expect_edge(*buttons, name, true));
+  EXPECT_EQ(buttons->counters().at("failed"), 2u);
+  EXPECT_EQ(buttons->counters().at("opened"), 2u);
 }
 
 // A pad on the USB whose cable is the file PREVIZ_TEST_USB_PAD (tests/rig_vm), where hidraw may not
