@@ -55,9 +55,20 @@ void note_primaries(const Imf::Header& header, std::vector<std::string>& notes) 
     notes.push_back("the file's primaries are not those of Rec. 709; its numbers are used as if");
 }
 
+// Throws previz::Error unless the window, which a small file may claim to be of any size, has
+// most_pixels at most.
+void check_size(const std::filesystem::path& path, const Imath::Box2i& window) {
+  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1,
+                     height = std::int64_t{window.max.y} - window.min.y + 1;
+  if (width < 1 || height < 1 || width > most_pixels / height)
+    throw Error(path.string() + ": has " + std::to_string(width) + "x" + std::to_string(height) +
+                " pixels; allowed: at most " + std::to_string(most_pixels));
+}
+
 LinearPicture read(const std::filesystem::path& path, std::vector<std::string>& notes) {
   Imf::InputFile file(path.c_str());
   const Imath::Box2i window = file.header().dataWindow();
+  check_size(path, window);
   if (window != file.header().displayWindow())
     throw Error(path.string() +
                 ": the data window is not the display window; a whole picture is "

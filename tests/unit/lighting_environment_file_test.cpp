@@ -219,6 +219,21 @@ TEST(LoadEnvironment, SaysWhatIsWrongWithAFile) {
   EXPECT_NE(message_of(directory.path()).find("cannot be read"), std::string::npos);
 }
 
+// A file of some kilobytes may claim to hold a picture that no memory holds.
+TEST(LoadEnvironment, AHugeWindowIsRefusedBeforeMemoryIsAskedFor) {
+  const previz::test::TemporaryDirectory directory;
+  const auto file = directory / "sky.exr";
+  {
+    Imf::Header header(65536, 32768);
+    header.compression() = Imf::ZIP_COMPRESSION;
+    for (const char* channel : {"R", "G", "B"})
+      header.channels().insert(channel, Imf::Channel(Imf::HALF));
+    const Imf::OutputFile without_pixels(file.c_str(), header);
+  }
+  EXPECT_NE(message_of(file).find("65536x32768 pixels; allowed: at most"), std::string::npos)
+      << message_of(file);
+}
+
 TEST(LoadEnvironment, CountsWhatIsNoRadiance) {
   const previz::test::TemporaryDirectory directory;
   LinearPicture sky{64, 32, std::vector<glm::vec3>(64 * 32, glm::vec3(1))};
