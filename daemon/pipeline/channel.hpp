@@ -120,6 +120,18 @@ class BoundedQueue final : public Channel<T> {
     return true;
   }
 
+  // Pushes without waiting. Returns false, and the value is gone, if there is no room or the
+  // channel is closed.
+  bool offer(T value) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (closed_ || values_.size() >= capacity_) return false;
+      values_.push_back(std::move(value));
+    }
+    filled_.notify_one();
+    return true;
+  }
+
   std::optional<T> pop() override {
     std::unique_lock lock(mutex_);
     filled_.wait(lock, [this] { return !values_.empty() || closed_; });

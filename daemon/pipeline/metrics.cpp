@@ -5,6 +5,15 @@
 #include <nlohmann/json.hpp>
 
 namespace previz::pipeline {
+namespace {
+
+std::uint64_t& count_named(std::map<std::string, std::uint64_t>& counts, const std::string& name) {
+  const auto known = counts.find(name);
+  if (known != counts.end()) return known->second;
+  return counts[counts.size() < Metrics::most_names ? name : Metrics::other_names];
+}
+
+}  // namespace
 
 double quantile(std::vector<double> values, double fraction) {
   if (values.empty()) return 0;
@@ -29,12 +38,12 @@ void Metrics::busy(const std::string& stage, double seconds) {
 void Metrics::dropped(const std::string& stage, const std::string& cause, std::uint64_t frames) {
   if (frames == 0) return;
   const std::lock_guard lock(mutex_);
-  stages_[stage].dropped[cause] += frames;
+  count_named(stages_[stage].dropped, cause) += frames;
 }
 
 void Metrics::count(const std::string& event, std::uint64_t times) {
   const std::lock_guard lock(mutex_);
-  counts_[event] += times;
+  count_named(counts_, event) += times;
 }
 
 void Metrics::device_counted(const std::string& device, const DeviceCounters& more) {

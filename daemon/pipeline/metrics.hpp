@@ -36,6 +36,8 @@ class Metrics {
   void worked(const std::string& stage, double seconds);
   // Adds time to a stage whose frames worked() counts.
   void busy(const std::string& stage, double seconds);
+  // Causes and events are few: beyond most_names of them, those with new names are counted together
+  // as `other_names`, so that no text of foreign origin fills the memory.
   void dropped(const std::string& stage, const std::string& cause, std::uint64_t frames = 1);
   void count(const std::string& event, std::uint64_t times = 1);
   // Adds what the device has counted since the last call for this device.
@@ -44,6 +46,9 @@ class Metrics {
 
   // `seconds` is the time since the start, by the caller's clock.
   MetricsSnapshot snapshot(double seconds) const;
+
+  static constexpr std::size_t most_names = 256;
+  static constexpr const char* other_names = "others";
 
  private:
   static constexpr std::size_t latency_window = 4096;  // frames

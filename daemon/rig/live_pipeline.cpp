@@ -113,7 +113,7 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
       calibration(pipeline::observer_calibration(parts.set, parts.cameras.recorded.info)),
       light({parts.set, parts.scene, parts.look, parts.kept},
             pipeline::light_calibration(parts.set, parts.cameras.recorded.info), calibration),
-      live_render(parts.set, parts.look, parts.inbox, parts.kept.metrics,
+      live_render(parts.set, parts.look, parts.inbox, parts.kept.metrics, parts.kept.reports,
                   {tracked, reviewed, snapshots, found, governed_samples, recorded_variants},
                   stop_source.get_token()),
       gpu_keeper(gpu(), {parts.kept.reports, parts.kept.metrics, stop_source.get_token(),
@@ -372,7 +372,8 @@ void LivePipeline::Impl::record_shown(const Shot& shot) {
 
 void count_picture(const Shot& shot, pipeline::Metrics& metrics, report::Reports& reports) {
   if (!shot.untouched.empty()) {
-    metrics.count("plate untouched: " + shot.untouched);
+    // Without its figures, such as the numbers of tags, a reason is one of few.
+    metrics.count("plate untouched: " + report::wording(shot.untouched));
     reports(report::once({Severity::warning, "plate untouched", shot.untouched}));
   }
   const render::Counters& counters = shot.counters;

@@ -25,11 +25,13 @@ double seconds_since(Clock::time_point begin) {
 }  // namespace
 
 LiveRender::LiveRender(const set::Set& set, const pipeline::Newest<Look>& look, Inbox& inbox,
-                       pipeline::Metrics& metrics, Channels channels, std::stop_token stop)
+                       pipeline::Metrics& metrics, report::Reports& reports, Channels channels,
+                       std::stop_token stop)
     : set_(set),
       look_(look),
       inbox_(inbox),
       metrics_(metrics),
+      reports_(reports),
       channels_(channels),
       stop_(std::move(stop)),
       drops_(metrics, "render", channels.tracked) {
@@ -282,8 +284,14 @@ void LiveRender::save_refined(const Look& look) {
   }
 }
 
+// The picture goes on while a disk hangs, and no more snapshots wait for it than the queue has room
+// for.
 void LiveRender::save(const Shot& shot) {
-  if (!channels_.snapshots.push(shot)) metrics_.dropped("snapshot", "stopped");
+  if (channels_.snapshots.offer(shot)) return;
+  if (stop_.stop_requested()) return metrics_.dropped("snapshot", "stopped");
+  metrics_.dropped("snapshot", "too many waited");
+  const std::string what = "is left out, because those before it are not on the disk yet";
+  reports_({report::Severity::error, "snapshot", what, {}, report::passing("snapshot", what)});
 }
 
 }  // namespace previz::rig

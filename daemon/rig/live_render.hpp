@@ -15,6 +15,7 @@
 #include "daemon/pipeline/metrics.hpp"
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/shot.hpp"
+#include "daemon/report/reports.hpp"
 #include "daemon/rig/controls.hpp"
 #include "daemon/rig/inbox.hpp"
 
@@ -34,7 +35,8 @@ class LiveRender {
 
   // The stage that renders must ask interrupted() whether it is cancelled.
   LiveRender(const set::Set& set, const pipeline::Newest<Look>& look, Inbox& inbox,
-             pipeline::Metrics& metrics, Channels channels, std::stop_token stop);
+             pipeline::Metrics& metrics, report::Reports& reports, Channels channels,
+             std::stop_token stop);
 
   void use(pipeline::RenderStage& stage) {
     stage_ = &stage;
@@ -86,6 +88,7 @@ class LiveRender {
   const pipeline::Newest<Look>& look_;
   Inbox& inbox_;
   pipeline::Metrics& metrics_;
+  report::Reports& reports_;
   Channels channels_;
   const std::stop_token stop_;
   pipeline::RenderStage* stage_ = nullptr;

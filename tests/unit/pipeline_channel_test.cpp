@@ -77,6 +77,20 @@ TEST(BoundedQueue, ClosingWakesAWriterThatWaitsForRoom) {
   EXPECT_FALSE(queue.pop());
 }
 
+TEST(BoundedQueue, AnOfferNeverWaits) {
+  BoundedQueue<int> queue(2);
+  EXPECT_TRUE(queue.offer(1));
+  EXPECT_TRUE(queue.offer(2));
+  EXPECT_FALSE(queue.offer(3));
+  EXPECT_EQ(queue.pop(), 1);
+  EXPECT_TRUE(queue.offer(4));
+  queue.close();
+  EXPECT_FALSE(queue.offer(5));
+  EXPECT_EQ(queue.pop(), 2);
+  EXPECT_EQ(queue.pop(), 4);
+  EXPECT_EQ(queue.pop(), std::nullopt);
+}
+
 TEST(BoundedQueue, TakingWithoutWaitingMakesRoom) {
   BoundedQueue<int> queue(1);
   EXPECT_FALSE(queue.try_pop());

@@ -167,6 +167,23 @@ TEST(Metrics, JsonHasRatesDropsAndLatency) {
   EXPECT_DOUBLE_EQ(json["latency_s"]["p99"], 0.099);
 }
 
+// Text of foreign origin that gets into a name fills no memory; what is known goes on being
+// counted.
+TEST(Metrics, OfNamesWithoutEndTheFirstAreCountedByName) {
+  Metrics metrics;
+  for (int i = 0; i < 10'000; ++i) {
+    metrics.count("event " + std::to_string(i));
+    metrics.dropped("render", "cause " + std::to_string(i));
+  }
+  metrics.count("event 0");
+  const MetricsSnapshot snapshot = metrics.snapshot(1);
+  for (const auto* counts : {&snapshot.counts, &snapshot.stages.at("render").dropped}) {
+    EXPECT_EQ(counts->size(), Metrics::most_names + 1);
+    EXPECT_EQ(counts->at(Metrics::other_names), 10'000 - Metrics::most_names);
+  }
+  EXPECT_EQ(snapshot.counts.at("event 0"), 2u);
+}
+
 // The window holds the last 4096 frames: older latencies leave the figures.
 TEST(Metrics, OldLatenciesLeaveTheWindow) {
   Metrics metrics;

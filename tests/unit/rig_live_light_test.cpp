@@ -143,6 +143,11 @@ TEST(CountPicture, WhatIsOddIsCountedAndReportedOnce) {
   EXPECT_EQ(metrics.snapshot(1).counts.at("paths cut off before their end"), 4u);
   EXPECT_EQ(metrics.snapshot(1).counts.at("trees of deforming meshes built anew"), 2u);
   EXPECT_EQ(log.str(), "plate untouched: pose lost: no tag in the picture\n");
+  for (const char* reason : {"no pose explains tags 3 and 17", "no pose explains tags 4 and 8"}) {
+    shot.untouched = reason;
+    count_picture(shot, metrics, reports);
+  }
+  EXPECT_EQ(metrics.snapshot(1).counts.at("plate untouched: no pose explains tags  and "), 2u);
 }
 
 }  // namespace rig_live_light_test
