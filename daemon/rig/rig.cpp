@@ -26,6 +26,7 @@ constexpr std::chrono::milliseconds tick_interval{20};
 constexpr int ticks_a_second = 50;
 constexpr int ticks_a_page = 5;               // the overlay is updated once in so many ticks
 constexpr const char* cut_off = "recording";  // source of the trouble that a take was cut off
+constexpr const char* salvage = "take";       // source of the trouble that takes from before were
 // A set that is read within this time is answered for at once; the loop waits for it.
 constexpr std::chrono::milliseconds prompt{200};
 // What the stages have in hand when a stop comes is recorded if they end within this time.
@@ -267,6 +268,7 @@ std::optional<std::string> Rig::carry_out(Request request, const std::string& by
       break;
     case Request::acknowledge:
       parts_.kept.reports.settle(cut_off);
+      parts_.kept.reports.settle(salvage);
       break;
     case Request::reload_set:
       return read_set([&] { parts_.sets.begin_change(0); }, by);
@@ -393,9 +395,20 @@ void Rig::look_at_recorder() {
            Severity::error);
   announce(finished_takes_, status.finished_takes, Event::take_finished,
            "take " + status.finished + " is finished", Severity::info);
-  for (; salvaged_ < status.salvaged.size(); ++salvaged_)
-    apply({status.salvaged[salvaged_], false, {}}, "recorder", Severity::warning);
+  announce_salvaged(status.salvaged);
   if (status.interrupted && !std::exchange(has_resumed_, true)) resume(*status.interrupted);
+}
+
+// Names the takes of an earlier process that were cut off, each once in the log and on the bus. On
+// the display, at which nobody may look just now, the last of them stands until somebody has taken
+// note.
+void Rig::announce_salvaged(const std::vector<std::string>& salvaged) {
+  if (salvaged_ == salvaged.size()) return;
+  for (; salvaged_ < salvaged.size(); ++salvaged_)
+    apply({salvaged[salvaged_], false, {}}, "recorder", Severity::warning);
+  std::string words = salvaged.back();
+  if (salvaged.size() > 1) words += " (and " + std::to_string(salvaged.size() - 1) + " more)";
+  parts_.kept.reports.show(report::lasting(salvage, words));
 }
 
 // A recording that nobody ended goes on in the next take, and the crew is told so until somebody

@@ -81,6 +81,7 @@ class Rig {
   void close_take();
   void look_at_folders();
   void look_at_recorder();
+  void announce_salvaged(const std::vector<std::string>& salvaged);
   void resume(const std::string& take);
   void show_facts();
   // Carries out the outcome's request, announces the result and returns it.

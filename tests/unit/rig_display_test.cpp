@@ -11,10 +11,13 @@
 
 #include "daemon/output/osd_painter.hpp"
 #include "daemon/output/png.hpp"
+#include "daemon/report/reports.hpp"
 #include "daemon/rig/live.hpp"
 #include "daemon/set/actions.hpp"
+#include "drivers/session/files.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/crewed_rig.hpp"
+#include "tests/support/session_fixture.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/wait_until.hpp"
@@ -221,6 +224,32 @@ TEST_F(RigDisplay, IsReleasedInStandbyAndBackAfterIt) {
     EXPECT_GT(shown(), before);
   });
   EXPECT_EQ(metrics_.counts.at("screen: released"), 1u);
+}
+
+// Two takes of an earlier process that nobody recorded on: the display says so until it was seen.
+TEST_F(RigDisplay, TakesThatWereCutOffStandOnItUntilSomebodyTakesNote) {
+  write_set("[display]\ndriver = \"headless\"\nmode = \"480x270\"\n");
+  for (const char* name : {"12A_take001", "12A_take002"}) {
+    const std::filesystem::path take = directory_ / "takes" / name;
+    session::write_small_session(take, 3);
+    std::string toml = session::read_file(take / "session.toml");
+    const std::string closed = "closed = true";
+    toml.replace(toml.find(closed), closed.size(), "closed = false");
+    session::replace_file(take / "session.toml", toml);
+  }
+  const std::string words = "take: 12A_take002 was cut off; it has 3 frames (and 1 more)";
+  run([&] {
+    until([&](const OsdPage& page) { return says(page.notices, words); });
+    std::this_thread::sleep_for(2 * report::Notices::trouble_time);
+    const std::size_t waiting = [this] {
+      const std::lock_guard lock(mutex_);
+      return unread_.size();
+    }();
+    for (std::size_t i = 0; i <= waiting; ++i)
+      EXPECT_TRUE(says(until([](const OsdPage&) { return true; }).notices, words)) << i;
+    press("acknowledge");
+    until([&](const OsdPage& page) { return !says(page.notices, words); });
+  });
 }
 
 TEST_F(RigDisplay, WithoutAScreenTheRigGoesOnAndSaysSoOnce) {
