@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs what building, testing and running previzd needs on Debian 12, and only what is missing.
-# As root, or through sudo; asks no questions.
+# Installs what building, testing and running previzd needs on Debian 12, and only what is missing;
+# and further packages that are named. As root, or through sudo; asks no questions.
 set -euo pipefail
 
 packages=(
@@ -30,7 +30,7 @@ packages=(
 )
 
 missing=()
-for package in "${packages[@]}"; do
+for package in "${packages[@]}" "$@"; do
   state=$(dpkg-query --show --showformat='${db:Status-Status}' "$package" 2>/dev/null || true)
   [[ $state == installed ]] || missing+=("$package")
 done

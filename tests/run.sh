@@ -6,7 +6,7 @@
 #
 #   tests/run.sh              the gate: release asan format lint
 #   tests/run.sh full         the gate, with all tests in release, and then
-#                             bench lint-all long asan-all tsan soak package rig_vm
+#                             bench lint-all long asan-all tsan fuzz soak package rig_vm
 #   tests/run.sh STEP...      only the named steps
 #
 #   release    builds everything but the benchmarks and soak, and runs the tests; in the gate without
@@ -20,6 +20,7 @@
 #   long       the cases that tests/*/CMakeLists.txt leave out of the gate (LONG), in the release build
 #   asan-all   every test program under ASan and UBSan
 #   tsan       the test programs marked THREADS under ThreadSanitizer
+#   fuzz       libFuzzer on every reader of foreign bytes, a minute each (tests/fuzz/run.sh)
 #   soak       half an hour of a whole rig (tests/soak)
 #   package    builds the .deb and installs it in a bare Debian (tests/package/run.sh)
 #   rig_vm     runs the drivers, then the package, on a rig in a VM (tests/rig_vm/run.sh)
@@ -34,7 +35,7 @@ gate=(release asan format lint)
 steps=("$@")
 once=OFF
 [[ ${#steps[@]} -gt 0 ]] || { steps=("${gate[@]}") once=ON; }
-[[ ${steps[*]} != full ]] || steps=("${gate[@]}" bench lint-all long asan-all tsan soak package rig_vm)
+[[ ${steps[*]} != full ]] || steps=("${gate[@]}" bench lint-all long asan-all tsan fuzz soak package rig_vm)
 failures=()
 summaries=()
 costs=()
@@ -110,6 +111,11 @@ bench() {
   return "$status"
 }
 
+fuzz() {
+  config/install-deps.sh clang libclang-rt-14-dev && build fuzz &&
+    tests/fuzz/run.sh build/fuzz/tests/fuzz/fuzz 60
+}
+
 soak() {
   cmake --preset release --log-level=WARNING && cmake --build --preset release --parallel "$jobs" --target soak &&
     build/release/tests/soak/soak --minutes 30
@@ -145,11 +151,11 @@ for name in "${steps[@]}"; do
     format) check "format" format ;;
     lint) check "lint" lint 20 ;;
     lint-all) check "lint-all" lint 86400 ;;
-    bench | soak) check "$name" "$name" ;;
+    bench | fuzz | soak) check "$name" "$name" ;;
     package | rig_vm) check "$name" "tests/$name/run.sh" ;;
     *)
       echo "tests/run.sh: no step '$name'; allowed: full, or of release, asan, format, lint," \
-        "bench, lint-all, long, asan-all, tsan, soak, package and rig_vm" >&2
+        "bench, lint-all, long, asan-all, tsan, fuzz, soak, package and rig_vm" >&2
       exit 2
       ;;
   esac

@@ -25,7 +25,6 @@
 namespace previz {
 namespace {
 
-using aravis::Kind;
 using aravis::Message;
 using aravis::Reach;
 using aravis::ReceiverProcess;
@@ -147,7 +146,7 @@ class AravisCamera final : public Camera {
     triggered_ = false;
     last_frame_ns_ = monotonic_ns();
     try {
-      receiver_.ask(Kind::start, Writer()(buffers_->ring()), time_to_answer,
+      receiver_.ask(aravis::Kind::start, Writer()(buffers_->ring()), time_to_answer,
                     buffers_->descriptor());
     } catch (const Error& error) {
       buffers_.reset();
@@ -159,7 +158,7 @@ class AravisCamera final : public Camera {
     if (!buffers_) return;
     if (!receiver_.gone() && !trouble_) {
       try {
-        receiver_.ask(Kind::stop, {}, time_to_answer);
+        receiver_.ask(aravis::Kind::stop, {}, time_to_answer);
       } catch (const Error&) {  // a camera that is gone cannot be stopped
       }
     }
@@ -191,7 +190,7 @@ class AravisCamera final : public Camera {
     const std::int64_t before_ns = monotonic_ns();
     try {
       const Message answer = receiver_.ask(
-          Kind::expose, Writer()(aravis::ExposureWords{exposure_s, gain}), time_to_answer);
+          aravis::Kind::expose, Writer()(aravis::ExposureWords{exposure_s, gain}), time_to_answer);
       const auto applied = aravis::body_of<aravis::ExposureWords>(answer);
       if (!applied || !is_exposure(applied->exposure_s, applied->gain)) {
         receiver_.give_up("says an exposure that cannot be");
@@ -220,7 +219,8 @@ class AravisCamera final : public Camera {
 
   Agreed open() {
     try {
-      Message answer = receiver_.ask(Kind::open, Writer()(aravis::Order{settings_}), time_to_open);
+      Message answer =
+          receiver_.ask(aravis::Kind::open, Writer()(aravis::Order{settings_}), time_to_open);
       const auto terms = aravis::body_of<aravis::Terms>(answer);
       if (!terms) throw Error("its receiver does not say what was agreed on");
       if (answer.descriptor) receiver_.hold(std::move(answer.descriptor), terms->address);
@@ -234,7 +234,7 @@ class AravisCamera final : public Camera {
 
   void trigger() {
     try {
-      receiver_.ask(Kind::trigger, {}, time_to_answer);
+      receiver_.ask(aravis::Kind::trigger, {}, time_to_answer);
       triggered_ = true;
     } catch (const Error& error) {
       if (!receiver_.gone())
@@ -252,9 +252,9 @@ class AravisCamera final : public Camera {
 
   // Takes a message; returns the frame, if it is a whole one.
   FramePtr handle(const Message& message) {
-    if (message.kind == Kind::lost) {
+    if (message.kind == aravis::Kind::lost) {
       trouble_ = DeviceTrouble{name(), "does not answer any more", true};
-    } else if (message.kind == Kind::pulse) {
+    } else if (message.kind == aravis::Kind::pulse) {
       take_counters(message);
     } else if (buffers_) {
       const auto note = aravis::body_of<aravis::FrameNote>(message);
@@ -263,7 +263,7 @@ class AravisCamera final : public Camera {
         return nullptr;
       }
       FramePtr frame = take(*note);
-      receiver_.post(Kind::give_back, Writer()(note->buffer));
+      receiver_.post(aravis::Kind::give_back, Writer()(note->buffer));
       triggered_ = false;
       if (frame) last_frame_ns_ = frame->arrival_ns;
       return frame;
@@ -371,7 +371,8 @@ std::vector<FoundCamera> find_aravis() {
     ReceiverProcess receiver(reach);
     std::optional<aravis::Listing> listing;
     try {
-      listing = aravis::body_of<aravis::Listing>(receiver.ask(Kind::list, {}, time_to_list));
+      listing =
+          aravis::body_of<aravis::Listing>(receiver.ask(aravis::Kind::list, {}, time_to_list));
     } catch (const Error&) {
       continue;
     }

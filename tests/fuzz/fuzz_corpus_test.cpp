@@ -1,0 +1,100 @@
+// Runs every target of the fuzzer over the bytes that are kept in tests/fuzz/corpus: those it began
+// with, and those that once broke a reader. It also runs cuts and changes of them, the same ones on
+// every run. Nothing may crash, throw what is no previz::Error, or break a promise.
+#include <gtest/gtest.h>
+
+extern "C" {
+#include <libavutil/log.h>
+}
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <filesystem>
+#include <random>
+#include <vector>
+
+#include "tests/fuzz/targets.hpp"
+#include "tests/support/session_fixture.hpp"
+
+namespace previz::fuzz {
+namespace fuzz_corpus_test {
+
+const std::filesystem::path corpus = std::filesystem::path(PREVIZ_SOURCE_DIR) / "tests/fuzz/corpus";
+
+std::vector<std::filesystem::path> inputs_of(const Target& target) {
+  std::vector<std::filesystem::path> inputs;
+  if (!std::filesystem::exists(corpus / target.name)) return inputs;
+  for (const auto& entry : std::filesystem::directory_iterator(corpus / target.name))
+    inputs.push_back(entry.path());
+  std::ranges::sort(inputs);
+  return inputs;
+}
+
+bool accepted(const Target& target, const std::string& input) {
+  return accepts(target, {reinterpret_cast<const std::uint8_t*>(input.data()), input.size()});
+}
+
+// Changes a few bytes, or the numbers that they may be.
+std::string changed(std::string input, std::mt19937& random) {
+  static constexpr std::array<std::uint32_t, 6> words = {0,          1,          0x7fffffff,
+                                                         0x80000000, 0xffffffff, 0x7fc00000};
+  for (std::size_t times = 1 + random() % 3; times > 0 && !input.empty(); --times) {
+    const std::size_t at = random() % input.size();
+    switch (random() % 5) {
+      case 0:
+        input[at] = static_cast<char>(random());
+        break;
+      case 1:
+        input[at] = static_cast<char>(input[at] ^ 1 << random() % 8);
+        break;
+      case 2:
+        std::memcpy(&input[at], &words[random() % words.size()],
+                    std::min<std::size_t>(4, input.size() - at));
+        break;
+      case 3:
+        input.erase(at, 1 + random() % 8);
+        break;
+      default:
+        input.insert(at, input, random() % input.size(), 1 + random() % 8);
+    }
+  }
+  return input;
+}
+
+class FuzzCorpus : public testing::TestWithParam<Target> {
+ protected:
+  static void SetUpTestSuite() { av_log_set_level(AV_LOG_QUIET); }
+};
+
+// A target that refuses all that it has would look at nothing but its first check.
+TEST_P(FuzzCorpus, HasSomethingThatIsAccepted) {
+  bool some = false;
+  for (const std::filesystem::path& input : inputs_of(GetParam()))
+    some = accepted(GetParam(), session::content_of(input)) || some;
+  EXPECT_TRUE(some);
+}
+
+TEST_P(FuzzCorpus, BreaksNoReaderCutOrChanged) {
+  for (const std::filesystem::path& input : inputs_of(GetParam())) {
+    SCOPED_TRACE(input);
+    const std::string whole = session::content_of(input);
+    for (std::size_t cut = 0; cut < 32; ++cut)
+      accepted(GetParam(), whole.substr(0, whole.size() * cut / 32));
+    std::mt19937 random(1);
+    for (int times = 0; times < 64; ++times) accepted(GetParam(), changed(whole, random));
+  }
+}
+
+// Every folder is some target's: one that was renamed would be read by nobody.
+TEST(FuzzTargets, HaveAFolderEach) {
+  for (const auto& entry : std::filesystem::directory_iterator(corpus))
+    EXPECT_NE(find_target(entry.path().filename().string()), nullptr) << entry.path();
+  for (const Target& target : targets()) EXPECT_FALSE(inputs_of(target).empty()) << target.name;
+}
+
+INSTANTIATE_TEST_SUITE_P(Targets, FuzzCorpus, testing::ValuesIn(targets().begin(), targets().end()),
+                         [](const auto& target) { return std::string(target.param.name); });
+
+}  // namespace fuzz_corpus_test
+}  // namespace previz::fuzz

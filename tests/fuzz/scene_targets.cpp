@@ -1,0 +1,111 @@
+// What a set and its assets consist of.
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "daemon/lighting/lighting.hpp"
+#include "daemon/output/png.hpp"
+#include "daemon/scene/scene.hpp"
+#include "daemon/set/set.hpp"
+#include "tests/fuzz/targets.hpp"
+
+namespace previz::fuzz {
+namespace scene_targets_cpp {
+
+// The files that the kept sets name are there, so that their sets are accepted.
+void set_file(Bytes bytes) {
+  std::filesystem::create_directories(work_folder() / "stage");
+  for (const char* name : {"phantom.glb", "virtual.glb", "pane.gltf", "sprout.glb", "stage/set.glb",
+                           "stage/creature.glb", "stage/lamp.glb"})
+    std::ofstream(work_folder() / name, std::ios::app);
+  set::parse_set(text_of(bytes), work_folder() / "stage.toml");
+}
+
+scene::Scene load(const std::filesystem::path& file) {
+  set::Set set;
+  set.objects.resize(1);
+  set.objects[0].file = file;
+  return scene::load_scene(set);
+}
+
+void gltf(Bytes bytes) {
+  const scene::Scene scene = load(file_of(bytes, "object.glb"));
+  for (const scene::Instance& instance : scene.instances)
+    expect(instance.mesh < scene.meshes.size() && instance.material < scene.materials.size(),
+           "an instance has a mesh and a material");
+}
+
+std::string little_endian(std::size_t number) {
+  std::string bytes;
+  for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(number >> shift);
+  return bytes;
+}
+
+// A binary glTF file of one triangle, whose texture's image are the bytes.
+std::string with_image(Bytes image) {
+  const float corners[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
+  std::string buffer(reinterpret_cast<const char*>(corners), sizeof corners);
+  buffer += text_of(image);
+  buffer.resize((buffer.size() + 3) / 4 * 4);
+  const nlohmann::json json = {
+      {"asset", {{"version", "2.0"}}},
+      {"buffers", {{{"byteLength", buffer.size()}}}},
+      {"bufferViews",
+       {{{"buffer", 0}, {"byteLength", sizeof corners}},
+        {{"buffer", 0}, {"byteOffset", sizeof corners}, {"byteLength", image.size()}}}},
+      {"accessors", {{{"bufferView", 0}, {"componentType", 5126}, {"type", "VEC3"}, {"count", 3}}}},
+      {"images", {{{"bufferView", 1}, {"mimeType", "image/png"}}}},
+      {"textures", {{{"source", 0}}}},
+      {"materials", {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}}},
+      {"meshes", {{{"primitives", {{{"attributes", {{"POSITION", 0}}}, {"material", 0}}}}}}},
+      {"nodes", {{{"mesh", 0}}}},
+      {"scenes", {{{"nodes", {0}}}}},
+      {"scene", 0}};
+  std::string text = json.dump();
+  text.resize((text.size() + 3) / 4 * 4, ' ');
+  return "glTF" + little_endian(2) + little_endian(28 + text.size() + buffer.size()) +
+         little_endian(text.size()) + "JSON" + text + little_endian(buffer.size()) +
+         std::string("BIN\0", 4) + buffer;
+}
+
+void texture(Bytes bytes) {
+  if (bytes.empty()) return;
+  const std::string file = with_image(bytes);
+  const scene::Scene scene = load(
+      file_of({reinterpret_cast<const std::uint8_t*>(file.data()), file.size()}, "textured.glb"));
+  for (const scene::Texture& texture : scene.textures)
+    expect(texture.texels.size() ==
+               static_cast<std::size_t>(texture.width) * static_cast<std::size_t>(texture.height),
+           "a texture is as large as it says");
+}
+
+void environment(Bytes bytes) {
+  set::Lighting settings;
+  settings.environment = file_of(bytes, "environment.exr");
+  settings.resolution = 8;
+  const lighting::Lighting light = lighting::load_environment(settings);
+  expect(light.environment.radiance.size() == 64, "a map is as large as it was chosen");
+}
+
+void png(Bytes bytes) {
+  const Plate plate = output::read_png(file_of(bytes, "plate.png"));
+  expect(plate.samples.size() == std::size_t{3} * static_cast<std::size_t>(plate.width) *
+                                     static_cast<std::size_t>(plate.height),
+         "a plate is as large as it says");
+}
+
+constexpr Target own[] = {
+    {"set", "a set file", set_file},
+    {"gltf", "a glTF file", gltf},
+    {"texture", "an image of a glTF file", texture},
+    {"environment", "an EXR environment", environment},
+    {"png", "a plate as PNG", png},
+};
+
+}  // namespace scene_targets_cpp
+
+std::span<const Target> scene_targets() {
+  return scene_targets_cpp::own;
+}
+
+}  // namespace previz::fuzz
