@@ -109,7 +109,7 @@ Imf::Header header(const render::Layers& layers, const ExrMetadata& metadata) {
   header.insert("previz.timestamp_ns", Imf::StringAttribute(std::to_string(metadata.timestamp_ns)));
   header.insert("previz.samples", Imf::IntAttribute(static_cast<int>(std::min<std::int64_t>(
                                       layers.samples, std::numeric_limits<int>::max()))));
-  if (metadata.pose == "tracked") {
+  if (metadata.pose == "tracked" || metadata.pose == "held") {
     Imath::M44d matrix;
     for (int row = 0; row < 4; ++row)
       for (int column = 0; column < 4; ++column)

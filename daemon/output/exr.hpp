@@ -21,11 +21,12 @@ namespace previz::output {
 //   previz.samples (int), previz.denoised (int: 1 where noise was taken out of composite, and
 //   variance says what seems to be left; outliers beyond the sensor's white are then gone, too),
 //   previz.exposure (double), previz.timestamp_ns (string; EXR has no 64-bit
-//   integers), previz.set (string), previz.pose (string: "tracked", "lost" or "ambiguous"),
+//   integers), previz.set (string), previz.pose (string: "tracked", "lost" or "ambiguous";
+//   "held" in a snapshot of a live picture that was shown with the expected pose),
 //   previz.world_from_camera (m44d; element [row][column] as the matrix is written, it multiplies
-//   column vectors; OpenCV camera axes, metres; absent unless the pose is tracked),
+//   column vectors; OpenCV camera axes, metres; absent unless the pose is tracked or held),
 // and OpenEXR's own (ImfStandardAttributes.h): worldToCamera and worldToNDC (m44f, of row vectors;
-//   the camera left-handed: right, up, forward; without lens distortion; absent unless tracked),
+//   the camera left-handed: right, up, forward; without lens distortion; absent like it),
 //   expTime, aperture and focus where they are known.
 struct ExrMetadata {
   double exposure = 1;

@@ -90,14 +90,15 @@ bool RenderStage::begin(Shot& shot) {
     pass_through(shot, std::move(plate), std::move(reason));
     return false;
   };
-  if (!shot.track.pose) return untouched(why_no_pose(shot.track));
+  const glm::dmat4* const camera = world_from_camera(shot);
+  if (!camera) return untouched(why_no_pose(shot.track));
   if (!shot.light) return untouched("no light frame yet");
 
   light(shot);
   if (placed_ != shot.scene || is_measured_anew_) place(shot.scene);
   renderer_->begin({.plate = std::move(plate),
                     .exposure = exposure_of(shot),
-                    .world_from_camera = shot.track.pose->world_from_camera,
+                    .world_from_camera = *camera,
                     .accumulates = options_.accumulates && set_.quality.accumulate});
   return true;
 }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/layers.hpp"
 #include "daemon/set/set.hpp"
+#include "daemon/tracking/pose_filter.hpp"
 #include "daemon/tracking/tracker.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/session/session.hpp"
@@ -52,7 +54,10 @@ struct Shot {
   // Tracking and lighting fill these in.
   tracking::Track track;
   bool tracking_done = false;  // false: tracking was paused, and `track` is not valid
-  LightPtr light;              // null: no light frame yet
+  // Where a live picture shows the camera; absent: where `track` says. It is for the display alone:
+  // a take, a refinement and offline work use `track`.
+  std::optional<tracking::ShownPose> shown_pose;
+  LightPtr light;                                                // null: no light frame yet
   std::shared_ptr<const session::CapturedLight> recorded_light;  // null: none came with the frame
   Motion motion;              // things moved by hand, and by themselves
   session::SceneState scene;  // things moved or relit; empty: as in the set
@@ -70,6 +75,12 @@ struct Shot {
   int history = 0;   // earlier frames whose samples the picture shares; 0: it is of its own alone
   bool frozen = false;  // true: a round of refining one frame, not a new frame
 };
+
+// Returns where the picture shows the camera; null: nowhere.
+inline const glm::dmat4* world_from_camera(const Shot& shot) {
+  if (shot.shown_pose) return &shot.shown_pose->world_from_camera;
+  return shot.track.pose ? &shot.track.pose->world_from_camera : nullptr;
+}
 
 // Returns the shot's frame as a plate, which the first call converts.
 inline const PlatePtr& plate_of(Shot& shot) {

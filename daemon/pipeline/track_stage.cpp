@@ -11,10 +11,10 @@ namespace previz::pipeline {
 
 TrackStage::TrackStage(const set::Set& set, const ObserverCalibration& calibration,
                        const std::vector<session::TrackRecord>& recorded, std::int64_t start_ns,
-                       std::int64_t lap_ns)
+                       std::int64_t lap_ns, tracking::Search search)
     : set_(set),
       recorded_(std::make_shared<tracking::RecordedTrack>(recorded, lap_ns)),
-      tracker_(tracking::make_tracker(set, calibration, recorded_)),
+      tracker_(tracking::make_tracker(set, calibration, recorded_, search)),
       start_ns_(start_ns) {
   if (set.lighting.from == set::LightFrom::recording &&
       std::ranges::none_of(recorded,

@@ -10,6 +10,7 @@
 
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/set/set.hpp"
+#include "daemon/tracking/apriltag_tracker.hpp"
 #include "daemon/tracking/recorded_track.hpp"
 #include "daemon/tracking/tracker.hpp"
 #include "drivers/calibration.hpp"
@@ -22,10 +23,10 @@ class TrackStage {
   // `recorded` is used if the set says tracking.enabled = false or lighting.from = "recording";
   // throws previz::Error if it then holds no poses or no light. Animations begin at `start_ns`, the
   // start of the take. `lap_ns` is the length of a lap if frames are replayed in a loop
-  // (replay_lap_ns), otherwise 0.
+  // (replay_lap_ns), otherwise 0. `search` is how tags are searched.
   TrackStage(const set::Set& set, const ObserverCalibration& calibration,
              const std::vector<session::TrackRecord>& recorded, std::int64_t start_ns,
-             std::int64_t lap_ns = 0);
+             std::int64_t lap_ns = 0, tracking::Search search = tracking::Search::whole);
 
   // Fills shot.track, shot.motion and shot.scene, and shot.recorded_light from the recorded track.
   // A frame that was not tracked is lost, never guessed; a carrier that is not found stays where it

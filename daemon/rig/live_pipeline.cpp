@@ -74,6 +74,7 @@ struct LivePipeline::Impl {
                                                        [this] { light_stop.request_stop(); }};
   const ObserverCalibration calibration;
   std::optional<pipeline::TrackStage> track_stage;
+  std::optional<tracking::PoseFilter> pose_filter;  // absent: the set shows poses as they are found
   pipeline::AnimationClock animation_clock;
   LiveLight light;
   LiveRender live_render;
@@ -142,8 +143,12 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
 }
 
 void LivePipeline::Impl::make_track_stage() {
-  track_stage.emplace(parts.set, calibration, parts.cameras.recorded.track, 0,
-                      parts.cameras.lap_ns);
+  const set::Tracking& wish = parts.set.tracking;
+  track_stage.emplace(parts.set, calibration, parts.cameras.recorded.track, 0, parts.cameras.lap_ns,
+                      wish.search_parts ? tracking::Search::parts : tracking::Search::whole);
+  pose_filter.reset();
+  if (wish.enabled && (wish.smooth || wish.hold_s > 0))
+    pose_filter.emplace(wish, calibration.intrinsics);
 }
 
 void LivePipeline::Impl::make_render_stage() {
@@ -317,6 +322,8 @@ Shot LivePipeline::Impl::track(Shot shot) {
     shot.motion = {};
     shot.tracking_done = true;
   }
+  if (pose_filter) shot.shown_pose = pose_filter->shown(shot.track, shot.frame->timestamp_ns);
+  if (shot.shown_pose && !shot.track.pose) parts.kept.metrics.count("poses held");
   shot.motion.animation_s = animation_s;
   lighting.attempt([&] {
     shot.light = light.light_for(shot, look->light_mode);

@@ -215,6 +215,8 @@ Shot LiveRender::render(const Look& look, Shot shot) {
   // If a refinement ended before its first round, this picture is the only one to save for it.
   const bool of_live = look.snapshots > snapshots_;
   const bool snapshot = of_live || look.refined_snapshots > refined_snapshots_;
+  // A snapshot can be compared with what `previzd render` makes of its frame.
+  if (snapshot && shot.track.pose) shot.shown_pose.reset();
   // A reviewed frame was not captured now, so its loss is not counted.
   const bool captured = !look.of_take;
   // The crew's changes go on top of what was recorded, never in its place.
@@ -243,7 +245,7 @@ Shot LiveRender::render(const Look& look, Shot shot) {
   count_shown(look);
   if (!shot.whole) return shot;
   if (shot.untouched.empty()) {
-    keep_as_good(shot, std::move(recorded));
+    if (shot.track.pose) keep_as_good(shot, std::move(recorded));
     if (look.governed && governor_) {
       if (!is_first_ && !snapshot) governor_->took(took);
       channels_.samples.set(governor_->samples());
@@ -257,7 +259,8 @@ Shot LiveRender::render(const Look& look, Shot shot) {
   return shot;
 }
 
-// Keeps the frame with its pose, light and scene, but without the rendered picture.
+// Keeps the frame with its tracked pose, light and scene, but without the rendered picture: a
+// refinement shows what `previzd render` makes of the frame.
 void LiveRender::keep_as_good(const Shot& shot, std::optional<session::SceneState> recorded) {
   if (!good_ && !good_of_take_) inbox_.post(Event::good_frame);
   Shot good;

@@ -73,6 +73,8 @@ std::string samples(const PictureFacts& picture, const Look& look) {
 }
 
 OsdText tracking_words(const PictureFacts& picture) {
+  if (picture.held_s > 0)
+    return {fmt::format("tracking held {:.1f} s", picture.held_s), OsdTone::warning};
   switch (picture.tracking) {
     case TrackStatus::lost:
       return {"tracking lost", OsdTone::alarm};
@@ -119,6 +121,7 @@ PictureFacts facts_of(const pipeline::Shot& shot) {
   facts.untouched = shot.untouched;
   facts.tracking = shot.track.status;
   facts.tracking_trouble = shot.track.reason;
+  if (shot.shown_pose) facts.held_s = shot.shown_pose->held_s;
   if (shot.track.pose) {
     facts.tags = static_cast<int>(shot.track.pose->tags.size());
     double variance_m2 = 0;  // of the position: the lower half of the 6x6 matrix's diagonal

@@ -24,6 +24,7 @@ struct PictureFacts {
   std::string untouched;      // why the plate alone is shown; empty: it was rendered
   tracking::TrackStatus tracking = tracking::TrackStatus::lost;
   int tags = 0;             // used for the pose
+  double held_s = 0;        // time since a pose was found, if an expected one is shown; 0: none is
   double deviation_mm = 0;  // standard deviation of the camera's position; 0: not known
   std::string tracking_trouble;
 };

@@ -95,8 +95,12 @@ fs::path write_snapshot(const pipeline::Shot& shot, const set::Set& set) {
   check_space(folder, pixels * most_bytes_a_pixel, set.recording.directory,
               static_cast<std::uint64_t>(set.recording.reserve_mb * 1e6));
   const fs::path stem = claim_snapshot(folder);
-  output::write_exr(snapshot_file(stem, ".exr"), *shot.layers,
-                    output::exr_metadata(*shot.layers, *shot.frame, shot.track, set));
+  output::ExrMetadata metadata = output::exr_metadata(*shot.layers, *shot.frame, shot.track, set);
+  if (shot.shown_pose) {
+    metadata.pose = "held";
+    metadata.world_from_camera = shot.shown_pose->world_from_camera;
+  }
+  output::write_exr(snapshot_file(stem, ".exr"), *shot.layers, metadata);
   output::write_png(snapshot_file(stem, ".png"), *shot.picture);
   return stem;
 }

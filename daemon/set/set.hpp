@@ -290,7 +290,12 @@ struct Tracking {
   double decimate = 1.0;
   double min_margin = 20.0;  // decision margin of a detection
   int max_hamming = 1;
-  double ambiguity_ratio = 0.2;   // best/second reprojection error above which one tag is ambiguous
+  double ambiguity_ratio = 0.2;  // best/second reprojection error above which one tag is ambiguous
+  // These are for live pictures only: takes, refinements and offline work never depend on them.
+  bool search_parts = true;       // where tags are expected, and the rest in turns
+  bool smooth = true;             // the shown pose
+  double hold_s = 0.5;            // the longest that the expected pose is shown while none is found
+  double hold_error = 0.01;       // likely error at which it ends earlier, of the picture's width
   std::vector<Tag> tags;          // fixed in the world; the camera's pose comes from them
   std::vector<Carrier> carriers;  // found after the camera
 };

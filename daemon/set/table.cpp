@@ -136,6 +136,10 @@ Keys tracking_keys(Tracking& t) {
       {"min_margin", &t.min_margin, plain.within(0, 255), "Detections whose decision margin is lower are dropped."},
       {"max_hamming", &t.max_hamming, plain.within(0, 3), "Bits of a tag's code that may be corrected."},
       {"ambiguity_ratio", &t.ambiguity_ratio, plain.within(0, 1), "A single tag can look alike from two positions. It counts as ambiguous if the error of the best one, over that of the second best, is above this."},
+      {"search_parts", &t.search_parts, plain, "Live, tags are searched where the last positions let them be expected, and the rest of the picture in strips, all of it within 16 frames. This keeps up with large pictures. false: the whole picture of every frame, as `previzd render` does."},
+      {"smooth", &t.smooth, plain, "Live pictures show the film camera without the jitter and the jumps of its positions. Takes, refinements and `previzd render` have the positions as they were found."},
+      {"hold_s", &t.hold_s, seconds.within(0, 60), "How long live pictures go on with the expected position while none is found, as when a hand covers the tags; 0: not at all. Such a position is never recorded."},
+      {"hold_error", &t.hold_error, plain.within(0, 1), "The expected position is given up earlier if things are likely to be off by more than this share of the picture's width, which comes soon while the camera moves."},
   };
 }
 

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cassert>
 #include <set>
+#include <thread>
 
 #include "daemon/tracking/carrier_pose.hpp"
+#include "daemon/tracking/search_plan.hpp"
 #include "daemon/tracking/tag_detector.hpp"
 #include "daemon/tracking/tag_map.hpp"
 #include "drivers/error.hpp"
@@ -17,11 +19,15 @@ using Detections = std::vector<TagDetection>;
 class AprilTagTracker final : public Tracker {
  public:
   AprilTagTracker(const set::Tracking& settings, const PinholeIntrinsics& lens,
-                  const ResponseCurve& response)
+                  const ResponseCurve& response, Search search)
       : settings_(settings),
         lens_(lens),
-        detector_({settings.family, settings.min_margin, settings.max_hamming}, lens, response),
-        stage_(settings.tags, lens, settings.ambiguity_ratio) {
+        search_(search),
+        detector_({settings.family, settings.min_margin, settings.max_hamming, threads(search),
+                   search == Search::whole ? Fit::exact : Fit::quick},
+                  lens, response),
+        stage_(settings.tags, lens, settings.ambiguity_ratio),
+        plan_(lens.width, lens.height) {
     assert(lens.width > 0 && lens.height > 0 && lens.fx > 0 && lens.fy > 0);
     std::set<int> taken;
     for (const set::Tag& tag : settings.tags) taken.insert(tag.id);
@@ -46,11 +52,11 @@ class AprilTagTracker final : public Tracker {
     stage_.forget_if_old(frame.timestamp_ns);
     for (Carrier& carrier : carriers_) carrier.map.forget_if_old(frame.timestamp_ns);
 
-    const double decimate = following_ ? std::max(1.0, settings_.decimate) : 1.0;
-    Track track = locate(detector_.detect(frame, decimate), frame.timestamp_ns);
-    if (decimate > 1 && lacks_what_was_followed(track))
-      track = locate(detector_.detect(frame, 1), frame.timestamp_ns);
+    std::optional<Track> in_parts;
+    if (search_ == Search::parts && following_) in_parts = track_in_parts(frame);
+    Track track = in_parts ? *std::move(in_parts) : track_in_whole(frame);
     following_ = track.pose.has_value();
+    seen_ = track.seen_tags;
     if (track.pose) stage_.remember(*track.pose, frame.timestamp_ns);
     for (std::size_t i = 0; i < carriers_.size(); ++i) {
       carriers_[i].following = carriers_[i].found.has_value();
@@ -72,6 +78,41 @@ class AprilTagTracker final : public Tracker {
     bool following;             // the previous frame showed the carrier
     std::optional<Pose> found;  // this picture's camera pose, in the carrier's frame
   };
+
+  static int threads(Search search) {
+    constexpr int most_threads = 4;
+    return search == Search::whole
+               ? 1
+               : std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, most_threads);
+  }
+
+  Track track_in_whole(const Frame& frame) {
+    plan_.searched_whole();
+    const double decimate = following_ ? std::max(1.0, settings_.decimate) : 1.0;
+    Track track = locate(detector_.detect(frame, decimate), frame.timestamp_ns);
+    if (decimate > 1 && lacks_what_was_followed(track))
+      track = locate(detector_.detect(frame, 1), frame.timestamp_ns);
+    return track;
+  }
+
+  // Returns nothing if the whole frame is to be searched.
+  std::optional<Track> track_in_parts(const Frame& frame) {
+    std::vector<ExpectedTag> expected;
+    stage_.expect(frame.timestamp_ns, detector_.printed_width(), expected);
+    for (const Carrier& carrier : carriers_)
+      carrier.map.expect(frame.timestamp_ns, detector_.printed_width(), expected);
+    Track track = locate(detector_.detect(frame, plan_.next(expected)), frame.timestamp_ns);
+    if (!track.pose) return std::nullopt;
+    int wanted = 0, missing = 0;  // tags that the previous frame showed, and this one should
+    for (const ExpectedTag& tag : expected) {
+      if (!tag.is_inside || std::ranges::find(seen_, tag.id) == seen_.end()) continue;
+      ++wanted;
+      missing += std::ranges::find(track.seen_tags, tag.id) == track.seen_tags.end();
+    }
+    const bool lacks_some = missing > 0 || lacks_what_was_followed(track);
+    if (2 * missing > wanted || (lacks_some && plan_.may_search_whole())) return std::nullopt;
+    return track;
+  }
 
   void reset_following() {
     following_ = false;
@@ -129,8 +170,11 @@ class AprilTagTracker final : public Tracker {
 
   set::Tracking settings_;
   PinholeIntrinsics lens_;
+  Search search_;
   TagDetector detector_;
   TagMap stage_;
+  SearchPlan plan_;
+  std::vector<int> seen_;  // tags of the previous frame
   std::vector<Carrier> carriers_;
   bool following_ = false;  // the previous frame was tracked
 };
@@ -139,8 +183,8 @@ class AprilTagTracker final : public Tracker {
 
 std::unique_ptr<Tracker> make_apriltag_tracker(const set::Tracking& settings,
                                                const PinholeIntrinsics& intrinsics,
-                                               const ResponseCurve& response) {
-  return std::make_unique<AprilTagTracker>(settings, intrinsics, response);
+                                               const ResponseCurve& response, Search search) {
+  return std::make_unique<AprilTagTracker>(settings, intrinsics, response, search);
 }
 
 }  // namespace previz::tracking

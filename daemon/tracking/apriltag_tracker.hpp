@@ -19,8 +19,19 @@ namespace previz::tracking {
 // full resolution if no pose is found or a carrier of the previous frame is missing; every other
 // frame is searched at full resolution. Carriers are found by the same rules, each by its own
 // tags.
+//
+// `search` says where frames are searched that follow a tracked one. With Search::parts these are
+// the parts where tags are expected, at full resolution, and a strip more (see search_plan.hpp), in
+// several threads: a tag of the stage is found in the first frame that shows it whole, unless the
+// camera's velocity changes by more than a 64th of the picture's width a frame; any other tag
+// within sweep_pictures frames. The frame is searched whole, as described above, if that shows no
+// pose or lacks most of the tags of the previous frame, and also if it lacks one of them or a
+// carrier, this at most every eighth frame. What is found depends on the frames before, so that
+// offline work searches all of each frame.
+enum class Search { whole, parts };
 std::unique_ptr<Tracker> make_apriltag_tracker(const set::Tracking& settings,
                                                const PinholeIntrinsics& intrinsics,
-                                               const ResponseCurve& response = {});
+                                               const ResponseCurve& response = {},
+                                               Search search = Search::whole);
 
 }  // namespace previz::tracking

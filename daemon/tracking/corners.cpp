@@ -64,7 +64,7 @@ double narrowest_cell_px(const CornerPixels& corners, int cells) {
 }
 
 RefinedCorners refine_corners(const Luminance& luminance, const PinholeIntrinsics& lens,
-                              const CornerPixels& guess, int cells, bool white_inside) {
+                              const CornerPixels& guess, int cells, bool white_inside, Fit how) {
   RefinedCorners result;
   const glm::dvec2 focal(lens.fx, lens.fy), centre(lens.cx, lens.cy);
   CornerPixels flat;  // on the pinhole plane
@@ -88,7 +88,7 @@ RefinedCorners refine_corners(const Luminance& luminance, const PinholeIntrinsic
     const EdgeGuess edge{flat[i], flat[j], white_inside ? middle : away,
                          white_inside ? outside : inside, white_inside ? inside : outside};
     const char* why = "";
-    const auto fit = fit_edge(luminance, lens, edge, &why);
+    const auto fit = fit_edge(luminance, lens, edge, &why, how);
     if (!fit) {
       result.trouble = std::string("the ") + kEdgeNames[k] + " edge is " + why;
       return result;
@@ -99,14 +99,14 @@ RefinedCorners refine_corners(const Luminance& luminance, const PinholeIntrinsic
   // Corner j is where edges i = j-1 and j meet; offsets e across the edges move it by N^-1 e.
   cv::Matx<double, 8, 8> corner_by_offset = cv::Matx<double, 8, 8>::zeros();
   cv::Matx<double, 8, 8> offsets = cv::Matx<double, 8, 8>::zeros();
-  const auto normal = [](const EdgeFit& e) {
+  const auto normal_of = [](const EdgeFit& e) {
     const glm::dvec2 d = glm::normalize(e.b - e.a);
     return glm::dvec2(-d.y, d.x);
   };
   for (std::size_t j = 0; j < 4; ++j) {
     const std::size_t i = (j + 3) % 4;
     const EdgeFit &before = edges[i], &after = edges[j];
-    const glm::dvec2 n0 = normal(before), n1 = normal(after);
+    const glm::dvec2 n0 = normal_of(before), n1 = normal_of(after);
     const glm::dmat2 normals(n0.x, n1.x, n0.y, n1.y);  // rows n0, n1
     if (std::abs(glm::determinant(normals)) < 0.05) {
       result.trouble = "two edges are nearly parallel";

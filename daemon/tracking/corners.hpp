@@ -25,7 +25,8 @@ struct RefinedCorners {
 // `cells` is the border's outer width in cells; `white_inside` holds for families with reversed
 // borders. `guess` must be within about 2 px.
 RefinedCorners refine_corners(const Luminance& luminance, const PinholeIntrinsics& lens,
-                              const CornerPixels& guess, int cells, bool white_inside);
+                              const CornerPixels& guess, int cells, bool white_inside,
+                              Fit how = Fit::exact);
 
 // Returns the width of the narrowest cell beside the border, px: below about 2 px its edges cannot
 // be separated.

@@ -74,31 +74,46 @@ Photometry::Photometry(const ResponseCurve& response)
 }
 
 std::vector<std::uint8_t> Photometry::gray8(const Frame& frame) const {
-  if (frame.bayer != BayerPattern::none) return gray8(*demosaiced(std::make_shared<Frame>(frame)));
-  const std::size_t pixels = std::size_t(frame.width) * std::size_t(frame.height);
-  std::vector<std::uint8_t> gray(pixels);
+  return gray8(frame, {0, 0, frame.width, frame.height});
+}
+
+std::vector<std::uint8_t> Photometry::gray8(const Frame& frame, const Region& part) const {
+  if (frame.bayer != BayerPattern::none)
+    return gray8(*demosaiced(std::make_shared<Frame>(frame)), part);
+  const std::size_t columns = std::size_t(part.width);
+  std::vector<std::uint8_t> gray(columns * std::size_t(part.height));
+  for (int row = 0; row < part.height; ++row)
+    gray_row(frame, std::size_t(part.y + row) * std::size_t(frame.width) + std::size_t(part.x),
+             columns, gray.data() + std::size_t(row) * columns);
+  return gray;
+}
+
+void Photometry::gray_row(const Frame& frame, std::size_t first, std::size_t pixels,
+                          std::uint8_t* gray) const {
   const std::uint8_t* bytes = frame.bytes.data();
   switch (frame.format) {
     case PixelFormat::rgb8:
+      bytes += 3 * first;
       for (std::size_t i = 0; i < pixels; ++i, bytes += 3)
         gray[i] = luma8(code8_[bytes[0]], code8_[bytes[1]], code8_[bytes[2]]);
       break;
     case PixelFormat::rgb16:
-      for (std::size_t i = 0; i < pixels; ++i)
-        gray[i] = luma8(code16_[sample16(frame, 3 * i)], code16_[sample16(frame, 3 * i + 1)],
-                        code16_[sample16(frame, 3 * i + 2)]);
+      for (std::size_t i = 0; i < pixels; ++i) {
+        const std::size_t sample = 3 * (first + i);
+        gray[i] = luma8(code16_[sample16(frame, sample)], code16_[sample16(frame, sample + 1)],
+                        code16_[sample16(frame, sample + 2)]);
+      }
       break;
     case PixelFormat::gray8:
-      for (std::size_t i = 0; i < pixels; ++i) gray[i] = code8_[bytes[i]];
+      for (std::size_t i = 0; i < pixels; ++i) gray[i] = code8_[bytes[first + i]];
       break;
     case PixelFormat::gray16:
-      for (std::size_t i = 0; i < pixels; ++i) gray[i] = code16_[sample16(frame, i)];
+      for (std::size_t i = 0; i < pixels; ++i) gray[i] = code16_[sample16(frame, first + i)];
       break;
     case PixelFormat::yuv422p8:
-      for (std::size_t i = 0; i < pixels; ++i) gray[i] = code_luma_[bytes[i]];
+      for (std::size_t i = 0; i < pixels; ++i) gray[i] = code_luma_[bytes[first + i]];
       break;
   }
-  return gray;
 }
 
 double Photometry::luminance(const Frame& frame, int x, int y) const {

@@ -51,6 +51,10 @@ constexpr int kMinPictureSide =
     16;  // libapriltag thresholds in tiles and reads past the end of smaller pictures
 constexpr double kMinSidePx = 8;    // of a tag; a smaller one has less than a pixel per cell
 constexpr double kMinCellPx = 1.7;  // the refinement needs an edge and a plain pixel on either side
+constexpr double kCoarseDecimate = 2;
+constexpr double kCutPx = 4;  // libapriltag looks at so much about a tag
+constexpr double kSmallPart =
+    8;  // threads do not pay in a part of a picture that is smaller by this
 constexpr double kUnrefinedSigmaPx = 0.5;  // libapriltag's corners, decimated or of tiny tags
 
 // A tag cut by the picture's border is seen with a false corner on that border.
@@ -79,21 +83,51 @@ double area(const CornerPixels& c) {
   return std::abs(twice) / 2;
 }
 
+// A tag that a part's border cuts is found whole in another part, or not at all.
+bool cut_by(const Region& part, const Frame& frame, const CornerPixels& corners) {
+  return std::any_of(corners.begin(), corners.end(), [&](glm::dvec2 p) {
+    return (part.x > 0 && p.x < part.x + kCutPx) || (part.y > 0 && p.y < part.y + kCutPx) ||
+           (part.x + part.width < frame.width && p.x > part.x + part.width - 1 - kCutPx) ||
+           (part.y + part.height < frame.height && p.y > part.y + part.height - 1 - kCutPx);
+  });
+}
+
+glm::dvec2 middle_of(const CornerPixels& c) {
+  return (c[0] + c[1] + c[2] + c[3]) / 4.0;
+}
+
+bool is_same_print(const TagDetection& a, const TagDetection& b) {
+  const glm::dvec2 apart = middle_of(a.corners) - middle_of(b.corners);
+  return a.id == b.id && std::hypot(apart.x, apart.y) < shortest_side(a.corners) / 2;
+}
+
+bool goes_before(const TagDetection& a, const TagDetection& b) {
+  return std::tuple(a.id, a.corners[0].x, a.corners[0].y) <
+         std::tuple(b.id, b.corners[0].x, b.corners[0].y);
+}
+
 }  // namespace
 
 struct TagDetector::Library {
   const Family& functions;
   apriltag_family_t* family;
   apriltag_detector_t* detector;
+  apriltag_detector_t* fast;  // with several threads
 
   // The table of codes grows with the power of `corrected_bits`: gigabytes for the large families
   // at the library's limit of 2.
-  Library(const Family& f, int corrected_bits)
-      : functions(f), family(f.create()), detector(apriltag_detector_create()) {
-    apriltag_detector_add_family_bits(detector, family, std::clamp(corrected_bits, 0, 2));
+  Library(const Family& f, int corrected_bits, int threads)
+      : functions(f),
+        family(f.create()),
+        detector(apriltag_detector_create()),
+        fast(apriltag_detector_create()) {
+    for (apriltag_detector_t* d : {detector, fast})
+      apriltag_detector_add_family_bits(d, family, std::clamp(corrected_bits, 0, 2));
+    fast->nthreads = std::max(1, threads);
   }
   ~Library() {
     apriltag_detector_destroy(detector);
+    apriltag_detector_destroy(fast);
     functions.destroy(family);
   }
   Library(const Library&) = delete;
@@ -105,21 +139,57 @@ TagDetector::TagDetector(const DetectorSettings& settings, const PinholeIntrinsi
     : settings_(settings),
       lens_(lens),
       photometry_(response),
-      library_(std::make_unique<Library>(family_by_name(settings.family), settings.max_hamming)) {}
+      library_(std::make_unique<Library>(family_by_name(settings.family), settings.max_hamming,
+                                         settings.threads)) {}
 
 TagDetector::~TagDetector() = default;
+
+double TagDetector::printed_width() const {
+  return 1.0 * library_->family->total_width / library_->family->width_at_border;
+}
 
 std::vector<TagDetection> TagDetector::detect(const Frame& frame, double decimate) {
   if (frame.bayer != BayerPattern::none)
     return detect(*demosaiced(std::make_shared<Frame>(frame)), decimate);
   std::vector<TagDetection> tags;
-  if (frame.width < kMinPictureSide * decimate || frame.height < kMinPictureSide * decimate)
-    return tags;
+  find(frame, {0, 0, frame.width, frame.height}, decimate, tags);
+  for (TagDetection& tag : tags) measure(frame, decimate, tag);
+  std::sort(tags.begin(), tags.end(), goes_before);
+  return tags;
+}
 
-  std::vector<std::uint8_t> gray = photometry_.gray8(frame);
-  image_u8_t picture{frame.width, frame.height, frame.width, gray.data()};
-  library_->detector->quad_decimate = float(decimate);
-  zarray_t* found = apriltag_detector_detect(library_->detector, &picture);
+std::vector<TagDetection> TagDetector::detect(const Frame& frame, const SearchStep& parts) {
+  if (frame.bayer != BayerPattern::none)
+    return detect(*demosaiced(std::make_shared<Frame>(frame)), parts);
+  std::vector<TagDetection> tags;
+  const auto add = [&](const Region& part, double decimate) {
+    std::vector<TagDetection> here;
+    find(frame, part, decimate, here);
+    for (TagDetection& tag : here) {
+      const bool is_known = std::any_of(tags.begin(), tags.end(), [&](const TagDetection& known) {
+        return is_same_print(known, tag);
+      });
+      if (is_known || cut_by(part, frame, tag.corners)) continue;
+      measure(frame, decimate, tag);
+      tags.push_back(tag);
+    }
+  };
+  for (const Region& part : parts.regions) add(part, 1);
+  if (parts.coarse) add({0, 0, frame.width, frame.height}, kCoarseDecimate);
+  std::sort(tags.begin(), tags.end(), goes_before);
+  return tags;
+}
+
+void TagDetector::find(const Frame& frame, const Region& part, double decimate,
+                       std::vector<TagDetection>& tags) {
+  if (part.width < kMinPictureSide * decimate || part.height < kMinPictureSide * decimate) return;
+  std::vector<std::uint8_t> gray = photometry_.gray8(frame, part);
+  image_u8_t picture{part.width, part.height, part.width, gray.data()};
+  const bool is_large =
+      1.0 * part.width * part.height * kSmallPart > 1.0 * frame.width * frame.height;
+  apriltag_detector_t* const detector = is_large ? library_->fast : library_->detector;
+  detector->quad_decimate = float(decimate);
+  zarray_t* found = apriltag_detector_detect(detector, &picture);
   for (int i = 0; i < zarray_size(found); ++i) {
     apriltag_detection_t* d = nullptr;
     zarray_get(found, i, &d);
@@ -129,36 +199,32 @@ std::vector<TagDetection> TagDetector::detect(const Frame& frame, double decimat
     tag.hamming = d->hamming;
     tag.margin = d->decision_margin;
     // In libapriltag (0,0) is a pixel's corner; here it is a pixel's centre.
-    for (std::size_t k = 0; k < 4; ++k) tag.corners[k] = {d->p[k][0] - 0.5, d->p[k][1] - 0.5};
+    for (std::size_t k = 0; k < 4; ++k)
+      tag.corners[k] = {d->p[k][0] - 0.5 + part.x, d->p[k][1] - 0.5 + part.y};
     if (area(tag.corners) >= kMinSidePx * kMinSidePx) tags.push_back(tag);
   }
   apriltag_detections_destroy(found);
+}
 
+void TagDetector::measure(const Frame& frame, double decimate, TagDetection& tag) const {
   const Luminance luminance = [&](int x, int y) { return photometry_.luminance(frame, x, y); };
   const int cells = library_->family->width_at_border;
-  for (TagDetection& tag : tags) {
-    if (near_border(tag.corners, frame, 1 + decimate)) {
-      tag.trouble = "cut by the picture's border";
-    } else if (shortest_side(tag.corners) > 4 &&
-               narrowest_cell_px(tag.corners, cells) >= kMinCellPx) {
-      const RefinedCorners refined =
-          refine_corners(luminance, lens_, tag.corners, cells, library_->family->reversed_border);
-      tag.trouble = refined.trouble;
-      if (refined.trouble.empty()) {
-        tag.corners = refined.pixel;
-        tag.covariance = refined.covariance;
-        tag.refined = true;
-      }
-    } else {
-      for (std::size_t k = 0; k < 8; ++k)
-        tag.covariance[9 * k] = kUnrefinedSigmaPx * kUnrefinedSigmaPx;
+  if (near_border(tag.corners, frame, 1 + decimate)) {
+    tag.trouble = "cut by the picture's border";
+  } else if (shortest_side(tag.corners) > 4 &&
+             narrowest_cell_px(tag.corners, cells) >= kMinCellPx) {
+    const RefinedCorners refined = refine_corners(luminance, lens_, tag.corners, cells,
+                                                  library_->family->reversed_border, settings_.fit);
+    tag.trouble = refined.trouble;
+    if (refined.trouble.empty()) {
+      tag.corners = refined.pixel;
+      tag.covariance = refined.covariance;
+      tag.refined = true;
     }
+  } else {
+    for (std::size_t k = 0; k < 8; ++k)
+      tag.covariance[9 * k] = kUnrefinedSigmaPx * kUnrefinedSigmaPx;
   }
-  std::sort(tags.begin(), tags.end(), [](const TagDetection& a, const TagDetection& b) {
-    return std::tuple(a.id, a.corners[0].x, a.corners[0].y) <
-           std::tuple(b.id, b.corners[0].x, b.corners[0].y);
-  });
-  return tags;
 }
 
 }  // namespace previz::tracking

@@ -8,6 +8,7 @@
 
 #include "daemon/tracking/corners.hpp"
 #include "daemon/tracking/photometry.hpp"
+#include "daemon/tracking/search_plan.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
 
@@ -27,6 +28,8 @@ struct DetectorSettings {
   std::string family = "tag36h11";
   double min_margin = 20;
   int max_hamming = 1;
+  int threads = 1;       // that search a large part of a picture
+  Fit fit = Fit::exact;  // of the corners
 };
 
 // Families are libapriltag's, by name: tag36h11, tag25h9, tag16h5, tagStandard41h12, ... Throws
@@ -41,9 +44,19 @@ class TagDetector {
   // shrinks the picture that is searched; corners are always measured at full resolution. Frames
   // below 16 px a side show no tag.
   std::vector<TagDetection> detect(const Frame& frame, double decimate);
+  // Returns the tags in parts of the picture: what the whole picture shows there at full
+  // resolution, without the tags that a part's border cuts. Parts may meet.
+  std::vector<TagDetection> detect(const Frame& frame, const SearchStep& parts);
+
+  // Returns the width of a tag as printed, over that of its border.
+  double printed_width() const;
 
  private:
   struct Library;
+  void find(const Frame& frame, const Region& part, double decimate,
+            std::vector<TagDetection>& tags);
+  void measure(const Frame& frame, double decimate, TagDetection& tag) const;
+
   DetectorSettings settings_;
   PinholeIntrinsics lens_;
   Photometry photometry_;

@@ -2,9 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/matrix.hpp>
 #include <opencv2/core.hpp>
 #include <set>
 
+#include "daemon/tracking/pose_starts.hpp"
+#include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::tracking {
@@ -15,6 +21,10 @@ constexpr double kReachRad = 0.035, kReachRadPerS = 3.0;  // how far a camera ma
 // Below this difference of chi-squares (a likelihood ratio of exp(-10)) noise alone could swap two
 // poses.
 constexpr double kDecisiveChiSquare = 20;
+// What a search expects: how many frames' motion ahead at most, and how far off a tag may be, of
+// the picture's width and of the tag.
+constexpr double kFarthest = 3, kMarginShare = 64, kMarginOfTag = 0.25;
+constexpr double kLeastPx = 6;             // smaller tags cannot be found
 constexpr double kSamePoseChiSquare = 16;  // within each other's noise; 6 degrees of freedom
 
 Pose to_pose(const FittedPose& fit, const std::vector<TagObservation>& tags) {
@@ -39,6 +49,16 @@ bool within_noise(const FittedPose& a, const FittedPose& b) {
   return d.dot(covariance.solve(d, cv::DECOMP_SVD)) < kSamePoseChiSquare;
 }
 
+// Returns how far from the axis the picture's corners see, on the plane z = 1, with a tenth more.
+double farthest_ray(const PinholeIntrinsics& lens) {
+  double most = 0;
+  for (const double x : {0.0, lens.width - 1.0})
+    for (const double y : {0.0, lens.height - 1.0})
+      if (const auto ray = undistort(lens, {x, y}))
+        most = std::max(most, std::hypot(ray->x, ray->y));
+  return 1.1 * most;
+}
+
 }  // namespace
 
 std::string tags_in_words(const std::vector<int>& ids) {
@@ -50,7 +70,7 @@ std::string tags_in_words(const std::vector<int>& ids) {
 
 TagMap::TagMap(const std::vector<set::Tag>& tags, const PinholeIntrinsics& lens,
                double ambiguity_ratio)
-    : lens_(lens), ambiguity_ratio_(ambiguity_ratio) {
+    : lens_(lens), ambiguity_ratio_(ambiguity_ratio), farthest_ray_(farthest_ray(lens)) {
   for (const set::Tag& tag : tags) {
     const std::string key = "tracking.tags: tag " + std::to_string(tag.id);
     if (!(tag.size_m > 0)) throw Error(key + ": the size must be above 0 m");
@@ -95,12 +115,78 @@ Track TagMap::locate(const std::vector<TagDetection>& detections, std::int64_t t
 }
 
 void TagMap::remember(const Pose& pose, std::int64_t time_ns) {
+  before_last_ = last_;
+  before_last_time_ns_ = last_time_ns_;
   last_ = camera_from_world(pose.world_from_camera);
   last_time_ns_ = time_ns;
 }
 
+void TagMap::reset() {
+  last_.reset();
+  before_last_.reset();
+}
+
 void TagMap::forget_if_old(std::int64_t now_ns) {
-  if (last_ && !(now_ns >= last_time_ns_ && now_ns - last_time_ns_ <= kMemoryNs)) last_.reset();
+  if (last_ && !(now_ns >= last_time_ns_ && now_ns - last_time_ns_ <= kMemoryNs)) reset();
+}
+
+CameraFromWorld TagMap::expected_pose(std::int64_t time_ns) const {
+  const double between_ns = static_cast<double>(last_time_ns_ - before_last_time_ns_);
+  if (!before_last_ || !(between_ns > 0)) return *last_;
+  const double share =
+      std::clamp(static_cast<double>(time_ns - last_time_ns_) / between_ns, 0.0, kFarthest);
+  const glm::dmat4 last = world_from_camera(*last_);
+  const glm::dmat4 motion = glm::inverse(world_from_camera(*before_last_)) * last;
+  const glm::dquat turn =
+      glm::slerp(glm::dquat(1, 0, 0, 0), glm::normalize(glm::quat_cast(glm::dmat3(motion))), share);
+  glm::dmat4 next(glm::mat3_cast(turn));
+  next[3] = glm::dvec4(share * glm::dvec3(motion[3]), 1);
+  return camera_from_world(last * next);
+}
+
+void TagMap::expect(std::int64_t time_ns, double printed_width,
+                    std::vector<ExpectedTag>& tags) const {
+  if (!last_) return;
+  const CameraFromWorld next = expected_pose(time_ns);
+  for (const auto& [id, tag] : tags_) {
+    std::optional<ExpectedTag> expected = expect(tag, next, printed_width);
+    const std::optional<ExpectedTag> was = expect(tag, *last_, printed_width);
+    if (!expected) continue;
+    // As far again as half of what it moves, because no velocity stays.
+    const glm::dvec2 moves =
+        was ? glm::abs((expected->low + expected->high) - (was->low + was->high)) / 4.0
+            : glm::dvec2(0);
+    const glm::dvec2 margin =
+        moves + lens_.width / kMarginShare + kMarginOfTag * (expected->high - expected->low);
+    expected->low -= margin;
+    expected->high += margin;
+    tags.push_back(*expected);
+  }
+}
+
+std::optional<ExpectedTag> TagMap::expect(const set::Tag& tag, const CameraFromWorld& pose,
+                                          double printed_width) const {
+  const glm::dvec3 eye = glm::transpose(pose.rotation) * -pose.translation;
+  if (!(glm::dot(glm::dvec3(tag.world_from_tag[2]), eye - glm::dvec3(tag.world_from_tag[3])) > 0))
+    return std::nullopt;
+  ExpectedTag expected{tag.id, glm::dvec2(HUGE_VAL), glm::dvec2(-HUGE_VAL), true};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec4 corner(tag_corner(printed_width * tag.size_m, i), 1);
+    const glm::dvec3 x = pose.rotation * glm::dvec3(tag.world_from_tag * corner) + pose.translation;
+    // Far outside the picture the lens's polynomial means nothing.
+    if (!(x.z > 0) || !(std::hypot(x.x / x.z, x.y / x.z) < farthest_ray_)) return std::nullopt;
+    const glm::dvec2 pixel = distort(lens_, {x.x / x.z, x.y / x.z});
+    expected.low = glm::min(expected.low, pixel);
+    expected.high = glm::max(expected.high, pixel);
+  }
+  const glm::dvec2 size(lens_.width, lens_.height);
+  const glm::dvec2 middle = (expected.low + expected.high) / 2.0;
+  if (!(middle.x > 0 && middle.y > 0 && middle.x < size.x && middle.y < size.y) ||
+      expected.high.x - expected.low.x < kLeastPx || expected.high.y - expected.low.y < kLeastPx)
+    return std::nullopt;
+  expected.is_inside = expected.low.x > 0 && expected.low.y > 0 && expected.high.x < size.x - 1 &&
+                       expected.high.y < size.y - 1;
+  return expected;
 }
 
 bool TagMap::within_reach(const FittedPose& fit, std::int64_t time_ns) const {

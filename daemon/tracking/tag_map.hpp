@@ -10,6 +10,7 @@
 
 #include "daemon/set/set.hpp"
 #include "daemon/tracking/joint_pose.hpp"
+#include "daemon/tracking/search_plan.hpp"
 #include "daemon/tracking/tag_detector.hpp"
 #include "daemon/tracking/tracker.hpp"
 #include "drivers/calibration.hpp"
@@ -32,18 +33,27 @@ class TagMap {
   Track locate(const std::vector<TagDetection>& detections, std::int64_t time_ns) const;
   void remember(const Pose& pose, std::int64_t time_ns);
   void forget_if_old(std::int64_t now_ns);
-  void reset() { last_.reset(); }
+  void reset();
+
+  // Adds where the tags of this map are likely to be in the picture at this time, if the camera
+  // keeps its velocity: those that face the camera and lie in the picture, or nearly. A tag as
+  // printed is `printed_width` times as wide as its border.
+  void expect(std::int64_t time_ns, double printed_width, std::vector<ExpectedTag>& tags) const;
 
  private:
   bool within_reach(const FittedPose& fit, std::int64_t time_ns) const;
+  CameraFromWorld expected_pose(std::int64_t time_ns) const;
+  std::optional<ExpectedTag> expect(const set::Tag& tag, const CameraFromWorld& pose,
+                                    double printed_width) const;
   void choose(const std::vector<FittedPose>& poses, const std::vector<TagObservation>& tags,
               std::int64_t time_ns, Track* track) const;
 
   PinholeIntrinsics lens_;
   double ambiguity_ratio_;
+  double farthest_ray_;  // that may be in the picture, from the axis on the plane z = 1
   std::map<int, set::Tag> tags_;
-  std::optional<CameraFromWorld> last_;
-  std::int64_t last_time_ns_ = 0;
+  std::optional<CameraFromWorld> last_, before_last_;
+  std::int64_t last_time_ns_ = 0, before_last_time_ns_ = 0;
 };
 
 }  // namespace previz::tracking

@@ -2,15 +2,16 @@
 
 #include <utility>
 
-#include "daemon/tracking/apriltag_tracker.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::tracking {
 
 std::unique_ptr<Tracker> make_tracker(const set::Set& set, const ObserverCalibration& calibration,
-                                      std::shared_ptr<const RecordedTrack> recorded) {
+                                      std::shared_ptr<const RecordedTrack> recorded,
+                                      Search search) {
   if (set.tracking.enabled)
-    return make_apriltag_tracker(set.tracking, calibration.intrinsics, calibration.response);
+    return make_apriltag_tracker(set.tracking, calibration.intrinsics, calibration.response,
+                                 search);
   if (!recorded || recorded->empty())
     throw Error(set.file.string() +
                 ": tracking.enabled: is false, but the session recorded no poses (track.jsonl)");

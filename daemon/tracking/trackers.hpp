@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "daemon/set/set.hpp"
+#include "daemon/tracking/apriltag_tracker.hpp"
 #include "daemon/tracking/recorded_track.hpp"
 #include "daemon/tracking/tracker.hpp"
 #include "drivers/calibration.hpp"
@@ -11,9 +12,11 @@
 namespace previz::tracking {
 
 // Returns the tracker of the observer with this calibration. `recorded` is the track that the
-// session recorded; it may be null if the set does not ask for it. Throws previz::Error if the set
-// asks for recorded poses and there are none, and as the trackers do.
+// session recorded; it may be null if the set does not ask for it. `search` is how tags are
+// searched. Throws previz::Error if the set asks for recorded poses and there are none, and as the
+// trackers do.
 std::unique_ptr<Tracker> make_tracker(const set::Set& set, const ObserverCalibration& calibration,
-                                      std::shared_ptr<const RecordedTrack> recorded);
+                                      std::shared_ptr<const RecordedTrack> recorded,
+                                      Search search = Search::whole);
 
 }  // namespace previz::tracking

@@ -222,14 +222,16 @@ TEST_F(MovingTake, ARangeKnowsWhatCameBeforeIt) {
 }
 
 // P21: the rig records the take while it plays it; what is rendered of the recording with its poses
-// is bit for bit what the display showed, where live does not average over frames.
+// is bit for bit what the display showed, where live neither averages over frames
+// nor smooths poses.
 TEST_F(MovingTake, IsRenderedAsItWasShown) {
   const std::string more =
       "[quality]\nsamples = 2\naccumulate = false\n[recording]\npreroll_s = 0\nslate = "
       "\"1\"\nreserve_mb = 1\n"
       "[[object]]\nname = \"card\"\nfile = \"card.gltf\"\npresence = \"virtual\"\n"
       "position_m = [-0.1, 0, 0]\nanimation = \"sway\"\n"
-      "[[button]]\nname = \"red\"\naction = \"record\"\n";
+      "[[button]]\nname = \"red\"\naction = \"record\"\n"
+      "[tracking]\nsmooth = false\n";
   write_take(more);
   std::ofstream events(directory_ / "session/events.jsonl");
   for (const auto& [ms, pushed] : {std::pair(10, "true"), {15, "false"}})
@@ -258,7 +260,7 @@ TEST_F(MovingTake, IsRenderedAsItWasShown) {
   test::run_crewed(std::move(options), directory_.path(), nobody, crew, out_);
 
   std::string text = set_text(more);
-  std::ofstream(directory_ / "as_recorded.toml") << text + "[tracking]\nenabled = false\n";
+  std::ofstream(directory_ / "as_recorded.toml") << text + "enabled = false\n";
   session::Session take = session::open_session(directory_ / "takes/1_take001");
   const auto stream = session::open_stream(take, "observer");
   const auto& records = stream->records();

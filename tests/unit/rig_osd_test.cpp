@@ -178,6 +178,19 @@ TEST(OsdWords, FactsOfAShot) {
   const PictureFacts facts = facts_of(shot);
   EXPECT_EQ(facts.tags, 3);
   EXPECT_NEAR(facts.deviation_mm, 0.3, 1e-12);
+  EXPECT_EQ(facts.held_s, 0);
+}
+
+// A pose that is only expected is shown as such, with the reason that none was found.
+TEST(OsdWords, ATrackingThatIsHeld) {
+  pipeline::Shot shot;
+  shot.samples = 4;
+  shot.track.reason = "no tag in the picture";
+  shot.shown_pose = tracking::ShownPose{glm::dmat4(1), {}, 0.32};
+  const PictureFacts facts = facts_of(shot);
+  const OsdPage page = osd_page(in(Mode::live), &facts, pace);
+  EXPECT_EQ(page.bottom_right.at(0), (OsdText{"tracking held 0.3 s", OsdTone::warning}));
+  EXPECT_EQ(page.notices, (Texts{{"tracking: no tag in the picture", OsdTone::warning}}));
 }
 
 }  // namespace rig_osd_test
