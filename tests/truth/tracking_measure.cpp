@@ -12,6 +12,7 @@
 #include "daemon/scene/scene.hpp"
 #include "daemon/tracking/apriltag_tracker.hpp"
 #include "daemon/tracking/joint_pose.hpp"
+#include "daemon/tracking/pose_filter.hpp"
 #include "daemon/tracking/pose_starts.hpp"
 #include "daemon/tracking/tag_detector.hpp"
 #include "drivers/calibration/pinhole.hpp"
@@ -99,6 +100,33 @@ void compare_pose(const TruthSet& set, const std::vector<glm::dvec3>& vertices,
   row->error_squared = normalised_error(*row->track.pose, truth_pose);
 }
 
+// By vertex: where it is minus where it should be; absent outside the picture.
+using VertexErrors = std::vector<std::optional<glm::dvec2>>;
+
+VertexErrors vertex_errors(const PinholeIntrinsics& lens, const std::vector<glm::dvec3>& vertices,
+                           const glm::dmat4& truth, const glm::dmat4& pose) {
+  VertexErrors errors;
+  for (const glm::dvec3& vertex : vertices) {
+    const auto should = project(lens, tracking::camera_from_world(truth), vertex);
+    const auto is = project(lens, tracking::camera_from_world(pose), vertex);
+    errors.push_back(should && is ? std::optional(*is - *should) : std::nullopt);
+  }
+  return errors;
+}
+
+// The mean length of the errors minus `others`, which may be empty, over the vertices that both
+// have.
+std::optional<double> mean_length(const VertexErrors& errors, const VertexErrors& others) {
+  double sum = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (!errors[i] || (!others.empty() && !others[i])) continue;
+    sum += glm::length(others.empty() ? *errors[i] : *errors[i] - *others[i]);
+    ++count;
+  }
+  return count > 0 ? std::optional(sum / count) : std::nullopt;
+}
+
 }  // namespace
 
 Frame read_frame(const std::filesystem::path& file) {
@@ -131,10 +159,14 @@ set::Tracking tracking_settings(const TruthSet& set) {
   return settings;
 }
 
-std::vector<TrackedFrame> measure_tracking(const TruthSet& set, const set::Tracking& settings) {
+std::vector<TrackedFrame> measure_tracking(const TruthSet& set, const set::Tracking& settings,
+                                           tracking::Search search) {
   const PinholeIntrinsics& lens = set.observer.intrinsics;
   const std::vector<glm::dvec3> vertices = virtual_vertices(set);
-  const auto tracker = tracking::make_apriltag_tracker(settings, lens, set.observer.response);
+  const auto tracker =
+      tracking::make_apriltag_tracker(settings, lens, set.observer.response, search);
+  tracking::PoseFilter filter(settings, lens);
+  VertexErrors last_found, last_shown;
   tracking::TagDetector detector({settings.family, settings.min_margin, settings.max_hamming}, lens,
                                  set.observer.response);
   std::vector<TrackedFrame> rows;
@@ -148,6 +180,24 @@ std::vector<TrackedFrame> measure_tracking(const TruthSet& set, const set::Track
     row.milliseconds =
         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     if (row.track.pose) compare_pose(set, vertices, observed.world_from_camera, &row);
+    const auto shown = filter.shown(row.track, frame.timestamp_ns);
+    const auto errors = [&](const glm::dmat4* pose) {
+      return pose ? vertex_errors(lens, vertices, observed.world_from_camera, *pose)
+                  : VertexErrors{};
+    };
+    const VertexErrors found =
+        errors(row.track.pose ? &row.track.pose->world_from_camera : nullptr);
+    const VertexErrors here = errors(shown ? &shown->world_from_camera : nullptr);
+    if (shown) {
+      row.held_s = shown->held_s;
+      row.shown_px = mean_length(here, {});
+    }
+    row.jitter_px = mean_length(found, last_found);
+    row.shown_jitter_px = mean_length(here, last_shown);
+    if (found.empty() || last_found.empty()) row.jitter_px.reset();
+    if (here.empty() || last_shown.empty()) row.shown_jitter_px.reset();
+    last_found = found;
+    last_shown = here;
 
     const auto truth = tracking::camera_from_world(observed.world_from_camera);
     const auto detections = detector.detect(frame, settings.decimate);

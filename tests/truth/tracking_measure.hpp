@@ -1,9 +1,11 @@
 // Measures the tracker on a ground truth set: every frame against exact poses and corners.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "daemon/tracking/apriltag_tracker.hpp"
 #include "daemon/tracking/tracker.hpp"
 #include "tests/truth/truth_set.hpp"
 
@@ -38,8 +40,15 @@ struct TrackedFrame {
   double rotation_rad = 0, translation_m = 0;
   double error_squared = 0;  // normalised by the covariance: chi-square of 6 degrees
   double milliseconds = 0;
+  // What a live picture shows; absent where it shows nothing.
+  double held_s = 0;
+  std::optional<double> shown_px;  // as vertex_px
+  // How far the vertices' error (found or shown minus true place) is from the last frame's: mean
+  // length.
+  std::optional<double> jitter_px, shown_jitter_px;
 };
 
-std::vector<TrackedFrame> measure_tracking(const TruthSet& set, const set::Tracking& settings);
+std::vector<TrackedFrame> measure_tracking(const TruthSet& set, const set::Tracking& settings,
+                                           tracking::Search search = tracking::Search::whole);
 
 }  // namespace previz::truth

@@ -15,7 +15,9 @@
 
 #include "daemon/tracking/apriltag_tracker.hpp"
 #include "daemon/tracking/joint_pose.hpp"
+#include "daemon/tracking/pose_filter.hpp"
 #include "daemon/tracking/tag_detector.hpp"
+#include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 #include "tests/truth/tracking_measure.hpp"
 
@@ -186,9 +188,25 @@ CountResult count_tags(const std::filesystem::path& picture, const std::string& 
   return result;
 }
 
-VideoResult measure_video(const std::filesystem::path& video, double decimate) {
+namespace {
+
+// The camera's place off the middle of its neighbours in time, rms a coordinate: the second
+// difference over sqrt(6), in which white noise keeps its size.
+double jitter(const std::vector<glm::dvec3>& places) {
+  double squares = 0;
+  for (std::size_t i = 2; i < places.size(); ++i) {
+    const glm::dvec3 s = places[i] - 2.0 * places[i - 1] + places[i - 2];
+    squares += glm::dot(s, s) / 6;
+  }
+  return places.size() > 2 ? std::sqrt(squares / double(places.size() - 2)) : 0;
+}
+
+}  // namespace
+
+WallVideo read_wall_video(const std::filesystem::path& video) {
   const nlohmann::json camera = read_json(video.parent_path() / "camera_derived.json");
-  PinholeIntrinsics lens;
+  WallVideo wall;
+  PinholeIntrinsics& lens = wall.lens;
   lens.width = camera.at("width"), lens.height = camera.at("height");
   const auto& k = camera.at("K_row_major");
   lens.fx = k[0], lens.cx = k[2], lens.fy = k[4], lens.cy = k[5];
@@ -197,33 +215,31 @@ VideoResult measure_video(const std::filesystem::path& video, double decimate) {
 
   cv::VideoCapture capture(video.string());
   if (!capture.isOpened()) throw Error(video.string() + ": cannot be opened as a video");
-  std::vector<Frame> frames;
   for (cv::Mat picture; capture.read(picture);) {
     cv::Mat gray(picture.rows, picture.cols, CV_8UC1);
     cv::extractChannel(picture, gray, 1);  // green: most of the luminance
     Frame frame;
     frame.width = gray.cols, frame.height = gray.rows;
     frame.format = PixelFormat::gray8;
-    frame.timestamp_ns = std::int64_t(frames.size()) * 33'333'333;
+    frame.timestamp_ns = std::int64_t(wall.frames.size()) * 33'333'333;
     frame.bytes.assign(gray.data, gray.data + gray.total());
-    frames.push_back(std::move(frame));
+    wall.frames.push_back(std::move(frame));
   }
 
   // Where tag 4 is from tag 3, as the first frames that show both without doubt have it (mean of
   // places; the first frame's rotation). The size is not stated: lengths are up to scale.
-  set::Tracking settings;
-  settings.decimate = decimate;
   set::Tag first, second;
   first.id = 3, second.id = 4;
   first.size_m = second.size_m = camera.at("tag_size_m_in_the_test");
   {
-    set::Tracking one = settings, other = settings;
+    set::Tracking one, other;
+    one.decimate = other.decimate = 2;
     one.tags = {first}, other.tags = {second};
     const auto a = tracking::make_apriltag_tracker(one, lens);
     const auto b = tracking::make_apriltag_tracker(other, lens);
     glm::dvec3 place(0);
     int used = 0;
-    for (const Frame& frame : frames) {
+    for (const Frame& frame : wall.frames) {
       const tracking::Track ta = a->track(frame), tb = b->track(frame);
       if (!ta.pose || !tb.pose) continue;
       const glm::dmat4 relative =
@@ -234,34 +250,51 @@ VideoResult measure_video(const std::filesystem::path& video, double decimate) {
     }
     if (used > 0) second.world_from_tag[3] = glm::dvec4(place / double(used), 1);
   }
-  settings.tags = {first, second};
+  wall.tags = {first, second};
+  return wall;
+}
 
-  const auto tracker = tracking::make_apriltag_tracker(settings, lens);
+VideoResult measure_video(const WallVideo& wall, double decimate, tracking::Search search) {
+  set::Tracking settings;
+  settings.decimate = decimate;
+  settings.tags = wall.tags;
+  const auto tracker = tracking::make_apriltag_tracker(settings, wall.lens, {}, search);
+  tracking::PoseFilter filter(settings, wall.lens);
   VideoResult result;
-  std::vector<glm::dvec3> places;
-  double squares = 0;
+  std::vector<glm::dvec3> places, shown_places;
+  double squares = 0, off_squares = 0;
   const auto start = std::chrono::steady_clock::now();
-  for (const Frame& frame : frames) {
+  for (const Frame& frame : wall.frames) {
     const tracking::Track track = tracker->track(frame);
+    const auto shown = filter.shown(track, frame.timestamp_ns);
     ++result.frames;
     const std::set<int> seen(track.seen_tags.begin(), track.seen_tags.end());
     result.with_both += seen.contains(3) && seen.contains(4);
     result.ambiguous += track.status == tracking::TrackStatus::ambiguous;
-    if (!track.pose) continue;
+    if (!track.pose || !shown) continue;
     ++result.tracked;
     squares += track.pose->reprojection_rms_px * track.pose->reprojection_rms_px;
     places.emplace_back(track.pose->world_from_camera[3]);
+    shown_places.emplace_back(shown->world_from_camera[3]);
+    const auto at = tracking::camera_from_world(shown->world_from_camera);
+    const auto found = tracking::camera_from_world(track.pose->world_from_camera);
+    for (const set::Tag& tag : wall.tags) {
+      const glm::dvec3 middle(tag.world_from_tag[3]);
+      const glm::dvec3 a = at.rotation * middle + at.translation;
+      const glm::dvec3 b = found.rotation * middle + found.translation;
+      const double off = glm::distance(distort(wall.lens, {a.x / a.z, a.y / a.z}),
+                                       distort(wall.lens, {b.x / b.z, b.y / b.z}));
+      off_squares += off * off / double(wall.tags.size());
+      result.shown_worst_px = std::max(result.shown_worst_px, off);
+    }
   }
   result.milliseconds =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count() /
       std::max(1, result.frames);
   result.rms_px = std::sqrt(squares / std::max(1, result.tracked));
-  double second_squares = 0;
-  for (std::size_t i = 2; i < places.size(); ++i) {
-    const glm::dvec3 s = places[i] - 2.0 * places[i - 1] + places[i - 2];
-    second_squares += glm::dot(s, s) / 6;
-  }
-  if (places.size() > 2) result.jitter_m = std::sqrt(second_squares / double(places.size() - 2));
+  result.shown_off_px = std::sqrt(off_squares / std::max(1, result.tracked));
+  result.jitter_m = jitter(places);
+  result.shown_jitter_m = jitter(shown_places);
   return result;
 }
 

@@ -6,7 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "daemon/set/set.hpp"
+#include "daemon/tracking/apriltag_tracker.hpp"
 #include "drivers/calibration.hpp"
+#include "drivers/frame.hpp"
 
 namespace previz::truth {
 
@@ -40,11 +43,21 @@ CountResult count_tags(const std::filesystem::path& picture, const std::string& 
 struct VideoResult {
   int frames = 0, with_both = 0, tracked = 0, ambiguous = 0;
   double rms_px = 0;
-  double jitter_m = 0;  // second difference of the camera's place over sqrt(6), rms
+  double jitter_m = 0;        // second difference of the camera's place over sqrt(6), rms
+  double shown_jitter_m = 0;  // the same, of what a live picture shows
+  double shown_off_px = 0, shown_worst_px = 0;  // shown against found, of the tags' middles
   double milliseconds = 0;
 };
 
 // `video/wall_tags3and4_1080p.mp4`: tag 3 is the map, tag 4 is put where the first frames see it.
-VideoResult measure_video(const std::filesystem::path& video, double decimate);
+struct WallVideo {
+  PinholeIntrinsics lens;
+  std::vector<Frame> frames;
+  std::vector<set::Tag> tags;
+};
+WallVideo read_wall_video(const std::filesystem::path& video);
+
+VideoResult measure_video(const WallVideo& wall, double decimate,
+                          tracking::Search search = tracking::Search::whole);
 
 }  // namespace previz::truth

@@ -23,7 +23,7 @@ struct Mean {
   double mean() const { return count ? sum / count : 0; }
 };
 
-void report(const truth::TruthSet& set, const set::Tracking& settings) {
+void report(const truth::TruthSet& set, const set::Tracking& settings, tracking::Search search) {
   std::printf("%s (%dx%d, %zu frames, decimate %g)\n", set.name.c_str(),
               set.observer.intrinsics.width, set.observer.intrinsics.height, set.frames.size(),
               settings.decimate);
@@ -32,7 +32,13 @@ void report(const truth::TruthSet& set, const set::Tracking& settings) {
   Mean corner, reprojection, vertex, nees, corner_chi, milliseconds;
   glm::dvec2 bias(0);
   double least_margin = HUGE_VAL;
-  for (const truth::TrackedFrame& row : measure_tracking(set, settings)) {
+  Mean shown, jitter, shown_jitter;
+  int held = 0;
+  for (const truth::TrackedFrame& row : measure_tracking(set, settings, search)) {
+    held += row.held_s > 0;
+    if (row.shown_px) shown.add(*row.shown_px);
+    if (row.jitter_px) jitter.add(*row.jitter_px);
+    if (row.shown_jitter_px) shown_jitter.add(*row.shown_jitter_px);
     Mean here;
     for (const truth::CornerError& tag : row.corners) {
       least_margin = std::min(least_margin, tag.margin);
@@ -61,11 +67,12 @@ void report(const truth::TruthSet& set, const set::Tracking& settings) {
       "  tracked %d of %zu; mean (max) px: corner %.3f (%.3f), reprojection %.3f (%.3f), vertices "
       "%.3f (%.3f)\n  corner bias %+.3f %+.3f px, corner chi2/8 %.2f, pose nees/6 %.2f, least "
       "margin "
-      "%.0f, %.1f ms a frame\n\n",
+      "%.0f, %.1f ms a frame\n  shown live: vertices %.3f (%.3f), jitter %.3f px of %.3f, held "
+      "%d\n\n",
       vertex.count, set.frames.size(), corner.mean(), corner.most, reprojection.mean(),
       reprojection.most, vertex.mean(), vertex.most, bias.x / std::max(1, corner.count),
       bias.y / std::max(1, corner.count), corner_chi.mean(), nees.mean() / 6, least_margin,
-      milliseconds.mean());
+      milliseconds.mean(), shown.mean(), shown.most, shown_jitter.mean(), jitter.mean(), held);
 }
 
 void report_photographs(const std::filesystem::path& directory, double decimate) {
@@ -93,13 +100,18 @@ void report_photographs(const std::filesystem::path& directory, double decimate)
                   family, margin, count.tags, count.least_margin, count.most_margin, count.refined);
     }
   }
-  const truth::VideoResult video =
-      truth::measure_video(directory / "video" / "wall_tags3and4_1080p.mp4", decimate);
-  std::printf(
-      "video: both tags in %d of %d frames, tracked %d, ambiguous %d, rms %.3f px, jitter %.2f mm, "
-      "%.0f ms a frame\n",
-      video.with_both, video.frames, video.tracked, video.ambiguous, video.rms_px,
-      1e3 * video.jitter_m, video.milliseconds);
+  const truth::WallVideo wall =
+      truth::read_wall_video(directory / "video" / "wall_tags3and4_1080p.mp4");
+  for (const auto& [name, search] : {std::pair("whole", tracking::Search::whole),
+                                     std::pair("in parts", tracking::Search::parts)}) {
+    const truth::VideoResult video = truth::measure_video(wall, decimate, search);
+    std::printf(
+        "video, %s: both tags in %d of %d frames, tracked %d, ambiguous %d, rms %.3f px, jitter "
+        "%.3f mm, shown %.3f mm, off by %.3f px (%.3f), %.0f ms a frame\n",
+        name, video.with_both, video.frames, video.tracked, video.ambiguous, video.rms_px,
+        1e3 * video.jitter_m, 1e3 * video.shown_jitter_m, video.shown_off_px, video.shown_worst_px,
+        video.milliseconds);
+  }
 }
 
 }  // namespace
@@ -111,6 +123,8 @@ int main(int argc, char** argv) {
   app.add_option("SETDIR", sets)->check(CLI::ExistingDirectory);
   app.add_option("--decimate", decimate, "shrink the picture in which tags are looked for")
       ->check(CLI::Range(1.0, 8.0));
+  bool in_parts = false;
+  app.add_flag("--in-parts", in_parts, "search parts of the pictures, as live");
   std::string photographs;
   app.add_option("--photographs", photographs, "folder with apriltag/ and video/")
       ->check(CLI::ExistingDirectory);
@@ -120,7 +134,7 @@ int main(int argc, char** argv) {
       const truth::TruthSet set = truth::load_truth_set(directory);
       set::Tracking settings = truth::tracking_settings(set);
       settings.decimate = decimate;
-      report(set, settings);
+      report(set, settings, in_parts ? tracking::Search::parts : tracking::Search::whole);
     }
     if (!photographs.empty()) report_photographs(photographs, decimate);
   } catch (const Error& error) {
