@@ -128,7 +128,8 @@ void calibrate_tags(const TagsOptions& options, std::ostream& out) {
   print_survey(survey, set, out);
   std::vector<int> wanted;
   for (const set::Tag& tag : set.tracking.tags) wanted.push_back(tag.id);
-  insist(missing_of_tags(survey, wanted, how.origin), options.force, out);
+  const std::string doubts =
+      insist(missing_of_tags(survey, wanted, how.origin), options.force, out);
   if (options.write) {
     const std::string text = with_tags(session::read_file(*options.set_file), survey);
     set::parse_set(text, *options.set_file);
@@ -136,7 +137,7 @@ void calibrate_tags(const TagsOptions& options, std::ostream& out) {
     session::replace_file(*options.set_file, text);
     fmt::print(out, "written into {}; as it was: {}\n", options.set_file->string(), old.string());
   }
-  write_tables(tag_tables(survey), options.table_file, out);
+  write_tables(doubts + tag_tables(survey), options.table_file, out);
 }
 
 }  // namespace previz::calibrate
