@@ -22,8 +22,8 @@ namespace previz::rig {
 struct Look {
   State state;
   int samples = 16;
-  bool governed = false;    // quality.fps decides the samples until somebody asks for a number
-  bool accumulates = true;  // averages over frames, live and in review
+  bool governed = false;     // quality.fps decides the samples until somebody asks for a number
+  bool accumulates = false;  // averages over frames, live and in review
   set::Estimator estimator = set::Estimator::paired;
   set::LightMode light_mode = set::LightMode::image;
   render::View view = render::View::composite;
