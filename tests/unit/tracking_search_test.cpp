@@ -198,7 +198,8 @@ TEST(SearchInParts, FindsWhatEnters) {
   }
 }
 
-// A camera that jumps is where no part shows its tags: the whole picture is searched at once.
+// A camera that jumps is where parts may show none of its tags: where most are missing, the whole
+// picture is searched at once, so that more than one of the three is found; the next frame has all.
 TEST(SearchInParts, AJumpHasTheWholePictureSearched) {
   const TagScene scene = table();
   const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens, {}, Search::parts);
@@ -207,7 +208,7 @@ TEST(SearchInParts, AJumpHasTheWholePictureSearched) {
     const Track track =
         tracker->track(at_time(picture(seen_from(scene, i / 4 % 2 * 1.5), random), i));
     ASSERT_TRUE(track.pose) << i << ": " << track.reason;
-    EXPECT_EQ(track.pose->tags.size(), 3u) << i;
+    EXPECT_GE(track.pose->tags.size(), i == 4 ? 2u : 3u) << i;
   }
 }
 
