@@ -74,7 +74,7 @@ std::vector<std::uint64_t> count_from(std::uint64_t first, std::uint64_t last) {
 TEST(Recorder, SaysForHowLongATakeIsBeingWritten) {
   const TemporaryDirectory directory;
   Recorder recorder(options_in(directory.path()));
-  EXPECT_TRUE(wait_until([&] { return !recorder.status().writing; }));
+  EXPECT_TRUE(wait_until("nothing is written", [&] { return !recorder.status().writing; }));
   recorder.start();
   for (std::uint64_t i = 0; i < 40; ++i) recorder.offer(picture(i));
   EXPECT_TRUE(recorder.status().writing);
@@ -82,7 +82,7 @@ TEST(Recorder, SaysForHowLongATakeIsBeingWritten) {
   // The disk has not taken the queue, and no track of the frames has come: they are waited for.
   EXPECT_FALSE(recorder.status().recording);
   EXPECT_TRUE(recorder.status().writing);
-  EXPECT_TRUE(wait_until([&] { return !recorder.status().writing; }));
+  EXPECT_TRUE(wait_until("the take is whole", [&] { return !recorder.status().writing; }));
   const RecorderStatus status = recorder.status();
   EXPECT_EQ(status.finished_takes, 1u);
   EXPECT_TRUE(session::open_session(status.directory).missing.empty());
