@@ -68,8 +68,9 @@ std::optional<PictureSize> tiff_size(const HeaderBytes& bytes) {
   for (std::uint64_t i = 0; i < *entries; ++i) {
     const std::uint64_t entry = *directory + 2 + 12 * i;
     const auto tag = bytes.number(entry, 2);
-    if (tag != width_tag && tag != height_tag) continue;
-    std::optional<std::uint64_t>& length = *tag == width_tag ? width : height;
+    const bool is_width = tag == width_tag;
+    if (!is_width && tag != height_tag) continue;
+    std::optional<std::uint64_t>& length = is_width ? width : height;
     if (length) return std::nullopt;  // of two, libraries choose differently
     const std::size_t size = bytes.number(entry + 2, 2) == of_two_bytes ? 2 : 4;
     length = bytes.number(entry + 8, size);

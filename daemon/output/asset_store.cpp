@@ -112,7 +112,7 @@ class AssetStore::Worker {
     for (;;) {
       changed_.wait(lock, [this] { return is_stopped_ || !orders_.empty(); });
       if (is_stopped_) return nullptr;
-      const std::shared_ptr<Order> order = orders_.front().lock();
+      std::shared_ptr<Order> order = orders_.front().lock();
       orders_.pop_front();
       if (order) return order;
     }

@@ -11,7 +11,7 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 
 // A frame may be offered so long after its capture.
-constexpr std::chrono::seconds late{1};
+constexpr std::chrono::seconds capture_delay{1};
 
 }  // namespace
 
@@ -152,7 +152,7 @@ void RecordQueue::forget_first_of_ring() {
 // In standby, or while the camera is missing, nothing is offered, and the ring's entries become too
 // old.
 void RecordQueue::forget_what_is_long_ago() {
-  const auto keep = std::chrono::duration<double>(preroll_s_) + late;
+  const auto keep = std::chrono::duration<double>(preroll_s_) + capture_delay;
   const auto is_long_ago = [&](const Entry& entry) {
     const auto* captured = std::get_if<Captured>(&entry);
     return !captured || SteadyClock::now() - captured->offered > keep;

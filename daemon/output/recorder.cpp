@@ -369,7 +369,8 @@ void Recorder::begin_take(bool goes_on) {
   const std::string slate = options_.take.info.take.value_or(session::TakeInfo{}).slate;
   while (!take_) {
     const std::size_t folder = folders_.choose();
-    take_.emplace().folder = folder;
+    take_ = Take();
+    take_->folder = folder;
     try {
       highest_number_ = next_take_number(folders_.all(), slate, highest_number_);
       take_->writer =

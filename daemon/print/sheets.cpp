@@ -60,10 +60,10 @@ std::vector<Sheet> on_grid(const std::vector<Drawing>& drawings, const Grid& gri
       sheets.back().title = title;
       if (pages > 1) sheets.back().title += fmt::format("; sheet {} of {}", sheets.size(), pages);
     }
-    const Rectangle window{
-        sheet_margin_mm + (place % grid.columns) * (drawings[i].width + gutter_mm),
-        sheet_margin_mm + (place / grid.columns) * (drawings[i].height + gutter_mm),
-        drawings[i].width, drawings[i].height};
+    const int column = place % grid.columns, row = place / grid.columns;
+    const Rectangle window{sheet_margin_mm + column * (drawings[i].width + gutter_mm),
+                           sheet_margin_mm + row * (drawings[i].height + gutter_mm),
+                           drawings[i].width, drawings[i].height};
     sheets.back().placed.push_back({i, window.x, window.y, window});
   }
   return sheets;

@@ -19,10 +19,10 @@ void check(int result, const char* what) {
 class Source final : public EventLoop::Watch {
  public:
   Source(sd_event* event, EventLoop::Callback callback,
-         std::shared_ptr<const EventLoop::OnFault> on_fault)
+         const std::shared_ptr<const EventLoop::OnFault>& on_fault)
       : event_(event),
         callback_(std::make_shared<EventLoop::Callback>(std::move(callback))),
-        on_fault_(std::move(on_fault)) {}
+        on_fault_(on_fault) {}
   ~Source() override {
     sd_event_source_set_enabled(source_, SD_EVENT_OFF);
     sd_event_source_unref(source_);

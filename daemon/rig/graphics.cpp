@@ -44,11 +44,11 @@ std::shared_ptr<render::Device> open_graphics(const render::DeviceOptions& optio
       options.name.empty() ? memory_file() : std::nullopt;
   const std::string had = memory ? remembered_gpu(*memory) : std::string();
   if (had.empty()) {
-    const std::shared_ptr<render::Device> device = render::open_device(options);
+    std::shared_ptr<render::Device> device = render::open_device(options);
     if (memory && render::is_gpu(*device)) remember(*memory, render::device_name(*device), reports);
     return device;
   }
-  const std::shared_ptr<render::Device> device = render::awaited_gpu(options);
+  std::shared_ptr<render::Device> device = render::awaited_gpu(options);
   try {
     render::reopen_device(*device, cpu_instead);
     if (render::is_gpu(*device)) remember(*memory, render::device_name(*device), reports);

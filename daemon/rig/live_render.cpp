@@ -13,7 +13,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds patience{100};  // how late a change of mode may be noticed
+constexpr std::chrono::milliseconds mode_delay{100};  // how late a change of mode may be noticed
 constexpr int most_round = 64;
 constexpr double round_s = 1;
 constexpr int most_samples = 1 << 24;  // above this the sums are no longer exact enough (P4)
@@ -105,7 +105,7 @@ std::optional<Shot> LiveRender::refine_round(const Look& look) {
   if (!refining_ && !begin_refinement(look)) return std::nullopt;
   Shot& shot = *good_of(look);
   if (shot.samples >= most_samples) {  // the finished picture stays on the screen
-    std::this_thread::sleep_for(patience);
+    std::this_thread::sleep_for(mode_delay);
     return refined_;
   }
   const auto begin = Clock::now();
@@ -178,7 +178,7 @@ std::optional<Shot> LiveRender::wait_for_frame(const Look& look) {
 // A frame that came while tracking rested has neither pose nor light, and its plate all the same.
 std::optional<Shot> LiveRender::take_frame(const Look& look, bool is_to_be_rendered) {
   const bool review = look.of_take;
-  std::optional<Shot> shot = (review ? channels_.reviewed : channels_.tracked).pop_for(patience);
+  std::optional<Shot> shot = (review ? channels_.reviewed : channels_.tracked).pop_for(mode_delay);
   if (review && channels_.tracked.try_pop()) metrics_.dropped("render", "review");
   if (!shot) return std::nullopt;
   if (look.state.mode == Mode::standby) {

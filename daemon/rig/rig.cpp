@@ -72,7 +72,7 @@ output::RecorderOptions recorder_options(const LoadedSet& loaded, const Cameras&
   return options;
 }
 
-Cameras open_cameras_of(const LoadedSet& loaded, const Rig::Parts& parts, Usb usb) {
+Cameras open_cameras_of(const LoadedSet& loaded, const Rig::Parts& parts, const Usb& usb) {
   Cameras cameras = open_cameras(loaded.set, parts.loop_cameras, usb);
   if (parts.around_cameras) parts.around_cameras(cameras);
   return cameras;

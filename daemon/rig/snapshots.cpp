@@ -61,7 +61,8 @@ fs::path claim_snapshot(const fs::path& folder) {
   for (int number = last + 1;; ++number) {
     std::array<char, 32> name{};
     std::snprintf(name.data(), name.size(), "%s%04d", snapshot_prefix.data(), number);
-    const fs::path stem = folder / name.data(), exr = snapshot_file(stem, ".exr");
+    fs::path stem = folder / name.data();
+    const fs::path exr = snapshot_file(stem, ".exr");
     const fs::path claim = output::unfinished_name(exr);
     const OwnedDescriptor made(
         ::open(claim.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
@@ -94,7 +95,7 @@ fs::path write_snapshot(const pipeline::Shot& shot, const set::Set& set) {
   const std::uint64_t pixels = shot.layers->mask.size();
   check_space(folder, pixels * most_bytes_a_pixel, set.recording.directory,
               static_cast<std::uint64_t>(set.recording.reserve_mb * 1e6));
-  const fs::path stem = claim_snapshot(folder);
+  fs::path stem = claim_snapshot(folder);
   output::ExrMetadata metadata = output::exr_metadata(*shot.layers, *shot.frame, shot.track, set);
   if (shot.shown_pose) {
     metadata.pose = "held";

@@ -8,7 +8,7 @@ namespace {
 
 constexpr int kStrips = sweep_pictures - 1;
 // A tag of 64 px in the middle of a strip's border, and what libapriltag needs about it.
-constexpr double kStripOverlapPx = 64 / 2 + 12;
+constexpr double kStripOverlapPx = 64.0 / 2 + 12;
 // libapriltag thresholds in tiles of this side; regions on this grid are thresholded as the whole
 // picture is.
 constexpr int kTilePx = 4;

@@ -34,7 +34,7 @@ fs::path receiver_program() {
   const fs::path own = fs::read_symlink("/proc/self/exe", none);
   fs::path folder = own.parent_path();
   for (int i = 0; i < 4 && !folder.empty(); ++i, folder = folder.parent_path()) {
-    const fs::path program = folder / "libexec" / "previzd" / "previzd-aravis";
+    fs::path program = folder / "libexec" / "previzd" / "previzd-aravis";
     if (fs::is_regular_file(program, none)) return program;
   }
   throw Error("libexec/previzd/previzd-aravis, which receives from aravis cameras, is not beside " +

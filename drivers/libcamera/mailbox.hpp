@@ -76,7 +76,7 @@ std::shared_ptr<Mailbox> mailbox_of(const std::shared_ptr<Camera>& camera) {
   std::erase_if(mailboxes, [](const auto& entry) { return entry.first.expired(); });
   if (const auto found = mailboxes.find(camera); found != mailboxes.end())
     return found->second.lock();
-  const auto mailbox = std::make_shared<Mailbox>();
+  auto mailbox = std::make_shared<Mailbox>();
   camera->requestCompleted.connect(
       mailbox.get(), [mailbox](::libcamera::Request* request) { mailbox->completed(request); });
   camera->disconnected.connect(mailbox.get(), [mailbox] { mailbox->disconnected(); });

@@ -426,7 +426,7 @@ TEST(Receiver, MessagesOfAnyBytesAreReadWithinThem) {
   const aravis::Pulse pulse{{{"stream failures", 1}, {"stream underruns", 2}}};
   const aravis::Listing listing{{{"a", "b", "c", "d", "e", "f"}}};
   std::mt19937 random(7);
-  for (Bytes whole :
+  for (const Bytes& whole :
        {aravis::Writer()(note).bytes(), aravis::Writer()(pulse).bytes(),
         aravis::Writer()(listing).bytes(), aravis::Writer()(aravis::Terms()).bytes()}) {
     for (int i = 0; i < 3000; ++i) {

@@ -53,15 +53,14 @@ struct FakeDevice {
   std::deque<v4l2_event> events;
   bool subscribed = false;
   bool unplugged = false;
+  bool damages_all = false;  // every buffer that is queued comes back at once, damaged
 
   // What it sends by itself, a frame each `frame_interval` from its start on.
   int frames_to_come = 0;
   std::function<void(FakeDevice&)> send_frame;  // the frame that is due at next_frame
   std::chrono::nanoseconds frame_interval = std::chrono::milliseconds(5);
   HostClock::Time next_frame{};
-  // Every buffer that is queued comes back at once, damaged.
-  bool damages_all = false;
-  std::chrono::nanoseconds dequeue_time{0};  // what the caller needs for such a buffer
+  std::chrono::nanoseconds dequeue_time{0};  // what the caller needs for a damaged buffer
 
   // Its time.
   std::int64_t now_ns = 1'000'000'000'000;

@@ -57,7 +57,7 @@ void write_pictures(const fs::path& corpus) {
   }
 }
 
-void write_environment(const fs::path& file, std::vector<const char*> channels,
+void write_environment(const fs::path& file, const std::vector<const char*>& channels,
                        Imf::Compression compression) {
   constexpr int width = 16, height = 8;
   Imf::Header header(width, height);

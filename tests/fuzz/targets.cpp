@@ -57,7 +57,7 @@ const std::filesystem::path& work_folder() {
 }
 
 std::filesystem::path file_of(Bytes bytes, const char* name) {
-  const std::filesystem::path file = work_folder() / name;
+  std::filesystem::path file = work_folder() / name;
   std::ofstream(file, std::ios::binary | std::ios::trunc) << text_of(bytes);
   return file;
 }

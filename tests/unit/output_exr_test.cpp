@@ -220,7 +220,7 @@ TEST(Exr, ADataWindowThatDoesNotBeginAtZeroIsRefused) {
   const TemporaryDirectory directory;
   const render::Layers layers = sample_layers(4, 4);
   const auto window_of = [&](int min_x, int min_y, int max_x, int max_y) {
-    const auto path = directory / "window.exr";
+    auto path = directory / "window.exr";
     write_exr(path, layers, {});
     std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
     std::string bytes(std::filesystem::file_size(path), '\0');

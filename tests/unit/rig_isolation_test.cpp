@@ -29,7 +29,7 @@ std::vector<session::FrameRecord> unbroken(const std::filesystem::path& take) {
   EXPECT_TRUE(session.missing.empty()) << testing::PrintToString(session.missing);
   const auto stream = session::open_stream(session, "observer");
   if (!stream) return {};
-  const std::vector<session::FrameRecord> records = stream->records();
+  std::vector<session::FrameRecord> records = stream->records();
   for (std::size_t i = 0; i < records.size(); ++i)
     EXPECT_EQ(records[i].sequence, records[0].sequence + i);
   return records;

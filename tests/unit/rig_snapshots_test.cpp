@@ -23,12 +23,13 @@ namespace fs = std::filesystem;
 TEST(Snapshots, HaveTheNumberAfterTheLast) {
   const test::TemporaryDirectory directory;
   EXPECT_EQ(claim_snapshot(directory / "new"), directory / "new/snapshot_0001");
+  const auto touch = [&](const std::string& name) { const std::ofstream made(directory / name); };
   for (const char* name :
        {"snapshot_0007.exr", "snapshot_0009.png", "snapshot_x.exr", "other_99.exr"})
-    std::ofstream(directory / name);
+    touch(name);
   EXPECT_EQ(claim_snapshot(directory.path()), directory / "snapshot_0010");
   EXPECT_EQ(claim_snapshot(directory.path()), directory / "snapshot_0011");
-  std::ofstream(directory / "snapshot_12345.exr");
+  touch("snapshot_12345.exr");
   EXPECT_EQ(claim_snapshot(directory.path()), directory / "snapshot_12346");
 }
 

@@ -22,7 +22,8 @@ bool holds(const Region& region, double x, double y, double half, int width, int
 }
 
 TEST(SearchPlan, SweepsEveryTagOfUpTo64Pixels) {
-  for (const auto& [width, height] : {std::pair(1920, 1080), {480, 360}, {641, 479}, {33, 17}}) {
+  for (const auto& [w, h] : {std::pair(1920, 1080), {480, 360}, {641, 479}, {33, 17}}) {
+    const int width = w, height = h;
     SearchPlan plan(width, height);
     std::vector<Region> swept;
     int coarse = 0;

@@ -42,8 +42,7 @@ Damage damage_of(ArvBufferStatus status) {
 }
 
 std::uint32_t number_of(ArvBuffer& buffer) {
-  return static_cast<std::uint32_t>(
-      reinterpret_cast<std::uintptr_t>(arv_buffer_get_user_data(&buffer)));
+  return GPOINTER_TO_UINT(arv_buffer_get_user_data(&buffer));
 }
 
 }  // namespace
@@ -110,9 +109,8 @@ void Device::begin_stream() {
   lent_.assign(ring.buffers, nullptr);
   for (std::uint32_t i = 0; i < ring.buffers; ++i)
     arv_stream_push_buffer(
-        stream_.get(),
-        arv_buffer_new_full(static_cast<std::size_t>(ring.payload), memory_->at(i).data(),
-                            reinterpret_cast<void*>(std::uintptr_t{i}), nullptr));
+        stream_.get(), arv_buffer_new_full(static_cast<std::size_t>(ring.payload),
+                                           memory_->at(i).data(), GUINT_TO_POINTER(i), nullptr));
   Failure failure;
   arv_camera_start_acquisition(camera_.get(), failure.out());
   failure.check(name_, "cannot start");
