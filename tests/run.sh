@@ -14,7 +14,7 @@
 #   asan       the test programs marked SANITIZED (tests/CMakeLists.txt) under ASan and UBSan
 #   format     clang-format
 #   lint       clang-tidy, of targets that have changed since they last passed on this machine, the
-#              newest first; in the gate none is begun after 20 s, and it says how many are left
+#              newest first; in the gate none is begun after 5 s, and it says how many are left
 #   lint-all   the same without a limit
 #   bench      builds the benchmarks and the programs that measure, and runs their test
 #   long       the cases that tests/*/CMakeLists.txt leave out of the gate (LONG), in the release build
@@ -149,7 +149,7 @@ for name in "${steps[@]}"; do
     release | asan | asan-all | tsan) build_and_test "$name" ;;
     long) build release && check "long" run_tests release --label-regex long ;;
     format) check "format" format ;;
-    lint) check "lint" lint 20 ;;
+    lint) check "lint" lint 5 ;;
     lint-all) check "lint-all" lint 86400 ;;
     bench | fuzz | soak) check "$name" "$name" ;;
     package | rig_vm) check "$name" "tests/$name/run.sh" ;;

@@ -1,6 +1,8 @@
 #include "daemon/render/kernel.hpp"
 
 #include <algorithm>
+#include <map>
+#include <mutex>
 #include <utility>
 
 #include "daemon/render/spirv.hpp"
@@ -34,6 +36,20 @@ std::shared_ptr<const Program> compile(const Device& device, const SpirvInfo& in
   return program;
 }
 
+// Every module is specialised once a process for the same values, whichever devices it is for: that
+// takes longer than all else at the start of a device that has its programs on Mesa's disk cache.
+const std::vector<std::uint32_t>& specialised(std::span<const std::uint32_t> spirv,
+                                              const std::vector<std::uint32_t>& values) {
+  static std::mutex mutex;
+  static std::map<std::pair<const std::uint32_t*, std::vector<std::uint32_t>>,
+                  std::vector<std::uint32_t>>
+      modules;
+  const std::lock_guard lock(mutex);
+  const std::pair key(spirv.data(), values);
+  if (const auto found = modules.find(key); found != modules.end()) return found->second;
+  return modules.emplace(key, specialise_spirv(spirv, values)).first->second;
+}
+
 }  // namespace
 
 Kernel::Kernel(Device& device, const char* name, std::span<const std::uint32_t> spirv,
@@ -43,7 +59,7 @@ Kernel::Kernel(Device& device, const char* name, std::span<const std::uint32_t> 
   std::vector<std::uint32_t> values = constants;
   if (!values.empty()) values.front() &= info.asked_bits;
   program_ = device.program(spirv.data(), values,
-                            [&] { return compile(device, info, specialise_spirv(spirv, values)); });
+                            [&] { return compile(device, info, specialised(spirv, values)); });
 }
 
 Kernel::BoundSet Kernel::create_set() const {

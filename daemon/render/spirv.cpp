@@ -42,24 +42,42 @@ struct SpirvId {
   bool is_used = false;
 };
 
+// Collects what specialisation constant 0 is masked with.
+struct Masks {
+  std::uint32_t constant = 0;  // its id
+  const std::vector<SpirvId>* ids = nullptr;
+  std::uint32_t bits = 0;
+};
+
+// What one instruction does with it. Its own definition, its name and its decoration do nothing.
+spv_result_t add_masks(void* user, const spv_parsed_instruction_t* instruction) {
+  Masks& masks = *static_cast<Masks*>(user);
+  const std::span operands(instruction->operands, instruction->num_operands);
+  const auto id_of = [&](const spv_parsed_operand_t& operand) {
+    return operand.type == SPV_OPERAND_TYPE_ID ? instruction->words[operand.offset] : 0;
+  };
+  const auto is_constant = [&](const auto& operand) { return id_of(operand) == masks.constant; };
+  const std::uint32_t op = instruction->opcode;
+  if (op == op_name || op == op_decorate || std::ranges::none_of(operands, is_constant))
+    return SPV_SUCCESS;
+  const bool is_mask = op == op_bitwise_and || (op == op_spec_constant_op &&
+                                                instruction->words[3] == op_bitwise_and);
+  const std::uint32_t a = id_of(operands[operands.size() - 2]), b = id_of(operands.back());
+  masks.bits |= is_mask ? (*masks.ids)[a == masks.constant ? b : a].value : ~0u;
+  return SPV_SUCCESS;
+}
+
 // Returns the constants with which specialisation constant 0 is masked; all bits if it is used in
 // any other way.
 std::uint32_t asked_bits(std::span<const std::uint32_t> spirv, const std::vector<SpirvId>& ids,
                          std::uint32_t constant) {
   if (constant == 0) return 0;
-  std::uint32_t bits = 0;
-  for (std::size_t at = spirv_header_words; at < spirv.size(); at += spirv[at] >> 16) {
-    const std::uint32_t op = spirv[at] & 0xffff;
-    if (op == op_name || op == op_decorate || op == op_constant || op == op_spec_constant) continue;
-    const std::span<const std::uint32_t> operands = spirv.subspan(at + 1, (spirv[at] >> 16) - 1);
-    if (std::ranges::find(operands, constant) == operands.end()) continue;
-    const bool is_mask =
-        op == op_bitwise_and || (op == op_spec_constant_op && operands[2] == op_bitwise_and);
-    if (!is_mask) return ~0u;
-    const auto [a, b] = std::pair(operands[operands.size() - 2], operands.back());
-    bits |= ids[a == constant ? b : a].value;
-  }
-  return bits;
+  Masks masks{constant, &ids};
+  const spvtools::Context context(SPV_ENV_VULKAN_1_3);
+  if (spvBinaryParse(context.CContext(), &masks, spirv.data(), spirv.size(), nullptr, add_masks,
+                     nullptr) != SPV_SUCCESS)
+    return ~0u;
+  return masks.bits;
 }
 
 }  // namespace

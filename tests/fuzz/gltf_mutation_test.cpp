@@ -230,18 +230,18 @@ TEST_F(GltfMutations, OfBytesOfABinaryFile) {
   const std::string whole{std::istreambuf_iterator<char>(stream), {}};
   load(directory_ / "sample.glb");
   ASSERT_EQ(loaded_, 2);
-  for (std::uint32_t seed = 0; seed < 4000; ++seed) {
+  for (std::uint32_t seed = 0; seed < 1500; ++seed) {
     SCOPED_TRACE(seed);
     std::ofstream(file, std::ios::binary) << Mutator(seed).bytes(whole);
     load(file);
   }
-  EXPECT_GT(loaded_, 100);
-  EXPECT_GT(refused_, 1000);
+  EXPECT_GT(loaded_, 40);
+  EXPECT_GT(refused_, 400);
 }
 
 TEST_F(GltfMutations, OfValuesOfTheJson) {
   const GltfWriter gltf = test::gltf_sample();
-  for (std::uint32_t seed = 0; seed < 2500; ++seed) {
+  for (std::uint32_t seed = 0; seed < 1000; ++seed) {
     SCOPED_TRACE(seed);
     Mutator mutator(seed);
     GltfWriter mutant = gltf;
@@ -251,8 +251,8 @@ TEST_F(GltfMutations, OfValuesOfTheJson) {
     mutant.save(file);
     load(file);
   }
-  EXPECT_GT(loaded_, 400);
-  EXPECT_GT(refused_, 500);
+  EXPECT_GT(loaded_, 160);
+  EXPECT_GT(refused_, 200);
 }
 
 TEST_F(GltfMutations, OfEveryTruncation) {

@@ -184,7 +184,7 @@ void expect_sound(const Set& set, const std::string& text) {
 
 TEST(SetFuzz, DamagedFilesAreSetsOrProblemsThatNameTheFile) {
   ASSERT_NO_THROW(parse_set(whole, file));
-  constexpr int rounds = 10000;
+  constexpr int rounds = 3000;
   Mutator mutate(1);
   int accepted = 0;
   for (int round = 0; round < rounds && !HasFailure(); ++round) {

@@ -247,15 +247,5 @@ TEST(LoadEnvironment, CountsWhatIsNoRadiance) {
     for (int c = 0; c < 3; ++c) ASSERT_TRUE(radiance[c] >= 0 && radiance[c] <= 2);
 }
 
-TEST(LoadEnvironment, PrintsItsTime) {
-  const previz::test::TemporaryDirectory directory;
-  write_exr_picture(directory / "sky.exr", rough_sky(1024));
-  const auto start = std::chrono::steady_clock::now();
-  const EnvironmentMap map = load_environment(settings_for(directory / "sky.exr")).environment;
-  const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - start;
-  EXPECT_EQ(map.size, 1024);
-  std::printf("1024x512 to %d x %d: %.0f ms\n", map.size, map.size, time.count());
-}
-
 }  // namespace lighting_environment_file_test
 }  // namespace previz::lighting

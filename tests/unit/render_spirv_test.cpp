@@ -8,6 +8,7 @@
 
 #include "daemon/render/feature.hpp"
 #include "daemon/render/kernel.hpp"
+#include "shaders/accumulate.spv.h"
 #include "shaders/extend.spv.h"
 #include "shaders/generate.spv.h"
 #include "shaders/lib/render_shared.h"
@@ -73,6 +74,11 @@ TEST(Spirv, APassIsCompiledOnceForFeaturesThatItDoesNotAskAbout) {
   });
   EXPECT_FALSE(compiled->bindings.empty());
   EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
+}
+
+TEST(Spirv, TheLastPassOfASampleAsksOnlyWhetherThereIsACameraOrATexture) {
+  EXPECT_EQ(describe_spirv(accumulate_spv).asked_bits,
+            gpu::FEATURE_CAMERA | gpu::FEATURE_TEXTURES);
 }
 
 // The picture of a scene of plain paint, with only what it needs compiled in and with every feature
