@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 #include <half.h>
 
-#include <chrono>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
