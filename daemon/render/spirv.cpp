@@ -60,8 +60,8 @@ spv_result_t add_masks(void* user, const spv_parsed_instruction_t* instruction) 
   const std::uint32_t op = instruction->opcode;
   if (op == op_name || op == op_decorate || std::ranges::none_of(operands, is_constant))
     return SPV_SUCCESS;
-  const bool is_mask = op == op_bitwise_and || (op == op_spec_constant_op &&
-                                                instruction->words[3] == op_bitwise_and);
+  const bool is_mask = op == op_bitwise_and ||
+                       (op == op_spec_constant_op && instruction->words[3] == op_bitwise_and);
   const std::uint32_t a = id_of(operands[operands.size() - 2]), b = id_of(operands.back());
   masks.bits |= is_mask ? (*masks.ids)[a == masks.constant ? b : a].value : ~0u;
   return SPV_SUCCESS;

@@ -77,8 +77,7 @@ TEST(Spirv, APassIsCompiledOnceForFeaturesThatItDoesNotAskAbout) {
 }
 
 TEST(Spirv, TheLastPassOfASampleAsksOnlyWhetherThereIsACameraOrATexture) {
-  EXPECT_EQ(describe_spirv(accumulate_spv).asked_bits,
-            gpu::FEATURE_CAMERA | gpu::FEATURE_TEXTURES);
+  EXPECT_EQ(describe_spirv(accumulate_spv).asked_bits, gpu::FEATURE_CAMERA | gpu::FEATURE_TEXTURES);
 }
 
 // The picture of a scene of plain paint, with only what it needs compiled in and with every feature
