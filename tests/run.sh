@@ -19,7 +19,7 @@
 #   bench      builds the benchmarks and the programs that measure, and runs their test
 #   long       the cases that tests/*/CMakeLists.txt leave out of the gate (LONG), in the release build
 #   asan-all   every test program under ASan and UBSan
-#   tsan       the test programs marked THREADS under ThreadSanitizer
+#   tsan       the test programs marked THREADS under ThreadSanitizer, with a storm of ten minutes
 #   fuzz       libFuzzer on every reader of foreign bytes, a minute each (tests/fuzz/run.sh)
 #   soak       half an hour of a whole rig (tests/soak)
 #   package    builds the .deb and installs it in a bare Debian (tests/package/run.sh)
@@ -146,7 +146,8 @@ lint() {
 config/install-deps.sh || exit 1
 for name in "${steps[@]}"; do
   case $name in
-    release | asan | asan-all | tsan) build_and_test "$name" ;;
+    release | asan | asan-all) build_and_test "$name" ;;
+    tsan) PREVIZ_STORM_S=600 build_and_test "$name" ;;
     long) build release && check "long" run_tests release --label-regex long ;;
     format) check "format" format ;;
     lint) check "lint" lint 5 ;;
