@@ -47,14 +47,14 @@ class RigLive : public testing::Test {
   };
 
   // The small take with a button for every action, named like it, and a lamp.
-  void write_set(const std::string& more = "") {
+  void write_set(const std::string& more = "", std::int64_t interval_ns = small_take_interval_ns) {
     std::string text =
         "[[light]]\nname = \"key\"\ntype = \"point\"\nposition_m = [0.3, 0, 0.6]\n"
         "emission = [1, 1, 1]\n[recording]\nslate = \"12A\"\nreserve_mb = 1\n"
         "directory = \"takes\"\n" +
         more;
     text += button_for_every_action();
-    write_small_take(directory_.path(), true, text);
+    write_small_take(directory_.path(), true, text, {}, interval_ns);
   }
 
   std::function<void()> while_shown_ = [] {};  // on the display's thread
@@ -97,6 +97,13 @@ class RigLive : public testing::Test {
     int count = 0;
     for (std::size_t at = 0; (at = text.find(words, at)) != std::string::npos; ++at) ++count;
     return count;
+  }
+  // Returns whether a take that began before `first` and ends after `s` is long enough for a crew
+  // that presses buttons in its review. A review goes at the pace of its take, whatever the machine
+  // can render meanwhile, and ends with it. So the take is as long as a dozen pictures took.
+  static bool is_long_after(const Shown& s, const Shown& first) {
+    return s.count > first.count + 12 &&
+           s.shot.frame->timestamp_ns > first.shot.frame->timestamp_ns + 4'000'000'000;
   }
   void until_counted(const std::string& what) { must_be_counted(directory_.path(), what); }
   void press(const std::string& button) { hand_.press(button); }

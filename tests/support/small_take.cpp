@@ -107,4 +107,33 @@ void write_small_take(const std::filesystem::path& directory, bool with_card,
   writer.close();
 }
 
+void write_card_with_variants(const std::filesystem::path& file) {
+  GltfWriter gltf;
+  const auto paper = [&](double grey, double glow) {
+    return gltf.add("materials",
+                    {{"pbrMetallicRoughness",
+                      {{"baseColorFactor", {grey, grey, grey, 1}},
+                       {"metallicFactor", 0.0},
+                       {"roughnessFactor", 1.0}}},
+                     {"emissiveFactor", {glow, glow, glow}},
+                     {"extensions", {{"KHR_materials_specular", {{"specularFactor", 0.0}}}}}});
+  };
+  const int grey = paper(0.5, 0), black = paper(0, 0), lamp = paper(0, 1);
+  gltf.json["extensionsUsed"] = {"KHR_materials_specular", "KHR_materials_variants"};
+  gltf.json["extensions"]["KHR_materials_variants"]["variants"] = {
+      {{"name", "grey"}}, {{"name", "black"}}, {{"name", "lamp"}}};
+  const int positions = gltf.positions(
+      {{-0.15f, 0.1f, 0.15f}, {0.15f, 0.1f, 0.15f}, {0.15f, 0.1f, -0.15f}, {-0.15f, 0.1f, -0.15f}});
+  gltf.root("card", gltf.mesh({{"attributes", {{"POSITION", positions}}},
+                               {"indices", gltf.indices({0, 1, 2, 0, 2, 3})},
+                               {"material", grey},
+                               {"extensions",
+                                {{"KHR_materials_variants",
+                                  {{"mappings",
+                                    {{{"material", grey}, {"variants", {0}}},
+                                     {{"material", black}, {"variants", {1}}},
+                                     {{"material", lamp}, {"variants", {2}}}}}}}}}}));
+  gltf.save(file);
+}
+
 }  // namespace previz::test

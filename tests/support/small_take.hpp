@@ -27,4 +27,7 @@ void write_small_take(const std::filesystem::path& directory, bool with_card = t
                       const std::optional<session::CapturedLight>& light = {},
                       std::int64_t interval_ns = small_take_interval_ns);
 
+// Writes the card with variants of its material: grey, as without one, black, and a lamp.
+void write_card_with_variants(const std::filesystem::path& file);
+
 }  // namespace previz::test

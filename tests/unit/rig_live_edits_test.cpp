@@ -5,7 +5,6 @@
 #include <fstream>
 
 #include "drivers/session/files.hpp"
-#include "tests/support/gltf_writer.hpp"
 #include "tests/support/live_rig.hpp"
 
 namespace previz::rig {
@@ -54,9 +53,7 @@ TEST_F(RigLive, ATakeInReviewIsChangedOnTopOfItsRecord) {
     until([&](const Shown& s) { return has(s, "card"); });
     press("record");
     const Shown first = until([](const Shown& s) { return s.look.state.recording; });
-    const Shown last = until([&](const Shown& s) {  // the presses below fall into its review
-      return s.shot.frame->timestamp_ns > first.shot.frame->timestamp_ns + 4'000'000'000;
-    });
+    const Shown last = until([&](const Shown& s) { return is_long_after(s, first); });
     press("record");
     until_said("12A_take001 is finished");
     press("move_right");  // live only: the take has one step
@@ -136,41 +133,11 @@ TEST_F(RigLive, ChangesOutlastTheSetAndAreKeptInItsFile) {
   EXPECT_NEAR(set.lights[0].gain_mixed, std::exp2(-1.0 / 3), 1e-6);
 }
 
-// The card, in grey, black and as a lamp.
-void write_card_with_variants(const std::filesystem::path& file) {
-  test::GltfWriter gltf;
-  const auto paper = [&](double grey, double glow) {
-    return gltf.add("materials",
-                    {{"pbrMetallicRoughness",
-                      {{"baseColorFactor", {grey, grey, grey, 1}},
-                       {"metallicFactor", 0.0},
-                       {"roughnessFactor", 1.0}}},
-                     {"emissiveFactor", {glow, glow, glow}},
-                     {"extensions", {{"KHR_materials_specular", {{"specularFactor", 0.0}}}}}});
-  };
-  const int grey = paper(0.5, 0), black = paper(0, 0), lamp = paper(0, 1);
-  gltf.json["extensionsUsed"] = {"KHR_materials_specular", "KHR_materials_variants"};
-  gltf.json["extensions"]["KHR_materials_variants"]["variants"] = {
-      {{"name", "grey"}}, {{"name", "black"}}, {{"name", "lamp"}}};
-  const int positions = gltf.positions(
-      {{-0.15f, 0.1f, 0.15f}, {0.15f, 0.1f, 0.15f}, {0.15f, 0.1f, -0.15f}, {-0.15f, 0.1f, -0.15f}});
-  gltf.root("card", gltf.mesh({{"attributes", {{"POSITION", positions}}},
-                               {"indices", gltf.indices({0, 1, 2, 0, 2, 3})},
-                               {"material", grey},
-                               {"extensions",
-                                {{"KHR_materials_variants",
-                                  {{"mappings",
-                                    {{{"material", grey}, {"variants", {0}}},
-                                     {{"material", black}, {"variants", {1}}},
-                                     {{"material", lamp}, {"variants", {2}}}}}}}}}}));
-  gltf.save(file);
-}
-
 // A variant is chosen by a button, recorded, rendered from the take as it was shown, changed in the
 // review and kept in the set file; no tree is built for any of it.
 TEST_F(RigLive, VariantsAreShownRecordedReviewedAndKept) {
   write_set();
-  write_card_with_variants(directory_ / "card.gltf");
+  test::write_card_with_variants(directory_ / "card.gltf");
   const auto variant_of = [](const Shown& s) {
     const auto found = s.shot.scene.variants.find("card");
     return found == s.shot.scene.variants.end() ? "-" : found->second;
@@ -182,9 +149,7 @@ TEST_F(RigLive, VariantsAreShownRecordedReviewedAndKept) {
     const Shown black = until([&](const Shown& s) { return variant_of(s) == "black"; });
     press("record");
     taken = until([&](const Shown& s) { return s.look.state.recording && s.shot.samples == 2; });
-    until([&](const Shown& s) {  // the presses below fall into its review
-      return s.shot.frame->timestamp_ns > taken.shot.frame->timestamp_ns + 4'000'000'000;
-    });
+    until([&](const Shown& s) { return is_long_after(s, taken); });
     press("record");
     until_said("12A_take001 is finished");
     press("next_variant");
