@@ -262,7 +262,8 @@ struct Recording {
   std::optional<double> queue_mb;  // limit of what is kept in memory; absent: by free memory
   double reserve_mb = 512;         // free disk space at which a take ends
   double timecode_fps = 25;
-  bool composite = false;  // the shown picture is recorded too
+  bool composite = false;    // the shown picture is recorded too
+  bool end_over_bus = true;  // members of the bus may end a take; buttons always may
 };
 
 // The crew's screen.

@@ -331,6 +331,7 @@ Keys recording_keys(Recording& r) {
       {"reserve_mb", &r.reserve_mb, megabytes.within(1, 1e9), "A take is ended properly before less disk space than this is left."},
       {"timecode_fps", &r.timecode_fps, plain.within(1, 240), "Frames per second of the timecode (time of day)."},
       {"composite", &r.composite, plain, "Also record the composite that was shown, without overlay: composite.mkv, lossless, for viewing the take elsewhere."},
+      {"end_over_bus", &r.end_over_bus, plain, "Whether a take may be ended over D-Bus, as by `previzctl record off`, by whoever may operate the rig there. Where not, only the crew's buttons end one; anybody who may operate it may begin one."},
   };
 }
 

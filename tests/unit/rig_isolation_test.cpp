@@ -297,6 +297,42 @@ TEST_F(RigLive, AStageThatEndsTheRigDoesNotEndTheRecording) {
   EXPECT_TRUE(std::filesystem::exists(takes / ".recording"));
 }
 
+// Where the set says so, whoever is on the bus may begin a take and not end one; a button may.
+TEST_F(RigLive, OnlyAButtonEndsATakeWhereTheSetSaysSo) {
+  const test::PrivateBus bus;
+  if (!bus.running()) GTEST_SKIP() << "dbus-daemon is not installed";
+  write_set("end_over_bus = false\n");
+  options_.bus = true;
+  const auto call = [](const char* method, const char* types, auto... arguments) {
+    sd_bus* client = nullptr;
+    sd_bus_error error = SD_BUS_ERROR_NULL;
+    std::string refused = "no bus";
+    if (sd_bus_open_system(&client) >= 0) {
+      const int result =
+          sd_bus_call_method(client, control::bus_name, control::object_path,
+                             control::interface_name, method, &error, nullptr, types, arguments...);
+      refused = result >= 0 ? "" : error.message ? error.message : "no answer";
+    }
+    sd_bus_error_free(&error);
+    sd_bus_flush_close_unref(client);
+    return refused;
+  };
+  run([&] {
+    test::must_come("the rig answers", [&] { return call("Metrics", "").empty(); });
+    EXPECT_EQ(call("Record", "b", 1), "");
+    until([](const Shown& s) { return s.look.state.recording; });
+    const std::string refusal = "the set lets only buttons end a take (recording.end_over_bus)";
+    EXPECT_EQ(call("Record", "b", 0), refusal);
+    EXPECT_EQ(call("Action", "s", "record"), refusal);
+    EXPECT_EQ(call("Record", "b", 1), "");
+    EXPECT_TRUE(until([](const Shown&) { return true; }).look.state.recording);
+    press("record");
+    until_said("12A_take001 is finished");
+    EXPECT_EQ(call("Action", "s", "record"), "");
+    until([](const Shown& s) { return s.look.state.recording; });
+  });
+}
+
 // The message bus is restarted, as by an upgrade of the system: the rig is on it again.
 TEST_F(RigLive, ABusThatIsRestartedIsJoinedAgain) {
   test::PrivateBus bus;
