@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -119,8 +120,10 @@ std::optional<double> TakeFolders::measure_speed() {
 std::optional<std::uint64_t> TakeFolders::free_bytes() const {
   std::optional<std::uint64_t> sum;
   std::set<dev_t> counted;
-  for (const std::filesystem::path& folder : folders_) {
+  for (std::size_t i = 0; i < folders_.size(); ++i) {
+    const std::filesystem::path& folder = folders_[i];
     try {
+      if (!given_up_[i].empty() || ::access(existing(folder).c_str(), W_OK) != 0) continue;
       const std::uint64_t free = free_on_disk_of(folder, free_bytes_);
       if (!counted.insert(disk_of(folder).value_or(0)).second) continue;
       sum = sum.value_or(0) + free - std::min(free, reserve_bytes_);

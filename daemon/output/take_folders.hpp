@@ -42,8 +42,8 @@ class TakeFolders {
   // may be called by any thread, and after the end of this.
   std::function<bool(std::uint64_t bytes)> room_of(std::size_t folder) const;
 
-  // Returns how much takes may still use of all disks, without the reserves; nothing if no disk can
-  // say.
+  // Returns how much takes may still use of all disks, without the reserves, those that were given
+  // up, and those that cannot be written; nothing if no disk can say.
   std::optional<std::uint64_t> free_bytes() const;
 
   // Measures how many bytes a second the disk of the folder that choose() would return takes, by a

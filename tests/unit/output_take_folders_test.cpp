@@ -68,6 +68,16 @@ TEST(TakeFolders, TheFirstThatHasRoomAndDidNotFailIsChosen) {
                                   "(recording.reserve_mb)");
 }
 
+TEST(TakeFolders, ADiskThatWasGivenUpHasNoRoomForTakes) {
+  const test::TemporaryDirectory directory;
+  TakeFolders folders({directory / "takes"}, 20, [](const auto&) { return 100; });
+  EXPECT_EQ(folders.free_bytes(), 80u);
+  folders.give_up(0, "it failed");
+  EXPECT_FALSE(folders.free_bytes());
+  folders.forgive_all();
+  EXPECT_EQ(folders.free_bytes(), 80u);
+}
+
 TEST(TakeFolders, AFolderThatCannotBeMadeIsPassedOverByName) {
   const TemporaryDirectory directory;
   session::write_content(directory / "file", "no folder");
