@@ -281,7 +281,7 @@ Outcome Controls::apply(const set::MoveObject& effect) {
   if (objects_.empty()) return none_of("virtual object");
   glm::dvec3& offset = edits().objects[selected_object()].offset_m;
   offset += control_.move_step_m * effect.steps;
-  return {fmt::format("{} moved to {:+.3f} {:+.3f} {:+.3f} m", selected_object(), offset.x,
+  return {fmt::format("{} moved by {:+.3f} {:+.3f} {:+.3f} m", selected_object(), offset.x,
                       offset.y, offset.z),
           false,
           {}};
@@ -296,7 +296,7 @@ Outcome Controls::apply(const set::TurnObject& effect) {
   // Rounded, so that no angle is -0.
   const glm::dvec3 angles =
       glm::round(pipeline::angles_of(turn) * (1800 / std::numbers::pi)) / 10.0;
-  return {fmt::format("{} turned to {:+.1f} {:+.1f} {:+.1f} degrees", selected_object(),
+  return {fmt::format("{} turned by {:+.1f} {:+.1f} {:+.1f} degrees", selected_object(),
                       angles.x + 0.0, angles.y + 0.0, angles.z + 0.0),
           false,
           {}};

@@ -19,7 +19,7 @@ OsdPage busy_page() {
       {{"6 tags · ±0.83 mm"}, {"light: hybrid"}},
       {{"film camera: usb-Acme_4K_0123456789abcdef-video-index0 was unplugged; it is opened anew",
         OsdTone::alarm},
-       {"card moved to +0.010 +0.000 +0.000 m"}}};
+       {"card moved by +0.010 +0.000 +0.000 m"}}};
 }
 
 bool overlap(const Overlay& a, const Overlay& b) {

@@ -69,7 +69,7 @@ TEST(TakeFolders, TheFirstThatHasRoomAndDidNotFailIsChosen) {
 }
 
 TEST(TakeFolders, ADiskThatWasGivenUpHasNoRoomForTakes) {
-  const test::TemporaryDirectory directory;
+  const TemporaryDirectory directory;
   TakeFolders folders({directory / "takes"}, 20, [](const auto&) { return 100; });
   EXPECT_EQ(folders.free_bytes(), 80u);
   folders.give_up(0, "it failed");

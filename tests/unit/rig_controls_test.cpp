@@ -240,10 +240,10 @@ TEST(Controls, LampsAreDimmedInStopsAndTinted) {
 
 TEST(Controls, TurnsAreReportedInDegrees) {
   Desk desk;
-  EXPECT_EQ(desk("turn_left").said, "vase turned to +0.0 +0.0 +5.0 degrees");
-  EXPECT_EQ(desk("tilt_back").said.substr(0, 19), "vase turned to -5.0");
+  EXPECT_EQ(desk("turn_left").said, "vase turned by +0.0 +0.0 +5.0 degrees");
+  EXPECT_EQ(desk("tilt_back").said.substr(0, 19), "vase turned by -5.0");
   desk("tilt_forward");
-  EXPECT_EQ(desk("turn_right").said, "vase turned to +0.0 +0.0 +0.0 degrees");
+  EXPECT_EQ(desk("turn_right").said, "vase turned by +0.0 +0.0 +0.0 degrees");
 }
 
 const pipeline::FoundLamp first{"found 1", {1, 0, 0}, 0.05}, second{"found 2", {0, 1, 0}, 0.05};

@@ -215,7 +215,7 @@ TEST_F(RigLive, ARefinementShowsWhatWasMovedInStandby) {
     press("standby");
     until_said("button standby: standby");
     press("move_right");
-    until_said("card moved to +0.010");
+    until_said("card moved by +0.010");
     press("refine");
     const Shown refined = until([](const Shown& s) { return s.shot.frozen; });
     EXPECT_TRUE(refined.shot.scene.objects.contains("card"));

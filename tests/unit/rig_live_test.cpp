@@ -102,7 +102,7 @@ TEST_F(RigLive, ThroughEveryModeByButtons) {
   });
 
   const std::vector<std::string> transcript = {
-      "button move_right: card moved to +0.010 +0.000 +0.000 m",
+      "button move_right: card moved by +0.010 +0.000 +0.000 m",
       "button light_up: key +0.33 stops",
       "button samples_up: 3 samples",
       "button debug_view: view: mixed",

@@ -130,7 +130,7 @@ TEST(OsdWords, FaultsInPlainWordsAndWhatAButtonDid) {
   const PictureFacts picture = tracked();
   RigFacts rig = in(Mode::live);
   rig.look.state.camera_lost = true;
-  const std::string moved = "card moved to +0.010 +0.000 +0.000 m";
+  const std::string moved = "card moved by +0.010 +0.000 +0.000 m";
   rig.news = {{report::Severity::info, "", moved}};
   EXPECT_EQ(osd_page(rig, &picture, pace).notices,
             (Texts{{"film camera: no picture", OsdTone::alarm}, {moved}}));
