@@ -106,7 +106,7 @@ class Storm : public test::RigLive {
     const std::string camera = "driver = \"replay\"\ndevice = \"session\"\n";
     const std::string faults =
         "faults = [\"disconnect@40+0.5s\", \"drop@70+3\", \"corrupt@90\", \"late@110+4\", "
-        "\"disconnect@130+1.5s\", \"stall@170\"]\nstall_timeout_s = 1\n";
+        "\"disconnect@130+1.5s\"]\n";
     text_.replace(text_.find(camera), camera.size(), camera + faults);
     std::ofstream(directory_ / "set.toml") << text_;
     std::ofstream(directory_ / "other.toml") << text_;
