@@ -45,9 +45,6 @@ const float LEAST_ALIKE = 0.9;
 const float MOST_BLUR = 2.0;
 // The history of an edge shows two surfaces, which move apart.
 const float MOST_EDGE_BLUR = 1.0;
-// Where some of the four pixels around a place are not of its surface, the others lie beside it. What
-// is kept then moves by the distance in each frame, and is kept until that is so many pixels.
-const float MOST_SHIFT = 0.5;
 // Nearer to a pixel than this, the pixel itself is taken.
 const float SNAP = 0.01;
 // A camera that moves the picture by less leaves an edge where it was.
@@ -215,7 +212,6 @@ bool interpolate(Wanted wanted, out Kept kept, inout float most) {
   const vec4 wx = sharp_weights(f.x);
   const vec4 wy = sharp_weights(f.y);
   float total = 0.0;
-  vec2 middle = vec2(0.0);  // of the pixels that are there
   vec3 sharp = vec3(0.0);
   for (int y = 0; y < 2; ++y)
     for (int x = 0; x < 2; ++x) {
@@ -229,7 +225,6 @@ bool interpolate(Wanted wanted, out Kept kept, inout float most) {
       kept.uncovered += weight * there.uncovered;
       kept.albedo += weight * there.albedo;
       total += weight;
-      middle += weight * vec2(x, y);
       sharp += wx[x + 1] * wy[y + 1] * there.light;
     }
   if (total < 0.05) return false;
@@ -241,8 +236,6 @@ bool interpolate(Wanted wanted, out Kept kept, inout float most) {
     kept.mask /= total;
     kept.uncovered /= total;
     kept.albedo /= total;
-    const float shift = distance(middle / total, f);
-    if (shift > SNAP) most = min(most, history.samples * MOST_SHIFT / shift);
   }
   if (!wanted.is_edge) kept.mask = wanted.mask;
   const float blur = f.x * (1.0 - f.x) + f.y * (1.0 - f.y);
