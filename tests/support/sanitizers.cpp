@@ -13,7 +13,7 @@ const char* __lsan_default_suppressions() {
 
 const char* __tsan_default_suppressions() {
   return "race:libaravis-0.8.so\nrace:libglib-2.0.so\nrace:libgio-2.0.so\nrace:libgobject-2.0.so\n"
-         "race:swrast_dri.so\nrace:libvulkan_lvp.so\n";
+         "race:swrast_dri.so\nrace:libvulkan_lvp.so\nrace:libopencv_core.so\n";
 }
 
 const char* __tsan_default_options() {
