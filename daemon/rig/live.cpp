@@ -82,16 +82,17 @@ control::Verbs verbs_of(Rig& rig, const set::Set& set, const render::Device& dev
   const auto ends_a_take = [&rig, &set](bool begins) {
     return !set.recording.end_over_bus && !begins && rig.controls().look().state.recording;
   };
-  const control::Answer not_here{"the set lets only buttons end a take (recording.end_over_bus)",
-                                 true};
+  const auto not_here = [] {
+    return control::Answer{"the set lets only buttons end a take (recording.end_over_bus)", true};
+  };
   control::Verbs verbs;
   verbs.perform = [&rig, answer, ends_a_take, not_here](const set::Action& action) {
-    if (std::holds_alternative<set::Record>(action.effect) && ends_a_take(false)) return not_here;
+    if (std::holds_alternative<set::Record>(action.effect) && ends_a_take(false)) return not_here();
     return answer(rig.perform(action, "bus"));
   };
   verbs.go = [&rig, answer](Mode mode) { return answer(rig.wish(wish_for(mode), "bus")); };
   verbs.record = [&rig, answer, ends_a_take, not_here](bool on) {
-    if (ends_a_take(on)) return not_here;
+    if (ends_a_take(on)) return not_here();
     return answer(rig.wish(on ? Event::record_on : Event::record_off, "bus"));
   };
   verbs.status = [&] { return status_of(rig, set, device, reports); };
