@@ -62,7 +62,8 @@ void main() {
     add_exactly(sums.mixed_high, sums.mixed_low, mixed);
     add_exactly(sums.diff_high, sums.diff_low, vec4(diff, aov.w));
     sums.normal += vec4(aov.xyz, aov.w > 0.0 ? 1.0 : 0.0);
-    if (has_feature(FEATURE_TEXTURES)) sums.albedo.rgb += unpack_halves(sample_albedo[slot]);
+    if (has_feature(FEATURE_TEXTURES | FEATURE_VERTEX_COLORS))
+      sums.albedo.rgb += unpack_halves(sample_albedo[slot]);
     const bool covered = mixed.w > 0.0;
     add_exactly(sums.uncovered_high, sums.uncovered_low, vec4(covered ? vec3(0.0) : diff, real.w));
     const vec3 added = covered ? mixed.rgb : diff;

@@ -46,14 +46,17 @@ void store_flight(Flight f, uint path) {
 // flux that enters is divided by ior^2, because bsdf_sample() leaves radiance unscaled.
 bool sample_dirac(Surface s, Lobes l, vec3 through, float p_mirror, float choice, out vec3 wi,
                   out vec3 weight) {
-  const float cos_o = dot(s.normal, s.wo);
+  const float p_clear = has_clear_normal() ? p_mirror * clear_mirror_share(l) : 0.0;
+  const bool clear = has_clear_normal() && choice < p_clear;
+  const vec3 normal = clear ? lacquer_normal(s) : s.normal;
+  const float cos_o = dot(normal, s.wo);
   wi = vec3(0.0);
   weight = vec3(0.0);
   if (cos_o <= 0.0) return false;
   if (choice < p_mirror) {
-    wi = 2.0 * cos_o * s.normal - s.wo;
-    weight = mirror_color(l, cos_o) / p_mirror;
-    if (!reflects_to(s, wi)) return false;
+    wi = 2.0 * cos_o * normal - s.wo;
+    weight = clear ? vec3(l.clear) / p_clear : mirror_color(l, cos_o) / (p_mirror - p_clear);
+    if (!reflects_to(s, wi, normal)) return false;
   } else if (has_feature(FEATURE_PANES) && any(greaterThan(through, vec3(0.0)))) {
     wi = 2.0 * cos_o * s.normal - s.wo;  // what passes the pane has passed
     weight = vec3(l.glass / (1.0 - p_mirror));
@@ -70,7 +73,7 @@ bool sample_dirac(Surface s, Lobes l, vec3 through, float p_mirror, float choice
   // the lobes (Veach 1997, "Robust Monte Carlo Methods for Light Transport Simulation", section
   // 5.3).
   weight *= abs(dot(wi, s.geometric_normal)) * cos_o /
-            (dot(s.wo, s.geometric_normal) * abs(dot(wi, s.normal)));
+            (dot(s.wo, s.geometric_normal) * abs(dot(wi, normal)));
   return true;
 }
 

@@ -424,7 +424,7 @@ float footprint_of(Path p, float t) {
 // Stores normal, depth and albedo of the mixed world's first surface.
 void write_aov(Path p, Surface s, float t) {
   sample_aov[p.slot] = vec4(s.normal, depth_of(p, t));
-  if (!has_feature(FEATURE_TEXTURES) || frame.keeps_albedo == 0u) return;
+  if (!has_feature(FEATURE_TEXTURES | FEATURE_VERTEX_COLORS) || frame.keeps_albedo == 0u) return;
   sample_albedo[p.slot] = pack_halves(brightness_of(s));
 }
 

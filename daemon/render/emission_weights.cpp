@@ -86,19 +86,19 @@ double mean_over(const Glow& glow, const glm::vec2& uv, const glm::vec2& u, cons
 
 std::vector<double> emission_weights(const scene::Scene& scene, const scene::Instance& instance) {
   const scene::Material& material = scene.materials[instance.material];
+  // Weights need not be exact: alpha counts where it is mapped as the emission is.
+  const std::size_t mapping = scene::mapping_of(material, &scene::Material::emission_texture);
+  const bool has_alpha = material.alpha_mode != scene::AlphaMode::opaque && mapping == 0;
   const Glow glow{&material, texture_of(scene, material.emission_texture),
-                  material.alpha_mode == scene::AlphaMode::opaque
-                      ? nullptr
-                      : texture_of(scene, material.base_color_texture)};
+                  has_alpha ? texture_of(scene, material.base_color_texture) : nullptr};
   const bool is_even = !glow.emission && material.alpha_mode == scene::AlphaMode::opaque;
   const scene::Mesh& mesh = scene.meshes[instance.mesh];
   if (is_even || !scene::emits(material) || mesh.triangles.empty()) return {};
+  const std::vector<glm::vec2>& uvs = scene::uvs_of(mesh, mapping);
   std::vector<double> weights;
   weights.reserve(mesh.triangles.size());
   for (const glm::uvec3& triangle : mesh.triangles) {
-    const auto uv = [&](std::uint32_t vertex) {
-      return mesh.uvs.empty() ? glm::vec2(0) : mesh.uvs[vertex];
-    };
+    const auto uv = [&](std::uint32_t vertex) { return uvs.empty() ? glm::vec2(0) : uvs[vertex]; };
     const glm::vec2 first = uv(triangle.x);
     weights.push_back(mean_over(glow, first, uv(triangle.y) - first, uv(triangle.z) - first));
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <glm/gtc/packing.hpp>
+#include <span>
 #include <vector>
 
 #include "daemon/render/gpu_lights.hpp"
@@ -19,17 +20,41 @@ bool is_textured(std::uint32_t texture) {
 }
 
 bool reflects(const Material& m, const Scene&, double) {
-  const bool opaque_part = m.metallic < 1 && m.transmission < 1;
-  return m.metallic > 0 || (opaque_part && m.specular > 0 && m.ior > 1);
+  return m.metallic > 0 || (scene::has_opaque_part(m) && m.specular > 0 && m.ior > 1);
 }
 
 bool has_coat_color(const Material& m, const Scene&, double) {
-  const bool opaque_part = m.metallic < 1 && m.transmission < 1;
-  return opaque_part && m.specular > 0 && m.ior > 1 && m.specular_color != glm::vec3(1);
+  return scene::has_opaque_part(m) && m.specular > 0 && m.ior > 1 && scene::has_specular_color(m);
 }
 
 bool glows(const Material& m, const Scene&, double) {
   return scene::emits(m);
+}
+
+bool has_layer_texture(const Material& m, const Scene&, double) {
+  const auto layers = std::span(scene::material_textures).subspan(scene::first_layer_texture);
+  return std::ranges::any_of(layers, [&](auto texture) { return is_textured(m.*texture); });
+}
+
+// A texture may leave lacquer and sheen off some of the material.
+bool can_be_bare(const Material& m) {
+  const bool lacquered = m.clearcoat > 0 && !is_textured(m.clearcoat_texture);
+  return !lacquered && (!scene::has_sheen(m) || is_textured(m.sheen_color_texture));
+}
+
+bool has_vertex_colors(const Scene& scene) {
+  return std::ranges::any_of(scene.meshes,
+                             [](const scene::Mesh& mesh) { return !mesh.colors.empty(); });
+}
+
+// Returns the least alpha of the colours that a mesh of this material states.
+float least_vertex_alpha(const Material& m, const Scene& scene) {
+  float least = 1;
+  scene::for_each_look(scene, [&](std::uint32_t mesh, std::uint32_t material) {
+    if (&scene.materials[material] != &m) return;
+    for (const glm::vec4& color : scene.meshes[mesh].colors) least = std::min(least, color.a);
+  });
+  return least;
 }
 
 // Alpha is judged as the shaders see it: texels are half floats, and a value between two texels may
@@ -44,6 +69,11 @@ bool lets_through(const Material& m, const Scene& scene, double) {
     least_texel = glm::unpackHalf1x16(glm::packHalf1x16(least_texel));
     if (least_texel < 1) rounding = 1e-6f;
     least *= least_texel;
+  }
+  if (const float least_color = least_vertex_alpha(m, scene); least_color < 1) {
+    // Colours are fractions of 16 bits, and between vertices a sum of three.
+    least *= std::max(least_color - 1e-5f, 0.0f);
+    rounding = 1e-6f;
   }
   return least * (1 - rounding) < (m.alpha_mode == scene::AlphaMode::mask ? m.alpha_cutoff : 1.0f);
 }
@@ -71,7 +101,7 @@ bool lamps_shine(const Scene& scene) {
   return std::ranges::any_of(scene.lights, shines) || scene::may_glow(scene);
 }
 
-constexpr std::array<Feature, 28> feature_table = {{
+constexpr std::array<Feature, 31> feature_table = {{
     {.name = "two worlds",
      .bit = gpu::FEATURE_FORKS,
      .can_be_carried = true,
@@ -154,8 +184,8 @@ constexpr std::array<Feature, 28> feature_table = {{
      .can_be_carried = true,
      .in_material =
          [](const Material& m, const Scene& scene, double alpha) {
-           return m.thin_walled && m.clearcoat <= 0 && !scene::has_sheen(m) &&
-                  scene::transmits(m) && scene::can_be_dirac(scene, m, alpha);
+           return m.thin_walled && can_be_bare(m) && scene::transmits(m) &&
+                  scene::can_be_dirac(scene, m, alpha);
          },
      .used = "light goes straight through thin panes of smooth glass",
      .left_out = "no object is a thin pane of smooth glass"},
@@ -188,11 +218,32 @@ constexpr std::array<Feature, 28> feature_table = {{
      .can_be_carried = true,
      .in_material =
          [](const Material& m, const Scene&, double) {
-           return is_textured(m.base_color_texture) || is_textured(m.metallic_roughness_texture) ||
-                  is_textured(m.emission_texture) || is_textured(m.normal_texture);
+           return std::ranges::any_of(scene::material_textures,
+                                      [&](auto texture) { return is_textured(m.*texture); });
          },
      .used = "a surface has its colour or detail from an image",
      .left_out = "no surface has its colour or detail from an image"},
+    {.name = "textures of layers",
+     .bit = gpu::FEATURE_LAYER_TEXTURES,
+     .can_be_carried = true,
+     .in_material = has_layer_texture,
+     .used = "an image says where a surface is glass, glossy, lacquered, brushed or cloth",
+     .left_out = "no image says where a surface is glass, glossy, lacquered, brushed or cloth"},
+    {.name = "texture mappings",
+     .bit = gpu::FEATURE_MAPPINGS,
+     .can_be_carried = true,
+     .in_material =
+         [](const Material& m, const Scene&, double) {
+           return std::ranges::any_of(m.mappings, [](std::uint8_t mapping) { return mapping > 0; });
+         },
+     .used = "the images of a surface lie on it in different ways",
+     .left_out = "all images of a surface lie on it in the same way"},
+    {.name = "vertex colours",
+     .bit = gpu::FEATURE_VERTEX_COLORS,
+     .can_be_carried = true,
+     .in_frame = [](bool, const Demand& d) { return has_vertex_colors(d.scene); },
+     .used = "a mesh has a colour of its own in each of its corners",
+     .left_out = "no mesh has a colour of its own in each of its corners"},
     {.name = "filtered textures",
      .bit = gpu::FEATURE_FILTERED_TEXTURES,
      .in_material =
@@ -208,8 +259,10 @@ constexpr std::array<Feature, 28> feature_table = {{
     {.name = "normal maps",
      .bit = gpu::FEATURE_NORMAL_MAPS,
      .can_be_carried = true,
-     .in_material = [](const Material& m, const Scene&,
-                       double) { return is_textured(m.normal_texture); },
+     .in_material =
+         [](const Material& m, const Scene&, double) {
+           return is_textured(m.normal_texture) || is_textured(m.clearcoat_normal_texture);
+         },
      .used = "a surface has its bumps from an image",
      .left_out = "no surface has its bumps from an image"},
     {.name = "alpha",

@@ -115,7 +115,7 @@ void append_lamp(PlacedLights& to, const set::Light& light) {
   result.gain_real = glm::vec3(static_cast<float>(light.gain_real));
   result.radius = static_cast<float>(light.radius_m);
   result.emission_texture = gpu::NO_INDEX;
-  result.alpha_material = gpu::NO_INDEX;
+  result.alpha_instance = gpu::NO_INDEX;
   if (light.type == set::LightType::spot) {
     result.cos_inner = static_cast<float>(std::cos(light.inner_cone_rad));
     result.cos_outer = static_cast<float>(std::cos(light.outer_cone_rad));
@@ -138,8 +138,10 @@ void append_lamp(PlacedLights& to, const set::Light& light) {
   to.weights.values.push_back(1);
 }
 
-void append_emitter(PlacedLights& to, const scene::Instance& instance, const scene::Mesh& mesh,
-                    const scene::Material& material, const std::vector<double>& weights) {
+void append_emitter(PlacedLights& to, const scene::Scene& scene, std::uint32_t index,
+                    const scene::Instance& instance, const std::vector<double>& weights) {
+  const scene::Mesh& mesh = scene.meshes[instance.mesh];
+  const scene::Material& material = scene.materials[instance.material];
   const auto world = [&](std::uint32_t vertex) {
     const glm::dvec4 p(glm::dvec3(mesh.positions[vertex]), 1.0);
     return glm::dvec3(instance.world_from_object * p);
@@ -149,7 +151,10 @@ void append_emitter(PlacedLights& to, const scene::Instance& instance, const sce
     all_weights.insert(all_weights.end(), mesh.triangles.size(), 1);
   else
     all_weights.insert(all_weights.end(), weights.begin(), weights.end());
-  for (const glm::uvec3& triangle : mesh.triangles) {
+  const std::vector<glm::vec2>& uvs =
+      scene::uvs_of(mesh, scene::mapping_of(material, &scene::Material::emission_texture));
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    const glm::uvec3& triangle = mesh.triangles[i];
     gpu::GpuLight light{};
     light.type = gpu::LIGHT_TRIANGLE;
     const glm::dvec3 v0 = world(triangle.x);
@@ -165,12 +170,12 @@ void append_emitter(PlacedLights& to, const scene::Instance& instance, const sce
     light.gain_mixed = glm::vec3((instance.presence & scene::world_mixed) != 0 ? 1 : 0);
     light.gain_real = glm::vec3((instance.presence & scene::world_real) != 0 ? 1 : 0);
     light.emission_texture = material.emission_texture;
-    light.alpha_material =
-        material.alpha_mode == scene::AlphaMode::opaque ? gpu::NO_INDEX : instance.material;
-    if (!mesh.uvs.empty()) {
-      light.uv0 = mesh.uvs[triangle.x];
-      light.uv1 = mesh.uvs[triangle.y];
-      light.uv2 = mesh.uvs[triangle.z];
+    light.alpha_instance = material.alpha_mode == scene::AlphaMode::opaque ? gpu::NO_INDEX : index;
+    light.alpha_primitive = i;
+    if (!uvs.empty()) {
+      light.uv0 = uvs[triangle.x];
+      light.uv1 = uvs[triangle.y];
+      light.uv2 = uvs[triangle.z];
     }
     to.lights.push_back(light);
     to.positions.push_back(v0);

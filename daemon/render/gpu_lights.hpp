@@ -37,10 +37,11 @@ struct PlacedLights {
 
 void append_lamp(PlacedLights& to, const set::Light& light);
 
-// Appends one light per triangle of the mesh, in the mesh's order. `weights` are those of
+// Appends one light per triangle of the mesh of an instance, in the mesh's order. `instance` is
+// that of this index in the scene, or says where it is instead. `weights` are those of
 // emission_weights(), and may be empty.
-void append_emitter(PlacedLights& to, const scene::Instance& instance, const scene::Mesh& mesh,
-                    const scene::Material& material, const std::vector<double>& weights);
+void append_emitter(PlacedLights& to, const scene::Scene& scene, std::uint32_t index,
+                    const scene::Instance& instance, const std::vector<double>& weights);
 
 // Returns what a lamp with a place sends along its brightest direction, as if it were a point
 // (W/sr, mean of the channels), with the largest of its gains.

@@ -1,6 +1,7 @@
 #include "daemon/render/gpu_scene.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <glm/common.hpp>
@@ -38,13 +39,20 @@ double environment_share(double environment_power, double light_power) {
   return std::clamp(environment_power / (environment_power + light_power), 0.1, 0.9);
 }
 
+// Returns in how many steps of its strength an anisotropy needs albedo tables; 0: it has one
+// strength.
+std::uint32_t anisotropy_steps(const scene::Material& m) {
+  return m.anisotropy_texture != scene::no_texture ? gpu::ANISOTROPIC_STEPS : 0;
+}
+
 // Concatenates the albedo tables: reflection's first, if anything is rough or has sheen, then that
 // of sheen, then those of each glass and of each anisotropic metal.
 struct AlbedoTables {
   std::vector<float> values{1};  // a placeholder that no shader reads
   std::map<float, std::uint32_t> of_ior;
-  // Keys: strength, roughness, and whether a texture makes it smoother.
-  std::map<std::tuple<float, float, bool>, std::uint32_t> of_anisotropy;
+  // Keys: strength, roughness, whether a texture makes it smoother, and whether one changes the
+  // strength.
+  std::map<std::tuple<float, float, bool, bool>, std::uint32_t> of_anisotropy;
 
   explicit AlbedoTables(bool has_sheen) {
     if (!has_sheen) return;
@@ -69,9 +77,12 @@ struct AlbedoTables {
  private:
   std::uint32_t first_of_anisotropy(const scene::Material& m) {
     const bool varies = m.metallic_roughness_texture != scene::no_texture;
+    const bool has_steps = anisotropy_steps(m) > 0;
     const auto [at, is_new] =
-        of_anisotropy.try_emplace({m.anisotropy, m.roughness, varies}, next());
-    if (is_new) add(anisotropic_albedo(m.anisotropy, varies ? 0.0 : m.roughness, m.roughness));
+        of_anisotropy.try_emplace({m.anisotropy, m.roughness, varies, has_steps}, next());
+    const std::uint32_t steps = has_steps ? gpu::ANISOTROPIC_STEPS : 1;
+    for (std::uint32_t step = 1; is_new && step <= steps; ++step)
+      add(anisotropic_albedo(m.anisotropy * step / steps, varies ? 0.0 : m.roughness, m.roughness));
     return at->second;
   }
 
@@ -87,6 +98,45 @@ glm::vec2 anisotropy_of(const scene::Material& m) {
   if (!scene::is_anisotropic(m)) return glm::vec2(0);
   return m.anisotropy *
          glm::vec2(std::cos(m.anisotropy_rotation_rad), std::sin(m.anisotropy_rotation_rad));
+}
+
+// Returns the mappings of all textures, packed for mapping_of() of the shaders.
+std::array<std::uint32_t, 2> packed_mappings(const scene::Material& m) {
+  static_assert(scene::max_mappings <= 16);
+  std::array<std::uint32_t, 2> packed{};
+  for (std::size_t i = 0; i < m.mappings.size(); ++i)
+    packed[i / 8] |= static_cast<std::uint32_t>(m.mappings[i]) << 4 * (i % 8);
+  return packed;
+}
+
+// Adds the textures of glass, gloss, lacquer and sheen.
+void set_layers(const scene::Material& m, gpu::GpuMaterial& to) {
+  static_assert(scene::first_layer_texture == gpu::TEXTURE_OF_LAYERS &&
+                scene::material_textures.size() == gpu::TEXTURE_OF_LAYERS + gpu::LAYERS);
+  for (std::uint32_t i = 0; i < gpu::LAYERS; ++i) {
+    to.layer_textures[i] = m.*scene::material_textures[scene::first_layer_texture + i];
+    if (to.layer_textures[i] != scene::no_texture) to.layers |= 1u << i;
+  }
+  const auto mappings = packed_mappings(m);
+  std::ranges::copy(mappings, to.mappings);
+}
+
+// What the vertices of a mesh have beside places, normals and first texture coordinates: as
+// GpuInstance says.
+std::uint32_t extras_per_vertex(const scene::Mesh& mesh) {
+  if (mesh.colors.empty() && mesh.more_uvs.empty()) return 0;
+  return static_cast<std::uint32_t>(1 + mesh.more_uvs.size());
+}
+
+void append_extras(const scene::Mesh& mesh, std::vector<glm::uvec2>& extras) {
+  for (std::size_t i = 0; extras_per_vertex(mesh) > 0 && i < mesh.positions.size(); ++i) {
+    const glm::vec4 color = mesh.colors.empty() ? glm::vec4(1) : mesh.colors[i];
+    extras.emplace_back(glm::packUnorm2x16(glm::vec2(color)),
+                        glm::packUnorm2x16(glm::vec2(color.z, color.w)));
+    for (const std::vector<glm::vec2>& uvs : mesh.more_uvs)
+      extras.emplace_back(uvs.empty() ? glm::uvec2(0)
+                                      : std::bit_cast<glm::uvec2>(glm::vec2(uvs[i])));
+  }
 }
 
 // A path has so many bits to say which medium it is in.
@@ -183,11 +233,12 @@ void GpuScene::find_bounds(const Spheres& spheres) {
 
 void GpuScene::upload_meshes() {
   // The memory of another scene is free for this one.
-  for (Buffer* buffer : {&bvh_, &vertices_, &triangles_}) *buffer = {};
+  for (Buffer* buffer : {&bvh_, &vertices_, &triangles_, &extras_}) *buffer = {};
   work_.trees += scene_.meshes.size();
   std::vector<glm::uvec4> bvh(scene::top_bvh_texels(scene_.instances.size()));
   std::vector<glm::vec4> vertices;
   std::vector<glm::uvec4> triangles;
+  std::vector<glm::uvec2> extras;
   places_.clear();
   deformer_.clear();
   std::map<const scene::Mesh*, scene::MeshBvh> deforming;
@@ -202,6 +253,8 @@ void GpuScene::upload_meshes() {
     append(bvh, std::exchange(place.bvh.texels, {}));
     const auto first = static_cast<std::uint32_t>(vertices.size() / 2);
     place.first_vertex = first;
+    place.first_extra = static_cast<std::uint32_t>(extras.size());
+    append_extras(mesh, extras);
     places_.push_back(std::move(place));
     for (const glm::uvec3& t : mesh.triangles)
       triangles.emplace_back(first + t.x, first + t.y, first + t.z, 0u);
@@ -214,6 +267,7 @@ void GpuScene::upload_meshes() {
   upload_texels(device_, bvh_, bvh, vk::Format::eR32G32B32A32Uint);
   upload_texels(device_, vertices_, vertices, vk::Format::eR32G32B32A32Sfloat);
   upload_texels(device_, triangles_, triangles, vk::Format::eR32G32B32A32Uint);
+  upload_texels(device_, extras_, extras, vk::Format::eR32G32Uint);
   if (!scene_.deformations.empty()) check_deforming();
   std::vector<Deformer::Place> deformed;
   for (const scene::Deformation& deformation : scene_.deformations) {
@@ -265,7 +319,13 @@ void GpuScene::upload_materials(double specular_alpha) {
                          .sheen_color = m.sheen_color,
                          .sheen_roughness = std::max(m.sheen_roughness, gpu::LEAST_SHEEN_ROUGHNESS),
                          .anisotropy = anisotropy_of(m),
-                         .specular_color = m.specular_color});
+                         .specular_color = m.specular_color,
+                         .layers = 0,
+                         .layer_textures = {},
+                         .mappings = {},
+                         .clearcoat_normal_scale = m.clearcoat_normal_scale,
+                         .anisotropy_steps = anisotropy_steps(m)});
+    set_layers(m, materials.back());
   }
   upload_storage(device_, materials_, materials);
   upload_texels(device_, albedo_, albedo.values, vk::Format::eR32Sfloat);
@@ -386,6 +446,8 @@ void GpuScene::upload_instances(const glm::dvec3& camera_position) {
     record.first_triangle = place.first_triangle;
     record.first_light = lights_.first_light(i);
     record.presence = instance.presence;
+    record.extras_per_vertex = extras_per_vertex(scene_.meshes[instance.mesh]);
+    record.first_extra = place.first_extra - place.first_vertex * record.extras_per_vertex;
     instances.push_back(record);
     top.push_back({&place.bvh, place.first_record, instance.presence, world});
   }
@@ -455,7 +517,7 @@ Buffers GpuScene::buffers() const {
       {"bvh", &bvh_},           {"vertices", &vertices_},       {"triangles", &triangles_},
       {"texels", &texels_},     {"environment", &environment_}, {"importance", &importance_},
       {"albedo", &albedo_},     {"instances", &instances_},     {"materials", &materials_},
-      {"textures", &textures_}, {"bounds", &bounds_buffer_}};
+      {"textures", &textures_}, {"bounds", &bounds_buffer_},    {"extras", &extras_}};
   lights_.add_to(buffers);
   return buffers;
 }

@@ -81,6 +81,7 @@ class GpuScene {
     std::uint32_t first_record = 0;
     std::uint32_t first_triangle = 0;
     std::uint32_t first_vertex = 0;
+    std::uint32_t first_extra = 0;
   };
 
   void upload_meshes();
@@ -118,8 +119,8 @@ class GpuScene {
   double environment_mean_ = 0, environment_spread_ = 2;
   set::LightSampling sampling_ = set::LightSampling::importance;
 
-  Buffer bvh_, vertices_, triangles_, texels_, environment_, importance_, albedo_, instances_,
-      materials_, textures_, bounds_buffer_;
+  Buffer bvh_, vertices_, triangles_, extras_, texels_, environment_, importance_, albedo_,
+      instances_, materials_, textures_, bounds_buffer_;
 };
 
 }  // namespace previz::render

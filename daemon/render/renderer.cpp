@@ -117,7 +117,8 @@ void Renderer::Impl::upload_frame() {
   gpu_frame.photon_count = photons();
   gpu_frame.exposure = static_cast<float>(frame.exposure);
   gpu_frame.past_samples = past_samples;
-  gpu_frame.keeps_albedo = (needed() & gpu::FEATURE_TEXTURES) != 0 ? 1 : 0;
+  constexpr std::uint32_t patterned = gpu::FEATURE_TEXTURES | gpu::FEATURE_VERTEX_COLORS;
+  gpu_frame.keeps_albedo = (needed() & patterned) != 0 ? 1 : 0;
   gpu_frame.clip_from = is_clipped ? response->clipping().from : gpu::NO_INDEX;
   scene.describe(gpu_frame, needed());
   upload_storage(*device, frame_buffer, std::vector{gpu_frame});

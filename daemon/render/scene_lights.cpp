@@ -11,7 +11,7 @@ namespace previz::render {
 namespace {
 
 // Lights have no padding, so that equal ones have equal bytes.
-static_assert(sizeof(gpu::GpuLight) == 156);
+static_assert(sizeof(gpu::GpuLight) == 160);
 
 // Lights are weighed for a radius of this many steps an octave, so that they stay as they are while
 // an object at the rim of the scene moves.
@@ -47,8 +47,7 @@ void SceneLights::shape(Emitter& emitter, const scene::Scene& scene) {
   unmoved.world_from_object = glm::dmat4(1.0);
   unmoved.presence = scene::world_both;
   PlacedLights alone;
-  append_emitter(alone, unmoved, scene.meshes[unmoved.mesh], scene.materials[unmoved.material],
-                 emitter.weights);
+  append_emitter(alone, scene, emitter.instance, unmoved, emitter.weights);
   emitter.shape = shape_of_emitter(alone);
 }
 
@@ -99,11 +98,10 @@ void SceneLights::encode(const scene::Scene& scene) {
   const std::size_t lamps = all.lights.size();
   std::vector<LightGroup> groups;
   for (const Emitter& emitter : emitters_) {
-    const scene::Instance& instance = scene.instances[emitter.instance];
     const auto first = static_cast<std::uint32_t>(all.lights.size());
     first_light_[emitter.instance] = first;
     groups.push_back({first, &emitter.shape});
-    append_emitter(all, instance, scene.meshes[instance.mesh], scene.materials[instance.material],
+    append_emitter(all, scene, emitter.instance, scene.instances[emitter.instance],
                    emitter.weights);
   }
   count_ = static_cast<std::uint32_t>(all.lights.size());

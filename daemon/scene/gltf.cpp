@@ -35,6 +35,12 @@ std::uint32_t presence_bits(set::Presence presence) {
   return world_both;
 }
 
+// Returns whether the first mappings of a mesh are those that a material wants.
+bool begin_alike(const std::vector<UvMapping>& wanted, const std::vector<UvMapping>& of_mesh) {
+  return wanted.size() <= of_mesh.size() &&
+         std::equal(wanted.begin(), wanted.end(), of_mesh.begin());
+}
+
 }  // namespace
 
 // One use of a mesh by a node.
@@ -73,11 +79,9 @@ struct GltfFile::Loader {
   void keep_looks(std::uint32_t object_index);
   void add_light(const PlacedNode& placed, const glm::dmat4& world_from_node,
                  std::uint32_t presence);
-  std::optional<std::uint32_t> use_mesh(const tinygltf::Primitive& primitive,
-                                        const MeshSource& source, const std::string& name,
+  std::optional<std::uint32_t> use_mesh(const MeshSource& source, const std::string& name,
                                         const std::string& what);
-  std::optional<std::uint32_t> add_deformed(const tinygltf::Primitive& primitive,
-                                            const MeshSource& source, const std::string& name,
+  std::optional<std::uint32_t> add_deformed(const MeshSource& source, const std::string& name,
                                             const std::string& what,
                                             const NodeDeformation& deforms);
 
@@ -191,13 +195,13 @@ bool GltfFile::Loader::add_primitive(const tinygltf::Primitive& primitive, const
 
   const std::vector<int> worn = variants.materials(primitive, what);
   const UsedMaterial material = materials.use(worn.size() > 1 ? worn[look] : worn[0]);
-  MeshSource source = mesh_source(primitive, material.mapping);
+  MeshSource source = mesh_source(primitive, material.mappings);
   add_deformation(primitive, use.deforms, file + ": " + what, source);
   note_missing_uvs(material, source, what);
   const auto index = static_cast<std::uint32_t>(scene.instances.size());
   const auto mesh = is_skinned || !source.targets.empty()
-                        ? add_deformed(primitive, source, name + suffix, what, use.deforms)
-                        : use_mesh(primitive, source, name + suffix, what);
+                        ? add_deformed(source, name + suffix, what, use.deforms)
+                        : use_mesh(source, name + suffix, what);
   if (!mesh) return true;
   budget.add_instance(file);
   instance.name += suffix;
@@ -221,16 +225,16 @@ void GltfFile::Loader::add_looks(const tinygltf::Primitive& primitive, const std
   for (const int material : worn) {
     const UsedMaterial used = materials.use(material);
     Variants::Look look_then{own.mesh, used.index};
-    if (used.is_textured && used.mapping != source.mapping) {
+    if (!begin_alike(used.mappings, source.mappings)) {
       if (deforms) {
         look_then.material = own.material;
         notes.add(what +
                   ": deforms, and one of its variants maps textures otherwise; there it "
                   "keeps its own material");
       } else {
-        const MeshSource mapped = mesh_source(primitive, used.mapping);
+        const MeshSource mapped = mesh_source(primitive, used.mappings);
         const std::string name = scene.meshes[own.mesh].name;
-        look_then.mesh = use_mesh(primitive, mapped, name, what).value_or(own.mesh);
+        look_then.mesh = use_mesh(mapped, name, what).value_or(own.mesh);
         note_missing_uvs(used, mapped, what);
       }
     } else if (used.index != own.material) {
@@ -242,12 +246,15 @@ void GltfFile::Loader::add_looks(const tinygltf::Primitive& primitive, const std
 
 void GltfFile::Loader::note_missing_uvs(const UsedMaterial& material, const MeshSource& source,
                                         const std::string& what) {
-  if (material.is_textured && source.uvs < 0)
-    notes.add(what + ": has no TEXCOORD_" + std::to_string(material.mapping.set) +
-              " for its textures; they are read at (0, 0)");
-  if (is_anisotropic(scene.materials[material.index]) && source.uvs < 0)
-    notes.add(what + ": has no TEXCOORD_" + std::to_string(material.mapping.set) +
-              " that says which way its anisotropy runs; any way is taken");
+  const auto missing = [&](std::size_t mapping) {
+    return what + ": has no TEXCOORD_" + std::to_string(source.mappings[mapping].set);
+  };
+  for (std::size_t i = 0; i < material.mappings.size(); ++i)
+    if (source.uvs[i] < 0) notes.add(missing(i) + " for its textures; they are read at (0, 0)");
+  const Material& m = scene.materials[material.index];
+  const std::size_t around = mapping_of(m, &Material::anisotropy_texture);
+  if (is_anisotropic(m) && source.uvs[around] < 0)
+    notes.add(missing(around) + " that says which way its anisotropy runs; any way is taken");
 }
 
 void GltfFile::Loader::keep_looks(std::uint32_t object_index) {
@@ -262,13 +269,10 @@ void GltfFile::Loader::keep_looks(std::uint32_t object_index) {
 }
 
 // Every instance of a mesh that deforms has a mesh of its own.
-std::optional<std::uint32_t> GltfFile::Loader::add_deformed(const tinygltf::Primitive& primitive,
-                                                            const MeshSource& source,
+std::optional<std::uint32_t> GltfFile::Loader::add_deformed(const MeshSource& source,
                                                             const std::string& name,
                                                             const std::string& what,
                                                             const NodeDeformation& deforms) {
-  if (primitive.attributes.contains("COLOR_0"))
-    notes.add(what + ": its vertex colours are ignored");
   std::optional<Mesh> mesh = read_mesh(model, source, file + ": " + what, what, notes, budget);
   if (!mesh) return {};
   mesh->name = name;
@@ -292,14 +296,11 @@ std::optional<std::uint32_t> GltfFile::Loader::add_deformed(const tinygltf::Prim
   return index;
 }
 
-std::optional<std::uint32_t> GltfFile::Loader::use_mesh(const tinygltf::Primitive& primitive,
-                                                        const MeshSource& source,
+std::optional<std::uint32_t> GltfFile::Loader::use_mesh(const MeshSource& source,
                                                         const std::string& name,
                                                         const std::string& what) {
   const auto [at, is_new] = meshes.try_emplace(source);
   if (!is_new) return at->second;
-  if (primitive.attributes.contains("COLOR_0"))
-    notes.add(what + ": its vertex colours are ignored");
   std::optional<Mesh> mesh = read_mesh(model, source, file + ": " + what, what, notes, budget);
   if (!mesh) return {};
   mesh->name = name;

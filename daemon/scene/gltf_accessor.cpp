@@ -176,6 +176,15 @@ std::vector<glm::vec4> read_vec4s(const tinygltf::Model& model, int accessor,
   return read_vectors<glm::vec4>(model, accessor, TINYGLTF_TYPE_VEC4, where);
 }
 
+std::vector<glm::vec4> read_colors(const tinygltf::Model& model, int index,
+                                   const std::string& where) {
+  const tinygltf::Accessor& accessor = checked(model, index, where);
+  if (accessor.type == TINYGLTF_TYPE_VEC4) return read_vec4s(model, index, where);
+  std::vector<glm::vec4> colors;
+  for (const glm::vec3& color : read_vec3s(model, index, where)) colors.emplace_back(color, 1.0f);
+  return colors;
+}
+
 // Matrices of floats have no padding between their columns (glTF 2.0, 3.6.2.4).
 std::vector<glm::dmat4> read_mat4s(const tinygltf::Model& model, int index,
                                    const std::string& where) {

@@ -22,6 +22,9 @@ std::vector<glm::vec3> read_vec3s(const tinygltf::Model& model, int accessor,
                                   const std::string& where);
 std::vector<glm::vec4> read_vec4s(const tinygltf::Model& model, int accessor,
                                   const std::string& where);
+// Colours without an alpha have an alpha of 1.
+std::vector<glm::vec4> read_colors(const tinygltf::Model& model, int accessor,
+                                   const std::string& where);
 std::vector<glm::dmat4> read_mat4s(const tinygltf::Model& model, int accessor,
                                    const std::string& where);
 std::vector<float> read_scalars(const tinygltf::Model& model, int accessor,

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <optional>
+#include <utility>
 
 #include "daemon/scene/gltf_value.hpp"
 #include "daemon/set/problems.hpp"
@@ -16,19 +16,45 @@ namespace {
 
 constexpr double max_radiance = 1e30;
 constexpr double max_distance_m = 1e15;  // attenuation is negligible beyond this
+// Alpha is the same in either encoding; colours come in this one, often in the same image.
+constexpr Encoding alpha_only = Encoding::srgb;
 
-template <typename TextureInfo>
-UvMapping mapping_of(const TextureInfo& texture, const std::string& what, Notes& notes) {
-  const tinygltf::Value transform = extension(texture.extensions, "KHR_texture_transform");
+// A reference to a texture, from the core of glTF or from an extension.
+struct TextureInfo {
+  int index = -1;
+  double set = 0;
+  tinygltf::Value transform;  // KHR_texture_transform
+};
+
+template <typename CoreInfo>
+TextureInfo info_of(const CoreInfo& core) {
+  return {core.index, static_cast<double>(core.texCoord),
+          extension(core.extensions, "KHR_texture_transform")};
+}
+
+TextureInfo info_of(const tinygltf::Value& extension, const std::string& key) {
+  const tinygltf::Value given = extension.Has(key) ? extension.Get(key) : tinygltf::Value();
+  if (!given.IsObject()) return {};
+  const tinygltf::Value extensions =
+      given.Has("extensions") ? given.Get("extensions") : tinygltf::Value();
+  const bool has_transform = extensions.IsObject() && extensions.Has("KHR_texture_transform");
+  return {static_cast<int>(std::clamp(number(given, "index", -1), -1.0, 2e9)),
+          number(given, "texCoord", 0),
+          has_transform ? extensions.Get("KHR_texture_transform")
+                        : tinygltf::Value(tinygltf::Value::Object{})};
+}
+
+UvMapping read_mapping(const TextureInfo& texture, const std::string& what, Notes& notes) {
+  constexpr double last_set = 255;  // far beyond what files have
   UvMapping mapping;
-  const double set = number(transform, "texCoord", texture.texCoord);
-  if (set == 0 || set == 1)
+  const double set = number(texture.transform, "texCoord", texture.set);
+  if (set >= 0 && set <= last_set && set == std::floor(set))
     mapping.set = static_cast<int>(set);
   else
-    notes.add(what + ": texture coordinate sets other than 0 and 1 are not supported; set 0 taken");
-  const std::vector<double> offset = numbers(transform, "offset", {0, 0});
-  const std::vector<double> scale = numbers(transform, "scale", {1, 1});
-  const double rotation = number(transform, "rotation", 0);
+    notes.add(what + ": its set of texture coordinates is none from 0 to 255; set 0 taken");
+  const std::vector<double> offset = numbers(texture.transform, "offset", {0, 0});
+  const std::vector<double> scale = numbers(texture.transform, "scale", {1, 1});
+  const double rotation = number(texture.transform, "rotation", 0);
   const double c = std::cos(rotation), s = std::sin(rotation);
   // The rotation is counter-clockwise as seen with v downwards, as in the extension's example and
   // in other viewers.
@@ -66,6 +92,41 @@ UsedMaterial GltfMaterials::use(int index) {
   return at->second;
 }
 
+// The textures of one material, and the mappings that they are read by.
+class GltfMaterials::Textures {
+ public:
+  Textures(GltfTextures& textures, const std::string& what, Notes& notes, Material& material)
+      : textures_(textures), what_(what), notes_(notes), material_(material) {}
+
+  // Gives the material a texture. Returns false if the file names one that cannot be had.
+  bool take(const TextureInfo& info, Encoding encoding, std::uint32_t Material::*texture,
+            const std::string& which) {
+    if (info.index < 0) return true;
+    const UvMapping wanted = read_mapping(info, what_ + ", " + which, notes_);
+    material_.*texture = textures_.use(info.index, encoding);
+    if (material_.*texture == no_texture) return false;
+    const auto at = std::ranges::find(mappings, wanted) - mappings.begin();
+    if (at == std::ssize(mappings)) mappings.push_back(wanted);
+    const auto role = std::ranges::find(material_textures, texture) - material_textures.begin();
+    material_.mappings[static_cast<std::size_t>(role)] = static_cast<std::uint8_t>(at);
+    return true;
+  }
+
+  // Takes a texture of an extension.
+  bool take(const tinygltf::Value& extension, const std::string& key, Encoding encoding,
+            std::uint32_t Material::*texture) {
+    return take(info_of(extension, key), encoding, texture, key);
+  }
+
+  std::vector<UvMapping> mappings;
+
+ private:
+  GltfTextures& textures_;
+  const std::string& what_;
+  Notes& notes_;
+  Material& material_;
+};
+
 UsedMaterial GltfMaterials::read(const tinygltf::Material& given, const std::string& what) {
   const tinygltf::PbrMetallicRoughness& pbr = given.pbrMetallicRoughness;
   Material material;
@@ -85,58 +146,58 @@ UsedMaterial GltfMaterials::read(const tinygltf::Material& given, const std::str
   for (int i = 0; i < 3; ++i)
     material.emission[i] = within(emissive[static_cast<std::size_t>(i)] * strength, 0, max_radiance,
                                   what + ": its emission", notes_);
-  read_extensions(given, what, material);
 
-  std::optional<UvMapping> mapping;
-  const auto texture = [&](const auto& info, Encoding encoding, const std::string& which) {
-    if (info.index < 0) return no_texture;
-    const UvMapping wanted = mapping_of(info, what + ", " + which, notes_);
-    if (mapping && *mapping != wanted) {
-      notes_.add(what + ": its " + which +
-                 " is mapped otherwise than the textures before it; left out");
-      return no_texture;
-    }
-    const std::uint32_t index = textures_.use(info.index, encoding);
-    if (index != no_texture) mapping = wanted;
-    return index;
-  };
-  material.base_color_texture =
-      texture(pbr.baseColorTexture, Encoding::srgb, "base colour texture");
-  material.metallic_roughness_texture =
-      texture(pbr.metallicRoughnessTexture, Encoding::linear, "metallic-roughness texture");
-  material.emission_texture = texture(given.emissiveTexture, Encoding::srgb, "emission texture");
-  material.normal_texture = texture(given.normalTexture, Encoding::linear, "normal texture");
+  // The base colour comes first, so that its mapping is the mesh's first (Material::mappings).
+  Textures textures(textures_, what, notes_, material);
+  textures.take(info_of(pbr.baseColorTexture), Encoding::srgb, &Material::base_color_texture,
+                "base colour texture");
+  textures.take(info_of(pbr.metallicRoughnessTexture), Encoding::linear,
+                &Material::metallic_roughness_texture, "metallic-roughness texture");
+  textures.take(info_of(given.emissiveTexture), Encoding::srgb, &Material::emission_texture,
+                "emission texture");
+  textures.take(info_of(given.normalTexture), Encoding::linear, &Material::normal_texture,
+                "normal texture");
   material.normal_scale =
       within(given.normalTexture.scale, -1e3, 1e3, what + ": its normal texture's scale", notes_);
   // Occlusion textures are not left out: path tracing finds occlusion itself.
+  read_extensions(given, what, textures, material);
 
   const auto index = static_cast<std::uint32_t>(scene_.materials.size());
   scene_.materials.push_back(std::move(material));
-  return {index, mapping.value_or(UvMapping{}), mapping.has_value()};
+  return {index, std::move(textures.mappings)};
 }
 
 void GltfMaterials::read_extensions(const tinygltf::Material& given, const std::string& what,
-                                    Material& material) {
+                                    Textures& textures, Material& material) {
   const tinygltf::Value ior = extension(given.extensions, "KHR_materials_ior");
   // An ior of 0 stands for a Fresnel term of 1 and is there for old specular-glossiness assets.
   material.ior = within(number(ior, "ior", 1.5), 1, 100, what + ": ior", notes_);
+  read_glass(given, what, textures, material);
+  read_clearcoat(given, what, textures, material);
+  read_sheen(given, what, textures, material);
+  read_specular(given, what, textures, material);
+  read_anisotropy(given, what, textures, material);
+}
 
-  const tinygltf::Value specular = extension(given.extensions, "KHR_materials_specular");
-  material.specular =
-      within(number(specular, "specularFactor", 1), 0, 1, what + ": specularFactor", notes_);
-  material.specular_color =
-      color_within(numbers(specular, "specularColorFactor", {1, 1, 1}),
-                   std::numeric_limits<float>::max(), what + ": specularColorFactor", notes_);
-  if (specular.Has("specularTexture") || specular.Has("specularColorTexture"))
-    notes_.add(what + ": the textures of KHR_materials_specular are not supported; left out");
+// A factor whose texture cannot be had says nothing about any place of the surface.
+void GltfMaterials::leave_out(const std::string& what, const std::string& extension) {
+  notes_.add(what + ": " + extension + " is left out, since its texture cannot be read");
+}
 
+void GltfMaterials::read_glass(const tinygltf::Material& given, const std::string& what,
+                               Textures& textures, Material& material) {
   const tinygltf::Value transmission = extension(given.extensions, "KHR_materials_transmission");
   material.transmission = within(number(transmission, "transmissionFactor", 0), 0, 1,
                                  what + ": transmissionFactor", notes_);
-  if (transmission.Has("transmissionTexture"))
-    notes_.add(what + ": its transmission texture is not supported; left out");
+  if (material.transmission > 0 &&
+      !textures.take(transmission, "transmissionTexture", Encoding::linear,
+                     &Material::transmission_texture)) {
+    leave_out(what, "KHR_materials_transmission");
+    material.transmission = 0;
+  }
 
   const tinygltf::Value volume = extension(given.extensions, "KHR_materials_volume");
+  // How thick it is where is for renderers that do not follow light through the mesh.
   material.thin_walled = !(number(volume, "thicknessFactor", 0) > 0);
   material.attenuation_color = color_within(numbers(volume, "attenuationColor", {1, 1, 1}), 1,
                                             what + ": attenuationColor", notes_);
@@ -145,27 +206,32 @@ void GltfMaterials::read_extensions(const tinygltf::Material& given, const std::
     material.attenuation_distance_m = static_cast<float>(distance_m);
   else if (distance_m <= 0)
     notes_.add(what + ": attenuationDistance must be greater than 0; taken as infinite");
+}
 
-  read_sheen(given, what, material);
-  read_anisotropy(given, what, material);
-  if (material.transmission > 0 && material.specular_color != glm::vec3(1))
-    notes_.add(what + ": specularColorFactor does not colour the reflection of glass");
-
+void GltfMaterials::read_clearcoat(const tinygltf::Material& given, const std::string& what,
+                                   Textures& textures, Material& material) {
   const tinygltf::Value lacquer = extension(given.extensions, "KHR_materials_clearcoat");
   material.clearcoat =
       within(number(lacquer, "clearcoatFactor", 0), 0, 1, what + ": clearcoatFactor", notes_);
   material.clearcoat_roughness = within(number(lacquer, "clearcoatRoughnessFactor", 0), 0, 1,
                                         what + ": clearcoatRoughnessFactor", notes_);
-  if (material.clearcoat > 0 &&
-      (lacquer.Has("clearcoatTexture") || lacquer.Has("clearcoatRoughnessTexture") ||
-       lacquer.Has("clearcoatNormalTexture")))
-    notes_.add(what + ": the textures of its clear coat are not supported; left out");
-  if (material.clearcoat > 0 && given.normalTexture.index >= 0)
-    notes_.add(what + ": its clear coat follows its normal texture");
+  if (material.clearcoat <= 0) return;
+  if (!textures.take(lacquer, "clearcoatTexture", Encoding::linear, &Material::clearcoat_texture) ||
+      !textures.take(lacquer, "clearcoatRoughnessTexture", Encoding::linear,
+                     &Material::clearcoat_roughness_texture)) {
+    leave_out(what, "KHR_materials_clearcoat");
+    material.clearcoat = 0;
+    return;
+  }
+  const std::string normals = "clearcoatNormalTexture";
+  textures.take(lacquer, normals, Encoding::linear, &Material::clearcoat_normal_texture);
+  if (lacquer.Has(normals) && lacquer.Get(normals).IsObject())
+    material.clearcoat_normal_scale = within(number(lacquer.Get(normals), "scale", 1), -1e3, 1e3,
+                                             what + ": " + normals + "'s scale", notes_);
 }
 
 void GltfMaterials::read_sheen(const tinygltf::Material& given, const std::string& what,
-                               Material& material) {
+                               Textures& textures, Material& material) {
   const tinygltf::Value sheen = extension(given.extensions, "KHR_materials_sheen");
   material.sheen_color = color_within(numbers(sheen, "sheenColorFactor", {0, 0, 0}), 1,
                                       what + ": sheenColorFactor", notes_);
@@ -177,22 +243,50 @@ void GltfMaterials::read_sheen(const tinygltf::Material& given, const std::strin
     notes_.add(what + ": its sheenRoughnessFactor is taken as " +
                std::to_string(gpu::LEAST_SHEEN_ROUGHNESS).substr(0, 4) +
                ", the least that is supported");
-  if (sheen.Has("sheenColorTexture") || sheen.Has("sheenRoughnessTexture"))
-    notes_.add(what + ": the textures of its sheen are not supported; left out");
+  if (textures.take(sheen, "sheenColorTexture", Encoding::srgb, &Material::sheen_color_texture) &&
+      textures.take(sheen, "sheenRoughnessTexture", alpha_only, &Material::sheen_roughness_texture))
+    return;
+  leave_out(what, "KHR_materials_sheen");
+  material.sheen_color = glm::vec3(0);
+}
+
+void GltfMaterials::read_specular(const tinygltf::Material& given, const std::string& what,
+                                  Textures& textures, Material& material) {
+  const tinygltf::Value specular = extension(given.extensions, "KHR_materials_specular");
+  material.specular =
+      within(number(specular, "specularFactor", 1), 0, 1, what + ": specularFactor", notes_);
+  material.specular_color =
+      color_within(numbers(specular, "specularColorFactor", {1, 1, 1}),
+                   std::numeric_limits<float>::max(), what + ": specularColorFactor", notes_);
+  if (!textures.take(specular, "specularTexture", alpha_only, &Material::specular_texture) ||
+      !textures.take(specular, "specularColorTexture", Encoding::srgb,
+                     &Material::specular_color_texture)) {
+    leave_out(what, "KHR_materials_specular");
+    material.specular = 1;
+    material.specular_color = glm::vec3(1);
+    material.specular_texture = material.specular_color_texture = no_texture;
+  }
+  if (material.transmission > 0 && has_specular_color(material))
+    notes_.add(what + ": KHR_materials_specular does not colour the reflection of its glass");
 }
 
 void GltfMaterials::read_anisotropy(const tinygltf::Material& given, const std::string& what,
-                                    Material& material) {
+                                    Textures& textures, Material& material) {
   const tinygltf::Value anisotropy = extension(given.extensions, "KHR_materials_anisotropy");
   material.anisotropy = within(number(anisotropy, "anisotropyStrength", 0), 0, 1,
                                what + ": anisotropyStrength", notes_);
   material.anisotropy_rotation_rad = within(number(anisotropy, "anisotropyRotation", 0), -1e3, 1e3,
                                             what + ": anisotropyRotation", notes_);
   if (material.anisotropy <= 0) return;
-  if (anisotropy.Has("anisotropyTexture"))
-    notes_.add(what + ": the texture of its anisotropy is not supported; left out");
-  if (!is_anisotropic(material))
+  if (!is_anisotropic(material)) {
     notes_.add(what + ": as it lets light through, its anisotropy is left out");
+    return;
+  }
+  if (textures.take(anisotropy, "anisotropyTexture", Encoding::linear,
+                    &Material::anisotropy_texture))
+    return;
+  leave_out(what, "KHR_materials_anisotropy");
+  material.anisotropy = 0;
 }
 
 }  // namespace previz::scene

@@ -15,13 +15,12 @@
 
 namespace previz::scene {
 
-// A material in the scene, and how a mesh that uses it must transform its texture coordinates. A
-// mesh has one set of coordinates: textures whose mapping differs from that of the first (base
-// colour, metallic-roughness, emission, normal, in this order) are left out with a note.
+// A material in the scene, and how its textures are mapped onto a mesh that uses it: the mesh has
+// texture coordinates of each mapping, to which Material::mappings counts. There is none if it has
+// no texture.
 struct UsedMaterial {
   std::uint32_t index = 0;  // in Scene::materials
-  UvMapping mapping;
-  bool is_textured = false;
+  std::vector<UvMapping> mappings;
 };
 
 // Holds the materials of one file, each created when first used.
@@ -40,12 +39,22 @@ class GltfMaterials {
   UsedMaterial use(int material);
 
  private:
+  class Textures;
+
   UsedMaterial read(const tinygltf::Material& given, const std::string& what);
-  void read_extensions(const tinygltf::Material& given, const std::string& what,
+  void read_extensions(const tinygltf::Material& given, const std::string& what, Textures& textures,
                        Material& material);
-  void read_sheen(const tinygltf::Material& given, const std::string& what, Material& material);
-  void read_anisotropy(const tinygltf::Material& given, const std::string& what,
+  void read_glass(const tinygltf::Material& given, const std::string& what, Textures& textures,
+                  Material& material);
+  void read_clearcoat(const tinygltf::Material& given, const std::string& what, Textures& textures,
+                      Material& material);
+  void read_sheen(const tinygltf::Material& given, const std::string& what, Textures& textures,
+                  Material& material);
+  void read_specular(const tinygltf::Material& given, const std::string& what, Textures& textures,
+                     Material& material);
+  void read_anisotropy(const tinygltf::Material& given, const std::string& what, Textures& textures,
                        Material& material);
+  void leave_out(const std::string& what, const std::string& extension);
 
   const tinygltf::Model& model_;
   std::string file_;

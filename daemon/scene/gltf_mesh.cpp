@@ -112,6 +112,8 @@ void take_vertices(Mesh& mesh, const std::vector<std::uint32_t>& vertices) {
   take(mesh.positions, vertices);
   take(mesh.normals, vertices);
   take(mesh.uvs, vertices);
+  for (std::vector<glm::vec2>& uvs : mesh.more_uvs) take(uvs, vertices);
+  take(mesh.colors, vertices);
   for (MorphTarget& target : mesh.undeformed.targets) {
     take(target.positions, vertices);
     take(target.normals, vertices);
@@ -198,13 +200,15 @@ void repair_normals(Mesh& mesh, const std::string& what, Notes& notes) {
               " to the back of every triangle around; turned round");
 }
 
-void read_uvs(const tinygltf::Model& model, const MeshSource& source, const std::string& where,
-              const std::string& what, Notes& notes, Mesh& mesh) {
-  const auto& [a, b, c, d, e, f] = source.mapping.affine;
-  mesh.uvs = read_vec2s(model, source.uvs, where + ", texture coordinates");
+std::vector<glm::vec2> read_uvs(const tinygltf::Model& model, int accessor,
+                                const UvMapping& mapping, const std::string& where,
+                                const std::string& what, Notes& notes) {
+  if (accessor < 0) return {};
+  const auto& [a, b, c, d, e, f] = mapping.affine;
+  std::vector<glm::vec2> uvs = read_vec2s(model, accessor, where + ", texture coordinates");
   std::uint64_t not_finite = 0;
-  for (glm::vec2& uv : mesh.uvs) {
-    if (source.mapping.affine != UvMapping{}.affine) {
+  for (glm::vec2& uv : uvs) {
+    if (mapping.affine != UvMapping{}.affine) {
       const glm::dvec2 p = uv;
       uv = {static_cast<float>(a * p.x + b * p.y + c), static_cast<float>(d * p.x + e * p.y + f)};
     }
@@ -216,6 +220,30 @@ void read_uvs(const tinygltf::Model& model, const MeshSource& source, const std:
     notes.add(what + ": " +
               count_of(not_finite, "texture coordinate is", "texture coordinates are") +
               " not a number or beyond 1e15; set to 0");
+  return uvs;
+}
+
+// Colours are factors from 0 to 1 (glTF 2.0, 3.7.2.1); one that is not a number leaves the
+// material's.
+std::vector<glm::vec4> read_vertex_colors(const tinygltf::Model& model, int accessor,
+                                          const std::string& where, const std::string& what,
+                                          Notes& notes) {
+  if (accessor < 0) return {};
+  std::vector<glm::vec4> colors = read_colors(model, accessor, where + ", COLOR_0");
+  std::uint64_t out_of_range = 0;
+  for (glm::vec4& color : colors) {
+    bool is_in_range = true;
+    for (int i = 0; i < 4; ++i) {
+      if (color[i] >= 0 && color[i] <= 1) continue;
+      is_in_range = false;
+      color[i] = std::isnan(color[i]) ? 1.0f : std::clamp(color[i], 0.0f, 1.0f);
+    }
+    out_of_range += is_in_range ? 0 : 1;
+  }
+  if (out_of_range > 0)
+    notes.add(what + ": " + count_of(out_of_range, "vertex colour is", "vertex colours are") +
+              " outside of 0 to 1; brought to the nearest allowed");
+  return colors;
 }
 
 int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
@@ -225,14 +253,17 @@ int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
 
 }  // namespace
 
-MeshSource mesh_source(const tinygltf::Primitive& primitive, const UvMapping& mapping) {
+MeshSource mesh_source(const tinygltf::Primitive& primitive, std::vector<UvMapping> mappings) {
   MeshSource source;
+  if (mappings.empty()) mappings.emplace_back();
   source.positions = attribute(primitive, "POSITION");
   source.normals = attribute(primitive, "NORMAL");
-  source.uvs = attribute(primitive, "TEXCOORD_" + std::to_string(mapping.set));
+  source.colors = attribute(primitive, "COLOR_0");
+  for (const UvMapping& mapping : mappings)
+    source.uvs.push_back(attribute(primitive, "TEXCOORD_" + std::to_string(mapping.set)));
   source.indices = primitive.indices;
   if (primitive.mode >= 0) source.mode = primitive.mode;
-  source.mapping = mapping;
+  source.mappings = std::move(mappings);
   return source;
 }
 
@@ -261,16 +292,24 @@ std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& so
   }
   Mesh mesh;
   const std::uint64_t count = element_count(model, source.positions, where + ", positions");
-  budget.add_vertices(count, where);
+  budget.add_vertices(count * source.mappings.size(), where);
   const std::uint64_t deformed = source.targets.size() + source.influences.size();
   budget.add_deformed(count * deformed, where);
   mesh.positions = read_vec3s(model, source.positions, where + ", positions");
   mesh.triangles = read_triangles(model, source, count, where, what, notes, budget);
   if (source.normals >= 0) mesh.normals = read_vec3s(model, source.normals, where + ", normals");
-  if (source.uvs >= 0) read_uvs(model, source, where, what, notes, mesh);
-  if ((source.normals >= 0 && mesh.normals.size() != count) ||
-      (source.uvs >= 0 && mesh.uvs.size() != count))
-    throw Error(where + ": its attributes have different numbers of elements");
+  for (std::size_t i = 0; i < source.mappings.size(); ++i) {
+    std::vector<glm::vec2>& uvs = i == 0 ? mesh.uvs : mesh.more_uvs.emplace_back();
+    uvs = read_uvs(model, source.uvs[i], source.mappings[i], where, what, notes);
+  }
+  mesh.colors = read_vertex_colors(model, source.colors, where, what, notes);
+  bool is_whole = (source.normals < 0 || mesh.normals.size() == count) &&
+                  (source.colors < 0 || mesh.colors.size() == count);
+  for (std::size_t i = 0; i < source.uvs.size(); ++i)
+    is_whole = is_whole && (source.uvs[i] < 0 || uvs_of(mesh, i).size() == count);
+  if (!is_whole) throw Error(where + ": its attributes have different numbers of elements");
+  if (std::ranges::all_of(mesh.colors, [](const glm::vec4& c) { return c == glm::vec4(1); }))
+    mesh.colors.clear();  // they change nothing
   read_undeformed(model, source, where, what, notes, mesh);
 
   drop_bad_triangles(mesh, what, notes);
@@ -284,7 +323,7 @@ std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& so
   } else {
     if (3 * mesh.triangles.size() > count) {
       const std::uint64_t more = 3 * mesh.triangles.size() - count;
-      budget.add_vertices(more, where);
+      budget.add_vertices(more * source.mappings.size(), where);
       budget.add_deformed(more * deformed, where);
     }
     set_flat_normals(mesh);

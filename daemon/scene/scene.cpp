@@ -15,11 +15,12 @@
 namespace previz::scene {
 namespace {
 
-// Returns the smallest factor that a texture applies to the roughness.
-float least_roughness_factor(const Scene& scene, std::uint32_t texture) {
-  if (texture == no_texture) return 1.0f;
-  float least = 1.0f;
-  for (const glm::vec4& texel : scene.textures[texture].texels) least = std::min(least, texel.g);
+// Returns the smallest factor that one channel of a texture applies.
+double least_factor(const Scene& scene, std::uint32_t texture, int channel) {
+  if (texture == no_texture) return 1;
+  float least = 1;
+  for (const glm::vec4& texel : scene.textures[texture].texels)
+    least = std::min(least, texel[channel]);
   return least;
 }
 
@@ -49,7 +50,9 @@ void apply(const set::Surface& surface, const std::string& set_file, Scene& scen
 // The shape at rest of a mesh that deforms follows from what it is before, and from its
 // deformation.
 bool are_same_mesh(const Mesh& a, const Mesh& b) {
-  if (a.triangles != b.triangles || a.uvs != b.uvs || a.undeformed != b.undeformed) return false;
+  if (a.triangles != b.triangles || a.uvs != b.uvs || a.more_uvs != b.more_uvs ||
+      a.colors != b.colors || a.undeformed != b.undeformed)
+    return false;
   return !a.undeformed.is_empty() || (a.positions == b.positions && a.normals == b.normals);
 }
 
@@ -105,6 +108,17 @@ bool show_variant(const Variants& variants, const std::string& name,
   return true;
 }
 
+std::size_t mapping_of(const Material& material, std::uint32_t Material::*texture) {
+  const auto role = std::ranges::find(material_textures, texture) - material_textures.begin();
+  return material.mappings[static_cast<std::size_t>(role)];
+}
+
+const std::vector<glm::vec2>& uvs_of(const Mesh& mesh, std::size_t mapping) {
+  static const std::vector<glm::vec2> none;
+  if (mapping == 0) return mesh.uvs;
+  return mapping <= mesh.more_uvs.size() ? mesh.more_uvs[mapping - 1] : none;
+}
+
 bool emits(const Material& m) {
   return m.emission.r > 0 || m.emission.g > 0 || m.emission.b > 0;
 }
@@ -142,27 +156,37 @@ bool has_sheen(const Material& m) {
   return m.sheen_color.r > 0 || m.sheen_color.g > 0 || m.sheen_color.b > 0;
 }
 
+bool has_specular_color(const Material& m) {
+  return m.specular_color != glm::vec3(1) || m.specular_color_texture != no_texture;
+}
+
 bool is_anisotropic(const Material& m) {
   return m.anisotropy > 0 && m.transmission <= 0;
 }
 
-double widest_alpha(const Material& m, double roughness) {
+bool has_opaque_part(const Material& m) {
+  return (m.metallic < 1 || m.metallic_roughness_texture != no_texture) &&
+         (m.transmission < 1 || m.transmission_texture != no_texture);
+}
+
+double widest_alpha(const Material& m, double roughness, double strength_factor) {
   const double alpha = roughness * roughness;
   if (!is_anisotropic(m)) return alpha;
-  const double strength = m.anisotropy;
+  const double strength = m.anisotropy * strength_factor;
   return std::max<double>(std::lerp(alpha, 1.0, strength * strength), gpu::LEAST_ANISOTROPIC_ALPHA);
 }
 
 bool can_be_dirac(const Scene& scene, const Material& m, double specular_alpha) {
   const bool glass = transmits(m);
   if (glass && m.ior < gpu::LEAST_ROUGH_IOR) return true;
-  const double lacquer = m.clearcoat_roughness;
+  const double lacquer =
+      m.clearcoat_roughness * least_factor(scene, m.clearcoat_roughness_texture, 1);
   if (m.clearcoat > 0 && lacquer * lacquer <= specular_alpha * (1 + 1e-5)) return true;
   if (!glass && !(m.metallic > 0) && !(m.specular > 0 && m.ior > 1)) return false;
-  const double roughness =
-      m.roughness * least_roughness_factor(scene, m.metallic_roughness_texture);
+  const double roughness = m.roughness * least_factor(scene, m.metallic_roughness_texture, 1);
+  const double strength_factor = least_factor(scene, m.anisotropy_texture, 2);
   // The shader's sum is in floats.
-  return widest_alpha(m, roughness) <= specular_alpha * (1 + 1e-5);
+  return widest_alpha(m, roughness, strength_factor) <= specular_alpha * (1 + 1e-5);
 }
 
 bool have_same_geometry(const Scene& a, const Scene& b) {

@@ -3,6 +3,7 @@
 // glTF's file format.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/mat4x4.hpp>
 #include <glm/vec2.hpp>
@@ -25,16 +26,19 @@ inline constexpr std::uint32_t world_mixed = 1;
 inline constexpr std::uint32_t world_real = 2;
 inline constexpr std::uint32_t world_both = world_mixed | world_real;
 
-// A mesh is in object space. All three arrays have one entry per vertex; `uvs` is empty where there
-// are none (a texture is then read at (0, 0)). Every vertex is finite and used; no triangle has
-// zero area. Normals are unit and, for at least one adjacent triangle, on the side of
-// counter-clockwise winding. Of a mesh that deforms that holds before it is deformed; positions and
-// normals are those at rest, as the renderer is given it.
+// A mesh is in object space. Its arrays have one entry per vertex; `uvs` is empty where there are
+// none (a texture is then read at (0, 0)), and so is `colors`, which then are white. Every vertex
+// is finite and used; no triangle has zero area. Normals are unit and, for at least one adjacent
+// triangle, on the side of counter-clockwise winding. Of a mesh that deforms that holds before it
+// is deformed; positions and normals are those at rest, as the renderer is given it.
 struct Mesh {
   std::string name;
   std::vector<glm::vec3> positions;
   std::vector<glm::vec3> normals;
   std::vector<glm::vec2> uvs;
+  // Texture coordinates of the material's further mappings (Material::mappings), from 1 on.
+  std::vector<std::vector<glm::vec2>> more_uvs;
+  std::vector<glm::vec4> colors;      // linear, 0..1: factors of the base colour and of the alpha
   std::vector<glm::uvec3> triangles;  // vertex indices
   Undeformed undeformed;              // empty: the mesh keeps its shape
 };
@@ -59,7 +63,7 @@ inline constexpr std::uint32_t no_object = 0xffffffffu;
 enum class AlphaMode : std::uint32_t { opaque, mask, blend };
 
 // A material is glTF 2.0 metallic-roughness with the extensions that the shaders implement. A
-// texture multiplies its factor.
+// texture multiplies its factor, with the channels that are stated; others mean nothing.
 struct Material {
   std::string name;
   glm::vec3 base_color{1};  // linear Rec. 709
@@ -74,9 +78,9 @@ struct Material {
   float transmission = 0;   // KHR_materials_transmission, 0..1
   bool thin_walled = true;  // false where KHR_materials_volume gives a thickness > 0
   glm::vec3 emission{0};    // radiance: emissiveFactor * emissive_strength
-  std::uint32_t base_color_texture = no_texture;
+  std::uint32_t base_color_texture = no_texture;          // RGB, and A of the alpha
   std::uint32_t metallic_roughness_texture = no_texture;  // G roughness, B metallic
-  std::uint32_t emission_texture = no_texture;
+  std::uint32_t emission_texture = no_texture;            // RGB
   AlphaMode alpha_mode = AlphaMode::opaque;
   float alpha_cutoff = 0.5f;
   // KHR_materials_volume: after attenuation_distance_m inside, white light has become
@@ -93,7 +97,41 @@ struct Material {
   float anisotropy_rotation_rad = 0;
   std::uint32_t normal_texture = no_texture;  // tangent space, +Y up, along the uvs
   float normal_scale = 1;
+  std::uint32_t transmission_texture = no_texture;         // R
+  std::uint32_t clearcoat_texture = no_texture;            // R
+  std::uint32_t clearcoat_roughness_texture = no_texture;  // G
+  std::uint32_t sheen_color_texture = no_texture;          // RGB
+  std::uint32_t sheen_roughness_texture = no_texture;      // A
+  std::uint32_t specular_texture = no_texture;             // A
+  std::uint32_t specular_color_texture = no_texture;       // RGB
+  // RG: the direction of the anisotropy, from -1 to 1, before it is turned; B the strength.
+  std::uint32_t anisotropy_texture = no_texture;
+  std::uint32_t clearcoat_normal_texture = no_texture;  // as normal_texture; without it lacquer is
+  float clearcoat_normal_scale = 1;                     // as smooth as the mesh
+  // By which of the mesh's texture coordinates each texture is read, in the order of
+  // material_textures: 0 for Mesh::uvs, which the base colour has, k for Mesh::more_uvs[k - 1].
+  std::array<std::uint8_t, 13> mappings{};
 };
+
+// The textures that a material can have. The shaders know those from the fifth on by their place
+// (LAYER_* of shaders/lib/render_shared.h).
+inline constexpr std::array<std::uint32_t Material::*, 13> material_textures = {
+    &Material::base_color_texture,
+    &Material::metallic_roughness_texture,
+    &Material::emission_texture,
+    &Material::normal_texture,
+    &Material::transmission_texture,
+    &Material::clearcoat_texture,
+    &Material::clearcoat_roughness_texture,
+    &Material::sheen_color_texture,
+    &Material::sheen_roughness_texture,
+    &Material::specular_texture,
+    &Material::specular_color_texture,
+    &Material::anisotropy_texture,
+    &Material::clearcoat_normal_texture};
+inline constexpr std::size_t first_layer_texture = 4;
+// A material reads its textures by at most so many different mappings.
+inline constexpr std::size_t max_mappings = material_textures.size();
 
 enum class Wrap : std::uint32_t { repeat, clamp, mirror };
 
@@ -191,6 +229,12 @@ void for_each_look(const Scene& scene, Visit visit) {
 
 bool emits(const Material& material);
 
+// Returns the mapping by which a material reads one of its textures (Material::mappings).
+std::size_t mapping_of(const Material& material, std::uint32_t Material::*texture);
+
+// Returns the mesh's texture coordinates of a mapping; empty where it has none.
+const std::vector<glm::vec2>& uvs_of(const Mesh& mesh, std::size_t mapping);
+
 // Returns whether an instance emits, or does in one of its variants.
 bool may_glow(const Scene& scene);
 
@@ -206,13 +250,20 @@ glm::vec3 attenuation_per_m(const Material& material);
 
 bool has_sheen(const Material& material);
 
+// Returns whether the reflection of paint or plastic has a colour of its own.
+bool has_specular_color(const Material& material);
+
 // Returns whether reflections are wider along one direction. What lets light through is left as it
 // is, rough glass in all directions alike.
 bool is_anisotropic(const Material& material);
 
 // Returns the GGX alpha of reflections at this roughness, in the direction in which they are
-// widest.
-double widest_alpha(const Material& material, double roughness);
+// widest, where a texture gives this share of the anisotropy's strength.
+double widest_alpha(const Material& material, double roughness, double strength_factor = 1);
+
+// Returns whether any part of this material can be opaque paint or plastic: a texture can take
+// metal or glass away.
+bool has_opaque_part(const Material& material);
 
 // Returns whether light can leave a surface of this material without blur: clear glass, and metal,
 // glass, a coat or lacquer whose GGX alpha is somewhere at or below `specular_alpha`

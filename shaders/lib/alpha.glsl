@@ -15,9 +15,7 @@ const uint MAX_LAYERS = 256u;
 
 // Returns the alpha of the surface at the hit, 1 where the surface is opaque.
 float hit_coverage(Hit hit) {
-  const uint material = instances[hit.instance].material;
-  if (materials[material].alpha_mode == ALPHA_OPAQUE) return 1.0;
-  return coverage(material, hit_uv(hit.instance, hit.primitive, hit.barycentrics));
+  return coverage(hit.instance, hit.primitive, hit.barycentrics);
 }
 
 vec3 hit_transmittance(Hit hit, vec3 direction) {

@@ -151,7 +151,15 @@ float coat_reflectance(Surface s, float cos_o, out vec3 color) {
 float reflection_albedo(Surface s, float cos_o) {
   if (!is_anisotropic(s)) return single_scatter_albedo(0u, cos_o, s.alpha);
   const vec2 across = vec2(dot(s.tangent, s.wo), dot(cross(s.normal, s.tangent), s.wo));
-  return anisotropic_albedo(s.albedo_table, across, cos_o, s.alpha);
+  if (!has_feature(FEATURE_LAYER_TEXTURES) || s.anisotropy_step < 0.0)
+    return anisotropic_albedo(s.albedo_table, across, cos_o, s.alpha);
+  // A texture gives the strength: the tables of the steps around it count.
+  const float low = min(floor(s.anisotropy_step), float(ANISOTROPIC_STEPS - 1u));
+  const uint above = s.albedo_table + uint(low) * ANISOTROPIC_TABLES;
+  const float weaker = low > 0.0
+                           ? anisotropic_albedo(above - ANISOTROPIC_TABLES, across, cos_o, s.alpha)
+                           : single_scatter_albedo(0u, cos_o, s.alpha);
+  return mix(weaker, anisotropic_albedo(above, across, cos_o, s.alpha), s.anisotropy_step - low);
 }
 
 // The p_* sum to 1, in proportion to the lobes' luminance, or are all 0 on a black surface.
@@ -202,7 +210,7 @@ Lobes make_lobes(Surface s) {
   l.clear = 0.0;
   l.smooth_clear = false;
   if (has_feature(FEATURE_CLEARCOAT) && s.clearcoat > 0.0) {
-    l.clear = s.clearcoat * lacquer_reflectance(s, nv);
+    l.clear = s.clearcoat * lacquer_reflectance(s, abs(dot(lacquer_normal(s), s.wo)));
     l.smooth_clear = s.clearcoat_alpha <= frame.specular_alpha;
     // What the lacquer does not reflect is left for what is below it.
     const float below = 1.0 - l.clear;
@@ -238,11 +246,13 @@ vec3 reflection_color(Lobes l, float cos_half) {
          l.conductor_weight * l.conductor_gain * fresnel_schlick(l.conductor, cos_half);
 }
 
-// Returns the colour of all reflections that are Dirac deltas.
+// Returns the colour of all reflections that are Dirac deltas and follow the base's normal: that of
+// lacquer is among them unless it has a normal of its own.
 vec3 mirror_color(Lobes l, float cos_o) {
   vec3 color = l.smooth_reflection ? reflection_color(l, cos_o) : vec3(0.0);
   if (has_feature(FEATURE_SHEEN)) color *= l.below_sheen;
-  return has_feature(FEATURE_CLEARCOAT) && l.smooth_clear ? color + l.clear : color;
+  const bool clear = has_feature(FEATURE_CLEARCOAT) && !has_clear_normal() && l.smooth_clear;
+  return clear ? color + l.clear : color;
 }
 
 // Returns the probability with which bsdf_sample() chooses a reflection that is a Dirac delta.
@@ -250,12 +260,18 @@ float mirror_probability(Lobes l) {
   const float base = l.smooth_reflection ? l.p_reflection : 0.0;
   return has_feature(FEATURE_CLEARCOAT) && l.smooth_clear ? base + l.p_clear : base;
 }
+// Returns the share of that which is the lacquer's, where it has a normal of its own.
+float clear_mirror_share(Lobes l) {
+  return has_clear_normal() && l.smooth_clear && l.p_clear > 0.0 ? l.p_clear / mirror_probability(l)
+                                                                 : 0.0;
+}
 
 // A reflected direction counts only if it is above both the surface and the plane of the shading
-// normal.
-bool reflects_to(Surface s, vec3 wi) {
-  return dot(wi, s.geometric_normal) > 0.0 && dot(wi, s.normal) > 0.0;
+// normal of what reflects.
+bool reflects_to(Surface s, vec3 wi, vec3 normal) {
+  return dot(wi, s.geometric_normal) > 0.0 && dot(wi, normal) > 0.0;
 }
+bool reflects_to(Surface s, vec3 wi) { return reflects_to(s, wi, s.normal); }
 
 // Returns the index of refraction behind the surface over the one in front of it.
 float relative_ior(Surface s) { return s.entering || s.thin_walled ? s.ior : 1.0 / s.ior; }
@@ -369,10 +385,16 @@ vec3 bsdf_evaluate(Surface s, Lobes l, vec3 wi, out float pdf) {
   const bool glass = has_feature(FEATURE_TRANSMISSION) && has_rough_glass(l);
   const bool base = glass || (has_feature(FEATURE_GLOSSY) && has_rough_reflection(l));
   if (!base && !has_rough_clear(l)) return value;
+  if (has_clear_normal() && has_rough_clear(l) && reflects_to(s, wi, s.clear_normal)) {
+    const mat3 clear = make_frame(s.clear_normal);
+    const vec3 o = s.wo * clear;
+    if (o.z > 0.0) add_clearcoat(s, l, o, wi * clear, value, pdf);
+  }
   const mat3 local = lobe_frame(s);
   const vec3 o = s.wo * local;
   if (o.z <= 0.0) return value;
-  if (reflects && has_rough_clear(l)) add_clearcoat(s, l, o, wi * local, value, pdf);
+  if (!has_clear_normal() && reflects && has_rough_clear(l))
+    add_clearcoat(s, l, o, wi * local, value, pdf);
   if (reflects && base)
     add_reflection(s, l, o, wi * local, value, pdf);
   else if (glass && dot(wi, s.geometric_normal) < 0.0 && dot(wi, s.normal) < 0.0)
@@ -437,14 +459,15 @@ bool bsdf_sample(Surface s, Lobes l, vec2 u, float choice, out vec3 wi, out vec3
     wi = make_frame(s.normal) * sample_hemisphere(u);
   } else if (has_feature(FEATURE_CLEARCOAT) && l.p_clear > 0.0 &&
              choose(u.x, l.p_clear / (l.p_clear + l.p_glass + l.p_reflection))) {
-    const float cos_o = dot(s.normal, s.wo);
+    const vec3 normal = lacquer_normal(s);
+    const float cos_o = dot(normal, s.wo);
     if (cos_o <= 0.0) return false;
     if (l.smooth_clear) {
-      wi = 2.0 * cos_o * s.normal - s.wo;
+      wi = 2.0 * cos_o * normal - s.wo;
       weight = vec3(l.clear / l.p_clear);
-      return reflects_to(s, wi);
+      return reflects_to(s, wi, normal);
     }
-    const mat3 local = make_frame(s.normal);
+    const mat3 local = make_frame(normal);
     const vec3 o = s.wo * local;
     const vec3 h = sample_ggx(o, s.clearcoat_alpha, u);
     wi = local * (2.0 * dot(o, h) * h - o);

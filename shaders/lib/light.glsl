@@ -118,8 +118,8 @@ vec3 triangle_emission(GpuLight light, vec2 b) {
   vec3 emission = light.emission;
   if (has_feature(FEATURE_TEXTURES) && light.emission_texture != NO_INDEX)
     emission *= sample_texture(light.emission_texture, uv).rgb;
-  if (has_feature(FEATURE_ALPHA) && light.alpha_material != NO_INDEX)
-    emission *= coverage(light.alpha_material, uv);
+  if (has_feature(FEATURE_ALPHA) && light.alpha_instance != NO_INDEX)
+    emission *= coverage(light.alpha_instance, light.alpha_primitive, b);
   return emission;
 }
 

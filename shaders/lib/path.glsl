@@ -23,7 +23,7 @@ layout(scalar) buffer Landed { vec4 sample_landed[]; };         // of a slot: th
 layout(scalar) buffer Aov { vec4 sample_aov[]; };               // of a slot: normal, depth (0: no hit)
 // The denoiser's albedo of a slot (shaders/README.md, "Denoising"): how bright the mixed world's first
 // surface is in white light, and what it emits over the sensor's white (lib/halves.glsl). 0: no hit.
-// It is kept with FEATURE_TEXTURES.
+// It is kept with FEATURE_TEXTURES and FEATURE_VERTEX_COLORS.
 layout(scalar) buffer Albedo { uvec2 sample_albedo[]; };
 layout(scalar) buffer Control { GpuControl control; };
 layout(scalar) readonly buffer Limits { uint limits[]; };       // of a block of the picture, row-major:

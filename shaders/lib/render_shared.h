@@ -16,6 +16,9 @@ PREVIZ_CONST uint ALBEDO_SIDE = 32u;
 PREVIZ_CONST uint ALBEDO_SHEEN = 1u;
 // An anisotropic reflection has so many tables, each for another azimuth of the viewer.
 PREVIZ_CONST uint ANISOTROPIC_TABLES = 9u;
+// Where a texture changes its strength it has them for so many equal steps of the strength, from the
+// first step to the whole.
+PREVIZ_CONST uint ANISOTROPIC_STEPS = 4u;
 // The lobe of smoother sheen is narrower than its table resolves.
 PREVIZ_CONST float LEAST_SHEEN_ROUGHNESS = 0.07f;
 // The GGX alpha of an anisotropic reflection is at least this in any direction.
@@ -79,6 +82,9 @@ PREVIZ_CONST uint FEATURE_SHEEN = 262144u;        // fibres of cloth above the b
 PREVIZ_CONST uint FEATURE_ANISOTROPY = 524288u;   // reflections that are wider along one direction
 PREVIZ_CONST uint FEATURE_COAT_COLOR = 1048576u;  // paint or plastic whose reflection has a colour
 PREVIZ_CONST uint FEATURE_FILTERED_TEXTURES = 2097152u;  // looked up over a sample's footprint
+PREVIZ_CONST uint FEATURE_VERTEX_COLORS = 4194304u;   // base colours that meshes state
+PREVIZ_CONST uint FEATURE_MAPPINGS = 8388608u;        // textures of a surface that lie differently on it
+PREVIZ_CONST uint FEATURE_LAYER_TEXTURES = 16777216u;  // textures of glass, gloss, lacquer and sheen
 
 // These bits are a path's state.
 PREVIZ_CONST uint PATH_WORLDS_MASK = 3u;      // WORLD_*
@@ -146,7 +152,7 @@ struct GpuPixel {
   vec4 square_high;  // squares, for the variance: of Lm where M = 1, of Lm - Lr where M = 0;
   vec4 square_low;   // w: number of samples
   vec4 normal;      // sum of normals; w: number of samples that hit a surface
-  vec4 albedo;      // sum of albedos (lib/path.glsl); 0 without FEATURE_TEXTURES
+  vec4 albedo;      // sum of albedos (lib/path.glsl); 0 where only materials have colours
 };
 
 // The first surface of the real world at the middle of a pixel.
@@ -179,7 +185,30 @@ struct GpuInstance {
   uint first_triangle;  // in TRIANGLES
   uint first_light;     // of its emissive triangles; NO_INDEX if it emits nothing
   uint presence;
+  // What else its vertices have: extras_per_vertex values from first_extra + v * extras_per_vertex
+  // on in EXTRAS, for the vertex v (modulo 2^32). The first is the colour, the others are texture
+  // coordinates. 0: nothing.
+  uint first_extra;
+  uint extras_per_vertex;
 };
+
+// The textures of a material, by their place in scene::material_textures: the first four have names
+// of their own in GpuMaterial, the others are its layer_textures, here from 0 on.
+PREVIZ_CONST uint TEXTURE_OF_BASE_COLOR = 0u;
+PREVIZ_CONST uint TEXTURE_OF_METALLIC_ROUGHNESS = 1u;
+PREVIZ_CONST uint TEXTURE_OF_EMISSION = 2u;
+PREVIZ_CONST uint TEXTURE_OF_NORMAL = 3u;
+PREVIZ_CONST uint TEXTURE_OF_LAYERS = 4u;
+PREVIZ_CONST uint LAYER_TRANSMISSION = 0u;
+PREVIZ_CONST uint LAYER_CLEARCOAT = 1u;
+PREVIZ_CONST uint LAYER_CLEARCOAT_ROUGHNESS = 2u;
+PREVIZ_CONST uint LAYER_SHEEN_COLOR = 3u;
+PREVIZ_CONST uint LAYER_SHEEN_ROUGHNESS = 4u;
+PREVIZ_CONST uint LAYER_SPECULAR = 5u;
+PREVIZ_CONST uint LAYER_SPECULAR_COLOR = 6u;
+PREVIZ_CONST uint LAYER_ANISOTROPY = 7u;
+PREVIZ_CONST uint LAYER_CLEARCOAT_NORMAL = 8u;
+PREVIZ_CONST uint LAYERS = 9u;
 
 struct GpuMaterial {
   vec3 base_color;
@@ -208,6 +237,11 @@ struct GpuMaterial {
   vec2 anisotropy;      // in which direction of the texture the reflection is wider, times the
                         // strength; 0: in none
   vec3 specular_color;  // factor of the coat's reflectance at normal incidence
+  uint layers;          // bit i: it has layer_textures[i]
+  uint layer_textures[LAYERS];
+  uint mappings[2];     // of every texture, of 4 bits each: by mapping_of()
+  float clearcoat_normal_scale;
+  uint anisotropy_steps;  // of ANISOTROPIC_TABLES from albedo_table on; 0: they are of one strength
 };
 
 // glTF's alpha modes: the surface is all there, or there where its alpha reaches the cutoff, or its
@@ -253,9 +287,10 @@ struct GpuLight {
   float selection; // probability that a light sample picks this light
   vec3 gain_real;
   float cdf;       // sum of selection up to and including this light
-  vec2 uv0, uv1, uv2;  // triangle: texture coordinates
+  vec2 uv0, uv1, uv2;  // triangle: where its corners are in the emission's texture
   uint emission_texture;
-  uint alpha_material;  // triangle: its alpha weakens the light; NO_INDEX if opaque
+  uint alpha_instance;   // triangle whose alpha weakens the light: its instance; NO_INDEX if opaque
+  uint alpha_primitive;  // and its place in the mesh
   uint leaf;              // of LIGHT_TREE; NO_INDEX: the light is not in the tree
   float rest_selection;   // probability that a light sample picks this light without the tree
   float rest_cdf;         // the share of these up to and including this light
@@ -439,11 +474,11 @@ static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 56);
 static_assert(sizeof(GpuPixel) == 160);
 static_assert(sizeof(GpuControl) == 96);
-static_assert(sizeof(GpuInstance) == 112);
-static_assert(sizeof(GpuMaterial) == 140);
+static_assert(sizeof(GpuInstance) == 120);
+static_assert(sizeof(GpuMaterial) == 196);
 static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 32);
-static_assert(sizeof(GpuLight) == 156);
+static_assert(sizeof(GpuLight) == 160);
 static_assert(offsetof(GpuLight, uv0) == 112);
 static_assert(sizeof(GpuFrame) == 224);
 static_assert(sizeof(GpuLightNode) == 48);

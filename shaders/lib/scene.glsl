@@ -10,6 +10,8 @@ bool has_feature(uint feature) { return (FEATURES & feature) != 0u; }
 // What many invocations read at random comes as texel buffers, which are faster on lavapipe.
 uniform textureBuffer vertices;    // RGBA32F, 2 texels a vertex: position, u; normal, v (object space)
 uniform utextureBuffer triangles;  // RGBA32UI, 1 texel a triangle: three indices into the vertices
+uniform utextureBuffer extras;     // RG32UI, of GpuInstance: colours as four 16-bit fractions, and texture
+                                   // coordinates as two floats
 uniform utextureBuffer texels;     // RG32UI, all textures one after the other: four halves a texel, linear
 layout(scalar) readonly buffer Instances { GpuInstance instances[]; };
 layout(scalar) readonly buffer Materials { GpuMaterial materials[]; };
@@ -25,6 +27,7 @@ struct Surface {
   float error;            // bound on the position's error along the geometric normal, metres
   vec3 geometric_normal;  // unit, dot(geometric_normal, wo) >= 0
   vec3 normal;            // unit, interpolated, on the side of the geometric normal
+  vec3 clear_normal;      // as normal, of the coat of lacquer: see lacquer_normal()
   vec3 wo;                // unit, towards where the ray came from
   bool entering;          // the ray came from outside, where the winding is counter-clockwise
   vec3 base_color;
@@ -42,6 +45,7 @@ struct Surface {
   float sheen_roughness;
   vec3 tangent;           // where is_anisotropic(): unit, across the normal
   float tangent_alpha;    // GGX width along the tangent; alpha is that across it
+  float anisotropy_step;  // of the anisotropy's tables, counted from no strength at all; below 0: the only one
   vec3 specular_color;    // factor of the coat's reflectance at normal incidence
   uint medium;            // behind the surface, where that is a coloured solid (lib/medium.glsl)
 };
@@ -154,6 +158,46 @@ struct Triangle {
   vec4 n0, n1, n2;  // normal, v
 };
 
+// Returns what a vertex of the instance has beside its place, its normal and its first texture
+// coordinates.
+uvec2 vertex_extra(GpuInstance instance, uint vertex, uint which) {
+  return texelFetch(extras, int(instance.first_extra + vertex * instance.extras_per_vertex + which)).xy;
+}
+
+// Returns the factors of the base colour and of the alpha that the mesh states at a point of a triangle
+// of these vertices.
+vec4 vertex_color(GpuInstance instance, uvec3 vertices, vec3 b) {
+  if (instance.extras_per_vertex == 0u) return vec4(1.0);
+  vec4 color = vec4(0.0);
+  for (int i = 0; i < 3; ++i) {
+    const uvec2 bits = vertex_extra(instance, vertices[i], 0u);
+    color += b[i] * vec4(unpackUnorm2x16(bits.x), unpackUnorm2x16(bits.y));
+  }
+  return color;
+}
+
+// Returns by which of the mesh's texture coordinates a material reads a texture (TEXTURE_OF_*).
+uint mapping_of(uint material, uint role) {
+  return (materials[material].mappings[role >> 3] >> (4u * (role & 7u))) & 15u;
+}
+
+// Returns the triangle with the texture coordinates by which the material reads a texture.
+Triangle mapped_triangle(Triangle t, GpuInstance instance, uvec3 vertices, uint role) {
+  if (!has_feature(FEATURE_MAPPINGS)) return t;
+  const uint mapping = mapping_of(instance.material, role);
+  if (mapping == 0u || mapping >= instance.extras_per_vertex) return t;
+  const vec2 uv0 = uintBitsToFloat(vertex_extra(instance, vertices.x, mapping));
+  const vec2 uv1 = uintBitsToFloat(vertex_extra(instance, vertices.y, mapping));
+  const vec2 uv2 = uintBitsToFloat(vertex_extra(instance, vertices.z, mapping));
+  t.p0.w = uv0.x;
+  t.n0.w = uv0.y;
+  t.p1.w = uv1.x;
+  t.n1.w = uv1.y;
+  t.p2.w = uv2.x;
+  t.n2.w = uv2.y;
+  return t;
+}
+
 // A mapped normal that dips below the surface is lifted above it by this much.
 const float LEAST_NORMAL_LIFT = 1e-3;
 
@@ -182,12 +226,13 @@ bool texture_frame(GpuInstance instance, Triangle t, vec3 normal, out vec3 tange
   return true;
 }
 
-// Applies the normal texture.
-vec3 map_normal(GpuInstance instance, GpuMaterial m, Triangle t, vec2 uv, vec3 normal, vec3 outward) {
+// Applies a normal texture.
+vec3 map_normal(GpuInstance instance, uint texture, float scale, Triangle t, vec2 uv, vec3 normal,
+                vec3 outward) {
   vec3 tangent, bitangent;
   if (!texture_frame(instance, t, normal, tangent, bitangent)) return normal;
-  vec3 mapped = sample_texture(m.normal_texture, uv).xyz * 2.0 - 1.0;
-  mapped.xy *= m.normal_scale;
+  vec3 mapped = sample_texture(texture, uv).xyz * 2.0 - 1.0;
+  mapped.xy *= scale;
   mapped = tangent * mapped.x + bitangent * mapped.y + normal * mapped.z;
   const float mapped_squared = dot(mapped, mapped);
   if (!(mapped_squared > 0.0)) return normal;
@@ -206,32 +251,12 @@ mat3 make_frame(vec3 n) {
               vec3(b, side + n.y * n.y * a, -n.y), n);
 }
 
-// Returns the direction of the material's anisotropy in world space, around the interpolated
-// normal; 0 where there is none.
-vec3 anisotropic_direction(GpuInstance instance, Triangle t, vec3 normal) {
-  const vec2 direction = materials[instance.material].anisotropy;
-  vec3 tangent, bitangent;
-  if (all(equal(direction, vec2(0.0))) || !texture_frame(instance, t, normal, tangent, bitangent))
-    return vec3(0.0);
-  return tangent * direction.x + bitangent * direction.y;
-}
-
 // Returns the unit vector across the normal that is nearest to a direction; any if the direction is
 // 0 or along the normal.
 vec3 tangent_near(vec3 direction, vec3 normal) {
   const vec3 across = direction - normal * dot(normal, direction);
   const float across_squared = dot(across, across);
   return across_squared > 0.0 ? across * inversesqrt(across_squared) : make_frame(normal)[0];
-}
-
-// Returns the share of a surface that is there, by the alpha of its material.
-float coverage(uint material, vec2 uv) {
-  const GpuMaterial m = materials[material];
-  if (m.alpha_mode == ALPHA_OPAQUE) return 1.0;
-  float alpha = m.alpha;
-  if (has_feature(FEATURE_TEXTURES) && m.base_color_texture != NO_INDEX)
-    alpha *= sample_texture(m.base_color_texture, uv).a;
-  return m.alpha_mode == ALPHA_MASK ? float(alpha >= m.alpha_cutoff) : clamp(alpha, 0.0, 1.0);
 }
 
 vec2 hit_uv(uint instance, uint primitive, vec2 barycentrics) {
@@ -242,6 +267,22 @@ vec2 hit_uv(uint instance, uint primitive, vec2 barycentrics) {
     uv += b[i] * vec2(texelFetch(vertices, int(2u * index[i])).w,
                       texelFetch(vertices, int(2u * index[i]) + 1).w);
   return uv;
+}
+
+float vertex_alpha(uint instance, uint primitive, vec2 barycentrics) {
+  const uvec3 index = texelFetch(triangles, int(instances[instance].first_triangle + primitive)).xyz;
+  return vertex_color(instances[instance], index, vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics)).a;
+}
+
+// Returns the share of a surface that is there, by the alpha of its material.
+float coverage(uint instance, uint primitive, vec2 barycentrics) {
+  const GpuMaterial m = materials[instances[instance].material];
+  if (m.alpha_mode == ALPHA_OPAQUE) return 1.0;
+  float alpha = m.alpha;
+  if (has_feature(FEATURE_TEXTURES) && m.base_color_texture != NO_INDEX)
+    alpha *= sample_texture(m.base_color_texture, hit_uv(instance, primitive, barycentrics)).a;
+  if (has_feature(FEATURE_VERTEX_COLORS)) alpha *= vertex_alpha(instance, primitive, barycentrics);
+  return m.alpha_mode == ALPHA_MASK ? float(alpha >= m.alpha_cutoff) : clamp(alpha, 0.0, 1.0);
 }
 
 // Returns the area in uv of a triangle's footprint of this area in the world; 0 of a triangle that has
@@ -258,8 +299,98 @@ float footprint_in_uv(GpuInstance instance, Triangle t, float cosine, float foot
   return area > 0.0 ? footprint * in_uv / area : 0.0;
 }
 
-// `footprint` is an area in uv.
-void apply_material(inout Surface s, uint material, vec2 uv, float footprint) {
+// Where a surface looks up its textures.
+struct TexturePoint {
+  GpuInstance instance;
+  uvec3 vertices;
+  Triangle triangle;
+  vec3 b;           // weights of the vertices
+  vec2 uv;          // by the first mapping
+  float area;       // of the sample's footprint in uv, by the first mapping
+  float footprint;  // in the world, across the ray
+  float cosine;     // under which the triangle is seen
+};
+
+// Finds where the point is in a texture of its material (TEXTURE_OF_*), and in `area` its footprint
+// there.
+vec2 mapped_uv(TexturePoint at, uint role, out float area) {
+  area = at.area;
+  if (!has_feature(FEATURE_MAPPINGS)) return at.uv;
+  const Triangle t = mapped_triangle(at.triangle, at.instance, at.vertices, role);
+  if (has_feature(FEATURE_FILTERED_TEXTURES) && at.footprint > 0.0)
+    area = footprint_in_uv(at.instance, t, at.cosine, at.footprint);
+  return triangle_uv(t.p0, t.n0, t.p1, t.n1, t.p2, t.n2, at.b);
+}
+
+vec4 look_up(TexturePoint at, uint texture, uint role) {
+  float area;
+  const vec2 uv = mapped_uv(at, role, area);
+  return sample_footprint(texture, uv, area);
+}
+
+// Looks up a texture of a layer (LAYER_*), which is never filtered.
+vec4 look_up_layer(TexturePoint at, uint layer) {
+  float area;
+  const vec2 uv = mapped_uv(at, TEXTURE_OF_LAYERS + layer, area);
+  const uint material = at.instance.material;
+  return sample_texture(materials[material].layer_textures[layer], uv);
+}
+
+// Returns whether the material has this texture (LAYER_*).
+bool has_layer(uint material, uint layer) {
+  return has_feature(FEATURE_LAYER_TEXTURES) && (materials[material].layers & (1u << layer)) != 0u;
+}
+
+// Applies the textures of glass, gloss, lacquer and sheen. There is one look-up for all of them, because
+// it is long.
+void apply_layers(inout Surface s, uint material, TexturePoint at, inout float clearcoat_roughness) {
+  uint left = materials[material].layers;
+  left &= ~((1u << LAYER_ANISOTROPY) | (1u << LAYER_CLEARCOAT_NORMAL));  // these give directions
+  for (; left != 0u; left &= left - 1u) {
+    const uint layer = uint(findLSB(left));
+    const vec4 texel = look_up_layer(at, layer);
+    switch (layer) {
+      case LAYER_TRANSMISSION: s.transmission *= texel.r; break;
+      case LAYER_CLEARCOAT: s.clearcoat *= texel.r; break;
+      case LAYER_CLEARCOAT_ROUGHNESS: clearcoat_roughness *= texel.g; break;
+      case LAYER_SHEEN_COLOR: s.sheen_color *= texel.rgb; break;
+      case LAYER_SHEEN_ROUGHNESS: s.sheen_roughness *= texel.a; break;
+      case LAYER_SPECULAR: s.specular *= texel.a; break;
+      case LAYER_SPECULAR_COLOR: s.specular_color *= texel.rgb; break;
+      default: break;
+    }
+  }
+  s.sheen_roughness = max(s.sheen_roughness, LEAST_SHEEN_ROUGHNESS);
+}
+
+// Returns the direction of the material's anisotropy on the texture times its strength, and the step of
+// the tables of that strength (Surface).
+vec2 anisotropy_at(uint material, TexturePoint at, out float step) {
+  const vec2 given = materials[material].anisotropy;
+  step = -1.0;
+  if (all(equal(given, vec2(0.0))) || !has_layer(material, LAYER_ANISOTROPY)) return given;
+  const vec3 texel = look_up_layer(at, LAYER_ANISOTROPY).rgb;
+  if (materials[material].anisotropy_steps > 0u)
+    step = clamp(texel.b, 0.0, 1.0) * float(materials[material].anisotropy_steps);
+  vec2 along = texel.rg * 2.0 - 1.0;
+  const float size = length(along);
+  along = size > 0.0 ? along / size : vec2(1.0, 0.0);
+  return texel.b * vec2(given.x * along.x - given.y * along.y, given.x * along.y + given.y * along.x);
+}
+
+// Returns the world's direction of an anisotropy around the interpolated normal; 0 where there is none.
+vec3 anisotropic_direction(TexturePoint at, vec2 anisotropy, vec3 normal) {
+  vec3 tangent, bitangent;
+  const Triangle t = mapped_triangle(at.triangle, at.instance, at.vertices,
+                                     TEXTURE_OF_LAYERS + LAYER_ANISOTROPY);
+  if (all(equal(anisotropy, vec2(0.0))) ||
+      !texture_frame(at.instance, t, normal, tangent, bitangent))
+    return vec3(0.0);
+  return tangent * anisotropy.x + bitangent * anisotropy.y;
+}
+
+void apply_material(inout Surface s, TexturePoint at, vec2 anisotropy) {
+  const uint material = at.instance.material;
   const GpuMaterial m = materials[material];
   s.base_color = m.base_color;
   s.metallic = m.metallic;
@@ -270,26 +401,30 @@ void apply_material(inout Surface s, uint material, vec2 uv, float footprint) {
   s.thin_walled = m.thin_walled != 0u;
   s.albedo_table = m.albedo_table;
   s.emission = m.emission;
+  if (has_feature(FEATURE_VERTEX_COLORS))
+    s.base_color *= vertex_color(at.instance, at.vertices, at.b).rgb;
   if (has_feature(FEATURE_TEXTURES)) {
     if (m.base_color_texture != NO_INDEX)
-      s.base_color *= sample_footprint(m.base_color_texture, uv, footprint).rgb;
+      s.base_color *= sample_footprint(m.base_color_texture, at.uv, at.area).rgb;
     if (m.metallic_roughness_texture != NO_INDEX) {
-      const vec4 t = sample_footprint(m.metallic_roughness_texture, uv, footprint);
+      const vec4 t = look_up(at, m.metallic_roughness_texture, TEXTURE_OF_METALLIC_ROUGHNESS);
       roughness *= t.g;
       s.metallic *= t.b;
     }
     if (m.emission_texture != NO_INDEX)
-      s.emission *= sample_footprint(m.emission_texture, uv, footprint).rgb;
+      s.emission *= look_up(at, m.emission_texture, TEXTURE_OF_EMISSION).rgb;
   }
   s.alpha = roughness * roughness;
   s.clearcoat = has_feature(FEATURE_CLEARCOAT) ? m.clearcoat : 0.0;
-  s.clearcoat_alpha = m.clearcoat_roughness * m.clearcoat_roughness;
+  float clearcoat_roughness = m.clearcoat_roughness;
   s.sheen_color = has_feature(FEATURE_SHEEN) ? m.sheen_color : vec3(0.0);
   s.sheen_roughness = m.sheen_roughness;
   s.specular_color = has_feature(FEATURE_COAT_COLOR) ? m.specular_color : vec3(1.0);
+  if (has_feature(FEATURE_LAYER_TEXTURES)) apply_layers(s, material, at, clearcoat_roughness);
+  s.clearcoat_alpha = clearcoat_roughness * clearcoat_roughness;
   s.tangent_alpha = s.alpha;
-  if (has_feature(FEATURE_ANISOTROPY) && any(notEqual(m.anisotropy, vec2(0.0)))) {
-    s.tangent_alpha = mix(s.alpha, 1.0, dot(m.anisotropy, m.anisotropy));
+  if (has_feature(FEATURE_ANISOTROPY) && any(notEqual(anisotropy, vec2(0.0)))) {
+    s.tangent_alpha = mix(s.alpha, 1.0, dot(anisotropy, anisotropy));
     s.alpha = max(s.alpha, LEAST_ANISOTROPIC_ALPHA);
     s.tangent_alpha = max(s.tangent_alpha, s.alpha);
   }
@@ -333,6 +468,27 @@ vec3 mirroring_normal(vec3 normal, vec3 geometric_normal, vec3 wo) {
   return length_squared > 0.0 ? half_way * inversesqrt(length_squared) : geometric_normal;
 }
 
+// Applies a normal texture (TEXTURE_OF_*) as it lies on the triangle.
+vec3 normal_at(TexturePoint at, uint texture, float scale, uint role, vec3 normal, vec3 outward) {
+  const Triangle t = mapped_triangle(at.triangle, at.instance, at.vertices, role);
+  return map_normal(at.instance, texture, scale, t,
+                    triangle_uv(t.p0, t.n0, t.p1, t.n1, t.p2, t.n2, at.b), normal, outward);
+}
+
+// Lacquer does not follow the normal texture of what is below it: it has its own, or is as smooth as the
+// mesh (KHR_materials_clearcoat).
+bool has_clear_normal() { return has_feature(FEATURE_CLEARCOAT) && has_feature(FEATURE_NORMAL_MAPS); }
+
+vec3 clear_normal_at(uint material, TexturePoint at, vec3 normal, vec3 outward) {
+  if (!has_layer(material, LAYER_CLEARCOAT_NORMAL)) return normal;
+  return normal_at(at, materials[material].layer_textures[LAYER_CLEARCOAT_NORMAL],
+                   materials[material].clearcoat_normal_scale,
+                   TEXTURE_OF_LAYERS + LAYER_CLEARCOAT_NORMAL, normal, outward);
+}
+
+// Returns the normal of the coat of lacquer.
+vec3 lacquer_normal(Surface s) { return has_clear_normal() ? s.clear_normal : s.normal; }
+
 // Makes the surface at a hit of a ray with this direction, for a sample whose footprint has this area
 // across the ray (0: a point). The hit's barycentrics are the weights of the triangle's second and
 // third vertex.
@@ -369,18 +525,34 @@ Surface make_surface(GpuHit hit, vec3 direction, float footprint) {
                                               n0.xyz * b.x + n1.xyz * b.y + n2.xyz * b.z);
   const float length_squared = dot(smooth_normal, smooth_normal);
   s.normal = length_squared > 0.0 ? smooth_normal * inversesqrt(length_squared) : outward;
-  if (has_feature(FEATURE_ANISOTROPY))
-    s.tangent = anisotropic_direction(instance, Triangle(p0, p1, p2, n0, n1, n2), s.normal);
-  const vec2 uv = triangle_uv(p0, n0, p1, n1, p2, n2, b);
-  if (has_feature(FEATURE_NORMAL_MAPS) && materials[instance.material].normal_texture != NO_INDEX)
-    s.normal = map_normal(instance, materials[instance.material],
-                          Triangle(p0, p1, p2, n0, n1, n2), uv, s.normal, outward);
-  if (dot(s.normal, s.geometric_normal) < 0.0) s.normal = -s.normal;
+  const uint material = instance.material;
+  TexturePoint at;
+  at.instance = instance;
+  at.vertices = index;
+  at.triangle = Triangle(p0, p1, p2, n0, n1, n2);
+  at.b = b;
+  at.uv = triangle_uv(p0, n0, p1, n1, p2, n2, b);
+  at.cosine = dot(s.geometric_normal, s.wo);
+  at.footprint = footprint;
+  at.area = footprint;
   if (has_feature(FEATURE_FILTERED_TEXTURES) && footprint > 0.0)
-    footprint = footprint_in_uv(instance, Triangle(p0, p1, p2, n0, n1, n2),
-                                dot(s.geometric_normal, s.wo), footprint);
-  apply_material(s, instance.material, uv, footprint);
+    at.area = footprint_in_uv(instance, at.triangle, at.cosine, footprint);
+  vec2 anisotropy = vec2(0.0);
+  if (has_feature(FEATURE_ANISOTROPY)) {
+    anisotropy = anisotropy_at(material, at, s.anisotropy_step);
+    s.tangent = anisotropic_direction(at, anisotropy, s.normal);
+  }
+  if (has_clear_normal()) s.clear_normal = clear_normal_at(material, at, s.normal, outward);
+  if (has_feature(FEATURE_NORMAL_MAPS) && materials[material].normal_texture != NO_INDEX)
+    s.normal = normal_at(at, materials[material].normal_texture, materials[material].normal_scale,
+                         TEXTURE_OF_NORMAL, s.normal, outward);
+  if (dot(s.normal, s.geometric_normal) < 0.0) s.normal = -s.normal;
+  apply_material(s, at, anisotropy);
   if (is_specular(s)) s.normal = mirroring_normal(s.normal, s.geometric_normal, s.wo);
+  if (has_clear_normal()) {
+    if (dot(s.clear_normal, s.geometric_normal) < 0.0) s.clear_normal = -s.clear_normal;
+    s.clear_normal = mirroring_normal(s.clear_normal, s.geometric_normal, s.wo);
+  }
   if (is_anisotropic(s)) s.tangent = tangent_near(s.tangent, s.normal);
   return s;
 }

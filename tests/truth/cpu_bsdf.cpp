@@ -243,6 +243,7 @@ std::optional<glm::dvec3> sample_rough_glass(const Bsdf& bsdf, const ShadingPoin
 // What each lobe reflects, and how likely sample() takes it.
 struct Lobes {
   double nv = 0;
+  double clear_nv = 0;    // by the clear coat's normal
   glm::dvec3 plastic{0};  // s Fr(N.V)
   double lacquer = 0;     // what the clear coat reflects; the rest is left for what is below it
   // Probabilities, sum 1 unless nothing reflects.
@@ -252,6 +253,7 @@ struct Lobes {
 Lobes lobes_of(const Bsdf& bsdf, const ShadingPoint& point) {
   Lobes lobes;
   lobes.nv = glm::dot(point.shading_normal, point.wo);
+  lobes.clear_nv = glm::dot(point.clear_normal, point.wo);
   lobes.plastic = plastic_reflectance(bsdf, lobes.nv);
   const double opaque = (1 - bsdf.metallic) * (1 - bsdf.transmission);
   lobes.diffuse = opaque * (1 - strongest(lobes.plastic)) * mean(bsdf.base_color);
@@ -261,7 +263,7 @@ Lobes lobes_of(const Bsdf& bsdf, const ShadingPoint& point) {
         opaque * mean(lobes.plastic) + bsdf.metallic * mean(schlick(bsdf.base_color, lobes.nv));
   }
   // On the outside of solid glass; from inside, too, the direction outside counts.
-  double outside = std::clamp(lobes.nv, 0.0, 1.0);
+  double outside = std::clamp(lobes.clear_nv, 0.0, 1.0);
   if (bsdf.transmission > 0 && !bsdf.thin_walled && !point.outside)
     outside = std::sqrt(std::max(0.0, 1 - (1 - outside * outside) * bsdf.ior * bsdf.ior));
   lobes.lacquer = bsdf.clearcoat * fresnel_dielectric(outside, 1.5);
@@ -272,7 +274,7 @@ Lobes lobes_of(const Bsdf& bsdf, const ShadingPoint& point) {
   lobes.diffuse *= below;
   lobes.specular *= below;
   lobes.glass *= below;
-  lobes.clearcoat = lobes.nv > 0 ? lobes.lacquer : 0;
+  lobes.clearcoat = lobes.clear_nv > 0 ? lobes.lacquer : 0;
   const double sum = lobes.diffuse + lobes.specular + lobes.glass + lobes.sheen + lobes.clearcoat;
   if (sum > 0) {
     lobes.sheen /= sum;
@@ -305,6 +307,16 @@ std::optional<BsdfSample> sample_glass(const Bsdf& bsdf, const ShadingPoint& poi
   if (glm::dot(wi, point.geometric_normal) >= 0) return std::nullopt;
   return BsdfSample{wi, weight * glass_tint(bsdf, point, true) * under_sheen(bsdf, point, wi), 0,
                     true};
+}
+
+// f * cos of the clear coat, which has a normal of its own.
+double clearcoat_value(const Bsdf& bsdf, const ShadingPoint& point, const Lobes& lobes,
+                       const glm::dvec3& wi) {
+  const double nl = glm::dot(point.clear_normal, wi);
+  if (bsdf.smooth_clearcoat || lobes.clear_nv <= 0 || nl <= 0) return 0;
+  const glm::dvec3 h = glm::normalize(point.wo + wi);
+  return nl * lobes.lacquer *
+         ggx_brdf(nl, lobes.clear_nv, glm::dot(point.clear_normal, h), bsdf.clearcoat_alpha);
 }
 
 }  // namespace
@@ -364,7 +376,9 @@ glm::dvec3 evaluate(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec
     glass = (1 - bsdf.metallic) * bsdf.transmission * rough_glass(bsdf, point, wi).value *
             glass_tint(bsdf, point, nl < 0) * (1 - lobes.lacquer) * under_sheen(bsdf, point, wi);
   }
-  if (nl <= 0 || glm::dot(point.geometric_normal, wi) <= 0) return glass;
+  if (glm::dot(point.geometric_normal, wi) <= 0) return glass;
+  glass += clearcoat_value(bsdf, point, lobes, wi);
+  if (nl <= 0) return glass;
   const double opaque = (1 - bsdf.metallic) * (1 - bsdf.transmission);
   glm::dvec3 f = opaque * (1 - strongest(lobes.plastic)) / pi * bsdf.base_color;
   if (!bsdf.smooth && lobes.nv > 0) {
@@ -375,11 +389,6 @@ glm::dvec3 evaluate(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec
   }
   f = f * under_sheen(bsdf, point, wi) + sheen_value(bsdf, point, wi) / nl;
   f *= 1 - lobes.lacquer;
-  if (!bsdf.smooth_clearcoat && lobes.nv > 0) {
-    const glm::dvec3 h = glm::normalize(point.wo + wi);
-    f += lobes.lacquer *
-         ggx_brdf(nl, lobes.nv, glm::dot(point.shading_normal, h), bsdf.clearcoat_alpha);
-  }
   return f * nl + glass;
 }
 
@@ -387,14 +396,15 @@ double pdf(const Bsdf& bsdf, const ShadingPoint& point, const glm::dvec3& wi) {
   const double nl = glm::dot(point.shading_normal, wi);
   const Lobes lobes = lobes_of(bsdf, point);
   double sum = scatters_behind(bsdf) ? lobes.glass * rough_glass(bsdf, point, wi).pdf : 0;
-  if (nl <= 0 || glm::dot(point.geometric_normal, wi) <= 0) return sum;
-  sum += (lobes.diffuse + lobes.sheen) * nl / pi;  // sheen is sampled by the cosine, too
-  if (!bsdf.smooth && lobes.specular > 0) sum += lobes.specular * Reflection(bsdf, point).pdf(wi);
-  if (!bsdf.smooth_clearcoat && lobes.clearcoat > 0) {
+  if (glm::dot(point.geometric_normal, wi) <= 0) return sum;
+  if (!bsdf.smooth_clearcoat && lobes.clearcoat > 0 && glm::dot(point.clear_normal, wi) > 0) {
     const glm::dvec3 h = glm::normalize(point.wo + wi);
     sum += lobes.clearcoat *
-           ggx_pdf(lobes.nv, glm::dot(point.shading_normal, h), bsdf.clearcoat_alpha);
+           ggx_pdf(lobes.clear_nv, glm::dot(point.clear_normal, h), bsdf.clearcoat_alpha);
   }
+  if (nl <= 0) return sum;
+  sum += (lobes.diffuse + lobes.sheen) * nl / pi;  // sheen is sampled by the cosine, too
+  if (!bsdf.smooth && lobes.specular > 0) sum += lobes.specular * Reflection(bsdf, point).pdf(wi);
   return sum;
 }
 
@@ -425,14 +435,15 @@ std::optional<BsdfSample> sample(const Bsdf& bsdf, const ShadingPoint& point, Ra
     wi = Reflection(bsdf, point).sample(random);
   } else if (choice < lobes.glass + lobes.specular + lobes.clearcoat) {
     if (bsdf.smooth_clearcoat) {
-      wi = 2 * lobes.nv * n - point.wo;
+      wi = 2 * lobes.clear_nv * point.clear_normal - point.wo;
       if (glm::dot(wi, point.geometric_normal) <= 0) return std::nullopt;
       return BsdfSample{wi, glm::dvec3(lobes.lacquer / lobes.clearcoat), 0, true};
     }
-    const glm::dvec3 wo = frame.local(point.wo);
+    const Frame of_coat(point.clear_normal);
+    const glm::dvec3 wo = of_coat.local(point.wo);
     const glm::dvec3 h =
         sample_visible_normal(wo, glm::dvec2(bsdf.clearcoat_alpha), random.uniform2());
-    wi = frame.world(2 * glm::dot(wo, h) * h - wo);
+    wi = of_coat.world(2 * glm::dot(wo, h) * h - wo);
   } else if (lobes.diffuse + lobes.sheen > 0) {
     const glm::dvec2 u = random.uniform2();
     const double r = std::sqrt(u.x);

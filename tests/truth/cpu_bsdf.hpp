@@ -34,8 +34,9 @@ struct ShadingPoint {
   glm::dvec3 geometric_normal{0, 0, 1};
   glm::dvec3 shading_normal{0, 0, 1};
   glm::dvec3 wo{0, 0, 1};
-  bool outside = true;          // the viewer is on the side the triangle's winding faces
-  glm::dvec3 tangent{1, 0, 0};  // across the shading normal
+  bool outside = true;               // the viewer is on the side the triangle's winding faces
+  glm::dvec3 tangent{1, 0, 0};       // across the shading normal
+  glm::dvec3 clear_normal{0, 0, 1};  // the shading normal of the clear coat
 };
 
 struct BsdfSample {

@@ -144,10 +144,7 @@ std::optional<Hit> Geometry::closest(const Ray& ray, std::uint32_t world) const 
   if (glm::dot(hit.shading_normal, hit.geometric_normal) < 0) {
     hit.shading_normal = -hit.shading_normal;
   }
-  if (!mesh.uvs.empty()) {
-    hit.uv = (1 - u - v) * glm::dvec2(mesh.uvs[vertex.x]) + u * glm::dvec2(mesh.uvs[vertex.y]) +
-             v * glm::dvec2(mesh.uvs[vertex.z]);
-  }
+  hit.weights = {1 - u - v, u, v};
   // Embree traces in single precision, in world and in object space: 2^-23 of the larger
   // coordinate is its rounding, 2^-19 leaves room for the sums in between.
   const glm::dvec3 in_object = hit.position - glm::dvec3(placed[3]);

@@ -17,15 +17,19 @@ struct Ray {
   glm::dvec3 direction{0, 0, 1};  // unit
 };
 
-struct Hit {
-  double distance = 0;
+// A point of a mesh.
+struct MeshPoint {
   std::uint32_t instance = 0;
   std::uint32_t triangle = 0;
+  glm::dvec3 weights{1, 0, 0};  // of the triangle's vertices
+};
+
+struct Hit : MeshPoint {
+  double distance = 0;
   glm::dvec3 position{0};
   glm::dvec3 geometric_normal{0};  // unit, on the side the triangle's winding faces
   glm::dvec3 shading_normal{0};    // unit, on the geometric normal's side
-  glm::dvec2 uv{0};
-  double offset = 0;  // how far a new ray must start from the surface, metres
+  double offset = 0;               // how far a new ray must start from the surface, metres
 };
 
 struct Triangle {

@@ -196,12 +196,7 @@ EmissiveMeshes::Sample EmissiveMeshes::sample(Random& random) const {
   s.triangle = entry.triangle;
   s.position = (1 - u.x - u.y) * t.v0 + u.x * t.v1 + u.y * t.v2;
   s.normal = glm::normalize(glm::cross(t.v1 - t.v0, t.v2 - t.v0));
-  const scene::Mesh& mesh = scene_.meshes[scene_.instances[entry.instance].mesh];
-  if (!mesh.uvs.empty()) {
-    const glm::uvec3 vertex = mesh.triangles[entry.triangle];
-    s.uv = (1 - u.x - u.y) * glm::dvec2(mesh.uvs[vertex.x]) + u.x * glm::dvec2(mesh.uvs[vertex.y]) +
-           u.y * glm::dvec2(mesh.uvs[vertex.z]);
-  }
+  s.weights = {1 - u.x - u.y, u.x, u.y};
   s.area_pdf = area_pdf(entry.instance, entry.triangle);
   return s;
 }

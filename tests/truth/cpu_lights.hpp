@@ -41,11 +41,9 @@ class EmissiveMeshes {
   EmissiveMeshes(const scene::Scene& scene, const Geometry& geometry, std::uint32_t world);
   bool empty() const { return cumulative_.empty(); }
 
-  struct Sample {
-    std::uint32_t instance = 0, triangle = 0;
+  struct Sample : MeshPoint {
     glm::dvec3 position{0};
     glm::dvec3 normal{0};
-    glm::dvec2 uv{0};
     double area_pdf = 0;  // per square metre
   };
   Sample sample(Random& random) const;

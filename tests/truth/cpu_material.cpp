@@ -44,34 +44,89 @@ glm::dvec4 look_up(const scene::Scene& scene, std::uint32_t index, const glm::dv
          f.y * ((1 - f.x) * texel(low.x, low.y + 1) + f.x * texel(low.x + 1, low.y + 1));
 }
 
+const scene::Mesh& mesh_of(const scene::Scene& scene, const MeshPoint& point) {
+  return scene.meshes[scene.instances[point.instance].mesh];
+}
+const scene::Material& material_of(const scene::Scene& scene, const MeshPoint& point) {
+  return scene.materials[scene.instances[point.instance].material];
+}
+
+template <typename Value>
+auto interpolated(const scene::Mesh& mesh, const MeshPoint& point,
+                  const std::vector<Value>& of_vertices) {
+  using Result = glm::vec<Value::length(), double>;
+  Result sum(0);
+  for (int i = 0; i < 3; ++i)
+    sum += point.weights[i] * Result(of_vertices[mesh.triangles[point.triangle][i]]);
+  return sum;
+}
+
+// One of the material's textures at a point, by its own mapping.
+glm::dvec4 texel_at(const scene::Scene& scene, const MeshPoint& point,
+                    std::uint32_t scene::Material::*texture) {
+  const scene::Material& m = material_of(scene, point);
+  const scene::Mesh& mesh = mesh_of(scene, point);
+  const std::vector<glm::vec2>& uvs = scene::uvs_of(mesh, scene::mapping_of(m, texture));
+  return look_up(scene, m.*texture, uvs.empty() ? glm::dvec2(0) : interpolated(mesh, point, uvs));
+}
+
+glm::dvec4 vertex_color(const scene::Scene& scene, const MeshPoint& point) {
+  const scene::Mesh& mesh = mesh_of(scene, point);
+  return mesh.colors.empty() ? glm::dvec4(1) : interpolated(mesh, point, mesh.colors);
+}
+
+// The strength of the material's anisotropy and its direction on the texture.
+struct Anisotropy {
+  double strength = 0;
+  glm::dvec2 direction{1, 0};
+};
+
+Anisotropy anisotropy_of(const scene::Scene& scene, const MeshPoint& point) {
+  const scene::Material& m = material_of(scene, point);
+  if (m.anisotropy <= 0 || m.transmission > 0) return {};
+  const double c = std::cos(m.anisotropy_rotation_rad), s = std::sin(m.anisotropy_rotation_rad);
+  const glm::dmat2 turn(c, s, -s, c);
+  if (m.anisotropy_texture == scene::no_texture) return {m.anisotropy, turn * glm::dvec2(1, 0)};
+  const glm::dvec4 texel = texel_at(scene, point, &scene::Material::anisotropy_texture);
+  const glm::dvec2 along = 2.0 * glm::dvec2(texel) - 1.0;
+  return {m.anisotropy * texel.z,
+          turn * (glm::length(along) > 0 ? glm::normalize(along) : glm::dvec2(1, 0))};
+}
+
 }  // namespace
 
-Bsdf bsdf_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2& uv,
-             double specular_roughness) {
-  const scene::Material& m = scene.materials[scene.instances[instance].material];
-  const glm::dvec4 metallic_roughness = look_up(scene, m.metallic_roughness_texture, uv);
+Bsdf bsdf_at(const scene::Scene& scene, const MeshPoint& point, double specular_roughness) {
+  using scene::Material;
+  const Material& m = material_of(scene, point);
+  const auto texel = [&](std::uint32_t Material::*texture) {
+    return texel_at(scene, point, texture);
+  };
+  const glm::dvec4 metallic_roughness = texel(&Material::metallic_roughness_texture);
   const double roughness = m.roughness * metallic_roughness.y;
   Bsdf b;
-  b.base_color = glm::dvec3(m.base_color) * glm::dvec3(look_up(scene, m.base_color_texture, uv));
+  b.base_color = glm::dvec3(m.base_color) * glm::dvec3(vertex_color(scene, point)) *
+                 glm::dvec3(texel(&Material::base_color_texture));
   b.metallic = m.metallic * metallic_roughness.z;
   b.alpha = b.alpha_along = roughness * roughness;
-  if (m.anisotropy > 0 && m.transmission <= 0) {
-    const double widened = static_cast<double>(m.anisotropy) * m.anisotropy;
+  if (const double strength = anisotropy_of(scene, point).strength; strength > 0) {
+    const double widened = strength * strength;
     b.alpha_along = std::max(1e-3, widened + (1 - widened) * b.alpha);
     b.alpha = std::max(1e-3, b.alpha);
   }
   b.smooth = b.alpha_along <= specular_roughness;
-  b.specular = m.specular;
-  b.specular_color = m.specular_color;
+  b.specular = m.specular * texel(&Material::specular_texture).w;
+  b.specular_color =
+      glm::dvec3(m.specular_color) * glm::dvec3(texel(&Material::specular_color_texture));
   b.ior = m.ior;
-  b.transmission = m.transmission;
+  b.transmission = m.transmission * texel(&Material::transmission_texture).x;
   b.thin_walled = m.thin_walled;
-  b.clearcoat = m.clearcoat;
-  const double lacquer = m.clearcoat_roughness;
+  b.clearcoat = m.clearcoat * texel(&Material::clearcoat_texture).x;
+  const double lacquer = m.clearcoat_roughness * texel(&Material::clearcoat_roughness_texture).y;
   b.clearcoat_alpha = lacquer * lacquer;
   b.smooth_clearcoat = b.clearcoat_alpha <= specular_roughness;
-  b.sheen_color = m.sheen_color;
-  b.sheen_roughness = std::max(0.07, static_cast<double>(m.sheen_roughness));
+  b.sheen_color = glm::dvec3(m.sheen_color) * glm::dvec3(texel(&Material::sheen_color_texture));
+  b.sheen_roughness =
+      std::max(0.07, m.sheen_roughness * texel(&Material::sheen_roughness_texture).w);
   return b;
 }
 
@@ -83,13 +138,14 @@ struct TextureAxes {
 };
 
 std::optional<TextureAxes> texture_axes(const scene::Scene& scene, const Geometry& geometry,
-                                        const Hit& hit) {
-  const scene::Mesh& mesh = scene.meshes[scene.instances[hit.instance].mesh];
-  if (mesh.uvs.empty()) return std::nullopt;
+                                        const Hit& hit, std::uint32_t scene::Material::*texture) {
+  const scene::Mesh& mesh = mesh_of(scene, hit);
+  const std::vector<glm::vec2>& uvs =
+      scene::uvs_of(mesh, scene::mapping_of(material_of(scene, hit), texture));
+  if (uvs.empty()) return std::nullopt;
   const glm::uvec3 corner = mesh.triangles[hit.triangle];
-  const glm::dvec2 uv0 = mesh.uvs[corner.x];
-  const glm::dmat2 uv_of_edges(glm::dvec2(mesh.uvs[corner.y]) - uv0,
-                               glm::dvec2(mesh.uvs[corner.z]) - uv0);
+  const glm::dvec2 uv0 = uvs[corner.x];
+  const glm::dmat2 uv_of_edges(glm::dvec2(uvs[corner.y]) - uv0, glm::dvec2(uvs[corner.z]) - uv0);
   if (glm::determinant(uv_of_edges) == 0) return std::nullopt;
   const glm::dmat2 edges_of_uv = glm::inverse(uv_of_edges);
   const Triangle t = geometry.triangle(hit.instance, hit.triangle);
@@ -103,43 +159,53 @@ std::optional<TextureAxes> texture_axes(const scene::Scene& scene, const Geometr
   return TextureAxes{tangent, up};
 }
 
-}  // namespace
-
-glm::dvec3 anisotropy_at(const scene::Scene& scene, const Geometry& geometry, const Hit& hit) {
-  const scene::Material& m = scene.materials[scene.instances[hit.instance].material];
-  if (m.anisotropy <= 0) return glm::dvec3(0);
-  const auto axes = texture_axes(scene, geometry, hit);
-  if (!axes) return glm::dvec3(0);
-  const double turned = m.anisotropy_rotation_rad;
-  return std::cos(turned) * axes->x + std::sin(turned) * axes->y;
-}
-
-glm::dvec3 normal_at(const scene::Scene& scene, const Geometry& geometry, const Hit& hit) {
-  const scene::Material& m = scene.materials[scene.instances[hit.instance].material];
-  if (m.normal_texture == scene::no_texture) return hit.shading_normal;
-  const auto axes = texture_axes(scene, geometry, hit);
+glm::dvec3 mapped_normal(const scene::Scene& scene, const Geometry& geometry, const Hit& hit,
+                         std::uint32_t scene::Material::*texture, double scale) {
+  if (material_of(scene, hit).*texture == scene::no_texture) return hit.shading_normal;
+  const auto axes = texture_axes(scene, geometry, hit, texture);
   if (!axes) return hit.shading_normal;
-  const glm::dvec3 texel = 2.0 * glm::dvec3(look_up(scene, m.normal_texture, hit.uv)) - 1.0;
-  const glm::dvec3 mapped =
-      glm::normalize(static_cast<double>(m.normal_scale) * (texel.x * axes->x + texel.y * axes->y) +
-                     texel.z * hit.shading_normal);
+  const glm::dvec3 texel = 2.0 * glm::dvec3(texel_at(scene, hit, texture)) - 1.0;
+  const glm::dvec3 mapped = glm::normalize(scale * (texel.x * axes->x + texel.y * axes->y) +
+                                           texel.z * hit.shading_normal);
   // One that dips below the surface is lifted onto it.
   const double lift = std::max(0.0, 1e-3 - glm::dot(mapped, hit.geometric_normal));
   return glm::normalize(mapped + lift * hit.geometric_normal);
 }
 
-double coverage_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2& uv) {
-  const scene::Material& m = scene.materials[scene.instances[instance].material];
+}  // namespace
+
+glm::dvec3 anisotropy_at(const scene::Scene& scene, const Geometry& geometry, const Hit& hit) {
+  const Anisotropy anisotropy = anisotropy_of(scene, hit);
+  if (anisotropy.strength <= 0) return glm::dvec3(0);
+  const auto axes = texture_axes(scene, geometry, hit, &scene::Material::anisotropy_texture);
+  if (!axes) return glm::dvec3(0);
+  return anisotropy.direction.x * axes->x + anisotropy.direction.y * axes->y;
+}
+
+glm::dvec3 normal_at(const scene::Scene& scene, const Geometry& geometry, const Hit& hit) {
+  return mapped_normal(scene, geometry, hit, &scene::Material::normal_texture,
+                       material_of(scene, hit).normal_scale);
+}
+
+glm::dvec3 clear_normal_at(const scene::Scene& scene, const Geometry& geometry, const Hit& hit) {
+  return mapped_normal(scene, geometry, hit, &scene::Material::clearcoat_normal_texture,
+                       material_of(scene, hit).clearcoat_normal_scale);
+}
+
+double coverage_at(const scene::Scene& scene, const MeshPoint& point) {
+  const scene::Material& m = material_of(scene, point);
   if (m.alpha_mode == scene::AlphaMode::opaque) return 1;
-  const double alpha = m.alpha * look_up(scene, m.base_color_texture, uv).w;
+  const double alpha = m.alpha * vertex_color(scene, point).w *
+                       texel_at(scene, point, &scene::Material::base_color_texture).w;
   if (m.alpha_mode == scene::AlphaMode::mask) return alpha >= m.alpha_cutoff ? 1 : 0;
   return std::clamp(alpha, 0.0, 1.0);
 }
 
-glm::dvec3 emission_at(const scene::Scene& scene, std::uint32_t instance, const glm::dvec2& uv) {
-  const scene::Material& m = scene.materials[scene.instances[instance].material];
+glm::dvec3 emission_at(const scene::Scene& scene, const MeshPoint& point) {
+  const scene::Material& m = material_of(scene, point);
   if (m.emission == glm::vec3(0)) return glm::dvec3(0);
-  return glm::dvec3(m.emission) * glm::dvec3(look_up(scene, m.emission_texture, uv));
+  return glm::dvec3(m.emission) *
+         glm::dvec3(texel_at(scene, point, &scene::Material::emission_texture));
 }
 
 }  // namespace previz::truth

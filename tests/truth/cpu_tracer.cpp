@@ -67,7 +67,7 @@ std::optional<Hit> closest_met(const scene::Scene& scene, const Geometry& geomet
   auto hit = geometry.closest(start, worlds);
   if (hit) hit->distance += glm::dot(start.origin - ray.origin, ray.direction);
   while (hit) {
-    const double coverage = coverage_at(scene, hit->instance, hit->uv);
+    const double coverage = coverage_at(scene, *hit);
     if (coverage >= 1 || random.uniform() < coverage) break;
     const Ray behind = resumed(ray, *hit);
     hit = geometry.closest(behind, worlds);
@@ -109,11 +109,16 @@ glm::dvec3 tangent_near(const glm::dvec3& direction, const glm::dvec3& n) {
 
 Vertex vertex_at(const World& world, const Hit& hit, const glm::dvec3& wo) {
   const double side = glm::dot(hit.geometric_normal, wo) < 0 ? -1 : 1;
-  const Bsdf bsdf = bsdf_at(world.scene, hit.instance, hit.uv, world.options.specular_roughness);
+  const Bsdf bsdf = bsdf_at(world.scene, hit, world.options.specular_roughness);
   const glm::dvec3 geometric_normal = side * hit.geometric_normal;
   glm::dvec3 normal = side * normal_at(world.scene, world.geometry, hit);
-  if (is_specular(bsdf)) normal = mirroring_normal(normal, geometric_normal, wo);
+  glm::dvec3 clear_normal = side * clear_normal_at(world.scene, world.geometry, hit);
+  if (is_specular(bsdf)) {
+    normal = mirroring_normal(normal, geometric_normal, wo);
+    clear_normal = mirroring_normal(clear_normal, geometric_normal, wo);
+  }
   ShadingPoint point{geometric_normal, normal, wo, side > 0};
+  point.clear_normal = clear_normal;
   if (bsdf.alpha_along > bsdf.alpha)
     point.tangent = tangent_near(anisotropy_at(world.scene, world.geometry, hit), normal);
   return {hit, bsdf, point};
@@ -127,7 +132,7 @@ glm::dvec3 light_through(const World& world, Ray ray, double distance) {
   while (share != glm::dvec3(0)) {
     const auto hit = world.geometry.closest(ray, world.bit);
     if (!hit || hit->distance >= distance) break;
-    const double coverage = coverage_at(world.scene, hit->instance, hit->uv);
+    const double coverage = coverage_at(world.scene, *hit);
     const Vertex vertex = vertex_at(world, *hit, -ray.direction);
     share *= 1 - coverage + coverage * straight_through(vertex.bsdf, vertex.point);
     distance -= hit->distance + 2 * hit->offset;
@@ -188,7 +193,7 @@ glm::dvec3 emitted(const World& world, const Ray& ray, const std::optional<Hit>&
     return sum + weight(world.environment.pdf(ray.direction)) *
                      world.environment.radiance(ray.direction) * transmittance(medium, infinity);
   }
-  const glm::dvec3 emission = emission_at(world.scene, hit->instance, hit->uv);
+  const glm::dvec3 emission = emission_at(world.scene, *hit);
   if (emission == glm::dvec3(0)) return sum;
   const double cosine = std::abs(glm::dot(hit->geometric_normal, ray.direction));
   const double pdf = world.emissive.area_pdf(hit->instance, hit->triangle) * hit->distance *
@@ -220,8 +225,8 @@ glm::dvec3 light_from_meshes(const World& world, const Vertex& vertex, Medium me
   const glm::dvec3 f = reflected(vertex, wi, light_pdf);
   const double margin = 0x1p-18 * std::max(glm::length(s.position), distance) / cosine;
   if (f == glm::dvec3(0)) return f;
-  const double coverage = coverage_at(world.scene, s.instance, s.uv);
-  return f * coverage * emission_at(world.scene, s.instance, s.uv) / light_pdf *
+  const double coverage = coverage_at(world.scene, s);
+  return f * coverage * emission_at(world.scene, s) / light_pdf *
          transmittance(medium_beyond(world, medium, vertex, wi), distance) *
          light_through(world, {start, wi}, distance - margin);
 }

@@ -23,7 +23,7 @@ using render::describe_spirv;
 using render::specialise_spirv;
 using render::SpirvInfo;
 
-constexpr std::uint32_t every_feature = (gpu::FEATURE_FILTERED_TEXTURES << 1) - 1;
+constexpr std::uint32_t every_feature = (gpu::FEATURE_LAYER_TEXTURES << 1) - 1;
 
 TEST(Spirv, NamesTheBuffersThatAreUsed) {
   const SpirvInfo info = describe_spirv(generate_spv);
@@ -77,7 +77,8 @@ TEST(Spirv, APassIsCompiledOnceForFeaturesThatItDoesNotAskAbout) {
 }
 
 TEST(Spirv, TheLastPassOfASampleAsksOnlyWhetherThereIsACameraOrATexture) {
-  EXPECT_EQ(describe_spirv(accumulate_spv).asked_bits, gpu::FEATURE_CAMERA | gpu::FEATURE_TEXTURES);
+  EXPECT_EQ(describe_spirv(accumulate_spv).asked_bits,
+            gpu::FEATURE_CAMERA | gpu::FEATURE_TEXTURES | gpu::FEATURE_VERTEX_COLORS);
 }
 
 // The picture of a scene of plain paint, with only what it needs compiled in and with every feature

@@ -261,5 +261,33 @@ TEST_F(GltfMesh, RefusesAbsurdSizesBeforeAllocating) {
   EXPECT_THAT(message_of("count", 1u << 30), HasSubstr("more than its data can hold"));
 }
 
+// glTF 2.0, 3.7.2.1: factors of the base colour, linear, brought into 0 to 1.
+TEST_F(GltfMesh, ReadsVertexColours) {
+  const int positions = gltf.positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+  const auto colored = [&](int colors) {
+    gltf.root("a", gltf.mesh({{"attributes", {{"POSITION", positions}, {"COLOR_0", colors}}}}));
+  };
+  colored(gltf.values<glm::vec3>(5126, "VEC3", {{0, 0.25f, 0.5f}, {1, 1, 1}, {0, 0, 0}}));
+  colored(gltf.accessor(gltf.view({255, 51, 0, 102, 0, 0, 0, 255, 255, 255, 255, 255}, 4), 5121,
+                        "VEC4", 3, true));
+  colored(gltf.accessor(
+      gltf.view(GltfWriter::bytes_of(std::vector<std::uint16_t>{65535, 0, 13107, 0,  //
+                                                                0, 65535, 0, 0,      //
+                                                                0, 0, 0, 0}),
+                8),
+      5123, "VEC3", 3, true));
+  colored(gltf.values<glm::vec3>(5126, "VEC3", {{2, -1, std::nanf("")}, {1, 1, 1}, {0, 0, 0}}));
+  colored(gltf.values<glm::vec3>(5126, "VEC3", {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}}));
+  const scene::Scene scene = load();
+  ASSERT_EQ(scene.meshes.size(), 5u);
+  EXPECT_EQ(scene.meshes[0].colors[0], glm::vec4(0, 0.25f, 0.5f, 1));
+  EXPECT_EQ(scene.meshes[1].colors[0], glm::vec4(1, 0.2f, 0, 0.4f));
+  EXPECT_EQ(scene.meshes[2].colors[0], glm::vec4(1, 0, 0.2f, 1));
+  EXPECT_EQ(scene.meshes[3].colors[0], glm::vec4(1, 0, 1, 1));
+  EXPECT_TRUE(scene.meshes[4].colors.empty());  // white changes nothing
+  EXPECT_THAT(scene.notes,
+              ::testing::ElementsAre(HasSubstr("1 vertex colour is outside of 0 to 1")));
+}
+
 }  // namespace scene_gltf_mesh_test
 }  // namespace previz::test
