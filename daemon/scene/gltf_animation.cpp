@@ -105,7 +105,8 @@ WeightChannel weight_channel_of(const tinygltf::Model& model,
   WeightChannel channel;
   channel.interpolation = interpolation_of(sampler, where);
   channel.times_s = times_of(model, sampler.input, where);
-  for (const float value : read_scalars(model, sampler.output, where + ", output")) {
+  for (const float value :
+       read_scalars(model, sampler.output, where + ", output", Components::animated)) {
     if (!std::isfinite(value)) throw Error(where + ", output: a weight is not finite");
     channel.values.push_back(value);
   }
@@ -119,7 +120,7 @@ AnimationChannel channel_of(const tinygltf::Model& model, const tinygltf::Animat
   channel.times_s = times_of(model, sampler.input, where);
   const std::string output = where + ", output";
   if (is_rotation)
-    for (const glm::vec4& value : read_vec4s(model, sampler.output, output))
+    for (const glm::vec4& value : read_vec4s(model, sampler.output, output, Components::animated))
       channel.values.emplace_back(value);
   else
     for (const glm::vec3& value : read_vec3s(model, sampler.output, output))

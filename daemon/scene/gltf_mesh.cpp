@@ -201,7 +201,8 @@ void repair_normals(Mesh& mesh, const std::string& what, Notes& notes) {
 void read_uvs(const tinygltf::Model& model, const MeshSource& source, const std::string& where,
               const std::string& what, Notes& notes, Mesh& mesh) {
   const auto& [a, b, c, d, e, f] = source.mapping.affine;
-  mesh.uvs = read_vec2s(model, source.uvs, where + ", texture coordinates");
+  mesh.uvs = read_vec2s(model, source.uvs, where + ", texture coordinates",
+                        Components::texture_coordinates);
   std::uint64_t not_finite = 0;
   for (glm::vec2& uv : mesh.uvs) {
     if (source.mapping.affine != UvMapping{}.affine) {
@@ -264,9 +265,11 @@ std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& so
   budget.add_vertices(count, where);
   const std::uint64_t deformed = source.targets.size() + source.influences.size();
   budget.add_deformed(count * deformed, where);
-  mesh.positions = read_vec3s(model, source.positions, where + ", positions");
+  mesh.positions =
+      read_vec3s(model, source.positions, where + ", positions", Components::positions);
   mesh.triangles = read_triangles(model, source, count, where, what, notes, budget);
-  if (source.normals >= 0) mesh.normals = read_vec3s(model, source.normals, where + ", normals");
+  if (source.normals >= 0)
+    mesh.normals = read_vec3s(model, source.normals, where + ", normals", Components::normals);
   if (source.uvs >= 0) read_uvs(model, source, where, what, notes, mesh);
   if ((source.normals >= 0 && mesh.normals.size() != count) ||
       (source.uvs >= 0 && mesh.uvs.size() != count))
