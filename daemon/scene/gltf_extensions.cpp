@@ -20,14 +20,14 @@ struct Extension {
   std::string_view text;  // ignored: what is different; refused: what can be done
 };
 
-constexpr std::string_view decompress_meshes =
-    "export the file without compression of meshes, or decompress it: gltf-transform copy IN OUT";
 constexpr std::string_view plain_textures = "export the file with textures in PNG or JPEG";
 constexpr std::string_view plain_meshes =
     "export the object as a mesh of triangles with its materials";
 
 constexpr Extension extensions[] = {
     {"EXT_mesh_gpu_instancing", Support::read, ""},
+    {"EXT_meshopt_compression", Support::read, ""},
+    {"KHR_draco_mesh_compression", Support::read, ""},
     {"KHR_lights_punctual", Support::read, ""},
     {"KHR_materials_anisotropy", Support::read, ""},
     {"KHR_materials_clearcoat", Support::read, ""},
@@ -39,6 +39,7 @@ constexpr Extension extensions[] = {
     {"KHR_materials_variants", Support::read, ""},
     {"KHR_materials_volume", Support::read, ""},
     {"KHR_mesh_quantization", Support::read, ""},
+    {"KHR_meshopt_compression", Support::read, ""},
     {"KHR_texture_transform", Support::read, ""},
     {"KHR_animation_pointer", Support::ignored,
      "what it animates besides nodes and weights stands still"},
@@ -54,12 +55,9 @@ constexpr Extension extensions[] = {
     {"KHR_xmp", Support::ignored, "it says who made the file, and changes nothing to see"},
     {"KHR_xmp_json_ld", Support::ignored, "it says who made the file, and changes nothing to see"},
     {"CESIUM_RTC", Support::refused, "export the file with its place in the nodes' translations"},
-    {"EXT_meshopt_compression", Support::refused, decompress_meshes},
     {"EXT_texture_avif", Support::refused, plain_textures},
     {"EXT_texture_webp", Support::refused, plain_textures},
-    {"KHR_draco_mesh_compression", Support::refused, decompress_meshes},
     {"KHR_gaussian_splatting", Support::refused, plain_meshes},
-    {"KHR_meshopt_compression", Support::refused, decompress_meshes},
     {"KHR_node_visibility", Support::refused,
      "delete the hidden nodes before the export, or name those to be shown with the key \"nodes\""
      " of the object and export without the extension"},

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "daemon/scene/gltf_components.hpp"
+#include "daemon/scene/gltf_compression.hpp"
 #include "daemon/scene/gltf_extensions.hpp"
 #include "daemon/scene/gltf_json.hpp"
 #include "daemon/scene/scene.hpp"
@@ -126,7 +127,9 @@ tinygltf::Model read_gltf(const fs::path& path, Notes& notes) {
   const std::string_view text =
       is_binary ? binary_json(bytes, file)
                 : std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  if (const GltfJson json = checked_json(text, file); json.is_changed) {
+  GltfJson json = checked_json(text, file);
+  const TakenOut taken_out = take_out_compression(json, is_binary);
+  if (json.is_changed) {
     const std::string changed = json.root.dump();
     bytes = is_binary ? with_json(bytes, changed, file)
                       : std::vector<unsigned char>(changed.begin(), changed.end());
@@ -150,6 +153,7 @@ tinygltf::Model read_gltf(const fs::path& path, Notes& notes) {
     errors += error.what();
   }
   if (!read) throw Error(file + ": is not a valid glTF file: " + one_line(errors));
+  decompress(model, taken_out, file);
   if (!errors.empty()) notes.add(one_line(errors));
   if (!warnings.empty()) notes.add(one_line(warnings));
   note_extensions(model, notes);

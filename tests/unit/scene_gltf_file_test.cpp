@@ -49,13 +49,10 @@ TEST_F(GltfFiles, RefusesRequiredExtensionsAndNotesUsedOnes) {
   EXPECT_THAT(load().notes, ElementsAre(HasSubstr("glass does not split light into its colours"),
                                         HasSubstr("lampshades are dark where light comes from"),
                                         HasSubstr("\"EXT_of_someone\" is not supported; ignored")));
-  gltf.json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
-  EXPECT_EQ(error(), (directory / "test.gltf").string() +
-                         ": requires the extension \"KHR_draco_mesh_compression\", which is not "
-                         "supported; export the file without compression of meshes, or "
-                         "decompress it: gltf-transform copy IN OUT");
   gltf.json["extensionsRequired"] = {"EXT_of_someone"};
-  EXPECT_THAT(error(), HasSubstr("which is not supported; export the file without it"));
+  EXPECT_EQ(error(), (directory / "test.gltf").string() +
+                         ": requires the extension \"EXT_of_someone\", which is not supported; "
+                         "export the file without it");
   gltf.json["extensionsRequired"] = {"KHR_texture_basisu"};
   EXPECT_THAT(error(), HasSubstr("textures in PNG or JPEG"));
   gltf.json["extensionsRequired"] = {"EXT_texture_webp"};
