@@ -21,10 +21,18 @@ namespace {
 
 constexpr const char* extension_name = "KHR_draco_mesh_compression";
 
-// A regular grid, whose connectivity hardly costs anything, has some hundred triangles a byte.
+// Encoders stay well below this. The library at its slowest keeps 523 triangles a byte of a flat
+// grid of 1025 by 1025 vertices that lie on its steps, and 21 of one of 500 by 500 that do not.
 constexpr std::uint64_t most_triangles_per_byte = 2000;
 
 constexpr const char* remedy = "; export the file again, or without compression";
+
+// Returns what the library says, without its full stop.
+std::string in_words(const draco::Status& status) {
+  std::string words = set::printable(status.error_msg_string());
+  if (words.ends_with('.')) words.pop_back();
+  return words;
+}
 
 tinygltf::Accessor& accessor_of(tinygltf::Model& model, int index, const std::string& where) {
   if (index < 0 || static_cast<std::size_t>(index) >= model.accessors.size())
@@ -45,8 +53,7 @@ std::uint64_t triangles_of(std::span<const unsigned char> bytes, const std::stri
   draco::DracoHeader header;
   if (const draco::Status status = draco::PointCloudDecoder::DecodeHeader(&buffer, &header);
       !status.ok())
-    throw Error(where + ": is not Draco data: " + set::printable(status.error_msg_string()) +
-                remedy);
+    throw Error(where + ": is not Draco data: " + in_words(status) + remedy);
   if (header.encoder_type != draco::TRIANGULAR_MESH)
     throw Error(where + ": its Draco data is no mesh of triangles" + remedy);
   if (header.version_major != 2 || header.version_minor != 2)
@@ -125,8 +132,7 @@ class DracoDecoder {
     draco::DecoderBuffer buffer = buffer_of(bytes);
     auto decoded = draco::Decoder().DecodeMeshFromBuffer(&buffer);
     if (!decoded.ok())
-      throw Error(where + ": cannot be decoded: " +
-                  set::printable(decoded.status().error_msg_string()) + remedy);
+      throw Error(where + ": cannot be decoded: " + in_words(decoded.status()) + remedy);
     const std::unique_ptr<draco::Mesh> mesh = std::move(decoded).value();
     for (const std::string& name : attributes.Keys())
       if (primitive.attributes.contains(name))
