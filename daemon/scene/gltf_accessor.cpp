@@ -143,18 +143,20 @@ void read_elements(const tinygltf::Model& model, const tinygltf::Accessor& acces
 
 template <typename Vector>
 std::vector<Vector> read_vectors(const tinygltf::Model& model, int index, int type,
-                                 const std::string& where) {
+                                 const std::string& where, Components use) {
   const tinygltf::Accessor& accessor = checked(model, index, where);
   if (accessor.type != type)
     throw Error(where + ": must have " + std::to_string(Vector::length()) +
                 " components an element");
+  check_components(accessor, use, where);
   std::vector<Vector> values(element_count(model, index, where), Vector(0));
   const std::size_t size = component_size(accessor.componentType);
+  const bool normalized = are_normalized(accessor, use);
   read_elements(model, accessor, Vector::length(), where,
                 [&](std::size_t element, const unsigned char* at) {
                   for (int i = 0; i < Vector::length(); ++i)
                     values[element][i] = load_float(at + static_cast<std::size_t>(i) * size,
-                                                    accessor.componentType, accessor.normalized);
+                                                    accessor.componentType, normalized);
                 });
   return values;
 }
@@ -162,26 +164,27 @@ std::vector<Vector> read_vectors(const tinygltf::Model& model, int index, int ty
 }  // namespace
 
 std::vector<glm::vec2> read_vec2s(const tinygltf::Model& model, int accessor,
-                                  const std::string& where) {
-  return read_vectors<glm::vec2>(model, accessor, TINYGLTF_TYPE_VEC2, where);
+                                  const std::string& where, Components use) {
+  return read_vectors<glm::vec2>(model, accessor, TINYGLTF_TYPE_VEC2, where, use);
 }
 
 std::vector<glm::vec3> read_vec3s(const tinygltf::Model& model, int accessor,
-                                  const std::string& where) {
-  return read_vectors<glm::vec3>(model, accessor, TINYGLTF_TYPE_VEC3, where);
+                                  const std::string& where, Components use) {
+  return read_vectors<glm::vec3>(model, accessor, TINYGLTF_TYPE_VEC3, where, use);
 }
 
 std::vector<glm::vec4> read_vec4s(const tinygltf::Model& model, int accessor,
-                                  const std::string& where) {
-  return read_vectors<glm::vec4>(model, accessor, TINYGLTF_TYPE_VEC4, where);
+                                  const std::string& where, Components use) {
+  return read_vectors<glm::vec4>(model, accessor, TINYGLTF_TYPE_VEC4, where, use);
 }
 
-std::vector<glm::vec4> read_colors(const tinygltf::Model& model, int index,
+std::vector<glm::vec4> read_colors(const tinygltf::Model& model, int accessor,
                                    const std::string& where) {
-  const tinygltf::Accessor& accessor = checked(model, index, where);
-  if (accessor.type == TINYGLTF_TYPE_VEC4) return read_vec4s(model, index, where);
+  if (checked(model, accessor, where).type == TINYGLTF_TYPE_VEC4)
+    return read_vec4s(model, accessor, where, Components::colors);
   std::vector<glm::vec4> colors;
-  for (const glm::vec3& color : read_vec3s(model, index, where)) colors.emplace_back(color, 1.0f);
+  for (const glm::vec3& color : read_vec3s(model, accessor, where, Components::colors))
+    colors.emplace_back(color, 1);
   return colors;
 }
 
@@ -202,10 +205,10 @@ std::vector<glm::dmat4> read_mat4s(const tinygltf::Model& model, int index,
 }
 
 std::vector<float> read_scalars(const tinygltf::Model& model, int accessor,
-                                const std::string& where) {
+                                const std::string& where, Components use) {
   std::vector<float> values;
   for (const glm::vec1& value :
-       read_vectors<glm::vec1>(model, accessor, TINYGLTF_TYPE_SCALAR, where))
+       read_vectors<glm::vec1>(model, accessor, TINYGLTF_TYPE_SCALAR, where, use))
     values.push_back(value.x);
   return values;
 }

@@ -1,6 +1,7 @@
 // Reads the numbers of a glTF accessor: every component type, normalised integers, strides and
 // sparse accessors (glTF 2.0, 3.6.2; KHR_mesh_quantization). Everything is checked against the
-// buffers before it is read; `where` begins the message of the previz::Error thrown.
+// buffers and against what its `use` allows before it is read; `where` begins the message of the
+// previz::Error thrown.
 #pragma once
 
 #include <tiny_gltf.h>
@@ -14,21 +15,23 @@
 #include <string>
 #include <vector>
 
+#include "daemon/scene/gltf_components.hpp"
+
 namespace previz::scene {
 
 std::vector<glm::vec2> read_vec2s(const tinygltf::Model& model, int accessor,
-                                  const std::string& where);
+                                  const std::string& where, Components use = Components::floats);
 std::vector<glm::vec3> read_vec3s(const tinygltf::Model& model, int accessor,
-                                  const std::string& where);
+                                  const std::string& where, Components use = Components::floats);
 std::vector<glm::vec4> read_vec4s(const tinygltf::Model& model, int accessor,
-                                  const std::string& where);
-// Colours without an alpha have an alpha of 1.
+                                  const std::string& where, Components use = Components::floats);
+// Reads the colours of vertices; those without alpha have 1.
 std::vector<glm::vec4> read_colors(const tinygltf::Model& model, int accessor,
                                    const std::string& where);
 std::vector<glm::dmat4> read_mat4s(const tinygltf::Model& model, int accessor,
                                    const std::string& where);
 std::vector<float> read_scalars(const tinygltf::Model& model, int accessor,
-                                const std::string& where);
+                                const std::string& where, Components use = Components::floats);
 std::vector<std::uint32_t> read_indices(const tinygltf::Model& model, int accessor,
                                         const std::string& where);
 

@@ -1,7 +1,11 @@
 #include "daemon/scene/gltf_animation.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <iomanip>
+#include <numeric>
+#include <sstream>
 
 #include "daemon/scene/gltf_accessor.hpp"
 #include "daemon/scene/gltf_nodes.hpp"
@@ -15,16 +19,65 @@ std::size_t place(int index) {
   return static_cast<std::size_t>(index);
 }
 
-const tinygltf::Animation& animation_named(const tinygltf::Model& model, const std::string& name,
-                                           const std::string& file) {
-  std::vector<std::string> known;
-  for (const tinygltf::Animation& animation : model.animations) {
-    if (animation.name == name) return animation;
-    known.push_back(animation.name);
+// Returns "animation 3", or "animation 3 "walk"" where it has a name.
+std::string label(const tinygltf::Model& model, std::size_t index) {
+  const std::string& name = model.animations[index].name;
+  return "animation " + std::to_string(index) +
+         (name.empty() ? "" : " \"" + set::printable(name) + "\"");
+}
+
+// Returns the duration of an animation in words; files that are wrong have none.
+std::string duration_of(const tinygltf::Model& model, const tinygltf::Animation& animation) {
+  double end_s = 0;
+  try {
+    for (const tinygltf::AnimationSampler& sampler : animation.samplers)
+      for (const float time : read_scalars(model, sampler.input, ""))
+        end_s = std::max(end_s, static_cast<double>(time));
+  } catch (const Error&) {
+    return "unreadable";
   }
-  const std::string near = set::nearest(name, known);
-  throw Error(file + ": has no animation \"" + set::printable(name) + "\"" +
-              (near.empty() ? std::string() : "; did you mean \"" + set::printable(near) + "\"?"));
+  std::ostringstream text;
+  text << std::setprecision(4) << end_s << " s";
+  return text.str();
+}
+
+std::string list_of_animations(const tinygltf::Model& model) {
+  constexpr std::size_t most_listed = 20;
+  const std::size_t count = model.animations.size();
+  if (count == 0) return "it has none";
+  std::string list = "it has ";
+  for (std::size_t i = 0; i < std::min(count, most_listed); ++i) {
+    const tinygltf::Animation& animation = model.animations[i];
+    list += (i > 0 ? ", " : "") + std::to_string(i) +
+            (animation.name.empty() ? " without a name"
+                                    : " \"" + set::printable(animation.name) + "\"") +
+            " (" + duration_of(model, animation) + ")";
+  }
+  if (count > most_listed) list += " and " + std::to_string(count - most_listed) + " more";
+  return list + "; give the name, the index or \"*\" for all";
+}
+
+std::vector<std::size_t> chosen_animations(const tinygltf::Model& model, const std::string& which,
+                                           const std::string& file) {
+  const std::vector<tinygltf::Animation>& all = model.animations;
+  const auto named = std::ranges::find(all, which, &tinygltf::Animation::name);
+  if (named != all.end()) return {static_cast<std::size_t>(named - all.begin())};
+  if (which == "*" && !all.empty()) {
+    std::vector<std::size_t> indices(all.size());
+    std::iota(indices.begin(), indices.end(), std::size_t{0});
+    return indices;
+  }
+  std::size_t index = 0;
+  const char* const end = which.data() + which.size();
+  const auto [read_to, error] = std::from_chars(which.data(), end, index);
+  if (error == std::errc() && read_to == end && index < all.size()) return {index};
+
+  std::vector<std::string> names;
+  for (const tinygltf::Animation& animation : all) names.push_back(animation.name);
+  const std::string near = set::nearest(which, names);
+  throw Error(file + ": has no animation \"" + set::printable(which) + "\"" +
+              (near.empty() ? "" : "; did you mean \"" + set::printable(near) + "\"?") + "; " +
+              list_of_animations(model));
 }
 
 Interpolation interpolation_of(const tinygltf::AnimationSampler& sampler,
@@ -52,7 +105,8 @@ WeightChannel weight_channel_of(const tinygltf::Model& model,
   WeightChannel channel;
   channel.interpolation = interpolation_of(sampler, where);
   channel.times_s = times_of(model, sampler.input, where);
-  for (const float value : read_scalars(model, sampler.output, where + ", output")) {
+  for (const float value :
+       read_scalars(model, sampler.output, where + ", output", Components::animated)) {
     if (!std::isfinite(value)) throw Error(where + ", output: a weight is not finite");
     channel.values.push_back(value);
   }
@@ -66,7 +120,7 @@ AnimationChannel channel_of(const tinygltf::Model& model, const tinygltf::Animat
   channel.times_s = times_of(model, sampler.input, where);
   const std::string output = where + ", output";
   if (is_rotation)
-    for (const glm::vec4& value : read_vec4s(model, sampler.output, output))
+    for (const glm::vec4& value : read_vec4s(model, sampler.output, output, Components::animated))
       channel.values.emplace_back(value);
   else
     for (const glm::vec3& value : read_vec3s(model, sampler.output, output))
@@ -89,7 +143,7 @@ AnimationChannel channel_of(const tinygltf::Model& model, const tinygltf::Animat
 
 }  // namespace
 
-GltfAnimation::GltfAnimation(const tinygltf::Model& model, const std::string& name,
+GltfAnimation::GltfAnimation(const tinygltf::Model& model, const std::string& which,
                              const std::string& file, Notes& notes)
     : model_(model),
       file_(file),
@@ -99,23 +153,39 @@ GltfAnimation::GltfAnimation(const tinygltf::Model& model, const std::string& na
       weights_(model.nodes.size()),
       is_moved_(model.nodes.size()),
       taken_up_(model.nodes.size(), no_node) {
-  const tinygltf::Animation& animation = animation_named(model, name, file);
-  for (std::size_t i = 0; i < animation.channels.size(); ++i)
-    read_channel(
-        animation, animation.channels[i],
-        file + ": animation \"" + set::printable(name) + "\", channel " + std::to_string(i));
+  const std::vector<std::size_t> chosen = chosen_animations(model, which, file);
+  for (const std::size_t index : chosen) {
+    const std::vector<tinygltf::AnimationChannel>& channels = model.animations[index].channels;
+    for (std::size_t i = 0; i < channels.size(); ++i)
+      read_channel(index, channels[i],
+                   file + ": " + label(model, index) + ", channel " + std::to_string(i));
+  }
   if (!(duration_s_ > 0))
-    throw Error(file + ": animation \"" + set::printable(name) +
-                "\" moves nothing, or for no time");
+    throw Error(file + ": " +
+                (chosen.size() > 1 ? "its " + std::to_string(chosen.size()) + " animations move"
+                                   : label(model, chosen[0]) + " moves") +
+                " nothing, or for no time");
   find_moved();
 }
 
-void GltfAnimation::read_channel(const tinygltf::Animation& animation,
-                                 const tinygltf::AnimationChannel& given,
+void GltfAnimation::note_replaced(std::size_t index, const tinygltf::AnimationChannel& given) {
+  const auto [before, is_new] = player_.try_emplace({given.target_node, given.target_path}, index);
+  if (is_new) return;
+  if (before->second == index)
+    notes_.add(label(model_, index) +
+               ": has two channels for the same property of a node; the later one is played");
+  else
+    notes_.add(label(model_, before->second) + " and " + label(model_, index) +
+               " animate the same property of a node; there the later one is played");
+  before->second = index;
+}
+
+void GltfAnimation::read_channel(std::size_t index, const tinygltf::AnimationChannel& given,
                                  const std::string& where) {
   if (given.target_node < 0) return;  // such a channel is ignored (glTF 2.0, 3.11)
   if (place(given.target_node) >= moved_.size())
     throw Error(where + ": there is no node " + std::to_string(given.target_node));
+  const tinygltf::Animation& animation = model_.animations[index];
   const tinygltf::Node& node = model_.nodes[place(given.target_node)];
   AnimatedNode& moved = moved_[place(given.target_node)];
   AnimationChannel* const channel = given.target_path == "translation" ? &moved.translations
@@ -124,11 +194,12 @@ void GltfAnimation::read_channel(const tinygltf::Animation& animation,
                                                                        : nullptr;
   const bool is_weights = given.target_path == "weights";
   if (!channel && !is_weights)
-    return notes_.add("animation \"" + set::printable(animation.name) + "\": its channels of \"" +
+    return notes_.add(label(model_, index) + ": its channels of \"" +
                       set::printable(given.target_path) + "\" are not played");
   if (given.sampler < 0 || place(given.sampler) >= animation.samplers.size())
     throw Error(where + ": there is no sampler " + std::to_string(given.sampler));
   const tinygltf::AnimationSampler& sampler = animation.samplers[place(given.sampler)];
+  note_replaced(index, given);
   if (is_weights) {
     weights_[place(given.target_node)] = weight_channel_of(model_, sampler, where);
     const double end_s = weights_[place(given.target_node)].times_s.back();

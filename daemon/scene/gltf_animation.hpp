@@ -1,9 +1,11 @@
-// Reads an animation of a glTF file by its name (glTF 2.0, 3.11).
+// Reads an animation of a glTF file, or all of them at once (glTF 2.0, 3.11).
 #pragma once
 
 #include <tiny_gltf.h>
 
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/scene/animation.hpp"
@@ -12,15 +14,18 @@
 
 namespace previz::scene {
 
-// Reads one animation and adds the nodes that it moves to an object's list as they are used.
+// Reads what is played and adds the nodes that it moves to an object's list as they are used.
 class GltfAnimation {
  public:
-  // Throws previz::Error naming `file` and the most similar name if there is no animation of this
-  // name, or if its keys cannot be understood. Channels of what glTF 2.0 itself does not name are
-  // noted and left out.
-  GltfAnimation(const tinygltf::Model& model, const std::string& name, const std::string& file,
+  // `which` is the name of an animation (the first of equal names), its index in decimal digits
+  // where no animation has that name, or "*" for all of them. Where two of all animate the same
+  // property of a node, the later one plays and a note says so. Throws previz::Error naming `file`
+  // and listing its animations if `which` is none of them, or if keys cannot be understood.
+  // Channels of what glTF 2.0 itself does not name are noted and left out.
+  GltfAnimation(const tinygltf::Model& model, const std::string& which, const std::string& file,
                 Notes& notes);
 
+  // The duration of the longest animation that is played.
   double duration_s() const { return duration_s_; }
   // Returns the index in `nodes` of a node that moves, by itself or with an ancestor; the node and
   // its ancestors are added if they are not there yet. Returns no_node if the node stands still.
@@ -30,8 +35,9 @@ class GltfAnimation {
   WeightChannel weights_of(int node, std::size_t targets) const;
 
  private:
-  void read_channel(const tinygltf::Animation& animation, const tinygltf::AnimationChannel& given,
+  void read_channel(std::size_t index, const tinygltf::AnimationChannel& given,
                     const std::string& where);
+  void note_replaced(std::size_t index, const tinygltf::AnimationChannel& given);
   void find_moved();
   std::uint32_t take_up(int node, std::vector<AnimatedNode>& nodes);
 
@@ -39,6 +45,8 @@ class GltfAnimation {
   std::string file_;
   Notes& notes_;
   double duration_s_ = 0;
+  // The animation that was read last for a node and a property of it.
+  std::map<std::pair<int, std::string>, std::size_t> player_;
   // These arrays have one entry per node of the file.
   std::vector<int> parents_;  // -1: a root
   std::vector<AnimatedNode> moved_;

@@ -99,8 +99,10 @@ void read_influences(const tinygltf::Model& model, const MeshSource& source,
   std::vector<Influence>& influences = mesh.undeformed.influences;
   influences.resize(sets * vertices);
   for (std::size_t set = 0; set < sets; ++set) {
-    const auto joints = read_vec4s(model, source.influences[set].first, where + ", joints");
-    const auto weights = read_vec4s(model, source.influences[set].second, where + ", weights");
+    const auto joints =
+        read_vec4s(model, source.influences[set].first, where + ", joints", Components::joints);
+    const auto weights =
+        read_vec4s(model, source.influences[set].second, where + ", weights", Components::weights);
     if (joints.size() != vertices || weights.size() != vertices)
       throw Error(where + ": its attributes have different numbers of elements");
     for (std::size_t v = 0; v < vertices; ++v) {
@@ -175,8 +177,8 @@ void add_deformation(const tinygltf::Primitive& primitive, const NodeDeformation
 
 void read_undeformed(const tinygltf::Model& model, const MeshSource& source,
                      const std::string& where, const std::string& what, Notes& notes, Mesh& mesh) {
-  const auto offsets = [&](int accessor) {
-    std::vector<glm::vec3> values = read_vec3s(model, accessor, where + ", morph target");
+  const auto offsets = [&](int accessor, Components use) {
+    std::vector<glm::vec3> values = read_vec3s(model, accessor, where + ", morph target", use);
     if (values.size() != mesh.positions.size())
       throw Error(where + ": its morph targets have different numbers of elements");
     for (glm::vec3& value : values)
@@ -187,10 +189,10 @@ void read_undeformed(const tinygltf::Model& model, const MeshSource& source,
   for (const auto& [positions, normals] : source.targets) {
     MorphTarget target;
     if (positions >= 0)
-      target.positions = offsets(positions);
+      target.positions = offsets(positions, Components::positions);
     else
       target.positions.resize(mesh.positions.size(), glm::vec3(0));
-    if (normals >= 0) target.normals = offsets(normals);
+    if (normals >= 0) target.normals = offsets(normals, Components::normals);
     mesh.undeformed.targets.push_back(std::move(target));
   }
   if (!source.influences.empty()) read_influences(model, source, where, what, notes, mesh);

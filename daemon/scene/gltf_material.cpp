@@ -35,12 +35,11 @@ TextureInfo info_of(const CoreInfo& core) {
 TextureInfo info_of(const tinygltf::Value& extension, const std::string& key) {
   const tinygltf::Value given = extension.Has(key) ? extension.Get(key) : tinygltf::Value();
   if (!given.IsObject()) return {};
-  const tinygltf::Value extensions =
-      given.Has("extensions") ? given.Get("extensions") : tinygltf::Value();
-  const bool has_transform = extensions.IsObject() && extensions.Has("KHR_texture_transform");
+  const tinygltf::Value own = given.Has("extensions") ? given.Get("extensions") : tinygltf::Value();
+  const bool has_transform = own.IsObject() && own.Has("KHR_texture_transform");
   return {static_cast<int>(std::clamp(number(given, "index", -1), -1.0, 2e9)),
           number(given, "texCoord", 0),
-          has_transform ? extensions.Get("KHR_texture_transform")
+          has_transform ? own.Get("KHR_texture_transform")
                         : tinygltf::Value(tinygltf::Value::Object{})};
 }
 

@@ -205,7 +205,8 @@ std::vector<glm::vec2> read_uvs(const tinygltf::Model& model, int accessor,
                                 const std::string& what, Notes& notes) {
   if (accessor < 0) return {};
   const auto& [a, b, c, d, e, f] = mapping.affine;
-  std::vector<glm::vec2> uvs = read_vec2s(model, accessor, where + ", texture coordinates");
+  std::vector<glm::vec2> uvs =
+      read_vec2s(model, accessor, where + ", texture coordinates", Components::texture_coordinates);
   std::uint64_t not_finite = 0;
   for (glm::vec2& uv : uvs) {
     if (mapping.affine != UvMapping{}.affine) {
@@ -295,9 +296,11 @@ std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& so
   budget.add_vertices(count * source.mappings.size(), where);
   const std::uint64_t deformed = source.targets.size() + source.influences.size();
   budget.add_deformed(count * deformed, where);
-  mesh.positions = read_vec3s(model, source.positions, where + ", positions");
+  mesh.positions =
+      read_vec3s(model, source.positions, where + ", positions", Components::positions);
   mesh.triangles = read_triangles(model, source, count, where, what, notes, budget);
-  if (source.normals >= 0) mesh.normals = read_vec3s(model, source.normals, where + ", normals");
+  if (source.normals >= 0)
+    mesh.normals = read_vec3s(model, source.normals, where + ", normals", Components::normals);
   for (std::size_t i = 0; i < source.mappings.size(); ++i) {
     std::vector<glm::vec2>& uvs = i == 0 ? mesh.uvs : mesh.more_uvs.emplace_back();
     uvs = read_uvs(model, source.uvs[i], source.mappings[i], where, what, notes);

@@ -80,7 +80,8 @@ std::vector<glm::dmat4> node_from_copies(const tinygltf::Model& model, const tin
   std::vector<glm::vec3> translations, scales;
   std::vector<glm::vec4> rotations;
   if (accessor("TRANSLATION") >= 0) translations = read_vec3s(model, accessor("TRANSLATION"), what);
-  if (accessor("ROTATION") >= 0) rotations = read_vec4s(model, accessor("ROTATION"), what);
+  if (accessor("ROTATION") >= 0)
+    rotations = read_vec4s(model, accessor("ROTATION"), what, Components::copies_rotated);
   if (accessor("SCALE") >= 0) scales = read_vec3s(model, accessor("SCALE"), what);
   const std::size_t count = std::max({translations.size(), rotations.size(), scales.size()});
   const auto fits = [&](std::size_t size) { return size == 0 || size == count; };

@@ -1,11 +1,14 @@
 #include "daemon/scene/gltf_read.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <fstream>
 #include <string_view>
 
+#include "daemon/scene/gltf_components.hpp"
+#include "daemon/scene/gltf_compression.hpp"
+#include "daemon/scene/gltf_extensions.hpp"
+#include "daemon/scene/gltf_json.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
@@ -14,37 +17,6 @@ namespace previz::scene {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::array known_extensions = {"EXT_mesh_gpu_instancing",
-                                         "KHR_lights_punctual",
-                                         "KHR_materials_anisotropy",
-                                         "KHR_materials_clearcoat",
-                                         "KHR_materials_emissive_strength",
-                                         "KHR_materials_ior",
-                                         "KHR_materials_sheen",
-                                         "KHR_materials_specular",
-                                         "KHR_materials_transmission",
-                                         "KHR_materials_variants",
-                                         "KHR_materials_volume",
-                                         "KHR_mesh_quantization",
-                                         "KHR_texture_transform"};
-
-// An extension of materials that is ignored, and what will look different for it.
-struct Ignored {
-  std::string_view extension;
-  std::string_view difference;
-};
-constexpr std::array ignored_extensions = {
-    Ignored{"KHR_materials_diffuse_transmission",
-            "leaves, paper and lampshades are dark where light comes from behind them"},
-    Ignored{"KHR_materials_dispersion", "glass does not split light into its colours"},
-    Ignored{"KHR_materials_iridescence",
-            "soap bubbles and films of oil do not change colour with the angle of view"},
-    Ignored{"KHR_materials_pbrSpecularGlossiness",
-            "colours and gloss are those of the material without it"},
-    Ignored{"KHR_materials_unlit",
-            "what should have one colour in any light is lit like all else"}};
-constexpr int max_json_depth = 128;
 
 // Joins the lines of a tinygltf message.
 std::string one_line(std::string text) {
@@ -97,33 +69,17 @@ bool keep_encoded(tinygltf::Image* image, int, std::string*, std::string*, int, 
   return true;
 }
 
-int nesting_depth(std::string_view json) {
-  int depth = 0, deepest = 0;
-  bool in_string = false;
-  for (std::size_t i = 0; i < json.size(); ++i) {
-    const char c = json[i];
-    if (in_string) {
-      if (c == '\\') ++i;
-      if (c == '"') in_string = false;
-    } else if (c == '"') {
-      in_string = true;
-    } else if (c == '{' || c == '[') {
-      deepest = std::max(deepest, ++depth);
-    } else if (c == '}' || c == ']') {
-      --depth;
-    }
-  }
-  return deepest;
-}
-
 std::uint32_t little_endian(const std::vector<unsigned char>& bytes, std::size_t at) {
   return bytes[at] | bytes[at + 1] << 8u | bytes[at + 2] << 16u |
          static_cast<std::uint32_t>(bytes[at + 3]) << 24u;
 }
 
-// Returns the JSON of a binary file; checks that every chunk lies within the file (glTF 2.0, 4.4).
+// Returns the JSON of a binary file of version 2; checks that every chunk lies within the file
+// (glTF 2.0, 4.4).
 std::string_view binary_json(const std::vector<unsigned char>& bytes, const std::string& file) {
   if (bytes.size() < 20) throw Error(file + ": a binary glTF file has at least 20 bytes");
+  const std::uint32_t version = little_endian(bytes, 4);
+  if (version != 2) refuse_version(std::to_string(version) + ".0", file);
   const std::uint64_t length = little_endian(bytes, 8);
   if (length > bytes.size())
     throw Error(file + ": is cut short: it has " + std::to_string(bytes.size()) + " of " +
@@ -139,46 +95,24 @@ std::string_view binary_json(const std::vector<unsigned char>& bytes, const std:
           static_cast<std::size_t>(std::min<std::uint64_t>(json_length, bytes.size() - 20))};
 }
 
-// Returns what a user can do about an extension that cannot be read.
-std::string remedy_for(const std::string& name) {
-  if (name == "KHR_draco_mesh_compression" || name == "EXT_meshopt_compression" ||
-      name == "KHR_meshopt_compression")
-    return "; export the file without compression of meshes, or decompress it: gltf-transform copy "
-           "IN OUT";
-  if (name == "KHR_texture_basisu" || name == "EXT_texture_webp")
-    return "; export the file with textures in PNG or JPEG";
-  return "";
-}
-
-// Returns what looks different without an extension, and on which materials; "" if that is not
-// known.
-std::string difference_without(const std::string& extension, const tinygltf::Model& model) {
-  constexpr std::size_t most_named = 3;
-  std::string result, materials;
-  const auto* const known = std::ranges::find(ignored_extensions, extension, &Ignored::extension);
-  if (known != ignored_extensions.end()) result.append(": ").append(known->difference);
-  std::size_t count = 0;
-  for (const tinygltf::Material& material : model.materials) {
-    if (!material.extensions.contains(extension) || ++count > most_named) continue;
-    materials += (count > 1 ? ", \"" : "\"") + set::printable(material.name) + '"';
+// Returns a binary file with another JSON, and its other chunks as they are.
+std::vector<unsigned char> with_json(const std::vector<unsigned char>& bytes, std::string json,
+                                     const std::string& file) {
+  const std::size_t end = std::min<std::size_t>(little_endian(bytes, 8), bytes.size());
+  const std::size_t rest = std::min<std::size_t>(20ull + little_endian(bytes, 12), end);
+  while (json.size() % 4 != 0) json.push_back(' ');
+  const std::uint64_t size = 20 + json.size() + (end - rest);
+  if (size > max_file_bytes) throw Error(file + ": is larger than 4 GiB");
+  std::vector<unsigned char> result(bytes.begin(), bytes.begin() + 20);
+  for (unsigned int i = 0; i < 4; ++i) {
+    result[8 + i] = static_cast<unsigned char>(size >> 8 * i);
+    result[12 + i] = static_cast<unsigned char>(json.size() >> 8 * i);
   }
-  if (count > most_named) materials += " and " + std::to_string(count - most_named) + " more";
-  return count > 0 ? result + " (materials: " + materials + ")" : result;
-}
-
-void check_extensions(const tinygltf::Model& model, const std::string& file, Notes& notes) {
-  const auto is_known = [](const std::string& name) {
-    return std::find(known_extensions.begin(), known_extensions.end(), name) !=
-           known_extensions.end();
-  };
-  for (const std::string& name : model.extensionsRequired)
-    if (!is_known(name))
-      throw Error(file + ": requires the extension \"" + set::printable(name) +
-                  "\", which is not supported" + remedy_for(name));
-  for (const std::string& name : model.extensionsUsed)
-    if (!is_known(name))
-      notes.add("the extension \"" + set::printable(name) + "\" is not supported; ignored" +
-                difference_without(name, model));
+  result.reserve(size);
+  result.insert(result.end(), json.begin(), json.end());
+  result.insert(result.end(), bytes.begin() + static_cast<std::ptrdiff_t>(rest),
+                bytes.begin() + static_cast<std::ptrdiff_t>(end));
+  return result;
 }
 
 }  // namespace
@@ -190,12 +124,16 @@ tinygltf::Model read_gltf(const fs::path& path, Notes& notes) {
     throw Error(file + ": cannot be opened: " + wrong);
 
   const bool is_binary = bytes.size() >= 4 && std::memcmp(bytes.data(), "glTF", 4) == 0;
-  const std::string_view json =
+  const std::string_view text =
       is_binary ? binary_json(bytes, file)
                 : std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  if (nesting_depth(json) > max_json_depth)
-    throw Error(file + ": its JSON is nested more than " + std::to_string(max_json_depth) +
-                " levels deep");
+  GltfJson json = checked_json(text, file);
+  const TakenOut taken_out = take_out_compression(json, is_binary);
+  if (json.is_changed) {
+    const std::string changed = json.root.dump();
+    bytes = is_binary ? with_json(bytes, changed, file)
+                      : std::vector<unsigned char>(changed.begin(), changed.end());
+  }
 
   tinygltf::TinyGLTF reader;
   reader.SetFsCallbacks({file_exists, same_path, read_whole_file, write_nothing, nullptr});
@@ -206,20 +144,20 @@ tinygltf::Model read_gltf(const fs::path& path, Notes& notes) {
   const std::string directory = fs::absolute(path).parent_path().string();
   const auto size = static_cast<unsigned int>(bytes.size());
   try {
-    read =
-        is_binary
-            ? reader.LoadBinaryFromMemory(&model, &errors, &warnings, bytes.data(), size, directory)
-            : reader.LoadASCIIFromString(&model, &errors, &warnings, json.data(), size, directory);
+    read = is_binary ? reader.LoadBinaryFromMemory(&model, &errors, &warnings, bytes.data(), size,
+                                                   directory)
+                     : reader.LoadASCIIFromString(&model, &errors, &warnings,
+                                                  reinterpret_cast<const char*>(bytes.data()), size,
+                                                  directory);
   } catch (const std::exception& error) {
     errors += error.what();
   }
   if (!read) throw Error(file + ": is not a valid glTF file: " + one_line(errors));
-  if (!model.asset.version.starts_with("2."))
-    throw Error(file + ": is glTF " + set::printable(model.asset.version) +
-                "; only version 2 is supported");
+  decompress(model, taken_out, file);
   if (!errors.empty()) notes.add(one_line(errors));
   if (!warnings.empty()) notes.add(one_line(warnings));
-  check_extensions(model, file, notes);
+  note_extensions(model, notes);
+  note_component_types(model, notes);
   return model;
 }
 

@@ -1,6 +1,6 @@
 // Reads a glTF 2.0 file, text or binary, with tinygltf. It guards against what tinygltf 2.7 lets
-// through: nesting that would overflow the stack, a binary chunk past the end of the file, and
-// paths that are not regular files. Images stay encoded.
+// through: a binary chunk past the end of the file, paths that are not regular files, and what
+// daemon/scene/gltf_json.hpp checks. Images stay encoded.
 #pragma once
 
 #include <tiny_gltf.h>

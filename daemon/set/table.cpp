@@ -161,7 +161,7 @@ Keys object_keys(ObjectDraft& o) {
       {"file", &o.file, plain, "glTF 2.0 (.glb or .gltf); its Y-up is turned to the world's Z-up.", required("\"vase.glb\"")},
       {"presence", &o.object.presence, plain, "\"phantom\" is the model of a real thing, \"virtual\" is added to the picture, \"removed\" is a real thing that is taken out of it.", required("\"virtual\"")},
       {"nodes", &o.object.nodes, plain, "Names of the glTF nodes to use; empty: the whole file."},
-      {"animation", &o.object.animation, plain, "Name of the animation in the file that is played (nodes, joints of skins and weights of morph targets), in the time of the pictures. Default: nothing moves.", optional("\"walk\"")},
+      {"animation", &o.object.animation, plain, "The animation in the file that is played (nodes, joints of skins and weights of morph targets), in the time of the pictures: its name, its index from \"0\", or \"*\" for all of them at once. A wrong name is answered with a list of what there is. Default: nothing moves.", optional("\"walk\"")},
       {"loops", &o.object.loops, plain, "The animation starts again at its end; false: it stops there."},
       {"variant", &o.object.variant, plain, "Name of the variant of its materials that the object is shown in (KHR_materials_variants); \"\" is the file as it is without one. The action next_variant steps through the variants of a virtual object.", optional("\"blue\"")},
       {"position_m", &o.pose.position, m, "Position of the file's origin in the world.", optional("[0.2, 0.1, 0.0]")},

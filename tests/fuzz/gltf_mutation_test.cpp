@@ -16,6 +16,7 @@
 #include "daemon/scene/placement.hpp"
 #include "daemon/scene/scene.hpp"
 #include "drivers/error.hpp"
+#include "tests/support/gltf_compressed.hpp"
 #include "tests/support/gltf_sample.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -253,6 +254,26 @@ TEST_F(GltfMutations, OfValuesOfTheJson) {
   }
   EXPECT_GT(loaded_, 160);
   EXPECT_GT(refused_, 200);
+}
+
+// What is damaged here is mostly the compressed data, which the decoders must refuse themselves.
+TEST_F(GltfMutations, OfCompressedMeshes) {
+  const std::filesystem::path file = directory_ / "mutant.glb";
+  for (const GltfWriter& gltf : {test::meshopt_grid(), test::draco_grid()}) {
+    gltf.save(directory_ / "whole.glb");
+    std::ifstream stream(directory_ / "whole.glb", std::ios::binary);
+    const std::string whole{std::istreambuf_iterator<char>(stream), {}};
+    const std::size_t data = whole.find("BIN\0", 0, 4) + 4;
+    for (std::uint32_t seed = 0; seed < 1000; ++seed) {
+      SCOPED_TRACE(seed);
+      std::string mutant = Mutator(seed).bytes(whole.substr(data));
+      mutant.resize(whole.size() - data);
+      std::ofstream(file, std::ios::binary) << whole.substr(0, data) + mutant;
+      load(file, "");
+    }
+  }
+  EXPECT_GT(loaded_, 40);
+  EXPECT_GT(refused_, 400);
 }
 
 TEST_F(GltfMutations, OfEveryTruncation) {

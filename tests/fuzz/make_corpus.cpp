@@ -12,6 +12,7 @@
 #include "daemon/output/png.hpp"
 #include "drivers/aravis/protocol.hpp"
 #include "drivers/session/session.hpp"
+#include "tests/support/gltf_compressed.hpp"
 #include "tests/support/gltf_sample.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -190,6 +191,8 @@ int main(int count, char** arguments) {
   write_messages(corpus / "aravis");
   fs::create_directories(corpus / "gltf");
   previz::test::gltf_sample().save(corpus / "gltf/sample.glb");
+  previz::test::meshopt_grid().save(corpus / "gltf/meshopt.glb");
+  previz::test::draco_grid().save(corpus / "gltf/draco.glb");
   write_texts(corpus);
   return 0;
 }

@@ -71,7 +71,7 @@ void GltfWriter::save(const std::filesystem::path& path) const {
   Json saved = json;
   const bool is_binary = path.extension() == ".glb";
   if (!buffer_.empty()) {
-    saved["buffers"] = Json::array({{{"byteLength", buffer_.size()}}});
+    saved["buffers"][0] = {{"byteLength", buffer_.size()}};
     if (!is_binary)
       saved["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64(buffer_);
   }

@@ -15,7 +15,7 @@ namespace previz::test {
 class GltfWriter {
  public:
   using Json = nlohmann::json;
-  // The buffer and its length are added when the file is saved.
+  // The buffer, which is the first, and its length are added when the file is saved.
   Json json = {{"asset", {{"version", "2.0"}}}};
 
   // Each returns the index of what it added.

@@ -99,6 +99,78 @@ TEST_F(GltfAnimations, StayAtTheirEndWhereTheyDoNotLoop) {
   EXPECT_EQ(world_from_nodes(loaded.animations.at(0), 9)[0][3], glm::dvec4(0, -2, 0, 1));
 }
 
+// An animation of node `node` along glTF's Z, from 0 at 0 s to `end` at `duration_s`.
+Json movement(GltfWriter& gltf, int node, float end, float duration_s) {
+  const int times = gltf.values<float>(5126, "SCALAR", {0, duration_s});
+  const int places = gltf.positions({{0, 0, 0}, {0, 0, end}});
+  return {{"channels", {{{"sampler", 0}, {"target", {{"node", node}, {"path", "translation"}}}}}},
+          {"samplers", {{{"input", times}, {"output", places}}}}};
+}
+
+TEST_F(GltfAnimations, AreChosenByNameOrIndex) {
+  gltf.root("a", gltf.triangle_mesh());
+  const auto named = [&](const char* name, float duration_s) {
+    Json animation = movement(gltf, 0, 2, duration_s);
+    animation["name"] = name;
+    return animation;
+  };
+  gltf.json["animations"] = {movement(gltf, 0, 2, 1), named("0", 2), named("twice", 3),
+                             named("twice", 4)};
+  const auto duration_of = [&](const char* which) {
+    object.animation = which;
+    return load().animations.at(0).duration_s;
+  };
+  EXPECT_EQ(duration_of("0"), 2);  // a name goes before an index
+  EXPECT_EQ(duration_of("1"), 2);
+  EXPECT_EQ(duration_of("twice"), 3);
+  EXPECT_EQ(duration_of("3"), 4);
+  gltf.json["animations"].erase(1);
+  EXPECT_EQ(duration_of("0"), 1);
+}
+
+TEST_F(GltfAnimations, ThatAreNotThereAreAnsweredWithAList) {
+  gltf.root("a", gltf.triangle_mesh());
+  object.animation = "wlak";
+  EXPECT_THAT(error(), HasSubstr("has no animation \"wlak\"; it has none"));
+  gltf.json["animations"] = {movement(gltf, 0, 2, 1), movement(gltf, 0, 2, 2.5)};
+  gltf.json["animations"][1]["name"] = "walk";
+  const char* list =
+      "; it has 0 without a name (1 s), 1 \"walk\" (2.5 s); give the name, the index "
+      "or \"*\" for all";
+  EXPECT_THAT(error(), HasSubstr(std::string("\"wlak\"; did you mean \"walk\"?") + list));
+  for (const char* which : {"2", "-1", "0x0", "1 ", "99999999999999999999999"}) {
+    object.animation = which;
+    EXPECT_THAT(error(), HasSubstr(std::string("has no animation \"") + which + "\"" + list));
+  }
+  for (int i = 2; i < 30; ++i) gltf.json["animations"].push_back(movement(gltf, 0, 2, 1));
+  EXPECT_THAT(error(), HasSubstr("19 without a name (1 s) and 10 more; give"));
+}
+
+// The animations move a node each and both the third, which follows the later one.
+TEST_F(GltfAnimations, PlayAllAtOnce) {
+  const int mesh = gltf.triangle_mesh();
+  for (const char* name : {"a", "b", "c"}) gltf.root(name, mesh);
+  const auto both = [&](int node, float end, float duration_s) {
+    Json animation = movement(gltf, node, end, duration_s);
+    animation["channels"].push_back(
+        {{"sampler", 0}, {"target", {{"node", 2}, {"path", "translation"}}}});
+    return animation;
+  };
+  gltf.json["animations"] = {both(0, 4, 4), both(1, 3, 1)};
+  object.animation = "*";
+  const Scene loaded = load();
+  EXPECT_THAT(loaded.notes,
+              Contains(HasSubstr("animation 0 and animation 1 animate the same property of a node; "
+                                 "there the later one is played")));
+  const Animation& animation = loaded.animations.at(0);
+  EXPECT_EQ(animation.duration_s, 4);
+  ASSERT_EQ(animation.instances.size(), 3u);
+  const std::vector<glm::dmat4> nodes = world_from_nodes(animation, 2);
+  const double expected[] = {-2, -3, -3};  // the world's Y is glTF's -Z
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_EQ(nodes[animation.instances[i].node][3].y, expected[i]) << i;
+}
+
 TEST_F(GltfAnimations, OfWhatGltfDoesNotNameAreNotedAndNotPlayed) {
   gltf.root("a", gltf.triangle_mesh());
   go({{{"sampler", 0}, {"target", {{"node", 0}, {"path", "pointer"}}}}});

@@ -1,0 +1,120 @@
+#include "daemon/scene/gltf_extensions.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string_view>
+
+#include "daemon/set/problems.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::scene {
+namespace {
+
+enum class Support { read, ignored, refused };
+
+struct Extension {
+  std::string_view name;
+  Support support;
+  std::string_view text;  // ignored: what is different; refused: what can be done
+};
+
+constexpr std::string_view plain_textures = "export the file with textures in PNG or JPEG";
+constexpr std::string_view plain_meshes =
+    "export the object as a mesh of triangles with its materials";
+
+constexpr Extension extensions[] = {
+    {"EXT_mesh_gpu_instancing", Support::read, ""},
+    {"EXT_meshopt_compression", Support::read, ""},
+    {"KHR_draco_mesh_compression", Support::read, ""},
+    {"KHR_lights_punctual", Support::read, ""},
+    {"KHR_materials_anisotropy", Support::read, ""},
+    {"KHR_materials_clearcoat", Support::read, ""},
+    {"KHR_materials_emissive_strength", Support::read, ""},
+    {"KHR_materials_ior", Support::read, ""},
+    {"KHR_materials_sheen", Support::read, ""},
+    {"KHR_materials_specular", Support::read, ""},
+    {"KHR_materials_transmission", Support::read, ""},
+    {"KHR_materials_variants", Support::read, ""},
+    {"KHR_materials_volume", Support::read, ""},
+    {"KHR_mesh_quantization", Support::read, ""},
+    {"KHR_meshopt_compression", Support::read, ""},
+    {"KHR_texture_transform", Support::read, ""},
+    {"KHR_animation_pointer", Support::ignored,
+     "what it animates besides nodes and weights stands still"},
+    {"KHR_materials_diffuse_transmission", Support::ignored,
+     "leaves, paper and lampshades are dark where light comes from behind them"},
+    {"KHR_materials_dispersion", Support::ignored, "glass does not split light into its colours"},
+    {"KHR_materials_iridescence", Support::ignored,
+     "soap bubbles and films of oil do not change colour with the angle of view"},
+    {"KHR_materials_pbrSpecularGlossiness", Support::ignored,
+     "colours and gloss are those of the material without it"},
+    {"KHR_materials_unlit", Support::ignored,
+     "what should have one colour in any light is lit like all else"},
+    {"KHR_xmp", Support::ignored, "it says who made the file, and changes nothing to see"},
+    {"KHR_xmp_json_ld", Support::ignored, "it says who made the file, and changes nothing to see"},
+    {"CESIUM_RTC", Support::refused, "export the file with its place in the nodes' translations"},
+    {"EXT_texture_avif", Support::refused, plain_textures},
+    {"EXT_texture_webp", Support::refused, plain_textures},
+    {"KHR_gaussian_splatting", Support::refused, plain_meshes},
+    {"KHR_node_visibility", Support::refused,
+     "delete the hidden nodes before the export, or name those to be shown with the key \"nodes\""
+     " of the object and export without the extension"},
+    {"KHR_techniques_webgl", Support::refused, "export the file with glTF's own materials"},
+    {"KHR_texture_basisu", Support::refused, plain_textures},
+    {"MSFT_texture_dds", Support::refused, plain_textures}};
+
+const Extension* find(std::string_view name) {
+  const auto* const at = std::ranges::find(extensions, name, &Extension::name);
+  return at == std::end(extensions) ? nullptr : at;
+}
+
+// Returns the materials that have an extension, in brackets; "" if none has.
+std::string materials_with(const std::string& extension, const tinygltf::Model& model) {
+  constexpr std::size_t most_named = 3;
+  std::string materials;
+  std::size_t count = 0;
+  for (const tinygltf::Material& material : model.materials) {
+    if (!material.extensions.contains(extension) || ++count > most_named) continue;
+    materials += (count > 1 ? ", \"" : "\"") + set::printable(material.name) + '"';
+  }
+  if (count > most_named) materials += " and " + std::to_string(count - most_named) + " more";
+  return count > 0 ? " (materials: " + materials + ")" : "";
+}
+
+}  // namespace
+
+void check_required_extensions(const nlohmann::json& root, const std::string& file) {
+  const auto required = root.find("extensionsRequired");
+  if (required == root.end() || !required->is_array()) return;
+  for (const nlohmann::json& element : *required) {
+    if (!element.is_string()) continue;
+    const std::string name = element.get<std::string>();
+    const Extension* const known = find(name);
+    if (known && known->support != Support::refused) continue;
+    std::string message =
+        file + ": requires the extension \"" + set::printable(name) + "\", which is not supported";
+    message.append("; ").append(known ? known->text : "export the file without it");
+    throw Error(message);
+  }
+}
+
+void note_extensions(const tinygltf::Model& model, Notes& notes) {
+  const std::set<std::string> required(model.extensionsRequired.begin(),
+                                       model.extensionsRequired.end());
+  std::vector<std::string> used = model.extensionsUsed;
+  for (const std::string& name : required)
+    if (std::ranges::find(used, name) == used.end()) used.push_back(name);
+  for (const std::string& name : used) {
+    const Extension* const known = find(name);
+    if (known && known->support == Support::read) continue;
+    std::string note = "the extension \"" + set::printable(name) + '"';
+    note += required.contains(name) ? ", which the file requires, is not supported; ignored"
+                                    : " is not supported; ignored";
+    if (known && known->support == Support::ignored) note.append(": ").append(known->text);
+    notes.add(note + materials_with(name, model));
+  }
+}
+
+}  // namespace previz::scene

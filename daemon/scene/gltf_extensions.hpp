@@ -1,0 +1,23 @@
+// What glTF's extensions are to previzd: read, ignored with a note, or refused where they are
+// required.
+#pragma once
+
+#include <tiny_gltf.h>
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "daemon/scene/load_log.hpp"
+
+namespace previz::scene {
+
+// Throws previz::Error beginning with `file`, with a remedy where one is known, if the file
+// requires an extension that is neither read nor ignored. One that only changes looks is ignored
+// even where it is required: what stands where is right without it, and the note says what looks
+// different.
+void check_required_extensions(const nlohmann::json& root, const std::string& file);
+
+// Notes the extensions that the file uses and previzd does not read.
+void note_extensions(const tinygltf::Model& model, Notes& notes);
+
+}  // namespace previz::scene
