@@ -79,9 +79,10 @@ std::string beginning_of(const std::filesystem::path& path) {
 }  // namespace
 
 void check_size(const std::filesystem::path& path, std::int64_t width, std::int64_t height) {
-  if (width < 1 || height < 1 || width > most_pixels / height)
-    throw Error(path.string() + ": has " + std::to_string(width) + "x" + std::to_string(height) +
-                " pixels; allowed: at most " + std::to_string(most_pixels));
+  if (width < 1 || height < 1 || width > most_pixels / height ||
+      std::max(width, height) > most_side)
+    throw Error(fmt::format("{}: has {}x{} pixels; allowed: at most {}, and {} a side",
+                            path.string(), width, height, most_pixels, most_side));
 }
 
 void reserve_pixels(LinearPicture& picture, std::uintmax_t bytes) {

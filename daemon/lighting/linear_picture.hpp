@@ -28,9 +28,10 @@ struct LinearPicture {
 // An environment of 16384x8192 pixels; light needs no finer one (max_resolution in
 // environment.hpp). Twice its 12 bytes a pixel are in memory while it is read.
 inline constexpr std::int64_t most_pixels = std::int64_t{1} << 27;
+inline constexpr std::int64_t most_side = std::int64_t{1} << 16;
 
 // Throws previz::Error naming the file unless the picture, which a small file may claim to be of
-// any size, has between one pixel and most_pixels.
+// any size, has between one pixel and most_pixels, and sides of most_side at most.
 void check_size(const std::filesystem::path& path, std::int64_t width, std::int64_t height);
 
 // Reserves memory for the picture, but no more than a file of this many bytes is likely to fill, so

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <compare>
 #include <limits>
 
 #include "drivers/error.hpp"
@@ -12,7 +13,9 @@ namespace previz::lighting {
 namespace {
 
 struct Place {
-  int x = 0, y = 0;
+  int y = 0, x = 0;
+
+  friend auto operator<=>(const Place&, const Place&) = default;
 };
 
 // Counts pixels, which are met row by row.
@@ -21,7 +24,7 @@ struct Found {
   Place first;
 
   void add(int x, int y) {
-    if (pixels++ == 0) first = {x, y};
+    if (pixels++ == 0) first = {y, x};
   }
 };
 
@@ -66,12 +69,10 @@ void fill(LinearPicture& picture, const PictureShape& shape, int channel,
     missing.clear();
     for (const auto& [place, value] : filled)
       for_neighbours(picture, shape, place, [&](int x, int y) {
-        if (std::isnan(picture.at(x, y)[channel])) missing.push_back({x, y});
+        if (std::isnan(picture.at(x, y)[channel])) missing.push_back({y, x});
       });
-    const auto key = [](const Place& place) { return std::pair(place.y, place.x); };
-    std::ranges::sort(missing, {}, key);
-    const auto repeated = std::ranges::unique(missing, {}, key);
-    missing.erase(repeated.begin(), repeated.end());
+    std::sort(missing.begin(), missing.end());
+    missing.erase(std::unique(missing.begin(), missing.end()), missing.end());
   }
 }
 
@@ -125,7 +126,7 @@ void repair(LinearPicture& picture, const PictureShape& shape, const std::filesy
           value = 0;
         } else {
           value = std::numeric_limits<float>::quiet_NaN();
-          missing.push_back({x, y});
+          missing.push_back({y, x});
         }
       }
     fill(picture, shape, c, std::move(missing));

@@ -6,6 +6,7 @@
 #include <half.h>
 
 #include <cmath>
+#include <fstream>
 #include <glm/geometric.hpp>
 #include <numbers>
 #include <random>
@@ -230,6 +231,16 @@ TEST(LoadEnvironment, AHugeWindowIsRefusedBeforeMemoryIsAskedFor) {
   }
   EXPECT_NE(message_of(file).find("65536x32768 pixels; allowed: at most"), std::string::npos)
       << message_of(file);
+}
+
+// So may an attribute of its header, which OpenEXR would ask as much memory for.
+TEST(LoadEnvironment, AHugeAttributeIsRefusedBeforeMemoryIsAskedFor) {
+  const previz::test::TemporaryDirectory directory;
+  const auto file = directory / "sky.exr";
+  const std::string name("owner\0string", 13);  // and a zero
+  std::ofstream(file, std::ios::binary) << std::string("\x76\x2f\x31\x01\2\0\0\0", 8) << name
+                                        << std::string("\xff\xff\xff\x7f", 4) << "and little more";
+  EXPECT_NE(message_of(file).find("its header is damaged"), std::string::npos) << message_of(file);
 }
 
 }  // namespace lighting_environment_file_test
