@@ -1,14 +1,19 @@
-// Implements load_environment: resamples a latitude-longitude picture to an octahedral map.
+// Implements load_environment: resamples a latitude-longitude picture or a cube to an octahedral
+// map.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "daemon/lighting/exr_picture.hpp"
+#include "daemon/lighting/cube_cross.hpp"
 #include "daemon/lighting/lighting.hpp"
+#include "daemon/lighting/linear_picture.hpp"
 #include "daemon/lighting/parallel.hpp"
+#include "daemon/lighting/picture_reduction.hpp"
+#include "daemon/lighting/picture_repair.hpp"
 #include "drivers/error.hpp"
+#include "shaders/lib/octahedral.h"
 
 namespace previz::lighting {
 namespace {
@@ -111,19 +116,110 @@ class TexelMeans {
   float quadrant_ = 0, start_ = 0;   // pixels: width of a quadrant; position of world azimuth 0
 };
 
-// Sets values that are no radiance to 0; returns the number of such pixels.
-std::size_t drop_impossible(LinearPicture& picture) {
-  std::size_t dropped = 0;
-  for (glm::vec3& radiance : picture.radiance) {
-    bool impossible = false;
-    for (int c = 0; c < 3; ++c) {
-      if (std::isfinite(radiance[c]) && radiance[c] >= 0) continue;
-      radiance[c] = 0;
-      impossible = true;
-    }
-    dropped += impossible;
+// Averages a cube over texels, by directions on the grid of TexelMeans.
+class CubeTexelMeans {
+ public:
+  CubeTexelMeans(const Cube& source, int size, int samples_a_side, double rotation_rad)
+      : source_(source),
+        samples_a_side_(samples_a_side),
+        step_(2.0f / static_cast<float>(size * samples_a_side)),
+        cosine_(static_cast<float>(std::cos(rotation_rad))),
+        sine_(static_cast<float>(std::sin(rotation_rad))) {}
+
+  glm::vec3 mean(int i, int j) const {
+    glm::vec3 sum(0);
+    for (int l = 0; l < samples_a_side_; ++l)
+      for (int k = 0; k < samples_a_side_; ++k) {
+        const glm::vec3 d = octahedral_direction(
+            {(static_cast<float>(i * samples_a_side_ + k) + 0.5f) * step_ - 1,
+             (static_cast<float>(j * samples_a_side_ + l) + 0.5f) * step_ - 1});
+        sum += source_.towards({cosine_ * d.x + sine_ * d.y, cosine_ * d.y - sine_ * d.x, d.z});
+      }
+    return sum / static_cast<float>(samples_a_side_ * samples_a_side_);
   }
-  return dropped;
+
+ private:
+  const Cube& source_;
+  int samples_a_side_;
+  float step_, cosine_, sine_;
+};
+
+// Returns the cross that the picture is, or null for a latitude-longitude picture. Throws
+// previz::Error for what is neither.
+const CubeCross* known_cross(const std::filesystem::path& path, const LinearPicture& picture) {
+  const std::int64_t width = picture.width, height = picture.height;
+  if (width == 2 * height) return nullptr;
+  const CubeCross* cross = cross_of(picture);
+  if (cross != nullptr && is_bare_beside(*cross, picture)) return cross;
+  std::string message = fmt::format(
+      "{}: the picture has {}x{} pixels; a latitude-longitude environment is twice as wide as high",
+      path.string(), width, height);
+  if (cross != nullptr)
+    message +=
+        ", and a cube cross, which has this shape, has nothing but one colour in its corners: this "
+        "is neither";
+  else if (width == height)
+    message +=
+        ". A square may be a mirror ball, an angular map or a fisheye; convert it to "
+        "latitude-longitude: HDRShop converts mirror balls and angular maps (light probes), and "
+        "Hugin a fisheye (projection: equirectangular)";
+  else if (width == 6 * height || height == 6 * width)
+    message +=
+        ". This looks like a strip of six cube faces, whose order differs from program to program; "
+        "convert it to latitude-longitude or to a cube cross, by cmft for example";
+  else
+    message += ", and a cube cross has 3:4 or 4:3; export it as one of these, and whole";
+  throw Error(message);
+}
+
+// A map that is this many times as coarse as the picture is made of a coarser picture, which has
+// coarse_pixels a texel: the samples would be too many otherwise. A map whose size is chosen by the
+// picture never is.
+constexpr double most_pixels_a_texel = 16, coarse_pixels = 8;
+
+// Returns whether the picture was reduced.
+bool reduce_for(LinearPicture& picture, const CubeCross* cross, double pixels_a_texel) {
+  if (pixels_a_texel < most_pixels_a_texel) return false;
+  const int rows = cross ? cross->rows : 1, columns = cross ? cross->columns : 2;
+  const int fine = picture.height / rows;
+  const int coarse = static_cast<int>(std::ceil(fine * coarse_pixels / pixels_a_texel));
+  std::vector<double> row_weights;
+  for (int y = 0; y < picture.height; ++y)
+    row_weights.push_back(std::cos(pi * (0.5 - (y + 0.5) / picture.height)));
+  const auto on_sphere = [&](int, int y) { return row_weights[static_cast<std::size_t>(y)]; };
+  const auto on_cube = [&](int x, int y) {
+    const double s = (2 * (x % fine) + 1.0) / fine - 1, t = (2 * (y % fine) + 1.0) / fine - 1;
+    const double square = 1 + s * s + t * t;
+    return 1 / (square * std::sqrt(square));
+  };
+  picture = cross ? reduced(picture, columns * coarse, rows * coarse, on_cube)
+                  : reduced(picture, columns * coarse, rows * coarse, on_sphere);
+  return true;
+}
+
+// Throws previz::Error where the gain makes light that the renderer cannot sum.
+void check_brightness(const set::Lighting& settings, const EnvironmentMap& map) {
+  for (const glm::vec3& radiance : map.radiance)
+    for (int c = 0; c < 3; ++c)
+      if (!(radiance[c] <= most_radiance))
+        throw Error(
+            fmt::format("lighting.environment_gain: with {:g}, {} is brighter than {:g} somewhere, "
+                        "beyond which "
+                        "light cannot be summed; make the gain smaller",
+                        settings.environment_gain, settings.environment->string(), most_radiance));
+}
+
+template <typename Means>
+EnvironmentMap map_of(const Means& means, int size, float gain) {
+  EnvironmentMap map{size, {}};
+  map.radiance.resize(static_cast<std::size_t>(size) * static_cast<std::size_t>(size));
+  parallel_blocks(size, [&](int begin, int end) {
+    for (int j = begin; j < end; ++j)
+      for (int i = 0; i < size; ++i)
+        map.radiance[static_cast<std::size_t>(j) * static_cast<std::size_t>(size) +
+                     static_cast<std::size_t>(i)] = gain * means.mean(i, j);
+  });
+  return map;
 }
 
 }  // namespace
@@ -132,33 +228,43 @@ Lighting load_environment(const set::Lighting& settings) {
   if (!settings.environment) throw Error("lighting.environment: no file is given");
   const std::filesystem::path& path = *settings.environment;
   Lighting lighting;
-  LinearPicture picture = read_exr_picture(path, lighting.report.notes);
-  if (picture.width != 2 * picture.height)
-    throw Error(
-        fmt::format("{}: the picture has {}x{} pixels; a latitude-longitude environment is "
-                    "twice as wide as high",
-                    path.string(), picture.width, picture.height));
-  if (const std::size_t dropped = drop_impossible(picture); dropped > 0)
-    lighting.report.notes.push_back(
-        fmt::format("{}: {} of {} pixels hold negative or non-finite values, taken as 0",
-                    path.string(), dropped, picture.radiance.size()));
+  std::vector<std::string>& notes = lighting.report.notes;
+  LinearPicture picture = read_linear_picture(path, notes);
+  const CubeCross* cross = known_cross(path, picture);
+  const int face_pixels = cross ? picture.height / cross->rows : 0;
+  repair(picture,
+         {.wraps = cross == nullptr,
+          .uses =
+              [&](int x, int y) {
+                return cross == nullptr ||
+                       cross->face_at(x / face_pixels, y / face_pixels) != nullptr;
+              }},
+         path, notes);
+  if (cross)
+    notes.push_back(fmt::format("{}: read as a {} cube cross, with +X in the middle face",
+                                path.string(), cross->rows == 4 ? "vertical" : "horizontal"));
 
-  const double pixel_rad = 2 * pi / picture.width;
+  // Radians a pixel: on the equator, or the mean of the cube's.
+  const auto radians_a_pixel = [&] {
+    return cross ? std::sqrt(4 * pi / 6) * cross->rows / picture.height : 2 * pi / picture.width;
+  };
+  double pixel_rad = radians_a_pixel();
   const int size = chosen_resolution(settings.resolution, pixel_rad * pixel_rad);
+  if (reduce_for(picture, cross, std::sqrt(texel_sr(size)) / pixel_rad))
+    pixel_rad = radians_a_pixel();
   const int samples_a_side =
       std::max(4, static_cast<int>(std::ceil(4 * std::sqrt(texel_sr(size)) / pixel_rad)));
-  const Panorama source(picture);
-  const TexelMeans means(source, size, samples_a_side, settings.environment_rotation_rad);
   const auto gain = static_cast<float>(settings.environment_gain);
-  EnvironmentMap& map = lighting.environment;
-  map.size = size;
-  map.radiance.resize(static_cast<std::size_t>(size) * static_cast<std::size_t>(size));
-  parallel_blocks(size, [&](int begin, int end) {
-    for (int j = begin; j < end; ++j)
-      for (int i = 0; i < size; ++i)
-        map.radiance[static_cast<std::size_t>(j) * static_cast<std::size_t>(size) +
-                     static_cast<std::size_t>(i)] = gain * means.mean(i, j);
-  });
+  const double turn_rad = settings.environment_rotation_rad;
+  if (cross) {
+    const Cube source(*cross, picture);
+    lighting.environment =
+        map_of(CubeTexelMeans(source, size, samples_a_side, turn_rad), size, gain);
+  } else {
+    const Panorama source(picture);
+    lighting.environment = map_of(TexelMeans(source, size, samples_a_side, turn_rad), size, gain);
+  }
+  check_brightness(settings, lighting.environment);
   lighting.report.seen_sr = 4 * pi;
   return lighting;
 }

@@ -6,10 +6,12 @@
 #include <ImfInputFile.h>
 #include <ImfStandardAttributes.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <exception>
+#include <fstream>
 
 #include "drivers/error.hpp"
 
@@ -55,20 +57,39 @@ void note_primaries(const Imf::Header& header, std::vector<std::string>& notes) 
     notes.push_back("the file's primaries are not those of Rec. 709; its numbers are used as if");
 }
 
-// Throws previz::Error unless the window, which a small file may claim to be of any size, has
-// most_pixels at most.
-void check_size(const std::filesystem::path& path, const Imath::Box2i& window) {
-  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1,
-                     height = std::int64_t{window.max.y} - window.min.y + 1;
-  if (width < 1 || height < 1 || width > most_pixels / height)
-    throw Error(path.string() + ": has " + std::to_string(width) + "x" + std::to_string(height) +
-                " pixels; allowed: at most " + std::to_string(most_pixels));
+// Walks the attributes of a file's first header (OpenEXR's "File Layout"), which OpenEXR itself
+// asks memory for by the sizes that they claim. Throws previz::Error where one claims more bytes
+// than the file has, or the picture too many pixels. What else is wrong is left to OpenEXR.
+void check_header(const std::filesystem::path& path) {
+  const auto bytes = static_cast<std::int64_t>(std::filesystem::file_size(path));
+  std::ifstream file(path, std::ios::binary);
+  file.seekg(8);  // the magic number and the version
+  std::string name, type;
+  while (std::getline(file, name, '\0') && !name.empty() && std::getline(file, type, '\0')) {
+    std::int32_t size = 0;
+    file.read(reinterpret_cast<char*>(&size), sizeof size);
+    const std::int64_t begin = file.tellg();
+    if (!file || begin < 0) return;
+    if (size < 0 || size > bytes - begin)
+      throw Error(path.string() +
+                  ": cannot be read as OpenEXR: its header is damaged, or its end is missing; copy "
+                  "or export it again");
+    if (name == "dataWindow" && size == sizeof(Imath::Box2i)) {
+      Imath::Box2i window;
+      file.read(reinterpret_cast<char*>(&window), sizeof window);
+      check_size(path, std::int64_t{window.max.x} - window.min.x + 1,
+                 std::int64_t{window.max.y} - window.min.y + 1);
+    }
+    file.seekg(begin + size);
+  }
 }
 
 LinearPicture read(const std::filesystem::path& path, std::vector<std::string>& notes) {
+  check_header(path);
   Imf::InputFile file(path.c_str());
   const Imath::Box2i window = file.header().dataWindow();
-  check_size(path, window);
+  check_size(path, std::int64_t{window.max.x} - window.min.x + 1,
+             std::int64_t{window.max.y} - window.min.y + 1);
   if (window != file.header().displayWindow())
     throw Error(path.string() +
                 ": the data window is not the display window; a whole picture is "
@@ -78,16 +99,24 @@ LinearPicture read(const std::filesystem::path& path, std::vector<std::string>& 
   picture.width = window.max.x - window.min.x + 1;
   picture.height = window.max.y - window.min.y + 1;
   const auto width = static_cast<std::size_t>(picture.width);
-  picture.radiance.resize(width * static_cast<std::size_t>(picture.height));
+  reserve_pixels(picture, std::filesystem::file_size(path));
 
+  // Memory grows with the rows that are met: a file may claim more of them than it has.
+  constexpr int pixels_at_once = 1 << 18;
+  const int rows_at_once = std::max(1, pixels_at_once / picture.width);
   // There is one frame-buffer slice per channel name; Y is read once and copied to all three.
   const bool luminance = names[0] == names[1];
-  Imf::FrameBuffer buffer;
-  for (std::size_t c = 0; c < (luminance ? 1u : 3u); ++c)
-    buffer.insert(names[c], Imf::Slice::Make(Imf::FLOAT, &picture.radiance[0][static_cast<int>(c)],
-                                             window, sizeof(glm::vec3), sizeof(glm::vec3) * width));
-  file.setFrameBuffer(buffer);
-  file.readPixels(window.min.y, window.max.y);
+  for (int row = 0; row < picture.height; row += rows_at_once) {
+    const int end = std::min(row + rows_at_once, picture.height);
+    picture.radiance.resize(width * static_cast<std::size_t>(end));
+    Imf::FrameBuffer buffer;
+    for (std::size_t c = 0; c < (luminance ? 1u : 3u); ++c)
+      buffer.insert(names[c],
+                    Imf::Slice::Make(Imf::FLOAT, &picture.radiance[0][static_cast<int>(c)], window,
+                                     sizeof(glm::vec3), sizeof(glm::vec3) * width));
+    file.setFrameBuffer(buffer);
+    file.readPixels(window.min.y + row, window.min.y + end - 1);
+  }
   if (luminance)
     for (glm::vec3& radiance : picture.radiance) radiance = glm::vec3(radiance.r);
   note_primaries(file.header(), notes);

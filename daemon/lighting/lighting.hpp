@@ -1,4 +1,5 @@
-// Computes the light around the set from the light camera's frames or an EXR environment (P9).
+// Computes the light around the set from the light camera's frames or from an environment's picture
+// (P9).
 #pragma once
 
 #include <filesystem>
@@ -46,13 +47,16 @@ class Estimator {
 Lighting estimate(std::span<const FramePtr> frames, const LightCameraCalibration& calibration,
                   const set::Lighting& settings, std::shared_ptr<const Room> room = nullptr);
 
-// Loads a latitude-longitude EXR: pixel centre column c, row r of w x h looks towards azimuth 2 pi
-// (0.5 - (c + 0.5) / w) from +X to +Y and elevation pi (0.5 - (r + 0.5) / h), Z up; the centre of
-// the picture is +X, seen from inside. It is bilinear between pixel centres, integrated over each
-// texel, turned and scaled by the settings. Resolution 0 gives the smallest power of two whose
-// texels are not larger than a pixel on the equator, at most 2048: 512 for 512x256. Negative and
-// non-finite values are taken as 0 and noted. Throws previz::Error naming the file and what is
-// wrong with it; the channels allowed are R, G and B (others are ignored), or Y.
+// Loads an OpenEXR or Radiance .hdr picture of the light from all around. If it is twice as wide as
+// high it is a latitude-longitude picture: pixel centre column c, row r of w x h looks towards
+// azimuth 2 pi (0.5 - (c + 0.5) / w) from +X to +Y and elevation pi (0.5 - (r + 0.5) / h), Z up;
+// the centre of the picture is +X, seen from inside. With an aspect of 3:4 or 4:3 it is a cube
+// cross (cube_cross.hpp). It is bilinear between pixel centres, integrated over each texel, turned
+// and scaled by the settings. Resolution 0 gives the smallest power of two whose texels are not
+// larger than a pixel on the equator, or than the mean pixel of a cube, at most 2048: 512 for
+// 512x256. Pixels that hold no radiance are replaced and noted (picture_repair.hpp). Throws
+// previz::Error naming the file and what is wrong with it; the channels allowed are R, G and B
+// (others are ignored), or Y.
 Lighting load_environment(const set::Lighting& settings);
 
 }  // namespace previz::lighting

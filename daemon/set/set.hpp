@@ -167,7 +167,7 @@ struct Lighting {
   LightFrom from = LightFrom::camera;
   LightMode mode = LightMode::image;
   LightSampling sampling = LightSampling::importance;
-  // A latitude-longitude EXR, used instead of the fisheye camera.
+  // A picture of the light from all around, used instead of the fisheye camera.
   std::optional<std::filesystem::path> environment;
   std::string environment_as_written;
   double environment_rotation_rad = 0;  // about world Z, counter-clockwise from above

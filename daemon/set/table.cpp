@@ -220,7 +220,7 @@ Keys lighting_keys(Draft& d) {
       {"from", &l.from, plain, "\"camera\": the light is measured in the light camera's frames, live or recorded. \"recording\": the lamps are those that were found while the session was recorded with mode = \"sources\". \"set\": all light is declared in this file, by environment and [[light]]."},
       {"mode", &l.mode, plain, "\"image\": the whole fisheye picture lights the scene. \"sources\": the lamps in it become discs or spheres, which needs far fewer samples; the rest of the picture is blurred or dropped. \"hybrid\": the lamps likewise, and the rest of the picture as it is."},
       {"sampling", &l.sampling, plain, "How directions towards the light are chosen: by its brightness, or by the surfaces alone (\"bsdf\"), which is noisier and meant for comparison."},
-      {"environment", &d.environment, plain, "Latitude-longitude EXR that replaces the light camera; Z up, the middle of the picture is +X.", optional("\"env.exr\"")},
+      {"environment", &d.environment, plain, "Picture of the light from all around, which replaces the light camera: OpenEXR or Radiance .hdr, latitude-longitude (2:1) or a cube cross (3:4 or 4:3); Z up, the middle of the picture, or of the middle face, is +X.", optional("\"env.exr\"")},
       {"environment_rotation_deg", &l.environment_rotation_rad, deg, "Rotation of the environment about world Z, counter-clockwise as seen from above."},
       {"environment_gain", &l.environment_gain, plain.at_least(0), "Brightness factor of the environment."},
       {"balance", &l.balance, plain.within(1e-6, 1e6), "Factors of red, green and blue that turn the light camera's radiance into the film camera's (previzd calibrate balance)."},

@@ -59,21 +59,37 @@ void write_pictures(const fs::path& corpus) {
 }
 
 void write_environment(const fs::path& file, const std::vector<const char*>& channels,
-                       Imf::Compression compression) {
-  constexpr int width = 16, height = 8;
+                       Imf::Compression compression, int width = 16, int height = 8) {
   Imf::Header header(width, height);
   header.compression() = compression;
-  std::vector<float> values(width * height);
-  for (std::size_t i = 0; i < values.size(); ++i) values[i] = 0.1f * static_cast<float>(i % 13);
+  std::vector<float> values(static_cast<std::size_t>(width * height));
+  const bool is_cross = width != 2 * height;  // its corners are bare
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = is_cross ? 0.5f : 0.1f * static_cast<float>(i % 13);
   Imf::FrameBuffer buffer;
   for (const char* channel : channels) {
     header.channels().insert(channel, Imf::Channel(Imf::FLOAT));
-    buffer.insert(channel, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()),
-                                      sizeof(float), sizeof(float) * width));
+    buffer.insert(channel,
+                  Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), sizeof(float),
+                             sizeof(float) * static_cast<std::size_t>(width)));
   }
   Imf::OutputFile written(file.c_str(), header);
   written.setFrameBuffer(buffer);
   written.writePixels(height);
+}
+
+// Radiance .hdr: flat pixels, runs by component, and older runs of pixels in a turned picture.
+void write_radiance(const fs::path& folder) {
+  const std::string format = "FORMAT=32-bit_rle_rgbe\n\n", pixel = "\x80\x40\x20\x81";
+  std::string flat, runs, older;
+  for (int line = 0; line < 8; ++line) {
+    for (int x = 0; x < 16; ++x) flat += pixel;
+    runs += std::string("\2\2\0\x10\x90\x80\x8a\x40\6\1\2\3\4\5\6\x90\x20\x90\x81", 19);
+    older += pixel + "\1\1\1\x0f";
+  }
+  write(folder / "flat.hdr", "#?RADIANCE\n" + format + "-Y 8 +X 16\n" + flat);
+  write(folder / "runs.hdr", "#?RGBE\nEXPOSURE=2\n" + format + "-Y 8 +X 16\n" + runs);
+  write(folder / "older.hdr", "#?RADIANCE\nCOLORCORR=1 2 3\n" + format + "+Y 8 -X 16\n" + older);
 }
 
 void write_session(const fs::path& corpus) {
@@ -187,6 +203,10 @@ int main(int count, char** arguments) {
   write_environment(corpus / "environment/rgb.exr", {"R", "G", "B"}, Imf::ZIP_COMPRESSION);
   write_environment(corpus / "environment/y.exr", {"Y"}, Imf::PIZ_COMPRESSION);
   write_environment(corpus / "environment/plain.exr", {"R", "G", "B"}, Imf::NO_COMPRESSION);
+  write_environment(corpus / "environment/vertical_cross.exr", {"Y"}, Imf::ZIP_COMPRESSION, 12, 16);
+  write_environment(corpus / "environment/horizontal_cross.exr", {"Y"}, Imf::RLE_COMPRESSION, 16,
+                    12);
+  write_radiance(corpus / "environment");
   write_session(corpus);
   write_messages(corpus / "aravis");
   fs::create_directories(corpus / "gltf");

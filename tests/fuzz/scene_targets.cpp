@@ -85,6 +85,9 @@ void environment(Bytes bytes) {
   settings.resolution = 8;
   const lighting::Lighting light = lighting::load_environment(settings);
   expect(light.environment.radiance.size() == 64, "a map is as large as it was chosen");
+  for (const glm::vec3& radiance : light.environment.radiance)
+    for (int c = 0; c < 3; ++c)
+      expect(radiance[c] >= 0 && radiance[c] <= 1e12f, "light can be summed");
 }
 
 void png(Bytes bytes) {
@@ -98,7 +101,7 @@ constexpr Target own[] = {
     {"set", "a set file", set_file},
     {"gltf", "a glTF file", gltf},
     {"texture", "an image of a glTF file", texture},
-    {"environment", "an EXR environment", environment},
+    {"environment", "an environment: OpenEXR or Radiance .hdr", environment},
     {"png", "a plate as PNG", png},
 };
 

@@ -1,0 +1,47 @@
+// Reads a picture of linear light from a file of either format that can hold one: OpenEXR or
+// Radiance .hdr.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <glm/vec3.hpp>
+#include <string>
+#include <vector>
+
+namespace previz::lighting {
+
+struct LinearPicture {
+  int width = 0;
+  int height = 0;
+  std::vector<glm::vec3> radiance;  // row-major, linear Rec. 709
+
+  glm::vec3& at(int x, int y) { return radiance[index(x, y)]; }
+  const glm::vec3& at(int x, int y) const { return radiance[index(x, y)]; }
+
+ private:
+  std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+           static_cast<std::size_t>(x);
+  }
+};
+
+// An environment of 16384x8192 pixels; light needs no finer one (max_resolution in
+// environment.hpp). Twice its 12 bytes a pixel are in memory while it is read.
+inline constexpr std::int64_t most_pixels = std::int64_t{1} << 27;
+inline constexpr std::int64_t most_side = std::int64_t{1} << 16;
+
+// Throws previz::Error naming the file unless the picture, which a small file may claim to be of
+// any size, has between one pixel and most_pixels, and sides of most_side at most.
+void check_size(const std::filesystem::path& path, std::int64_t width, std::int64_t height);
+
+// Reserves memory for the picture, but no more than a file of this many bytes is likely to fill, so
+// that a small file that claims to be large costs no memory before its pixels are met.
+void reserve_pixels(LinearPicture& picture, std::uintmax_t bytes);
+
+// Reads the file by what it holds, whatever its name is. Oddities that do not prevent its use are
+// appended to `notes`. Throws previz::Error naming the file and what is wrong with it; a file of
+// another format is refused by the name of that format.
+LinearPicture read_linear_picture(const std::filesystem::path& path,
+                                  std::vector<std::string>& notes);
+
+}  // namespace previz::lighting
