@@ -49,21 +49,29 @@ void for_neighbours(const LinearPicture& picture, const PictureShape& shape, con
     }
 }
 
-// Fills the NaNs of a channel from their borders inwards; `missing` are all of them.
+// Returns the lower median.
+float median(std::vector<float>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Fills the NaNs of a channel from their borders inwards; `missing` are all of them, and
+// `negative`, in order, those of them that were negative.
 void fill(LinearPicture& picture, const PictureShape& shape, int channel,
-          std::vector<Place> missing) {
+          std::vector<Place> missing, const std::vector<Place>& negative) {
+  std::vector<float> around;
   while (!missing.empty()) {
     std::vector<std::pair<Place, float>> filled;
     for (const Place& place : missing) {
-      double sum = 0;
-      int count = 0;
+      around.clear();
       for_neighbours(picture, shape, place, [&](int x, int y) {
         const float value = picture.at(x, y)[channel];
-        if (std::isnan(value)) return;
-        sum += value;
-        ++count;
+        if (!std::isnan(value)) around.push_back(value);
       });
-      if (count > 0) filled.emplace_back(place, static_cast<float>(sum / count));
+      if (around.empty()) continue;
+      const bool was_negative = std::binary_search(negative.begin(), negative.end(), place);
+      filled.emplace_back(place, was_negative ? *std::ranges::min_element(around) : median(around));
     }
     for (const auto& [place, value] : filled) picture.at(place.x, place.y)[channel] = value;
     missing.clear();
@@ -92,10 +100,10 @@ void repair(LinearPicture& picture, const PictureShape& shape, const std::filesy
       bool has_beyond = false, has_negative = false, has_none = false;
       for (int c = 0; c < 3; ++c) {
         const float value = radiance[c];
-        const bool is_light = is_good(value) || is_beyond(value) || is_negative(value);
+        const bool is_light = is_good(value) || is_beyond(value);
         has_beyond |= is_beyond(value);
         has_negative |= is_negative(value);
-        has_none |= !is_light;
+        has_none |= !is_light && !is_negative(value);
         has_light[c] |= is_light;
         if (is_good(value)) largest = std::max(largest, value);
       }
@@ -105,31 +113,30 @@ void repair(LinearPicture& picture, const PictureShape& shape, const std::filesy
     }
   for (int c = 0; c < 3; ++c)
     if (!has_light[c])
-      throw Error(
-          fmt::format("{}: no pixel's {} holds a brightness (all are NaN or -Inf); export the "
-                      "picture again",
-                      path.string(),
-                      c == 0   ? "red"
-                      : c == 1 ? "green"
-                               : "blue"));
+      throw Error(fmt::format(
+          "{}: no pixel's {} holds a brightness (all are negative or not a number); export the "
+          "picture again",
+          path.string(),
+          c == 0   ? "red"
+          : c == 1 ? "green"
+                   : "blue"));
   if (beyond.pixels + negative.pixels + missing_light.pixels == 0) return;
 
   for (int c = 0; c < 3; ++c) {
-    std::vector<Place> missing;
+    std::vector<Place> missing, were_negative;
     for (int y = 0; y < picture.height; ++y)
       for (int x = 0; x < picture.width; ++x) {
         float& value = picture.at(x, y)[c];
         if (is_good(value) || !shape.uses(x, y)) continue;
         if (is_beyond(value)) {
           value = largest;
-        } else if (is_negative(value)) {
-          value = 0;
         } else {
+          if (is_negative(value)) were_negative.push_back({y, x});
           value = std::numeric_limits<float>::quiet_NaN();
           missing.push_back({y, x});
         }
       }
-    fill(picture, shape, c, std::move(missing));
+    fill(picture, shape, c, std::move(missing), were_negative);
   }
   if (beyond.pixels > 0)
     notes.push_back(fmt::format(
@@ -139,12 +146,12 @@ void repair(LinearPicture& picture, const PictureShape& shape, const std::filesy
         path.string(), beyond.pixels, used, beyond.pixels == 1 ? "is" : "are", largest,
         beyond.first.x, beyond.first.y));
   if (negative.pixels > 0)
-    notes.push_back(
-        fmt::format("{}: {} of {} pixels {} negative and taken as 0, as there are beside the lamps "
-                    "of a picture "
-                    "that was sharpened or scaled; the first is at x = {}, y = {}",
-                    path.string(), negative.pixels, used, negative.pixels == 1 ? "is" : "are",
-                    negative.first.x, negative.first.y));
+    notes.push_back(fmt::format(
+        "{}: {} of {} pixels {} negative and {} filled from the darkest beside them, as "
+        "there are around the lamps of a picture that was sharpened or scaled; the first "
+        "is at x = {}, y = {}",
+        path.string(), negative.pixels, used, negative.pixels == 1 ? "is" : "are",
+        negative.pixels == 1 ? "is" : "are", negative.first.x, negative.first.y));
   if (missing_light.pixels > 0)
     notes.push_back(fmt::format(
         "{}: {} of {} pixels {} no brightness (not a number) and {} filled from the pixels around; "

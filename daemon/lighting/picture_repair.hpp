@@ -21,11 +21,12 @@ struct PictureShape {
 
 // Replaces values of a channel: +Inf and what is above most_radiance by the largest other value of
 // the picture, at least largest_half, because files that were converted to floats have overflowed
-// as halves; negative ones by 0, because they are the overshoot of a filter beside a lamp, where
-// the neighbours' mean would add light; and NaN and -Inf by the mean of the others in the 3x3
-// pixels around, and where there is none, from the border of the hole inwards. What was replaced is
-// counted in `notes` with the place of the first. Throws previz::Error naming the file if a channel
-// is NaN or -Inf everywhere.
+// as halves; NaN and -Inf by the median of the others in the 3x3 pixels around; and negative ones
+// by the least of these, because they are the overshoot of a filter beside a lamp, or a colour that
+// is out of gamut over an area, into which no light may come from its border. Where there is no
+// other pixel around, holes are filled from the border inwards. What was replaced is counted in
+// `notes` with the place of the first. Throws previz::Error naming the file if a channel has
+// nothing but such values.
 void repair(LinearPicture& picture, const PictureShape& shape, const std::filesystem::path& path,
             std::vector<std::string>& notes);
 

@@ -133,16 +133,17 @@ TEST_F(PictureRepair, AGainThatCannotBeSummedIsRefused) {
   EXPECT_THAT(refusal(sky, 1e300), HasSubstr("make the gain smaller"));
 }
 
-// The means are of the eight neighbours, or of those that are good; the left edge joins the right.
+// The median of the eight neighbours, or of those that are good; the left edge joins the right.
 TEST_F(PictureRepair, WhatHoldsNoBrightnessComesFromItsNeighbours) {
   LinearPicture sky = grey_sky();
-  pixel(sky, 63, 5) = glm::vec3(9, 1, 1);
+  for (const int y : {4, 5, 6}) pixel(sky, 63, y).r = 9;
+  for (const int y : {4, 6}) pixel(sky, 0, y).r = 9;
   pixel(sky, 11, 9) = glm::vec3(1, 1, 17);
   LinearPicture expected = sky;
   pixel(sky, 0, 5) = glm::vec3(not_a_number, 1, 1);
-  pixel(expected, 0, 5) = glm::vec3(2, 1, 1);  // (7 * 1 + 9) / 8
+  pixel(expected, 0, 5) = glm::vec3(9, 1, 1);  // five of eight, three of them over the edge
   pixel(sky, 10, 9) = glm::vec3(1, 1, -infinity);
-  pixel(expected, 10, 9) = glm::vec3(1, 1, 3);  // (7 * 1 + 17) / 8
+  pixel(expected, 10, 9) = glm::vec3(1, 1, 1);  // seven of eight: a lamp beside it is not doubled
   EXPECT_THAT(expect_like(sky, expected),
               ElementsAre(AllOf(HasSubstr("2 of 2048 pixels hold no brightness"),
                                 HasSubstr("x = 0, y = 5"))));
@@ -150,14 +151,30 @@ TEST_F(PictureRepair, WhatHoldsNoBrightnessComesFromItsNeighbours) {
 
 // A filter that overshoots beside a lamp leaves negative pixels. Those of Blender's studio lights
 // would add 4 % to all light if they took their neighbours' mean.
-TEST_F(PictureRepair, NegativeLightIsNone) {
+TEST_F(PictureRepair, NegativeLightIsThatOfTheDarkestNeighbour) {
   LinearPicture sky = grey_sky(), expected = grey_sky();
-  for (LinearPicture* picture : {&sky, &expected}) pixel(*picture, 30, 9) = glm::vec3(4000);
+  for (LinearPicture* picture : {&sky, &expected}) {
+    pixel(*picture, 30, 9) = glm::vec3(4000);
+    pixel(*picture, 32, 10).r = 0.5f;
+  }
   pixel(sky, 31, 9) = glm::vec3(-30, 1, -20);
-  pixel(expected, 31, 9) = glm::vec3(0, 1, 0);
+  pixel(expected, 31, 9) = glm::vec3(0.5f, 1, 1);
   EXPECT_THAT(expect_like(sky, expected),
-              ElementsAre(AllOf(HasSubstr("1 of 2048 pixels is negative and taken as 0"),
+              ElementsAre(AllOf(HasSubstr("1 of 2048 pixels is negative and is filled"),
                                 HasSubstr("x = 31, y = 9"))));
+}
+
+// Red that fades out towards a lamp whose colour is out of gamut: no red comes in from around.
+TEST_F(PictureRepair, AnAreaThatIsOutOfGamutStaysDark) {
+  LinearPicture sky = grey_sky(), expected = grey_sky();
+  for (int y = 10; y < 20; ++y)
+    for (int x = 10; x < 20; ++x) {
+      const int inside =
+          std::min({x - 10, 19 - x, y - 10, 19 - y});  // 0 at the border, then up to 4
+      pixel(sky, x, y).r = 0.01f - 0.02f * static_cast<float>(inside);
+      pixel(expected, x, y).r = 0.01f;
+    }
+  expect_like(sky, expected);
 }
 
 TEST_F(PictureRepair, AHoleIsFilledFromItsBorderInwards) {
@@ -165,14 +182,20 @@ TEST_F(PictureRepair, AHoleIsFilledFromItsBorderInwards) {
   for (int y = 0; y < 8; ++y)
     for (int x = -10; x < 20; ++x) pixel(sky, (x + 64) % 64, y) = glm::vec3(not_a_number);
   EXPECT_THAT(expect_like(sky, grey_sky()), ElementsAre(HasSubstr("240 of 2048 pixels")));
-  // A sun that overflowed beside damage counts as good: it is 65504 before holes are filled. Seven
-  // neighbours of the hole are 1.
+  // A sun that overflowed beside damage counts as good: it is 65504 before holes are filled. Three
+  // neighbours of the hole are 1, of the five others each is a sun.
   sky = grey_sky();
   LinearPicture expected = grey_sky();
   pixel(sky, 30, 9).r = not_a_number;
-  pixel(sky, 31, 9).r = infinity;
-  pixel(expected, 30, 9).r = (7 + 65504) / 8.0f;
-  pixel(expected, 31, 9).r = 65504;
+  pixel(expected, 30, 9).r = 65504;
+  for (const int y : {8, 9, 10}) {
+    pixel(sky, 31, y).r = infinity;
+    pixel(expected, 31, y).r = 65504;
+  }
+  for (const int y : {8, 10}) {
+    pixel(sky, 30, y).r = infinity;
+    pixel(expected, 30, y).r = 65504;
+  }
   EXPECT_EQ(expect_like(sky, expected).size(), 2u);
 }
 
