@@ -18,7 +18,7 @@ PREVIZ_CONST uint ALBEDO_SHEEN = 1u;
 PREVIZ_CONST uint ANISOTROPIC_TABLES = 9u;
 // Where a texture changes its strength it has them for so many equal steps of the strength, from the
 // first step to the whole.
-PREVIZ_CONST uint ANISOTROPIC_STEPS = 4u;
+PREVIZ_CONST uint ANISOTROPIC_STEPS = 8u;
 // The lobe of smoother sheen is narrower than its table resolves.
 PREVIZ_CONST float LEAST_SHEEN_ROUGHNESS = 0.07f;
 // The GGX alpha of an anisotropic reflection is at least this in any direction.

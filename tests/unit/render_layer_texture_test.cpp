@@ -119,7 +119,7 @@ TEST(LayerTextures, MultiplyTheirFactorByTheirChannels) {
 
 // Red and green give the direction, from -1 to 1, and blue the strength (KHR_materials_anisotropy):
 // a half is no direction at all, which is taken as +X, and 0.5 + 0.5 (0, 1) a quarter turn. The
-// tables of half the strength are those of the second step of four.
+// tables of half the strength are those of the fourth step of eight.
 TEST(LayerTextures, GiveAnAnisotropyItsDirectionAndStrength) {
   const auto brushed = [](float strength, double rotation_rad) {
     Material m = metal({0.9f, 0.7f, 0.4f}, 0.4f);
