@@ -121,8 +121,8 @@ void set_layers(const scene::Material& m, gpu::GpuMaterial& to) {
   std::ranges::copy(mappings, to.mappings);
 }
 
-// What the vertices of a mesh have beside places, normals and first texture coordinates: as
-// GpuInstance says.
+// Returns how many values a vertex of the mesh has in EXTRAS (GpuInstance): its colour, and its
+// texture coordinates after the first.
 std::uint32_t extras_per_vertex(const scene::Mesh& mesh) {
   if (mesh.colors.empty() && mesh.more_uvs.empty()) return 0;
   return static_cast<std::uint32_t>(1 + mesh.more_uvs.size());
