@@ -27,11 +27,33 @@ Wrap wrap(int gltf) {
   return Wrap::repeat;
 }
 
-bool is_png_or_jpeg(std::span<const unsigned char> bytes) {
-  static constexpr unsigned char png[] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-  static constexpr unsigned char jpeg[] = {0xff, 0xd8, 0xff};
-  return (bytes.size() > sizeof png && std::memcmp(bytes.data(), png, sizeof png) == 0) ||
-         (bytes.size() > sizeof jpeg && std::memcmp(bytes.data(), jpeg, sizeof jpeg) == 0);
+constexpr unsigned char png_signature[] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+constexpr unsigned char jpeg_signature[] = {0xff, 0xd8, 0xff};
+
+bool begins_with(std::span<const unsigned char> bytes, std::span<const unsigned char> signature) {
+  return bytes.size() > signature.size() &&
+         std::memcmp(bytes.data(), signature.data(), signature.size()) == 0;
+}
+
+// stb_image asks for as much memory as a chunk's length says before it reads the chunk: up to 2 GiB
+// for a file of a few bytes. Throws previz::Error unless the chunks of a PNG, up to IEND, are in
+// its bytes.
+void require_chunks(std::span<const unsigned char> png, const std::string& where) {
+  std::size_t at = sizeof png_signature;
+  for (;;) {
+    constexpr std::size_t head = 8, checksum = 4;  // bytes; the head is a length and a name
+    if (png.size() - at < head) throw Error(where + ": is cut short: it has no IEND chunk");
+    const std::size_t length = std::size_t{png[at]} << 24 | std::size_t{png[at + 1]} << 16 |
+                               std::size_t{png[at + 2]} << 8 | png[at + 3];
+    const std::string name(png.begin() + static_cast<std::ptrdiff_t>(at + 4),
+                           png.begin() + static_cast<std::ptrdiff_t>(at + head));
+    if (name == "IEND") return;
+    const std::size_t left = png.size() - at - head;
+    if (left < checksum || length > left - checksum)
+      throw Error(where + ": is cut short: its chunk " + set::printable(name) + " says " +
+                  std::to_string(length) + " bytes, and " + std::to_string(left) + " are left");
+    at += head + length + checksum;
+  }
 }
 
 template <typename Sample>
@@ -97,9 +119,12 @@ Texture GltfTextures::decode(int index, Encoding encoding) {
                                                    ? view_bytes(model_, image.bufferView, where)
                                                    : std::span<const unsigned char>(image.image);
   if (bytes.empty()) throw Error(where + ": there is no such file, or it is empty");
-  if (!is_png_or_jpeg(bytes)) throw Error(where + ": is neither PNG nor JPEG");
+  const bool is_png = begins_with(bytes, png_signature);
+  if (!is_png && !begins_with(bytes, jpeg_signature))
+    throw Error(where + ": is neither PNG nor JPEG");
   if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()))
     throw Error(where + ": is larger than 2 GiB");
+  if (is_png) require_chunks(bytes, where);
   const int size = static_cast<int>(bytes.size());
   int width = 0, height = 0, channels = 0;
   if (!stbi_info_from_memory(bytes.data(), size, &width, &height, &channels) || width < 1 ||

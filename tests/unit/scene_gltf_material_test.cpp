@@ -448,7 +448,7 @@ TEST_F(GltfMaterials, NamesImagesThatCannotBeRead) {
                         {"uri", "data:text/plain;base64," + base64({'n', 'o', '!', '!'})}}),
             file + ": image 0 \"text\": is neither PNG nor JPEG");
   std::vector<unsigned char> broken = png(2, 1, two_texels);
-  broken.resize(40);
+  broken.at(42) ^= 0xff;  // the header of the compressed texels
   EXPECT_THAT(message_of({{"uri", "data:image/png;base64," + base64(broken)}}),
               HasSubstr("image 0: cannot be decoded"));
   // Width in the PNG's header, big-endian at byte 16: larger than allowed, and more than its bytes.
@@ -461,6 +461,35 @@ TEST_F(GltfMaterials, NamesImagesThatCannotBeRead) {
   EXPECT_THAT(message_of({{"uri", "data:image/png;base64," + base64(huge)}}),
               HasSubstr("is cut short"));
   EXPECT_THAT(message_of({{"bufferView", 99}, {"mimeType", "image/png"}}), HasSubstr("image[0]"));
+}
+
+// A PNG is a signature of 8 bytes and chunks of length, name, data and checksum, up to IEND. The
+// decoder asks for as many bytes as a chunk claims before it looks whether the file has them.
+TEST_F(GltfMaterials, RefusesPngsWhoseChunksGoOnAfterTheFile) {
+  const int image = gltf.add("images", Json::object());
+  use({{"pbrMetallicRoughness",
+        {{"baseColorTexture", {{"index", gltf.add("textures", {{"source", image}})}}}}}});
+  const auto message_of = [&](const std::vector<unsigned char>& bytes) {
+    gltf.json["images"][0] = {{"uri", "data:image/png;base64," + base64(bytes)}};
+    return error();
+  };
+  const std::vector<unsigned char> whole = png(2, 1, two_texels);
+  const auto said = HasSubstr("image 0: is cut short: its chunk ");
+  for (std::size_t size = 34; size < whole.size() - 8; ++size)
+    EXPECT_THAT(message_of({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)}),
+                HasSubstr("image 0: is cut short"))
+        << size;
+  for (const std::size_t length_at : {std::size_t{8}, std::size_t{33}}) {  // IHDR, IDAT
+    std::vector<unsigned char> lying = whole;
+    lying.at(length_at) = 0x58;  // 1.5 GB
+    EXPECT_THAT(message_of(lying), said);
+    lying.at(length_at) = 0xff;
+    EXPECT_THAT(message_of(lying), said);
+  }
+  // The one checksum that no decoder needs.
+  gltf.json["images"][0] = {
+      {"uri", "data:image/png;base64," + base64({whole.begin(), whole.end() - 4})}};
+  EXPECT_EQ(load().textures.at(0).width, 2);
 }
 
 TEST_F(GltfMaterials, LeavesOutTexturesInFormatsOfExtensions) {
