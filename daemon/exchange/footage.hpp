@@ -13,21 +13,28 @@
 
 namespace previz::exchange {
 
+struct ReadAs;
+
 struct Picture {
   PixelFormat format = PixelFormat::rgb8;
   int width = 0, height = 0;
   std::vector<std::uint8_t> bytes;           // laid out as Frame::bytes
   std::string name;                          // for errors: the file, or file and frame
   std::optional<std::int64_t> container_ns;  // a video's own time, from its first frame
+  std::uint64_t number = 0;                  // in the footage, from 0; lost frames count
 };
 
 class Footage {
  public:
   virtual ~Footage() = default;
-  // Returns the next picture, or nothing after the last. Throws previz::Error naming the picture
-  // that cannot be read.
+  // Returns the next picture, or nothing after the last. A video's frame that cannot be decoded is
+  // left out and counted. Throws previz::Error naming the picture that cannot be read, or the video
+  // if none of it can.
   virtual std::optional<Picture> next() = 0;
-  // Returns the conversions in plain words; they are known after the first picture.
+  // Returns how many frames have been left out so far.
+  virtual std::uint64_t lost() const { return 0; }
+  // Returns the conversions and what is lost in plain words; they are complete after the last
+  // picture.
   virtual std::vector<std::string> notes() const { return {}; }
 };
 
@@ -36,6 +43,8 @@ class Footage {
 inline constexpr std::size_t most_pixels = std::size_t{1} << 28;
 
 std::unique_ptr<Footage> open_pictures(std::vector<std::filesystem::path> files);
+// `read_as` stands for tags of the file that are wrong or lacking (video_tags.hpp).
+std::unique_ptr<Footage> open_video(const std::filesystem::path& file, const ReadAs& read_as);
 std::unique_ptr<Footage> open_video(const std::filesystem::path& file);
 
 }  // namespace previz::exchange

@@ -90,6 +90,15 @@ std::string text(PixelFormat format, int width, int height) {
          std::to_string(height);
 }
 
+struct ImportedFrame {
+  std::uint64_t number = 0;  // in the footage, from 0; lost frames count
+  std::int64_t timestamp_ns = 0;
+};
+struct Imported {
+  std::vector<ImportedFrame> frames;
+  std::uint64_t in_footage = 0;  // with those that are lost
+};
+
 // Reads one camera's footage and writes it into the session.
 class FootageImport {
  public:
@@ -97,19 +106,18 @@ class FootageImport {
                 std::optional<Size> calibrated, session::SessionWriter& writer)
       : file_(description_file), footage_(footage), calibrated_(calibrated), writer_(writer) {}
 
-  // The capture times of the frames written.
-  std::vector<std::int64_t> run(std::vector<std::string>& notes) {
-    const auto pictures =
-        footage_.video.empty() ? open_pictures(footage_.pictures) : open_video(footage_.video);
-    std::vector<std::int64_t> times;
+  Imported run(std::vector<std::string>& notes) {
+    const auto pictures = footage_.video.empty() ? open_pictures(footage_.pictures)
+                                                 : open_video(footage_.video, footage_.read_as);
+    std::vector<ImportedFrame> frames;
     while (const auto picture = pictures->next()) {
       check(*picture);
-      const std::size_t i = times.size();
+      const std::size_t i = picture->number;
       check_count(i, *picture);
       Frame frame;
       frame.source = footage_.source;
       frame.sequence = i;
-      frame.timestamp_ns = frame.arrival_ns = time_of(i, *picture, times);
+      frame.timestamp_ns = frame.arrival_ns = time_of(i, *picture, frames);
       frame.exposure = one_of(footage_.exposure, i, 1);
       frame.exposure_s = one_of(footage_.exposure_s, i, 0);
       frame.gain = one_of(footage_.gain, i, 1);
@@ -118,14 +126,15 @@ class FootageImport {
       frame.height = picture->height;
       frame.bytes = picture->bytes;
       writer_.write(frame);
-      times.push_back(frame.timestamp_ns);
+      frames.push_back({i, frame.timestamp_ns});
     }
-    if (times.empty()) fail("holds no frame");
-    if (listed() > 0 && times.size() != listed())
-      fail("has " + std::to_string(times.size()) + " frames; " + std::to_string(listed()) +
+    if (frames.empty()) fail("holds no frame");
+    const std::uint64_t all = frames.size() + pictures->lost();
+    if (listed() > 0 && all != listed())
+      fail("has " + std::to_string(all) + " frames; " + std::to_string(listed()) +
            " are described");
     for (const std::string& note : pictures->notes()) notes.push_back(note);
-    return times;
+    return {std::move(frames), all};
   }
 
  private:
@@ -158,13 +167,13 @@ class FootageImport {
   }
 
   std::int64_t time_of(std::size_t i, const Picture& picture,
-                       const std::vector<std::int64_t>& before) const {
+                       const std::vector<ImportedFrame>& before) const {
     if (!footage_.timestamps_ns.empty()) return footage_.timestamps_ns[i];
     if (footage_.fps > 0)
       return footage_.start_ns + std::llround(static_cast<double>(i) / footage_.fps * 1e9);
     if (!picture.container_ns) throw Error(picture.name + ": its container gives it no time");
     const std::int64_t time = footage_.start_ns + *picture.container_ns;
-    if (time < 0 || (!before.empty() && time <= before.back()))
+    if (time < 0 || (!before.empty() && time <= before.back().timestamp_ns))
       throw Error(picture.name +
                   ": its container's times do not increase; give fps or "
                   "timestamps_ns");
@@ -188,21 +197,34 @@ std::optional<Size> size_of_pictures(const std::optional<Calibration>& calibrati
   return Size{calibration->intrinsics.width, calibration->intrinsics.height};
 }
 
+// Returns how many of the poses belong to a frame of the take.
 std::uint64_t write_track(const ImportDescription& description, const fs::path& file,
-                          const std::vector<std::int64_t>& times, session::SessionWriter& writer) {
+                          const Imported& imported, session::SessionWriter& writer,
+                          std::vector<std::string>& notes) {
   if (description.track.empty()) return 0;
-  if (const auto last = description.track.back().frame; last >= times.size())
+  if (const auto last = description.track.back().frame; last >= imported.in_footage)
     throw Error(file.string() + ": track has a pose for frame " + std::to_string(last) +
-                "; observer has frames 0 to " + std::to_string(times.size() - 1));
+                "; observer has frames 0 to " + std::to_string(imported.in_footage - 1));
+  const std::vector<ImportedFrame>& frames = imported.frames;
+  std::uint64_t poses = 0;
   auto pose = description.track.begin();
-  for (std::size_t i = 0; i < times.size(); ++i) {
+  for (std::size_t i = 0; i < frames.size(); ++i) {
     session::TrackRecord record;
-    if (pose != description.track.end() && pose->frame == i) record = *pose++;
+    while (pose != description.track.end() && pose->frame < frames[i].number) ++pose;
+    if (pose != description.track.end() && pose->frame == frames[i].number) {
+      record = *pose;
+      ++poses;
+    }
     record.frame = i;
-    record.timestamp_ns = times[i];
+    record.timestamp_ns = frames[i].timestamp_ns;
     writer.write(record);
   }
-  return description.track.size();
+  if (const std::size_t unused = description.track.size() - poses)
+    notes.push_back(
+        file.string() + ": " + std::to_string(unused) +
+        (unused == 1 ? " pose belongs to a lost frame" : " poses belong to lost frames") +
+        ", and left out");
+  return poses;
 }
 
 session::SessionInfo info_of(const ImportDescription& description, const fs::path& target) {
@@ -234,13 +256,13 @@ ImportReport import_session(const ImportOptions& options) {
       report.light_frames = FootageImport(options.description, *description.light,
                                           size_of_pictures(description.light_calibration), writer)
                                 .run(report.notes)
-                                .size();
-    const std::vector<std::int64_t> times =
+                                .frames.size();
+    const Imported observer =
         FootageImport(options.description, description.observer,
                       size_of_pictures(description.observer_calibration), writer)
             .run(report.notes);
-    report.observer_frames = times.size();
-    report.poses = write_track(description, options.description, times, writer);
+    report.observer_frames = observer.frames.size();
+    report.poses = write_track(description, options.description, observer, writer, report.notes);
     writer.close();
   }
   report.assets = std::set<std::pair<std::string, fs::path>>(assets.begin(), assets.end()).size();

@@ -17,11 +17,23 @@
 // observer, light - the pictures, exactly one of:
 //   pictures      list of paths; or a path whose file name holds one number "%d" or "%04d" (all
 //                 there are; a gap is an error), or wildcards * and ? (in the order of the numbers
-//                 in the names). PNG, JPEG or TIFF, grey or RGB, 8 or 16 bits; all alike.
-//   video         path of a video. Y'CbCr 4:2:2 in 8 bits, BT.709, limited range, and grey are kept
-//                 as they are; everything else becomes RGB, 8 bits, or 16 if it has more than 8. A
-//                 video that does not say its colour matrix counts as BT.709 from 720 lines on and
-//                 as BT.601 below, as players do.
+//                 in the names). PNG, JPEG or TIFF, grey or RGB, 8 or 16 bits; all alike. They are
+//                 turned upright as their EXIF data says.
+//   video         path of a video. Y'CbCr 4:2:2 in 8 bits, BT.709, limited range, and full grey are
+//                 kept as they are; everything else becomes RGB or grey, 8 bits, or 16 if it has
+//                 more than 8. Its tags are heeded: which side is up, the shape of a pixel (made
+//                 square), range, matrix, transfer and primaries. High dynamic range (HLG, PQ),
+//                 linear and logarithmic signals become sRGB's curve, wider primaries Rec. 709's,
+//                 in 16 bits; the curves of sRGB and television are kept. A video that does not say
+//                 its colour matrix counts as BT.709 from 720 lines on and as BT.601 below, as
+//                 players do. What was found and what was assumed is reported. A frame that cannot
+//                 be decoded is lost: it is counted, and its number is left free.
+//   read_as       beside video, in place of tags that are wrong or lacking: {range: "full" or
+//                 "limited", matrix: "bt601", "bt709", "bt2020" or "smpte240m", transfer: "srgb",
+//                 "bt709", "hlg", "pq", "linear", "gamma22", "gamma28", "log100", "log316", or "as
+//                 recorded", which leaves it to response; primaries: "bt709", "bt2020", "p3-d65",
+//                 "p3-dci", "bt601-525" or "bt601-625", rotation_deg: 0, 90, 180 or 270 clockwise,
+//                 pixel_aspect: [width, height]}
 //   csv           path of a table with a header line; its column `file` (relative to the table's
 //                 folder) are the pictures, unless `pictures` or `video` is given, which it then
 //                 lists in order. Columns timestamp_ns, exposure, exposure_s and gain stand for the

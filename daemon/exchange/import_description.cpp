@@ -11,6 +11,7 @@
 
 #include "daemon/exchange/import_tables.hpp"
 #include "daemon/exchange/json_members.hpp"
+#include "daemon/exchange/read_as.hpp"
 #include "drivers/calibration/read.hpp"
 #include "drivers/error.hpp"
 
@@ -117,12 +118,15 @@ bool is_video_name(const std::string& name) {
 
 void read_pictures(const CameraMembers& camera, FootageDescription& footage) {
   const Members& m = camera.members;
+  if (m.has("read_as") && !m.has("video"))
+    m.fail("read_as", "stands for the tags of a video; pictures are read as they are");
   if (m.has("pictures") && m.has("video"))
     m.fail("video", "contradicts pictures; one of them is allowed");
   if (m.has("video")) {
     footage.video = camera.folder / m.read<std::string>("video");
     if (!fs::is_regular_file(footage.video))
       m.fail("video", "names " + footage.video.string() + ", which is not a file");
+    footage.read_as = read_read_as(m);
   } else if (m.has("pictures") && m.value("pictures").is_string() &&
              is_video_name(m.read<std::string>("pictures"))) {
     m.fail("pictures", "names a video; write \"video\" in place of \"pictures\"");
@@ -275,8 +279,8 @@ FootageDescription read_footage(const Members& m, const fs::path& folder, const 
 
 std::vector<std::string> camera_members(std::vector<std::string> own) {
   for (const char* common :
-       {"pictures", "video", "csv", "timestamps_ns", "fps", "start_ns", "sort_by_time", "exposure",
-        "exposure_s", "gain", "intrinsics", "response"})
+       {"pictures", "video", "read_as", "csv", "timestamps_ns", "fps", "start_ns", "sort_by_time",
+        "exposure", "exposure_s", "gain", "intrinsics", "response"})
     own.emplace_back(common);
   return own;
 }

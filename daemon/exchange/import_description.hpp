@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/exchange/video_tags.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/session/session.hpp"
@@ -18,6 +19,7 @@ struct FootageDescription {
   std::string source;                           // "observer" or "light"
   std::vector<std::filesystem::path> pictures;  // empty: video
   std::filesystem::path video;
+  ReadAs read_as;                           // of the video
   std::vector<std::int64_t> timestamps_ns;  // empty: fps, or the container's if that is 0
   double fps = 0;
   std::int64_t start_ns = 0;

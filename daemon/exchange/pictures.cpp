@@ -1,7 +1,9 @@
+#include <exiv2/exiv2.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "daemon/exchange/footage.hpp"
+#include "daemon/exchange/orientation.hpp"
 #include "daemon/exchange/picture_header.hpp"
 #include "drivers/error.hpp"
 
@@ -24,15 +26,29 @@ PixelFormat format_of(const cv::Mat& image) {
   return deep ? PixelFormat::rgb16 : PixelFormat::rgb8;
 }
 
+// Which side of a JPEG or PNG is up, by its EXIF data. (OpenCV turns TIFF itself.)
+Orientation orientation_of(const std::string& file) try {
+  const auto image = Exiv2::ImageFactory::open(file);
+  if (image->imageType() == Exiv2::ImageType::tiff) return {};
+  image->readMetadata();
+  const Exiv2::ExifData& data = image->exifData();
+  const auto found = data.findKey(Exiv2::ExifKey("Exif.Image.Orientation"));
+  if (found == data.end() || found->count() == 0) return {};
+  return exif_orientation(static_cast<int>(found->toLong())).value_or(Orientation{});
+} catch (const Exiv2::AnyError&) {
+  return {};  // damaged EXIF data says nothing; the picture may be whole
+}
+
 class PictureFiles final : public Footage {
  public:
   explicit PictureFiles(std::vector<std::filesystem::path> files) : files_(std::move(files)) {}
 
   std::optional<Picture> next() override {
     if (index_ == files_.size()) return std::nullopt;
+    const std::uint64_t number = index_;
     const std::string name = files_[index_++].string();
     check_picture_file(name);
-    // UNCHANGED keeps the bit depth and ignores EXIF's rotation.
+    // UNCHANGED keeps the bit depth, and leaves EXIF's rotation to us: IMREAD_COLOR would turn it.
     cv::Mat image = cv::imread(name, cv::IMREAD_UNCHANGED);
     if (image.empty()) throw Error(name + ": cannot be read as a picture; it is damaged");
     const bool known_depth = image.depth() == CV_8U || image.depth() == CV_16U;
@@ -45,14 +61,24 @@ class PictureFiles final : public Footage {
     if (image.channels() >= 3)
       cv::cvtColor(image, image, image.channels() == 4 ? cv::COLOR_BGRA2RGB : cv::COLOR_BGR2RGB);
     if (!image.isContinuous()) image = image.clone();
-    Picture picture{format_of(image), image.cols, image.rows, {}, name, {}};
+    Picture picture{format_of(image), image.cols, image.rows, {}, name, {}, number};
     picture.bytes.assign(image.datastart, image.dataend);
+    const Orientation orientation = orientation_of(name);
+    turn(picture, orientation);
+    if (!orientation.is_upright() && turned_++ == 0)
+      first_turned_ = name + ": is " + orientation.words() + ", as its EXIF data says";
     return picture;
+  }
+
+  std::vector<std::string> notes() const override {
+    if (turned_ == 0) return {};
+    return {first_turned_ + (turned_ == 1 ? "" : "; " + std::to_string(turned_) + " pictures are")};
   }
 
  private:
   std::vector<std::filesystem::path> files_;
-  std::size_t index_ = 0;
+  std::size_t index_ = 0, turned_ = 0;
+  std::string first_turned_;
 };
 
 }  // namespace

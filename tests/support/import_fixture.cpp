@@ -7,6 +7,7 @@ extern "C" {
 #include <libavutil/pixdesc.h>
 }
 
+#include <cstring>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -35,51 +36,115 @@ void write_picture(const std::filesystem::path& file, const cv::Mat& picture) {
   ASSERT_TRUE(cv::imwrite(file.string(), picture));
 }
 
-void write_video(const std::filesystem::path& file, const std::string& pixel_format,
-                 const std::vector<std::vector<std::uint8_t>>& frames, int width, int height,
-                 int fps, bool bt709) {
+namespace {
+
+av::Codec open_encoder(const VideoForm& form) {
+  const AVCodec* codec = avcodec_find_encoder_by_name(form.encoder.c_str());
+  if (!codec) throw Error("libav has no encoder " + form.encoder);
+  av::Codec encoder(avcodec_alloc_context3(codec));
+  encoder->width = form.width;
+  encoder->height = form.height;
+  encoder->pix_fmt = av_get_pix_fmt(form.pixel_format.c_str());
+  encoder->time_base = {1, form.fps};
+  encoder->framerate = {form.fps, 1};
+  encoder->thread_count = 1;
+  encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
+  encoder->strict_std_compliance = FF_COMPLIANCE_EXPERIMENTAL;
+  encoder->color_range = form.range;
+  encoder->colorspace = form.matrix;
+  encoder->color_trc = form.transfer;
+  encoder->color_primaries = form.primaries;
+  encoder->sample_aspect_ratio = form.pixel_aspect;
+  AVDictionary* options = nullptr;
+  for (const auto& [name, value] : form.options)
+    av_dict_set(&options, name.c_str(), value.c_str(), 0);
+  const int opened = avcodec_open2(encoder.get(), codec, &options);
+  EXPECT_EQ(av_dict_count(options), 0) << "unknown options of " << form.encoder;
+  av_dict_free(&options);
+  av::check(opened, form.encoder, "cannot be opened");
+  return encoder;
+}
+
+AVStream& add_stream(AVFormatContext& context, const AVCodecContext& encoder,
+                     const VideoForm& form) {
+  AVStream* stream = avformat_new_stream(&context, nullptr);
+  avcodec_parameters_from_context(stream->codecpar, &encoder);
+  stream->time_base = encoder.time_base;
+  stream->avg_frame_rate = encoder.framerate;
+  stream->sample_aspect_ratio = form.pixel_aspect;
+  for (const auto& [name, value] : form.metadata)
+    av_dict_set(&stream->metadata, name.c_str(), value.c_str(), 0);
+  const std::size_t bytes = form.display_matrix.size() * sizeof(std::int32_t);
+  if (bytes > 0)
+    std::memcpy(av_stream_new_side_data(stream, AV_PKT_DATA_DISPLAYMATRIX, bytes),
+                form.display_matrix.data(), bytes);
+  return *stream;
+}
+
+av::Picture picture_of(const std::vector<std::uint8_t>& bytes, const AVCodecContext& encoder) {
+  av::Picture picture(av_frame_alloc());
+  picture->width = encoder.width;
+  picture->height = encoder.height;
+  picture->format = encoder.pix_fmt;
+  av_frame_get_buffer(picture.get(), 0);
+  const std::uint8_t* planes[4];
+  int strides[4];
+  av_image_fill_arrays(const_cast<std::uint8_t**>(planes), strides, bytes.data(), encoder.pix_fmt,
+                       encoder.width, encoder.height, 1);
+  av_image_copy(picture->data, picture->linesize, planes, strides, encoder.pix_fmt, encoder.width,
+                encoder.height);
+  return picture;
+}
+
+}  // namespace
+
+void write_video(const std::filesystem::path& file, const VideoForm& form,
+                 const std::vector<std::vector<std::uint8_t>>& frames) {
+  av_log_set_level(AV_LOG_ERROR);  // encoders talk
   AVFormatContext* context = nullptr;
   ASSERT_GE(avformat_alloc_output_context2(&context, nullptr, nullptr, file.c_str()), 0);
   const av::Muxer muxer(context);
-  const AVCodec* codec = avcodec_find_encoder(AV_CODEC_ID_FFV1);
-  const av::Codec encoder(avcodec_alloc_context3(codec));
-  encoder->width = width;
-  encoder->height = height;
-  encoder->pix_fmt = av_get_pix_fmt(pixel_format.c_str());
-  encoder->time_base = {1, fps};
-  encoder->thread_count = 1;
-  encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
-  if (bt709) {
-    encoder->colorspace = AVCOL_SPC_BT709;
-    encoder->color_range = AVCOL_RANGE_MPEG;
-  }
-  ASSERT_EQ(avcodec_open2(encoder.get(), codec, nullptr), 0);
-  AVStream* stream = avformat_new_stream(context, nullptr);
-  avcodec_parameters_from_context(stream->codecpar, encoder.get());
-  stream->time_base = encoder->time_base;
+  const av::Codec encoder = open_encoder(form);
+  AVStream& stream = add_stream(*context, *encoder, form);
   ASSERT_GE(avio_open(&muxer->pb, file.c_str(), AVIO_FLAG_WRITE), 0);
   ASSERT_GE(avformat_write_header(context, nullptr), 0);
   const av::Packet packet(av_packet_alloc());
+  int written = 0;
+  const auto write = [&] {
+    while (avcodec_receive_packet(encoder.get(), packet.get()) == 0) {
+      av_packet_rescale_ts(packet.get(), encoder->time_base, stream.time_base);
+      const bool stays = !form.spoil || form.spoil(*packet, written);
+      if (stays) {
+        ASSERT_GE(av_write_frame(context, packet.get()), 0);
+      }
+      ++written;
+      av_packet_unref(packet.get());
+    }
+  };
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    const av::Picture picture(av_frame_alloc());
-    picture->width = width;
-    picture->height = height;
-    picture->format = encoder->pix_fmt;
-    av_frame_get_buffer(picture.get(), 0);
-    const std::uint8_t* planes[4];
-    int strides[4];
-    av_image_fill_arrays(const_cast<std::uint8_t**>(planes), strides, frames[i].data(),
-                         encoder->pix_fmt, width, height, 1);
-    av_image_copy(picture->data, picture->linesize, planes, strides, encoder->pix_fmt, width,
-                  height);
-    picture->pts = static_cast<std::int64_t>(i);
+    const av::Picture picture = picture_of(frames[i], *encoder);
+    picture->pts = form.times.empty() ? static_cast<std::int64_t>(i) : form.times[i];
     ASSERT_EQ(avcodec_send_frame(encoder.get(), picture.get()), 0);
-    ASSERT_EQ(avcodec_receive_packet(encoder.get(), packet.get()), 0);
-    av_packet_rescale_ts(packet.get(), encoder->time_base, stream->time_base);
-    ASSERT_GE(av_write_frame(context, packet.get()), 0);
-    av_packet_unref(packet.get());
+    write();
   }
+  ASSERT_EQ(avcodec_send_frame(encoder.get(), nullptr), 0);
+  write();
   ASSERT_EQ(av_write_trailer(context), 0);
+}
+
+void write_video(const std::filesystem::path& file, const std::string& pixel_format,
+                 const std::vector<std::vector<std::uint8_t>>& frames, int width, int height,
+                 int fps, bool bt709) {
+  VideoForm form;
+  form.pixel_format = pixel_format;
+  form.width = width;
+  form.height = height;
+  form.fps = fps;
+  if (bt709) {
+    form.matrix = AVCOL_SPC_BT709;
+    form.range = AVCOL_RANGE_MPEG;
+  }
+  write_video(file, form, frames);
 }
 
 Shoot::Shoot() {

@@ -1,7 +1,14 @@
 // Makes footage for the tests of the import: pictures of noise in every kind of file, and a video.
 #pragma once
 
+extern "C" {
+#include <libavcodec/avcodec.h>
+}
+
+#include <array>
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <string>
@@ -22,8 +29,30 @@ cv::Mat noise_picture(int seed, int type, int width, int height);
 std::vector<std::uint8_t> frame_bytes_of(const cv::Mat& picture);
 void write_picture(const std::filesystem::path& file, const cv::Mat& picture);
 
-// Rows packed, planes one after the other, in the order of `pixel_format`, one string a frame;
-// FFV1 or whatever the container's name wants. Marked BT.709 limited range if `bt709`.
+// A video as write_video() makes it.
+struct VideoForm {
+  std::string pixel_format = "rgb24";
+  int width = 32, height = 16, fps = 25;
+  std::string encoder = "ffv1";                // libav's name
+  std::map<std::string, std::string> options;  // the encoder's
+  AVColorRange range = AVCOL_RANGE_UNSPECIFIED;
+  AVColorSpace matrix = AVCOL_SPC_UNSPECIFIED;
+  AVColorTransferCharacteristic transfer = AVCOL_TRC_UNSPECIFIED;
+  AVColorPrimaries primaries = AVCOL_PRI_UNSPECIFIED;
+  AVRational pixel_aspect = {0, 1};
+  std::vector<std::int32_t> display_matrix;     // 9, as in libavutil/display.h
+  std::vector<std::int64_t> times;              // in frames; else 0, 1, 2 ...
+  std::map<std::string, std::string> metadata;  // of the stream
+  // Changes the packet of a number, in the order of decoding; false leaves it out.
+  std::function<bool(AVPacket&, int)> spoil;
+};
+
+// Each frame's rows packed, planes one after the other, in the order of the pixel format. The
+// container is what the file's name says.
+void write_video(const std::filesystem::path& file, const VideoForm& form,
+                 const std::vector<std::vector<std::uint8_t>>& frames);
+
+// FFV1, marked BT.709 limited range if `bt709`.
 void write_video(const std::filesystem::path& file, const std::string& pixel_format,
                  const std::vector<std::vector<std::uint8_t>>& frames, int width, int height,
                  int fps, bool bt709);

@@ -230,7 +230,8 @@ TEST(Import, AnyOtherVideoBecomesRgb) {
     shoot.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
     const ImportReport report = shoot.import();
     EXPECT_NE(report.notes.at(0).find("converted to rgb8"), std::string::npos);
-    EXPECT_EQ(report.notes.at(0).find("(assumed)") == std::string::npos, matrix.bt709);
+    EXPECT_EQ(report.notes.at(0).find("matrix smpte170m (assumed)") == std::string::npos,
+              matrix.bt709);
     const FramePtr rgb = open(shoot, "observer")->read(0);
     ASSERT_EQ(rgb->format, PixelFormat::rgb8);
     for (std::size_t i = 0; i < rgb->bytes.size(); i += 3) {
