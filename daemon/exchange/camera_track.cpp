@@ -86,6 +86,10 @@ std::string distortion_words(const PinholeIntrinsics& i) {
          number_text(i.k3);
 }
 
+std::string timecode_words(const CameraTrack& track) {
+  return track.timecode ? ". Timecode of frame 0: " + track.timecode->first : "";
+}
+
 // Says how far the picture's middle is from the optical axis.
 std::string chan_offset_words(const PinholeIntrinsics& i) {
   std::array<char, 96> text{};
@@ -187,7 +191,10 @@ void export_scene(const pipeline::Take& take, const std::filesystem::path& direc
 CameraTrack camera_track(const session::Session& session,
                          const std::vector<session::FrameRecord>& frames,
                          const ObserverCalibration& calibration) {
-  CameraTrack track{session.info.name, calibration, 25, frames.size(), {}};
+  std::vector<std::int64_t> times;
+  for (const session::FrameRecord& frame : frames) times.push_back(frame.timestamp_ns);
+  CameraTrack track{session.info.name,         calibration,   session::nominal_rate(times),
+                    timecode_of(session.info), frames.size(), {}};
   for (const session::TrackRecord& record : session.track)
     if (record.tracked) track.keys.push_back({record.frame, record.world_from_camera});
   if (track.keys.empty())
@@ -195,21 +202,19 @@ CameraTrack camera_track(const session::Session& session,
         session.directory.string() +
         ": no frame has a pose, so that there is no camera to export; `previzd track` says why, "
         "and the set needs [[tag]] tables, or the take's import a track");
-  if (frames.size() > 1)
-    track.fps = static_cast<double>(frames.size() - 1) * 1e9 /
-                static_cast<double>(frames.back().timestamp_ns - frames.front().timestamp_ns);
   return track;
 }
 
 std::string to_usda(const CameraTrack& track) {
+  const std::string fps = number_text(track.rate.fps);
   std::string text =
       "#usda 1.0\n(\n    defaultPrim = \"camera\"\n    metersPerUnit = 1\n"
       "    upAxis = \"Z\"\n    startTimeCode = 0\n    endTimeCode = " +
       std::to_string(track.frames == 0 ? 0 : track.frames - 1) +
-      "\n    timeCodesPerSecond = " + number_text(track.fps) +
-      "\n    framesPerSecond = " + number_text(track.fps) + "\n)\n\n";
+      "\n    timeCodesPerSecond = " + fps + "\n    framesPerSecond = " + fps + "\n)\n\n";
   text += "def Camera \"camera\" (\n    doc = " +
-          quoted_text(track.name + ". " + distortion_words(track.calibration.intrinsics)) +
+          quoted_text(track.name + ". " + distortion_words(track.calibration.intrinsics) +
+                      timecode_words(track)) +
           "\n)\n{\n" + usd_lens(track.calibration);
   text += "    matrix4d xformOp:transform.timeSamples = {\n";
   for (const CameraKey& key : track.keys) {
@@ -263,6 +268,9 @@ void export_take(const ExportOptions& options, std::ostream& out) {
   out << options.directory.string() << ": camera.usda, camera.chan, " << track.keys.size()
       << " poses of " << track.frames << " frames";
   if (track.keys.size() < track.frames) out << "; the others have none (`previzd track` says why)";
+  out << std::endl;
+  out << "  " << session::words_of(track.rate);
+  if (track.timecode) out << "; timecode of frame 0: " << track.timecode->first;
   out << std::endl;
   out << "  camera.chan: rotation order ZXY (set it in Blender, whose own is XYZ); it holds "
          "neither "

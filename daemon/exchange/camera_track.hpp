@@ -6,11 +6,13 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <iosfwd>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
 
 #include "drivers/calibration.hpp"
+#include "drivers/session/nominal_rate.hpp"
 #include "drivers/session/session.hpp"
 
 namespace previz::exchange {
@@ -23,12 +25,13 @@ struct CameraKey {
 struct CameraTrack {
   std::string name;
   ObserverCalibration calibration;
-  double fps = 25;
-  std::uint64_t frames = 0;     // number of frames in the take
-  std::vector<CameraKey> keys;  // the frames that were tracked
+  session::NominalRate rate;
+  std::optional<session::Timecode> timecode;  // of frame 0
+  std::uint64_t frames = 0;                   // number of frames in the take
+  std::vector<CameraKey> keys;                // the frames that were tracked
 };
 
-// Makes the camera track of a take; its rate is the mean over the observer's times. Throws
+// Makes the camera track of a take; its rate is the nominal one of the observer's times. Throws
 // previz::Error if the take has no calibration or no pose.
 CameraTrack camera_track(const session::Session& session,
                          const std::vector<session::FrameRecord>& frames,

@@ -33,6 +33,8 @@ class Footage {
   virtual std::optional<Picture> next() = 0;
   // Returns how many frames have been left out so far.
   virtual std::uint64_t lost() const { return 0; }
+  // Returns the timecode that the file has for its frame 0, lost or not: "10:00:00:00".
+  virtual std::optional<std::string> timecode() const { return std::nullopt; }
   // Returns the conversions and what is lost in plain words; they are complete after the last
   // picture.
   virtual std::vector<std::string> notes() const { return {}; }

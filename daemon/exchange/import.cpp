@@ -12,8 +12,10 @@
 #include "daemon/exchange/footage.hpp"
 #include "daemon/exchange/import_description.hpp"
 #include "daemon/scene/assets.hpp"
+#include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
+#include "drivers/session/nominal_rate.hpp"
 #include "drivers/session/session.hpp"
 
 namespace previz::exchange {
@@ -97,6 +99,8 @@ struct ImportedFrame {
 struct Imported {
   std::vector<ImportedFrame> frames;
   std::uint64_t in_footage = 0;  // with those that are lost
+  session::NominalRate rate;
+  std::optional<session::Timecode> timecode;  // of the first of these frames
 };
 
 // Reads one camera's footage and writes it into the session.
@@ -134,10 +138,31 @@ class FootageImport {
       fail("has " + std::to_string(all) + " frames; " + std::to_string(listed()) +
            " are described");
     for (const std::string& note : pictures->notes()) notes.push_back(note);
-    return {std::move(frames), all};
+    Imported imported{std::move(frames), all, {}, {}};
+    read_times(imported, *pictures, notes);
+    return imported;
   }
 
  private:
+  // The rate and the timecode of what was imported.
+  void read_times(Imported& imported, const Footage& pictures, std::vector<std::string>& notes) {
+    std::vector<std::int64_t> times;
+    for (const ImportedFrame& frame : imported.frames) times.push_back(frame.timestamp_ns);
+    imported.rate = session::nominal_rate(times);
+    if (times.size() > 1)
+      notes.push_back(footage_.source + ": " + session::words_of(imported.rate));
+    const auto first = pictures.timecode();
+    if (!first) return;
+    const session::Timecode of_file{*first, imported.rate.fps};
+    const auto number = static_cast<std::int64_t>(imported.frames.front().number);
+    const auto digits = session::timecode_after(of_file, number);
+    if (digits)
+      imported.timecode = session::Timecode{session::words_of(*digits), of_file.fps};
+    else
+      notes.push_back(footage_.source + ": its timecode, " + set::printable(*first) +
+                      ", is none at this rate, and left out");
+  }
+
   // Returns how many frames the lists are for; 0 if there are no lists.
   std::size_t listed() const {
     std::size_t count = footage_.timestamps_ns.size();
@@ -262,6 +287,7 @@ ImportReport import_session(const ImportOptions& options) {
                       size_of_pictures(description.observer_calibration), writer)
             .run(report.notes);
     report.observer_frames = observer.frames.size();
+    if (observer.timecode) writer.set_timecode(*observer.timecode);
     report.poses = write_track(description, options.description, observer, writer, report.notes);
     writer.close();
   }

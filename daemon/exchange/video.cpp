@@ -126,6 +126,18 @@ class VideoFile final : public Footage {
 
   std::uint64_t lost() const override { return lost_.all(); }
 
+  // Containers have it as a track of its own, or as the video's or the file's own words.
+  std::optional<std::string> timecode() const override {
+    const auto of = [](const AVDictionary* words) {
+      return av_dict_get(words, "timecode", nullptr, 0);
+    };
+    const AVDictionaryEntry* found = of(stream().metadata);
+    if (!found) found = of(demuxer_->metadata);
+    for (unsigned i = 0; !found && i < demuxer_->nb_streams; ++i)
+      found = of(demuxer_->streams[i]->metadata);
+    return found ? std::optional<std::string>(found->value) : std::nullopt;
+  }
+
   std::vector<std::string> notes() const override {
     std::vector<std::string> notes = pictures_ ? pictures_->notes() : std::vector<std::string>{};
     if (const std::uint64_t count = lost_.all())

@@ -25,6 +25,7 @@
 
 #include "daemon/output/file.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/nominal_rate.hpp"
 
 namespace previz::output {
 namespace {
@@ -90,6 +91,19 @@ void add_camera(Imf::Header& header, const ExrMetadata& metadata) {
   Imf::addWorldToNDC(header, row_vector_matrix(ndc_from_camera * camera_from_world));
 }
 
+void add_time(Imf::Header& header, const ExrMetadata& metadata) {
+  if (metadata.fps <= 0) return;
+  const session::RateFraction rate = session::fraction_of(metadata.fps);
+  Imf::addFramesPerSecond(header,
+                          Imf::Rational(rate.frames, static_cast<unsigned int>(rate.seconds)));
+  if (!metadata.timecode || metadata.timecode->fps > 60) return;
+  const session::TimecodeDigits& time = *metadata.timecode;
+  const int in_a_count = time.fps > 30 ? 2 : 1;
+  Imf::TimeCode code(time.hours, time.minutes, time.seconds, time.frames / in_a_count, time.drops);
+  code.setFieldPhase(time.frames % in_a_count == 1);
+  Imf::addTimeCode(header, code);
+}
+
 Imf::Header header(const render::Layers& layers, const ExrMetadata& metadata) {
   Imf::Header header(layers.width, layers.height);
   header.compression() = Imf::ZIP_COMPRESSION;
@@ -117,6 +131,7 @@ Imf::Header header(const render::Layers& layers, const ExrMetadata& metadata) {
     header.insert("previz.world_from_camera", Imf::M44dAttribute(matrix));
     add_camera(header, metadata);
   }
+  add_time(header, metadata);
   if (metadata.exposure_s > 0) Imf::addExpTime(header, static_cast<float>(metadata.exposure_s));
   if (metadata.lens) {
     Imf::addAperture(header, static_cast<float>(metadata.lens->f_number));

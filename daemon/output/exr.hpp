@@ -13,6 +13,7 @@
 #include "daemon/tracking/tracker.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/session/timecode.hpp"
 
 namespace previz::output {
 
@@ -27,7 +28,9 @@ namespace previz::output {
 //   column vectors; OpenCV camera axes, metres; absent unless the pose is tracked or held),
 // and OpenEXR's own (ImfStandardAttributes.h): worldToCamera and worldToNDC (m44f, of row vectors;
 //   the camera left-handed: right, up, forward; without lens distortion; absent like it),
-//   expTime, aperture and focus where they are known.
+//   expTime, aperture, focus, framesPerSecond and timeCode where they are known. From 31 to 60
+//   frames a second timeCode counts pairs, and its field phase the second of each, as SMPTE ST
+//   12-1 does; it has no place for more.
 struct ExrMetadata {
   double exposure = 1;
   std::int64_t timestamp_ns = 0;
@@ -37,6 +40,8 @@ struct ExrMetadata {
   std::optional<PinholeIntrinsics> intrinsics;  // for the picture's size
   std::optional<ThinLens> lens;
   double exposure_s = 0;  // 0: not known
+  double fps = 0;         // 0: not known
+  std::optional<session::TimecodeDigits> timecode;
 };
 
 // Returns the metadata for a picture of these layers, which was rendered into `frame` with the pose

@@ -6,6 +6,7 @@
 
 #include "daemon/output/file.hpp"
 #include "drivers/av.hpp"
+#include "drivers/session/nominal_rate.hpp"
 
 extern "C" {
 #include <libavutil/opt.h>
@@ -100,7 +101,8 @@ struct VideoWriter::Impl {
 };
 
 VideoWriter::VideoWriter(const std::filesystem::path& stem, int width, int height,
-                         const VideoCodec& codec)
+                         const VideoCodec& codec, const session::TakeClock& clock,
+                         std::int64_t first_ns)
     : impl_(std::make_unique<Impl>()) {
   impl_->path = std::filesystem::path(stem) += codec.extension;
   impl_->unfinished = unfinished_name(impl_->path);
@@ -116,6 +118,12 @@ VideoWriter::VideoWriter(const std::filesystem::path& stem, int width, int heigh
   impl_->file.reset(file);
   impl_->stream = avformat_new_stream(file, nullptr);
   impl_->stream->time_base = video_clock;
+  if (clock.fps > 0) {
+    const session::RateFraction rate = session::fraction_of(clock.fps);
+    impl_->stream->avg_frame_rate = {rate.frames, rate.seconds};
+  }
+  if (const auto timecode = clock.at(first_ns); timecode && counts_frames(clock))
+    av_dict_set(&impl_->stream->metadata, "timecode", session::words_of(*timecode).c_str(), 0);
   impl_->check(avcodec_parameters_from_context(impl_->stream->codecpar, impl_->encoder.get()),
                "cannot be made");
   impl_->check(avio_open(&file->pb, url.c_str(), AVIO_FLAG_WRITE), "cannot be opened");

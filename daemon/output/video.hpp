@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "drivers/frame.hpp"
+#include "drivers/session/timecode.hpp"
 
 namespace previz::output {
 
@@ -27,8 +28,10 @@ std::vector<VideoCodec> review_codecs();
 // 16-bit ones are rounded to 8. Pixels are BT.709 limited range, 4:2:0 (4:4:4 where a side is odd).
 class VideoWriter {
  public:
-  // Throws previz::Error naming the file if it cannot be written.
-  VideoWriter(const std::filesystem::path& stem, int width, int height, const VideoCodec& codec);
+  // Throws previz::Error naming the file if it cannot be written. `clock` gives the file its rate
+  // and, in MP4, the timecode of the first picture, which is taken at `first_ns`.
+  VideoWriter(const std::filesystem::path& stem, int width, int height, const VideoCodec& codec,
+              const session::TakeClock& clock = {}, std::int64_t first_ns = 0);
   ~VideoWriter();  // removes an unfinished file
   VideoWriter(const VideoWriter&) = delete;
   VideoWriter& operator=(const VideoWriter&) = delete;

@@ -24,6 +24,7 @@
 #include "daemon/set/names.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
+#include "drivers/session/nominal_rate.hpp"
 
 namespace previz::post {
 namespace {
@@ -83,6 +84,14 @@ std::string settings_of(const pipeline::Take& take, const set::Set& set,
     json["file " + set.lighting.environment_as_written] =
         session::sha256_of(*set.lighting.environment);
   return json.dump(2) + "\n";
+}
+
+session::TakeClock clock_of(const pipeline::Take& take) {
+  std::vector<std::int64_t> times;
+  for (const session::FrameRecord& frame : take.observer_stream->records())
+    times.push_back(frame.timestamp_ns);
+  return {session::nominal_rate(times).fps, session::timecode_of(take.session.info),
+          times.empty() ? 0 : times.front()};
 }
 
 FrameRange range_of(const RenderOptions& options, const pipeline::Take& take) {
@@ -173,7 +182,8 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
                                               take.set.output.directory);
   const set::Set& set = take.set;
   const FrameRange range = range_of(options, take);
-  RenderDirectory directory(set.output, settings_of(take, set, with, options.scale), options.force);
+  RenderDirectory directory(set.output, settings_of(take, set, with, options.scale), options.force,
+                            clock_of(take));
 
   RenderReport report;
   report.directory = directory.path();

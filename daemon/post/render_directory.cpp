@@ -38,8 +38,9 @@ std::string differences(const nlohmann::json& there, const nlohmann::json& now) 
 
 }  // namespace
 
-RenderDirectory::RenderDirectory(const set::Output& output, const std::string& settings, bool force)
-    : output_(output) {
+RenderDirectory::RenderDirectory(const set::Output& output, const std::string& settings, bool force,
+                                 const session::TakeClock& clock)
+    : output_(output), clock_(clock) {
   std::error_code code;
   std::filesystem::create_directories(path(), code);
   if (!std::filesystem::is_directory(path()))
@@ -90,9 +91,12 @@ const FinishedFrame* RenderDirectory::finished(std::uint64_t frame) const {
 }
 
 void RenderDirectory::write(const pipeline::Shot& shot, const set::Set& set) {
-  if (output_.exr)
-    output::write_exr(file(shot.index, ".exr"), *shot.layers,
-                      output::exr_metadata(*shot.layers, *shot.frame, shot.track, set));
+  if (output_.exr) {
+    output::ExrMetadata metadata = output::exr_metadata(*shot.layers, *shot.frame, shot.track, set);
+    metadata.fps = clock_.fps;
+    metadata.timecode = clock_.at(shot.frame->timestamp_ns);
+    output::write_exr(file(shot.index, ".exr"), *shot.layers, metadata);
+  }
   if (wants_png()) output::write_png(file(shot.index, ".png"), *shot.picture);
 
   const FinishedFrame record = finished_frame(shot);
@@ -112,12 +116,17 @@ std::filesystem::path RenderDirectory::write_video(const std::vector<FinishedFra
   std::optional<output::VideoWriter> video;
   for (const FinishedFrame& frame : frames) {
     const Plate picture = output::read_png(file(frame.frame, ".png"));
-    if (!video) video.emplace(path() / "review", picture.width, picture.height, codecs.front());
+    if (!video)
+      video.emplace(path() / "review", picture.width, picture.height, codecs.front(), clock_,
+                    frame.timestamp_ns);
     video->write(picture, frame.timestamp_ns);
   }
   std::filesystem::path written = video->close();
   out << written.string() << ": " << frames.size() << " pictures, " << codecs.front().description
       << std::endl;
+  if (clock_.timecode && !session::counts_frames(clock_))
+    out << "  without timecode: the take's counts " << clock_.timecode->fps
+        << " frames a second (recording.timecode_fps), and it has " << clock_.fps << std::endl;
   return written;
 }
 

@@ -13,6 +13,7 @@
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/post/finished_frame.hpp"
 #include "daemon/set/set.hpp"
+#include "drivers/session/timecode.hpp"
 
 namespace previz::post {
 
@@ -20,8 +21,9 @@ class RenderDirectory {
  public:
   // Makes the directory. `settings` is JSON: an object whose values decide what the pictures look
   // like. If it holds frames made with other settings, throws previz::Error naming the differences;
-  // with `force` these frames count as not finished.
-  RenderDirectory(const set::Output& output, const std::string& settings, bool force);
+  // with `force` these frames count as not finished. `clock` is the take's.
+  RenderDirectory(const set::Output& output, const std::string& settings, bool force,
+                  const session::TakeClock& clock = {});
 
   // Returns null if the frame is still to be rendered. A frame is finished if its line and all the
   // files that the set asks for are there.
@@ -43,6 +45,7 @@ class RenderDirectory {
   void read_finished();
 
   const set::Output output_;
+  const session::TakeClock clock_;
   std::map<std::uint64_t, FinishedFrame> finished_;
 };
 

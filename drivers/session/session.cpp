@@ -82,6 +82,12 @@ void read_track(Session& session) {
 
 }  // namespace
 
+std::optional<Timecode> timecode_of(const SessionInfo& info) {
+  if (info.timecode) return info.timecode;
+  if (!info.take || info.take->timecode.empty()) return std::nullopt;
+  return Timecode{info.take->timecode, info.take->timecode_fps};
+}
+
 std::vector<std::string> words_of(const Losses& lost) {
   std::vector<std::string> words;
   const auto add = [&](std::uint64_t count, const char* what) {

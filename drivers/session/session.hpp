@@ -19,6 +19,7 @@
 #include "drivers/buttons.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/session/timecode.hpp"
 
 namespace previz::session {
 
@@ -69,8 +70,12 @@ struct SessionInfo {
   // Paths as the set file writes them -> paths below the session ("assets/<sha256>.glb").
   std::map<std::string, std::string> assets;
   std::vector<MissingAsset> missing_assets;
-  std::optional<TakeInfo> take;  // recorded on a rig
+  std::optional<TakeInfo> take;      // recorded on a rig
+  std::optional<Timecode> timecode;  // of an imported clip that has one
 };
+
+// Returns the timecode of a take or of an imported clip; nothing if it has none.
+std::optional<Timecode> timecode_of(const SessionInfo& info);
 
 // A lamp of the set that was moved or relit.
 struct LightState {
@@ -203,7 +208,8 @@ class SessionWriter {
   void write(const ButtonEvent& event);  // writes to events.jsonl
   // Writes anything else that happened, in words, to events.jsonl.
   void write_event(std::int64_t timestamp_ns, const std::string& what);
-  void set_take(const TakeInfo& take);  // replaces session.toml
+  void set_take(const TakeInfo& take);          // replaces session.toml
+  void set_timecode(const Timecode& timecode);  // likewise
   // Copies a file into assets/ under its content hash and maps `as_written` to it.
   void add_asset(const std::string& as_written, const std::filesystem::path& file);
   // Names the assets, which must be in the directory and on the disk, and those that are not there.

@@ -205,6 +205,11 @@ std::string take_toml(const TakeInfo& take) {
          "\ngood = " + (take.good ? "true" : "false") + "\n";
 }
 
+std::string timecode_toml(const Timecode& timecode) {
+  return "\n[timecode]  # of the first observer frame, as the clip had it\nfirst = " +
+         quote(timecode.first) + "\n" + line("fps", timecode.fps);
+}
+
 // ---- reading
 
 // Says where a value is looked for, so that an error can name it.
@@ -330,6 +335,10 @@ TakeInfo parse_take(const Place& place) {
   return take;
 }
 
+Timecode parse_timecode(const Place& place) {
+  return {place.text("first"), place.number("fps")};
+}
+
 void parse_set(const Place& place, SessionInfo& info) {
   info.set_name = place.text("name");
   if (!place.table.contains("text_base64")) {
@@ -357,6 +366,7 @@ std::string to_toml(const SessionFile& file) {
   if (file.info.observer) text += observer_toml(*file.info.observer);
   if (file.info.light) text += light_toml(*file.info.light);
   if (file.info.take) text += take_toml(*file.info.take);
+  if (file.info.timecode) text += timecode_toml(*file.info.timecode);
   text += "\n[assets]  # as the set writes them = where they are below this directory\n";
   for (const auto& [as_written, path] : file.info.assets)
     text += quote(as_written) + " = " + quote(path) + "\n";
@@ -409,6 +419,7 @@ SessionFile parse_session_toml(const std::string& text, const std::filesystem::p
   if (top.find("missing_assets"))
     file.info.missing_assets = parse_missing(top.inner("missing_assets"));
   if (top.find("take")) file.info.take = parse_take(top.inner("take"));
+  if (top.find("timecode")) file.info.timecode = parse_timecode(top.inner("timecode"));
   parse_set(top.inner("set"), file.info);
   return file;
 }

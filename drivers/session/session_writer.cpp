@@ -245,6 +245,12 @@ void SessionWriter::set_take(const TakeInfo& take) {
   impl_->using_disk([&] { impl_->write_toml(); });
 }
 
+void SessionWriter::set_timecode(const Timecode& timecode) {
+  impl_->check_open();
+  impl_->file.info.timecode = timecode;
+  impl_->using_disk([&] { impl_->write_toml(); });
+}
+
 void SessionWriter::add_asset(const std::string& as_written, const std::filesystem::path& file) {
   impl_->check_open();
   const std::string name = sha256_of(file) + file.extension().string();

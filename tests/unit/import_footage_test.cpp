@@ -174,7 +174,7 @@ TEST(Import, AVideoOfBt709KeepsItsSamples) {
   shoot.json["observer"] = {
       {"video", "take.mkv"}, {"timestamps_ns", "container"}, {"start_ns", 1000}, {"exposure", 1}};
   const ImportReport report = shoot.import();
-  ASSERT_EQ(report.notes.size(), 1u);
+  ASSERT_EQ(report.notes.size(), 2u);
   EXPECT_NE(report.notes[0].find("kept as it is"), std::string::npos) << report.notes[0];
   const auto stream = open(shoot, "observer");
   ASSERT_EQ(stream->records().size(), 4u);

@@ -756,6 +756,44 @@ TEST(ImportVideo, ACutAtAnOpenGroupOfPicturesComesIn) {
     EXPECT_TRUE(frame->second == from_end->second) << "the frame at " << frame->first;
 }
 
+// A phone's clip that lost one frame while it was filmed, with a track of timecode.
+TEST(ImportVideo, TheRateIsTheNominalOneAndTheTimecodeTheClips) {
+  VideoForm form = marked_form();
+  form.fps = 30;
+  form.metadata = {{"timecode", "10:59:59:20"}};
+  for (std::int64_t i = 0; i < 60; ++i)
+    if (i != 20) form.times.push_back(i);
+  Shoot shoot;
+  write_video(shoot.folder() / "take.mov", form,
+              std::vector<Bytes>(59, marked_picture(form.width, form.height)));
+  shoot.json["observer"] = {{"video", "take.mov"}, {"exposure", 1}};
+  const ImportReport report = shoot.import();
+  EXPECT_TRUE(std::ranges::any_of(report.notes, [](const std::string& note) {
+    return note == "observer: 30 frames a second; 1 frame is missing, after frame 19";
+  })) << report.notes.back();
+  const session::Session opened = session::open_session(shoot.session());
+  EXPECT_EQ(opened.info.timecode, (session::Timecode{"10:59:59:20", 30}));
+}
+
+// The timecode of the file is that of its first frame, which was lost.
+TEST(ImportVideo, TheTimecodeIsThatOfTheFirstFrameThatCameIn) {
+  VideoForm form = marked_form();
+  form.encoder = "mjpeg";
+  form.pixel_format = "yuvj420p";
+  form.metadata = {{"timecode", "10:59:59:24"}};
+  form.spoil = [](AVPacket& packet, int number) {
+    if (number == 0) std::fill_n(packet.data, packet.size, std::uint8_t{0});
+    return true;
+  };
+  Shoot shoot;
+  write_video(shoot.folder() / "take.mov", form,
+              std::vector<Bytes>(10, Bytes(48 * 16 * 3 / 2, 90)));
+  shoot.json["observer"] = {{"video", "take.mov"}, {"exposure", 1}};
+  ASSERT_EQ(shoot.error(), "");
+  const session::Session opened = session::open_session(shoot.session());
+  EXPECT_EQ(opened.info.timecode, (session::Timecode{"11:00:00:00", 25}));
+}
+
 // A pose belongs to its frame, not to the one that takes its place.
 TEST(ImportVideo, PosesOfLostFramesAreLeftOut) {
   Shoot shoot;

@@ -71,6 +71,33 @@ TEST(Exr, StandardCameraAttributesProjectAKnownPoint) {
   EXPECT_FALSE(Imf::hasWorldToCamera(Imf::InputFile((directory / "lost.exr").c_str()).header()));
 }
 
+TEST(Exr, HasRateAndTimecode) {
+  const TemporaryDirectory directory;
+  ExrMetadata metadata;
+  metadata.fps = 30000.0 / 1001;
+  metadata.timecode = session::timecode_after({"01:00:59;29", metadata.fps}, 1);
+  write_exr(directory / "a.exr", sample_layers(5, 3), metadata);
+  const Imf::InputFile file((directory / "a.exr").c_str());
+  EXPECT_EQ(Imf::framesPerSecond(file.header()).n, 30000);
+  EXPECT_EQ(Imf::framesPerSecond(file.header()).d, 1001u);
+  const Imf::TimeCode& code = Imf::timeCode(file.header());
+  EXPECT_EQ(code.hours(), 1);
+  EXPECT_EQ(code.minutes(), 1);
+  EXPECT_EQ(code.seconds(), 0);
+  EXPECT_EQ(code.frame(), 2);
+  EXPECT_TRUE(code.dropFrame());
+
+  metadata.fps = 60;  // in pairs
+  metadata.timecode = session::timecode_after({"10:00:00:00", 60}, 59);
+  write_exr(directory / "b.exr", sample_layers(5, 3), metadata);
+  const Imf::InputFile fast((directory / "b.exr").c_str());
+  EXPECT_EQ(Imf::timeCode(fast.header()).frame(), 29);
+  EXPECT_TRUE(Imf::timeCode(fast.header()).fieldPhase());
+
+  write_exr(directory / "c.exr", sample_layers(5, 3), {});
+  EXPECT_FALSE(Imf::hasTimeCode(Imf::InputFile((directory / "c.exr").c_str()).header()));
+}
+
 TEST(Exr, ChannelsAreExactlyTheNamedOnesIn32BitFloat) {
   const TemporaryDirectory directory;
   write_exr(directory / "frame.exr", sample_layers(5, 3), {});

@@ -136,6 +136,23 @@ TEST(Video, EveryCodecKeepsTimesSizeAndLevel) {
   }
 }
 
+TEST(Video, HasTheTakesRateAndTimecode) {
+  const TemporaryDirectory directory;
+  const VideoCodec codec = review_codecs().front();
+  if (codec.container != "mp4") GTEST_SKIP() << "libav has no encoder for MP4";
+  const double fps = 30000.0 / 1001;
+  const session::TakeClock clock{fps, session::Timecode{"01:00:59;29", fps}, 0};
+  VideoWriter video(directory / "review", 64, 48, codec, clock, 33'366'667);
+  for (int i = 0; i < 5; ++i) video.write(gray(64, 48, 8, 100), (i + 1) * 33'366'667LL);
+  AVFormatContext* context = nullptr;
+  ASSERT_EQ(avformat_open_input(&context, video.close().c_str(), nullptr, nullptr), 0);
+  const av::Demuxer file(context);
+  ASSERT_GE(avformat_find_stream_info(context, nullptr), 0);
+  EXPECT_STREQ(av_dict_get(context->streams[0]->metadata, "timecode", nullptr, 0)->value,
+               "01:01:00;02");
+  EXPECT_NEAR(av_q2d(context->streams[0]->avg_frame_rate), fps, 1e-3);
+}
+
 TEST(Video, SixteenBitsAreRoundedToEight) {
   const TemporaryDirectory directory;
   const auto codec = review_codecs().front();

@@ -120,7 +120,7 @@ TEST(CameraTrack, FramesThatWereNotTrackedHaveNoKey) {
   const CameraTrack track = camera_track(session, frames, {});
   ASSERT_EQ(track.keys.size(), 1u);
   EXPECT_EQ(track.keys[0].frame, 1u);
-  EXPECT_DOUBLE_EQ(track.fps, 20);
+  EXPECT_DOUBLE_EQ(track.rate.fps, 20);
   session.track[1].tracked = false;
   EXPECT_THROW(camera_track(session, frames, {}), Error);
 }

@@ -1,0 +1,119 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "drivers/session/nominal_rate.hpp"
+#include "drivers/session/session_toml.hpp"
+#include "drivers/session/timecode.hpp"
+
+namespace previz::session {
+namespace session_rate_test {
+
+// Times of `count` frames at a rate, rounded as containers do.
+std::vector<std::int64_t> times_at(double fps, int count, std::int64_t resolution_ns = 1) {
+  std::vector<std::int64_t> times;
+  for (int i = 0; i < count; ++i) {
+    const double time = i * 1e9 / fps / static_cast<double>(resolution_ns);
+    times.push_back(std::llround(time) * resolution_ns);
+  }
+  return times;
+}
+
+TEST(NominalRate, IsTheStandardOneOfEveryContainersTimes) {
+  constexpr double ntsc = 1000.0 / 1001;
+  for (const double fps : {12.0, 15.0, 24 * ntsc, 24.0, 25.0, 30 * ntsc, 30.0, 48.0, 50.0,
+                           60 * ntsc, 60.0, 120.0, 240.0})
+    for (const std::int64_t resolution : {1, 11'111, 1'000'000})
+      for (const int count : {500, 5000}) {
+        const NominalRate rate = nominal_rate(times_at(fps, count, resolution));
+        EXPECT_DOUBLE_EQ(rate.fps, fps) << resolution << " ns, " << count << " frames";
+        EXPECT_TRUE(rate.is_standard && !rate.varies && rate.gaps.empty()) << fps;
+      }
+}
+
+TEST(NominalRate, CountsWhatIsMissing) {
+  std::vector<std::int64_t> times = times_at(30, 159);
+  times.erase(times.begin() + 53);
+  times.erase(times.begin() + 100, times.begin() + 110);
+  const NominalRate rate = nominal_rate(times);
+  EXPECT_DOUBLE_EQ(rate.fps, 30);
+  ASSERT_EQ(rate.gaps.size(), 2u);
+  EXPECT_EQ(rate.gaps[0].after, 52u);
+  EXPECT_EQ(rate.gaps[0].frames, 1);
+  EXPECT_EQ(rate.gaps[1].after, 99u);
+  EXPECT_EQ(rate.gaps[1].frames, 10);
+  EXPECT_EQ(words_of(rate),
+            "30 frames a second; 11 are missing, after frame 52 and after frame 99");
+}
+
+TEST(NominalRate, OfACameraIsItsOwnClocks) {
+  // 50 millionths fast, with times that jitter by a millisecond.
+  std::mt19937 random(1);
+  std::uniform_int_distribution<std::int64_t> jitter(-500'000, 500'000);
+  std::vector<std::int64_t> times = times_at(25 * (1 + 50e-6), 300);
+  for (std::int64_t& time : times) time += jitter(random);
+  EXPECT_DOUBLE_EQ(nominal_rate(times).fps, 25);
+  const NominalRate odd = nominal_rate(times_at(17.3, 300));
+  EXPECT_NEAR(odd.fps, 17.3, 1e-6);
+  EXPECT_FALSE(odd.is_standard);
+}
+
+// A phone in dim light: half of the frames take half as long again.
+TEST(NominalRate, SaysThatItVaries) {
+  std::vector<std::int64_t> times{0};
+  for (int i = 0; i < 200; ++i)
+    times.push_back(times.back() + (i % 3 == 0 ? 50'000'000 : 33'333'333));
+  const NominalRate rate = nominal_rate(times);
+  EXPECT_TRUE(rate.varies);
+  EXPECT_TRUE(rate.gaps.empty());
+  EXPECT_DOUBLE_EQ(rate.fps, 30);
+}
+
+TEST(NominalRate, OfNoFramesAndOfOneIsAGuess) {
+  EXPECT_DOUBLE_EQ(nominal_rate({}).fps, 25);
+  EXPECT_DOUBLE_EQ(nominal_rate(std::vector<std::int64_t>{7}).fps, 25);
+}
+
+std::string after(const char* first, double fps, std::int64_t frames) {
+  const auto digits = timecode_after({first, fps}, frames);
+  return digits ? words_of(*digits) : "none";
+}
+
+// SMPTE ST 12-1, 5.2: of each minute but every tenth, the numbers 00 and 01 are left out.
+TEST(Timecode, Counts) {
+  EXPECT_EQ(after("14:03:27:12", 25, 0), "14:03:27:12");
+  EXPECT_EQ(after("14:03:27:12", 25, 13), "14:03:28:00");
+  EXPECT_EQ(after("23:59:59:24", 25, 1), "00:00:00:00");
+  EXPECT_EQ(after("01:00:59;29", 30000.0 / 1001, 1), "01:01:00;02");
+  EXPECT_EQ(after("01:09:59;29", 30000.0 / 1001, 1), "01:10:00;00");
+  EXPECT_EQ(after("01:00:59:29", 30000.0 / 1001, 1), "01:01:00:00");
+  EXPECT_EQ(after("10:00:00:59", 60, 1), "10:00:01:00");
+  EXPECT_EQ(after("10:00:00", 25, 1), "none");
+  EXPECT_EQ(after("", 25, 1), "none");
+}
+
+TEST(Timecode, OfAFrameIsThatOfItsTime) {
+  const TakeClock clock{25, Timecode{"10:00:00:00", 25}, 1'000};
+  EXPECT_EQ(words_of(*clock.at(1'000)), "10:00:00:00");
+  // Three frames later, with jitter, though they were lost.
+  EXPECT_EQ(words_of(*clock.at(1'000 + 120'000'000 + 9'000'000)), "10:00:00:03");
+  EXPECT_FALSE((TakeClock{25, std::nullopt, 0}.at(5)));
+}
+
+TEST(Timecode, OfAClipIsInTheSession) {
+  SessionFile file;
+  file.info.timecode = Timecode{"01:00:59;29", 30000.0 / 1001};
+  const SessionFile back = parse_session_toml(to_toml(file), "session.toml");
+  EXPECT_EQ(back.info.timecode, file.info.timecode);
+  EXPECT_EQ(timecode_of(back.info), file.info.timecode);
+  EXPECT_FALSE(timecode_of(SessionInfo{}));
+  SessionInfo recorded;
+  recorded.take = TakeInfo{};
+  recorded.take->timecode = "14:03:27:12";
+  recorded.take->timecode_fps = 24;
+  EXPECT_EQ(timecode_of(recorded), (Timecode{"14:03:27:12", 24}));
+}
+
+}  // namespace session_rate_test
+}  // namespace previz::session
