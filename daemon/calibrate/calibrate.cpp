@@ -96,10 +96,14 @@ void calibrate_observer(const LensOptions& options, std::ostream& out) {
     views = gather(options, "observer", observer.intrinsics, out);
     observer = fit_observer(views);
   }
-  print_fit(views, observer.fit, observer_parameters, observer.picture, out);
+  print_fit(views, observer.fit, observer.parameters, observer.picture, out);
+  if (!observer.left_out.empty())
+    fmt::print(out, "left at 0, because the corners do not hold {}: {}\n",
+               observer.left_out.size() == 1 ? "it" : "them", fmt::join(observer.left_out, ", "));
   plot(options, views, observer.fit, observer.picture, out);
-  const std::string doubts = insist(missing_views(views, observer), options.force, out);
+  std::string doubts = insist(missing_views(views, observer), options.force, out);
   if (has_few_views(views, observer)) fit_by_few(views, observer, out);
+  if (doubts.empty()) doubts = warn(doubts_of(observer), out);
   ObserverCalibration calibration;
   calibration.intrinsics = observer.intrinsics;
   write_tables(doubts + set::intrinsics_toml(calibration), options.table_file, out);

@@ -51,9 +51,9 @@ void calibrate_response(const ResponseOptions& options, std::ostream& out) {
   const ResponseFit& best = better_fit(fits);
   fmt::print(out, "taken: {}; codes {} to {} were seen\n", to_string(best.method), best.darkest,
              best.brightest);
-  write_tables(
-      of_light ? table<LightCameraCalibration>(best.curve) : table<ObserverCalibration>(best.curve),
-      options.table_file, out);
+  write_tables(warn(doubts_of(best), out) + (of_light ? table<LightCameraCalibration>(best.curve)
+                                                      : table<ObserverCalibration>(best.curve)),
+               options.table_file, out);
 }
 
 }  // namespace previz::calibrate

@@ -131,7 +131,7 @@ void calibrate_tags(const TagsOptions& options, std::ostream& out) {
   const std::string doubts =
       insist(missing_of_tags(survey, wanted, how.origin), options.force, out);
   if (options.write) {
-    const std::string text = with_tags(session::read_file(*options.set_file), survey);
+    const std::string text = with_tags(session::read_file(*options.set_file), survey, doubts);
     set::parse_set(text, *options.set_file);
     const auto old = set::keep_beside(*options.set_file);
     session::replace_file(*options.set_file, text);

@@ -122,7 +122,37 @@ void miss_certainty(std::vector<UncertainPixel> picture, std::vector<std::string
         number("%.1f", middle->sigma_px) + " px only");
 }
 
+// Says where the picture is least certain and why.
+std::string worst_words(const ObserverFit& observer) {
+  const auto worst = std::ranges::max_element(observer.picture, {}, &UncertainPixel::sigma_px);
+  return number("%.1f", worst->sigma_px) + " px near " + number("%.0f", worst->pixel.x) + ", " +
+         number("%.0f", worst->pixel.y) + " (the farthest corner of the board was seen " +
+         number("%.0f", 100 * observer.reach) +
+         " % of the way from the picture's middle to its corners)";
+}
+
+void miss_worst(const ObserverFit& observer, std::vector<std::string>& missing) {
+  if (worst_px(observer.picture) > useless_px)
+    missing.push_back("the board farther out in the picture: the lens is certain only to " +
+                      worst_words(observer));
+}
+
 }  // namespace
+
+std::vector<std::string> doubts_of(const ObserverFit& observer) {
+  constexpr double least_reach = 2.0 / 3;
+  std::vector<std::string> doubts;
+  if (worst_px(observer.picture) > doubtful_px)
+    doubts.push_back(
+        "the lens is certain only to " + worst_words(observer) +
+        ": what is placed there will seem to slip; film the board farther out in the picture");
+  else if (observer.reach < least_reach)
+    doubts.push_back("no corner of the board was seen beyond " +
+                     number("%.0f", 100 * observer.reach) +
+                     " % of the way from the picture's middle to its corners: farther out the lens "
+                     "is a guess, however certain it seems; film the board there, too");
+  return doubts;
+}
 
 std::vector<std::string> missing_views(const Views& views, const ObserverFit& observer) {
   std::vector<std::string> missing;
@@ -131,6 +161,7 @@ std::vector<std::string> missing_views(const Views& views, const ObserverFit& ob
   miss_tilt(observer.fit, missing);
   miss_distance(views, observer.fit, missing);
   if (missing.empty()) miss_certainty(observer.picture, missing);
+  if (missing.empty()) miss_worst(observer, missing);
   return missing;
 }
 

@@ -23,8 +23,14 @@ namespace previz::calibrate {
 //             from size by the change of scale across the board, which a small board lacks.
 //   certainty over half of the picture the projection is certain to 1 px (one standard deviation),
 //             whatever else was wrong with the views.
-// The last rule is only checked if the others hold, because it depends on them.
+//   worst     and nowhere worse than to useless_px.
+// The last rules are only checked if the others hold, because they depend on them.
 std::vector<std::string> missing_views(const Views& views, const ObserverFit& observer);
+
+// Returns what a lens that is taken may still be doubted for: a picture that is uncertain by more
+// than doubtful_px somewhere; or whose outer third, towards its corners, no corner of a board was
+// seen in, where a coefficient that was left at 0 counts as certain and is not. Empty: nothing.
+std::vector<std::string> doubts_of(const ObserverFit& observer);
 
 // Returns whether the rules `number` or `tilt` are broken: then not even the focal length can be
 // told from the rest of the lens.

@@ -12,13 +12,19 @@
 namespace previz::calibrate {
 namespace {
 
-constexpr std::size_t k3_parameter = 8;
+// Indices in observer_parameters.
+enum Parameter : std::size_t { k1 = 4, k2, p1, p2, k3 };
+constexpr std::size_t first_coefficient = k1;
 constexpr int grid_columns = 16;
 
 struct CvView {
   std::vector<cv::Point3f> points;
   std::vector<cv::Point2f> pixels;
 };
+
+int grid_rows(int width, int height) {
+  return std::max(2, grid_columns * height / width);
+}
 
 std::vector<CvView> to_cv(const std::vector<View>& views) {
   std::vector<CvView> all(views.size());
@@ -61,16 +67,17 @@ Bundle started_lens(const Views& views) {
   return start;
 }
 
-// Returns the Bayesian information criterion; smaller is better. A further parameter must lower it
-// to be kept.
-double bayesian_information(const BundleFit& fit, std::size_t parameters) {
+// Returns the Bayesian information criterion for each residual; smaller is better. Outliers differ
+// from fit to fit, and so does the number of residuals.
+double bayesian_information(const BundleFit& fit) {
   const double n = 2 * double(fit.corners_used);
-  return n * std::log(fit.sigma_px * fit.sigma_px) + double(parameters) * std::log(n);
+  return std::log(fit.sigma_px * fit.sigma_px) + double(fit.bundle.lens.size()) * std::log(n) / n;
 }
 
+// Returns a ray for each point of a grid over the picture; points where the lens folds have none.
 std::vector<glm::dvec3> picture_rays(const PinholeIntrinsics& lens) {
   std::vector<glm::dvec3> rays;
-  const int rows = std::max(2, grid_columns * lens.height / lens.width);
+  const int rows = grid_rows(lens.width, lens.height);
   for (int row = 0; row < rows; ++row)
     for (int column = 0; column < grid_columns; ++column) {
       const glm::dvec2 pixel((lens.width - 1) * (column + 0.5) / grid_columns,
@@ -78,6 +85,57 @@ std::vector<glm::dvec3> picture_rays(const PinholeIntrinsics& lens) {
       if (const auto x = undistort(lens, pixel)) rays.push_back(glm::normalize(glm::dvec3(*x, 1)));
     }
   return rays;
+}
+
+// Returns a lens in the order of observer_parameters whose other coefficients are 0.
+std::vector<double> whole_lens(std::span<const double> fitted,
+                               const std::vector<std::size_t>& coefficients) {
+  std::vector<double> lens(observer_parameters.size(), 0);
+  std::copy_n(fitted.begin(), first_coefficient, lens.begin());
+  for (std::size_t i = 0; i < coefficients.size(); ++i)
+    lens[coefficients[i]] = fitted[first_coefficient + i];
+  return lens;
+}
+
+ObserverFit fit_model(const Views& views, Bundle start,
+                      const std::vector<std::size_t>& coefficients) {
+  const Projection project = [&](std::span<const double> fitted, const glm::dvec3& point) {
+    return project_pinhole(whole_lens(fitted, coefficients), point);
+  };
+  start.lens.resize(first_coefficient + coefficients.size());
+  ObserverFit observer;
+  observer.fit = fit_bundle(views.views, start, project);
+  observer.intrinsics =
+      pinhole(whole_lens(observer.fit.bundle.lens, coefficients), views.width, views.height);
+  observer.sigma = whole_lens(lens_sigma(observer.fit), coefficients);
+  for (std::size_t p = 0; p < observer_parameters.size(); ++p)
+    if (p < first_coefficient || std::ranges::find(coefficients, p) != coefficients.end())
+      observer.parameters.push_back(observer_parameters[p]);
+  observer.picture =
+      projection_uncertainty(observer.fit, project, picture_rays(observer.intrinsics));
+  return observer;
+}
+
+bool folds(const ObserverFit& observer) {
+  const PinholeIntrinsics& lens = observer.intrinsics;
+  return observer.picture.size() <
+         std::size_t(grid_columns) * std::size_t(grid_rows(lens.width, lens.height));
+}
+
+bool is_better(const ObserverFit& fit, const ObserverFit& than) {
+  if (folds(fit) != folds(than)) return folds(than);
+  const bool is_useless = worst_px(fit.picture) > useless_px;
+  if (is_useless != (worst_px(than.picture) > useless_px)) return !is_useless;
+  return bayesian_information(fit.fit) < bayesian_information(than.fit);
+}
+
+double reach_of(const Views& views) {
+  const glm::dvec2 middle(0.5 * (views.width - 1), 0.5 * (views.height - 1));
+  double farthest = 0;
+  for (const View& view : views.views)
+    for (const glm::dvec2& pixel : view.pixels)
+      farthest = std::max(farthest, glm::distance(pixel, middle));
+  return farthest / (0.5 * std::hypot(views.width, views.height));
 }
 
 }  // namespace
@@ -93,7 +151,7 @@ PinholeIntrinsics pinhole(std::span<const double> lens, int width, int height) {
           .k2 = lens[5],
           .p1 = lens[6],
           .p2 = lens[7],
-          .k3 = lens.size() > k3_parameter ? lens[k3_parameter] : 0};
+          .k3 = lens.size() > k3 ? lens[k3] : 0};
 }
 
 std::optional<glm::dvec2> project_pinhole(std::span<const double> lens, const glm::dvec3& point) {
@@ -101,25 +159,25 @@ std::optional<glm::dvec2> project_pinhole(std::span<const double> lens, const gl
   return distort(pinhole(lens, 0, 0), {point.x / point.z, point.y / point.z});
 }
 
-ObserverFit fit_observer(const Views& views) {
-  Bundle start = started_lens(views);
-  start.lens.resize(k3_parameter);
-  ObserverFit observer;
-  observer.fit = fit_bundle(views.views, start, project_pinhole);
-  Bundle with_k3 = observer.fit.bundle;
-  with_k3.lens.push_back(0);
-  BundleFit fuller = fit_bundle(views.views, with_k3, project_pinhole);
-  if (bayesian_information(fuller, k3_parameter + 1) <
-      bayesian_information(observer.fit, k3_parameter))
-    observer.fit = std::move(fuller);
+double worst_px(const std::vector<UncertainPixel>& picture) {
+  double worst = 0;
+  for (const UncertainPixel& pixel : picture) worst = std::max(worst, pixel.sigma_px);
+  return worst;
+}
 
-  const BundleFit& fit = observer.fit;
-  observer.intrinsics = pinhole(fit.bundle.lens, views.width, views.height);
-  observer.sigma.assign(observer_parameters.size(), 0);
-  std::ranges::copy(lens_sigma(fit), observer.sigma.begin());
-  observer.picture =
-      projection_uncertainty(fit, project_pinhole, picture_rays(observer.intrinsics));
-  return observer;
+ObserverFit fit_observer(const Views& views) {
+  const Bundle start = started_lens(views);
+  const std::vector<std::vector<std::size_t>> models = {
+      {k1}, {k1, k2}, {k1, p1, p2}, {k1, k2, p1, p2}, {k1, k2, p1, p2, k3}};
+  std::optional<ObserverFit> best;
+  for (const std::vector<std::size_t>& coefficients : models) {
+    ObserverFit fit = fit_model(views, start, coefficients);
+    if (!best || is_better(fit, *best)) best = std::move(fit);
+  }
+  for (std::size_t p = first_coefficient; p < observer_parameters.size(); ++p)
+    if (best->sigma[p] == 0) best->left_out.push_back(observer_parameters[p]);
+  best->reach = reach_of(views);
+  return std::move(*best);
 }
 
 ObserverFit fit_observer_by_few(const Views& views) {
@@ -145,6 +203,8 @@ ObserverFit fit_observer_by_few(const Views& views) {
   observer.intrinsics = lens_of(observer.fit.bundle.lens);
   const std::vector<double> sigma = lens_sigma(observer.fit);
   observer.sigma = {sigma[0], sigma[0], 0, 0, sigma[1], 0, 0, 0, 0};
+  observer.parameters.assign(few_observer_parameters.begin(), few_observer_parameters.end());
+  observer.reach = reach_of(views);
   observer.picture =
       projection_uncertainty(observer.fit, project, picture_rays(observer.intrinsics));
   return observer;

@@ -75,7 +75,16 @@ std::string insist(const std::vector<std::string>& missing, bool force, std::ost
   for (const std::string& what : missing) text += "\n  " + what;
   if (!force) throw Error(text + "\n(--force takes the calibration as it is)");
   fmt::print(out, "{}\n", text);
-  return as_comment("NOT TO BE RELIED ON: taken with --force although " + text);
+  return as_comment(fmt::format("{}: taken with --force although {}", not_to_be_relied_on, text));
+}
+
+std::string warn(const std::vector<std::string>& doubts, std::ostream& out) {
+  std::string comment;
+  for (const std::string& doubt : doubts) {
+    fmt::print(out, "warning: {}\n", doubt);
+    comment += as_comment("WITH A DOUBT: " + doubt);
+  }
+  return comment;
 }
 
 void write_tables(const std::string& tables, const std::optional<std::filesystem::path>& file,

@@ -22,9 +22,15 @@ inline constexpr double degree = std::numbers::pi / 180;
 void print_fit(const Views& views, const BundleFit& fit, std::span<const char* const> names,
                std::vector<UncertainPixel> picture, std::ostream& out);
 
+// How the comment of a calibration that was forced begins.
+inline constexpr const char* not_to_be_relied_on = "NOT TO BE RELIED ON";
+
 // Throws previz::Error naming what is missing. With `force` it prints that on `out` instead, and
 // returns it as a comment for the table, which is empty if nothing is missing.
 std::string insist(const std::vector<std::string>& missing, bool force, std::ostream& out);
+
+// Prints a warning on `out` for each doubt, and returns them as a comment for the table.
+std::string warn(const std::vector<std::string>& doubts, std::ostream& out);
 
 // Returns the lines as a comment of a set file, each of at most about 100 characters.
 std::string as_comment(const std::string& text);

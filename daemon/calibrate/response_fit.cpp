@@ -1,5 +1,7 @@
 #include "daemon/calibrate/response_fit.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <opencv2/photo.hpp>
@@ -245,6 +247,30 @@ ResponseFit fit_response(std::span<const BracketPicture> bracket, ResponseMethod
     }
   fit.flat_steps = flat_steps(fit.curve, fit.darkest, fit.brightest);
   return fit;
+}
+
+std::vector<std::string> doubts_of(const ResponseFit& fit) {
+  constexpr double certain_codes = 5, jump = 3;
+  constexpr std::size_t step = 5, dark_codes = 32;
+  std::vector<std::string> doubts;
+  if (fit.error_codes > certain_codes)
+    doubts.push_back(fmt::format(
+        "an exposure left out is predicted only to {:.1f} codes: the light changed, something "
+        "moved, or the camera changed more than the time (its aperture, gain or white balance was "
+        "automatic, or it sharpens and lifts shadows)",
+        fit.error_codes));
+  const std::vector<double>& curve = fit.curve.inverse_table;
+  for (std::size_t code = dark_codes; code + step < curve.size(); ++code) {
+    if (curve[code + step] <= jump * curve[code]) continue;
+    doubts.push_back(fmt::format(
+        "the curve jumps from {:.3f} at code {} to {:.3f} at code {}: the camera probably clips "
+        "its light at about code {}, so that all brighter codes are guesses and white is too "
+        "bright; take a bracket with darker pictures of what is brightest, or give clip_share = "
+        "{:.2f} beside the table",
+        curve[code], code, curve[code + step], code + step, code, double(code) / 255));
+    break;
+  }
+  return doubts;
 }
 
 const ResponseFit& better_fit(std::span<const ResponseFit> fits) {

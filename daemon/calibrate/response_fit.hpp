@@ -42,6 +42,12 @@ struct ResponseFit {
 // returns it. Throws previz::Error if fewer than 100 pixels can be used.
 ResponseFit fit_response(std::span<const BracketPicture> bracket, ResponseMethod method);
 
+// Returns what a curve may be doubted for, and the likely cause; empty: nothing.
+//   error   an exposure that was left out is predicted to more than 5 codes.
+//   jumps   the curve grows threefold within 5 codes above code 32, where no camera's does: a gamma
+//           of 2.2 grows by 1.37.
+std::vector<std::string> doubts_of(const ResponseFit& fit);
+
 // Returns the better of fits to one bracket: that of the least error, where a curve that does not
 // rise over a share of its codes, and cannot tell their light apart, counts as that share worse.
 // There is at least one.

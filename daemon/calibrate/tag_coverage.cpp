@@ -12,6 +12,7 @@ namespace previz::calibrate {
 namespace {
 
 constexpr int least_pictures_of_tag = 4;
+constexpr std::size_t least_tags_of_chain = 3;
 constexpr double least_views_of_tag = 20 * degree;
 constexpr double certain_m = 2e-3, certain_share = 1e-3, certain_rad = 0.5 * degree;
 
@@ -63,15 +64,32 @@ bool miss_of_tag(const SurveyedTag& tag, std::vector<std::string>& missing) {
   return missing.size() == before;
 }
 
-void miss_certainty_of_tag(const SurveyedTag& tag, double from_origin_m,
-                           std::vector<std::string>& missing) {
-  if (tag.position_sigma_m <= certain_m + certain_share * from_origin_m &&
-      tag.rotation_sigma_rad <= certain_rad)
+bool is_certain(const SurveyedTag& tag, double from_origin_m) {
+  return tag.position_sigma_m <= certain_m + certain_share * from_origin_m &&
+         tag.rotation_sigma_rad <= certain_rad;
+}
+
+void miss_certainty(const TagSurvey& survey, const std::vector<const SurveyedTag*>& uncertain,
+                    std::vector<std::string>& missing) {
+  if (uncertain.size() >= least_tags_of_chain && 2 * survey.pictures_of_pairs > survey.pictures) {
+    std::vector<int> ids;
+    for (const SurveyedTag* tag : uncertain) ids.push_back(tag->id);
+    const SurveyedTag& worst =
+        **std::ranges::max_element(uncertain, {}, &SurveyedTag::position_sigma_m);
+    missing.push_back(fmt::format(
+        "three tags or more in a picture: {} of {} pictures show two only, and a chain of pairs "
+        "bends ({} are not certain; tag {}, the worst, to {:.0f} mm and {:.1f} degrees): film from "
+        "farther away or stick more tags; if the lengths alone are to be certain, measure two far "
+        "ones and give --distance",
+        survey.pictures_of_pairs, survey.pictures, tracking::tags_in_words(ids), worst.id,
+        1000 * worst.position_sigma_m, worst.rotation_sigma_rad / degree));
     return;
-  missing.push_back(fmt::format(
-      "tag {} from nearer, with others beside it: it is certain to {:.1f} mm and {:.2f} "
-      "degrees only",
-      tag.id, 1000 * tag.position_sigma_m, tag.rotation_sigma_rad / degree));
+  }
+  for (const SurveyedTag* tag : uncertain)
+    missing.push_back(fmt::format(
+        "tag {} from nearer, with others beside it: it is certain to {:.1f} mm and {:.2f} "
+        "degrees only",
+        tag->id, 1000 * tag->position_sigma_m, tag->rotation_sigma_rad / degree));
 }
 
 }  // namespace
@@ -83,14 +101,16 @@ std::vector<std::string> missing_of_tags(const TagSurvey& survey, const std::vec
   miss_links(survey, origin, missing);
   miss_moved(survey, missing);
   const auto at_origin = std::ranges::find(survey.tags, origin, &SurveyedTag::id);
+  std::vector<const SurveyedTag*> uncertain;
   for (const SurveyedTag& tag : survey.tags) {
     if (tag.id == origin || !miss_of_tag(tag, missing)) continue;
     const double away = at_origin == survey.tags.end()
                             ? 0
                             : glm::distance(glm::dvec3(tag.world_from_tag[3]),
                                             glm::dvec3(at_origin->world_from_tag[3]));
-    miss_certainty_of_tag(tag, away, missing);
+    if (!is_certain(tag, away)) uncertain.push_back(&tag);
   }
+  miss_certainty(survey, uncertain, missing);
   return missing;
 }
 

@@ -60,6 +60,12 @@ std::size_t count_of_pictures(const TagWalk& walk) {
   return std::size_t(std::ranges::count(used, true));
 }
 
+std::size_t count_of_pairs(const TagWalk& walk) {
+  std::vector<int> tags(walk.pictures.size(), 0);
+  for (const TagSighting& seen : walk.sightings) ++tags[seen.picture];
+  return std::size_t(std::ranges::count(tags, 2));
+}
+
 std::size_t count_of_tags(const TagWalk& walk) {
   std::vector<bool> used(walk.ids.size(), false);
   for (const TagSighting& seen : walk.sightings) used[seen.tag] = true;
@@ -276,6 +282,7 @@ void measure(const Surveying& state, TagSurvey& survey) {
     squares += tag.rms_px * tag.rms_px * 4 * tag.pictures;
   }
   survey.pictures = count_of_pictures(state.walk);
+  survey.pictures_of_pairs = count_of_pairs(state.walk);
   survey.sightings_used = state.walk.sightings.size();
   survey.rms_px = std::sqrt(squares / std::max(1.0, 4.0 * double(survey.sightings_used)));
   survey.model_error_px = state.model_error_px;

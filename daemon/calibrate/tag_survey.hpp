@@ -53,8 +53,9 @@ struct TagSurvey {
   std::vector<std::vector<int>> apart;  // groups of tags that no picture links to the origin
   double size_factor = 1;  // all lengths were multiplied by it, to have the stated distance
   std::size_t pictures = 0, sightings = 0, sightings_used = 0;
-  double rms_px = 0;          // of the used corners' distances
-  double model_error_px = 0;  // of a coordinate, beside the noise of the picture
+  std::size_t pictures_of_pairs = 0;  // that link two tags and no more
+  double rms_px = 0;                  // of the used corners' distances
+  double model_error_px = 0;          // of a coordinate, beside the noise of the picture
 };
 
 // Adjusts the tags' places and the camera's poses together (start_of_tags, adjust_tags):
@@ -80,7 +81,9 @@ TagSurvey survey_tags(const TagWalk& walk, const PinholeIntrinsics& lens,
 //   pictures  at least 4 of each tag: one alone is not checked by any other.
 //   sides     they differ by 20 degrees: from one side, depth is taken from the size alone.
 //   certain   to 2 mm and a thousandth of the distance from the origin, and to half a degree (one
-//             standard deviation); checked where the others hold.
+//             standard deviation); checked where the others hold. Where three tags or more are
+//             not, and most pictures link two tags only, that is named instead: each link of a
+//             chain of pairs adds its error to the next.
 std::vector<std::string> missing_of_tags(const TagSurvey& survey, const std::vector<int>& wanted,
                                          int origin);
 

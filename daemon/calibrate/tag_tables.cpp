@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <map>
+#include <sstream>
 
 #include "daemon/calibrate/report.hpp"
 #include "daemon/pipeline/edits.hpp"
@@ -78,6 +79,25 @@ void put_tag(const SurveyedTag& tag, std::size_t index, set::FileEdit& file) {
   file.put("tag", index, "rotation_deg", rotation_text(tag));
 }
 
+// Puts the comment before the first [[tag]] table, and takes away that of an earlier calibration.
+std::string with_doubts(const std::string& text, const std::string& doubts) {
+  std::istringstream lines(text);
+  std::string result;
+  bool is_old = false, is_written = false;
+  for (std::string line; std::getline(lines, line);) {
+    is_old = line.starts_with(fmt::format("# {}", not_to_be_relied_on)) ||
+             (is_old && line.starts_with('#'));
+    if (is_old) continue;
+    if (!is_written && line.starts_with("[[tag]]")) {
+      result += doubts;
+      is_written = true;
+    }
+    result += line + "\n";
+  }
+  if (!text.ends_with('\n') && !result.empty()) result.pop_back();
+  return result;
+}
+
 }  // namespace
 
 std::string tag_tables(const TagSurvey& survey) {
@@ -94,7 +114,7 @@ std::string tag_tables(const TagSurvey& survey) {
   return text;
 }
 
-std::string with_tags(const std::string& text, const TagSurvey& survey) {
+std::string with_tags(const std::string& text, const TagSurvey& survey, const std::string& doubts) {
   set::FileEdit file(text);
   std::map<std::string, std::size_t> tables;
   for (std::size_t i = 0; i < file.count("tag"); ++i)
@@ -106,7 +126,7 @@ std::string with_tags(const std::string& text, const TagSurvey& survey) {
     else
       put_tag(tag, known->second, file);
   }
-  return file.text();
+  return with_doubts(file.text(), doubts);
 }
 
 }  // namespace previz::calibrate

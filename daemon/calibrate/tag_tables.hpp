@@ -13,8 +13,10 @@ std::string tag_tables(const TagSurvey& survey);
 
 // Returns the set file's text with the tags' sizes and places in the tables that the file has for
 // them, in the form that each is written in (position_m and rotation_deg, corners_m, or
-// world_from_tag), and new tables for the others at the end. Everything else stays as it is. Throws
-// previz::Error if the text cannot be changed.
-std::string with_tags(const std::string& text, const TagSurvey& survey);
+// world_from_tag), and new tables for the others at the end. `doubts`, a comment as insist()
+// returns it, comes before the first table, in place of an earlier calibration's. Everything else
+// stays as it is. Throws previz::Error if the text cannot be changed.
+std::string with_tags(const std::string& text, const TagSurvey& survey,
+                      const std::string& doubts = {});
 
 }  // namespace previz::calibrate

@@ -68,12 +68,25 @@ TEST(RealObserver, AgreesWithOpencvsSolver) {
   EXPECT_NEAR(observer.intrinsics.cy, camera.at<double>(1, 2), 0.1 * observer.sigma[3]);
 }
 
+// Its boards reach half of the way to the picture's corners. k3, which is -10.9 +- 2.0 there, would
+// fold the picture and leave it certain to 6.8 px.
+TEST(RealObserver, AnUnfilledPictureHoldsFewCoefficients) {
+  PREVIZ_NEEDS(real("apriltag/room/calibration"));
+  const Views views = look(real("apriltag/room/calibration"), "chessboard:7x5:30mm");
+  const ObserverFit observer = fit_observer(views);
+  EXPECT_EQ(observer.intrinsics.k3, 0);
+  EXPECT_LE(observer.fit.rms_px, 0.18);
+  EXPECT_NEAR(observer.reach, 0.55, 0.01);
+  EXPECT_LE(worst_px(observer.picture), doubtful_px);
+}
+
 TEST(RealObserver, ACharucoBoardThatWasHardlyTiltedIsRefused) {
   PREVIZ_NEEDS(real("calib/charuco_lifecam_1280"));
   const Views views = look(real("calib/charuco_lifecam_1280"), "charuco:8x8:1in:0.75in:4x4_1000");
   EXPECT_EQ(views.views.size(), 13u);
   const ObserverFit observer = fit_observer(views);
-  EXPECT_LE(observer.fit.rms_px, 0.30);
+  // 0.298 with all nine parameters, of which boards without tilt hold few.
+  EXPECT_LE(observer.fit.rms_px, 0.32);
   const std::vector<std::string> missing = missing_views(views, observer);
   ASSERT_EQ(missing.size(), 2u);
   EXPECT_NE(missing[0].find("turned to the left and to the right"), std::string::npos);

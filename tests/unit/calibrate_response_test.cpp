@@ -277,5 +277,17 @@ TEST(ResponseFit, FlatStepsAreCounted) {
   EXPECT_GT(smooth.brightest, smooth.darkest);
 }
 
+// A camera that clips at code 244 of 255: nothing is known of what lies above.
+TEST(ResponseCalibration, AJumpIsNamedWithItsCause) {
+  ResponseFit fit = fit_response(make_bracket(6, 1.5), ResponseMethod::debevec);
+  EXPECT_TRUE(doubts_of(fit).empty());
+  for (std::size_t code = 0; code < 245; ++code) fit.curve.inverse_table[code] *= 0.07;
+  ASSERT_EQ(doubts_of(fit).size(), 1u);
+  EXPECT_NE(doubts_of(fit)[0].find("clips its light at about code 240"), std::string::npos)
+      << doubts_of(fit)[0];
+  fit.error_codes = 12;
+  EXPECT_NE(doubts_of(fit)[0].find("predicted only to 12.0 codes"), std::string::npos);
+}
+
 }  // namespace calibrate_response_test
 }  // namespace previz::calibrate

@@ -18,6 +18,7 @@
 #include "daemon/calibrate/tag_tables.hpp"
 #include "daemon/calibrate/tag_walk.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 #include "tests/support/tag_walks.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/tracking_synthetic.hpp"
@@ -393,6 +394,44 @@ TEST_F(TagCommand, RefusesAWalkWithABumpUnlessForcedAndWritesTheRest) {
   text << std::ifstream(set_file()).rdbuf();
   EXPECT_EQ(text.str().find("# The attic\n"), 0u);
   EXPECT_NE(text.str().find("[[tag]]  # in the middle\n"), std::string::npos);
+}
+
+// Whoever opens the set file next week sees that the map was forced; a good one takes that away.
+TEST_F(TagCommand, AForcedMapSaysSoInTheSetFile) {
+  const auto text_of_set = [&] { return session::read_file(set_file()); };
+  options.force = options.write = true;
+  said();
+  const std::string forced = text_of_set();
+  const std::size_t doubt = forced.find("# NOT TO BE RELIED ON: taken with --force although");
+  ASSERT_NE(doubt, std::string::npos) << forced;
+  EXPECT_LT(doubt, forced.find("[[tag]]"));
+  EXPECT_NE(forced.find("# tag 4 once more"), std::string::npos) << forced;
+  said();
+  EXPECT_EQ(text_of_set(), forced);
+  EXPECT_EQ(with_tags(forced, two_tags(), "").find("NOT TO BE"), std::string::npos);
+  EXPECT_EQ(with_tags(forced, two_tags(), "").find("# tag 4"), std::string::npos);
+}
+
+// Each picture links two neighbours of a row of tags: their errors add up.
+TEST(TagSurvey, AChainOfPairsIsNamed) {
+  TagSurvey survey;
+  for (int id = 0; id < 8; ++id) {
+    SurveyedTag tag;
+    tag.id = id;
+    tag.pictures = 10;
+    tag.views_rad = 1;
+    tag.position_sigma_m = 0.004 * id;
+    survey.tags.push_back(tag);
+  }
+  survey.pictures = 40;
+  survey.pictures_of_pairs = 37;
+  const auto missing = missing_of_tags(survey, {}, 0);
+  ASSERT_EQ(missing.size(), 1u);
+  EXPECT_NE(missing[0].find("37 of 40 pictures show two only, and a chain of pairs bends"),
+            std::string::npos);
+  EXPECT_NE(missing[0].find("tag 7, the worst, to 28 mm"), std::string::npos) << missing[0];
+  survey.pictures_of_pairs = 3;
+  EXPECT_EQ(missing_of_tags(survey, {}, 0).size(), 7u);
 }
 
 TEST_F(TagCommand, SaysWhatItLacks) {
