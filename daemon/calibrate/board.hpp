@@ -25,6 +25,7 @@ struct Board {
 //                                          (4x4, 5x5, 6x6 or 7x7 _50, _100, _250 or _1000)
 //   aprilgrid:6x6:88mm:26.4mm              tags, outer edge of the black border, gap between two;
 //                                          then, where they differ, :tag36h11 and :0 (first id)
+//                                          (Kalibr's own form of tag36h11 is found as well)
 inline constexpr const char* board_grammar =
     "chessboard:COLUMNSxROWS:SQUARE (inner corners), "
     "charuco:COLUMNSxROWS:SQUARE:MARKER:DICTIONARY (squares; 4x4_50 ... 7x7_1000) or "

@@ -121,20 +121,112 @@ TagSearch tag_search(const Board& board, const ResponseCurve& response, const Kn
   };
 }
 
+// Returns the picture with its white parts grown by a pixel: black squares that touch the tags'
+// corners come apart from them, which libapriltag needs to see a tag's border.
+Frame with_squares_apart(const Frame& frame, const cv::Mat1b& picture) {
+  Frame apart = frame;
+  apart.format = PixelFormat::gray8;
+  apart.bayer = BayerPattern::none;
+  cv::Mat grown;
+  cv::dilate(picture, grown, cv::getStructuringElement(cv::MORPH_RECT, {3, 3}));
+  apart.bytes.assign(grown.datastart, grown.dataend);
+  return apart;
+}
+
 class AprilgridFinder final : public BoardFinder {
  public:
-  AprilgridFinder(const Board& board, TagSearch search)
-      : board_(board), search_(std::move(search)) {}
+  AprilgridFinder(const Board& board, const ResponseCurve& response, const KnownLens& lens)
+      : board_(board), gap_(board.marker_m / board.square_m), photometry_(response) {
+    forms_.push_back({"a black border of one cell", tag_search(board, response, lens)});
+    if (board.dictionary != "tag36h11") return;
+    Board wide = board;
+    wide.dictionary = "tag36h11b2";
+    forms_.push_back({"a black border of two cells", tag_search(wide, response, lens)});
+  }
 
   BoardCorners find(const Frame& frame) override {
+    const cv::Mat1b picture = gray(frame, photometry_);
+    const Frame apart = with_squares_apart(frame, picture);
+    BoardCorners best;
+    for (const Form& form : forms_) {
+      const auto touching = form.search(apart);
+      const bool has_squares = shows_squares(picture, touching);
+      BoardCorners corners =
+          has_squares ? saddles(picture, touching) : of_board(form.search(frame));
+      if (corners.ids.size() <= best.ids.size()) continue;
+      best = std::move(corners);
+      found_ =
+          form.name + (has_squares ? ", squares at the corners" : ", no squares at the corners");
+    }
+    return best;
+  }
+
+  std::string form() const override {
+    return forms_.size() < 2 || found_.empty() ? "" : "the tags have " + found_;
+  }
+
+ private:
+  struct Form {
+    std::string name;
+    TagSearch search;
+  };
+  using Tags = std::vector<tracking::TagDetection>;
+
+  // Returns the picture's value at a place; -1 outside the picture.
+  static int value(const cv::Mat1b& picture, glm::dvec2 at) {
+    const cv::Point pixel(cvRound(at.x), cvRound(at.y));
+    return cv::Rect({}, picture.size()).contains(pixel) ? picture(pixel) : -1;
+  }
+
+  // Returns whether most of the tags' corners touch a black square, as wide as the gap.
+  bool shows_squares(const cv::Mat1b& picture, const Tags& tags) const {
+    int votes = 0;
+    for (const tracking::TagDetection& tag : tags) {
+      const auto& c = tag.corners;
+      const glm::dvec2 centre = (c[0] + c[1] + c[2] + c[3]) / 4.0;
+      for (std::size_t i = 0; i < 4; ++i) {
+        const glm::dvec2 beside = (c[i] + c[(i + 1) % 4]) / 2.0 - centre;
+        const int square = value(picture, c[i] + gap_ * (c[i] - centre));
+        const int black = value(picture, c[i] - 0.1 * (c[i] - centre));
+        const int white = value(picture, centre + (1 + gap_) * beside);
+        if (square >= 0 && black >= 0 && white >= 0) votes += 2 * square < black + white ? 1 : -1;
+      }
+    }
+    return votes > 0;
+  }
+
+  // Refines corners that are saddle points, in windows that hold no other corner.
+  BoardCorners saddles(const cv::Mat1b& picture, Tags tags) const {
+    const cv::TermCriteria until(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 50, 1e-4);
+    for (tracking::TagDetection& tag : tags) {
+      std::vector<cv::Point2f> pixels;
+      double side = HUGE_VAL;
+      for (std::size_t i = 0; i < 4; ++i) {
+        pixels.emplace_back(float(tag.corners[i].x), float(tag.corners[i].y));
+        side = std::min(side, glm::distance(tag.corners[i], tag.corners[(i + 1) % 4]));
+      }
+      const int window = std::clamp(int(side * std::min(0.4 * gap_, 0.1)), 2, 11);
+      const cv::Rect inside(window + 1, window + 1, picture.cols - 2 * window - 2,
+                            picture.rows - 2 * window - 2);
+      tag.refined = std::ranges::all_of(
+          pixels, [&](const cv::Point2f& p) { return inside.contains(cv::Point(p)); });
+      tag.trouble.clear();
+      if (!tag.refined) continue;
+      cv::cornerSubPix(picture, pixels, {window, window}, {-1, -1}, until);
+      for (std::size_t i = 0; i < 4; ++i) tag.corners[i] = {pixels[i].x, pixels[i].y};
+    }
+    return of_board(tags);
+  }
+
+  BoardCorners of_board(const Tags& tags) const {
     BoardCorners corners;
     int last = -1;
-    for (const tracking::TagDetection& tag : search_(frame)) {
+    for (const tracking::TagDetection& tag : tags) {
       const int index = tag.id - board_.first_id;
-      const bool of_board = index >= 0 && index < board_.columns * board_.rows;
+      const bool is_on_board = index >= 0 && index < board_.columns * board_.rows;
       // An id that is seen twice cannot be trusted: both tags are dropped.
       if (index == last) remove(index, corners);
-      if (!of_board || index == last || !tag.trouble.empty() || !tag.refined) continue;
+      if (!is_on_board || index == last || !tag.trouble.empty() || !tag.refined) continue;
       last = index;
       for (int i = 0; i < 4; ++i) {
         corners.ids.push_back(4 * index + i);
@@ -144,7 +236,6 @@ class AprilgridFinder final : public BoardFinder {
     return corners;
   }
 
- private:
   static void remove(int index, BoardCorners& corners) {
     while (!corners.ids.empty() && corners.ids.back() / 4 == index) {
       corners.ids.pop_back();
@@ -153,7 +244,10 @@ class AprilgridFinder final : public BoardFinder {
   }
 
   Board board_;
-  TagSearch search_;
+  double gap_;  // over the side of a tag
+  tracking::Photometry photometry_;
+  std::vector<Form> forms_;
+  std::string found_;
 };
 
 }  // namespace
@@ -168,7 +262,7 @@ std::unique_ptr<BoardFinder> make_board_finder(const Board& board, const Respons
     case Board::Kind::aprilgrid:
       break;
   }
-  return std::make_unique<AprilgridFinder>(board, tag_search(board, response, lens));
+  return std::make_unique<AprilgridFinder>(board, response, lens);
 }
 
 }  // namespace previz::calibrate

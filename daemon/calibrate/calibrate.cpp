@@ -25,6 +25,7 @@ Views gather(const LensOptions& options, const std::string& stream, const KnownL
   gathering.every = options.every;
   Views views = gather_views(*source, *finder, board, gathering,
                              [&](const std::string& line) { out << line << '\n'; });
+  if (const std::string form = finder->form(); !form.empty()) out << form << '\n';
   for (const std::string& note : source->notes()) out << note << '\n';
   return views;
 }

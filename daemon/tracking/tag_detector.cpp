@@ -26,8 +26,21 @@ struct Family {
   void (*destroy)(apriltag_family_t*);
 };
 
+// Kalibr prints tag36h11 with a black border of two cells: the same codes, one cell further in.
+apriltag_family_t* tag36h11_wide_create() {
+  apriltag_family_t* family = tag36h11_create();
+  family->width_at_border += 2;
+  family->total_width += 2;
+  for (std::uint32_t bit = 0; bit < family->nbits; ++bit) {
+    ++family->bit_x[bit];
+    ++family->bit_y[bit];
+  }
+  return family;
+}
+
 constexpr Family kFamilies[] = {
     {"tag36h11", tag36h11_create, tag36h11_destroy},
+    {"tag36h11b2", tag36h11_wide_create, tag36h11_destroy},
     {"tag25h9", tag25h9_create, tag25h9_destroy},
     {"tag16h5", tag16h5_create, tag16h5_destroy},
     {"tag36h10", tag36h10_create, tag36h10_destroy},

@@ -32,7 +32,8 @@ struct DetectorSettings {
   Fit fit = Fit::exact;  // of the corners
 };
 
-// Families are libapriltag's, by name: tag36h11, tag25h9, tag16h5, tagStandard41h12, ... Throws
+// Families are libapriltag's, by name: tag36h11, tag25h9, tag16h5, tagStandard41h12, ..., and
+// tag36h11b2, which is tag36h11 with a black border of two cells, as Kalibr prints it. Throws
 // previz::Error naming them all if `settings.family` is none of them.
 class TagDetector {
  public:
