@@ -1,18 +1,12 @@
 // Boards as they are written, and found in pictures whose corners are known exactly.
-#include <apriltag/apriltag.h>
-#include <apriltag/tag36h11.h>
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <glm/geometric.hpp>
 #include <opencv2/aruco/charuco.hpp>
-#include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "daemon/calibrate/board.hpp"
 #include "daemon/calibrate/board_finder.hpp"
-#include "daemon/calibrate/observer.hpp"
-#include "daemon/calibrate/views.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
@@ -41,6 +35,11 @@ TEST(Board, IsReadAsWritten) {
   EXPECT_EQ(grid.dictionary, "tag25h9");
   EXPECT_NEAR(glm::distance(grid.points[4], glm::dvec3(0.088 + 0.0264, 0, 0)), 0, 1e-15);
   EXPECT_EQ(parse_board("aprilgrid:6x5:88mm:26mm").dictionary, "tag36h11");
+  EXPECT_FALSE(parse_board("aprilgrid:6x5:88mm:26mm").is_kalibr);
+  const Board kalibr = parse_board("aprilgrid:6x5:88mm:26mm:kalibr:4");
+  EXPECT_TRUE(kalibr.is_kalibr);
+  EXPECT_EQ(kalibr.dictionary, "tag36h11");
+  EXPECT_EQ(kalibr.first_id, 4);
 }
 
 TEST(Board, EveryMistakeIsNamed) {
@@ -173,109 +172,6 @@ TEST(BoardFinder, AprilgridCornersHaveTheirIds) {
     const glm::dvec3 corner = board.points[std::size_t(found.ids[i])];
     const glm::dvec3 centre = glm::dvec3(scene.tags[tag].world_from_tag[3]);
     EXPECT_NEAR(glm::distance(corner, centre), 0.03 * std::sqrt(2.0), 1e-12);
-  }
-}
-
-// Kalibr's 6x6 board (88 mm tags, gaps of 0.3 of that), 10 px
-// per cell of a two-cell border; the lower left tag's lower left corner is at `kalibr_origin`.
-constexpr int kalibr_tag_px = 100, kalibr_gap_px = 30, kalibr_margin_px = 60;
-constexpr double kalibr_px_m = 0.088 / kalibr_tag_px;
-
-cv::Mat1b kalibr_board(bool has_squares) {
-  apriltag_family_t* family = tag36h11_create();
-  const int pitch = kalibr_tag_px + kalibr_gap_px, side = 6 * pitch + kalibr_gap_px;
-  cv::Mat1b board(side, side, std::uint8_t(255));
-  for (int id = 0; id < 36; ++id) {
-    const cv::Point at(kalibr_gap_px + id % 6 * pitch, kalibr_gap_px + (5 - id / 6) * pitch);
-    board(cv::Rect(at.x, at.y, kalibr_tag_px, kalibr_tag_px)) = 0;
-    image_u8_t* tag = apriltag_to_image(family, std::uint32_t(id));
-    for (int y = 0; y < 6; ++y)
-      for (int x = 0; x < 6; ++x)
-        if (tag->buf[(y + 2) * tag->stride + x + 2])
-          board(cv::Rect(at.x + 10 * (x + 2), at.y + 10 * (y + 2), 10, 10)) = 255;
-    std::free(tag->buf);
-    std::free(tag);
-  }
-  tag36h11_destroy(family);
-  for (int y = 0; has_squares && y <= 6; ++y)
-    for (int x = 0; x <= 6; ++x)
-      board(cv::Rect(x * pitch, y * pitch, kalibr_gap_px, kalibr_gap_px)) = 0;
-  const int m = kalibr_margin_px - kalibr_gap_px;
-  cv::copyMakeBorder(board, board, m, m, m, m, cv::BORDER_CONSTANT, 255);
-  return board;
-}
-
-struct KalibrView {
-  Frame frame;
-  cv::Matx33d pixel_from_board;  // from the board's metres
-};
-
-// A view by a pinhole of 620 px, 8x8 samples per pixel, slightly blurred, noise of 1.5 of 255.
-KalibrView kalibr_view(const cv::Mat1b& board, cv::RNG& random) {
-  const auto any = [&](double reach) { return random.uniform(-reach, reach); };
-  const cv::Vec3d turn(any(0.55), any(0.55), any(0.3)), shift(any(0.06), any(0.05), 0);
-  cv::Matx33d r;
-  cv::Rodrigues(turn, r);
-  const double half = 0.5 * (6 * 0.088 + 5 * 0.0264);
-  // The board's y points up, the picture's down.
-  const cv::Matx33d centred(1, 0, -half, 0, -1, half, 0, 0, 1);
-  const double away = 1.1 + 0.2 * random.uniform(0.0, 1.0);
-  const cv::Matx33d pose(r(0, 0), r(0, 1), shift[0], r(1, 0), r(1, 1), shift[1], r(2, 0), r(2, 1),
-                         away);
-  KalibrView view;
-  view.pixel_from_board = cv::Matx33d(620, 0, 319.5, 0, 620, 239.5, 0, 0, 1) * pose * centred;
-  const double low = board.rows - kalibr_margin_px - 0.5, left = kalibr_margin_px - 0.5;
-  const cv::Matx33d board_from_drawing(kalibr_px_m, 0, -left * kalibr_px_m, 0, -kalibr_px_m,
-                                       low * kalibr_px_m, 0, 0, 1);
-  const cv::Matx33d finer(8, 0, 3.5, 0, 8, 3.5, 0, 0, 1);
-  cv::Mat1b fine, picture;
-  cv::warpPerspective(board, fine, finer * view.pixel_from_board * board_from_drawing,
-                      {8 * width, 8 * height}, cv::INTER_LINEAR, cv::BORDER_CONSTANT, 200);
-  cv::resize(fine, picture, {width, height}, 0, 0, cv::INTER_AREA);
-  cv::GaussianBlur(picture, picture, {}, 0.7);
-  cv::Mat noisy(height, width, CV_16S);
-  random.fill(noisy, cv::RNG::NORMAL, 0, 1.5);
-  cv::add(picture, noisy, picture, {}, CV_8U);
-  view.frame.format = PixelFormat::gray8;
-  view.frame.width = width;
-  view.frame.height = height;
-  view.frame.bytes.assign(picture.datastart, picture.dataend);
-  return view;
-}
-
-// 0.3 px and 0.2 % are the promised bounds of the form with squares.
-TEST(BoardFinder, KalibrsAprilgridGivesTheLens) {
-  const Board board = parse_board("aprilgrid:6x6:88mm:26.4mm");
-  for (const bool has_squares : {true, false}) {
-    const cv::Mat1b drawing = kalibr_board(has_squares);
-    cv::RNG random(3);
-    Views views{width, height, {}};
-    const auto finder = make_board_finder(board, {});
-    std::size_t found = 0;
-    double largest = 0;
-    for (int i = 0; i < 14; ++i) {
-      const KalibrView truth = kalibr_view(drawing, random);
-      const BoardCorners corners = finder->find(truth.frame);
-      View view{std::to_string(i), {}, corners.pixels};
-      for (std::size_t k = 0; k < corners.ids.size(); ++k) {
-        const glm::dvec3& point = board.points[std::size_t(corners.ids[k])];
-        view.points.push_back(point);
-        const cv::Vec3d at = truth.pixel_from_board * cv::Vec3d(point.x, point.y, 1);
-        largest = std::max(
-            largest, glm::distance(corners.pixels[k], glm::dvec2(at[0] / at[2], at[1] / at[2])));
-      }
-      found += corners.ids.size();
-      if (!view.points.empty()) views.views.push_back(std::move(view));
-    }
-    SCOPED_TRACE(finder->form() + ": " + std::to_string(found) + " corners");
-    EXPECT_NE(finder->form().find("border of two cells"), std::string::npos);
-    EXPECT_EQ(finder->form().find(", no squares") == std::string::npos, has_squares);
-    EXPECT_GT(found, 14u * 144u * 9 / 10);
-    // Without squares the edges' own refinement is used, which leaves single corners to
-    // fit_observer.
-    if (!has_squares) continue;
-    EXPECT_LT(largest, 0.3);
-    EXPECT_NEAR(fit_observer(views).intrinsics.fx, 620, 0.002 * 620);
   }
 }
 
