@@ -103,7 +103,9 @@ Board parse_board(const std::string& text) {
     parts.size(1, 1, board);
     board.square_m = parts.length_m(2, "tag");
     board.marker_m = parts.length_m(3, "gap");
-    board.dictionary = parts.has(4) ? parts.part(4, "family") : "tag36h11";
+    const std::string family = parts.has(4) ? parts.part(4, "family") : "tag36h11";
+    board.is_kalibr = family == "kalibr";
+    board.dictionary = board.is_kalibr ? "tag36h11" : family;
     board.first_id = parts.has(5) ? parts.whole(5, "first id") : 0;
     parts.ends_after(6);
     add_tags(board);

@@ -25,6 +25,9 @@ Views gather(const LensOptions& options, const std::string& stream, const KnownL
   gathering.every = options.every;
   Views views = gather_views(*source, *finder, board, gathering,
                              [&](const std::string& line) { out << line << '\n'; });
+  // A second pass, through the lens that the first one found, sees the same board.
+  const bool is_first = std::holds_alternative<std::monostate>(lens);
+  if (const std::string form = finder->form(); is_first && !form.empty()) out << form << '\n';
   for (const std::string& note : source->notes()) out << note << '\n';
   return views;
 }

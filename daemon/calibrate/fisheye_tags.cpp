@@ -110,7 +110,8 @@ std::vector<tracking::TagDetection> detect_in_fisheye(const Frame& frame,
     const Frame view = resampled(picture, fisheye, lens, fisheye_from_view);
     for (tracking::TagDetection& tag : detector.detect(view, 1)) {
       const double distance = from_middle(tag, lens);
-      if (!tag.trouble.empty() || !tag.refined || distance >= best[tag.id].from_middle) continue;
+      const bool is_measured = tag.refined || !settings.are_edges_fitted;
+      if (!tag.trouble.empty() || !is_measured || distance >= best[tag.id].from_middle) continue;
       bool all_seen = true;
       for (glm::dvec2& corner : tag.corners) {
         const auto pixel = fisheye.project(fisheye_from_view * ray_of(lens, corner));

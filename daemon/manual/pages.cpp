@@ -48,6 +48,8 @@ previzd devices --rules: Prints the lines by which the service may open pads, pe
 previzd print board charuco:7x5:30mm:22mm:5x5_100 --out board.pdf: Draws a board for the calibration of the lenses, to be printed on A4 at 100 %.
 previzd print tags --ids 0-11 --size 80mm --out tags.pdf: Draws twelve tags with crop marks, and a ruler by which the printer's scale is checked.
 previzd calibrate observer views --board charuco:7x5:30mm:22mm:5x5_100 --out lens.toml: Measures the film camera's lens from a folder of pictures of a board, and writes the tables for the set file.
+previzd calibrate observer views --board aprilgrid:6x6:88mm:26.4mm --out lens.toml: Does the same by Kalibr's AprilGrid: 6x6 tags of 88 mm with gaps of 26.4 mm, which is its tagSpacing of 0.3. The output names the form found.
+previzd print board aprilgrid:6x6:40mm:12mm:kalibr --paper A3 --out board.pdf: Draws an AprilGrid as Kalibr prints it, which both programs find.
 previzd calibrate light views --board charuco:7x5:30mm:22mm:5x5_100 --tags desk.toml: Measures the fisheye's lens, and finds where it stands by the set's tags.
 previzd calibrate tags walk --set desk.toml --size 80mm --write: Finds where the tags are, from a walk with the film camera past all of them, and writes that into the set file.
 previzd check desk.toml: Lists every mistake in a set file, or what its scene asks of the renderer.

@@ -74,8 +74,27 @@ Drawing charuco(const calibrate::Board& board, const std::string& name) {
   return drawing;
 }
 
+// Adds a ring of `width` inside the square of `side` whose upper left corner is at (x, y).
+void add_ring(double x, double y, double side, double width, Drawing& drawing) {
+  const double inner = side - 2 * width;
+  drawing.black.push_back({x, y, side, width});
+  drawing.black.push_back({x, y + side - width, side, width});
+  drawing.black.push_back({x, y + width, width, inner});
+  drawing.black.push_back({x + side - width, y + width, width, inner});
+}
+
+// Adds the squares in the crossings of the gaps, the outermost among them; the upper left tag is at
+// (`at`, `at`).
+void add_corner_squares(const calibrate::Board& board, double at, Drawing& drawing) {
+  const double gap = mm_per_m * board.marker_m, pitch = mm_per_m * board.square_m + gap;
+  for (int row = 0; row <= board.rows; ++row)
+    for (int column = 0; column <= board.columns; ++column)
+      drawing.black.push_back({at - gap + column * pitch, at - gap + row * pitch, gap, gap});
+}
+
 Drawing aprilgrid(const calibrate::Board& board, const std::string& name) {
-  const FamilyShape shape = family_shape(board.dictionary);
+  FamilyShape shape = family_shape(board.dictionary);
+  if (board.is_kalibr) shape.total += 2, shape.border += 2;
   const double tag = mm_per_m * board.square_m, gap = mm_per_m * board.marker_m;
   const double cell = tag / shape.border, outside = (shape.total - shape.border) * cell / 2;
   if (gap < 2 * outside)
@@ -83,16 +102,20 @@ Drawing aprilgrid(const calibrate::Board& board, const std::string& name) {
         fmt::format("board \"{}\" has tags that run into each other: {} of {:g} mm needs a "
                     "gap of {:g} mm or more",
                     name, board.dictionary, tag, 2 * outside));
-  const double margin = std::max(gap, outside + cell);
+  const double margin = board.is_kalibr ? gap + cell : std::max(gap, outside + cell);
   Drawing drawing =
       framed(board.columns * (tag + gap) - gap, board.rows * (tag + gap) - gap, margin, name);
   for (int row = 0; row < board.rows; ++row)
     for (int column = 0; column < board.columns; ++column) {
       const int from_top = board.rows - 1 - row;  // ids count upwards from the lower left
-      add_tag_cells(board.dictionary, board.first_id + row * board.columns + column,
-                    margin + column * (tag + gap) - outside,
-                    margin + from_top * (tag + gap) - outside, cell, drawing);
+      const double x = margin + column * (tag + gap), y = margin + from_top * (tag + gap);
+      // Of tag36h11 the white cells about the border become the border's outer cells.
+      const double outer = board.is_kalibr ? 0 : outside;
+      if (board.is_kalibr) add_ring(x, y, tag, cell, drawing);
+      add_tag_cells(board.dictionary, board.first_id + row * board.columns + column, x - outer,
+                    y - outer, cell, drawing);
     }
+  if (board.is_kalibr) add_corner_squares(board, margin, drawing);
   return drawing;
 }
 

@@ -38,6 +38,16 @@ constexpr Family kFamilies[] = {
     {"tagCustom48h12", tagCustom48h12_create, tagCustom48h12_destroy},
 };
 
+// Makes the border a cell wider on every side, around the same codes.
+void widen(apriltag_family_t& family) {
+  family.width_at_border += 2;
+  family.total_width += 2;
+  for (std::uint32_t bit = 0; bit < family.nbits; ++bit) {
+    ++family.bit_x[bit];
+    ++family.bit_y[bit];
+  }
+}
+
 const Family& family_by_name(const std::string& name) {
   std::string known;
   for (const Family& family : kFamilies) {
@@ -114,16 +124,17 @@ struct TagDetector::Library {
   apriltag_detector_t* detector;
   apriltag_detector_t* fast;  // with several threads
 
-  // The table of codes grows with the power of `corrected_bits`: gigabytes for the large families
-  // at the library's limit of 2.
-  Library(const Family& f, int corrected_bits, int threads)
-      : functions(f),
-        family(f.create()),
+  // The table of codes grows with the power of `max_hamming`: gigabytes for the large families at
+  // the library's limit of 2.
+  explicit Library(const DetectorSettings& settings)
+      : functions(family_by_name(settings.family)),
+        family(functions.create()),
         detector(apriltag_detector_create()),
         fast(apriltag_detector_create()) {
+    if (settings.wide_border) widen(*family);
     for (apriltag_detector_t* d : {detector, fast})
-      apriltag_detector_add_family_bits(d, family, std::clamp(corrected_bits, 0, 2));
-    fast->nthreads = std::max(1, threads);
+      apriltag_detector_add_family_bits(d, family, std::clamp(settings.max_hamming, 0, 2));
+    fast->nthreads = std::max(1, settings.threads);
   }
   ~Library() {
     apriltag_detector_destroy(detector);
@@ -139,8 +150,7 @@ TagDetector::TagDetector(const DetectorSettings& settings, const PinholeIntrinsi
     : settings_(settings),
       lens_(lens),
       photometry_(response),
-      library_(std::make_unique<Library>(family_by_name(settings.family), settings.max_hamming,
-                                         settings.threads)) {}
+      library_(std::make_unique<Library>(settings)) {}
 
 TagDetector::~TagDetector() = default;
 
@@ -211,7 +221,7 @@ void TagDetector::measure(const Frame& frame, double decimate, TagDetection& tag
   const int cells = library_->family->width_at_border;
   if (near_border(tag.corners, frame, 1 + decimate)) {
     tag.trouble = "cut by the picture's border";
-  } else if (shortest_side(tag.corners) > 4 &&
+  } else if (settings_.are_edges_fitted && shortest_side(tag.corners) > 4 &&
              narrowest_cell_px(tag.corners, cells) >= kMinCellPx) {
     const RefinedCorners refined = refine_corners(luminance, lens_, tag.corners, cells,
                                                   library_->family->reversed_border, settings_.fit);

@@ -30,6 +30,9 @@ struct DetectorSettings {
   int max_hamming = 1;
   int threads = 1;       // that search a large part of a picture
   Fit fit = Fit::exact;  // of the corners
+  // The black border is two cells wide, as Kalibr prints tag36h11; else it is one cell.
+  bool wide_border = false;
+  bool are_edges_fitted = true;  // else the corners are libapriltag's, not refined
 };
 
 // Families are libapriltag's, by name: tag36h11, tag25h9, tag16h5, tagStandard41h12, ... Throws

@@ -35,6 +35,11 @@ TEST(Board, IsReadAsWritten) {
   EXPECT_EQ(grid.dictionary, "tag25h9");
   EXPECT_NEAR(glm::distance(grid.points[4], glm::dvec3(0.088 + 0.0264, 0, 0)), 0, 1e-15);
   EXPECT_EQ(parse_board("aprilgrid:6x5:88mm:26mm").dictionary, "tag36h11");
+  EXPECT_FALSE(parse_board("aprilgrid:6x5:88mm:26mm").is_kalibr);
+  const Board kalibr = parse_board("aprilgrid:6x5:88mm:26mm:kalibr:4");
+  EXPECT_TRUE(kalibr.is_kalibr);
+  EXPECT_EQ(kalibr.dictionary, "tag36h11");
+  EXPECT_EQ(kalibr.first_id, 4);
 }
 
 TEST(Board, EveryMistakeIsNamed) {

@@ -178,13 +178,26 @@ void expect_board(const Frame& page, const std::string& text) {
 }
 
 TEST_F(Print, BoardsAreFoundAtTrueSize) {
-  for (const char* text : {"chessboard:9x6:25mm", "chessboard:6x9:20mm",
-                           "charuco:7x5:30mm:22mm:5x5_100", "charuco:6x8:1in:0.75in:4x4_50",
-                           "aprilgrid:4x3:40mm:12mm", "aprilgrid:3x3:40mm:12mm:tag25h9:4"}) {
+  for (const char* text :
+       {"chessboard:9x6:25mm", "chessboard:6x9:20mm", "charuco:7x5:30mm:22mm:5x5_100",
+        "charuco:6x8:1in:0.75in:4x4_50", "aprilgrid:4x3:40mm:12mm",
+        "aprilgrid:3x3:40mm:12mm:tag25h9:4", "aprilgrid:4x3:40mm:12mm:kalibr:5"}) {
     const auto found = pages({draw_board(calibrate::parse_board(text), text)}, "A4");
     ASSERT_EQ(found.size(), 1u) << text;
     expect_board(found[0], text);
   }
+}
+
+// Kalibr's form: a tag's border is black over two of its ten cells, and a square touches each of
+// its corners. It is recognised by a finder that was not told of it.
+TEST_F(Print, KalibrsBoardHasItsForm) {
+  const std::string plain = "aprilgrid:4x3:40mm:12mm", text = plain + ":kalibr";
+  const auto found = pages({draw_board(calibrate::parse_board(text), text)}, "A4");
+  ASSERT_EQ(found.size(), 1u);
+  expect_board(found[0], plain);
+  const auto finder = calibrate::make_board_finder(calibrate::parse_board(plain), no_curve());
+  EXPECT_EQ(finder->find(found[0]).ids.size(), 4u * 12u);
+  EXPECT_EQ(finder->form(), "the tags have a black border of two cells, squares at the corners");
 }
 
 // The tiles of a board that is larger than the paper, cut at the marks and put together.
@@ -266,6 +279,8 @@ TEST(PrintRefusals, SayWhatIsPossible) {
   EXPECT_THAT(refused([&] { print_board(board, out); }), HasSubstr("not a dictionary"));
   board.board = "aprilgrid:3x3:40mm:5mm:tagStandard41h12";
   EXPECT_THAT(refused([&] { print_board(board, out); }), HasSubstr("gap of 32 mm or more"));
+  board.board = "aprilgrid:3x3:40mm:7mm:kalibr";  // a white cell about each of ten cells of 4 mm
+  EXPECT_THAT(refused([&] { print_board(board, out); }), HasSubstr("gap of 8 mm or more"));
 }
 
 TEST(PrintReport, SaysWhatIsInTheFile) {
