@@ -65,12 +65,15 @@ bool is_above(double least, Polynomial<N> right, int halvings) {
 // Returns whether a polynomial is above 0 all over [0, end], by more than its terms are rounded.
 template <std::size_t N>
 bool is_above_zero(const Polynomial<N>& p, double end) {
-  double terms = 0, scale = 1;
+  double terms = 0, below = 0, scale = 1;
   for (const double coefficient : p) {
     terms += std::abs(coefficient) * scale;
+    below += std::min(coefficient, 0.0) * scale;
     scale *= end;
   }
-  return is_above(1e-14 * terms, bernstein(p, end), 50);
+  const double least = 1e-14 * terms;
+  if (p[0] + below > least) return true;  // as most are
+  return is_above(least, bernstein(p, end), 50);
 }
 
 glm::dvec2 without_distortion(const PinholeIntrinsics& lens, glm::dvec2 pixel) {
@@ -82,15 +85,15 @@ glm::dvec2 without_distortion(const PinholeIntrinsics& lens, glm::dvec2 pixel) {
 glm::dvec2 distort(const PinholeIntrinsics& lens, glm::dvec2 normalised, glm::dmat2* jacobian) {
   const double x = normalised.x, y = normalised.y;
   const double r2 = x * x + y * y;
-  const double divisor = 1 + r2 * (lens.k4 + r2 * (lens.k5 + r2 * lens.k6));
-  const double radial = (1 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3))) / divisor;
+  const double shrink = 1 / (1 + r2 * (lens.k4 + r2 * (lens.k5 + r2 * lens.k6)));
+  const double radial = (1 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3))) * shrink;
   const double xd = x * radial + 2 * lens.p1 * x * y + lens.p2 * (r2 + 2 * x * x);
   const double yd = y * radial + lens.p1 * (r2 + 2 * y * y) + 2 * lens.p2 * x * y;
   if (jacobian) {
     const double dividend_slope = lens.k1 + r2 * (2 * lens.k2 + r2 * 3 * lens.k3);
     const double divisor_slope = lens.k4 + r2 * (2 * lens.k5 + r2 * 3 * lens.k6);
     const double slope =
-        2 * (dividend_slope - radial * divisor_slope) / divisor;  // dradial/dx over x
+        2 * (dividend_slope - radial * divisor_slope) * shrink;  // dradial/dx over x
     const double cross = x * y * slope + 2 * lens.p1 * x + 2 * lens.p2 * y;
     const double dxdx = radial + x * x * slope + 2 * lens.p1 * y + 6 * lens.p2 * x;
     const double dydy = radial + y * y * slope + 6 * lens.p1 * y + 2 * lens.p2 * x;
