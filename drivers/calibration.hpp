@@ -11,12 +11,14 @@
 
 namespace previz {
 
-// Pinhole with Brown-Conrady distortion in OpenCV's order. Pixels; (0,0) is the centre of the
-// top-left pixel.
+// Pinhole with Brown-Conrady distortion in OpenCV's order, and the divisor of its rational model:
+// a point r off the axis is drawn by (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6
+// r^6). Pixels; (0,0) is the centre of the top-left pixel.
 struct PinholeIntrinsics {
   int width = 0, height = 0;
   double fx = 0, fy = 0, cx = 0, cy = 0;
   double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
+  double k4 = 0, k5 = 0, k6 = 0;
 };
 
 // Kannala-Brandt (OpenCV fisheye): r = t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9, t the angle off axis,

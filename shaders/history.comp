@@ -8,6 +8,7 @@
 
 #include "shaders/lib/halves.glsl"
 #include "shaders/lib/history.glsl"
+#include "shaders/lib/lens.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 layout(scalar, push_constant) uniform Show { GpuShow show; };
@@ -111,12 +112,9 @@ ivec2 nearest_around(ivec2 at) {
   return nearest;
 }
 
-// Returns the place of a ray in the picture before (Brown 1966, Conrady 1919).
+// Returns the place of a ray in the picture before.
 vec2 project_before(vec2 ray) {
-  const float r2 = dot(ray, ray);
-  const float radial = 1.0 + r2 * (history.radial.x + r2 * (history.radial.y + r2 * history.radial.z));
-  const vec2 p = history.tangential;
-  const vec2 bent = ray * radial + 2.0 * p * ray.x * ray.y + p.yx * (r2 + 2.0 * ray * ray);
+  const vec2 bent = distorted(ray, history.radial, history.radial_divisor, history.tangential);
   return history.focal_px * bent + history.principal_px;
 }
 

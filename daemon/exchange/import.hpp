@@ -51,8 +51,8 @@
 //   exposure_s    shutter time, with
 //   gain          linear, default 1: exposure = exposure_s * gain * response.responsivity
 // observer, light - the calibration, written as in the set file; may be left out if the set has it:
-//   intrinsics    {width, height, fx, fy, cx, cy, k1, k2, p1, p2, k3}; light: {width, height, fx,
-//                 fy, cx, cy, k: [k1, k2, k3, k4], max_angle_deg}
+//   intrinsics    {width, height, fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6}; light: {width,
+//                 height, fx, fy, cx, cy, k: [k1, k2, k3, k4], max_angle_deg}
 //   lens          observer only: {focal_length_mm, f_number, focus_distance_m}
 //   response      {kind: "srgb", "linear", "gamma" or "table", gamma, table, responsivity}
 //   pose          light only: {world_from_camera} or {position_m, rotation_deg}

@@ -1,25 +1,14 @@
 #include "daemon/render/corner_rays.hpp"
 
-#include <cmath>
+#include <glm/geometric.hpp>
 #include <opencv2/calib3d.hpp>
+#include <optional>
 #include <string>
 
+#include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::render {
-
-namespace {
-
-// Projects forward, to check the inverse (OpenCV's model; Brown 1966, Conrady 1919).
-cv::Point2d project(const PinholeIntrinsics& k, double x, double y) {
-  const double r2 = x * x + y * y;
-  const double radial = 1 + r2 * (k.k1 + r2 * (k.k2 + r2 * k.k3));
-  const double xd = x * radial + 2 * k.p1 * x * y + k.p2 * (r2 + 2 * x * x);
-  const double yd = y * radial + k.p1 * (r2 + 2 * y * y) + 2 * k.p2 * x * y;
-  return {k.fx * xd + k.cx, k.fy * yd + k.cy};
-}
-
-}  // namespace
 
 std::vector<glm::vec2> corner_rays(const PinholeIntrinsics& k) {
   std::vector<cv::Point2d> corners;
@@ -28,7 +17,7 @@ std::vector<glm::vec2> corner_rays(const PinholeIntrinsics& k) {
     for (int i = 0; i <= k.width; ++i) corners.emplace_back(i - 0.5, j - 0.5);
 
   const cv::Matx33d camera(k.fx, 0, k.cx, 0, k.fy, k.cy, 0, 0, 1);
-  const cv::Vec<double, 5> distortion(k.k1, k.k2, k.p1, k.p2, k.k3);
+  const cv::Vec<double, 8> distortion(k.k1, k.k2, k.p1, k.p2, k.k3, k.k4, k.k5, k.k6);
   const cv::TermCriteria until(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 100, 1e-10);
   std::vector<cv::Point2d> rays;
   cv::undistortPoints(corners, rays, camera, distortion, cv::noArray(), cv::noArray(), until);
@@ -36,12 +25,16 @@ std::vector<glm::vec2> corner_rays(const PinholeIntrinsics& k) {
   std::vector<glm::vec2> result;
   result.reserve(rays.size());
   for (std::size_t i = 0; i < rays.size(); ++i) {
-    const cv::Point2d off = project(k, rays[i].x, rays[i].y) - corners[i];
-    if (!(std::hypot(off.x, off.y) < 0.01))
+    const glm::dvec2 corner(corners[i].x, corners[i].y);
+    std::optional<glm::dvec2> ray({rays[i].x, rays[i].y});
+    // OpenCV's iteration does not converge everywhere, and may end where the lens has folded.
+    if (!(glm::distance(distort(k, *ray), corner) < 0.01) || !is_unfolded(k, *ray, corner))
+      ray = undistort(k, corner);
+    if (!ray)
       throw Error("observer.intrinsics: the distortion cannot be inverted at pixel (" +
-                  std::to_string(corners[i].x) + ", " + std::to_string(corners[i].y) +
+                  std::to_string(corner.x) + ", " + std::to_string(corner.y) +
                   "); recalibrate the lens or lower its radial terms");
-    result.emplace_back(rays[i].x, rays[i].y);
+    result.emplace_back(*ray);
   }
   return result;
 }

@@ -237,6 +237,7 @@ gpu::GpuHistory History::constants(std::int64_t samples) const {
   result.focal_px = {k.fx, k.fy};
   result.principal_px = {k.cx, k.cy};
   result.radial = {k.k1, k.k2, k.k3};
+  result.radial_divisor = {k.k4, k.k5, k.k6};
   result.tangential = {k.p1, k.p2};
   result.white_ratio = static_cast<float>(past.view.white / now.view.white);
   result.samples = static_cast<float>(samples);

@@ -108,6 +108,7 @@ void Renderer::Impl::upload_frame() {
   gpu_frame.focal_px = {k.fx, k.fy};
   gpu_frame.principal_px = {k.cx, k.cy};
   gpu_frame.radial = {k.k1, k.k2, k.k3};
+  gpu_frame.radial_divisor = {k.k4, k.k5, k.k6};
   gpu_frame.tangential = {k.p1, k.p2};
   gpu_frame.seed = frame.seed.value_or(estimation.seed);
   gpu_frame.max_depth = static_cast<std::uint32_t>(estimation.max_depth);

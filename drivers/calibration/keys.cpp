@@ -32,6 +32,9 @@ Keys pinhole_keys(PinholeIntrinsics& i) {
       {"intrinsics", "p1", &i.p1, plain, "Tangential distortion."},
       {"intrinsics", "p2", &i.p2, plain, "Tangential distortion."},
       {"intrinsics", "k3", &i.k3, plain, "Radial distortion."},
+      {.table = "intrinsics", .name = "k4", .to = &i.k4, .rule = plain, .about = "Radial distortion of OpenCV's rational model, for wide lenses: points r off the axis are drawn by (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6).", .is_recorded_if_not_zero = true},
+      {.table = "intrinsics", .name = "k5", .to = &i.k5, .rule = plain, .about = "Radial distortion of the rational model.", .is_recorded_if_not_zero = true},
+      {.table = "intrinsics", .name = "k6", .to = &i.k6, .rule = plain, .about = "Radial distortion of the rational model.", .is_recorded_if_not_zero = true},
   };
 }
 

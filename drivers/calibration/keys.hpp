@@ -27,8 +27,9 @@ inline constexpr int max_picture_side_px = 16384;
 inline constexpr double far_m = 1e6;
 
 // Set files and FRAMES.json are authored: people write them, in the units that a key's name ends
-// in, and may leave keys out. session.toml is recorded: previzd writes every key of it, in the
-// units and to the last bit of the structs.
+// in, and may leave keys out. session.toml is recorded: previzd writes every key of it, but for
+// those that older versions do not know and that are 0, in the units and to the last bit of the
+// structs.
 enum class Format { authored, recorded };
 
 struct ObserverDraft {
@@ -55,6 +56,8 @@ struct Key {
   const char* recorded = name;                     // its path in session.toml; "": not there
   std::optional<ResponseCurve::Kind> only_with{};  // goes with this kind of response only
   bool optional_in_old_sessions = false;           // was not recorded from the beginning
+  // Sessions have such keys only if one of them is not 0. They are numbers.
+  bool is_recorded_if_not_zero = false;
 
   std::string spelled(Format format) const { return format == Format::recorded ? recorded : name; }
   Rule bounds(Format format) const { return format == Format::recorded ? rule.in_si() : rule; }

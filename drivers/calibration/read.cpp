@@ -83,7 +83,8 @@ std::string missing(const Key& key, Format format) {
 bool is_needed(const Key& key, const Source& source) {
   if (key.table == std::string_view("lens") && !source.has_lens) return false;
   if (source.format == Format::authored) return key.need.kind == Need::Kind::required;
-  return *key.recorded && !key.only_with && !key.optional_in_old_sessions;
+  return *key.recorded && !key.only_with && !key.optional_in_old_sessions &&
+         !key.is_recorded_if_not_zero;
 }
 
 template <class Draft>

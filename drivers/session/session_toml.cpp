@@ -129,14 +129,21 @@ std::pair<std::string, std::string> table_and_key(const std::string& path) {
                                   : std::pair{path.substr(0, dot), path.substr(dot + 1)};
 }
 
+bool is_not_zero(const calibration::Key& row) {
+  return row.is_recorded_if_not_zero && *std::get<double*>(row.to) != 0;
+}
+
 template <typename Draft>
 std::string calibration_toml(const std::string& table, const std::string& comment, bool has_lens,
                              Draft draft) {
+  const std::vector<calibration::Key> rows = keys(draft);
+  const bool one_is_not_zero = std::ranges::any_of(rows, is_not_zero);
   std::string text;
   for (const std::string part : {"", "response", "lens"}) {
     if (part == "lens" && !has_lens) continue;
     text += "\n[" + table + (part.empty() ? "]" + comment : "." + part + "]") + "\n";
-    for (const calibration::Key& row : keys(draft)) {
+    for (const calibration::Key& row : rows) {
+      if (row.is_recorded_if_not_zero && !one_is_not_zero) continue;
       const auto [home, key] = table_and_key(row.recorded);
       if (key.empty() || home != part) continue;
       if (row.only_with.value_or(draft.calibration.response.kind) ==

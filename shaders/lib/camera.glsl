@@ -4,6 +4,7 @@
 #define PREVIZ_CAMERA_GLSL
 
 #include "shaders/lib/calibrated_ray.glsl"
+#include "shaders/lib/lens.glsl"
 
 // RGBA32F, width * height: radiance, 1 / depth of the surface (0: not to be used). This is a view of
 // camera_usable.comp's plate.
@@ -13,16 +14,13 @@ uniform textureBuffer seen_radiance;
 // no more than this share.
 const float SEEN_DEPTH_TOLERANCE = 2e-3;
 // The ray through a point's projection must pass the point this closely, in pixels. Otherwise the
-// polynomial of the distortion has folded the point back into the picture.
+// distortion has folded the point back into the picture.
 const float SEEN_RAY_TOLERANCE = 0.5;
 
 // Returns the place in the picture of a ray given by x/z and y/z; pixel centres are at whole
-// numbers (Brown 1966, Conrady 1919; coefficients in OpenCV's order).
+// numbers.
 vec2 project(vec2 ray) {
-  const float r2 = dot(ray, ray);
-  const float radial = 1.0 + r2 * (frame.radial.x + r2 * (frame.radial.y + r2 * frame.radial.z));
-  const vec2 p = frame.tangential;
-  const vec2 bent = ray * radial + 2.0 * p * ray.x * ray.y + p.yx * (r2 + 2.0 * ray * ray);
+  const vec2 bent = distorted(ray, frame.radial, frame.radial_divisor, frame.tangential);
   return frame.focal_px * bent + frame.principal_px;
 }
 

@@ -343,6 +343,7 @@ struct GpuFrame {
   uint clip_from;             // code of the plate from which a channel may be clipped; NO_INDEX: none
   vec2 focal_px, principal_px;  // of the observer's lens, OpenCV's convention
   vec3 radial;                  // k1, k2, k3
+  vec3 radial_divisor;          // k4, k5, k6
   vec2 tangential;              // p1, p2
   float exposure;               // signal over radiance
   uint keeps_albedo;            // 1: the scene has textures, which the denoiser divides by
@@ -382,6 +383,7 @@ struct GpuHistory {
   vec4 camera_from_world[3];         // rows of the rotation in the frame before
   vec2 focal_px, principal_px;       // of the lens in the frame before, OpenCV's convention
   vec3 radial;                       // k1, k2, k3
+  vec3 radial_divisor;               // k4, k5, k6
   vec2 tangential;                   // p1, p2
   float white_ratio;                 // the sensor's white in the frame before over this frame's
   float samples;                     // that a pixel of this frame has
@@ -468,7 +470,7 @@ struct GpuShow {
 #ifdef __cplusplus
 static_assert(sizeof(GpuDenoise) == 24);
 static_assert(sizeof(GpuMotion) == 52);
-static_assert(sizeof(GpuHistory) == 116);
+static_assert(sizeof(GpuHistory) == 128);
 static_assert(sizeof(GpuShow) == 60);
 static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 56);
@@ -480,7 +482,7 @@ static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 32);
 static_assert(sizeof(GpuLight) == 160);
 static_assert(offsetof(GpuLight, uv0) == 112);
-static_assert(sizeof(GpuFrame) == 224);
+static_assert(sizeof(GpuFrame) == 236);
 static_assert(sizeof(GpuLightNode) == 48);
 static_assert(sizeof(GpuBatch) == 28);
 static_assert(sizeof(GpuPhoton) == 64);

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <optional>
 #include <thread>
+#include <utility>
 
 #include "drivers/error.hpp"
 #include "tests/bench/equal_error/cycles.hpp"
@@ -54,8 +55,9 @@ Method our_method() {
 // Cycles has no lens distortion: both sides do without it, and cannot be held against the truth.
 bool drop_distortion(View& view) {
   PinholeIntrinsics& k = view.camera.intrinsics;
-  const bool had = k.k1 != 0 || k.k2 != 0 || k.k3 != 0 || k.p1 != 0 || k.p2 != 0;
-  k.k1 = k.k2 = k.k3 = k.p1 = k.p2 = 0;
+  bool had = false;
+  for (double* term : {&k.k1, &k.k2, &k.p1, &k.p2, &k.k3, &k.k4, &k.k5, &k.k6})
+    had |= std::exchange(*term, 0) != 0;
   return had;
 }
 

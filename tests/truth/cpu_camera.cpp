@@ -12,18 +12,29 @@
 namespace previz::truth {
 namespace {
 
-// Brown-Conrady as OpenCV defines it: where the normalised point (x, y) lands.
+double divisor_of(const PinholeIntrinsics& k, double r2) {
+  return 1 + r2 * (k.k4 + r2 * (k.k5 + r2 * k.k6));
+}
+
+double radial_of(const PinholeIntrinsics& k, double r2) {
+  return (1 + r2 * (k.k1 + r2 * (k.k2 + r2 * k.k3))) / divisor_of(k, r2);
+}
+
+// Returns where the normalised point (x, y) lands, by the rational model as OpenCV defines it.
 glm::dvec2 distort(const PinholeIntrinsics& k, const glm::dvec2& p) {
   const double r2 = glm::dot(p, p);
-  const double radial = 1 + r2 * (k.k1 + r2 * (k.k2 + r2 * k.k3));
+  const double radial = radial_of(k, r2);
   return {p.x * radial + 2 * k.p1 * p.x * p.y + k.p2 * (r2 + 2 * p.x * p.x),
           p.y * radial + k.p1 * (r2 + 2 * p.y * p.y) + 2 * k.p2 * p.x * p.y};
 }
 
 glm::dmat2 distort_jacobian(const PinholeIntrinsics& k, const glm::dvec2& p) {
   const double r2 = glm::dot(p, p);
-  const double radial = 1 + r2 * (k.k1 + r2 * (k.k2 + r2 * k.k3));
-  const double slope = 2 * (k.k1 + r2 * (2 * k.k2 + r2 * 3 * k.k3));  // d radial / d r2, doubled
+  const double radial = radial_of(k, r2);
+  const double dividend_slope = k.k1 + r2 * (2 * k.k2 + r2 * 3 * k.k3);
+  const double divisor_slope = k.k4 + r2 * (2 * k.k5 + r2 * 3 * k.k6);
+  // d radial / d r2, doubled.
+  const double slope = 2 * (dividend_slope - radial * divisor_slope) / divisor_of(k, r2);
   const double cross = slope * p.x * p.y + 2 * k.p1 * p.x + 2 * k.p2 * p.y;
   return {{radial + slope * p.x * p.x + 2 * k.p1 * p.y + 6 * k.p2 * p.x, cross},
           {cross, radial + slope * p.y * p.y + 6 * k.p1 * p.y + 2 * k.p2 * p.x}};

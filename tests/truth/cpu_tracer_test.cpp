@@ -146,11 +146,13 @@ TEST(CpuEnvironment, SamplesWithTheDensityItStates) {
 }
 
 TEST(CpuCamera, InvertsTheDistortionExactly) {
-  PinholeIntrinsics k{640, 480, 598.4, 600.9, 325.3, 233.1, -0.118, 0.041, 0.0009, -0.0007, -0.006};
+  PinholeIntrinsics k{640,   480,    598.4,   600.9,  325.3, 233.1, -0.118,
+                      0.041, 0.0009, -0.0007, -0.006, 0.09,  -0.03, 0.02};
   for (const glm::dvec2& pixel : {glm::dvec2(0, 0), glm::dvec2(639, 479), glm::dvec2(100, 400)}) {
     const glm::dvec3 d = undistorted_direction(k, pixel.x, pixel.y);
     const double r2 = d.x * d.x + d.y * d.y;
-    const double radial = 1 + k.k1 * r2 + k.k2 * r2 * r2 + k.k3 * r2 * r2 * r2;
+    const double radial = (1 + k.k1 * r2 + k.k2 * r2 * r2 + k.k3 * r2 * r2 * r2) /
+                          (1 + k.k4 * r2 + k.k5 * r2 * r2 + k.k6 * r2 * r2 * r2);
     const double x = d.x * radial + 2 * k.p1 * d.x * d.y + k.p2 * (r2 + 2 * d.x * d.x);
     const double y = d.y * radial + k.p1 * (r2 + 2 * d.y * d.y) + 2 * k.p2 * d.x * d.y;
     EXPECT_NEAR(k.fx * x + k.cx, pixel.x, 1e-9);

@@ -26,7 +26,8 @@ constexpr double seen_tolerance = 2e-3;
 // Returns the place of a point, in camera axes, in the picture (Brown 1966, Conrady 1919).
 glm::dvec2 projected(const PinholeIntrinsics& k, const glm::dvec3& camera) {
   const double x = camera.x / camera.z, y = camera.y / camera.z, r2 = x * x + y * y;
-  const double radial = 1 + r2 * (k.k1 + r2 * (k.k2 + r2 * k.k3));
+  const double radial =
+      (1 + r2 * (k.k1 + r2 * (k.k2 + r2 * k.k3))) / (1 + r2 * (k.k4 + r2 * (k.k5 + r2 * k.k6)));
   return {k.fx * (x * radial + 2 * k.p1 * x * y + k.p2 * (r2 + 2 * x * x)) + k.cx,
           k.fy * (y * radial + k.p1 * (r2 + 2 * y * y) + 2 * k.p2 * x * y) + k.cy};
 }

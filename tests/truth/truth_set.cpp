@@ -146,6 +146,9 @@ ObserverCalibration parse_observer(const Node& observer) {
     k.p1 = d.number_or("p1", 0);
     k.p2 = d.number_or("p2", 0);
     k.k3 = d.number_or("k3", 0);
+    k.k4 = d.number_or("k4", 0);
+    k.k5 = d.number_or("k5", 0);
+    k.k6 = d.number_or("k6", 0);
   }
   if (observer.has("vignetting")) observer["vignetting"].fail("vignetting is not supported");
   out.lens = parse_lens(observer);

@@ -1,5 +1,6 @@
 // A calibration in each of its three formats: the same numbers give the same camera, and the same
 // mistake gives the same words, at the place where it is.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <string>
 
 #include "daemon/exchange/import_description.hpp"
+#include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration/fisheye.hpp"
 #include "drivers/error.hpp"
@@ -31,6 +33,9 @@ k2 = 0.03
 p1 = 0.001
 p2 = -0.002
 k3 = 0.004
+k4 = 0.05
+k5 = -0.006
+k6 = 0.007
 [observer.lens]
 focal_length_mm = 35.3
 f_number = 2.8
@@ -59,7 +64,8 @@ world_from_camera = [[0, -1, 0, 0.5], [1, 0, 0, 0], [0, 0, 1, 1.6], [0, 0, 0, 1]
 const char* const frames_text = R"({
 "observer": {
   "intrinsics": {"width": 64, "height": 48, "fx": 60.1, "fy": 60.3, "cx": 31.5, "cy": 23.5,
-                 "k1": -0.1, "k2": 0.03, "p1": 0.001, "p2": -0.002, "k3": 0.004},
+                 "k1": -0.1, "k2": 0.03, "p1": 0.001, "p2": -0.002, "k3": 0.004,
+                 "k4": 0.05, "k5": -0.006, "k6": 0.007},
   "lens": {"focal_length_mm": 35.3, "f_number": 2.8, "focus_distance_m": 1.2},
   "response": {"kind": "srgb", "responsivity": 3.5},
   "pictures": ["a.png"], "fps": 25, "exposure": 1},
@@ -190,6 +196,9 @@ const Mistake observer_mistakes[] = {
     {"observer", "intrinsics", "fy", "", "is missing; allowed: number in px, above 0"},
     {"observer", "intrinsics", "cx", "[1]", "a list of 1 entry is not allowed; allowed: number"},
     {"observer", "intrinsics", "k1", "true", "true is not allowed; allowed: number"},
+    {"observer", "intrinsics", "k4", "\"wide\"", "\"wide\" is not allowed; allowed: number"},
+    {"observer", "intrinsics", "k6", "[1, 2]",
+     "a list of 2 entries is not allowed; allowed: number"},
     {.camera = "observer",
      .table = "lens",
      .key = "focal_length_mm",
@@ -294,7 +303,37 @@ TEST(Calibration, IsTheSameCameraInEveryFormat) {
   EXPECT_EQ(text_of(imported.observer_calibration, imported.light_calibration), text);
   EXPECT_EQ(text_of(recorded.observer, recorded.light), text);
   EXPECT_EQ(set.observer.calibration->lens->focal_length_m, 35.3 * 1e-3);
+  EXPECT_EQ(set.observer.calibration->intrinsics.k4, 0.05);
+  EXPECT_EQ(set.observer.calibration->intrinsics.k5, -0.006);
+  EXPECT_EQ(set.observer.calibration->intrinsics.k6, 0.007);
   EXPECT_EQ(set.light_camera.calibration->world_from_camera[3], glm::dvec4(0.5, 0, 1.6, 1));
+}
+
+// JSON has no such numbers.
+TEST(Calibration, DistortionThatIsNotFiniteIsRefused) {
+  for (const char* key : {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"})
+    for (const char* value : {"nan", "inf", "-inf"}) {
+      const std::string words =
+          std::string(key) + ": " + value + " is not allowed; allowed: finite number";
+      const auto set = edited(set_text, "observer.intrinsics", key, value).first;
+      EXPECT_THAT(message_of([&] { set::parse_set(set, "stage.toml"); }),
+                  testing::HasSubstr("observer.intrinsics." + words));
+      const auto session = edited(session_text(), "observer.calibration", key, value).first;
+      EXPECT_THAT(message_of([&] { session::parse_session_toml(session, "session.toml"); }),
+                  testing::HasSubstr("observer.calibration." + words));
+    }
+}
+
+// The terms of the rational model are printed for the lenses that have them only.
+TEST(Calibration, RationalTermsArePrintedIfTheyAreNotZero) {
+  ObserverCalibration calibration = *set::parse_set(set_text, "stage.toml").observer.calibration;
+  const std::string with = set::intrinsics_toml(calibration);
+  EXPECT_THAT(with, testing::HasSubstr("k3 = 0.004\nk4 = 0.05\nk5 = -0.006\nk6 = 0.007\n"));
+  EXPECT_EQ(set::intrinsics_toml(*set::parse_set(with, "printed.toml").observer.calibration), with);
+  PinholeIntrinsics& lens = calibration.intrinsics;
+  lens.k4 = lens.k5 = lens.k6 = 0;
+  const std::string without = set::intrinsics_toml(calibration);
+  EXPECT_EQ(without, with.substr(0, with.find("k4 = ")));
 }
 
 // r = t - 0.2 t^3 stops growing at t = sqrt(1 / 0.6) = 73.97 degrees. Whoever wrote the file can

@@ -220,7 +220,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"/observer/intrinsics/fx", "-3",
                 "observer.intrinsics.fx: -3 is not allowed; allowed: finite number"},
         Mistake{"/observer/intrinsics/width", "33", "observer.intrinsics is for 33x24"},
-        Mistake{"/observer/intrinsics/k4", "0", "observer.intrinsics.k4 is not known"},
+        Mistake{"/observer/intrinsics/k7", "0", "observer.intrinsics.k7 is not known"},
         Mistake{"/observer/intrinsics", "", "observer.lens needs intrinsics beside it"},
         Mistake{"/observer/lens/focus_distance_m", "0.01",
                 "the focus is not beyond the focal length"},

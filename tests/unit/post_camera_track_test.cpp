@@ -44,7 +44,12 @@ TEST(CameraTrack, UsdOfALevelCamera) {
   EXPECT_NE(usda.find("upAxis = \"Z\""), std::string::npos);
   EXPECT_NE(usda.find("endTimeCode = 10\n"), std::string::npos);
   EXPECT_NE(usda.find("12A \\\"close\\\""), std::string::npos);
-  EXPECT_NE(usda.find("k1 -0.08"), std::string::npos);
+  EXPECT_NE(usda.find("Brown-Conrady: k1 -0.08"), std::string::npos);
+  EXPECT_EQ(usda.find("k4"), std::string::npos);
+  CameraTrack wide = track_of(along_y);
+  wide.calibration.intrinsics.k5 = 0.25;
+  EXPECT_NE(to_usda(wide).find("rational model: k1 -0.08"), std::string::npos);
+  EXPECT_NE(to_usda(wide).find(", k4 0, k5 0.25, k6 0"), std::string::npos);
 }
 
 // The lens is 35 mm; the film is as wide as the picture at that distance.

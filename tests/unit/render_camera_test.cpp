@@ -3,6 +3,7 @@
 #include <initializer_list>
 #include <numbers>
 
+#include "drivers/calibration/pinhole.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test {
@@ -71,7 +72,8 @@ glm::dvec2 mirrored_pixel(const View& view, int x, int y) {
   const glm::dmat4& camera = view.world_from_camera;
   const glm::dmat4& mirror = view.scene.instances[1].world_from_object;
   const glm::dvec3 eye(camera[3]), normal(mirror[2]), middle(mirror[3]);
-  const glm::dvec3 ray(glm::dmat3(camera) * glm::dvec3((x - k.cx) / k.fx, (y - k.cy) / k.fy, 1));
+  const glm::dvec2 straight = undistort(k, {x, y}).value();
+  const glm::dvec3 ray(glm::dmat3(camera) * glm::dvec3(straight, 1));
   const double t = glm::dot(middle - eye, normal) / glm::dot(ray, normal);
   const glm::dvec3 hit = eye + t * ray;
   const glm::dvec2 inside(glm::dot(hit - middle, glm::dvec3(mirror[0])),
@@ -81,7 +83,7 @@ glm::dvec2 mirrored_pixel(const View& view, int x, int y) {
   if (reflected.z >= 0) return {-1, -1};
   const glm::dvec3 floor = hit - reflected * (hit.z / reflected.z);
   const glm::dvec3 seen = glm::inverse(glm::dmat3(camera)) * (floor - eye);
-  return {k.cx + k.fx * seen.x / seen.z, k.cy + k.fy * seen.y / seen.z};
+  return distort(k, {seen.x / seen.z, seen.y / seen.z});
 }
 
 bool is_inside(const glm::dvec2& pixel) {
@@ -118,6 +120,14 @@ void expect_mirror_shows_plate(const View& view, bool where_it_can = false) {
 
 TEST(CameraRadiance, AMirrorShowsThePlate) {
   expect_mirror_shows_plate(floor_and_mirror());
+}
+
+// Without its divisor the lens would draw the corners, 0.6 off the axis, two pixels further out.
+TEST(CameraRadiance, AMirrorShowsThePlateThroughARationalLens) {
+  View view = floor_and_mirror();
+  PinholeIntrinsics& lens = view.calibration.intrinsics;
+  lens.k1 = 0.05, lens.k4 = 0.25, lens.k5 = -0.05, lens.k6 = 0.02;
+  expect_mirror_shows_plate(view);
 }
 
 // Paint and plastic as glTF's defaults have them, and as Blender writes them: the rough coat

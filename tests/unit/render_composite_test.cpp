@@ -35,6 +35,8 @@ TEST(Composite, WithoutAVirtualObjectThePlateComesBackBitForBit) {
   lens.k3 = -0.006;
   const Plate plate = random_plate(70, 50, 8);
   EXPECT_EQ(show(view, plate, 2).samples, plate.samples) << "distorted";
+  lens.k4 = 0.09, lens.k5 = -0.03, lens.k6 = 0.02;
+  EXPECT_EQ(show(view, plate, 2).samples, plate.samples) << "by the rational model";
   view.calibration.lens = ThinLens{0.05, 1.4, 0.8};
   EXPECT_EQ(show(view, plate, 2).samples, plate.samples) << "defocused";
 }

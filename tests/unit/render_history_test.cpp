@@ -109,8 +109,9 @@ TEST(History, OfAMovingCameraIsBetterThanAFrameAlone) {
 // pixels, so what is shown lies between the extremes of the 3x3 pixels around, within the two codes
 // of rounding. Box and shadow are left out by looking past them, and so are the 8 pixels at the
 // picture's border, into which the past is interpolated from one side only.
-TEST(History, OfAMovingCameraKeepsValuesInTheirPlaces) {
+void expect_values_stay_in_their_places(const PinholeIntrinsics& lens) {
   Stage stage(glm::vec3(0));
+  stage.view.calibration.intrinsics = lens;
   set::Light added = lamp(set::LightType::point, glm::dvec3(3));
   added.position = {0, 0, 3};
   added.gain_mixed = 1;
@@ -140,6 +141,16 @@ TEST(History, OfAMovingCameraKeepsValuesInTheirPlaces) {
       ASSERT_GE(green(last, 0, 0), low - 2) << x << ", " << y;
       ASSERT_LE(green(last, 0, 0), high + 2) << x << ", " << y;
     }
+}
+
+TEST(History, OfAMovingCameraKeepsValuesInTheirPlaces) {
+  expect_values_stay_in_their_places(pinhole(width, height, 0.9).intrinsics);
+}
+
+TEST(History, OfAMovingCameraKeepsValuesInTheirPlacesThroughARationalLens) {
+  PinholeIntrinsics lens = pinhole(width, height, 0.9).intrinsics;
+  lens.k1 = 0.05, lens.k4 = 0.25, lens.k5 = -0.05, lens.k6 = 0.02;
+  expect_values_stay_in_their_places(lens);
 }
 
 TEST(History, LeavesThePlateBitForBitWhereNothingDiffers) {

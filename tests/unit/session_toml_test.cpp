@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -89,7 +90,10 @@ TEST(SessionToml, EveryNumberComesBackBitForBit) {
                          0.041,
                          9e-4,
                          -7e-4,
-                         std::numeric_limits<double>::denorm_min()};
+                         std::numeric_limits<double>::denorm_min(),
+                         0.09,
+                         -0.0,
+                         1.0 / 3.0};
   observer.lens = ThinLens{0.0235, 2.0, 0.78};
   observer.response.kind = ResponseCurve::Kind::gamma;
   observer.response.gamma = 1.0 / 0.45;
@@ -118,8 +122,9 @@ TEST(SessionToml, EveryNumberComesBackBitForBit) {
   const PinholeIntrinsics &in = observer.intrinsics, &out = back.info.observer->intrinsics;
   for (const auto member : {&PinholeIntrinsics::fx, &PinholeIntrinsics::fy, &PinholeIntrinsics::cx,
                             &PinholeIntrinsics::cy, &PinholeIntrinsics::k1, &PinholeIntrinsics::k2,
-                            &PinholeIntrinsics::p1, &PinholeIntrinsics::p2, &PinholeIntrinsics::k3})
-    EXPECT_EQ(out.*member, in.*member);
+                            &PinholeIntrinsics::p1, &PinholeIntrinsics::p2, &PinholeIntrinsics::k3,
+                            &PinholeIntrinsics::k4, &PinholeIntrinsics::k5, &PinholeIntrinsics::k6})
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(out.*member), std::bit_cast<std::uint64_t>(in.*member));
   EXPECT_EQ(out.width, 1920);
   EXPECT_EQ(back.info.observer->lens->focal_length_m, 0.0235);
   EXPECT_EQ(back.info.observer->lens->f_number, 2.0);
@@ -242,6 +247,18 @@ inverse_table = [0.0, 0.25, 1.0]
 [assets])"),
             std::string::npos)
       << text;
+}
+
+TEST(SessionToml, RationalTermsAreWrittenIfOneIsNotZero) {
+  SessionFile file;
+  ObserverCalibration observer;
+  observer.intrinsics = {64, 48, 60, 60, 31.5, 23, -0.1, 0.03, 1e-3, 0, 0};
+  file.info.observer = observer;
+  EXPECT_EQ(to_toml(file).find("k4"), std::string::npos);
+  file.info.observer->intrinsics.k5 = 0.25;
+  EXPECT_NE(to_toml(file).find("k3 = 0.0\nk4 = 0.0\nk5 = 0.25\nk6 = 0.0\nresponsivity"),
+            std::string::npos)
+      << to_toml(file);
 }
 
 TEST(SessionToml, WhatIsMissingComesBack) {

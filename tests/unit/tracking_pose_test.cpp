@@ -7,11 +7,10 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
-#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
 #include <random>
 
 #include "daemon/tracking/joint_pose.hpp"
-#include "drivers/calibration/pinhole.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::tracking {
@@ -55,45 +54,6 @@ double normalised_error(const FittedPose& fit, const glm::dmat4& truth) {
   const glm::dvec3 w = glm::axis(q) * glm::angle(q);
   const cv::Matx<double, 6, 1> e(w.x, w.y, w.z, d[3][0], d[3][1], d[3][2]);
   return e.dot(cv::Matx<double, 6, 6>(fit.covariance.data()).solve(e, cv::DECOMP_SVD));
-}
-
-TEST(TrackingLens, AgreesWithOpenCv) {
-  PinholeIntrinsics lens = test::plain_lens(640, 480, 600);
-  lens.fy = 603, lens.k1 = -0.118, lens.k2 = 0.041, lens.p1 = 9e-4, lens.p2 = -7e-4;
-  lens.k3 = -0.006;
-  const cv::Matx33d k(lens.fx, 0, lens.cx, 0, lens.fy, lens.cy, 0, 0, 1);
-  const std::vector<double> distortion{lens.k1, lens.k2, lens.p1, lens.p2, lens.k3};
-  for (double x = -0.5; x <= 0.5; x += 0.25) {
-    for (double y = -0.4; y <= 0.4; y += 0.2) {
-      std::vector<cv::Point2d> pixel;
-      cv::projectPoints(std::vector<cv::Point3d>{{x, y, 1}}, cv::Vec3d(), cv::Vec3d(), k,
-                        distortion, pixel);
-      glm::dmat2 jacobian;
-      const glm::dvec2 ours = distort(lens, {x, y}, &jacobian);
-      EXPECT_NEAR(ours.x, pixel[0].x, 1e-9);
-      EXPECT_NEAR(ours.y, pixel[0].y, 1e-9);
-      const auto back = undistort(lens, ours);
-      ASSERT_TRUE(back);
-      EXPECT_NEAR(back->x, x, 1e-11);
-      EXPECT_NEAR(back->y, y, 1e-11);
-      const double h = 1e-6;
-      for (int axis = 0; axis < 2; ++axis) {
-        glm::dvec2 step(0);
-        step[axis] = h;
-        const glm::dvec2 slope =
-            (distort(lens, glm::dvec2(x, y) + step) - distort(lens, glm::dvec2(x, y) - step)) /
-            (2 * h);
-        EXPECT_NEAR(glm::distance(slope, jacobian[axis]), 0, 1e-5);
-      }
-    }
-  }
-}
-
-TEST(TrackingLens, SaysWhereThereIsNoInverse) {
-  PinholeIntrinsics lens = test::plain_lens(640, 480, 300);
-  lens.k1 = -0.4;  // turns back at r^2 = 1 / 1.2, at 183 px
-  EXPECT_TRUE(undistort(lens, {lens.cx + 170, lens.cy}));
-  EXPECT_FALSE(undistort(lens, {lens.cx + 250, lens.cy}));
 }
 
 // Rounding alone: 1e-9 m at 1 m, at every scale and 1 km from the origin.
