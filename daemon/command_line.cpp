@@ -137,6 +137,7 @@ void add_export(CLI::App& app, exchange::ExportOptions& options) {
       *app.add_subcommand("export", "Write a take's camera for USD and Nuke, with its scene");
   command.add_option("session", options.session, "Session directory")->required();
   command.add_option("directory", options.directory, "Directory for the files")->required();
+  command.add_option("--set", options.set_file, "Set file, instead of the session's own");
   add_any_paths(command, options.any_paths);
 }
 

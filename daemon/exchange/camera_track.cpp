@@ -207,7 +207,8 @@ CameraTrack camera_track(const session::Session& session,
     throw Error(
         session.directory.string() +
         ": no frame has a pose, so that there is no camera to export; `previzd track` says why, "
-        "and the set needs [[tag]] tables, or the take's import a track");
+        "and the set needs [[tag]] tables (`previzd calibrate tags` measures them; --set names "
+        "another set file than the take's own), or the take's import a track");
   return track;
 }
 
@@ -260,7 +261,8 @@ std::string to_chan(const CameraTrack& track) {
 }
 
 void export_take(const ExportOptions& options, std::ostream& out) {
-  pipeline::Take take = pipeline::open_take(options.session, {}, options.any_paths, options.stop);
+  pipeline::Take take =
+      pipeline::open_take(options.session, options.set_file, options.any_paths, options.stop);
   for (const std::string& what : take.session.missing) out << "session: " << what << std::endl;
   solve_missing(take, out, options.stop);
   const CameraTrack track =

@@ -55,9 +55,10 @@ glm::dvec3 zxy_degrees(const glm::dmat3& rotation);
 
 struct ExportOptions {
   std::filesystem::path session;
-  std::filesystem::path directory;  // made if need be
-  bool any_paths = false;           // also files outside of the session that its set names
-  std::stop_token stop = {};        // ends the search for poses, with previz::Error
+  std::filesystem::path directory;                     // made if need be
+  std::optional<std::filesystem::path> set_file = {};  // instead of the session's own
+  bool any_paths = false;     // also files outside of the session that its set names
+  std::stop_token stop = {};  // ends the search for poses, with previz::Error
 };
 // Writes DIR/camera.usda, DIR/camera.chan and the glTF file of each object, moved to where the set
 // and the take have it, as `previzd export` does; of two files of one name, the second becomes

@@ -6,9 +6,11 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <ostream>
+#include <set>
 
 #include "daemon/pipeline/track_stage.hpp"
 #include "daemon/report/report.hpp"
+#include "daemon/tracking/tag_map.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 
@@ -75,6 +77,22 @@ void print_tags(const std::vector<TrackedFrame>& frames, std::ostream& out) {
         << count.second << '\n';
   for (const auto& [name, count] : carriers)
     out << "  carrier \"" << name << "\": found in " << count << " frames\n";
+}
+
+// Tags that the set does not have are no mistake of the tracking.
+void print_strangers(const std::vector<TrackedFrame>& frames, const set::Tracking& tracking,
+                     std::ostream& out) {
+  std::set<int> known, strangers;
+  for (const set::Tag& tag : tracking.tags) known.insert(tag.id);
+  for (const set::Carrier& carrier : tracking.carriers)
+    for (const set::Tag& tag : carrier.tags) known.insert(tag.id);
+  for (const TrackedFrame& frame : frames)
+    for (const int tag : frame.seen_tags)
+      if (!known.contains(tag)) strangers.insert(tag);
+  if (strangers.empty()) return;
+  out << "  " << tracking::tags_in_words({strangers.begin(), strangers.end()})
+      << ": not in the set; `previzd calibrate tags` measures where tags are, and writes it there "
+         "(--set SET --write)\n";
 }
 
 // Prints each reason once, with the figures of the first frame that it holds for.
@@ -166,6 +184,7 @@ int track_take(const TrackOptions& options, std::ostream& out) {
   }
   print_poses(frames, out);
   print_tags(frames, out);
+  print_strangers(frames, take.set.tracking, out);
   print_reasons(frames, out);
   if (options.out) out << options.out->string() << std::endl;
   const bool found =

@@ -11,8 +11,11 @@ namespace previz::pipeline {
 ObserverCalibration observer_calibration(const set::Set& set, const session::SessionInfo& session) {
   if (set.observer.calibration) return *set.observer.calibration;
   if (session.observer) return *session.observer;
-  throw Error(set.file.string() +
-              ": observer: neither the set nor the session has the observer's calibration");
+  throw Error(
+      set.file.string() +
+      ": observer: neither the set nor the session has the observer's calibration: find it with "
+      "`previzd calibrate observer`, or `previzd calibrate from` if another tool has it, "
+      "and put the table [observer.intrinsics] into the set");
 }
 
 std::optional<LightCameraCalibration> light_calibration(const set::Set& set,
@@ -53,6 +56,11 @@ Take open_take(const std::filesystem::path& session_directory,
   if (!take.observer_stream || take.observer_stream->records().empty())
     throw Error(session_directory.string() + ": the session has no observer frames");
   return take;
+}
+
+std::string no_light_words() {
+  return "the session has no light frames, and the set gives no lighting.environment: name a "
+         "picture of the light there, or give lamps ([[light]]) and from = \"set\" in [lighting]";
 }
 
 std::int64_t start_of(const Take& take) {

@@ -35,6 +35,9 @@ Take open_take(const std::filesystem::path& session_directory,
                const std::stop_token& stop = {}, const std::optional<set::Overlay>& with = {});
 
 // Returns the timestamp (ns) of the take's first observer frame.
+// Says that the light must come from a light camera, that the take has none, and what to do.
+std::string no_light_words();
+
 std::int64_t start_of(const Take& take);
 
 // These return a camera's calibration: the set's own, otherwise the session's.

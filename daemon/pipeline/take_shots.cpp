@@ -28,8 +28,7 @@ TakeShots::TakeShots(const Take& take, TakeShotsOptions options)
              options_.whole_light ? nullptr : options_.scene),
       light_stream_(take.light_stream) {
   if (light_.needs_frames() && !light_stream_)
-    throw Error(take.session.directory.string() +
-                ": the session has no light frames, and the set gives no lighting.environment");
+    throw Error(take.session.directory.string() + ": " + no_light_words());
   const std::size_t frames = take.observer_stream->records().size();
   if (options_.first >= frames)
     throw Error(take.session.directory.string() + ": has no frame " +

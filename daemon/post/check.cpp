@@ -15,6 +15,7 @@
 #include "daemon/output/take_folders.hpp"
 #include "daemon/pipeline/room_model.hpp"
 #include "daemon/pipeline/take.hpp"
+#include "daemon/post/implausible.hpp"
 #include "daemon/render/feature.hpp"
 #include "daemon/render/photon_schedule.hpp"
 #include "daemon/render/picture_memory.hpp"
@@ -37,6 +38,7 @@ using Lines = std::vector<std::string>;
 struct Checked {
   set::Set set;
   bool has_track = false;  // the session has poses
+  bool is_take = false;    // its cameras are recorded
   Lines remarks;           // things that are allowed but unusual
 };
 
@@ -68,6 +70,7 @@ Checked open(const fs::path& set_or_session) {
     checked.set.observer.calibration = take.observer;
     checked.set.light_camera.calibration = take.light;
     checked.has_track = !take.session.track.empty();
+    checked.is_take = true;
     checked.remarks = take.session.missing;
     if (!take.light_stream) checked.set.light_camera.driver = set::no_driver;
     return checked;
@@ -127,6 +130,17 @@ void check_environment(Checked& checked, Lines& problems) {
     for (const auto& note : lighting::load_environment(coarse).report.notes)
       checked.remarks.push_back(note);
   });
+}
+
+// What a live set, or the rendering of a take, would be refused for.
+void check_cameras(const Checked& checked, Lines& problems) {
+  const set::Lighting& lighting = checked.set.lighting;
+  const bool from_camera = lighting.from == set::LightFrom::camera && !lighting.environment;
+  if (checked.is_take && from_camera && checked.set.light_camera.driver == set::no_driver)
+    problems.push_back(checked.set.file.string() + ": " + pipeline::no_light_words());
+  if (checked.is_take) return;
+  for (const std::string& line : other_sizes(checked.set))
+    problems.push_back(checked.set.file.string() + ": " + line);
 }
 
 void check_room(const set::Set& set, Lines& problems) {
@@ -374,9 +388,11 @@ int check_set(const fs::path& set_or_session, std::ostream& out) {
   const auto scene = load_scene(checked.set, problems);
   check_environment(checked, problems);
   check_room(checked.set, problems);
+  check_cameras(checked, problems);
   check_tracking(checked, problems);
   if (!problems.empty()) return refuse(problems, out);
 
+  for (const std::string& line : implausible(checked.set)) checked.remarks.push_back(line);
   remark_on_cameras(checked);
   remark_on_recording(checked);
   remark_on_scene(checked, *scene);

@@ -104,6 +104,10 @@ FrameRange range_of(const RenderOptions& options, const pipeline::Take& take) {
   return range;
 }
 
+std::string size_words(const PinholeIntrinsics& picture) {
+  return std::to_string(picture.width) + "x" + std::to_string(picture.height);
+}
+
 std::string percent_words(double share) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.2g %%", 100 * share);
@@ -204,7 +208,7 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
     for (const std::string& note : scene.notes) out << "scene: " << note << std::endl;
     const std::shared_ptr<render::Device> device = render::open_device(options.device);
     out << take.session.info.name << ": " << to_do.size() << " frames of "
-        << take.observer.intrinsics.width << "x" << take.observer.intrinsics.height << ", "
+        << size_words(pipeline::scaled(take.observer, options.scale).intrinsics) << ", "
         << quality_words(set.quality) << ", on " << render::device_name(*device) << std::endl;
 
     output::Progress progress(out, options.terminal, to_do.size(), now_s());

@@ -198,7 +198,9 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     }
     reports({report::Severity::info, "",
              "live on " + device_words(*device) + ", set \"" + set.name + "\", " +
-                 std::to_string(set.quality.samples) + " samples a frame"});
+                 (set.quality.fps > 0 ? "at most " : "") + std::to_string(set.quality.samples) +
+                 " samples a frame" +
+                 (set.quality.fps > 0 ? ", fewer where the rate would suffer (quality.fps)" : "")});
     std::optional<BusLink> bus;
     std::optional<RecordingWatch> watch;
     if (options.bus) {

@@ -101,6 +101,9 @@ std::vector<std::string> words_of(const Losses& lost) {
 
 Session open_session(const std::filesystem::path& directory, const std::stop_token& stop) {
   const std::filesystem::path toml = directory / "session.toml";
+  if (!std::filesystem::exists(directory))
+    throw Error(directory.string() +
+                ": is not there; `previzd takes list FOLDER` shows the takes there are");
   if (!std::filesystem::exists(toml))
     throw Error(directory.string() + ": is not a session; it holds no session.toml");
   const SessionFile file = parse_session_toml(read_file(toml), toml);

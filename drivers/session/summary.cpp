@@ -39,6 +39,7 @@ void add_own_files(const std::filesystem::path& directory, const std::filesystem
 
 Summary summary_of(const std::filesystem::path& directory) {
   const std::filesystem::path toml = directory / "session.toml";
+  if (!std::filesystem::exists(directory)) throw Error(directory.string() + ": is not there");
   if (!std::filesystem::exists(toml))
     throw Error(directory.string() + ": is not a take; it holds no session.toml");
   SessionFile file = parse_session_toml(read_file(toml), toml);

@@ -138,7 +138,7 @@ TEST_F(UntrackedTake, PosesAreFoundWithoutRendering) {
 
 // It was refused: "track.jsonl has no pose".
 TEST_F(UntrackedTake, IsExportedWithItsCamera) {
-  export_take({session_, out_, false}, said_);
+  export_take({session_, out_}, said_);
   EXPECT_THAT(said_.str(), HasSubstr("finding the poses of 4 frames"));
   EXPECT_THAT(said_.str(), HasSubstr("3 poses of 4 frames"));
   EXPECT_THAT(said_.str(), HasSubstr("rotation order ZXY"));
@@ -150,11 +150,25 @@ TEST_F(UntrackedTake, IsExportedWithItsCamera) {
 
 // It lay at the origin.
 TEST_F(UntrackedTake, IsExportedWithItsObjectsInTheirPlaces) {
-  export_take({session_, out_, false}, said_);
+  export_take({session_, out_}, said_);
   const glm::dmat4 in_set = place_in(
       directory_.path(), "position_m = [-0.05, 0.0, -0.28]\nrotation_deg = [10.0, 20.0, 90.0]\n");
   EXPECT_LT(distance(place_in(out_, ""), in_set), 1e-12);
   EXPECT_GT(distance(in_set, glm::dmat4(1)), 0.2);
+}
+
+// The take was recorded before the tags were measured.
+TEST_F(UntrackedTake, IsExportedWithAnotherSetFile) {
+  std::string toml = session::read_file(session_ / "session.toml");
+  const std::string whole_set = session::open_session(session_).info.set_text;
+  const std::size_t tag = toml.find("[[tag]]");
+  toml.replace(tag, toml.find("[[object]]") - tag, "");
+  session::replace_file(session_ / "session.toml", toml);
+  session::replace_file(directory_ / "measured.toml", whole_set);
+  ExportOptions options{session_, out_};
+  options.set_file = directory_ / "measured.toml";
+  export_take(options, said_);
+  EXPECT_THAT(said_.str(), HasSubstr("3 poses of 4 frames"));
 }
 
 TEST_F(UntrackedTake, WithoutTagsSaysWhatToDo) {
@@ -164,7 +178,7 @@ TEST_F(UntrackedTake, WithoutTagsSaysWhatToDo) {
   toml.replace(tag, toml.find("[[object]]") - tag, "");
   session::replace_file(session_ / "session.toml", toml);
   try {
-    export_take({session_, out_, false}, said_);
+    export_take({session_, out_}, said_);
     FAIL() << "a camera nobody knows was exported";
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), HasSubstr("`previzd track` says why, and the set needs [[tag]]"));

@@ -146,7 +146,7 @@ TEST(ExportTake, TwoFilesOfOneNameStayTwo) {
   const std::string card = session::read_file(directory / "card.gltf");
   rewrite(directory / "session", "card.gltf", "props/floor.gltf");
   std::ostringstream out;
-  export_take({directory / "session", directory / "out", false}, out);
+  export_take({directory / "session", directory / "out"}, out);
   EXPECT_EQ(session::read_file(directory / "out/floor.gltf"), floor);
   EXPECT_EQ(session::read_file(directory / "out/floor_2.gltf"), card);
 }
@@ -162,9 +162,9 @@ TEST(ExportTake, CopiesNoForeignFile) {
   // What the set names is no asset of the session any more.
   rewrite(directory / "session", "\"../secret.gltf\" =", "\"other.gltf\" =");
   std::ostringstream out;
-  EXPECT_THROW(export_take({directory / "session", directory / "out", false}, out), Error);
+  EXPECT_THROW(export_take({directory / "session", directory / "out"}, out), Error);
   EXPECT_FALSE(std::filesystem::exists(directory / "out/secret.gltf"));
-  export_take({directory / "session", directory / "out", true}, out);
+  export_take({directory / "session", directory / "out", {}, true}, out);
   EXPECT_TRUE(std::filesystem::exists(directory / "out/secret.gltf"));
 }
 

@@ -205,6 +205,8 @@ TEST_F(Check, TakesSetAndCalibrationOfASession) {
   frame.height = 8;
   frame.bytes.resize(frame_bytes(frame.format, frame.width, frame.height));
   writer.write(frame);
+  frame.source = "light";
+  writer.write(frame);
   writer.close();
 
   std::ostringstream out;
@@ -217,6 +219,73 @@ TEST_F(Check, TakesSetAndCalibrationOfASession) {
   expect_said("16x8, 35 mm lens at f/2.8, focus at 1.5 m");
   expect_used("lens: the aperture blurs what is out of focus");
   expect_said("tracking is off: only a session that recorded poses can be used");
+}
+
+// `render` refuses it later.
+TEST_F(Check, ATakeWithoutLightIsAProblem) {
+  session::SessionInfo info;
+  info.set_text = "[set]\nname = 'dark'\n[tracking]\nenabled = false\n";
+  info.observer.emplace();
+  info.observer->intrinsics = {.width = 16, .height = 8, .fx = 20, .fy = 20, .cx = 7.5, .cy = 3.5};
+  session::SessionWriter writer(directory_ / "take", info);
+  Frame frame;
+  frame.source = "observer";
+  frame.width = 16;
+  frame.height = 8;
+  frame.bytes.resize(frame_bytes(frame.format, frame.width, frame.height));
+  writer.write(frame);
+  writer.close();
+  std::ostringstream out;
+  EXPECT_EQ(check_set(directory_ / "take", out), 1);
+  said_ = out.str();
+  expect_said("the session has no light frames, and the set gives no lighting.environment: name");
+}
+
+// Twenty-two mistakes of beginners; what is allowed and odd is said, and the rest refused.
+TEST_F(Check, FindsImplausibleUnits) {
+  const auto odd = [&](const std::string& set, const std::string& words) {
+    EXPECT_EQ(check(set), 0) << said_;
+    expect_said(words);
+  };
+  const std::string lens = "[observer.intrinsics]\nwidth=1920\nheight=1080\ncx=959.5\ncy=539.5\n";
+  odd("[[tag]]\nid=3\nsize_m=80.0\nposition_m=[0.0,0.0,0.0]\n",
+      "tag 3: its side is 80 m; sizes are in metres, so 80 mm is 0.08");
+  odd("[[tag]]\nid=3\nsize_m=0.8\nposition_m=[0.0,0.0,0.0]\n",
+      "tag 3: its side is 0.8 m; sizes are in metres, so 80 mm is 0.08");
+  odd("[[tag]]\nid=3\nsize_m=0.08\nposition_m=[1350.0,0.0,0.0]\n",
+      "tag 3: it is 1350 m from the origin");
+  odd(lens + "fx=18.664\nfy=18.664\n",
+      "fx = 18.664: a picture 1920 px wide would show 178 degrees");
+  odd(lens + "fx=1866.0\nfy=1244.0\n", "differ by 50 %");
+  odd("[observer.intrinsics]\nwidth=1920\nheight=1080\ncx=319.5\ncy=239.5\nfx=1866.0\nfy=1866.0\n",
+      "are these numbers for another picture size?");
+  odd(lens +
+          "fx=1866.0\nfy=1866.0\n[observer.lens]\nfocal_length_mm=0.035\nf_number=2.8\n"
+          "focus_distance_m=1.8\n",
+      "focal_length_mm = 0.035: it is in millimetres");
+  odd("[observer]\ndriver='v4l2'\ndevice='a'\n[observer.camera]\nrate_hz=30.0\nexposure_s=0.5\n",
+      "exposes for 0.5 s, longer than a frame lasts at 30 a second (0.0333 s)");
+}
+
+// The numbers of another picture size: a live set would be refused.
+TEST_F(Check, RefusesTheIntrinsicsOfAnotherPictureSize) {
+  const std::string set =
+      "[observer]\ndriver='v4l2'\ndevice='a'\n[observer.camera]\nwidth=1280\nheight=720\n"
+      "[observer.intrinsics]\nwidth=1920\nheight=1080\nfx=1866.0\nfy=1866.0\ncx=959.5\ncy=539.5\n";
+  EXPECT_EQ(check(set), 1);
+  expect_said("[observer.camera] is 1280x720 and [observer.intrinsics] is for 1920x1080");
+  expect_said("multiply fx and cx + 0.5 by 0.666667");
+}
+
+// What somebody copies on the first day, with the models that come along.
+TEST_F(Check, TheExampleIsRightAsCopied) {
+  const std::filesystem::path config = PREVIZ_SOURCE_DIR "/config";
+  std::filesystem::copy(config / "set.example.toml", directory_ / "my_set.toml");
+  std::filesystem::copy(config / "stage", directory_ / "stage",
+                        std::filesystem::copy_options::recursive);
+  std::ostringstream out;
+  EXPECT_EQ(check_set(directory_ / "my_set.toml", out), 0) << out.str();
+  EXPECT_EQ(out.str().find("[observer"), std::string::npos) << out.str();  // nothing is odd
 }
 
 TEST_F(Check, RefusesWithEveryProblemOfTheSetFile) {

@@ -269,7 +269,6 @@ TEST_F(RenderSession, ASecondRunSkipsWhatIsFinishedAndOtherSamplesAreRefused) {
   EXPECT_EQ(render(options).found_finished, 0u);
 }
 
-// What a run leaves must not depend on where it was interrupted.
 // 24 x 18 of the 48 x 36 pixels: to look at a take quickly. It is another picture, not the same.
 TEST_F(RenderSession, ASmallerPictureIsAnotherOne) {
   test::write_small_take(directory_.path());

@@ -87,7 +87,7 @@ const auto example_file = config / "set.example.toml";
 Set example(const std::string& text) {
   const auto& any = example_file;
   return parse_set(text, any,
-                   {{"stage/set.glb", any}, {"stage/creature.glb", any}, {"stage/lamp.glb", any}});
+                   {{"stage/set.gltf", any}, {"stage/creature.gltf", any}, {"stage/lamp.gltf", any}});
 }
 
 TEST(SetExample, Parses) {
