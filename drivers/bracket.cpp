@@ -15,6 +15,7 @@ class Bracket final : public Camera {
 
   std::string name() const override { return camera_->name(); }
   CameraFormat format() const override { return camera_->format(); }
+  std::vector<std::string> doubts() const override { return camera_->doubts(); }
   DeviceCounters counters() const override { return camera_->counters(); }
   void stop() override { camera_->stop(); }
   bool set_exposure(double, double) override { return false; }

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <string>
 #include <variant>
+#include <vector>
 
 #include "drivers/device.hpp"
 #include "drivers/frame.hpp"
@@ -49,6 +50,9 @@ class Camera {
   virtual std::string name() const = 0;
 
   virtual CameraFormat format() const = 0;
+
+  // What the device does not do as it was asked, in plain words, with what it can: a lower rate.
+  virtual std::vector<std::string> doubts() const { return {}; }
 
   // Starts streaming: frames captured from now on are delivered. Throws previz::Error if the device
   // refuses. Does nothing while the camera streams.

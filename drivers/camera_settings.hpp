@@ -1,6 +1,9 @@
 // The settings that a set asks of a camera, as plain data.
 #pragma once
 
+#include <array>
+#include <cmath>
+#include <cstdio>
 #include <optional>
 #include <string>
 
@@ -25,5 +28,17 @@ struct CameraSettings {
   std::optional<int> packet_size;  // bytes, network cameras; absent: the largest that gets through
   double responsivity = 1;         // exposure = exposure_s * gain * responsivity
 };
+
+// Returns that a device takes another rate than it was asked for, by more than a hundredth; nothing
+// if it does not, or reports none.
+inline std::optional<std::string> other_rate(const CameraSettings& asked, double granted_hz) {
+  if (!asked.rate_hz || !(granted_hz > 0) ||
+      std::abs(granted_hz - *asked.rate_hz) <= 0.01 * *asked.rate_hz)
+    return std::nullopt;
+  std::array<char, 96> text{};
+  std::snprintf(text.data(), text.size(), "takes %.5g frames a second, not the %.5g of rate_hz",
+                granted_hz, *asked.rate_hz);
+  return text.data();
+}
 
 }  // namespace previz

@@ -37,6 +37,7 @@ class FaultyCamera final : public Camera {
 
   std::string name() const override { return camera_->name(); }
   CameraFormat format() const override { return camera_->format(); }
+  std::vector<std::string> doubts() const override { return camera_->doubts(); }
   DeviceCounters counters() const override { return camera_->counters(); }
   bool set_exposure(double exposure_s, double gain) override {
     return camera_->set_exposure(exposure_s, gain);

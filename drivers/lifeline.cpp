@@ -84,7 +84,10 @@ std::optional<CameraEvent> Lifeline::open() {
   sequence_offset_.reset();
   state_ = DeviceState::starting;
   since_ = clock_.now();
-  return std::nullopt;
+  std::string doubts;
+  for (const std::string& doubt : camera_->doubts()) add_to_list(doubts, doubt, "; ");
+  if (doubts.empty()) return std::nullopt;
+  return DeviceTrouble{name_, doubts, false};
 }
 
 std::optional<CameraEvent> Lifeline::not_opened(const std::string& why) {

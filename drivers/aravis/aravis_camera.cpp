@@ -136,6 +136,10 @@ class AravisCamera final : public Camera {
 
   std::string name() const override { return settings_.device; }
   CameraFormat format() const override { return agreed_.format; }
+  std::vector<std::string> doubts() const override {
+    const auto other = other_rate(settings_, agreed_.format.rate_hz);
+    return other ? std::vector{*other} : std::vector<std::string>{};
+  }
 
   void start() override {
     if (buffers_) return;

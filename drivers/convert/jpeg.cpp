@@ -29,9 +29,13 @@ struct Reports {
   }
 
   // Level -1 is a warning: the data is damaged, and libjpeg goes on with made-up samples. Padding
-  // before a marker, which many cameras send, is no damage.
+  // before a marker, which many cameras send, is no damage; nor is a picture whose last marker
+  // (EOI) is missing, as some cameras send it: where samples are missing, too, libjpeg says that as
+  // well (JWRN_HIT_MARKER).
   static void emit(j_common_ptr decoder, int level) {
-    if (level < 0 && decoder->err->msg_code != JWRN_EXTRANEOUS_DATA) of(decoder).note(decoder);
+    const int what = decoder->err->msg_code;
+    if (level < 0 && what != JWRN_EXTRANEOUS_DATA && what != JWRN_JPEG_EOF)
+      of(decoder).note(decoder);
   }
 
   static void too_many_scans(j_common_ptr decoder) {

@@ -1,7 +1,9 @@
 #include "drivers/v4l2/configure.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <vector>
 
@@ -91,9 +93,74 @@ class Configuration {
     return names.empty() ? "none" : names;
   }
 
+  // Returns the rates that the node has for pictures of a format and size; none if it does not say.
+  std::vector<double> rates_of(std::uint32_t fourcc, std::uint32_t width,
+                               std::uint32_t height) const {
+    std::vector<double> rates;
+    v4l2_frmivalenum interval{};
+    interval.pixel_format = fourcc;
+    interval.width = width;
+    interval.height = height;
+    const auto add = [&](const v4l2_fract& period) {
+      if (period.numerator > 0) rates.push_back(double(period.denominator) / period.numerator);
+    };
+    for (; interval.index < most_entries; ++interval.index) {
+      if (node_.control(VIDIOC_ENUM_FRAMEINTERVALS, &interval) != 0) break;
+      if (interval.type == V4L2_FRMIVAL_TYPE_DISCRETE) {
+        add(interval.discrete);
+        continue;
+      }
+      add(interval.stepwise.max);
+      add(interval.stepwise.min);
+      break;
+    }
+    return rates;
+  }
+
+  // Returns whether the node can take that many frames a second, or does not say.
+  bool holds_rate(std::uint32_t fourcc, const v4l2_pix_format& picture) const {
+    const std::vector<double> rates = rates_of(fourcc, picture.width, picture.height);
+    return !settings_.rate_hz || rates.empty() ||
+           *std::ranges::max_element(rates) >= 0.99 * *settings_.rate_hz;
+  }
+
+  static bool is_compressed(std::uint32_t fourcc) {
+    const auto wire = wire_format(fourcc);
+    return wire && wire->layout == convert::Layout::mjpeg;
+  }
+
+  // Returns the first that holds the rate: what the node is set to, its other formats, and last
+  // those that lose quality. Where none does, what the node is set to.
+  std::uint32_t format_for_rate(std::uint32_t first, const std::vector<std::uint32_t>& its,
+                                const v4l2_pix_format& picture) const {
+    if (holds_rate(first, picture)) return first;
+    for (const bool compressed : {false, true})
+      for (const std::uint32_t fourcc : its)
+        if (wire_format(fourcc) && is_compressed(fourcc) == compressed &&
+            holds_rate(fourcc, picture))
+          return fourcc;
+    return first;
+  }
+
+  std::string rates_text(const v4l2_pix_format& picture) const {
+    std::string text;
+    for (const std::uint32_t fourcc : formats()) {
+      if (!wire_format(fourcc)) continue;
+      std::string rates;
+      for (const double rate : rates_of(fourcc, picture.width, picture.height)) {
+        std::array<char, 32> one{};
+        std::snprintf(one.data(), one.size(), "%.5g", rate);
+        add_to_list(rates, one.data());
+      }
+      if (!rates.empty()) add_to_list(text, fourcc_name(fourcc) + " " + rates, "; ");
+    }
+    return text.empty() ? "not known" : text;
+  }
+
   // Returns the format that the set asks for; else what the node is set to, if that can be
-  // converted; else the first of its formats that can.
-  std::uint32_t wanted_format(std::uint32_t now) const {
+  // converted; else the first of its formats that can; but another one if only that holds the rate.
+  std::uint32_t wanted_format(const v4l2_pix_format& picture) const {
+    const std::uint32_t now = picture.pixelformat;
     const std::vector<std::uint32_t> its = formats();
     if (settings_.format) {
       const std::optional<std::uint32_t> wanted = fourcc_of(*settings_.format);
@@ -103,12 +170,12 @@ class Configuration {
         refuse("has no format " + *settings_.format + "; it has: " + format_names());
       return *wanted;
     }
-    if (wire_format(now)) return now;
+    if (wire_format(now)) return format_for_rate(now, its, picture);
     const auto first = std::ranges::find_if(
         its, [](std::uint32_t fourcc) { return wire_format(fourcc).has_value(); });
     if (first == its.end())
       refuse("has no format that can be converted; it has: " + format_names());
-    return *first;
+    return format_for_rate(*first, its, picture);
   }
 
   void agree_on_format() {
@@ -116,14 +183,14 @@ class Configuration {
     format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     check(node_.control(VIDIOC_G_FMT, &format), "does not report its format");
     v4l2_pix_format& picture = format.fmt.pix;
-    const std::uint32_t wanted = wanted_format(picture.pixelformat);
-    picture.pixelformat = wanted;
-    picture.field = V4L2_FIELD_NONE;
-    picture.bytesperline = picture.sizeimage = 0;
     if (settings_.width && settings_.height) {
       picture.width = static_cast<std::uint32_t>(*settings_.width);
       picture.height = static_cast<std::uint32_t>(*settings_.height);
     }
+    const std::uint32_t wanted = wanted_format(picture);
+    picture.pixelformat = wanted;
+    picture.field = V4L2_FIELD_NONE;
+    picture.bytesperline = picture.sizeimage = 0;
     check(node_.control(VIDIOC_S_FMT, &format), "does not take the format " + fourcc_name(wanted));
     const bool as_wanted = picture.pixelformat == wanted &&
                            (!settings_.width || !settings_.height ||
@@ -137,6 +204,7 @@ class Configuration {
     const std::optional<convert::WireFormat> wire = wire_format(picture);
     if (!wire) refuse("sends " + fourcc_name(picture.pixelformat) + ", which cannot be converted");
     agreed_.wire = *wire;
+    picture_ = picture;
     agreed_.stride = wire->layout == convert::Layout::mjpeg ? 0 : picture.bytesperline;
     agreed_.format = {convert::delivered_format(*wire), static_cast<int>(picture.width),
                       static_cast<int>(picture.height), 0, convert::bayer_pattern(*wire)};
@@ -202,6 +270,10 @@ class Configuration {
     }
     const double rate_hz = period.numerator > 0 ? double(period.denominator) / period.numerator : 0;
     if (rate_hz <= most_rate_hz) agreed_.format.rate_hz = rate_hz;  // otherwise it is not known
+    if (const auto other = other_rate(settings_, agreed_.format.rate_hz))
+      agreed_.doubts.push_back(*other + "; at " + size_text(picture_.width, picture_.height) +
+                               " it has: " + rates_text(picture_) +
+                               " (pixel_format chooses; a smaller picture may be faster)");
   }
 
   void agree_on_exposure() {
@@ -242,6 +314,7 @@ class Configuration {
   Node& node_;
   const CameraSettings& settings_;
   Agreed agreed_;
+  v4l2_pix_format picture_{};
 };
 
 }  // namespace

@@ -22,6 +22,7 @@ struct Agreed {
   std::size_t least_bytes = 0;  // of a whole picture; 0 for mjpeg, whose pictures vary
   Exposure exposure;            // 0 s if the node does not report it
   bool drives_exposure = false;
+  std::vector<std::string> doubts;  // where the rate is not what was asked for
 };
 
 // Writes the settings to the node and reads back what it made of them. Throws previz::Error that

@@ -51,6 +51,7 @@ class V4l2Camera final : public Camera {
 
   std::string name() const override { return settings_.device; }
   CameraFormat format() const override { return agreed_.format; }
+  std::vector<std::string> doubts() const override { return agreed_.doubts; }
   DeviceCounters counters() const override { return counters_; }
 
   void start() override {

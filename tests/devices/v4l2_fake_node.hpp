@@ -25,6 +25,7 @@ struct FakeDevice {
   std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
   std::vector<std::uint32_t> formats{V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_YUYV};
   std::vector<std::pair<std::uint32_t, std::uint32_t>> sizes{{32, 24}, {16, 12}};
+  std::map<std::uint32_t, std::vector<std::uint32_t>> rates;  // frames a second by format, if said
   std::uint32_t extra_stride = 0;
   std::uint32_t field = V4L2_FIELD_NONE;
   std::map<std::uint32_t, v4l2_queryctrl> controls;
@@ -153,6 +154,8 @@ class FakeNode final : public Node {
         return entry(*static_cast<v4l2_fmtdesc*>(argument));
       case VIDIOC_ENUM_FRAMESIZES:
         return entry(*static_cast<v4l2_frmsizeenum*>(argument));
+      case VIDIOC_ENUM_FRAMEINTERVALS:
+        return entry(*static_cast<v4l2_frmivalenum*>(argument));
       case VIDIOC_G_FMT:
         static_cast<v4l2_format*>(argument)->fmt.pix = device_.picture;
         return 0;
@@ -202,6 +205,14 @@ class FakeNode final : public Node {
     return 0;
   }
 
+  int entry(v4l2_frmivalenum& interval) const {
+    const auto found = device_.rates.find(interval.pixel_format);
+    if (found == device_.rates.end() || interval.index >= found->second.size()) return EINVAL;
+    interval.type = V4L2_FRMIVAL_TYPE_DISCRETE;
+    interval.discrete = {1, found->second[interval.index]};
+    return 0;
+  }
+
   // As drivers do: what is not possible becomes something that is.
   int set(v4l2_pix_format& wanted) {
     if (std::ranges::find(device_.formats, wanted.pixelformat) == device_.formats.end())
@@ -217,7 +228,9 @@ class FakeNode final : public Node {
     return 0;
   }
   int set(v4l2_fract& wanted) {
-    if (wanted.denominator > 60 * wanted.numerator) wanted = {1, 60};
+    const auto found = device_.rates.find(device_.picture.pixelformat);
+    const std::uint32_t most = found == device_.rates.end() ? 60 : found->second.front();
+    if (wanted.denominator > most * wanted.numerator) wanted = {1, most};
     device_.period = wanted;
     return 0;
   }

@@ -91,7 +91,7 @@ TEST(Mjpeg, FlatColoursComeBack) {
 
 TEST(Mjpeg, EveryCutIsNoticed) {
   const Bytes jpeg = jpeg_of(48, 32, noise(48, 32));
-  for (std::size_t size = 0; size < jpeg.size(); size += size < 700 ? 1 : 13) {
+  for (std::size_t size = 0; size + 2 < jpeg.size(); size += size < 700 ? 1 : 13) {
     // In memory of its own, so that reading past the end is seen.
     const Bytes cut(jpeg.begin(), jpeg.begin() + static_cast<std::ptrdiff_t>(size));
     Frame frame;
@@ -99,8 +99,22 @@ TEST(Mjpeg, EveryCutIsNoticed) {
     EXPECT_TRUE(frame.bytes.empty());
   }
   Frame frame;
-  EXPECT_TRUE(convert({mjpeg, 48, 32, 0, Bytes(jpeg.begin(), jpeg.end() - 2)}, frame));
+  EXPECT_TRUE(convert({mjpeg, 48, 32, 0, Bytes(jpeg.begin(), jpeg.end() - 3)}, frame));
   EXPECT_FALSE(convert({mjpeg, 48, 32, 0, jpeg}, frame));
+}
+
+// Some cameras leave out the last marker (EOI), or half of it; the picture is all there.
+TEST(Mjpeg, APictureWithoutItsLastMarkerIsWhole) {
+  for (const auto& [width, height] : {std::pair{48, 32}, std::pair{35, 18}}) {
+    const Bytes jpeg = jpeg_of(width, height, noise(width, height));
+    Frame whole, cut;
+    ASSERT_FALSE(convert({mjpeg, width, height, 0, jpeg}, whole));
+    for (const int missing : {1, 2}) {
+      const Bytes bytes(jpeg.begin(), jpeg.end() - missing);
+      ASSERT_FALSE(convert({mjpeg, width, height, 0, bytes}, cut)) << missing;
+      EXPECT_EQ(cut.bytes, whole.bytes);
+    }
+  }
 }
 
 // Buffers are often longer than the picture in them, and some cameras pad before the last marker.
