@@ -21,6 +21,8 @@ std::string content_of_lens_file(const std::filesystem::path& file) {
   std::error_code error;
   if (std::filesystem::is_directory(file, error))
     throw Error(file.string() + ": is a folder; give the file with the calibration");
+  if (std::filesystem::exists(file, error) && !std::filesystem::is_regular_file(file, error))
+    throw Error(file.string() + ": is a device or a pipe; give a file");
   const auto size = std::filesystem::file_size(file, error);
   if (!error && size > most_lens_file_bytes)
     throw Error(file.string() + ": is larger than 1 MiB; it is not a calibration");

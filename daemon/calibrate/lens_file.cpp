@@ -157,8 +157,10 @@ void refuse_binary(std::string_view bytes, const FilePlace& at) {
                   readable_formats);
 }
 
-// Their models are those of a film scanner's lens, whose distortion is defined from the distorted
-// picture and in units of the film back, which OpenCV's do not express.
+constexpr std::string_view nuke_node = "LensDistortion";
+
+// Their distortion is defined from the distorted picture to the undistorted one, in units of the
+// film back, which OpenCV's models do not express.
 void refuse_by_name(std::string_view text, const FilePlace& at) {
   constexpr const char* instead =
       "; export an OpenCV-like model from there, or measure the lens with \"previzd calibrate "
@@ -167,8 +169,14 @@ void refuse_by_name(std::string_view text, const FilePlace& at) {
        {"LD_3DE", "LD_3DE4_", "3DE4 Radial", "3DE4 Anamorphic", "3DE Classic LD Model"})
     if (text.find(node) != text.npos)
       fail_at(at, std::string("is a lens of 3DEqualizer, which is not supported") + instead);
-  if (text.find("LensDistortion") != text.npos && text.find('{') != text.npos)
-    fail_at(at, std::string("is a LensDistortion node of Nuke, which is not supported") + instead);
+  for (std::size_t at_node = text.find(nuke_node); at_node != text.npos;
+       at_node = text.find(nuke_node, at_node + 1)) {
+    const std::size_t next = text.find_first_not_of(" \t\r\n", at_node + nuke_node.size());
+    if ((at_node == 0 || text[at_node - 1] == '\n' || text[at_node - 1] == ' ') &&
+        next != text.npos && text[next] == '{')
+      fail_at(at,
+              std::string("is a LensDistortion node of Nuke, which is not supported") + instead);
+  }
 }
 
 LensFile read_tree(const Tree& tree, std::string_view text, const char* syntax,
@@ -192,13 +200,12 @@ LensFile read_text(std::string_view text, const std::string& file) {
   if (lens_formats::is_colmap(text))
     return {"COLMAP's cameras.txt", lens_formats::read_colmap(text, file), {}};
   if (text[first] == '<') return read_tree(parse_xml(text, file), text, "XML", file);
-  refuse_by_name(text, {file, 0, ""});
   if (text[first] == '{') return read_tree(parse_json(text, file), text, "JSON", file);
+  refuse_by_name(text, {file, 0, ""});
   const YamlTree yaml = parse_yaml(text, file);
   LensFile read = read_tree(yaml.tree, text, "YAML", file);
-  if (yaml.documents > 1)
-    read.notes.push_back(
-        fmt::format("the file has {} YAML documents; the first is used", yaml.documents));
+  if (yaml.has_more)
+    read.notes.push_back("the file has more than one YAML document; the first is used");
   return read;
 }
 

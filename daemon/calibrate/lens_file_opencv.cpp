@@ -172,6 +172,7 @@ FileLens opencv_lens(const Tree& map, std::string_view text, const std::string& 
   const bool is_uncalibrated = std::ranges::all_of(k, [](double value) { return value == 0; });
   if (is_uncalibrated)
     if (auto rectified = rectified_lens(map, scope)) return *rectified;
+  if (is_uncalibrated) fail_at(at, "is 0, as of a camera that is not calibrated; calibrate it");
   if (!given)
     fail_at(scope.place(map, "distortion_coefficients"),
             "is missing; write the lens's, or an empty list if its pictures are undistorted");

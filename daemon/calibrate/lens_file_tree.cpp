@@ -101,40 +101,35 @@ class YamlEvents : public YAML::EventHandler {
  public:
   explicit YamlEvents(const std::string& file) : file_(file), builder_(file) {}
 
-  void OnDocumentStart(const YAML::Mark&) override { ++documents_; }
+  void OnDocumentStart(const YAML::Mark&) override {}
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     refuse(mark, anchor);
-    if (is_read()) builder_.nothing(line(mark));
+    builder_.nothing(line(mark));
   }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override { refuse(mark, 1); }
   void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
                 const std::string& value) override {
     refuse(mark, anchor);
-    if (is_read()) builder_.word(line(mark), value);
+    builder_.word(line(mark), value);
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
                        YAML::EmitterStyle::value) override {
     refuse(mark, anchor);
-    if (is_read()) builder_.begin(Tree::Kind::list, line(mark));
+    builder_.begin(Tree::Kind::list, line(mark));
   }
-  void OnSequenceEnd() override {
-    if (is_read()) builder_.end();
-  }
+  void OnSequenceEnd() override { builder_.end(); }
   void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
                   YAML::EmitterStyle::value) override {
     refuse(mark, anchor);
-    if (is_read()) builder_.begin(Tree::Kind::map, line(mark));
+    builder_.begin(Tree::Kind::map, line(mark));
   }
-  void OnMapEnd() override {
-    if (is_read()) builder_.end();
-  }
+  void OnMapEnd() override { builder_.end(); }
 
-  YamlTree take() { return {builder_.take(), documents_}; }
+  Tree take() { return builder_.take(); }
 
  private:
   static int line(const YAML::Mark& mark) { return mark.line + 1; }
-  bool is_read() const { return documents_ == 1; }
   void refuse(const YAML::Mark& mark, YAML::anchor_t anchor) const {
     if (anchor != YAML::NullAnchor)
       fail_at({file_, line(mark), ""},
@@ -143,7 +138,6 @@ class YamlEvents : public YAML::EventHandler {
 
   std::string file_;
   TreeBuilder builder_;
-  int documents_ = 0;
 };
 
 class JsonEvents : public nlohmann::json_sax<nlohmann::json> {
@@ -220,16 +214,18 @@ YamlTree parse_yaml(std::string_view text, const std::string& file) {
   // OpenCV's own first line, "%YAML:1.0", is not a directive of YAML.
   if (lines.starts_with("%YAML")) lines.replace(0, std::min(lines.find('\n'), lines.size()), "");
   YamlEvents events(file);
+  bool has_more = false;
   try {
     std::istringstream stream(lines);
     YAML::Parser parser(stream);
-    while (parser.HandleNextDocument(events)) {
-    }
+    // To ask for all documents may not end: yaml-cpp 0.7 finds any number of them before a comma.
+    parser.HandleNextDocument(events);
+    has_more = bool(parser);
   } catch (const YAML::Exception& error) {
     fail_at({file, error.mark.is_null() ? 0 : error.mark.line + 1, ""},
             "is not valid YAML: " + printable(error.msg));
   }
-  return events.take();
+  return {events.take(), has_more};
 }
 
 Tree parse_json(std::string_view text, const std::string& file) {

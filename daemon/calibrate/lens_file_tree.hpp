@@ -34,8 +34,8 @@ struct FilePlace {
 // with the line for a mistake in the syntax, a key that a map has twice, anchors and aliases, more
 // than 32 levels, 200 000 values, or 1000 keys of one map.
 struct YamlTree {
-  Tree tree;          // of the first document
-  int documents = 0;  // that the file has
+  Tree tree;              // of the first document
+  bool has_more = false;  // documents
 };
 YamlTree parse_yaml(std::string_view text, const std::string& file);
 Tree parse_json(std::string_view text, const std::string& file);

@@ -236,7 +236,7 @@ TEST(LensFiles, RosMessagesAreReadAsTheyArePrinted) {
       "binning_x: 2\nbinning_y: 2\nroi: {x_offset: 0, width: 0}\n---\nheight: 960\n---\n");
   expect_as_opencv(observer_in(result), ros_lens(five));
   EXPECT_THAT(result.words, HasSubstr("warning: the file states binning"));
-  EXPECT_THAT(result.words, HasSubstr("YAML documents; the first is used"));
+  EXPECT_THAT(result.words, HasSubstr("more than one YAML document; the first is used"));
 }
 
 TEST(LensFiles, RectifiedFilesAreSaid) {
@@ -509,6 +509,7 @@ TEST(LensFiles, WhatIsNoCalibrationIsRefusedByWhatItIs) {
 }
 
 TEST(LensFiles, HostileFilesEndSoon) {
+  EXPECT_NE(from("\"a\",\n , 0 1\n").error, "");  // has documents without end for yaml-cpp
   EXPECT_THAT(from("a: &a [1]\nb: *a\n").error,
               HasSubstr("lens.txt:1: anchors (&) and aliases (*) are not supported"));
   EXPECT_THAT(from("a: " + std::string(40, '[') + std::string(40, ']')).error,
