@@ -428,6 +428,15 @@ TEST(LensRefits, AFisheyeBeyond90DegreesIsNoFilmCamerasLens) {
                 "camera's lens cannot hold; use --as light"));
 }
 
+// theta - theta^3 / 12 ends at 533 px, and the corner is 1101 px off.
+TEST(LensRefits, AFisheyesCircleIsNoFilmCamerasPicture) {
+  EXPECT_THAT(from("1 OPENCV_FISHEYE 1920 1080 400 400 960 540 -0.083333333333333333 0 0 0\n",
+                   as(CameraRole::observer))
+                  .error,
+              HasSubstr("as observer: pixel 0, 0 is outside of the fisheye's circle; use --as "
+                        "light"));
+}
+
 // f (theta) with k = 0 goes on to pi; the corner is 400 theta = 1101.5 px off, 157.8 degrees.
 TEST(LensFiles, AFisheyesAngleIsThatOfTheCornerOrOfTheFold) {
   const FisheyeIntrinsics corner =
@@ -465,6 +474,17 @@ TEST(LensFiles, WrongNumbersAreRefusedWithTheirPlace) {
               HasSubstr("camera_matrix: has 8 numbers; allowed: 9"));
   EXPECT_THAT(from(matrix_file("[1500, 0, 960, 0, 1500, 540, 0, 0, 1]", "[1, 2, 3]")).error,
               HasSubstr("lens.txt:4: distortion_coefficients: has 3 coefficients; allowed: 4, 5"));
+}
+
+TEST(LensFiles, WhatIsNotCalibratedOrHasNoCoefficientsIsRefused) {
+  EXPECT_THAT(from(matrix_file("[0, 0, 0, 0, 0, 0, 0, 0, 0]")).error,
+              HasSubstr("lens.txt:3: camera_matrix: is 0, as of a camera that is not calibrated"));
+  EXPECT_THAT(from("camera_matrix: [[900, 0, 9], [0, 900, 9], [0, 0, 1]]\n").error,
+              HasSubstr("distortion_coefficients: is missing; write the lens's, or an empty list"));
+  FromOptions options;
+  options.file = "/dev/zero";
+  std::ostringstream out;
+  EXPECT_THROW(calibrate_from(options, out), Error);
 }
 
 // r (1 - r^2) grows up to r = 0.577, the picture's corner is drawn from 0.734 or farther.
