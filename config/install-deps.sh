@@ -20,7 +20,7 @@ packages=(
   # markers, geometry, scenes
   libapriltag-dev libembree-dev libtinygltf-dev libdraco-dev libmeshoptimizer-dev libstb-dev libglm-dev
   # files, command line, log, hashes
-  libtomlplusplus-dev nlohmann-json3-dev libcli11-dev libspdlog-dev libfmt-dev libssl-dev
+  libtomlplusplus-dev nlohmann-json3-dev libyaml-cpp-dev libtinyxml2-dev libcli11-dev libspdlog-dev libfmt-dev libssl-dev
   # main loop, service, D-Bus
   libsystemd-dev dbus-daemon
   # tests

@@ -70,6 +70,15 @@ struct TagsOptions {
   std::optional<std::filesystem::path> table_file;
 };
 
+struct FromOptions {
+  std::filesystem::path file;         // of OpenCV, ROS, Kalibr or COLMAP (lens_file.hpp)
+  std::optional<CameraRole> as;       // absent: a fisheye's is light, a pinhole's observer
+  std::optional<std::string> camera;  // name or index, of a file with several
+  std::string size;                   // "1920x1080"; empty: the file has it
+  bool force = false;                 // print the table although the model does not fit
+  std::optional<std::filesystem::path> table_file;
+};
+
 struct BalanceOptions {
   std::filesystem::path session;
   std::optional<std::filesystem::path> set_file;  // instead of the session's own
@@ -88,6 +97,9 @@ void calibrate_response(const ResponseOptions& options, std::ostream& out);
 void calibrate_dark(const DarkOptions& options, std::ostream& out);
 void calibrate_vignetting(const VignettingOptions& options, std::ostream& out);
 void calibrate_lens(const ThinLensOptions& options, std::ostream& out);
+// Takes the lens from another program's file. A model that the camera's table does not have is
+// fitted by the table's, which may be off by at most 0.1 px anywhere unless forced.
+void calibrate_from(const FromOptions& options, std::ostream& out);
 void calibrate_balance(const BalanceOptions& options, std::ostream& out);
 void calibrate_tags(const TagsOptions& options, std::ostream& out);
 

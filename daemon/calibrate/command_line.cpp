@@ -84,6 +84,29 @@ void add_lens(CLI::App& calibrate, ThinLensOptions& options) {
   command.add_option("--out", options.table_file, "File for the set file's table");
 }
 
+void add_from(CLI::App& calibrate, FromOptions& options) {
+  CLI::App& command = *calibrate.add_subcommand(
+      "from", "A lens that OpenCV, ROS, Kalibr or COLMAP calibrated, from its file");
+  command
+      .add_option("file", options.file,
+                  "OpenCV's YAML, XML or JSON, ROS's camera_info, Kalibr's camchain or COLMAP's "
+                  "cameras.txt")
+      ->required();
+  command
+      .add_option("--as", options.as,
+                  "Camera that gets the lens: observer or light (default: light for a fisheye, "
+                  "observer for a pinhole)")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, CameraRole>{
+          {"observer", CameraRole::observer}, {"light", CameraRole::light}}));
+  command.add_option("--camera", options.camera,
+                     "Name or index (from 0) of a camera, if the file has several");
+  command.add_option("--size", options.size,
+                     "Size of the calibrated picture if the file does not have it: 1920x1080");
+  command.add_option("--out", options.table_file, "File for the set file's table");
+  command.add_flag("--force", options.force,
+                   "Accept the lens although the camera's model is more than 0.1 px off");
+}
+
 void add_balance(CLI::App& calibrate, BalanceOptions& options) {
   CLI::App& command = *calibrate.add_subcommand(
       "balance", "One scale and white balance between the cameras, and the colours of surfaces");
@@ -142,6 +165,7 @@ void add_calibrate(CLI::App& app, Commands& commands) {
   add_dark(command, commands.dark);
   add_vignetting(command, commands.vignetting);
   add_lens(command, commands.lens);
+  add_from(command, commands.from);
   add_balance(command, commands.balance);
   add_tags(command, commands.tags);
 }
@@ -154,6 +178,7 @@ int do_calibrate(const CLI::App& app, const Commands& commands, std::ostream& ou
   if (command.got_subcommand("dark")) calibrate_dark(commands.dark, out);
   if (command.got_subcommand("vignetting")) calibrate_vignetting(commands.vignetting, out);
   if (command.got_subcommand("lens")) calibrate_lens(commands.lens, out);
+  if (command.got_subcommand("from")) calibrate_from(commands.from, out);
   if (command.got_subcommand("balance")) calibrate_balance(commands.balance, out);
   if (command.got_subcommand("tags")) calibrate_tags(commands.tags, out);
   return 0;

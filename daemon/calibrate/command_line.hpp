@@ -18,6 +18,7 @@ struct Commands {
   DarkOptions dark;
   VignettingOptions vignetting;
   ThinLensOptions lens;
+  FromOptions from;
   BalanceOptions balance;
   TagsOptions tags;
 };

@@ -51,6 +51,8 @@ previzd calibrate observer views --board charuco:7x5:30mm:22mm:5x5_100 --out len
 previzd calibrate observer views --board aprilgrid:6x6:88mm:26.4mm --out lens.toml: Does the same by Kalibr's AprilGrid: 6x6 tags of 88 mm with gaps of 26.4 mm, which is its tagSpacing of 0.3. The output names the form found.
 previzd print board aprilgrid:6x6:40mm:12mm:kalibr --paper A3 --out board.pdf: Draws an AprilGrid as Kalibr prints it, which both programs find.
 previzd calibrate light views --board charuco:7x5:30mm:22mm:5x5_100 --tags desk.toml: Measures the fisheye's lens, and finds where it stands by the set's tags.
+previzd calibrate from camchain.yaml --camera cam0 --out lens.toml: Takes a lens that Kalibr, OpenCV, ROS or COLMAP calibrated.
+previzd calibrate from cameras.txt --as observer: Makes a fisheye of COLMAP the film camera's lens, and says by how many pixels it is off at worst.
 previzd calibrate tags walk --set desk.toml --size 80mm --write: Finds where the tags are, from a walk with the film camera past all of them, and writes that into the set file.
 previzd check desk.toml: Lists every mistake in a set file, or what its scene asks of the renderer.
 previzd run desk.toml: Composites live. The rig's buttons, or previzctl, do the rest.
@@ -110,6 +112,12 @@ Film them with the film camera, at the zoom and focus of its calibration, slowly
 The size is that of the black border, from outer edge to outer edge, as measured on the paper. Better than the size of one tag is a tape across the whole set: with `--distance 0-7:2.345m` the distance between the middles of two tags gives all lengths.
 )"};
 
+const Chapter lenses_chapter{"LENSES OF OTHER PROGRAMS", R"(
+`previzd calibrate from FILE` recognises by their content: OpenCV's YAML, XML and JSON (4, 5 or 8 coefficients, or a fisheye's 4), ROS's camera_info (plumb_bob, rational_polynomial, equidistant), Kalibr's camchain (pinhole with radtan, equidistant or none), and COLMAP's cameras.txt (all models up to FULL_OPENCV and OPENCV_FISHEYE). What is assumed or converted is said, such as COLMAP's pixels, which are counted from the corner of the first one and not from its centre.
+A fisheye becomes the light camera's lens and a pinhole the film camera's, unless `--as` says otherwise: then the one is fitted by the other's model, and the worst difference over the picture is said. More than 0.1 px needs `--force`.
+Not supported are thin prisms and tilted sensors, Kalibr's omni, eucm, ds and fov, COLMAP's FOV and THIN_PRISM_FISHEYE, Nuke's LensDistortion and the lenses of 3DEqualizer: calibrate with another model, or from pictures of a board.
+)"};
+
 const Chapter previzd_status{"EXIT STATUS", R"(
 0: Done.
 1: An error; one line on standard error says which.
@@ -166,9 +174,9 @@ Chapter see_also(const std::string& pages) {
 
 std::vector<Page> man_pages() {
   return {{"previzd.8", man_page(previzd_commands(), 8,
-                                 {service_chapter, examples_chapter, tags_chapter, glossary_chapter,
-                                  previzd_cameras, previzd_files, previzd_formats, previzd_status,
-                                  see_also("previzctl(1), previz-set(5)")})},
+                                 {service_chapter, examples_chapter, tags_chapter, lenses_chapter,
+                                  glossary_chapter, previzd_cameras, previzd_files, previzd_formats,
+                                  previzd_status, see_also("previzctl(1), previz-set(5)")})},
           {"previzctl.1", man_page(previzctl_commands(), 1,
                                    {{"ACTIONS", actions_text()},
                                     previzctl_status,

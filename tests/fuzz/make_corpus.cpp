@@ -189,6 +189,38 @@ void write_texts(const fs::path& corpus) {
   }
 }
 
+// As OpenCV writes them itself.
+void write_opencv_lenses(const fs::path& folder) {
+  for (const char* name : {"opencv.yml", "opencv.xml", "opencv.json"}) {
+    cv::FileStorage file(name, cv::FileStorage::WRITE | cv::FileStorage::MEMORY);
+    file << "image_width" << 640 << "image_height" << 480;
+    file << "camera_matrix" << cv::Mat(cv::Matx33d(520, 0, 319, 0, 521, 239, 0, 0, 1));
+    file << "distortion_coefficients" << cv::Mat(cv::Matx<double, 1, 5>(-0.1, 0.02, 0, 0, 0));
+    write(folder / name, file.releaseAndGetString());
+  }
+}
+
+void write_lenses(const fs::path& folder) {
+  write_opencv_lenses(folder);
+  write(folder / "stereo.json",
+        R"({"M1": [[520, 0, 319], [0, 521, 239], [0, 0, 1]], "D1": [0.01, 0, 0, 0],
+ "M2": [[520, 0, 319], [0, 521, 239], [0, 0, 1]], "D2": [0.01, 0, 0, 0], "size": [640, 480]})");
+  write(
+      folder / "camera_info.yaml",
+      "image_width: 640\nimage_height: 480\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [520, 0, "
+      "319, 0, 521, 239, 0, 0, 1]\ndistortion_model: plumb_bob\ndistortion_coefficients:\n  data: "
+      "[-0.1, 0.02, 0, 0, 0]\n");
+  write(folder / "camchain.yaml",
+        "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.02, 0.004, 0, 0]\n  "
+        "distortion_model: equidistant\n  intrinsics: [260, 260, 319, 239]\n  resolution: [640, "
+        "480]\ncam1:\n  camera_model: omni\n  intrinsics: [1, 260, 260, 319, 239]\n  resolution: "
+        "[640, 480]\n");
+  write(
+      folder / "cameras.txt",
+      "# Camera list with one line of data per camera:\n1 OPENCV 640 480 520 521 320 240 -0.1 0.02 "
+      "0 0\n2 SIMPLE_RADIAL_FISHEYE 640 480 260 320 240 0.01\n");
+}
+
 }  // namespace
 }  // namespace previz::fuzz
 
@@ -214,5 +246,6 @@ int main(int count, char** arguments) {
   previz::test::meshopt_grid().save(corpus / "gltf/meshopt.glb");
   previz::test::draco_grid().save(corpus / "gltf/draco.glb");
   write_texts(corpus);
+  write_lenses(corpus / "lens_file");
   return 0;
 }

@@ -1,12 +1,17 @@
 // What a set and its assets consist of.
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <numbers>
 
+#include "daemon/calibrate/lens_file.hpp"
+#include "daemon/calibrate/lens_file_check.hpp"
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
+#include "drivers/error.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace previz::fuzz {
@@ -97,12 +102,44 @@ void png(Bytes bytes) {
          "a plate is as large as it says");
 }
 
+// The size is given where the file has none. Of one camera at least, the lens must be accepted.
+void lens_file(Bytes bytes) {
+  const std::string text = text_of(bytes);
+  calibrate::LensFile read = calibrate::read_lens_file(text, "lens");
+  expect(!read.cameras.empty(), "a lens file has a camera");
+  std::string refusal;
+  bool some = false;
+  for (calibrate::FileCamera& camera : read.cameras) {
+    expect(camera.lens.has_value() == camera.refusal.empty(), "a camera has a lens or a refusal");
+    if (!camera.lens) {
+      refusal = camera.refusal;
+      continue;
+    }
+    std::optional<calibrate::PictureSize> size;
+    if (calibrate::picture_size(camera.lens->lens) == calibrate::PictureSize{}) size = {640, 480};
+    calibrate::complete_lens(*camera.lens, size);
+    std::visit(
+        [](const auto& lens) {
+          expect(lens.fx > 0 && lens.fy > 0 && std::isfinite(lens.fx + lens.fy + lens.cx + lens.cy),
+                 "a lens's numbers are finite, and its focal lengths above 0");
+          expect(lens.width > 0 && lens.height > 0, "a complete lens has a size");
+          if constexpr (requires { lens.max_angle_rad; })
+            expect(lens.max_angle_rad > 0 && lens.max_angle_rad <= std::numbers::pi,
+                   "a fisheye has an angle");
+        },
+        camera.lens->lens);
+    some = true;
+  }
+  if (!some) throw Error(refusal);
+}
+
 constexpr Target own[] = {
     {"set", "a set file", set_file},
     {"gltf", "a glTF file", gltf},
     {"texture", "an image of a glTF file", texture},
     {"environment", "an environment: OpenEXR or Radiance .hdr", environment},
     {"png", "a plate as PNG", png},
+    {"lens_file", "a lens of OpenCV, ROS, Kalibr or COLMAP", lens_file},
 };
 
 }  // namespace scene_targets_cpp
