@@ -1,4 +1,6 @@
 #include "daemon/command_line.hpp"
+#include "daemon/trade/axes.hpp"
+#include "drivers/error.hpp"
 
 #include <CLI/CLI.hpp>
 #include <optional>
@@ -167,7 +169,15 @@ void add_trade(CLI::App& app, trade::TradeOptions& options) {
   options.answers = true;
   command.add_option("--frame", options.frame, "Observer frame (default: the first tracked)");
   command.add_option("--out", options.directory, "Directory for trade.csv and trade.html");
-  command.add_option("--axes", options.axes, "What to vary (default: everything)")->delimiter(',');
+  std::string axes;
+  for (const std::string& name : trade::axis_names()) add_to_list(axes, name);
+  command.add_option("--axes", options.axes, "What to vary (default: everything): " + axes)
+      ->delimiter(',');
+  options.minutes = 5;
+  command
+      .add_option("--minutes", options.minutes,
+                  "Time that it may take; what is not measured by then is named on the page")
+      ->capture_default_str();
   command
       .add_option("--scale", options.scale, "Size of the pictures, relative to the film camera's")
       ->capture_default_str();

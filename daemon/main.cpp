@@ -88,15 +88,16 @@ int do_trade(trade::TradeOptions& options, const StopOnSignal& stop) {
   options.stop = stop.token();
   options.terminal = isatty(STDOUT_FILENO) != 0;
   const trade::TradeReport report = trade::run_trade(options, std::cout);
-  if (report.interrupted) return 128 + stop.received();
   std::cout << "\n";
   for (const trade::TradeFrontPoint& at : trade::listed_front_of(report))
     std::cout << trade::front_words(report, at) << "\n";
   std::cout << "\n";
   for (const trade::TradeAnswer& answer : report.answers)
-    std::cout << answer.use << ": " << answer.words << " (--with " << answer.file.string() << ")\n";
-  std::cout << "\n" << report.csv.string() << "\n" << report.page.string() << std::endl;
-  return 0;
+    std::cout << answer.use << ": " << answer.words
+              << (answer.is_met ? " (--with " + answer.file.string() + ")" : "") << "\n";
+  if (!report.page.empty())
+    std::cout << "\n" << report.csv.string() << "\n" << report.page.string() << std::endl;
+  return report.interrupted ? 128 + stop.received() : 0;
 }
 
 int do_run(rig::LiveOptions& options, const StopOnSignal& stop) {

@@ -33,15 +33,14 @@ struct Found {
   Making making = {};
   double seconds = never, error = never;
   double worth = never;
+  bool is_whole = true;
 };
 
 using Judge = std::function<Found(const TradeSettings&)>;
 
 // Goes along the axes until a round changes nothing, at most twice.
-Found descend(const TradeSettings& own, const std::vector<TradeAxis>& axes, const Judge& judge,
-              const TradeProbe& probe, const std::string& use) {
-  probe.step(use + ": the set's own settings");
-  Found best = judge(own);
+void descend_from(Found& best, const std::vector<TradeAxis>& axes, const Judge& judge,
+                  const TradeProbe& probe, const std::string& use) {
   for (int round = 0; round < 2; ++round) {
     bool is_better = false;
     for (const TradeAxis& axis : axes) {
@@ -58,6 +57,22 @@ Found descend(const TradeSettings& own, const std::vector<TradeAxis>& axes, cons
     }
     if (!is_better) break;
   }
+}
+
+// The set's own settings are judged whatever the time; from there on it goes as far as that
+// reaches.
+Found descend(const TradeSettings& own, const std::vector<TradeAxis>& axes, const Judge& judge,
+              const TradeProbe& probe, const std::string& use, TradePhase phase) {
+  probe.limit(std::nullopt);
+  probe.step(use + ": the set's own settings");
+  Found best = judge(own);
+  probe.limit(phase);
+  try {
+    descend_from(best, axes, judge, probe, use);
+  } catch (const OutOfTime&) {
+    best.is_whole = false;
+  }
+  probe.limit(std::nullopt);
   return best;
 }
 
@@ -102,14 +117,22 @@ std::vector<TradeStep> steps_of(const TradeSettings& settings, double slowest_s,
                                 const TradeProbe& probe) {
   const PathCost cost = probe.cost(settings, true);
   std::vector<TradeStep> all;
-  for (const double scale : scales)
-    for (const bool denoise : {true, false})
-      for (const int samples : step_samples) {
-        const Making making{samples, scale, denoise};
-        const double seconds = cost.seconds(making);
-        if (seconds > slowest_s) break;  // far above what a preview may take
-        all.push_back({making, seconds, probe.error(settings, making)});
-      }
+  probe.limit(TradePhase::live_steps);
+  try {
+    // First what is fastest: a preview that cannot go below its rate's step falls behind.
+    for (const int samples : step_samples)
+      for (const double scale : scales)
+        for (const bool denoise : {true, false}) {
+          const Making making{samples, scale, denoise};
+          const double seconds = cost.seconds(making);
+          // Far above what a preview may take.
+          if (seconds > slowest_s) continue;
+          all.push_back({making, seconds, probe.error(settings, making)});
+        }
+  } catch (const OutOfTime&) {
+    // Steps of few samples are there, which is what live needs.
+  }
+  probe.limit(std::nullopt);
   return best_steps(std::move(all));
 }
 
@@ -121,6 +144,10 @@ set::Set with(set::Set set, const TradeSettings& settings) {
   return set;
 }
 
+std::string unfinished_words(const Found& found) {
+  return found.is_whole ? "" : "; there was no time to try all settings";
+}
+
 TradeAnswer answer_live(const TradeQuestion& question, const set::Set& set, const Found& found,
                         const TradeProbe& probe) {
   const double frame_s = 1 / question.fps;
@@ -129,6 +156,7 @@ TradeAnswer answer_live(const TradeQuestion& question, const set::Set& set, cons
   answer.seconds = found.seconds;
   answer.error = found.error;
   answer.is_met = found.seconds <= planned_s;
+  answer.is_whole = found.is_whole;
   set::Set wanted = with(set, found.settings);
   wanted.quality.fps = question.fps;
   probe.step("live: the steps of the preview");
@@ -147,6 +175,7 @@ TradeAnswer answer_live(const TradeQuestion& question, const set::Set& set, cons
                 share_words(found.error))
           : fmt::format("{:g} pictures a second are more than this machine makes: {:.2g} at most",
                         question.fps, 1 / found.seconds);
+  answer.words += unfinished_words(found);
   return answer;
 }
 
@@ -156,6 +185,7 @@ TradeAnswer answer_still(const std::string& use, const TradeQuestion& question, 
   answer.seconds = found.seconds;
   answer.error = found.error;
   answer.is_met = found.error <= question.error;
+  answer.is_whole = found.is_whole;
   set::Set wanted = with(set, found.settings);
   wanted.quality.steps.clear();
   wanted.quality.denoise = found.making.denoise;
@@ -167,6 +197,7 @@ TradeAnswer answer_still(const std::string& use, const TradeQuestion& question, 
                                    found.making.samples, found.making.denoise ? ", denoised" : "")
                      : fmt::format("an error of {} is not reached; {} is the least seen",
                                    share_words(question.error), share_words(found.error));
+  answer.words += unfinished_words(found);
   return answer;
 }
 
@@ -217,12 +248,13 @@ std::vector<TradeAnswer> answer(const TradeQuestion& question, const set::Set& s
   const double planned_s = pipeline::Governor::headroom / question.fps;
   const Found live = descend(
       own, axes, [&](const TradeSettings& s) { return judge_live(s, planned_s, probe); }, probe,
-      "live");
+      "live", TradePhase::live);
+  TradeAnswer for_live = answer_live(question, set, live, probe);
   // A refinement keeps the layers, as a render does, and so finds its settings in the same way.
   const Found still = descend(
       own, axes, [&](const TradeSettings& s) { return judge_still(s, question.error, probe); },
-      probe, "refine and post");
-  return {answer_live(question, set, live, probe), answer_still("refine", question, set, still),
+      probe, "refine and post", TradePhase::still);
+  return {std::move(for_live), answer_still("refine", question, set, still),
           answer_still("post", question, set, still)};
 }
 

@@ -6,10 +6,12 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "daemon/trade/axes.hpp"
+#include "daemon/trade/budget.hpp"
 #include "daemon/trade/frame.hpp"
 #include "daemon/trade/measure.hpp"
 #include "daemon/trade/path_timer.hpp"
@@ -29,9 +31,10 @@ struct TradeAnswer {
   double seconds = 0;  // a frame, at full size
   double error = 0;    // of the picture, as measured at the sweep's size
   bool is_met = false;
+  bool is_whole = true;             // all settings were tried; otherwise time ran out
   std::string toml = {};            // set::overlay_toml()
   std::string words = {};           // what it comes to, in a sentence
-  std::filesystem::path file = {};  // as written
+  std::filesystem::path file = {};  // as written; empty where it is not met
 };
 
 // What the search asks of the sweep. `error` returns the error of the picture, made with the
@@ -40,6 +43,8 @@ struct TradeProbe {
   std::function<double(const TradeSettings&, const Making&)> error;
   std::function<PathCost(const TradeSettings&, bool is_live)> cost;
   std::function<void(const std::string&)> step;  // called with what is searched next; may throw
+  // From now on probes throw OutOfTime when that phase is over; nothing: they are made.
+  std::function<void(std::optional<TradePhase>)> limit;
 };
 
 // The axes on which settings are searched: those of the estimator and of the light. What is a

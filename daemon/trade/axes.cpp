@@ -117,10 +117,10 @@ std::vector<TradeAxis> trade_axes(const TradeSettings& own, std::uint32_t needed
        {{"even", [](TradeSettings& s) { s.adaptive = false; }},
         {"adaptive", [](TradeSettings& s) { s.adaptive = true; }}},
        ""},
-      {"noise",
+      {"denoise",
        "noise left in the picture, or removed where the variance shows it",
-       {{"left", [](TradeSettings& s) { s.denoise = false; }},
-        {"denoised", [](TradeSettings& s) { s.denoise = true; }}},
+       {{"off", [](TradeSettings& s) { s.denoise = false; }},
+        {"on", [](TradeSettings& s) { s.denoise = true; }}},
        ""},
       {"lens",
        "the lens with its aperture, or a pinhole that keeps everything in focus",
@@ -135,6 +135,12 @@ std::vector<TradeAxis> trade_axes(const TradeSettings& own, std::uint32_t needed
     for (const char* of_the_light_around : {"light_sampling", "light_resolution"})
       drop(axes, of_the_light_around);
   return axes;
+}
+
+std::vector<std::string> axis_names() {
+  std::vector<std::string> names;
+  for (const TradeAxis& axis : trade_axes({}, ~0u)) names.push_back(axis.name);
+  return names;
 }
 
 TradePlan plan_trade(const TradeSettings& own, std::vector<TradeAxis> axes,

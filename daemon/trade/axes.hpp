@@ -43,6 +43,9 @@ struct TradeAxis {
 // an object that is virtual or removed nothing is aimed at one.
 std::vector<TradeAxis> trade_axes(const TradeSettings& own, std::uint32_t needed);
 
+// Returns the names of all axes, as --axes takes them.
+std::vector<std::string> axis_names();
+
 // The name of the axis whose variants carry features that are not needed. They must show the set's
 // own picture, bit for bit.
 inline constexpr const char* parts_axis = "parts";

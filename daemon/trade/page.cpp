@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "daemon/trade/chart.hpp"
+#include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::trade {
@@ -221,11 +222,12 @@ std::string answers_section(const TradeReport& report) {
     html += (answer.is_met ? "<tr>" : "<tr class=\"bend\">") + cell(answer.use) +
             cell(answer.words) + cell(time_words(answer.seconds), true) +
             cell(std::isfinite(answer.error) ? share_words(answer.error) : "not known", true) +
-            cell(answer.use + ".toml") + "</tr>\n";
+            cell(answer.is_met ? answer.use + ".toml" : "none") + "</tr>\n";
   html += "</table>\n";
   for (const TradeAnswer& answer : report.answers)
-    html += "<details><summary>" + escaped(answer.use) + ".toml</summary>\n<pre>" +
-            escaped(answer.toml) + "</pre></details>\n";
+    if (answer.is_met)
+      html += "<details><summary>" + escaped(answer.use) + ".toml</summary>\n<pre>" +
+              escaped(answer.toml) + "</pre></details>\n";
   return html +
          "<p class=\"soft\">Take a file with <code>previzd run SET --with live.toml</code> or "
          "<code>previzd render SESSION --with post.toml</code>; a frozen frame that is refined has "
@@ -290,15 +292,20 @@ std::string axis_section(const TradeReport& report, const TradePlan::Axis& axis)
          "</div>\n" + bias_sentence(report, axis);
 }
 
+// The time of a method at its most samples.
+std::string measured_words(const TradeMethod& method) {
+  const bool is_measured = !method.points.empty() && method.points.back().seconds > 0;
+  return is_measured ? time_words(method.points.back().seconds) : "not measured";
+}
+
 // Photons are a part that this set may need: they are switched off to see what they cost.
 std::string photons_row(const TradeReport& report) {
   const auto axis = std::ranges::find(report.plan.axes, "caustics", &TradePlan::Axis::name);
   if (axis == report.plan.axes.end()) return "";
   const auto time_of = [&](const char* variant) -> std::string {
     const auto entry = std::ranges::find(axis->entries, variant, &TradePlan::Entry::variant);
-    return entry == axis->entries.end()
-               ? "not measured"
-               : time_words(report.methods[entry->method].points.back().seconds);
+    return entry == axis->entries.end() ? "not measured"
+                                        : measured_words(report.methods[entry->method]);
   };
   return "<tr>" + cell("photons, which caustics need") + cell(time_of("none"), true) +
          cell(time_of("photons"), true) + cell("caustics", true) + "</tr>\n";
@@ -317,11 +324,23 @@ std::string parts_section(const TradeReport& report, const TradePlan::Axis& axis
     const TradeMethod& method = report.methods[entry.method];
     if (!method.changed_pixels) continue;
     html += "<tr>" + cell(entry.variant) + cell(time_words(own.seconds), true) +
-            cell(time_words(method.points.back().seconds), true) +
+            cell(measured_words(method), true) +
             cell(std::to_string(*method.changed_pixels), true) + "</tr>\n";
   }
   return html + photons_row(report) + "</table>\n<p class=\"soft\">" + samples_words(own.samples) +
          ".</p>\n";
+}
+
+// What there was no time for, so that nobody takes its absence for a result.
+std::string unmeasured_section(const TradeReport& report) {
+  std::string names;
+  for (const std::string& name : report.unmeasured) add_to_list(names, plain_words(name));
+  std::string text;
+  if (report.interrupted) text += "<p><b>It was stopped before it had ended.</b></p>\n";
+  if (!names.empty())
+    text += "<p>There was no time to measure: " + escaped(names) +
+            ". With <code>--minutes</code> there is more.</p>\n";
+  return text;
 }
 
 std::string reading_section(const TradeReport& report) {
@@ -395,14 +414,17 @@ std::string front_words(const TradeReport& report, const TradeFrontPoint& at) {
 }
 
 std::string trade_page(const TradeReport& report) {
+  const bool is_any_measured = !report.methods.front().points.empty();
   std::string html =
       "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta "
       "name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
       escaped(report.set) + ": what time buys</title>\n<style>" + style +
-      "</style>\n</head>\n<body>\n" + opening(report) + answers_section(report) +
-      front_section(report) + corners_section(report);
+      "</style>\n</head>\n<body>\n" + opening(report) + unmeasured_section(report) +
+      answers_section(report) + (is_any_measured ? front_section(report) : std::string()) +
+      corners_section(report);
   for (const TradePlan::Axis& axis : report.plan.axes)
-    html += axis.name == parts_axis ? parts_section(report, axis) : axis_section(report, axis);
+    if (is_any_measured)
+      html += axis.name == parts_axis ? parts_section(report, axis) : axis_section(report, axis);
   return html + reading_section(report) + "</body>\n</html>\n";
 }
 

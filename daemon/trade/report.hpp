@@ -26,7 +26,7 @@ struct TradePoint {
 
 struct TradeMethod {
   std::string name;
-  std::vector<TradePoint> points;            // in order of samples
+  std::vector<TradePoint> points;            // in order of samples; none: it was not measured
   std::optional<TradeReference::Bias> bias;  // absent: fewer than three rounds
   // For methods that carry unneeded features: the number of pixels that differ from the set's own
   // picture, which must be 0.
@@ -60,9 +60,10 @@ struct TradeReport {
   std::vector<TradeCorner> corners;
   Plate reference;
   TradeQuestion question;
-  std::vector<TradeAnswer> answers;  // empty: none was asked for
-  std::filesystem::path csv, page;   // as written
-  bool interrupted = false;          // then nothing was written
+  std::vector<TradeAnswer> answers;     // empty: none was asked for
+  std::filesystem::path csv, page;      // as written
+  bool interrupted = false;             // by a signal; what was known by then is there
+  std::vector<std::string> unmeasured;  // methods that there was no time for
 
   const TradePoint& point(const TradeFrontPoint& at) const {
     return methods[at.method].points[at.point];

@@ -33,14 +33,17 @@ struct TradeOptions {
   // Samples of both halves together; absent: 256 times the largest of `samples`, so that the
   // reference's error is about a sixteenth of the set's own best.
   std::optional<int> reference_samples;
+  std::optional<double> minutes;  // that it may take, above 0; absent: as long as it takes
   int rounds = 3;  // each variant is measured so often, with other random numbers each time
   render::DeviceOptions device;
   bool terminal = false;  // `out` is a terminal: progress is one rewritten line
-  std::stop_token stop;   // ends without a result
+  std::stop_token stop;   // ends with what is known by then
 };
 
 // Writes DIR/trade.csv and DIR/trade.html (page.hpp), and, with answers, DIR/live.toml, refine.toml
-// and post.toml, which `previzd run` and `previzd render` take with --with. Progress and notes go
+// and post.toml, which `previzd run` and `previzd render` take with --with, of those answers that
+// hold what was asked for. Table and page are written after every round, so that they are there
+// whenever it ends; what was not measured in the time is named on the page. Progress and notes go
 // to `out`. Throws previz::Error for a set without a take (TradeSource), a frame that is missing or
 // was not tracked, an impossible scale, a directory that is a file, or a picture with nothing
 // virtual in it.

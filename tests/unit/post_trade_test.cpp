@@ -193,14 +193,43 @@ TEST_F(Trade, RefusesAPictureWithNothingVirtualInIt) {
   expect_refused(none, "nothing virtual");
 }
 
-TEST_F(Trade, AStopLeavesNothing) {
+// A page of what is known by then: the reference at least.
+TEST_F(Trade, AStopLeavesWhatIsKnown) {
   test::write_small_take(directory_.path());
   std::stop_source stop;
   stop.request_stop();
   TradeOptions stopped = options();
   stopped.stop = stop.get_token();
-  EXPECT_TRUE(run_trade(stopped, out_).interrupted);
-  EXPECT_FALSE(std::filesystem::exists(directory_ / "out/trade.csv"));
+  const TradeReport report = run_trade(stopped, out_);
+  EXPECT_TRUE(report.interrupted);
+  const std::string page = session::read_file(report.page);
+  EXPECT_NE(page.find("It was stopped before it had ended"), std::string::npos);
+  EXPECT_NE(page.find("There was no time to measure: "), std::string::npos);
+  EXPECT_NE(page.find("<b>converged</b>"), std::string::npos);
+  EXPECT_TRUE(report.answers.empty());
+}
+
+// Whatever the time, the set's own settings are measured and judged; the rest is named.
+TEST_F(Trade, TakesTheTimeThatItIsGiven) {
+  test::write_small_take(directory_.path());
+  TradeOptions hurried = options();
+  hurried.minutes = 1e-3;
+  hurried.answers = true;
+  hurried.fps = 1e-3;
+  const TradeReport report = run_trade(hurried, out_);
+  EXPECT_FALSE(report.interrupted);
+  ASSERT_FALSE(report.methods.front().points.empty());
+  EXPECT_EQ(report.unmeasured.size(), report.methods.size() - 1);
+  ASSERT_EQ(report.answers.size(), 3u);
+  for (const TradeAnswer& answer : report.answers) {
+    EXPECT_FALSE(answer.is_whole) << answer.use;
+    EXPECT_NE(answer.words.find("no time to try all settings"), std::string::npos);
+    EXPECT_EQ(answer.file.empty(), !answer.is_met);
+  }
+  const std::string csv = session::read_file(report.csv);
+  EXPECT_NE(csv.find("estimator,"), std::string::npos);
+  EXPECT_EQ(csv.find(",0,,"), csv.find(",0,,\n"));  // no row of what was not measured
+  EXPECT_NE(out_.str().find(", within "), std::string::npos);
 }
 
 }  // namespace post_trade_test
