@@ -1,14 +1,15 @@
 // What sanitizers must know of libraries that are not built with them; linked into every program of
 // theirs. LeakSanitizer: Mesa's lavapipe leaves a hundred bytes a device behind. The report could
 // not say whose they are, since the Vulkan loader has unloaded the driver by then; so libraries
-// stay loaded, and the driver's leaks can be named. ThreadSanitizer sees neither the locks of GLib
+// stay loaded, and the driver's leaks can be named. So does x265, which encodes videos for tests,
+// with its parameters. ThreadSanitizer sees neither the locks of GLib
 // nor the threads' hand-over within Aravis and Mesa's CPU driver; and it lets a child that was
 // forked beside threads start its own, as the recorder's tests do, only if it is asked to.
 
 extern "C" {
 
 const char* __lsan_default_suppressions() {
-  return "leak:libvulkan_lvp.so\n";
+  return "leak:libvulkan_lvp.so\nleak:libx265.so\n";
 }
 
 const char* __tsan_default_suppressions() {

@@ -86,8 +86,8 @@ const auto example_file = config / "set.example.toml";
 // The example's files are the crew's own; any file stands in for them here.
 Set example(const std::string& text) {
   const auto& any = example_file;
-  return parse_set(text, any,
-                   {{"stage/set.gltf", any}, {"stage/creature.gltf", any}, {"stage/lamp.gltf", any}});
+  return parse_set(
+      text, any, {{"stage/set.gltf", any}, {"stage/creature.gltf", any}, {"stage/lamp.gltf", any}});
 }
 
 TEST(SetExample, Parses) {
