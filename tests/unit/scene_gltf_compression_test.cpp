@@ -23,7 +23,7 @@ using Corners = std::array<std::uint32_t, 3>;
 
 // Codecs may begin a triangle at another of its corners: here the least is the first.
 Corners turned(Corners corners) {
-  std::ranges::rotate(corners, std::ranges::min_element(corners));
+  std::rotate(corners.begin(), std::ranges::min_element(corners), corners.end());
   return corners;
 }
 
