@@ -82,11 +82,10 @@ std::string usd_lens(const ObserverCalibration& calibration) {
 
 std::string distortion_words(const PinholeIntrinsics& i) {
   const bool has_divisor = i.k4 != 0 || i.k5 != 0 || i.k6 != 0;
-  const std::string words = std::string("Lens distortion, ") +
-                            (has_divisor ? "OpenCV's rational model: k1 " : "Brown-Conrady: k1 ") +
-                            number_text(i.k1) + ", k2 " + number_text(i.k2) + ", p1 " +
-                            number_text(i.p1) + ", p2 " + number_text(i.p2) + ", k3 " +
-                            number_text(i.k3);
+  std::string words = std::string("Lens distortion, ") +
+                      (has_divisor ? "OpenCV's rational model: k1 " : "Brown-Conrady: k1 ") +
+                      number_text(i.k1) + ", k2 " + number_text(i.k2) + ", p1 " +
+                      number_text(i.p1) + ", p2 " + number_text(i.p2) + ", k3 " + number_text(i.k3);
   if (!has_divisor) return words;
   return words + ", k4 " + number_text(i.k4) + ", k5 " + number_text(i.k5) + ", k6 " +
          number_text(i.k6);
