@@ -50,7 +50,7 @@ AVPixelFormat whole_chroma_format(int depth) {
   }
 }
 
-// What a code of luma, 0..1, and of chroma, -0.5..0.5, means (H.273, 8.3).
+// The codes between which luma goes from 0 to 1 and chroma from -0.5 to 0.5 (H.273, 8.3).
 struct Levels {
   float black, luma_range, gray, chroma_range;
 };

@@ -43,7 +43,7 @@ std::uint8_t byte_of(std::uint16_t sample) {
   return static_cast<std::uint8_t>((sample + 128) / 257);
 }
 
-// Of a picture with 16 bits a sample.
+// Returns the samples of a picture that has 16 bits for each.
 std::span<std::uint16_t> deep_samples(Picture& picture) {
   return {reinterpret_cast<std::uint16_t*>(picture.bytes.data()),
           picture.bytes.size() / sizeof(std::uint16_t)};

@@ -45,7 +45,7 @@ bool names_a_log_curve(const std::string& value) {
       names, [&](const char* name) { return text.find(name) != std::string::npos; });
 }
 
-// What people write of a clip, as against what a camera does.
+// Returns whether people write this of a clip, and not a camera.
 bool is_free_text(const std::string& key) {
   static constexpr std::array keys = {
       "title",        "comment",  "description", "artist",           "author",

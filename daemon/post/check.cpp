@@ -132,7 +132,7 @@ void check_environment(Checked& checked, Lines& problems) {
   });
 }
 
-// What a live set, or the rendering of a take, would be refused for.
+// Adds the problems for which a live set, or the rendering of a take, would be refused.
 void check_cameras(const Checked& checked, Lines& problems) {
   const set::Lighting& lighting = checked.set.lighting;
   const bool from_camera = lighting.from == set::LightFrom::camera && !lighting.environment;

@@ -331,7 +331,7 @@ std::string parts_section(const TradeReport& report, const TradePlan::Axis& axis
          ".</p>\n";
 }
 
-// What there was no time for, so that nobody takes its absence for a result.
+// Names what there was no time for, so that nobody takes its absence for a result.
 std::string unmeasured_section(const TradeReport& report) {
   std::string names;
   for (const std::string& name : report.unmeasured) add_to_list(names, plain_words(name));

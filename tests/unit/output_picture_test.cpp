@@ -139,7 +139,7 @@ TEST(Video, EveryCodecKeepsTimesSizeAndLevel) {
 TEST(Video, HasTheTakesRateAndTimecode) {
   const TemporaryDirectory directory;
   const VideoCodec codec = review_codecs().front();
-  if (codec.container != "mp4") GTEST_SKIP() << "libav has no encoder for MP4";
+  ASSERT_EQ(codec.container, "mp4");  // Debian's libav has two encoders for it
   const double fps = 30000.0 / 1001;
   const session::TakeClock clock{fps, session::Timecode{"01:00:59;29", fps}, 0};
   VideoWriter video(directory / "review", 64, 48, codec, clock, 33'366'667);

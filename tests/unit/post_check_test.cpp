@@ -44,6 +44,20 @@ class Check : public testing::Test {
     return status;
   }
 
+  // A take of one black frame of 16x8 pixels by each camera.
+  void write_take(const session::SessionInfo& info, const std::vector<std::string>& cameras) {
+    session::SessionWriter writer(directory_ / "take", info);
+    for (const std::string& camera : cameras) {
+      Frame frame;
+      frame.source = camera;
+      frame.width = 16;
+      frame.height = 8;
+      frame.bytes.resize(frame_bytes(frame.format, frame.width, frame.height));
+      writer.write(frame);
+    }
+    writer.close();
+  }
+
   void expect_said(const std::string& words) {
     EXPECT_NE(said_.find(words), std::string::npos) << words << "\nis not in\n" << said_;
   }
@@ -198,16 +212,7 @@ TEST_F(Check, TakesSetAndCalibrationOfASession) {
   info.observer.emplace();
   info.observer->intrinsics = {.width = 16, .height = 8, .fx = 20, .fy = 20, .cx = 7.5, .cy = 3.5};
   info.observer->lens = {.focal_length_m = 0.035, .f_number = 2.8, .focus_distance_m = 1.5};
-  session::SessionWriter writer(directory_ / "take", info);
-  Frame frame;
-  frame.source = "observer";
-  frame.width = 16;
-  frame.height = 8;
-  frame.bytes.resize(frame_bytes(frame.format, frame.width, frame.height));
-  writer.write(frame);
-  frame.source = "light";
-  writer.write(frame);
-  writer.close();
+  write_take(info, {"observer", "light"});
 
   std::ostringstream out;
   ASSERT_EQ(check_set(directory_ / "take", out), 0) << out.str();
@@ -227,14 +232,7 @@ TEST_F(Check, ATakeWithoutLightIsAProblem) {
   info.set_text = "[set]\nname = 'dark'\n[tracking]\nenabled = false\n";
   info.observer.emplace();
   info.observer->intrinsics = {.width = 16, .height = 8, .fx = 20, .fy = 20, .cx = 7.5, .cy = 3.5};
-  session::SessionWriter writer(directory_ / "take", info);
-  Frame frame;
-  frame.source = "observer";
-  frame.width = 16;
-  frame.height = 8;
-  frame.bytes.resize(frame_bytes(frame.format, frame.width, frame.height));
-  writer.write(frame);
-  writer.close();
+  write_take(info, {"observer"});
   std::ostringstream out;
   EXPECT_EQ(check_set(directory_ / "take", out), 1);
   said_ = out.str();

@@ -1,0 +1,279 @@
+// Videos of others that are damaged, cut or lack frames: what comes in, when, and with which poses.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <opencv2/imgproc.hpp>
+
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "drivers/session/session.hpp"
+#include "tests/support/import_fixture.hpp"
+
+namespace previz::exchange {
+namespace import_lost_frames_test {
+
+using Bytes = std::vector<std::uint8_t>;
+
+std::unique_ptr<session::StreamReader> open(const Shoot& shoot) {
+  session::Session opened = session::open_session(shoot.session());
+  return session::open_stream(opened, "observer");
+}
+
+VideoForm small_form() {
+  VideoForm form;
+  form.encoder = "png";
+  form.width = 48;
+  return form;
+}
+
+// A texture that moves, so that every frame differs from every other one and refers to others.
+std::vector<Bytes> moving_texture(int count, int width, int height) {
+  std::vector<Bytes> frames;
+  for (int i = 0; i < count; ++i) {
+    Bytes bytes;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        bytes.push_back(static_cast<std::uint8_t>(
+            128 + 60 * std::sin((x + 3 * i) * 0.3) * std::cos((y + 2 * i) * 0.25) +
+            30 * std::sin((x - y + 5 * i) * 0.11)));
+    bytes.resize(static_cast<std::size_t>(width * height * 3 / 2), 128);
+    frames.push_back(std::move(bytes));
+  }
+  return frames;
+}
+
+struct Timed {
+  std::map<std::int64_t, Bytes> frames;  // by their times, in nanoseconds
+  std::vector<std::string> notes;
+};
+
+Timed import_video(const Shoot& shoot) {
+  Timed timed;
+  timed.notes = shoot.import().notes;
+  const auto stream = open(shoot);
+  for (std::size_t i = 0; i < stream->records().size(); ++i) {
+    const FramePtr frame = stream->read(i);
+    timed.frames[frame->timestamp_ns] = frame->bytes;
+  }
+  return timed;
+}
+
+struct Damage {
+  const char* name;
+  const char* encoder;
+  const char* file;
+  std::map<std::string, std::string> options;
+  std::size_t at_least;  // so many frames come in
+};
+
+std::ostream& operator<<(std::ostream& out, const Damage& damage) {
+  return out << damage.name;
+}
+
+class ImportVideoWithAHole : public testing::TestWithParam<Damage> {};
+class ImportTruncatedVideo : public testing::TestWithParam<Damage> {};
+
+constexpr int texture_frames = 48;
+
+using Spoil = std::function<bool(AVPacket&, int)>;
+
+void film(Shoot& shoot, const Damage& damage, Spoil spoil) {
+  VideoForm form;
+  form.encoder = damage.encoder;
+  form.options = damage.options;
+  form.pixel_format = std::string(damage.encoder) == "mjpeg" ? "yuvj420p" : "yuv420p";
+  form.width = 160;
+  form.height = 96;
+  form.spoil = std::move(spoil);
+  write_video(shoot.folder() / damage.file, form, moving_texture(texture_frames, 160, 96));
+  shoot.json["observer"] = {{"video", damage.file}, {"exposure", 1}};
+}
+
+Timed import_video(const Damage& damage, Spoil spoil) {
+  Shoot shoot;
+  film(shoot, damage, std::move(spoil));
+  return import_video(shoot);
+}
+
+void expect_same_frames(const Timed& damaged, const Timed& whole) {
+  for (const auto& [time, bytes] : damaged.frames) {
+    const auto found = whole.frames.find(time);
+    ASSERT_NE(found, whole.frames.end()) << "a frame at " << time << " is not in the whole video";
+    EXPECT_TRUE(bytes == found->second) << "the frame at " << time << " is another picture";
+  }
+}
+
+// As a bad sector and a full disk leave a packet: half of it nought, or its second half gone. (Of
+// bytes that are merely others no decoder can tell: most of them say something.)
+void zero_half(AVPacket& packet) {
+  std::fill(packet.data + packet.size / 4, packet.data + packet.size * 3 / 4, std::uint8_t{0});
+}
+void cut_half(AVPacket& packet) {
+  av_shrink_packet(&packet, packet.size / 2);
+}
+
+void expect_lost_frames_only(const Damage& damage, void (*harm)(AVPacket&)) {
+  const Timed whole = import_video(damage, nullptr);
+  ASSERT_EQ(whole.frames.size(), std::size_t{texture_frames});
+  const Timed damaged = import_video(damage, [&](AVPacket& packet, int number) {
+    if (number == 14) harm(packet);
+    return true;
+  });
+  expect_same_frames(damaged, whole);
+  EXPECT_LT(damaged.frames.size(), whole.frames.size());
+  EXPECT_GE(damaged.frames.size(), damage.at_least);
+  const std::string lost = std::to_string(whole.frames.size() - damaged.frames.size());
+  EXPECT_TRUE(std::ranges::any_of(damaged.notes, [&](const std::string& note) {
+    return note.find(": " + lost + (lost == "1" ? " frame is lost" : " frames are lost")) !=
+           std::string::npos;
+  }));
+}
+
+TEST_P(ImportVideoWithAHole, NoFrameThatRefersToALostOneComesIn) {
+  expect_lost_frames_only(GetParam(), zero_half);
+}
+
+TEST_P(ImportTruncatedVideo, NoFrameThatRefersToALostOneComesIn) {
+  expect_lost_frames_only(GetParam(), cut_half);
+}
+
+// The most that may be lost: a group of 12, and the frames before the next key frame in time.
+constexpr std::size_t all_but_a_group = texture_frames - 15;
+const std::map<std::string, std::string> groups = {{"g", "12"}, {"bf", "2"}};
+const Damage mjpeg{"mjpeg", "mjpeg", "take.avi", {}, texture_frames - 1};
+const Damage h264{"h264", "libx264", "take.mp4", groups, all_but_a_group};
+const Damage hevc{"hevc",
+                  "libx265",
+                  "take.mkv",
+                  {{"g", "12"}, {"x265-params", "log-level=none:pools=none:bframes=2"}},
+                  all_but_a_group};
+const Damage mpeg4{"mpeg4", "mpeg4", "take.mp4", groups, all_but_a_group};
+const Damage mpeg2{"mpeg2", "mpeg2video", "take.mkv", groups, all_but_a_group};
+
+std::string name_of(const testing::TestParamInfo<Damage>& damage) {
+  return damage.param.name;
+}
+// Nought bytes mean something in MJPEG, and libav's decoder of HEVC takes what ends early for
+// whole.
+INSTANTIATE_TEST_SUITE_P(Codecs, ImportVideoWithAHole, testing::Values(h264, hevc, mpeg4, mpeg2),
+                         name_of);
+INSTANTIATE_TEST_SUITE_P(Codecs, ImportTruncatedVideo, testing::Values(mjpeg, h264, mpeg4, mpeg2),
+                         name_of);
+
+// Where in the second half of a transport stream a packet begins that goes on with a picture
+// (ISO/IEC 13818-1, 2.4.3.2): the payload begins no unit, and it belongs to libav's first stream.
+std::size_t continuing_packet(const std::string& stream) {
+  for (std::size_t i = stream.size() / 188 / 2 * 188; i < stream.size(); i += 188)
+    if ((stream[i + 1] & 0x5f) == 0x01 && stream[i + 2] == 0x00) return i;
+  throw Error("no picture fills more than one packet");
+}
+
+// As a receiver of a stream has it: one of its packets of 188 bytes never came.
+TEST(ImportVideo, ATransportStreamThatLostPacketsComesInWithoutTheirFrames) {
+  for (const char* encoder : {"libx264", "libx265"}) {
+    Damage stream{"ts", encoder, "take.ts", {{"g", "12"}}, 0};
+    if (std::string(encoder) == "libx265")
+      stream.options["x265-params"] = "log-level=none:pools=none";
+    Shoot shoot;
+    film(shoot, stream, nullptr);
+    const Timed whole = import_video(shoot);
+    ASSERT_EQ(whole.frames.size(), std::size_t{texture_frames});
+    std::filesystem::remove_all(shoot.session());
+    std::ifstream in(shoot.folder() / "take.ts", std::ios::binary);
+    std::string bytes(std::istreambuf_iterator<char>(in), {});
+    bytes.erase(continuing_packet(bytes), 188);
+    session::write_content(shoot.folder() / "take.ts", bytes);
+    const Timed damaged = import_video(shoot);
+    EXPECT_LT(damaged.frames.size(), whole.frames.size());
+    EXPECT_GE(damaged.frames.size(), std::size_t{texture_frames - 16});
+    expect_same_frames(damaged, whole);
+  }
+}
+
+// What was cut away before an open group's key frame is lost at the beginning; the numbers and
+// times of the others count from what is in the file.
+TEST(ImportVideo, ACutAtAnOpenGroupOfPicturesComesIn) {
+  const Damage open_group{"",
+                          "libx264",
+                          "take.mkv",
+                          {{"g", "12"}, {"bf", "2"}, {"x264-params", "open-gop=1:scenecut=0"}},
+                          0};
+  const Timed whole = import_video(open_group, nullptr);
+  ASSERT_EQ(whole.frames.size(), std::size_t{texture_frames});
+  int first = 0;
+  const Timed cut = import_video(open_group, [&](AVPacket& packet, int number) {
+    if (number > 0 && packet.flags & AV_PKT_FLAG_KEY && first == 0) first = number;
+    return first > 0;
+  });
+  // All but those between two of the frames that the key frame is one of: at most the two B-frames.
+  const auto left = static_cast<std::size_t>(texture_frames - first);
+  EXPECT_GE(cut.frames.size(), left - 2);
+  EXPECT_LT(cut.frames.size(), left + 1);
+  // The frames are the last ones of the whole.
+  auto from_end = whole.frames.rbegin();
+  for (auto frame = cut.frames.rbegin(); frame != cut.frames.rend(); ++frame, ++from_end)
+    EXPECT_TRUE(frame->second == from_end->second) << "the frame at " << frame->first;
+}
+
+// A phone's clip that lost one frame while it was filmed, with a track of timecode.
+TEST(ImportVideo, TheRateIsTheNominalOneAndTheTimecodeTheClips) {
+  VideoForm form = small_form();
+  form.fps = 30;
+  form.metadata = {{"timecode", "10:59:59:20"}};
+  for (std::int64_t i = 0; i < 60; ++i)
+    if (i != 20) form.times.push_back(i);
+  Shoot shoot;
+  write_video(shoot.folder() / "take.mov", form, std::vector<Bytes>(59, Bytes(3 * 48 * 16, 90)));
+  shoot.json["observer"] = {{"video", "take.mov"}, {"exposure", 1}};
+  const ImportReport report = shoot.import();
+  EXPECT_TRUE(std::ranges::any_of(report.notes, [](const std::string& note) {
+    return note == "observer: 30 frames a second; 1 frame is missing, after frame 19";
+  })) << report.notes.back();
+  const session::Session opened = session::open_session(shoot.session());
+  EXPECT_EQ(opened.info.timecode, (session::Timecode{"10:59:59:20", 30}));
+}
+
+// The timecode of the file is that of its first frame, which was lost.
+TEST(ImportVideo, TheTimecodeIsThatOfTheFirstFrameThatCameIn) {
+  VideoForm form = small_form();
+  form.encoder = "mjpeg";
+  form.pixel_format = "yuvj420p";
+  form.metadata = {{"timecode", "10:59:59:24"}};
+  form.spoil = [](AVPacket& packet, int number) {
+    if (number == 0) std::fill_n(packet.data, packet.size, std::uint8_t{0});
+    return true;
+  };
+  Shoot shoot;
+  write_video(shoot.folder() / "take.mov", form,
+              std::vector<Bytes>(10, Bytes(48 * 16 * 3 / 2, 90)));
+  shoot.json["observer"] = {{"video", "take.mov"}, {"exposure", 1}};
+  ASSERT_EQ(shoot.error(), "");
+  const session::Session opened = session::open_session(shoot.session());
+  EXPECT_EQ(opened.info.timecode, (session::Timecode{"11:00:00:00", 25}));
+}
+
+// A pose belongs to its frame, not to the one that takes its place.
+TEST(ImportVideo, PosesOfLostFramesAreLeftOut) {
+  Shoot shoot;
+  film(shoot, mjpeg, [](AVPacket& packet, int number) {
+    if (number == 1) std::fill_n(packet.data, packet.size, std::uint8_t{0});
+    return true;
+  });
+  for (const int frame : {0, 1, 2})
+    shoot.json["track"].push_back(
+        {{"frame", frame},
+         {"world_from_camera", {{1, 0, 0, frame}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}}});
+  const ImportReport report = shoot.import();
+  EXPECT_EQ(report.observer_frames, std::uint64_t{texture_frames - 1});
+  EXPECT_EQ(report.poses, 2u);
+  EXPECT_NE(report.notes.back().find("1 pose belongs to a lost frame"), std::string::npos);
+  const auto stream = open(shoot);
+  EXPECT_EQ(stream->read(1)->sequence, 2u);
+  EXPECT_EQ(stream->read(1)->timestamp_ns, 80'000'000);
+}
+
+}  // namespace import_lost_frames_test
+}  // namespace previz::exchange
