@@ -20,8 +20,6 @@
 namespace previz::calibrate {
 namespace {
 
-// A chi-square of 9 degrees of freedom exceeds this once in a million.
-constexpr double contradicting_chi_square = 44.8;
 constexpr double worth_a_word_m = 1e-3, worth_a_word_of_size = 2e-3;
 
 // "0-3:1.234m"
@@ -125,12 +123,13 @@ void print_refined(const RefinedLens& refined, std::ostream& out) {
       refined.rms_before_px > 0 ? fmt::format("before {:.3f} px", refined.rms_before_px)
                                 : "before no map fitted the pictures",
       refined.corner_moved_px, refined.sigma_px, refined.sigma_before_px);
-  if (refined.survey.prior_chi_square > contradicting_chi_square)
+  if (refined.boards_factor > 1)
     fmt::print(
         out,
-        "warning: tags and boards disagree about the lens (chi-square {:.0f} of 9): were zoom "
-        "and focus the same, the boards flat, and the tags as large as stated?\n",
-        refined.survey.prior_chi_square);
+        "warning: tags and boards disagree about the lens by more than their noise explains, "
+        "so the boards count for less (deviations times {:.1f}): check that zoom and focus "
+        "are the same, boards and tags flat, and tags as large as stated\n",
+        std::sqrt(refined.boards_factor));
 }
 
 // Refines the lens where the set has the statistics of its boards.

@@ -44,6 +44,27 @@ glm::dvec3 common_rotation(const PinholeIntrinsics& lens, const PinholeIntrinsic
   return {turn[0], turn[1], turn[2]};
 }
 
+// Surveys with the lens free, and widens the prior until the tags do not contradict it. Multiplies
+// `factor` by what the prior's covariance is widened by.
+TagSurvey survey_with_free_lens(const TagWalk& walk, const PinholeIntrinsics& lens,
+                                TagSurveyOptions& options, double& factor) {
+  constexpr int most_rounds = 8;
+  constexpr double sigmas = 3;
+  TagSurvey survey = survey_tags(walk, lens, options);
+  for (int round = 0; round < most_rounds; ++round) {
+    LensMatrix& information = options.lens_prior->information;
+    const double redundancy = lens_size - cv::trace(survey.lens_covariance * information);
+    if (!(redundancy > 0) ||
+        survey.prior_chi_square < redundancy + sigmas * std::sqrt(2 * redundancy))
+      break;
+    const double wider = survey.prior_chi_square / redundancy;
+    factor *= wider;
+    information = information * (1 / wider);
+    survey = survey_tags(walk, survey.lens, options);
+  }
+  return survey;
+}
+
 std::string why_it_stays(const RefinedLens& refined) {
   if (refined.survey.pictures < least_lens_pictures)
     return fmt::format("only {} pictures show tags; {} are needed", refined.survey.pictures,
@@ -63,7 +84,12 @@ double worst_projection_px(const PinholeIntrinsics& lens, const LensMatrix& cova
   const LensVector values = lens_vector(lens);
   fit.bundle.lens.assign(values.val, values.val + lens_size);
   fit.lens_covariance.assign(covariance.val, covariance.val + lens_size * lens_size);
-  return worst_px(projection_uncertainty(fit, project_pinhole, picture_rays(lens)));
+  std::vector<glm::dvec3> rays = picture_rays(lens);
+  for (const double x : {0.0, lens.width - 1.0})
+    for (const double y : {0.0, lens.height - 1.0})
+      if (const auto plane = undistort(lens, {x, y}))
+        rays.push_back(glm::normalize(glm::dvec3(*plane, 1)));
+  return worst_px(projection_uncertainty(fit, project_pinhole, rays));
 }
 
 double corner_difference_px(const PinholeIntrinsics& lens, const PinholeIntrinsics& other) {
@@ -95,14 +121,14 @@ RefinedLens survey_tags_and_lens(const TagWalk& walk, const PinholeIntrinsics& l
     why_none = error.what();
   }
   try {
-    refined.survey = survey_tags(walk, lens, free);
+    refined.survey = survey_with_free_lens(walk, lens, free, refined.boards_factor);
   } catch (const Error& error) {
     if (!before) throw;
     refined.survey = *before;
     refined.why_not = error.what();
     return refined;
   }
-  const LensMatrix boards = prior.information.inv(cv::DECOMP_CHOLESKY);
+  const LensMatrix boards = free.lens_prior->information.inv(cv::DECOMP_CHOLESKY);
   refined.sigma_before_px = worst_projection_px(refined.survey.lens, boards);
   refined.sigma_px = worst_projection_px(refined.survey.lens, refined.survey.lens_covariance);
   refined.corner_moved_px = corner_difference_px(lens, refined.survey.lens);

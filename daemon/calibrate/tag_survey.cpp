@@ -135,10 +135,12 @@ std::vector<double> settle_sizes(Surveying& state) {
   TagAdjustment free = state.how();
   free.sizes_free = true;
   free.loss_scale = map_loss_scale;
-  TagPlaces places = adjust_tags(state.walk, state.lens, state.places, free);
-  free.model_error_px = state.model_error_px = model_error(state.walk, state.lens, places);
-  places = adjust_tags(state.walk, state.lens, std::move(places), free);
-  const std::vector<TagCovariance> all = tag_covariances(state.walk, state.lens, places, free);
+  TagsAndLens at = adjust_tags_and_lens(state.walk, {state.places, state.lens}, free);
+  free.model_error_px = state.model_error_px = model_error(state.walk, at.lens, at.places);
+  at = adjust_tags_and_lens(state.walk, std::move(at), free);
+  TagPlaces places = std::move(at.places);
+  state.lens = at.lens;
+  const std::vector<TagCovariance> all = tag_covariances(state.walk, at.lens, places, free);
   std::vector<double> off, sigma(state.walk.ids.size()), seen_off;
   for (std::size_t t = 0; t < state.walk.ids.size(); ++t) {
     off.push_back(std::log(places.sizes_m[t] / state.walk.sizes_m[t]));
