@@ -96,6 +96,18 @@ TEST(TagLens, ALensThatBoardsDetermineStaysWithinWhatTheyAreCertainTo) {
   EXPECT_LE(corner_difference_px(refined.survey.lens, true_lens()), 3 * refined.sigma_before_px);
 }
 
+// Boards that state a tenth of their deviations, as bent paper makes them do: they are widened
+// until the tags do not contradict them, and the rim is as certain as is said.
+TEST(TagLens, BoardsThatAreTooSureOfThemselvesCountForLess) {
+  const ObserverFit boards = by_boards(in_the_centre(), 8);
+  LensPrior prior = prior_of(boards);
+  prior.information = prior.information * 100.0;
+  const RefinedLens refined = survey_tags_and_lens(walk(60, 8), boards.intrinsics, {}, prior);
+  ASSERT_TRUE(refined.is_refined) << refined.why_not;
+  EXPECT_GT(refined.boards_factor, 1);
+  EXPECT_LT(corner_difference_px(refined.survey.lens, true_lens()), 3 * refined.sigma_px);
+}
+
 TEST(TagLens, StaysWhereFewPicturesShowTags) {
   const ObserverFit boards = by_boards(in_the_centre(), 5);
   const RefinedLens refined =
