@@ -171,9 +171,7 @@ class Resolver {
     const auto& table = given("observer.lens_fit");
     const LensFit& fit = set_.observer.lens_fit;
     if (table.good("values") && fit.values.size() != values)
-      problem(table, "values",
-              "has " + std::to_string(fit.values.size()) +
-                  " numbers; allowed: 9, as `previzd calibrate observer` prints them");
+      problem(table, "values", "has " + std::to_string(fit.values.size()) + " numbers; allowed: 9");
     if (!table.good("covariance_root")) return;
     bool is_root = fit.covariance_root.size() == triangle;
     for (std::size_t row = 0; is_root && row < values; ++row)
