@@ -59,13 +59,13 @@ struct TagsAndLens {
 };
 
 // Moves the unknowns to the nearest minimum (Levenberg-Marquardt; the cameras are eliminated by a
-// Schur complement: Triggs et al. 2000, "Bundle Adjustment - A Modern Synthesis", section 6.1).
+// Schur complement: Triggs et al. 2000, "Bundle Adjustment - A Modern Synthesis").
 // Tags and cameras without a used sighting stay where they are.
 TagPlaces adjust_tags(const TagWalk& walk, const PinholeIntrinsics& lens, TagPlaces start,
                       const TagAdjustment& how);
 
 // The same with the free parameters of how.lens_prior, which must be there, as further unknowns
-// (self-calibration with the lens as observed parameters: Triggs et al. 2000, section 2.3; Luhmann
+// (self-calibration with the lens as observed parameters: Triggs et al. 2000; Luhmann
 // et al., "Close-Range Photogrammetry and 3D Imaging", section 4.4).
 TagsAndLens adjust_tags_and_lens(const TagWalk& walk, TagsAndLens start, const TagAdjustment& how);
 

@@ -33,7 +33,7 @@ struct RefinedLens {
 // Real boards and tags contradict each other by more than the noise of their corners says: paper is
 // not flat. Where the lens is off from that of the boards by more than three standard deviations of
 // chi-square, the boards' covariance is multiplied by what brings it to its expectation, the
-// prior's redundancy (variance components: Foerstner 1979; Luhmann et al., section 2.4.4), so that
+// prior's redundancy (variance components: Foerstner 1979), so that
 // a prior that is too sure of itself does not bend the map.
 // Throws previz::Error as survey_tags does, if neither survey succeeds.
 RefinedLens survey_tags_and_lens(const TagWalk& walk, const PinholeIntrinsics& lens,
