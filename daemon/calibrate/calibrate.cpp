@@ -5,6 +5,7 @@
 #include "daemon/calibrate/coverage.hpp"
 #include "daemon/calibrate/fisheye.hpp"
 #include "daemon/calibrate/known_camera.hpp"
+#include "daemon/calibrate/lens_prior.hpp"
 #include "daemon/calibrate/light_pose.hpp"
 #include "daemon/calibrate/observer.hpp"
 #include "daemon/calibrate/report.hpp"
@@ -83,6 +84,14 @@ std::string pose_by_tags(const LightOptions& options, const set::Set& set,
   return set::light_pose_toml(pose.world_from_camera);
 }
 
+// Returns the table by which calibrate tags refines the lens; empty if the views do not hold all of
+// its coefficients together.
+std::string statistics_of(const ObserverFit& observer) {
+  if (observer.whole_lens.empty()) return "";
+  return "\n" + set::lens_fit_toml(lens_fit_table(LensVector(observer.whole_lens.data()),
+                                                  LensMatrix(observer.whole_covariance.data())));
+}
+
 constexpr auto pose_by_hand =
     "# Where it stands, by hand (or by calibrate light --tags SET):\n"
     "#[light_camera.pose]\n"
@@ -109,7 +118,8 @@ void calibrate_observer(const LensOptions& options, std::ostream& out) {
   if (doubts.empty()) doubts = warn(doubts_of(observer), out);
   ObserverCalibration calibration;
   calibration.intrinsics = observer.intrinsics;
-  write_tables(doubts + set::intrinsics_toml(calibration), options.table_file, out);
+  write_tables(doubts + set::intrinsics_toml(calibration) + statistics_of(observer),
+               options.table_file, out);
 }
 
 void calibrate_light(const LightOptions& options, std::ostream& out) {

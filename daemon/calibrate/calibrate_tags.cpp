@@ -9,6 +9,7 @@
 #include "daemon/calibrate/length.hpp"
 #include "daemon/calibrate/moved_tags.hpp"
 #include "daemon/calibrate/report.hpp"
+#include "daemon/calibrate/tag_lens.hpp"
 #include "daemon/calibrate/tag_survey.hpp"
 #include "daemon/calibrate/tag_tables.hpp"
 #include "daemon/calibrate/tag_walk.hpp"
@@ -111,6 +112,46 @@ void print_survey(const TagSurvey& survey, const set::Set& set, std::ostream& ou
                words_of(moved));
 }
 
+void print_refined(const RefinedLens& refined, std::ostream& out) {
+  if (!refined.is_refined) return fmt::print(out, "the lens stays as it is: {}\n", refined.why_not);
+  fmt::print(
+      out,
+      "the lens is refined by boards and tags together: rms {:.3f} px, {}; it moves by {:.2f} "
+      "px in the corner of the picture, and is certain to {:.3f} px at worst ({:.3f} px by "
+      "the boards alone)\n",
+      refined.survey.rms_px,
+      refined.rms_before_px > 0 ? fmt::format("before {:.3f} px", refined.rms_before_px)
+                                : "before no map fitted the pictures",
+      refined.corner_moved_px, refined.sigma_px, refined.sigma_before_px);
+  if (refined.boards_factor > 1)
+    fmt::print(
+        out,
+        "warning: tags and boards disagree about the lens by more than their noise explains, "
+        "so the boards count for less (deviations times {:.1f}): check that zoom and focus "
+        "are the same, boards and tags flat, and tags as large as stated\n",
+        std::sqrt(refined.boards_factor));
+}
+
+// Refines the lens where the set has the statistics of its boards.
+TagSurvey surveyed_with_lens(const TagWalk& walk, const PinholeIntrinsics& lens,
+                             const set::Set& set, const TagSurveyOptions& how, std::ostream& out) {
+  const set::LensFit& table = set.observer.lens_fit;
+  std::string why_not =
+      table.values.empty()
+          ? "the set has no [observer.lens_fit], which calibrate observer prints; nothing says how "
+            "certain the lens is"
+          : why_not_of(lens_prior(table), lens);
+  if (!why_not.empty()) {
+    if (!table.values.empty())
+      why_not = "[observer.lens_fit] is not of [observer.intrinsics]: " + why_not;
+    fmt::print(out, "the lens stays as it is: {}\n", why_not);
+    return survey_tags(walk, lens, how);
+  }
+  const RefinedLens refined = survey_tags_and_lens(walk, lens, how, lens_prior(table));
+  print_refined(refined, out);
+  return refined.survey;
+}
+
 }  // namespace
 
 void calibrate_tags(const TagsOptions& options, std::ostream& out) {
@@ -124,20 +165,23 @@ void calibrate_tags(const TagsOptions& options, std::ostream& out) {
       gather_walk(*source, camera.intrinsics, camera.response, walk_options(options, set),
                   [&](const std::string& line) { out << line << '\n'; });
   const TagSurveyOptions how = survey_options(options, set, walk);
-  const TagSurvey survey = survey_tags(walk, camera.intrinsics, how);
+  const TagSurvey survey = surveyed_with_lens(walk, camera.intrinsics, set, how, out);
   print_survey(survey, set, out);
   std::vector<int> wanted;
   for (const set::Tag& tag : set.tracking.tags) wanted.push_back(tag.id);
   const std::string doubts =
       insist(missing_of_tags(survey, wanted, how.origin), options.force, out);
   if (options.write) {
-    const std::string text = with_tags(session::read_file(*options.set_file), survey, doubts);
+    const std::string text =
+        with_lens(with_tags(session::read_file(*options.set_file), survey, doubts),
+                  camera.intrinsics, survey.lens);
     set::parse_set(text, *options.set_file);
     const auto old = set::keep_beside(*options.set_file);
     session::replace_file(*options.set_file, text);
     fmt::print(out, "written into {}; as it was: {}\n", options.set_file->string(), old.string());
   }
-  write_tables(doubts + tag_tables(survey), options.table_file, out);
+  write_tables(lens_table(camera.intrinsics, survey.lens) + doubts + tag_tables(survey),
+               options.table_file, out);
 }
 
 }  // namespace previz::calibrate

@@ -74,19 +74,6 @@ double bayesian_information(const BundleFit& fit) {
   return std::log(fit.sigma_px * fit.sigma_px) + double(fit.bundle.lens.size()) * std::log(n) / n;
 }
 
-// Returns a ray for each point of a grid over the picture; points where the lens folds have none.
-std::vector<glm::dvec3> picture_rays(const PinholeIntrinsics& lens) {
-  std::vector<glm::dvec3> rays;
-  const int rows = grid_rows(lens.width, lens.height);
-  for (int row = 0; row < rows; ++row)
-    for (int column = 0; column < grid_columns; ++column) {
-      const glm::dvec2 pixel((lens.width - 1) * (column + 0.5) / grid_columns,
-                             (lens.height - 1) * (row + 0.5) / rows);
-      if (const auto x = undistort(lens, pixel)) rays.push_back(glm::normalize(glm::dvec3(*x, 1)));
-    }
-  return rays;
-}
-
 // Returns a lens in the order of observer_parameters whose other coefficients are 0.
 std::vector<double> whole_lens(std::span<const double> fitted,
                                const std::vector<std::size_t>& coefficients) {
@@ -116,14 +103,8 @@ ObserverFit fit_model(const Views& views, Bundle start,
   return observer;
 }
 
-bool folds(const ObserverFit& observer) {
-  const PinholeIntrinsics& lens = observer.intrinsics;
-  return observer.picture.size() <
-         std::size_t(grid_columns) * std::size_t(grid_rows(lens.width, lens.height));
-}
-
 bool is_better(const ObserverFit& fit, const ObserverFit& than) {
-  if (folds(fit) != folds(than)) return folds(than);
+  if (folds(fit.intrinsics) != folds(than.intrinsics)) return folds(than.intrinsics);
   const bool is_useless = worst_px(fit.picture) > useless_px;
   if (is_useless != (worst_px(than.picture) > useless_px)) return !is_useless;
   return bayesian_information(fit.fit) < bayesian_information(than.fit);
@@ -139,6 +120,23 @@ double reach_of(const Views& views) {
 }
 
 }  // namespace
+
+std::vector<glm::dvec3> picture_rays(const PinholeIntrinsics& lens) {
+  std::vector<glm::dvec3> rays;
+  const int rows = grid_rows(lens.width, lens.height);
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < grid_columns; ++column) {
+      const glm::dvec2 pixel((lens.width - 1) * (column + 0.5) / grid_columns,
+                             (lens.height - 1) * (row + 0.5) / rows);
+      if (const auto x = undistort(lens, pixel)) rays.push_back(glm::normalize(glm::dvec3(*x, 1)));
+    }
+  return rays;
+}
+
+bool folds(const PinholeIntrinsics& lens) {
+  return picture_rays(lens).size() <
+         std::size_t(grid_columns) * std::size_t(grid_rows(lens.width, lens.height));
+}
 
 PinholeIntrinsics pinhole(std::span<const double> lens, int width, int height) {
   return {.width = width,
@@ -170,12 +168,17 @@ ObserverFit fit_observer(const Views& views) {
   const std::vector<std::vector<std::size_t>> models = {
       {k1}, {k1, k2}, {k1, p1, p2}, {k1, k2, p1, p2}, {k1, k2, p1, p2, k3}};
   std::optional<ObserverFit> best;
+  std::vector<double> whole, whole_covariance;
   for (const std::vector<std::size_t>& coefficients : models) {
     ObserverFit fit = fit_model(views, start, coefficients);
+    whole = fit.fit.bundle.lens;  // the last model has all
+    whole_covariance = fit.fit.lens_covariance;
     if (!best || is_better(fit, *best)) best = std::move(fit);
   }
   for (std::size_t p = first_coefficient; p < observer_parameters.size(); ++p)
     if (best->sigma[p] == 0) best->left_out.push_back(observer_parameters[p]);
+  best->whole_lens = std::move(whole);
+  best->whole_covariance = std::move(whole_covariance);
   best->reach = reach_of(views);
   return std::move(*best);
 }

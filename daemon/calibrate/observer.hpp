@@ -22,6 +22,9 @@ struct ObserverFit {
   std::vector<double> sigma;  // standard deviations, as observer_parameters; 0 of one left at 0
   std::vector<UncertainPixel> picture;     // on a grid over the picture
   std::vector<const char*> left_out = {};  // coefficients that the corners do not hold
+  // The fit by all parameters, whichever were left out: values, and their covariance, row-major.
+  // Empty after fit_observer_by_few.
+  std::vector<double> whole_lens = {}, whole_covariance = {};
   double reach = 0;  // of the farthest corner from the picture's middle, in halves of the diagonal
 };
 
@@ -43,6 +46,12 @@ double worst_px(const std::vector<UncertainPixel>& picture);
 // few_observer_parameters; `sigma` has both focal lengths and k1.
 inline constexpr std::array few_observer_parameters = {"f", "k1"};
 ObserverFit fit_observer_by_few(const Views& views);
+
+// Returns unit vectors in camera axes for the points of a grid over the picture, but those where
+// the lens folds.
+std::vector<glm::dvec3> picture_rays(const PinholeIntrinsics& lens);
+// Returns whether the lens folds at one of these points.
+bool folds(const PinholeIntrinsics& lens);
 
 // Convert a bundle's parameters to a lens, and project by them.
 PinholeIntrinsics pinhole(std::span<const double> lens, int width, int height);

@@ -5,9 +5,11 @@
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "daemon/calibrate/lens_prior.hpp"
 #include "daemon/tracking/joint_pose.hpp"
 #include "drivers/calibration.hpp"
 
@@ -47,20 +49,41 @@ struct TagAdjustment {
   double model_error_px = 0.3;
   // Which sightings count; empty: all.
   std::vector<bool> used;
+  // The lens is unknown, too, and this is what is known of it. adjust_tags holds it.
+  std::optional<LensPrior> lens_prior = std::nullopt;
+};
+
+struct TagsAndLens {
+  TagPlaces places;
+  PinholeIntrinsics lens;
 };
 
 // Moves the unknowns to the nearest minimum (Levenberg-Marquardt; the cameras are eliminated by a
-// Schur complement: Triggs et al. 2000, "Bundle Adjustment - A Modern Synthesis", section 6.1).
+// Schur complement: Triggs et al. 2000, "Bundle Adjustment - A Modern Synthesis").
 // Tags and cameras without a used sighting stay where they are.
 TagPlaces adjust_tags(const TagWalk& walk, const PinholeIntrinsics& lens, TagPlaces start,
                       const TagAdjustment& how);
 
+// The same with the free parameters of how.lens_prior, which must be there, as further unknowns
+// (self-calibration with the lens as observed parameters: Triggs et al. 2000; Luhmann
+// et al., "Close-Range Photogrammetry and 3D Imaging", section 4.4).
+TagsAndLens adjust_tags_and_lens(const TagWalk& walk, TagsAndLens start, const TagAdjustment& how);
+
 // The covariance of each tag: rotation (rad) and shift (m) along the tag's own axes against the
 // origin, and the logarithm of its size; row-major 7x7, from the Jacobian at the minimum. It is
-// zero for what is held, and for tags that nothing was seen of.
+// zero for what is held, and for tags that nothing was seen of. With a prior of the lens it
+// includes what the lens may be off by.
 using TagCovariance = std::array<double, 49>;
 std::vector<TagCovariance> tag_covariances(const TagWalk& walk, const PinholeIntrinsics& lens,
                                            const TagPlaces& places, const TagAdjustment& how);
+
+// Returns the covariance of the lens after an adjustment with how.lens_prior; 0 of parameters that
+// are held.
+LensMatrix lens_covariance(const TagWalk& walk, const TagsAndLens& at, const TagAdjustment& how);
+
+// Returns the sum of all squares that the adjustment makes small, in standard deviations: those of
+// the sightings and of the priors.
+double chi_square(const TagWalk& walk, const TagsAndLens& at, const TagAdjustment& how);
 
 // Returns how far off a tag's corners may be (rms, px) and still count as explained: 1 px, or 4.5
 // standard deviations.

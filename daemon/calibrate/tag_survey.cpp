@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 
 #include "daemon/calibrate/moved_tags.hpp"
+#include "daemon/calibrate/observer.hpp"
 #include "daemon/calibrate/tag_start.hpp"
 #include "daemon/tracking/tag_map.hpp"
 #include "drivers/error.hpp"
@@ -100,8 +101,9 @@ double model_error(const TagWalk& walk, const PinholeIntrinsics& lens, const Tag
 // The state of a survey between its steps.
 struct Surveying {
   TagWalk walk;
-  const PinholeIntrinsics& lens;
+  PinholeIntrinsics lens;
   std::size_t origin;
+  std::optional<LensPrior> lens_prior;
   TagPlaces places;
   double model_error_px = 1;
 
@@ -109,13 +111,20 @@ struct Surveying {
     TagAdjustment result;
     result.origin = origin;
     result.model_error_px = model_error_px;
+    result.lens_prior = lens_prior;
     return result;
+  }
+  // Adjusts the places, and the lens if there is a prior of it.
+  void adjust(const TagAdjustment& adjustment) {
+    TagsAndLens at = adjust_tags_and_lens(walk, {std::move(places), lens}, adjustment);
+    places = std::move(at.places);
+    lens = at.lens;
   }
   // Adjusts with the loss that keeps what disagrees from bending the rest.
   void adjust_robustly() {
     TagAdjustment robust_how = how();
     robust_how.loss_scale = map_loss_scale;
-    places = adjust_tags(walk, lens, std::move(places), robust_how);
+    adjust(robust_how);
     model_error_px = model_error(walk, lens, places);
   }
 };
@@ -126,10 +135,12 @@ std::vector<double> settle_sizes(Surveying& state) {
   TagAdjustment free = state.how();
   free.sizes_free = true;
   free.loss_scale = map_loss_scale;
-  TagPlaces places = adjust_tags(state.walk, state.lens, state.places, free);
-  free.model_error_px = state.model_error_px = model_error(state.walk, state.lens, places);
-  places = adjust_tags(state.walk, state.lens, std::move(places), free);
-  const std::vector<TagCovariance> all = tag_covariances(state.walk, state.lens, places, free);
+  TagsAndLens at = adjust_tags_and_lens(state.walk, {state.places, state.lens}, free);
+  free.model_error_px = state.model_error_px = model_error(state.walk, at.lens, at.places);
+  at = adjust_tags_and_lens(state.walk, std::move(at), free);
+  TagPlaces places = std::move(at.places);
+  state.lens = at.lens;
+  const std::vector<TagCovariance> all = tag_covariances(state.walk, at.lens, places, free);
   std::vector<double> off, sigma(state.walk.ids.size()), seen_off;
   for (std::size_t t = 0; t < state.walk.ids.size(); ++t) {
     off.push_back(std::log(places.sizes_m[t] / state.walk.sizes_m[t]));
@@ -203,7 +214,7 @@ std::vector<MovedTag> take_out_moved(Surveying& state, std::vector<std::vector<i
 void finish(Surveying& state) {
   constexpr int most_rounds = 5;
   for (int round = 0; round < most_rounds; ++round) {
-    state.places = adjust_tags(state.walk, state.lens, std::move(state.places), state.how());
+    state.adjust(state.how());
     const std::size_t before = state.walk.sightings.size();
     keep_sightings(state.walk, [&](const TagSighting& seen) {
       const double gate = sighting_gate_px(seen, state.model_error_px);
@@ -212,7 +223,37 @@ void finish(Surveying& state) {
     state.model_error_px = model_error(state.walk, state.lens, state.places);
     if (state.walk.sightings.size() == before && round > 0) break;
   }
-  state.places = adjust_tags(state.walk, state.lens, std::move(state.places), state.how());
+  state.adjust(state.how());
+}
+
+constexpr auto all_free = std::array{true, true, true, true, true, true, true, true, true};
+
+// Keeps those coefficients of the lens that boards and tags hold: the sum of squares may grow by
+// the logarithm of the number of residuals for each one that is left at 0.
+void choose_coefficients(Surveying& state) {
+  using Free = std::array<bool, lens_size>;
+  const double price = std::log(8.0 * double(state.walk.sightings.size()));
+  std::optional<Surveying> best;
+  double least = 0;
+  // k1, k2, p1, p2, k3: the models of fit_observer.
+  for (const auto& [k2, p, k3] :
+       {std::array{true, true, true}, std::array{true, true, false}, std::array{true, false, false},
+        std::array{false, true, false}, std::array{false, false, false}}) {
+    Surveying tried = state;
+    tried.lens_prior->free = Free{true, true, true, true, true, k2, p, p, k3};
+    LensVector values = lens_vector(tried.lens);
+    for (int i = 0; i < lens_size; ++i)
+      if (!tried.lens_prior->free[std::size_t(i)]) values[i] = 0;
+    tried.lens = with_parameters(tried.lens, values);
+    tried.adjust(tried.how());
+    const double criterion = chi_square(tried.walk, {tried.places, tried.lens}, tried.how()) +
+                             price * double(std::ranges::count(tried.lens_prior->free, true));
+    if (folds(tried.lens) || (best && criterion >= least)) continue;
+    best = std::move(tried);
+    least = criterion;
+  }
+  if (!best) throw Error("no lens that boards and tags agree on shows the whole picture");
+  state = std::move(*best);
 }
 
 double longest_sigma(const TagCovariance& covariance, int first) {
@@ -259,15 +300,20 @@ SurveyedTag surveyed(const Surveying& state, std::size_t tag, const TagCovarianc
   return result;
 }
 
+// Returns by what the residuals show the covariances to be off.
+double factor_of_covariances(const Surveying& state) {
+  double squares = 0;
+  for (const TagSighting& seen : state.walk.sightings)
+    squares += tag_squares_px2(seen, state.lens, state.places) /
+               (seen.variance_px2 + state.model_error_px * state.model_error_px);
+  return squares / degrees_of_freedom(state.walk);
+}
+
 // Returns the covariances times what the residuals show them to be off by.
 std::vector<TagCovariance> scaled_covariances(const Surveying& state) {
   std::vector<TagCovariance> all =
       tag_covariances(state.walk, state.lens, state.places, state.how());
-  double chi_square = 0;
-  for (const TagSighting& seen : state.walk.sightings)
-    chi_square += tag_squares_px2(seen, state.lens, state.places) /
-                  (seen.variance_px2 + state.model_error_px * state.model_error_px);
-  const double factor = chi_square / degrees_of_freedom(state.walk);
+  const double factor = factor_of_covariances(state);
   for (TagCovariance& covariance : all)
     for (double& value : covariance) value *= factor;
   return all;
@@ -286,6 +332,18 @@ void measure(const Surveying& state, TagSurvey& survey) {
   survey.sightings_used = state.walk.sightings.size();
   survey.rms_px = std::sqrt(squares / std::max(1.0, 4.0 * double(survey.sightings_used)));
   survey.model_error_px = state.model_error_px;
+}
+
+// Fills in what is known of the lens after the adjustment.
+void measure_lens(const Surveying& state, TagSurvey& survey) {
+  survey.lens = state.lens;
+  if (!state.lens_prior) return;
+  TagAdjustment all = state.how();
+  all.lens_prior->free = all_free;
+  survey.lens_covariance = lens_covariance(state.walk, {state.places, state.lens}, all) *
+                           std::max(1.0, factor_of_covariances(state));
+  const LensVector off = lens_vector(state.lens) - state.lens_prior->values;
+  survey.prior_chi_square = off.dot(state.lens_prior->information * off);
 }
 
 // Throws if the map explains the pictures worse than the tracker would accept.
@@ -325,7 +383,7 @@ void scale_to(const StatedDistance& stated, TagSurvey& survey) {
 
 TagSurvey survey_tags(const TagWalk& walk, const PinholeIntrinsics& lens,
                       const TagSurveyOptions& options) {
-  Surveying state{walk, lens, index_of(walk, options.origin), {}};
+  Surveying state{walk, lens, index_of(walk, options.origin), options.lens_prior, {}};
   TagSurvey survey;
   survey.sightings = walk.sightings.size();
   survey.apart = take_out_unlinked(state.walk, state.origin);
@@ -338,8 +396,13 @@ TagSurvey survey_tags(const TagWalk& walk, const PinholeIntrinsics& lens,
   state.adjust_robustly();
   survey.moved = take_out_moved(state, survey.apart);
   finish(state);
+  if (state.lens_prior) {
+    choose_coefficients(state);
+    finish(state);
+  }
   measure(state, survey);
-  insist_on_lens(survey, lens);
+  measure_lens(state, survey);
+  insist_on_lens(survey, state.lens);
   for (SurveyedTag& tag : survey.tags) {
     const std::size_t t = index_of(walk, tag.id);
     tag.stated_size_m = walk.sizes_m[t];

@@ -21,6 +21,8 @@ struct TagSurveyOptions {
   int origin = 0;                        // the tag that defines the world
   glm::dmat4 world_from_origin{1.0};     // where the set has it
   std::optional<StatedDistance> stated;  // gives all lengths; else the tags' stated sizes do
+  // What is known of the lens, which is then unknown, too. Absent: it is held.
+  std::optional<LensPrior> lens_prior = std::nullopt;
 };
 
 struct SurveyedTag {
@@ -56,6 +58,11 @@ struct TagSurvey {
   std::size_t pictures_of_pairs = 0;  // that link two tags and no more
   double rms_px = 0;                  // of the used corners' distances
   double model_error_px = 0;          // of a coordinate, beside the noise of the picture
+  PinholeIntrinsics lens;             // as given, or as it was adjusted
+  // Of the lens's parameters, from boards and tags, were all of them free; 0 of a lens that is
+  // held.
+  LensMatrix lens_covariance = LensMatrix::zeros();
+  double prior_chi_square = 0;  // of the adjusted lens against its prior, of 9 degrees of freedom
 };
 
 // Adjusts the tags' places and the camera's poses together (start_of_tags, adjust_tags):
@@ -69,6 +76,10 @@ struct TagSurvey {
 //           explains as well is not found; the covariances are large there.)
 //   the rest is adjusted by least squares, without sightings that are off by more than 1 px and 4.5
 //           standard deviations.
+//   lens    with a prior, it is adjusted with everything from the second step on. Last, the model
+//   is
+//           chosen among those of the observer's calibration, by the Bayesian information criterion
+//           (Schwarz 1978) of boards and tags together; none that folds within the picture.
 // Throws previz::Error if the origin is not there, or moved; if the tags of the stated distance are
 // not there; and if most tags seem to have moved or the rms is what the tracker refuses, as with
 // the calibration of another lens.

@@ -6,9 +6,11 @@
 #include <map>
 #include <sstream>
 
+#include "daemon/calibrate/observer.hpp"
 #include "daemon/calibrate/report.hpp"
 #include "daemon/pipeline/edits.hpp"
 #include "daemon/set/file_edit.hpp"
+#include "daemon/set/print.hpp"
 #include "daemon/tracking/pose_starts.hpp"
 #include "drivers/keys/value.hpp"
 
@@ -127,6 +129,26 @@ std::string with_tags(const std::string& text, const TagSurvey& survey, const st
       put_tag(tag, known->second, file);
   }
   return with_doubts(file.text(), doubts);
+}
+
+std::string lens_table(const PinholeIntrinsics& before, const PinholeIntrinsics& after) {
+  if (lens_vector(before) == lens_vector(after)) return "";
+  ObserverCalibration camera;
+  camera.intrinsics = after;
+  return "# refined by the tags\n" + set::intrinsics_toml(camera) + "\n";
+}
+
+std::string with_lens(const std::string& text, const PinholeIntrinsics& before,
+                      const PinholeIntrinsics& after) {
+  if (lens_vector(before) == lens_vector(after)) return text;
+  set::FileEdit file(text);
+  const LensVector values = lens_vector(after);
+  for (int i = 0; i < lens_size; ++i) {
+    const char* const key = observer_parameters[std::size_t(i)];
+    if (values[i] != 0 || file.has("observer.intrinsics", 0, key))
+      file.put("observer.intrinsics", 0, key, codec::print_number(values[i]));
+  }
+  return file.text();
 }
 
 }  // namespace previz::calibrate

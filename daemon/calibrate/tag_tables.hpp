@@ -19,4 +19,13 @@ std::string tag_tables(const TagSurvey& survey);
 std::string with_tags(const std::string& text, const TagSurvey& survey,
                       const std::string& doubts = {});
 
+// Returns the table of a refined lens; empty if it is as it was.
+std::string lens_table(const PinholeIntrinsics& before, const PinholeIntrinsics& after);
+
+// Returns the set file's text with the parameters of the refined lens in its [observer.intrinsics];
+// unchanged if the lens is as it was. The statistics of the boards stay: another walk begins with
+// them, so that no walk counts twice.
+std::string with_lens(const std::string& text, const PinholeIntrinsics& before,
+                      const PinholeIntrinsics& after);
+
 }  // namespace previz::calibrate

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <toml++/toml.h>
 #include <algorithm>
+#include <functional>
 
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
@@ -33,32 +34,40 @@ std::size_t offset_of(const std::string& text, const toml::source_position& at) 
   return offset;
 }
 
+// Calls body(name, table) for each [table], also those in others, and for each of the [[tables]]
+// that are in none.
+void for_each_table(const toml::table& parent, const std::string& path,
+                    const std::function<void(const std::string&, const toml::table&)>& body) {
+  for (const auto& [key, node] : parent) {
+    const std::string name = path + std::string(key.str());
+    if (const toml::table* one = node.as_table()) {
+      body(name, *one);
+      for_each_table(*one, name + '.', body);
+    }
+    const toml::array* array = node.as_array();
+    if (!array || !path.empty()) continue;
+    for (const toml::node& entry : *array)
+      if (const toml::table* one = entry.as_table()) body(name, *one);
+  }
+}
+
 }  // namespace
 
 FileEdit::FileEdit(std::string text) : text_(std::move(text)) {
-  const toml::table root = parsed(text_);
-  for (const auto& [name, node] : root) {
-    const toml::array* array = node.as_array();
-    if (!array) continue;
-    std::vector<Table>& all = tables_[std::string(name.str())];
-    for (const toml::node& entry : *array) {
-      const toml::table* given = entry.as_table();
-      if (!given) continue;
-      Table& table = all.emplace_back();
-      table.is_inline = given->is_inline();
-      table.new_keys =
-          std::min(text_.find('\n', offset_of(text_, given->source().begin)), text_.size());
-      for (const auto& [key, value] : *given) {
-        const toml::source_region& source = value.source();
-        if (value.is_table() || (value.is_array() && value.as_array()->is_array_of_tables()))
-          continue;
-        const Span span{offset_of(text_, source.begin), offset_of(text_, source.end)};
-        table.values[std::string(key.str())] = span;
-        table.new_keys =
-            std::max(table.new_keys, std::min(text_.find('\n', span.end), text_.size()));
-      }
+  for_each_table(parsed(text_), "", [&](const std::string& name, const toml::table& given) {
+    Table& table = tables_[name].emplace_back();
+    table.is_inline = given.is_inline();
+    table.new_keys =
+        std::min(text_.find('\n', offset_of(text_, given.source().begin)), text_.size());
+    for (const auto& [key, value] : given) {
+      const toml::source_region& source = value.source();
+      if (value.is_table() || (value.is_array() && value.as_array()->is_array_of_tables()))
+        continue;
+      const Span span{offset_of(text_, source.begin), offset_of(text_, source.end)};
+      table.values[std::string(key.str())] = span;
+      table.new_keys = std::max(table.new_keys, std::min(text_.find('\n', span.end), text_.size()));
     }
-  }
+  });
 }
 
 const FileEdit::Table& FileEdit::table(const std::string& tables, std::size_t index) const {

@@ -17,7 +17,8 @@ class FileEdit {
   // Throws previz::Error if `text` is not TOML.
   explicit FileEdit(std::string text);
 
-  // Returns the number of the file's [[tables]] of this name.
+  // Returns the number of the file's [[tables]] of this name. A [table] counts as one; that in
+  // another is named as its header has it, "observer.intrinsics".
   std::size_t count(const std::string& tables) const;
 
   // These concern the table number `index` (from 0) of the file's [[tables]] of this name. They

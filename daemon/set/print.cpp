@@ -52,6 +52,12 @@ std::string intrinsics_toml(const LightCameraCalibration& calibration) {
   return table_toml(std::move(draft), "light_camera.intrinsics");
 }
 
+std::string lens_fit_toml(const LensFit& fit) {
+  Draft draft;
+  draft.set.observer.lens_fit = fit;
+  return table_toml(std::move(draft), "observer.lens_fit");
+}
+
 std::string lens_toml(const ThinLens& lens) {
   Draft draft;
   draft.observer.lens = lens;

@@ -13,6 +13,7 @@ namespace previz::set {
 std::string intrinsics_toml(const ObserverCalibration& calibration);  // [observer.intrinsics]
 std::string intrinsics_toml(
     const LightCameraCalibration& calibration);                        // [light_camera.intrinsics]
+std::string lens_fit_toml(const LensFit& fit);                         // [observer.lens_fit]
 std::string lens_toml(const ThinLens& lens);                           // [observer.lens]
 std::string light_pose_toml(const glm::dmat4& world_from_camera);      // [light_camera.pose]
 std::string response_toml(const ObserverCalibration& calibration);     // [observer.response]

@@ -160,8 +160,27 @@ class Resolver {
     device("observer", set_.observer.driver, set_.observer.device);
     needs_intrinsics("observer", "lens");
     needs_intrinsics("observer", "response");
+    needs_intrinsics("observer", "lens_fit");
+    lens_fit();
     check("observer", draft_.observer);
     if (given("observer.intrinsics").at) set_.observer.calibration = draft_.observer.calibration;
+  }
+
+  void lens_fit() {
+    constexpr std::size_t values = 9, triangle = values * (values + 1) / 2;
+    const auto& table = given("observer.lens_fit");
+    const LensFit& fit = set_.observer.lens_fit;
+    if (table.good("values") && fit.values.size() != values)
+      problem(table, "values", "has " + std::to_string(fit.values.size()) + " numbers; allowed: 9");
+    if (!table.good("covariance_root")) return;
+    bool is_root = fit.covariance_root.size() == triangle;
+    for (std::size_t row = 0; is_root && row < values; ++row)
+      is_root = fit.covariance_root[row * (row + 3) / 2] > 0;
+    if (!is_root)
+      problem(
+          table, "covariance_root",
+          "is not the root of a covariance; allowed: the 45 numbers of a lower triangle, row by "
+          "row, whose diagonal is above 0, as `previzd calibrate observer` prints them");
   }
 
   void light_camera() {

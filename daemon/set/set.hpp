@@ -31,6 +31,14 @@ struct CameraWish {
   double stall_timeout_s = 2;     // between two frames
 };
 
+// The fit of a lens by boards with all of its parameters, of which the lens of the set may keep
+// fewer: fx, fy, cx, cy (px), k1, k2, p1, p2, k3. Empty: not given.
+struct LensFit {
+  std::vector<double> values;  // 9
+  // The lower triangle, row by row (45), of L, where L L^T is the parameters' covariance.
+  std::vector<double> covariance_root;
+};
+
 struct Observer {
   std::string driver = replay_driver;
   std::string device;  // replay: session directory; otherwise the device's stable name
@@ -38,6 +46,7 @@ struct Observer {
   std::vector<std::string> faults;  // faults to rehearse, written as in drivers/faults.hpp
   // Calibration given here overrides the session's.
   std::optional<ObserverCalibration> calibration;
+  LensFit lens_fit;                // what calibrate tags refines the lens by
   std::optional<double> exposure;  // absolute; overrides the frames' own
 };
 

@@ -95,6 +95,13 @@ Keys observer_keys(Observer& o) {
   };
 }
 
+Keys lens_fit_keys(LensFit& f) {
+  return {
+      {"values", &f.values, plain, "fx, fy, cx, cy, k1, k2, p1, p2 and k3 as the boards have them if none is left at 0: 9 numbers.", required("[1850.0, 1850.0, 959.5, 539.5, -0.1, 0.02, 0.0, 0.0, 0.0]")},
+      {"covariance_root", &f.covariance_root, plain, "How far off they may be, together: the lower triangle, row by row, of the matrix L whose L L^T is their covariance; 45 numbers.", required("[0.4, 0.0, 0.4, 0.0, 0.0, 0.6, 0.0, 0.0, 0.0, 0.6, 0.0, 0.0, 0.0, 0.0, 0.002, 0.0, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0001, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0001, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.02]")},
+  };
+}
+
 Keys camera_keys(CameraWish& wish) {
   CameraSettings& c = wish.settings;
   return {
@@ -380,6 +387,7 @@ std::vector<Section> sections(Draft& d) {
       once("observer", always, "The film camera.", [&d] { return observer_keys(d.set.observer); }),
       once("observer.camera", optional, "Settings of a live camera; those that are not given stay as they are in the camera.", [&d] { return camera_keys(d.set.observer.camera); }),
       once("observer.intrinsics", optional, "The calibrated lens of the film camera. A calibration given here replaces that of the session as a whole.", [&d] { return calibration_keys(d.observer, "intrinsics"); }),
+      once("observer.lens_fit", optional, "How certain that lens is: the statistics of the boards, which `previzd calibrate observer` prints. `previzd calibrate tags` refines the lens by it; nothing else reads it.", [&d] { return lens_fit_keys(d.set.observer.lens_fit); }),
       once("observer.lens", optional, "The lens, for depth of field. Without this table everything is in focus.", [&d] { return calibration_keys(d.observer, "lens"); }),
       once("observer.response", optional, "How its sensor turns light into picture values.", [&d] { return calibration_keys(d.observer, "response"); }),
       once("light_camera", always, "The light camera: a fisheye that sees the lamps.", [&d] { return light_camera_keys(d.set.light_camera); }),

@@ -8,13 +8,17 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
+#include "daemon/calibrate/calibrate.hpp"
 #include "daemon/calibrate/moved_tags.hpp"
 #include "daemon/calibrate/source.hpp"
+#include "daemon/calibrate/tag_lens.hpp"
 #include "daemon/calibrate/tag_survey.hpp"
 #include "daemon/calibrate/tag_walk.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/shared_data.hpp"
+#include "tests/support/temporary_directory.hpp"
 #include "tests/support/units.hpp"
 #include "tests/truth/truth_set.hpp"
 
@@ -144,6 +148,33 @@ TEST(RealTags, Room) {
   EXPECT_GE(survey.sightings_used, survey.sightings - 2);
   EXPECT_LE(survey.rms_px, 0.463);
   for (const SurveyedTag& tag : survey.tags) EXPECT_LE(tag.rms_px, 1) << "tag " << tag.id;
+}
+
+// The boards of the room reach 55 % of the way to the corners of the picture. By their lens alone
+// the map has 0.43 px; 0.30 px is what the crew asks for.
+TEST(RealTags, RoomByBoardsThatFilledHalfOfThePicture) {
+  const fs::path room = test::shared_data("real/apriltag/room");
+  PREVIZ_NEEDS(room);
+  const test::TemporaryDirectory folder;
+  LensOptions boards;
+  boards.footage = room / "calibration";
+  boards.board = "chessboard:7x5:30mm";
+  boards.table_file = folder / "room.toml";
+  std::ostringstream out;
+  calibrate_observer(boards, out);
+  const set::Observer camera = set::load_set(*boards.table_file).observer;
+  WalkOptions options;
+  options.sizes.common_m = 0.127;
+  const auto source = open_source(room, "observer");
+  const TagWalk walk =
+      gather_walk(*source, camera.calibration->intrinsics, camera.calibration->response, options,
+                  [](const std::string&) {});
+  const RefinedLens refined =
+      survey_tags_and_lens(walk, camera.calibration->intrinsics, {}, lens_prior(camera.lens_fit));
+  std::printf("rms %.3f px, before %.3f px\n", refined.survey.rms_px, refined.rms_before_px);
+  EXPECT_TRUE(refined.is_refined) << refined.why_not;
+  EXPECT_LE(refined.survey.rms_px, 0.30);
+  EXPECT_LT(refined.survey.rms_px, refined.rms_before_px);
 }
 
 }  // namespace calibrate_tags_truth_test
