@@ -66,7 +66,7 @@ TagPlaces adjust_tags(const TagWalk& walk, const PinholeIntrinsics& lens, TagPla
 
 // The same with the free parameters of how.lens_prior, which must be there, as further unknowns
 // (self-calibration with the lens as observed parameters: Triggs et al. 2000; Luhmann
-// et al., "Close-Range Photogrammetry and 3D Imaging", section 4.4).
+// et al., "Close-Range Photogrammetry and 3D Imaging").
 TagsAndLens adjust_tags_and_lens(const TagWalk& walk, TagsAndLens start, const TagAdjustment& how);
 
 // The covariance of each tag: rotation (rad) and shift (m) along the tag's own axes against the

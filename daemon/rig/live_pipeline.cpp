@@ -99,7 +99,7 @@ struct LivePipeline::Impl {
   pipeline::Mailbox<Shot> seen, tracked, reviewed, rendered;
   pipeline::Newest<std::vector<pipeline::FoundLamp>> found{{}};
   pipeline::Newest<std::map<std::string, std::string>> recorded_variants{{}};
-  pipeline::Newest<int> governed_samples{0};
+  pipeline::Newest<set::PreviewStep> governed{{.samples = 0, .denoise = {}}};
   pipeline::BoundedQueue<Shot> snapshots{4};  // closed by the render thread, or at a stop
   std::stop_callback<std::function<void()>> close_snapshots{stop_source.get_token(),
                                                             [this] { snapshots.close(); }};
@@ -115,7 +115,7 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
       light({parts.set, parts.scene, parts.look, parts.kept},
             pipeline::light_calibration(parts.set, parts.cameras.recorded.info), calibration),
       live_render(parts.set, parts.look, parts.inbox, parts.kept.metrics, parts.kept.reports,
-                  {tracked, reviewed, snapshots, found, governed_samples, recorded_variants},
+                  {tracked, reviewed, snapshots, found, governed, recorded_variants},
                   stop_source.get_token()),
       gpu_keeper(gpu(), {parts.kept.reports, parts.kept.metrics, stop_source.get_token(),
                          [this](std::chrono::milliseconds time) { show_plates(time); }}) {
@@ -417,8 +417,8 @@ std::vector<pipeline::FoundLamp> LivePipeline::found_lamps() const {
   return *impl_->found.get();
 }
 
-int LivePipeline::governed_samples() const {
-  return *impl_->governed_samples.get();
+set::PreviewStep LivePipeline::governed() const {
+  return *impl_->governed.get();
 }
 
 std::map<std::string, std::string> LivePipeline::recorded_variants() const {

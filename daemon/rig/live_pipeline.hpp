@@ -65,8 +65,9 @@ class LivePipeline {
   pipeline::Mailbox<pipeline::Shot>& reviewed();  // a review pushes its frames here
   // Returns the lamps that were found in the light of the last picture.
   std::vector<pipeline::FoundLamp> found_lamps() const;
-  // Returns the samples per pixel that hold quality.fps; 0 if no picture was held to it yet.
-  int governed_samples() const;
+  // Returns the step that holds quality.fps, with the samples per pixel; 0 samples if no picture
+  // was held to it yet.
+  set::PreviewStep governed() const;
   // Returns the variants, by object, that the last picture of a take in review was recorded with.
   std::map<std::string, std::string> recorded_variants() const;
 

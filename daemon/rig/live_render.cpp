@@ -248,7 +248,9 @@ Shot LiveRender::render(const Look& look, Shot shot) {
     if (shot.track.pose) keep_as_good(shot, std::move(recorded));
     if (look.governed && governor_) {
       if (!is_first_ && !snapshot) governor_->took(took);
-      channels_.samples.set(governor_->samples());
+      set::PreviewStep step = governor_->step();
+      step.samples = governor_->samples();
+      channels_.governed.set(step);
     }
     is_first_ = false;
   }

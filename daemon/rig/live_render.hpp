@@ -28,7 +28,7 @@ class LiveRender {
     pipeline::Mailbox<pipeline::Shot>& reviewed;                // a take's, with their light
     pipeline::BoundedQueue<pipeline::Shot>& snapshots;          // output, with layers
     pipeline::Newest<std::vector<pipeline::FoundLamp>>& found;  // output, of the last light
-    pipeline::Newest<int>& samples;  // output, of the last picture while the rate is held
+    pipeline::Newest<set::PreviewStep>& governed;               // output, as the rate is held
     // Output: the variants, by object, that the last reviewed frame was recorded with.
     pipeline::Newest<std::map<std::string, std::string>>& recorded_variants;
   };

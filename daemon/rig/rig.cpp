@@ -196,12 +196,12 @@ void Rig::close_take() {
 void Rig::know_picture() {
   controls_.use_found(pipeline_.found_lamps());
   controls_.use_recorded(pipeline_.recorded_variants());
-  controls_.use_governed(pipeline_.governed_samples());
+  controls_.use_governed(pipeline_.governed().samples);
 }
 
 int Rig::samples() const {
   const Look& look = controls_.look();
-  const int governed = pipeline_.governed_samples();
+  const int governed = pipeline_.governed().samples;
   return look.governed && governed > 0 ? governed : look.samples;
 }
 

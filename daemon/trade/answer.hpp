@@ -1,6 +1,6 @@
 // Answers what a crew asks of the trade: which settings hold a frame rate with the least error, and
-// which reach an error in the least time. Combinations are searched from the set's own settings on,
-// one axis after the other, each time keeping what was found (coordinate descent).
+// which reach an error in the least time. Combinations are searched from the set's own settings on:
+// first what brought most by itself, each time keeping what was found (greedy coordinate descent).
 #pragma once
 
 #include <filesystem>
@@ -12,9 +12,11 @@
 
 #include "daemon/trade/axes.hpp"
 #include "daemon/trade/budget.hpp"
+#include "daemon/trade/curve.hpp"
 #include "daemon/trade/frame.hpp"
 #include "daemon/trade/measure.hpp"
 #include "daemon/trade/path_timer.hpp"
+#include "daemon/trade/rehearsal.hpp"
 
 namespace previz::trade {
 
@@ -29,7 +31,10 @@ struct TradeAnswer {
   TradeSettings settings;
   Making making;       // live: the step that holds the rate
   double seconds = 0;  // a frame, at full size
-  double error = 0;    // of the picture, as measured at the sweep's size
+  // Of the picture, as measured at the sweep's size, and the standard deviation of that.
+  double error = 0, error_deviation = 0;
+  double shown_fps =
+      0;  // live: the pictures a second of the rehearsal; 0: there was no time for one
   bool is_met = false;
   bool is_whole = true;             // all settings were tried; otherwise time ran out
   std::string toml = {};            // set::overlay_toml()
@@ -37,11 +42,22 @@ struct TradeAnswer {
   std::filesystem::path file = {};  // as written; empty where it is not met
 };
 
-// What the search asks of the sweep. `error` returns the error of the picture, made with the
-// settings in these samples at a scale relative to the sweep's size, as the rms of some rounds.
+struct StillCurves {
+  ErrorCurve noisy, denoised;
+};
+
+// What the search asks of the sweep.
 struct TradeProbe {
-  std::function<double(const TradeSettings&, const Making&)> error;
+  // The square of the error of the picture, made with the settings in these samples at a scale
+  // relative to the sweep's size; of all rounds if it is to be stated.
+  std::function<SquaredError(const TradeSettings&, const Making&, bool stated)> error;
+  std::function<StillCurves(const TradeSettings&, double wanted)> curves;
+  // What the settings are expected to bring: by how much the square of the error is smaller than
+  // with the set's own settings in the same time, as measured alone; 1: nothing is known.
+  std::function<double(const TradeSettings&, bool is_live)> gain;
   std::function<PathCost(const TradeSettings&, bool is_live)> cost;
+  std::function<Rehearsal(const set::Set&)> rehearse;
+  double take_fps = 0;  // the most pictures a second that a rehearsal can show
   std::function<void(const std::string&)> step;  // called with what is searched next; may throw
   // From now on probes throw OutOfTime when that phase is over; nothing: they are made.
   std::function<void(std::optional<TradePhase>)> limit;
@@ -58,10 +74,6 @@ struct TradeStep {
   double seconds = 0, error = 0;
 };
 std::vector<TradeStep> best_steps(std::vector<TradeStep> all);
-
-// Returns the samples that bring the error of a picture down to `wanted`, given two errors at two
-// numbers of samples: error^2 = bias^2 + variance / samples. Returns 0 if no number does.
-int samples_for(double wanted, int few, double error_of_few, int many, double error_of_many);
 
 std::vector<TradeAnswer> answer(const TradeQuestion& question, const set::Set& set,
                                 const TradeSettings& own, const std::vector<TradeAxis>& axes,

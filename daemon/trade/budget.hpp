@@ -2,11 +2,13 @@
 // errors can be told, the sweep draws the page, and the search finds the answers.
 #pragma once
 
+#include <algorithm>
+#include <limits>
 #include <optional>
 
 namespace previz::trade {
 
-enum class TradePhase { reference, sweep, live, live_steps, still };
+enum class TradePhase { reference, sweep, live, live_steps, live_rehearsal, still };
 
 class TradeBudget {
  public:
@@ -17,6 +19,11 @@ class TradeBudget {
 
   bool is_limited() const { return seconds_.has_value(); }
   double seconds() const { return seconds_.value_or(0); }
+  // Returns what is left of a phase, at least 0; without an end, infinity.
+  double left(TradePhase phase, double now_s) const {
+    return seconds_ ? std::max(start_s_ + share_of(phase) * *seconds_ - now_s, 0.0)
+                    : std::numeric_limits<double>::infinity();
+  }
   // What a phase leaves over falls to the next.
   bool is_over(TradePhase phase, double now_s) const {
     return seconds_ && now_s - start_s_ >= share_of(phase) * *seconds_;
@@ -28,13 +35,15 @@ class TradeBudget {
   double share_of(TradePhase phase) const {
     switch (phase) {
       case TradePhase::reference:
-        return searches_ ? 0.15 : 0.25;
+        return searches_ ? 0.2 : 0.3;
       case TradePhase::sweep:
         return searches_ ? 0.45 : 0.9;
       case TradePhase::live:
-        return 0.62;
+        return 0.60;
       case TradePhase::live_steps:
-        return 0.70;
+        return 0.67;
+      case TradePhase::live_rehearsal:
+        return 0.80;
       case TradePhase::still:
         return 0.92;
     }

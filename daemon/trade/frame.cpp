@@ -90,6 +90,13 @@ std::string TradeFrame::what_lacks() const {
   return shot_.light ? "" : "no light frame was seen before it";
 }
 
+double TradeFrame::take_fps() const {
+  const auto& frames = take_.observer_stream->records();
+  const std::int64_t span_ns = frames.back().timestamp_ns - frames.front().timestamp_ns;
+  return span_ns > 0 ? 1e9 * static_cast<double>(frames.size() - 1) / static_cast<double>(span_ns)
+                     : 0;
+}
+
 double TradeFrame::exposure() const {
   return set().observer.exposure.value_or(shot_.frame->exposure);
 }

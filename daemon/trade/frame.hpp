@@ -34,6 +34,9 @@ class TradeFrame {
   TradeFrame(const TradeSource& source, std::optional<std::uint64_t> index);
 
   const set::Set& set() const { return take_.set; }
+  const std::filesystem::path& take() const { return take_.session.directory; }
+  double take_fps()
+      const;  // frames a second of the take, over its whole length; 0: it has one frame
   std::uint64_t index() const { return shot_.index; }
   double exposure() const;
   const glm::dmat4& world_from_camera() const { return shot_.track.pose->world_from_camera; }

@@ -61,6 +61,27 @@ struct CommonDifference {
   double noise = 0;
 };
 
+// The squared difference of two pictures over the square of `signal`, with the deviation of its
+// sums over blocks.
+SquaredError squared_difference(const TradePicture& a, const TradePicture& b,
+                                const TradePicture& signal) {
+  const auto width = static_cast<std::size_t>(a.width), height = static_cast<std::size_t>(a.height);
+  const std::size_t columns = (width + block_px - 1) / block_px;
+  std::vector<double> blocks(columns * ((height + block_px - 1) / block_px));
+  double sum = 0, of_signal = 0;
+  for (std::size_t i = 0; i < a.shown.size(); ++i) {
+    const glm::dvec3 d = glm::dvec3(a.shown[i]) - glm::dvec3(b.shown[i]);
+    blocks[i / width / block_px * columns + i % width / block_px] += glm::dot(d, d);
+    sum += glm::dot(d, d);
+    of_signal += glm::dot(glm::dvec3(signal.shown[i]), glm::dvec3(signal.shown[i]));
+  }
+  if (!(of_signal > 0)) return {};
+  const double mean = sum / static_cast<double>(blocks.size());
+  double spread = 0;
+  for (const double block : blocks) spread += (block - mean) * (block - mean);
+  return {sum / of_signal, std::sqrt(spread) / of_signal};
+}
+
 CommonDifference common_difference(std::span<const TradePicture> alike,
                                    std::span<const TradePicture> own, std::size_t i) {
   const auto difference = [&](std::size_t k) {
@@ -108,7 +129,20 @@ TradePicture enlarged(const TradePicture& picture, int width, int height) {
 
 // In expectation the mean of the halves is as far from the truth as from either half.
 TradeReference::TradeReference(const TradePicture& a, const TradePicture& b)
-    : mean_(middle(a, b)), noise_(errors(a)) {}
+    : mean_(middle(a, b)), second_(b), noise_(errors(a)) {
+  own_ = squared_difference(a, mean_, mean_);
+}
+
+SquaredError TradeReference::squared_error(const TradePicture& picture) const {
+  const SquaredError seen = squared_difference(picture, mean_, mean_);
+  return {seen.value - own_.value, std::hypot(seen.deviation, own_.deviation)};
+}
+
+// A half has twice the variance of the mean.
+SquaredError TradeReference::squared_error_by_second_half(const TradePicture& picture) const {
+  const SquaredError seen = squared_difference(picture, second_, mean_);
+  return {seen.value - 2 * own_.value, std::hypot(seen.deviation, 2 * own_.deviation)};
+}
 
 TradeErrors TradeReference::errors(const TradePicture& picture) const {
   assert(picture.shown.size() == mean_.shown.size());
@@ -145,6 +179,26 @@ TradeReference::Bias TradeReference::bias(std::span<const TradePicture> alike,
   bias.least = std::sqrt(three_errors / signal);
   if (common > three_errors) bias.value = std::sqrt(common / signal);
   return bias;
+}
+
+double error_of(const SquaredError& squared) {
+  return std::sqrt(std::max(squared.value, 0.0));
+}
+
+double deviation_of(const SquaredError& squared) {
+  const auto root = [](double value) { return std::sqrt(std::max(value, 0.0)); };
+  return 0.5 * (root(squared.value + squared.deviation) - root(squared.value - squared.deviation));
+}
+
+SquaredError mean(std::span<const SquaredError> squared) {
+  assert(!squared.empty());
+  SquaredError sum;
+  for (const SquaredError& one : squared) {
+    sum.value += one.value;
+    sum.deviation = std::hypot(sum.deviation, one.deviation);
+  }
+  const auto count = static_cast<double>(squared.size());
+  return {sum.value / count, sum.deviation / count};
 }
 
 TradeErrors rms(std::span<const TradeErrors> errors) {

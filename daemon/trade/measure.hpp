@@ -37,12 +37,30 @@ struct TradeErrors {
   std::optional<double> picture;       // of the composite everywhere: `previzd render --error`
 };
 
+// The square of a relative error, with its standard deviation. Independent errors add up by their
+// squares, so that those of a noisy reference can be subtracted; what is left may be below 0.
+struct SquaredError {
+  double value = 0, deviation = 0;
+};
+// Returns the root, and how far it may be off: the half width of the roots of value +- deviation.
+double error_of(const SquaredError& squared);
+double deviation_of(const SquaredError& squared);
+// Returns the mean of squared errors that were measured independently; there must be one.
+SquaredError mean(std::span<const SquaredError> squared);
+
 // A long render in two independent halves, against which errors are measured.
 class TradeReference {
  public:
   TradeReference(const TradePicture& a, const TradePicture& b);
 
   const TradePicture& picture() const { return mean_; }
+  // Returns the square of how far a picture is from the truth, which is the square of its
+  // TradeErrors::picture without the reference's own noise. The picture must be independent of the
+  // reference. The deviation is that of sums over 8x8 pixels, as if all of how these differ were
+  // chance: at most so much.
+  SquaredError squared_error(const TradePicture& picture) const;
+  // The same for a picture that shares samples with the reference's first half: by the second.
+  SquaredError squared_error_by_second_half(const TradePicture& picture) const;
   // Returns the standard error of the halves' mean: half their difference.
   const TradeErrors& noise() const { return noise_; }
   // Returns the errors of `picture`, which must have the reference's size.
@@ -61,7 +79,8 @@ class TradeReference {
   Bias bias(std::span<const TradePicture> alike, std::span<const TradePicture> own) const;
 
  private:
-  TradePicture mean_;
+  TradePicture mean_, second_;
+  SquaredError own_;  // of the mean
   TradeErrors noise_;
 };
 

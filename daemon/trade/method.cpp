@@ -65,6 +65,12 @@ void MethodRenderer::add(int samples) {
   layers_ = renderer_.layers();
 }
 
+TradePicture MethodRenderer::denoised_picture() {
+  render::Layers denoised = layers_;
+  renderer_.show(true, &denoised);
+  return trade_picture(denoised, camera_, 1 / exposure_);
+}
+
 TradePicture MethodRenderer::picture() const {
   return trade_picture(layers_, camera_, 1 / exposure_);
 }

@@ -35,6 +35,8 @@ class MethodRenderer {
   std::uint32_t needed() const { return renderer_.needed(); }
   const render::Layers& layers() const { return layers_; }
   TradePicture picture() const;
+  // Returns what denoising makes of the samples so far.
+  TradePicture denoised_picture();
 
  private:
   const double exposure_;

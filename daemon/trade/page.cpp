@@ -210,9 +210,10 @@ std::string answers_section(const TradeReport& report) {
   std::string html =
       "<h2>What you get</h2>\n<p>Asked for: " + escaped(rate_words(report.question.fps)) +
       " live, and an error of " + share_words(report.question.error) +
-      " of a frozen or a rendered frame. Times are those of full-size frames, from the "
-      "camera's frame to the picture; finding the camera and showing the picture happen "
-      "at the same time.</p>\n<table>\n" +
+      " of a frozen or a rendered frame. Live, the take was played for some seconds with all that "
+      "runs beside the renderer; the time is that of its part. Refine and post: a full-size frame "
+      "and all its layers, with nothing beside. Errors are from the converged picture, without its "
+      "own noise.</p>\n<table>\n" +
       head_row({{"for", false},
                 {"what you get", false},
                 {"a frame", true},

@@ -2,6 +2,7 @@
 // `previzd run` does, or to all layers, as `previzd render` does.
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include "daemon/pipeline/render_stage.hpp"
@@ -24,13 +25,15 @@ class PathTimer {
   PathTimer(const std::shared_ptr<render::Device>& device, TradeFrame& frame,
             const scene::Scene& scene, const TradeSettings& settings);
 
-  // Both return seconds: the median of a few frames, after one that warms up. Tracking and the
-  // screen have threads of their own and are not in it, nor is the writing of files.
+  // Both return seconds: the median of a few frames, or of one that takes long, after one of a
+  // single sample that warms up. Tracking and the screen have threads of their own and are not in
+  // it, nor is the writing of files.
   double live(const Making& making);
   double offline(const Making& making);
 
  private:
   double time(const Making& making, bool layers);
+  double time_of_a_frame();
 
   pipeline::Shot shot_;
   const set::Quality quality_;
@@ -41,14 +44,29 @@ class PathTimer {
 // one for each pixel, one for denoising each pixel, and one for each sample of each pixel.
 class PathCost {
  public:
-  // Only live are pictures made smaller.
-  PathCost(PathTimer& timer, bool is_live);
+  // Only live are pictures made smaller; frames of the whole size are then measured if one sample
+  // of it fits `limit_s`, and otherwise follow from smaller ones.
+  PathCost(PathTimer& timer, bool is_live, double limit_s);
+  // From frames of a quarter of the size alone, by what `like` costs at that and at other sizes.
+  PathCost(PathTimer& timer, bool is_live, const PathCost& like);
+  // Of known parts: fixed, of a sample and of denoising, all of the whole picture, in seconds.
+  PathCost(double fixed_s, double per_sample_s, double denoise_s)
+      : per_sample_(per_sample_s), whole_(fixed_s), per_pixels_(fixed_s), denoise_(denoise_s) {}
 
   double seconds(const Making& making) const;
   // Returns the largest number of samples that fit, or 0.
   int samples_within(double seconds, Making making) const;
 
  private:
+  // Parts of a frame of a quarter of the size, in seconds.
+  struct Small {
+    double fixed = 0, per_sample = 0, denoise = 0;
+  };
+  static Small measure_small(const std::function<double(const Making&)>& time);
+  void measure_live(const std::function<double(const Making&)>& time, double limit_s);
+  void measure_whole(const std::function<double(const Making&)>& time);
+
+  Small small_;
   double per_sample_ = 0;              // of the whole picture
   double whole_ = 0;                   // fixed, of the whole picture
   double fixed_ = 0, per_pixels_ = 0;  // of smaller ones: the parts that pixels do not change

@@ -150,5 +150,27 @@ TEST(TradeFront, TheKneeIsFurthestBelowTheLineBetweenTheEnds) {
   EXPECT_EQ(knee(straight), 0u);
 }
 
+// A grey picture of 1 with Gaussian noise: the square of its relative error is its variance. The
+// reference has noise of its own, 1e-4 a half, of which nothing may be left in the result: without
+// the subtraction it would be a fifth too much. The bound is three of the stated deviations.
+TEST(TradeReference, SquaredErrorIsWithoutTheReferencesNoise) {
+  std::mt19937 random(7);
+  const auto grey = [&](double deviation) {
+    std::normal_distribution<float> noise(0, static_cast<float>(deviation));
+    TradePicture picture{64, 48, {}, {}, std::vector<float>(64 * 48, 0)};
+    for (int i = 0; i < 64 * 48; ++i)
+      picture.shown.emplace_back(1 + noise(random), 1 + noise(random), 1 + noise(random));
+    picture.added = picture.shown;
+    return picture;
+  };
+  const TradeReference reference(grey(0.01), grey(0.01));
+  const SquaredError squared = reference.squared_error(grey(0.0158));
+  EXPECT_NEAR(squared.value, 2.5e-4, 3 * squared.deviation);
+  EXPECT_LT(3 * squared.deviation, 0.5e-4) << "the bound tells nothing";
+  EXPECT_NEAR(error_of(squared), 0.0158, 3 * deviation_of(squared));
+  const SquaredError by_half = reference.squared_error_by_second_half(grey(0.0158));
+  EXPECT_NEAR(by_half.value, 2.5e-4, 3 * by_half.deviation);
+}
+
 }  // namespace post_trade_measure_test
 }  // namespace previz::trade

@@ -1,0 +1,86 @@
+// Measures what the search for answers asks for, and remembers it.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <vector>
+
+#include "daemon/render/renderer.hpp"
+#include "daemon/scene/scene.hpp"
+#include "daemon/trade/answer.hpp"
+#include "daemon/trade/budget.hpp"
+#include "daemon/trade/frame.hpp"
+#include "daemon/trade/measure.hpp"
+#include "daemon/trade/method.hpp"
+
+namespace previz::trade {
+
+// The sweep was told to stop.
+struct Stopped {};
+
+class Probes {
+ public:
+  struct Parts {  // references outlive the probes
+    std::shared_ptr<render::Device> device;
+    TradeFrame& frame;
+    const scene::Scene& scene;
+    const TradeBudget& budget;
+    double scale;         // of the sweep, relative to the observer's size
+    int rounds;           // of an error that is stated
+    double live_limit_s;  // a frame of the whole size that takes longer is of no use live
+    std::function<std::uint32_t(int round)> seed;
+    std::function<double()> now_s;
+    std::stop_token stop;
+  };
+  Probes(Parts parts, TradeSettings own) : parts_(std::move(parts)), own_(std::move(own)) {}
+
+  // Everything below compares with it.
+  void use(const TradeReference& reference) { reference_ = &reference; }
+  const TradeReference& reference() const { return *reference_; }
+  // Takes what was measured elsewhere.
+  void know_error(const TradeSettings& settings, int samples, const SquaredError& squared);
+  void know_curves(StillCurves of_own) { of_own_ = std::move(of_own); }
+
+  // All throw Stopped, and OutOfTime if the phase that limit() was told is over and what is asked
+  // for is not known.
+  void limit(std::optional<TradePhase> phase) { phase_ = phase; }
+  // The square of the error of a picture of this making, its scale relative to the sweep's size: of
+  // one round, or the mean of all with `stated`.
+  SquaredError error(const TradeSettings& settings, const Making& making, bool stated);
+  // How the error falls with the samples, noisy and denoised, until it is at most `wanted`. What
+  // the phase has no time for follows from the set's own settings.
+  StillCurves curves(const TradeSettings& settings, double wanted);
+  PathCost cost(const TradeSettings& settings, bool is_live);
+
+ private:
+  struct Known {
+    TradeSettings settings;
+    int samples;
+    std::vector<SquaredError> rounds;
+  };
+  struct KnownCost {
+    TradeSettings settings;
+    bool is_live;
+    PathCost cost;
+  };
+  Known& known(const TradeSettings& settings, int samples);
+  SquaredError measure(const TradeSettings& settings, int samples, int round);
+  StillCurves measure_curves(const TradeSettings& settings, double wanted);
+  bool is_over() const;
+  void stop_if_over() const;
+
+  Parts parts_;
+  const TradeSettings own_;
+  const TradeReference* reference_ = nullptr;
+  StillCurves of_own_;
+  std::vector<Known> known_;
+  std::vector<KnownCost> costs_;
+  std::vector<std::pair<TradeSettings, StillCurves>> curves_;
+  std::optional<MethodRenderer> probing_;  // with these settings
+  TradeSettings probed_;
+  std::optional<TradePhase> phase_;
+};
+
+}  // namespace previz::trade

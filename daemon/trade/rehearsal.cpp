@@ -1,0 +1,135 @@
+#include "daemon/trade/rehearsal.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "daemon/output/recorder.hpp"
+#include "daemon/pipeline/channel.hpp"
+#include "daemon/pipeline/liveness.hpp"
+#include "daemon/pipeline/metrics.hpp"
+#include "daemon/report/reports.hpp"
+#include "daemon/rig/cameras.hpp"
+#include "daemon/rig/controls.hpp"
+#include "daemon/rig/inbox.hpp"
+#include "daemon/rig/live_pipeline.hpp"
+
+namespace previz::trade {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double settling_share = 1.0 / 3;
+constexpr std::size_t least_pictures = 3;
+constexpr std::chrono::seconds first_picture_patience{60};
+constexpr std::chrono::milliseconds look_delay{20};
+
+// The set with the take in the place of its cameras, without what a rehearsal must not touch.
+set::Set on_take(set::Set set, const std::filesystem::path& take) {
+  set.observer.driver = set::replay_driver;
+  set.observer.device = take.string();
+  set.observer.faults.clear();
+  if (set.light_camera.driver != set::replay_driver || set.light_camera.device.empty()) {
+    set.light_camera.driver = set::replay_driver;
+    set.light_camera.device = take.string();
+  }
+  set.light_camera.faults.clear();
+  set.buttons = {};
+  return set;
+}
+
+output::RecorderOptions idle_recorder(const set::Set& set) {
+  output::RecorderOptions options;
+  options.take.folders = {set.recording.directory};
+  options.preroll_s = set.recording.preroll_s;
+  options.queue_bytes = output::default_queue_bytes();
+  return options;
+}
+
+// The pictures that were shown: when, and what each took to render.
+class Shown {
+ public:
+  void add(const pipeline::Shot& shot) {
+    if (!shot.untouched.empty()) return;
+    const std::lock_guard lock(mutex_);
+    pictures_.push_back({Clock::now(), shot.render_s});
+  }
+  std::size_t count() const {
+    const std::lock_guard lock(mutex_);
+    return pictures_.size();
+  }
+  Rehearsal since(std::size_t first) const {
+    const std::lock_guard lock(mutex_);
+    Rehearsal found;
+    if (pictures_.size() < first + least_pictures) return found;
+    std::vector<double> times;
+    for (std::size_t i = first; i < pictures_.size(); ++i) times.push_back(pictures_[i].render_s);
+    const std::chrono::duration<double> span = pictures_.back().when - pictures_[first].when;
+    found.fps = static_cast<double>(times.size() - 1) / span.count();
+    found.frame_s = pipeline::quantile(std::move(times), 0.5);
+    return found;
+  }
+
+ private:
+  struct Picture {
+    Clock::time_point when;
+    double render_s;
+  };
+  mutable std::mutex mutex_;
+  std::vector<Picture> pictures_;
+};
+
+}  // namespace
+
+Rehearsal rehearse(const std::shared_ptr<render::Device>& device, const set::Set& set,
+                   const scene::Scene& scene, const std::filesystem::path& take, double seconds,
+                   const std::stop_token& stop) {
+  const set::Set played = on_take(set, take);
+  report::Reports reports([](const report::Report&) {});
+  pipeline::Metrics metrics;
+  pipeline::Liveness liveness;
+  rig::Cameras cameras = rig::open_cameras(played, true);
+  rig::Controls controls(played, {}, scene);
+  pipeline::Newest<rig::Look> look(controls.look());
+  rig::Inbox inbox;
+  output::Recorder recorder(idle_recorder(played));
+  std::shared_ptr<render::Renderer> renderer;
+  Shown shown;
+  rig::LivePipeline pipeline(
+      {.set = played,
+       .cameras = cameras,
+       .scene = scene,
+       .device = device,
+       .renderer = renderer,
+       .recorder = recorder,
+       .look = look,
+       .inbox = inbox,
+       .kept = {.reports = reports, .metrics = metrics, .liveness = liveness},
+       .show = [&](const pipeline::Shot& shot) { shown.add(shot); }},
+      stop);
+  const auto wait_until = [&](Clock::time_point end) {
+    while (Clock::now() < end && !stop.stop_requested() && !inbox.finished())
+      std::this_thread::sleep_for(look_delay);
+  };
+  // Until then a device may compile its programs.
+  const auto latest = Clock::now() + first_picture_patience;
+  while (shown.count() == 0 && Clock::now() < latest && !stop.stop_requested() && !inbox.finished())
+    std::this_thread::sleep_for(look_delay);
+  const auto begin = Clock::now();
+  const auto in = [&](double s) {
+    return begin + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(s));
+  };
+  wait_until(in(settling_share * seconds));
+  const std::size_t settled = shown.count();
+  wait_until(in(seconds));
+  Rehearsal found = shown.since(settled);
+  const set::PreviewStep step = pipeline.governed();
+  found.making = {std::max(step.samples, 1), step.scale,
+                  step.denoise.value_or(played.quality.denoise)};
+  return found;
+}
+
+}  // namespace previz::trade

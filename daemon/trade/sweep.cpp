@@ -1,0 +1,377 @@
+#include "daemon/trade/sweep.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+#include <ostream>
+#include <span>
+#include <utility>
+
+#include "daemon/pipeline/metrics.hpp"
+#include "daemon/pipeline/preview_size.hpp"
+#include "daemon/trade/rehearsal.hpp"
+#include "drivers/error.hpp"
+#include "shaders/lib/render_shared.h"
+
+namespace previz::trade {
+namespace {
+
+// A long rendering is cut into parts, for the progress line and so that it can be stopped.
+constexpr int parts_of_half = 32;
+// A rehearsal is long enough for the governor to settle and for some pictures of a slow machine.
+constexpr double rehearsal_s = 12, shortest_rehearsal_s = 4;
+
+TradeSettings own_settings(const TradeFrame& frame) {
+  TradeSettings own;
+  own.estimation = frame.set().estimation;
+  own.lighting = frame.set().lighting;
+  own.lens = frame.calibration().lens;
+  own.adaptive = frame.set().quality.adaptive;
+  own.denoise = frame.set().quality.denoise;
+  return own;
+}
+
+TradeQuestion question_of(const TradeOptions& options, const TradeFrame& frame) {
+  const double fps = frame.set().quality.fps;
+  return {options.fps.value_or(fps > 0 ? fps : TradeQuestion().fps),
+          options.error.value_or(TradeQuestion().error)};
+}
+
+double steady_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// Returns the square of a method's error after a time, between its points as a power of the time.
+double squared_after(const std::vector<TradePoint>& points, double seconds, double noise_squared) {
+  const auto squared = [&](const TradePoint& point) {
+    const double error = point.errors.picture.value_or(0);
+    return std::max(error * error - noise_squared, 0.01 * error * error);
+  };
+  std::size_t i = 1;
+  while (i + 1 < points.size() && points[i].seconds < seconds) ++i;
+  if (points.size() == 1) return squared(points.front());
+  const double slope = std::log(squared(points[i]) / squared(points[i - 1])) /
+                       std::log(points[i].seconds / points[i - 1].seconds);
+  if (!std::isfinite(slope)) return squared(points[i]);
+  return squared(points[i]) *
+         std::exp(std::clamp(slope, -1.0, 0.0) * std::log(seconds / points[i].seconds));
+}
+
+}  // namespace
+
+Sweep::Sweep(const TradeOptions& options, TradeFrame& frame, std::ostream& out)
+    : options_(options),
+      frame_(frame),
+      scene_(scene::load_scene(frame.set())),
+      device_(render::open_device(options.device)),
+      budget_(options.minutes ? std::optional(60 * *options.minutes) : std::nullopt, steady_s(),
+              options.answers),
+      probes_({.device = device_,
+               .frame = frame_,
+               .scene = scene_,
+               .budget = budget_,
+               .scale = options.scale,
+               .rounds = options.rounds,
+               .live_limit_s = 2 / question_of(options, frame).fps,
+               .seed = [this](int round) { return seed(round); },
+               .now_s = steady_s,
+               .stop = options.stop},
+              own_settings(frame)),
+      last_s_(steady_s()) {
+  for (const std::string& note : scene_.notes) out << "scene: " << note << std::endl;
+  const PinholeIntrinsics& full = frame.calibration().intrinsics;
+  const PinholeIntrinsics sweep = pipeline::scaled(frame.calibration(), options.scale).intrinsics;
+  report_.set = frame.set().name;
+  report_.device = render::device_name(*device_);
+  report_.frame = frame.index();
+  report_.width = sweep.width;
+  report_.height = sweep.height;
+  report_.full_width = full.width;
+  report_.full_height = full.height;
+  report_.rounds = options.rounds;
+  report_.reference_samples = 2 * (*options.reference_samples / 2);
+  plan();
+}
+
+void Sweep::plan() {
+  const TradeSettings own = own_settings(frame_);
+  MethodRenderer renderer(device_, frame_, scene_, own, options_.scale);
+  renderer.begin(own.estimation.seed);
+  needed_ = renderer.needed();
+  TradeSettings with_photons = own;
+  with_photons.estimation.caustics = set::Caustics::photons;
+  if (own != with_photons) {
+    MethodRenderer other(device_, frame_, scene_, with_photons, options_.scale);
+    other.begin(own.estimation.seed);
+    needed_ |= other.needed() & gpu::FEATURE_PHOTONS;
+  }
+  report_.plan = plan_trade(own, trade_axes(own, needed_), options_.axes);
+
+  for (const TradePlan::Method& method : report_.plan.methods) {
+    report_.methods.emplace_back().name = method.name;
+  }
+  rounds_.assign(report_.methods.size(), std::vector<Rounds>(options_.samples.size()));
+  best_.resize(report_.methods.size());
+}
+
+TradeReport Sweep::run(std::ostream& out, const std::function<void(const TradeReport&)>& save) {
+  const int methods = static_cast<int>(report_.methods.size());
+  const int once = std::reduce(options_.samples.begin(), options_.samples.end()) + 1;
+  const int corners = 3 * options_.samples.back();
+  const double work = report_.reference_samples + 1.0 * methods * options_.rounds * once + corners;
+  progress_.emplace(out, options_.terminal, budget_.is_limited() ? budget_.seconds() : work,
+                    last_s_);
+  out << report_.set << ": frame " << report_.frame << " at " << report_.width << "x"
+      << report_.height << ", " << methods << " variants on " << report_.plan.axes.size()
+      << " axes, reference of " << report_.reference_samples << " samples, on " << report_.device;
+  if (budget_.is_limited())
+    out << ", within " << output::duration_words(budget_.seconds()) << " (--minutes)";
+  out << std::endl;
+  try {
+    make_reference();
+    sweep(save);
+    find_corners();
+    save(report_);
+    if (options_.answers) find_answers();
+  } catch (const Stopped&) {
+    report_.interrupted = true;
+    if (reference_) conclude();
+  }
+  return std::move(report_);
+}
+
+// With a budget, work is counted by the clock, so that the line shows what is left of that.
+void Sweep::worked(const std::string& step, double work) {
+  const double now = steady_s();
+  progress_->worked(step, budget_.is_limited() ? now - last_s_ : work, now);
+  last_s_ = now;
+}
+
+// Both halves grow together, so that there is a reference whenever time is over. On its way the
+// first half shows how the error of the set's own settings falls.
+void Sweep::make_reference() {
+  constexpr std::uint32_t beyond_all_rounds = 1u << 20;
+  constexpr double step_s = 1;
+  std::array<MethodRenderer, 2> halves{renderer_of(0), renderer_of(0)};
+  for (std::uint32_t half = 0; half < 2; ++half)
+    halves[half].begin(seed(0) + beyond_all_rounds + half);
+  const int samples = report_.reference_samples / 2, most = std::max(samples / parts_of_half, 1);
+  std::vector<OnTheWay> seen;
+  int done = 0;
+  for (int step = 1, next = 1; done < samples;) {
+    const int now = std::min({step, samples - done, next - done});
+    const double before = steady_s();
+    for (MethodRenderer& half : halves) half.add(now);
+    done += now;
+    if (done == next) {
+      seen.push_back({done, halves[0].picture(), halves[0].denoised_picture()});
+      next *= 2;
+    }
+    worked("reference", 2.0 * now);
+    const double took = std::max(steady_s() - before, 1e-6);
+    step = std::clamp(static_cast<int>(now * step_s / took), 1, most);
+    if (options_.stop.stop_requested() || budget_.is_over(TradePhase::reference, steady_s())) break;
+  }
+  report_.reference_samples = 2 * done;
+  progress_->step_done("reference of " + std::to_string(2 * done) + " samples", steady_s());
+  reference_.emplace(halves[0].picture(), halves[1].picture());
+  report_.noise = reference_->noise();
+  report_.reference = displayed(reference_->picture());
+  const auto& added = reference_->picture().added;
+  if (std::ranges::all_of(added, [](const glm::vec3& light) { return light == glm::vec3(0); }))
+    throw Error(frame_.set().file.string() + ": frame " + std::to_string(report_.frame) +
+                ": nothing virtual, removed or relit is seen in it; there is nothing to trade");
+  probes_.use(*reference_);
+  probes_.know_curves(curves_of(seen));
+}
+
+StillCurves Sweep::curves_of(const std::vector<OnTheWay>& seen) const {
+  StillCurves curves;
+  for (const OnTheWay& at : seen) {
+    curves.noisy.add(at.samples, reference_->squared_error_by_second_half(at.noisy));
+    curves.denoised.add(at.samples, reference_->squared_error_by_second_half(at.denoised));
+  }
+  return curves;
+}
+
+// Methods take turns, so that a drift of the machine's speed does not favour one of them.
+void Sweep::sweep(const std::function<void(const TradeReport&)>& save) {
+  const int methods = static_cast<int>(report_.methods.size());
+  for (int round = 0; round < options_.rounds; ++round) {
+    for (int i = 0; i < methods; ++i) {
+      const int turned = (i + round * methods / options_.rounds) % methods;
+      const bool is_first = round == 0 && i == 0;  // without the set's own there is no table
+      if (is_first || has_time_for_a_method()) measure(static_cast<std::size_t>(turned), round);
+    }
+    conclude();
+    save(report_);
+  }
+}
+
+bool Sweep::has_time_for_a_method() const {
+  return !budget_.is_over(TradePhase::sweep, steady_s() + of_a_method_s_);
+}
+
+void Sweep::measure(std::size_t method, int round) {
+  const double before = steady_s();
+  const std::string& name = report_.methods[method].name;
+  MethodRenderer renderer = renderer_of(method);
+  renderer.warm_up();
+  worked(name, 1);
+  for (std::size_t i = 0; i < options_.samples.size(); ++i) {
+    renderer.begin(seed(round));
+    const double seconds = renderer.render(options_.samples[i]);
+    stop_if_asked();
+    const TradePicture picture = at_sweep_size(renderer.picture());
+    rounds_[method][i].seconds.push_back(seconds);
+    rounds_[method][i].errors.push_back(reference_->errors(picture));
+    probes_.know_error(report_.plan.methods[method].settings, options_.samples[i],
+                       reference_->squared_error(picture));
+    if (i + 1 == options_.samples.size()) best_[method].push_back(picture);
+    worked(name, options_.samples[i]);
+  }
+  if (round == 0) compare_parts(method, renderer.layers());
+  of_a_method_s_ = std::max(of_a_method_s_, steady_s() - before);
+  progress_->step_done(
+      "round " + std::to_string(round + 1) + " of " + std::to_string(options_.rounds) + ", " + name,
+      steady_s());
+}
+
+// This relies on the set's own settings being the first method of the first round.
+void Sweep::compare_parts(std::size_t method, const render::Layers& layers) {
+  if (method == 0) own_ = layers;
+  if (report_.plan.methods[method].settings.carried == 0) return;
+  std::size_t changed = 0;
+  for (std::size_t i = 0; i < layers.composite.size(); ++i)
+    changed += layers.composite[i] != own_.composite[i] || layers.diff[i] != own_.diff[i] ||
+               layers.mask[i] != own_.mask[i];
+  report_.methods[method].changed_pixels = changed;
+}
+
+// Makes of the rounds so far what the table and the page show. A method of which a number of
+// samples was not measured has no points.
+void Sweep::conclude() {
+  std::vector<TradePoint*> candidates;
+  std::vector<TradeCost> costs;
+  report_.unmeasured.clear();
+  for (std::size_t m = 0; m < report_.methods.size(); ++m) {
+    TradeMethod& method = report_.methods[m];
+    if (rounds_[m].back().errors.empty()) {
+      report_.unmeasured.push_back(method.name);
+      continue;
+    }
+    method.points.resize(options_.samples.size());
+    for (std::size_t i = 0; i < method.points.size(); ++i) {
+      TradePoint& point = method.points[i];
+      point.samples = options_.samples[i];
+      point.seconds = pipeline::quantile(rounds_[m][i].seconds, 0.5);
+      point.errors = rms(rounds_[m][i].errors);
+      point.within_noise = within_noise(point.errors, report_.noise);
+      if (method.changed_pixels) continue;  // features that are not needed are no choice
+      candidates.push_back(&point);
+      costs.push_back({point.seconds, point.errors.picture.value_or(0)});
+    }
+    const std::size_t alike = std::min(best_[m].size(), best_[0].size());
+    if (alike >= 3)
+      method.bias =
+          reference_->bias(std::span(best_[m]).first(alike), std::span(best_[0]).first(alike));
+  }
+  const std::vector<bool> front = pareto_front(costs);
+  for (std::size_t i = 0; i < front.size(); ++i) candidates[i]->pareto = front[i];
+}
+
+void Sweep::find_corners() {
+  const std::vector<TradeFrontPoint> front = front_of(report_);
+  std::vector<TradeCost> costs;
+  for (const TradeFrontPoint& at : front)
+    costs.push_back({report_.point(at).seconds, report_.point(at).errors.picture.value_or(0)});
+  const auto add = [&](const char* name, const TradeFrontPoint& at) {
+    stop_if_asked();
+    report_.corners.push_back(corner(name, at));
+    worked(name, options_.samples.back());
+  };
+  add("fastest", front.front());
+  const std::size_t bend = knee(costs);
+  if (bend > 0 && bend + 1 < front.size()) add("knee", front[bend]);
+  if (front.size() > 1) add("best", front.back());
+  progress_->step_done("pictures at the corners", steady_s());
+}
+
+TradeCorner Sweep::corner(const std::string& name, const TradeFrontPoint& at) const {
+  MethodRenderer renderer = renderer_of(at.method);
+  renderer.begin(seed(0));
+  renderer.render(report_.point(at).samples);
+  const TradePicture picture = renderer.picture();
+  TradeCorner corner{name, at, displayed(picture), displayed(at_sweep_size(picture))};
+  for (std::size_t i = 0; i < corner.difference.samples.size(); ++i) {
+    const int off = static_cast<int>(corner.difference.samples[i]) - report_.reference.samples[i];
+    corner.difference.samples[i] = static_cast<std::uint16_t>(std::clamp(128 + 5 * off, 0, 255));
+  }
+  return corner;
+}
+
+Plate Sweep::displayed(const TradePicture& picture) const {
+  const lighting::Response response(frame_.calibration().response, 8);
+  Plate plate{picture.width, picture.height, 8, {}};
+  plate.samples.reserve(3 * picture.shown.size());
+  for (const glm::vec3& radiance : picture.shown)
+    for (int c = 0; c < 3; ++c)
+      plate.samples.push_back(
+          response.forward(frame_.exposure() * static_cast<double>(radiance[c])));
+  return plate;
+}
+
+// What a method brought alone, in the time of the set's own at few samples, or at the most.
+double Sweep::gain(const TradeSettings& settings, bool is_live) const {
+  const auto planned =
+      std::ranges::find(report_.plan.methods, settings, &TradePlan::Method::settings);
+  if (planned == report_.plan.methods.end()) return 1;
+  const std::vector<TradePoint>& own = report_.methods.front().points;
+  const std::vector<TradePoint>& other =
+      report_.methods[static_cast<std::size_t>(planned - report_.plan.methods.begin())].points;
+  if (own.empty() || other.empty()) return 1;
+  const double noise = report_.noise.picture.value_or(0);
+  const double seconds = is_live ? own.front().seconds : own.back().seconds;
+  return squared_after(own, seconds, noise * noise) / squared_after(other, seconds, noise * noise);
+}
+
+// The rehearsal has the time that its phase leaves; without any there is none.
+Rehearsal Sweep::rehearsal_of(const set::Set& set) {
+  const double left = budget_.left(TradePhase::live_rehearsal, steady_s());
+  if (left < shortest_rehearsal_s) return {};
+  const Rehearsal rehearsal =
+      rehearse(device_, set, scene_, frame_.take(), std::min(left, rehearsal_s), options_.stop);
+  stop_if_asked();
+  return rehearsal;
+}
+
+void Sweep::find_answers() {
+  report_.question = question_of(options_, frame_);
+  const TradeSettings& own = report_.plan.methods.front().settings;
+  std::vector<TradeAxis> axes = searched_axes(own, needed_);
+  if (!options_.axes.empty())
+    std::erase_if(axes, [&](const TradeAxis& axis) {
+      return std::ranges::find(options_.axes, axis.name) == options_.axes.end();
+    });
+  report_.answers = answer(
+      report_.question, frame_.set(), own, axes,
+      {.error = [this](const TradeSettings& s, const Making& m,
+                       bool stated) { return probes_.error(s, m, stated); },
+       .curves = [this](const TradeSettings& s,
+                        double wanted) { return probes_.curves(s, wanted); },
+       .gain = [this](const TradeSettings& s, bool is_live) { return gain(s, is_live); },
+       .cost = [this](const TradeSettings& s, bool is_live) { return probes_.cost(s, is_live); },
+       .rehearse = [this](const set::Set& set) { return rehearsal_of(set); },
+       .take_fps = frame_.take_fps(),
+       .step =
+           [this](const std::string& what) {
+             stop_if_asked();
+             worked("search, " + what, 0);
+             progress_->step_done("search, " + what, steady_s());
+           },
+       .limit = [this](std::optional<TradePhase> phase) { probes_.limit(phase); }});
+}
+
+}  // namespace previz::trade

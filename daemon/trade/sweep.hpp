@@ -1,0 +1,91 @@
+// The sweep of `previzd trade`: the reference, every method in every round, the pictures at the
+// corners, and then the answers.
+#pragma once
+
+#include <functional>
+#include <iosfwd>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/output/progress.hpp"
+#include "daemon/render/renderer.hpp"
+#include "daemon/scene/scene.hpp"
+#include "daemon/trade/budget.hpp"
+#include "daemon/trade/frame.hpp"
+#include "daemon/trade/measure.hpp"
+#include "daemon/trade/method.hpp"
+#include "daemon/trade/probes.hpp"
+#include "daemon/trade/report.hpp"
+#include "daemon/trade/trade.hpp"
+
+namespace previz::trade {
+
+class Sweep {
+ public:
+  Sweep(const TradeOptions& options, TradeFrame& frame, std::ostream& out);
+  // Calls `save` with what is known, whenever that grows. Ends early, with that, if it is to stop.
+  TradeReport run(std::ostream& out, const std::function<void(const TradeReport&)>& save);
+
+ private:
+  MethodRenderer renderer_of(std::size_t method) const {
+    return {device_, frame_, scene_, report_.plan.methods[method].settings, options_.scale};
+  }
+  // In one round all methods use the same seed, so that they differ by their settings alone.
+  std::uint32_t seed(int round) const {
+    return report_.plan.methods.front().settings.estimation.seed + 1 +
+           static_cast<std::uint32_t>(round);
+  }
+  TradePicture at_sweep_size(const TradePicture& picture) const {
+    return enlarged(picture, report_.width, report_.height);
+  }
+  void plan();
+  // The first half of the reference, when it had so many samples.
+  struct OnTheWay {
+    int samples;
+    TradePicture noisy, denoised;
+  };
+  void make_reference();
+  StillCurves curves_of(const std::vector<OnTheWay>& seen) const;
+  void sweep(const std::function<void(const TradeReport&)>& save);
+  bool has_time_for_a_method() const;
+  void worked(const std::string& step, double work);
+  void measure(std::size_t method, int round);
+  void compare_parts(std::size_t method, const render::Layers& layers);
+  void conclude();
+  void find_corners();
+  TradeCorner corner(const std::string& name, const TradeFrontPoint& at) const;
+  Plate displayed(const TradePicture& picture) const;
+  void find_answers();
+  double gain(const TradeSettings& settings, bool is_live) const;
+  Rehearsal rehearsal_of(const set::Set& set);
+  void stop_if_asked() const {
+    if (options_.stop.stop_requested()) throw Stopped();
+  }
+
+  const TradeOptions& options_;
+  TradeFrame& frame_;
+  const scene::Scene scene_;
+  const std::shared_ptr<render::Device> device_;
+  TradeReport report_;
+  std::optional<TradeReference> reference_;
+  // The measurements of one point, with one entry a round.
+  struct Rounds {
+    std::vector<TradeErrors> errors;
+    std::vector<double> seconds;
+  };
+  std::vector<std::vector<Rounds>> rounds_;      // by method and point
+  std::vector<std::vector<TradePicture>> best_;  // by method and round: at the most samples
+  render::Layers own_;                           // the set's own, from the first round
+
+  std::uint32_t needed_ = 0;  // as searched_axes() wants it
+
+  TradeBudget budget_;
+  Probes probes_;
+  std::optional<output::ShareProgress> progress_;
+  double last_s_;             // when progress was shown last
+  double of_a_method_s_ = 0;  // the longest measurement of a method so far
+};
+
+}  // namespace previz::trade
