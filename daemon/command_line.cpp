@@ -178,6 +178,8 @@ void add_trade(CLI::App& app, trade::TradeOptions& options) {
       .add_option("--minutes", options.minutes,
                   "Time that it may take; what is not measured by then is named on the page")
       ->capture_default_str();
+  command.add_flag("--anew", options.anew,
+                   "Measure everything, also what the last table in the directory has already");
   command
       .add_option("--scale", options.scale, "Size of the pictures, relative to the film camera's")
       ->capture_default_str();

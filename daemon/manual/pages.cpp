@@ -60,6 +60,7 @@ previzd render takes/12A_take003 --out renders/12A_take003: Renders a take with 
 previzd render takes/12A_take003 --set relit.toml --spp 512 --frames 100-150 --out renders/relit: Renders a part of a take with other settings: other lamps, other objects, more samples.
 previzd trade desk.toml --axes estimator,depth: Measures what the estimator and the number of bounces cost and bring on this set.
 previzd trade takes/12A_take003 --set desk.toml --fps 25 --error 2% --out trade: Finds the settings that hold 25 pictures a second with the least error, and those that reach an error of 2 % in the least time.
+previzd trade takes/12A_take003 --set desk.toml --out trade --minutes 20: Goes on from what the last one measured there, with more time.
 previzd run desk.toml --with trade/live.toml: Composites live with what the trade has found.
 previzd render takes/12A_take003 --with trade/post.toml: Renders with what the trade has found.
 previzd import frames.json sessions/desk: Makes a take of your own pictures or video.

@@ -34,6 +34,7 @@ class TradeFrame {
   TradeFrame(const TradeSource& source, std::optional<std::uint64_t> index);
 
   const set::Set& set() const { return take_.set; }
+  const std::string& set_text() const { return take_.set_text; }
   const std::filesystem::path& take() const { return take_.session.directory; }
   double take_fps()
       const;  // frames a second of the take, over its whole length; 0: it has one frame

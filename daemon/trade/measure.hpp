@@ -63,6 +63,7 @@ class TradeReference {
   SquaredError squared_error_by_second_half(const TradePicture& picture) const;
   // Returns the standard error of the halves' mean: half their difference.
   const TradeErrors& noise() const { return noise_; }
+  const SquaredError& squared_noise() const { return own_; }
   // Returns the errors of `picture`, which must have the reference's size.
   TradeErrors errors(const TradePicture& picture) const;
 

@@ -2,6 +2,7 @@
 // `previzd run` does, or to all layers, as `previzd render` does.
 #pragma once
 
+#include <array>
 #include <functional>
 #include <memory>
 
@@ -49,6 +50,19 @@ class PathCost {
   PathCost(PathTimer& timer, bool is_live, double limit_s);
   // From frames of a quarter of the size alone, by what `like` costs at that and at other sizes.
   PathCost(PathTimer& timer, bool is_live, const PathCost& like);
+  // Everything that was measured, to be kept; in no stated order.
+  using Parts = std::array<double, 8>;
+  Parts parts() const {
+    return {small_.fixed, small_.per_sample, small_.denoise, per_sample_, whole_,
+            fixed_,       per_pixels_,       denoise_};
+  }
+  explicit PathCost(const Parts& parts)
+      : small_{parts[0], parts[1], parts[2]},
+        per_sample_(parts[3]),
+        whole_(parts[4]),
+        fixed_(parts[5]),
+        per_pixels_(parts[6]),
+        denoise_(parts[7]) {}
   // Of known parts: fixed, of a sample and of denoising, all of the whole picture, in seconds.
   PathCost(double fixed_s, double per_sample_s, double denoise_s)
       : per_sample_(per_sample_s), whole_(fixed_s), per_pixels_(fixed_s), denoise_(denoise_s) {}

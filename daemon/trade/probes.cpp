@@ -21,16 +21,6 @@ void Probes::stop_if_over() const {
   if (is_over()) throw OutOfTime();
 }
 
-Probes::Known& Probes::known(const TradeSettings& settings, int samples) {
-  for (Known& known : known_)
-    if (known.samples == samples && known.settings == settings) return known;
-  return known_.emplace_back(Known{settings, samples, {}});
-}
-
-void Probes::know_error(const TradeSettings& settings, int samples, const SquaredError& squared) {
-  known(settings, samples).rounds.push_back(squared);
-}
-
 SquaredError Probes::measure(const TradeSettings& settings, int samples, int round) {
   stop_if_over();
   if (!probing_ || !(probed_ == settings)) {
@@ -49,26 +39,30 @@ SquaredError Probes::error(const TradeSettings& settings, const Making& making, 
   probed.denoise = making.denoise;
   probed.adaptive = false;
   const auto wanted = static_cast<std::size_t>(stated ? parts_.rounds : 1);
-  while (known(probed, making.samples).rounds.size() < wanted) {
-    const auto done = static_cast<int>(known(probed, making.samples).rounds.size());
+  std::vector<SquaredError>& rounds = memory_.point(words(probed), making.samples).squared;
+  while (rounds.size() < wanted) {
     try {
-      const SquaredError squared = measure(probed, making.samples, done);
-      known(probed, making.samples).rounds.push_back(squared);
+      rounds.push_back(measure(probed, making.samples, static_cast<int>(rounds.size())));
     } catch (const OutOfTime&) {
-      if (done == 0) throw;
+      if (rounds.empty()) throw;
       break;  // the rounds that there are
     }
   }
-  return mean(known(probed, making.samples).rounds);
+  return mean(rounds);
 }
 
 StillCurves Probes::curves(const TradeSettings& settings, double wanted) {
   TradeSettings probed = settings;
   probed.adaptive = false;
-  if (probed == own_ || settings == own_) return of_own_;
-  for (const auto& [known, curves] : curves_)
-    if (known == probed) return curves;
-  return curves_.emplace_back(probed, measure_curves(probed, wanted)).second;
+  if (probed == own_ || settings == own_) return memory_.reference.curves;
+  const std::string name = words(probed);
+  const auto known = std::ranges::find(memory_.curves, name, &KeptCurves::settings);
+  StillCurves curves =
+      known != memory_.curves.end() ? known->curves : measure_curves(probed, wanted);
+  if (known == memory_.curves.end()) memory_.curves.push_back({name, curves});
+  curves.noisy.extend(memory_.reference.curves.noisy);
+  curves.denoised.extend(memory_.reference.curves.denoised);
+  return curves;
 }
 
 StillCurves Probes::measure_curves(const TradeSettings& settings, double wanted) {
@@ -77,8 +71,8 @@ StillCurves Probes::measure_curves(const TradeSettings& settings, double wanted)
   MethodRenderer renderer(parts_.device, parts_.frame, parts_.scene, settings, parts_.scale);
   renderer.begin(parts_.seed(0));
   StillCurves curves;
-  const int most = of_own_.noisy.empty() ? most_curve_samples
-                                         : static_cast<int>(of_own_.noisy.points().back().samples);
+  const ErrorCurve& own = memory_.reference.curves.noisy;
+  const int most = own.empty() ? most_curve_samples : static_cast<int>(own.points().back().samples);
   for (int samples = 1; samples <= most; samples *= 2) {
     if (samples > least_curve_samples && is_over()) break;
     if (parts_.stop.stop_requested()) throw Stopped();
@@ -87,23 +81,24 @@ StillCurves Probes::measure_curves(const TradeSettings& settings, double wanted)
     curves.denoised.add(samples, reference_->squared_error(renderer.denoised_picture()));
     if (error_of(curves.noisy.points().back().squared) <= wanted) break;
   }
-  curves.noisy.extend(of_own_.noisy);
-  curves.denoised.extend(of_own_.denoised);
   return curves;
 }
 
 PathCost Probes::cost(const TradeSettings& settings, bool is_live) {
-  for (const KnownCost& known : costs_)
-    if (known.is_live == is_live && known.settings == settings) return known.cost;
+  const auto known = [&](const TradeSettings& wanted) -> const KeptCost* {
+    const std::string name = words(wanted);
+    for (const KeptCost& cost : memory_.costs)
+      if (cost.is_live == is_live && cost.settings == name) return &cost;
+    return nullptr;
+  };
+  if (const KeptCost* cost = known(settings)) return cost->cost;
   stop_if_over();
-  const auto own = std::ranges::find_if(costs_, [&](const KnownCost& known) {
-    return known.is_live == is_live && known.settings == own_;
-  });
   PathTimer timer(parts_.device, parts_.frame, parts_.scene, settings);
-  costs_.push_back({settings, is_live,
-                    own == costs_.end() ? PathCost(timer, is_live, parts_.live_limit_s)
-                                        : PathCost(timer, is_live, own->cost)});
-  return costs_.back().cost;
+  const KeptCost* own = known(own_);
+  const PathCost cost =
+      own ? PathCost(timer, is_live, own->cost) : PathCost(timer, is_live, parts_.live_limit_s);
+  memory_.costs.push_back({words(settings), is_live, cost});
+  return cost;
 }
 
 }  // namespace previz::trade

@@ -5,7 +5,8 @@
 #include <memory>
 #include <optional>
 #include <stop_token>
-#include <vector>
+#include <string>
+#include <utility>
 
 #include "daemon/render/renderer.hpp"
 #include "daemon/scene/scene.hpp"
@@ -13,6 +14,7 @@
 #include "daemon/trade/budget.hpp"
 #include "daemon/trade/frame.hpp"
 #include "daemon/trade/measure.hpp"
+#include "daemon/trade/memory.hpp"
 #include "daemon/trade/method.hpp"
 
 namespace previz::trade {
@@ -34,15 +36,13 @@ class Probes {
     std::function<double()> now_s;
     std::stop_token stop;
   };
-  Probes(Parts parts, TradeSettings own) : parts_(std::move(parts)), own_(std::move(own)) {}
+  // What is measured goes into `memory`, and what is there is not measured again.
+  Probes(Parts parts, TradeSettings own, TradeMemory& memory)
+      : parts_(std::move(parts)), own_(std::move(own)), memory_(memory) {}
 
   // Everything below compares with it.
   void use(const TradeReference& reference) { reference_ = &reference; }
   const TradeReference& reference() const { return *reference_; }
-  // Takes what was measured elsewhere.
-  void know_error(const TradeSettings& settings, int samples, const SquaredError& squared);
-  void know_curves(StillCurves of_own) { of_own_ = std::move(of_own); }
-
   // All throw Stopped, and OutOfTime if the phase that limit() was told is over and what is asked
   // for is not known.
   void limit(std::optional<TradePhase> phase) { phase_ = phase; }
@@ -55,17 +55,9 @@ class Probes {
   PathCost cost(const TradeSettings& settings, bool is_live);
 
  private:
-  struct Known {
-    TradeSettings settings;
-    int samples;
-    std::vector<SquaredError> rounds;
-  };
-  struct KnownCost {
-    TradeSettings settings;
-    bool is_live;
-    PathCost cost;
-  };
-  Known& known(const TradeSettings& settings, int samples);
+  std::string words(const TradeSettings& settings) const {
+    return settings_words(parts_.frame.set(), settings);
+  }
   SquaredError measure(const TradeSettings& settings, int samples, int round);
   StillCurves measure_curves(const TradeSettings& settings, double wanted);
   bool is_over() const;
@@ -74,10 +66,7 @@ class Probes {
   Parts parts_;
   const TradeSettings own_;
   const TradeReference* reference_ = nullptr;
-  StillCurves of_own_;
-  std::vector<Known> known_;
-  std::vector<KnownCost> costs_;
-  std::vector<std::pair<TradeSettings, StillCurves>> curves_;
+  TradeMemory& memory_;
   std::optional<MethodRenderer> probing_;  // with these settings
   TradeSettings probed_;
   std::optional<TradePhase> phase_;

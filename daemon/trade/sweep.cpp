@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <ostream>
 #include <span>
@@ -11,6 +12,7 @@
 
 #include "daemon/pipeline/metrics.hpp"
 #include "daemon/pipeline/preview_size.hpp"
+#include "daemon/render/composite.hpp"
 #include "daemon/trade/rehearsal.hpp"
 #include "drivers/error.hpp"
 #include "shaders/lib/render_shared.h"
@@ -20,6 +22,8 @@ namespace {
 
 // A long rendering is cut into parts, for the progress line and so that it can be stopped.
 constexpr int parts_of_half = 32;
+// A reference is enough for the answers if its noise is this share of the error that is asked for.
+constexpr double enough_noise = 0.25;
 // A rehearsal is long enough for the governor to settle and for some pictures of a slow machine.
 constexpr double rehearsal_s = 12, shortest_rehearsal_s = 4;
 
@@ -61,11 +65,13 @@ double squared_after(const std::vector<TradePoint>& points, double seconds, doub
 
 }  // namespace
 
-Sweep::Sweep(const TradeOptions& options, TradeFrame& frame, std::ostream& out)
+Sweep::Sweep(const TradeOptions& options, TradeFrame& frame, const scene::Scene& scene,
+             std::shared_ptr<render::Device> device, TradeMemory& memory)
     : options_(options),
       frame_(frame),
-      scene_(scene::load_scene(frame.set())),
-      device_(render::open_device(options.device)),
+      scene_(scene),
+      device_(std::move(device)),
+      memory_(memory),
       budget_(options.minutes ? std::optional(60 * *options.minutes) : std::nullopt, steady_s(),
               options.answers),
       probes_({.device = device_,
@@ -78,9 +84,8 @@ Sweep::Sweep(const TradeOptions& options, TradeFrame& frame, std::ostream& out)
                .seed = [this](int round) { return seed(round); },
                .now_s = steady_s,
                .stop = options.stop},
-              own_settings(frame)),
+              own_settings(frame), memory),
       last_s_(steady_s()) {
-  for (const std::string& note : scene_.notes) out << "scene: " << note << std::endl;
   const PinholeIntrinsics& full = frame.calibration().intrinsics;
   const PinholeIntrinsics sweep = pipeline::scaled(frame.calibration(), options.scale).intrinsics;
   report_.set = frame.set().name;
@@ -112,8 +117,13 @@ void Sweep::plan() {
   for (const TradePlan::Method& method : report_.plan.methods) {
     report_.methods.emplace_back().name = method.name;
   }
-  rounds_.assign(report_.methods.size(), std::vector<Rounds>(options_.samples.size()));
   best_.resize(report_.methods.size());
+  for (std::size_t m = 0; m < report_.methods.size(); ++m)
+    if (const KeptMethod* kept =
+            memory_.method(settings_words(frame_.set(), report_.plan.methods[m].settings))) {
+      report_.methods[m].bias = kept->bias;
+      report_.methods[m].changed_pixels = kept->changed_pixels;
+    }
 }
 
 TradeReport Sweep::run(std::ostream& out, const std::function<void(const TradeReport&)>& save) {
@@ -149,42 +159,85 @@ void Sweep::worked(const std::string& step, double work) {
   last_s_ = now;
 }
 
+TradePicture Sweep::picture_of(const render::Layers& layers) const {
+  const PlatePtr plate = frame_.plate(options_.scale);
+  return trade_picture(layers,
+                       render::plate_radiance(*plate, frame_.response(), frame_.exposure()).value,
+                       1 / frame_.exposure());
+}
+
+// More of the reference tells little where its noise is far below the error that is asked for.
+bool Sweep::is_enough(const KeptReference& reference) const {
+  if (reference.samples >= report_.reference_samples / 2) return true;
+  if (!options_.answers || reference.samples == 0) return false;
+  const TradeReference so_far(picture_of(reference.halves[0]), picture_of(reference.halves[1]));
+  return so_far.noise().picture.value_or(0) <= question_of(options_, frame_).error * enough_noise;
+}
+
 // Both halves grow together, so that there is a reference whenever time is over. On its way the
-// first half shows how the error of the set's own settings falls.
+// first half shows how the error of the set's own settings falls. What is kept of an earlier
+// reference has other random numbers.
 void Sweep::make_reference() {
   constexpr std::uint32_t beyond_all_rounds = 1u << 20;
   constexpr double step_s = 1;
-  std::array<MethodRenderer, 2> halves{renderer_of(0), renderer_of(0)};
-  for (std::uint32_t half = 0; half < 2; ++half)
-    halves[half].begin(seed(0) + beyond_all_rounds + half);
+  const KeptReference before = memory_.reference;
   const int samples = report_.reference_samples / 2, most = std::max(samples / parts_of_half, 1);
   std::vector<OnTheWay> seen;
   int done = 0;
-  for (int step = 1, next = 1; done < samples;) {
-    const int now = std::min({step, samples - done, next - done});
-    const double before = steady_s();
-    for (MethodRenderer& half : halves) half.add(now);
-    done += now;
-    if (done == next) {
-      seen.push_back({done, halves[0].picture(), halves[0].denoised_picture()});
+  if (!is_enough(before)) {
+    std::array<MethodRenderer, 2> halves{renderer_of(0), renderer_of(0)};
+    const auto used = 2 * static_cast<std::uint32_t>(before.samples);
+    for (std::uint32_t half = 0; half < 2; ++half)
+      halves[half].begin(seed(0) + beyond_all_rounds + used + half);
+    for (int step = 1, next = 1; before.samples + done < samples;) {
+      const int now = std::min({step, samples - before.samples - done, next - done});
+      const double begun = steady_s();
+      for (MethodRenderer& half : halves) half.add(now);
+      done += now;
+      worked("reference", 2.0 * now);
+      const double took = std::max(steady_s() - begun, 1e-6);
+      step = std::clamp(static_cast<int>(now * step_s / took), 1, most);
+      const bool is_over =
+          options_.stop.stop_requested() || budget_.is_over(TradePhase::reference, steady_s());
+      if (done < next && !is_over) continue;
+      memory_.reference = before;
+      memory_.reference.add(done, {&halves[0].layers(), &halves[1].layers()});
+      if (done == next) seen.push_back({done, halves[0].picture(), halves[0].denoised_picture()});
       next *= 2;
+      if (is_over || is_enough(memory_.reference)) break;
     }
-    worked("reference", 2.0 * now);
-    const double took = std::max(steady_s() - before, 1e-6);
-    step = std::clamp(static_cast<int>(now * step_s / took), 1, most);
-    if (options_.stop.stop_requested() || budget_.is_over(TradePhase::reference, steady_s())) break;
+    if (memory_.reference.samples < before.samples + done) {
+      memory_.reference = before;
+      memory_.reference.add(done, {&halves[0].layers(), &halves[1].layers()});
+    }
   }
-  report_.reference_samples = 2 * done;
-  progress_->step_done("reference of " + std::to_string(2 * done) + " samples", steady_s());
-  reference_.emplace(halves[0].picture(), halves[1].picture());
+  use_reference();
+  const StillCurves now = curves_of(seen);
+  if (memory_.reference.curves.noisy.points().size() < now.noisy.points().size())
+    memory_.reference.curves = now;
+  // Both halves together are another point of it.
+  ErrorCurve& curve = memory_.reference.curves.noisy;
+  if (curve.empty() || report_.reference_samples > curve.points().back().samples)
+    curve.add(report_.reference_samples, reference_->squared_noise());
+  progress_->step_done("reference of " + std::to_string(report_.reference_samples) + " samples" +
+                           (before.samples > 0 ? ", " + std::to_string(2 * before.samples) +
+                                                     " of them from the last time"
+                                               : ""),
+                       steady_s());
+}
+
+void Sweep::use_reference() {
+  const KeptReference& kept = memory_.reference;
+  report_.reference_samples = 2 * kept.samples;
+  reference_.emplace(picture_of(kept.halves[0]), picture_of(kept.halves[1]));
   report_.noise = reference_->noise();
+  memory_.change_noise(report_.noise);
   report_.reference = displayed(reference_->picture());
   const auto& added = reference_->picture().added;
   if (std::ranges::all_of(added, [](const glm::vec3& light) { return light == glm::vec3(0); }))
     throw Error(frame_.set().file.string() + ": frame " + std::to_string(report_.frame) +
                 ": nothing virtual, removed or relit is seen in it; there is nothing to trade");
   probes_.use(*reference_);
-  probes_.know_curves(curves_of(seen));
 }
 
 StillCurves Sweep::curves_of(const std::vector<OnTheWay>& seen) const {
@@ -196,14 +249,28 @@ StillCurves Sweep::curves_of(const std::vector<OnTheWay>& seen) const {
   return curves;
 }
 
+KeptPoint& Sweep::kept(std::size_t method, std::size_t point) {
+  return memory_.point(settings_words(frame_.set(), report_.plan.methods[method].settings),
+                       options_.samples[point]);
+}
+
+int Sweep::rounds_of(std::size_t method) {
+  int rounds = std::numeric_limits<int>::max();
+  for (std::size_t i = 0; i < options_.samples.size(); ++i)
+    rounds = std::min(rounds, static_cast<int>(kept(method, i).errors.size()));
+  return rounds;
+}
+
 // Methods take turns, so that a drift of the machine's speed does not favour one of them.
 void Sweep::sweep(const std::function<void(const TradeReport&)>& save) {
   const int methods = static_cast<int>(report_.methods.size());
   for (int round = 0; round < options_.rounds; ++round) {
     for (int i = 0; i < methods; ++i) {
-      const int turned = (i + round * methods / options_.rounds) % methods;
+      const auto turned =
+          static_cast<std::size_t>((i + round * methods / options_.rounds) % methods);
+      if (rounds_of(turned) > round) continue;     // from the last time
       const bool is_first = round == 0 && i == 0;  // without the set's own there is no table
-      if (is_first || has_time_for_a_method()) measure(static_cast<std::size_t>(turned), round);
+      if (is_first || has_time_for_a_method()) measure(turned, round);
     }
     conclude();
     save(report_);
@@ -225,11 +292,14 @@ void Sweep::measure(std::size_t method, int round) {
     const double seconds = renderer.render(options_.samples[i]);
     stop_if_asked();
     const TradePicture picture = at_sweep_size(renderer.picture());
-    rounds_[method][i].seconds.push_back(seconds);
-    rounds_[method][i].errors.push_back(reference_->errors(picture));
-    probes_.know_error(report_.plan.methods[method].settings, options_.samples[i],
-                       reference_->squared_error(picture));
-    if (i + 1 == options_.samples.size()) best_[method].push_back(picture);
+    KeptPoint& point = kept(method, i);
+    if (point.errors.size() <= static_cast<std::size_t>(round)) {
+      point.seconds.push_back(seconds);
+      point.errors.push_back(reference_->errors(picture));
+    }
+    if (point.squared.size() <= static_cast<std::size_t>(round))
+      point.squared.push_back(reference_->squared_error(picture));
+    if (i + 1 == options_.samples.size()) best_[method][round] = picture;
     worked(name, options_.samples[i]);
   }
   if (round == 0) compare_parts(method, renderer.layers());
@@ -239,15 +309,32 @@ void Sweep::measure(std::size_t method, int round) {
       steady_s());
 }
 
-// This relies on the set's own settings being the first method of the first round.
 void Sweep::compare_parts(std::size_t method, const render::Layers& layers) {
   if (method == 0) own_ = layers;
   if (report_.plan.methods[method].settings.carried == 0) return;
+  if (own_.composite.empty()) {
+    MethodRenderer own = renderer_of(0);
+    own.begin(seed(0));
+    own.render(options_.samples.back());
+    own_ = own.layers();
+  }
   std::size_t changed = 0;
   for (std::size_t i = 0; i < layers.composite.size(); ++i)
     changed += layers.composite[i] != own_.composite[i] || layers.diff[i] != own_.diff[i] ||
                layers.mask[i] != own_.mask[i];
   report_.methods[method].changed_pixels = changed;
+}
+
+// Returns the pictures of the rounds that both methods have from this run.
+std::pair<std::vector<TradePicture>, std::vector<TradePicture>> Sweep::alike(
+    std::size_t method) const {
+  std::pair<std::vector<TradePicture>, std::vector<TradePicture>> pictures;
+  for (const auto& [round, picture] : best_[method])
+    if (const auto own = best_[0].find(round); own != best_[0].end()) {
+      pictures.first.push_back(picture);
+      pictures.second.push_back(own->second);
+    }
+  return pictures;
 }
 
 // Makes of the rounds so far what the table and the page show. A method of which a number of
@@ -256,27 +343,29 @@ void Sweep::conclude() {
   std::vector<TradePoint*> candidates;
   std::vector<TradeCost> costs;
   report_.unmeasured.clear();
+  memory_.methods.clear();
   for (std::size_t m = 0; m < report_.methods.size(); ++m) {
     TradeMethod& method = report_.methods[m];
-    if (rounds_[m].back().errors.empty()) {
+    if (rounds_of(m) == 0) {
       report_.unmeasured.push_back(method.name);
       continue;
     }
     method.points.resize(options_.samples.size());
     for (std::size_t i = 0; i < method.points.size(); ++i) {
+      const KeptPoint& rounds = kept(m, i);
       TradePoint& point = method.points[i];
       point.samples = options_.samples[i];
-      point.seconds = pipeline::quantile(rounds_[m][i].seconds, 0.5);
-      point.errors = rms(rounds_[m][i].errors);
+      point.seconds = pipeline::quantile(rounds.seconds, 0.5);
+      point.errors = rms(rounds.errors);
       point.within_noise = within_noise(point.errors, report_.noise);
       if (method.changed_pixels) continue;  // features that are not needed are no choice
       candidates.push_back(&point);
       costs.push_back({point.seconds, point.errors.picture.value_or(0)});
     }
-    const std::size_t alike = std::min(best_[m].size(), best_[0].size());
-    if (alike >= 3)
-      method.bias =
-          reference_->bias(std::span(best_[m]).first(alike), std::span(best_[0]).first(alike));
+    const auto [pictures, own] = alike(m);
+    if (pictures.size() >= 3) method.bias = reference_->bias(pictures, own);
+    memory_.methods.push_back({settings_words(frame_.set(), report_.plan.methods[m].settings),
+                               method.bias, method.changed_pixels});
   }
   const std::vector<bool> front = pareto_front(costs);
   for (std::size_t i = 0; i < front.size(); ++i) candidates[i]->pareto = front[i];

@@ -4,9 +4,11 @@
 
 #include <functional>
 #include <iosfwd>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/output/progress.hpp"
@@ -15,6 +17,7 @@
 #include "daemon/trade/budget.hpp"
 #include "daemon/trade/frame.hpp"
 #include "daemon/trade/measure.hpp"
+#include "daemon/trade/memory.hpp"
 #include "daemon/trade/method.hpp"
 #include "daemon/trade/probes.hpp"
 #include "daemon/trade/report.hpp"
@@ -24,7 +27,9 @@ namespace previz::trade {
 
 class Sweep {
  public:
-  Sweep(const TradeOptions& options, TradeFrame& frame, std::ostream& out);
+  // Goes on from `memory`, which outlives the sweep, and adds what it measures.
+  Sweep(const TradeOptions& options, TradeFrame& frame, const scene::Scene& scene,
+        std::shared_ptr<render::Device> device, TradeMemory& memory);
   // Calls `save` with what is known, whenever that grows. Ends early, with that, if it is to stop.
   TradeReport run(std::ostream& out, const std::function<void(const TradeReport&)>& save);
 
@@ -47,11 +52,17 @@ class Sweep {
     TradePicture noisy, denoised;
   };
   void make_reference();
+  TradePicture picture_of(const render::Layers& layers) const;
+  bool is_enough(const KeptReference& reference) const;
+  void use_reference();
   StillCurves curves_of(const std::vector<OnTheWay>& seen) const;
   void sweep(const std::function<void(const TradeReport&)>& save);
   bool has_time_for_a_method() const;
   void worked(const std::string& step, double work);
+  KeptPoint& kept(std::size_t method, std::size_t point);
+  int rounds_of(std::size_t method);
   void measure(std::size_t method, int round);
+  std::pair<std::vector<TradePicture>, std::vector<TradePicture>> alike(std::size_t method) const;
   void compare_parts(std::size_t method, const render::Layers& layers);
   void conclude();
   void find_corners();
@@ -66,18 +77,13 @@ class Sweep {
 
   const TradeOptions& options_;
   TradeFrame& frame_;
-  const scene::Scene scene_;
+  const scene::Scene& scene_;
   const std::shared_ptr<render::Device> device_;
   TradeReport report_;
   std::optional<TradeReference> reference_;
-  // The measurements of one point, with one entry a round.
-  struct Rounds {
-    std::vector<TradeErrors> errors;
-    std::vector<double> seconds;
-  };
-  std::vector<std::vector<Rounds>> rounds_;      // by method and point
-  std::vector<std::vector<TradePicture>> best_;  // by method and round: at the most samples
-  render::Layers own_;                           // the set's own, from the first round
+  TradeMemory& memory_;
+  std::vector<std::map<int, TradePicture>> best_;  // by method and round: at the most samples
+  render::Layers own_;  // the set's own in the first round, at the most samples; empty: not yet
 
   std::uint32_t needed_ = 0;  // as searched_axes() wants it
 

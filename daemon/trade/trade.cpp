@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <memory>
 #include <ostream>
 
+#include "daemon/scene/scene.hpp"
 #include "daemon/set/problems.hpp"
 #include "daemon/trade/frame.hpp"
+#include "daemon/trade/memory.hpp"
 #include "daemon/trade/page.hpp"
 #include "daemon/trade/sweep.hpp"
 #include "drivers/error.hpp"
@@ -59,6 +62,21 @@ std::string answer_file(const TradeReport& report, const TradeAnswer& answer) {
          answer.file.filename().string() + "\n\n" + answer.toml;
 }
 
+// What the last trade in the directory measured, if it was of the same.
+TradeMemory remembered(const TradeOptions& options, const fs::path& directory,
+                       const std::string& key, std::ostream& out) {
+  if (options.anew) return {};
+  std::string why_not;
+  TradeMemory memory = load_memory(directory, key, why_not);
+  if (!why_not.empty())
+    out << (directory / "trade.json").string() << ": " << why_not << "; everything is measured anew"
+        << std::endl;
+  else if (memory.reference.samples > 0)
+    out << "goes on from the last table in " << directory.string() << " (--anew: from nothing)"
+        << std::endl;
+  return memory;
+}
+
 fs::path made_directory(const fs::path& directory) {
   std::error_code code;
   fs::create_directories(directory, code);
@@ -85,11 +103,17 @@ TradeReport run_trade(const TradeOptions& given, std::ostream& out) {
   TradeFrame frame(options.source, options.frame);
   const fs::path directory =
       made_directory(options.directory.value_or(frame.set().output.directory / "trade"));
+  const scene::Scene scene = scene::load_scene(frame.set());
+  for (const std::string& note : scene.notes) out << "scene: " << note << std::endl;
+  const std::shared_ptr<render::Device> device = render::open_device(options.device);
+  const std::string key = memory_key(frame, scene, options.scale, render::device_name(*device));
+  TradeMemory memory = remembered(options, directory, key, out);
   const auto save = [&](const TradeReport& report) {
     session::replace_file(directory / "trade.csv", trade_csv(report));
     session::replace_file(directory / "trade.html", trade_page(report));
+    save_memory(directory, key, memory);
   };
-  TradeReport report = Sweep(options, frame, out).run(out, save);
+  TradeReport report = Sweep(options, frame, scene, device, memory).run(out, save);
   if (report.reference.samples.empty()) return report;  // it was stopped before anything was known
   report.csv = directory / "trade.csv";
   report.page = directory / "trade.html";

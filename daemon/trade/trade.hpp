@@ -34,6 +34,7 @@ struct TradeOptions {
   // reference's error is about a sixteenth of the set's own best.
   std::optional<int> reference_samples;
   std::optional<double> minutes;  // that it may take, above 0; absent: as long as it takes
+  bool anew = false;              // takes nothing from the last table in the directory
   int rounds = 3;  // each variant is measured so often, with other random numbers each time
   render::DeviceOptions device;
   bool terminal = false;  // `out` is a terminal: progress is one rewritten line
@@ -43,7 +44,8 @@ struct TradeOptions {
 // Writes DIR/trade.csv and DIR/trade.html (page.hpp), and, with answers, DIR/live.toml, refine.toml
 // and post.toml, which `previzd run` and `previzd render` take with --with, of those answers that
 // hold what was asked for. Table and page are written after every round, so that they are there
-// whenever it ends; what was not measured in the time is named on the page. Progress and notes go
+// whenever it ends; beside them trade.json and reference.bin keep what was measured for the next
+// time (memory.hpp); what was not measured in the time is named on the page. Progress and notes go
 // to `out`. Throws previz::Error for a set without a take (TradeSource), a frame that is missing or
 // was not tracked, an impossible scale, a directory that is a file, or a picture with nothing
 // virtual in it.

@@ -234,5 +234,56 @@ TEST_F(Trade, TakesTheTimeThatItIsGiven) {
   EXPECT_NE(out_.str().find(", within "), std::string::npos);
 }
 
+// The second trade of the same frame and set measures only what the first did not: no method, and
+// with a reference that is whole no sample of it. Another depth is another picture.
+TEST_F(Trade, GoesOnFromItsLastTable) {
+  test::write_small_take(directory_.path());
+  TradeOptions once = options();
+  once.rounds = 1;
+  const TradeReport first = run_trade(once, out_);
+  out_.str("");
+  const TradeReport second = run_trade(once, out_);
+  EXPECT_NE(out_.str().find("goes on from the last table"), std::string::npos);
+  EXPECT_EQ(out_.str().find("round 1 of 1"), std::string::npos) << out_.str();
+  EXPECT_EQ(second.reference_samples, first.reference_samples);
+  for (std::size_t m = 0; m < first.methods.size(); ++m)
+    for (std::size_t i = 0; i < first.methods[m].points.size(); ++i) {
+      EXPECT_EQ(second.methods[m].points[i].seconds, first.methods[m].points[i].seconds);
+      EXPECT_EQ(second.methods[m].points[i].errors.picture,
+                first.methods[m].points[i].errors.picture);
+    }
+
+  once.rounds = 2;
+  *once.reference_samples *= 2;
+  out_.str("");
+  const TradeReport third = run_trade(once, out_);
+  EXPECT_EQ(third.reference_samples, 2 * first.reference_samples);
+  EXPECT_EQ(out_.str().find("round 1 of 2"), std::string::npos) << out_.str();
+  EXPECT_NE(out_.str().find("round 2 of 2"), std::string::npos) << out_.str();
+
+  rewrite_set("[quality]", "[estimator]\nmax_depth = 3\n\n[quality]");
+  out_.str("");
+  run_trade(once, out_);
+  EXPECT_NE(out_.str().find("everything is measured anew"), std::string::npos) << out_.str();
+  EXPECT_NE(out_.str().find("round 1 of 2"), std::string::npos);
+}
+
+TEST_F(Trade, ADamagedMemoryIsSaidAndNotUsed) {
+  test::write_small_take(directory_.path());
+  TradeOptions once = options();
+  once.rounds = 1;
+  run_trade(once, out_);
+  const std::filesystem::path reference = directory_ / "out" / "reference.bin";
+  std::filesystem::resize_file(reference, std::filesystem::file_size(reference) / 2);
+  out_.str("");
+  run_trade(once, out_);
+  EXPECT_NE(out_.str().find("it ends early; everything is measured anew"), std::string::npos)
+      << out_.str();
+  std::ofstream(directory_ / "out" / "trade.json") << "{]";
+  out_.str("");
+  EXPECT_NO_THROW(run_trade(once, out_));
+  EXPECT_NE(out_.str().find("everything is measured anew"), std::string::npos) << out_.str();
+}
+
 }  // namespace post_trade_test
 }  // namespace previz::trade
