@@ -48,6 +48,10 @@ svg g.own polyline, svg g.front polyline { stroke-width: 2.6; } svg .name { fill
 svg .own, svg .name.own { --c: var(--ink); } svg .front { --c: var(--accent); }
 svg .cloud { --c: var(--soft); opacity: .45; } .s1 { --c: var(--s1); } .s2 { --c: var(--s2); }
 .s3 { --c: var(--s3); } .s4 { --c: var(--s4); } .s5 { --c: var(--s5); } .s6 { --c: var(--s6); }
+@media (max-width: 40rem) { body { padding-top: 1.5rem; } th, td { padding-right: .7rem; }
+  table, .scroll { display: block; overflow-x: auto; } .scroll svg { min-width: 42rem; } .answers tr { display: block; padding: .5rem 0;
+  border-bottom: 1px solid var(--line); } .answers td { display: block; border: 0; padding: 0; }
+  .answers td:first-child { font-weight: 600; } .answers th, .answers td.n { display: none; } }
 )";
 
 using Measure = std::optional<double> TradeErrors::*;
@@ -179,8 +183,8 @@ std::string front_section(const TradeReport& report) {
       "<h2>The best choices</h2>\n<p>Every dot is one setting at one number of samples. The dots "
       "on "
       "the line are the best choices: every other setting is slower or has a larger error. In the "
-      "shaded part the reference itself is too noisy to decide.</p>\n" +
-      front_chart(report) + "<table>\n" +
+      "shaded part the reference itself is too noisy to decide.</p>\n<div class=\"scroll\">" +
+      front_chart(report) + "</div>\n<table>\n" +
       head_row({{"time", true},
                 {"what", false},
                 {"error", true},
@@ -213,7 +217,7 @@ std::string answers_section(const TradeReport& report) {
       " of a frozen or a rendered frame. Live, the take was played for some seconds with all that "
       "runs beside the renderer; the time is that of its part. Refine and post: a full-size frame "
       "and all its layers, with nothing beside. Errors are from the converged picture, without its "
-      "own noise.</p>\n<table>\n" +
+      "own noise.</p>\n<table class=\"answers\">\n" +
       head_row({{"for", false},
                 {"what you get", false},
                 {"a frame", true},
@@ -340,7 +344,8 @@ std::string unmeasured_section(const TradeReport& report) {
   if (report.interrupted) text += "<p><b>It was stopped before it had ended.</b></p>\n";
   if (!names.empty())
     text += "<p>There was no time to measure: " + escaped(names) +
-            ". With <code>--minutes</code> there is more.</p>\n";
+            ". Called again, it goes on from here; with more <code>--minutes</code> it gets "
+            "further at once.</p>\n";
   return text;
 }
 
