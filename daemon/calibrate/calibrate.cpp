@@ -2,6 +2,7 @@
 
 #include <fmt/ostream.h>
 
+#include "daemon/calibrate/board_guess.hpp"
 #include "daemon/calibrate/coverage.hpp"
 #include "daemon/calibrate/fisheye.hpp"
 #include "daemon/calibrate/known_camera.hpp"
@@ -24,6 +25,7 @@ Views gather(const LensOptions& options, const std::string& stream, const KnownL
   const auto finder = make_board_finder(board, response_of(options.footage, stream), lens);
   GatherOptions gathering;
   gathering.every = options.every;
+  gathering.response = response_of(options.footage, stream);
   Views views = gather_views(*source, *finder, board, gathering,
                              [&](const std::string& line) { out << line << '\n'; });
   // A second pass, through the lens that the first one found, sees the same board.
@@ -31,6 +33,29 @@ Views gather(const LensOptions& options, const std::string& stream, const KnownL
   if (const std::string form = finder->form(); is_first && !form.empty()) out << form << '\n';
   for (const std::string& note : source->notes()) out << note << '\n';
   return views;
+}
+
+// A board that is a part of the one in the pictures is found at random places, or hardly ever: its
+// fit fails, is off by pixels, or has few views. Calls `fit` and names the board that they hold.
+template <class Fit>
+auto fitted(const Views& views, const LensOptions& options, const std::string& stream,
+            std::ostream& out, Fit fit) {
+  constexpr double bad_px = 3;
+  constexpr std::size_t few_views = 5;
+  const auto other = [&] {
+    return other_board(views.sampled, parse_board(options.board),
+                       response_of(options.footage, stream));
+  };
+  try {
+    auto found = fit(views);
+    if (found.fit.rms_all_px > bad_px || views.views.size() < few_views)
+      if (const std::string words = other(); !words.empty()) out << "WARNING: " << words << '\n';
+    return found;
+  } catch (const Error& error) {
+    if (const std::string words = other(); !words.empty())
+      throw Error(std::string(error.what()) + "; " + words);
+    throw;
+  }
 }
 
 void plot(const LensOptions& options, const Views& views, const BundleFit& fit,
@@ -45,7 +70,7 @@ void plot(const LensOptions& options, const Views& views, const BundleFit& fit,
 std::string calibrate_fisheye(const LightOptions& options, LightCameraCalibration& camera,
                               std::ostream& out) {
   Views views = gather(options, "light", {}, out);
-  FisheyeFit fisheye = fit_fisheye(views);
+  FisheyeFit fisheye = fitted(views, options, "light", out, fit_fisheye);
   if (needs_lens(parse_board(options.board))) {
     out << "once more, through the lens found:\n";
     views = gather(options, "light", fisheye.intrinsics, out);
@@ -102,7 +127,7 @@ constexpr auto pose_by_hand =
 
 void calibrate_observer(const LensOptions& options, std::ostream& out) {
   Views views = gather(options, "observer", {}, out);
-  ObserverFit observer = fit_observer(views);
+  ObserverFit observer = fitted(views, options, "observer", out, fit_observer);
   if (needs_lens(parse_board(options.board))) {
     out << "once more, through the lens found:\n";
     views = gather(options, "observer", observer.intrinsics, out);

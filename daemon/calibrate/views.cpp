@@ -1,9 +1,11 @@
 #include "daemon/calibrate/views.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "daemon/calibrate/board_guess.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::calibrate {
@@ -12,6 +14,7 @@ namespace {
 constexpr std::size_t looked_at_of_a_stream = 150;
 constexpr int every_of_a_video = 10;  // about a third of a second
 constexpr std::size_t least_corners = 6;
+constexpr std::size_t most_sampled = 5;
 constexpr double same_view = 0.02;  // share of the diagonal
 
 int step(const PictureSource& source, const GatherOptions& options) {
@@ -47,6 +50,14 @@ std::vector<View> thinned(std::vector<View> views, std::size_t count) {
   return kept;
 }
 
+std::string why_nowhere(const Views& gathered, const Board& board, const ResponseCurve& response) {
+  if (const std::string other = other_board(gathered.sampled, board, response); !other.empty())
+    return ": " + other;
+  return ", and nothing like it: it must be wholly in view, sharp, evenly lit, and large (a square "
+         "or a tag's cell of ten pixels or more). A chessboard with tags at a few places only is "
+         "none of the boards that are known";
+}
+
 }  // namespace
 
 Views gather_views(PictureSource& source, BoardFinder& finder, const Board& board,
@@ -68,6 +79,8 @@ Views gather_views(PictureSource& source, BoardFinder& finder, const Board& boar
                   std::to_string(gathered.width) + "x" + std::to_string(gathered.height) +
                   "; a calibration holds for one size");
     }
+    if (std::has_single_bit(looked_at) && gathered.sampled.size() < most_sampled)
+      gathered.sampled.push_back(picture->frame);
     BoardCorners corners = finder.find(frame);
     const double same = same_view * std::hypot(frame.width, frame.height);
     const bool is_new = std::ranges::none_of(
@@ -86,9 +99,8 @@ Views gather_views(PictureSource& source, BoardFinder& finder, const Board& boar
     }
   }
   if (gathered.views.empty())
-    throw Error("the board is in none of the " + std::to_string(looked_at) +
-                " pictures looked at; is it the one that --board says, and wholly in view? (A "
-                "chessboard with tags at a few places only is none of the boards that are known.)");
+    throw Error("the board is in none of the " + std::to_string(looked_at) + " pictures looked at" +
+                why_nowhere(gathered, board, options.response));
   const std::size_t found = gathered.views.size();
   gathered.views = thinned(std::move(gathered.views), std::size_t(options.at_most));
   std::string said = std::to_string(looked_at) + " of " + std::to_string(index) +

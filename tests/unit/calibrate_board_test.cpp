@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <glm/geometric.hpp>
+#include <memory>
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "daemon/calibrate/board.hpp"
 #include "daemon/calibrate/board_finder.hpp"
+#include "daemon/calibrate/board_guess.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
@@ -127,8 +129,7 @@ TEST(BoardFinder, SeesNoBoardInNoise) {
 
 // OpenCV's own drawing of the board, enlarged by whole pixels: its corner (i, j) lies between
 // pixels, at (i + 1, j + 1) squares - 0.5. There is no noise; the bound is that of the bias above.
-TEST(BoardFinder, CharucoCornersHaveTheirIds) {
-  const Board board = parse_board("charuco:7x5:40mm:30mm:4x4_50");
+Frame charuco_drawing() {
   const auto drawing = cv::aruco::CharucoBoard::create(
       7, 5, 0.04f, 0.03f, cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50));
   cv::Mat1b picture;
@@ -140,7 +141,12 @@ TEST(BoardFinder, CharucoCornersHaveTheirIds) {
   frame.width = picture.cols;
   frame.height = picture.rows;
   frame.bytes.assign(picture.datastart, picture.dataend);
-  const BoardCorners found = make_board_finder(board, {})->find(frame);
+  return frame;
+}
+
+TEST(BoardFinder, CharucoCornersHaveTheirIds) {
+  const Board board = parse_board("charuco:7x5:40mm:30mm:4x4_50");
+  const BoardCorners found = make_board_finder(board, {})->find(charuco_drawing());
   ASSERT_EQ(found.ids.size(), 24u);
   for (std::size_t i = 0; i < 24; ++i) {
     const int column = found.ids[i] % 6, row = found.ids[i] / 6;
@@ -149,8 +155,7 @@ TEST(BoardFinder, CharucoCornersHaveTheirIds) {
   }
 }
 
-TEST(BoardFinder, AprilgridCornersHaveTheirIds) {
-  const Board board = parse_board("aprilgrid:3x2:60mm:20mm:tag36h11:7");
+test::TagScene six_tags() {
   test::TagScene scene;
   scene.lens = test::plain_lens(width, height, 600);
   scene.world_from_camera = test::camera_looking({0.1, -0.2, 0.45}, {0.11, 0.07, 0});
@@ -158,9 +163,18 @@ TEST(BoardFinder, AprilgridCornersHaveTheirIds) {
     const int column = i % 3, row = i / 3;
     scene.tags.push_back(test::flat_tag(7 + i, 0.06, {0.03 + 0.08 * column, 0.03 + 0.08 * row, 0}));
   }
+  return scene;
+}
+
+Frame picture_of(const test::TagScene& scene) {
   std::mt19937 random(1);
-  const Frame frame =
-      test::expose(test::render(scene), {.full_well_e = 20000, .response = {}}, random);
+  return test::expose(test::render(scene), {.full_well_e = 20000, .response = {}}, random);
+}
+
+TEST(BoardFinder, AprilgridCornersHaveTheirIds) {
+  const Board board = parse_board("aprilgrid:3x2:60mm:20mm:tag36h11:7");
+  const test::TagScene scene = six_tags();
+  const Frame frame = picture_of(scene);
   const BoardCorners found = make_board_finder(board, {})->find(frame);
   ASSERT_EQ(found.ids.size(), 24u);
   for (std::size_t i = 0; i < 24; ++i) {
@@ -173,6 +187,44 @@ TEST(BoardFinder, AprilgridCornersHaveTheirIds) {
     const glm::dvec3 centre = glm::dvec3(scene.tags[tag].world_from_tag[3]);
     EXPECT_NEAR(glm::distance(corner, centre), 0.03 * std::sqrt(2.0), 1e-12);
   }
+}
+
+std::string other(const Frame& picture, const std::string& named) {
+  return other_board({std::make_shared<const Frame>(picture)}, parse_board(named), {});
+}
+
+TEST(OtherBoard, AChessboardIsCountedByItsInnerCorners) {
+  const Frame picture = chessboard(9, 6, 0.025);
+  const std::string right =
+      "the pictures hold a chessboard of 9x6 inner corners (10x7 squares): --board "
+      "chessboard:9x6:25mm";
+  // Counted in squares; a row too many or too few; a part of it.
+  for (const char* named : {"10x7", "9x7", "8x6", "8x5", "4x3", "11x8"})
+    EXPECT_EQ(other(picture, std::string("chessboard:") + named + ":25mm"), right) << named;
+  EXPECT_EQ(other(picture, "chessboard:9x6:25mm"), "");
+  EXPECT_EQ(other(picture, "chessboard:6x9:25mm"), "");
+}
+
+TEST(OtherBoard, MarkersAreNamedByTheirDictionary) {
+  const std::string words = other(charuco_drawing(), "charuco:7x5:40mm:30mm:6x6_250");
+  EXPECT_NE(words.find("markers of 4x4_50 (ids 0 to 16)"), std::string::npos) << words;
+  const std::string miscounted = other(charuco_drawing(), "charuco:5x4:40mm:30mm:4x4_50");
+  EXPECT_NE(miscounted.find("such a board has 33 squares at least"), std::string::npos)
+      << miscounted;
+  // Three tags that look like markers of 4x4_1000 here and there are no board of it.
+  EXPECT_EQ(other(picture_of(six_tags()), "charuco:7x5:40mm:30mm:6x6_250"), "");
+}
+
+TEST(OtherBoard, TagsAreNamedByTheirFamilyAndIds) {
+  const Frame picture = picture_of(six_tags());
+  const std::string words = other(picture, "aprilgrid:3x2:60mm:20mm:tag25h9");
+  EXPECT_NE(words.find("tags of tag36h11, ids 7 to 12: name that family"), std::string::npos)
+      << words;
+  const std::string first = other(picture, "aprilgrid:3x2:60mm:20mm");
+  EXPECT_NE(first.find("aprilgrid:COLUMNSxROWS:TAG:GAP:tag36h11:7"), std::string::npos) << first;
+  const std::string kalibr = other(picture, "aprilgrid:3x2:60mm:20mm:kalibr:7");
+  EXPECT_NE(kalibr.find("leave the word kalibr out"), std::string::npos) << kalibr;
+  EXPECT_EQ(other(picture, "aprilgrid:3x2:60mm:20mm:tag36h11:7"), "");
 }
 
 }  // namespace calibrate_board_test
