@@ -5,7 +5,6 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <numeric>
 
@@ -24,7 +23,6 @@ using units::plain;
 
 constexpr Rule positive = plain.above(0);
 constexpr Rule not_negative = plain.at_least(0);
-constexpr std::int64_t latest_ns = std::numeric_limits<std::int64_t>::max();
 
 // ---- calibration
 
