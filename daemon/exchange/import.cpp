@@ -194,8 +194,14 @@ class FootageImport {
   std::int64_t time_of(std::size_t i, const Picture& picture,
                        const std::vector<ImportedFrame>& before) const {
     if (!footage_.timestamps_ns.empty()) return footage_.timestamps_ns[i];
-    if (footage_.fps > 0)
-      return footage_.start_ns + std::llround(static_cast<double>(i) / footage_.fps * 1e9);
+    const double since_start = footage_.fps > 0       ? std::round(double(i) / footage_.fps * 1e9)
+                               : picture.container_ns ? double(*picture.container_ns)
+                                                      : 0;
+    if (!(since_start < static_cast<double>(latest_ns - footage_.start_ns)))
+      throw Error(picture.name + ": its time does not fit into 64 bits of nanoseconds, " +
+                  "292 years; check " + footage_.source + ".start_ns and fps in " + file_.string() +
+                  ", or give timestamps_ns");
+    if (footage_.fps > 0) return footage_.start_ns + static_cast<std::int64_t>(since_start);
     if (!picture.container_ns) throw Error(picture.name + ": its container gives it no time");
     const std::int64_t time = footage_.start_ns + *picture.container_ns;
     if (time < 0 || (!before.empty() && time <= before.back().timestamp_ns))

@@ -1,11 +1,12 @@
 #include "daemon/exchange/import_description.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <numeric>
 
@@ -24,7 +25,6 @@ using units::plain;
 
 constexpr Rule positive = plain.above(0);
 constexpr Rule not_negative = plain.at_least(0);
-constexpr std::int64_t latest_ns = std::numeric_limits<std::int64_t>::max();
 
 // ---- calibration
 
@@ -200,8 +200,13 @@ std::vector<double> read_series(const CameraMembers& camera, const std::string& 
   return {m.read<double>(key, positive)};
 }
 
+// Of a video without times it is not known yet, but its lists must all be for as many.
 std::size_t frame_count(const FootageDescription& footage) {
-  return std::max(footage.pictures.size(), footage.timestamps_ns.size());
+  std::size_t count = std::max(footage.pictures.size(), footage.timestamps_ns.size());
+  if (count > 0) return count;
+  for (const auto* series : {&footage.exposure, &footage.exposure_s, &footage.gain})
+    if (series->size() > 1) count = std::max(count, series->size());
+  return count;
 }
 
 void check_length(const CameraMembers& camera, const std::string& key,
@@ -231,8 +236,16 @@ void read_exposures(const CameraMembers& camera, double responsivity, FootageDes
                         "it: 1, and the light of the set is then in units of the camera's white)");
   const std::vector<double> gain = footage.gain.empty() ? std::vector{1.0} : footage.gain;
   const std::size_t count = std::max(footage.exposure_s.size(), gain.size());
-  for (std::size_t i = 0; i < count; ++i)
+  for (std::size_t i = 0; i < count; ++i) {
     footage.exposure.push_back(at(footage.exposure_s, i) * at(gain, i) * responsivity);
+    if (const double exposure = footage.exposure.back(); !(exposure > 0 && std::isfinite(exposure)))
+      camera.members.fault(
+          "exposure_s",
+          fmt::format("frame {}: {:g} s times gain {:g} times responsivity {:g} "
+                      "is {:g}; an exposure must be finite and above 0: check "
+                      "the units",
+                      i, at(footage.exposure_s, i), at(gain, i), responsivity, exposure));
+  }
 }
 
 template <typename Value>

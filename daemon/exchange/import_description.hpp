@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,6 +14,9 @@
 #include "drivers/session/session.hpp"
 
 namespace previz::exchange {
+
+// No frame is taken later than this: times have 64 bits.
+inline constexpr std::int64_t latest_ns = std::numeric_limits<std::int64_t>::max();
 
 // The frames of a camera. Lists have one entry a frame; `exposure` is resolved, never empty.
 struct FootageDescription {

@@ -253,8 +253,12 @@ class VideoFile final : public Footage {
 
   // Counts from the first frame, decoded or lost.
   std::optional<std::int64_t> container_ns(std::int64_t pts) const {
-    if (pts == AV_NOPTS_VALUE) return std::nullopt;
-    return av_rescale_q(pts - first_pts_, stream().time_base, {1, 1'000'000'000});
+    std::int64_t since_first = 0;
+    if (pts == AV_NOPTS_VALUE || __builtin_sub_overflow(pts, first_pts_, &since_first))
+      return std::nullopt;
+    const std::int64_t ns = av_rescale_q(since_first, stream().time_base, {1, 1'000'000'000});
+    // libav returns its word for no time where the number is too large.
+    return ns == AV_NOPTS_VALUE ? std::nullopt : std::optional(ns);
   }
 
   std::filesystem::path file_;

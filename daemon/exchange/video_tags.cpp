@@ -30,6 +30,16 @@ std::string name_of(const char* name) {
   return name ? name : "unknown";
 }
 
+// libav puts any number of a file into its enumerations, where C++ must not read those beyond them.
+// Returns `count`, which is no tag, for such a number.
+template <typename Tag>
+Tag tag_of(const Tag& field, Tag count) {
+  int code = 0;
+  static_assert(sizeof code == sizeof field);
+  std::memcpy(&code, &field, sizeof code);
+  return code >= 0 && code < count ? static_cast<Tag>(code) : count;
+}
+
 AVColorSpace usual_matrix(const AVFrame& frame) {
   return frame.height >= 720 ? AVCOL_SPC_BT709 : AVCOL_SPC_SMPTE170M;
 }
@@ -77,22 +87,24 @@ void refuse_log_curves(const AVDictionary* metadata, const std::filesystem::path
 void read_colors(const AVFrame& frame, const ReadAs& read_as, const std::filesystem::path& file,
                  VideoTags& tags) {
   const auto format = AVPixelFormat(frame.format);
-  const bool tagged_full =
-      frame.color_range == AVCOL_RANGE_JPEG || has_range_in_its_name(format) ||
-      (frame.color_range == AVCOL_RANGE_UNSPECIFIED && (is_rgb(format) || is_gray(format)));
+  const bool tagged_full = tag_of(frame.color_range, AVCOL_RANGE_NB) == AVCOL_RANGE_JPEG ||
+                           has_range_in_its_name(format) ||
+                           (tag_of(frame.color_range, AVCOL_RANGE_NB) == AVCOL_RANGE_UNSPECIFIED &&
+                            (is_rgb(format) || is_gray(format)));
   tags.full_range = read_as.range ? *read_as.range == AVCOL_RANGE_JPEG : tagged_full;
-  tags.matrix = read_as.matrix.value_or(frame.colorspace);
+  tags.matrix = read_as.matrix.value_or(tag_of(frame.colorspace, AVCOL_SPC_NB));
   if (tags.matrix == AVCOL_SPC_UNSPECIFIED) tags.matrix = usual_matrix(frame);
   if (!is_rgb(format) && !is_gray(format) && !luma_shares(tags.matrix))
     refuse(file, "has the colour matrix " + name_of(av_color_space_name(tags.matrix)), "matrix=709",
            "matrix");
-  tags.transfer =
-      read_as.keeps_signal ? AVCOL_TRC_UNSPECIFIED : read_as.transfer.value_or(frame.color_trc);
+  tags.transfer = read_as.keeps_signal
+                      ? AVCOL_TRC_UNSPECIFIED
+                      : read_as.transfer.value_or(tag_of(frame.color_trc, AVCOL_TRC_NB));
   if (!keeps_signal(tags.transfer) && !light_of(tags.transfer, 0))
     refuse(file,
            "has the transfer characteristics " + name_of(av_color_transfer_name(tags.transfer)),
            "transfer=709", "transfer");
-  tags.primaries = read_as.primaries.value_or(frame.color_primaries);
+  tags.primaries = read_as.primaries.value_or(tag_of(frame.color_primaries, AVCOL_PRI_NB));
   if (!rec709_from(tags.primaries))
     refuse(file, "has the primaries " + name_of(av_color_primaries_name(tags.primaries)),
            "primaries=709", "primaries");
@@ -141,9 +153,10 @@ std::string words_of(const AVFrame& frame, const ReadAs& read_as, const VideoTag
   std::string text = name_of(av_get_pix_fmt_name(format));
   if (!is_rgb(format) && !is_gray(format))
     text += ", matrix " + name_of(av_color_space_name(tags.matrix)) +
-            assumed(read_as.matrix.has_value(), frame.colorspace != AVCOL_SPC_UNSPECIFIED);
-  const bool range_tagged =
-      frame.color_range != AVCOL_RANGE_UNSPECIFIED || has_range_in_its_name(format);
+            assumed(read_as.matrix.has_value(),
+                    tag_of(frame.colorspace, AVCOL_SPC_NB) != AVCOL_SPC_UNSPECIFIED);
+  const bool range_tagged = tag_of(frame.color_range, AVCOL_RANGE_NB) != AVCOL_RANGE_UNSPECIFIED ||
+                            has_range_in_its_name(format);
   text += std::string(tags.full_range ? ", full range" : ", limited range") +
           assumed(read_as.range.has_value(), range_tagged);
   if (read_as.keeps_signal)

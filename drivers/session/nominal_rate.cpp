@@ -1,9 +1,14 @@
 #include "drivers/session/nominal_rate.hpp"
 
+extern "C" {
+#include <libavutil/rational.h>
+}
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 namespace previz::session {
@@ -15,6 +20,10 @@ constexpr double clock_error = 4e-4;
 constexpr double most_standard_fps = 1000;
 constexpr double ntsc = 1000.0 / 1001;
 constexpr std::size_t gaps_named = 3;
+constexpr double most_missing = 9e18;  // in one gap; more is no 64-bit number
+// People write 23.976024 as 23.98, and no other of these rates farther from what it is.
+constexpr double written_error_fps = 5e-3, written_error = written_error_fps / 24;
+constexpr double most_int = std::numeric_limits<int>::max();
 
 double nearest_standard(double fps) {
   const double whole = std::clamp(std::round(fps), 1.0, most_standard_fps);
@@ -52,7 +61,8 @@ NominalRate nominal_rate(std::span<const std::int64_t> times_ns) {
     frames += count;
     if (std::abs(steps[i] / usual - count) > 0.25) ++off;
     worst = std::max(worst, std::abs(steps[i] - count * usual));
-    if (count > 1) rate.gaps.push_back({i, static_cast<std::int64_t>(count) - 1});
+    if (count > 1)
+      rate.gaps.push_back({i, static_cast<std::int64_t>(std::min(count, most_missing)) - 1});
   }
   const auto time = static_cast<double>(times_ns.back() - times_ns.front());
   rate.varies = 10 * off > steps.size();
@@ -67,12 +77,17 @@ NominalRate nominal_rate(std::span<const std::int64_t> times_ns) {
   return rate;
 }
 
-RateFraction fraction_of(double fps) {
+RateFraction fraction_of(double given_fps) {
+  const double fps = std::clamp(given_fps, 1 / most_int, most_int);
   const double rounded = std::round(fps);
-  if (std::abs(fps - rounded) < 1e-9) return {static_cast<int>(rounded), 1};
+  if (rounded > 0 && std::abs(fps - rounded) < 1e-9) return {static_cast<int>(rounded), 1};
   const double up = std::round(fps / ntsc);
-  if (std::abs(fps - up * ntsc) < 5e-3) return {static_cast<int>(up) * 1000, 1001};
-  return {static_cast<int>(std::lround(fps * 1000)), 1000};
+  if (up * 1000 <= most_int &&
+      std::abs(fps - up * ntsc) < std::min(written_error_fps, written_error * fps))
+    return {static_cast<int>(up) * 1000, 1001};
+  if (fps >= 1 && fps * 1000 < most_int) return {static_cast<int>(std::lround(fps * 1000)), 1000};
+  const AVRational nearest = av_d2q(fps, std::numeric_limits<int>::max());
+  return {nearest.num, nearest.den};
 }
 
 std::string words_of(const NominalRate& rate) {

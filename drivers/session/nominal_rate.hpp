@@ -27,7 +27,8 @@ struct NominalRate {
 // are. Of fewer than two times the rate is 25.
 NominalRate nominal_rate(std::span<const std::int64_t> times_ns);
 
-// Returns the numerator and denominator of a rate: 30000, 1001 for 29.97.
+// Returns the numerator and denominator of a rate: 30000, 1001 for 29.97. Both are at least 1; a
+// finite rate that has no such fraction, beyond 2^31 - 1 or its inverse, becomes the nearest.
 struct RateFraction {
   int frames, seconds;
 };

@@ -20,6 +20,10 @@ std::optional<TimecodeDigits> timecode_after(const Timecode& timecode, std::int6
   if (rate.frames <= 0 || av_timecode_init_from_string(&first, {rate.frames, rate.seconds},
                                                        timecode.first.c_str(), nullptr) < 0)
     return std::nullopt;
+  // libav reads any number of hours, and counts them in an int.
+  const double in_a_day = 24 * 3600 * std::ceil(timecode.fps);
+  if (!(in_a_day < std::numeric_limits<int>::max()) || first.start < 0 || first.start >= in_a_day)
+    return std::nullopt;
   first.flags |= AV_TIMECODE_FLAG_24HOURSMAX;
   if (frames < -first.start || frames > std::numeric_limits<int>::max() - first.start)
     return std::nullopt;

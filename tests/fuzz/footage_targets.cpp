@@ -1,5 +1,4 @@
-// What `previzd import` reads. The decoders of video are libav's own, whose makers fuzz them; here
-// their results alone would be looked at.
+// What `previzd import` reads, but for videos (video_targets.cpp).
 #include <fstream>
 
 #include "daemon/exchange/footage.hpp"

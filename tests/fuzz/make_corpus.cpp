@@ -14,6 +14,7 @@
 #include "drivers/session/session.hpp"
 #include "tests/support/gltf_compressed.hpp"
 #include "tests/support/gltf_sample.hpp"
+#include "tests/support/import_fixture.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/temporary_directory.hpp"
 
@@ -189,6 +190,66 @@ void write_texts(const fs::path& corpus) {
   }
 }
 
+exchange::VideoForm form_of(const char* pixel_format, const char* encoder) {
+  exchange::VideoForm form;
+  form.pixel_format = pixel_format;
+  form.encoder = encoder;
+  form.width = form.height = 16;
+  return form;
+}
+
+// A video of four frames, behind the two bytes that say how it is read.
+void write_video(const fs::path& kept, const std::string& head, const char* name,
+                 const exchange::VideoForm& form, std::size_t half_bytes_per_pixel) {
+  const test::TemporaryDirectory directory;
+  std::vector<std::vector<std::uint8_t>> frames;
+  for (int i = 0; i < 4; ++i)
+    frames.emplace_back(16 * 16 * half_bytes_per_pixel / 2, static_cast<std::uint8_t>(1 + i % 2));
+  exchange::write_video(directory / name, form, frames);
+  write(kept, head + session::content_of(directory / name));
+}
+
+void write_videos(const fs::path& folder) {
+  exchange::VideoForm h264 = form_of("yuv420p", "libx264");
+  h264.options = {{"crf", "40"}, {"bf", "2"}};
+  write_video(folder / "h264", "v0", "a.mp4", h264, 3);
+  write_video(folder / "transport_stream", "v0", "a.ts", h264, 3);
+  exchange::VideoForm mjpeg = form_of("yuvj420p", "mjpeg");
+  mjpeg.metadata = {{"timecode", "10:00:00:00"}};
+  write_video(folder / "mjpeg", "v3", "a.mov", mjpeg, 3);
+  exchange::VideoForm turned = form_of("rgb24", "png");
+  const int one = 1 << 16;
+  turned.display_matrix = {0, one, 0, -one, 0, 0, 0, 0, 1 << 30};
+  turned.pixel_aspect = {2, 1};
+  write_video(folder / "turned", "v0", "a.mov", turned, 6);
+  exchange::VideoForm hlg = form_of("yuv422p10le", "prores_ks");
+  hlg.matrix = AVCOL_SPC_BT2020_NCL;
+  hlg.transfer = AVCOL_TRC_ARIB_STD_B67;
+  hlg.primaries = AVCOL_PRI_BT2020;
+  write_video(folder / "hlg", "v0", "a.mov", hlg, 8);
+  write_video(folder / "read_as", "v1", "a.mov", hlg, 8);
+  write_video(folder / "gray", "v2", "a.mkv", form_of("gray10le", "ffv1"), 4);
+  write_video(folder / "vp9", "v0", "a.webm", form_of("yuv420p", "libvpx-vp9"), 3);
+}
+
+// FRAMES.json that names the videos above.
+void write_video_descriptions(const fs::path& folder) {
+  write(folder / "both", R"({"name": "shoot", "clock": "camera",
+ "observer": {"video": "a.mp4", "timestamps_ns": "container", "start_ns": 1000, "exposure": 1,
+  "intrinsics": {"width": 16, "height": 16, "fx": 15, "fy": 15, "cx": 7.5, "cy": 7.5},
+  "response": {"kind": "srgb"}},
+ "light": {"video": "b.mov", "fps": 23.976, "start_ns": 5, "exposure_s": 0.01, "gain": [1, 1, 2, 2]},
+ "track": [{"frame": 0, "world_from_camera": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+  "tags": [0, 3]},
+ {"frame": 3, "world_from_camera": [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]}]})");
+  write(folder / "stamps", R"({"observer": {"video": "b.mov", "timestamps_ns": [1, 20, 300, 4000],
+ "exposure": [1, 1, 0.5, 0.5], "read_as": {"range": "limited", "matrix": "bt709",
+  "transfer": "as recorded", "primaries": "p3-d65"}}})");
+  write(folder / "table", R"({"observer": {"video": "a.mp4", "csv": "times.csv",
+ "read_as": {"range": "full", "matrix": "bt2020", "transfer": "pq", "primaries": "bt601-525",
+  "rotation_deg": 90, "pixel_aspect": [3, 2]}}})");
+}
+
 // As OpenCV writes them itself.
 void write_opencv_lenses(const fs::path& folder) {
   for (const char* name : {"opencv.yml", "opencv.xml", "opencv.json"}) {
@@ -219,6 +280,28 @@ void write_lenses(const fs::path& folder) {
       folder / "cameras.txt",
       "# Camera list with one line of data per camera:\n1 OPENCV 640 480 520 521 320 240 -0.1 0.02 "
       "0 0\n2 SIMPLE_RADIAL_FISHEYE 640 480 260 320 240 0.01\n");
+  write(folder / "models.txt",
+        "1 FULL_OPENCV 640 480 520 521 320 240 -0.1 0.02 0 0 0.001 0.1 0.01 0.001\n"
+        "2 OPENCV_FISHEYE 640 480 260 261 320 240 0.01 0 0 0\n3 FOV 640 480 520 521 320 240 0.9\n");
+  write(folder / "rectified.yaml",
+        "width: 640\nheight: 480\ndistortion_model: rational_polynomial\nd: [-0.1, 0.02, 0, 0, 0, "
+        "0.1, 0, 0]\nk: [520, 0, 319, 0, 521, 239, 0, 0, 1]\np: [520, 0, 319, 0, 0, 521, 239, 0, "
+        "0, 0, 1, 0]\nroi: {x_offset: 0, y_offset: 0, width: 640, height: 480, do_rectify: true}\n"
+        "binning_x: 1\n");
+  write(
+      folder / "nodes.xml",
+      "<opencv_storage><left><K type_id=\"opencv-matrix\"><rows>3</rows><cols>3</cols><data>\n260 "
+      "0 319 0 261 239 0 0 1</data></K><D><data>0.01 0 0 0</data></D><fisheye_model>1"
+      "</fisheye_model><imageSize>640 480</imageSize></left></opencv_storage>\n");
+  // These are refused by name.
+  write(folder / "lens.nk",
+        "LensDistortion {\n model_preset \"3DE4 Radial - Standard, Degree 4\"\n}\n");
+  write(folder / "classic.nk",
+        "set cut_paste_input [stack 0]\n LensDistortion {\n distortion1 0.1\n}\n");
+  std::string binary("\1\0\0\0\0\0\0\0\1\0\0\0\0\0\0\0\x80\2\0\0\0\0\0\0\xe0\1\0\0\0\0\0\0", 32);
+  for (const double parameter : {520.0, 320.0, 240.0})
+    binary.append(reinterpret_cast<const char*>(&parameter), sizeof parameter);
+  write(folder / "cameras.bin", binary);
 }
 
 }  // namespace
@@ -247,5 +330,7 @@ int main(int count, char** arguments) {
   previz::test::draco_grid().save(corpus / "gltf/draco.glb");
   write_texts(corpus);
   write_lenses(corpus / "lens_file");
+  write_videos(corpus / "import_video");
+  write_video_descriptions(corpus / "import_video");
   return 0;
 }

@@ -22,10 +22,12 @@ for target in "${targets[@]}"; do
   mkdir -p "$found/$target" "$crashes"
   log=$crashes/$target.log
   broken=
+  words=()  # that a format is made of, where chance would take long to find them
+  [[ ! -f ../dictionary/$target ]] || words=("-dict=../dictionary/$target")
   # The time limit of an input is for a machine that is busy, and under two sanitizers.
   PREVIZ_FUZZ_TARGET=$target "$program" -max_total_time="$seconds" -timeout=25 -rss_limit_mb=2048 \
     -max_len=65536 -print_final_stats=1 -artifact_prefix="$crashes/$target-" \
-    "$found/$target" "$target" >"$log" 2>&1 || broken="  BROKEN: see $log"
+    "${words[@]}" "$found/$target" "$target" >"$log" 2>&1 || broken="  BROKEN: see $log"
   [[ -z $broken ]] || status=1
   printf '%-14s %10s inputs, %6s places reached%s\n' "$target" \
     "$(sed -n 's/^stat::number_of_executed_units: *//p' "$log")" \

@@ -33,6 +33,7 @@ std::span<const Target> footage_targets();
 std::span<const Target> scene_targets();
 std::span<const Target> session_targets();
 std::span<const Target> bus_targets();
+std::span<const Target> video_targets();
 
 // Reports a promise that was broken, and aborts.
 void expect(bool holds, const char* promise);

@@ -262,6 +262,38 @@ TEST(ImportDescription, PicturesOfDifferentSizesAreAnError) {
             std::string::npos);
 }
 
+// How many frames a video has is not known while FRAMES.json is read.
+TEST(ImportDescription, ListsOfAVideoMustBeForAsManyFrames) {
+  Shoot shoot;
+  write_video(shoot.folder() / "take.mkv", "gray",
+              std::vector(4, std::vector<std::uint8_t>(32 * 16, 7)), 32, 16, 50, false);
+  shoot.json["observer"] = {
+      {"video", "take.mkv"}, {"exposure_s", {0.01, 0.01, 0.02, 0.02}}, {"gain", {1, 2}}};
+  EXPECT_NE(shoot.error().find("observer.gain has 2 entries; there are 4 frames"),
+            std::string::npos)
+      << shoot.error();
+  shoot.json["observer"] = {
+      {"video", "take.mkv"}, {"exposure", {1, 1, 2, 2}}, {"exposure_s", {0.01, 0.01, 0.02}}};
+  EXPECT_NE(shoot.error().find("observer.exposure_s has 3 entries; there are 4 frames"),
+            std::string::npos)
+      << shoot.error();
+  shoot.json["observer"]["exposure_s"].push_back(0.02);
+  shoot.json["observer"]["gain"] = {1, 1, 2, 2};
+  EXPECT_EQ(shoot.error(), "");
+}
+
+// The smallest double is 4.9e-324, and the largest 1.8e308.
+TEST(ImportDescription, ExposuresThatNoNumberHoldsAreRefused) {
+  for (const double factor : {1e-200, 1e200}) {
+    Shoot shoot;
+    shoot.json["observer"].erase("exposure");
+    shoot.json["observer"]["exposure_s"] = factor;
+    shoot.json["observer"]["gain"] = {1, factor, 1};
+    EXPECT_NE(shoot.error().find("observer.exposure_s: frame 1: "), std::string::npos)
+        << shoot.error();
+  }
+}
+
 TEST(ImportDescription, TablesNameFileAndLine) {
   Shoot shoot;
   shoot.json["observer"].erase("fps");

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <random>
 
@@ -193,6 +194,23 @@ TEST(Import, AVideoBringsItsOwnTimes) {
   shoot.json["observer"] = {{"video", "take.mkv"}, {"exposure", 1}};
   ASSERT_EQ(shoot.error(), "");
   EXPECT_EQ(open(shoot, "observer")->records().at(1).timestamp_ns, 20'000'000);
+}
+
+// Frame 1 is taken at start_ns + 1e9 / fps; the times of a session are below 2^63 ns = 9.22e18.
+TEST(Import, TimesThatNoSessionCanHoldAreRefused) {
+  for (const auto& [fps, start_ns] : {std::pair<double, std::int64_t>{1e-300, 0},
+                                      {1.08e-10, 0},
+                                      {2.1e-10, 4'600'000'000'000'000'000}}) {
+    Shoot shoot;
+    shoot.json["observer"]["fps"] = fps;
+    shoot.json["observer"]["start_ns"] = start_ns;
+    const std::string error = shoot.error();
+    EXPECT_NE(error.find("0001.png: its time does not fit"), std::string::npos) << fps << error;
+  }
+  Shoot slow;
+  slow.json["observer"]["fps"] = 2.2e-10;  // frame 2 at 9.09e18
+  ASSERT_EQ(slow.error(), "");
+  EXPECT_EQ(open(slow, "observer")->records().at(2).timestamp_ns, std::llround(2 / 2.2e-10 * 1e9));
 }
 
 TEST(Import, AVideoOfRgbKeepsItsSamples) {

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <random>
 
 #include "drivers/session/nominal_rate.hpp"
@@ -75,6 +76,45 @@ TEST(NominalRate, OfNoFramesAndOfOneIsAGuess) {
   EXPECT_DOUBLE_EQ(nominal_rate(std::vector<std::int64_t>{7}).fps, 25);
 }
 
+// The largest time that there is, behind frames a nanosecond apart: as many are missing.
+TEST(NominalRate, OfAGapAsLongAsTimeItselfIsStillThatOfTheOthers) {
+  constexpr std::int64_t latest = std::numeric_limits<std::int64_t>::max();
+  const NominalRate rate = nominal_rate(std::vector<std::int64_t>{0, 1, 2, 3, latest});
+  ASSERT_EQ(rate.gaps.size(), 1u);
+  EXPECT_NEAR(static_cast<double>(rate.gaps[0].frames), 9.22e18, 0.03 * 9.22e18);
+}
+
+void expect_fraction(double fps, int frames, int seconds) {
+  const RateFraction rate = fraction_of(fps);
+  EXPECT_EQ(rate.frames, frames) << fps;
+  EXPECT_EQ(rate.seconds, seconds) << fps;
+}
+
+TEST(RateFraction, IsThatOfEditors) {
+  expect_fraction(25, 25, 1);
+  for (const double written : {24000.0 / 1001, 23.976, 23.98})
+    expect_fraction(written, 24000, 1001);
+  for (const double written : {30000.0 / 1001, 29.97}) expect_fraction(written, 30000, 1001);
+  for (const double written : {60000.0 / 1001, 59.94}) expect_fraction(written, 60000, 1001);
+  expect_fraction(17.3, 17300, 1000);
+}
+
+// A picture every ten minutes or every month, and times that are nanoseconds apart. Numerator and
+// denominator are ints: the fraction nearest to a rate r, at least 1 / (2^31 - 1), is within
+// max(r, 1) / (2^31 - 1) of it; of 2^31 numbers in double precision.
+TEST(RateFraction, IsNearEveryRate) {
+  for (const double fps : {1 / 2.6e6, 1 / 600.0, 0.004, 0.5, 0.9985, 3'575'000.3, 1e9, 2e9 + 0.5}) {
+    const RateFraction rate = fraction_of(fps);
+    ASSERT_GT(rate.frames, 0) << fps;
+    ASSERT_GT(rate.seconds, 0) << fps;
+    const double error = std::max(fps, 1.0) / 2147483647;
+    EXPECT_NEAR(static_cast<double>(rate.frames) / rate.seconds, fps, error) << fps;
+  }
+  expect_fraction(1e300, 2147483647, 1);
+  EXPECT_EQ(fraction_of(1e-300).frames, 1);
+  EXPECT_GE(fraction_of(1e-300).seconds, 2147483646);
+}
+
 std::string after(const char* first, double fps, std::int64_t frames) {
   const auto digits = timecode_after({first, fps}, frames);
   return digits ? words_of(*digits) : "none";
@@ -91,6 +131,11 @@ TEST(Timecode, Counts) {
   EXPECT_EQ(after("10:00:00:59", 60, 1), "10:00:01:00");
   EXPECT_EQ(after("10:00:00", 25, 1), "none");
   EXPECT_EQ(after("", 25, 1), "none");
+  // Hours end at 23 (5.1), and what counts more of them than an int can hold is no timecode.
+  EXPECT_EQ(after("24:00:00:00", 25, 1), "none");
+  EXPECT_EQ(after("59652:19:24:00", 25, 1), "none");
+  EXPECT_EQ(after("10:00:00:00", 3'575'000.3, 1), "none");
+  EXPECT_EQ(after("10:00:00:00", 1e300, 1), "none");
 }
 
 TEST(Timecode, OfAFrameIsThatOfItsTime) {
