@@ -24,10 +24,26 @@ bool is_diffuse(const scene::Material& m) {
          m.alpha_mode == scene::AlphaMode::opaque;
 }
 
+// Leaves out what is not real. Deformations and animations name their instances by their places.
 scene::Scene real_world(scene::Scene scene) {
-  std::erase_if(scene.instances, [](const scene::Instance& instance) {
-    return (instance.presence & scene::world_real) == 0;
+  std::vector<scene::Instance> kept;
+  std::vector<std::optional<std::uint32_t>> place(scene.instances.size());
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    if ((scene.instances[i].presence & scene::world_real) == 0) continue;
+    place[i] = static_cast<std::uint32_t>(kept.size());
+    kept.push_back(std::move(scene.instances[i]));
+  }
+  scene.instances = std::move(kept);
+  std::erase_if(scene.deformations, [&](const scene::Deformation& deformation) {
+    return !place[deformation.instance];
   });
+  for (scene::Deformation& deformation : scene.deformations)
+    deformation.instance = *place[deformation.instance];
+  for (scene::Animation& animation : scene.animations) {
+    std::erase_if(animation.instances, [&](const auto& use) { return !place[use.what]; });
+    for (auto& use : animation.instances) use.what = *place[use.what];
+  }
+  scene.variants.clear();  // they are of virtual objects
   return scene;
 }
 

@@ -1,5 +1,6 @@
 #include "daemon/exchange/import.hpp"
 
+#include <fmt/format.h>
 #include <stdlib.h>
 
 #include <algorithm>
@@ -131,6 +132,10 @@ class FootageImport {
       frame.bytes = picture->bytes;
       writer_.write(frame);
       frames.push_back({i, frame.timestamp_ns});
+      if (picture->container_ns)
+        farthest_ns_ = std::max(farthest_ns_, std::abs(static_cast<double>(*picture->container_ns) -
+                                                       static_cast<double>(frame.timestamp_ns) +
+                                                       static_cast<double>(footage_.start_ns)));
     }
     if (frames.empty()) fail("holds no frame");
     const std::uint64_t all = frames.size() + pictures->lost();
@@ -138,12 +143,24 @@ class FootageImport {
       fail("has " + std::to_string(all) + " frames; " + std::to_string(listed()) +
            " are described");
     for (const std::string& note : pictures->notes()) notes.push_back(note);
+    note_replaced_times(notes);
     Imported imported{std::move(frames), all, {}, {}};
     read_times(imported, *pictures, notes);
     return imported;
   }
 
  private:
+  // A rate that is given counts frames, and so does not see those that are missing in the file.
+  void note_replaced_times(std::vector<std::string>& notes) const {
+    if (footage_.fps > 0 && farthest_ns_ > 0.5e9 / footage_.fps)
+      notes.push_back(
+          fmt::format("{}: {}.fps = {:g} takes the place of the times in {}, which are up to "
+                      "{:.3g} s away: the "
+                      "clip has another rate, or lacks frames; without fps its own times hold",
+                      file_.string(), footage_.source, footage_.fps, footage_.video.string(),
+                      farthest_ns_ / 1e9));
+  }
+
   // The rate and the timecode of what was imported.
   void read_times(Imported& imported, const Footage& pictures, std::vector<std::string>& notes) {
     std::vector<std::int64_t> times;
@@ -219,7 +236,8 @@ class FootageImport {
   const FootageDescription& footage_;
   std::optional<Size> calibrated_;
   session::SessionWriter& writer_;
-  std::string first_;  // format and size of the first picture
+  std::string first_;       // format and size of the first picture
+  double farthest_ns_ = 0;  // of a frame's time from that in its container
 };
 
 template <typename Calibration>

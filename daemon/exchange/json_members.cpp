@@ -93,13 +93,31 @@ std::vector<Members> Members::objects(const std::string& key,
   return values;
 }
 
+namespace {
+
+// Whether a file begins as text does: videos and pictures have bytes that no text has.
+bool is_text_at_its_start(std::istream& stream) {
+  char start[64];
+  stream.clear();
+  stream.seekg(0);
+  stream.read(start, sizeof start);
+  return std::none_of(start, start + stream.gcount(), [](char c) {
+    return static_cast<unsigned char>(c) < ' ' && c != '\n' && c != '\r' && c != '\t';
+  });
+}
+
+}  // namespace
+
 Json read_json(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw Error(file.string() + ": cannot be opened: " + std::strerror(errno));
   try {
     return Json::parse(stream);
   } catch (const Json::exception& error) {
-    throw Error(file.string() + ": is not JSON: " + error.what());
+    throw Error(file.string() + ": is not JSON: " + error.what() +
+                (is_text_at_its_start(stream) ? ""
+                                              : ". A video or a picture is named in a JSON file; "
+                                                "config/frames.example.json shows how"));
   }
 }
 

@@ -43,6 +43,19 @@ class Limits {
   AVDictionary* options_ = nullptr;
 };
 
+// While a file is opened, libav would print that it may not decode sound, and odd rates that are
+// said otherwise.
+class QuietLibav {
+ public:
+  QuietLibav() : level_(av_log_get_level()) { av_log_set_level(AV_LOG_QUIET); }
+  ~QuietLibav() { av_log_set_level(level_); }
+  QuietLibav(const QuietLibav&) = delete;
+  QuietLibav& operator=(const QuietLibav&) = delete;
+
+ private:
+  const int level_;
+};
+
 // The frames of a video that are not in the take, by the time of their packets. libav gives frames
 // in the order of their times, but takes packets in the order in which they are decoded.
 class LostFrames {
@@ -74,6 +87,7 @@ class VideoFile final : public Footage {
  public:
   VideoFile(const std::filesystem::path& file, const ReadAs& read_as)
       : file_(file), read_as_(read_as) {
+    const QuietLibav quiet;
     AVFormatContext* context = nullptr;
     // "file:" keeps a name with a colon from being taken for another protocol.
     const std::string url = "file:" + std::filesystem::absolute(file).string();
@@ -146,6 +160,11 @@ class VideoFile final : public Footage {
                       " cannot be decoded without what is damaged or missing in the file" +
                       (first_fault_.empty() ? "" : " (" + first_fault_ + ")"));
     if (!end_fault_.empty()) notes.push_back(end_fault_);
+    for (unsigned i = 0; i < demuxer_->nb_streams; ++i)
+      if (demuxer_->streams[i]->codecpar->codec_type == AVMEDIA_TYPE_AUDIO) {
+        notes.push_back(file_.string() + ": its sound is left out");
+        break;
+      }
     return notes;
   }
 

@@ -210,7 +210,7 @@ void check_brightness(const set::Lighting& settings, const EnvironmentMap& map) 
 }
 
 template <typename Means>
-EnvironmentMap map_of(const Means& means, int size, float gain) {
+EnvironmentMap map_of(const Means& means, int size, const glm::vec3& gain) {
   EnvironmentMap map{size, {}};
   map.radiance.resize(static_cast<std::size_t>(size) * static_cast<std::size_t>(size));
   parallel_blocks(size, [&](int begin, int end) {
@@ -254,7 +254,7 @@ Lighting load_environment(const set::Lighting& settings) {
     pixel_rad = radians_a_pixel();
   const int samples_a_side =
       std::max(4, static_cast<int>(std::ceil(4 * std::sqrt(texel_sr(size)) / pixel_rad)));
-  const auto gain = static_cast<float>(settings.environment_gain);
+  const glm::vec3 gain(settings.environment_gain * settings.balance);
   const double turn_rad = settings.environment_rotation_rad;
   if (cross) {
     const Cube source(*cross, picture);

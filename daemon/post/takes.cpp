@@ -84,7 +84,7 @@ Row row_of(const ListedTake& take) {
   row[1] = info.good ? "good" : "";
   row[2] = length_words(summary.seconds);
   row[3] = std::to_string(summary.frames);
-  row[4] = info.timecode;
+  if (const auto timecode = session::timecode_of(summary.info)) row[4] = timecode->first;
   const auto rendered = rendered_frames(take);
   row[6] = !rendered                     ? "?"
            : *rendered == 0              ? ""

@@ -230,7 +230,7 @@ Keys lighting_keys(Draft& d) {
       {"environment", &d.environment, plain, "Picture of the light from all around, which replaces the light camera: OpenEXR or Radiance .hdr, latitude-longitude (2:1) or a cube cross (3:4 or 4:3); Z up, the middle of the picture, or of the middle face, is +X.", optional("\"env.exr\"")},
       {"environment_rotation_deg", &l.environment_rotation_rad, deg, "Rotation of the environment about world Z, counter-clockwise as seen from above."},
       {"environment_gain", &l.environment_gain, plain.at_least(0), "Brightness factor of the environment."},
-      {"balance", &l.balance, plain.within(1e-6, 1e6), "Factors of red, green and blue that turn the light camera's radiance into the film camera's (previzd calibrate balance)."},
+      {"balance", &l.balance, plain.within(1e-6, 1e6), "Factors of red, green and blue that turn the light camera's radiance, or the environment's, into the film camera's (previzd calibrate balance)."},
       {"resolution", &l.resolution, plain.within(0, 4096), "Size of the light map in texels a side, a power of two; 0: as fine as the picture that it is made from."},
       {"unseen", &l.unseen, plain, "What is assumed where the light camera cannot see. \"horizon\" continues the edge of its picture, \"mirror\" mirrors the picture about the plane of the lens, \"observer\" uses what the film camera has seen there and the horizon elsewhere, \"constant\" uses unseen_radiance."},
       {"unseen_radiance", &d.unseen_radiance, plain.at_least(0), "With unseen = \"constant\" only: linear Rec. 709 radiance.", optional("[0.1, 0.1, 0.1]")},

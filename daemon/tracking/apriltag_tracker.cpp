@@ -123,9 +123,19 @@ class AprilTagTracker final : public Tracker {
     if (frame.width == lens_.width && frame.height == lens_.height &&
         frame.bytes.size() == frame_bytes(frame.format, frame.width, frame.height))
       return {};
-    return "the frame is " + std::to_string(frame.width) + "x" + std::to_string(frame.height) +
-           " of " + std::to_string(frame.bytes.size()) + " bytes, the calibration is for " +
-           std::to_string(lens_.width) + "x" + std::to_string(lens_.height);
+    const auto size = [](int width, int height) {
+      return std::to_string(width) + "x" + std::to_string(height);
+    };
+    if (frame.width == lens_.width && frame.height == lens_.height)
+      return "the frame of " + size(frame.width, frame.height) + " has " +
+             std::to_string(frame.bytes.size()) + " bytes, which are too few or too many";
+    const bool is_turned = frame.width == lens_.height && frame.height == lens_.width;
+    return "the frame is " + size(frame.width, frame.height) + ", the lens is calibrated for " +
+           size(lens_.width, lens_.height) +
+           (is_turned
+                ? ": one of the two is turned by a quarter; turn the pictures as the lens was "
+                  "calibrated, or calibrate it with pictures like these"
+                : ": calibrate it with pictures of this size");
   }
 
   bool lacks_what_was_followed(const Track& track) const {

@@ -167,6 +167,18 @@ TEST_F(TruthBalance, CamerasOfOneScaleAreFoundToBe) {
   for (int c = 0; c < 3; ++c) EXPECT_NEAR(balance.scale[c], 1, 0.03 + 3 * balance.sigma[c]);
 }
 
+// What is not real is left out before the surfaces are looked at; a deformed one had named its
+// place among the instances, which was then another's or none.
+TEST_F(TruthBalance, AMovingVirtualObjectDoesNoHarm) {
+  const SurfacePixels without = probe(bundled, 1, "");
+  const SurfacePixels with =
+      probe(bundled, 1,
+            "\n[[object]]\nname = \"sprout\"\nfile = \"" PREVIZ_SOURCE_DIR
+            "/config/demo/sprout.glb\"\npresence = \"virtual\"\nanimation = \"sway\"\n");
+  ASSERT_EQ(with.surfaces.size(), without.surfaces.size());
+  EXPECT_EQ(with.pixels.size(), without.pixels.size());
+}
+
 TEST_F(TruthBalance, ExposuresWrongByTwoStopsAreFound) {
   const Balance balance = fit_balance(probe(bundled, 4, ""), {});
   EXPECT_NEAR(exposure_error_stops(balance), 2, 0.1);

@@ -339,6 +339,12 @@ TEST(ImportDescription, WhatIsNotJsonIsAnError) {
   EXPECT_NE(error_of("{\n\"name\": }").find("line 2"), std::string::npos);
   EXPECT_NE(error_of("[]").find("F.json: the document must be an object"), std::string::npos);
   EXPECT_NE(error_of("").find("F.json: is not JSON"), std::string::npos);
+  EXPECT_EQ(error_of("{\n\"name\": }").find("A video or a picture"), std::string::npos);
+  EXPECT_NE(error_of(std::string("\0\0\0\x20"
+                                 "ftypisom",
+                                 12))
+                .find("A video or a picture is named in a JSON file; config/frames.example.json"),
+            std::string::npos);
   EXPECT_THROW(import_session({folder.path() / "absent.json", folder.path() / "take"}), Error);
 }
 

@@ -236,6 +236,22 @@ TEST(ImportVideo, TheRateIsTheNominalOneAndTheTimecodeTheClips) {
   EXPECT_EQ(opened.info.timecode, (session::Timecode{"10:59:59:20", 30}));
 }
 
+// A rate beside the clip counts its frames, and so hides the one that is missing: that is said.
+TEST(ImportVideo, ARateThatHidesAMissingFrameIsSaid) {
+  VideoForm form = small_form();
+  form.fps = 30;
+  for (std::int64_t i = 0; i < 60; ++i)
+    if (i != 20) form.times.push_back(i);
+  Shoot shoot;
+  write_video(shoot.folder() / "take.mov", form, std::vector<Bytes>(59, Bytes(3 * 48 * 16, 90)));
+  shoot.json["observer"] = {{"video", "take.mov"}, {"exposure", 1}, {"fps", 30}};
+  const ImportReport report = shoot.import();
+  EXPECT_TRUE(std::ranges::any_of(report.notes, [](const std::string& note) {
+    return note.find("observer.fps = 30 takes the place of the times in ") != std::string::npos &&
+           note.find("take.mov, which are up to 0.0333 s away") != std::string::npos;
+  })) << report.notes.back();
+}
+
 // The timecode of the file is that of its first frame, which was lost.
 TEST(ImportVideo, TheTimecodeIsThatOfTheFirstFrameThatCameIn) {
   VideoForm form = small_form();

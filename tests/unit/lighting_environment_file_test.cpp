@@ -110,6 +110,19 @@ TEST(LoadEnvironment, KeepsFluxAndIrradiance) {
   }
 }
 
+// What `previzd calibrate balance` prints makes up for an environment that does not fit the camera.
+TEST(LoadEnvironment, IsMultipliedByTheBalanceAndTheGain) {
+  const previz::test::TemporaryDirectory directory;
+  write_exr_picture(directory / "sky.exr", rough_sky(64));
+  set::Lighting settings = settings_for(directory / "sky.exr");
+  const EnvironmentMap plain = load_environment(settings).environment;
+  settings.environment_gain = 2;
+  settings.balance = {0.5, 0.25, 4};
+  const EnvironmentMap balanced = load_environment(settings).environment;
+  for (std::size_t i = 0; i < plain.radiance.size(); ++i)
+    ASSERT_EQ(balanced.radiance[i], plain.radiance[i] * glm::vec3(1, 0.5f, 8));
+}
+
 TEST(LoadEnvironment, SeesTheLayoutFromInside) {
   const previz::test::TemporaryDirectory directory;
   // Red grows with x, green with y, blue with z.
