@@ -34,6 +34,7 @@ class LibcameraCamera final : public Camera {
   std::string name() const override { return settings_.device; }
   CameraFormat format() const override { return device_.agreed().format; }
   DeviceCounters counters() const override { return counters_; }
+  std::vector<std::string> doubts() const override { return device_.agreed().doubts; }
 
   void start() override {
     if (device_.streaming()) return;

@@ -193,9 +193,11 @@ TEST(V4l2Configure, SaysWhichRatesThereAreWhereNoneHolds) {
   const auto camera = open(device, wanted);
   EXPECT_EQ(device.picture.pixelformat, V4L2_PIX_FMT_YUYV);
   ASSERT_EQ(camera->doubts().size(), 1u);
-  EXPECT_EQ(camera->doubts()[0],
-            "takes 5 frames a second, not the 50 of rate_hz; at 32x24 it has: MJPG 30, 15; YUYV 5, "
-            "2 (pixel_format chooses; a smaller picture may be faster)");
+  EXPECT_EQ(
+      camera->doubts()[0],
+      "rate_hz 50 is not possible; the camera sends 5 frames per second; allowed: 30, 15 "
+      "(pixel_format MJPG), 5, 2 (pixel_format YUYV) at 32x24; change rate_hz or remove it; a "
+      "smaller picture may be faster");
   // What the set names is taken, whatever its rate.
   wanted.rate_hz = 30;
   wanted.format = "YUYV";
@@ -218,7 +220,7 @@ TEST(V4l2Configure, WhatCannotBeSaysWhatCan) {
   EXPECT_THAT(refusal(device, wanted), HasSubstr("known are: GREY"));
   wanted = settings();
   wanted.exposure_s = 0.1;
-  EXPECT_THAT(refusal(device, wanted), HasSubstr("exposure cannot be set"));
+  EXPECT_EQ(refusal(device, wanted), "usb-cam: its exposure cannot be set; remove exposure_s");
   wanted = settings();
   wanted.white_balance_k = 5600;
   EXPECT_THAT(refusal(device, wanted), HasSubstr("leave white_balance_k out"));
@@ -228,6 +230,12 @@ TEST(V4l2Configure, WhatCannotBeSaysWhatCan) {
   wanted = settings();
   wanted.gain = 2;
   EXPECT_THAT(refusal(device, wanted), HasSubstr("raw_gain"));
+  wanted = settings();
+  wanted.rate_hz = -1;
+  device.rates = {{V4L2_PIX_FMT_YUYV, {5, 2}}};
+  EXPECT_EQ(refusal(device, wanted),
+            "usb-cam: rate_hz -1 is not possible; allowed: 5, 2 (pixel_format YUYV) at 32x24; "
+            "change rate_hz or remove it");
   wanted = settings();
   wanted.trigger = "Line1";
   EXPECT_THAT(refusal(device, wanted), HasSubstr("trigger"));
