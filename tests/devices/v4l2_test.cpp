@@ -160,52 +160,6 @@ TEST(V4l2Configure, SetsFormatSizeRateAndControls) {
   EXPECT_EQ(device.values[V4L2_CID_WHITE_BALANCE_TEMPERATURE], 5600);
 }
 
-TEST(V4l2Configure, TheRateIsWhatTheDeviceMadeOfIt) {
-  FakeDevice device;
-  CameraSettings wanted = settings();
-  wanted.rate_hz = 1000;
-  EXPECT_EQ(open(device, wanted)->format().rate_hz, 60);
-}
-
-// A C920 at 1080p: YUYV takes 5 frames a second over USB 2, and MJPG 30.
-TEST(V4l2Configure, TakesACompressedFormatWhereOnlyThatHoldsTheRate) {
-  FakeDevice device;
-  device.rates = {{V4L2_PIX_FMT_YUYV, {5, 2}}, {V4L2_PIX_FMT_MJPEG, {30, 15}}};
-  CameraSettings wanted = settings();
-  wanted.rate_hz = 30;
-  const auto camera = open(device, wanted);
-  EXPECT_EQ(device.picture.pixelformat, V4L2_PIX_FMT_MJPEG);
-  EXPECT_EQ(camera->format().rate_hz, 30);
-  EXPECT_TRUE(camera->doubts().empty());
-
-  FakeDevice slow;
-  slow.rates = device.rates;
-  wanted.rate_hz = 5;
-  open(slow, wanted);
-  EXPECT_EQ(slow.picture.pixelformat, V4L2_PIX_FMT_YUYV);
-}
-
-TEST(V4l2Configure, SaysWhichRatesThereAreWhereNoneHolds) {
-  FakeDevice device;
-  device.rates = {{V4L2_PIX_FMT_YUYV, {5, 2}}, {V4L2_PIX_FMT_MJPEG, {30, 15}}};
-  CameraSettings wanted = settings();
-  wanted.rate_hz = 50;
-  const auto camera = open(device, wanted);
-  EXPECT_EQ(device.picture.pixelformat, V4L2_PIX_FMT_YUYV);
-  ASSERT_EQ(camera->doubts().size(), 1u);
-  EXPECT_EQ(
-      camera->doubts()[0],
-      "rate_hz 50 is not possible; the camera sends 5 frames per second; allowed: 30, 15 "
-      "(pixel_format MJPG), 5, 2 (pixel_format YUYV) at 32x24; change rate_hz or remove it; a "
-      "smaller picture may be faster");
-  // What the set names is taken, whatever its rate.
-  wanted.rate_hz = 30;
-  wanted.format = "YUYV";
-  FakeDevice named;
-  named.rates = device.rates;
-  EXPECT_EQ(open(named, wanted)->format().rate_hz, 5);
-}
-
 TEST(V4l2Configure, WhatCannotBeSaysWhatCan) {
   FakeDevice device;
   CameraSettings wanted = settings();
@@ -230,12 +184,6 @@ TEST(V4l2Configure, WhatCannotBeSaysWhatCan) {
   wanted = settings();
   wanted.gain = 2;
   EXPECT_THAT(refusal(device, wanted), HasSubstr("raw_gain"));
-  wanted = settings();
-  wanted.rate_hz = -1;
-  device.rates = {{V4L2_PIX_FMT_YUYV, {5, 2}}};
-  EXPECT_EQ(refusal(device, wanted),
-            "usb-cam: rate_hz -1 is not possible; allowed: 5, 2 (pixel_format YUYV) at 32x24; "
-            "change rate_hz or remove it");
   wanted = settings();
   wanted.trigger = "Line1";
   EXPECT_THAT(refusal(device, wanted), HasSubstr("trigger"));
