@@ -104,6 +104,8 @@ constexpr auto known_pixel_formats = std::to_array<Known>({
     {lc::formats::YUYV, Layout::yuyv},
     {lc::formats::UYVY, Layout::uyvy},
     {lc::formats::NV12, Layout::nv12},
+    {lc::formats::YUV420, Layout::i420},
+    {lc::formats::YVU420, Layout::yv12},
     {lc::formats::MJPEG, Layout::mjpeg},
 });
 
@@ -307,14 +309,19 @@ struct Device::Impl {
              " bytes; its picture is " + std::to_string(least));
   }
 
+  // Returns a bound of the frame's duration; 0 for one that is no whole number of microseconds.
+  static double microseconds(const lc::ControlValue& bound) {
+    if (bound.type() != lc::ControlTypeInteger64 || bound.isArray()) return 0;
+    return static_cast<double>(bound.get<std::int64_t>());
+  }
+
   // The bounds depend on the format. A pipeline clips a rate beyond them and does not report it.
   void agree_on_rate() {
     if (!settings.rate_hz) return;
     const lc::ControlInfo& limits =
         camera->controls().find(lc::controls::FrameDurationLimits.id())->second;
-    const auto least_us = static_cast<double>(limits.min().get<std::int64_t>());
-    const auto most_us = static_cast<double>(limits.max().get<std::int64_t>());
-    const RatesOnOffer offer = rates_between(1e6 / most_us, 1e6 / least_us);
+    const RatesOnOffer offer =
+        rates_between(1e6 / microseconds(limits.max()), 1e6 / microseconds(limits.min()));
     agreed.format.rate_hz = nearest_rate(offer, *settings.rate_hz);
     if (const auto other = other_rate(settings, agreed.format.rate_hz, text_of(offer)))
       agreed.doubts.push_back(*other);

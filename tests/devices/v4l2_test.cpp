@@ -94,6 +94,16 @@ TEST(V4l2Formats, NamesComeBack) {
   EXPECT_EQ(fourcc_of("Y16-BE"), std::nullopt);
 }
 
+// The kernel's documentation, "Planar YUV formats": YU12 has Cb first, YV12 Cr.
+TEST(V4l2Formats, PlanarPicturesOf420AreTakenInBothOrders) {
+  EXPECT_EQ(wire_format(fourcc_of("YU12").value())->layout, convert::Layout::i420);
+  EXPECT_EQ(wire_format(fourcc_of("YV12").value())->layout, convert::Layout::yv12);
+  FakeDevice device;
+  device.formats = {V4L2_PIX_FMT_YUV420};
+  device.picture.pixelformat = V4L2_PIX_FMT_YUV420;
+  EXPECT_EQ(open(device)->format(), (CameraFormat{PixelFormat::rgb8, 32, 24, 30}));
+}
+
 // The kernel's documentation, "Colorspaces": SRGB and JPEG default to BT.601, webcams send them.
 TEST(V4l2Formats, ColourCodingsAreTheDriversOrV4l2sDefaults) {
   v4l2_pix_format format{};
