@@ -253,18 +253,18 @@ struct Device::Impl {
   }
 
   void agree() {
-    if (settings.trigger) refuse("libcamera has no triggers; leave trigger out");
-    if (settings.packet_size) refuse("is no network camera; leave packet_size out");
+    if (settings.trigger) refuse("libcamera has no triggers; remove trigger");
+    if (settings.packet_size) refuse("is not a network camera; remove packet_size");
     if (settings.raw_gain) refuse("its gain is linear; gain sets it");
     agreed.drives_exposure = has(lc::controls::ExposureTime);
     agreed.drives_gain = has(lc::controls::AnalogueGain);
     if (settings.exposure_s && !agreed.drives_exposure)
       refuse("its exposure cannot be set; remove exposure_s");
-    if (settings.gain && !agreed.drives_gain) refuse("its gain cannot be set; leave gain out");
+    if (settings.gain && !agreed.drives_gain) refuse("its gain cannot be set; remove gain");
     if (settings.gain && !settings.exposure_s)
       refuse("its gain and exposure are set together; give exposure_s too");
     if (settings.white_balance_k && !has(lc::controls::ColourTemperature))
-      refuse("has no colour temperature; leave white_balance_k out");
+      refuse("has no colour temperature; remove white_balance_k");
     if (settings.rate_hz && !has(lc::controls::FrameDurationLimits))
       refuse("its rate cannot be set; remove rate_hz");
     agree_on_format();

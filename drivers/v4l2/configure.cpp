@@ -74,8 +74,8 @@ class Configuration {
       refuse("is multi-planar; the libcamera driver is for such cameras");
     if (!(can & V4L2_CAP_VIDEO_CAPTURE)) refuse("captures no video");
     if (!(can & V4L2_CAP_STREAMING)) refuse("cannot stream");
-    if (settings_.trigger) refuse("V4L2 has no triggers; leave trigger out");
-    if (settings_.packet_size) refuse("is no network camera; leave packet_size out");
+    if (settings_.trigger) refuse("V4L2 has no triggers; remove trigger");
+    if (settings_.packet_size) refuse("is not a network camera; remove packet_size");
     if (settings_.gain) refuse("its gain has no unit, so no factor can be set; raw_gain sets it");
   }
 
@@ -296,7 +296,7 @@ class Configuration {
     const std::string name(key);
     write(node_, automatic, 0);
     const std::optional<v4l2_queryctrl> bounds = query(node_, id);
-    if (!bounds) refuse("has no such control; leave " + name + " out");
+    if (!bounds) refuse("has no such control; remove " + name);
     if (*value < bounds->minimum || *value > bounds->maximum)
       refuse(name + " " + std::to_string(*value) + " is not possible; " +
              std::to_string(bounds->minimum) + " to " + std::to_string(bounds->maximum) + " is");

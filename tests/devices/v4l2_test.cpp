@@ -187,7 +187,7 @@ TEST(V4l2Configure, WhatCannotBeSaysWhatCan) {
   EXPECT_EQ(refusal(device, wanted), "usb-cam: its exposure cannot be set; remove exposure_s");
   wanted = settings();
   wanted.white_balance_k = 5600;
-  EXPECT_THAT(refusal(device, wanted), HasSubstr("leave white_balance_k out"));
+  EXPECT_THAT(refusal(device, wanted), HasSubstr("remove white_balance_k"));
   device.add_control(V4L2_CID_WHITE_BALANCE_TEMPERATURE, 2800, 6500, 4000);
   wanted.white_balance_k = 9000;
   EXPECT_THAT(refusal(device, wanted), HasSubstr("2800 to 6500 is"));

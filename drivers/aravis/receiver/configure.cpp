@@ -203,7 +203,7 @@ class Configuration {
   // SFNC has colour ratios, not temperatures; only a calibration can say which ratio a lamp needs.
   void agree_on_white_balance() const {
     if (settings_.white_balance_k)
-      refuse("GenICam cameras have no colour temperature; leave white_balance_k out");
+      refuse("GenICam cameras have no colour temperature; remove white_balance_k");
   }
 
   void agree_on_chunks() {
@@ -214,7 +214,7 @@ class Configuration {
 
   void agree_on_packets() {
     if (!arv_camera_is_gv_device(&camera_)) {
-      if (settings_.packet_size) refuse("is no network camera; leave packet_size out");
+      if (settings_.packet_size) refuse("is not a network camera; remove packet_size");
       return;
     }
     // Packet sockets need a privilege that the daemon does not have.
