@@ -22,7 +22,7 @@ class Bracket final : public Camera {
 
   void start() override {
     next_ = 0;
-    if (!advance()) throw Error(name() + ": its exposure cannot be driven; leave bracket_s out");
+    if (!advance()) throw Error(name() + ": its exposure cannot be driven; remove bracket_s");
     camera_->start();
   }
 

@@ -1,9 +1,6 @@
 // The settings that a set asks of a camera, as plain data.
 #pragma once
 
-#include <array>
-#include <cmath>
-#include <cstdio>
 #include <optional>
 #include <string>
 
@@ -11,7 +8,7 @@ namespace previz {
 
 // An absent setting stays as the device has it. A setting that the device cannot do is an error
 // that says what it can do; only a rate or an exposure is silently rounded, to the device's own
-// steps.
+// steps. A rate farther off is an error as well, or a doubt of the camera (frame_rate.hpp).
 struct CameraSettings {
   std::string source = "observer";    // becomes Frame::source
   std::string device;                 // the stable name, as `previzd devices` prints it
@@ -28,17 +25,5 @@ struct CameraSettings {
   std::optional<int> packet_size;  // bytes, network cameras; absent: the largest that gets through
   double responsivity = 1;         // exposure = exposure_s * gain * responsivity
 };
-
-// Returns that a device takes another rate than it was asked for, by more than a hundredth; nothing
-// if it does not, or reports none.
-inline std::optional<std::string> other_rate(const CameraSettings& asked, double granted_hz) {
-  if (!asked.rate_hz || !(granted_hz > 0) ||
-      std::abs(granted_hz - *asked.rate_hz) <= 0.01 * *asked.rate_hz)
-    return std::nullopt;
-  std::array<char, 96> text{};
-  std::snprintf(text.data(), text.size(), "takes %.5g frames a second, not the %.5g of rate_hz",
-                granted_hz, *asked.rate_hz);
-  return text.data();
-}
 
 }  // namespace previz

@@ -105,10 +105,10 @@ Keys lens_fit_keys(LensFit& f) {
 Keys camera_keys(CameraWish& wish) {
   CameraSettings& c = wish.settings;
   return {
-      {"pixel_format", &c.format, plain, "The name that the driver uses. Formats with more bits are worth their bandwidth.", optional("\"BayerRG12\"")},
+      {"pixel_format", &c.format, plain, "The name that the driver uses: YUYV, NV12, YU12 (planar 4:2:0; YUV420 in libcamera) and so on. Formats with more bits are worth their bandwidth.", optional("\"BayerRG12\"")},
       {"width", &c.width, px.within(1, max_picture_side_px), "Width of the pictures; height must be given as well.", optional("1920")},
       {"height", &c.height, px.within(1, max_picture_side_px), "Height of the pictures; width must be given as well.", optional("1080")},
-      {"rate_hz", &c.rate_hz, plain.above(0, 1e4), "Frames per second.", optional("25.0")},
+      {"rate_hz", &c.rate_hz, plain.above(0, 1e4), "Frames per second. Of a rate that the camera does not have, a message lists those that it has: aravis refuses it, and v4l2 and libcamera use the nearest.", optional("25.0")},
       {"exposure_s", &c.exposure_s, seconds.above(0, 100), "Shutter time. Turns the camera's automatic exposure off.", optional("0.01")},
       {"gain", &c.gain, plain.within(1, 1e4), "Linear gain, for cameras that state their gain in dB.", optional("2.0")},
       {"raw_gain", &c.raw_gain, plain, "Gain in the camera's own units. The factor that it stands for must be part of the responsivity.", optional("64.0")},

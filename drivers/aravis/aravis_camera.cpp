@@ -20,6 +20,7 @@
 #include "drivers/convert/convert.hpp"
 #include "drivers/error.hpp"
 #include "drivers/exposure_ledger.hpp"
+#include "drivers/frame_rate.hpp"
 #include "drivers/host_clock.hpp"
 
 namespace previz {
@@ -137,7 +138,7 @@ class AravisCamera final : public Camera {
   std::string name() const override { return settings_.device; }
   CameraFormat format() const override { return agreed_.format; }
   std::vector<std::string> doubts() const override {
-    const auto other = other_rate(settings_, agreed_.format.rate_hz);
+    const auto other = other_rate(settings_, agreed_.format.rate_hz, "");
     return other ? std::vector{*other} : std::vector<std::string>{};
   }
 

@@ -18,6 +18,10 @@ bool is_yuv422(Layout layout) {
   return layout == Layout::yuyv || layout == Layout::uyvy;
 }
 
+bool is_yuv420(Layout layout) {
+  return layout == Layout::nv12 || layout == Layout::i420 || layout == Layout::yv12;
+}
+
 std::size_t channels(Layout layout) {
   return layout == Layout::rgb || layout == Layout::bgr ? 3 : 1;
 }
@@ -189,11 +193,33 @@ std::vector<std::uint8_t> rgb_of_422(const WirePicture& picture) {
   return rgb;
 }
 
+// The chroma planes of a 4:2:0 picture: where the first samples are, and the bytes from each to the
+// next one and to the next row.
+struct Chroma420 {
+  const std::uint8_t *cb, *cr;
+  std::size_t step, stride;
+};
+
+// The kernel's documentation of V4L2_PIX_FMT_NV12 and V4L2_PIX_FMT_YUV420 ("half as many pad bytes
+// after their rows").
+Chroma420 chroma_planes(const WirePicture& picture) {
+  const std::size_t height = picture.height;
+  const std::uint8_t* first = Rows(picture)[height];
+  const std::size_t luma_stride =
+      picture.stride ? picture.stride : row_bytes(picture.format, picture.width);
+  if (picture.format.layout == Layout::nv12) return {first, first + 1, 2, luma_stride};
+  const std::size_t stride = luma_stride / 2;
+  const std::uint8_t* second = first + (height + 1) / 2 * stride;
+  if (picture.format.layout == Layout::yv12) return {second, first, 1, stride};
+  return {first, second, 1, stride};
+}
+
 // 4:2:0 chroma rows lie midway between luma rows 2i and 2i+1 (MPEG-2), so a luma row takes three
 // quarters of the nearer chroma row and one of the other.
-std::vector<std::uint8_t> rgb_of_nv12(const WirePicture& picture) {
+std::vector<std::uint8_t> rgb_of_420(const WirePicture& picture) {
   const std::size_t width = picture.width, height = picture.height;
   const std::size_t chroma_width = (width + 1) / 2, chroma_height = (height + 1) / 2;
+  const Chroma420 chroma = chroma_planes(picture);
   const YuvToRgb to_rgb(picture.format.matrix, picture.format.range);
   std::vector<std::uint8_t> rgb(3 * width * height);
   const Rows rows(picture);
@@ -201,15 +227,14 @@ std::vector<std::uint8_t> rgb_of_nv12(const WirePicture& picture) {
     const std::size_t near = y / 2;
     const std::size_t other =
         y % 2 ? std::min(near + 1, chroma_height - 1) : near - std::min<std::size_t>(near, 1);
-    const std::uint8_t* a = rows[height + near];
-    const std::uint8_t* b = rows[height + other];
-    const auto eighths = [&](std::size_t left, std::size_t right) {
-      return 3 * (a[left] + a[right]) + b[left] + b[right];
-    };
+    const std::size_t a = near * chroma.stride, b = other * chroma.stride;
     for (std::size_t x = 0; x < width; ++x) {
-      const std::size_t left = 2 * (x / 2), right = 2 * std::min(x / 2 + x % 2, chroma_width - 1);
-      to_rgb(rows[y][x], eighths(left, right), eighths(left + 1, right + 1),
-             &rgb[3 * (y * width + x)]);
+      const std::size_t left = chroma.step * (x / 2);
+      const std::size_t right = chroma.step * std::min(x / 2 + x % 2, chroma_width - 1);
+      const auto eighths = [&](const std::uint8_t* plane) {
+        return 3 * (plane[a + left] + plane[a + right]) + plane[b + left] + plane[b + right];
+      };
+      to_rgb(rows[y][x], eighths(chroma.cb), eighths(chroma.cr), &rgb[3 * (y * width + x)]);
     }
   }
   return rgb;
@@ -232,6 +257,8 @@ PixelFormat delivered_format(const WireFormat& format) {
                  ? PixelFormat::yuv422p8
                  : PixelFormat::rgb8;
     case Layout::nv12:
+    case Layout::i420:
+    case Layout::yv12:
     case Layout::mjpeg:
       return PixelFormat::rgb8;
     default:
@@ -259,7 +286,7 @@ std::size_t row_bytes(const WireFormat& format, int width) {
   const std::size_t samples = w * channels(format.layout);
   if (format.layout == Layout::mjpeg) return 0;
   if (is_yuv422(format.layout)) return 4 * ((w + 1) / 2);
-  if (format.layout == Layout::nv12) return 2 * ((w + 1) / 2);
+  if (is_yuv420(format.layout)) return 2 * ((w + 1) / 2);
   if (bits == 8) return samples;
   switch (format.packing) {
     case Packing::words:
@@ -277,10 +304,30 @@ std::size_t row_bytes(const WireFormat& format, int width) {
 }
 
 std::size_t picture_bytes(const WireFormat& format, int width, int height, std::size_t stride) {
-  const std::size_t row = row_bytes(format, width);
-  std::size_t rows = height;
-  if (format.layout == Layout::nv12) rows += (rows + 1) / 2;
-  return rows == 0 ? 0 : (rows - 1) * (stride ? stride : row) + row;
+  const std::size_t row = row_bytes(format, width), rows = height, chroma_rows = (rows + 1) / 2;
+  const std::size_t from_row_to_row = stride ? stride : row;
+  if (rows == 0) return 0;
+  if (format.layout == Layout::nv12) return (rows + chroma_rows - 1) * from_row_to_row + row;
+  if (is_yuv420(format.layout))
+    return rows * from_row_to_row + (2 * chroma_rows - 1) * (from_row_to_row / 2) + row / 2;
+  return (rows - 1) * from_row_to_row + row;
+}
+
+std::vector<std::uint8_t> joined_planes(const WireFormat& format, int width, int height,
+                                        std::size_t stride,
+                                        std::span<const std::span<const std::uint8_t>> planes) {
+  const std::size_t luma_stride = stride ? stride : row_bytes(format, width), rows = height;
+  const std::size_t luma = luma_stride * rows, planar_chroma = luma_stride / 2 * ((rows + 1) / 2);
+  std::vector<std::uint8_t> joined;
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    std::span<const std::uint8_t> plane = planes[i];
+    const bool is_last = i + 1 == planes.size();
+    const std::size_t needed = i == 0 ? luma : planar_chroma;
+    if (!is_last) plane = plane.first(std::min(plane.size(), needed));
+    joined.insert(joined.end(), plane.begin(), plane.end());
+    if (!is_last && plane.size() < needed) break;
+  }
+  return joined;
 }
 
 std::optional<std::string> convert(const WirePicture& picture, Frame& frame) {
@@ -293,7 +340,9 @@ std::optional<std::string> convert(const WirePicture& picture, Frame& frame) {
         return damage;
       break;
     case Layout::nv12:
-      bytes = rgb_of_nv12(picture);
+    case Layout::i420:
+    case Layout::yv12:
+      bytes = rgb_of_420(picture);
       break;
     case Layout::yuyv:
     case Layout::uyvy:

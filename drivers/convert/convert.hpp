@@ -25,6 +25,8 @@ enum class Layout {
   yuyv,   // 4:2:2, Y Cb Y Cr
   uyvy,   // 4:2:2, Cb Y Cr Y
   nv12,   // 4:2:0, a plane of Y, then one of Cb Cr pairs
+  i420,   // 4:2:0, a plane of Y, one of Cb, one of Cr; the rows of the last two half as far apart
+  yv12,   // i420 with Cr before Cb
   mjpeg,  // a JFIF picture; its own header says the rest
 };
 
@@ -40,7 +42,7 @@ struct WireFormat {
   Layout layout = Layout::mono;
   int bits = 8;  // significant bits of a sample, 8 to 16; mono, Bayer, rgb and bgr only
   Packing packing = Packing::words;
-  YuvMatrix matrix = YuvMatrix::bt601;  // yuyv, uyvy and nv12 only
+  YuvMatrix matrix = YuvMatrix::bt601;  // Y'CbCr only, but for mjpeg
   YuvRange range = YuvRange::limited;
 
   friend bool operator==(const WireFormat&, const WireFormat&) = default;
@@ -48,8 +50,8 @@ struct WireFormat {
 
 struct WirePicture {
   WireFormat format;
-  int width = 0, height = 0;            // pixels
-  std::size_t stride = 0;               // bytes from row to row; 0: rows follow without a gap
+  int width = 0, height = 0;  // pixels
+  std::size_t stride = 0;     // bytes from row to row (of Y); 0: rows follow without a gap
   std::span<const std::uint8_t> bytes;  // may be more than the picture needs
 };
 
@@ -63,10 +65,17 @@ constexpr std::size_t most_picture_bytes = std::size_t{1} << 30;
 PixelFormat delivered_format(const WireFormat& format);
 BayerPattern bayer_pattern(const WireFormat& format);
 
-// Return the least number of bytes of a row, and of a whole picture (0 for mjpeg, whose size is
-// unknown).
+// Return the least number of bytes of a row (of Y), and of a whole picture (0 for mjpeg, whose size
+// is unknown).
 std::size_t row_bytes(const WireFormat& format, int width);
 std::size_t picture_bytes(const WireFormat& format, int width, int height, std::size_t stride = 0);
+
+// Returns planes that lie apart as one picture, in which each follows the last row of the one
+// before, as convert() wants them. What a plane has after its last row is dropped. After a plane
+// that lacks bytes nothing more follows, so that the picture is cut short.
+std::vector<std::uint8_t> joined_planes(const WireFormat& format, int width, int height,
+                                        std::size_t stride,
+                                        std::span<const std::span<const std::uint8_t>> planes);
 
 // Fills in frame.format, bayer, width, height and bytes. Returns what is wrong with the picture, in
 // words ("is cut short: 100 of 3072 bytes"), and leaves the frame alone, if it is not whole.

@@ -16,6 +16,7 @@
 #include <regex>
 
 #include "drivers/error.hpp"
+#include "drivers/frame_rate.hpp"
 #include "drivers/libcamera/mailbox.hpp"
 
 namespace previz::libcam {
@@ -103,6 +104,8 @@ constexpr auto known_pixel_formats = std::to_array<Known>({
     {lc::formats::YUYV, Layout::yuyv},
     {lc::formats::UYVY, Layout::uyvy},
     {lc::formats::NV12, Layout::nv12},
+    {lc::formats::YUV420, Layout::i420},
+    {lc::formats::YVU420, Layout::yv12},
     {lc::formats::MJPEG, Layout::mjpeg},
 });
 
@@ -250,21 +253,22 @@ struct Device::Impl {
   }
 
   void agree() {
-    if (settings.trigger) refuse("libcamera has no triggers; leave trigger out");
-    if (settings.packet_size) refuse("is no network camera; leave packet_size out");
+    if (settings.trigger) refuse("libcamera has no triggers; remove trigger");
+    if (settings.packet_size) refuse("is not a network camera; remove packet_size");
     if (settings.raw_gain) refuse("its gain is linear; gain sets it");
     agreed.drives_exposure = has(lc::controls::ExposureTime);
     agreed.drives_gain = has(lc::controls::AnalogueGain);
     if (settings.exposure_s && !agreed.drives_exposure)
-      refuse("its exposure cannot be set; leave exposure_s out");
-    if (settings.gain && !agreed.drives_gain) refuse("its gain cannot be set; leave gain out");
+      refuse("its exposure cannot be set; remove exposure_s");
+    if (settings.gain && !agreed.drives_gain) refuse("its gain cannot be set; remove gain");
     if (settings.gain && !settings.exposure_s)
       refuse("its gain and exposure are set together; give exposure_s too");
     if (settings.white_balance_k && !has(lc::controls::ColourTemperature))
-      refuse("has no colour temperature; leave white_balance_k out");
+      refuse("has no colour temperature; remove white_balance_k");
     if (settings.rate_hz && !has(lc::controls::FrameDurationLimits))
-      refuse("its rate cannot be set; leave rate_hz out");
+      refuse("its rate cannot be set; remove rate_hz");
     agree_on_format();
+    agree_on_rate();
   }
 
   void agree_on_format() {
@@ -292,8 +296,7 @@ struct Device::Impl {
     agreed.wire = wire_format(known, config.colorSpace);
     agreed.stride = known.layout == Layout::mjpeg ? 0 : config.stride;
     agreed.format = {convert::delivered_format(agreed.wire), static_cast<int>(config.size.width),
-                     static_cast<int>(config.size.height), settings.rate_hz.value_or(0),
-                     convert::bayer_pattern(agreed.wire)};
+                     static_cast<int>(config.size.height), 0, convert::bayer_pattern(agreed.wire)};
     const std::size_t least =
         convert::picture_bytes(agreed.wire, agreed.format.width, agreed.format.height);
     const std::size_t delivered =
@@ -304,6 +307,24 @@ struct Device::Impl {
     if (config.frameSize < least)
       refuse("says that a frame is " + std::to_string(config.frameSize) +
              " bytes; its picture is " + std::to_string(least));
+  }
+
+  // Returns a bound of the frame's duration; 0 for one that is no whole number of microseconds.
+  static double microseconds(const lc::ControlValue& bound) {
+    if (bound.type() != lc::ControlTypeInteger64 || bound.isArray()) return 0;
+    return static_cast<double>(bound.get<std::int64_t>());
+  }
+
+  // The bounds depend on the format. A pipeline clips a rate beyond them and does not report it.
+  void agree_on_rate() {
+    if (!settings.rate_hz) return;
+    const lc::ControlInfo& limits =
+        camera->controls().find(lc::controls::FrameDurationLimits.id())->second;
+    const RatesOnOffer offer =
+        rates_between(1e6 / microseconds(limits.max()), 1e6 / microseconds(limits.min()));
+    agreed.format.rate_hz = nearest_rate(offer, *settings.rate_hz);
+    if (const auto other = other_rate(settings, agreed.format.rate_hz, text_of(offer)))
+      agreed.doubts.push_back(*other);
   }
 
   // Returns the format that the set asks for; else what the camera proposes, if that can be
@@ -347,7 +368,7 @@ struct Device::Impl {
                    static_cast<std::int32_t>(std::lround(*settings.white_balance_k)));
     }
     if (settings.rate_hz) {
-      const std::int64_t frame_us = std::llround(1e6 / *settings.rate_hz);
+      const std::int64_t frame_us = std::llround(1e6 / agreed.format.rate_hz);
       controls.set(lc::controls::FrameDurationLimits, {frame_us, frame_us});
     }
     return controls;

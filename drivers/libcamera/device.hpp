@@ -36,6 +36,7 @@ struct Agreed {
   convert::WireFormat wire;
   std::size_t stride = 0;  // bytes
   bool drives_exposure = false, drives_gain = false;
+  std::vector<std::string> doubts;  // as Camera::doubts()
 };
 
 // A request that came back. Its bytes are valid until the buffer is queued again.

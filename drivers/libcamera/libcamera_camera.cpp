@@ -34,6 +34,7 @@ class LibcameraCamera final : public Camera {
   std::string name() const override { return settings_.device; }
   CameraFormat format() const override { return device_.agreed().format; }
   DeviceCounters counters() const override { return counters_; }
+  std::vector<std::string> doubts() const override { return device_.agreed().doubts; }
 
   void start() override {
     if (device_.streaming()) return;
@@ -126,15 +127,9 @@ class LibcameraCamera final : public Camera {
   // Returns the planes one after the other, as the conversions want them.
   std::span<const std::uint8_t> bytes_of(const Completed& completed) {
     if (completed.planes.size() == 1) return completed.planes.front();
-    joined_.clear();
-    for (std::size_t i = 0; i < completed.planes.size(); ++i) {
-      std::span<const std::uint8_t> plane = completed.planes[i];
-      // Bytes after the last row of the luma plane are no part of the picture.
-      const std::size_t luma =
-          device_.agreed().stride * static_cast<std::size_t>(device_.agreed().format.height);
-      if (i == 0) plane = plane.first(std::min(plane.size(), luma));
-      joined_.insert(joined_.end(), plane.begin(), plane.end());
-    }
+    const libcam::Agreed& agreed = device_.agreed();
+    joined_ = convert::joined_planes(agreed.wire, agreed.format.width, agreed.format.height,
+                                     agreed.stride, completed.planes);
     return joined_;
   }
 

@@ -1,13 +1,12 @@
 #include "drivers/v4l2/configure.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <vector>
 
 #include "drivers/error.hpp"
+#include "drivers/frame_rate.hpp"
 #include "drivers/v4l2/formats.hpp"
 
 namespace previz::v4l2 {
@@ -25,6 +24,10 @@ std::optional<v4l2_queryctrl> query(Node& node, std::uint32_t id) {
   if (node.control(VIDIOC_QUERYCTRL, &control) != 0) return std::nullopt;
   if (control.flags & V4L2_CTRL_FLAG_DISABLED) return std::nullopt;
   return control;
+}
+
+double rate_of(const v4l2_fract& period) {
+  return double(period.denominator) / period.numerator;
 }
 
 bool write(Node& node, std::uint32_t id, std::int32_t value) {
@@ -71,8 +74,8 @@ class Configuration {
       refuse("is multi-planar; the libcamera driver is for such cameras");
     if (!(can & V4L2_CAP_VIDEO_CAPTURE)) refuse("captures no video");
     if (!(can & V4L2_CAP_STREAMING)) refuse("cannot stream");
-    if (settings_.trigger) refuse("V4L2 has no triggers; leave trigger out");
-    if (settings_.packet_size) refuse("is no network camera; leave packet_size out");
+    if (settings_.trigger) refuse("V4L2 has no triggers; remove trigger");
+    if (settings_.packet_size) refuse("is not a network camera; remove packet_size");
     if (settings_.gain) refuse("its gain has no unit, so no factor can be set; raw_gain sets it");
   }
 
@@ -93,35 +96,31 @@ class Configuration {
     return names.empty() ? "none" : names;
   }
 
-  // Returns the rates that the node has for pictures of a format and size; none if it does not say.
-  std::vector<double> rates_of(std::uint32_t fourcc, std::uint32_t width,
-                               std::uint32_t height) const {
-    std::vector<double> rates;
+  // Returns the rates that the node offers for pictures of a format and size.
+  RatesOnOffer rates_of(std::uint32_t fourcc, std::uint32_t width, std::uint32_t height) const {
+    RatesOnOffer rates;
     v4l2_frmivalenum interval{};
     interval.pixel_format = fourcc;
     interval.width = width;
     interval.height = height;
-    const auto add = [&](const v4l2_fract& period) {
-      if (period.numerator > 0) rates.push_back(double(period.denominator) / period.numerator);
-    };
     for (; interval.index < most_entries; ++interval.index) {
       if (node_.control(VIDIOC_ENUM_FRAMEINTERVALS, &interval) != 0) break;
       if (interval.type == V4L2_FRMIVAL_TYPE_DISCRETE) {
-        add(interval.discrete);
+        if (interval.discrete.numerator > 0) rates.hz.push_back(rate_of(interval.discrete));
         continue;
       }
-      add(interval.stepwise.max);
-      add(interval.stepwise.min);
+      if (interval.stepwise.max.numerator > 0 && interval.stepwise.min.numerator > 0)
+        rates = rates_between(rate_of(interval.stepwise.max), rate_of(interval.stepwise.min));
       break;
     }
     return rates;
   }
 
-  // Returns whether the node can take that many frames a second, or does not say.
+  // Returns whether the node can send that many frames per second, or does not report it.
   bool holds_rate(std::uint32_t fourcc, const v4l2_pix_format& picture) const {
-    const std::vector<double> rates = rates_of(fourcc, picture.width, picture.height);
-    return !settings_.rate_hz || rates.empty() ||
-           *std::ranges::max_element(rates) >= 0.99 * *settings_.rate_hz;
+    const RatesOnOffer rates = rates_of(fourcc, picture.width, picture.height);
+    return !settings_.rate_hz || rates.hz.empty() ||
+           std::ranges::max(rates.hz) >= 0.99 * *settings_.rate_hz;
   }
 
   static bool is_compressed(std::uint32_t fourcc) {
@@ -142,19 +141,15 @@ class Configuration {
     return first;
   }
 
+  // Returns the rates at the picture's size by pixel format; empty if the node reports none.
   std::string rates_text(const v4l2_pix_format& picture) const {
     std::string text;
     for (const std::uint32_t fourcc : formats()) {
       if (!wire_format(fourcc)) continue;
-      std::string rates;
-      for (const double rate : rates_of(fourcc, picture.width, picture.height)) {
-        std::array<char, 32> one{};
-        std::snprintf(one.data(), one.size(), "%.5g", rate);
-        add_to_list(rates, one.data());
-      }
-      if (!rates.empty()) add_to_list(text, fourcc_name(fourcc) + " " + rates, "; ");
+      const std::string rates = text_of(rates_of(fourcc, picture.width, picture.height));
+      if (!rates.empty()) add_to_list(text, rates + " (pixel_format " + fourcc_name(fourcc) + ")");
     }
-    return text.empty() ? "not known" : text;
+    return text.empty() ? text : text + " at " + size_text(picture.width, picture.height);
   }
 
   // Returns the format that the set asks for; else what the node is set to, if that can be
@@ -262,24 +257,22 @@ class Configuration {
     v4l2_fract& period = parameters.parm.capture.timeperframe;
     if (settings_.rate_hz) {
       if (!(*settings_.rate_hz > 0 && *settings_.rate_hz <= most_rate_hz))
-        refuse("a rate of " + std::to_string(*settings_.rate_hz) + " Hz is not possible");
+        refuse(rate_not_possible(*settings_.rate_hz, std::nullopt, rates_text(picture_)));
       period = {1000, static_cast<std::uint32_t>(std::lround(1000 * *settings_.rate_hz))};
       check(node_.control(VIDIOC_S_PARM, &parameters), "its rate cannot be set");
     } else if (node_.control(VIDIOC_G_PARM, &parameters) != 0) {
       return;
     }
-    const double rate_hz = period.numerator > 0 ? double(period.denominator) / period.numerator : 0;
+    const double rate_hz = period.numerator > 0 ? rate_of(period) : 0;
     if (rate_hz <= most_rate_hz) agreed_.format.rate_hz = rate_hz;  // otherwise it is not known
-    if (const auto other = other_rate(settings_, agreed_.format.rate_hz))
-      agreed_.doubts.push_back(*other + "; at " + size_text(picture_.width, picture_.height) +
-                               " it has: " + rates_text(picture_) +
-                               " (pixel_format chooses; a smaller picture may be faster)");
+    if (const auto other = other_rate(settings_, agreed_.format.rate_hz, rates_text(picture_)))
+      agreed_.doubts.push_back(*other + "; a smaller picture may be faster");
   }
 
   void agree_on_exposure() {
     agreed_.drives_exposure = query(node_, V4L2_CID_EXPOSURE_ABSOLUTE).has_value();
     if (!agreed_.drives_exposure) {
-      if (settings_.exposure_s) refuse("its exposure cannot be set; leave exposure out");
+      if (settings_.exposure_s) refuse("its exposure cannot be set; remove exposure_s");
       return;
     }
     if (settings_.exposure_s) {
@@ -303,7 +296,7 @@ class Configuration {
     const std::string name(key);
     write(node_, automatic, 0);
     const std::optional<v4l2_queryctrl> bounds = query(node_, id);
-    if (!bounds) refuse("has no such control; leave " + name + " out");
+    if (!bounds) refuse("has no such control; remove " + name);
     if (*value < bounds->minimum || *value > bounds->maximum)
       refuse(name + " " + std::to_string(*value) + " is not possible; " +
              std::to_string(bounds->minimum) + " to " + std::to_string(bounds->maximum) + " is");

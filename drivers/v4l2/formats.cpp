@@ -62,6 +62,8 @@ constexpr auto table = std::to_array<Known>({
     {V4L2_PIX_FMT_YUYV, Layout::yuyv},
     {V4L2_PIX_FMT_UYVY, Layout::uyvy},
     {V4L2_PIX_FMT_NV12, Layout::nv12},
+    {V4L2_PIX_FMT_YUV420, Layout::i420},
+    {V4L2_PIX_FMT_YVU420, Layout::yv12},
     {V4L2_PIX_FMT_MJPEG, Layout::mjpeg},
     {V4L2_PIX_FMT_JPEG, Layout::mjpeg},
 });

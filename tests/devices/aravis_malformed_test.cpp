@@ -61,15 +61,16 @@ class AbsurdCamera : public testing::Test {
     ASSERT_TRUE(arv_fake_camera_write_register(fake_, at, value));
   }
 
-  static std::unique_ptr<Camera> open() {
+  static std::unique_ptr<Camera> open(std::optional<double> rate_hz = std::nullopt) {
     CameraSettings settings;
     settings.device = address;
     settings.packet_size = 1500;
+    settings.rate_hz = rate_hz;
     return camera_driver("aravis").open(settings);
   }
-  static std::string refusal() {
+  static std::string refusal(std::optional<double> rate_hz = std::nullopt) {
     try {
-      open();
+      open(rate_hz);
     } catch (const Error& error) {
       return error.what();
     }
@@ -135,6 +136,20 @@ TEST_F(AbsurdCamera, AnExposureThatCannotBeIsRefused) {
               "<FormulaFrom>" + std::string(formula) + "</FormulaFrom>"));
     EXPECT_THAT(refusal(), HasSubstr("says its exposure is")) << formula;
   }
+}
+
+// 60.3 is within a hundredth of what the camera has.
+TEST_F(AbsurdCamera, ARateBeyondItsBoundsIsRefusedInTheWordsOfEveryDriver) {
+  const std::string rate = "<pValue>AcquisitionFrameRateConverter</pValue>";
+  plug(with(description(), rate, rate + "<Min>10</Min><Max>60</Max>"));
+  EXPECT_EQ(
+      refusal(120),
+      "127.0.0.1: rate_hz 120 is not possible; allowed: 10 to 60; change rate_hz or remove it");
+  EXPECT_EQ(refusal(5),
+            "127.0.0.1: rate_hz 5 is not possible; allowed: 10 to 60; change rate_hz or remove it");
+  const auto camera = open(60.3);
+  EXPECT_NEAR(camera->format().rate_hz, 60, 0.01);
+  EXPECT_TRUE(camera->doubts().empty());
 }
 
 TEST_F(AbsurdCamera, ADescriptionThatIsNoneIsRefused) {

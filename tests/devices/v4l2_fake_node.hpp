@@ -26,6 +26,7 @@ struct FakeDevice {
   std::vector<std::uint32_t> formats{V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_YUYV};
   std::vector<std::pair<std::uint32_t, std::uint32_t>> sizes{{32, 24}, {16, 12}};
   std::map<std::uint32_t, std::vector<std::uint32_t>> rates;  // frames a second by format, if said
+  bool has_rates_between = false;  // the first of `rates` is the greatest, the second the least
   std::uint32_t extra_stride = 0;
   std::uint32_t field = V4L2_FIELD_NONE;
   std::map<std::uint32_t, v4l2_queryctrl> controls;
@@ -208,6 +209,11 @@ class FakeNode final : public Node {
   int entry(v4l2_frmivalenum& interval) const {
     const auto found = device_.rates.find(interval.pixel_format);
     if (found == device_.rates.end() || interval.index >= found->second.size()) return EINVAL;
+    if (device_.has_rates_between) {
+      interval.type = V4L2_FRMIVAL_TYPE_CONTINUOUS;
+      interval.stepwise = {{1, found->second[0]}, {1, found->second[1]}, {1, 1}};
+      return 0;
+    }
     interval.type = V4L2_FRMIVAL_TYPE_DISCRETE;
     interval.discrete = {1, found->second[interval.index]};
     return 0;

@@ -170,6 +170,8 @@ void write_texts(const fs::path& corpus) {
         std::string("\0\7\0\0\0\0\0\0\0\0\0\3\0\1\0\0", 16) + std::string(64, '\x55'));
   write(corpus / "wire/nv12",
         std::string("\0\11\0\0\0\0\0\1\0\1\0\3\0\3\0\0", 16) + std::string(64, '\x55'));
+  write(corpus / "wire/i420",
+        std::string("\0\12\0\0\0\0\0\1\0\1\0\3\0\3\0\0", 16) + std::string(64, '\x55'));
   write(corpus / "frames_json/list", R"({"name": "shoot", "clock": "camera",
  "observer": {"pictures": ["0000.png", "0001.png"], "timestamps_ns": [1, 2], "exposure": [1, 2],
   "intrinsics": {"width": 64, "height": 48, "fx": 50, "fy": 50, "cx": 31.5, "cy": 23.5},

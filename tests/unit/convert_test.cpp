@@ -147,27 +147,101 @@ TEST(Yuv, BothWaysFrom422AgreeForBt709) {
   }
 }
 
+// Puts the samples of a picture's planes into the order of a layout.
+struct Layout420 {
+  const char* name;
+  Layout layout;
+  Bytes of(const Bytes& luma, const Bytes& cb, const Bytes& cr) const {
+    Bytes bytes = luma;
+    const auto add = [&](const Bytes& plane) {
+      bytes.insert(bytes.end(), plane.begin(), plane.end());
+    };
+    if (layout == Layout::nv12)
+      for (std::size_t i = 0; i < cb.size(); ++i) bytes.insert(bytes.end(), {cb[i], cr[i]});
+    if (layout == Layout::i420) add(cb), add(cr);
+    if (layout == Layout::yv12) add(cr), add(cb);
+    return bytes;
+  }
+};
+constexpr Layout420 layouts_420[] = {
+    {"nv12", Layout::nv12}, {"i420", Layout::i420}, {"yv12", Layout::yv12}};
+
+Bytes with_gaps(const Bytes& samples, std::size_t row, std::size_t gap) {
+  Bytes bytes;
+  for (std::size_t i = 0; i < samples.size(); i += row) {
+    bytes.insert(bytes.end(), &samples[i], &samples[i] + row);
+    bytes.insert(bytes.end(), gap, 99);
+  }
+  return bytes;
+}
+
 // Luma 126, Cr 128; Cb of the chroma rows 100 and 140. MPEG-2 sites chroma row i at luma row
 // 2i + 1/2, so the luma rows see 100 (edge), 110, 130, 140 (edge).
-TEST(Yuv, Nv12ChromaIsSitedBetweenTheRows) {
-  const Frame frame = converted(plain(Layout::nv12), 2, 4,
-                                {126, 126, 126, 126, 126, 126, 126, 126, 100, 128, 140, 128});
+TEST(Yuv, ChromaOf420IsSitedBetweenTheRows) {
   const double cb[] = {100, 110, 130, 140};
-  for (int y = 0; y < 4; ++y) {
-    const double grey = 255.0 * (126 - 16) / 219.0;
-    const double blue = grey + 255.0 * 1.772 * (cb[y] - 128) / 224.0;
-    EXPECT_EQ(frame.bytes[6 * y + 0], std::lround(grey));
-    EXPECT_EQ(frame.bytes[6 * y + 2], std::lround(blue));
+  for (const Layout420& made : layouts_420) {
+    const Frame frame =
+        converted(plain(made.layout), 2, 4, made.of(Bytes(8, 126), {100, 140}, {128, 128}));
+    for (int y = 0; y < 4; ++y) {
+      const double grey = 255.0 * (126 - 16) / 219.0;
+      const double blue = grey + 255.0 * 1.772 * (cb[y] - 128) / 224.0;
+      EXPECT_EQ(frame.bytes[6 * y + 0], std::lround(grey)) << made.name;
+      EXPECT_EQ(frame.bytes[6 * y + 2], std::lround(blue)) << made.name;
+    }
   }
 }
 
-TEST(Yuv, Nv12ChromaIsLinearAlongTheRows) {
-  const Frame frame =
-      converted(plain(Layout::nv12), 4, 1, {126, 126, 126, 126, 128, 100, 128, 140});
+TEST(Yuv, ChromaOf420IsLinearAlongTheRows) {
   const double cr[] = {100, 120, 140, 140};
-  for (int x = 0; x < 4; ++x)
-    EXPECT_EQ(frame.bytes[3 * x],
-              std::lround(255.0 * (110.0 / 219.0 + 1.402 * (cr[x] - 128) / 224.0)));
+  for (const Layout420& made : layouts_420) {
+    const Frame frame =
+        converted(plain(made.layout), 4, 1, made.of(Bytes(4, 126), {128, 128}, {100, 140}));
+    for (int x = 0; x < 4; ++x)
+      EXPECT_EQ(frame.bytes[3 * x],
+                std::lround(255.0 * (110.0 / 219.0 + 1.402 * (cr[x] - 128) / 224.0)))
+          << made.name;
+  }
+}
+
+// The same samples in three orders, with and without gaps between the rows: the same pixels.
+TEST(Yuv, EveryLayoutOf420HasTheSamePixels) {
+  const int width = 31, height = 9;
+  const Bytes luma = random_bytes(32 * 9, 1), cb = random_bytes(16 * 5, 2),
+              cr = random_bytes(16 * 5, 3);
+  const Frame nv12 = converted(plain(Layout::nv12), width, height, layouts_420[0].of(luma, cb, cr));
+  for (const Layout420& made : layouts_420) {
+    const Bytes tight = made.of(luma, cb, cr);
+    EXPECT_EQ(picture_bytes(plain(made.layout), width, height), tight.size()) << made.name;
+    EXPECT_EQ(converted(plain(made.layout), width, height, tight).bytes, nv12.bytes) << made.name;
+    const bool is_planar = made.layout != Layout::nv12;
+    // Gaps of 8 bytes after 32; half of both after the rows of a chroma plane of its own.
+    Bytes wide = made.of(with_gaps(luma, 32, 8), with_gaps(cb, 16, 4), with_gaps(cr, 16, 4));
+    wide.resize(wide.size() - (is_planar ? 4 : 8));  // the last row has none
+    EXPECT_EQ(picture_bytes(plain(made.layout), width, height, 40), wide.size()) << made.name;
+    EXPECT_EQ(converted(plain(made.layout), width, height, wide, 40).bytes, nv12.bytes)
+        << made.name;
+  }
+}
+
+// Planes of 2x4 pixels with a stride of 4, each with a byte too many, as page alignment leaves
+// them.
+TEST(Yuv, PlanesThatLieApartAreJoinedWithoutWhatFollowsTheirLastRows) {
+  const Bytes luma{1, 2, 0, 0, 3, 4, 0, 0, 5, 6, 0, 0, 7, 8, 0, 0, 99};
+  const Bytes cb{10, 0, 11, 0, 99}, cr{20, 0, 21, 0, 99}, pairs{10, 20, 0, 0, 11, 21, 0, 0, 99};
+  const std::array<std::span<const std::uint8_t>, 3> three{luma, cb, cr};
+  const std::array<std::span<const std::uint8_t>, 2> two{luma, pairs};
+  const Bytes planar = joined_planes(plain(Layout::i420), 2, 4, 4, three);
+  EXPECT_EQ(planar, (Bytes{1, 2, 0, 0,  3, 4,  0, 0,  5, 6,  0, 0, 7,
+                           8, 0, 0, 10, 0, 11, 0, 20, 0, 21, 0, 99}));
+  EXPECT_EQ(
+      converted(plain(Layout::i420), 2, 4, planar, 4).bytes,
+      converted(plain(Layout::nv12), 2, 4, joined_planes(plain(Layout::nv12), 2, 4, 4, two), 4)
+          .bytes);
+  // A plane that lacks a byte takes none of the next one's place.
+  const std::array<std::span<const std::uint8_t>, 3> short_of_cb{luma, three[1].first(3), cr};
+  const Bytes cut = joined_planes(plain(Layout::i420), 2, 4, 4, short_of_cb);
+  Frame frame;
+  EXPECT_EQ(convert({plain(Layout::i420), 2, 4, 4, cut}, frame), "is cut short: 19 of 23 bytes");
 }
 
 // ---- plain samples
@@ -364,6 +438,8 @@ TEST(Malformed, ShortAndAbsurdPicturesAreRefusedInWords) {
       plain(Layout::yuyv),
       plain(Layout::uyvy),
       plain(Layout::nv12),
+      plain(Layout::i420),
+      plain(Layout::yv12),
   };
   for (const WireFormat& format : formats) {
     const std::size_t whole = picture_bytes(format, 9, 7);

@@ -271,9 +271,11 @@ TEST_F(LifelineTest, ADeviceThatIsPulledIsNotReset) {
 // A device as a recorder of what it is asked.
 class Asked final : public Camera {
  public:
-  explicit Asked(std::vector<double>& exposures) : exposures_(exposures) {}
+  explicit Asked(std::vector<double>& exposures, std::vector<std::string> doubts = {})
+      : exposures_(exposures), doubts_(std::move(doubts)) {}
   std::string name() const override { return "asked"; }
   CameraFormat format() const override { return {}; }
+  std::vector<std::string> doubts() const override { return doubts_; }
   void start() override {}
   void stop() override {}
   CameraEvent next(milliseconds) override { return DeviceTrouble{"asked", "is gone", true}; }
@@ -285,6 +287,7 @@ class Asked final : public Camera {
 
  private:
   std::vector<double>& exposures_;
+  const std::vector<std::string> doubts_;
 };
 
 TEST_F(LifelineTest, ExposuresAndCountersOutliveAnOpening) {
@@ -294,6 +297,20 @@ TEST_F(LifelineTest, ExposuresAndCountersOutliveAnOpening) {
   story(lifeline, milliseconds(800));  // opened at 0, 250 and 750 ms
   EXPECT_EQ(exposures, (std::vector<double>{0.25, 0.25, 0.25}));
   EXPECT_EQ(lifeline.counters().at("frames cut short"), 6u);
+}
+
+// Opened at 0 and 250 ms; story() checks that no doubt counts as a loss.
+TEST_F(LifelineTest, WhatADeviceDoesOtherwiseIsPassedOnAtEveryOpening) {
+  std::vector<double> exposures;
+  Lifeline lifeline = started([&] {
+    return std::make_unique<Asked>(
+        exposures, std::vector<std::string>{"sends 5 frames per second", "has no colour"});
+  });
+  const std::string opening =
+      " [sends 5 frames per second; has no colour]  [is gone; reopening it] ";
+  EXPECT_EQ(story(lifeline, milliseconds(400)), opening + opening);
+  EXPECT_EQ(lifeline.counters().at("opened"), 2u);
+  EXPECT_EQ(lifeline.counters().at("lost"), 2u);
 }
 
 }  // namespace lifeline_test

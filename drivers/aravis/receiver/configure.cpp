@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "drivers/aravis/pixel_formats.hpp"
+#include "drivers/frame_rate.hpp"
 
 namespace previz::aravis {
 namespace {
@@ -129,21 +130,22 @@ class Configuration {
 
   void agree_on_rate() {
     if (settings_.trigger) {  // setting a rate would end the trigger
-      if (settings_.rate_hz) refuse("its trigger sets its rate; leave rate_hz out");
+      if (settings_.rate_hz) refuse("its trigger sets its rate; remove rate_hz");
       return;
     }
     if (!arv_camera_is_frame_rate_available(&camera_, failure_.out())) {
-      if (settings_.rate_hz) refuse("its rate cannot be set; leave rate_hz out");
+      if (settings_.rate_hz) refuse("its rate cannot be set; remove rate_hz");
       return;
     }
     if (settings_.rate_hz) {
       double least = 0, most = 0;
       arv_camera_get_frame_rate_bounds(&camera_, &least, &most, failure_.out());
       check("frame rate");
-      if (!(*settings_.rate_hz >= least && *settings_.rate_hz <= most))
-        refuse("a frame rate of " + std::to_string(*settings_.rate_hz) + " Hz is not possible; " +
-               std::to_string(least) + " to " + std::to_string(most) + " is");
-      arv_camera_set_frame_rate(&camera_, *settings_.rate_hz, failure_.out());
+      const RatesOnOffer offer = rates_between(least, most);
+      const double nearest_hz = nearest_rate(offer, *settings_.rate_hz);
+      if (!is_same_rate(*settings_.rate_hz, nearest_hz))
+        refuse(rate_not_possible(*settings_.rate_hz, std::nullopt, text_of(offer)));
+      arv_camera_set_frame_rate(&camera_, nearest_hz, failure_.out());
       check("frame rate");
     }
     const double rate_hz = arv_camera_get_frame_rate(&camera_, failure_.out());
@@ -154,7 +156,7 @@ class Configuration {
     agreed_.gain_in_db = gain_is_in_db(camera_);
     agreed_.drives_exposure = arv_camera_is_exposure_time_available(&camera_, failure_.out());
     if (!agreed_.drives_exposure && settings_.exposure_s)
-      refuse("its exposure cannot be set; leave exposure out");
+      refuse("its exposure cannot be set; remove exposure_s");
     if (settings_.gain && !agreed_.gain_in_db)
       refuse("its gain is not in dB, so no factor can be set; raw_gain sets it");
     end_automatics();
@@ -201,7 +203,7 @@ class Configuration {
   // SFNC has colour ratios, not temperatures; only a calibration can say which ratio a lamp needs.
   void agree_on_white_balance() const {
     if (settings_.white_balance_k)
-      refuse("GenICam cameras have no colour temperature; leave white_balance_k out");
+      refuse("GenICam cameras have no colour temperature; remove white_balance_k");
   }
 
   void agree_on_chunks() {
@@ -212,7 +214,7 @@ class Configuration {
 
   void agree_on_packets() {
     if (!arv_camera_is_gv_device(&camera_)) {
-      if (settings_.packet_size) refuse("is no network camera; leave packet_size out");
+      if (settings_.packet_size) refuse("is not a network camera; remove packet_size");
       return;
     }
     // Packet sockets need a privilege that the daemon does not have.
