@@ -17,9 +17,8 @@ namespace previz {
 
 // The rates, in frames per second, that a device offers for the picture it is set to.
 struct RatesOnOffer {
-  std::vector<double> hz;  // empty: the device does not report any
-  bool all_between =
-      false;  // `hz` is the least and the greatest, and those between are offered too
+  std::vector<double> hz;    // empty: the device does not report any
+  bool all_between = false;  // `hz` is the least and the greatest, and others lie between
 };
 
 // Returns the rates from one to the other; none if these are no bounds, as a faulty device may

@@ -313,12 +313,12 @@ std::size_t picture_bytes(const WireFormat& format, int width, int height, std::
   return (rows - 1) * from_row_to_row + row;
 }
 
-std::vector<std::uint8_t> joined_planes(const WireFormat& format, int width, int height,
-                                        std::size_t stride,
-                                        std::span<const std::span<const std::uint8_t>> planes) {
+void join_planes(const WireFormat& format, int width, int height, std::size_t stride,
+                 std::span<const std::span<const std::uint8_t>> planes,
+                 std::vector<std::uint8_t>& joined) {
   const std::size_t luma_stride = stride ? stride : row_bytes(format, width), rows = height;
   const std::size_t luma = luma_stride * rows, planar_chroma = luma_stride / 2 * ((rows + 1) / 2);
-  std::vector<std::uint8_t> joined;
+  joined.clear();
   for (std::size_t i = 0; i < planes.size(); ++i) {
     std::span<const std::uint8_t> plane = planes[i];
     const bool is_last = i + 1 == planes.size();
@@ -327,7 +327,6 @@ std::vector<std::uint8_t> joined_planes(const WireFormat& format, int width, int
     joined.insert(joined.end(), plane.begin(), plane.end());
     if (!is_last && plane.size() < needed) break;
   }
-  return joined;
 }
 
 std::optional<std::string> convert(const WirePicture& picture, Frame& frame) {

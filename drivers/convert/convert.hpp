@@ -70,12 +70,13 @@ BayerPattern bayer_pattern(const WireFormat& format);
 std::size_t row_bytes(const WireFormat& format, int width);
 std::size_t picture_bytes(const WireFormat& format, int width, int height, std::size_t stride = 0);
 
-// Returns planes that lie apart as one picture, in which each follows the last row of the one
-// before, as convert() wants them. What a plane has after its last row is dropped. After a plane
-// that lacks bytes nothing more follows, so that the picture is cut short.
-std::vector<std::uint8_t> joined_planes(const WireFormat& format, int width, int height,
-                                        std::size_t stride,
-                                        std::span<const std::span<const std::uint8_t>> planes);
+// Puts planes that lie apart into one picture, in which each follows the last row of the one
+// before, as convert() wants them; replaces what was in `joined`. What a plane has after its last
+// row is dropped, but for the last plane's. After a plane that lacks bytes nothing more follows, so
+// that the picture is cut short.
+void join_planes(const WireFormat& format, int width, int height, std::size_t stride,
+                 std::span<const std::span<const std::uint8_t>> planes,
+                 std::vector<std::uint8_t>& joined);
 
 // Fills in frame.format, bayer, width, height and bytes. Returns what is wrong with the picture, in
 // words ("is cut short: 100 of 3072 bytes"), and leaves the frame alone, if it is not whole.

@@ -265,8 +265,6 @@ struct Device::Impl {
       refuse("its gain and exposure are set together; give exposure_s too");
     if (settings.white_balance_k && !has(lc::controls::ColourTemperature))
       refuse("has no colour temperature; remove white_balance_k");
-    if (settings.rate_hz && !has(lc::controls::FrameDurationLimits))
-      refuse("its rate cannot be set; remove rate_hz");
     agree_on_format();
     agree_on_rate();
   }
@@ -318,6 +316,7 @@ struct Device::Impl {
   // The bounds depend on the format. A pipeline clips a rate beyond them and does not report it.
   void agree_on_rate() {
     if (!settings.rate_hz) return;
+    if (!has(lc::controls::FrameDurationLimits)) refuse("its rate cannot be set; remove rate_hz");
     const lc::ControlInfo& limits =
         camera->controls().find(lc::controls::FrameDurationLimits.id())->second;
     const RatesOnOffer offer =

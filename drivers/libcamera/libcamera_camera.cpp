@@ -128,8 +128,8 @@ class LibcameraCamera final : public Camera {
   std::span<const std::uint8_t> bytes_of(const Completed& completed) {
     if (completed.planes.size() == 1) return completed.planes.front();
     const libcam::Agreed& agreed = device_.agreed();
-    joined_ = convert::joined_planes(agreed.wire, agreed.format.width, agreed.format.height,
-                                     agreed.stride, completed.planes);
+    convert::join_planes(agreed.wire, agreed.format.width, agreed.format.height, agreed.stride,
+                         completed.planes, joined_);
     return joined_;
   }
 

@@ -223,6 +223,13 @@ TEST(Yuv, EveryLayoutOf420HasTheSamePixels) {
   }
 }
 
+Bytes joined_planes(const WireFormat& format, int width, int height, std::size_t stride,
+                    std::span<const std::span<const std::uint8_t>> planes) {
+  Bytes joined{1, 2, 3};  // of the frame before
+  join_planes(format, width, height, stride, planes, joined);
+  return joined;
+}
+
 // Planes of 2x4 pixels with a stride of 4, each with a byte too many, as page alignment leaves
 // them.
 TEST(Yuv, PlanesThatLieApartAreJoinedWithoutWhatFollowsTheirLastRows) {
