@@ -26,7 +26,6 @@ struct FakeDevice {
   std::vector<std::uint32_t> formats{V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_YUYV};
   std::vector<std::pair<std::uint32_t, std::uint32_t>> sizes{{32, 24}, {16, 12}};
   std::map<std::uint32_t, std::vector<std::uint32_t>> rates;  // frames a second by format, if said
-  bool has_rates_between = false;  // the first of `rates` is the greatest, the second the least
   std::uint32_t extra_stride = 0;
   std::uint32_t field = V4L2_FIELD_NONE;
   std::map<std::uint32_t, v4l2_queryctrl> controls;
@@ -43,6 +42,7 @@ struct FakeDevice {
   std::function<void(v4l2_pix_format&)> format_made = [](v4l2_pix_format&) {};
   std::optional<int> queues_until_error;  // so many buffers are queued; then ENOMEM
   bool has_events = false;
+  bool has_rates_between = false;  // the first of `rates` is the greatest, the second the least
 
   // Its buffers, and what it has sent.
   std::vector<std::vector<std::uint8_t>> memory;

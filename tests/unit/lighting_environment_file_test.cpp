@@ -250,7 +250,7 @@ TEST(LoadEnvironment, AHugeWindowIsRefusedBeforeMemoryIsAskedFor) {
 TEST(LoadEnvironment, AHugeAttributeIsRefusedBeforeMemoryIsAskedFor) {
   const previz::test::TemporaryDirectory directory;
   const auto file = directory / "sky.exr";
-  const std::string name("owner\0string", 13);  // and a zero
+  const std::string name("owner\0string\0", 13);
   std::ofstream(file, std::ios::binary) << std::string("\x76\x2f\x31\x01\2\0\0\0", 8) << name
                                         << std::string("\xff\xff\xff\x7f", 4) << "and little more";
   EXPECT_NE(message_of(file).find("its header is damaged"), std::string::npos) << message_of(file);
