@@ -36,9 +36,9 @@ int do_takes(const CLI::App& app, const TakesCommands& commands, std::ostream& o
              const std::stop_token& stop) {
   const CLI::App& takes = *app.get_subcommand("takes");
   if (takes.got_subcommand("check")) return post::check_takes(commands.checked, out, stop);
+  if (takes.got_subcommand("copy")) return post::copy_takes(commands.copied, out, stop);
   if (takes.got_subcommand("list")) post::list_takes(commands.listed, out);
   if (takes.got_subcommand("mark")) post::mark_takes(commands.marked, !commands.not_good, out);
-  if (takes.got_subcommand("copy")) post::copy_takes(commands.copied, out, stop);
   if (takes.got_subcommand("delete")) post::delete_takes(commands.deleted, commands.also_good, out);
   return 0;
 }

@@ -173,21 +173,30 @@ void mark_takes(const Paths& takes, bool good, std::ostream& out) {
   }
 }
 
+namespace {
+
+// Reads a take from end to end. Returns what is damaged or missing, in words.
+std::vector<std::string> damage_of(const fs::path& take, const std::stop_token& stop) {
+  std::vector<std::string> faults;
+  try {
+    session::Session session = session::open_session(take, stop);
+    for (const char* stream : {"observer", "light", "composite"})
+      static_cast<void>(session::open_stream(session, stream, stop));
+    faults = session.missing;
+    for (const std::string& fault : checksum_faults(take, stop)) faults.push_back(fault);
+  } catch (const Error& error) {
+    if (stop.stop_requested()) throw;
+    faults.emplace_back(error.what());
+  }
+  return faults;
+}
+
+}  // namespace
+
 int check_takes(const Paths& takes, std::ostream& out, const std::stop_token& stop) {
   int result = 0;
   for (const ListedTake& take : takes_at_rest(takes)) {
-    std::vector<std::string> faults;
-    try {
-      session::Session session = session::open_session(take.directory, stop);
-      for (const char* stream : {"observer", "light", "composite"})
-        static_cast<void>(session::open_stream(session, stream, stop));
-      faults = session.missing;
-      for (const std::string& fault : checksum_faults(take.directory, stop))
-        faults.push_back(fault);
-    } catch (const Error& error) {
-      if (stop.stop_requested()) throw;
-      faults.emplace_back(error.what());
-    }
+    const std::vector<std::string> faults = damage_of(take.directory, stop);
     for (const std::string& fault : faults) out << take.directory.string() << ": " << fault << '\n';
     if (faults.empty())
       out << take.directory.string() << ": whole, " << take.summary.frames << " frames"
@@ -198,7 +207,8 @@ int check_takes(const Paths& takes, std::ostream& out, const std::stop_token& st
   return result;
 }
 
-void copy_takes(const CopyOptions& options, std::ostream& out, const std::stop_token& stop) {
+int copy_takes(const CopyOptions& options, std::ostream& out, const std::stop_token& stop) {
+  int result = 0;
   const std::vector<ListedTake> takes = takes_at_rest(options.takes);
   session::make_folders(options.folder);
   for (const ListedTake& take : takes) {
@@ -207,7 +217,13 @@ void copy_takes(const CopyOptions& options, std::ostream& out, const std::stop_t
     out << copy.string()
         << (was_made ? ": " + size_words(take.bytes) + ", checked" : ": was copied before")
         << std::endl;
+    // The bytes are the same; whether they are a whole take is another question.
+    for (const std::string& fault : damage_of(copy, stop)) {
+      out << copy.string() << ": the take itself is damaged, not by copying: " << fault << '\n';
+      result = 1;
+    }
   }
+  return result;
 }
 
 void delete_takes(const Paths& takes, bool also_good, std::ostream& out) {

@@ -30,9 +30,10 @@ struct CopyOptions {
 };
 // Copies the takes' own files and nothing else, writes their SHA-256 into the copy's SHA256SUMS
 // (`sha256sum -c` reads it), and compares copy and take by reading both back. A copy gets its name
-// when it is whole; a stop or an error leaves none. What was copied before is left as it is. Throws
-// previz::Error.
-void copy_takes(const CopyOptions& options, std::ostream& out, const std::stop_token& stop);
+// when it is whole; a stop or an error leaves none. What was copied before is left as it is. Then
+// reads the copy as check_takes does: a take that was damaged before is copied as it is, and said.
+// Returns 0, or 1 if one is damaged. Throws previz::Error.
+int copy_takes(const CopyOptions& options, std::ostream& out, const std::stop_token& stop);
 
 // Deletes the takes' own files and the SHA256SUMS of a copy, and each folder that is then empty;
 // whatever else lies in it stays and is reported. Throws previz::Error, and deletes nothing, if one

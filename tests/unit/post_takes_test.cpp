@@ -194,6 +194,22 @@ TEST_F(Takes, ADamagedCopyIsFound) {
   EXPECT_THAT(out.str(), HasSubstr("track.jsonl: was changed since it was copied; copy the take"));
 }
 
+// A frame that was damaged on the rig's disk: the copy is the same, byte for byte, and as damaged.
+TEST_F(Takes, ADamagedTakeIsCopiedAsItIsAndSaid) {
+  const fs::path film = one_ / "observer.mkv";
+  ASSERT_TRUE(fs::exists(film));
+  {
+    std::fstream file(film, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(fs::file_size(film) / 2));
+    file << "XXXXXXXXXXXXXXXX";
+  }
+  std::ostringstream out;
+  EXPECT_EQ(copy_takes({{one_}, directory_ / "disk"}, out, {}), 1);
+  EXPECT_THAT(out.str(), HasSubstr("checked"));
+  EXPECT_THAT(out.str(), HasSubstr("the take itself is damaged, not by copying: observer.mkv"));
+  EXPECT_EQ(copy_takes({{two_}, directory_ / "disk"}, out, {}), 0);
+}
+
 TEST_F(Takes, AMarkIsNoDamageToACopy) {
   const fs::path disk = directory_ / "disk", copy = disk / "12A_take001";
   copy_takes({{one_}, disk}, out_, {});
