@@ -124,7 +124,7 @@ void read_pictures(const CameraMembers& camera, FootageDescription& footage) {
     m.fail("video", "contradicts pictures; one of them is allowed");
   if (m.has("video")) {
     footage.video = camera.folder / m.read<std::string>("video");
-    if (!fs::is_regular_file(footage.video))
+    if (std::error_code none; !fs::is_regular_file(footage.video, none))
       m.fail("video", "names " + footage.video.string() + ", which is not a file");
     footage.read_as = read_read_as(m);
   } else if (m.has("pictures") && m.value("pictures").is_string() &&
@@ -143,7 +143,7 @@ void read_pictures(const CameraMembers& camera, FootageDescription& footage) {
     m.fail("pictures", "is missing; allowed: pictures, video, or csv with a column \"file\"");
   }
   for (const fs::path& picture : footage.pictures)
-    if (!fs::is_regular_file(picture))
+    if (std::error_code none; !fs::is_regular_file(picture, none))
       throw Error(picture.string() + ": is not a file, but " + m.path("pictures") + " lists it");
 }
 

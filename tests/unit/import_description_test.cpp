@@ -324,6 +324,20 @@ TEST(ImportDescription, NothingIsOverwritten) {
   EXPECT_NO_THROW(shoot.import());  // an empty folder is taken
 }
 
+// The system refuses such a name without looking; the words are those of any file that is missing.
+TEST(ImportDescription, ANameThatIsTooLongIsAMissingFile) {
+  const test::TemporaryDirectory folder;
+  session::write_content(folder.path() / "F.json",
+                         "{\"name\": \"a\", \"observer\": {\"video\": \"" + std::string(300, 'b') +
+                             "\", \"exposure\": 1}}");
+  try {
+    import_session({folder.path() / "F.json", folder.path() / "take"});
+    ADD_FAILURE() << "not refused";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("observer.video"), std::string::npos) << error.what();
+  }
+}
+
 TEST(ImportDescription, WhatIsNotJsonIsAnError) {
   const test::TemporaryDirectory folder;
   const auto error_of = [&](const std::string& text) -> std::string {
