@@ -17,7 +17,7 @@ namespace {
 
 using Pictures = std::vector<std::shared_ptr<const Frame>>;
 
-// Of fewer, some may be patterns of the room that look like one.
+// The least different ids that count as a board: fewer may be patterns of the room.
 constexpr std::size_t least_markers = 3;
 const std::array tag_families = {"tag36h11",      "tag25h9",          "tag16h5",
                                  "tag36h10",      "tagStandard41h12", "tagStandard52h13",
@@ -59,7 +59,7 @@ std::string other_chessboard(const Pictures& pictures, const Board& board,
       chessboard_words(largest, board.square_m));
 }
 
-// What was seen of one dictionary or family.
+// The markers or tags of one dictionary or family that pictures show.
 struct Seen {
   std::string name;
   std::size_t count = 0;  // over all pictures

@@ -200,7 +200,8 @@ std::vector<double> read_series(const CameraMembers& camera, const std::string& 
   return {m.read<double>(key, positive)};
 }
 
-// Of a video without times it is not known yet, but its lists must all be for as many.
+// Returns the number of frames that is described; 0: it is not known yet, as of a video without
+// times. The lists of such a video must all be for as many.
 std::size_t frame_count(const FootageDescription& footage) {
   std::size_t count = std::max(footage.pictures.size(), footage.timestamps_ns.size());
   if (count > 0) return count;

@@ -95,7 +95,7 @@ std::vector<Members> Members::objects(const std::string& key,
 
 namespace {
 
-// Whether a file begins as text does: videos and pictures have bytes that no text has.
+// Returns whether a file begins as text does: videos and pictures have bytes that no text has.
 bool is_text_at_its_start(std::istream& stream) {
   char start[64];
   stream.clear();

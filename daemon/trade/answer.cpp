@@ -21,7 +21,7 @@ constexpr double worth_keeping = 0.97;
 constexpr std::array scales = {1.0, 0.7071, 0.5, 0.3536, 0.25};
 constexpr std::array step_samples = {1, 2, 4, 8, 16};
 constexpr std::size_t most_steps = 8;
-// What brought less than this alone is not tried together with others.
+// A variant that brought less than this alone is not tried together with others.
 constexpr double hopeless_gain = 0.8;
 // A rehearsal that takes this much longer than frames alone asks for another plan.
 constexpr double worth_planning_anew = 1.25;
@@ -50,7 +50,8 @@ struct Candidate {
   double gain;
 };
 
-// What is worth a try, the most promising first. What was clearly worse alone is not.
+// Returns the variants that are worth a try, the most promising first, without those that were
+// clearly worse alone.
 std::vector<Candidate> candidates(const TradeSettings& own, const std::vector<TradeAxis>& axes,
                                   const TradeProbe& probe, bool is_live) {
   std::vector<Candidate> found;

@@ -46,7 +46,7 @@ struct StillCurves {
   ErrorCurve noisy, denoised;
 };
 
-// What the search asks of the sweep.
+// The measurements that the search asks for.
 struct TradeProbe {
   // The square of the error of the picture, made with the settings in these samples at a scale
   // relative to the sweep's size; of all rounds if it is to be stated.

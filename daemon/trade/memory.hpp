@@ -17,7 +17,7 @@
 
 namespace previz::trade {
 
-// What one number of samples with some settings gave, with an entry a round in each.
+// The measurements with some settings and one number of samples, with an entry a round in each.
 struct KeptPoint {
   std::string settings;  // settings_words()
   int samples = 0;

@@ -12,7 +12,7 @@ namespace previz::trade {
 namespace {
 
 constexpr std::size_t timed_frames = 3;
-// Of frames that take long, fewer are timed.
+// Once timed frames have taken so long together, no more are timed.
 constexpr double long_s = 0.5;
 constexpr double small_scale = 0.25;  // PathCost's small frames
 

@@ -63,7 +63,7 @@ class PathCost {
         fixed_(parts[5]),
         per_pixels_(parts[6]),
         denoise_(parts[7]) {}
-  // Of known parts: fixed, of a sample and of denoising, all of the whole picture, in seconds.
+  // Makes the cost of known parts, all of the whole picture, in seconds.
   PathCost(double fixed_s, double per_sample_s, double denoise_s)
       : per_sample_(per_sample_s), whole_(fixed_s), per_pixels_(fixed_s), denoise_(denoise_s) {}
 

@@ -412,7 +412,7 @@ Plate Sweep::displayed(const TradePicture& picture) const {
   return plate;
 }
 
-// What a method brought alone, in the time of the set's own at few samples, or at the most.
+// Compares a method with the set's own, in the time of the latter at few samples, or at the most.
 double Sweep::gain(const TradeSettings& settings, bool is_live) const {
   const auto planned =
       std::ranges::find(report_.plan.methods, settings, &TradePlan::Method::settings);

@@ -62,7 +62,7 @@ std::string answer_file(const TradeReport& report, const TradeAnswer& answer) {
          answer.file.filename().string() + "\n\n" + answer.toml;
 }
 
-// What the last trade in the directory measured, if it was of the same.
+// Returns what the last trade in the directory measured, if it was of the same.
 TradeMemory remembered(const TradeOptions& options, const fs::path& directory,
                        const std::string& key, std::ostream& out) {
   if (options.anew) return {};
