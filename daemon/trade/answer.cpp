@@ -206,7 +206,9 @@ std::string live_words(const TradeQuestion& question, const TradeAnswer& answer,
   std::string words = fmt::format("{:g} pictures a second with {}, error {}", question.fps,
                                   making_words(answer.making), error_words(answer));
   if (answer.shown_fps == 0)
-    return words + "; there was no time to rehearse it beside tracking and lighting";
+    return words + (answer.not_rehearsed.empty()
+                        ? "; there was no time to rehearse it beside tracking and lighting"
+                        : "; its rehearsal failed: " + answer.not_rehearsed);
   if (take_fps < rate_tolerance * question.fps)
     words += fmt::format("; rehearsed at the take's {:.3g} a second", take_fps);
   return words;
@@ -278,6 +280,7 @@ class LiveSearch {
     answer.seconds = plan.found.seconds;
     probe_.step("live: rehearsal of the take");
     const Rehearsal rehearsal = probe_.rehearse(plan.set);
+    answer.not_rehearsed = rehearsal.why_not;
     if (rehearsal.fps > 0) {
       answer.making = rehearsal.making;
       answer.seconds = rehearsal.frame_s;

@@ -35,6 +35,7 @@ struct TradeAnswer {
   double error = 0, error_deviation = 0;
   double shown_fps =
       0;  // live: the pictures a second of the rehearsal; 0: there was no time for one
+  std::string not_rehearsed = {};  // live: why the rehearsal showed nothing; empty: no time
   bool is_met = false;
   bool is_whole = true;             // all settings were tried; otherwise time ran out
   std::string toml = {};            // set::overlay_toml()

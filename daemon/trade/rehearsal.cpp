@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -82,13 +83,31 @@ class Shown {
   std::vector<Picture> pictures_;
 };
 
+// The first error that a stage reports: why nothing was shown.
+class FirstFailure {
+ public:
+  void hear(const report::Report& report) {
+    const std::lock_guard lock(mutex_);
+    if (words_.empty() && report.severity == report::Severity::error) words_ = report.text;
+  }
+  std::string words() const {
+    const std::lock_guard lock(mutex_);
+    return words_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::string words_;
+};
+
 }  // namespace
 
 Rehearsal rehearse(const std::shared_ptr<render::Device>& device, const set::Set& set,
                    const scene::Scene& scene, const std::filesystem::path& take, double seconds,
                    const std::stop_token& stop) {
   const set::Set played = on_take(set, take);
-  report::Reports reports([](const report::Report&) {});
+  FirstFailure failure;  // Reports calls it on one thread at a time
+  report::Reports reports([&](const report::Report& report) { failure.hear(report); });
   pipeline::Metrics metrics;
   pipeline::Liveness liveness;
   rig::Cameras cameras = rig::open_cameras(played, true);
@@ -126,6 +145,7 @@ Rehearsal rehearse(const std::shared_ptr<render::Device>& device, const set::Set
   const std::size_t settled = shown.count();
   wait_until(in(seconds));
   Rehearsal found = shown.since(settled);
+  if (found.fps == 0) found.why_not = failure.words();
   const set::PreviewStep step = pipeline.governed();
   found.making = {std::max(step.samples, 1), step.scale,
                   step.denoise.value_or(played.quality.denoise)};

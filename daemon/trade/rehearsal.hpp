@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <stop_token>
+#include <string>
 
 #include "daemon/render/renderer.hpp"
 #include "daemon/scene/scene.hpp"
@@ -14,9 +15,10 @@
 namespace previz::trade {
 
 struct Rehearsal {
-  double fps = 0;      // pictures a second, once the rate had settled; 0: too few were shown
-  double frame_s = 0;  // time that the render stage worked on each of those
-  Making making;       // of the last picture: what the governor had come to
+  double fps = 0;            // pictures a second, once the rate had settled; 0: too few were shown
+  double frame_s = 0;        // time that the render stage worked on each of those
+  Making making;             // of the last picture: what the governor had come to
+  std::string why_not = {};  // fps is 0 because a stage failed so
 };
 
 // Plays `take` in the place of the set's cameras, over and over in its own time, and shows the
