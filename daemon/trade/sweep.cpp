@@ -430,7 +430,7 @@ double Sweep::gain(const TradeSettings& settings, bool is_live) const {
 Rehearsal Sweep::rehearsal_of(const set::Set& set) {
   const double left = budget_.left(TradePhase::live_rehearsal, steady_s());
   if (left < shortest_rehearsal_s) return {};
-  const Rehearsal rehearsal =
+  Rehearsal rehearsal =
       rehearse(device_, set, scene_, frame_.take(), std::min(left, rehearsal_s), options_.stop);
   stop_if_asked();
   return rehearsal;
