@@ -1,10 +1,14 @@
 #include "daemon/calibrate/board.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <charconv>
 #include <optional>
 #include <sstream>
 
 #include "daemon/calibrate/length.hpp"
+#include "daemon/set/tag_families.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::calibrate {
@@ -106,6 +110,9 @@ Board parse_board(const std::string& text) {
     const std::string family = parts.has(4) ? parts.part(4, "family") : "tag36h11";
     board.is_kalibr = family == "kalibr";
     board.dictionary = board.is_kalibr ? "tag36h11" : family;
+    if (std::ranges::count(set::tag_families, board.dictionary) == 0)
+      parts.fail(fmt::format("has tags of the family \"{}\", which is not known (known: {})",
+                             family, fmt::join(set::tag_families, ", ")));
     board.first_id = parts.has(5) ? parts.whole(5, "first id") : 0;
     parts.ends_after(6);
     add_tags(board);

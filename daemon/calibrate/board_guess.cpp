@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <opencv2/aruco.hpp>
 #include <opencv2/calib3d.hpp>
 #include <set>
 
 #include "daemon/calibrate/marker_dictionary.hpp"
+#include "daemon/set/tag_families.hpp"
 #include "daemon/tracking/photometry.hpp"
 #include "daemon/tracking/tag_detector.hpp"
 
@@ -19,9 +19,6 @@ using Pictures = std::vector<std::shared_ptr<const Frame>>;
 
 // The least different ids that count as a board: fewer may be patterns of the room.
 constexpr std::size_t least_markers = 3;
-const std::array tag_families = {"tag36h11",      "tag25h9",          "tag16h5",
-                                 "tag36h10",      "tagStandard41h12", "tagStandard52h13",
-                                 "tagCircle21h7", "tagCircle49h12",   "tagCustom48h12"};
 
 cv::Mat1b gray(const Frame& frame, const ResponseCurve& response) {
   const std::vector<std::uint8_t> samples = tracking::Photometry(response).gray8(frame);
@@ -141,7 +138,7 @@ std::string other_aprilgrid(const Pictures& pictures, const Board& board,
                             const ResponseCurve& response) {
   Seen most = seen_tags(pictures, "tag36h11", true, response);
   bool is_wide = most.count > 0;
-  for (const char* family : tag_families) {
+  for (const char* family : set::tag_families) {
     const Seen seen = seen_tags(pictures, family, false, response);
     if (seen.count <= most.count) continue;
     most = seen;

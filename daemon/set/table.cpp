@@ -4,6 +4,7 @@
 #include <variant>
 
 #include "daemon/set/actions.hpp"
+#include "daemon/set/tag_families.hpp"
 #include "drivers/camera_drivers.hpp"
 #include "drivers/display_drivers.hpp"
 
@@ -28,10 +29,6 @@ using namespace units;
 using calibration::far_m, calibration::max_picture_side_px;
 
 constexpr Unit seconds{"s", 1}, stops{"stops", 1}, megabytes{"MB", 1};
-
-constexpr const char* tag_families[] = {"tag36h11",      "tag25h9",          "tag16h5",
-                                        "tag36h10",      "tagStandard41h12", "tagStandard52h13",
-                                        "tagCircle21h7", "tagCircle49h12",   "tagCustom48h12"};
 
 // Lists what a camera's `driver` may be: a replayed session, a camera driver, or none.
 std::span<const char* const> camera_driver_words() {

@@ -33,8 +33,7 @@ struct TradeAnswer {
   double seconds = 0;  // a frame, at full size
   // Of the picture, as measured at the sweep's size, and the standard deviation of that.
   double error = 0, error_deviation = 0;
-  double shown_fps =
-      0;  // live: the pictures a second of the rehearsal; 0: there was no time for one
+  double shown_fps = 0;  // live: the pictures a second of the rehearsal; 0: it showed none
   std::string not_rehearsed = {};  // live: why the rehearsal showed nothing; empty: no time
   bool is_met = false;
   bool is_whole = true;             // all settings were tried; otherwise time ran out

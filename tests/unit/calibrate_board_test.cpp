@@ -59,6 +59,8 @@ TEST(Board, EveryMistakeIsNamed) {
 TEST(Board, UnknownDictionariesAndFamiliesAreNamed) {
   EXPECT_THROW(make_board_finder(parse_board("charuco:5x5:20mm:15mm:8x8_50"), {}), Error);
   EXPECT_THROW(make_board_finder(parse_board("charuco:20x20:20mm:15mm:4x4_50"), {}), Error);
+  EXPECT_NE(problem("aprilgrid:6x6:24mm:7mm:tag99h9").find("family \"tag99h9\""),
+            std::string::npos);
 }
 
 constexpr int width = 640, height = 480;

@@ -156,6 +156,21 @@ TEST(TradeAnswer, SaysTheRateThatIsShownWhereNoneHolds) {
       << answers[0].words;
 }
 
+TEST(TradeAnswer, SaysWhyARehearsalShowedNothing) {
+  Simulated simulated;
+  TradeProbe probe = simulated.probe();
+  const auto words_after = [&](const std::string& why_not) {
+    probe.rehearse = [&](const set::Set&) { return Rehearsal{0, 0, {}, why_not}; };
+    return answer({25, 0.1}, {}, {}, {}, probe)[0].words;
+  };
+  const std::string failed = words_after("light: lights.mkv: no frame can be read");
+  EXPECT_TRUE(failed.ends_with("its rehearsal failed: light: lights.mkv: no frame can be read"))
+      << failed;
+  const std::string late = words_after("");
+  EXPECT_TRUE(late.ends_with("there was no time to rehearse it beside tracking and lighting"))
+      << late;
+}
+
 // Denoised pictures never get below 0.1 by their bias; noisy ones reach 0.05 with 64 samples.
 TEST(TradeAnswer, TakesNoiseForABias) {
   Simulated simulated;
