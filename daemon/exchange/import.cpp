@@ -1,7 +1,6 @@
 #include "daemon/exchange/import.hpp"
 
 #include <fmt/format.h>
-#include <stdlib.h>
 
 #include <algorithm>
 #include <chrono>
@@ -15,7 +14,7 @@
 #include "daemon/scene/assets.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/files.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/nominal_rate.hpp"
 #include "drivers/session/session.hpp"
 
@@ -24,45 +23,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A folder beside `target` that gets the target's name when it is complete, and is otherwise
-// removed.
-class Draft {
- public:
-  explicit Draft(const fs::path& target) : target_(fs::absolute(target)) {
-    if (!target_.has_filename()) target_ = target_.parent_path();
-    std::error_code failure;
-    if (fs::exists(target_) && !(fs::is_directory(target_) && fs::is_empty(target_)))
-      throw Error(target_.string() + ": is there already; a session needs a name of its own");
-    fs::create_directories(target_.parent_path(), failure);
-    std::string name = target_.parent_path() / ".";
-    name += target_.filename().string();
-    name += ".XXXXXX";
-    if (!::mkdtemp(name.data()))
-      throw Error(target_.parent_path().string() + ": no folder can be made in it");
-    path_ = name;
-    fs::permissions(path_, fs::perms{0755});
-  }
-  ~Draft() {
-    std::error_code ignored;
-    if (!path_.empty()) fs::remove_all(path_, ignored);
-  }
-  Draft(const Draft&) = delete;
-  Draft& operator=(const Draft&) = delete;
+fs::path without_slash(const fs::path& folder) {
+  return folder.has_filename() ? folder : folder.parent_path();
+}
 
-  const fs::path& path() const { return path_; }
-  const fs::path& target() const { return target_; }
-
-  void complete() {
-    std::error_code failure;
-    fs::rename(path_, target_, failure);
-    if (failure) throw Error(target_.string() + ": cannot be made: " + failure.message());
-    path_.clear();
-    session::sync_names(target_.parent_path());
-  }
-
- private:
-  fs::path target_, path_;
-};
+void check_target(const fs::path& target) {
+  if (fs::exists(target) && !(fs::is_directory(target) && fs::is_empty(target)))
+    throw Error(target.string() + ": is there already; a session needs a name of its own");
+  std::error_code seen_later;
+  fs::create_directories(target.parent_path(), seen_later);
+}
 
 std::string content_of(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -297,9 +267,12 @@ ImportReport import_session(const ImportOptions& options) {
   const auto assets = description.set ? scene::assets_of(*description.set)
                                       : std::vector<std::pair<std::string, fs::path>>{};
   ImportReport report;
-  Draft draft(options.session);
+  const fs::path target = without_slash(fs::absolute(options.session));
+  check_target(target);
+  session::remove_dead_drafts(target.parent_path());
+  session::DraftFolder draft(target);
   {
-    session::SessionWriter writer(draft.path(), info_of(description, draft.target()));
+    session::SessionWriter writer(draft.path(), info_of(description, target));
     for (const auto& [as_written, file] : assets) writer.add_asset(as_written, file);
     if (description.light)
       report.light_frames = FootageImport(options.description, *description.light,
@@ -317,7 +290,7 @@ ImportReport import_session(const ImportOptions& options) {
   }
   report.assets = std::set<std::pair<std::string, fs::path>>(assets.begin(), assets.end()).size();
   report.bytes = size_of(draft.path());
-  draft.complete();
+  draft.put();
   report.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return report;
 }

@@ -1,6 +1,5 @@
 #include "daemon/output/asset_store.hpp"
 
-#include <fcntl.h>
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -9,7 +8,7 @@
 #include <system_error>
 
 #include "drivers/error.hpp"
-#include "drivers/session/files.hpp"
+#include "drivers/session/draft.hpp"
 
 namespace previz::output {
 namespace {
@@ -20,15 +19,6 @@ namespace fs = std::filesystem;
 constexpr std::chrono::seconds disk_patience{2};
 // The room on the disk is looked at again after so many bytes.
 constexpr std::uint64_t bytes_between_looks = 64'000'000;
-
-// Makes sure that a draft is gone unless it was put in place.
-struct Draft {
-  const fs::path file;
-  ~Draft() {
-    std::error_code ignored;
-    fs::remove(file, ignored);
-  }
-};
 
 }  // namespace
 
@@ -147,14 +137,13 @@ class AssetStore::Worker {
     if (known.empty()) remember_hash(asset, hash);
     if (fs::exists(place_of(hash))) return place_of(hash);
     session::make_folders(folder_);
-    const Draft draft{folder_ / ".part"};
+    session::Draft draft(place_of(hash));
     // The name is that of the copy's content, whatever happens to the original meanwhile.
-    const std::string copied = copy(file, draft.file, is_left);
+    const std::string copied = copy(file, draft.file(), is_left);
     if (!known.empty() && copied != known)
       throw Error(file.string() + ": was changed since the set was loaded");
     remember_hash(asset, copied);
-    fs::rename(draft.file, place_of(copied));
-    session::sync_names(folder_);
+    draft.put_as_new(place_of(copied));
     return place_of(copied);
   }
 
@@ -165,12 +154,11 @@ class AssetStore::Worker {
   }
 
   // Brings a copy to the disk, and returns the hash of its content.
-  std::string copy(const fs::path& from, const fs::path& to,
+  std::string copy(const fs::path& from, const session::OpenFile& written,
                    const std::function<bool()>& is_left) const {
     struct stat status {};
     if (::stat(from.c_str(), &status) != 0) status = {};
     check_room(static_cast<std::uint64_t>(status.st_size));
-    const session::OpenFile written(to, O_WRONLY | O_CREAT | O_TRUNC);
     if (status.st_mode != 0) ::fchmod(written.get(), (status.st_mode & 0777) | S_IWUSR);
     session::Sha256 hash;
     std::uint64_t since_look = 0;
@@ -228,12 +216,10 @@ class AssetStore::Worker {
     if (fs::exists(target)) return;
     std::error_code cannot_link;
     fs::create_hard_link(stored, target, cannot_link);
-    if (cannot_link) {
-      const Draft draft{target.string() + ".part"};
-      copy(stored, draft.file, is_left);
-      fs::rename(draft.file, target);
-    }
-    session::sync_names(target.parent_path());
+    if (!cannot_link) return session::sync_names(target.parent_path());
+    session::Draft draft(target);
+    copy(stored, draft.file(), is_left);
+    draft.put();
   }
 
   const fs::path folder_;

@@ -15,15 +15,18 @@
 #include <ImfStringAttribute.h>
 #include <ImfTestFile.h>
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <glm/matrix.hpp>
 #include <limits>
+#include <string>
+#include <utility>
 
-#include "daemon/output/file.hpp"
+#include "daemon/output/picture_size.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/nominal_rate.hpp"
 
@@ -140,45 +143,51 @@ Imf::Header header(const render::Layers& layers, const ExrMetadata& metadata) {
   return header;
 }
 
-// A file that remembers its errors, because OpenEXR writes the end of a picture in a destructor,
-// which cannot report them.
+// Writes into a draft. OpenEXR writes the end of a picture in a destructor, which cannot report an
+// error: the first one is remembered.
 class WrittenFile final : public Imf::OStream {
  public:
-  explicit WrittenFile(const std::filesystem::path& file)
-      : OStream(file.c_str()), stream_(file, std::ios::binary | std::ios::trunc) {
-    remember();
-  }
+  explicit WrittenFile(const session::Draft& draft)
+      : OStream(draft.target().c_str()), file_(draft.file()) {}
 
   void write(const char bytes[], int count) override {
-    stream_.write(bytes, count);
-    remember();
-    if (error_ != 0) fail();
+    waiting_.append(bytes, static_cast<std::size_t>(count));
+    position_ += static_cast<std::uint64_t>(count);
+    if (waiting_.size() >= piece) flush();
   }
-  std::uint64_t tellp() override {
-    return static_cast<std::uint64_t>(std::streamoff(stream_.tellp()));
-  }
+  std::uint64_t tellp() override { return position_; }
   void seekp(std::uint64_t position) override {
-    stream_.seekp(static_cast<std::streamoff>(position));
-    remember();
+    flush();
+    position_ = position;
+    if (::lseek(file_.get(), static_cast<off_t>(position), SEEK_SET) < 0)
+      remember(std::string(fileName()) + ": cannot be written: " + std::strerror(errno));
   }
 
   // Throws previz::Error if any part of the file could not be written.
   void close() {
-    stream_.close();
-    remember();
-    if (error_ != 0) fail();
+    flush();
+    if (!failure_.empty()) throw Error(failure_);
   }
 
  private:
-  void remember() {
-    if (!stream_ && error_ == 0) error_ = errno != 0 ? errno : EIO;
+  static constexpr std::size_t piece = 1 << 20;
+
+  void flush() {
+    try {
+      file_.append(std::exchange(waiting_, {}));
+    } catch (const Error& error) {
+      remember(error.what());
+    }
+    if (!failure_.empty()) throw Error(failure_);
   }
-  [[noreturn]] void fail() const {
-    throw Error(std::string(fileName()) + ": cannot be written: " + std::strerror(error_));
+  void remember(const std::string& failure) {
+    if (failure_.empty()) failure_ = failure;
   }
 
-  std::ofstream stream_;
-  int error_ = 0;
+  const session::OpenFile& file_;
+  std::string waiting_;  // for the file, from position_ - waiting_.size() on
+  std::uint64_t position_ = 0;
+  std::string failure_;
 };
 
 void require_whole(const std::filesystem::path& path, const render::Layers& layers) {
@@ -224,26 +233,31 @@ ExrMetadata exr_metadata(const render::Layers& layers, const Frame& frame,
   return metadata;
 }
 
-void write_exr(const std::filesystem::path& path, const render::Layers& layers,
-               const ExrMetadata& metadata) {
+session::Draft exr_draft(const std::filesystem::path& path, const render::Layers& layers,
+                         const ExrMetadata& metadata) {
   require_whole(path, layers);
   render::Layers written = layers;
   for (std::size_t i = 0; i < written.diff.size(); ++i) written.diff[i] *= 1.0f - written.mask[i];
+  session::Draft draft(path);
   try {
-    write_whole(path, [&](const std::filesystem::path& unfinished) {
-      WrittenFile stream(unfinished);
-      {
-        Imf::OutputFile file(stream, header(written, metadata));
-        file.setFrameBuffer(frame_buffer(written));
-        file.writePixels(written.height);
-      }
-      stream.close();
-    });
+    WrittenFile stream(draft);
+    {
+      Imf::OutputFile file(stream, header(written, metadata));
+      file.setFrameBuffer(frame_buffer(written));
+      file.writePixels(written.height);
+    }
+    stream.close();
   } catch (const Error&) {
     throw;
   } catch (const std::exception& error) {
     throw Error(path.string() + ": cannot be written: " + error.what());
   }
+  return draft;
+}
+
+void write_exr(const std::filesystem::path& path, const render::Layers& layers,
+               const ExrMetadata& metadata) {
+  exr_draft(path, layers, metadata).put();
 }
 
 render::Layers read_exr(const std::filesystem::path& path) {

@@ -13,6 +13,7 @@
 #include "daemon/tracking/tracker.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/timecode.hpp"
 
 namespace previz::output {
@@ -56,6 +57,10 @@ ExrMetadata exr_metadata(const render::Layers& layers, const Frame& frame,
 // file on failure.
 void write_exr(const std::filesystem::path& path, const render::Layers& layers,
                const ExrMetadata& metadata);
+
+// Writes likewise, but does not yet put the file in place: whoever calls may give it another name.
+session::Draft exr_draft(const std::filesystem::path& path, const render::Layers& layers,
+                         const ExrMetadata& metadata);
 
 // Reads the layers of a file that write_exr wrote (diff comes back as written, multiplied by 1 -
 // mask). Throws previz::Error naming the file and the channel that is missing.

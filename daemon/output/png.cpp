@@ -1,6 +1,5 @@
 #include "daemon/output/png.hpp"
 
-#include <fcntl.h>
 #include <png.h>
 
 #include <cerrno>
@@ -10,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/output/file.hpp"
+#include "daemon/output/picture_size.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 
@@ -65,7 +64,7 @@ std::vector<png_bytep> row_pointers(std::vector<png_byte>& bytes, int height) {
 
 // The file that libpng writes to.
 struct Written {
-  session::OpenFile file;
+  const session::OpenFile& file;
   std::string failure;
 };
 
@@ -137,21 +136,20 @@ struct Reader {
 
 }  // namespace
 
-void write_png(const std::filesystem::path& path, const Plate& picture, Sync sync) {
+void write_png(const std::filesystem::path& path, const Plate& picture, session::Sync sync) {
   if (picture.width < 1 || picture.height < 1 || (picture.bits != 8 && picture.bits != 16) ||
       picture.samples.size() != 3 * std::size_t(picture.width) * std::size_t(picture.height))
     throw Error(path.string() + ": the picture is not RGB of 8 or 16 bits, or not whole");
   std::vector<png_byte> bytes = to_bytes(picture);
   std::vector<png_bytep> rows = row_pointers(bytes, picture.height);
-  const auto write = [&](const std::filesystem::path& unfinished) {
-    Written file{session::OpenFile(unfinished, O_WRONLY | O_CREAT | O_TRUNC), ""};
-    PngError error;
-    Writer writer(error);
-    if (!encode(writer.png, writer.info, &file, picture, rows.data()))
-      throw Error(file.failure.empty() ? path.string() + ": cannot be written: " + error.message
-                                       : file.failure);
-  };
-  write_whole(path, write, sync);
+  session::Draft draft(path);
+  Written file{draft.file(), ""};
+  PngError error;
+  Writer writer(error);
+  if (!encode(writer.png, writer.info, &file, picture, rows.data()))
+    throw Error(file.failure.empty() ? path.string() + ": cannot be written: " + error.message
+                                     : file.failure);
+  draft.put(sync);
 }
 
 Plate read_png(const std::filesystem::path& path) {

@@ -26,10 +26,6 @@ constexpr std::chrono::milliseconds ending_interval{10};
 // A disk that takes longer for one thing is reported.
 constexpr std::chrono::seconds silence{2};
 
-std::string megabytes(double bytes) {
-  return std::to_string(std::lround(1e-6 * bytes)) + " MB";
-}
-
 }  // namespace
 
 std::uint64_t default_queue_bytes() {
@@ -47,12 +43,20 @@ Recorder::Recorder(RecorderOptions options)
     : options_(std::move(options)),
       queue_(options_.preroll_s, options_.queue_bytes),
       folders_(options_.take.folders, options_.reserve_bytes, options_.free_bytes),
-      salvage_(options_.take.folders,
-               [this](const std::string& what) { note(Severity::warning, what); }) {
-  for (std::size_t i = 0; i < folders_.all().size(); ++i)
+      told_(options_.take.folders.size()) {
+  const auto warn = [this](const std::string& what) { note(Severity::warning, what); };
+  const std::string slate = options_.take.info.take.value_or(session::TakeInfo{}).slate;
+  for (std::size_t i = 0; i < folders_.all().size(); ++i) {
     stores_.push_back(std::make_unique<AssetStore>(
-        folders_.all()[i] / ".assets", options_.take.assets,
-        [this](const std::string& what) { note(Severity::warning, what); }, folders_.room_of(i)));
+        folders_.all()[i] / ".assets", options_.take.assets, warn, folders_.room_of(i)));
+    const auto on_news = [this] {
+      const std::lock_guard lock(mutex_);
+      has_news_ = true;
+      filled_.notify_one();
+    };
+    watches_.push_back(std::make_unique<FolderWatch>(
+        FolderWatchOptions{folders_.all()[i], slate, options_.free_bytes, warn, on_news}));
+  }
   thread_ = std::jthread([this] { run(); });
 }
 
@@ -196,17 +200,18 @@ void Recorder::run() {
   std::unique_lock lock(mutex_);
   for (;;) {
     const bool waits = !ending_.empty();
-    const auto due = waits ? Clock::now() + ending_interval : looked_ + disk_interval;
-    filled_.wait_until(lock, due, [&] { return !queue_.empty() || (quit_ && !waits); });
+    const auto due = Clock::now() + (waits ? ending_interval : disk_interval);
+    filled_.wait_until(lock, due,
+                       [&] { return !queue_.empty() || has_news_ || (quit_ && !waits); });
+    const bool has_news = std::exchange(has_news_, false);
     std::optional<Queued> next;
     if (!queue_.empty()) next = queue_.pop();
     const bool is_last = quit_ && !next;
     handling_since_ = Clock::now();
     writes_ = take_ || !ending_.empty() || next;
     lock.unlock();
-    if (!take_ && ending_.empty()) look_for_interruption();
+    if (has_news) take_news();
     serve(next, is_last);
-    look_at_disk();
     lock.lock();
     writes_ = take_ || !ending_.empty();
     if (next) queue_.give_back(std::move(*next));
@@ -368,11 +373,13 @@ void Recorder::end_running_take() {
 void Recorder::begin_take(bool goes_on) {
   const std::string slate = options_.take.info.take.value_or(session::TakeInfo{}).slate;
   while (!take_) {
-    const std::size_t folder = folders_.choose();
+    const std::size_t folder = folders_.choose([&](std::size_t i) { return why_not_own(i); });
     take_ = Take();
     take_->folder = folder;
     try {
-      highest_number_ = next_take_number(folders_.all(), slate, highest_number_);
+      for (const FolderSeen& seen : folders())
+        highest_number_ = std::max(highest_number_, seen.highest_number);
+      highest_number_ = next_take_number({folders_.all()[folder]}, slate, highest_number_);
       take_->writer =
           std::make_unique<TakeWriter>(options_.take, folders_.all()[folder], highest_number_);
       if (goes_on)
@@ -388,12 +395,8 @@ void Recorder::begin_take(bool goes_on) {
   const std::filesystem::path directory = take_->writer->directory();
   checked_ = Clock::now();
   if (!options_.take.assets.empty()) take_->order = stores_[take_->folder]->deliver(directory);
-  try {
-    TakeFolders::keep_wish(directory);
-  } catch (const Error& error) {
-    note(Severity::warning,
-         std::string("after a restart it would not go on by itself: ") + error.what());
-  }
+  watches_[take_->folder]->follow(directory);
+  watches_[take_->folder]->keep_wish(directory);
   const std::lock_guard lock(mutex_);
   status_.directory = directory;
   status_.number = take_->writer->number();
@@ -415,28 +418,6 @@ void Recorder::name_assets(Take& take, bool is_last) {
     if (!take.writer->is_sound()) throw;
     note(Severity::warning, std::string("the set's files cannot be named: ") + error.what());
   }
-}
-
-void Recorder::drop_wish() {
-  try {
-    folders_.drop_wish();
-  } catch (const Error& error) {
-    note(Severity::warning,
-         std::string("after a restart it would begin by itself: ") + error.what());
-  }
-}
-
-// Looks for what the last process left: the wish to record, and takes that it could not end. Once a
-// take was begun, an older wish is none.
-void Recorder::look_for_interruption() {
-  if (Clock::now() - looked_back_ < disk_interval) return;
-  looked_back_ = Clock::now();
-  std::vector<std::string> salvaged;
-  if (!salvage_.look(salvaged)) return;
-  std::optional<std::string> interrupted = folders_.kept_wish();
-  const std::lock_guard lock(mutex_);
-  for (std::string& take : salvaged) status_.salvaged.push_back(std::move(take));
-  if (begun_ == 0 && !status_.interrupted) status_.interrupted = std::move(interrupted);
 }
 
 // Ends the takes that have all they wait for, or have waited long enough.
@@ -485,30 +466,6 @@ void Recorder::end(Take& take) {
   note(Severity::info, name + " has " + std::to_string(take.writer->observer_frames()) + " frames");
 }
 
-// After a failure of the running take's disk: leaves that take and begins the next one on the next
-// disk, if there is one. Returns whether it goes on.
-bool Recorder::goes_on_elsewhere(const std::string& why) {
-  if (!take_) return false;
-  const std::filesystem::path folder = folders_.all()[take_->folder];
-  if (!folders_.give_up(take_->folder, folder.string() + ": its disk failed")) return false;
-  const std::string failed = take_->writer->directory().filename().string();
-  abandon(*take_, why);
-  {
-    const std::lock_guard lock(mutex_);
-    count_finished(*take_);
-  }
-  take_.reset();
-  try {
-    begin_take(true);
-  } catch (const std::exception& error) {
-    note(Severity::error, std::string("recording cannot go on elsewhere: ") + error.what());
-    return false;
-  }
-  note(Severity::error,
-       failed + " ended: " + why + "; recording goes on in " + take_->writer->directory().string());
-  return true;
-}
-
 // Leaves the files as they are: a session that was not closed opens up to its last whole frame.
 void Recorder::abandon(Take& take, const std::string& why) {
   if (take.order) {
@@ -523,12 +480,17 @@ void Recorder::abandon(Take& take, const std::string& why) {
 void Recorder::fail(const std::string& why) {
   if (!take_) {
     // The takes that are ending get the tracking that is there already, and wait for no more.
-    for (const session::TrackRecord& record : leave_out_queue()) write(record);
+    std::unique_lock lock(mutex_);
+    const std::vector<session::TrackRecord> late = leave_out_queue();
+    lock.unlock();
+    for (const session::TrackRecord& record : late) write(record);
     end_what_is_over(true, true);
   }
-  const std::vector<session::TrackRecord> late = leave_out_queue();
+  std::vector<session::TrackRecord> late;
   {
+    // In one go, so that nothing is offered to a take that is none any more.
     const std::lock_guard lock(mutex_);
+    late = leave_out_queue();
     if (queue_.empty()) status_.recording = late_tracks_ = false;
     if (take_) count_finished(*take_);
     count_failure(why);
@@ -541,10 +503,9 @@ void Recorder::fail(const std::string& why) {
 }
 
 // Takes what is queued before the next start out of the queue, and counts it as lost. Returns the
-// tracks among it that takes which are ending wait for.
+// tracks among it that takes which are ending wait for. Call it with the lock held.
 std::vector<session::TrackRecord> Recorder::leave_out_queue() {
   std::vector<session::TrackRecord> late;
-  const std::lock_guard lock(mutex_);
   while (!queue_.empty() && !queue_.begins_a_take()) {
     const Queued left = queue_.pop();
     const auto* record = std::get_if<session::TrackRecord>(&left.entry);
@@ -571,59 +532,6 @@ void Recorder::count_finished(const Take& take) {
   if (take.writer->observer_frames() == 0) return;
   ++status_.finished_takes;
   status_.finished = take.writer->directory().filename().string();
-}
-
-// Ends the take properly while there is still room on its disk, and goes on where there is more.
-// The room that the end of the take gives back is no reason to begin there again.
-void Recorder::check_disk() {
-  checked_ = Clock::now();
-  const std::size_t folder = take_->folder;
-  const std::string full = folders_.why_full(folder);
-  if (full.empty()) return;
-  folders_.give_up(folder, full);
-  const std::string name = take_->writer->directory().filename().string();
-  begin_next_take();
-  note(Severity::warning, "the disk of " + name + " is almost full; recording goes on in " +
-                              take_->writer->directory().string());
-}
-
-void Recorder::look_at_disk() {
-  if (Clock::now() - looked_ < disk_interval) return;
-  looked_ = Clock::now();
-  if (options_.measures_disk && !take_ && ending_.empty() && !has_compared_speeds_)
-    compare_speeds();
-  const std::optional<std::uint64_t> left = folders_.free_bytes();
-  const std::lock_guard lock(mutex_);
-  free_bytes_ = left;
-}
-
-// Compares what the cameras deliver, by the ring, with what the disk takes. FFV1 packs pictures of
-// a camera to about half.
-void Recorder::compare_speeds() {
-  constexpr double packed = 0.5, least_length_s = 0.5;
-  double rate = 0;
-  {
-    const std::lock_guard lock(mutex_);
-    const double length_s = queue_.ring_length_s();
-    if (status_.recording || length_s <= 0) return;
-    if (length_s < std::min(least_length_s, 0.5 * options_.preroll_s)) return;
-    rate = static_cast<double>(queue_.ring_bytes()) / length_s;
-  }
-  has_compared_speeds_ = true;
-  try {
-    const std::optional<double> speed = folders_.measure_speed();
-    if (!speed || *speed > packed * rate) return;
-    note(Severity::warning, "the disk takes " + megabytes(*speed) +
-                                " a second, and the cameras deliver " + megabytes(rate) +
-                                ": takes will lack frames");
-  } catch (const std::exception& error) {
-    note(Severity::warning, std::string("the disk's speed is not known: ") + error.what());
-  }
-}
-
-std::optional<std::uint64_t> Recorder::free_bytes() const {
-  const std::lock_guard lock(mutex_);
-  return free_bytes_;
 }
 
 }  // namespace previz::output

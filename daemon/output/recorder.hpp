@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "daemon/output/asset_store.hpp"
+#include "daemon/output/folder_watch.hpp"
 #include "daemon/output/record_queue.hpp"
-#include "daemon/output/salvage.hpp"
 #include "daemon/output/take_folders.hpp"
 #include "daemon/output/take_writer.hpp"
 #include "daemon/report/report.hpp"
@@ -103,6 +103,8 @@ class Recorder {
   // Returns how much of the disk takes may still use, without the reserve, as it was about a second
   // ago; nothing if the disk cannot say.
   std::optional<std::uint64_t> free_bytes() const;
+  // Returns the folders of takes as they were last seen, in the order of preference.
+  std::vector<FolderSeen> folders() const;
 
  private:
   using Entry = RecordQueue::Entry;
@@ -153,9 +155,10 @@ class Recorder {
   std::vector<session::TrackRecord> leave_out_queue();
   void abandon(Take& take, const std::string& why);
   void check_disk();
-  void look_at_disk();  // for free_bytes()
   void compare_speeds();
-  void look_for_interruption();
+  std::string why_not_own(std::size_t folder);
+  void take_news();  // of the folders' watches
+  void look_for_interruption(const std::vector<FolderSeen>& seen, bool are_known);
   void drop_wish();
   void note(report::Severity severity, const std::string& what) const;
   void note_short_preroll(double kept_s) const;
@@ -175,16 +178,18 @@ class Recorder {
   bool writes_ = false;  // the writer thread has a take, or an entry in hand
   bool silence_noted_ = false;
   bool short_preroll_noted_ = false;
+  bool has_news_ = true;  // a folder was looked at
 
   // Only the writer thread uses these.
   TakeFolders folders_;
-  std::vector<std::unique_ptr<AssetStore>> stores_;  // one in each folder
-  Salvage salvage_;
+  std::vector<std::unique_ptr<AssetStore>> stores_;    // one in each folder
+  std::vector<std::unique_ptr<FolderWatch>> watches_;  // one of each folder
+  std::vector<std::size_t> told_;                      // takes of each that were salvaged, and said
   std::optional<Take> take_;
   std::list<EndingTake> ending_;
   NewestLight light_;       // that the running take has
   int highest_number_ = 0;  // of the takes so far
-  Clock::time_point checked_, looked_, looked_back_;
+  Clock::time_point checked_;
   bool has_compared_speeds_ = false;
   std::jthread thread_;  // last: it uses all of the above
 };

@@ -5,6 +5,7 @@
 #include <optional>
 #include <system_error>
 
+#include "drivers/session/draft.hpp"
 #include "drivers/session/session.hpp"
 
 namespace previz::output {
@@ -19,7 +20,8 @@ bool Salvage::look(std::vector<std::string>& salvaged) {
       is_first = true;
       is_looked_at_[i] = true;
       for (const auto& entry : std::filesystem::directory_iterator(folders_[i]))
-        if (entry.is_directory()) takes.push_back(entry.path());
+        if (entry.is_directory() && !entry.is_symlink()) takes.push_back(entry.path());
+      session::remove_dead_drafts(folders_[i]);
     } catch (const std::filesystem::filesystem_error& error) {
       is_looked_at_[i] = true;  // once, and not each second
       note_("takes from before cannot be looked at: " + std::string(error.what()));
@@ -33,6 +35,7 @@ bool Salvage::look(std::vector<std::string>& salvaged) {
 void Salvage::salvage(const std::filesystem::path& take, std::vector<std::string>& salvaged) const {
   try {
     const std::optional<std::uint64_t> frames = session::salvage(take);
+    if (frames) session::remove_dead_drafts(take);
     if (frames)
       salvaged.push_back(take.filename().string() + " was cut off; it has " +
                          std::to_string(*frames) + " frames");

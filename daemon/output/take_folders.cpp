@@ -1,6 +1,5 @@
 #include "daemon/output/take_folders.hpp"
 
-#include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -11,8 +10,9 @@
 #include <system_error>
 #include <utility>
 
+#include "daemon/output/folder_watch.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/files.hpp"
+#include "drivers/session/draft.hpp"
 
 namespace previz::output {
 namespace {
@@ -25,25 +25,26 @@ std::string megabytes(std::uint64_t bytes) {
   return std::to_string(bytes / 1'000'000) + " MB";
 }
 
-// Returns the folder, or where it will be made the folder above it.
-std::filesystem::path existing(const std::filesystem::path& folder) {
-  std::filesystem::path above = std::filesystem::absolute(folder);
-  while (!std::filesystem::exists(above) && above.has_relative_path()) above = above.parent_path();
-  return above;
+}  // namespace
+
+std::filesystem::path existing_part(const std::filesystem::path& folder) {
+  std::error_code unknown;
+  std::filesystem::path there = std::filesystem::absolute(folder);
+  while (!std::filesystem::exists(there, unknown) && there.has_relative_path())
+    there = there.parent_path();
+  return there;
 }
 
 std::optional<dev_t> disk_of(const std::filesystem::path& folder) {
   struct stat status {};
-  if (::stat(existing(folder).c_str(), &status) != 0) return std::nullopt;
+  if (::stat(existing_part(folder).c_str(), &status) != 0) return std::nullopt;
   return status.st_dev;
 }
 
 std::uint64_t free_on_disk_of(const std::filesystem::path& folder,
                               const TakeFolders::FreeBytes& free_bytes) {
-  return free_bytes ? free_bytes(folder) : std::filesystem::space(existing(folder)).available;
+  return free_bytes ? free_bytes(folder) : std::filesystem::space(existing_part(folder)).available;
 }
-
-}  // namespace
 
 bool are_on_one_disk(const std::filesystem::path& a, const std::filesystem::path& b) {
   const std::optional<dev_t> of_a = disk_of(a);
@@ -57,12 +58,13 @@ TakeFolders::TakeFolders(std::vector<std::filesystem::path> folders, std::uint64
       free_bytes_(std::move(free_bytes)),
       given_up_(folders_.size()) {}
 
-std::size_t TakeFolders::choose() {
+std::size_t TakeFolders::choose(const std::function<std::string(std::size_t)>& why_not) {
   std::string why_none;
   for (std::size_t i = 0; i < folders_.size(); ++i) {
     std::string why = given_up_[i];
     try {
       if (why.empty()) session::make_folders(folders_[i]);
+      if (why.empty() && why_not) why = why_not(i);
       if (why.empty()) why = why_full(i);
       if (why.empty()) return i;
     } catch (const std::exception& error) {
@@ -103,33 +105,26 @@ std::optional<double> TakeFolders::measure_speed() {
   std::string bytes(piece, '\0');  // noise, which no disk can make smaller
   std::minstd_rand random(1);
   for (char& byte : bytes) byte = static_cast<char>(random());
-  const std::filesystem::path file = folder / ".speed";
   std::size_t written = 0;
   const Clock::time_point begin = Clock::now();
   {
-    const session::OpenFile probe(file, O_WRONLY | O_CREAT | O_TRUNC);
-    std::filesystem::remove(file);  // it goes when it is closed, or the process ends
+    const session::Draft probe(folder / "speed");  // which goes at the end
     for (; written < most && Clock::now() - begin < long_enough; written += piece) {
-      probe.append(bytes);
-      probe.sync();
+      probe.file().append(bytes);
+      probe.file().sync();
     }
   }
   return static_cast<double>(written) / std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-std::optional<std::uint64_t> TakeFolders::free_bytes() const {
+std::optional<std::uint64_t> TakeFolders::free_bytes(const std::vector<FolderSeen>& seen) const {
   std::optional<std::uint64_t> sum;
   std::set<dev_t> counted;
-  for (std::size_t i = 0; i < folders_.size(); ++i) {
-    const std::filesystem::path& folder = folders_[i];
-    try {
-      if (!given_up_[i].empty() || ::access(existing(folder).c_str(), W_OK) != 0) continue;
-      const std::uint64_t free = free_on_disk_of(folder, free_bytes_);
-      if (!counted.insert(disk_of(folder).value_or(0)).second) continue;
-      sum = sum.value_or(0) + free - std::min(free, reserve_bytes_);
-    } catch (const std::filesystem::filesystem_error&) {
-      // This disk cannot say.
-    }
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (!given_up_[i].empty() || !seen[i].why_not.empty() || !seen[i].free_bytes) continue;
+    if (!counted.insert(seen[i].disk.value_or(0)).second) continue;
+    const std::uint64_t free = *seen[i].free_bytes;
+    sum = sum.value_or(0) + free - std::min(free, reserve_bytes_);
   }
   return sum;
 }
@@ -156,20 +151,18 @@ void TakeFolders::drop_wish() const {
   if (!faults.empty()) throw Error(faults);
 }
 
-std::optional<std::string> TakeFolders::kept_wish() const {
-  std::optional<std::string> newest;
-  std::filesystem::file_time_type newest_time{};
+std::optional<KeptWish> TakeFolders::kept_wish() const {
+  std::optional<KeptWish> newest;
   for (const std::filesystem::path& folder : folders_) {
     std::error_code none;
     const auto time = std::filesystem::last_write_time(wish_in(folder), none);
-    if (none || (newest && time < newest_time)) continue;
+    if (none || (newest && time < newest->time)) continue;
     try {
-      newest = session::read_file(wish_in(folder));
+      const std::string text = session::read_plain_file(wish_in(folder));
+      newest = KeptWish{text.substr(0, text.find_last_not_of('\n') + 1), time};
     } catch (const Error&) {
       continue;
     }
-    while (!newest->empty() && newest->back() == '\n') newest->pop_back();
-    newest_time = time;
   }
   return newest;
 }

@@ -3,6 +3,8 @@
 // restart and an upgrade, that somebody wishes to record.
 #pragma once
 
+#include <sys/types.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -15,6 +17,23 @@ namespace previz::output {
 
 // Returns whether both folders are, or will be made, on one disk.
 bool are_on_one_disk(const std::filesystem::path& a, const std::filesystem::path& b);
+
+// Return the part of a path that is there, and the device and free bytes of its disk. All may wait
+// for it. The free bytes are those of `free_bytes`, if that is not empty; throws
+// std::filesystem::filesystem_error.
+std::filesystem::path existing_part(const std::filesystem::path& folder);
+std::optional<dev_t> disk_of(const std::filesystem::path& folder);
+std::uint64_t free_on_disk_of(
+    const std::filesystem::path& folder,
+    const std::function<std::uint64_t(const std::filesystem::path& folder)>& free_bytes);
+
+struct FolderSeen;
+
+// The take that was being recorded, by its name, and when that was written down.
+struct KeptWish {
+  std::string take;
+  std::filesystem::file_time_type time;
+};
 
 // Used by one thread, since every call may wait for a disk.
 class TakeFolders {
@@ -31,7 +50,8 @@ class TakeFolders {
 
   // Makes the first folder that has room and is not given up, and returns its index. Throws
   // previz::Error that says of each folder why it cannot be used.
-  std::size_t choose();
+  // A folder for which `why_not` returns anything is not made, and said with that.
+  std::size_t choose(const std::function<std::string(std::size_t)>& why_not = {});
   // Returns why a folder is full; empty: it has room.
   std::string why_full(std::size_t folder) const;
   // Gives a folder up until forgive_all(), because its disk failed or is full. Returns whether
@@ -42,9 +62,10 @@ class TakeFolders {
   // may be called by any thread, and after the end of this.
   std::function<bool(std::uint64_t bytes)> room_of(std::size_t folder) const;
 
-  // Returns how much takes may still use of all disks, without the reserves, those that were given
-  // up, and those that cannot be written; nothing if no disk can say.
-  std::optional<std::uint64_t> free_bytes() const;
+  // Returns how much takes may still use of all disks, as the folders were last seen: without the
+  // reserves, those that were given up, and those that cannot be written; nothing if no disk can
+  // say. Waits for no disk.
+  std::optional<std::uint64_t> free_bytes(const std::vector<FolderSeen>& seen) const;
 
   // Measures how many bytes a second the disk of the folder that choose() would return takes, by a
   // file of up to 64 MB that is removed again; at most about a second. Nothing if there is no room
@@ -56,9 +77,9 @@ class TakeFolders {
   // Removes what the folders remember: the recording was ended, or it cannot go on. Throws
   // previz::Error that names those that cannot; the others have forgotten it then.
   void drop_wish() const;
-  // Returns the name of the take that was being recorded when the last process ended, if one was:
-  // the newest that a folder remembers. A folder that cannot be read remembers nothing.
-  std::optional<std::string> kept_wish() const;
+  // Returns the take that was being recorded when the last process ended, if one was: the newest
+  // that a folder remembers. A folder that cannot be read remembers nothing.
+  std::optional<KeptWish> kept_wish() const;
 
  private:
   const std::vector<std::filesystem::path> folders_;

@@ -10,15 +10,19 @@
 namespace previz::output {
 namespace {
 
+// A folder that nobody may look into counts as one, and so does a session.toml that is no file:
+// that a take is there and cannot be read must be seen.
 bool is_take(const std::filesystem::path& directory) {
   std::error_code unknown;
-  return std::filesystem::is_regular_file(directory / "session.toml", unknown);
+  const auto kind = std::filesystem::symlink_status(directory / "session.toml", unknown).type();
+  return kind != std::filesystem::file_type::not_found;
 }
 
 // Returns whether the folder of the take remembers that the take is being recorded.
 bool is_remembered(const std::filesystem::path& take) {
   const std::filesystem::path parent = std::filesystem::absolute(take).parent_path();
-  return TakeFolders({parent}, 0, {}).kept_wish() == take.filename().string();
+  const std::optional<KeptWish> wish = TakeFolders({parent}, 0, {}).kept_wish();
+  return wish && wish->take == take.filename();
 }
 
 ListedTake look_at(const std::filesystem::path& directory) {
@@ -27,14 +31,20 @@ ListedTake look_at(const std::filesystem::path& directory) {
   try {
     take.summary = session::summary_of(directory);
     const bool is_over = take.summary.closed || !take.summary.fault.empty();
-    take.may_be_in_recording = !is_over && is_remembered(directory);
+    take.may_be_in_recording =
+        !is_over && (is_remembered(directory) || session::is_being_written(directory));
   } catch (const Error& error) {
     take.fault = error.what();
   }
-  for (const std::filesystem::path& file : session::own_files(directory)) {
-    std::error_code gone;
-    const std::uintmax_t size = std::filesystem::file_size(directory / file, gone);
-    if (!gone) take.bytes += size;
+  try {
+    take.strangers = session::strangers_in(directory);
+    for (const std::filesystem::path& file : session::own_files(directory)) {
+      std::error_code gone;
+      const std::uintmax_t size = std::filesystem::file_size(directory / file, gone);
+      if (!gone) take.bytes += size;
+    }
+  } catch (const Error& error) {
+    if (take.fault.empty()) take.fault = error.what();
   }
   return take;
 }

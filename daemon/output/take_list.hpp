@@ -16,6 +16,7 @@ struct ListedTake {
   std::uintmax_t bytes = 0;          // of its own files
   bool may_be_in_recording = false;  // the rig records it, or did so when its computer went down
   std::string fault;  // why its session.toml cannot be read; the summary is then empty
+  std::vector<std::string> strangers;  // as session::strangers_in() returns them
 };
 
 // Returns the take in this folder. Throws previz::Error if it is not a take, and says what a folder

@@ -4,8 +4,8 @@
 #include <array>
 #include <optional>
 
-#include "daemon/output/file.hpp"
 #include "drivers/av.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/nominal_rate.hpp"
 
 extern "C" {
@@ -71,7 +71,7 @@ std::vector<VideoCodec> review_codecs() {
 
 struct VideoWriter::Impl {
   std::filesystem::path path;
-  std::filesystem::path unfinished;
+  std::optional<session::Draft> draft;
   av::Codec encoder;
   av::Muxer file;
   av::Scaler converter;
@@ -105,14 +105,14 @@ VideoWriter::VideoWriter(const std::filesystem::path& stem, int width, int heigh
                          std::int64_t first_ns)
     : impl_(std::make_unique<Impl>()) {
   impl_->path = std::filesystem::path(stem) += codec.extension;
-  impl_->unfinished = unfinished_name(impl_->path);
   impl_->encoder = open_encoder(codec, width, height);
   if (!impl_->encoder)
     throw Error(impl_->path.string() + ": libav cannot encode " + std::to_string(width) + "x" +
                 std::to_string(height) + " as " + codec.description);
 
+  impl_->draft.emplace(impl_->path);
   AVFormatContext* file = nullptr;
-  const std::string url = av::url_of(impl_->unfinished);
+  const std::string url = av::url_of(impl_->draft->path());
   impl_->check(avformat_alloc_output_context2(&file, nullptr, codec.container.c_str(), url.c_str()),
                "cannot be made");
   impl_->file.reset(file);
@@ -141,12 +141,7 @@ VideoWriter::VideoWriter(const std::filesystem::path& stem, int width, int heigh
   sws_setColorspaceDetails(impl_->converter.get(), bt709, 1, bt709, 0, 0, unity, unity);
 }
 
-VideoWriter::~VideoWriter() {
-  if (!impl_->file) return;
-  impl_->file.reset();
-  std::error_code ignored;
-  std::filesystem::remove(impl_->unfinished, ignored);
-}
+VideoWriter::~VideoWriter() = default;
 
 void VideoWriter::write(const Plate& picture, std::int64_t timestamp_ns) {
   if (picture.width != impl_->frame->width || picture.height != impl_->frame->height)
@@ -177,7 +172,7 @@ std::filesystem::path VideoWriter::close() {
   impl_->check(av_write_trailer(impl_->file.get()), "cannot be finished");
   impl_->check(avio_closep(&impl_->file->pb), "cannot be finished");
   impl_->file.reset();
-  finish(impl_->unfinished, impl_->path);
+  impl_->draft->put();
   return impl_->path;
 }
 

@@ -1,14 +1,14 @@
 #include "daemon/post/take_copy.hpp"
 
 #include <fcntl.h>
-#include <stdlib.h>
 
-#include <fstream>
 #include <map>
 #include <sstream>
 
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
+#include "drivers/session/summary.hpp"
 
 namespace previz::post {
 namespace {
@@ -19,37 +19,6 @@ using Checksums = std::map<std::string, std::string>;  // of files, by their pat
 
 constexpr std::size_t hash_digits = 64;
 
-// A folder that is removed unless it gets its name.
-class CopyDraft {
- public:
-  explicit CopyDraft(const fs::path& target) : target_(target) {
-    const fs::path folder = fs::absolute(target).parent_path();
-    std::string name = (folder / ("." + target.filename().string() + ".XXXXXX")).string();
-    if (!::mkdtemp(name.data())) throw Error(folder.string() + ": no folder can be made in it");
-    path_ = name;
-    fs::permissions(path_, fs::perms{0755});
-  }
-  ~CopyDraft() {
-    std::error_code ignored;
-    if (!path_.empty()) fs::remove_all(path_, ignored);
-  }
-  CopyDraft(const CopyDraft&) = delete;
-  CopyDraft& operator=(const CopyDraft&) = delete;
-
-  const fs::path& path() const { return path_; }
-  void complete() {
-    std::error_code failure;
-    fs::rename(path_, target_, failure);
-    if (failure) throw Error(target_.string() + ": cannot be made: " + failure.message());
-    path_.clear();
-    session::sync_names(fs::absolute(target_).parent_path());
-  }
-
- private:
-  const fs::path target_;
-  fs::path path_;
-};
-
 std::string to_text(const Checksums& sums) {
   std::string text;
   for (const auto& [file, hash] : sums) text.append(hash).append("  ").append(file).append("\n");
@@ -58,7 +27,7 @@ std::string to_text(const Checksums& sums) {
 
 Checksums read_checksums(const fs::path& file) {
   Checksums sums;
-  std::istringstream lines(session::read_file(file));
+  std::istringstream lines(session::read_plain_file(file));
   int number = 0;
   for (std::string line; std::getline(lines, line);) {
     ++number;
@@ -73,17 +42,10 @@ Checksums read_checksums(const fs::path& file) {
 
 // Copies a file and waits until it is on the medium, from where it is read again afterwards.
 void copy_synced(const fs::path& from, const fs::path& to, const std::stop_token& stop) {
-  std::ifstream source(from, std::ios::binary);
-  if (!source) throw Error(from.string() + ": cannot be opened");
   const session::OpenFile copy(to, O_WRONLY | O_CREAT | O_EXCL);
-  std::string block(1 << 22, '\0');
-  while (source) {
-    if (stop.stop_requested())
-      throw Error(from.string() + ": was not copied, because it is to end");
-    source.read(block.data(), static_cast<std::streamsize>(block.size()));
-    copy.append({block.data(), static_cast<std::size_t>(source.gcount())});
-  }
-  if (source.bad()) throw Error(from.string() + ": cannot be read");
+  session::read_blocks(
+      session::open_plain_file(from), [&] { return stop.stop_requested(); },
+      [&](std::string_view block) { copy.append(block); });
   copy.sync();
   ::posix_fadvise(copy.get(), 0, 0, POSIX_FADV_DONTNEED);
 }
@@ -125,7 +87,11 @@ bool copy_take(const output::ListedTake& take, const fs::path& copy, const std::
                 "folder, or remove it");
   }
   check_room(take, folder);
-  CopyDraft draft(copy);
+  if (const auto strangers = session::strangers_in(take.directory); !strangers.empty())
+    throw Error((take.directory / strangers.front()).string() +
+                "; without it the copy is not whole");
+  session::remove_dead_drafts(folder);
+  session::DraftFolder draft(copy);
   Checksums sums;
   for (const fs::path& file : session::own_files(take.directory)) {
     const fs::path from = take.directory / file, to = draft.path() / file;
@@ -140,7 +106,7 @@ bool copy_take(const output::ListedTake& take, const fs::path& copy, const std::
   }
   session::replace_file(draft.path() / checksums_name, to_text(sums));
   if (fs::exists(draft.path() / "assets")) session::sync_names(draft.path() / "assets");
-  draft.complete();
+  draft.put();
   return true;
 }
 

@@ -66,6 +66,7 @@ std::string what_it_lacks(const ListedTake& take) {
     add_to_list(text, "cut off");
   for (const std::string& words : session::words_of(summary.lost))
     add_to_list(text, "lost " + words);
+  for (const std::string& stranger : take.strangers) add_to_list(text, stranger);
   if (summary.info.take && !summary.info.take->notes.empty())
     add_to_list(text, "notes: " + summary.info.take->notes);
   return text;

@@ -1,14 +1,11 @@
 #include "daemon/rig/live_files.hpp"
 
-#include <fcntl.h>
-
 #include <chrono>
 #include <cstdlib>
 
-#include "daemon/output/file.hpp"
 #include "daemon/output/png.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/files.hpp"
+#include "drivers/session/draft.hpp"
 
 namespace previz::rig {
 
@@ -47,12 +44,11 @@ void LiveFiles::run() {
 void LiveFiles::write(const Plate* picture) const {
   try {
     // The next second replaces them, so that no disk is made to keep them.
-    using output::Sync;
+    using session::Sync;
     if (picture) output::write_png(directory_ / "picture.png", *picture, Sync::no);
-    const auto write_metrics = [this](const std::filesystem::path& unfinished) {
-      session::OpenFile(unfinished, O_WRONLY | O_CREAT | O_TRUNC).append(metrics_());
-    };
-    output::write_whole(directory_ / "metrics.json", write_metrics, Sync::no);
+    session::Draft metrics(directory_ / "metrics.json");
+    metrics.file().append(metrics_());
+    metrics.put(Sync::no);
   } catch (const std::exception& error) {
     reports_(report::once({report::Severity::error, "", error.what()}));
   }

@@ -1,7 +1,5 @@
 #include "daemon/rig/rig.hpp"
 
-#include <unistd.h>
-
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -33,6 +31,8 @@ constexpr std::chrono::milliseconds prompt{200};
 constexpr std::chrono::milliseconds pipeline_patience{2000};
 // A disk that does not answer for longer than this is not waited for when the rig ends.
 constexpr double longest_disk_silence_s = 90;
+// A disk of takes that does not answer for longer is reported.
+constexpr double longest_folder_silence_s = 2;
 
 output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& cameras,
                                    Reports& reports) {
@@ -76,16 +76,6 @@ Cameras open_cameras_of(const LoadedSet& loaded, const Rig::Parts& parts, const 
   Cameras cameras = open_cameras(loaded.set, parts.loop_cameras, usb);
   if (parts.around_cameras) parts.around_cameras(cameras);
   return cameras;
-}
-
-// Returns why files cannot be made in a folder, or where it is to be made; empty if they can.
-std::string why_not_writable(const std::filesystem::path& folder) {
-  std::error_code unknown;
-  std::filesystem::path there = std::filesystem::absolute(folder);
-  while (!std::filesystem::exists(there, unknown) && there.has_relative_path())
-    there = there.parent_path();
-  if (!std::filesystem::is_directory(there, unknown)) return "it is no folder";
-  return access(there.c_str(), W_OK) == 0 ? "" : std::strerror(errno);
 }
 
 // If the USB cannot be watched, cameras are still found, but only when the next attempt is due.
@@ -366,18 +356,19 @@ void Rig::announce_faults() {
 }
 
 // A folder is looked at before a take needs it, because the unit may not let the service write
-// there.
+// there, or its disk may stand still.
 void Rig::look_at_folders() {
-  const set::Recording& recording = loaded_.set.recording;
-  for (const auto& folder : {std::optional(recording.directory), recording.second_directory}) {
-    if (!folder) continue;
-    const std::string name = folder->string(), why_not = why_not_writable(*folder);
-    if (why_not.empty()) {
+  for (const output::FolderSeen& seen : recorder_.folders()) {
+    const std::string name = seen.folder.string();
+    std::string what;
+    if (seen.silent_s > longest_folder_silence_s)
+      what = "its disk does not answer; takes may not be written there";
+    else if (!seen.why_not.empty())
+      what = "takes cannot be written there: " + seen.why_not;
+    if (what.empty())
       parts_.kept.reports.settle(name);
-      continue;
-    }
-    const std::string what = "takes cannot be written there: " + why_not;
-    parts_.kept.reports({Severity::error, name, what, name + what, report::lasting(name, what)});
+    else
+      parts_.kept.reports({Severity::error, name, what, name + what, report::lasting(name, what)});
   }
 }
 

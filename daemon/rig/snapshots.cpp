@@ -1,6 +1,5 @@
 #include "daemon/rig/snapshots.hpp"
 
-#include <fcntl.h>
 #include <sys/stat.h>
 
 #include <algorithm>
@@ -12,9 +11,7 @@
 #include <system_error>
 
 #include "daemon/output/exr.hpp"
-#include "daemon/output/file.hpp"
 #include "daemon/output/png.hpp"
-#include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 
@@ -53,25 +50,16 @@ std::optional<dev_t> disk_of(fs::path folder) {
 
 }  // namespace
 
-fs::path claim_snapshot(const fs::path& folder) {
-  session::make_folders(folder);
+fs::path put_snapshot(session::Draft& exr) {
+  const fs::path folder = exr.target().parent_path();
   int last = 0;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder))
     last = std::max(last, number_of(entry.path().filename().string()));
   for (int number = last + 1;; ++number) {
     std::array<char, 32> name{};
     std::snprintf(name.data(), name.size(), "%s%04d", snapshot_prefix.data(), number);
-    fs::path stem = folder / name.data();
-    const fs::path exr = snapshot_file(stem, ".exr");
-    const fs::path claim = output::unfinished_name(exr);
-    const OwnedDescriptor made(
-        ::open(claim.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-    if (!made && errno != EEXIST)
-      throw Error(claim.string() + ": cannot be made: " + std::generic_category().message(errno));
-    if (!made) continue;
-    // Somebody else may have finished this number after it was looked for.
-    if (!fs::exists(exr) && !fs::exists(snapshot_file(stem, ".png"))) return stem;
-    fs::remove(claim);
+    const fs::path stem = folder / name.data();
+    if (exr.put_as_new(snapshot_file(stem, ".exr"))) return stem;
   }
 }
 
@@ -95,13 +83,13 @@ fs::path write_snapshot(const pipeline::Shot& shot, const set::Set& set) {
   const std::uint64_t pixels = shot.layers->mask.size();
   check_space(folder, pixels * most_bytes_a_pixel, set.recording.directory,
               static_cast<std::uint64_t>(set.recording.reserve_mb * 1e6));
-  fs::path stem = claim_snapshot(folder);
   output::ExrMetadata metadata = output::exr_metadata(*shot.layers, *shot.frame, shot.track, set);
   if (shot.shown_pose) {
     metadata.pose = "held";
     metadata.world_from_camera = shot.shown_pose->world_from_camera;
   }
-  output::write_exr(snapshot_file(stem, ".exr"), *shot.layers, metadata);
+  session::Draft exr = output::exr_draft(folder / "snapshot.exr", *shot.layers, metadata);
+  fs::path stem = put_snapshot(exr);
   output::write_png(snapshot_file(stem, ".png"), *shot.picture);
   return stem;
 }

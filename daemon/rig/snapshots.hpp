@@ -7,6 +7,7 @@
 
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/set/set.hpp"
+#include "drivers/session/draft.hpp"
 
 namespace previz::rig {
 
@@ -15,9 +16,9 @@ namespace previz::rig {
 // keep free on their disk (recording.reserve_mb). Throws previz::Error naming the file.
 std::filesystem::path write_snapshot(const pipeline::Shot& shot, const set::Set& set);
 
-// Takes the next number in the folder: makes the empty file that write_exr() replaces, so that
-// nobody else takes the same. Returns the path without extension; throws previz::Error.
-std::filesystem::path claim_snapshot(const std::filesystem::path& folder);
+// Puts an EXR under the next number in its folder, which nobody else then takes. Returns the path
+// without extension; throws previz::Error.
+std::filesystem::path put_snapshot(session::Draft& exr);
 
 // Throws previz::Error if a file of so many bytes in `folder` would leave less than `reserve_bytes`
 // on the disk that the takes are on; on another disk, if it does not fit.

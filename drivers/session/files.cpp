@@ -10,7 +10,6 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <iterator>
 #include <memory>
 #include <string_view>
@@ -18,21 +17,13 @@
 #include <vector>
 
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 
 namespace previz::session {
 namespace {
 
 [[noreturn]] void fail(const std::filesystem::path& file, const char* what) {
   throw Error(file.string() + ": " + what + ": " + std::strerror(errno));
-}
-
-// Gives a draft the owner and the mode of the file that it is to replace. Only root may give a file
-// away, so that a refusal is no error.
-void keep_owner(const std::filesystem::path& file, const OpenFile& draft) {
-  struct stat known {};
-  if (::stat(file.c_str(), &known) != 0) return;
-  [[maybe_unused]] const int refused = ::fchown(draft.get(), known.st_uid, known.st_gid);
-  if (::fchmod(draft.get(), known.st_mode & 07777) != 0) fail(file, "cannot be given its mode");
 }
 
 }  // namespace
@@ -76,19 +67,10 @@ void make_folders(const std::filesystem::path& folder) {
 }
 
 void replace_file(const std::filesystem::path& file, const std::string& content) {
-  const std::filesystem::path draft = file.string() + ".part";
-  try {
-    const OpenFile written(draft, O_WRONLY | O_CREAT | O_TRUNC);
-    keep_owner(file, written);
-    written.append(content);
-    written.sync();
-    if (std::rename(draft.c_str(), file.c_str()) != 0) fail(file, "cannot be replaced");
-  } catch (const Error&) {
-    std::error_code ignored;
-    std::filesystem::remove(draft, ignored);
-    throw;
-  }
-  sync_names(file.parent_path());
+  Draft draft(file);
+  draft.keep_owner();
+  draft.file().append(content);
+  draft.put();
 }
 
 bool lies_within(const std::filesystem::path& folder, const std::filesystem::path& file) {
@@ -102,19 +84,70 @@ bool lies_within(const std::filesystem::path& folder, const std::filesystem::pat
   return std::mismatch(real_folder.begin(), last, real_file.begin(), real_file.end()).first == last;
 }
 
+namespace {
+
+std::string content_of(const OpenFile& file, const std::filesystem::path& name) {
+  std::string content;
+  std::vector<char> block(1 << 18);
+  for (;;) {
+    const ssize_t count = ::read(file.get(), block.data(), block.size());
+    if (count == 0) return content;
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) fail(name, "cannot be read");
+    content.append(block.data(), static_cast<std::size_t>(count));
+  }
+}
+
+std::string words_of(mode_t mode) {
+  if (S_ISDIR(mode)) return "a folder";
+  if (S_ISFIFO(mode)) return "a pipe";
+  if (S_ISSOCK(mode)) return "a socket";
+  return "a device";
+}
+
+}  // namespace
+
 std::string read_file(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) fail(file, "cannot be opened");
-  std::string content{std::istreambuf_iterator<char>(stream), {}};
-  if (stream.bad()) fail(file, "cannot be read");
-  return content;
+  return content_of(OpenFile(file, O_RDONLY), file);
+}
+
+std::string why_not_plain(const std::filesystem::path& file) {
+  struct stat known {};
+  if (::lstat(file.c_str(), &known) != 0 || S_ISREG(known.st_mode)) return "";
+  if (!S_ISLNK(known.st_mode))
+    return "is " + words_of(known.st_mode) + " and not a file, and is not opened";
+  std::error_code unknown;
+  return "is a link (to " + std::filesystem::read_symlink(file, unknown).string() +
+         "), which is not followed; put the file itself there";
+}
+
+OpenFile open_plain_file(const std::filesystem::path& file) {
+  // Without O_NONBLOCK the opening of a pipe waits for somebody who writes.
+  OwnedDescriptor open(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  struct stat known {};
+  const bool is_plain = open && ::fstat(open.get(), &known) == 0 && S_ISREG(known.st_mode);
+  const int error = errno;
+  const std::string why_not = is_plain ? "" : why_not_plain(file);
+  if (!why_not.empty()) throw Error(file.string() + ": " + why_not);
+  errno = error;
+  if (!is_plain) fail(file, "cannot be opened");
+  return {std::move(open), file};
+}
+
+std::string read_plain_file(const std::filesystem::path& file) {
+  return content_of(open_plain_file(file), file);
 }
 
 void read_blocks(const std::filesystem::path& file, const std::function<bool()>& is_left,
                  const std::function<void(std::string_view)>& pass_on) {
-  constexpr int patience_ms = 100;
   // Without O_NONBLOCK the opening of a pipe waits for somebody who writes.
-  const OpenFile open(file, O_RDONLY | O_NONBLOCK);
+  read_blocks(OpenFile(file, O_RDONLY | O_NONBLOCK), is_left, pass_on);
+}
+
+void read_blocks(const OpenFile& open, const std::function<bool()>& is_left,
+                 const std::function<void(std::string_view)>& pass_on) {
+  constexpr int patience_ms = 100;
+  const std::filesystem::path& file = open.name();
   std::vector<char> block(1 << 20);
   for (;;) {
     if (is_left()) throw Error(file.string() + ": was left, because reading it is to end");

@@ -9,6 +9,7 @@
 #include <stop_token>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "drivers/descriptor.hpp"
 
@@ -18,7 +19,11 @@ class OpenFile {
  public:
   // Throws previz::Error naming the file. `flags` as for open(2), always with O_CLOEXEC.
   OpenFile(std::filesystem::path file, int flags);
+  // Takes over what is open already; `name` is for errors.
+  OpenFile(OwnedDescriptor open, std::filesystem::path name)
+      : file_(std::move(name)), descriptor_(std::move(open)) {}
   int get() const { return descriptor_.get(); }
+  const std::filesystem::path& name() const { return file_; }
   void append(std::string_view text) const;
   // Waits until what was written is on the medium; throws previz::Error.
   void sync() const;
@@ -56,10 +61,21 @@ bool lies_within(const std::filesystem::path& folder, const std::filesystem::pat
 
 // Returns the whole file; throws previz::Error naming it.
 std::string read_file(const std::filesystem::path& file);
+
+// Takes come from elsewhere: a link in one may lead anywhere, and a pipe or a device may keep its
+// reader waiting for ever. Both open and read only what is a file itself, without waiting. Throw
+// previz::Error that says what else is there.
+OpenFile open_plain_file(const std::filesystem::path& file);
+std::string read_plain_file(const std::filesystem::path& file);
+// Returns what is there in the place of a file, and what to do about it, as the end of a sentence
+// that begins with its name; empty: a file, or nothing.
+std::string why_not_plain(const std::filesystem::path& file);
 // Passes the file's content on in blocks. `is_left` is asked between blocks, and a few times a
 // second while a pipe has nothing; where it returns true, previz::Error ends the reading. Throws
 // previz::Error naming the file.
 void read_blocks(const std::filesystem::path& file, const std::function<bool()>& is_left,
+                 const std::function<void(std::string_view)>& pass_on);
+void read_blocks(const OpenFile& file, const std::function<bool()>& is_left,
                  const std::function<void(std::string_view)>& pass_on);
 
 // Computes a SHA-256 of what comes in pieces.

@@ -4,13 +4,14 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 #include "drivers/session/light_json.hpp"
 
 namespace previz::session {
@@ -215,7 +216,8 @@ bool in_order(const ButtonEvent&, const ButtonEvent&) {
 template <typename Record, typename Parse>
 Lines<Record> read_lines(const std::filesystem::path& file, Parse parse) {
   Lines<Record> lines;
-  std::ifstream stream(file, std::ios::binary);
+  if (!std::filesystem::exists(std::filesystem::symlink_status(file))) return lines;
+  std::istringstream stream(read_plain_file(file));
   std::string text;
   for (std::uint64_t number = 1; std::getline(stream, text); ++number) {
     try {

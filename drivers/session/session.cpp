@@ -26,6 +26,7 @@
 #include "drivers/session/json_lines.hpp"
 #include "drivers/session/missing.hpp"
 #include "drivers/session/session_toml.hpp"
+#include "drivers/session/summary.hpp"
 
 namespace previz::session {
 namespace {
@@ -104,11 +105,12 @@ Session open_session(const std::filesystem::path& directory, const std::stop_tok
   if (!std::filesystem::exists(directory))
     throw Error(directory.string() +
                 ": is not there; `previzd takes list FOLDER` shows the takes there are");
-  if (!std::filesystem::exists(toml))
+  if (!std::filesystem::exists(std::filesystem::symlink_status(toml)))
     throw Error(directory.string() + ": is not a session; it holds no session.toml");
-  const SessionFile file = parse_session_toml(read_file(toml), toml);
+  const SessionFile file = parse_session_toml(read_plain_file(toml), toml);
   Session session{directory, file.info, {}, {}};
   read_end(file, session);
+  for (const std::string& stranger : strangers_in(directory)) session.missing.push_back(stranger);
   check_assets(session, stop);
   read_track(session);
   return session;

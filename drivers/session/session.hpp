@@ -231,9 +231,14 @@ class SessionWriter {
   std::unique_ptr<Impl> impl_;
 };
 
-// Brings a session that was cut off into order: writes into its session.toml that, unless it is
-// there already, and returns how many frames of the observer it has; nothing if there was nothing
-// to do. Does not read the videos. Throws previz::Error as open_session() does.
+// Returns whether a SessionWriter, of any process on this machine, is writing the session now, as
+// far as the file system knows locks.
+bool is_being_written(const std::filesystem::path& directory);
+
+// Brings a session that was cut off, and that nobody is writing, into order: writes into its
+// session.toml that, unless it is there already, and returns how many frames of the observer it
+// has; nothing if there was nothing to do. Does not read the videos. Throws previz::Error as
+// open_session() does.
 std::optional<std::uint64_t> salvage(const std::filesystem::path& directory);
 
 // Changes the take that a finished session describes. Throws previz::Error naming the file.

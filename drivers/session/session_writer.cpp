@@ -1,11 +1,15 @@
 #include <fcntl.h>
+#include <sys/file.h>
 
+#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <map>
 #include <utility>
 
+#include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/json_lines.hpp"
 #include "drivers/session/session.hpp"
@@ -70,10 +74,19 @@ void make_empty_directory(const std::filesystem::path& directory) {
     throw Error(directory.string() + ": is not empty; a session needs a directory of its own");
 }
 
+// A folder that its writer holds locked as long as it is written. File systems without locks let
+// everybody have it.
+OwnedDescriptor locked(const std::filesystem::path& directory, bool& is_anothers) {
+  OwnedDescriptor folder(::open(directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  is_anothers = folder && ::flock(folder.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  return folder;
+}
+
 }  // namespace
 
 struct SessionWriter::Impl {
   std::filesystem::path directory;
+  OwnedDescriptor lock;  // of the directory
   std::chrono::nanoseconds sync_interval{};
   SessionFile file;
   std::map<std::string, StreamWriter> streams;
@@ -126,7 +139,6 @@ struct SessionWriter::Impl {
       make_folders(target.parent_path());
       if (!std::filesystem::exists(target)) {
         copy(from, target);
-        sync_names(target.parent_path());
       }
     } catch (const std::filesystem::filesystem_error& error) {
       throw Error(from.string() + ": cannot be copied into the session: " + error.code().message());
@@ -135,12 +147,10 @@ struct SessionWriter::Impl {
   }
 
   static void copy(const std::filesystem::path& from, const std::filesystem::path& target) {
-    const std::filesystem::path draft = target.string() + ".part";
-    std::filesystem::copy_file(from, draft, std::filesystem::copy_options::overwrite_existing);
-    std::filesystem::permissions(draft, std::filesystem::perms::owner_write,
-                                 std::filesystem::perm_options::add);
-    OpenFile(draft, O_RDONLY).sync();
-    std::filesystem::rename(draft, target);
+    Draft draft(target);
+    read_blocks(
+        from, [] { return false; }, [&](std::string_view block) { draft.file().append(block); });
+    draft.put();
   }
 
   // The file opens at its first line.
@@ -195,6 +205,8 @@ SessionWriter::SessionWriter(const std::filesystem::path& directory, const Sessi
   impl_->sync_interval = sync_interval;
   impl_->file.info = info;
   make_empty_directory(directory);
+  bool is_in_draft = false;  // which is locked already
+  impl_->lock = locked(directory, is_in_draft);
   impl_->write_toml();
 }
 
@@ -287,14 +299,18 @@ void SessionWriter::abandon(const std::string& fault) {
   impl_->abandon(fault);
 }
 
+bool is_being_written(const std::filesystem::path& directory) {
+  bool is_anothers = false;
+  locked(directory, is_anothers);
+  return is_anothers;
+}
+
 std::optional<std::uint64_t> salvage(const std::filesystem::path& directory) {
   const std::filesystem::path toml = directory / "session.toml";
-  if (!std::filesystem::exists(toml)) return std::nullopt;
-  SessionFile file = parse_session_toml(read_file(toml), toml);
-  if (file.closed || !file.fault.empty()) return std::nullopt;
-  const std::filesystem::path lines = directory / "observer.jsonl";
-  const std::uint64_t frames =
-      std::filesystem::exists(lines) ? read_frame_lines(lines).records.size() : 0;
+  if (!std::filesystem::exists(std::filesystem::symlink_status(toml))) return std::nullopt;
+  SessionFile file = parse_session_toml(read_plain_file(toml), toml);
+  if (file.closed || !file.fault.empty() || is_being_written(directory)) return std::nullopt;
+  const std::uint64_t frames = read_frame_lines(directory / "observer.jsonl").records.size();
   file.fault = "it was cut off by a crash or a power cut";
   replace_file(toml, to_toml(file));
   return frames;
@@ -303,7 +319,7 @@ std::optional<std::uint64_t> salvage(const std::filesystem::path& directory) {
 void change_take(const std::filesystem::path& directory,
                  const std::function<void(TakeInfo&)>& change) {
   const std::filesystem::path toml = directory / "session.toml";
-  SessionFile file = parse_session_toml(read_file(toml), toml);
+  SessionFile file = parse_session_toml(read_plain_file(toml), toml);
   if (!file.info.take) file.info.take.emplace();
   change(*file.info.take);
   replace_file(toml, to_toml(file));

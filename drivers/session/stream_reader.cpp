@@ -112,7 +112,7 @@ void list_missing(const Leftovers& left, const std::string& source,
 std::unique_ptr<VideoReader> open_video(const std::filesystem::path& file,
                                         const StreamFormat& format,
                                         std::vector<std::string>& missing) {
-  if (!std::filesystem::exists(file)) {
+  if (!std::filesystem::exists(std::filesystem::symlink_status(file))) {
     missing.push_back(file.filename().string() + ": the file is missing");
     return nullptr;
   }
@@ -129,7 +129,7 @@ std::unique_ptr<VideoReader> open_video(const std::filesystem::path& file,
 std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& source,
                                           const std::stop_token& stop) {
   const std::filesystem::path toml = session.directory / "session.toml";
-  const SessionFile file = parse_session_toml(read_file(toml), toml);
+  const SessionFile file = parse_session_toml(read_plain_file(toml), toml);
   const std::filesystem::path video_file = session.directory / (source + ".mkv");
   const std::filesystem::path line_file = session.directory / (source + ".jsonl");
   const auto declared = file.streams.find(source);

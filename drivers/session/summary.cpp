@@ -22,17 +22,27 @@ bool is_asset_name(const std::filesystem::path& name) {
   return hash.size() == 64 && hash.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
-void add_own_files(const std::filesystem::path& directory, const std::filesystem::path& folder,
-                   std::vector<std::filesystem::path>& files) {
+// Calls `visit` with the files that are, or stand in the place of, a session's own, by their paths
+// in its folder. Throws previz::Error if a folder cannot be listed.
+template <typename Visit>
+void visit_own(const std::filesystem::path& directory, const std::filesystem::path& folder,
+               const Visit& visit) {
   std::error_code failure;
   for (const auto& entry : std::filesystem::directory_iterator(directory / folder, failure)) {
     const std::filesystem::path name = entry.path().filename();
     const bool is_own = folder.empty() ? std::ranges::find(own_names, name) != own_names.end()
                                        : is_asset_name(name);
-    if (is_own && !entry.is_symlink() && entry.is_regular_file()) files.push_back(folder / name);
+    if (is_own) visit(folder / name, entry);
   }
   if (failure && failure != std::errc::no_such_file_or_directory)
     throw Error((directory / folder).string() + ": cannot be listed: " + failure.message());
+}
+
+template <typename Visit>
+void visit_own(const std::filesystem::path& directory, const Visit& visit) {
+  visit_own(directory, {}, visit);
+  if (std::filesystem::is_directory(std::filesystem::symlink_status(directory / "assets")))
+    visit_own(directory, "assets", visit);
 }
 
 }  // namespace
@@ -40,9 +50,9 @@ void add_own_files(const std::filesystem::path& directory, const std::filesystem
 Summary summary_of(const std::filesystem::path& directory) {
   const std::filesystem::path toml = directory / "session.toml";
   if (!std::filesystem::exists(directory)) throw Error(directory.string() + ": is not there");
-  if (!std::filesystem::exists(toml))
+  if (!std::filesystem::exists(std::filesystem::symlink_status(toml)))
     throw Error(directory.string() + ": is not a take; it holds no session.toml");
-  SessionFile file = parse_session_toml(read_file(toml), toml);
+  SessionFile file = parse_session_toml(read_plain_file(toml), toml);
   Summary summary{std::move(file.info), file.closed, file.fault, file.lost, 0, 0, 0};
   const auto observer = read_frame_lines(directory / "observer.jsonl").records;
   summary.frames = observer.size();
@@ -55,10 +65,24 @@ Summary summary_of(const std::filesystem::path& directory) {
 
 std::vector<std::filesystem::path> own_files(const std::filesystem::path& directory) {
   std::vector<std::filesystem::path> files;
-  add_own_files(directory, {}, files);
-  if (!std::filesystem::is_symlink(directory / "assets")) add_own_files(directory, "assets", files);
+  visit_own(directory, [&](const std::filesystem::path& file, const auto& entry) {
+    if (!entry.is_symlink() && entry.is_regular_file()) files.push_back(file);
+  });
   std::ranges::sort(files);
   return files;
+}
+
+std::vector<std::string> strangers_in(const std::filesystem::path& directory) {
+  std::vector<std::string> strangers;
+  const auto look_at = [&](const std::filesystem::path& file) {
+    const std::string why_not = why_not_plain(directory / file);
+    if (!why_not.empty()) strangers.push_back(file.string() + ": " + why_not);
+  };
+  visit_own(directory, [&](const std::filesystem::path& file, const auto&) { look_at(file); });
+  if (!std::filesystem::is_directory(std::filesystem::symlink_status(directory / "assets")))
+    look_at("assets");
+  std::ranges::sort(strangers);
+  return strangers;
 }
 
 }  // namespace previz::session

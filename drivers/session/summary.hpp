@@ -27,5 +27,9 @@ Summary summary_of(const std::filesystem::path& directory);
 // session.toml, the videos and the lines beside them, and in assets/ the files that are named by
 // their content. Whatever else lies in the folder is not the session's, and neither is a link.
 std::vector<std::filesystem::path> own_files(const std::filesystem::path& directory);
+// Returns, in words that begin with its name, what has the name of one of the session's own files
+// and is a link, a folder, a pipe or a device: nobody opens it, and no copy has it. Both throw
+// previz::Error if the folder cannot be listed.
+std::vector<std::string> strangers_in(const std::filesystem::path& directory);
 
 }  // namespace previz::session

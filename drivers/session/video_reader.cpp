@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "drivers/av.hpp"
+#include "drivers/session/files.hpp"
 #include "drivers/session/samples.hpp"
 
 namespace previz::session {
@@ -12,7 +13,9 @@ namespace {
 av::Demuxer open_demuxer(const std::filesystem::path& file) {
   AVFormatContext* context = nullptr;
   const AVInputFormat* matroska = av_find_input_format("matroska");
-  av::check(avformat_open_input(&context, av::url_of(file).c_str(), matroska, nullptr), file,
+  const OpenFile plain = open_plain_file(file);  // which libav opens once more, by its descriptor
+  const std::filesystem::path same = "/proc/self/fd/" + std::to_string(plain.get());
+  av::check(avformat_open_input(&context, av::url_of(same).c_str(), matroska, nullptr), file,
             "cannot be read as Matroska");
   // Packets are read as they are in the file: without a parser, and without invented times.
   context->flags |= AVFMT_FLAG_NOPARSE | AVFMT_FLAG_NOFILLIN;

@@ -5,12 +5,11 @@
 #include <random>
 
 #include "daemon/output/exr.hpp"
-#include "daemon/output/file.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/output/video.hpp"
 #include "daemon/render/composite.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/files.hpp"
+#include "drivers/session/draft.hpp"
 #include "tests/durability/faulty_disk.hpp"
 #include "tests/support/session_fixture.hpp"
 
@@ -130,7 +129,7 @@ TEST_P(EveryCallOfAFile, LeavesTheFileWholeOrNotThereAndSaysSo) {
 // What another file replaces a second later makes no disk wait, and still is whole or as before.
 TEST(Files, OfASecondAreNotSynced) {
   const TemporaryDirectory directory;
-  const auto syncs_of = [&](const char* folder, output::Sync sync) {
+  const auto syncs_of = [&](const char* folder, session::Sync sync) {
     std::filesystem::create_directory(directory / folder);
     const FaultyDisk disk(directory / folder);
     output::write_png(directory / folder / "a.png", picture(1), sync);
@@ -140,8 +139,8 @@ TEST(Files, OfASecondAreNotSynced) {
     EXPECT_GT(disk.calls(), 2u);
     return syncs;
   };
-  EXPECT_EQ(syncs_of("briefly", output::Sync::no), 0);
-  EXPECT_EQ(syncs_of("for_good", output::Sync::yes), 2);  // the file and its name
+  EXPECT_EQ(syncs_of("briefly", session::Sync::no), 0);
+  EXPECT_EQ(syncs_of("for_good", session::Sync::yes), 2);  // the file and its name
   EXPECT_EQ(output::read_png(directory / "briefly/a.png").samples, picture(1).samples);
 }
 

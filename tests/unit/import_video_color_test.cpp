@@ -243,7 +243,7 @@ TEST_P(ImportVideoColors, ComeInAsTheTagsSay) {
   video.width = video.height = side;
   if (video.encoder == "libx264") video.options = {{"qp", "0"}};
   if (video.encoder == "libx265")
-    video.options = {{"x265-params", "lossless=1:log-level=none:pools=none"}};
+    video.options = {{"x265-params", "lossless=1:log-level=none:pools=none:bframes=0"}};
   if (video.encoder == "mjpeg") video.options = {{"qmin", "1"}, {"qmax", "1"}};
   if (form.tagged) {
     video.range = form.full ? AVCOL_RANGE_JPEG : AVCOL_RANGE_MPEG;

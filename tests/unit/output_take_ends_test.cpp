@@ -258,19 +258,16 @@ TEST(Recorder, LeavesOutWhatCannotBeRecordedAndGoesOn) {
 TEST(Recorder, CountsTheLossesOfEachTakeThoughTheNextRecordingHasBegun) {
   Rig rig;
   std::mutex disk;
-  std::atomic<bool> hangs = false;
   RecorderOptions options = rig.options();
   options.queue_bytes = 4 * picture(0)->bytes.size();
   options.free_bytes = [&](const auto&) {  // the writer asks the disk once a second
-    hangs = true;
     const std::lock_guard lock(disk);
-    hangs = false;
     return plenty;
   };
-  const auto wait_for_the_disk_to_hang = [&] {
-    return wait_until("the disk hangs", [&] { return hangs.load(); });
-  };
   Recorder recorder(std::move(options));
+  const auto wait_for_the_disk_to_hang = [&] {
+    return wait_until("the disk hangs", [&] { return recorder.status().disk_silent_s > 0.1; });
+  };
   recorder.start();
   recorder.offer(picture(0));
   ASSERT_TRUE(wait_for_frames(recorder, 1));

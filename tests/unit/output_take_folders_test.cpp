@@ -8,6 +8,7 @@
 #include <mutex>
 #include <thread>
 
+#include "daemon/output/folder_watch.hpp"
 #include "daemon/output/recorder.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
@@ -70,12 +71,16 @@ TEST(TakeFolders, TheFirstThatHasRoomAndDidNotFailIsChosen) {
 
 TEST(TakeFolders, ADiskThatWasGivenUpHasNoRoomForTakes) {
   const TemporaryDirectory directory;
-  TakeFolders folders({directory / "takes"}, 20, [](const auto&) { return 100; });
-  EXPECT_EQ(folders.free_bytes(), 80u);
+  TakeFolders folders({directory / "takes"}, 20, {});
+  FolderSeen seen;
+  seen.free_bytes = 100;
+  EXPECT_EQ(folders.free_bytes({seen}), 80u);
   folders.give_up(0, "it failed");
-  EXPECT_FALSE(folders.free_bytes());
+  EXPECT_FALSE(folders.free_bytes({seen}));
   folders.forgive_all();
-  EXPECT_EQ(folders.free_bytes(), 80u);
+  EXPECT_EQ(folders.free_bytes({seen}), 80u);
+  seen.why_not = "Read-only file system";
+  EXPECT_FALSE(folders.free_bytes({seen}));
 }
 
 TEST(TakeFolders, AFolderThatCannotBeMadeIsPassedOverByName) {
@@ -90,17 +95,17 @@ TEST(TakeFolders, AFolderThatCannotBeMadeIsPassedOverByName) {
 TEST(TakeFolders, AWishIsKeptInTheFolderOfItsTakeAndTheNewestCounts) {
   const TemporaryDirectory directory;
   const TakeFolders folders({directory / "a", directory / "b"}, 0, {});
-  EXPECT_EQ(folders.kept_wish(), std::nullopt);
+  EXPECT_FALSE(folders.kept_wish());
   for (const char* folder : {"a", "b"}) session::make_folders(directory / folder);
   TakeFolders::keep_wish(directory / "a/12A_take003");
-  EXPECT_EQ(folders.kept_wish(), "12A_take003");
+  EXPECT_EQ(folders.kept_wish()->take, "12A_take003");
   TakeFolders::keep_wish(directory / "b/12A_take004");
   std::filesystem::last_write_time(
       directory / "a/.recording",
       std::filesystem::last_write_time(directory / "b/.recording") - std::chrono::seconds(1));
-  EXPECT_EQ(folders.kept_wish(), "12A_take004");
+  EXPECT_EQ(folders.kept_wish()->take, "12A_take004");
   folders.drop_wish();
-  EXPECT_EQ(folders.kept_wish(), std::nullopt);
+  EXPECT_FALSE(folders.kept_wish());
 }
 
 TEST(TakeFolders, TheSpeedOfADiskIsMeasuredAndNothingStays) {

@@ -22,36 +22,42 @@ namespace fs = std::filesystem;
 
 TEST(Snapshots, HaveTheNumberAfterTheLast) {
   const test::TemporaryDirectory directory;
-  EXPECT_EQ(claim_snapshot(directory / "new"), directory / "new/snapshot_0001");
+  const auto put = [&](const fs::path& folder) {
+    session::Draft exr(folder / "snapshot.exr");
+    return put_snapshot(exr);
+  };
+  fs::create_directory(directory / "new");
+  EXPECT_EQ(put(directory / "new"), directory / "new/snapshot_0001");
   const auto touch = [&](const std::string& name) { const std::ofstream made(directory / name); };
   for (const char* name :
        {"snapshot_0007.exr", "snapshot_0009.png", "snapshot_x.exr", "other_99.exr"})
     touch(name);
-  EXPECT_EQ(claim_snapshot(directory.path()), directory / "snapshot_0010");
-  EXPECT_EQ(claim_snapshot(directory.path()), directory / "snapshot_0011");
+  EXPECT_EQ(put(directory.path()), directory / "snapshot_0010");
+  EXPECT_EQ(put(directory.path()), directory / "snapshot_0011");
   touch("snapshot_12345.exr");
-  EXPECT_EQ(claim_snapshot(directory.path()), directory / "snapshot_12346");
+  EXPECT_EQ(put(directory.path()), directory / "snapshot_12346");
 }
 
-// Every file that a claimer finishes stays the only one of its number.
+// Every file that is put stays the only one of its number.
 TEST(Snapshots, OfManyAtOnceHaveANumberEach) {
   const test::TemporaryDirectory directory;
   std::mutex mutex;
-  std::multiset<fs::path> claimed;
+  std::set<std::string> contents;
   {
-    std::vector<std::jthread> claimers;
+    std::vector<std::jthread> writers;
     for (int i = 0; i < 4; ++i)
-      claimers.emplace_back([&] {
+      writers.emplace_back([&, i] {
         for (int times = 0; times < 25; ++times) {
-          const fs::path stem = claim_snapshot(directory.path());
-          fs::rename(stem.string() + ".exr.part", stem.string() + ".exr");
+          session::Draft exr(directory / "snapshot.exr");
+          exr.file().append(std::to_string(100 * i + times));
+          const fs::path stem = put_snapshot(exr);
           const std::lock_guard lock(mutex);
-          claimed.insert(stem);
+          contents.insert(session::read_file(stem.string() + ".exr"));
         }
       });
   }
-  EXPECT_EQ(claimed.size(), 100u);
-  EXPECT_EQ((std::set<fs::path>(claimed.begin(), claimed.end()).size()), 100u);
+  EXPECT_EQ(contents.size(), 100u);
+  EXPECT_EQ(std::distance(fs::directory_iterator(directory.path()), {}), 100);
 }
 
 TEST(Snapshots, LeaveTheSpaceThatTakesKeepFree) {

@@ -1,0 +1,294 @@
+#include "daemon/output/folder_watch.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <condition_variable>
+#include <cstring>
+#include <ctime>
+#include <deque>
+#include <mutex>
+#include <system_error>
+#include <utility>
+
+#include "daemon/output/salvage.hpp"
+#include "daemon/output/take_writer.hpp"
+#include "drivers/descriptor.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+
+namespace previz::output {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+// A disk is waited for so long when the watch ends.
+constexpr std::chrono::seconds end_patience{2};
+constexpr const char* owner_name = ".recorder";
+
+// Returns why files cannot be made in a folder, or where it is to be made; empty if they can.
+std::string why_not_writable(const fs::path& folder) {
+  const fs::path there = existing_part(folder);
+  std::error_code unknown;
+  if (!fs::is_directory(there, unknown)) return "it is no folder";
+  return ::access(there.c_str(), W_OK) == 0 ? "" : std::strerror(errno);
+}
+
+std::string owner_words() {
+  const std::time_t now = std::time(nullptr);
+  std::tm local{};
+  localtime_r(&now, &local);
+  std::string since(32, '\0');
+  since.resize(std::strftime(since.data(), since.size(), "%Y-%m-%d %H:%M:%S", &local));
+  return "process " + std::to_string(::getpid()) + ", since " + since;
+}
+
+// A file that a process holds locked. File systems without locks let everybody have it.
+class Ownership {
+ public:
+  // Returns why it cannot be had; empty if it is held.
+  std::string take(const fs::path& folder) {
+    if (held_) return "";
+    const fs::path file = folder / owner_name;
+    OwnedDescriptor open(
+        ::open(file.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0644));
+    if (!open) return file.string() + " cannot be opened: " + std::strerror(errno);
+    if (::flock(open.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+      return "another previzd records there (" + first_line(file) + ")";
+    static_cast<void>(!::ftruncate(open.get(), 0));
+    const std::string words = owner_words() + "\n";
+    static_cast<void>(!::write(open.get(), words.data(), words.size()));  // for people
+    held_ = std::move(open);
+    return "";
+  }
+  void leave() { held_ = {}; }
+
+ private:
+  static std::string first_line(const fs::path& file) {
+    try {
+      const std::string text = session::read_plain_file(file);
+      return text.substr(0, text.find('\n'));
+    } catch (const Error& error) {
+      return error.what();
+    }
+  }
+  OwnedDescriptor held_;
+};
+
+struct Followed {
+  fs::path take;
+  dev_t disk = 0;
+  ino_t file = 0;
+};
+
+}  // namespace
+
+class FolderWatch::Worker {
+ public:
+  explicit Worker(FolderWatchOptions options)
+      : options_(std::move(options)),
+        salvage_({options_.folder}, [this](const std::string& what) { note(what); }) {
+    seen_.folder = options_.folder;
+  }
+
+  void run() {
+    std::unique_lock lock(mutex_);
+    for (Clock::time_point due{}; !(is_ended_ && tasks_.empty());) {
+      changed_.wait_until(lock, due, [this] { return is_ended_ || !tasks_.empty(); });
+      std::optional<Task> task;
+      if (!tasks_.empty()) {
+        task = std::move(tasks_.front());
+        tasks_.pop_front();
+      }
+      busy_since_ = Clock::now();
+      lock.unlock();
+      if (task) {
+        carry_out(*task);
+      } else if (Clock::now() >= due) {
+        look();
+        due = Clock::now() + interval;
+      }
+      lock.lock();
+      busy_since_.reset();
+    }
+    has_ended_ = true;
+    changed_.notify_all();
+  }
+
+  // Returns whether the thread has ended, or ends at once.
+  bool end() {
+    std::unique_lock lock(mutex_);
+    is_ended_ = true;
+    changed_.notify_all();
+    const bool has_ended = changed_.wait_for(lock, end_patience, [this] { return has_ended_; });
+    lock.unlock();
+    if (!has_ended) note(options_.folder.string() + ": the disk does not answer, and is left");
+    is_left_ = true;
+    {
+      const std::lock_guard calls(calls_);
+      options_.note = {};
+      options_.on_news = {};
+    }
+    const std::unique_lock owner(owner_mutex_, std::try_to_lock);
+    if (owner) owner_.leave();
+    return has_ended;
+  }
+
+  FolderSeen seen() const {
+    const std::lock_guard lock(mutex_);
+    FolderSeen seen = seen_;
+    if (busy_since_)
+      seen.silent_s = std::chrono::duration<double>(Clock::now() - *busy_since_).count();
+    return seen;
+  }
+
+  std::string hold() {
+    const std::lock_guard lock(owner_mutex_);
+    const std::string why_not = owner_.take(options_.folder);
+    if (is_left_) owner_.leave();
+    return why_not;
+  }
+
+  void follow(const fs::path& take) {
+    struct stat status {};
+    const bool is_there = ::stat(take.c_str(), &status) == 0;
+    const std::lock_guard lock(mutex_);
+    seen_.take_gone.clear();
+    followed_.reset();
+    if (is_there) followed_ = {take, status.st_dev, status.st_ino};
+  }
+
+  void add(std::function<void()> action, std::string otherwise) {
+    const std::lock_guard lock(mutex_);
+    tasks_.push_back({std::move(action), std::move(otherwise)});
+    changed_.notify_all();
+  }
+
+  const fs::path& folder() const { return options_.folder; }
+
+ private:
+  struct Task {
+    std::function<void()> action;
+    std::string otherwise;  // what follows if it fails, in words
+  };
+
+  void note(const std::string& what) {
+    const std::lock_guard lock(calls_);
+    if (options_.note) options_.note(what);
+  }
+
+  void carry_out(const Task& task) {
+    try {
+      task.action();
+    } catch (const std::exception& error) {
+      note(task.otherwise + ": " + error.what());
+    }
+  }
+
+  void look() {
+    FolderSeen now = seen();
+    now.is_looked_at = true;
+    std::error_code unknown;
+    now.is_there = fs::exists(options_.folder, unknown);
+    now.why_not = why_not_writable(options_.folder);
+    now.disk = disk_of(options_.folder);
+    now.free_bytes.reset();
+    try {
+      now.free_bytes = free_on_disk_of(options_.folder, options_.free_bytes);
+    } catch (const std::exception&) {
+      // This disk cannot say.
+    }
+    if (now.is_there && now.why_not.empty()) now.why_not = hold();
+    now.is_own = now.is_there && now.why_not.empty();
+    if (now.is_own)
+      bring_into_order(now);
+    else if (now.is_there && !std::exchange(has_said_why_not_, true))
+      note("takes from before cannot be looked at: " + options_.folder.string() + ": " +
+           now.why_not);
+    publish(std::move(now));
+    const std::lock_guard lock(calls_);
+    if (options_.on_news) options_.on_news();
+  }
+
+  // Of what the process before left; once.
+  void bring_into_order(FolderSeen& now) {
+    if (std::exchange(is_in_order_, true)) return;
+    const TakeFolders alone({options_.folder}, 0, {});
+    now.highest_number =
+        next_take_number({options_.folder}, options_.slate, now.highest_number) - 1;
+    salvage_.look(now.salvaged);
+    now.wish = alone.kept_wish();
+  }
+
+  void publish(FolderSeen now) {
+    std::optional<Followed> followed;
+    {
+      const std::lock_guard lock(mutex_);
+      followed = followed_;
+    }
+    struct stat status {};
+    const bool is_gone =
+        followed && (::stat(followed->take.c_str(), &status) != 0 ||
+                     status.st_dev != followed->disk || status.st_ino != followed->file);
+    const std::lock_guard lock(mutex_);
+    const bool is_same = followed && followed_ && followed->take == followed_->take;
+    now.take_gone = is_gone && is_same ? followed->take.string() +
+                                             " is no longer there; its disk was unmounted, or it "
+                                             "was moved"
+                                       : "";
+    seen_ = std::move(now);
+  }
+
+  FolderWatchOptions options_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  FolderSeen seen_;
+  std::deque<Task> tasks_;
+  std::optional<Followed> followed_;
+  std::optional<Clock::time_point> busy_since_;
+  bool is_ended_ = false, has_ended_ = false;
+  std::mutex calls_;  // held while the options' functions are called
+  std::mutex owner_mutex_;
+  Ownership owner_;
+  std::atomic<bool> is_left_ = false;
+  // Only the watch's thread uses these.
+  Salvage salvage_;
+  bool is_in_order_ = false, has_said_why_not_ = false;
+};
+
+FolderWatch::FolderWatch(FolderWatchOptions options)
+    : worker_(std::make_shared<Worker>(std::move(options))),
+      thread_([worker = worker_] { worker->run(); }) {}
+
+FolderWatch::~FolderWatch() {
+  worker_->end() ? thread_.join() : thread_.detach();
+}
+
+FolderSeen FolderWatch::seen() const {
+  return worker_->seen();
+}
+
+std::string FolderWatch::hold() {
+  return worker_->hold();
+}
+
+void FolderWatch::follow(const fs::path& take) {
+  worker_->follow(take);
+}
+
+void FolderWatch::keep_wish(const fs::path& take) {
+  worker_->add([take] { TakeFolders::keep_wish(take); },
+               "after a restart it would not go on by itself");
+}
+
+void FolderWatch::drop_wish() {
+  worker_->add([folder = worker_->folder()] { TakeFolders({folder}, 0, {}).drop_wish(); },
+               "after a restart it would begin by itself");
+}
+
+}  // namespace previz::output

@@ -1,0 +1,139 @@
+// What the recorder does about its disks.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "daemon/output/recorder.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::output {
+
+using report::Severity;
+
+namespace {
+
+// A disk that does not answer for longer is not waited for to know what there is.
+constexpr double longest_wait_s = 1;
+
+std::string megabytes(double bytes) {
+  return std::to_string(std::lround(1e-6 * bytes)) + " MB";
+}
+
+}  // namespace
+
+void Recorder::drop_wish() {
+  for (const auto& watch : watches_) watch->drop_wish();
+}
+
+std::vector<FolderSeen> Recorder::folders() const {
+  std::vector<FolderSeen> seen;
+  for (const auto& watch : watches_) seen.push_back(watch->seen());
+  return seen;
+}
+
+// A folder in which another process records is left to that.
+std::string Recorder::why_not_own(std::size_t folder) {
+  const std::string why_not = watches_[folder]->hold();
+  return why_not.empty() ? "" : folders_.all()[folder].string() + ": " + why_not;
+}
+
+void Recorder::take_news() {
+  const std::vector<FolderSeen> seen = folders();
+  const bool are_known = std::ranges::all_of(seen, [](const FolderSeen& folder) {
+    return folder.is_looked_at || folder.silent_s > longest_wait_s;
+  });
+  look_for_interruption(seen, are_known);
+  if (are_known) {
+    const std::optional<std::uint64_t> left = folders_.free_bytes(seen);
+    const std::lock_guard lock(mutex_);
+    free_bytes_ = left;
+  }
+  if (options_.measures_disk && !take_ && ending_.empty() && !has_compared_speeds_)
+    compare_speeds();
+  if (!take_) return;
+  const std::string gone = seen[take_->folder].take_gone;
+  if (!gone.empty() && !goes_on_elsewhere(gone)) fail(gone);
+}
+
+// Takes that the last process could not end, and its wish to record. Once a take was begun, an
+// older wish is none; and a disk that does not answer is not waited for.
+void Recorder::look_for_interruption(const std::vector<FolderSeen>& seen, bool are_known) {
+  std::optional<KeptWish> newest;
+  for (const FolderSeen& folder : seen)
+    if (folder.wish && (!newest || folder.wish->time > newest->time)) newest = folder.wish;
+  const std::lock_guard lock(mutex_);
+  for (std::size_t i = 0; i < seen.size(); ++i)
+    for (; told_[i] < seen[i].salvaged.size(); ++told_[i])
+      status_.salvaged.push_back(seen[i].salvaged[told_[i]]);
+  if (are_known && newest && begun_ == 0 && !status_.interrupted)
+    status_.interrupted = newest->take;
+}
+
+// After a failure of the running take's disk: leaves that take and begins the next one on the next
+// disk, if there is one. Returns whether it goes on.
+bool Recorder::goes_on_elsewhere(const std::string& why) {
+  if (!take_) return false;
+  const std::filesystem::path folder = folders_.all()[take_->folder];
+  if (!folders_.give_up(take_->folder, folder.string() + ": its disk failed")) return false;
+  const std::string failed = take_->writer->directory().filename().string();
+  abandon(*take_, why);
+  {
+    const std::lock_guard lock(mutex_);
+    count_finished(*take_);
+  }
+  take_.reset();
+  try {
+    begin_take(true);
+  } catch (const std::exception& error) {
+    note(Severity::error, std::string("recording cannot go on elsewhere: ") + error.what());
+    return false;
+  }
+  note(Severity::error,
+       failed + " ended: " + why + "; recording goes on in " + take_->writer->directory().string());
+  return true;
+}
+
+// Ends the take properly while there is still room on its disk, and goes on where there is more.
+// The room that the end of the take gives back is no reason to begin there again.
+void Recorder::check_disk() {
+  checked_ = Clock::now();
+  const std::size_t folder = take_->folder;
+  const std::string full = folders_.why_full(folder);
+  if (full.empty()) return;
+  folders_.give_up(folder, full);
+  const std::string name = take_->writer->directory().filename().string();
+  begin_next_take();
+  note(Severity::warning, "the disk of " + name + " is almost full; recording goes on in " +
+                              take_->writer->directory().string());
+}
+
+// Compares what the cameras deliver, by the ring, with what the disk takes. FFV1 packs pictures of
+// a camera to about half.
+void Recorder::compare_speeds() {
+  constexpr double packed = 0.5, least_length_s = 0.5;
+  double rate = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    const double length_s = queue_.ring_length_s();
+    if (status_.recording || length_s <= 0) return;
+    if (length_s < std::min(least_length_s, 0.5 * options_.preroll_s)) return;
+    rate = static_cast<double>(queue_.ring_bytes()) / length_s;
+  }
+  has_compared_speeds_ = true;
+  try {
+    const std::optional<double> speed = folders_.measure_speed();
+    if (!speed || *speed > packed * rate) return;
+    note(Severity::warning, "the disk takes " + megabytes(*speed) +
+                                " a second, and the cameras deliver " + megabytes(rate) +
+                                ": takes will lack frames");
+  } catch (const std::exception& error) {
+    note(Severity::warning, std::string("the disk's speed is not known: ") + error.what());
+  }
+}
+
+std::optional<std::uint64_t> Recorder::free_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return free_bytes_;
+}
+
+}  // namespace previz::output

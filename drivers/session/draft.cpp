@@ -1,0 +1,167 @@
+#include "drivers/session/draft.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <random>
+#include <utility>
+
+#include "drivers/error.hpp"
+
+namespace previz::session {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t chance_digits = 16, longest_name = 255;
+constexpr std::string_view ending = ".part";
+
+[[noreturn]] void fail_draft(const fs::path& file, const char* what) {
+  throw Error(file.string() + ": " + what + ": " + std::strerror(errno));
+}
+
+// ".NAME.0123456789abcdef.part"; a long NAME is cut.
+fs::path name_of_chance(const fs::path& target) {
+  std::random_device random;
+  const std::uint64_t chance = std::uint64_t{random()} << 32 | random();
+  std::array<char, chance_digits + 1> digits{};
+  std::snprintf(digits.data(), digits.size(), "%016llx", static_cast<unsigned long long>(chance));
+  std::string name = target.filename().string();
+  name.resize(std::min(name.size(), longest_name - chance_digits - ending.size() - 2));
+  return target.parent_path() / ("." + name + "." + digits.data() + std::string(ending));
+}
+
+bool is_draft_name(const std::string& name) {
+  if (name.size() < 1 + 1 + chance_digits + ending.size() || name.front() != '.' ||
+      !name.ends_with(ending))
+    return false;
+  const std::string digits =
+      name.substr(name.size() - ending.size() - chance_digits, chance_digits);
+  return digits.find_first_not_of("0123456789abcdef") == std::string::npos;
+}
+
+// Returns false where another process found the draft before it was locked, and removes it.
+bool lock(const OwnedDescriptor& draft) {
+  if (::flock(draft.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) return false;
+  struct stat status {};
+  return ::fstat(draft.get(), &status) == 0 && status.st_nlink > 0;
+}
+
+void sync_folder_of(const fs::path& file) {
+  sync_names(file.parent_path());
+}
+
+}  // namespace
+
+Draft::Made Draft::make(const fs::path& target) {
+  for (;;) {
+    fs::path path = name_of_chance(target);
+    OwnedDescriptor made(
+        ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
+    if (!made && errno == EEXIST) continue;
+    if (!made) fail_draft(target, "cannot be made");
+    if (lock(made)) return {std::move(path), std::move(made)};
+  }
+}
+
+Draft::Draft(fs::path target) : Draft(target, make(target)) {}
+
+Draft::Draft(fs::path target, Made made)
+    : target_(std::move(target)),
+      path_(std::move(made.path)),
+      file_(std::move(made.descriptor), target_) {}
+
+Draft::Draft(Draft&& other) noexcept
+    : target_(std::move(other.target_)),
+      path_(std::exchange(other.path_, {})),
+      file_(std::move(other.file_)) {}
+
+Draft::~Draft() {
+  std::error_code ignored;
+  if (!path_.empty()) fs::remove(path_, ignored);
+}
+
+void Draft::keep_owner() const {
+  struct stat known {};
+  if (::lstat(target_.c_str(), &known) != 0 || !S_ISREG(known.st_mode)) return;
+  // Only root may give a file away, so that a refusal is no error.
+  [[maybe_unused]] const int refused = ::fchown(file_.get(), known.st_uid, known.st_gid);
+  if (::fchmod(file_.get(), known.st_mode & 07777) != 0)
+    fail_draft(target_, "cannot be given its mode");
+}
+
+void Draft::put(Sync sync) {
+  if (sync == Sync::yes) file_.sync();
+  if (std::rename(path_.c_str(), target_.c_str()) != 0)
+    fail_draft(target_, "cannot be put in place");
+  path_.clear();
+  if (sync == Sync::yes) sync_folder_of(target_);
+}
+
+bool Draft::put_as_new(const fs::path& target) {
+  file_.sync();
+  if (::link(path_.c_str(), target.c_str()) == 0) {
+    std::error_code stays;  // a second name; it counts as left by a dead process
+    fs::remove(path_, stays);
+  } else if (errno == EEXIST) {
+    return false;
+  } else if (::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, target.c_str(), RENAME_NOREPLACE) !=
+             0) {
+    if (errno == EEXIST) return false;  // a file system without links
+    fail_draft(target, "cannot be put in place");
+  }
+  path_.clear();
+  sync_folder_of(target);
+  return true;
+}
+
+DraftFolder::DraftFolder(const fs::path& target) : target_(fs::absolute(target)) {
+  if (!target_.has_filename()) target_ = target_.parent_path();
+  for (;;) {
+    path_ = name_of_chance(target_);
+    const bool made = ::mkdir(path_.c_str(), 0777) == 0;
+    if (!made && errno == EEXIST) continue;
+    if (!made) fail_draft(target_.parent_path(), "no folder can be made in it");
+    lock_ = OwnedDescriptor(::open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (lock_ && lock(lock_)) return;
+  }
+}
+
+DraftFolder::~DraftFolder() {
+  std::error_code ignored;
+  if (!path_.empty()) fs::remove_all(path_, ignored);
+}
+
+void DraftFolder::put() {
+  if (std::rename(path_.c_str(), target_.c_str()) != 0) fail_draft(target_, "cannot be made");
+  path_.clear();
+  sync_folder_of(target_);
+}
+
+std::vector<std::string> remove_dead_drafts(const fs::path& folder) {
+  std::vector<std::string> removed;
+  std::error_code unreadable;
+  for (fs::directory_iterator entry(folder, unreadable), end; !unreadable && entry != end;
+       entry.increment(unreadable)) {
+    const std::string name = entry->path().filename().string();
+    if (!is_draft_name(name)) continue;
+    const int kind =
+        entry->is_directory() && !entry->is_symlink() ? O_RDONLY | O_DIRECTORY : O_RDWR;
+    const OwnedDescriptor draft(
+        ::open(entry->path().c_str(), kind | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+    if (!draft || ::flock(draft.get(), LOCK_EX | LOCK_NB) != 0) continue;
+    std::error_code stays;
+    if (fs::remove_all(entry->path(), stays) > 0 && !stays) removed.push_back(name);
+  }
+  return removed;
+}
+
+}  // namespace previz::session

@@ -1,0 +1,154 @@
+// Drafts are nobody else's files, and those of dead processes go.
+#include "drivers/session/draft.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <string>
+
+#include "drivers/error.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace previz::session {
+namespace session_draft_test {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> names_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder))
+    names.push_back(entry.path().filename().string());
+  return names;
+}
+
+TEST(Draft, IsNotThereUntilItIsPut) {
+  const test::TemporaryDirectory directory;
+  const fs::path file = directory / "a.exr";
+  {
+    Draft draft(file);
+    draft.file().append("half of it");
+    EXPECT_FALSE(fs::exists(file));
+  }
+  EXPECT_TRUE(names_in(directory.path()).empty());
+  Draft draft(file);
+  draft.file().append("whole");
+  draft.put();
+  EXPECT_EQ(read_file(file), "whole");
+  EXPECT_EQ(names_in(directory.path()).size(), 1u);
+}
+
+TEST(Draft, OfANameThatIsAsLongAsNamesMayBe) {
+  const test::TemporaryDirectory directory;
+  const fs::path file = directory / std::string(255, 'a');
+  replace_file(file, "whole");
+  EXPECT_EQ(read_file(file), "whole");
+}
+
+TEST(Draft, TakesNoNameThatIsTaken) {
+  const test::TemporaryDirectory directory;
+  replace_file(directory / "1", "old");
+  Draft draft(directory / "any");
+  draft.file().append("new");
+  EXPECT_FALSE(draft.put_as_new(directory / "1"));
+  EXPECT_TRUE(draft.put_as_new(directory / "2"));
+  EXPECT_EQ(read_file(directory / "1"), "old");
+  EXPECT_EQ(read_file(directory / "2"), "new");
+  EXPECT_EQ(names_in(directory.path()).size(), 2u);
+}
+
+// Whatever lies in the folder: what a link leads to is neither written nor given another mode.
+TEST(Draft, FollowsNoLink) {
+  const test::TemporaryDirectory directory, elsewhere;
+  const fs::path victim = elsewhere / "victim";
+  std::ofstream(victim) << "as it was";
+  ASSERT_EQ(::chmod(victim.c_str(), 0600), 0);
+  fs::create_symlink(victim, directory / "a.toml.part");
+  fs::create_symlink(victim, directory / "a.toml");
+  replace_file(directory / "a.toml", "new");
+  EXPECT_EQ(read_file(victim), "as it was");
+  struct stat status {};
+  ASSERT_EQ(::stat(victim.c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 07777, 0600u);
+  EXPECT_EQ(read_plain_file(directory / "a.toml"), "new");
+}
+
+TEST(Draft, KeepsTheModeOfWhatItReplaces) {
+  const test::TemporaryDirectory directory;
+  const fs::path file = directory / "a.toml";
+  replace_file(file, "old");
+  ASSERT_EQ(::chmod(file.c_str(), 0640), 0);
+  replace_file(file, "new");
+  struct stat status {};
+  ASSERT_EQ(::stat(file.c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 07777, 0640u);
+}
+
+// A process makes a file and a folder, and is killed.
+TEST(Draft, OfADeadProcessIsRemovedAndNoOther) {
+  const test::TemporaryDirectory directory;
+  int says[2];
+  ASSERT_EQ(::pipe(says), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const Draft draft(directory / "0001.exr");
+    const DraftFolder folder(directory / "K_take003");
+    std::ofstream(folder.path() / "observer.mkv") << "some frames";
+    static_cast<void>(!::write(says[1], "x", 1));
+    for (;;) ::pause();
+  }
+  char made = 0;
+  ASSERT_EQ(::read(says[0], &made, 1), 1);
+  const Draft own(directory / "own.exr");
+  std::ofstream(directory / "frames.part") << "of somebody else";
+  EXPECT_TRUE(remove_dead_drafts(directory.path()).empty()) << "the child lives";
+  ::kill(child, SIGKILL);
+  ASSERT_EQ(::waitpid(child, nullptr, 0), child);
+  EXPECT_EQ(remove_dead_drafts(directory.path()).size(), 2u);
+  EXPECT_EQ(names_in(directory.path()).size(), 2u);
+  EXPECT_TRUE(fs::exists(own.path()));
+  ::close(says[0]);
+  ::close(says[1]);
+}
+
+TEST(DraftFolder, GetsItsNameWhereNothingIs) {
+  const test::TemporaryDirectory directory;
+  DraftFolder first(directory / "take"), second(directory / "take/");
+  std::ofstream(first.path() / "a") << "first";
+  first.put();
+  EXPECT_TRUE(fs::exists(directory / "take/a"));
+  EXPECT_THROW(second.put(), Error);
+}
+
+std::string refusal(const fs::path& file) {
+  try {
+    read_plain_file(file);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(PlainFile, IsNoLinkPipeDeviceOrFolder) {
+  const test::TemporaryDirectory directory;
+  replace_file(directory / "a", "text");
+  EXPECT_EQ(read_plain_file(directory / "a"), "text");
+  fs::create_symlink("a", directory / "link");
+  fs::create_symlink("/dev/zero", directory / "device");
+  fs::create_symlink("nothing", directory / "dangling");
+  fs::create_directory(directory / "folder");
+  ASSERT_EQ(::mkfifo((directory / "pipe").c_str(), 0600), 0);
+  EXPECT_NE(refusal(directory / "link").find("is a link (to a)"), std::string::npos);
+  EXPECT_NE(refusal(directory / "device").find("is a link (to /dev/zero)"), std::string::npos);
+  EXPECT_NE(refusal(directory / "dangling").find("is a link"), std::string::npos);
+  EXPECT_NE(refusal(directory / "folder").find("is a folder"), std::string::npos);
+  EXPECT_NE(refusal(directory / "pipe").find("is a pipe"), std::string::npos);
+  EXPECT_NE(refusal("/dev/null").find("is a device"), std::string::npos);
+  EXPECT_NE(refusal(directory / "missing").find("cannot be opened"), std::string::npos);
+}
+
+}  // namespace session_draft_test
+}  // namespace previz::session
