@@ -150,7 +150,7 @@ observer.mkv, light.mkv, composite.mkv: In a take: the cameras' pictures, and wh
 track.jsonl: In a take: the camera's pose in each frame that was tracked while it was shown, and what was moved, relit or carried; world_from_camera are 16 numbers, row by row.
 events.jsonl: In a take: buttons and whatever else happened, in order.
 assets: In a take: the files that the set names, each under the SHA-256 of its content.
-frames.jsonl: Beside rendered pictures, a line a frame: whether it was rendered or why not, samples, seconds, the camera's pose with its error in pixels and the tags it is from, and the light frames.
+frames.jsonl: Beside rendered pictures, a line a frame: whether it was rendered or why not, samples, seconds, the camera's pose with its error in pixels and the tags it is from, the light frames, and size and SHA-256 of its files. A render that goes on checks them, and renders a frame again whose file is missing or was changed, or that has no line; it says which and why.
 render.json: Beside rendered pictures: the settings they were made with.
 poses.jsonl: Written by `previzd track --out`, a line a frame: frame, timestamp_ns, tracked; world_from_camera (4 rows of 4, metres, OpenCV axes, world Z up; as the track of FRAMES.json takes it), covariance, tags and reprojection_rms_px, or the reason why there is no pose; and carriers that were found.
 camera.chan: Written by `previzd export`: frame, position, rotation and vertical angle of view. The rotation order is ZXY, Nuke's own; Blender's import must be set to it. It holds neither the lens's distortion nor its principal point; camera.usda has both, the distortion in words.
