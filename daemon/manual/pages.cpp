@@ -146,7 +146,7 @@ const Chapter previzd_files{"FILES", R"(
 // What is written beside the pictures, and what a take consists of.
 const Chapter previzd_formats{"FORMATS", R"(
 session.toml: In a take: its name, slate, number and timecode, whether it is good, the calibrations, what was lost, and the set file word for word. Versions of previzd that do not know k4, k5 and k6 of a calibration read it without them.
-observer.mkv, light.mkv, composite.mkv: In a take: the cameras' pictures, and what was shown; lossless (FFV1). The lines of observer.jsonl and so on have the time and exposure of each frame.
+observer.mkv, light.mkv, composite.mkv: In a take: the cameras' pictures, and what was shown; lossless (FFV1). The lines of observer.jsonl and so on have the time and exposure of each frame. They also name each picture by its checksum, by which it is found in a video whose head is torn.
 track.jsonl: In a take: the camera's pose in each frame that was tracked while it was shown, and what was moved, relit or carried; world_from_camera are 16 numbers, row by row.
 events.jsonl: In a take: buttons and whatever else happened, in order.
 assets: In a take: the files that the set names, each under the SHA-256 of its content.
