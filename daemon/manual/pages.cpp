@@ -67,6 +67,7 @@ previzd import frames.json sessions/desk: Makes a take of your own pictures or v
 previzd takes list /var/lib/previzd/takes: Lists the takes: which are good, how long they are, what they lack, and how much of each is rendered.
 previzd takes mark takes/12A_take003: Marks a take as good, as the rig's action mark_good does; with --not the mark goes.
 previzd takes copy takes/12A_* --to /media/disk/day1: Copies takes, and reads the copies back. Each has its checksums in SHA256SUMS, for `previzd takes check` and for `sha256sum -c`.
+previzd takes check takes/12A_take003 --repair repaired: Reads a take from end to end; if it was cut off or damaged, writes every frame and line of it that is whole into the new take repaired/12A_take003, which says what is lost. The damaged one stays as it is.
 previzd takes delete takes/12A_take001: Deletes a take. A good one is deleted with --good only, and what is not the take's own stays.
 previzd render takes --good --out renders: Renders all good takes, each into a folder of its name.
 previzd track takes/12A_take003 --out poses.jsonl: Finds the camera in every frame without rendering, and says why it is lost where it is.
