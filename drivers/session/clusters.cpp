@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstring>
 #include <optional>
 #include <string>
 
@@ -24,8 +23,9 @@ constexpr std::uint32_t timestamp_id = 0xe7, simple_block_id = 0xa3, group_id = 
 // A window on a file; looking forward through it reads the file once.
 class Window {
  public:
-  explicit Window(const std::filesystem::path& file)
-      : file_(file, O_RDONLY), bytes_(std::size_t{1} << 20) {
+  static constexpr std::size_t length = std::size_t{1} << 20;  // bytes
+
+  explicit Window(const std::filesystem::path& file) : file_(file, O_RDONLY), bytes_(length) {
     size_ = std::filesystem::file_size(file);
   }
 
@@ -40,10 +40,11 @@ class Window {
       const std::size_t all =
           offset >= size_ ? 0 : std::min<std::uint64_t>(bytes_.size(), size_ - offset);
       filled_ = 0;
-      if (!read_at(file_, offset, {bytes_.data(), all})) return {};  // it became shorter
+      read_ += all;
+      if (!read_at(file_, offset, {bytes_.data(), all}))
+        return {};  // it became shorter, or the disk fails
       begin_ = offset;
       filled_ = all;
-      read_ += all;
     }
     if (there == 0) return {};
     return std::span<const std::uint8_t>(bytes_).subspan(offset - begin_,
@@ -98,7 +99,12 @@ class Search {
       if (stop.stop_requested())
         throw Error(file.string() + ": was left, because reading it is to end");
       const std::span<const std::uint8_t> bytes = window_.at(at, cluster_id.size());
-      if (bytes.size() < cluster_id.size()) break;
+      if (bytes.size() < cluster_id.size()) {
+        // The end, or a place that the disk cannot read; there is more behind that.
+        at += Window::length;
+        if (at >= window_.size()) break;
+        continue;
+      }
       const auto found =
           std::search(bytes.begin(), bytes.end(), cluster_id.begin(), cluster_id.end());
       const auto before = static_cast<std::uint64_t>(found - bytes.begin());
@@ -203,8 +209,7 @@ bool read_at(const OpenFile& file, std::uint64_t offset, std::span<std::uint8_t>
     const ssize_t count =
         ::pread(file.get(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) throw Error(std::string("a video cannot be read: ") + std::strerror(errno));
-    if (count == 0) return false;
+    if (count <= 0) return false;
     bytes = bytes.subspan(static_cast<std::size_t>(count));
     offset += static_cast<std::uint64_t>(count);
   }

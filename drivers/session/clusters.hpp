@@ -30,11 +30,12 @@ using WantedPackets = std::set<std::pair<std::int64_t, std::uint32_t>>;
 // of the file nor sizes in it are trusted: a packet counts only if its time and CRC-32 are wanted,
 // and none of more than `most_bytes` is read. The time it takes grows
 // with the size of the file, whatever is in it, and the memory with the number of wanted packets.
-// A stop ends it with previz::Error, as a file that cannot be read does.
+// Places that the disk cannot read are passed over. A stop ends it with previz::Error, as a file
+// that cannot be opened does.
 std::vector<PacketPlace> find_packets(const std::filesystem::path& file, WantedPackets wanted,
                                       std::size_t most_bytes, const std::stop_token& stop = {});
 
-// Fills `bytes` from the file; returns false if the file ends before. Throws previz::Error.
+// Fills `bytes` from the file; returns false if the file ends before, or cannot be read there.
 bool read_at(const OpenFile& file, std::uint64_t offset, std::span<std::uint8_t> bytes);
 
 }  // namespace previz::session

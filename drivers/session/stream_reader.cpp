@@ -143,6 +143,7 @@ OpenedVideo open_video(const std::filesystem::path& file, const StreamFormat& fo
 void search_lost(OpenedVideo& video, const std::filesystem::path& file, const StreamFormat& format,
                  const std::vector<FrameLine>& lines, const std::stop_token& stop,
                  std::vector<std::string>& missing) {
+  if (!std::filesystem::is_regular_file(file)) return;
   WantedPackets wanted;
   for (const FrameLine& line : lines) wanted.emplace(line.video_ms, line.crc32);
   const std::vector<PacketPlace> found =

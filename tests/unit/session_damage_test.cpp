@@ -250,6 +250,14 @@ TEST_F(Damage, AFileOfNestedClustersIsSearchedInLinearTime) {
   }
 }
 
+TEST_F(Damage, AFolderInThePlaceOfTheVideoIsSaid) {
+  std::filesystem::remove(copy() / "observer.mkv");
+  std::filesystem::create_directory(copy() / "observer.mkv");
+  const Opened opened = open_copy();
+  EXPECT_TRUE(opened.frames.empty());
+  EXPECT_TRUE(mentions(opened.missing, "no picture can be read"));
+}
+
 TEST_F(Damage, OneDamagedPictureCostsThatFrameOnly) {
   const std::string video = content_of(whole() / "observer.mkv");
   std::string damaged = video;
