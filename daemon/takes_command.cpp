@@ -24,7 +24,10 @@ void add_takes(CLI::App& app, TakesCommands& commands) {
   add_takes_command(takes, "mark", "Mark takes as good", commands.marked)
       .add_flag("--not", commands.not_good, "Take the mark away");
   add_takes_command(takes, "check", "Read takes from end to end and list what is damaged",
-                    commands.checked);
+                    commands.checked)
+      .add_option("--repair", commands.repaired,
+                  "Write what is whole of a damaged take into this folder, as a new take of its "
+                  "name; the damaged one stays as it is");
   CLI::App& copy = add_takes_command(
       takes, "copy", "Copy takes with checksums, and read the copies back", commands.copied.takes);
   copy.add_option("--to", commands.copied.folder, "Folder for the copies")->required();
@@ -35,7 +38,10 @@ void add_takes(CLI::App& app, TakesCommands& commands) {
 int do_takes(const CLI::App& app, const TakesCommands& commands, std::ostream& out,
              const std::stop_token& stop) {
   const CLI::App& takes = *app.get_subcommand("takes");
-  if (takes.got_subcommand("check")) return post::check_takes(commands.checked, out, stop);
+  if (takes.got_subcommand("check"))
+    return commands.repaired.empty()
+               ? post::check_takes(commands.checked, out, stop)
+               : post::repair_takes({commands.checked, commands.repaired}, out, stop);
   if (takes.got_subcommand("copy")) return post::copy_takes(commands.copied, out, stop);
   if (takes.got_subcommand("list")) post::list_takes(commands.listed, out);
   if (takes.got_subcommand("mark")) post::mark_takes(commands.marked, !commands.not_good, out);

@@ -15,8 +15,9 @@ namespace previz {
 
 struct TakesCommands {
   post::Paths listed, marked, checked, deleted;
-  bool not_good = false;   // take the mark away
-  bool also_good = false;  // delete takes that are marked good, too
+  bool not_good = false;           // take the mark away
+  bool also_good = false;          // delete takes that are marked good, too
+  std::filesystem::path repaired;  // folder for repaired takes; empty: takes are only checked
   post::CopyOptions copied;
 };
 

@@ -67,6 +67,7 @@ previzd import frames.json sessions/desk: Makes a take of your own pictures or v
 previzd takes list /var/lib/previzd/takes: Lists the takes: which are good, how long they are, what they lack, and how much of each is rendered.
 previzd takes mark takes/12A_take003: Marks a take as good, as the rig's action mark_good does; with --not the mark goes.
 previzd takes copy takes/12A_* --to /media/disk/day1: Copies takes, and reads the copies back. Each has its checksums in SHA256SUMS, for `previzd takes check` and for `sha256sum -c`.
+previzd takes check takes/12A_take003 --repair repaired: Reads a take from end to end; if it was cut off or damaged, writes every frame and line of it that is whole into the new take repaired/12A_take003, which says what is lost. The damaged one stays as it is.
 previzd takes delete takes/12A_take001: Deletes a take. A good one is deleted with --good only, and what is not the take's own stays.
 previzd render takes --good --out renders: Renders all good takes, each into a folder of its name.
 previzd track takes/12A_take003 --out poses.jsonl: Finds the camera in every frame without rendering, and says why it is lost where it is.
@@ -146,11 +147,11 @@ const Chapter previzd_files{"FILES", R"(
 // What is written beside the pictures, and what a take consists of.
 const Chapter previzd_formats{"FORMATS", R"(
 session.toml: In a take: its name, slate, number and timecode, whether it is good, the calibrations, what was lost, and the set file word for word. Versions of previzd that do not know k4, k5 and k6 of a calibration read it without them.
-observer.mkv, light.mkv, composite.mkv: In a take: the cameras' pictures, and what was shown; lossless (FFV1). The lines of observer.jsonl and so on have the time and exposure of each frame.
+observer.mkv, light.mkv, composite.mkv: In a take: the cameras' pictures, and what was shown; lossless (FFV1). The lines of observer.jsonl and so on have the time and exposure of each frame. They also name each picture by its checksum, by which it is found in a video whose head is torn.
 track.jsonl: In a take: the camera's pose in each frame that was tracked while it was shown, and what was moved, relit or carried; world_from_camera are 16 numbers, row by row.
 events.jsonl: In a take: buttons and whatever else happened, in order.
 assets: In a take: the files that the set names, each under the SHA-256 of its content.
-frames.jsonl: Beside rendered pictures, a line a frame: whether it was rendered or why not, samples, seconds, the camera's pose with its error in pixels and the tags it is from, and the light frames.
+frames.jsonl: Beside rendered pictures, a line a frame: whether it was rendered or why not, samples, seconds, the camera's pose with its error in pixels and the tags it is from, the light frames, and size and SHA-256 of its files. A render that goes on checks them, and renders a frame again whose file is missing or was changed, or that has no line; it says which and why.
 render.json: Beside rendered pictures: the settings they were made with.
 poses.jsonl: Written by `previzd track --out`, a line a frame: frame, timestamp_ns, tracked; world_from_camera (4 rows of 4, metres, OpenCV axes, world Z up; as the track of FRAMES.json takes it), covariance, tags and reprojection_rms_px, or the reason why there is no pose; and carriers that were found.
 camera.chan: Written by `previzd export`: frame, position, rotation and vertical angle of view. The rotation order is ZXY, Nuke's own; Blender's import must be set to it. It holds neither the lens's distortion nor its principal point; camera.usda has both, the distortion in words.

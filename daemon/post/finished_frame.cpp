@@ -82,6 +82,8 @@ std::string to_json(const FinishedFrame& frame) {
     json["measured"] = frame.counters.measured;
     json["unmeasured"] = frame.counters.unmeasured;
   }
+  for (const auto& [name, mark] : frame.files)
+    json["files"][name] = {{"bytes", mark.bytes}, {"sha256", mark.sha256}};
   return json.dump();
 }
 
@@ -117,6 +119,9 @@ FinishedFrame from_json(const std::string& line) {
   frame.counters.rebuilt_trees = json.value("rebuilt_trees", std::uint64_t{0});
   frame.counters.measured = json.value("measured", std::uint64_t{0});
   frame.counters.unmeasured = json.value("unmeasured", std::uint64_t{0});
+  if (json.contains("files"))
+    for (const auto& [name, mark] : json["files"].items())
+      frame.files[name] = {mark.at("bytes"), mark.at("sha256")};
   return frame;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,6 +13,20 @@
 #include "daemon/tracking/tracker.hpp"
 
 namespace previz::post {
+
+// Observer frames by index in the stream, both ends included.
+struct FrameRange {
+  std::uint64_t first = 0;
+  std::uint64_t last = 0;
+};
+
+// What a file was when it was written, by which it is checked before a later run keeps it.
+struct FileMark {
+  std::uint64_t bytes = 0;
+  std::string sha256;  // 64 lower-case hexadecimal digits
+
+  friend bool operator==(const FileMark&, const FileMark&) = default;
+};
 
 enum class FrameStatus { rendered, untouched };
 
@@ -29,6 +44,8 @@ struct FinishedFrame {
   std::vector<lighting::Source> light_sources;
   double light_dropped_share = 0;  // of all luminous flux; lighting.sources.residual = "dropped"
   render::Counters counters;
+  // By the file's name in DIR, "0007.exr"; empty in a line of a previzd that wrote none.
+  std::map<std::string, FileMark> files;
 };
 
 // Returns the record of a shot whose pictures are written.

@@ -136,6 +136,17 @@ std::string quality_words(const set::Quality& quality) {
   return text;
 }
 
+// Returns "frame 7", or "frames 1, 3 to 5, 9".
+std::string frames_words(const std::vector<std::uint64_t>& frames) {
+  std::string text;
+  for (std::size_t first = 0, last = 0; first < frames.size(); first = last = last + 1) {
+    while (last + 1 < frames.size() && frames[last + 1] == frames[last] + 1) ++last;
+    add_to_list(text, std::to_string(frames[first]) +
+                          (last > first ? " to " + std::to_string(frames[last]) : ""));
+  }
+  return (frames.size() == 1 ? "frame " : "frames ") + text;
+}
+
 // Reports NaN and negative samples, which are left out of the means, and paths that were cut short,
 // so that nobody misses them.
 std::string dropped_text(const render::Counters& counters) {
@@ -187,7 +198,7 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
   const set::Set& set = take.set;
   const FrameRange range = range_of(options, take);
   RenderDirectory directory(set.output, settings_of(take, set, with, options.scale), options.force,
-                            clock_of(take));
+                            clock_of(take), range, options.stop);
 
   RenderReport report;
   report.directory = directory.path();
@@ -199,7 +210,10 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
   for (const std::string& what : take.session.missing) out << "session: " << what << std::endl;
   if (report.found_finished > 0)
     out << directory.path().string() << ": " << report.found_finished
-        << " frames are finished already" << std::endl;
+        << " frames are finished already, and their files are as they were written" << std::endl;
+  for (const auto& [why, frames] : directory.rejected())
+    out << directory.path().string() << ": rendered again: " << frames_words(frames) << ": " << why
+        << std::endl;
 
   pipeline::Metrics metrics;
   const double start = now_s();

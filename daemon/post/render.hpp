@@ -19,12 +19,6 @@
 
 namespace previz::post {
 
-// Observer frames by index in the stream, both ends included.
-struct FrameRange {
-  std::uint64_t first = 0;
-  std::uint64_t last = 0;
-};
-
 // Reads "7", "3-9" or "3-" (to the end); throws previz::Error saying what is allowed.
 FrameRange parse_frame_range(const std::string& text);
 
@@ -68,10 +62,11 @@ struct RenderReport {
 
 // Writes NNNN.exr and NNNN.png for every frame, then review.mp4 over all pictures of the range, and
 //   DIR/render.json   the settings; a run with other settings refuses to mix its frames with these
-//   DIR/frames.jsonl  a line a finished frame (FinishedFrame)
-// Frames that are finished are skipped. A frame whose pose is lost, or that no light frame
-// precedes, passes through untouched and is reported so. Progress and notes go to `out`. Throws
-// previz::Error on anything that keeps the job from being done.
+//   DIR/frames.jsonl  a line a finished frame (FinishedFrame), with the SHA-256 of its files
+// Frames that are finished, and whose files are as they were written, are skipped. A frame whose
+// pose is lost, or that no light frame precedes, passes through untouched and is reported so.
+// Progress and notes go to `out`. Throws previz::Error on anything that keeps the job from being
+// done.
 RenderReport render_session(const RenderOptions& options, std::ostream& out);
 
 }  // namespace previz::post

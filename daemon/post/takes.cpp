@@ -12,6 +12,7 @@
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
+#include "drivers/session/repair.hpp"
 
 namespace previz::post {
 namespace {
@@ -204,6 +205,35 @@ int check_takes(const Paths& takes, std::ostream& out, const std::stop_token& st
           << std::endl;
     else
       result = 1;
+  }
+  return result;
+}
+
+int repair_takes(const RepairOptions& options, std::ostream& out, const std::stop_token& stop) {
+  const std::vector<ListedTake> takes = takes_at_rest(options.takes);
+  for (const ListedTake& take : takes)
+    if (const fs::path place = options.folder / take.directory.filename(); fs::exists(place))
+      throw Error(
+          place.string() +
+          ": already exists; repair into another folder, or remove it; nothing was written");
+  int result = 0;
+  for (const ListedTake& take : takes) {
+    if (!take.fault.empty()) throw Error(take.fault);
+    if (damage_of(take.directory, stop).empty()) {
+      out << take.directory.string() << ": whole, nothing to repair" << std::endl;
+      continue;
+    }
+    session::make_folders(options.folder);
+    const fs::path place = options.folder / take.directory.filename();
+    const session::Repair repair = session::repair_session(take.directory, place, stop);
+    for (const std::string& what : repair.lacked)
+      out << take.directory.string() << ": " << what << '\n';
+    out << place.string() << ": repaired, " << repair.frames << " frames"
+        << (repair.is_complete ? ", nothing is lost" : "; what is lost is in its session.toml")
+        << std::endl;
+    for (const std::string& fault : damage_of(place, stop))
+      out << place.string() << ": " << fault << '\n';
+    if (!repair.is_complete) result = 1;
   }
   return result;
 }

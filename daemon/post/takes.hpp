@@ -24,6 +24,16 @@ void mark_takes(const Paths& takes, bool good, std::ostream& out);
 // anything is.
 int check_takes(const Paths& takes, std::ostream& out, const std::stop_token& stop);
 
+struct RepairOptions {
+  Paths takes;
+  std::filesystem::path folder;  // made if need be; a repaired take is named as the damaged one
+};
+// Checks the takes as check_takes() does, and writes what is whole of each damaged one into a new
+// take (session::repair_session()); the damaged one stays as it is. Then reads the new one as
+// check_takes() does. Prints what was wrong and what is lost. Returns 0, or 1 if anything is lost.
+// Throws previz::Error, and writes nothing, if the place of one is taken.
+int repair_takes(const RepairOptions& options, std::ostream& out, const std::stop_token& stop);
+
 struct CopyOptions {
   Paths takes;
   std::filesystem::path folder;  // made if need be; a copy is named as its take

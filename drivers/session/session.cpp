@@ -62,7 +62,9 @@ void read_end(const SessionFile& file, Session& session) {
   const auto miss = [&](const std::string& what) {
     session.missing.push_back("session.toml: " + what);
   };
-  if (!file.fault.empty())
+  if (file.closed && !file.fault.empty())
+    miss(file.fault);  // repair_session() writes both
+  else if (!file.fault.empty())
     miss("the recording ended by a fault (" + file.fault +
          "); what came after the last whole frame is lost");
   else if (!file.closed)

@@ -181,7 +181,8 @@ Session open_session(const std::filesystem::path& directory, const std::stop_tok
 // Opens the stream `source`: "observer", "light" or "composite" (what was shown). Returns null if
 // the session has no such stream. What is missing of the stream is appended to session.missing.
 // Reads the video once from end to end, so that a damaged picture is known here (packet checksums)
-// and never shown.
+// and never shown. Where pictures are missing, it looks for each by its checksum, also in a file
+// whose head is torn.
 std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& source,
                                           const std::stop_token& stop = {});
 

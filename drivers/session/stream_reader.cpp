@@ -5,6 +5,8 @@
 #include <set>
 
 #include "drivers/error.hpp"
+#include "drivers/session/clusters.hpp"
+#include "drivers/session/ffv1.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/json_lines.hpp"
 #include "drivers/session/missing.hpp"
@@ -69,30 +71,37 @@ struct Leftovers {
   std::vector<std::uint64_t> without_picture;  // frames
   std::vector<std::uint64_t> damaged;          // frames
   std::uint64_t without_line = 0;              // pictures
+
+  bool has_lost_pictures() const { return !without_picture.empty() || !damaged.empty(); }
 };
 
-Leftovers join(const std::vector<FrameLine>& lines,
-               const std::vector<VideoReader::PacketInfo>& packets, RecordedStream& stream) {
+struct Joined {
+  std::vector<FrameLine> whole;  // lines whose picture is there
+  Leftovers left;
+};
+
+Joined join(const std::vector<FrameLine>& lines,
+            const std::vector<VideoReader::PacketInfo>& packets) {
   std::multimap<std::int64_t, std::uint32_t> unclaimed;
   for (const VideoReader::PacketInfo& packet : packets)
     unclaimed.emplace(packet.video_ms, packet.crc32);
-  Leftovers left;
+  Joined joined;
   for (const FrameLine& line : lines) {
     const auto [first, last] = unclaimed.equal_range(line.video_ms);
     const auto whole =
         std::find_if(first, last, [&](const auto& packet) { return packet.second == line.crc32; });
     if (whole != last) {
-      stream.add(line);
+      joined.whole.push_back(line);
       unclaimed.erase(whole);
     } else if (first != last) {
-      left.damaged.push_back(line.record.frame);
+      joined.left.damaged.push_back(line.record.frame);
       unclaimed.erase(first);
     } else {
-      left.without_picture.push_back(line.record.frame);
+      joined.left.without_picture.push_back(line.record.frame);
     }
   }
-  left.without_line = unclaimed.size();
-  return left;
+  joined.left.without_line = unclaimed.size();
+  return joined;
 }
 
 void list_missing(const Leftovers& left, const std::string& source,
@@ -109,19 +118,49 @@ void list_missing(const Leftovers& left, const std::string& source,
                       " have no line that says when they were taken, and are left out");
 }
 
-std::unique_ptr<VideoReader> open_video(const std::filesystem::path& file,
-                                        const StreamFormat& format,
-                                        std::vector<std::string>& missing) {
-  if (!std::filesystem::exists(std::filesystem::symlink_status(file))) {
-    missing.push_back(file.filename().string() + ": the file is missing");
-    return nullptr;
-  }
+// A video as far as it could be opened, joined with its lines.
+struct OpenedVideo {
+  std::unique_ptr<VideoReader> reader;  // null: no picture can be read
+  Joined joined;
+  std::string fault;  // why there is no reader
+};
+
+OpenedVideo open_video(const std::filesystem::path& file, const StreamFormat& format,
+                       const std::vector<FrameLine>& lines, const std::stop_token& stop) {
+  OpenedVideo video;
+  std::vector<VideoReader::PacketInfo> packets;
   try {
-    return std::make_unique<VideoReader>(file, format);
+    video.reader = std::make_unique<VideoReader>(file, format);
   } catch (const Error& error) {
-    missing.push_back(std::string("no picture can be read: ") + error.what());
-    return nullptr;
+    video.fault = std::string("no picture can be read: ") + error.what();
   }
+  if (video.reader) packets = video.reader->scan(stop);
+  video.joined = join(lines, packets);
+  return video;
+}
+
+// Where pictures are missing, looks for them one by one, and reads them so if that finds more.
+void search_lost(OpenedVideo& video, const std::filesystem::path& file, const StreamFormat& format,
+                 const std::vector<FrameLine>& lines, const std::stop_token& stop,
+                 std::vector<std::string>& missing) {
+  if (!why_not_plain(file).empty()) return;  // which was said
+  WantedPackets wanted;
+  for (const FrameLine& line : lines) wanted.emplace(line.video_ms, line.crc32);
+  const std::vector<PacketPlace> found =
+      find_packets(file, std::move(wanted), most_packet_bytes(format), stop);
+  const std::size_t before = video.joined.whole.size();
+  if (found.size() <= before) return;
+  std::vector<VideoReader::PacketInfo> packets;
+  for (const PacketPlace& place : found) packets.push_back({place.video_ms, place.crc32});
+  const std::uint64_t without_line = video.joined.left.without_line;
+  video.joined = join(lines, packets);
+  video.joined.left.without_line = without_line;
+  video.reader = std::make_unique<VideoReader>(file, format, found);
+  video.fault.clear();
+  missing.push_back(file.filename().string() +
+                    ": its head, or what lies between its pictures, is damaged; " +
+                    count_of("picture", found.size() - before) + " of " +
+                    std::to_string(lines.size()) + " found one by one, whole by their checksums");
 }
 
 }  // namespace
@@ -134,24 +173,32 @@ std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& s
   const std::filesystem::path line_file = session.directory / (source + ".jsonl");
   const auto declared = file.streams.find(source);
   if (declared == file.streams.end()) {
-    if (std::filesystem::exists(video_file))
+    if (std::filesystem::exists(std::filesystem::symlink_status(video_file)))
       session.missing.push_back("session.toml: does not say what is in " + source +
                                 ".mkv, which is left out");
     return nullptr;
   }
-  std::unique_ptr<VideoReader> video = open_video(video_file, declared->second, session.missing);
-  std::vector<VideoReader::PacketInfo> packets;
-  if (video) packets = video->scan(stop);
-
-  if (!std::filesystem::exists(line_file))
+  const StreamFormat& format = declared->second;
+  if (!std::filesystem::exists(std::filesystem::symlink_status(line_file)))
     session.missing.push_back(source + ".jsonl: the file is missing");
   const Lines<FrameLine> lines = read_frame_lines(line_file);
   if (!lines.bad_lines.empty())
     session.missing.push_back(source + ".jsonl: " + list_of("line", lines.bad_lines) +
                               " cannot be understood and are left out");
 
-  auto stream = std::make_unique<RecordedStream>(source, declared->second, std::move(video));
-  list_missing(join(lines.records, packets, *stream), source, session.missing);
+  OpenedVideo video;
+  if (std::filesystem::exists(std::filesystem::symlink_status(video_file))) {
+    video = open_video(video_file, format, lines.records, stop);
+    if (video.joined.left.has_lost_pictures())
+      search_lost(video, video_file, format, lines.records, stop, session.missing);
+    if (!video.fault.empty()) session.missing.push_back(video.fault);
+  } else {
+    video.joined = join(lines.records, {});
+    session.missing.push_back(source + ".mkv: the file is missing");
+  }
+  auto stream = std::make_unique<RecordedStream>(source, format, std::move(video.reader));
+  for (const FrameLine& line : video.joined.whole) stream->add(line);
+  list_missing(video.joined.left, source, session.missing);
   const std::uint64_t whole = stream->records().size();
   if (const auto recorded = declared->second.frames; recorded && whole < *recorded)
     session.missing.push_back(source + ": " + std::to_string(whole) + " of " +

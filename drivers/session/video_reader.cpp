@@ -1,9 +1,13 @@
 #include "drivers/session/video_reader.hpp"
 
-#include <algorithm>
-#include <thread>
+#include <unistd.h>
+
+#include <map>
+#include <optional>
+#include <utility>
 
 #include "drivers/av.hpp"
+#include "drivers/session/ffv1.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/samples.hpp"
 
@@ -28,26 +32,16 @@ int find_track(const AVFormatContext& demuxer, const std::filesystem::path& file
   throw Error(file.string() + ": holds no FFV1 track");
 }
 
-av::Codec open_decoder(const AVCodecParameters& parameters, const std::filesystem::path& file) {
-  const AVCodec* codec = avcodec_find_decoder(AV_CODEC_ID_FFV1);
-  if (!codec) throw Error(file.string() + ": this libavcodec has no FFV1 decoder");
-  av::Codec decoder(avcodec_alloc_context3(codec));
-  av::check(avcodec_parameters_to_context(decoder.get(), &parameters), file,
-            "its video header is damaged");
-  // Slices are independent within a picture; threads over frames would hold pictures back.
-  decoder->thread_type = FF_THREAD_SLICE;
-  decoder->thread_count = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 16);
-  av::check(avcodec_open2(decoder.get(), codec, nullptr), file, "its video header is damaged");
-  return decoder;
-}
-
 }  // namespace
 
 struct VideoReader::Impl {
+  using Key = std::pair<std::int64_t, std::uint32_t>;  // time and CRC-32 of a packet
   std::filesystem::path file;
   StreamFormat format;
-  av::Demuxer demuxer;
-  int track;
+  av::Demuxer demuxer;  // null where the places of the packets are known
+  int track = -1;
+  std::map<Key, PacketPlace> places;  // of the packets, if there is no demuxer
+  std::optional<OpenFile> opened;     // likewise
   av::Codec decoder;
   av::Packet packet{av_packet_alloc()};
   av::Picture picture{av_frame_alloc()};
@@ -57,11 +51,20 @@ struct VideoReader::Impl {
         format(stream_format),
         demuxer(open_demuxer(file)),
         track(find_track(*demuxer, file)),
-        decoder(open_decoder(*demuxer->streams[track]->codecpar, file)) {
+        decoder(open_ffv1_decoder(*demuxer->streams[track]->codecpar, file)) {
     if (decoder->width != format.width || decoder->height != format.height)
       throw Error(file.string() + ": its video header says " + std::to_string(decoder->width) +
                   "x" + std::to_string(decoder->height) + ", session.toml " +
                   std::to_string(format.width) + "x" + std::to_string(format.height));
+  }
+
+  Impl(const std::filesystem::path& path, const StreamFormat& stream_format,
+       const std::vector<PacketPlace>& packets)
+      : file(path),
+        format(stream_format),
+        opened(open_plain_file(file)),
+        decoder(open_ffv1_decoder(format, file)) {
+    for (const PacketPlace& place : packets) places[{place.video_ms, place.crc32}] = place;
   }
 
   void rewind() { demuxer = open_demuxer(file); }
@@ -89,7 +92,19 @@ struct VideoReader::Impl {
     return false;
   }
 
+  // Reads a packet whose place is known; it may have been changed since it was found.
+  bool read_place(const PacketInfo& wanted) {
+    const auto found = places.find({wanted.video_ms, wanted.crc32});
+    if (found == places.end()) return false;
+    const auto& [key, place] = *found;
+    av_packet_unref(packet.get());
+    av::check(av_new_packet(packet.get(), static_cast<int>(place.bytes)), file, "no memory");
+    return read_at(*opened, place.offset, {packet->data, place.bytes}) &&
+           av::crc32(*packet) == wanted.crc32;
+  }
+
   bool find(const PacketInfo& wanted) {
+    if (!demuxer) return read_place(wanted);
     if (next_packet() && holds(wanted)) return true;
     if (av_seek_frame(demuxer.get(), track, wanted.video_ms, AVSEEK_FLAG_BACKWARD) >= 0 &&
         find_forward(wanted))
@@ -106,10 +121,16 @@ struct VideoReader::Impl {
 VideoReader::VideoReader(const std::filesystem::path& file, const StreamFormat& format)
     : impl_(std::make_unique<Impl>(file, format)) {}
 
+VideoReader::VideoReader(const std::filesystem::path& file, const StreamFormat& format,
+                         const std::vector<PacketPlace>& packets)
+    : impl_(std::make_unique<Impl>(file, format, packets)) {}
+
 VideoReader::~VideoReader() = default;
 
 std::vector<VideoReader::PacketInfo> VideoReader::scan(const std::stop_token& stop) {
   std::vector<PacketInfo> packets;
+  for (const auto& [key, place] : impl_->places) packets.push_back({key.first, key.second});
+  if (!impl_->demuxer) return packets;
   while (impl_->next_packet()) {
     if (stop.stop_requested())
       throw Error(impl_->file.string() + ": was left, because reading it is to end");

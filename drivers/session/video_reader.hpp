@@ -8,6 +8,7 @@
 #include <stop_token>
 #include <vector>
 
+#include "drivers/session/clusters.hpp"
 #include "drivers/session/session_toml.hpp"
 
 namespace previz::session {
@@ -21,10 +22,14 @@ class VideoReader {
 
   // Throws previz::Error naming the file if it holds no FFV1 track that can be read.
   VideoReader(const std::filesystem::path& file, const StreamFormat& format);
+  // Reads these packets where they lie, whatever the rest of the file is, with a video header made
+  // anew from the format. Throws previz::Error naming the file.
+  VideoReader(const std::filesystem::path& file, const StreamFormat& format,
+              const std::vector<PacketPlace>& packets);
   ~VideoReader();
 
-  // Returns every packet that can be found, in file order. Reads the file once from end to end; a
-  // stop ends that with previz::Error.
+  // Returns every packet that can be found, in file order or in order of time. Reads the file once
+  // from end to end; a stop ends that with previz::Error.
   std::vector<PacketInfo> scan(const std::stop_token& stop = {});
   // Returns Frame::bytes of the packet; packets read in order need no seeking. Throws previz::Error
   // naming the file and the time if the packet, or a whole picture in it, is not there.

@@ -3,54 +3,14 @@
 #include <fcntl.h>
 
 #include <algorithm>
-#include <thread>
-
-extern "C" {
-#include <libavutil/opt.h>
-}
 
 #include "drivers/av.hpp"
+#include "drivers/session/ffv1.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/samples.hpp"
 
 namespace previz::session {
 namespace {
-
-// FFV1 codes a picture in independent slices, each on one thread. libav's encoder knows only some
-// counts: 1 up to 352x288 pixels, 4 and 16 always.
-int slice_count(const StreamFormat& format) {
-  if (format.width <= 352 && format.height <= 288)
-    return format.width * format.height < 128 * 128 ? 1 : 4;
-  return std::min(format.width, format.height) < 480 ? 4 : 16;
-}
-
-av::Codec open_encoder(const StreamFormat& format, const std::filesystem::path& file) {
-  const AVCodec* codec = avcodec_find_encoder(AV_CODEC_ID_FFV1);
-  if (!codec) throw Error(file.string() + ": this libavcodec has no FFV1 encoder");
-  av::Codec encoder(avcodec_alloc_context3(codec));
-  const int slices = slice_count(format);
-  encoder->width = format.width;
-  encoder->height = format.height;
-  encoder->pix_fmt = encoder_format(format.format);
-  encoder->time_base = {1, 1000};
-  encoder->gop_size = 1;
-  encoder->level = 3;
-  encoder->slices = slices;
-  encoder->thread_type = FF_THREAD_SLICE;
-  encoder->thread_count =
-      std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, slices);
-  encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
-  if (format.format == PixelFormat::yuv422p8) {
-    encoder->colorspace = AVCOL_SPC_BT709;
-    encoder->color_range = AVCOL_RANGE_MPEG;
-    encoder->chroma_sample_location = AVCHROMA_LOC_LEFT;
-  }
-  av_opt_set_int(encoder->priv_data, "slicecrc", 1, 0);
-  const bool deep = format.format == PixelFormat::rgb16 || format.format == PixelFormat::gray16;
-  if (deep) av_opt_set(encoder->priv_data, "coder", "range_tab", 0);  // its only coder for 16 bits
-  av::check(avcodec_open2(encoder.get(), codec, nullptr), file, "FFV1 cannot be started");
-  return encoder;
-}
 
 av::Muxer open_muxer(const AVCodecContext& encoder, const std::filesystem::path& file) {
   AVFormatContext* context = nullptr;
@@ -84,7 +44,7 @@ struct VideoWriter::Impl {
   Impl(const std::filesystem::path& path, const StreamFormat& stream_format)
       : file(path),
         format(stream_format),
-        encoder(open_encoder(format, file)),
+        encoder(open_ffv1_encoder(format, file)),
         muxer(open_muxer(*encoder, file)),
         same_file(file, O_RDONLY),
         picture(av_frame_alloc()),

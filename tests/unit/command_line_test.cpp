@@ -82,6 +82,8 @@ TEST(CommandLine, TakesAreNamed) {
   EXPECT_EQ(copied.takes.copied.takes, (post::Paths{"one", "two"}));
   EXPECT_EQ(copied.takes.copied.folder, "disk");
   EXPECT_FALSE(parsed("takes delete one").takes.also_good);
+  EXPECT_EQ(parsed("takes check one --repair disk").takes.repaired, "disk");
+  EXPECT_TRUE(parsed("takes check one").takes.repaired.empty());
 }
 
 }  // namespace command_line_test

@@ -10,10 +10,14 @@
 #include "daemon/output/png.hpp"
 #include "daemon/post/render.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "tests/support/session_fixture.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace previz::post {
 namespace post_render_directory_test {
+
+using session::content_of, session::write_content;
 
 constexpr const char* settings =
     R"({"samples": 16, "set": "a text that is too long to be repeated in an error message, as sets are"})";
@@ -121,6 +125,104 @@ TEST_F(RenderDirectoryTest, AMissingFileOrAHalfLineMeansTheFrameIsDoneAgain) {
     directory.write(sample_shot(3), set_);  // its line must not run into the half one
   }
   EXPECT_NE(open().finished(3), nullptr);
+}
+
+// Frames 0 to 5; each but the first is damaged in its own way, and the reason says which.
+TEST_F(RenderDirectoryTest, AFileThatIsNotAsItWasWrittenIsDoneAgain) {
+  {
+    RenderDirectory directory = open();
+    for (const std::uint64_t frame : {0, 1, 2, 3, 4, 5}) directory.write(sample_shot(frame), set_);
+  }
+  const std::filesystem::path out = directory_ / "out";
+  for (const char* name : {"0001.exr", "0002.png"})
+    std::filesystem::resize_file(out / name, std::filesystem::file_size(out / name) / 2);
+  for (const char* name : {"0003.exr", "0004.png"}) {
+    std::string bytes = content_of(out / name);
+    bytes[bytes.size() / 2] ^= 0x10;
+    write_content(out / name, bytes);
+  }
+  std::string lines = content_of(out / "frames.jsonl");
+  lines.resize(lines.rfind("{\"frame\":5") + 20);  // the last line is torn
+  write_content(out / "frames.jsonl", lines);
+
+  const RenderDirectory again = open();
+  EXPECT_NE(again.finished(0), nullptr);
+  for (const std::uint64_t frame : {1, 2, 3, 4, 5}) EXPECT_EQ(again.finished(frame), nullptr);
+  using Frames = std::vector<std::uint64_t>;
+  const std::map<std::string, Frames> expected{
+      {"its .exr has another size than when it was written", {1}},
+      {"its .png has another size than when it was written", {2}},
+      {"its .exr has another content (SHA-256) than when it was written", {3}},
+      {"its .png has another content (SHA-256) than when it was written", {4}},
+      {"it has no whole line in frames.jsonl", {5}}};
+  EXPECT_EQ(again.rejected(), expected);
+}
+
+TEST_F(RenderDirectoryTest, ALineHasSizeAndHashOfItsFiles) {
+  open().write(sample_shot(7), set_);
+  const RenderDirectory again = open();
+  ASSERT_NE(again.finished(7), nullptr);
+  EXPECT_TRUE(again.rejected().empty());
+  for (const char* name : {"0007.exr", "0007.png"}) {
+    const auto& files = again.finished(7)->files;
+    ASSERT_TRUE(files.contains(name));
+    EXPECT_EQ(files.at(name).bytes, content_of(directory_ / "out" / name).size());
+    EXPECT_EQ(files.at(name).sha256, session::sha256_of(directory_ / "out" / name));
+  }
+}
+
+// Lines of a previzd that wrote no hashes: what decodes is kept, and has its hash from then on.
+TEST_F(RenderDirectoryTest, FilesOfAnOlderVersionAreDecoded) {
+  const std::filesystem::path out = directory_ / "out";
+  {
+    RenderDirectory directory = open();
+    std::string lines;
+    for (const std::uint64_t frame : {0, 1, 2}) {
+      directory.write(sample_shot(frame), set_);
+      FinishedFrame old = *directory.finished(frame);
+      old.files.clear();
+      lines += to_json(old) + "\n";
+    }
+    write_content(out / "frames.jsonl", lines);
+  }
+  for (const char* name : {"0001.exr", "0002.png"})
+    std::filesystem::resize_file(out / name, std::filesystem::file_size(out / name) / 2);
+  {
+    const RenderDirectory again = open();
+    EXPECT_NE(again.finished(0), nullptr);
+    EXPECT_EQ(again.finished(1), nullptr);
+    EXPECT_EQ(again.finished(2), nullptr);
+    const std::map<std::string, std::vector<std::uint64_t>> expected{
+        {"its .exr cannot be decoded", {1}}, {"its .png cannot be decoded", {2}}};
+    EXPECT_EQ(again.rejected(), expected);
+  }
+  std::string bytes = content_of(out / "0000.exr");
+  bytes.back() ^= 1;
+  write_content(out / "0000.exr", bytes);
+  EXPECT_EQ(open().finished(0), nullptr);
+}
+
+// What is outside of the range is neither read nor forgotten.
+TEST_F(RenderDirectoryTest, FramesOutsideOfTheRangeKeepTheirLines) {
+  {
+    RenderDirectory directory = open();
+    for (const std::uint64_t frame : {0, 1, 2}) directory.write(sample_shot(frame), set_);
+  }
+  std::filesystem::resize_file(directory_ / "out/0000.png", 10);
+  const RenderDirectory part(output_, settings, false, {}, {1, 2});
+  EXPECT_TRUE(part.rejected().empty());
+  EXPECT_EQ(open().rejected().size(), 1u);
+}
+
+TEST_F(RenderDirectoryTest, AStopEndsTheCheckAndChangesNothing) {
+  open().write(sample_shot(0), set_);
+  std::stop_source stop;
+  stop.request_stop();
+  const std::string lines = content_of(directory_ / "out/frames.jsonl");
+  EXPECT_THROW(
+      RenderDirectory(output_, settings, false, {}, RenderDirectory::all_frames, stop.get_token()),
+      Error);
+  EXPECT_EQ(content_of(directory_ / "out/frames.jsonl"), lines);
 }
 
 TEST_F(RenderDirectoryTest, OtherSettingsAreRefusedByNameUnlessForced) {

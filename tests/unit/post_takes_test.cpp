@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -208,6 +209,38 @@ TEST_F(Takes, ADamagedTakeIsCopiedAsItIsAndSaid) {
   EXPECT_THAT(out.str(), HasSubstr("checked"));
   EXPECT_THAT(out.str(), HasSubstr("the take itself is damaged, not by copying: observer.mkv"));
   EXPECT_EQ(copy_takes({{two_}, directory_ / "disk"}, out, {}), 0);
+}
+
+TEST_F(Takes, ADamagedTakeIsRepairedIntoANewOne) {
+  const fs::path film = one_ / "observer.mkv", disk = directory_ / "disk/repaired";
+  const std::string before = session::read_file(film);
+  std::string damaged = before;
+  damaged[damaged.size() / 2] ^= 0x10;
+  session::replace_file(film, damaged);
+  EXPECT_EQ(repair_takes({{one_, two_}, disk}, out_, {}), 1);
+  EXPECT_THAT(out_.str(), HasSubstr("12A_take001: repaired, 7 frames; what is lost is in its"));
+  EXPECT_THAT(out_.str(), HasSubstr("12A_take002: whole, nothing to repair"));
+  EXPECT_EQ(session::read_file(film), damaged);
+  EXPECT_FALSE(fs::exists(disk / "12A_take002"));
+  std::ostringstream out;
+  EXPECT_EQ(check_takes({disk / "12A_take001"}, out, {}), 1);
+  EXPECT_THAT(out.str(), HasSubstr("repaired from 12A_take001, which was damaged: observer.mkv"));
+  EXPECT_EQ(std::ranges::count(out.str(), '\n'), 1);  // nothing else is wrong with it
+  EXPECT_THAT(refusal([&] {
+                repair_takes({{one_}, disk}, out_, {});
+              }),
+              HasSubstr("12A_take001: already exists; repair into another folder"));
+  EXPECT_THAT(refusal([&] {
+                repair_takes({{one_}, folder_}, out_, {});
+              }),
+              HasSubstr("already exists"));
+
+  damaged = before;
+  damaged[0] = 0;
+  session::replace_file(film, damaged);
+  EXPECT_EQ(repair_takes({{one_}, disk / "again"}, out_, {}), 0);
+  EXPECT_THAT(out_.str(), HasSubstr("repaired, 8 frames, nothing is lost"));
+  EXPECT_EQ(check_takes({disk / "again/12A_take001"}, out_, {}), 0);
 }
 
 TEST_F(Takes, AMarkIsNoDamageToACopy) {

@@ -8,6 +8,7 @@ extern "C" {
 }
 
 #include <algorithm>
+#include <chrono>
 #include <random>
 
 #include "drivers/error.hpp"
@@ -148,6 +149,113 @@ TEST_F(Damage, AChangedByteOfTheVideoIsNeverShown) {
         EXPECT_EQ(opened.frames, std::vector<std::uint64_t>{1 - p}) << "byte " << at;
       }
   }
+}
+
+// Where the head of a video lies, before its first cluster, and where that one's picture begins.
+std::size_t head_of(const std::string& video) {
+  return video.find("\x1f\x43\xb6\x75");
+}
+
+// The head is one byte short of being right, is zeros up to some place, or the file lacks it: every
+// picture behind it is found by its checksum.
+TEST_F(Damage, ATornHeadCostsNoPictureBehindIt) {
+  const std::string video = content_of(whole() / "observer.mkv");
+  const std::size_t head = head_of(video);
+  ASSERT_NE(head, std::string::npos);
+  std::string first_byte = video, zeros = video;
+  first_byte[0] = 0;
+  std::fill_n(zeros.begin(), head, '\0');
+  for (const std::string& torn : {first_byte, zeros, video.substr(head)}) {
+    write_content(copy() / "observer.mkv", torn);
+    const Opened opened = open_copy();
+    EXPECT_EQ(opened.frames, (std::vector<std::uint64_t>{0, 1, 2, 3, 4, 5}));
+    EXPECT_TRUE(mentions(opened.missing, "6 pictures of 6 found one by one"));
+    EXPECT_FALSE(mentions(opened.missing, "no picture can be read"));
+  }
+}
+
+// A block of zeros over head and first pictures costs those it touches; they are named.
+TEST_F(Damage, ATornFirstBlockCostsThePicturesInIt) {
+  const std::string video = content_of(whole() / "observer.mkv");
+  const auto packets = packets_of(whole() / "observer.mkv");
+  ASSERT_EQ(packets.size(), std::size_t{frame_count});
+  std::string torn = video;
+  std::fill_n(torn.begin(), packets[1].first + 10, '\0');
+  write_content(copy() / "observer.mkv", torn);
+  const Opened opened = open_copy();
+  EXPECT_EQ(opened.frames, (std::vector<std::uint64_t>{2, 3, 4, 5}));
+  EXPECT_TRUE(mentions(opened.missing, "the pictures of frames 0 to 1 are missing"));
+  EXPECT_TRUE(mentions(opened.missing, "4 of 6 recorded frames are whole"));
+}
+
+// Every byte before the first cluster in turn is zeroed or turned over: none costs a picture.
+TEST_F(Damage, NoByteOfTheHeadCostsAPicture) {
+  constexpr int few = 2;
+  write_small_frames(few, 8, 8);
+  const std::string video = content_of(whole() / "observer.mkv");
+  for (std::size_t at = 0; at < head_of(video); ++at) {
+    for (const char byte : {'\0', static_cast<char>(~video[at])}) {
+      std::string damaged = video;
+      damaged[at] = byte;
+      write_content(copy() / "observer.mkv", damaged);
+      EXPECT_EQ(open_copy().frames.size(), std::size_t{few}) << "byte " << at;
+    }
+  }
+}
+
+// The video header is made anew from session.toml, and the pictures come back bit for bit, in every
+// format and with every number of slices.
+TEST_F(Damage, EveryFormatIsReadWithoutAHead) {
+  struct Size {
+    int width, height;
+  };
+  for (const PixelFormat format : {PixelFormat::rgb8, PixelFormat::rgb16, PixelFormat::gray8,
+                                   PixelFormat::gray16, PixelFormat::yuv422p8})
+    for (const Size size : {Size{24, 18}, Size{160, 120}, Size{400, 300}, Size{640, 480}}) {
+      const TemporaryDirectory directory;
+      const std::filesystem::path take = directory.path() / "take";
+      {
+        SessionWriter writer(take, {});
+        for (std::uint64_t i = 0; i < 2; ++i)
+          writer.write(noise_frame("observer", i, format, size.width, size.height));
+      }
+      std::string video = content_of(take / "observer.mkv");
+      std::fill_n(video.begin(), head_of(video), '\0');
+      write_content(take / "observer.mkv", video);
+      Session session = open_session(take);
+      const auto stream = open_stream(session, "observer");
+      ASSERT_EQ(stream->records().size(), 2u) << size.width;
+      for (std::size_t i : {1, 0}) EXPECT_TRUE(is_frame(*stream->read(i), i)) << size.width;
+    }
+}
+
+// Clusters within clusters, each of which claims the rest of the file: what is looked at again is
+// bounded, so that the time grows with the size of the file. A search without that bound would read
+// 8 MB for each of half a million clusters, which is 4 TB.
+TEST_F(Damage, AFileOfNestedClustersIsSearchedInLinearTime) {
+  // A cluster of unknown size, its time of 0 ms, and an element of 2 MB that holds the next one.
+  const std::string nested("\x1f\x43\xb6\x75\xff\xe7\x81\x00\xec\x10\x20\x00\x00", 13);
+  // The same with elements that are walked through one by one.
+  const std::string walked("\x1f\x43\xb6\x75\xff\xe7\x81\x00\xec\x84", 10);
+  // A block at a time that is wanted, of all that follows and more than a picture.
+  const std::string block("\x1f\x43\xb6\x75\xff\xe7\x81\x00\xa3\x43\x00\x81\x00\x00\x80", 15);
+  for (const std::string& unit : {nested, walked, block}) {
+    std::string video;
+    while (video.size() < (std::size_t{8} << 20)) video += unit;
+    write_content(copy() / "observer.mkv", video);
+    const auto start = std::chrono::steady_clock::now();
+    EXPECT_TRUE(open_copy().frames.empty());
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+    EXPECT_LT(took.count(), 60.0);
+  }
+}
+
+TEST_F(Damage, AFolderInThePlaceOfTheVideoIsSaid) {
+  std::filesystem::remove(copy() / "observer.mkv");
+  std::filesystem::create_directory(copy() / "observer.mkv");
+  const Opened opened = open_copy();
+  EXPECT_TRUE(opened.frames.empty());
+  EXPECT_TRUE(mentions(opened.missing, "no picture can be read"));
 }
 
 TEST_F(Damage, OneDamagedPictureCostsThatFrameOnly) {
