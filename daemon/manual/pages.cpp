@@ -131,6 +131,7 @@ const Chapter previzd_status{"EXIT STATUS", R"(
 const Chapter previzd_cameras{"NETWORK CAMERAS", R"(
 A GigE Vision camera obeys whoever asks first and proves nothing of itself: any host that reaches the camera can take it over, and one that answers under its serial number or address is taken for it. Connect such cameras to a network port of the rig's computer that nothing else is connected to, without a router and without forwarding (`sysctl net.ipv4.ip_forward` is 0, `net.ipv4.conf.all.rp_filter` is 1), and name them in the set file by their addresses.
 What aravis cameras send is received by a process of its own for each camera, previzd-aravis. It can open no file and start no program, packets of other hosts and packets that are not whole do not reach it, from the moment that it has a socket, and one that ends or does not answer is replaced: the camera is reported lost, and found again within two seconds. A take goes on meanwhile.
+The process of a camera on the USB opens files below /dev/bus/usb, /sys and /run/udev only, which takes a kernel with Landlock (Linux 5.13 or later; Debian's has it). Without Landlock such a camera is refused.
 )"};
 
 const Chapter previzd_files{"FILES", R"(

@@ -8,10 +8,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <linux/netlink.h>
+#include <linux/seccomp.h>
 #include <linux/sockios.h>
 #include <sys/ioctl.h>
+#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 
 #include <algorithm>
@@ -29,6 +32,7 @@
 
 #include "drivers/aravis/child_process.hpp"
 #include "drivers/aravis/protocol.hpp"
+#include "drivers/aravis/receiver/bpf.hpp"
 #include "drivers/aravis/receiver/sandbox.hpp"
 #include "drivers/aravis/receiver_process.hpp"
 #include "drivers/camera_drivers.hpp"
@@ -310,6 +314,76 @@ TEST(Sandbox, SignalsNobodyByWayOfADescriptor) {
   }
   close(ends[0]);
   close(ends[1]);
+}
+
+// Runs a call in a process for which the kernel ends this system call with an error, as an older
+// kernel or the service's filter does; returns what it says of its trouble, "" for none.
+template <class Call>
+std::string trouble_without(long system_call, int error, const Call& call) {
+  int ends[2];
+  if (pipe(ends) != 0) return "no pipe";
+  const pid_t child = fork();
+  if (child == 0) {
+    namespace bpf = aravis::bpf;
+    bpf::Program filter =
+        bpf::all({bpf::load(BPF_W, offsetof(seccomp_data, nr)),
+                  bpf::when(BPF_JEQ, static_cast<std::uint32_t>(system_call),
+                            bpf::verdict(SECCOMP_RET_ERRNO | static_cast<std::uint32_t>(error))),
+                  bpf::verdict(SECCOMP_RET_ALLOW)});
+    const sock_fprog program{static_cast<unsigned short>(filter.size()), filter.data()};
+    std::string said;
+    if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 ||
+        prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program, 0, 0) != 0)
+      said = "no filter";
+    try {
+      call();
+    } catch (const Error& trouble) {
+      said += trouble.what();
+    }
+    _exit(write(ends[1], said.data(), said.size()) < 0);
+  }
+  close(ends[1]);
+  std::string said(1000, '\0');
+  const ssize_t size = read(ends[0], said.data(), said.size());
+  said.resize(static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
+  close(ends[0]);
+  waitpid(child, nullptr, 0);
+  return said;
+}
+
+TEST(Sandbox, WithoutLandlockAUsbReceiverIsRefusedInWordsThatLeadOn) {
+  const auto usb = [] { aravis::enter_sandbox(true); };
+  const std::string files = "other files than the USB's: ";
+  EXPECT_THAT(trouble_without(SYS_landlock_create_ruleset, ENOSYS, usb),
+              HasSubstr(files + "this kernel has no Landlock; install Linux 5.13 or later"));
+  EXPECT_THAT(trouble_without(SYS_landlock_create_ruleset, EOPNOTSUPP, usb),
+              HasSubstr(files + "Landlock is switched off; add landlock to lsm="));
+  for (const long call : {SYS_landlock_create_ruleset, SYS_landlock_restrict_self})
+    EXPECT_THAT(trouble_without(call, EPERM, usb),
+                HasSubstr("not permitted; allow the service the system calls landlock_create"));
+  EXPECT_EQ(
+      trouble_without(SYS_landlock_create_ruleset, ENOSYS, [] { aravis::enter_sandbox(false); }),
+      "");
+}
+
+// The receiver may end before or after the request comes, so that it is asked often.
+TEST(Receiver, OfAUsbCameraSaysThatThereIsNoLandlock) {
+  for (int i = 0; i < 30; ++i) {
+    const std::string trouble = trouble_without(SYS_landlock_create_ruleset, ENOSYS, [] {
+      aravis::ReceiverProcess receiver(aravis::Reach::usb);
+      receiver.ask(aravis::Kind::list, {}, seconds(5));
+    });
+    EXPECT_THAT(trouble, HasSubstr("this kernel has no Landlock"));
+  }
+}
+
+TEST(Receiver, ThatMayNotLookForCamerasIsListedWithTheReason) {
+  const std::string trouble = trouble_without(SYS_landlock_create_ruleset, ENOSYS, [] {
+    for (const FoundCamera& found : camera_driver("aravis").find())
+      if (!found.trouble.empty()) throw Error(found.trouble);
+  });
+  EXPECT_THAT(trouble, StartsWith("cannot look for cameras on the USB: "));
+  EXPECT_THAT(trouble, HasSubstr("this kernel has no Landlock"));
 }
 
 // A request that is none is refused, and the process goes on.
