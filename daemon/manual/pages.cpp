@@ -36,7 +36,7 @@ std::string actions_text() {
 const Chapter service_chapter{"THE SERVICE", R"(
 previzd.service runs `previzd run --bus --loop /etc/previzd/set.toml` as the user previz. When the set file is saved, it is loaded again, at the latest on `systemctl reload previzd`. If it has a mistake, the old one keeps running, and the journal and `previzctl status` say what is wrong. What buttons have moved and relit stays.
 `previzctl action keep` writes what buttons have changed into the set file. As installed, the service may write nowhere in /etc: keep the set file in /var/lib/previzd, or let the service write (`systemctl edit previzd`, ReadWritePaths=/etc/previzd) into a folder that belongs to previz.
-`journalctl -u previzd` shows what it reports, each line with the priority of its severity: with `-p err` only the errors.
+`journalctl -u previzd` shows what it reports, each line with the priority of its severity: with `-p err` only the errors. Each loss of a device is a line, from the second on with its number ("the 3rd time in this run"); what repeats with every frame is a line the first, the 10th, 100th and 1000th time.
 Members of the group previz may operate the rig with previzctl.
 )"};
 

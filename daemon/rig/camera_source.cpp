@@ -59,10 +59,11 @@ void CameraSource::failed(const std::string& what) {
 }
 
 void CameraSource::trouble(const DeviceTrouble& trouble) {
-  parts_.kept.reports(report::once({.severity = report::Severity::error,
-                                    .source = trouble.device,
-                                    .text = trouble.what,
-                                    .notice = report::lasting(crews_name_, trouble.what)}));
+  const report::Report report{.severity = report::Severity::error,
+                              .source = trouble.device,
+                              .text = trouble.what,
+                              .notice = report::lasting(crews_name_, trouble.what)};
+  parts_.kept.reports(trouble.lost ? report::counted(report) : report::once(report));
   parts_.kept.metrics.count(stage_ + ": device trouble");
   if (trouble.lost) lose();
 }
