@@ -26,6 +26,10 @@ void list_cameras(std::ostream& out) {
   std::size_t count = 0;
   for (const CameraDriver& driver : camera_drivers()) {
     for (const FoundCamera& camera : driver.find()) {
+      if (!camera.trouble.empty()) {
+        out << "  " << camera.driver << ": " << camera.trouble << '\n';
+        continue;
+      }
       print(out, "driver = \"" + camera.driver + "\", device = " + codec::quote(camera.device),
             camera.description);
       ++count;

@@ -29,9 +29,10 @@ struct CameraFormat {
 
 // A camera that is there now.
 struct FoundCamera {
-  std::string driver;       // as in the set file
-  std::string device;       // its stable name
-  std::string description;  // vendor, model, where it is plugged in
+  std::string driver;        // as in the set file
+  std::string device;        // its stable name
+  std::string description;   // vendor, model, where it is plugged in
+  std::string trouble = {};  // not empty: no camera, but why the driver could not look everywhere
 };
 
 // An open camera. Making it opens the device and settles its format; destroying it gives the device

@@ -36,7 +36,7 @@ std::string actions_text() {
 const Chapter service_chapter{"THE SERVICE", R"(
 previzd.service runs `previzd run --bus --loop /etc/previzd/set.toml` as the user previz. When the set file is saved, it is loaded again, at the latest on `systemctl reload previzd`. If it has a mistake, the old one keeps running, and the journal and `previzctl status` say what is wrong. What buttons have moved and relit stays.
 `previzctl action keep` writes what buttons have changed into the set file. As installed, the service may write nowhere in /etc: keep the set file in /var/lib/previzd, or let the service write (`systemctl edit previzd`, ReadWritePaths=/etc/previzd) into a folder that belongs to previz.
-`journalctl -u previzd` shows what it reports, each line with the priority of its severity: with `-p err` only the errors.
+`journalctl -u previzd` shows what it reports, each line with the priority of its severity: with `-p err` only the errors. Each loss of a device is a line, from the second on with its number ("the 3rd time in this run"); what repeats with every frame is a line the first, the 10th, 100th and 1000th time.
 Members of the group previz may operate the rig with previzctl.
 )"};
 
@@ -131,7 +131,8 @@ const Chapter previzd_status{"EXIT STATUS", R"(
 
 const Chapter previzd_cameras{"NETWORK CAMERAS", R"(
 A GigE Vision camera obeys whoever asks first and proves nothing of itself: any host that reaches the camera can take it over, and one that answers under its serial number or address is taken for it. Connect such cameras to a network port of the rig's computer that nothing else is connected to, without a router and without forwarding (`sysctl net.ipv4.ip_forward` is 0, `net.ipv4.conf.all.rp_filter` is 1), and name them in the set file by their addresses.
-What aravis cameras send is received by a process of its own for each camera, previzd-aravis. It can open no file and start no program, packets of other hosts and packets that are not whole do not reach it, and one that ends or does not answer is replaced: the camera is reported lost, and found again within two seconds. A take goes on meanwhile.
+What aravis cameras send is received by a process of its own for each camera, previzd-aravis. It can open no file and start no program, packets of other hosts and packets that are not whole do not reach it, from the moment that it has a socket, and one that ends or does not answer is replaced: the camera is reported lost, and found again within two seconds. A take goes on meanwhile.
+The process of a camera on the USB opens files below /dev/bus/usb, /sys and /run/udev only, which takes a kernel with Landlock (Linux 5.13 or later; Debian's has it). Without Landlock such a camera is refused.
 )"};
 
 const Chapter previzd_files{"FILES", R"(

@@ -37,10 +37,11 @@ struct Notice {
 
 struct Report {
   Severity severity = Severity::info;
-  std::string source;                 // who reports: "light", "button red"; may be empty
-  std::string text;                   // the first of its lines says what happened
-  std::string once_key = {};          // reports with equal keys are logged once; empty: every time
+  std::string source;    // who reports: "light", "button red"; may be empty
+  std::string text;      // the first of its lines says what happened
+  std::string key = {};  // reports with equal keys are repetitions of one; empty: of none
   std::optional<Notice> notice = {};  // shown on the display, every time
+  bool logs_all = false;              // with a key: whether all repetitions are logged, or few
 };
 
 // Returns "film camera: was unplugged", or the text alone if there is no source.
@@ -58,9 +59,18 @@ inline std::string wording(const std::string& line) {
   return words;
 }
 
-// Returns the report with a key that makes it logged once, whatever figures are in it.
+// Returns the report of a state that may be reported with every frame. Whatever figures are in it,
+// it is logged the first time, and the 10th, 100th, 1000th time with that number.
 inline Report once(Report report) {
-  report.once_key = wording(line_of(report));
+  report.key = wording(line_of(report));
+  return report;
+}
+
+// Returns the report of an event, such as the loss of a device. It is logged every time, from the
+// second on with its number.
+inline Report counted(Report report) {
+  report.key = wording(line_of(report));
+  report.logs_all = true;
   return report;
 }
 

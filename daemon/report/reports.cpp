@@ -15,6 +15,24 @@ bool takes_the_place_of(const Notice& newer, const Notice& older) {
   return newer.source == older.source && (is_trouble(newer) || newer.text == older.text);
 }
 
+bool is_power_of_ten(std::uint64_t number) {
+  while (number % 10 == 0 && number > 0) number /= 10;
+  return number == 1;
+}
+
+// Returns "1st", "2nd", "3rd", "4th", "11th", "21st".
+std::string ordinal(std::uint64_t number) {
+  const std::uint64_t last = number % 10;
+  const bool is_regular = last == 0 || last > 3 || number / 10 % 10 == 1;
+  return std::to_string(number) + (is_regular ? "th" : last == 1 ? "st" : last == 2 ? "nd" : "rd");
+}
+
+Report numbered(Report report, std::uint64_t times) {
+  report.text.insert(std::min(report.text.find('\n'), report.text.size()),
+                     ", the " + ordinal(times) + " time in this run");
+  return report;
+}
+
 }  // namespace
 
 void Notices::add(const Notice& notice, Clock::time_point now) {
@@ -57,7 +75,13 @@ std::vector<Notice> Notices::news(Clock::time_point now) {
 }
 
 void Reports::take(const Report& report, Clock::time_point now) {
-  if (report.once_key.empty() || logged_.is_first(report.once_key)) log_(report);
+  if (report.key.empty()) {
+    log_(report);
+  } else {
+    const std::uint64_t times = ++said_[report.key];
+    if (report.logs_all || is_power_of_ten(times))
+      log_(times == 1 ? report : numbered(report, times));
+  }
   if (report.notice) notices_.add(*report.notice, now);
 }
 

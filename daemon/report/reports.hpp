@@ -3,9 +3,11 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <iosfwd>
+#include <map>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -68,7 +70,7 @@ class Reports {
 
   mutable std::mutex mutex_;
   const Log log_;
-  Once logged_;
+  std::map<std::string, std::uint64_t> said_;  // how often, by key
   Notices notices_;
   std::string announced_;
 };

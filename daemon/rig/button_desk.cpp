@@ -34,10 +34,10 @@ void ButtonDesk::read(Watched& watched) {
       edge(*pushed);
     }
     if (const auto* trouble = std::get_if<DeviceTrouble>(&*event)) {
-      parts_.reports(report::once({.severity = report::Severity::error,
-                                   .source = trouble->device,
-                                   .text = trouble->what,
-                                   .notice = report::lasting(buttons.name(), trouble->what)}));
+      parts_.reports(report::counted({.severity = report::Severity::error,
+                                      .source = trouble->device,
+                                      .text = trouble->what,
+                                      .notice = report::lasting(buttons.name(), trouble->what)}));
       over = trouble->lost;
     }
     if (over) return watched.watch.reset();

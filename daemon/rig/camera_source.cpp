@@ -32,7 +32,7 @@ FramePtr CameraSource::ask() {
     has_ended_ = std::holds_alternative<EndOfStream>(event);
     counts_.update(camera_.counters());
     if (has_ended_) return nullptr;
-    if (const auto* what = std::get_if<DeviceTrouble>(&event)) trouble(*what);
+    if (const auto* what = std::get_if<DeviceTrouble>(&event)) trouble(*what, true);
     if (frame) arrived(*frame);
     if (!frame) look_at_silence();
   } catch (const std::exception& error) {
@@ -49,7 +49,7 @@ void CameraSource::look_at_silence() {
 void CameraSource::failed(const std::string& what) {
   pulse_.wait();
   try {
-    trouble({camera_.name(), what, false});
+    trouble({camera_.name(), what, false}, false);
     look_at_silence();
   } catch (const std::exception&) {
     // Memory may be short; what is asked again will be reported again.
@@ -58,11 +58,12 @@ void CameraSource::failed(const std::string& what) {
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
 }
 
-void CameraSource::trouble(const DeviceTrouble& trouble) {
-  parts_.kept.reports(report::once({.severity = report::Severity::error,
-                                    .source = trouble.device,
-                                    .text = trouble.what,
-                                    .notice = report::lasting(crews_name_, trouble.what)}));
+void CameraSource::trouble(const DeviceTrouble& trouble, bool is_event) {
+  const report::Report report{.severity = report::Severity::error,
+                              .source = trouble.device,
+                              .text = trouble.what,
+                              .notice = report::lasting(crews_name_, trouble.what)};
+  parts_.kept.reports(is_event ? report::counted(report) : report::once(report));
   parts_.kept.metrics.count(stage_ + ": device trouble");
   if (trouble.lost) lose();
 }

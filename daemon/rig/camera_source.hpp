@@ -36,7 +36,8 @@ class CameraSource {
  private:
   FramePtr ask();
   void failed(const std::string& what);
-  void trouble(const DeviceTrouble& trouble);
+  // With `is_event` the log has a line each time; otherwise it may come at every call.
+  void trouble(const DeviceTrouble& trouble, bool is_event);
   void look_at_silence();
   void lose();
   void arrived(const Frame& frame);

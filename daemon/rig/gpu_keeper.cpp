@@ -13,10 +13,11 @@ constexpr const char* graphics_device = "graphics device";  // as the crew calls
 }  // namespace
 
 void GpuKeeper::say_lost(const std::string& what) {
-  parts_.reports({.severity = Severity::error,
-                  .source = "",
-                  .text = what + "; it is opened again",
-                  .notice = report::lasting(graphics_device, "is lost; it is opened again")});
+  parts_.reports(
+      report::counted({.severity = Severity::error,
+                       .source = "",
+                       .text = what + "; it is opened again",
+                       .notice = report::lasting(graphics_device, "is lost; it is opened again")}));
   parts_.metrics.count("device lost");
   gpu_.drop();
 }

@@ -181,7 +181,7 @@ void Screen::Impl::put(const output::OsdPage& next, bool fresh) {
   if (!event) return;
   const DeviceTrouble& trouble = std::get<DeviceTrouble>(*event);
   parts.kept.metrics.count("screen: device trouble");
-  parts.kept.reports({report::Severity::error, trouble.device, trouble.what});
+  parts.kept.reports(report::counted({report::Severity::error, trouble.device, trouble.what}));
 }
 
 Screenful Screen::Impl::compose(const DisplayMode& mode, const output::OsdPage& next) {

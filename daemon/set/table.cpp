@@ -111,7 +111,7 @@ Keys camera_keys(CameraWish& wish) {
       {"raw_gain", &c.raw_gain, plain, "Gain in the camera's own units. The factor that it stands for must be part of the responsivity.", optional("64.0")},
       {"white_balance_k", &c.white_balance_k, plain.within(1000, 25000), "Colour temperature in kelvin. Turns the camera's automatic white balance off.", optional("5600.0")},
       {"trigger", &c.trigger, plain, "\"software\", or the camera's input line that triggers each frame. Default: no trigger, the camera runs at its own rate.", optional("\"Line1\"")},
-      {"packet_size", &c.packet_size, plain.within(576, 16000), "Packet size of network cameras, in bytes. Default: the largest that the network passes.", optional("9000")},
+      {"packet_size", &c.packet_size, plain.within(576, 16000), "Packet size of network cameras, in bytes. Default: the largest that the network passes. A size that is given is used untried; no frame arrives if the network does not pass it.", optional("9000")},
       {"start_timeout_s", &wish.start_timeout_s, seconds.above(0, 600), "A camera that delivers no frame for this long after its start is opened again."},
       {"stall_timeout_s", &wish.stall_timeout_s, seconds.above(0, 600), "A camera that delivers no frame for this long counts as stalled, and is soon opened again."},
   };

@@ -378,10 +378,12 @@ std::vector<FoundCamera> find_aravis() {
     try {
       listing =
           aravis::body_of<aravis::Listing>(receiver.ask(aravis::Kind::list, {}, time_to_list));
-    } catch (const Error&) {
+      if (!listing) throw Error("its receiver does not say what is there");
+    } catch (const Error& error) {
+      const std::string where = reach == Reach::usb ? "on the USB" : "in the network";
+      found.push_back({"aravis", "", "", "cannot look for cameras " + where + ": " + error.what()});
       continue;
     }
-    if (!listing) continue;
     for (const aravis::Listed& listed : listing->devices)
       found.push_back({"aravis",
                        aravis::printable(listed.serial.empty() ? listed.id : listed.serial),

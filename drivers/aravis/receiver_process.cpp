@@ -138,7 +138,9 @@ Received ReceiverProcess::take(Message& message, Clock::time_point until) {
     const Received received = receive(socket_.get(), message);
     if (received == Received::message) heard_ = Clock::now();
     if (message.kind != Kind::done) message.descriptor = {};  // nothing else brings one
-    if (received == Received::closed) give_up("is not there any more");
+    // The kernel reports the reset by a process that ended with a request unread before its words.
+    if (received == Received::closed)
+      give_up(last_words(socket_.get()).value_or("is not there any more"));
     if (received != Received::nothing || Clock::now() >= until) return received;
     pollfd readable{socket_.get(), POLLIN, 0};
     poll(&readable, 1, time_left(until));
@@ -148,7 +150,8 @@ Received ReceiverProcess::take(Message& message, Clock::time_point until) {
 // A process that has closed its socket is about to end by itself, and how it ends says more.
 void ReceiverProcess::give_up(const std::string& why) {
   if (gone()) return;
-  const bool ended = process_->ends_within(milliseconds(why == "is not there any more" ? 100 : 0));
+  const bool closed = why == "is not there any more" || why.starts_with("refuses: ");
+  const bool ended = process_->ends_within(milliseconds(closed ? 100 : 0));
   const std::string end = process_->end();
   why_gone_ = "the process that receives from it " + why + (ended ? ": " + end : "");
   socket_ = {};

@@ -1,4 +1,4 @@
-// What becomes of a report: its priority in the journal, its place on the display, its once-key.
+// What becomes of a report: its priority in the journal, its place on the display, its repetitions.
 #include "daemon/report/report.hpp"
 
 #include <gtest/gtest.h>
@@ -99,6 +99,40 @@ TEST(Reports, AnEqualOnceKeyIsLoggedOnceAndShownEveryTime) {
   EXPECT_EQ(out.str(), "light: frame 7 is left out\nbutton red: snapshot\nbutton red: snapshot\n");
   ASSERT_EQ(reports.troubles().size(), 1u);
   EXPECT_EQ(line_of(reports.troubles()[0]), "light: frame 12 is left out");
+}
+
+// A device that is lost again and again is not lost once.
+TEST(Reports, AnEventIsLoggedEachTimeWithItsNumber) {
+  std::ostringstream out;
+  Reports reports(lines_to(out));
+  for (int i = 1; i <= 23; ++i)
+    reports(counted({Severity::error, "observer", "ended by signal " + std::to_string(4 + i % 2)}));
+  reports(counted({Severity::error, "light camera", "ended by signal 5"}));
+  std::vector<std::string> lines;
+  std::istringstream in(out.str());
+  for (std::string line; std::getline(in, line);) lines.push_back(line);
+  ASSERT_EQ(lines.size(), 24u);
+  EXPECT_EQ(lines[0], "observer: ended by signal 5");
+  EXPECT_EQ(lines[1], "observer: ended by signal 4, the 2nd time in this run");
+  EXPECT_EQ(lines[2], "observer: ended by signal 5, the 3rd time in this run");
+  EXPECT_EQ(lines[3], "observer: ended by signal 4, the 4th time in this run");
+  EXPECT_EQ(lines[10], "observer: ended by signal 5, the 11th time in this run");
+  EXPECT_EQ(lines[12], "observer: ended by signal 5, the 13th time in this run");
+  EXPECT_EQ(lines[20], "observer: ended by signal 5, the 21st time in this run");
+  EXPECT_EQ(lines[22], "observer: ended by signal 5, the 23rd time in this run");
+  EXPECT_EQ(lines[23], "light camera: ended by signal 5");
+}
+
+TEST(Reports, AStateIsLoggedFirstAndThenAtTheTenthHundredthAndThousandthTime) {
+  std::ostringstream out;
+  Reports reports(lines_to(out));
+  for (int frame = 1; frame <= 1000; ++frame)
+    reports(once({Severity::warning, "light", "frame is left out\nThe lamp is too bright."}));
+  const std::string rest = "\nThe lamp is too bright.\n";
+  EXPECT_EQ(out.str(), "light: frame is left out" + rest +
+                           "light: frame is left out, the 10th time in this run" + rest +
+                           "light: frame is left out, the 100th time in this run" + rest +
+                           "light: frame is left out, the 1000th time in this run" + rest);
 }
 
 TEST(Reports, TheBusSaysWhatWasAnnouncedLastUntilAnotherSetBegins) {

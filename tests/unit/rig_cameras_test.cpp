@@ -142,6 +142,26 @@ TEST_F(RigCameras, ACameraThatThrowsAtEveryCallIsLost) {
   EXPECT_TRUE(is_lost);
 }
 
+TEST_F(RigCameras, EachLossOfADeviceIsALineWithItsNumber) {
+  set::Set set = replayed();
+  set.observer.faults = {"disconnect@2+0s"};
+  std::ostringstream out;
+  report::Reports reports(report::lines_to(out));
+  pipeline::Metrics metrics;
+  pipeline::Liveness liveness;
+  std::string cameras_name;
+  for (int loaded = 1; loaded <= 3; ++loaded) {
+    const Cameras cameras = open_cameras(set, /*loop=*/true);
+    cameras_name = cameras.observer->name();
+    CameraSource source(*cameras.observer, "observer", "film camera",
+                        {{}, {reports, metrics, liveness}, 1.0, {}});
+    for (int i = 0; i < 4; ++i) ASSERT_TRUE(source.next());
+  }
+  const std::string lost = cameras_name + ": was unplugged; reopening it";
+  EXPECT_EQ(out.str(), lost + "\n" + lost + ", the 2nd time in this run\n" + lost +
+                           ", the 3rd time in this run\n");
+}
+
 // `previzctl metrics` prints them; they go on over sets that are loaded anew.
 TEST_F(RigCameras, WhatADeviceCountsIsInTheMetrics) {
   set::Set set = replayed();

@@ -3,18 +3,22 @@
 #include <arpa/inet.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <optional>
 
 #include "drivers/aravis/pixel_formats.hpp"
+#include "drivers/aravis/receiver/guarded_sockets.hpp"
+#include "drivers/aravis/receiver/packet_filter.hpp"
 #include "drivers/frame_rate.hpp"
 
 namespace previz::aravis {
 namespace {
 
-bool is_address(const std::string& text) {
-  std::array<unsigned char, 16> ignored{};
-  return inet_pton(AF_INET, text.c_str(), ignored.data()) == 1;
+// Returns an IPv4 address in host order; none for other text.
+std::optional<std::uint32_t> address_of(const std::string& text) {
+  in_addr address{};
+  if (inet_pton(AF_INET, text.c_str(), &address) != 1) return std::nullopt;
+  return ntohl(address.s_addr);
 }
 
 std::string or_nothing(const char* text) {
@@ -224,6 +228,9 @@ class Configuration {
     else
       arv_camera_gv_auto_packet_size(&camera_, failure_.out());
     check("packet size");
+    // Aravis would try the size again as it makes the stream, by a socket that has the filter of
+    // the stream, which lets no trial through.
+    arv_camera_gv_set_packet_size_adjustment(&camera_, ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);
   }
 
   // The driver decides whether it is large enough for the picture, and not too large.
@@ -238,7 +245,12 @@ class Configuration {
   Agreed agreed_;
 };
 
-Owned<ArvCamera> open_camera(const std::string& id, const std::string& device) {
+// Aravis makes the socket of the control channel here, and one to try packet sizes in configure();
+// the filter of answers lets the packets of that trial pass, too.
+Owned<ArvCamera> open_camera(const std::string& id, const std::string& address,
+                             const std::string& device) {
+  if (const std::optional<std::uint32_t> camera = address_of(address))
+    admit(control_filter(*camera));
   Failure failure;
   Owned<ArvCamera> camera(arv_camera_new(id.c_str(), failure.out()));
   if (!camera) throw Error(device + ": cannot be opened: " + failure.text());
@@ -248,6 +260,7 @@ Owned<ArvCamera> open_camera(const std::string& id, const std::string& device) {
 }  // namespace
 
 std::vector<Listed> list_devices() {
+  admit(discovery_filter());
   arv_update_device_list();
   std::vector<Listed> devices;
   for (unsigned i = 0; i < arv_get_n_devices(); ++i)
@@ -260,12 +273,12 @@ std::vector<Listed> list_devices() {
 
 Owned<ArvCamera> find_camera(const std::string& device) {
   if (device.empty()) throw Error("an aravis camera needs its serial number or address");
-  if (is_address(device)) return open_camera(device, device);
+  if (address_of(device)) return open_camera(device, device, device);
   std::string seen;
   for (const Listed& listed : list_devices()) {
     if (device == listed.serial || device == listed.id ||
         device == listed.vendor + "-" + listed.serial)
-      return open_camera(listed.id, device);
+      return open_camera(listed.id, listed.address, device);
     add_to_list(seen, listed.serial + " (" + listed.address + ")");
   }
   throw Error(device + ": is not there; seen are: " + (seen.empty() ? "no cameras" : seen));

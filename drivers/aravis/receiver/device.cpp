@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "drivers/aravis/receiver/guarded_sockets.hpp"
 #include "drivers/aravis/receiver/packet_filter.hpp"
 #include "drivers/host_clock.hpp"
 
@@ -56,7 +57,8 @@ Device::Device(const CameraSettings& settings)
   if (agreed_.chunks) chunks_.reset(arv_camera_create_chunk_parser(camera_.get()));
   if (address_ != 0) {
     control_socket_ = udp_socket(0);
-    if (control_socket_ >= 0) attach(control_socket_, control_filter(address_));
+    if (!is_filtered(control_socket_))
+      throw Error(name_ + ": the socket that controls it is not filtered");
   }
   lost_handler_ = g_signal_connect(arv_camera_get_device(camera_.get()), "control-lost",
                                    G_CALLBACK(+[](ArvDevice*, gpointer self) {
@@ -89,6 +91,11 @@ void Device::start(const Ring& ring, OwnedDescriptor memory) {
   if (stream_ || ring.buffers == 0 || ring.payload == 0) throw Error("cannot start as it is");
   memory_.emplace(ring, std::move(memory));
   Failure failure;
+  if (address_ != 0) {
+    const std::int64_t packet_size = arv_camera_gv_get_packet_size(camera_.get(), failure.out());
+    failure.check(name_, "packet size");
+    admit(stream_filter(address_, packet_size, agreed_.payload));
+  }
   stream_.reset(arv_camera_create_stream(camera_.get(), &Device::on_stream, this, failure.out()));
   if (!stream_) throw Error(name_ + ": its stream cannot be opened: " + failure.text());
   try {
@@ -101,7 +108,7 @@ void Device::start(const Ring& ring, OwnedDescriptor memory) {
 
 void Device::begin_stream() {
   if (ARV_IS_GV_STREAM(stream_.get())) {
-    filter_stream();
+    check_stream();
     configure_gige_stream(*stream_, agreed_.payload);
   }
   filling_ = stream_.get();
@@ -117,13 +124,9 @@ void Device::begin_stream() {
 }
 
 // Aravis believes what it receives, so nothing but what the camera can have sent comes to it.
-void Device::filter_stream() {
-  Failure failure;
-  const std::int64_t packet_size = arv_camera_gv_get_packet_size(camera_.get(), failure.out());
-  failure.check(name_, "packet size");
-  const int socket = udp_socket(arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get())));
-  if (socket < 0) throw Error(name_ + ": the socket of its stream is not found");
-  attach(socket, stream_filter(address_, packet_size, agreed_.payload));
+void Device::check_stream() const {
+  if (!is_filtered(udp_socket(arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get())))))
+    throw Error(name_ + ": the socket of its stream is not filtered");
 }
 
 // Destroys the stream with the buffers that it has, so that none of them can come again.

@@ -56,7 +56,7 @@ class Device {
   static void on_stream(void* self, ArvStreamCallbackType type, ArvBuffer* buffer);
   void wake() const;
   void begin_stream();
-  void filter_stream();
+  void check_stream() const;
   bool more_mismatches(ArvStream& stream);
   FrameNote note_of(const Filled& filled);
   void add_chunk_exposure(ArvBuffer& buffer, FrameNote& note);

@@ -17,6 +17,7 @@
 
 #include "drivers/aravis/protocol.hpp"
 #include "drivers/aravis/receiver/device.hpp"
+#include "drivers/aravis/receiver/guarded_sockets.hpp"
 #include "drivers/aravis/receiver/sandbox.hpp"
 #include "drivers/error.hpp"
 
@@ -152,6 +153,7 @@ int main(int argc, char** argv) {
     if (argv[2] != std::string(PREVIZ_RECEIVER_MESSAGES))
       throw Error("it is of another version of previzd than the one that runs; restart previzd");
     enter_sandbox(usb);
+    if (!usb) check_that_sockets_are_filtered();
   } catch (const Error& error) {
     send(driver, Kind::refused, Writer()(std::string(error.what())), -1, false);
     return 1;

@@ -3,8 +3,6 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
-#include <cerrno>
-#include <cstring>
 #include <string>
 
 #include "drivers/error.hpp"
@@ -67,18 +65,31 @@ Program control_filter(std::uint32_t camera) {
               when(BPF_JEQ, 0x0089, patience), pass});
 }
 
-void attach(int socket, Program filter) {
-  const sock_fprog program{static_cast<unsigned short>(filter.size()), filter.data()};
+// A DISCOVERY_ACK of GigE Vision 2.0 has a header of 8 bytes and 248 about the camera.
+Program discovery_filter() {
+  constexpr std::uint32_t header = 8, announced = 248;
+  return all({load(BPF_B, udp + header + announced - 1), load(BPF_H, udp + 2),
+              when_not(BPF_JEQ, 0x0003, drop), pass});
+}
+
+bool attach(int socket, const Program& filter) {
+  Program copy = filter;  // the kernel's interface asks for what it could write to
+  const sock_fprog program{static_cast<unsigned short>(copy.size()), copy.data()};
   const int locked = 1;
-  if (setsockopt(socket, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program) != 0 ||
-      setsockopt(socket, SOL_SOCKET, SO_LOCK_FILTER, &locked, sizeof locked) != 0)
-    throw Error(std::string("its packets cannot be filtered: ") + std::strerror(errno));
+  return setsockopt(socket, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program) == 0 &&
+         setsockopt(socket, SOL_SOCKET, SO_LOCK_FILTER, &locked, sizeof locked) == 0;
+}
+
+bool is_filtered(int socket) {
+  int locked = 0;
+  socklen_t size = sizeof locked;
+  return getsockopt(socket, SOL_SOCKET, SO_LOCK_FILTER, &locked, &size) == 0 && locked == 1;
 }
 
 int udp_socket(std::uint16_t port) {
   constexpr int most_descriptors = 256;  // limit_resources() allows no more
   for (int descriptor = 0; descriptor < most_descriptors; ++descriptor) {
-    int type = 0, locked = 0;
+    int type = 0;
     socklen_t size = sizeof type;
     sockaddr_in own{};
     if (getsockopt(descriptor, SOL_SOCKET, SO_TYPE, &type, &size) != 0 || type != SOCK_DGRAM)
@@ -87,9 +98,7 @@ int udp_socket(std::uint16_t port) {
     if (getsockname(descriptor, reinterpret_cast<sockaddr*>(&own), &size) != 0 ||
         own.sin_family != AF_INET)
       continue;
-    size = sizeof locked;
-    getsockopt(descriptor, SOL_SOCKET, SO_LOCK_FILTER, &locked, &size);
-    if (port == 0 ? locked == 0 : own.sin_port == htons(port)) return descriptor;
+    if (port == 0 || own.sin_port == htons(port)) return descriptor;
   }
   return -1;
 }

@@ -20,11 +20,16 @@ bpf::Program stream_filter(std::uint32_t camera, std::int64_t packet_size, std::
 // a second (PENDING_ACK) is dropped; Aravis 0.8 would wait as long as it says, up to weeks.
 bpf::Program control_filter(std::uint32_t camera);
 
-// Puts a filter on a UDP socket for good. Throws previz::Error.
-void attach(int socket, bpf::Program filter);
+// Lets pass what answers a search for cameras, from whomever: announcements (DISCOVERY_ACK) that
+// are whole, as Aravis 0.8 reads all of one whatever has come.
+bpf::Program discovery_filter();
 
-// Returns the UDP socket of this process with that port, or, with port 0, the one that has no
-// filter yet; -1 if there is none. Aravis does not say which sockets it has.
+// Puts a filter on a UDP socket for good. Returns false, with errno, if the kernel refuses.
+bool attach(int socket, const bpf::Program& filter);
+bool is_filtered(int socket);
+
+// Returns the UDP socket of this process with that port, or, with port 0, the first that there is;
+// -1 if there is none. Aravis does not say which sockets it has.
 int udp_socket(std::uint16_t port);
 
 }  // namespace previz::aravis

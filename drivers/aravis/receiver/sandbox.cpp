@@ -160,13 +160,25 @@ Program files(bool usb) {
   });
 }
 
-// Where the kernel has no Landlock, or the service may not use it, this does nothing.
+// What is to be done so that Landlock's first call does not end with this error.
+std::string way_to_landlock(int error) {
+  if (error == ENOSYS) return "this kernel has no Landlock; install Linux 5.13 or later with it";
+  if (error == EOPNOTSUPP)
+    return "Landlock is switched off; add landlock to lsm= on the kernel's command line";
+  return std::string(std::strerror(error)) +
+         "; allow the service the system calls landlock_create_ruleset, landlock_add_rule and"
+         " landlock_restrict_self";
+}
+
+// libusb opens devices by their paths as they are plugged in, and a filter of system calls cannot
+// read paths, so that without Landlock any file of the user could be opened.
 void confine_files() {
+  const std::string trouble = "its receiver cannot be kept from other files than the USB's: ";
   landlock_ruleset_attr handled{};
   handled.handled_access_fs = (LANDLOCK_ACCESS_FS_MAKE_SYM << 1) - 1;  // all of its first version
   const OwnedDescriptor rules(static_cast<int>(
       syscall(SYS_landlock_create_ruleset, &handled, sizeof handled.handled_access_fs, 0)));
-  if (!rules) return;
+  if (!rules) throw Error(trouble + way_to_landlock(errno));
   const auto may = [&](const char* where, std::uint64_t access) {
     const OwnedDescriptor folder(open(where, O_PATH | O_CLOEXEC));
     if (!folder) return;
@@ -179,7 +191,8 @@ void confine_files() {
   may("/dev/bus/usb", read | LANDLOCK_ACCESS_FS_WRITE_FILE);
   may("/sys", read);
   may("/run/udev", read);
-  syscall(SYS_landlock_restrict_self, rules.get(), 0);
+  if (syscall(SYS_landlock_restrict_self, rules.get(), 0) != 0)
+    throw Error(trouble + way_to_landlock(errno));
 }
 
 }  // namespace

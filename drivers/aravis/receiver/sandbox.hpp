@@ -11,8 +11,8 @@ bool limit_resources(int parent);
 // Allows from now on, in all threads: memory that is not executable, threads, UDP, and the sockets
 // that are there. No file can be opened, no program run, no process made, and none but this one be
 // signalled, not by way of a descriptor either. A process for cameras on the USB may also open
-// files that are there, where the kernel has Landlock only those below /dev/bus/usb, /sys and
-// /run/udev; and it has no IP. Throws previz::Error if the kernel refuses.
+// files that are there below /dev/bus/usb, /sys and /run/udev, which takes a kernel with Landlock;
+// and it has no IP. Throws previz::Error if the kernel refuses, or if it has no Landlock and `usb`.
 void enter_sandbox(bool usb);
 
 }  // namespace previz::aravis
