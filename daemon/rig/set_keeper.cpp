@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "daemon/rig/errand.hpp"
 #include "daemon/rig/kept_edits.hpp"
 #include "daemon/set/file_edit.hpp"
 #include "drivers/error.hpp"
@@ -13,6 +14,9 @@ namespace previz::rig {
 using report::Severity;
 
 namespace {
+
+// A set that is being read is waited for so long when the rig ends.
+constexpr std::chrono::seconds end_patience{2};
 
 // Reads a set from the text of its file; `changed` is left open.
 LoadedSet loaded(std::string text, const std::filesystem::path& file,
@@ -32,7 +36,7 @@ LoadedSet load_whole_set(const std::filesystem::path& file,
                          const std::optional<std::filesystem::path>& with) {
   std::error_code missing;  // reading the file gives a better error
   const auto changed = std::filesystem::last_write_time(file, missing);
-  LoadedSet set = loaded(session::read_file(file), file, with);
+  LoadedSet set = loaded(set::read_set_file(file), file, with);
   set.changed = changed;
   return set;
 }
@@ -52,9 +56,11 @@ std::filesystem::path neighbour(const std::filesystem::path& file, int next) {
 }
 
 SetKeeper::SetKeeper(const std::filesystem::path& file, std::function<void(set::Set&)> override_set,
-                     report::Reports& reports, std::optional<std::filesystem::path> with)
+                     report::Reports& reports, std::optional<std::filesystem::path> with,
+                     std::chrono::milliseconds patience)
     : override_set_(std::move(override_set)),
       with_(std::move(with)),
+      patience_(patience),
       reports_(reports),
       running_(load_whole_set(file, with_)),
       file_(running_.changed) {
@@ -64,15 +70,28 @@ SetKeeper::SetKeeper(const std::filesystem::path& file, std::function<void(set::
 void SetKeeper::begin(std::function<Read()> read,
                       std::function<std::string(const std::string&)> refused) {
   refused_ = std::move(refused);
+  begun_ = Clock::now();
   try {
-    reading_ = std::async(std::launch::async, read);
+    reading_ = sent_off(std::move(read));
   } catch (const std::exception&) {  // there is no thread for it
-    reading_ = std::async(std::launch::deferred, std::move(read));
+    std::promise<Read> promise;
+    promise.set_exception(std::current_exception());
+    reading_ = promise.get_future();
   }
 }
 
+// A thread that still reads is left to itself if its disk does not answer.
+SetKeeper::~SetKeeper() {
+  if (reading_.valid()) reading_.wait_for(end_patience);
+}
+
 std::optional<SetKeeper::Ended> SetKeeper::finish(std::chrono::milliseconds patience) {
-  if (reading_.wait_for(patience) == std::future_status::timeout) return std::nullopt;
+  if (reading_.wait_for(patience) == std::future_status::timeout) {
+    if (Clock::now() - begun_ < patience_) return std::nullopt;
+    reading_ = {};
+    next_.reset();
+    return Ended{refused_("its files cannot be read: the disk does not answer")};
+  }
   try {
     Read read = reading_.get();
     override_set_(read.set.set);
@@ -108,13 +127,23 @@ void SetKeeper::begin_change(int next) {
       });
 }
 
-void SetKeeper::look_at_file() {
-  if (is_reading()) return;
-  std::error_code gone;
-  const auto time = std::filesystem::last_write_time(running_.set.file, gone);
-  if (gone || !file_.is_changed(time)) return;
+bool SetKeeper::look_at_file() {
+  if (is_reading()) return false;
+  if (!looked_.valid()) {
+    looked_for_ = running_.set.file;
+    looked_ = sent_off<std::optional<SetFileWatch::Time>>(
+        [file = looked_for_]() -> std::optional<SetFileWatch::Time> {
+          std::error_code gone;
+          const auto time = std::filesystem::last_write_time(file, gone);
+          return gone ? std::nullopt : std::optional(time);
+        });
+  }
+  if (looked_.wait_for(std::chrono::milliseconds(0)) == std::future_status::timeout) return false;
+  const std::optional<SetFileWatch::Time> time = looked_.get();
+  if (!time || looked_for_ != running_.set.file || !file_.is_changed(*time)) return true;
   reports_({Severity::info, running_.set.file.string(), "the file has changed"});
   begin_change(0);
+  return true;
 }
 
 void SetKeeper::begin_keep(const pipeline::Edits& edits) {
@@ -122,7 +151,7 @@ void SetKeeper::begin_keep(const pipeline::Edits& edits) {
     const std::filesystem::path& file = set.file;
     // What a symbolic link leads to is written, not the link.
     const std::filesystem::path target = std::filesystem::canonical(file);
-    if (session::read_file(target) != text_before)
+    if (set::read_set_file(target) != text_before)
       throw Error(file.string() + " was changed since it was read; load it again first");
     const std::string text = with_edits(text_before, set, edits);
     if (text == text_before)

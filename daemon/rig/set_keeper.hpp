@@ -54,17 +54,22 @@ std::filesystem::path neighbour(const std::filesystem::path& file, int next);
 class SetKeeper {
  public:
   // Reads the first set; throws previz::Error with all its problems. `override_set` is applied to
-  // every set that is to run, and so is the file `with`. `reports` outlives the keeper.
+  // every set that is to run, and so is the file `with`. `reports` outlives the keeper. What is
+  // begun and has not ended after `patience` is given up, because a disk does not answer.
   SetKeeper(const std::filesystem::path& file, std::function<void(set::Set&)> override_set,
-            report::Reports& reports, std::optional<std::filesystem::path> with = {});
+            report::Reports& reports, std::optional<std::filesystem::path> with = {},
+            std::chrono::milliseconds patience = std::chrono::seconds(30));
+  ~SetKeeper();
 
   const LoadedSet& running() const { return running_; }
   bool has_next() const { return next_.has_value(); }
 
   // Begins to read the set file `next` places on in the folder; with 0, the running one again.
   void begin_change(int next);
-  // Begins to read the running set's file again if it has changed. Call it once a second.
-  void look_at_file();
+  // Begins to read the running set's file again if it has changed. Call it once a second. Waits for
+  // no disk, nor does anything below: returns whether a look, which an earlier call may have begun,
+  // has ended.
+  bool look_at_file();
   // Begins to write the changes into the running set's file; the old file is kept beside it. The
   // next set is then what was written, and its run begins without changes. They are not written if
   // the file was changed meanwhile, would not load or cannot be written; it is then as it was.
@@ -117,13 +122,18 @@ class SetKeeper {
 
   const std::function<void(set::Set&)> override_set_;
   const std::optional<std::filesystem::path> with_;
+  const std::chrono::milliseconds patience_;
   report::Reports& reports_;
   LoadedSet running_;
   SetFileWatch file_;
   std::optional<LoadedSet> next_, before_;
   Changes changes_, changes_before_;
   std::function<std::string(const std::string&)> refused_;  // reports why a reading has failed
-  std::future<Read> reading_;  // last: its thread uses none of the above
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point begun_{};
+  std::future<Read> reading_;  // its thread uses nothing of this, nor does that of the next
+  std::future<std::optional<SetFileWatch::Time>> looked_;
+  std::filesystem::path looked_for_;
 };
 
 }  // namespace previz::rig

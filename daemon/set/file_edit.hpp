@@ -57,6 +57,10 @@ class FileEdit {
   std::vector<Replacement> replacements_;
 };
 
+// Returns the text of a set file. Throws previz::Error that names it where it cannot be read, and
+// where it is no file: a pipe can be read only once, and one that nobody writes to, never.
+std::string read_set_file(const std::filesystem::path& file);
+
 // Copies a file beside itself, as NAME.1.old or the next number that is free, and returns the copy.
 // Throws previz::Error naming the file that cannot be read or written.
 std::filesystem::path keep_beside(const std::filesystem::path& file);

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "daemon/set/file_edit.hpp"
 #include "daemon/set/resolve.hpp"
 #include "daemon/set/table.hpp"
 #include "drivers/error.hpp"
@@ -162,20 +163,35 @@ Set parse_set(const std::string& text, const std::filesystem::path& file, const 
   return set;
 }
 
-Overlay read_overlay(const std::filesystem::path& file) {
+namespace {
+
+// Returns a file of settings. A pipe can be read only once, and one that nobody writes to, never.
+std::string text_of(const std::filesystem::path& file, const char* allowed) {
+  std::error_code unknown;
+  const auto kind = std::filesystem::status(file, unknown).type();
+  if (kind != std::filesystem::file_type::regular &&
+      kind != std::filesystem::file_type::not_found && kind != std::filesystem::file_type::none)
+    throw Error(file.string() +
+                ": is no file, but a folder, a pipe or a device; allowed: " + allowed);
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;
-  if (!stream || !(text << stream.rdbuf()))
-    throw Error(file.string() + ": cannot be read; allowed: a file of settings (TOML)");
-  return {file, text.str()};
+  if (!stream || (stream.peek() != EOF && !(text << stream.rdbuf())))
+    throw Error(file.string() + ": cannot be read; allowed: " + allowed);
+  return text.str();
+}
+
+}  // namespace
+
+std::string read_set_file(const std::filesystem::path& file) {
+  return text_of(file, "a set file (TOML)");
+}
+
+Overlay read_overlay(const std::filesystem::path& file) {
+  return {file, text_of(file, "a file of settings (TOML)")};
 }
 
 Set load_set(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  if (!stream || !(text << stream.rdbuf()))
-    throw Error(file.string() + ": cannot be read; allowed: a set file (TOML)");
-  return parse_set(text.str(), file);
+  return parse_set(read_set_file(file), file);
 }
 
 }  // namespace previz::set

@@ -1,9 +1,9 @@
 #include "drivers/session/repair.hpp"
 
 #include <algorithm>
-#include <fstream>
 #include <map>
 #include <optional>
+#include <sstream>
 #include <utility>
 
 #include "drivers/error.hpp"
@@ -111,13 +111,13 @@ class Repairer {
   void copy_lines(const char* name, const std::vector<std::uint64_t>& bad,
                   const std::string& more) {
     if (!bad.empty()) repair_.is_complete = false;
-    std::ifstream from(damaged_ / name, std::ios::binary);
-    if (!from && more.empty()) return;
+    const bool is_there = fs::exists(fs::symlink_status(damaged_ / name));
+    if (!is_there && more.empty()) return;
+    std::istringstream from(is_there ? read_plain_file(damaged_ / name) : "");
     const LineFile to(draft_ / name);
     std::uint64_t number = 0;
     for (std::string line; std::getline(from, line);)
       if (!std::ranges::binary_search(bad, ++number)) to.append(line);
-    if (from.bad()) throw Error((damaged_ / name).string() + ": cannot be read");
     if (!more.empty()) to.append(more);
     to.sync();
   }

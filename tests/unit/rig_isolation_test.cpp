@@ -85,41 +85,6 @@ INSTANTIATE_TEST_SUITE_P(Stages, RigIsolation,
                            return word;
                          });
 
-// A disk that hangs keeps a snapshot, but neither the picture nor the take. For a disk stands a
-// pipe that has the name of a snapshot's file, and so many digits that the next number is its own:
-// whoever opens it waits until somebody has it open to read.
-TEST_F(RigLive, ADiskThatHangsOnASnapshotKeepsNoPictureWaiting) {
-  write_set();
-  const std::filesystem::path folder = directory_ / "live";
-  std::filesystem::create_directories(folder);
-  const std::filesystem::path pipe = folder / "snapshot_1000000000.png.part";
-  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-  OwnedDescriptor reader;
-  run([&] {
-    struct AtEnd {
-      std::function<void()> call;
-      ~AtEnd() { call(); }
-    } const at_end{[&] { reader = OwnedDescriptor(open(pipe.c_str(), O_RDWR | O_CLOEXEC)); }};
-    until([](const Shown& s) { return s.shot.samples == 2; });
-    press("record");
-    until([](const Shown& s) { return s.look.state.recording; });
-    constexpr std::uint64_t waiting = 4;
-    for (std::uint64_t i = 1; i <= waiting + 3; ++i) {
-      press("snapshot");
-      const Shown now = until([&](const Shown& s) { return s.look.snapshots == i; });
-      until([&](const Shown& s) { return s.count > now.count + 3; });
-    }
-    until_said("snapshot: is left out");
-    press("record");
-    until_said("12A_take001 is finished");
-  });
-  const auto dropped = metrics_.stages.at("snapshot").dropped;
-  ASSERT_TRUE(dropped.contains("too many waited")) << log_.text();
-  EXPECT_GE(dropped.at("too many waited"), 1u);
-  EXPECT_LE(dropped.at("too many waited"), 2u);
-  unbroken(directory_ / "takes/12A_take001");
-}
-
 // While the renderer is made anew, the plate is shown.
 TEST_F(RigLive, TheCrewSeesThePlateWhileTheRendererIsMadeAnew) {
   write_set();

@@ -1,0 +1,126 @@
+// Takes on disks that stand still, at any call: nobody but the recorder's own threads waits, and
+// what is offered meanwhile is recorded or counted.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "daemon/output/recorder.hpp"
+#include "drivers/error.hpp"
+#include "tests/durability/still_disk.hpp"
+#include "tests/support/session_fixture.hpp"
+#include "tests/support/wait_until.hpp"
+
+namespace previz::output {
+namespace still_recorder_test {
+
+using session::noise_frame;
+using session::TemporaryDirectory;
+using test::StillDisk;
+using test::wait_until;
+
+FramePtr picture(std::uint64_t index) {
+  return std::make_shared<Frame>(noise_frame("observer", index, PixelFormat::rgb8, 32, 24));
+}
+
+session::TrackRecord track_of(std::uint64_t index) {
+  session::TrackRecord record;
+  record.timestamp_ns = picture(index)->timestamp_ns;
+  return record;
+}
+
+struct Rig {
+  const TemporaryDirectory directory;
+  const std::filesystem::path first = directory / "first", second = directory / "second";
+  std::mutex mutex;
+  std::vector<std::string> notes;
+
+  RecorderOptions options() {
+    RecorderOptions options;
+    options.take.folders = {first, second};
+    options.take.info.take = session::TakeInfo{0, "12A", "", 25, "", false};
+    options.preroll_s = 0;
+    options.reserve_bytes = 100;
+    options.note = [this](const report::Report& report) {
+      const std::lock_guard lock(mutex);
+      notes.push_back(line_of(report));
+    };
+    return options;
+  }
+};
+
+std::uint64_t frames_of(const std::filesystem::path& take) {
+  session::Session session = session::open_session(take);
+  const auto stream = session::open_stream(session, "observer");
+  return stream ? stream->records().size() : 0;
+}
+
+// Offers a take. Where anything of this waits for the disk, the test never ends.
+constexpr std::uint64_t frames_offered = 4;
+void offer_take(Recorder& recorder) {
+  recorder.start();
+  for (std::uint64_t i = 0; i < frames_offered; ++i) {
+    recorder.offer(picture(i));
+    recorder.offer(track_of(i));
+    recorder.offer_event(0, "something");
+  }
+  static_cast<void>(recorder.status());
+  static_cast<void>(recorder.folders());
+  static_cast<void>(recorder.free_bytes());
+  recorder.mark_good();
+  recorder.stop();
+}
+
+TEST(StillDisk, AtAnyCallKeepsNobodyWaitingAndLosesNoFrameUncounted) {
+  for (std::size_t call = 0;; ++call) {
+    Rig rig;
+    StillDisk disk(rig.first);
+    disk.stand_still(call);
+    bool was_still = true;
+    std::filesystem::path take;
+    session::Losses lost;
+    {
+      Recorder recorder(rig.options());
+      offer_take(recorder);
+      ASSERT_TRUE(wait_until("it waits, or is done", [&] {
+        return disk.waiting() > 0 || recorder.status().finished_takes == 1;
+      }));
+      was_still = disk.waiting() > 0;
+      disk.go_on();
+      ASSERT_TRUE(
+          wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+      recorder.finish();
+      take = recorder.status().directory;
+      lost = recorder.status().lost;
+    }
+    SCOPED_TRACE("still at call " + std::to_string(call));
+    EXPECT_EQ(frames_of(take) + lost.frames, frames_offered);
+    EXPECT_EQ(lost.frames, 0u);
+    if (!was_still) break;
+  }
+}
+
+// The second disk is of no concern as long as the first is good, whatever was left on it.
+TEST(StillDisk, ThatIsTheSecondKeepsNothingFromTheFirst) {
+  Rig rig;
+  std::filesystem::create_directories(rig.second / "12A_take001");
+  StillDisk disk(rig.second);
+  disk.stand_still();
+  {
+    Recorder recorder(rig.options());
+    ASSERT_TRUE(wait_until("it is still", [&] { return disk.waiting() > 0; }));
+    offer_take(recorder);
+    ASSERT_TRUE(
+        wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+    EXPECT_EQ(recorder.status().directory.parent_path(), rig.first);
+    EXPECT_GT(recorder.folders().at(1).silent_s, 0);
+  }  // and ends
+  EXPECT_EQ(frames_of(rig.first / "12A_take001"), frames_offered);
+}
+
+}  // namespace still_recorder_test
+}  // namespace previz::output

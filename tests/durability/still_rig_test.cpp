@@ -1,0 +1,106 @@
+// A rig whose disks stand still: pictures and buttons go on.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "daemon/rig/set_keeper.hpp"
+#include "tests/durability/still_disk.hpp"
+#include "tests/support/live_rig.hpp"
+
+namespace previz::rig {
+namespace still_rig_test {
+
+using test::RigLive;
+using test::StillDisk;
+
+TEST_F(RigLive, ADiskThatStandsStillForASnapshotKeepsNoPictureWaiting) {
+  write_set();
+  std::filesystem::create_directories(directory_ / "live");
+  StillDisk disk(directory_ / "live");
+  run([&] {
+    struct AtEnd {
+      std::function<void()> call;
+      ~AtEnd() { call(); }
+    } const at_end{[&] { disk.go_on(); }};
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    press("record");
+    until([](const Shown& s) { return s.look.state.recording; });
+    disk.stand_still();
+    constexpr std::uint64_t waiting = 4;
+    for (std::uint64_t i = 1; i <= waiting + 3; ++i) {
+      press("snapshot");
+      const Shown now = until([&](const Shown& s) { return s.look.snapshots == i; });
+      until([&](const Shown& s) { return s.count > now.count + 3; });
+    }
+    until_said("snapshot: is left out");
+    press("record");
+    until_said("12A_take001 is finished");
+  });
+  const auto dropped = metrics_.stages.at("snapshot").dropped;
+  ASSERT_TRUE(dropped.contains("too many waited")) << log_.text();
+  EXPECT_GE(dropped.at("too many waited"), 1u);
+  EXPECT_LE(dropped.at("too many waited"), 2u);
+  EXPECT_TRUE(session::open_session(directory_ / "takes/12A_take001").missing.empty());
+}
+
+// The takes' disk: the main loop, which answers buttons, the bus and the watchdog, asks it nothing.
+TEST_F(RigLive, ADiskOfTakesThatStandsStillKeepsNoButtonWaiting) {
+  write_set();
+  std::filesystem::create_directories(directory_ / "takes");
+  StillDisk disk(directory_ / "takes");
+  run([&] {
+    struct AtEnd {
+      std::function<void()> call;
+      ~AtEnd() { call(); }
+    } const at_end{[&] { disk.go_on(); }};
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    disk.stand_still();
+    press("record");
+    until([](const Shown& s) { return s.look.state.recording; });
+    until_said("its disk does not answer");
+    for (int times = 0; times < 2; ++times) {
+      const Shown now = until([](const Shown&) { return true; });
+      press("refine");
+      until_mode(Mode::refine);
+      press("live");
+      until_mode(Mode::live);
+      until([&](const Shown& s) { return s.count > now.count + 2; });
+    }
+    disk.go_on();
+    press("record");
+    until_said("12A_take001 is finished");
+  });
+}
+
+// Nobody waits for a set whose disk does not answer: it is given up after a while, and a rig that
+// ends meanwhile does so.
+TEST(SetKeeperOnAStillDisk, ReadsOnAThreadOfItsOwnAndGivesUp) {
+  const test::TemporaryDirectory folder;
+  const std::filesystem::path file = folder / "sets/b.toml";
+  std::filesystem::create_directories(file.parent_path());
+  std::ofstream(file) << "set.name = \"old\"\n";
+  std::ostringstream log;
+  report::Reports reports(report::lines_to(log));
+  StillDisk disk(file.parent_path());
+  {
+    SetKeeper sets(
+        file, [](set::Set&) {}, reports, {}, std::chrono::milliseconds(0));
+    disk.stand_still();
+    EXPECT_FALSE(sets.look_at_file());
+    sets.begin_change(0);
+    EXPECT_TRUE(sets.is_reading());
+    const std::optional<SetKeeper::Ended> ended = sets.finish(std::chrono::milliseconds(0));
+    ASSERT_TRUE(ended && ended->why_not);
+    EXPECT_NE(ended->why_not->find("the disk does not answer"), std::string::npos);
+    EXPECT_FALSE(sets.is_reading());
+    EXPECT_EQ(sets.running().set.name, "old");
+    EXPECT_FALSE(sets.look_at_file());
+  }
+  disk.go_on();
+  // The threads that were left end by themselves.
+  ASSERT_TRUE(test::wait_until("nobody waits", [&] { return disk.waiting() == 0; }));
+}
+
+}  // namespace still_rig_test
+}  // namespace previz::rig
