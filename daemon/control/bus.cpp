@@ -99,6 +99,8 @@ int append_value(sd_bus_message* message, const Status& status) {
     return sd_bus_message_append(message, "b", int{value});
   } else if constexpr (std::is_same_v<T, std::uint64_t>) {
     return sd_bus_message_append(message, "t", value);
+  } else if constexpr (std::is_same_v<T, double>) {
+    return sd_bus_message_append(message, "d", value);
   } else {
     return sd_bus_message_append(message, "i", value);
   }
@@ -120,6 +122,8 @@ constexpr Property properties[] = {
     property<&Status::take>("Take", "s"),
     property<&Status::take_frames>("TakeFrames", "t"),
     property<&Status::take_dropped>("TakeDropped", "t"),
+    property<&Status::behind_s>("BehindSeconds", "d"),
+    property<&Status::behind_mb>("BehindMegabytes", "t"),
     property<&Status::fault>("Fault", "s"),
     property<&Status::camera_lost>("CameraLost", "b"),
     property<&Status::samples>("Samples", "i"),

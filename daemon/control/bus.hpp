@@ -23,8 +23,11 @@ struct Status {
   bool recording = false;
   bool writing = false;  // the take is not whole on the disk yet, perhaps after recording ended
   std::string take;      // name of the running or the last take; empty: none yet
-  std::uint64_t take_frames = 0, take_dropped = 0;
-  std::string fault;  // why the last take ended by itself
+  std::uint64_t take_frames = 0;  // of the observer, written to the disk
+  std::uint64_t take_dropped = 0;
+  double behind_s = 0;          // of the recording behind the cameras, in tenths of a second
+  std::uint64_t behind_mb = 0;  // what of it waits in memory, megabytes
+  std::string fault;            // why the last take ended by itself
   bool camera_lost = false;
   std::int32_t samples = 0;
   std::string set, object, light;  // names of the set, the selected object and the selected lamp

@@ -3,6 +3,8 @@
 #include <systemd/sd-bus.h>
 
 #include <CLI/CLI.hpp>
+#include <array>
+#include <cstdio>
 #include <cstring>
 #include <iostream>
 #include <memory>
@@ -79,6 +81,12 @@ std::string value_text(sd_bus_message* message) {
     int value = 0;
     sd_bus_message_read(message, "b", &value);
     text = value != 0 ? "yes" : "no";
+  } else if (signature == "d") {
+    double value = 0;
+    sd_bus_message_read(message, "d", &value);
+    std::array<char, 32> digits{};
+    std::snprintf(digits.data(), digits.size(), "%.1f", value);
+    text = digits.data();
   } else if (signature == "t") {
     std::uint64_t value = 0;
     sd_bus_message_read(message, "t", &value);

@@ -8,8 +8,6 @@
 namespace previz::output {
 namespace {
 
-using SteadyClock = std::chrono::steady_clock;
-
 // A frame may be offered so long after its capture.
 constexpr std::chrono::seconds capture_delay{1};
 
@@ -88,7 +86,32 @@ bool RecordQueue::push_within(std::uint64_t room, Entry entry) {
 
 bool RecordQueue::push(const Captured& captured) {
   if (captured.frame->source == "light") older_light_.remember(captured);
-  return push_within(bytes_, captured);
+  newest_ = std::max(newest_, captured.offered);
+  const Backlog backlog = backlog_with(newest_);
+  is_too_far_behind_ = backlog.seconds - backlog.of_ring_s > most_behind_s_;
+  if (!is_too_far_behind_) return push_within(bytes_, captured);
+  add(left_out_, loss_of(captured));
+  return false;
+}
+
+Backlog RecordQueue::backlog() const {
+  return backlog_with(newest_);
+}
+
+Backlog RecordQueue::backlog_with(SteadyClock::time_point newest) const {
+  using Seconds = std::chrono::duration<double>;
+  Backlog backlog{0, queued_bytes_, 0};
+  const auto oldest = std::ranges::find_if(queue_, [](const Queued& queued) {
+    const auto* captured = std::get_if<Captured>(&queued.entry);
+    // The light from before the ring may be of any age.
+    return captured && captured->frame->source != "light";
+  });
+  if (oldest == queue_.end()) return backlog;
+  const Seconds waits = newest - std::get<Captured>(oldest->entry).offered;
+  backlog.seconds = std::max(0.0, waits.count());
+  const double since_s = Seconds(newest - began_).count();
+  backlog.of_ring_s = begun_with_s_ * std::clamp(1 - since_s / ring_grace_s, 0.0, 1.0);
+  return backlog;
 }
 
 bool RecordQueue::push_shown(const Captured& captured) {
@@ -163,6 +186,10 @@ void RecordQueue::forget_what_is_long_ago() {
 void RecordQueue::begin() {
   push_mark(Start{});
   forget_what_is_long_ago();
+  begun_with_s_ = ring_length_s();
+  began_ = newest_ = SteadyClock::now();
+  for (const Entry& entry : ring_)
+    if (const auto* captured = std::get_if<Captured>(&entry)) began_ = newest_ = captured->offered;
   const auto queue_always = [this](Entry entry) {
     queued_bytes_ += bytes_of(entry);
     queue_.push_back({std::move(entry), {}});

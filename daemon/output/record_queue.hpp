@@ -39,9 +39,19 @@ class NewestLight {
 
 void add(session::Losses& to, const session::Losses& more);
 
+// What was offered and is not written yet.
+struct Backlog {
+  double seconds = 0;  // from the oldest frame that waits to the newest that was offered
+  std::uint64_t bytes = 0;
+  // Of these seconds what the ring held when the take began, and is given time to be written: the
+  // whole at the beginning, nothing after `ring_grace_s`.
+  double of_ring_s = 0;
+};
+
 // Not thread-safe; the recorder holds its lock.
 class RecordQueue {
  public:
+  using SteadyClock = std::chrono::steady_clock;
   struct Event {
     std::int64_t timestamp_ns;
     std::string what;
@@ -58,15 +68,21 @@ class RecordQueue {
     session::Losses lost;  // offered between the entry before and this one, and left out
   };
 
+  static constexpr double ring_grace_s = 10;
+
   // `bytes` is the room for frames, of which the ring gets at most half and pictures that were
-  // shown half; tracking, buttons and events may take an eighth more.
-  RecordQueue(double preroll_s, std::uint64_t bytes) : preroll_s_(preroll_s), bytes_(bytes) {}
+  // shown half; tracking, buttons and events may take an eighth more. A frame is left out, too, if
+  // the backlog would be more than `most_behind_s`, beside what of it is the ring's.
+  RecordQueue(double preroll_s, std::uint64_t bytes, double most_behind_s)
+      : preroll_s_(preroll_s), bytes_(bytes), most_behind_s_(most_behind_s) {}
 
   // Returns the entry as a loss.
   static session::Losses loss_of(const Entry& entry);
 
   // These return false where there is no room: the entry is left out, and the next one says so.
   bool push(const Captured& captured);
+  // Whether the last frame that push() left out was so because the backlog is too long in time.
+  bool is_too_far_behind() const { return is_too_far_behind_; }
   bool push_shown(const Captured& captured);
   bool push_record(Entry entry);  // a line of tracking, a button or an event
   void push_mark(Entry entry);    // a stop or a mark, for which there is always room
@@ -79,6 +95,7 @@ class RecordQueue {
   void begin();
 
   bool empty() const { return queue_.empty(); }
+  Backlog backlog() const;
   bool begins_a_take() const;  // the next entry does
   Queued pop();
   void give_back(Queued queued);    // the one that was popped last
@@ -93,11 +110,13 @@ class RecordQueue {
   static std::uint64_t bytes_of(const Entry& entry);
   bool push_within(std::uint64_t room, Entry entry);
   bool trim_ring();
+  Backlog backlog_with(SteadyClock::time_point newest) const;
   void forget_first_of_ring();
   void forget_what_is_long_ago();
 
   const double preroll_s_;
   const std::uint64_t bytes_;
+  const double most_behind_s_;
   std::deque<Queued> queue_;  // entries for the disk, in order
   std::uint64_t queued_bytes_ = 0;
   session::Losses left_out_;  // since the last entry of the queue
@@ -105,6 +124,11 @@ class RecordQueue {
   std::uint64_t ring_bytes_ = 0;
   NewestLight older_light_;  // that is no longer in the ring
   std::int64_t last_frame_ns_ = 0;
+  // Of the running take: when it began, how long the ring was, and the newest frame that was
+  // offered.
+  SteadyClock::time_point began_{}, newest_{};
+  double begun_with_s_ = 0;
+  bool is_too_far_behind_ = false;
 };
 
 }  // namespace previz::output

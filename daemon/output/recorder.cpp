@@ -23,6 +23,8 @@ constexpr std::chrono::milliseconds track_patience{500};
 constexpr std::chrono::seconds disk_interval{1};
 // A take that ends is looked at so often.
 constexpr std::chrono::milliseconds ending_interval{10};
+// A recording that is further behind the cameras is reported.
+constexpr double long_behind_s = 1;
 // A disk that takes longer for one thing is reported.
 constexpr std::chrono::seconds silence{2};
 
@@ -41,7 +43,7 @@ std::uint64_t default_queue_bytes() {
 
 Recorder::Recorder(RecorderOptions options)
     : options_(std::move(options)),
-      queue_(options_.preroll_s, options_.queue_bytes),
+      queue_(options_.preroll_s, options_.queue_bytes, options_.most_behind_s),
       folders_(options_.take.folders, options_.reserve_bytes, options_.free_bytes),
       told_(options_.take.folders.size()) {
   const auto warn = [this](const std::string& what) { note(Severity::warning, what); };
@@ -77,7 +79,7 @@ void Recorder::finish() {
 
 void Recorder::offer(const FramePtr& frame) {
   const Captured captured{frame};
-  bool is_first_dropped = false, is_silent = false;
+  bool is_first_dropped = false, is_silent = false, lags = false, is_far_behind = false;
   {
     std::unique_lock lock(mutex_);
     if (!status_.recording) {
@@ -90,17 +92,44 @@ void Recorder::offer(const FramePtr& frame) {
     if (!queue_.push(captured)) {
       count_as_lost(RecordQueue::loss_of(captured));
       is_first_dropped = status_.lost.frames == 1;
+      is_far_behind = queue_.is_too_far_behind();
     }
+    lags = has_new_lag();
   }
   filled_.notify_one();
   if (is_silent)
     note(Severity::warning, "the disk does not answer; what is recorded waits in memory");
-  if (is_first_dropped) note(Severity::warning, "the disk is too slow; frames are left out");
+  if (lags)
+    note(Severity::warning,
+         "the recording is more than a second behind the cameras; what waits is lost if the "
+         "computer "
+         "goes down");
+  if (is_first_dropped && is_far_behind)
+    note_far_behind();
+  else if (is_first_dropped)
+    note(Severity::warning,
+         "the disk is too slow, and the memory for what waits is full "
+         "(recording.queue_mb); frames are left out");
 }
 
 bool Recorder::has_new_silence() {
   if (silence_noted_ || !handling_since_ || Clock::now() - *handling_since_ < silence) return false;
   return silence_noted_ = true;
+}
+
+bool Recorder::has_new_lag() {
+  const Backlog backlog = queue_.backlog();
+  if (behind_noted_ || backlog.seconds - backlog.of_ring_s < long_behind_s) return false;
+  return behind_noted_ = true;
+}
+
+void Recorder::note_far_behind() const {
+  std::array<char, 200> text{};
+  std::snprintf(text.data(), text.size(),
+                "the disk or the encoder is too slow: the recording is %.1f s behind the cameras "
+                "(recording.most_behind_s), and frames are left out",
+                options_.most_behind_s);
+  note(Severity::warning, text.data());
 }
 
 void Recorder::offer_shown(const FramePtr& frame) {
@@ -164,6 +193,7 @@ void Recorder::start() {
   status_.frames = 0;
   status_.seconds = 0;
   status_.fault.clear();
+  behind_noted_ = false;
   queue_.begin();
   filled_.notify_one();
 }
@@ -187,6 +217,7 @@ RecorderStatus Recorder::status() const {
   const std::lock_guard lock(mutex_);
   RecorderStatus status = status_;
   status.writing = status_.recording || writes_ || !queue_.empty();
+  status.backlog = queue_.backlog();
   if (handling_since_)
     status.disk_silent_s = std::chrono::duration<double>(Clock::now() - *handling_since_).count();
   return status;

@@ -33,6 +33,9 @@ struct RecorderOptions {
   // Room for frames, of which the ring gets at most half; tracking, buttons and events may take an
   // eighth more.
   std::uint64_t queue_bytes = 1'000'000'000;
+  // A frame is left out if the disk and the encoder are more than this behind the cameras, because
+  // what is in memory only is lost where the process dies. The ring's frames are given ten seconds.
+  double most_behind_s = 2;
   std::uint64_t reserve_bytes = 500'000'000;        // a take ends before less than this is free
   std::function<void(const report::Report&)> note;  // called from any thread
   TakeFolders::FreeBytes free_bytes;                // empty: the file system is asked
@@ -53,6 +56,7 @@ struct RecorderStatus {
   std::uint64_t frames = 0;          // observer frames of the take on disk
   double seconds = 0;                // from the first to the last of them
   session::Losses lost;              // since the take began
+  Backlog backlog;                   // of the take, or of what is left of the last one
   double disk_silent_s = 0;          // for how long the disk has not answered a write
   std::uint64_t finished_takes = 0;  // since the start; takes without a frame do not count
   std::string finished;              // name of the take that finished last
@@ -67,12 +71,12 @@ struct RecorderStatus {
 };
 
 // No call here but finish() waits for the disk, and all may come from any thread. SessionWriter
-// bounds what can be lost: at most the frame in hand if the process dies, about the last second if
-// the power fails. An error of the disk ends the take, with everything so far readable, but nothing
-// else. A full or failing disk ends the take, too, and the next one begins at once on the next
-// disk, if there is one; that disk is then left alone until the next start(). What cannot be
-// recorded by its nature, such as a frame without an exposure, is left out and counted, and no file
-// of the set that is missing ends a take: the take says so.
+// bounds what can be lost: the backlog (RecorderStatus), at most most_behind_s, if the process
+// dies, and about the last second before it if the power fails. An error of the disk ends the take,
+// with everything so far readable, but nothing else. A full or failing disk ends the take, too, and
+// the next one begins at once on the next disk, if there is one; that disk is then left alone until
+// the next start(). What cannot be recorded by its nature, such as a frame without an exposure, is
+// left out and counted, and no file of the set that is missing ends a take: the take says so.
 class Recorder {
  public:
   explicit Recorder(RecorderOptions options);
@@ -133,6 +137,7 @@ class Recorder {
   void count_failure(const std::string& why);
   void count_finished(const Take& take);  // in order or not
   bool has_new_silence();                 // of the disk, that nobody was told of
+  bool has_new_lag();                     // behind the cameras, likewise
   // Returns whether no take was begun after the one that the writer thread works on: the status is
   // that take's.
   bool is_newest() const { return begun_ == starts_; }
@@ -162,6 +167,7 @@ class Recorder {
   void drop_wish();
   void note(report::Severity severity, const std::string& what) const;
   void note_short_preroll(double kept_s) const;
+  void note_far_behind() const;
 
   const RecorderOptions options_;
 
@@ -177,6 +183,7 @@ class Recorder {
   std::optional<Clock::time_point> handling_since_;  // by the writer thread
   bool writes_ = false;  // the writer thread has a take, or an entry in hand
   bool silence_noted_ = false;
+  bool behind_noted_ = false;  // of the running take
   bool short_preroll_noted_ = false;
   bool has_news_ = true;  // a folder was looked at
 

@@ -1,8 +1,12 @@
 #include "daemon/rig/graphics.hpp"
 
+#include <sys/resource.h>
+
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <optional>
+#include <string_view>
 
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
@@ -36,7 +40,25 @@ void remember(const std::filesystem::path& memory, const std::string& gpu,
   }
 }
 
+// Mesa's driver for the processor draws in threads of these names.
+constexpr std::string_view drawing_threads = "llvmpipe-";
+constexpr int drawing_niceness = 10;  // about a tenth of the time, where two want a core
+
 }  // namespace
+
+void let_recording_first() {
+  std::error_code unreadable;
+  for (std::filesystem::directory_iterator task("/proc/self/task", unreadable), end;
+       !unreadable && task != end; task.increment(unreadable)) {
+    std::ifstream file(task->path() / "comm");
+    std::string name;
+    std::getline(file, name);
+    if (!name.starts_with(drawing_threads)) continue;
+    const auto thread = static_cast<id_t>(std::stoul(task->path().filename().string()));
+    ::setpriority(PRIO_PROCESS, thread,
+                  drawing_niceness);  // of this thread only; may only be refused
+  }
+}
 
 std::shared_ptr<render::Device> open_graphics(const render::DeviceOptions& options,
                                               bool cpu_instead, report::Reports& reports) {

@@ -17,6 +17,11 @@ namespace previz::rig {
 std::shared_ptr<render::Device> open_graphics(const render::DeviceOptions& options,
                                               bool cpu_instead, report::Reports& reports);
 
+// Lets whatever else runs go before the drawing of a device that is the processor: above all the
+// recording, which then keeps up with the cameras while pictures become fewer. Of no effect on a
+// GPU.
+void let_recording_first();
+
 // Returns the device's name for the log.
 std::string device_words(const render::Device& device);
 

@@ -1,6 +1,7 @@
 #include "daemon/rig/live.hpp"
 
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <thread>
 #include <utility>
@@ -62,6 +63,8 @@ control::Status status_of(const Rig& rig, const set::Set& set, const render::Dev
           recorder.directory.filename().string(),
           recorder.frames,
           recorder.lost.frames,
+          0.1 * std::floor(10 * recorder.backlog.seconds),
+          recorder.backlog.bytes / 1'000'000,
           recorder.fault,
           look.state.camera_lost,
           rig.samples(),

@@ -14,6 +14,7 @@
 #include "daemon/pipeline/track_stage.hpp"
 #include "daemon/rig/camera_source.hpp"
 #include "daemon/rig/gpu_keeper.hpp"
+#include "daemon/rig/graphics.hpp"
 #include "daemon/rig/live_light.hpp"
 #include "daemon/rig/live_render.hpp"
 #include "daemon/rig/snapshots.hpp"
@@ -166,6 +167,7 @@ void LivePipeline::Impl::make_render_stage() {
                                }});
   parts.renderer = render_stage->renderer();
   live_render.use(*render_stage);
+  let_recording_first();
 }
 
 void LivePipeline::Impl::drop_render_stage() {

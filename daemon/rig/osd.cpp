@@ -15,7 +15,8 @@ using output::OsdTone;
 using tracking::TrackStatus;
 
 constexpr std::uint64_t little_space = 10'000'000'000;  // bytes, besides the reserve
-constexpr double long_silence_s = 2;                    // of a disk
+constexpr double long_silence_s = 2;
+constexpr double long_behind_s = 1;  // of a disk
 
 // "1 tag", "2 tags"
 std::string counted(int number, const char* noun) {
@@ -98,6 +99,10 @@ void add_notices(const RigFacts& rig, const PictureFacts* picture, OsdPage& page
   if (rig.disk_silent_s >= long_silence_s)
     page.notices.push_back(
         {fmt::format("the disk has not answered for {:.0f} s", rig.disk_silent_s), OsdTone::alarm});
+  else if (rig.backlog.seconds - rig.backlog.of_ring_s >= long_behind_s)
+    page.notices.push_back({fmt::format("recording is {:.1f} s behind ({:.0f} MB in memory)",
+                                        rig.backlog.seconds, 1e-6 * double(rig.backlog.bytes)),
+                            OsdTone::warning});
   for (const std::string& lost : session::words_of(rig.lost))
     page.notices.push_back({"missing from the take: " + lost, OsdTone::alarm});
   if (!picture && !rig.look.state.camera_lost)

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/output/osd_page.hpp"
+#include "daemon/output/record_queue.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/report/report.hpp"
 #include "daemon/rig/controls.hpp"
@@ -42,6 +43,7 @@ struct RigFacts {
   std::string take;          // name of the take that is being recorded
   double recorded_s = 0;     // its length so far
   session::Losses lost;      // since the take began
+  output::Backlog backlog;   // of the recording
   double disk_silent_s = 0;  // for how long the disk has not answered a write
   std::string recorder_fault;
   std::string device;                       // that draws; empty: none, or not known

@@ -64,6 +64,7 @@ output::RecorderOptions recorder_options(const LoadedSet& loaded, const Cameras&
   output::RecorderOptions options;
   options.take = take_template(loaded, cameras, reports);
   options.preroll_s = recording.preroll_s;
+  options.most_behind_s = recording.most_behind_s;
   options.queue_bytes = recording.queue_mb ? static_cast<std::uint64_t>(*recording.queue_mb * 1e6)
                                            : output::default_queue_bytes();
   options.reserve_bytes = static_cast<std::uint64_t>(recording.reserve_mb * 1e6);
@@ -420,6 +421,7 @@ void Rig::show_facts() {
   facts.recorded_s = recorder.seconds;
   facts.lost = recorder.lost;
   facts.disk_silent_s = recorder.disk_silent_s;
+  facts.backlog = recorder.backlog;
   facts.recorder_fault = recorder.fault;
   facts.device = render::drawing_device(*parts_.device);
   facts.free_bytes = free_bytes_;

@@ -268,6 +268,7 @@ struct Recording {
   std::string slate;               // scene and shot, as on the board; empty: the set's name
   std::string notes;               // written into every take
   double preroll_s = 2;            // length kept in memory and put in front of a take
+  double most_behind_s = 2;        // frames are left out rather than recorded later
   std::optional<double> queue_mb;  // limit of what is kept in memory; absent: by free memory
   double reserve_mb = 512;         // free disk space at which a take ends
   double timecode_fps = 25;

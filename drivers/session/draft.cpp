@@ -108,14 +108,16 @@ void Draft::put(Sync sync) {
 
 bool Draft::put_as_new(const fs::path& target) {
   file_.sync();
-  if (::link(path_.c_str(), target.c_str()) == 0) {
+  const bool is_linked = ::link(path_.c_str(), target.c_str()) == 0;
+  const bool has_no_links = errno == EPERM || errno == EOPNOTSUPP || errno == ENOSYS;
+  if (is_linked) {
     std::error_code stays;  // a second name; it counts as left by a dead process
     fs::remove(path_, stays);
   } else if (errno == EEXIST) {
     return false;
-  } else if (::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, target.c_str(), RENAME_NOREPLACE) !=
-             0) {
-    if (errno == EEXIST) return false;  // a file system without links
+  } else if (!has_no_links || ::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, target.c_str(),
+                                          RENAME_NOREPLACE) != 0) {
+    if (errno == EEXIST) return false;
     fail_draft(target, "cannot be put in place");
   }
   path_.clear();

@@ -50,7 +50,9 @@ void visit_own(const std::filesystem::path& directory, const Visit& visit) {
 Summary summary_of(const std::filesystem::path& directory) {
   const std::filesystem::path toml = directory / "session.toml";
   if (!std::filesystem::exists(directory)) throw Error(directory.string() + ": is not there");
-  if (!std::filesystem::exists(std::filesystem::symlink_status(toml)))
+  std::error_code unreadable;  // reading the file gives a better error
+  if (std::filesystem::symlink_status(toml, unreadable).type() ==
+      std::filesystem::file_type::not_found)
     throw Error(directory.string() + ": is not a take; it holds no session.toml");
   SessionFile file = parse_session_toml(read_plain_file(toml), toml);
   Summary summary{std::move(file.info), file.closed, file.fault, file.lost, 0, 0, 0};

@@ -7,10 +7,12 @@
 #include "daemon/rig/set_keeper.hpp"
 #include "tests/durability/still_disk.hpp"
 #include "tests/support/live_rig.hpp"
+#include "tests/support/notify_socket.hpp"
 
 namespace previz::rig {
 namespace still_rig_test {
 
+using test::NotifySocket;
 using test::RigLive;
 using test::StillDisk;
 
@@ -71,6 +73,53 @@ TEST_F(RigLive, ADiskOfTakesThatStandsStillKeepsNoButtonWaiting) {
     press("record");
     until_said("12A_take001 is finished");
   });
+}
+
+// A set that takes long to be read: the rig goes on with the set it has, answers, and changes when
+// it is there.
+TEST_F(RigLive, ASetThatTakesLongToBeReadHoldsUpNothing) {
+  write_set();
+  const std::filesystem::path file = directory_ / "set.toml";
+  std::string other = session::read_file(file);
+  const std::string good = other;
+  other.replace(other.find("samples = 2"), 11, "samples = 4");
+  // By a name at which the disk does not stand still.
+  const auto write = [&](const std::string& text) {
+    std::ofstream(directory_ / "beside") << text;
+    std::filesystem::rename(directory_ / "beside", directory_ / "." / "set.toml");
+  };
+  StillDisk disk(file);
+  NotifySocket systemd(directory_ / "notify");
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    disk.stand_still();
+    write(other);
+    press("reload_set");
+    until_said("button reload_set: loading the set file again");
+    systemd.skip();
+    EXPECT_GE(systemd.fed_within(std::chrono::seconds(2)), 3);
+    press("samples_up");
+    until([](const Shown& s) { return s.shot.samples == 3; });
+    press("next_set");
+    until_said("button next_set: a set is being read already");
+    disk.go_on();
+    until([](const Shown& s) { return s.shot.samples == 4; });
+
+    // A take that begins meanwhile is not ended by a set.
+    disk.stand_still();
+    write(good);
+    press("reload_set");
+    press("record");
+    until([](const Shown& s) { return s.look.state.recording; });
+    disk.go_on();
+    until_said("the set stays as it was: recording began while another one was read");
+    const int before = until([](const Shown&) { return true; }).count;
+    until([&](const Shown& s) { return s.count > before + 4 && s.look.state.recording; });
+    press("record");
+    until_said("12A_take001 is finished");
+    until([](const Shown& s) { return s.shot.samples == 2; });  // it is read now
+  });
+  EXPECT_TRUE(session::open_session(directory_ / "takes/12A_take001").missing.empty());
 }
 
 // Nobody waits for a set whose disk does not answer: it is given up after a while, and a rig that

@@ -257,5 +257,59 @@ TEST(Recorder, WarnsOfADiskThatIsTooSlowForTheCameras) {
   }));
 }
 
+// As `umount -l` does it: files that are open stay so, and nobody finds them by name.
+TEST(Recorder, WhoseTakeIsGoneGoesOnOnTheNextDisk) {
+  TwoDisks rig;
+  Recorder recorder(rig.options());
+  recorder.start();
+  recorder.offer(picture(0));
+  ASSERT_TRUE(wait_until("the take is begun", [&] { return recorder.status().frames == 1; }));
+  std::filesystem::rename(rig.directory / "first", rig.directory / "unmounted");
+  std::filesystem::create_directory(rig.directory / "first");
+  ASSERT_TRUE(wait_until("it goes on", [&] { return recorder.status().number == 2; }));
+  recorder.offer(picture(1));
+  recorder.stop();
+  recorder.finish();
+  EXPECT_EQ(recorder.status().directory, rig.directory / "second/12A_take002");
+  const session::Session left = session::open_session(rig.directory / "unmounted/12A_take001");
+  EXPECT_TRUE(mentions(left.missing, "not closed"));
+  const std::lock_guard lock(rig.mutex);
+  EXPECT_TRUE(mentions(rig.notes, "is no longer there; its disk was unmounted"));
+}
+
+TEST(Recorder, ThatFindsAnotherInItsFolderLeavesItAlone) {
+  const TemporaryDirectory directory;
+  RecorderOptions options;
+  options.take.folders = {directory / "takes"};
+  options.take.info.take = session::TakeInfo{0, "12A", "", 25, "", false};
+  options.preroll_s = 0;
+  options.reserve_bytes = 0;
+  Recorder first(options);
+  first.start();
+  first.offer(picture(0));
+  ASSERT_TRUE(wait_until("the take is begun", [&] { return first.status().frames == 1; }));
+  {
+    Recorder second(options);
+    ASSERT_TRUE(wait_until("it has looked", [&] { return second.folders()[0].is_looked_at; }));
+    EXPECT_NE(second.folders()[0].why_not.find("another previzd records there (process "),
+              std::string::npos)
+        << second.folders()[0].why_not;
+    EXPECT_TRUE(second.status().salvaged.empty());
+    second.start();
+    second.offer(picture(5));
+    ASSERT_TRUE(wait_until("it is refused", [&] { return second.status().failures == 1; }));
+    EXPECT_NE(second.status().fault.find("another previzd"), std::string::npos);
+    EXPECT_FALSE(second.status().interrupted);
+  }
+  first.offer(picture(1));
+  first.stop();
+  first.finish();
+  EXPECT_EQ(first.status().failures, 0u);
+  EXPECT_TRUE(session::open_session(directory / "takes/12A_take001").missing.empty());
+  // Whoever is left takes the folder over.
+  Recorder third(options);
+  EXPECT_TRUE(wait_until("it has the folder", [&] { return third.folders()[0].is_own; }));
+}
+
 }  // namespace output_take_folders_test
 }  // namespace previz::output

@@ -3,6 +3,7 @@
 #include "daemon/rig/live.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <condition_variable>
@@ -395,6 +396,24 @@ TEST_F(RigLive, RecordsOnAfterARestartUntilSomebodyEndsIt) {
   before = shown_.count;
   run([&] { until_recorded(false); });
   EXPECT_FALSE(std::filesystem::exists(directory_ / "takes/12A_take003"));
+}
+
+// The threads that Mesa's driver for the processor draws in yield to those of the recorder.
+TEST_F(RigLive, WhatDrawsOnTheProcessorYieldsToTheRecording) {
+  write_set();
+  int drawing = 0, yielding = 0;
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
+      std::string name;
+      std::ifstream(task.path() / "comm") >> name;
+      if (!name.starts_with("llvmpipe-")) continue;
+      ++drawing;
+      const auto thread = static_cast<id_t>(std::stoul(task.path().filename().string()));
+      yielding += ::getpriority(PRIO_PROCESS, thread) >= 10 ? 1 : 0;
+    }
+  });
+  EXPECT_EQ(yielding, drawing);
 }
 
 }  // namespace rig_live_test

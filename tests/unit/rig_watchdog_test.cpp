@@ -19,75 +19,14 @@
 #include "drivers/descriptor.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/live_rig.hpp"
+#include "tests/support/notify_socket.hpp"
 #include "tests/support/other_camera.hpp"
 
 namespace previz::rig {
 namespace rig_watchdog_test {
 
+using test::NotifySocket;
 using test::RigLive;
-
-// systemd's end of the notification socket, which is always read: whoever writes would else wait.
-class NotifySocket {
- public:
-  explicit NotifySocket(const std::filesystem::path& path)
-      : descriptor_(socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    path.string().copy(address.sun_path, sizeof address.sun_path - 1);
-    EXPECT_EQ(bind(descriptor_.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-    thread_ = std::jthread([this](const std::stop_token& stop) { listen(stop); });
-    setenv("NOTIFY_SOCKET", path.c_str(), 1);
-    setenv("WATCHDOG_USEC", "200000", 1);
-  }
-  ~NotifySocket() {
-    unsetenv("NOTIFY_SOCKET");
-    unsetenv("WATCHDOG_USEC");
-  }
-  // The next message; empty where none came within the time.
-  std::string next(int milliseconds) {
-    std::unique_lock lock(mutex_);
-    news_.wait_for(lock, std::chrono::milliseconds(milliseconds), [&] { return !said_.empty(); });
-    if (said_.empty()) return "";
-    std::string first = std::move(said_.front());
-    said_.pop_front();
-    return first;
-  }
-  void skip() {
-    while (!next(0).empty()) continue;
-  }
-  // Returns how often the watchdog was fed within this time.
-  int fed_within(std::chrono::milliseconds time) {
-    int fed = 0;
-    const auto end = std::chrono::steady_clock::now() + time;
-    while (std::chrono::steady_clock::now() < end)
-      fed += next(50).find("WATCHDOG=1") != std::string::npos ? 1 : 0;
-    return fed;
-  }
-  void until(const std::string& words) {
-    for (std::string said = next(60'000); said.find(words) == std::string::npos;
-         said = next(60'000))
-      if (said.empty()) throw test::WaitedInVain("systemd is not sent " + words);
-  }
-
- private:
-  void listen(const std::stop_token& stop) {
-    pollfd poll_one{descriptor_.get(), POLLIN, 0};
-    while (!stop.stop_requested()) {
-      if (poll(&poll_one, 1, 20) != 1) continue;
-      std::array<char, 1024> text{};
-      const ssize_t size = recv(descriptor_.get(), text.data(), text.size(), 0);
-      const std::lock_guard lock(mutex_);
-      said_.emplace_back(text.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
-      news_.notify_all();
-    }
-  }
-
-  OwnedDescriptor descriptor_;
-  std::mutex mutex_;
-  std::condition_variable news_;
-  std::deque<std::string> said_;
-  std::jthread thread_;
-};
 
 // The watchdog is fed every 50 ms here. A machine that is busy with other tests is late at times,
 // so that a quarter of it is enough.
@@ -139,59 +78,6 @@ TEST_F(RigLive, TheWatchdogIsFedWhileTheCameraIsSilent) {
     const int before = until([](const Shown&) { return true; }).count;
     until([&](const Shown& s) { return s.count > before; });
   });
-}
-
-// A set that takes long to be read: here until the other end of a pipe is written. The rig goes on
-// with the set it has, answers, and changes when it is there.
-TEST_F(RigLive, ASetThatTakesLongToBeReadHoldsUpNothing) {
-  write_set();
-  const std::filesystem::path file = directory_ / "set.toml";
-  std::string other = session::read_file(file);
-  const std::string good = other;
-  other.replace(other.find("samples = 2"), 11, "samples = 4");
-  const auto set_of_a_pipe = [&] {
-    std::filesystem::remove(file);
-    ASSERT_EQ(mkfifo(file.c_str(), 0600), 0);
-  };
-  // What was read is then also a file like any other, before it is looked at again.
-  const auto write_pipe = [&](const std::string& text) {
-    const std::filesystem::path beside = directory_ / "beside";
-    std::ofstream(beside) << text;
-    std::ofstream pipe(file);
-    std::filesystem::rename(beside, file);
-    pipe << text;
-  };
-  NotifySocket systemd(directory_ / "notify");
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
-    set_of_a_pipe();
-    press("reload_set");
-    until_said("button reload_set: loading the set file again");
-    systemd.skip();
-    EXPECT_GE(systemd.fed_within(while_fed), often);
-    press("samples_up");
-    until([](const Shown& s) { return s.shot.samples == 3; });
-    press("next_set");
-    until_said("button next_set: a set is being read already");
-    write_pipe(other);
-    until([](const Shown& s) { return s.shot.samples == 4; });
-    test::must_come("the file that replaced the pipe is read, too",
-                    [&] { return count_said("live on ") == 3; });
-
-    // A take that begins meanwhile is not ended by a set.
-    set_of_a_pipe();
-    press("reload_set");
-    press("record");
-    until([](const Shown& s) { return s.look.state.recording; });
-    write_pipe(good);
-    until_said("the set stays as it was: recording began while another one was read");
-    const int before = until([](const Shown&) { return true; }).count;
-    until([&](const Shown& s) { return s.count > before + 4 && s.look.state.recording; });
-    press("record");
-    until_said("12A_take001 is finished");
-    until([](const Shown& s) { return s.shot.samples == 2; });  // it is read now
-  });
-  EXPECT_TRUE(session::open_session(directory_ / "takes/12A_take001").missing.empty());
 }
 
 // systemd waits 90 s for a start unless it is asked for more.
