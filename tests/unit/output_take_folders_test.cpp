@@ -284,10 +284,10 @@ TEST(Recorder, ThatFindsAnotherInItsFolderLeavesItAlone) {
   options.take.info.take = session::TakeInfo{0, "12A", "", 25, "", false};
   options.preroll_s = 0;
   options.reserve_bytes = 0;
-  Recorder first(options);
-  first.start();
-  first.offer(picture(0));
-  ASSERT_TRUE(wait_until("the take is begun", [&] { return first.status().frames == 1; }));
+  auto first = std::make_unique<Recorder>(options);
+  first->start();
+  first->offer(picture(0));
+  ASSERT_TRUE(wait_until("the take is begun", [&] { return first->status().frames == 1; }));
   {
     Recorder second(options);
     ASSERT_TRUE(wait_until("it has looked", [&] { return second.folders()[0].is_looked_at; }));
@@ -301,10 +301,11 @@ TEST(Recorder, ThatFindsAnotherInItsFolderLeavesItAlone) {
     EXPECT_NE(second.status().fault.find("another previzd"), std::string::npos);
     EXPECT_FALSE(second.status().interrupted);
   }
-  first.offer(picture(1));
-  first.stop();
-  first.finish();
-  EXPECT_EQ(first.status().failures, 0u);
+  first->offer(picture(1));
+  first->stop();
+  first->finish();
+  EXPECT_EQ(first->status().failures, 0u);
+  first.reset();
   EXPECT_TRUE(session::open_session(directory / "takes/12A_take001").missing.empty());
   // Whoever is left takes the folder over.
   Recorder third(options);
