@@ -83,6 +83,8 @@ std::size_t most_packet_bytes(const StreamFormat& format) {
   const auto pixels =
       static_cast<std::size_t>(format.width) * static_cast<std::size_t>(format.height);
   constexpr std::size_t most = std::numeric_limits<int>::max() - padding;  // of an AVPacket
+  if (format.codec == VideoCodec::raw)
+    return frame_bytes(format.format, format.width, format.height);
   return std::min(padding + pixels * a_pixel, most);
 }
 

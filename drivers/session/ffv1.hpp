@@ -17,8 +17,8 @@ av::Codec open_ffv1_decoder(const AVCodecParameters& parameters, const std::file
 // Opens a decoder for packets whose own header is lost, with the header that a new encoder of this
 // format makes.
 av::Codec open_ffv1_decoder(const StreamFormat& format, const std::filesystem::path& file);
-// The encoder never makes a packet of more bytes: libav's own bound for versions up to 3, 37 times
-// 4 bytes a pixel and its padding (libavcodec/ffv1enc.c, encode_frame).
+// No packet of such a video has more bytes. Raw: those of a frame. FFV1: libav's own bound for
+// versions up to 3, 37 times 4 bytes a pixel and its padding (libavcodec/ffv1enc.c, encode_frame).
 std::size_t most_packet_bytes(const StreamFormat& format);
 
 }  // namespace previz::session

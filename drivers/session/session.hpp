@@ -20,10 +20,14 @@
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/session/timecode.hpp"
+#include "drivers/session/video_codec.hpp"
 
 namespace previz::session {
 
-inline constexpr int format_version = 1;
+// What session.toml has as format_version. A session has the first one that can say what is in it,
+// so that an earlier previzd reads what it can and refuses the rest. 1: all videos are FFV1; 2: a
+// video may say its codec.
+inline constexpr int first_format_version = 1, format_version = 2;
 
 // Identifies the take of a session, as the clapperboard does.
 struct TakeInfo {
@@ -186,18 +190,20 @@ Session open_session(const std::filesystem::path& directory, const std::stop_tok
 std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& source,
                                           const std::stop_token& stop = {});
 
-// Writes a session directory; every call leaves a readable session behind. FFV1 in Matroska,
-// lossless; streams open at their first frame. Throws previz::Error naming the file on failure. A
-// frame has reached the kernel when write() returns: a process killed at any time loses at most the
-// frame it was writing. About once a second write() also waits until all is on the disk, the files'
-// names included: a power cut loses about the last second. Once a call has failed because of the
-// disk, nothing can be added, and the session is never marked as closed: what the disk has is not
-// known. Call it from a thread that may wait. Not thread-safe.
+// Writes a session directory; every call leaves a readable session behind. Lossless
+// video in Matroska; streams open at their first frame. Throws previz::Error naming the file on
+// failure. A frame has reached the kernel when write() returns: a process killed at any time loses
+// at most the frame it was writing. About once a second write() also waits until all is on the
+// disk, the files' names included: a power cut loses about the last second. Once a call has failed
+// because of the disk, nothing can be added, and the session is never marked as closed: what the
+// disk has is not known. Call it from a thread that may wait. Not thread-safe.
 class SessionWriter {
  public:
-  // The directory must not exist or be empty. All is on the disk at least this often.
+  // The directory must not exist or be empty. All is on the disk at least this often. `codec` is
+  // that of the cameras' pictures; the composite's is always FFV1.
   SessionWriter(const std::filesystem::path& directory, const SessionInfo& info,
-                std::chrono::nanoseconds sync_interval = std::chrono::seconds(1));
+                std::chrono::nanoseconds sync_interval = std::chrono::seconds(1),
+                VideoCodec codec = VideoCodec::ffv1);
   ~SessionWriter();
   SessionWriter(const SessionWriter&) = delete;
   SessionWriter& operator=(const SessionWriter&) = delete;

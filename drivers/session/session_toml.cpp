@@ -170,6 +170,7 @@ std::string light_toml(const LightCameraCalibration& calibration) {
 std::string stream_toml(const std::string& source, const StreamFormat& stream) {
   std::string text = "\n[" + source + ".video]\nformat = " + quote(to_string(stream.format)) + "\n";
   text += line("width", stream.width) + line("height", stream.height);
+  if (stream.codec == VideoCodec::raw) text += "codec = \"raw\"\n";
   if (stream.bayer != BayerPattern::none)
     text += "bayer = " + quote(to_string(stream.bayer)) + "\n";
   if (stream.frames) text += "frames = " + std::to_string(*stream.frames) + "\n";
@@ -296,6 +297,12 @@ StreamFormat parse_stream(const Place& place) {
     if (stream.format != PixelFormat::gray8 && stream.format != PixelFormat::gray16)
       place.fail("bayer", std::string("does not go with ") + to_string(stream.format));
   }
+  if (place.table.contains("codec")) {
+    const std::string codec = place.text("codec");
+    if (codec != "ffv1" && codec != "raw")
+      place.fail("codec", "is \"" + codec + "\"; this previzd reads: ffv1, raw");
+    if (codec == "raw") stream.codec = VideoCodec::raw;
+  }
   stream.width = place.pixels("width");
   stream.height = place.pixels("height");
   if (place.table.contains("frames")) {
@@ -363,7 +370,9 @@ void parse_set(const Place& place, SessionInfo& info) {
 
 std::string to_toml(const SessionFile& file) {
   std::string text = "# A recorded session: what the devices of a take said.\n";
-  text += line("format_version", format_version);
+  const bool is_ffv1 = std::ranges::all_of(
+      file.streams, [](const auto& stream) { return stream.second.codec == VideoCodec::ffv1; });
+  text += line("format_version", is_ffv1 ? first_format_version : format_version);
   text += "name = " + quote(file.info.name) + "\nclock = " + quote(file.info.clock) + "\n";
   text += std::string("closed = ") + (file.closed ? "true" : "false") +
           "  # false: still recording, or the recording was cut off\n";
@@ -399,8 +408,9 @@ SessionFile parse_session_toml(const std::string& text, const std::filesystem::p
   }
   const Place top{path, root, ""};
   const auto version = top.get<std::int64_t>("format_version", "a whole number");
-  if (version != format_version)
+  if (version < first_format_version || version > format_version)
     top.fail("format_version", "is " + std::to_string(version) + "; this previzd reads " +
+                                   std::to_string(first_format_version) + " to " +
                                    std::to_string(format_version));
   SessionFile file;
   file.info.name = top.text("name");

@@ -19,6 +19,7 @@ struct StreamFormat {
   int width = 0, height = 0;            // pixels
   std::optional<std::uint64_t> frames;  // known once the session was closed
   BayerPattern bayer = BayerPattern::none;
+  VideoCodec codec = VideoCodec::ffv1;  // what older sessions, which do not say it, have
 };
 
 struct SessionFile {

@@ -88,6 +88,7 @@ struct SessionWriter::Impl {
   std::filesystem::path directory;
   OwnedDescriptor lock;  // of the directory
   std::chrono::nanoseconds sync_interval{};
+  VideoCodec codec = VideoCodec::ffv1;  // of the cameras
   SessionFile file;
   std::map<std::string, StreamWriter> streams;
   std::unique_ptr<LineFile> track, events;
@@ -116,7 +117,8 @@ struct SessionWriter::Impl {
 
   // session.toml announces a stream before its files are there, so that their loss is noticed.
   StreamWriter& open(const Frame& frame) {
-    const StreamFormat format{frame.format, frame.width, frame.height, {}, frame.bayer};
+    const VideoCodec its_codec = frame.source == "composite" ? VideoCodec::ffv1 : codec;
+    const StreamFormat format{frame.format, frame.width, frame.height, {}, frame.bayer, its_codec};
     file.streams[frame.source] = format;
     write_toml();
     StreamWriter& stream =
@@ -199,10 +201,11 @@ struct SessionWriter::Impl {
 };
 
 SessionWriter::SessionWriter(const std::filesystem::path& directory, const SessionInfo& info,
-                             std::chrono::nanoseconds sync_interval)
+                             std::chrono::nanoseconds sync_interval, VideoCodec codec)
     : impl_(std::make_unique<Impl>()) {
   impl_->directory = directory;
   impl_->sync_interval = sync_interval;
+  impl_->codec = codec;
   impl_->file.info = info;
   make_empty_directory(directory);
   bool is_in_draft = false;  // which is locked already

@@ -26,10 +26,14 @@ av::Demuxer open_demuxer(const std::filesystem::path& file) {
   return av::Demuxer(context);
 }
 
-int find_track(const AVFormatContext& demuxer, const std::filesystem::path& file) {
+int find_track(const AVFormatContext& demuxer, VideoCodec codec,
+               const std::filesystem::path& file) {
+  const bool is_raw = codec == VideoCodec::raw;
   for (unsigned int i = 0; i < demuxer.nb_streams; ++i)
-    if (demuxer.streams[i]->codecpar->codec_id == AV_CODEC_ID_FFV1) return static_cast<int>(i);
-  throw Error(file.string() + ": holds no FFV1 track");
+    if (demuxer.streams[i]->codecpar->codec_id ==
+        (is_raw ? AV_CODEC_ID_RAWVIDEO : AV_CODEC_ID_FFV1))
+      return static_cast<int>(i);
+  throw Error(file.string() + ": holds no " + (is_raw ? "raw" : "FFV1") + " track");
 }
 
 }  // namespace
@@ -50,11 +54,11 @@ struct VideoReader::Impl {
       : file(path),
         format(stream_format),
         demuxer(open_demuxer(file)),
-        track(find_track(*demuxer, file)),
-        decoder(open_ffv1_decoder(*demuxer->streams[track]->codecpar, file)) {
-    if (decoder->width != format.width || decoder->height != format.height)
-      throw Error(file.string() + ": its video header says " + std::to_string(decoder->width) +
-                  "x" + std::to_string(decoder->height) + ", session.toml " +
+        track(find_track(*demuxer, format.codec, file)),
+        decoder(is_raw() ? nullptr : open_ffv1_decoder(header(), file)) {
+    if (header().width != format.width || header().height != format.height)
+      throw Error(file.string() + ": its video header says " + std::to_string(header().width) +
+                  "x" + std::to_string(header().height) + ", session.toml " +
                   std::to_string(format.width) + "x" + std::to_string(format.height));
   }
 
@@ -63,9 +67,12 @@ struct VideoReader::Impl {
       : file(path),
         format(stream_format),
         opened(open_plain_file(file)),
-        decoder(open_ffv1_decoder(format, file)) {
+        decoder(is_raw() ? nullptr : open_ffv1_decoder(format, file)) {
     for (const PacketPlace& place : packets) places[{place.video_ms, place.crc32}] = place;
   }
+
+  bool is_raw() const { return format.codec == VideoCodec::raw; }
+  const AVCodecParameters& header() const { return *demuxer->streams[track]->codecpar; }
 
   void rewind() { demuxer = open_demuxer(file); }
 
@@ -143,6 +150,12 @@ std::vector<VideoReader::PacketInfo> VideoReader::scan(const std::stop_token& st
 std::vector<std::uint8_t> VideoReader::read(const PacketInfo& wanted) {
   Impl& s = *impl_;
   if (!s.find(wanted)) throw Error(s.failure(wanted, "is no longer in the file"));
+  if (s.is_raw()) {
+    if (static_cast<std::size_t>(s.packet->size) !=
+        frame_bytes(s.format.format, s.format.width, s.format.height))
+      throw Error(s.failure(wanted, "has not the format and size that session.toml says"));
+    return {s.packet->data, s.packet->data + s.packet->size};
+  }
   int code = avcodec_send_packet(s.decoder.get(), s.packet.get());
   if (code >= 0) code = avcodec_receive_frame(s.decoder.get(), s.picture.get());
   if (code < 0) {

@@ -20,7 +20,8 @@ class VideoReader {
     std::uint32_t crc32 = 0;    // of the packet as it is in the file now
   };
 
-  // Throws previz::Error naming the file if it holds no FFV1 track that can be read.
+  // Throws previz::Error naming the file if it holds no track of the format's
+  // codec that can be read.
   VideoReader(const std::filesystem::path& file, const StreamFormat& format);
   // Reads these packets where they lie, whatever the rest of the file is, with a video header made
   // anew from the format. Throws previz::Error naming the file.

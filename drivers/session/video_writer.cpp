@@ -12,7 +12,24 @@
 namespace previz::session {
 namespace {
 
-av::Muxer open_muxer(const AVCodecContext& encoder, const std::filesystem::path& file) {
+constexpr AVRational milliseconds{1, 1000};
+
+AVPixelFormat raw_format(PixelFormat format) {
+  return format == PixelFormat::rgb8 ? AV_PIX_FMT_RGB24 : encoder_format(format);
+}
+
+// Describes samples that are written as they are.
+void describe_raw(AVCodecParameters& parameters, const StreamFormat& format) {
+  parameters.codec_type = AVMEDIA_TYPE_VIDEO;
+  parameters.codec_id = AV_CODEC_ID_RAWVIDEO;
+  parameters.width = format.width;
+  parameters.height = format.height;
+  parameters.format = raw_format(format.format);
+}
+
+// `encoder` is null for raw video.
+av::Muxer open_muxer(const StreamFormat& format, const AVCodecContext* encoder,
+                     const std::filesystem::path& file) {
   AVFormatContext* context = nullptr;
   const std::string url = av::url_of(file);
   av::check(avformat_alloc_output_context2(&context, nullptr, "matroska", url.c_str()), file,
@@ -20,10 +37,17 @@ av::Muxer open_muxer(const AVCodecContext& encoder, const std::filesystem::path&
   av::Muxer muxer(context);
   AVStream* stream = avformat_new_stream(context, nullptr);
   if (!stream) throw Error(file.string() + ": no memory for a video track");
-  av::check(avcodec_parameters_from_context(stream->codecpar, &encoder), file, "cannot be set up");
-  stream->time_base = encoder.time_base;
+  if (encoder)
+    av::check(avcodec_parameters_from_context(stream->codecpar, encoder), file, "cannot be set up");
+  else
+    describe_raw(*stream->codecpar, format);
+  stream->time_base = milliseconds;
   context->flags |= AVFMT_FLAG_BITEXACT;  // the same frames make the same file
   av::check(avio_open(&context->pb, url.c_str(), AVIO_FLAG_WRITE), file, "cannot be created");
+  av::check(avformat_init_output(context, nullptr), file, "cannot be set up");
+  // libav's list of tags for Matroska lacks those of RGB, with which it reads them.
+  if (!encoder)
+    stream->codecpar->codec_tag = avcodec_pix_fmt_to_codec_tag(raw_format(format.format));
   av::check(avformat_write_header(context, nullptr), file, "its header cannot be written");
   return muxer;
 }
@@ -44,11 +68,12 @@ struct VideoWriter::Impl {
   Impl(const std::filesystem::path& path, const StreamFormat& stream_format)
       : file(path),
         format(stream_format),
-        encoder(open_ffv1_encoder(format, file)),
-        muxer(open_muxer(*encoder, file)),
+        encoder(format.codec == VideoCodec::ffv1 ? open_ffv1_encoder(format, file) : nullptr),
+        muxer(open_muxer(format, encoder.get(), file)),
         same_file(file, O_RDONLY),
         picture(av_frame_alloc()),
         packet(av_packet_alloc()) {
+    if (!encoder) return;
     picture->width = format.width;
     picture->height = format.height;
     picture->format = encoder->pix_fmt;
@@ -64,6 +89,23 @@ struct VideoWriter::Impl {
     constexpr double one_year_ms = 366.0 * 86'400'000.0;
     const auto wanted = static_cast<std::int64_t>(std::clamp(elapsed_ms, 0.0, one_year_ms));
     return last_ms = std::max(last_ms + 1, wanted);
+  }
+
+  // Each of these makes the packet of a frame.
+  void encode(const Frame& frame, std::int64_t time_ms) {
+    av::check(av_frame_make_writable(picture.get()), file, "no memory for a picture");
+    pack(frame.bytes, frame.format, *picture);
+    picture->pts = time_ms;
+    av::check(avcodec_send_frame(encoder.get(), picture.get()), file, "FFV1 failed");
+    av::check(avcodec_receive_packet(encoder.get(), packet.get()), file, "FFV1 failed");
+  }
+
+  void take_as_is(const Frame& frame, std::int64_t time_ms) {
+    // The muxer reads these bytes and does not keep them.
+    packet->data = const_cast<std::uint8_t*>(frame.bytes.data());
+    packet->size = static_cast<int>(frame.bytes.size());
+    packet->flags = AV_PKT_FLAG_KEY;
+    packet->pts = packet->dts = time_ms;
   }
 
   // Writes out what the muxer holds back, so that the kernel has the whole frame.
@@ -83,14 +125,11 @@ VideoWriter::~VideoWriter() = default;
 
 VideoWriter::Stamp VideoWriter::write(const Frame& frame) {
   Impl& s = *impl_;
-  av::check(av_frame_make_writable(s.picture.get()), s.file, "no memory for a picture");
-  pack(frame.bytes, frame.format, *s.picture);
-  s.picture->pts = s.next_ms(frame.timestamp_ns);
-  av::check(avcodec_send_frame(s.encoder.get(), s.picture.get()), s.file, "FFV1 failed");
-  av::check(avcodec_receive_packet(s.encoder.get(), s.packet.get()), s.file, "FFV1 failed");
-  const Stamp stamp{s.picture->pts, av::crc32(*s.packet)};
+  const std::int64_t time_ms = s.next_ms(frame.timestamp_ns);
+  s.encoder ? s.encode(frame, time_ms) : s.take_as_is(frame, time_ms);
+  const Stamp stamp{time_ms, av::crc32(*s.packet)};
   s.packet->stream_index = 0;
-  av_packet_rescale_ts(s.packet.get(), s.encoder->time_base, s.muxer->streams[0]->time_base);
+  av_packet_rescale_ts(s.packet.get(), milliseconds, s.muxer->streams[0]->time_base);
   const int written = av_write_frame(s.muxer.get(), s.packet.get());
   av_packet_unref(s.packet.get());
   av::check(written, s.file, "cannot be written");

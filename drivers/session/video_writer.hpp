@@ -1,5 +1,5 @@
-// Writes FFV1 in Matroska, such that every frame is in the file once write() returns. Not for use
-// outside drivers/.
+// Writes lossless video in Matroska, such that every frame is in the file once write() returns. Not
+// for use outside drivers/.
 #pragma once
 
 #include <cstdint>
@@ -18,8 +18,7 @@ class VideoWriter {
     std::uint32_t crc32 = 0;    // of the packet
   };
 
-  // Opens a file of FFV1 level 3, intra only, with slice checksums. Throws previz::Error naming the
-  // file.
+  // Opens a file of the format's codec. Throws previz::Error naming the file.
   VideoWriter(const std::filesystem::path& file, const StreamFormat& format);
   ~VideoWriter();
 

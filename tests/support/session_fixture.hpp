@@ -49,10 +49,10 @@ inline Frame noise_frame(const std::string& source, std::uint64_t index, PixelFo
 
 // A closed session with `count` small observer frames.
 inline void write_small_session(const std::filesystem::path& directory, int count, int width = 24,
-                                int height = 18) {
+                                int height = 18, VideoCodec codec = VideoCodec::ffv1) {
   SessionInfo info;
   info.name = "small";
-  SessionWriter writer(directory, info);
+  SessionWriter writer(directory, info, std::chrono::seconds(1), codec);
   for (int i = 0; i < count; ++i)
     writer.write(noise_frame("observer", i, PixelFormat::rgb8, width, height));
   writer.close();

@@ -25,12 +25,13 @@ class Damage : public testing::Test {
  protected:
   static void SetUpTestSuite() { av_log_set_level(AV_LOG_QUIET); }
   void SetUp() override { write_small_frames(frame_count, 24, 18); }
-  void write_small_frames(int count, int width, int height) {
+  void expect_no_changed_byte_is_shown(VideoCodec codec);
+  void write_small_frames(int count, int width, int height, VideoCodec codec = VideoCodec::ffv1) {
     width_ = width;
     height_ = height;
     std::filesystem::remove_all(whole());
     std::filesystem::remove_all(copy());
-    write_small_session(whole(), count, width, height);
+    write_small_session(whole(), count, width, height, codec);
     std::filesystem::copy(whole(), copy());
   }
   std::filesystem::path whole() const { return directory_.path() / "whole"; }
@@ -129,9 +130,9 @@ std::vector<std::pair<std::size_t, std::size_t>> packets_of(const std::filesyste
 // Every byte of a small video in turn is changed. A frame that is still offered is the right one
 // (open_copy sees to that), and one that is not is reported. A byte of a picture costs exactly that
 // picture: each has its checksum. What else is in the file, headers and index, may be repaired.
-TEST_F(Damage, AChangedByteOfTheVideoIsNeverShown) {
+void Damage::expect_no_changed_byte_is_shown(VideoCodec codec) {
   constexpr std::size_t few = 2;
-  write_small_frames(few, 8, 8);
+  write_small_frames(few, 8, 8, codec);
   const std::string video = content_of(whole() / "observer.mkv");
   const auto packets = packets_of(whole() / "observer.mkv");
   ASSERT_EQ(packets.size(), few);
@@ -149,6 +150,14 @@ TEST_F(Damage, AChangedByteOfTheVideoIsNeverShown) {
         EXPECT_EQ(opened.frames, std::vector<std::uint64_t>{1 - p}) << "byte " << at;
       }
   }
+}
+
+TEST_F(Damage, AChangedByteOfTheVideoIsNeverShown) {
+  expect_no_changed_byte_is_shown(VideoCodec::ffv1);
+}
+
+TEST_F(Damage, AChangedByteOfARawVideoIsNeverShown) {
+  expect_no_changed_byte_is_shown(VideoCodec::raw);
 }
 
 // Where the head of a video lies, before its first cluster, and where that one's picture begins.
@@ -209,24 +218,25 @@ TEST_F(Damage, EveryFormatIsReadWithoutAHead) {
   struct Size {
     int width, height;
   };
-  for (const PixelFormat format : {PixelFormat::rgb8, PixelFormat::rgb16, PixelFormat::gray8,
-                                   PixelFormat::gray16, PixelFormat::yuv422p8})
-    for (const Size size : {Size{24, 18}, Size{160, 120}, Size{400, 300}, Size{640, 480}}) {
-      const TemporaryDirectory directory;
-      const std::filesystem::path take = directory.path() / "take";
-      {
-        SessionWriter writer(take, {});
-        for (std::uint64_t i = 0; i < 2; ++i)
-          writer.write(noise_frame("observer", i, format, size.width, size.height));
+  for (const VideoCodec codec : {VideoCodec::ffv1, VideoCodec::raw})
+    for (const PixelFormat format : {PixelFormat::rgb8, PixelFormat::rgb16, PixelFormat::gray8,
+                                     PixelFormat::gray16, PixelFormat::yuv422p8})
+      for (const Size size : {Size{24, 18}, Size{160, 120}, Size{400, 300}, Size{640, 480}}) {
+        const TemporaryDirectory directory;
+        const std::filesystem::path take = directory.path() / "take";
+        {
+          SessionWriter writer(take, {}, std::chrono::seconds(1), codec);
+          for (std::uint64_t i = 0; i < 2; ++i)
+            writer.write(noise_frame("observer", i, format, size.width, size.height));
+        }
+        std::string video = content_of(take / "observer.mkv");
+        std::fill_n(video.begin(), head_of(video), '\0');
+        write_content(take / "observer.mkv", video);
+        Session session = open_session(take);
+        const auto stream = open_stream(session, "observer");
+        ASSERT_EQ(stream->records().size(), 2u) << size.width;
+        for (std::size_t i : {1, 0}) EXPECT_TRUE(is_frame(*stream->read(i), i)) << size.width;
       }
-      std::string video = content_of(take / "observer.mkv");
-      std::fill_n(video.begin(), head_of(video), '\0');
-      write_content(take / "observer.mkv", video);
-      Session session = open_session(take);
-      const auto stream = open_stream(session, "observer");
-      ASSERT_EQ(stream->records().size(), 2u) << size.width;
-      for (std::size_t i : {1, 0}) EXPECT_TRUE(is_frame(*stream->read(i), i)) << size.width;
-    }
 }
 
 // Clusters within clusters, each of which claims the rest of the file: what is looked at again is

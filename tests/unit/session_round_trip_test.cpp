@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <tuple>
 
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
@@ -15,13 +16,14 @@ struct Picture {
   int width, height;
 };
 
-class RoundTrip : public testing::TestWithParam<Picture> {};
+class RoundTrip : public testing::TestWithParam<std::tuple<Picture, VideoCodec>> {};
 
 TEST_P(RoundTrip, EveryFrameComesBackBitForBit) {
-  const auto [format, width, height] = GetParam();
+  const auto [picture, codec] = GetParam();
+  const auto [format, width, height] = picture;
   const TemporaryDirectory directory;
   {
-    SessionWriter writer(directory.path(), {});
+    SessionWriter writer(directory.path(), {}, std::chrono::seconds(1), codec);
     for (int i = 0; i < 3; ++i) writer.write(noise_frame("observer", i, format, width, height));
     writer.close();
   }
@@ -42,15 +44,39 @@ TEST_P(RoundTrip, EveryFrameComesBackBitForBit) {
 
 INSTANTIATE_TEST_SUITE_P(
     Formats, RoundTrip,
-    testing::Values(Picture{PixelFormat::rgb8, 160, 120}, Picture{PixelFormat::rgb16, 160, 120},
-                    Picture{PixelFormat::gray8, 160, 120}, Picture{PixelFormat::gray16, 160, 120},
-                    Picture{PixelFormat::yuv422p8, 160, 120}, Picture{PixelFormat::rgb8, 8, 8},
-                    Picture{PixelFormat::rgb16, 8, 9}, Picture{PixelFormat::gray8, 9, 8},
-                    Picture{PixelFormat::gray16, 8, 8}, Picture{PixelFormat::yuv422p8, 9, 9},
-                    Picture{PixelFormat::yuv422p8, 35, 8}, Picture{PixelFormat::rgb8, 2000, 8},
-                    Picture{PixelFormat::yuv422p8, 8, 2000}, Picture{PixelFormat::rgb16, 8, 2000},
-                    Picture{PixelFormat::gray8, 37, 21}, Picture{PixelFormat::rgb8, 643, 481},
-                    Picture{PixelFormat::gray16, 643, 481}));
+    testing::Combine(
+        testing::Values(Picture{PixelFormat::rgb8, 160, 120}, Picture{PixelFormat::rgb16, 160, 120},
+                        Picture{PixelFormat::gray8, 160, 120},
+                        Picture{PixelFormat::gray16, 160, 120},
+                        Picture{PixelFormat::yuv422p8, 160, 120}, Picture{PixelFormat::rgb8, 8, 8},
+                        Picture{PixelFormat::rgb16, 8, 9}, Picture{PixelFormat::gray8, 9, 8},
+                        Picture{PixelFormat::gray16, 8, 8}, Picture{PixelFormat::yuv422p8, 9, 9},
+                        Picture{PixelFormat::yuv422p8, 35, 8}, Picture{PixelFormat::rgb8, 2000, 8},
+                        Picture{PixelFormat::yuv422p8, 8, 2000},
+                        Picture{PixelFormat::rgb16, 8, 2000}, Picture{PixelFormat::gray8, 37, 21},
+                        Picture{PixelFormat::rgb8, 643, 481},
+                        Picture{PixelFormat::gray16, 643, 481}),
+        testing::Values(VideoCodec::ffv1, VideoCodec::raw)));
+
+// An earlier previzd, which knows FFV1 alone, reads what it can and refuses the rest in words.
+TEST(Session, OnlyATakeWithRawVideoNeedsANewerPrevizd) {
+  for (const VideoCodec codec : {VideoCodec::ffv1, VideoCodec::raw}) {
+    const TemporaryDirectory directory;
+    SessionWriter writer(directory.path(), {}, std::chrono::seconds(1), codec);
+    writer.write(noise_frame("observer", 0, PixelFormat::rgb8, 24, 18));
+    writer.write(noise_frame("composite", 0, PixelFormat::rgb8, 24, 18));
+    writer.close();
+    const std::string text = content_of(directory / "session.toml");
+    const bool is_raw = codec == VideoCodec::raw;
+    EXPECT_NE(text.find(is_raw ? "format_version = 2\n" : "format_version = 1\n"),
+              std::string::npos);
+    EXPECT_EQ(text.find("codec = \"raw\"") != std::string::npos, is_raw);
+    EXPECT_EQ(text.find("codec"), text.rfind("codec"));  // not the composite's
+    Session session = open_session(directory.path());
+    EXPECT_TRUE(is_frame(*open_stream(session, "observer")->read(0), 0));
+    EXPECT_TRUE(is_frame(*open_stream(session, "composite")->read(0), 0));
+  }
+}
 
 // To libav such a relative name is an address of the protocol "12".
 TEST(Session, AColonInARelativePathIsNoProtocol) {

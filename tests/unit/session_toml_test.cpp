@@ -157,7 +157,7 @@ TEST(SessionToml, ErrorsNameFileLineAndKey) {
     text.replace(text.find(from), from.size(), to);
     return error_of(text);
   };
-  EXPECT_NE(with("format_version = 1", "format_version = 2").find("session.toml:2: format_version"),
+  EXPECT_NE(with("format_version = 1", "format_version = 3").find("session.toml:2: format_version"),
             std::string::npos);
   EXPECT_NE(with("format = \"rgb8\"", "format = \"nv12\"").find("observer.video.format"),
             std::string::npos);
