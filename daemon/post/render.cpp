@@ -185,6 +185,138 @@ FrameRange parse_frame_range(const std::string& text) {
   return range;
 }
 
+namespace {
+
+// A take and where its pictures go.
+struct Job {
+  const RenderOptions& options;
+  const pipeline::Take& take;
+  const scene::Scene& scene;
+  const std::shared_ptr<render::Device>& device;
+  RenderDirectory& directory;
+  pipeline::Metrics& metrics;
+};
+
+// Renders those of the frames that no other process has finished or is rendering, and returns the
+// frames that were left to others.
+std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64_t>& to_do,
+                                      output::Progress& progress) {
+  const auto& [options, take, scene, device, directory, metrics] = job;
+  const set::Set& set = take.set;
+  std::set<std::uint64_t> left;
+  const auto is_wanted = [&](std::uint64_t frame) {
+    if (!to_do.contains(frame)) return false;
+    const Claim claim = directory.claim(frame);
+    if (claim != Claim::mine) left.insert(frame);
+    return claim == Claim::mine;
+  };
+  pipeline::TakeShots shots(take, {.first = *to_do.begin(),
+                                   .last = *to_do.rbegin(),
+                                   .wanted = is_wanted,
+                                   .scene = &scene,
+                                   .note = [&](const std::string& what) { progress.note(what); },
+                                   .metrics = &metrics,
+                                   .stop = options.stop});
+  report::Once light_notes;
+  pipeline::RenderStageOptions render_options;
+  render_options.layers = true;
+  render_options.scale = options.scale;
+  set::Set written = set;  // with the lens of the pictures, for what is written beside them
+  written.observer.calibration = pipeline::scaled(take.observer, options.scale);
+  render_options.cancelled = [&] { return options.stop.stop_requested(); };
+  render_options.progress = [&](const Shot& shot, int samples) {
+    progress.sample(shot.index, samples, set.quality.samples, now_s());
+  };
+  render_options.note = [&](const std::string& what) { progress.note(what); };
+  pipeline::RenderStage render(device, set, take.observer, scene, render_options);
+
+  // One shot ahead of each stage keeps them all busy; whole layers wait in the last queue.
+  pipeline::BoundedQueue<Shot> lit(1), rendered(1);
+  pipeline::StageThreads stages(metrics, options.stop);
+  stages.source("observer", lit, [&] {
+    std::optional<Shot> shot = shots.next();
+    if (shot && shot->light)
+      for (const std::string& what : shot->light->lighting.report.notes)
+        if (light_notes.is_first(report::wording(what))) progress.note("light: " + what);
+    return shot;
+  });
+  stages.stage("render", lit, rendered, [&](Shot shot) {
+    render(shot);
+    return shot;
+  });
+  stages.sink("output", rendered, [&](const Shot& shot) {
+    if (!shot.whole) return directory.release(shot.index);
+    directory.write(shot, written);
+    if (const std::string dropped = dropped_text(shot.counters); !dropped.empty())
+      progress.note("frame " + std::to_string(shot.index) + ": left out " + dropped);
+    progress.frame_done(done_text(shot), now_s());
+    if (options.on_frame) options.on_frame(shot);
+  });
+  stages.wait();
+  return left;
+}
+
+// Renders the frames, and then those that another process had and did not finish: it was killed.
+void render_all(const RenderOptions& options, const pipeline::Take& take,
+                std::set<std::uint64_t> to_do, RenderDirectory& directory,
+                pipeline::Metrics& metrics, std::ostream& out) {
+  const scene::Scene scene = scene::load_scene(take.set);
+  for (const std::string& note : scene.notes) out << "scene: " << note << std::endl;
+  const std::shared_ptr<render::Device> device = render::open_device(options.device);
+  out << take.session.info.name << ": " << to_do.size() << " frames of "
+      << size_words(pipeline::scaled(take.observer, options.scale).intrinsics) << ", "
+      << quality_words(take.set.quality) << ", on " << render::device_name(*device) << std::endl;
+  output::Progress progress(out, options.terminal, to_do.size(), now_s());
+  const Job job{options, take, scene, device, directory, metrics};
+  while (!to_do.empty() && !options.stop.stop_requested()) {
+    const std::set<std::uint64_t> left = render_frames(job, to_do, progress);
+    to_do.clear();
+    std::set<std::uint64_t> at_others;
+    for (const auto& [who, frames] : directory.at_others(left))
+      at_others.insert(frames.begin(), frames.end());
+    for (const std::uint64_t frame : left)
+      if (!directory.finished(frame) && !at_others.contains(frame)) to_do.insert(frame);
+    if (!to_do.empty())
+      progress.note(frames_words({to_do.begin(), to_do.end()}) +
+                    (to_do.size() == 1 ? ": was" : ": were") +
+                    " left unfinished by a process that ended, and " +
+                    (to_do.size() == 1 ? "is" : "are") + " rendered here");
+  }
+}
+
+void report_opened(const RenderDirectory& directory, const RenderReport& report,
+                   std::ostream& out) {
+  const std::string folder = directory.path().string();
+  for (const std::string& note : directory.notes()) out << folder << ": " << note << std::endl;
+  if (report.found_finished > 0)
+    out << folder << ": " << report.found_finished
+        << " frames are finished already, and their files are as they were written" << std::endl;
+  for (const auto& [why, frames] : directory.rejected())
+    out << folder << ": rendered again: " << frames_words(frames) << ": " << why << std::endl;
+}
+
+// Makes the review video if all frames are done, or says who is to be waited for.
+void finish_video(const std::map<std::string, std::vector<std::uint64_t>>& at_others,
+                  bool wants_video, RenderDirectory& directory, RenderReport& report,
+                  std::ostream& out) {
+  const std::string folder = directory.path().string();
+  for (const auto& [who, frames] : at_others) {
+    report.at_others += frames.size();
+    out << folder << ": " << frames_words(frames) << (frames.size() == 1 ? " is" : " are")
+        << " being rendered by " << who << std::endl;
+  }
+  if (report.at_others > 0 && wants_video)
+    out << folder << ": no review video yet; when they are done, run the same command for it"
+        << std::endl;
+  if (report.at_others > 0 || !wants_video || report.frames.empty()) return;
+  if (directory.claim_video())
+    report.video = directory.write_video(report.frames, out);
+  else
+    out << folder << ": another process is making the review video" << std::endl;
+}
+
+}  // namespace
+
 RenderReport render_session(const RenderOptions& options, std::ostream& out) {
   std::optional<set::Overlay> with;
   if (options.with) with = set::read_overlay(*options.with);
@@ -206,77 +338,18 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
   for (std::uint64_t frame = range.first; frame <= range.last; ++frame)
     if (!directory.finished(frame)) to_do.insert(frame);
   report.found_finished = range.last - range.first + 1 - to_do.size();
-
   for (const std::string& what : take.session.missing) out << "session: " << what << std::endl;
-  if (report.found_finished > 0)
-    out << directory.path().string() << ": " << report.found_finished
-        << " frames are finished already, and their files are as they were written" << std::endl;
-  for (const auto& [why, frames] : directory.rejected())
-    out << directory.path().string() << ": rendered again: " << frames_words(frames) << ": " << why
-        << std::endl;
+  report_opened(directory, report, out);
 
   pipeline::Metrics metrics;
   const double start = now_s();
-  if (!to_do.empty()) {
-    const scene::Scene scene = scene::load_scene(set);
-    for (const std::string& note : scene.notes) out << "scene: " << note << std::endl;
-    const std::shared_ptr<render::Device> device = render::open_device(options.device);
-    out << take.session.info.name << ": " << to_do.size() << " frames of "
-        << size_words(pipeline::scaled(take.observer, options.scale).intrinsics) << ", "
-        << quality_words(set.quality) << ", on " << render::device_name(*device) << std::endl;
+  if (!to_do.empty()) render_all(options, take, to_do, directory, metrics, out);
 
-    output::Progress progress(out, options.terminal, to_do.size(), now_s());
-    pipeline::TakeShots shots(take,
-                              {.first = *to_do.begin(),
-                               .last = *to_do.rbegin(),
-                               .wanted = [&](std::uint64_t frame) { return to_do.contains(frame); },
-                               .scene = &scene,
-                               .note = [&](const std::string& what) { progress.note(what); },
-                               .metrics = &metrics,
-                               .stop = options.stop});
-    report::Once light_notes;
-    pipeline::RenderStageOptions render_options;
-    render_options.layers = true;
-    render_options.scale = options.scale;
-    set::Set written = set;  // with the lens of the pictures, for what is written beside them
-    written.observer.calibration = pipeline::scaled(take.observer, options.scale);
-    render_options.cancelled = [&] { return options.stop.stop_requested(); };
-    render_options.progress = [&](const Shot& shot, int samples) {
-      progress.sample(shot.index, samples, set.quality.samples, now_s());
-    };
-    render_options.note = [&](const std::string& what) { progress.note(what); };
-    pipeline::RenderStage render(device, set, take.observer, scene, render_options);
-
-    // One shot ahead of each stage keeps them all busy; whole layers wait in the last queue.
-    pipeline::BoundedQueue<Shot> lit(1), rendered(1);
-    pipeline::StageThreads stages(metrics, options.stop);
-    stages.source("observer", lit, [&] {
-      std::optional<Shot> shot = shots.next();
-      if (shot && shot->light)
-        for (const std::string& what : shot->light->lighting.report.notes)
-          if (light_notes.is_first(report::wording(what))) progress.note("light: " + what);
-      return shot;
-    });
-    stages.stage("render", lit, rendered, [&](Shot shot) {
-      render(shot);
-      return shot;
-    });
-    stages.sink("output", rendered, [&](const Shot& shot) {
-      if (!shot.whole) return;
-      directory.write(shot, written);
-      if (const std::string dropped = dropped_text(shot.counters); !dropped.empty())
-        progress.note("frame " + std::to_string(shot.index) + ": left out " + dropped);
-      progress.frame_done(done_text(shot), now_s());
-      if (options.on_frame) options.on_frame(shot);
-    });
-    stages.wait();
-  }
-
+  const auto at_others = directory.at_others(to_do);
   for (std::uint64_t frame = range.first; frame <= range.last; ++frame)
     if (const FinishedFrame* record = directory.finished(frame)) report.frames.push_back(*record);
   report.interrupted = options.stop.stop_requested();
-  if (set.output.video && !report.interrupted && !report.frames.empty())
-    report.video = directory.write_video(report.frames, out);
+  if (!report.interrupted) finish_video(at_others, set.output.video, directory, report, out);
   report.seconds = now_s() - start;
   report.metrics = metrics.snapshot(report.seconds);
   return report;

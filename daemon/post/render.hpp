@@ -54,6 +54,7 @@ struct RenderReport {
   std::filesystem::path directory;
   std::vector<FinishedFrame> frames;  // every finished frame of the range, in order
   std::size_t found_finished = 0;     // number that an earlier run had finished
+  std::size_t at_others = 0;          // number that other processes are rendering; not in `frames`
   bool interrupted = false;
   double seconds = 0;           // wall clock, without opening the session, scene and device
   std::filesystem::path video;  // empty: none was made
@@ -63,6 +64,10 @@ struct RenderReport {
 // Writes NNNN.exr and NNNN.png for every frame, then review.mp4 over all pictures of the range, and
 //   DIR/render.json   the settings; a run with other settings refuses to mix its frames with these
 //   DIR/frames.jsonl  a line a finished frame (FinishedFrame), with the SHA-256 of its files
+//   DIR/render.lock   who is at work there (FolderLocks)
+// Several processes may render into one DIR: each takes frames that no other is at, and whoever
+// finishes the last frame of its range makes the video. A frame that a killed process had is
+// rendered by another. What others are still rendering at the end is named.
 // Frames that are finished, and whose files are as they were written, are skipped. A frame whose
 // pose is lost, or that no light frame precedes, passes through untouched and is reported so.
 // Progress and notes go to `out`. Throws previz::Error on anything that keeps the job from being

@@ -1,6 +1,8 @@
 #include "daemon/post/render_directory.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
@@ -9,12 +11,14 @@
 #include <optional>
 #include <ostream>
 #include <set>
+#include <sstream>
 #include <utility>
 
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/output/video.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::post {
@@ -57,7 +61,9 @@ void decode(const std::filesystem::path& file) {
 std::string why_broken(const std::filesystem::path& file, bool has_marks, FinishedFrame& record) {
   const std::string its = "its " + file.extension().string();
   std::error_code unknown;
-  if (!std::filesystem::exists(file, unknown)) return its + " is missing";
+  if (!std::filesystem::exists(std::filesystem::symlink_status(file, unknown)))
+    return its + " is missing";
+  if (const std::string why = session::why_not_plain(file); !why.empty()) return its + " " + why;
   const std::string name = file.filename().string();
   try {
     if (!has_marks) {
@@ -86,8 +92,34 @@ std::optional<std::uint64_t> frame_of(const std::filesystem::path& name) {
   return frame;
 }
 
+// Returns what changes when anybody appends to the file or replaces it; empty: there is no file.
+std::string state_of(const std::filesystem::path& file) {
+  // Over NFS, stat(2) may return what was known seconds ago; after an opening it is what is there.
+  const OwnedDescriptor open(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  struct stat now {};
+  if (!open || ::fstat(open.get(), &now) != 0) return "";
+  std::string state;
+  for (const std::int64_t part :
+       {static_cast<std::int64_t>(now.st_ino), static_cast<std::int64_t>(now.st_size),
+        static_cast<std::int64_t>(now.st_mtim.tv_sec),
+        static_cast<std::int64_t>(now.st_mtim.tv_nsec)})
+    state += std::to_string(part) + " ";
+  return state;
+}
+
+// A process that died while it appended may have left half a line.
+void append_line(const std::filesystem::path& file, const std::string& line) {
+  const session::OpenFile lines(file, O_RDWR | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK);
+  const off_t size = ::lseek(lines.get(), 0, SEEK_END);
+  char last = '\n';
+  const bool is_torn = size > 0 && ::pread(lines.get(), &last, 1, size - 1) == 1 && last != '\n';
+  lines.append((is_torn ? "\n" : "") + line + "\n");
+  lines.sync();
+}
+
 }  // namespace
 
+// What takes long, the reading of the pictures, is done while others may go on.
 RenderDirectory::RenderDirectory(const set::Output& output, const std::string& settings, bool force,
                                  const session::TakeClock& clock, FrameRange range,
                                  const std::stop_token& stop)
@@ -96,32 +128,70 @@ RenderDirectory::RenderDirectory(const set::Output& output, const std::string& s
   std::filesystem::create_directories(path(), code);
   if (!std::filesystem::is_directory(path()))
     throw Error(path().string() + ": cannot be made: " + code.message());
-  if (!force) read_finished();
-  if (!finished_.empty()) check_settings(settings);
-  if (!force) {
-    reject_without_line(range);
-    reject_broken(range, stop);
+  for (const char* name : {settings_name, lines_name})
+    if (const std::string why = session::why_not_plain(path() / name); !why.empty())
+      throw Error((path() / name).string() + ": " + why);
+  const std::vector<std::string> drafts = session::remove_dead_drafts(path());
+  if (!drafts.empty()) {
+    std::string names;
+    for (const std::string& name : drafts) add_to_list(names, name);
+    notes_.push_back("removed, half written by a process that was killed: " + names);
   }
-  session::replace_file(path() / settings_name, settings);
-  std::string lines;
-  for (const auto& [frame, record] : finished_) lines += to_json(record) + "\n";
-  session::replace_file(path() / lines_name, lines);
+  locks_.emplace(path());
+  if (!locks_->missing().empty()) notes_.push_back(locks_->missing());
+  begin(settings, force, range, stop);
+  verify(range, stop);
 }
 
-void RenderDirectory::check_settings(const std::string& settings) const {
-  const std::filesystem::path name = path() / settings_name;
-  std::ifstream file(name);
-  const auto there = nlohmann::json::parse(file, nullptr, /*allow_exceptions=*/false);
-  const std::string differ =
-      there.is_object() ? differences(there, nlohmann::json::parse(settings)) : "it cannot be read";
-  if (!differ.empty())
-    throw Error(name.string() + ": the frames there were rendered with other settings (" + differ +
+// Finds out whether the pictures of this run may go beside what is there, and joins.
+void RenderDirectory::begin(const std::string& settings, bool force, FrameRange range,
+                            const std::stop_token& stop) {
+  const FolderLocks::Transaction transaction(*locks_, stop);
+  const std::vector<FolderUser> others = locks_->others();
+  std::string who;
+  for (const FolderUser& user : others) add_to_list(who, words_of(user), "; ");
+  if (!who.empty()) notes_.push_back("also at work here: " + who);
+  read_lines();
+  const std::string name = (path() / settings_name).string();
+  const bool is_new = finished_.empty() && others.empty();
+  const std::string differ = is_new ? "" : differences_from(settings);
+  if (!differ.empty() && !others.empty())
+    throw Error(name + ": other settings are being rendered there (" + differ + ") by " + who +
+                "; name another directory with --out, or wait until they have ended");
+  if (!differ.empty() && !force)
+    throw Error(name + ": the frames there were rendered with other settings (" + differ +
                 "); name another directory with --out, or render them again with --force");
+  if (force && !others.empty())
+    notes_.push_back(
+        "--force is ignored while others are at work here, so that what they finish "
+        "stays; use it with the first command only");
+  if (force && others.empty()) {
+    if (!differ.empty())
+      finished_.clear();
+    else
+      finished_.erase(finished_.lower_bound(range.first), finished_.upper_bound(range.last));
+    write_lines();
+  }
+  if (is_new || !differ.empty()) session::replace_file(path() / settings_name, settings);
+  locks_->join();
 }
 
-void RenderDirectory::read_finished() {
-  std::ifstream file(path() / lines_name);
-  for (std::string line; std::getline(file, line);) {
+std::string RenderDirectory::differences_from(const std::string& settings) const {
+  const std::filesystem::path name = path() / settings_name;
+  std::error_code unknown;
+  if (!std::filesystem::exists(name, unknown)) return "it cannot be read";
+  const auto there = nlohmann::json::parse(session::read_plain_file(name), nullptr,
+                                           /*allow_exceptions=*/false);
+  return there.is_object() ? differences(there, nlohmann::json::parse(settings))
+                           : "it cannot be read";
+}
+
+void RenderDirectory::read_lines() {
+  const std::string state = state_of(path() / lines_name);
+  if (state == lines_state_) return;
+  finished_.clear();
+  std::istringstream text(state.empty() ? "" : session::read_plain_file(path() / lines_name));
+  for (std::string line; std::getline(text, line);) {
     try {
       const FinishedFrame record = from_json(line);
       finished_[record.frame] = record;
@@ -129,13 +199,56 @@ void RenderDirectory::read_finished() {
       // A power cut may leave a line half written; its frame is rendered again.
     }
   }
+  lines_state_ = state;
+}
+
+void RenderDirectory::write_lines() const {
+  std::string lines;
+  for (const auto& [frame, record] : finished_) lines += to_json(record) + "\n";
+  session::replace_file(path() / lines_name, lines);
+}
+
+// Reads the pictures without the locks. What another process has done to a frame meanwhile holds.
+void RenderDirectory::verify(FrameRange range, const std::stop_token& stop) {
+  std::map<std::uint64_t, std::string> before, why_not;
+  std::map<std::uint64_t, FinishedFrame> read = finished_;
+  for (auto at = read.lower_bound(range.first); at != read.end() && at->first <= range.last; ++at) {
+    if (stop.stop_requested())
+      throw Error(path().string() +
+                  ": interrupted while the finished frames were checked; nothing was changed, the "
+                  "same command starts again");
+    auto& [frame, record] = *at;
+    before[frame] = to_json(record);
+    const bool has_marks = !record.files.empty();
+    std::string& why = why_not[frame];
+    for (const char* extension : extensions())
+      if (why.empty()) why = why_broken(file(frame, extension), has_marks, record);
+  }
+
+  const FolderLocks::Transaction transaction(*locks_, stop);
+  read_lines();
+  for (const auto& [frame, why] : why_not) {
+    const auto now = finished_.find(frame);
+    if (now == finished_.end() || to_json(now->second) != before[frame] ||
+        locks_->is_at_another(frame))
+      continue;
+    now->second = read[frame];
+    if (why.empty()) continue;
+    rejected_[why].push_back(frame);
+    finished_.erase(now);
+  }
+  reject_without_line(range);
+  write_lines();
+  lines_state_ = state_of(path() / lines_name);
 }
 
 void RenderDirectory::reject_without_line(FrameRange range) {
-  std::set<std::uint64_t> frames;
+  std::set<std::uint64_t> frames, broken;
+  for (const auto& [why, of_these] : rejected_) broken.insert(of_these.begin(), of_these.end());
   for (const auto& entry : std::filesystem::directory_iterator(path())) {
     const std::optional<std::uint64_t> frame = frame_of(entry.path().filename());
-    if (!frame || *frame < range.first || *frame > range.last || finished_.contains(*frame))
+    if (!frame || *frame < range.first || *frame > range.last || finished_.contains(*frame) ||
+        broken.contains(*frame) || locks_->is_at_another(*frame))
       continue;
     for (const char* extension : extensions())
       if (file(*frame, extension).filename() == entry.path().filename()) frames.insert(*frame);
@@ -143,23 +256,6 @@ void RenderDirectory::reject_without_line(FrameRange range) {
   if (!frames.empty())
     rejected_["it has no whole line in " + std::string(lines_name)].assign(frames.begin(),
                                                                            frames.end());
-}
-
-void RenderDirectory::reject_broken(FrameRange range, const std::stop_token& stop) {
-  for (auto at = finished_.lower_bound(range.first);
-       at != finished_.end() && at->first <= range.last;) {
-    if (stop.stop_requested())
-      throw Error(path().string() +
-                  ": interrupted while the finished frames were checked; nothing was changed, the "
-                  "same command starts again");
-    auto& [frame, record] = *at;
-    const bool has_marks = !record.files.empty();
-    std::string why;
-    for (const char* extension : extensions())
-      if (why.empty()) why = why_broken(file(frame, extension), has_marks, record);
-    if (!why.empty()) rejected_[why].push_back(frame);
-    at = why.empty() ? std::next(at) : finished_.erase(at);
-  }
 }
 
 std::vector<const char*> RenderDirectory::extensions() const {
@@ -175,13 +271,55 @@ std::filesystem::path RenderDirectory::file(std::uint64_t frame, const char* ext
   return path() / (number + extension);
 }
 
+bool RenderDirectory::is_there(std::uint64_t frame, const char* extension) const {
+  std::error_code unknown;
+  return std::filesystem::is_regular_file(
+      std::filesystem::symlink_status(file(frame, extension), unknown));
+}
+
 const FinishedFrame* RenderDirectory::finished(std::uint64_t frame) const {
   const auto found = finished_.find(frame);
   const bool whole =
       found != finished_.end() && std::ranges::all_of(extensions(), [&](const char* extension) {
-        return std::filesystem::exists(file(frame, extension));
+        return is_there(frame, extension);
       });
   return whole ? &found->second : nullptr;
+}
+
+Claim RenderDirectory::claim(std::uint64_t frame) {
+  const std::lock_guard guard(mutex_);
+  const FolderLocks::Transaction transaction(*locks_);
+  read_lines();
+  if (finished(frame)) return Claim::finished;
+  return locks_->claim(frame) ? Claim::mine : Claim::at_another;
+}
+
+void RenderDirectory::release(std::uint64_t frame) {
+  const std::lock_guard guard(mutex_);
+  const FolderLocks::Transaction transaction(*locks_);
+  locks_->release(frame);
+}
+
+std::map<std::string, std::vector<std::uint64_t>> RenderDirectory::at_others(
+    const std::set<std::uint64_t>& frames) {
+  const std::lock_guard guard(mutex_);
+  const FolderLocks::Transaction transaction(*locks_);
+  read_lines();
+  const std::vector<FolderUser> others = locks_->others();
+  std::map<std::string, std::vector<std::uint64_t>> held;
+  for (const std::uint64_t frame : frames) {
+    if (finished(frame) || !locks_->is_at_another(frame)) continue;
+    const auto user = std::ranges::find_if(
+        others, [&](const FolderUser& other) { return other.frames.contains(frame); });
+    held[words_of(user == others.end() ? FolderUser{} : *user)].push_back(frame);
+  }
+  return held;
+}
+
+bool RenderDirectory::claim_video() {
+  const std::lock_guard guard(mutex_);
+  const FolderLocks::Transaction transaction(*locks_);
+  return locks_->claim_video();
 }
 
 void RenderDirectory::write(const pipeline::Shot& shot, const set::Set& set) {
@@ -198,10 +336,13 @@ void RenderDirectory::write(const pipeline::Shot& shot, const set::Set& set) {
     const std::filesystem::path written = file(shot.index, extension);
     record.files[written.filename().string()] = mark_of(written);
   }
-  const session::OpenFile lines(path() / lines_name, O_WRONLY | O_CREAT | O_APPEND);
-  lines.append(to_json(record) + "\n");
-  lines.sync();
+  const std::lock_guard guard(mutex_);
+  const FolderLocks::Transaction transaction(*locks_);
+  read_lines();
+  append_line(path() / lines_name, to_json(record));
   finished_[record.frame] = record;
+  lines_state_ = state_of(path() / lines_name);
+  locks_->release(record.frame);
 }
 
 std::filesystem::path RenderDirectory::write_video(const std::vector<FinishedFrame>& frames,

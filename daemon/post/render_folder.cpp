@@ -33,6 +33,8 @@ std::optional<std::uint64_t> rendered_frames(const output::ListedTake& take) {
   } catch (const Error&) {
     return std::nullopt;
   }
+  std::error_code unknown;
+  if (!fs::is_regular_file(fs::symlink_status(folder / "frames.jsonl", unknown))) return 0;
   std::ifstream lines(folder / "frames.jsonl");
   std::uint64_t count = 0;
   for (std::string line; std::getline(lines, line);) ++count;

@@ -1,15 +1,24 @@
 // What a render leaves behind, and how the next one goes on from it.
 #include "daemon/post/render_directory.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <array>
+#include <cerrno>
+#include <csignal>
 #include <fstream>
+#include <set>
 #include <sstream>
+#include <thread>
 
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/post/render.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -245,6 +254,160 @@ TEST_F(RenderDirectoryTest, OtherSettingsAreRefusedByNameUnlessForced) {
 TEST_F(RenderDirectoryTest, WithoutFinishedFramesOtherSettingsAreNoMatter) {
   open();
   EXPECT_NO_THROW(open(R"({"samples": 64})"));
+}
+
+// Two objects stand for two processes: the locks are of the open file, not of the process.
+TEST_F(RenderDirectoryTest, TwoShareTheFramesAndLoseNoLine) {
+  constexpr std::uint64_t count = 24;
+  RenderDirectory first = open(), second = open();
+  std::array<std::set<std::uint64_t>, 2> written;
+  const auto work = [&](RenderDirectory& directory, std::set<std::uint64_t>& own) {
+    for (std::uint64_t frame = 0; frame < count; ++frame) {
+      if (directory.claim(frame) != Claim::mine) continue;
+      own.insert(frame);
+      directory.write(sample_shot(frame), set_);
+    }
+  };
+  {
+    const std::jthread other([&] { work(first, written[0]); });
+    work(second, written[1]);
+  }
+  EXPECT_EQ(written[0].size() + written[1].size(), count);  // none twice, none left out
+  std::istringstream lines(content_of(directory_ / "out/frames.jsonl"));
+  std::set<std::uint64_t> found;
+  for (std::string line; std::getline(lines, line);)
+    EXPECT_TRUE(found.insert(from_json(line).frame).second) << line;
+  EXPECT_EQ(found.size(), count);
+}
+
+TEST_F(RenderDirectoryTest, WhatAnotherHasIsNamedWithWho) {
+  RenderDirectory first = open();
+  EXPECT_EQ(first.claim(7), Claim::mine);
+  EXPECT_EQ(first.claim(12), Claim::mine);
+  RenderDirectory second = open();
+  ASSERT_EQ(second.notes().size(), 1u);
+  EXPECT_NE(second.notes()[0].find("also at work here: previzd"), std::string::npos);
+  EXPECT_EQ(second.claim(7), Claim::at_another);
+  EXPECT_EQ(second.claim(8), Claim::mine);
+  const auto held = second.at_others({7, 8, 9, 12});
+  ASSERT_EQ(held.size(), 1u);
+  EXPECT_EQ(held.begin()->second, (std::vector<std::uint64_t>{7, 12}));
+  std::array<char, 256> host{};
+  ::gethostname(host.data(), host.size() - 1);
+  const std::string& who = held.begin()->first;
+  EXPECT_EQ(
+      who.find("previzd " + std::to_string(::getpid()) + " on host " + host.data() + ", since 20"),
+      0u)
+      << who;
+  first.write(sample_shot(7), set_);
+  first.release(12);
+  EXPECT_EQ(second.claim(7), Claim::finished);
+  EXPECT_EQ(second.claim(12), Claim::mine);
+}
+
+// The other process holds a frame, is in the middle of a picture and of a line, and is killed.
+TEST_F(RenderDirectoryTest, FramesOfAKilledProcessAreFreeAgain) {
+  RenderDirectory directory = open();
+  directory.write(sample_shot(0), set_);
+  std::array<int, 2> ready{};
+  ASSERT_EQ(::pipe(ready.data()), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    RenderDirectory other = open();
+    const bool has_it = other.claim(3) == Claim::mine;
+    const session::Draft draft(directory_ / "out/0003.exr");
+    std::ofstream(directory_ / "out/frames.jsonl", std::ios::app) << R"({"frame":3,"ti)";
+    [[maybe_unused]] const ssize_t sent = ::write(ready[1], has_it ? "y" : "n", 1);
+    for (;;) ::pause();
+  }
+  char answer = 0;
+  ASSERT_EQ(::read(ready[0], &answer, 1), 1);
+  EXPECT_EQ(answer, 'y');
+  EXPECT_EQ(directory.claim(3), Claim::at_another);
+  EXPECT_EQ(directory.at_others({3}).size(), 1u);
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
+  for (const int end : ready) ::close(end);
+
+  EXPECT_TRUE(directory.at_others({3}).empty());
+  EXPECT_EQ(directory.claim(3), Claim::mine);
+  directory.write(sample_shot(3), set_);  // its line must not run into the half one
+  const RenderDirectory again = open();
+  EXPECT_NE(again.finished(0), nullptr);
+  EXPECT_NE(again.finished(3), nullptr);
+  ASSERT_EQ(again.notes().size(), 2u);
+  EXPECT_NE(again.notes()[0].find(".0003.exr."), std::string::npos) << again.notes()[0];
+}
+
+TEST_F(RenderDirectoryTest, OtherSettingsAreRefusedWhileAnotherIsAtWorkEvenIfForced) {
+  constexpr const char* other = R"({"samples": 64, "set": "another text"})";
+  RenderDirectory running = open();  // and has finished nothing yet
+  EXPECT_THROW(open(other), Error);
+  EXPECT_THROW(open(other, true), Error);
+  running.write(sample_shot(0), set_);
+  const RenderDirectory forced = open(settings, true);  // would take from it what it has finished
+  EXPECT_NE(forced.finished(0), nullptr);
+  EXPECT_NE(forced.notes().back().find("--force is ignored"), std::string::npos);
+}
+
+TEST_F(RenderDirectoryTest, ForceOfAFewFramesKeepsTheLinesOfTheOthers) {
+  {
+    RenderDirectory directory = open();
+    for (const std::uint64_t frame : {0, 1, 2}) directory.write(sample_shot(frame), set_);
+  }
+  { const RenderDirectory forced(output_, settings, true, {}, {1, 1}); }
+  const RenderDirectory again = open();
+  EXPECT_NE(again.finished(0), nullptr);
+  EXPECT_EQ(again.finished(1), nullptr);
+  EXPECT_NE(again.finished(2), nullptr);
+}
+
+TEST_F(RenderDirectoryTest, NothingIsWrittenThroughALink) {
+  write_content(directory_ / "elsewhere", "mine");
+  for (const char* name : {"frames.jsonl", "render.json", "render.lock"}) {
+    std::filesystem::remove_all(directory_ / "out");
+    std::filesystem::create_directory(directory_ / "out");
+    std::filesystem::create_symlink("../elsewhere", directory_ / "out" / name);
+    EXPECT_THROW(open(), Error) << name;
+  }
+  std::filesystem::remove_all(directory_ / "out");
+  {
+    RenderDirectory directory = open();
+    directory.write(sample_shot(0), set_);
+    std::filesystem::rename(directory_ / "out/frames.jsonl", directory_ / "lines");
+    std::filesystem::create_symlink("../lines", directory_ / "out/frames.jsonl");
+    EXPECT_THROW(directory.write(sample_shot(1), set_), Error);
+    std::filesystem::rename(directory_ / "lines", directory_ / "out/frames.jsonl");
+  }
+  // A picture that is a link to the very same bytes elsewhere is rendered again, in its place.
+  std::filesystem::rename(directory_ / "out/0000.png", directory_ / "picture");
+  std::filesystem::create_symlink("../picture", directory_ / "out/0000.png");
+  const std::string before = content_of(directory_ / "picture");
+  RenderDirectory again = open();
+  ASSERT_EQ(again.rejected().size(), 1u);
+  EXPECT_EQ(again.rejected().begin()->first.find("its .png is a link"), 0u);
+  pipeline::Shot shot = sample_shot(0);
+  shot.picture =
+      std::make_shared<const Plate>(Plate{8, 6, 8, std::vector<std::uint16_t>(3 * 8 * 6, 7)});
+  again.write(shot, set_);
+  EXPECT_FALSE(std::filesystem::is_symlink(directory_ / "out/0000.png"));
+  EXPECT_EQ(content_of(directory_ / "picture"), before);
+  EXPECT_EQ(content_of(directory_ / "elsewhere"), "mine");
+}
+
+// fcntl(2) of a file system without locks.
+TEST(FolderLocks, WithoutLocksOfTheFileSystemEveryClaimSucceedsAndThatIsSaid) {
+  const test::TemporaryDirectory directory;
+  FolderLocks locks(directory.path(), [](int, int, struct flock*) {
+    errno = EOPNOTSUPP;
+    return -1;
+  });
+  EXPECT_NE(locks.missing().find("the file system has no locks"), std::string::npos);
+  const FolderLocks::Transaction transaction(locks);
+  locks.join();
+  EXPECT_TRUE(locks.claim(3));
+  EXPECT_FALSE(locks.is_at_another(3));
+  EXPECT_TRUE(locks.others().empty());
 }
 
 TEST_F(RenderDirectoryTest, VideoIsMadeOfThePicturesInOrder) {

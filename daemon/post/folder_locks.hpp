@@ -1,0 +1,91 @@
+// Shares a folder of rendered pictures between processes, on one machine or on several over NFS:
+// says which frame is at whose, and lets one at a time change what is common. The locks are those
+// of fcntl(2), F_OFD_SETLK, on bytes of DIR/render.lock; they go with the death of their process.
+// The text in that file is for people and for messages; what holds is the locks.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <set>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "drivers/descriptor.hpp"
+
+struct flock;
+
+namespace previz::post {
+
+// A process that is at work in the folder.
+struct FolderUser {
+  std::string host;  // empty: its line in render.lock is not whole
+  std::int64_t pid = 0;
+  std::string since;               // "2026-11-25 14:03 UTC"
+  std::set<std::uint64_t> frames;  // that it is rendering
+};
+
+// Returns "previzd 4711 on host a, since 2026-11-25 14:03 UTC".
+std::string words_of(const FolderUser& user);
+
+// Not for several threads at once; two objects exclude each other even in one process.
+class FolderLocks {
+ public:
+  static constexpr const char* file_name = "render.lock";
+  // As fcntl(2); a test puts a file system without locks in its place.
+  using LockCall = int (*)(int descriptor, int command, struct flock* range);
+
+  // Opens or makes render.lock. Throws previz::Error, also where that is a link.
+  explicit FolderLocks(const std::filesystem::path& folder);
+  FolderLocks(const std::filesystem::path& folder, LockCall call);
+  ~FolderLocks();  // lets everything go, and takes the process's line out of the text
+  FolderLocks(const FolderLocks&) = delete;
+  FolderLocks& operator=(const FolderLocks&) = delete;
+
+  // Why the file system has no locks: then every claim succeeds. Empty: it has.
+  const std::string& missing() const { return missing_; }
+
+  // As long as it lives, no other process is in one.
+  class Transaction {
+   public:
+    // Waits for it; throws previz::Error on a stop, or after five minutes, naming who else is
+    // there: a transaction takes less than a second.
+    explicit Transaction(FolderLocks& locks, const std::stop_token& stop = {});
+    ~Transaction();
+    Transaction(const Transaction&) = delete;
+    Transaction& operator=(const Transaction&) = delete;
+
+   private:
+    FolderLocks& locks_;
+  };
+
+  // All that follow are called within a transaction. They throw previz::Error where render.lock
+  // cannot be written or read.
+
+  // Adds this process to those that are at work here.
+  void join();
+  // Returns the other processes that are at work here.
+  std::vector<FolderUser> others() const;
+  // Takes a frame; returns false if another process has it.
+  bool claim(std::uint64_t frame);
+  void release(std::uint64_t frame);
+  bool is_at_another(std::uint64_t frame) const;
+  // Takes the review video, until this object ends; returns false if another process has it.
+  bool claim_video();
+
+ private:
+  bool lock(std::uint64_t byte);
+  void unlock(std::uint64_t byte);
+  bool is_locked_by_another(std::uint64_t byte) const;
+  std::vector<std::string> lines() const;
+  void write_own_line();
+
+  std::filesystem::path file_;
+  OwnedDescriptor open_;
+  LockCall call_;
+  std::string missing_;
+  std::int64_t line_ = -1;  // of this process in the text; -1: none yet
+  FolderUser self_;
+};
+
+}  // namespace previz::post
