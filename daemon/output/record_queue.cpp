@@ -155,6 +155,16 @@ bool RecordQueue::trim_ring() {
   return is_short;
 }
 
+std::vector<FramePtr> RecordQueue::newest_of_ring(double seconds) const {
+  std::vector<FramePtr> newest;
+  for (const Entry& entry : ring_)
+    if (const auto* captured = std::get_if<Captured>(&entry)) newest.push_back(captured->frame);
+  if (newest.empty()) return newest;
+  const std::int64_t begin = newest.back()->timestamp_ns - static_cast<std::int64_t>(1e9 * seconds);
+  std::erase_if(newest, [&](const FramePtr& frame) { return frame->timestamp_ns < begin; });
+  return newest;
+}
+
 double RecordQueue::ring_length_s() const {
   std::optional<std::int64_t> first, last;
   for (const Entry& entry : ring_)

@@ -101,6 +101,8 @@ class RecordQueue {
   void give_back(Queued queued);    // the one that was popped last
   session::Losses take_left_out();  // after the last entry; the next one does not say it then
 
+  // The newest frames of the ring, of both cameras, that it holds within so many seconds.
+  std::vector<FramePtr> newest_of_ring(double seconds) const;
   double ring_length_s() const;  // from its oldest frame to its newest
   std::uint64_t ring_bytes() const { return ring_bytes_; }
   // Returns the time of the newest observer frame that was queued.

@@ -161,6 +161,7 @@ class Recorder {
   void abandon(Take& take, const std::string& why);
   void check_disk();
   void compare_speeds();
+  void note_slow(double taken, double delivered, double bytes_a_s);
   std::string why_not_own(std::size_t folder);
   void take_news();  // of the folders' watches
   void look_for_interruption(const std::vector<FolderSeen>& seen, bool are_known);

@@ -1,6 +1,8 @@
 // What the recorder does about its disks.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <utility>
 
 #include "daemon/output/recorder.hpp"
@@ -107,28 +109,49 @@ void Recorder::check_disk() {
                               take_->writer->directory().string());
 }
 
-// Compares what the cameras deliver, by the ring, with what the disk takes. FFV1 packs pictures of
-// a camera to about half.
+// Compares what the cameras deliver, by the ring, with what encoder and disk take together.
 void Recorder::compare_speeds() {
-  constexpr double packed = 0.5, least_length_s = 0.5;
-  double rate = 0;
+  constexpr double least_length_s = 0.5;
+  double bytes_a_s = 0;
+  std::vector<FramePtr> frames;
   {
     const std::lock_guard lock(mutex_);
     const double length_s = queue_.ring_length_s();
     if (status_.recording || length_s <= 0) return;
     if (length_s < std::min(least_length_s, 0.5 * options_.preroll_s)) return;
-    rate = static_cast<double>(queue_.ring_bytes()) / length_s;
+    bytes_a_s = static_cast<double>(queue_.ring_bytes()) / length_s;
+    frames = queue_.newest_of_ring(least_length_s);
   }
+  if (frames.size() < 2 || frames.back()->timestamp_ns <= frames.front()->timestamp_ns) return;
   has_compared_speeds_ = true;
+  const auto span_ns = frames.back()->timestamp_ns - frames.front()->timestamp_ns;
+  const double delivered =
+      1e9 * static_cast<double>(frames.size() - 1) / static_cast<double>(span_ns);
   try {
-    const std::optional<double> speed = folders_.measure_speed();
-    if (!speed || *speed > packed * rate) return;
-    note(Severity::warning, "the disk takes " + megabytes(*speed) +
-                                " a second, and the cameras deliver " + megabytes(rate) +
-                                ": takes will lack frames");
+    const std::optional<double> taken = folders_.measure_frame_rate(frames, options_.take.codec);
+    if (taken && *taken < delivered) note_slow(*taken, delivered, bytes_a_s);
   } catch (const std::exception& error) {
-    note(Severity::warning, std::string("the disk's speed is not known: ") + error.what());
+    note(Severity::warning,
+         std::string("how fast takes can be written is not known: ") + error.what());
   }
+}
+
+void Recorder::note_slow(double taken, double delivered, double bytes_a_s) {
+  std::array<char, 160> figures{};
+  std::snprintf(figures.data(), figures.size(),
+                "encoder and disk take %.3g pictures a second, and the cameras deliver %.3g: takes "
+                "will lack frames",
+                taken, delivered);
+  std::string text = figures.data();
+  if (options_.take.codec == session::VideoCodec::ffv1) {
+    const std::optional<double> disk = folders_.measure_speed();
+    if (disk)
+      text += "; recording.codec = \"raw\" needs no encoder and a disk of " + megabytes(bytes_a_s) +
+              " a second, and this one takes " + megabytes(*disk);
+  } else {
+    text += "; it needs a faster disk, or recording.codec = \"ffv1\", which is smaller";
+  }
+  note(Severity::warning, text);
 }
 
 std::optional<std::uint64_t> Recorder::free_bytes() const {

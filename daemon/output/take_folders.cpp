@@ -13,6 +13,7 @@
 #include "daemon/output/folder_watch.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
+#include "drivers/session/session.hpp"
 
 namespace previz::output {
 namespace {
@@ -114,6 +115,24 @@ std::optional<double> TakeFolders::measure_speed() {
       probe.file().sync();
     }
   }
+  return static_cast<double>(written) / std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+std::optional<double> TakeFolders::measure_frame_rate(const std::vector<FramePtr>& frames,
+                                                      session::VideoCodec codec) {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::chrono::seconds long_enough{1}, at_the_end{1000};
+  const std::filesystem::path folder = folders_[choose()];
+  std::uint64_t bytes = 0;
+  for (const FramePtr& frame : frames) bytes += frame->bytes.size();
+  if (free_on_disk_of(folder, free_bytes_) < reserve_bytes_ + 2 * bytes) return std::nullopt;
+  const session::DraftFolder draft(folder / "speed");  // which goes at the end
+  std::size_t written = 0;
+  session::SessionWriter trial(draft.path(), {}, at_the_end, codec);
+  const Clock::time_point begin = Clock::now();
+  for (; written < frames.size() && Clock::now() - begin < long_enough; ++written)
+    trial.write(*frames[written]);
+  trial.close();
   return static_cast<double>(written) / std::chrono::duration<double>(Clock::now() - begin).count();
 }
 

@@ -13,6 +13,9 @@
 #include <string>
 #include <vector>
 
+#include "drivers/frame.hpp"
+#include "drivers/session/video_codec.hpp"
+
 namespace previz::output {
 
 // Returns whether both folders are, or will be made, on one disk.
@@ -71,6 +74,11 @@ class TakeFolders {
   // file of up to 64 MB that is removed again; at most about a second. Nothing if there is no room
   // for it. Throws previz::Error.
   std::optional<double> measure_speed();
+  // Records frames, as takes are, into a folder that is removed again, until all of them are on the
+  // medium or a second is over. Returns how many were written a second; nothing if there is no
+  // room. Throws previz::Error.
+  std::optional<double> measure_frame_rate(const std::vector<FramePtr>& frames,
+                                           session::VideoCodec codec);
 
   // Writes into the take's folder that it is being recorded. Throws previz::Error.
   static void keep_wish(const std::filesystem::path& take);

@@ -93,7 +93,7 @@ int next_take_number(const std::vector<std::filesystem::path>& folders, const st
 TakeWriter::TakeWriter(const TakeTemplate& take, const std::filesystem::path& folder, int number)
     : take_(numbered(take, number)),
       directory_(folder / take_name(take_.slate, take_.number)),
-      writer_(directory_, session_info(take, take_)) {}
+      writer_(directory_, session_info(take, take_), std::chrono::seconds(1), take.codec) {}
 
 bool TakeWriter::fits(const Frame& frame) const {
   const auto found = formats_.find(frame.source);

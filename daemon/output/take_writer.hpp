@@ -21,6 +21,7 @@ struct TakeTemplate {
   std::vector<std::filesystem::path> folders;  // of takes, each perhaps on a disk of its own
   session::SessionInfo info;  // calibrations, set; take: slate, notes and timecode_fps
   std::vector<std::pair<std::string, std::filesystem::path>> assets;
+  session::VideoCodec codec = session::VideoCodec::ffv1;  // of the cameras' pictures
 };
 
 // Both return a time of day as "HH:MM:SS:FF", without drop-frame: the frames of a second are

@@ -50,6 +50,7 @@ output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& camer
                                      set.recording.timecode_fps,
                                      set.recording.notes,
                                      false};
+  take.codec = set.recording.codec;
   try {
     take.assets = scene::assets_of(set);
   } catch (const Error& error) {

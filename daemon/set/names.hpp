@@ -20,6 +20,14 @@ constexpr auto names(ContactWiring::Bias) {
                                                    {"pull_down", ContactWiring::Bias::pull_down}});
 }
 
+namespace session {
+
+constexpr auto names(VideoCodec) {
+  return std::to_array<Name<VideoCodec>>({{"ffv1", VideoCodec::ffv1}, {"raw", VideoCodec::raw}});
+}
+
+}  // namespace session
+
 namespace set {
 
 using previz::name_of;

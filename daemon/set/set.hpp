@@ -15,6 +15,7 @@
 #include "drivers/calibration.hpp"
 #include "drivers/camera_settings.hpp"
 #include "drivers/display.hpp"
+#include "drivers/session/video_codec.hpp"
 
 namespace previz::set {
 
@@ -272,7 +273,8 @@ struct Recording {
   std::optional<double> queue_mb;  // limit of what is kept in memory; absent: by free memory
   double reserve_mb = 512;         // free disk space at which a take ends
   double timecode_fps = 25;
-  bool composite = false;    // the shown picture is recorded too
+  session::VideoCodec codec = session::VideoCodec::ffv1;  // of the cameras' pictures
+  bool composite = false;                                 // the shown picture is recorded too
   bool end_over_bus = true;  // members of the bus may end a take; buttons always may
 };
 

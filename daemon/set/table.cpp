@@ -332,6 +332,7 @@ Keys recording_keys(Recording& r) {
       {"notes", &r.notes, plain, "Notes that are written into every take.", optional("\"second unit, 35 mm\"")},
       {"preroll_s", &r.preroll_s, seconds.within(0, 60), "A take begins this long before the button was pressed; the frames are kept in memory until then."},
       {"most_behind_s", &r.most_behind_s, seconds.within(0.2, 600), "A frame is left out, counted and reported if the disk and the encoder are more than this behind the cameras: what waits in memory is lost where the computer goes down. What pre-roll adds at the beginning of a take is given ten seconds."},
+      {"codec", &r.codec, plain, "Form of the cameras' pictures in a take, both without loss: ffv1 is about half as large and costs a processor core for every few pictures of 1920x1080 a second; raw costs a fast disk (1920x1080 at 25 pictures a second: 160 MB a second) and no processor. The rig says before the first take which does not keep up."},
       {"queue_mb", &r.queue_mb, megabytes.within(1, 1e6), "Memory for frames that wait for the disk, half of it for those before the button. Frames that do not fit are dropped, counted and reported. Default: a quarter of the memory that is free at the start.", optional("1024.0")},
       {"reserve_mb", &r.reserve_mb, megabytes.within(1, 1e9), "A take is ended properly before less disk space than this is left."},
       {"timecode_fps", &r.timecode_fps, plain.within(1, 240), "Frames per second of the timecode (time of day)."},

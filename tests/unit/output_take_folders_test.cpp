@@ -253,8 +253,22 @@ TEST(Recorder, WarnsOfADiskThatIsTooSlowForTheCameras) {
   }
   EXPECT_TRUE(wait_until("it is compared", [&] {
     const std::lock_guard lock(disks.mutex);
-    return mentions(disks.notes, "takes will lack frames");
+    return mentions(disks.notes, "takes will lack frames; recording.codec = \"raw\" needs");
   }));
+}
+
+TEST(Recorder, WritesTheFormThatTheSetWants) {
+  TwoDisks disks;
+  RecorderOptions options = disks.options();
+  options.take.codec = session::VideoCodec::raw;
+  Recorder recorder(std::move(options));
+  recorder.start();
+  for (std::uint64_t i = 0; i < 3; ++i) recorder.offer(picture(i));
+  recorder.stop();
+  recorder.finish();
+  const std::filesystem::path take = disks.directory / "first/12A_take001";
+  EXPECT_EQ(frames_of(take, 0), 3u);
+  EXPECT_NE(session::read_file(take / "session.toml").find("codec = \"raw\""), std::string::npos);
 }
 
 // As `umount -l` does it: files that are open stay so, and nobody finds them by name.

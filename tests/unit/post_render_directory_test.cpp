@@ -379,6 +379,8 @@ TEST_F(RenderDirectoryTest, NothingIsWrittenThroughALink) {
     EXPECT_THROW(directory.write(sample_shot(1), set_), Error);
     std::filesystem::rename(directory_ / "lines", directory_ / "out/frames.jsonl");
   }
+  for (const char* name : {"0001.exr", "0001.png"})  // of the frame whose line was refused
+    std::filesystem::remove(directory_ / "out" / name);
   // A picture that is a link to the very same bytes elsewhere is rendered again, in its place.
   std::filesystem::rename(directory_ / "out/0000.png", directory_ / "picture");
   std::filesystem::create_symlink("../picture", directory_ / "out/0000.png");
