@@ -201,7 +201,10 @@ struct Job {
 // frames that were left to others.
 std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64_t>& to_do,
                                       output::Progress& progress) {
-  const auto& [options, take, scene, device, directory, metrics] = job;
+  // No structured binding: clang 14's lambdas cannot capture one.
+  const RenderOptions& options = job.options;
+  const pipeline::Take& take = job.take;
+  RenderDirectory& directory = job.directory;
   const set::Set& set = take.set;
   std::set<std::uint64_t> left;
   const auto is_wanted = [&](std::uint64_t frame) {
@@ -213,9 +216,9 @@ std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64
   pipeline::TakeShots shots(take, {.first = *to_do.begin(),
                                    .last = *to_do.rbegin(),
                                    .wanted = is_wanted,
-                                   .scene = &scene,
+                                   .scene = &job.scene,
                                    .note = [&](const std::string& what) { progress.note(what); },
-                                   .metrics = &metrics,
+                                   .metrics = &job.metrics,
                                    .stop = options.stop});
   report::Once light_notes;
   pipeline::RenderStageOptions render_options;
@@ -228,11 +231,11 @@ std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64
     progress.sample(shot.index, samples, set.quality.samples, now_s());
   };
   render_options.note = [&](const std::string& what) { progress.note(what); };
-  pipeline::RenderStage render(device, set, take.observer, scene, render_options);
+  pipeline::RenderStage render(job.device, set, take.observer, job.scene, render_options);
 
   // One shot ahead of each stage keeps them all busy; whole layers wait in the last queue.
   pipeline::BoundedQueue<Shot> lit(1), rendered(1);
-  pipeline::StageThreads stages(metrics, options.stop);
+  pipeline::StageThreads stages(job.metrics, options.stop);
   stages.source("observer", lit, [&] {
     std::optional<Shot> shot = shots.next();
     if (shot && shot->light)

@@ -58,7 +58,7 @@ fs::path put_snapshot(session::Draft& exr) {
   for (int number = last + 1;; ++number) {
     std::array<char, 32> name{};
     std::snprintf(name.data(), name.size(), "%s%04d", snapshot_prefix.data(), number);
-    const fs::path stem = folder / name.data();
+    fs::path stem = folder / name.data();
     if (exr.put_as_new(snapshot_file(stem, ".exr"))) return stem;
   }
 }

@@ -311,8 +311,13 @@ bool is_being_written(const std::filesystem::path& directory) {
 std::optional<std::uint64_t> salvage(const std::filesystem::path& directory) {
   const std::filesystem::path toml = directory / "session.toml";
   if (!std::filesystem::exists(std::filesystem::symlink_status(toml))) return std::nullopt;
+  // A writer locks its folder before it writes session.toml. What this reads under the lock is the
+  // last that the writer wrote; before, it might be about to be replaced.
+  bool is_anothers = false;
+  const OwnedDescriptor lock = locked(directory, is_anothers);
+  if (is_anothers) return std::nullopt;
   SessionFile file = parse_session_toml(read_plain_file(toml), toml);
-  if (file.closed || !file.fault.empty() || is_being_written(directory)) return std::nullopt;
+  if (file.closed || !file.fault.empty()) return std::nullopt;
   const std::uint64_t frames = read_frame_lines(directory / "observer.jsonl").records.size();
   file.fault = "it was cut off by a crash or a power cut";
   replace_file(toml, to_toml(file));

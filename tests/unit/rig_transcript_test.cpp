@@ -223,7 +223,8 @@ class RigTranscript : public testing::Test {
   // Which signal says what of the take depends on how far the recorder's thread is: it is no part
   // of a line, and compared with the take afterwards.
   void remember_take(Changes& changes) {
-    for (const char* name : {"Take", "TakeFrames", "TakeDropped", "Writing"})
+    for (const char* name :
+         {"Take", "TakeFrames", "TakeDropped", "Writing", "BehindSeconds", "BehindMegabytes"})
       if (const auto found = changes.find(name); found != changes.end()) {
         take_[name].push_back(found->second);
         changes.erase(found);

@@ -11,6 +11,7 @@
 #include <string>
 
 #include "drivers/error.hpp"
+#include "drivers/session/session.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace previz::session {
@@ -148,6 +149,23 @@ TEST(PlainFile, IsNoLinkPipeDeviceOrFolder) {
   EXPECT_NE(refusal(directory / "pipe").find("is a pipe"), std::string::npos);
   EXPECT_NE(refusal("/dev/null").find("is a device"), std::string::npos);
   EXPECT_NE(refusal(directory / "missing").find("cannot be opened"), std::string::npos);
+}
+
+// What a daemon does with the takes of the process before must not hit one that is being written.
+TEST(Salvage, LeavesASessionAloneThatIsBeingWritten) {
+  const test::TemporaryDirectory directory;
+  const fs::path take = directory / "take";
+  {
+    SessionWriter writer(take, {});
+    EXPECT_TRUE(is_being_written(take));
+    EXPECT_FALSE(salvage(take));
+    writer.close();
+    EXPECT_FALSE(salvage(take));
+  }
+  EXPECT_FALSE(is_being_written(take));
+  EXPECT_FALSE(salvage(take)) << "it is closed";
+  fs::create_directory(directory / "empty");
+  EXPECT_FALSE(salvage(directory / "empty"));
 }
 
 }  // namespace session_draft_test
