@@ -25,7 +25,7 @@ namespace previz::output {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
+using WatchClock = std::chrono::steady_clock;
 
 // A disk is waited for so long when the watch ends.
 constexpr std::chrono::seconds end_patience{2};
@@ -98,20 +98,20 @@ class FolderWatch::Worker {
 
   void run() {
     std::unique_lock lock(mutex_);
-    for (Clock::time_point due{}; !(is_ended_ && tasks_.empty());) {
+    for (WatchClock::time_point due{}; !(is_ended_ && tasks_.empty());) {
       changed_.wait_until(lock, due, [this] { return is_ended_ || !tasks_.empty(); });
       std::optional<Task> task;
       if (!tasks_.empty()) {
         task = std::move(tasks_.front());
         tasks_.pop_front();
       }
-      busy_since_ = Clock::now();
+      busy_since_ = WatchClock::now();
       lock.unlock();
       if (task) {
         carry_out(*task);
-      } else if (Clock::now() >= due) {
+      } else if (WatchClock::now() >= due) {
         look();
-        due = Clock::now() + interval;
+        due = WatchClock::now() + interval;
       }
       lock.lock();
       busy_since_.reset();
@@ -143,13 +143,13 @@ class FolderWatch::Worker {
     const std::lock_guard lock(mutex_);
     FolderSeen seen = seen_;
     if (busy_since_)
-      seen.silent_s = std::chrono::duration<double>(Clock::now() - *busy_since_).count();
+      seen.silent_s = std::chrono::duration<double>(WatchClock::now() - *busy_since_).count();
     return seen;
   }
 
   std::string hold() {
     const std::lock_guard lock(owner_mutex_);
-    const std::string why_not = owner_.take(options_.folder);
+    std::string why_not = owner_.take(options_.folder);
     if (is_left_) owner_.leave();
     return why_not;
   }
@@ -250,7 +250,7 @@ class FolderWatch::Worker {
   FolderSeen seen_;
   std::deque<Task> tasks_;
   std::optional<Followed> followed_;
-  std::optional<Clock::time_point> busy_since_;
+  std::optional<WatchClock::time_point> busy_since_;
   bool is_ended_ = false, has_ended_ = false;
   std::mutex calls_;  // held while the options' functions are called
   std::mutex owner_mutex_;

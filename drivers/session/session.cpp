@@ -10,7 +10,8 @@
 //     observer.mkv    FFV1 level 3, every frame a key frame, slice checksums, a Matroska cluster a
 //                     frame: RGB (8 or 16 bit), gray (8 or 16 bit) or 4:2:2 Y'CbCr. Of codec
 //                     "raw" the samples themselves, rows without padding, planes one after the
-//                     other; its checksum is that of the line. Matroska times are milliseconds from the first frame, strictly increasing.
+//                     other; its checksum is that of the line. Matroska times are milliseconds from
+//                     the first frame, strictly increasing.
 //     observer.jsonl  a line a frame: frame, sequence, timestamp_ns, arrival_ns, exposure_s, gain,
 //                     exposure; video_ms and crc32 name the packet of observer.mkv that holds its
 //                     picture, so that the two files can lose parts and still be joined rightly.
