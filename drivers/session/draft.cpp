@@ -72,7 +72,7 @@ Draft::Made Draft::make(const fs::path& target) {
   }
 }
 
-Draft::Draft(fs::path target) : Draft(target, make(target)) {}
+Draft::Draft(const fs::path& target) : Draft(target, make(target)) {}
 
 Draft::Draft(fs::path target, Made made)
     : target_(std::move(target)),

@@ -20,7 +20,7 @@ enum class Sync { yes, no };
 class Draft {
  public:
   // Makes an empty draft in the folder of `target`. Throws previz::Error naming the target.
-  explicit Draft(std::filesystem::path target);
+  explicit Draft(const std::filesystem::path& target);
   ~Draft();  // removes it unless it was put in place
   Draft(Draft&& other) noexcept;
   Draft& operator=(Draft&&) = delete;
