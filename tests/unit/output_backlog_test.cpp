@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <mutex>
 
 #include "daemon/output/recorder.hpp"
@@ -21,7 +22,7 @@ constexpr double fps = 25, bound_s = 2;
 
 // The frame of a camera that began at a time of the steady clock.
 Captured frame_at(SteadyClock::time_point begin, double seconds) {
-  const auto index = static_cast<std::uint64_t>(seconds * fps + 0.5);
+  const auto index = static_cast<std::uint64_t>(std::llround(seconds * fps));
   Captured captured{
       std::make_shared<Frame>(noise_frame("observer", index, PixelFormat::rgb8, 16, 8))};
   captured.offered = begin + std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 * seconds));
