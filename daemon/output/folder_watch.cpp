@@ -215,7 +215,7 @@ class FolderWatch::Worker {
     if (options_.on_news) options_.on_news();
   }
 
-  // Of what the process before left; once.
+  // Salvages the takes that the process before left, and reads what it was recording; once.
   void bring_into_order(FolderSeen& now) {
     if (std::exchange(is_in_order_, true)) return;
     const TakeFolders alone({options_.folder}, 0, {});

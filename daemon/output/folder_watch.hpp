@@ -33,7 +33,7 @@ struct FolderSeen {
   std::optional<std::uint64_t> free_bytes;  // of its disk; nothing: the disk cannot say
   std::optional<dev_t> disk;
   int highest_number = 0;  // of the slate's takes, as the folder was found
-  // Of the process before: takes that were cut off and are in order again, in words, and the take
+  // Takes that the process before left cut off and that are in order again, in words, and the take
   // that it was recording.
   std::vector<std::string> salvaged;
   std::optional<KeptWish> wish;

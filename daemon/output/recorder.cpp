@@ -102,8 +102,7 @@ void Recorder::offer(const FramePtr& frame) {
   if (lags)
     note(Severity::warning,
          "the recording is more than a second behind the cameras; what waits is lost if the "
-         "computer "
-         "goes down");
+         "computer goes down");
   if (is_first_dropped && is_far_behind)
     note_far_behind();
   else if (is_first_dropped)

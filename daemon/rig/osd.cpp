@@ -15,8 +15,8 @@ using output::OsdTone;
 using tracking::TrackStatus;
 
 constexpr std::uint64_t little_space = 10'000'000'000;  // bytes, besides the reserve
-constexpr double long_silence_s = 2;
-constexpr double long_behind_s = 1;  // of a disk
+constexpr double long_silence_s = 2;                    // of a disk
+constexpr double long_behind_s = 1;                     // of a recording
 
 // "1 tag", "2 tags"
 std::string counted(int number, const char* noun) {

@@ -66,9 +66,8 @@ void pass(int descriptor) {
   if (disk().watches && disk().open.contains(descriptor)) pass(lock);
 }
 
-int opened(const char* path, int descriptor, bool is_on_disk) {
+int opened(int descriptor, bool is_on_disk) {
   const std::lock_guard lock(disk().mutex);
-  static_cast<void>(path);
   if (descriptor >= 0 && is_on_disk) disk().open.insert(descriptor);
   if (descriptor >= 0 && !is_on_disk) disk().open.erase(descriptor);
   return descriptor;
@@ -77,7 +76,7 @@ int opened(const char* path, int descriptor, bool is_on_disk) {
 int open_passed(const char* path, int flags, mode_t mode) {
   const bool is_on_disk = pass(path);
   const int descriptor = real<int(const char*, int, ...)>("open64")(path, flags, mode);
-  return opened(path, descriptor, is_on_disk);
+  return opened(descriptor, is_on_disk);
 }
 
 }  // namespace

@@ -16,15 +16,18 @@ using test::NotifySocket;
 using test::RigLive;
 using test::StillDisk;
 
+// Lets the disk go on however a script ends, because the rig waits for it.
+struct GoesOn {
+  StillDisk& disk;
+  ~GoesOn() { disk.go_on(); }
+};
+
 TEST_F(RigLive, ADiskThatStandsStillForASnapshotKeepsNoPictureWaiting) {
   write_set();
   std::filesystem::create_directories(directory_ / "live");
   StillDisk disk(directory_ / "live");
   run([&] {
-    struct AtEnd {
-      std::function<void()> call;
-      ~AtEnd() { call(); }
-    } const at_end{[&] { disk.go_on(); }};
+    const GoesOn at_end{disk};
     until([](const Shown& s) { return s.shot.samples == 2; });
     press("record");
     until([](const Shown& s) { return s.look.state.recording; });
@@ -52,10 +55,7 @@ TEST_F(RigLive, ADiskOfTakesThatStandsStillKeepsNoButtonWaiting) {
   std::filesystem::create_directories(directory_ / "takes");
   StillDisk disk(directory_ / "takes");
   run([&] {
-    struct AtEnd {
-      std::function<void()> call;
-      ~AtEnd() { call(); }
-    } const at_end{[&] { disk.go_on(); }};
+    const GoesOn at_end{disk};
     until([](const Shown& s) { return s.shot.samples == 2; });
     disk.stand_still();
     press("record");
@@ -83,7 +83,7 @@ TEST_F(RigLive, ASetThatTakesLongToBeReadHoldsUpNothing) {
   std::string other = session::read_file(file);
   const std::string good = other;
   other.replace(other.find("samples = 2"), 11, "samples = 4");
-  // By a name at which the disk does not stand still.
+  // The disk does not stand still for this name of the file.
   const auto write = [&](const std::string& text) {
     std::ofstream(directory_ / "beside") << text;
     std::filesystem::rename(directory_ / "beside", directory_ / "." / "set.toml");
