@@ -70,28 +70,58 @@ session::Losses RecordQueue::loss_of(const Entry& entry) {
   return bytes_of(entry) > 0 ? session::Losses{.records = 1} : session::Losses{};
 }
 
-bool RecordQueue::push_within(std::uint64_t room, Entry entry) {
+session::Losses RecordQueue::push_within(std::uint64_t room, Entry entry) {
   const std::uint64_t bytes = bytes_of(entry);
   if (bytes > 0 && queued_bytes_ + bytes > room) {
-    add(left_out_, loss_of(entry));
-    return false;
+    const session::Losses loss = loss_of(entry);
+    add(left_out_, loss);
+    return loss;
   }
   const auto* captured = std::get_if<Captured>(&entry);
   if (captured && captured->frame->source == "observer")
     last_frame_ns_ = captured->frame->timestamp_ns;
   queued_bytes_ += bytes;
   queue_.push_back({std::move(entry), std::exchange(left_out_, {})});
-  return true;
+  return {};
 }
 
-bool RecordQueue::push(const Captured& captured) {
+LeftOut RecordQueue::push(const Captured& captured) {
   if (captured.frame->source == "light") older_light_.remember(captured);
   newest_ = std::max(newest_, captured.offered);
+  LeftOut left_out;
+  while (is_behind(most_behind_s_)) leave_out(oldest_picture(), left_out);
+  left_out.is_too_far_behind = left_out.any();
+  add(left_out.of_newest, push_within(bytes_, captured));
+  return left_out;
+}
+
+bool RecordQueue::is_behind(double bound_s) const {
   const Backlog backlog = backlog_with(newest_);
-  is_too_far_behind_ = backlog.seconds - backlog.of_ring_s > most_behind_s_;
-  if (!is_too_far_behind_) return push_within(bytes_, captured);
-  add(left_out_, loss_of(captured));
-  return false;
+  return backlog.seconds - backlog.of_ring_s > bound_s;
+}
+
+// The entry after it says what was left out, or the next one if there is none.
+void RecordQueue::leave_out(std::size_t place, LeftOut& left_out) {
+  const auto at = queue_.begin() + static_cast<std::ptrdiff_t>(place), next = std::next(at);
+  const bool is_older = std::any_of(next, queue_.end(), [](const Queued& queued) {
+    return std::holds_alternative<Start>(queued.entry);
+  });
+  const session::Losses loss = loss_of(at->entry);
+  add(is_older ? left_out.of_older : left_out.of_newest, loss);
+  session::Losses& said_by_next = next == queue_.end() ? left_out_ : next->lost;
+  add(said_by_next, loss);
+  add(said_by_next, at->lost);
+  queued_bytes_ -= bytes_of(at->entry);
+  queue_.erase(at);
+}
+
+// The light from before the take may be of any age.
+std::size_t RecordQueue::oldest_picture() const {
+  const auto oldest = std::ranges::find_if(queue_, [this](const Queued& queued) {
+    const auto* captured = std::get_if<Captured>(&queued.entry);
+    return captured && (captured->frame->source != "light" || captured->offered > began_);
+  });
+  return static_cast<std::size_t>(oldest - queue_.begin());
 }
 
 Backlog RecordQueue::backlog() const {
@@ -101,26 +131,30 @@ Backlog RecordQueue::backlog() const {
 Backlog RecordQueue::backlog_with(SteadyClock::time_point newest) const {
   using Seconds = std::chrono::duration<double>;
   Backlog backlog{0, queued_bytes_, 0};
-  const auto oldest = std::ranges::find_if(queue_, [](const Queued& queued) {
-    const auto* captured = std::get_if<Captured>(&queued.entry);
-    // The light from before the ring may be of any age.
-    return captured && captured->frame->source != "light";
-  });
-  if (oldest == queue_.end()) return backlog;
-  const Seconds waits = newest - std::get<Captured>(oldest->entry).offered;
+  const std::size_t oldest = oldest_picture();
+  if (oldest == queue_.size()) return backlog;
+  const Seconds waits = newest - std::get<Captured>(queue_[oldest].entry).offered;
   backlog.seconds = std::max(0.0, waits.count());
   const double since_s = Seconds(newest - began_).count();
   backlog.of_ring_s = begun_with_s_ * std::clamp(1 - since_s / ring_grace_s, 0.0, 1.0);
   return backlog;
 }
 
-bool RecordQueue::push_shown(const Captured& captured) {
-  return push_within(bytes_ / 2, captured);
+LeftOut RecordQueue::push_shown(const Captured& captured) {
+  LeftOut left_out;
+  left_out.is_too_far_behind = is_behind(most_behind_s_ / 2);
+  if (left_out.is_too_far_behind) {
+    left_out.of_newest = loss_of(captured);
+    add(left_out_, left_out.of_newest);
+  } else {
+    left_out.of_newest = push_within(bytes_ / 2, captured);
+  }
+  return left_out;
 }
 
 // Frames fill the queue first, so that a disk that is a little too slow loses no tracking.
-bool RecordQueue::push_record(Entry entry) {
-  return push_within(bytes_ + bytes_ / 8, std::move(entry));
+LeftOut RecordQueue::push_record(Entry entry) {
+  return {push_within(bytes_ + bytes_ / 8, std::move(entry)), {}, false};
 }
 
 void RecordQueue::push_mark(Entry entry) {

@@ -48,6 +48,15 @@ struct Backlog {
   double of_ring_s = 0;
 };
 
+// What an entry that was offered cost: itself, or pictures that waited before it.
+struct LeftOut {
+  session::Losses of_newest;       // of the take that was begun last
+  session::Losses of_older;        // of those before it, which are not all on the disk yet
+  bool is_too_far_behind = false;  // whether the backlog was too long in time; else in memory
+
+  bool any() const { return of_newest != session::Losses{} || of_older != session::Losses{}; }
+};
+
 // Not thread-safe; the recorder holds its lock.
 class RecordQueue {
  public:
@@ -71,21 +80,21 @@ class RecordQueue {
   static constexpr double ring_grace_s = 10;
 
   // `bytes` is the room for frames, of which the ring gets at most half and pictures that were
-  // shown half; tracking, buttons and events may take an eighth more. A frame is left out, too, if
-  // the backlog would be more than `most_behind_s`, beside what of it is the ring's.
+  // shown half; tracking, buttons and events may take an eighth more. Where the backlog is more
+  // than `most_behind_s`, beside what of it is the ring's, the oldest pictures that wait are left
+  // out: so it is never longer, and an encoder that is too slow keeps every second or third frame
+  // instead of a few seconds at a time. A picture that was shown is left out at half of that.
   RecordQueue(double preroll_s, std::uint64_t bytes, double most_behind_s)
       : preroll_s_(preroll_s), bytes_(bytes), most_behind_s_(most_behind_s) {}
 
   // Returns the entry as a loss.
   static session::Losses loss_of(const Entry& entry);
 
-  // These return false where there is no room: the entry is left out, and the next one says so.
-  bool push(const Captured& captured);
-  // Whether the last frame that push() left out was so because the backlog is too long in time.
-  bool is_too_far_behind() const { return is_too_far_behind_; }
-  bool push_shown(const Captured& captured);
-  bool push_record(Entry entry);  // a line of tracking, a button or an event
-  void push_mark(Entry entry);    // a stop or a mark, for which there is always room
+  // These return what had to be left out; the next entry says so.
+  LeftOut push(const Captured& captured);
+  LeftOut push_shown(const Captured& captured);
+  LeftOut push_record(Entry entry);  // a line of tracking, a button or an event
+  void push_mark(Entry entry);       // a stop or a mark, for which there is always room
 
   // Keep what is offered while nothing is recorded. Of a frame: returns whether others were dropped
   // only because the ring was full.
@@ -110,7 +119,10 @@ class RecordQueue {
 
  private:
   static std::uint64_t bytes_of(const Entry& entry);
-  bool push_within(std::uint64_t room, Entry entry);
+  session::Losses push_within(std::uint64_t room, Entry entry);
+  std::size_t oldest_picture() const;  // its place in the queue; the queue's size if there is none
+  bool is_behind(double bound_s) const;
+  void leave_out(std::size_t place, LeftOut& left_out);
   bool trim_ring();
   Backlog backlog_with(SteadyClock::time_point newest) const;
   void forget_first_of_ring();
@@ -130,7 +142,6 @@ class RecordQueue {
   // offered.
   SteadyClock::time_point began_{}, newest_{};
   double begun_with_s_ = 0;
-  bool is_too_far_behind_ = false;
 };
 
 }  // namespace previz::output

@@ -28,6 +28,10 @@ constexpr double long_behind_s = 1;
 // A disk that takes longer for one thing is reported.
 constexpr std::chrono::seconds silence{2};
 
+// Why something that was offered is not kept.
+constexpr const char *too_far_behind = "too far behind", *memory_full = "memory full",
+                     *disk_failed = "disk failed", *cannot_be_recorded = "cannot be recorded";
+
 }  // namespace
 
 std::uint64_t default_queue_bytes() {
@@ -89,11 +93,11 @@ void Recorder::offer(const FramePtr& frame) {
       return note_short_preroll(kept_s);
     }
     is_silent = has_new_silence();
-    if (!queue_.push(captured)) {
-      count_as_lost(RecordQueue::loss_of(captured));
-      is_first_dropped = status_.lost.frames == 1;
-      is_far_behind = queue_.is_too_far_behind();
-    }
+    const bool had_lost = status_.lost.frames > 0;
+    const LeftOut left_out = queue_.push(captured);
+    count_as_lost(left_out);
+    is_far_behind = left_out.is_too_far_behind;
+    is_first_dropped = !had_lost && status_.lost.frames > 0;
     lags = has_new_lag();
   }
   filled_.notify_one();
@@ -136,8 +140,9 @@ void Recorder::offer_shown(const FramePtr& frame) {
   {
     const std::lock_guard lock(mutex_);
     if (!status_.recording) return;
-    if (queue_.push_shown(captured)) return filled_.notify_one();
-    count_as_lost(RecordQueue::loss_of(captured));
+    const LeftOut left_out = queue_.push_shown(captured);
+    if (!left_out.any()) return filled_.notify_one();
+    count_as_lost(left_out);
     if (status_.lost.shown > 1) return;
   }
   note(Severity::warning, "the disk is too slow; pictures that were shown are left out");
@@ -161,13 +166,20 @@ void Recorder::offer_event(std::int64_t timestamp_ns, const std::string& what) {
 }
 
 void Recorder::offer_record(Entry entry) {
-  const session::Losses loss = RecordQueue::loss_of(entry);
-  if (!queue_.push_record(std::move(entry))) return count_as_lost(loss);
+  count_as_lost(queue_.push_record(std::move(entry)));
   filled_.notify_one();
 }
 
-void Recorder::count_as_lost(const session::Losses& loss) {
-  add(status_.lost, loss);
+void Recorder::count_as_lost(const session::Losses& loss, const char* cause, bool of_newest) {
+  if (of_newest) add(status_.lost, loss);
+  const std::uint64_t pictures = loss.frames + loss.shown;
+  if (pictures > 0 && options_.left_out) options_.left_out(cause, pictures);
+}
+
+void Recorder::count_as_lost(const LeftOut& left_out) {
+  const char* cause = left_out.is_too_far_behind ? too_far_behind : memory_full;
+  count_as_lost(left_out.of_newest, cause, true);
+  count_as_lost(left_out.of_older, cause, false);
 }
 
 void Recorder::note_short_preroll(double kept_s) const {
@@ -273,7 +285,7 @@ void Recorder::serve(std::optional<Queued>& next, bool is_last) {
       if (next) {
         const std::lock_guard lock(mutex_);
         const session::Losses loss = RecordQueue::loss_of(next->entry);
-        if (is_newest()) count_as_lost(loss);
+        count_as_lost(loss, disk_failed, is_newest());
         if (take_) add(take_->lost, loss);
       }
       next.reset();
@@ -335,10 +347,10 @@ void Recorder::mark_last_good() {
 void Recorder::write(const Captured& captured) {
   const Frame& frame = *captured.frame;
   if (!take_->writer->fits(frame) && frame.source == "composite") {
-    add(take_->lost, {.frames = 0, .shown = 1, .records = 0});
+    constexpr session::Losses one{.frames = 0, .shown = 1, .records = 0};
+    add(take_->lost, one);
     const std::lock_guard lock(mutex_);
-    if (is_newest()) ++status_.lost.shown;
-    return;
+    return count_as_lost(one, cannot_be_recorded, is_newest());
   }
   if (!take_->writer->fits(frame)) {
     note(Severity::warning, "the " + frame.source + " camera changed its format; " +
@@ -381,7 +393,7 @@ void Recorder::leave_out(const Entry& entry, Take& take, const std::string& why)
   add(take.lost, loss);
   {
     const std::lock_guard lock(mutex_);
-    if (is_newest()) count_as_lost(loss);
+    count_as_lost(loss, cannot_be_recorded, is_newest());
   }
   if (std::exchange(take.has_noted_odd, true)) return;
   note(Severity::warning,
@@ -544,7 +556,7 @@ std::vector<session::TrackRecord> Recorder::leave_out_queue() {
                          });
     if (is_late) late.push_back(*record);
     const session::Losses loss = is_late ? session::Losses{} : RecordQueue::loss_of(left.entry);
-    if (is_newest()) count_as_lost(loss);
+    count_as_lost(loss, disk_failed, is_newest());
     if (!take_) continue;
     add(take_->lost, loss);
     add(take_->lost, left.lost);

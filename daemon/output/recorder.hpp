@@ -38,8 +38,11 @@ struct RecorderOptions {
   double most_behind_s = 2;
   std::uint64_t reserve_bytes = 500'000'000;        // a take ends before less than this is free
   std::function<void(const report::Report&)> note;  // called from any thread
-  TakeFolders::FreeBytes free_bytes;                // empty: the file system is asked
-  bool measures_disk = false;  // whether the disk's speed is measured before the first take
+  // Counts pictures that were offered and are not kept, by cause ("too far behind", "memory full",
+  // "disk failed", "cannot be recorded"). Called from any thread; it may not call the recorder.
+  std::function<void(const std::string& cause, std::uint64_t pictures)> left_out;
+  TakeFolders::FreeBytes free_bytes;  // empty: the file system is asked
+  bool measures_disk = false;         // whether the disk's speed is measured before the first take
   // A take that ends waits so long for files of the set that are still being copied.
   std::chrono::milliseconds asset_patience{20'000};
 };
@@ -133,7 +136,8 @@ class Recorder {
 
   // Call these with the lock held.
   void offer_record(Entry entry);  // or counts it as lost
-  void count_as_lost(const session::Losses& loss);
+  void count_as_lost(const session::Losses& loss, const char* cause, bool of_newest);
+  void count_as_lost(const LeftOut& left_out);
   void count_failure(const std::string& why);
   void count_finished(const Take& take);  // in order or not
   bool has_new_silence();                 // of the disk, that nobody was told of

@@ -60,17 +60,20 @@ output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& camer
 }
 
 output::RecorderOptions recorder_options(const LoadedSet& loaded, const Cameras& cameras,
-                                         Reports& reports) {
+                                         const pipeline::StageKeeper::Parts& kept) {
   const set::Recording& recording = loaded.set.recording;
   output::RecorderOptions options;
-  options.take = take_template(loaded, cameras, reports);
+  options.take = take_template(loaded, cameras, kept.reports);
   options.preroll_s = recording.preroll_s;
   options.most_behind_s = recording.most_behind_s;
   options.queue_bytes = recording.queue_mb ? static_cast<std::uint64_t>(*recording.queue_mb * 1e6)
                                            : output::default_queue_bytes();
   options.reserve_bytes = static_cast<std::uint64_t>(recording.reserve_mb * 1e6);
   options.measures_disk = true;
-  options.note = [&reports](const report::Report& report) { reports(report); };
+  options.note = [&reports = kept.reports](const report::Report& report) { reports(report); };
+  options.left_out = [&metrics = kept.metrics](const std::string& cause, std::uint64_t pictures) {
+    metrics.dropped("recorder", cause, pictures);
+  };
   return options;
 }
 
@@ -98,7 +101,7 @@ Rig::Rig(Parts parts)
       cameras_(open_cameras_of(loaded_, parts_, watch_usb(parts_.kept.reports))),
       controls_(loaded_.set, parts_.sets.edits(), loaded_.scene),
       look_(controls_.look()),
-      recorder_(recorder_options(loaded_, cameras_, parts_.kept.reports)),
+      recorder_(recorder_options(loaded_, cameras_, parts_.kept)),
       pipeline_(
           {.set = loaded_.set,
            .cameras = cameras_,

@@ -4,7 +4,6 @@
 
 #include <filesystem>
 #include <functional>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -12,52 +11,22 @@
 #include "daemon/output/recorder.hpp"
 #include "drivers/error.hpp"
 #include "tests/durability/still_disk.hpp"
-#include "tests/support/session_fixture.hpp"
+#include "tests/support/recorder_fixture.hpp"
 #include "tests/support/wait_until.hpp"
 
 namespace previz::output {
 namespace still_recorder_test {
 
-using session::noise_frame;
 using session::TemporaryDirectory;
 using test::StillDisk;
 using test::wait_until;
 
-FramePtr picture(std::uint64_t index) {
-  return std::make_shared<Frame>(noise_frame("observer", index, PixelFormat::rgb8, 32, 24));
-}
-
-session::TrackRecord track_of(std::uint64_t index) {
-  session::TrackRecord record;
-  record.timestamp_ns = picture(index)->timestamp_ns;
-  return record;
-}
-
 struct Rig {
   const TemporaryDirectory directory;
   const std::filesystem::path first = directory / "first", second = directory / "second";
-  std::mutex mutex;
-  std::vector<std::string> notes;
 
-  RecorderOptions options() {
-    RecorderOptions options;
-    options.take.folders = {first, second};
-    options.take.info.take = session::TakeInfo{0, "12A", "", 25, "", false};
-    options.preroll_s = 0;
-    options.reserve_bytes = 100;
-    options.note = [this](const report::Report& report) {
-      const std::lock_guard lock(mutex);
-      notes.push_back(line_of(report));
-    };
-    return options;
-  }
+  RecorderOptions options() const { return recorder_options({first, second}); }
 };
-
-std::uint64_t frames_of(const std::filesystem::path& take) {
-  session::Session session = session::open_session(take);
-  const auto stream = session::open_stream(session, "observer");
-  return stream ? stream->records().size() : 0;
-}
 
 // Offers a take. Where anything of this waits for the disk, the test never ends.
 constexpr std::uint64_t frames_offered = 4;
@@ -98,7 +67,7 @@ TEST(StillDisk, AtAnyCallKeepsNobodyWaitingAndLosesNoFrameUncounted) {
       lost = recorder.status().lost;
     }
     SCOPED_TRACE("still at call " + std::to_string(call));
-    EXPECT_EQ(frames_of(take) + lost.frames, frames_offered);
+    EXPECT_EQ(frame_count(take) + lost.frames, frames_offered);
     EXPECT_EQ(lost.frames, 0u);
     if (!was_still) break;
   }
@@ -119,7 +88,7 @@ TEST(StillDisk, ThatIsTheSecondKeepsNothingFromTheFirst) {
     EXPECT_EQ(recorder.status().directory.parent_path(), rig.first);
     EXPECT_GT(recorder.folders().at(1).silent_s, 0);
   }  // and ends
-  EXPECT_EQ(frames_of(rig.first / "12A_take001"), frames_offered);
+  EXPECT_EQ(frame_count(rig.first / "12A_take001"), frames_offered);
 }
 
 }  // namespace still_recorder_test

@@ -1,12 +1,12 @@
 // How far a recording may be behind the cameras.
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <mutex>
 
 #include "daemon/output/recorder.hpp"
-#include "tests/support/session_fixture.hpp"
+#include "tests/support/recorder_fixture.hpp"
 #include "tests/support/wait_until.hpp"
 
 namespace previz::output {
@@ -17,7 +17,6 @@ using session::TemporaryDirectory;
 using test::wait_until;
 using SteadyClock = RecordQueue::SteadyClock;
 
-constexpr std::uint64_t plenty = 1'000'000'000;
 constexpr double fps = 25, bound_s = 2;
 
 // The frame of a camera that began at a time of the steady clock.
@@ -29,20 +28,53 @@ Captured frame_at(SteadyClock::time_point begin, double seconds) {
   return captured;
 }
 
+std::uint64_t sequence_of(const RecordQueue::Queued& queued) {
+  const auto* captured = std::get_if<Captured>(&queued.entry);
+  return captured ? captured->frame->sequence : 0;
+}
+
+// Of what waits too long the oldest goes, and the one that is next says so.
 TEST(RecordQueue, LeavesFramesOutRatherThanBeFurtherBehind) {
   RecordQueue queue(0, plenty, bound_s);
   queue.begin();
+  queue.pop();
   const SteadyClock::time_point begin = SteadyClock::now();
-  int taken = 0;
-  for (int i = 0; i < 100; ++i) taken += queue.push(frame_at(begin, i / fps)) ? 1 : 0;
-  EXPECT_EQ(taken, 51);  // of 0 to 2 s, both included
-  EXPECT_TRUE(queue.is_too_far_behind());
-  EXPECT_NEAR(queue.backlog().seconds, 99 / fps, 1e-6);
+  std::uint64_t lost = 0;
+  for (int i = 0; i < 100; ++i) {
+    const LeftOut left_out = queue.push(frame_at(begin, i / fps));
+    EXPECT_EQ(left_out.is_too_far_behind, left_out.any());
+    EXPECT_EQ(left_out.of_older, session::Losses{});
+    lost += left_out.of_newest.frames;
+  }
+  EXPECT_EQ(lost, 49u);  // beside 2 s, both ends included
+  EXPECT_NEAR(queue.backlog().seconds, bound_s, 1e-6);
   EXPECT_EQ(queue.backlog().bytes, 51u * 16 * 8 * 3);
-  // Nothing is left out any more once enough was written.
-  while (queue.backlog().seconds > 1) queue.pop();
-  EXPECT_TRUE(queue.push(frame_at(begin, 100 / fps)));
-  EXPECT_FALSE(queue.is_too_far_behind());
+  const RecordQueue::Queued first = queue.pop();
+  EXPECT_EQ(sequence_of(first), frame_at(begin, 49 / fps).frame->sequence);
+  EXPECT_EQ(first.lost.frames, lost);
+  EXPECT_FALSE(queue.push(frame_at(begin, 100 / fps)).any());
+}
+
+// What is left out of a take that has ended is none of the take that has begun meanwhile.
+TEST(RecordQueue, SaysOfWhichTakeItLeavesFramesOut) {
+  RecordQueue queue(0, plenty, bound_s);
+  const SteadyClock::time_point begin = SteadyClock::now();
+  queue.begin();
+  for (int i = 0; i < 50; ++i) queue.push(frame_at(begin, i / fps));
+  queue.push_mark(RecordQueue::Stop{true});
+  queue.begin();
+  LeftOut all;
+  for (int i = 50; i < 150; ++i) {
+    const LeftOut left_out = queue.push(frame_at(begin, i / fps));
+    add(all.of_older, left_out.of_older);
+    add(all.of_newest, left_out.of_newest);
+  }
+  EXPECT_EQ(all.of_older.frames, 50u);
+  EXPECT_EQ(all.of_newest.frames, 49u);
+  queue.pop();                              // the first take's start
+  EXPECT_EQ(queue.pop().lost.frames, 50u);  // its stop
+  EXPECT_EQ(queue.pop().lost.frames, 0u);   // the second take's start
+  EXPECT_EQ(queue.pop().lost.frames, 49u);
 }
 
 TEST(RecordQueue, IsNotBehindWhatWasWritten) {
@@ -50,10 +82,59 @@ TEST(RecordQueue, IsNotBehindWhatWasWritten) {
   queue.begin();
   const SteadyClock::time_point begin = SteadyClock::now();
   for (int i = 0; i < 1000; ++i) {
-    ASSERT_TRUE(queue.push(frame_at(begin, i / fps)));
+    ASSERT_FALSE(queue.push(frame_at(begin, i / fps)).any());
     while (!queue.empty()) queue.pop();
     EXPECT_EQ(queue.backlog().seconds, 0);
     EXPECT_EQ(queue.backlog().bytes, 0u);
+  }
+}
+
+// Of an encoder that takes four times as long as there is, every fourth frame is kept.
+TEST(RecordQueue, OfAnEncoderThatIsTooSlowLeavesFramesOutEvenly) {
+  RecordQueue queue(0, plenty, bound_s);
+  queue.begin();
+  queue.pop();  // the take's start
+  const SteadyClock::time_point begin = SteadyClock::now();
+  constexpr int a_picture = 4;
+  std::vector<std::uint64_t> written;
+  for (int i = 0; i < 60 * fps; ++i) {
+    queue.push(frame_at(begin, i / fps));
+    EXPECT_LE(queue.backlog().seconds, bound_s + 1e-6);
+    if (i % a_picture == 0) written.push_back(sequence_of(queue.pop()));
+  }
+  // After the first two seconds, of which all were queued; times are whole nanoseconds.
+  for (std::size_t i = static_cast<std::size_t>(bound_s * fps) + 1; i < written.size(); ++i)
+    EXPECT_NEAR(static_cast<double>(written[i] - written[i - 1]), a_picture, 1) << i;
+}
+
+// A disk that stands still for less than the bound and is fast otherwise loses nothing.
+TEST(RecordQueue, OfADiskThatStandsStillNowAndThenLosesNothing) {
+  RecordQueue queue(0, plenty, bound_s);
+  queue.begin();
+  const SteadyClock::time_point begin = SteadyClock::now();
+  constexpr double still_s = 1.8, interval_s = 6;
+  for (int i = 0; i < 60 * fps; ++i) {
+    const Captured captured = frame_at(begin, i / fps);
+    ASSERT_FALSE(queue.push(captured).any()) << "frame " << i;
+    if (std::fmod(i / fps, interval_s) < still_s) continue;
+    for (int k = 0; k < 3 && !queue.empty(); ++k) queue.pop();
+  }
+}
+
+// Pictures that were shown, which are worth less, are left out first.
+TEST(RecordQueue, LeavesShownPicturesOutAtHalfTheBound) {
+  RecordQueue queue(0, plenty, bound_s);
+  queue.begin();
+  const SteadyClock::time_point begin = SteadyClock::now();
+  for (int i = 0; i <= bound_s * fps; ++i) {
+    ASSERT_FALSE(queue.push(frame_at(begin, i / fps)).any());
+    Captured shown = frame_at(begin, i / fps);
+    auto composite = std::make_shared<Frame>(*shown.frame);
+    composite->source = "composite";
+    shown.frame = composite;
+    const LeftOut left_out = queue.push_shown(shown);
+    EXPECT_EQ(left_out.of_newest.shown, i / fps <= bound_s / 2 ? 0 : 1) << i;
+    EXPECT_EQ(left_out.is_too_far_behind, left_out.any());
   }
 }
 
@@ -72,7 +153,7 @@ TEST(RecordQueue, GivesThePreRollTenSeconds) {
   double first_loss_s = 0;
   for (; i < (ring_s + 15) * fps; ++i) {
     const double since_s = i / fps - ring_s;
-    if (!queue.push(frame_at(begin, i / fps)) && first_loss_s == 0) first_loss_s = since_s;
+    if (queue.push(frame_at(begin, i / fps)).any() && first_loss_s == 0) first_loss_s = since_s;
     if (i % 3 != 0) queue.pop();
   }
   // 4 + t/3 of backlog meet 2 + 4 (1 - t/10) of allowance: t = 2 / (1/3 + 4/10).
@@ -85,12 +166,9 @@ TEST(RecordQueue, GivesThePreRollTenSeconds) {
 // The recorder counts what it leaves out, in the take as well, and says why.
 TEST(Recorder, SaysHowFarItIsBehindAndWhatItLeavesOut) {
   const TemporaryDirectory directory;
-  std::mutex disk, notes_mutex;
-  std::vector<std::string> notes;
-  RecorderOptions options;
-  options.take.folders = {directory / "takes"};
-  options.take.info.take = session::TakeInfo{0, "12A", "", 25, "", false};
-  options.preroll_s = 0;
+  std::mutex disk;
+  Heard heard;
+  RecorderOptions options = recorder_options({directory / "takes"});
   options.most_behind_s = 0.3;
   options.queue_bytes = plenty;
   options.reserve_bytes = 0;
@@ -98,10 +176,7 @@ TEST(Recorder, SaysHowFarItIsBehindAndWhatItLeavesOut) {
     const std::lock_guard lock(disk);
     return plenty;
   };
-  options.note = [&](const report::Report& report) {
-    const std::lock_guard lock(notes_mutex);
-    notes.push_back(report.text);
-  };
+  heard.listen(options);
   Recorder recorder(std::move(options));
   std::uint64_t offered = 0;
   const auto offer = [&] {
@@ -116,7 +191,8 @@ TEST(Recorder, SaysHowFarItIsBehindAndWhatItLeavesOut) {
     offer();
     return recorder.status().lost.frames > 3;
   }));
-  EXPECT_GT(recorder.status().backlog.seconds, 0.3);
+  EXPECT_GT(recorder.status().backlog.seconds, 0);
+  EXPECT_LE(recorder.status().backlog.seconds, 0.3);
   EXPECT_GT(recorder.status().backlog.bytes, 0u);
   disk.unlock();
   recorder.stop();
@@ -126,7 +202,8 @@ TEST(Recorder, SaysHowFarItIsBehindAndWhatItLeavesOut) {
   const auto stream = session::open_stream(session, "observer");
   EXPECT_EQ(stream->records().size() + recorder.status().lost.frames, offered);
   EXPECT_TRUE(session::mentions(session.missing, "frames of the cameras did not reach the disk"));
-  EXPECT_THAT(notes, testing::Contains(testing::HasSubstr("recording.most_behind_s")));
+  EXPECT_TRUE(heard.said("recording.most_behind_s"));
+  EXPECT_EQ(heard.left_out(), (Causes{{"too far behind", recorder.status().lost.frames}}));
 }
 
 }  // namespace output_backlog_test

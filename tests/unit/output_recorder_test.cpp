@@ -14,7 +14,7 @@
 #include "drivers/bracket.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/full_disk.hpp"
-#include "tests/support/session_fixture.hpp"
+#include "tests/support/recorder_fixture.hpp"
 #include "tests/support/wait_until.hpp"
 
 namespace previz::output {
@@ -28,23 +28,9 @@ using test::wait_until;
 
 constexpr std::int64_t interval_ns = 40'000'003;  // of noise_frame
 
-FramePtr picture(std::uint64_t index, const std::string& source = "observer", int width = 32) {
-  return std::make_shared<Frame>(noise_frame(source, index, PixelFormat::rgb8, width, 24));
-}
-
-session::TrackRecord track_of(std::uint64_t index) {
-  session::TrackRecord record;
-  record.timestamp_ns = picture(index)->timestamp_ns;
-  record.tracked = true;
-  record.world_from_camera[3][0] = static_cast<double>(index);
-  return record;
-}
-
 RecorderOptions options_in(const std::filesystem::path& directory) {
-  RecorderOptions options;
-  options.take.folders = {directory};
-  options.take.info.take = session::TakeInfo{0, "12A", "", 25, "rain", false};
-  options.preroll_s = 0;
+  RecorderOptions options = recorder_options({directory});
+  options.take.info.take->notes = "rain";
   options.reserve_bytes = 0;
   return options;
 }
@@ -309,8 +295,8 @@ TEST(Recorder, ASlowDiskCostsFramesThatAreCounted) {
   const TemporaryDirectory directory;
   RecorderOptions options = options_in(directory.path());
   options.queue_bytes = 3 * picture(0)->bytes.size();
-  std::vector<std::string> notes;
-  options.note = [&](const report::Report& what) { notes.push_back(line_of(what)); };
+  Heard heard;
+  heard.listen(options);
   constexpr std::uint64_t offered = 400;
   std::vector<FramePtr> pictures;
   for (std::uint64_t i = 0; i < offered; ++i) pictures.push_back(picture(i));
@@ -327,7 +313,8 @@ TEST(Recorder, ASlowDiskCostsFramesThatAreCounted) {
   EXPECT_EQ(frames_of(directory / "12A_take001").size(), status.frames);
   EXPECT_EQ(status.frames + status.lost.frames, offered);
   EXPECT_GT(status.lost.frames, 0u);
-  EXPECT_TRUE(mentions(notes, "too slow"));
+  EXPECT_TRUE(heard.said("too slow"));
+  EXPECT_EQ(heard.left_out(), (Causes{{"memory full", status.lost.frames}}));
   EXPECT_EQ(status.failures, 0u);
 }
 
@@ -376,7 +363,10 @@ void record_until_the_disk_is_full(Recorder& recorder, std::uint64_t& next) {
 
 TEST(Recorder, AFileThatCannotGrowEndsTheTakeWithEverythingSoFarReadable) {
   const TemporaryDirectory directory;
-  Recorder recorder(options_in(directory.path()));
+  Heard heard;
+  RecorderOptions options = options_in(directory.path());
+  heard.listen(options);
+  Recorder recorder(std::move(options));
   std::uint64_t next = 0;
   {
     const test::FileSizeLimit limit(60'000);  // about 25 frames of noise
@@ -386,6 +376,7 @@ TEST(Recorder, AFileThatCannotGrowEndsTheTakeWithEverythingSoFarReadable) {
   EXPECT_NE(status.fault.find("12A_take001"), std::string::npos) << status.fault;
   EXPECT_GT(status.frames, 10u);
   EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(0, status.frames - 1));
+  EXPECT_EQ(heard.left_out(), (Causes{{"disk failed", status.lost.frames}}));
   recorder.start();  // and it goes on when there is room again
   recorder.offer(picture(next));
   recorder.stop();

@@ -12,54 +12,34 @@
 #include "daemon/output/recorder.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
-#include "tests/support/session_fixture.hpp"
+#include "tests/support/recorder_fixture.hpp"
 #include "tests/support/wait_until.hpp"
 
 namespace previz::output {
 namespace output_take_ends_test {
 
 using session::mentions;
-using session::noise_frame;
 using session::write_content;
 using test::wait_until;
 
-constexpr std::uint64_t plenty = 1'000'000'000;
 // The SHA-256 of "a model", as sha256sum has it.
 constexpr char hash_of_a_model[] =
     "97ff8a35544dcf40ad84047074439dd6aa3a0be469ea578a1b1c017d939ec61c";
-
-FramePtr picture(std::uint64_t index, const std::string& source = "observer", int width = 32) {
-  return std::make_shared<Frame>(noise_frame(source, index, PixelFormat::rgb8, width, 24));
-}
-
-session::TrackRecord track_of(std::uint64_t index) {
-  session::TrackRecord record;
-  record.timestamp_ns = picture(index)->timestamp_ns;
-  return record;
-}
 
 // A recorder of two folders whose disks have as much room as a test says.
 struct Rig {
   const test::TemporaryDirectory directory;
   const std::filesystem::path first = directory / "first", second = directory / "second";
   std::atomic<std::uint64_t> free_on_first = plenty, free_on_second = plenty;
-  std::mutex mutex;
-  std::vector<std::string> notes;
+  Heard heard;
 
   RecorderOptions options() {
-    RecorderOptions options;
-    options.take.folders = {first, second};
-    options.take.info.take = session::TakeInfo{0, "12A", "", 25, "", false};
-    options.preroll_s = 0;
-    options.reserve_bytes = 100;
+    RecorderOptions options = recorder_options({first, second});
     options.asset_patience = std::chrono::milliseconds(500);
     options.free_bytes = [this](const std::filesystem::path& folder) {
       return folder.filename() == "first" ? free_on_first.load() : free_on_second.load();
     };
-    options.note = [this](const report::Report& report) {
-      const std::lock_guard lock(mutex);
-      notes.push_back(line_of(report));
-    };
+    heard.listen(options);
     return options;
   }
   RecorderOptions options_with_asset() {
@@ -67,10 +47,6 @@ struct Rig {
     RecorderOptions with = options();
     with.take.assets = {{"a.glb", directory / "set/a.glb"}};
     return with;
-  }
-  bool said(const std::string& words) {
-    const std::lock_guard lock(mutex);
-    return mentions(notes, words);
   }
 };
 
@@ -140,7 +116,7 @@ TEST(Recorder, WithoutAFileOfTheSetRecordsAndTheTakeSaysWhichItWas) {
   EXPECT_EQ(asset.sha256, hash_of_a_model);
   EXPECT_FALSE(asset.why.empty());
   EXPECT_TRUE(mentions(session.missing, "a.glb: is not in the take"));
-  EXPECT_TRUE(rig.said("12A_take001 lacks a.glb"));
+  EXPECT_TRUE(rig.heard.said("12A_take001 lacks a.glb"));
 }
 
 TEST(Recorder, OfAStoreThatWasDeletedTakesTheFileOfTheSetIfItIsTheSame) {
@@ -169,7 +145,8 @@ TEST(Recorder, LeavesTheReserveToTakesAndNotToTheFilesOfTheSet) {
   Rig rig;
   rig.free_on_first = 103;  // the reserve of 100 bytes, and less than the model's 7
   Recorder recorder(rig.options_with_asset());
-  ASSERT_TRUE(wait_until("it is said", [&] { return rig.said("a.glb will not be in the takes"); }));
+  ASSERT_TRUE(
+      wait_until("it is said", [&] { return rig.heard.said("a.glb will not be in the takes"); }));
   EXPECT_FALSE(std::filesystem::exists(kept_in(rig.first)));
   recorder.start();
   recorder.offer(picture(0));
@@ -244,13 +221,14 @@ TEST(Recorder, LeavesOutWhatCannotBeRecordedAndGoesOn) {
   EXPECT_EQ(status.failures, 0u) << status.fault;
   EXPECT_EQ(status.directory, rig.first / "12A_take001");
   EXPECT_EQ(status.lost, (session::Losses{1, 0, 2}));
+  EXPECT_EQ(rig.heard.left_out(), (Causes{{"cannot be recorded", 1}}));
   EXPECT_EQ(frames_of(rig.first / "12A_take001"), 3u);
   const session::Session session = session::open_session(rig.first / "12A_take001");
   EXPECT_EQ(session.track.size(), 2u);
   EXPECT_EQ(session.missing.size(), 2u);
   for (const std::string& words : session::words_of(status.lost))
     EXPECT_TRUE(mentions(session.missing, words)) << words;
-  EXPECT_TRUE(rig.said("12A_take001 lacks what cannot be recorded: frame 100"));
+  EXPECT_TRUE(rig.heard.said("12A_take001 lacks what cannot be recorded: frame 100"));
 }
 
 // The first recording loses frames, rolls over twice, and is still being written when the next one
@@ -299,6 +277,7 @@ TEST(Recorder, CountsTheLossesOfEachTakeThoughTheNextRecordingHasBegun) {
     takes_that_lack += session.missing.empty() ? 0 : 1;
   }
   EXPECT_EQ(takes_that_lack, 1u);
+  EXPECT_EQ(rig.heard.left_out(), (Causes{{"memory full", 6}}));
 }
 
 // ---- from one take to the next
@@ -396,7 +375,7 @@ TEST(Recorder, WhoseFirstFolderCannotBeReadFindsWhatIsInTheSecond) {
   EXPECT_EQ(recorder.status().salvaged,
             std::vector<std::string>{"12A_take007 was cut off; it has 3 frames"});
   EXPECT_EQ(recorder.status().interrupted, "12A_take007");
-  EXPECT_TRUE(rig.said("takes from before cannot be looked at"));
+  EXPECT_TRUE(rig.heard.said("takes from before cannot be looked at"));
 }
 
 TEST(Recorder, FindsWhatIsOnADiskThatIsMountedLater) {

@@ -12,7 +12,7 @@
 #include "daemon/output/recorder.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
-#include "tests/support/session_fixture.hpp"
+#include "tests/support/recorder_fixture.hpp"
 #include "tests/support/wait_until.hpp"
 
 namespace previz::output {
@@ -20,21 +20,8 @@ namespace output_take_folders_test {
 
 using session::is_frame;
 using session::mentions;
-using session::noise_frame;
 using session::TemporaryDirectory;
 using test::wait_until;
-
-constexpr std::uint64_t plenty = 1'000'000'000;
-
-FramePtr picture(std::uint64_t index) {
-  return std::make_shared<Frame>(noise_frame("observer", index, PixelFormat::rgb8, 32, 24));
-}
-
-session::TrackRecord track_of(std::uint64_t index) {
-  session::TrackRecord record;
-  record.timestamp_ns = picture(index)->timestamp_ns;
-  return record;
-}
 
 std::string refusal(TakeFolders& folders) {
   try {
