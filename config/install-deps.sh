@@ -11,7 +11,7 @@ packages=(
   # pictures and video
   libopencv-dev libopenexr-dev libimath-dev libpng-dev libexiv2-dev
   libcairo2-dev
-  libavformat-dev libavcodec-dev libavutil-dev libswscale-dev libjpeg62-turbo-dev
+  libavformat-dev libavcodec-dev libavutil-dev libswscale-dev libdeflate-dev libjpeg62-turbo-dev
   # the display and its text
   libegl-dev libgles-dev libegl-mesa0 libgl1-mesa-dri libgbm-dev libdrm-dev libfreetype-dev libharfbuzz-dev
   fonts-dejavu-core

@@ -5,7 +5,6 @@
 extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
-#include <libavutil/crc.h>
 #include <libswscale/swscale.h>
 }
 
@@ -13,6 +12,7 @@ extern "C" {
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "drivers/error.hpp"
@@ -60,10 +60,8 @@ inline std::string url_of(const std::filesystem::path& file) {
   return "file:" + file.string();
 }
 
-// Returns the CRC-32 of a packet's bytes (IEEE 802.3, as zlib's).
-inline std::uint32_t crc32(const AVPacket& packet) {
-  return ~av_crc(av_crc_get_table(AV_CRC_32_IEEE_LE), ~0u, packet.data,
-                 static_cast<std::size_t>(packet.size));
+inline std::span<const std::uint8_t> bytes_of(const AVPacket& packet) {
+  return {packet.data, static_cast<std::size_t>(packet.size)};
 }
 
 }  // namespace previz::av

@@ -9,8 +9,8 @@
 #include <optional>
 #include <string>
 
-#include "drivers/av.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/crc32.hpp"
 
 namespace previz::session {
 namespace {
@@ -183,15 +183,15 @@ class Search {
 
   std::uint32_t checksum(const PacketPlace& place) {
     checked_bytes_ += place.bytes;
-    std::uint32_t crc = ~0u;
+    std::uint32_t crc = 0;
     block_.resize(std::min(place.bytes, std::size_t{1} << 20));
     for (std::size_t done = 0; done < place.bytes;) {
       const std::size_t count = std::min(block_.size(), place.bytes - done);
       if (!read_at(window_.file(), place.offset + done, {block_.data(), count})) return 0;
-      crc = av_crc(av_crc_get_table(AV_CRC_32_IEEE_LE), crc, block_.data(), count);
+      crc = crc32({block_.data(), count}, crc);
       done += count;
     }
-    return ~crc;
+    return crc;
   }
 
   Window window_;

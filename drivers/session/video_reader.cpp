@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "drivers/av.hpp"
+#include "drivers/session/crc32.hpp"
 #include "drivers/session/ffv1.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/samples.hpp"
@@ -89,7 +90,7 @@ struct VideoReader::Impl {
   std::int64_t time_ms() const { return packet->pts != AV_NOPTS_VALUE ? packet->pts : packet->dts; }
 
   bool holds(const PacketInfo& wanted) const {
-    return time_ms() == wanted.video_ms && av::crc32(*packet) == wanted.crc32;
+    return time_ms() == wanted.video_ms && crc32(av::bytes_of(*packet)) == wanted.crc32;
   }
 
   // Searches forward for the packet; a file's times increase, unless they are damaged.
@@ -107,7 +108,7 @@ struct VideoReader::Impl {
     av_packet_unref(packet.get());
     av::check(av_new_packet(packet.get(), static_cast<int>(place.bytes)), file, "no memory");
     return read_at(*opened, place.offset, {packet->data, place.bytes}) &&
-           av::crc32(*packet) == wanted.crc32;
+           crc32(av::bytes_of(*packet)) == wanted.crc32;
   }
 
   bool find(const PacketInfo& wanted) {
@@ -141,7 +142,7 @@ std::vector<VideoReader::PacketInfo> VideoReader::scan(const std::stop_token& st
   while (impl_->next_packet()) {
     if (stop.stop_requested())
       throw Error(impl_->file.string() + ": was left, because reading it is to end");
-    packets.push_back({impl_->time_ms(), av::crc32(*impl_->packet)});
+    packets.push_back({impl_->time_ms(), crc32(av::bytes_of(*impl_->packet))});
   }
   impl_->rewind();
   return packets;

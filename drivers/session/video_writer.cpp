@@ -4,7 +4,12 @@
 
 #include <algorithm>
 
+extern "C" {
+#include <libavutil/opt.h>
+}
+
 #include "drivers/av.hpp"
+#include "drivers/session/crc32.hpp"
 #include "drivers/session/ffv1.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/samples.hpp"
@@ -44,6 +49,8 @@ av::Muxer open_muxer(const StreamFormat& format, const AVCodecContext* encoder,
   stream->time_base = milliseconds;
   context->flags |= AVFMT_FLAG_BITEXACT;  // the same frames make the same file
   av::check(avio_open(&context->pb, url.c_str(), AVIO_FLAG_WRITE), file, "cannot be created");
+  // The lines beside the video have the checksum of each packet.
+  av::check(av_opt_set(context->priv_data, "write_crc32", "0", 0), file, "cannot be set up");
   av::check(avformat_init_output(context, nullptr), file, "cannot be set up");
   // libav's list of tags for Matroska lacks those of RGB, with which it reads them.
   if (!encoder)
@@ -127,7 +134,7 @@ VideoWriter::Stamp VideoWriter::write(const Frame& frame) {
   Impl& s = *impl_;
   const std::int64_t time_ms = s.next_ms(frame.timestamp_ns);
   s.encoder ? s.encode(frame, time_ms) : s.take_as_is(frame, time_ms);
-  const Stamp stamp{time_ms, av::crc32(*s.packet)};
+  const Stamp stamp{time_ms, crc32(av::bytes_of(*s.packet))};
   s.packet->stream_index = 0;
   av_packet_rescale_ts(s.packet.get(), milliseconds, s.muxer->streams[0]->time_base);
   const int written = av_write_frame(s.muxer.get(), s.packet.get());

@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
+#include <span>
 #include <tuple>
 
 #include "drivers/error.hpp"
+#include "drivers/session/crc32.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/session_fixture.hpp"
 
@@ -59,6 +62,14 @@ INSTANTIATE_TEST_SUITE_P(
         testing::Values(VideoCodec::ffv1, VideoCodec::raw)));
 
 // An earlier previzd, which knows FFV1 alone, reads what it can and refuses the rest in words.
+// By the check value of the CRC-32 of IEEE 802.3, in one piece and in two.
+TEST(Session, NamesPacketsByTheStandardChecksum) {
+  constexpr std::array<std::uint8_t, 9> digits = {'1', '2', '3', '4', '5', '6', '7', '8', '9'};
+  const std::span<const std::uint8_t> all(digits);
+  EXPECT_EQ(crc32(all), 0xcbf43926u);
+  EXPECT_EQ(crc32(all.subspan(4), crc32(all.first(4))), 0xcbf43926u);
+}
+
 TEST(Session, OnlyATakeWithRawVideoNeedsANewerPrevizd) {
   for (const VideoCodec codec : {VideoCodec::ffv1, VideoCodec::raw}) {
     const TemporaryDirectory directory;
