@@ -103,7 +103,8 @@ TEST_F(Trade, PartsThatNobodyNeedsChangeNoPixel) {
   EXPECT_EQ(carried, (std::vector<std::string>{
                          "parts lens", "parts coloured gloss", "parts brushed metal", "parts cloth",
                          "parts lacquer", "parts refraction", "parts panes", "parts coloured glass",
-                         "parts textures", "parts normal maps", "parts alpha", "parts lamps",
+                         "parts textures", "parts textures of layers", "parts texture mappings",
+                         "parts vertex colours", "parts normal maps", "parts alpha", "parts lamps",
                          "parts lamps in view", "parts many lamps"}));
 }
 

@@ -1,0 +1,182 @@
+// What reads and writes takes beside the recording, on disks that stand still at any call: it
+// waits, goes on where it was, and shows nobody half of anything meanwhile.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "daemon/output/salvage.hpp"
+#include "daemon/output/take_list.hpp"
+#include "daemon/post/render_directory.hpp"
+#include "daemon/post/take_copy.hpp"
+#include "drivers/error.hpp"
+#include "tests/durability/still_disk.hpp"
+#include "tests/support/session_fixture.hpp"
+#include "tests/support/wait_until.hpp"
+
+namespace previz::post {
+namespace still_commands_test {
+
+namespace fs = std::filesystem;
+using session::TemporaryDirectory;
+using test::StillDisk;
+using test::wait_until;
+
+constexpr std::uint64_t frames = 3;
+
+// Runs `work` on a thread while the disk of `folder` stands still from this call on, looks at what
+// there is meanwhile, and lets it go on. Returns whether the work came to the call.
+bool run_past_call(std::size_t call, const fs::path& folder, const std::function<void()>& work,
+                   const std::function<void()>& while_still) {
+  StillDisk disk(folder);
+  disk.stand_still(call);
+  std::atomic<bool> is_done = false;
+  std::jthread thread([&] {
+    EXPECT_NO_THROW(work());
+    is_done = true;
+  });
+  EXPECT_TRUE(wait_until("it waits, or is done", [&] { return is_done || disk.waiting() > 0; }));
+  const bool was_still = !is_done;
+  // What looks at the disk here would wait as well.
+  if (was_still) while_still();
+  disk.go_on();
+  return was_still;
+}
+
+void nothing_more() {}
+
+TEST(StillDiskOfACopy, AtAnyCallIsWaitedForAndTheCopyIsWhole) {
+  bool was_still = true;
+  for (std::size_t call = 0; was_still; ++call) {
+    SCOPED_TRACE("still at call " + std::to_string(call));
+    const TemporaryDirectory directory;
+    const fs::path take = directory / "12A_take001", copy = directory / "copies/12A_take001";
+    session::write_small_session(take, frames);
+    fs::create_directories(copy.parent_path());
+    bool is_new = false;
+    was_still = run_past_call(
+        call, directory.path(), [&] { is_new = copy_take(output::listed_take(take), copy, {}); },
+        nothing_more);
+    EXPECT_TRUE(is_new);
+    EXPECT_TRUE(checksum_faults(copy, {}).empty());
+    for (const fs::path& file : session::own_files(take))
+      EXPECT_EQ(session::content_of(copy / file), session::content_of(take / file)) << file;
+  }
+}
+
+// Somebody presses Ctrl-C while the disk stands still: once it answers, nothing is left of the
+// copy, or it is whole.
+TEST(StillDiskOfACopy, ThatIsStoppedMeanwhileLeavesNoHalfCopy) {
+  bool was_still = true;
+  for (std::size_t call = 0; was_still; ++call) {
+    SCOPED_TRACE("still at call " + std::to_string(call));
+    const TemporaryDirectory directory;
+    const fs::path take = directory / "12A_take001", copies = directory / "copies";
+    session::write_small_session(take, frames);
+    fs::create_directories(copies);
+    std::stop_source stop;
+    const auto work = [&] {
+      try {
+        copy_take(output::listed_take(take), copies / "12A_take001", stop.get_token());
+      } catch (const Error& error) {
+        EXPECT_TRUE(stop.stop_requested()) << error.what();
+      }
+    };
+    was_still = run_past_call(call, directory.path(), work, [&] { stop.request_stop(); });
+    for (const fs::directory_entry& entry : fs::directory_iterator(copies)) {
+      EXPECT_EQ(entry.path().filename(), "12A_take001");
+      EXPECT_TRUE(fs::exists(entry.path() / checksums_name));
+      EXPECT_TRUE(checksum_faults(entry.path(), {}).empty());
+    }
+  }
+}
+
+// A take that was cut off, without anything that knows its end.
+void write_cut_off(const fs::path& take) {
+  session::SessionInfo info;
+  info.take = session::TakeInfo{1, "12A", "", 25, "", false};
+  session::SessionWriter writer(take, info);
+  for (std::uint64_t i = 0; i < frames; ++i)
+    writer.write(session::noise_frame("observer", i, PixelFormat::rgb8, 24, 18));
+  const fs::path as_it_is = take.string() + ".cut";
+  fs::copy(take, as_it_is, fs::copy_options::recursive);
+  writer.close();
+  fs::remove_all(take);
+  fs::rename(as_it_is, take);
+}
+
+TEST(StillDiskOfATake, ThatWasCutOffIsInOrderAgainWhereverTheDiskStoodStill) {
+  bool was_still = true;
+  for (std::size_t call = 0; was_still; ++call) {
+    SCOPED_TRACE("still at call " + std::to_string(call));
+    const TemporaryDirectory directory;
+    const fs::path takes = directory / "takes";
+    write_cut_off(takes / "12A_take001");
+    std::vector<std::string> salvaged, notes;
+    output::Salvage salvage({takes}, [&](const std::string& note) { notes.push_back(note); });
+    was_still = run_past_call(
+        call, takes, [&] { salvage.look(salvaged); }, nothing_more);
+    EXPECT_EQ(salvaged, std::vector<std::string>{"12A_take001 was cut off; it has 3 frames"})
+        << testing::PrintToString(notes);
+    EXPECT_TRUE(notes.empty()) << notes.front();
+    EXPECT_EQ(session::summary_of(takes / "12A_take001").frames, frames);
+  }
+}
+
+pipeline::Shot grey_shot(std::uint64_t index) {
+  constexpr int width = 8, height = 6;
+  pipeline::Shot shot;
+  shot.index = index;
+  auto frame = std::make_shared<Frame>();
+  frame->timestamp_ns = 40'000'000 * static_cast<std::int64_t>(index);
+  shot.frame = frame;
+  shot.light = std::make_shared<pipeline::Light>();
+  shot.picture = std::make_shared<const Plate>(
+      Plate{width, height, 8, std::vector<std::uint16_t>(3 * width * height, 99)});
+  render::Layers layers;
+  layers.width = width;
+  layers.height = height;
+  layers.samples = 16;
+  for (auto* layer : {&layers.composite, &layers.mixed, &layers.real, &layers.diff, &layers.normal,
+                      &layers.variance})
+    layer->resize(width * height, glm::vec3(0.5f));
+  layers.mask.resize(width * height);
+  layers.depth.resize(width * height);
+  shot.layers = std::make_shared<const render::Layers>(layers);
+  shot.whole = true;
+  return shot;
+}
+
+// A render is begun and its frames are checked, and the next frame is written.
+TEST(StillDiskOfARender, AtAnyCallIsWaitedForAndTheRenderGoesOn) {
+  constexpr const char* settings = R"({"samples": 16})";
+  bool was_still = true;
+  for (std::size_t call = 0; was_still; ++call) {
+    SCOPED_TRACE("still at call " + std::to_string(call));
+    const TemporaryDirectory directory;
+    set::Set set;
+    set.output = {directory / "out", true, true, false};
+    {
+      RenderDirectory before(set.output, settings, false);
+      for (std::uint64_t i = 0; i < frames; ++i) before.write(grey_shot(i), set);
+    }
+    const auto go_on = [&] {
+      RenderDirectory again(set.output, settings, false);
+      for (std::uint64_t i = 0; i < frames; ++i) EXPECT_TRUE(again.finished(i)) << i;
+      EXPECT_TRUE(again.rejected().empty());
+      EXPECT_EQ(again.claim(frames), Claim::mine);
+      again.write(grey_shot(frames), set);
+    };
+    was_still = run_past_call(call, set.output.directory, go_on, nothing_more);
+    const RenderDirectory after(set.output, settings, false);
+    for (std::uint64_t i = 0; i <= frames; ++i) EXPECT_TRUE(after.finished(i)) << i;
+  }
+}
+
+}  // namespace still_commands_test
+}  // namespace previz::post
