@@ -1,5 +1,7 @@
 #include "daemon/output/recorder.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <cinttypes>
@@ -34,8 +36,19 @@ constexpr const char *too_far_behind = "too far behind", *memory_full = "memory 
 
 }  // namespace
 
-std::uint64_t default_queue_bytes() {
+std::uint64_t memory_bytes() {
+  return static_cast<std::uint64_t>(std::max(0L, ::sysconf(_SC_PHYS_PAGES))) *
+         static_cast<std::uint64_t>(std::max(0L, ::sysconf(_SC_PAGE_SIZE)));
+}
+
+std::uint64_t most_queue_bytes(std::uint64_t memory) {
+  return memory / 4 * 3;
+}
+
+std::uint64_t queue_bytes(std::optional<double> wished_mb, std::uint64_t memory) {
   constexpr std::uint64_t least = 256'000'000;
+  if (wished_mb)
+    return std::min(static_cast<std::uint64_t>(*wished_mb * 1e6), most_queue_bytes(memory));
   std::ifstream file("/proc/meminfo");
   for (std::string line; std::getline(file, line);) {
     std::uint64_t kib = 0;

@@ -47,9 +47,13 @@ struct RecorderOptions {
   std::chrono::milliseconds asset_patience{20'000};
 };
 
-// Returns a quarter of the memory that is free now, in bytes: room for what is recorded on a
-// machine that has other things to do.
-std::uint64_t default_queue_bytes();
+// Return bytes: the computer's memory, and how much of it may hold what is recorded at most (three
+// quarters).
+std::uint64_t memory_bytes();
+std::uint64_t most_queue_bytes(std::uint64_t memory);
+// Returns the room for what is recorded: as wished, but not more than that; without a wish a
+// quarter of the memory that is free now, because the machine has other things to do.
+std::uint64_t queue_bytes(std::optional<double> wished_mb, std::uint64_t memory = memory_bytes());
 
 struct RecorderStatus {
   bool recording = false;

@@ -12,9 +12,10 @@
 #include <vector>
 
 #include "daemon/lighting/lighting.hpp"
-#include "daemon/output/take_folders.hpp"
+#include "daemon/output/recorder.hpp"
 #include "daemon/pipeline/room_model.hpp"
 #include "daemon/pipeline/take.hpp"
+#include "daemon/post/check_recording.hpp"
 #include "daemon/post/implausible.hpp"
 #include "daemon/render/feature.hpp"
 #include "daemon/render/photon_schedule.hpp"
@@ -174,13 +175,12 @@ void remark_on_cameras(Checked& checked) {
         "no environment and no calibrated light camera here: the light must come with the session");
 }
 
-void remark_on_recording(Checked& checked) {
-  const set::Recording& recording = checked.set.recording;
-  if (recording.second_directory &&
-      output::are_on_one_disk(recording.directory, *recording.second_directory))
-    checked.remarks.push_back(
-        "recording.second_directory is on the disk of recording.directory now: where that is full "
-        "or fails, no recording can go on in it");
+// A take says how it was recorded, and nothing more is recorded by its set.
+void check_recording(Checked& checked, Lines& problems) {
+  if (checked.is_take) return;
+  for (const std::string& line : why_nothing_is_recorded(checked.set)) problems.push_back(line);
+  for (const std::string& line : remarks_on_recording(checked.set, output::memory_bytes()))
+    checked.remarks.push_back(line);
 }
 
 void remark_on_scene(Checked& checked, const scene::Scene& scene) {
@@ -390,11 +390,11 @@ int check_set(const fs::path& set_or_session, std::ostream& out) {
   check_room(checked.set, problems);
   check_cameras(checked, problems);
   check_tracking(checked, problems);
+  check_recording(checked, problems);
   if (!problems.empty()) return refuse(problems, out);
 
   for (const std::string& line : implausible(checked.set)) checked.remarks.push_back(line);
   remark_on_cameras(checked);
-  remark_on_recording(checked);
   remark_on_scene(checked, *scene);
   out << checked.set.name << " (" << checked.set.file.string() << ") is right\n";
   print_cameras(checked.set, out);
@@ -402,6 +402,7 @@ int check_set(const fs::path& set_or_session, std::ostream& out) {
   print_objects(checked.set, *scene, out);
   print_lights(checked.set, *scene, out);
   print_estimator(checked.set, out);
+  if (!checked.is_take) print_recording(checked.set, out);
   const scene::Size size = scene::size_of(*scene);
   const render::Demand demand = render::demand_of(
       checked.set, *scene,

@@ -66,8 +66,12 @@ output::RecorderOptions recorder_options(const LoadedSet& loaded, const Cameras&
   options.take = take_template(loaded, cameras, kept.reports);
   options.preroll_s = recording.preroll_s;
   options.most_behind_s = recording.most_behind_s;
-  options.queue_bytes = recording.queue_mb ? static_cast<std::uint64_t>(*recording.queue_mb * 1e6)
-                                           : output::default_queue_bytes();
+  options.queue_bytes = output::queue_bytes(recording.queue_mb);
+  if (recording.queue_mb && 1e6 * *recording.queue_mb > static_cast<double>(options.queue_bytes))
+    kept.reports(
+        report::once({Severity::warning, "recording.queue_mb",
+                      "is more than three quarters of this computer's memory; " +
+                          std::to_string(options.queue_bytes / 1'000'000) + " MB are used"}));
   options.reserve_bytes = static_cast<std::uint64_t>(recording.reserve_mb * 1e6);
   options.measures_disk = true;
   options.note = [&reports = kept.reports](const report::Report& report) { reports(report); };

@@ -208,7 +208,7 @@ void Screen::Impl::read_back() {
   written = Clock::now();
   try {
     output::write_png(parts.directory / "screen.png", life.display()->read_back());
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {
     parts.kept.reports(report::once({report::Severity::error, "", error.what()}));
   }
 }

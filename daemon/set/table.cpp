@@ -30,6 +30,18 @@ using calibration::far_m, calibration::max_picture_side_px;
 
 constexpr Unit seconds{"s", 1}, stops{"stops", 1}, megabytes{"MB", 1};
 
+// What nobody can mean is refused where it is written, and not met as a picture without sense.
+constexpr double least_m = 1e-6, most_radiance = 1e12, most_gain = 1e6;
+constexpr Rule place = m.within(-far_m, far_m);
+constexpr Rule turn = deg.within(-36'000, 36'000);  // a hundred times around
+constexpr Rule axis = plain.within(-1e6, 1e6);      // of a direction, whose length does not matter
+constexpr Rule matrix = plain.within(-far_m, far_m);
+constexpr Rule length = m.within(least_m, far_m);
+constexpr Rule radiance = plain.within(0, most_radiance);
+constexpr Rule gain = plain.within(0, most_gain);
+constexpr Rule absolute_exposure = plain.within(1e-12, 1e12);
+constexpr Rule shutter = seconds.within(1e-7, 100);
+
 // Lists what a camera's `driver` may be: a replayed session, a camera driver, or none.
 std::span<const char* const> camera_driver_words() {
   static const std::vector<const char*> words = [] {
@@ -88,14 +100,14 @@ Keys observer_keys(Observer& o) {
       {"driver", &o.driver, Rule{.words = camera_driver_words()}, "Driver of the film camera."},
       {"device", &o.device, plain, "The camera's stable name, as `previzd devices` lists it; for replay the folder of the session, relative to this file. Default: the session named on the command line.", optional("\"sessions/take1\"")},
       {"faults", &o.faults, plain, "Faults to simulate, for rehearsals, and the frames at which they happen: drop, corrupt, late, stall, disconnect.", optional("[\"stall@250\", \"disconnect@1000+2.5s\"]")},
-      {"exposure", &o.exposure, plain.above(0), "Absolute exposure, which overrides that of the frames: signal = exposure * radiance, where a signal of 1 is the sensor's white.", optional("1.0")},
+      {"exposure", &o.exposure, absolute_exposure, "Absolute exposure, which overrides that of the frames: signal = exposure * radiance, where a signal of 1 is the sensor's white.", optional("1.0")},
   };
 }
 
 Keys lens_fit_keys(LensFit& f) {
   return {
-      {"values", &f.values, plain, "fx, fy, cx, cy, k1, k2, p1, p2 and k3 as the boards have them if none is left at 0: 9 numbers.", required("[1850.0, 1850.0, 959.5, 539.5, -0.1, 0.02, 0.0, 0.0, 0.0]")},
-      {"covariance_root", &f.covariance_root, plain, "How far off they may be, together: the lower triangle, row by row, of the matrix L whose L L^T is their covariance; 45 numbers.", required("[0.4, 0.0, 0.4, 0.0, 0.0, 0.6, 0.0, 0.0, 0.0, 0.6, 0.0, 0.0, 0.0, 0.0, 0.002, 0.0, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0001, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0001, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.02]")},
+      {"values", &f.values, plain.within(-1e9, 1e9), "fx, fy, cx, cy, k1, k2, p1, p2 and k3 as the boards have them if none is left at 0: 9 numbers.", required("[1850.0, 1850.0, 959.5, 539.5, -0.1, 0.02, 0.0, 0.0, 0.0]")},
+      {"covariance_root", &f.covariance_root, plain.within(-1e9, 1e9), "How far off they may be, together: the lower triangle, row by row, of the matrix L whose L L^T is their covariance; 45 numbers.", required("[0.4, 0.0, 0.4, 0.0, 0.0, 0.6, 0.0, 0.0, 0.0, 0.6, 0.0, 0.0, 0.0, 0.0, 0.002, 0.0, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0001, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0001, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.02]")},
   };
 }
 
@@ -105,21 +117,21 @@ Keys camera_keys(CameraWish& wish) {
       {"pixel_format", &c.format, plain, "The name that the driver uses: YUYV, NV12, YU12 (planar 4:2:0; YUV420 in libcamera) and so on. Formats with more bits are worth their bandwidth.", optional("\"BayerRG12\"")},
       {"width", &c.width, px.within(1, max_picture_side_px), "Width of the pictures; height must be given as well.", optional("1920")},
       {"height", &c.height, px.within(1, max_picture_side_px), "Height of the pictures; width must be given as well.", optional("1080")},
-      {"rate_hz", &c.rate_hz, plain.above(0, 1e4), "Frames per second. Of a rate that the camera does not have, a message lists those that it has: aravis refuses it, and v4l2 and libcamera use the nearest.", optional("25.0")},
-      {"exposure_s", &c.exposure_s, seconds.above(0, 100), "Shutter time. Turns the camera's automatic exposure off.", optional("0.01")},
+      {"rate_hz", &c.rate_hz, plain.within(0.001, 1e4), "Frames per second. Of a rate that the camera does not have, a message lists those that it has: aravis refuses it, and v4l2 and libcamera use the nearest.", optional("25.0")},
+      {"exposure_s", &c.exposure_s, shutter, "Shutter time. Turns the camera's automatic exposure off.", optional("0.01")},
       {"gain", &c.gain, plain.within(1, 1e4), "Linear gain, for cameras that state their gain in dB.", optional("2.0")},
-      {"raw_gain", &c.raw_gain, plain, "Gain in the camera's own units. The factor that it stands for must be part of the responsivity.", optional("64.0")},
+      {"raw_gain", &c.raw_gain, plain.within(-most_gain, most_gain), "Gain in the camera's own units. The factor that it stands for must be part of the responsivity.", optional("64.0")},
       {"white_balance_k", &c.white_balance_k, plain.within(1000, 25000), "Colour temperature in kelvin. Turns the camera's automatic white balance off.", optional("5600.0")},
       {"trigger", &c.trigger, plain, "\"software\", or the camera's input line that triggers each frame. Default: no trigger, the camera runs at its own rate.", optional("\"Line1\"")},
       {"packet_size", &c.packet_size, plain.within(576, 16000), "Packet size of network cameras, in bytes. Default: the largest that the network passes. A size that is given is used untried; no frame arrives if the network does not pass it.", optional("9000")},
-      {"start_timeout_s", &wish.start_timeout_s, seconds.above(0, 600), "A camera that delivers no frame for this long after its start is opened again."},
-      {"stall_timeout_s", &wish.stall_timeout_s, seconds.above(0, 600), "A camera that delivers no frame for this long counts as stalled, and is soon opened again."},
+      {"start_timeout_s", &wish.start_timeout_s, seconds.within(0.001, 600), "A camera that delivers no frame for this long after its start is opened again."},
+      {"stall_timeout_s", &wish.stall_timeout_s, seconds.within(0.001, 600), "A camera that delivers no frame for this long counts as stalled, and is soon opened again."},
   };
 }
 
 Keys light_camera_driving_keys(CameraWish& wish) {
   Keys keys = camera_keys(wish);
-  keys.push_back({"bracket_s", &wish.bracket_s, seconds.above(0, 100), "Shutter times to cycle through (a bracket), because one exposure cannot hold both the lamps and the room.", optional("[0.0002, 0.002, 0.02]")});
+  keys.push_back({"bracket_s", &wish.bracket_s, shutter, "Shutter times to cycle through (a bracket), because one exposure cannot hold both the lamps and the room.", optional("[0.0002, 0.002, 0.02]")});
   return keys;
 }
 
@@ -128,7 +140,7 @@ Keys light_camera_keys(LightCamera& c) {
       {"driver", &c.driver, Rule{.words = camera_driver_words()}, "Driver of the light camera, the fisheye that looks at the lamps."},
       {"device", &c.device, plain, "As in [observer].", optional("\"sessions/take1\"")},
       {"faults", &c.faults, plain, "As in [observer].", optional("[\"drop@30+5\"]")},
-      {"exposure", &c.exposure, plain.above(0), "Absolute exposure, which overrides that of the frames; see [observer].", optional("0.35")},
+      {"exposure", &c.exposure, absolute_exposure, "Absolute exposure, which overrides that of the frames; see [observer].", optional("0.35")},
   };
 }
 
@@ -150,11 +162,11 @@ Keys tracking_keys(Tracking& t) {
 Keys tag_keys(TagDraft& t) {
   return {
       {"id", &t.id, plain.within(0, 65535), "The number of the tag; each at most once.", required("0")},
-      {"size_m", &t.size, m.above(0, 100), "Side of the black border, measured outside. Required unless corners_m is given.", optional("0.08")},
-      {"position_m", &t.pose.position, m, "Position of the tag's middle in the world (Z up).", optional("[0.0, 0.0, 0.0]")},
-      {"rotation_deg", &t.pose.rotation, deg, "Rotation about world X, then Y, then Z. Without it the tag lies face up with its right along X; [90, 0, 0] hangs it on a wall, facing -Y.", optional("[0.0, 0.0, 0.0]")},
-      {"corners_m", &t.corners, m, "Instead of position and rotation: the corners of the black border, as printed: lower left, lower right, upper right, upper left.", optional("[[-0.04, -0.04, 0], [0.04, -0.04, 0], [0.04, 0.04, 0], [-0.04, 0.04, 0]]")},
-      {"world_from_tag", &t.pose.matrix, plain, "Instead of position and rotation: the rigid transform; the tag's axes point right, up and out of the paper.", optional("[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]")},
+      {"size_m", &t.size, m.within(1e-4, 100), "Side of the black border, measured outside. Required unless corners_m is given.", optional("0.08")},
+      {"position_m", &t.pose.position, place, "Position of the tag's middle in the world (Z up).", optional("[0.0, 0.0, 0.0]")},
+      {"rotation_deg", &t.pose.rotation, turn, "Rotation about world X, then Y, then Z. Without it the tag lies face up with its right along X; [90, 0, 0] hangs it on a wall, facing -Y.", optional("[0.0, 0.0, 0.0]")},
+      {"corners_m", &t.corners, place, "Instead of position and rotation: the corners of the black border, as printed: lower left, lower right, upper right, upper left.", optional("[[-0.04, -0.04, 0], [0.04, -0.04, 0], [0.04, 0.04, 0], [-0.04, 0.04, 0]]")},
+      {"world_from_tag", &t.pose.matrix, matrix, "Instead of position and rotation: the rigid transform; the tag's axes point right, up and out of the paper.", optional("[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]")},
       {"carrier", &t.carrier, plain, "Name of the thing that the tag is stuck to, if it is moved by hand: a stick, a tray. The tag's pose is then relative to the carrier; without a pose, the carrier's frame is that of the tag.", optional("\"stick\"")},
   };
 }
@@ -168,11 +180,11 @@ Keys object_keys(ObjectDraft& o) {
       {"animation", &o.object.animation, plain, "The animation in the file that is played (nodes, joints of skins and weights of morph targets), in the time of the pictures: its name, its index from \"0\", or \"*\" for all of them at once. A wrong name is answered with a list of what there is. Default: nothing moves.", optional("\"walk\"")},
       {"loops", &o.object.loops, plain, "The animation starts again at its end; false: it stops there."},
       {"variant", &o.object.variant, plain, "Name of the variant of its materials that the object is shown in (KHR_materials_variants); \"\" is the file as it is without one. The action next_variant steps through the variants of a virtual object.", optional("\"blue\"")},
-      {"position_m", &o.pose.position, m, "Position of the file's origin in the world.", optional("[0.2, 0.1, 0.0]")},
-      {"rotation_deg", &o.pose.rotation, deg, "Rotation about world X, then Y, then Z, applied before the position.", optional("[0.0, 0.0, 45.0]")},
-      {"scale", &o.scale, plain.above(0, 1e6), "Scale factor, applied before the rotation."},
+      {"position_m", &o.pose.position, place, "Position of the file's origin in the world.", optional("[0.2, 0.1, 0.0]")},
+      {"rotation_deg", &o.pose.rotation, turn, "Rotation about world X, then Y, then Z, applied before the position.", optional("[0.0, 0.0, 45.0]")},
+      {"scale", &o.scale, plain.within(1e-9, 1e6), "Scale factor, applied before the rotation."},
       {"carrier", &o.object.carrier, plain, "Carrier of a [[tag]] that it is attached to: it moves along, and its pose is relative to the carrier.", optional("\"stick\"")},
-      {"world_from_file", &o.pose.matrix, plain, "Instead of position, rotation and scale: any invertible transform.", optional("[[1, 0, 0, 0.2], [0, 1, 0, 0.1], [0, 0, 1, 0], [0, 0, 0, 1]]")},
+      {"world_from_file", &o.pose.matrix, matrix, "Instead of position, rotation and scale: any invertible transform.", optional("[[1, 0, 0, 0.2], [0, 1, 0, 0.1], [0, 0, 1, 0], [0, 0, 0, 1]]")},
   };
 }
 
@@ -188,33 +200,33 @@ Keys light_keys(LightDraft& d) {
   return {
       {"name", &l.name, plain, "Name used in messages.", optional("\"key light\"")},
       {"type", &l.type, plain, "Shape of the lamp.", required("\"spot\"")},
-      {"position_m", &l.position, m, "Position of its centre; not for a directional light.", optional("[0.0, -1.0, 2.0]")},
-      {"direction", &l.direction, plain, "Direction in which the light travels: spot, directional, rectangle.", optional("[0.0, 0.5, -1.0]")},
-      {"up", &l.up, plain, "Rectangle: direction of its height; the part along `direction` is ignored.", optional("[0.0, 1.0, 0.0]")},
-      {"emission", &l.emission, plain.at_least(0), "Linear Rec. 709, in the units of the set's radiance. Point, spot: intensity in W/sr; directional: W/m^2 on a plane that faces it; rectangle, sphere: radiance in W/sr/m^2. Required, but for a lamp with captured = true: without it, the lamp is as bright as the light camera sees it.", optional("[10.0, 9.5, 8.0]")},
-      {"width_m", &l.width_m, m.above(0), "Rectangle: its width.", optional("1.0")},
-      {"height_m", &l.height_m, m.above(0), "Rectangle: its height.", optional("0.5")},
-      {"radius_m", &l.radius_m, m.above(0), "Sphere: its radius.", optional("0.05")},
+      {"position_m", &l.position, place, "Position of its centre; not for a directional light.", optional("[0.0, -1.0, 2.0]")},
+      {"direction", &l.direction, axis, "Direction in which the light travels: spot, directional, rectangle.", optional("[0.0, 0.5, -1.0]")},
+      {"up", &l.up, axis, "Rectangle: direction of its height; the part along `direction` is ignored.", optional("[0.0, 1.0, 0.0]")},
+      {"emission", &l.emission, radiance, "Linear Rec. 709, in the units of the set's radiance. Point, spot: intensity in W/sr; directional: W/m^2 on a plane that faces it; rectangle, sphere: radiance in W/sr/m^2. Required, but for a lamp with captured = true: without it, the lamp is as bright as the light camera sees it.", optional("[10.0, 9.5, 8.0]")},
+      {"width_m", &l.width_m, length, "Rectangle: its width.", optional("1.0")},
+      {"height_m", &l.height_m, length, "Rectangle: its height.", optional("0.5")},
+      {"radius_m", &l.radius_m, length, "Sphere: its radius.", optional("0.05")},
       {"angular_radius_deg", &l.angular_radius_rad, deg.within(0, 90), "Directional: half the angle under which it is seen; 0 gives sharp shadows, the sun has 0.265.", optional("0.265")},
       {"inner_cone_deg", &l.inner_cone_rad, deg.within(0, 90), "Spot: half angle of its full intensity. Default: 0.", optional("20.0")},
-      {"outer_cone_deg", &l.outer_cone_rad, deg.above(0, 90), "Spot: half angle at which its light ends. Default: 45.", optional("35.0")},
+      {"outer_cone_deg", &l.outer_cone_rad, deg.within(0.01, 90), "Spot: half angle at which its light ends. Default: 45.", optional("35.0")},
       {"carrier", &l.carrier, plain, "Carrier of a [[tag]] that it is attached to: it moves along, and its pose is relative to the carrier.", optional("\"stick\"")},
-      {"gain_mixed", &l.gain_mixed, plain.at_least(0), "Brightness in the composite: 1 as it is, 0 off, 0.3 dimmed to 30 %."},
-      {"gain_real", &l.gain_real, plain.at_least(0), "Brightness on the real set: 1 for a real lamp, 0 for one that is added."},
-      {"tint", &l.tint, plain.at_least(0), "Colour of its light in the composite over that on the real set: one factor for each of red, green and blue.", optional("[1.0, 0.8, 0.6]")},
+      {"gain_mixed", &l.gain_mixed, gain, "Brightness in the composite: 1 as it is, 0 off, 0.3 dimmed to 30 %."},
+      {"gain_real", &l.gain_real, gain, "Brightness on the real set: 1 for a real lamp, 0 for one that is added."},
+      {"tint", &l.tint, gain, "Colour of its light in the composite over that on the real set: one factor for each of red, green and blue.", optional("[1.0, 0.8, 0.6]")},
       {"captured", &d.captured, plain, "Whether the light around the set shows this lamp too. It is then taken out of it, so that it does not shine twice, and dimming or removing it changes the light. Default: true for a lamp with gain_real above 0 and no carrier where the light comes from a light camera.", optional("false")},
-      {"cone_deg", &l.cone_rad, deg.above(0, 60), "With captured = true: what is taken out is a cone of this half angle around the lamp. Default: its outline as the light camera sees it, and 1 degree around that.", optional("5.0")},
+      {"cone_deg", &l.cone_rad, deg.within(0.01, 60), "With captured = true: what is taken out is a cone of this half angle around the lamp. Default: its outline as the light camera sees it, and 1 degree around that.", optional("5.0")},
   };
 }
 
 Keys captured_lamp_keys(CapturedLamp& l) {
   return {
       {"name", &l.name, plain, "Name used in messages and by the buttons; each at most once, and not that of a [[light]].", required("\"window\"")},
-      {"direction", &l.direction, plain, "Direction from the light camera towards the lamp, by the axes of the set, also where there is a room. Required unless position_m is given.", optional("[0.71, 0.33, 0.62]")},
-      {"position_m", &l.position, m, "Instead of direction: the lamp's place, from which its light then comes.", optional("[1.2, 0.4, 2.3]")},
-      {"cone_deg", &l.cone_rad, deg.above(0, 60), "Half angle of the cone that holds the whole lamp; what is brighter in it than at its edge is the lamp's light.", required("6.0")},
-      {"gain_mixed", &l.gain_mixed, plain.at_least(0), "Brightness in the composite: 1 as it is, 0 off, 0.3 dimmed to 30 %."},
-      {"tint", &l.tint, plain.at_least(0), "Colour of its light in the composite, as factors of red, green and blue."},
+      {"direction", &l.direction, axis, "Direction from the light camera towards the lamp, by the axes of the set, also where there is a room. Required unless position_m is given.", optional("[0.71, 0.33, 0.62]")},
+      {"position_m", &l.position, place, "Instead of direction: the lamp's place, from which its light then comes.", optional("[1.2, 0.4, 2.3]")},
+      {"cone_deg", &l.cone_rad, deg.within(0.01, 60), "Half angle of the cone that holds the whole lamp; what is brighter in it than at its edge is the lamp's light.", required("6.0")},
+      {"gain_mixed", &l.gain_mixed, gain, "Brightness in the composite: 1 as it is, 0 off, 0.3 dimmed to 30 %."},
+      {"tint", &l.tint, gain, "Colour of its light in the composite, as factors of red, green and blue."},
   };
 }
 
@@ -225,12 +237,12 @@ Keys lighting_keys(Draft& d) {
       {"mode", &l.mode, plain, "\"image\": the whole fisheye picture lights the scene. \"sources\": the lamps in it become discs or spheres, which needs far fewer samples; the rest of the picture is blurred or dropped. \"hybrid\": the lamps likewise, and the rest of the picture as it is."},
       {"sampling", &l.sampling, plain, "How directions towards the light are chosen: by its brightness, or by the surfaces alone (\"bsdf\"), which is noisier and meant for comparison."},
       {"environment", &d.environment, plain, "Picture of the light from all around, which replaces the light camera: OpenEXR or Radiance .hdr, latitude-longitude (2:1) or a cube cross (3:4 or 4:3); Z up, the middle of the picture, or of the middle face, is +X.", optional("\"env.exr\"")},
-      {"environment_rotation_deg", &l.environment_rotation_rad, deg, "Rotation of the environment about world Z, counter-clockwise as seen from above."},
-      {"environment_gain", &l.environment_gain, plain.at_least(0), "Brightness factor of the environment."},
+      {"environment_rotation_deg", &l.environment_rotation_rad, turn, "Rotation of the environment about world Z, counter-clockwise as seen from above."},
+      {"environment_gain", &l.environment_gain, gain, "Brightness factor of the environment."},
       {"balance", &l.balance, plain.within(1e-6, 1e6), "Factors of red, green and blue that turn the light camera's radiance, or the environment's, into the film camera's (previzd calibrate balance)."},
       {"resolution", &l.resolution, plain.within(0, 4096), "Size of the light map in texels a side, a power of two; 0: as fine as the picture that it is made from."},
       {"unseen", &l.unseen, plain, "What is assumed where the light camera cannot see. \"horizon\" continues the edge of its picture, \"mirror\" mirrors the picture about the plane of the lens, \"observer\" uses what the film camera has seen there and the horizon elsewhere, \"constant\" uses unseen_radiance."},
-      {"unseen_radiance", &d.unseen_radiance, plain.at_least(0), "With unseen = \"constant\" only: linear Rec. 709 radiance.", optional("[0.1, 0.1, 0.1]")},
+      {"unseen_radiance", &d.unseen_radiance, radiance, "With unseen = \"constant\" only: linear Rec. 709 radiance.", optional("[0.1, 0.1, 0.1]")},
       {"smoothing_s", &l.smoothing_s, seconds.within(0, 60), "Time over which steady light is averaged. Changes that exceed the sensor's noise are followed at once. 0: no averaging."},
       {"clipped_gain", &l.clipped_gain, plain.within(1, 1e6), "Light that clips in every exposure may be taken for up to this many times as bright as the level at which it clips; 1: exactly that level, which is its lower bound."},
       {"frame", &l.frame, plain.within(-1, 1'000'000), "Light frame to use for the whole take; -1: for each picture the last bracket before it."},
@@ -239,11 +251,11 @@ Keys lighting_keys(Draft& d) {
 
 Keys room_keys(Draft& d) {
   return {
-      {"size_m", &d.room.size_m, m.above(0, far_m), "Inner size of a box-shaped room along X, Y and Z, before its rotation. Required unless file is given.", optional("[6.0, 5.0, 2.8]")},
+      {"size_m", &d.room.size_m, length, "Inner size of a box-shaped room along X, Y and Z, before its rotation. Required unless file is given.", optional("[6.0, 5.0, 2.8]")},
       {"file", &d.room_file, plain, "Instead of size_m: a glTF 2.0 file with the walls and lamps, as in [[object]].", optional("\"room.glb\"")},
-      {"position_m", &d.room_pose.position, m, "Position of the box's middle, or of the file's origin, in the world.", optional("[0.0, 0.0, 1.4]")},
-      {"rotation_deg", &d.room_pose.rotation, deg, "Rotation about world X, then Y, then Z, applied before the position.", optional("[0.0, 0.0, 30.0]")},
-      {"seen_from_m", &d.room.seen_from, m, "Where the light is needed: a place among the virtual objects."},
+      {"position_m", &d.room_pose.position, place, "Position of the box's middle, or of the file's origin, in the world.", optional("[0.0, 0.0, 1.4]")},
+      {"rotation_deg", &d.room_pose.rotation, turn, "Rotation about world X, then Y, then Z, applied before the position.", optional("[0.0, 0.0, 30.0]")},
+      {"seen_from_m", &d.room.seen_from, place, "Where the light is needed: a place among the virtual objects."},
   };
 }
 
@@ -252,7 +264,7 @@ Keys light_sources_keys(LightSources& l) {
       {"contrast", &l.contrast, plain.within(2, 1e6), "A lamp must be at least this many times as bright as the mean of everything that is not a lamp."},
       {"least_share", &l.least_share, plain.within(0, 1), "A lamp must bring at least this share of all light; fainter ones, such as reflections of lamps, stay in the picture."},
       {"residual", &l.residual, plain, "With mode = \"sources\": the light of everything but the lamps is kept, blurred beyond recognition, or dropped; its share is then reported."},
-      {"distance_m", &l.distance_m, m.above(0, far_m), "Distance of the lamps from the light camera. Default: they are on the walls of [lighting.room], or infinitely far away if there is none.", optional("2.5")},
+      {"distance_m", &l.distance_m, length, "Distance of the lamps from the light camera. Default: they are on the walls of [lighting.room], or infinitely far away if there is none.", optional("2.5")},
   };
 }
 
@@ -315,12 +327,12 @@ Keys gpio_keys(GpioContact& c) {
 
 Keys control_keys(Control& c) {
   return {
-      {"move_step_m", &c.move_step_m, m.above(0, 100), "How far move_left and the like move."},
-      {"turn_step_deg", &c.turn_step_rad, deg.above(0, 180), "How far turn_left and the like turn."},
-      {"scale_step", &c.scale_step, plain.above(1, 100), "Factor by which scale_up enlarges."},
-      {"light_step_stops", &c.light_step_stops, stops.above(0, 20), "How much light_up and light_down change; a stop is a factor of two."},
-      {"tint_step_stops", &c.tint_step_stops, stops.above(0, 20), "How much light_warmer and light_greener change the balance between the colours."},
-      {"exposure_step_stops", &c.exposure_step_stops, stops.above(0, 20), "How much exposure_up and exposure_down change."},
+      {"move_step_m", &c.move_step_m, m.within(least_m, 100), "How far move_left and the like move."},
+      {"turn_step_deg", &c.turn_step_rad, deg.within(0.001, 180), "How far turn_left and the like turn."},
+      {"scale_step", &c.scale_step, plain.within(1.0001, 100), "Factor by which scale_up enlarges."},
+      {"light_step_stops", &c.light_step_stops, stops.within(0.001, 20), "How much light_up and light_down change; a stop is a factor of two."},
+      {"tint_step_stops", &c.tint_step_stops, stops.within(0.001, 20), "How much light_warmer and light_greener change the balance between the colours."},
+      {"exposure_step_stops", &c.exposure_step_stops, stops.within(0.001, 20), "How much exposure_up and exposure_down change."},
   };
 }
 
@@ -331,9 +343,9 @@ Keys recording_keys(Recording& r) {
       {"slate", &r.slate, plain, "Scene and shot, as on the slate. Default: the set's name.", optional("\"12A\"")},
       {"notes", &r.notes, plain, "Notes that are written into every take.", optional("\"second unit, 35 mm\"")},
       {"preroll_s", &r.preroll_s, seconds.within(0, 60), "A take begins this long before the button was pressed; the frames are kept in memory until then."},
-      {"most_behind_s", &r.most_behind_s, seconds.within(0.2, 600), "A frame is left out, counted and reported if the disk and the encoder are more than this behind the cameras: what waits in memory is lost where the computer goes down. What pre-roll adds at the beginning of a take is given ten seconds."},
+      {"most_behind_s", &r.most_behind_s, seconds.within(0.2, 600), "The disk and the encoder are never more than this behind the cameras, because what waits in memory is lost where the computer goes down: of what waits longer, the oldest frame is left out, counted and reported. What pre-roll adds at the beginning of a take is given ten seconds."},
       {"codec", &r.codec, plain, "Form of the cameras' pictures in a take, both without loss: ffv1 is about half as large and costs a processor core for every few pictures of 1920x1080 a second; raw costs a fast disk (1920x1080 at 25 pictures a second: 160 MB a second) and no processor. The rig says before the first take which does not keep up."},
-      {"queue_mb", &r.queue_mb, megabytes.within(1, 1e6), "Memory for frames that wait for the disk, half of it for those before the button. Frames that do not fit are dropped, counted and reported. Default: a quarter of the memory that is free at the start.", optional("1024.0")},
+      {"queue_mb", &r.queue_mb, megabytes.within(1, 1e6), "Memory for frames that wait for the disk, half of it for those before the button, and at most three quarters of the computer's. Frames that do not fit are dropped, counted and reported. Default: a quarter of the memory that is free at the start.", optional("1024.0")},
       {"reserve_mb", &r.reserve_mb, megabytes.within(1, 1e9), "A take is ended properly before less disk space than this is left."},
       {"timecode_fps", &r.timecode_fps, plain.within(1, 240), "Frames per second of the timecode (time of day)."},
       {"composite", &r.composite, plain, "Also record the composite that was shown, without overlay: composite.mkv, lossless, for viewing the take elsewhere."},

@@ -46,7 +46,7 @@ output::RecorderOptions idle_recorder(const set::Set& set) {
   output::RecorderOptions options;
   options.take.folders = {set.recording.directory};
   options.preroll_s = set.recording.preroll_s;
-  options.queue_bytes = output::default_queue_bytes();
+  options.queue_bytes = output::queue_bytes({});
   return options;
 }
 

@@ -141,8 +141,9 @@ class GpioButtons final : public Buttons {
       refusal_.clear();
       for (Line& line : lines_) see_held(line);
       ++counters_["opened"];
-    } catch (const Error& error) {
+    } catch (const std::exception& error) {
       for (Line& line : lines_) line.line = nullptr;
+      chip_.reset();
       retry_ns_ = monotonic_ns() + second_ns;
       ++counters_["not opened"];
       if (refusal_ == error.what()) return;

@@ -94,7 +94,7 @@ output::RecorderOptions settings_of(const Options& options, const fs::path& fold
   settings.take.info.take = session::TakeInfo{0, "bench", "", options.rate_hz, "", false};
   settings.take.codec = options.codec;
   settings.preroll_s = 0;
-  settings.queue_bytes = output::default_queue_bytes();
+  settings.queue_bytes = output::queue_bytes({});
   settings.reserve_bytes = static_cast<std::uint64_t>(1e6 * options.reserve_mb);
   settings.note = [](const report::Report& report) {
     std::fprintf(stderr, "%s\n", line_of(report).c_str());

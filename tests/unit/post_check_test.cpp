@@ -82,8 +82,62 @@ class Check : public testing::Test {
 TEST_F(Check, RemarksThatBothFoldersOfTakesAreOnOneDisk) {
   ASSERT_EQ(check("[recording]\nsecond_directory='more'\n"), 0) << said_;
   expect_said("recording.second_directory is on the disk of recording.directory now");
-  ASSERT_EQ(check("[recording]\nsecond_directory='/proc/takes'\n"), 0) << said_;
+  ASSERT_EQ(check("[recording]\nsecond_directory='/dev/shm/takes'\n"), 0) << said_;
   EXPECT_EQ(said_.find("second_directory"), std::string::npos) << said_;
+}
+
+TEST_F(Check, RefusesAFolderOfTakesThatIsAFile) {
+  write("takes", "a file");
+  ASSERT_EQ(check("[recording]\ndirectory='takes'\n"), 1) << said_;
+  expect_said("recording.directory: " + (directory_ / "takes").string() + " is a file");
+  ASSERT_EQ(check("[recording]\nsecond_directory='takes/more'\n"), 1) << said_;
+  expect_said("recording.second_directory: " + (directory_ / "takes").string() + " is a file");
+}
+
+constexpr const char* live_set = R"(
+[observer]
+driver = "v4l2"
+device = "usb-camera"
+[observer.camera]
+width = 1920
+height = 1080
+rate_hz = 25.0
+[light_camera]
+driver = "none"
+)";
+
+TEST_F(Check, SaysForHowLongTheDiskLasts) {
+  ASSERT_EQ(check(live_set), 0) << said_;
+  expect_said("the cameras' pictures: about 104 MB a second, and about half of that recorded");
+  expect_said("takes go to " + (directory_ / "takes").string());
+  expect_said(" free, enough for at least ");
+  ASSERT_EQ(check(std::string(live_set) + "[recording]\ncodec='raw'\n"), 0) << said_;
+  expect_said("recorded as they are");
+}
+
+TEST_F(Check, SaysWhatItNeedsToKnowForThat) {
+  ASSERT_EQ(check("[observer]\ndriver='v4l2'\ndevice='usb-camera'\n"), 0) << said_;
+  expect_said("cannot be said without [observer.camera] rate_hz and the picture's size");
+}
+
+TEST_F(Check, RemarksOnADiskThatIsAlmostFull) {
+  ASSERT_EQ(check("[recording]\nreserve_mb = 1e9\n"), 0) << said_;
+  expect_said("recording.directory: the disk is almost full");
+  expect_said("keeps 1e+06 GB free; no take can begin there");
+}
+
+TEST_F(Check, RemarksOnMemoryTooSmallForThePreRoll) {
+  const auto with = [](const char* recording) {
+    return std::string(live_set) + "[recording]\n" + recording;
+  };
+  // 1920 * 1080 * 2 * 25 bytes a second, of which half of a gigabyte holds 4.8 seconds.
+  ASSERT_EQ(check(with("preroll_s = 10\nqueue_mb = 1000\n")), 0) << said_;
+  expect_said("recording.preroll_s = 10: this needs about 1.04 GB of memory and there are 500 MB");
+  expect_said("begins about 4.8 s before the button");
+  ASSERT_EQ(check(with("preroll_s = 4\nqueue_mb = 1000\n")), 0) << said_;
+  EXPECT_EQ(said_.find("preroll_s"), std::string::npos) << said_;
+  ASSERT_EQ(check(with("queue_mb = 1e6\n")), 0) << said_;
+  expect_said("recording.queue_mb = 1e+06: this computer has ");
 }
 
 // A light camera that the set does not have sees nothing.

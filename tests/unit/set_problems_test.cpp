@@ -137,24 +137,30 @@ const Mistake ranges[] = {
     {"[estimator]\nseed = -1\n", "2:8: estimator.seed: -1", "0 to 4294967295"},
     {"[estimator]\nseed = 4294967296\n", "2:8: estimator.seed: 4294967296", "0 to 4294967295"},
     {"[estimator]\nmax_depth = 65\n", "2:13: estimator.max_depth: 65", "1 to 64"},
-    {"[observer]\nexposure = 0.0\n", "2:12: observer.exposure: 0 is not", "above 0"},
+    {"[observer]\nexposure = 0.0\n", "2:12: observer.exposure: 0 is not", "1e-12 to 1e+12"},
     {"[observer]\nexposure = inf\n", "2:12: observer.exposure: inf", "finite"},
     {"[lighting]\nenvironment_rotation_deg = -inf\n",
      "2:28: lighting.environment_rotation_deg: -inf", "finite"},
     {"[lighting]\nresolution = 100\n", "2:1: lighting.resolution: 100", "power of two"},
     {"[lighting]\nresolution = 8192\n", "2:14: lighting.resolution: 8192", "0 to 4096"},
     {"[[tag]]\nid=1\nsize_m=0.1\nposition_m=[0,nan,0]\n", "4:15: tag.position_m: nan", "finite"},
-    {"[[tag]]\nid=1\nsize_m=-0.1\nposition_m=[0,0,0]\n", "3:8: tag.size_m: -0.1", "above 0"},
+    {"[[tag]]\nid=1\nsize_m=-0.1\nposition_m=[0,0,0]\n", "3:8: tag.size_m: -0.1", "0.0001 to 100"},
     {"[[tag]]\nid=-1\nsize_m=0.1\nposition_m=[0,0,0]\n", "2:4: tag.id: -1", "0 to 65535"},
     {"[[light]]\ntype='point'\nposition_m=[0,0,1]\nemission=[1,-1,1]\n", "4:13: light.emission: -1",
-     "at least 0"},
+     "0 to 1e+12"},
+    {"[recording]\ndirectory='/proc/takes'\n",
+     "2:1: recording.directory: /proc/takes holds no files of anybody", "a folder on a disk"},
+    {"[recording]\nsecond_directory='/a/../sys'\n", "2:1: recording.second_directory: /sys holds",
+     "a folder on a disk"},
+    {"[output]\ndirectory='/sys/kernel'\n", "2:1: output.directory: /sys/kernel holds",
+     "a folder on a disk"},
 };
 INSTANTIATE_TEST_SUITE_P(Ranges, SetMistake, testing::ValuesIn(ranges));
 
 const Mistake missing[] = {
     {"[[button]]\nname='red'\n", "1:1: button.action: is missing", "\"record\""},
     {"[observer.intrinsics]\nwidth=64\nheight=48\nfx=60.0\ncx=31.5\ncy=23.5\n",
-     "1:1: observer.intrinsics.fy: is missing", "number in px, above 0"},
+     "1:1: observer.intrinsics.fy: is missing", "number in px, 1 to 1000000"},
     {"[observer.lens]\nf_number=2.0\nfocal_length_mm=35\nfocus_distance_m=1.0\n",
      "1:1: observer.lens: [observer.intrinsics] is missing", "as a whole"},
     {"[light_camera.response]\nkind=\"linear\"\n",
@@ -328,7 +334,7 @@ const Mistake optics[] = {
     {"[light_camera.intrinsics]\nmax_angle_deg=90\nk=[-0.2,0,0,0]\n" FISHEYE POSE,
      "3:1: light_camera.intrinsics.k: the picture folds back at 73.9 degrees", "max_angle_deg"},
     {"[light_camera.intrinsics]\nmax_angle_deg=181\n" FISHEYE POSE,
-     "2:15: light_camera.intrinsics.max_angle_deg: 181", "at most 180"},
+     "2:15: light_camera.intrinsics.max_angle_deg: 181", "1 to 180"},
 };
 INSTANTIATE_TEST_SUITE_P(Optics, SetMistake, testing::ValuesIn(optics));
 

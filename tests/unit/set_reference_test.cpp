@@ -1,5 +1,6 @@
 // config/reference.toml and the example: generated, complete, and true.
 #include <gtest/gtest.h>
+#include <array>
 
 #include <cmath>
 #include <fstream>
@@ -59,6 +60,49 @@ TEST(SetReference, CommentedDefaultsAreTheStructs) {
     for (const auto& key : section.open().keys)
       EXPECT_EQ(key.need.kind == Need::Kind::defaulted, !key.initial.empty())
           << section.path << '.' << key.name;
+}
+
+// Returns the forms in which a key may have this number: alone, in lists, in a matrix, in corners.
+std::vector<Value> forms_of(double number) {
+  const auto list = [](std::size_t count, const Value& entry) {
+    return Value{{}, std::vector<Value>(count, entry)};
+  };
+  const Value alone{{}, number};
+  std::vector<Value> forms = {alone, list(4, list(3, alone))};
+  for (const std::size_t count : {1, 2, 3, 4, 5, 9, 45}) forms.push_back(list(count, alone));
+  const std::array<double, 16> pose = {1, 0, 0, number, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  Value matrix{{}, std::vector<Value>()};
+  for (std::size_t row = 0; row < 4; ++row) {
+    Value& numbers = std::get<std::vector<Value>>(matrix.data).emplace_back();
+    numbers.data = std::vector<Value>();
+    for (std::size_t column = 0; column < 4; ++column)
+      std::get<std::vector<Value>>(numbers.data).push_back({{}, pose[4 * row + column]});
+  }
+  forms.push_back(matrix);
+  return forms;
+}
+
+bool takes(const set::Key& key, const Value& value) {
+  try {
+    key.read(value);
+    return true;
+  } catch (const Misread&) {
+    return false;
+  }
+}
+
+// No key takes a number that overflows a float, squared or not, or one that is not 0 and could be.
+TEST(SetReference, NoKeyTakesANumberThatNobodyCanMean) {
+  Draft draft;
+  for (const auto& section : sections(draft))
+    for (const auto& key : section.open().keys) {
+      const auto zeros = forms_of(0), small = forms_of(1e-308);
+      for (const double large : {1e308, -1e308, 1e13, -1e13})
+        for (const Value& value : forms_of(large))
+          EXPECT_FALSE(takes(key, value)) << section.path << '.' << key.name << ' ' << large;
+      for (std::size_t i = 0; i < small.size(); ++i)
+        EXPECT_LE(takes(key, small[i]), takes(key, zeros[i])) << section.path << '.' << key.name;
+    }
 }
 
 // Take the "#" from every key: each value must be one that its key takes. What contradicts another
