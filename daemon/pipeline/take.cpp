@@ -8,6 +8,18 @@
 #include "drivers/session/files.hpp"
 
 namespace previz::pipeline {
+namespace {
+
+// Returns what the session says is missing of this camera: ": observer.mkv: is a pipe ...".
+std::string why_missing(const session::Session& session, const std::string& source) {
+  std::string why;
+  for (const std::string& line : session.missing)
+    if (line.starts_with(source)) why += (why.empty() ? ": " : "; ") + line;
+  return why;
+}
+
+}  // namespace
+
 ObserverCalibration observer_calibration(const set::Set& set, const session::SessionInfo& session) {
   if (set.observer.calibration) return *set.observer.calibration;
   if (session.observer) return *session.observer;
@@ -54,7 +66,8 @@ Take open_take(const std::filesystem::path& session_directory,
   take.observer_stream = session::open_stream(take.session, "observer", stop);
   take.light_stream = session::open_stream(take.session, "light", stop);
   if (!take.observer_stream || take.observer_stream->records().empty())
-    throw Error(session_directory.string() + ": the session has no observer frames");
+    throw Error(session_directory.string() + ": the session has no observer frames" +
+                why_missing(take.session, "observer"));
   return take;
 }
 

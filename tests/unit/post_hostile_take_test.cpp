@@ -12,6 +12,7 @@
 #include <sstream>
 
 #include "daemon/output/salvage.hpp"
+#include "daemon/pipeline/take.hpp"
 #include "daemon/post/takes.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
@@ -105,6 +106,10 @@ TEST_P(HostileTake, IsNamedAndHarmsNobody) {
                 copy_takes({{take_}, disk_}, out, {});
               }),
               HasSubstr(name));
+  if (name.starts_with("observer")) {
+    EXPECT_THAT(said([&](std::ostream&) { pipeline::open_take(take_, std::nullopt); }),
+                HasSubstr(name));
+  }
   EXPECT_TRUE(!fs::exists(disk_) || fs::is_empty(disk_)) << "a copy that is not whole";
   expect_victim_untouched();
 }
