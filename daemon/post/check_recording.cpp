@@ -95,10 +95,11 @@ std::vector<Folder> folders_of(const set::Recording& recording) {
 }
 
 std::optional<double> free_bytes(const fs::path& folder) {
-  std::error_code unknown;
-  const fs::space_info space = fs::space(output::existing_part(folder), unknown);
-  if (unknown) return std::nullopt;
-  return static_cast<double>(space.available);
+  try {
+    return static_cast<double>(output::free_on_disk_of(folder, {}));
+  } catch (const fs::filesystem_error&) {  // it is said of the folder itself
+    return std::nullopt;
+  }
 }
 
 // Returns for how long of the cameras' pictures a folder's disk has room; raw, which is the least.
@@ -142,8 +143,8 @@ void look_at_preroll(const set::Recording& recording, double bytes_a_second,
   if (needed > room)
     lines.push_back(fmt::format(
         "recording.preroll_s = {:g}: this needs about {} of memory and there are {}, so that a "
-        "take "
-        "begins about {:.1f} s before the button; more by recording.queue_mb, of which it is half",
+        "take begins about {:.1f} s before the button; more by recording.queue_mb, of which it is "
+        "half",
         recording.preroll_s, size_in_words(needed), size_in_words(room), room / bytes_a_second));
 }
 

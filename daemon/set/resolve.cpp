@@ -71,23 +71,19 @@ class Resolver {
     return (folder_ / as_written).lexically_normal();
   }
 
-  // Returns the path of a folder, without the slash that it may end in. No disk is asked: a set is
-  // read while the disk of the takes may be anywhere.
+  // Returns the path of a folder, without the slash that it may end in. No disk is asked.
   fs::path folder_at(const char* table, const char* key, const fs::path& as_written) {
     const fs::path folder = located(as_written);
-    const auto in = folder.is_absolute() ? std::next(folder.begin()) : folder.begin();
-    if (folder.is_absolute() && in != folder.end() && (*in == "proc" || *in == "sys"))
-      problem(given(table), key,
-              folder.string() + " holds no files of anybody; allowed: a folder on a disk");
+    const std::string path = folder.string(), below = path + '/';
+    if (below.starts_with("/proc/") || below.starts_with("/sys/"))
+      problem(given(table), key, path + " holds no files of anybody; allowed: a folder on a disk");
     return folder.has_filename() || folder == folder.root_path() ? folder : folder.parent_path();
   }
 
   void recording() {
-    auto& first = set_.recording.directory;
-    first = folder_at("recording", "directory", first);
+    set_.recording.directory = folder_at("recording", "directory", set_.recording.directory);
     auto& second = set_.recording.second_directory;
-    if (!second) return;
-    second = folder_at("recording", "second_directory", *second);
+    if (second) second = folder_at("recording", "second_directory", *second);
     if (second == set_.recording.directory)
       problem(given("recording"), "second_directory",
               "is the folder of recording.directory; allowed: a folder on another disk");

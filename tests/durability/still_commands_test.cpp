@@ -17,6 +17,7 @@
 #include "drivers/error.hpp"
 #include "tests/durability/still_disk.hpp"
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/small_shot.hpp"
 #include "tests/support/wait_until.hpp"
 
 namespace previz::post {
@@ -42,7 +43,6 @@ bool run_past_call(std::size_t call, const fs::path& folder, const std::function
   });
   EXPECT_TRUE(wait_until("it waits, or is done", [&] { return is_done || disk.waiting() > 0; }));
   const bool was_still = !is_done;
-  // What looks at the disk here would wait as well.
   if (was_still) while_still();
   disk.go_on();
   return was_still;
@@ -128,30 +128,6 @@ TEST(StillDiskOfATake, ThatWasCutOffIsInOrderAgainWhereverTheDiskStoodStill) {
   }
 }
 
-pipeline::Shot grey_shot(std::uint64_t index) {
-  constexpr int width = 8, height = 6;
-  pipeline::Shot shot;
-  shot.index = index;
-  auto frame = std::make_shared<Frame>();
-  frame->timestamp_ns = 40'000'000 * static_cast<std::int64_t>(index);
-  shot.frame = frame;
-  shot.light = std::make_shared<pipeline::Light>();
-  shot.picture = std::make_shared<const Plate>(
-      Plate{width, height, 8, std::vector<std::uint16_t>(3 * width * height, 99)});
-  render::Layers layers;
-  layers.width = width;
-  layers.height = height;
-  layers.samples = 16;
-  for (auto* layer : {&layers.composite, &layers.mixed, &layers.real, &layers.diff, &layers.normal,
-                      &layers.variance})
-    layer->resize(width * height, glm::vec3(0.5f));
-  layers.mask.resize(width * height);
-  layers.depth.resize(width * height);
-  shot.layers = std::make_shared<const render::Layers>(layers);
-  shot.whole = true;
-  return shot;
-}
-
 // A render is begun and its frames are checked, and the next frame is written.
 TEST(StillDiskOfARender, AtAnyCallIsWaitedForAndTheRenderGoesOn) {
   constexpr const char* settings = R"({"samples": 16})";
@@ -163,14 +139,14 @@ TEST(StillDiskOfARender, AtAnyCallIsWaitedForAndTheRenderGoesOn) {
     set.output = {directory / "out", true, true, false};
     {
       RenderDirectory before(set.output, settings, false);
-      for (std::uint64_t i = 0; i < frames; ++i) before.write(grey_shot(i), set);
+      for (std::uint64_t i = 0; i < frames; ++i) before.write(test::small_shot(i), set);
     }
     const auto go_on = [&] {
       RenderDirectory again(set.output, settings, false);
       for (std::uint64_t i = 0; i < frames; ++i) EXPECT_TRUE(again.finished(i)) << i;
       EXPECT_TRUE(again.rejected().empty());
       EXPECT_EQ(again.claim(frames), Claim::mine);
-      again.write(grey_shot(frames), set);
+      again.write(test::small_shot(frames), set);
     };
     was_still = run_past_call(call, set.output.directory, go_on, nothing_more);
     const RenderDirectory after(set.output, settings, false);

@@ -33,7 +33,7 @@ std::uint64_t sequence_of(const RecordQueue::Queued& queued) {
   return captured ? captured->frame->sequence : 0;
 }
 
-// Of what waits too long the oldest goes, and the one that is next says so.
+// The oldest frame goes where one waits too long, and the one that is next says so.
 TEST(RecordQueue, LeavesFramesOutRatherThanBeFurtherBehind) {
   RecordQueue queue(0, plenty, bound_s);
   queue.begin();
@@ -55,7 +55,7 @@ TEST(RecordQueue, LeavesFramesOutRatherThanBeFurtherBehind) {
   EXPECT_FALSE(queue.push(frame_at(begin, 100 / fps)).any());
 }
 
-// What is left out of a take that has ended is none of the take that has begun meanwhile.
+// A loss of a take that has ended does not count for the take that has begun meanwhile.
 TEST(RecordQueue, SaysOfWhichTakeItLeavesFramesOut) {
   RecordQueue queue(0, plenty, bound_s);
   const SteadyClock::time_point begin = SteadyClock::now();
@@ -89,7 +89,7 @@ TEST(RecordQueue, IsNotBehindWhatWasWritten) {
   }
 }
 
-// Of an encoder that takes four times as long as there is, every fourth frame is kept.
+// Every fourth frame is kept where the encoder takes four times as long as there is.
 TEST(RecordQueue, OfAnEncoderThatIsTooSlowLeavesFramesOutEvenly) {
   RecordQueue queue(0, plenty, bound_s);
   queue.begin();

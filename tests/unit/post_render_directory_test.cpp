@@ -21,6 +21,7 @@
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/small_shot.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace previz::post {
@@ -32,13 +33,7 @@ constexpr const char* settings =
     R"({"samples": 16, "set": "a text that is too long to be repeated in an error message, as sets are"})";
 
 pipeline::Shot sample_shot(std::uint64_t index) {
-  constexpr int width = 8, height = 6;
-  pipeline::Shot shot;
-  shot.index = index;
-  auto frame = std::make_shared<Frame>();
-  frame->timestamp_ns = 1'000'000'000 + 40'000'000 * static_cast<std::int64_t>(index);
-  frame->exposure = 1.1;
-  shot.frame = frame;
+  pipeline::Shot shot = test::small_shot(index);
   shot.track.status = tracking::TrackStatus::tracked;
   shot.track.pose.emplace();
   shot.track.pose->world_from_camera[3] = {0.1, -0.2, 0.3, 1.0};
@@ -49,22 +44,9 @@ pipeline::Shot sample_shot(std::uint64_t index) {
   light.lighting.sources = {{3, {0.6, 0, 0.8}, 0.01, {3, 2, 1.0 / 3}}};
   light.lighting.report.dropped_share = 0.25;
   shot.light = std::make_shared<pipeline::Light>(light);
-  shot.picture = std::make_shared<const Plate>(
-      Plate{width, height, 8, std::vector<std::uint16_t>(3 * width * height, 99)});
-  render::Layers layers;
-  layers.width = width;
-  layers.height = height;
-  layers.samples = 16;
-  for (auto* layer : {&layers.composite, &layers.mixed, &layers.real, &layers.diff, &layers.normal,
-                      &layers.variance})
-    layer->resize(width * height, glm::vec3(0.5f));
-  layers.mask.resize(width * height);
-  layers.depth.resize(width * height);
-  shot.layers = std::make_shared<const render::Layers>(layers);
   shot.counters.rays = 1234;
   shot.counters.unfinished = 5;
   shot.counters.rebuilt_trees = 2;
-  shot.whole = true;
   return shot;
 }
 
