@@ -20,10 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string bracket(const std::string& table) {
-  return '[' + table + ']';
-}
-
 class Resolver {
  public:
   Resolver(Draft& draft, const fs::path& file, const Assets& assets, Origin origin,
@@ -119,7 +115,7 @@ class Resolver {
     const auto& table = given(camera + '.' + part);
     if (table.at && !given(camera + ".intrinsics").at)
       problems_.add(*table.at, table.path,
-                    bracket(camera + ".intrinsics") +
+                    '[' + camera + ".intrinsics]" +
                         " is missing; a calibration given here replaces the session's as a whole");
   }
 
