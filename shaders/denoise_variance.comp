@@ -51,6 +51,10 @@ const float LEAST_KNOWING = 4.0;
 // the place of the overlap. The neighbours of a young history may be older and scatter less, for
 // which their mean number of samples over the pixel's own makes up.
 vec3 variance_with_history(ivec2 at, Pixel here) {
+  // An edge is like no neighbour, so a young one knows of no scatter at all. It is taken to be as
+  // noisy as a pixel can be.
+  if (is_edge(here) && here.overlap < LEAST_KNOWING)
+    return vec3(DENOISE_MOST_WHITES * DENOISE_MOST_WHITES);
   if (here.overlap >= LEAST_KNOWING) return max(here.variance, mean_variance(at, here));
   const int reach = int(DENOISE_VARIANCE_REACH);
   float samples = 0.0;

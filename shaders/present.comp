@@ -1,6 +1,8 @@
 // Turns the composite into codes as the display shows them, by exposure and response. An invocation
 // works on two pixels, whose six codes are three words. Where nothing virtual touches a pixel, it
-// keeps the codes of the plate.
+// keeps the codes of the plate. Elsewhere codes may be dithered: a difference of the worlds of a third
+// of a code, over a wide surface, would otherwise be lost or be shown as a whole one (shaders/README.md,
+// "The composite").
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -14,6 +16,8 @@ layout(scalar) readonly buffer Signals { vec4 signals[]; };        // denoised, 
 layout(scalar) readonly buffer Uncovered { vec4 uncovered[]; };
 layout(scalar) readonly buffer Reals { vec4 reals[]; };
 layout(scalar) readonly buffer Highlights { uint highlights[]; };
+// DITHER_SIDE^2 thresholds between 0 and 1, of blue noise (daemon/render/blue_noise.hpp).
+layout(scalar) readonly buffer Thresholds { float thresholds[]; };
 layout(scalar) writeonly buffer Picture { uint picture[]; };     // samples, as the plate's
 
 // Returns the largest code whose least signal is not above `signal`, and 0 for NaN.
@@ -27,6 +31,23 @@ uint code_of(float signal) {
     else above = middle;
   }
   return code;
+}
+
+// Returns the code below or above `signal`, so that the mean over the pattern's pixels is the signal
+// itself. Each channel has the pattern at another place, so that they are not raised together.
+uint dithered_code_of(float signal, uvec2 at, uint channel) {
+  if (!(signal > 0.0)) return 0u;
+  uint code = 0u;
+  uint above = show.most + 1u;
+  while (above - code > 1u) {
+    const uint middle = (code + above) / 2u;
+    if (signal_of[middle] <= signal) code = middle;
+    else above = middle;
+  }
+  if (code == show.most) return code;
+  const float share = (signal - signal_of[code]) / (signal_of[code + 1u] - signal_of[code]);
+  const uvec2 in_pattern = (at + channel * uvec2(23u, 41u)) % DITHER_SIDE;
+  return share > thresholds[in_pattern.y * DITHER_SIDE + in_pattern.x] ? code + 1u : code;
 }
 
 // Returns the composite without noise. A channel that was white stays as it was where it is a
@@ -55,7 +76,12 @@ uvec3 codes_of(uint pixel) {
     radiance = without_noise(radiance, compose(measured_at(index), estimate), highlights[index]);
   }
   const vec3 exposed = show.exposure * radiance;
-  return uvec3(code_of(exposed.r), code_of(exposed.g), code_of(exposed.b));
+  if (show.is_dithered == 0u)
+    return uvec3(code_of(exposed.r), code_of(exposed.g), code_of(exposed.b));
+  const uint in_picture = show.in_picture + index;
+  const uvec2 at = uvec2(in_picture % show.width, in_picture / show.width);
+  return uvec3(dithered_code_of(exposed.r, at, 0u), dithered_code_of(exposed.g, at, 1u),
+               dithered_code_of(exposed.b, at, 2u));
 }
 
 void main() {

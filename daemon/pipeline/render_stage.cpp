@@ -64,7 +64,7 @@ RenderStage::RenderStage(std::shared_ptr<render::Device> device, const set::Set&
 
 void RenderStage::operator()(Shot& shot) {
   const auto start = std::chrono::steady_clock::now();
-  if (!begin(shot)) return;
+  if (!begin(shot, options_.is_live)) return;
   const Refined refined = refine(
       *renderer_, set_.quality, [&] { return cancelled(); },
       [&](int samples) {
@@ -78,6 +78,10 @@ void RenderStage::operator()(Shot& shot) {
 }
 
 bool RenderStage::begin(Shot& shot) {
+  return begin(shot, false);
+}
+
+bool RenderStage::begin(Shot& shot, bool is_live) {
   shot.whole = false;
   PlatePtr plate = plate_of(shot);
   if (!response_ || response_->bits() != plate->bits)
@@ -99,7 +103,8 @@ bool RenderStage::begin(Shot& shot) {
   renderer_->begin({.plate = std::move(plate),
                     .exposure = exposure_of(shot),
                     .world_from_camera = *camera,
-                    .accumulates = options_.accumulates && set_.quality.accumulate});
+                    .accumulates = is_live && set_.quality.accumulate,
+                    .dithers = is_live && !options_.layers});
   return true;
 }
 

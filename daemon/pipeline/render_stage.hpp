@@ -22,8 +22,10 @@ struct RenderStageOptions {
   bool layers = false;  // fill shot.layers
   // Renders in place of a new one; what of its scene the set has too is kept. May be null.
   std::shared_ptr<render::Renderer> renderer = {};
-  // Averages over frames where the set's quality asks for it. Otherwise every frame stands alone.
-  bool accumulates = false;
+  // Shots that are rendered as a whole follow one another on a display: they are dithered
+  // (render::FrameInput), and averaged where the set's quality asks for it. Otherwise every shot
+  // stands alone.
+  bool is_live = false;
   double scale = 1;  // size of everything a shot gets, over the observer's size (preview_size.hpp)
   // A frame of another size than the calibration's passes through untouched, as from a camera that
   // was exchanged; otherwise it is an error, as in a take, all of whose frames would be like it.
@@ -71,6 +73,7 @@ class RenderStage {
   void fill_layers(bool layers) { options_.layers = layers; }
 
  private:
+  bool begin(Shot& shot, bool is_live);
   bool cancelled() const { return options_.cancelled && options_.cancelled(); }
   double exposure_of(const Shot& shot) const;
   void light(const Shot& shot);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "daemon/render/blue_noise.hpp"
 #include "shaders/composite.spv.h"
 #include "shaders/present.spv.h"
 
@@ -45,6 +46,8 @@ gpu::GpuShow constants_of(const ToPresent& what, int bits, const lighting::Clipp
   constants.white = static_cast<float>(1 / what.exposure);
   constants.most_variance = most_variance(constants.white, what.samples);
   constants.is_denoised = what.denoise ? 1 : 0;
+  constants.is_dithered = what.dither ? 1 : 0;
+  constants.width = static_cast<std::uint32_t>(what.width);
   return constants;
 }
 
@@ -62,6 +65,8 @@ Presenter::Presenter(Device& device, const lighting::Response& response)
   for (std::size_t code = 0; code < inverse.size(); ++code)
     least.push_back(static_cast<float>(response.least_signal(static_cast<std::uint16_t>(code))));
   upload_storage(device, least_of_, least);
+  static const std::vector<float> pattern = blue_noise(gpu::DITHER_SIDE);
+  upload_storage(device, thresholds_, pattern);
 }
 
 void Presenter::reserve(std::size_t pixels) {
@@ -137,6 +142,7 @@ Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
         {"plate_samples", &what.plate},
         {"signal_of", &signal_of_},
         {"least_of", &least_of_},
+        {"thresholds", &thresholds_},
         {"composites", &composites_},
         {"highlights", &highlights_},
         {"uncovered", &denoiser.denoised_uncovered()},

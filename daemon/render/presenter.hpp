@@ -27,6 +27,7 @@ struct ToPresent {
   CompositeRule rule;
   std::int64_t samples;  // the largest number that a pixel has
   bool denoise;
+  bool dither = false;  // the picture is to be looked at, and its codes may be off by one
   History* history = nullptr;  // what the frame is added to; null: it stands alone
 };
 
@@ -53,7 +54,7 @@ class Presenter {
   lighting::Clipping clipping_;
   Kernel composite_, present_;
   std::size_t pixels_ = 0;
-  Buffer signal_of_, least_of_, composites_, highlights_, picture_;
+  Buffer signal_of_, least_of_, thresholds_, composites_, highlights_, picture_;
 };
 
 }  // namespace previz::render

@@ -352,7 +352,8 @@ Plate Renderer::show(bool denoise, Layers* layers) {
                  r.frame.exposure,
                  r.rule(),
                  r.sampled(),
-                 denoise};
+                 denoise,
+                 r.frame.dithers};
   std::optional<Plate> accumulated;
   if (r.frame.accumulates && r.samples > 0) {
     r.history->find_surfaces(r.scene_buffers, r.features, r.samples);

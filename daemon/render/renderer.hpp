@@ -28,6 +28,9 @@ struct FrameInput {
   // (daemon/render/history.hpp). The frame's random numbers then follow those of the frames before.
   // A frame that does not accumulate ends what was accumulated.
   bool accumulates = false;
+  // show() dithers the codes where the worlds differ, by a pattern that stands still, so that the
+  // mean over a few pixels is right to a fraction of a code.
+  bool dithers = false;
 };
 
 class Renderer {

@@ -156,7 +156,7 @@ void LivePipeline::Impl::make_render_stage() {
   render_stage.emplace(parts.device, parts.set, calibration, parts.scene,
                        pipeline::RenderStageOptions{
                            .renderer = std::exchange(parts.renderer, nullptr),
-                           .accumulates = true,
+                           .is_live = true,
                            .scale = parts.set.quality.scale,
                            .passes_other_sizes = true,
                            .cancelled = [this] { return live_render.interrupted(); },

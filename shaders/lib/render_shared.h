@@ -465,13 +465,17 @@ struct GpuShow {
   float most_variance; // radiance squared
   uint is_single;      // 1: pixels have one sample, and so no variance of their own
   uint is_denoised;    // 1: the denoised change replaces that of the samples
+  uint is_dithered;    // 1: codes are dithered where the worlds differ
+  uint width;          // of the picture
 };
+// Dithering repeats after so many pixels in both directions.
+PREVIZ_CONST uint DITHER_SIDE = 64u;
 
 #ifdef __cplusplus
 static_assert(sizeof(GpuDenoise) == 24);
 static_assert(sizeof(GpuMotion) == 52);
 static_assert(sizeof(GpuHistory) == 128);
-static_assert(sizeof(GpuShow) == 60);
+static_assert(sizeof(GpuShow) == 68);
 static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 56);
 static_assert(sizeof(GpuPixel) == 160);

@@ -123,7 +123,7 @@ void play_live(const std::filesystem::path& directory, const LiveSettings& setti
   render::DeviceOptions device;
   device.name = settings.device;
   pipeline::RenderStageOptions options;
-  options.accumulates = true;
+  options.is_live = true;
   pipeline::RenderStage stage(render::open_device(device), take.set, take.observer, scene, options);
   while (const std::optional<pipeline::Shot> next = shots.next())
     for (int i = 0; i < std::max(settings.still, 1); ++i) {

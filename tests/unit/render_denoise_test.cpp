@@ -327,6 +327,41 @@ TEST_P(DenoiseRules, KeepThePlatesTexture) {
   EXPECT_LT(square, 0.01 / 20);
 }
 
+// The outline of a virtual wall, a column of pixels that it covers by half. One of them has a
+// single sample, which met a light; its neighbours in the column have many. It must not stay as
+// bright as it is, as if a sample without neighbours to compare it with were certain.
+TEST(Denoise, TakesAnOutlierOutOfAYoungOutline) {
+  constexpr int side = 16, outline = 8, young = 8 * side + outline;
+  std::vector<glm::vec4> signals, variances, surfaces, nothing(side * side);
+  for (int i = 0; i < side * side; ++i) {
+    const int x = i % side;
+    const float cover = x < outline ? 1.0f : x == outline ? 0.5f : 0.0f;
+    signals.emplace_back(glm::vec3(0.4f * cover), 0.5f);
+    variances.emplace_back(glm::vec3(0), i == young ? 1.0f : 31.0f);
+    surfaces.emplace_back(0, 0, 1, cover);
+  }
+  signals[young] = {3, 3, 3, 0.5f};
+  render::Device& device = *shared_device();
+  render::Denoiser denoiser(device);
+  denoiser.reserve(side * side, false);
+  const auto upload = [&](render::Buffer& buffer, const auto& values) {
+    render::upload_bytes(device, buffer, std::as_bytes(std::span(values)));
+  };
+  upload(denoiser.signal(), signals);
+  upload(denoiser.variance(), variances);
+  upload(denoiser.surface(), surfaces);
+  upload(denoiser.uncovered(), nothing);
+  upload(denoiser.real(), nothing);
+  upload(denoiser.albedo(), std::vector<std::uint16_t>(4 * side * side, 0x3c00));  // halves of 1
+  device.submit([&](const vk::raii::CommandBuffer& commands) {
+    denoiser.record(commands, side, side, false, true);
+  });
+  const auto clean = render::download<glm::vec4>(device, denoiser.denoised_signal(), side * side);
+  // Half of the wall's 0.4, and the outlier's own part in the mean over its surroundings.
+  EXPECT_NEAR(clean[young].r, 0.2, 3.0 / 10);
+  EXPECT_EQ(render::validation_messages(device), 0u);
+}
+
 // A virtual wall before the left third of a real one on which nothing changes: noise on the one
 // does not reach the other.
 TEST(Denoise, LeavesARealSurfaceBesideAVirtualOneBitForBit) {
