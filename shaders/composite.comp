@@ -9,6 +9,7 @@
 #include "shaders/lib/show.glsl"
 
 layout(scalar) readonly buffer Pixels { GpuPixel pixels[]; };  // of a tile
+layout(scalar) readonly buffer PixelCaustics { vec4 pixel_caustics[]; };  // likewise, with has_caustics
 layout(scalar) writeonly buffer Composites { vec4 composites[]; };  // of the band: composite, mean(M)
 // The denoiser's, as lib/denoise.glsl reads them.
 layout(scalar) writeonly buffer Signals { vec4 signals[]; };
@@ -17,6 +18,7 @@ layout(scalar) writeonly buffer Surfaces { vec4 surfaces[]; };
 layout(scalar) writeonly buffer Uncovered { vec4 uncovered[]; };
 layout(scalar) writeonly buffer Reals { vec4 reals[]; };
 layout(scalar) writeonly buffer Albedos { uvec2 albedos[]; };  // as lib/halves.glsl
+layout(scalar) writeonly buffer Caustics { vec4 caustics[]; };  // over white; variance
 // For each pixel of the band, the bits of channels that are brighter than white by more than chance
 // (bit 0: red).
 layout(scalar) writeonly buffer Highlights { uint highlights[]; };
@@ -59,6 +61,22 @@ uvec2 albedo_of(GpuPixel sums, float mask) {
   return pack_halves(albedo);
 }
 
+// Returns the part of the change that photons have brought to what the pixel shows, which is not
+// filtered: an edge has two surfaces, and keeps it. The fourth component is its variance.
+vec4 caustic_of(float mask, float samples) {
+  if (show.has_caustics == 0u || (mask > 0.0 && mask < 1.0)) return vec4(0.0);
+  const vec4 sum = pixel_caustics[show.in_tile + gl_GlobalInvocationID.x];
+  return sum / vec4(vec3(samples), samples * samples);
+}
+
+// The filter of photons' light takes no more than this in either direction, in whites.
+const float MOST_CAUSTIC = 1e12;
+
+vec4 over_white(vec4 caustic) {
+  const vec3 light = clamp(caustic.rgb / show.white, -MOST_CAUSTIC, MOST_CAUSTIC);
+  return vec4(light, min(caustic.w / show.white / show.white, MOST_CAUSTIC * MOST_CAUSTIC));
+}
+
 void main() {
   if (gl_GlobalInvocationID.x >= show.count) return;
   const GpuPixel sums = pixels[show.in_tile + gl_GlobalInvocationID.x];
@@ -80,7 +98,11 @@ void main() {
   const uvec2 halves = albedo_of(sums, mask);
   const vec3 albedo = unpack_halves(halves);  // what is divided by is what is multiplied with
   albedos[index] = halves;
-  uncovered[index] = vec4(own.rgb / show.white / albedo, 0.0);
+  const vec4 of_photons = caustic_of(mask, samples);
+  const vec3 caustic = of_photons.rgb;
+  if (show.has_caustics != 0u) caustics[index] = over_white(of_photons);
+  const vec3 own_left = mask > 0.0 ? own.rgb : own.rgb - caustic;
+  uncovered[index] = vec4(own_left / show.white / albedo, 0.0);
   reals[index] = vec4(real / show.white / albedo, 0.0);
 
   const float hits = sums.normal.w;
@@ -91,7 +113,7 @@ void main() {
     gains[i] = mix(gain(camera.radiance[i], real[i], camera.variance[i]), 1.0, mask);
   const uint bits = highlight_bits(composite - show.white, gains * gains * variance);
   highlights[index] = bits;
-  signals[index] = vec4(min(change / show.white, vec3(DENOISE_MOST_WHITES)) / albedo,
+  signals[index] = vec4(min((change - caustic) / show.white, vec3(DENOISE_MOST_WHITES)) / albedo,
                         depth > 0.0 ? 1.0 / depth : 0.0);
   variances[index] = vec4(min(variance, vec3(show.most_variance)) / (show.white * show.white) /
                               (albedo * albedo), 0.0);

@@ -13,6 +13,8 @@
 uniform textureBuffer uncovered;  // over white and albedo
 uniform textureBuffer reals;
 uniform textureBuffer albedos;  // RGBA16F
+// What photons bring, over white, which no level has seen; with has_caustics. An edge's is in its signal.
+uniform textureBuffer caustics;
 layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
 layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
 layout(scalar) writeonly buffer DenoisedUncovered { vec4 denoised_uncovered[]; };
@@ -29,16 +31,23 @@ struct Parts {
 
 vec3 albedo_at(ivec2 at) { return texelFetch(albedos, pixel_index(at)).rgb; }
 
-// Returns the pixel with its albedo.
+vec3 caustic_at(ivec2 at) {
+  return denoise.has_caustics != 0u ? texelFetch(caustics, pixel_index(at)).rgb : vec3(0.0);
+}
+
+// Returns the pixel with its albedo and with the light of photons.
 Pixel load_lit(ivec2 at) {
   Pixel p = load_pixel(at);
   const vec3 albedo = albedo_at(at);
-  p.signal *= albedo;
+  p.signal = p.signal * albedo + caustic_at(at);
   p.variance *= albedo * albedo;
   return p;
 }
 
-vec3 uncovered_at(ivec2 at) { return texelFetch(uncovered, pixel_index(at)).rgb * albedo_at(at); }
+vec3 uncovered_at(ivec2 at) {
+  const vec3 own = texelFetch(uncovered, pixel_index(at)).rgb * albedo_at(at);
+  return texelFetch(surfaces, pixel_index(at)).w > 0.0 ? own : own + caustic_at(at);
+}
 
 Parts load_parts(ivec2 at) {
   Parts p;

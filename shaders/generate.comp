@@ -62,6 +62,8 @@ void main() {
     sample_real[slot] = vec4(0.0, 0.0, 0.0, difference ? SAMPLE_DIFFERENCE : SAMPLE_FULL);
     if (has_feature(FEATURE_CAMERA)) sample_landed[slot] = vec4(0.0);
     sample_aov[slot] = vec4(0.0);
+    if (has_feature(FEATURE_PHOTONS))
+      sample_caustic[2u * slot] = sample_caustic[2u * slot + 1u] = vec4(0.0);
     if (has_feature(FEATURE_TEXTURES | FEATURE_VERTEX_COLORS))
       sample_albedo[slot] = uvec2(0u);
   }

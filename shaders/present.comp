@@ -16,6 +16,7 @@ layout(scalar) readonly buffer Signals { vec4 signals[]; };        // denoised, 
 layout(scalar) readonly buffer Uncovered { vec4 uncovered[]; };
 layout(scalar) readonly buffer Reals { vec4 reals[]; };
 layout(scalar) readonly buffer Highlights { uint highlights[]; };
+layout(scalar) readonly buffer Caustics { vec4 caustics[]; };    // what the signals are without
 // DITHER_SIDE^2 thresholds between 0 and 1, of blue noise (daemon/render/blue_noise.hpp).
 layout(scalar) readonly buffer Thresholds { float thresholds[]; };
 layout(scalar) writeonly buffer Picture { uint picture[]; };     // samples, as the plate's
@@ -67,7 +68,8 @@ uvec3 codes_of(uint pixel) {
   const vec4 shown = composites[index];
   const float mask = shown.w;
   const vec3 signal = signals[index].rgb;
-  if (show.has_plate != 0u && mask == 0.0 && signal == vec3(0.0))
+  const vec3 rest = show.has_caustics != 0u ? caustics[index].rgb : vec3(0.0);
+  if (show.has_plate != 0u && mask == 0.0 && signal == vec3(0.0) && rest == vec3(0.0))
     return plate_codes(show.in_picture + index);
   vec3 radiance = shown.rgb;
   if (show.is_denoised != 0u) {

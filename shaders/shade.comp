@@ -276,7 +276,15 @@ void meet_photons(Path p, Surface s, Lobes l) {
   if (!is_rough(l)) return;
   const bool differing = cancels(p, EQUAL_GAIN);
   const GatheredPair gathered = gather_photons(s, l, frame.max_depth - p.depth - 1u, differing);
-  add_pair(p.slot, p.worlds, p.landed, p.throughput * gathered.mixed, p.throughput * gathered.real);
+  const vec3 mixed = p.throughput * gathered.mixed;
+  const vec3 real = p.throughput * gathered.real;
+  add_pair(p.slot, p.worlds, p.landed, mixed, real);
+  if (p.rough) return;
+  const float weight = mean_square(p.throughput);
+  if ((p.worlds & WORLD_MIXED) != 0u)
+    sample_caustic[2u * p.slot] += vec4(mixed, min(weight * gathered.mixed_variance, MOST_VARIANCE));
+  if ((p.worlds & WORLD_REAL) != 0u)
+    sample_caustic[2u * p.slot + 1u] += vec4(real, min(weight * gathered.real_variance, MOST_VARIANCE));
 }
 
 // Plays Russian roulette with a path of the difference; the farther it is from all objects that are

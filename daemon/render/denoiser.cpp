@@ -5,6 +5,7 @@
 
 #include "daemon/render/each_pixel.hpp"
 #include "shaders/denoise.spv.h"
+#include "shaders/denoise_caustics.spv.h"
 #include "shaders/denoise_edges.spv.h"
 #include "shaders/denoise_guide.spv.h"
 #include "shaders/denoise_variance.spv.h"
@@ -21,6 +22,14 @@ constexpr int wavelet_levels = 4;
 constexpr int band_margin = 3 * ((1 << wavelet_levels) - 1) +
                             static_cast<int>(gpu::DENOISE_VARIANCE_REACH + gpu::DENOISE_EDGE_REACH);
 static_assert(gpu::DENOISE_VARIANCE_REACH >= 2);
+
+// The light of photons has these levels, with steps of 1, 2 and 4 pixels.
+constexpr int caustic_levels = 3;
+static_assert(caustic_levels <= wavelet_levels);
+
+Buffer texels_for(Device& device, std::size_t count) {
+  return create_texel_buffer(device, count * sizeof(gpu::vec4), vk::Format::eR32G32B32A32Sfloat);
+}
 
 }  // namespace
 
@@ -39,13 +48,16 @@ Denoiser::Denoiser(Device& device, std::size_t most_pixels)
       variance_pass_(device, "denoise_variance", denoise_variance_spv),
       guide_pass_(device, "denoise_guide", denoise_guide_spv),
       level_pass_(device, "denoise", denoise_spv),
+      caustic_pass_(device, "denoise_caustics", denoise_caustics_spv),
       edge_pass_(device, "denoise_edges", denoise_edges_spv) {}
 
-void Denoiser::reserve(std::size_t pixels, bool companions) {
+void Denoiser::reserve(std::size_t pixels, bool companions, bool caustics) {
+  has_caustics_ = caustics;
+  for (Buffer& side : caustic_)
+    if (const std::size_t count = caustics ? pixels : 1; side.size < count * sizeof(gpu::vec4))
+      side = texels_for(device_, count);
   filters_companions_ = companions;
-  const auto texels = [&](std::size_t count) {
-    return create_texel_buffer(device_, count * sizeof(gpu::vec4), vk::Format::eR32G32B32A32Sfloat);
-  };
+  const auto texels = [&](std::size_t count) { return texels_for(device_, count); };
   if (pixels > pixels_) {
     pixels_ = companion_pixels_ = 0;  // stay 0 if an allocation below throws
     for (int side : {0, 1}) {
@@ -91,13 +103,16 @@ void Denoiser::record(const vk::raii::CommandBuffer& commands, int width, int ro
                             1,
                             single_sample && !has_history ? 1u : 0u,
                             filters_companions_ ? 1u : 0u,
-                            has_history ? 1u : 0u};
-  int side = 0, companion = 0;
+                            has_history ? 1u : 0u,
+                            has_caustics_ ? 1u : 0u};
+  int side = 0, companion = 0, caustic = 0;
   const auto run = [&](Kernel& pass) {
     const Buffers buffers{{"signals", &signal_[side]},
                           {"variances", &variance_[side]},
                           {"surfaces", &surface_},
                           {"albedos", &albedo_},
+                          {"caustics", &caustic_[caustic]},
+                          {"denoised_caustics", &caustic_[1 - caustic]},
                           {"guides", &guide_},
                           {"guide_variances", &guide_variance_},
                           {"uncovered", &uncovered_[companion]},
@@ -114,6 +129,10 @@ void Denoiser::record(const vk::raii::CommandBuffer& commands, int width, int ro
     constants.step = 1u << level;
     run(guide_pass_);
     run(level_pass_);
+    if (has_caustics_ && level < caustic_levels) {
+      run(caustic_pass_);
+      caustic = 1 - caustic;
+    }
     if (filters_companions_) companion = 1 - companion;
   }
   side = 1 - side;

@@ -35,7 +35,9 @@ class Denoiser {
   // Makes the buffers large enough for this many pixels, which may replace them. With `companions`,
   // the following record() filters the change's uncovered part and mean(Lr) as well, which the
   // composite needs where the rule is not additive or the plate is clipped.
-  void reserve(std::size_t pixels, bool companions);
+  // With `caustics` there is room for the light of photons, which record() filters by itself and
+  // adds after the levels.
+  void reserve(std::size_t pixels, bool companions, bool caustics = false);
 
   // The input buffers have one vec4 per pixel in the layout of shaders/lib/denoise.glsl, but for
   // the albedo, which has four halves; shaders/composite.comp fills them from the samples.
@@ -50,6 +52,8 @@ class Denoiser {
   Buffer& uncovered() { return uncovered_[0]; }
   Buffer& real() { return real_[0]; }
   Buffer& albedo() { return albedo_; }
+  // The light of photons over white, without a division by the albedo, and its variance.
+  Buffer& caustic() { return caustic_[0]; }
   // Records the passes over this many rows. `single_sample` says that pixels do not know their
   // variance; with `has_history` the variance has the number of each pixel's samples in its fourth
   // component, as shaders/history_show.comp leaves it.
@@ -73,9 +77,11 @@ class Denoiser {
   std::size_t pixels_ = 0;
   std::size_t companion_pixels_ = 0;  // that both sides of the companions have room for
   bool filters_companions_ = false;
-  Kernel variance_pass_, guide_pass_, level_pass_, edge_pass_;
+  bool has_caustics_ = false;
+  Kernel variance_pass_, guide_pass_, level_pass_, caustic_pass_, edge_pass_;
   // A pass reads one side and writes the other.
   Buffer signal_[2], variance_[2], uncovered_[2], real_[2];
+  Buffer caustic_[2];
   Buffer surface_, albedo_, guide_, guide_variance_;
 };
 

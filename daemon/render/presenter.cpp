@@ -90,6 +90,8 @@ void Presenter::composite(const ToPresent& what, const Denoiser::Band& band, gpu
     constants.in_tile = static_cast<std::uint32_t>(first - tile.first_row) * width;
     constants.in_band = static_cast<std::uint32_t>(first - band.top) * width;
     const Buffers buffers{{"pixels", &tile.pixels},
+                          {"pixel_caustics", tile.caustics ? tile.caustics : &tile.pixels},
+                          {"caustics", &denoiser.caustic()},
                           {"plate_samples", &what.plate},
                           {"signal_of", &signal_of_},
                           {"composites", &composites_},
@@ -130,12 +132,16 @@ Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
     const std::size_t count = static_cast<std::size_t>(band.last - band.first) * width;
     const std::size_t pixels = static_cast<std::size_t>(band.bottom - band.top) * width;
     const bool filters_companions = what.denoise && needs_companions(what);
-    denoiser.reserve(pixels, filters_companions);
+    // What is averaged over frames has photons' light in it.
+    const bool has_caustics = what.tiles.front().caustics && !what.history;
+    denoiser.reserve(pixels, filters_companions, has_caustics);
     reserve(pixels);
     gpu::GpuShow constants = constants_of(what, bits_, clipping_);
     constants.in_picture = static_cast<std::uint32_t>(top);
+    constants.has_caustics = has_caustics ? 1 : 0;
     composite(what, band, constants, denoiser);
     if (what.history) accumulate(what, band, constants, denoiser);
+    if (what.denoise) constants.has_caustics = 0;  // it was added to what is denoised
     constants.count = static_cast<std::uint32_t>(count);
     constants.in_band = static_cast<std::uint32_t>(first - top);
     const Buffers buffers{
@@ -143,6 +149,7 @@ Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
         {"signal_of", &signal_of_},
         {"least_of", &least_of_},
         {"thresholds", &thresholds_},
+        {"caustics", &denoiser.caustic()},
         {"composites", &composites_},
         {"highlights", &highlights_},
         {"uncovered", &denoiser.denoised_uncovered()},

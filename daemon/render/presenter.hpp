@@ -27,7 +27,7 @@ struct ToPresent {
   CompositeRule rule;
   std::int64_t samples;  // the largest number that a pixel has
   bool denoise;
-  bool dither = false;  // the picture is to be looked at, and its codes may be off by one
+  bool dither = false;         // the picture is to be looked at, and its codes may be off by one
   History* history = nullptr;  // what the frame is added to; null: it stands alone
 };
 

@@ -106,9 +106,9 @@ void Wavefront::create_paths() {
 void Wavefront::create_path_buffers(std::uint32_t slots) {
   slots_ = 0;  // stays 0 if an allocation below throws
   const vk::DeviceSize paths = paths_a_slot_ * static_cast<vk::DeviceSize>(slots);
-  for (Buffer* old :
-       {&ray_origin_, &ray_direction_, &throughput_, &receivers_, &hits_, &queue_, &shadow_rays_,
-        &sample_mixed_, &sample_real_, &sample_landed_, &sample_aov_, &sample_albedo_})
+  for (Buffer* old : {&ray_origin_, &ray_direction_, &throughput_, &receivers_, &hits_, &queue_,
+                      &shadow_rays_, &sample_mixed_, &sample_real_, &sample_landed_, &sample_aov_,
+                      &sample_albedo_, &sample_caustic_})
     *old = Buffer{};  // frees the old memory before the new is allocated
   ray_origin_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
   ray_direction_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
@@ -140,16 +140,32 @@ Buffers Wavefront::buffers_of(std::size_t tile) const {
                   {"sample_landed", &sample_landed_},
                   {"sample_aov", &sample_aov_},
                   {"sample_albedo", &sample_albedo_},
+                  {"sample_caustic", &sample_caustic_},
                   {"control", &control_},
                   {"limits", &limits_},
-                  {"pixels", &pixels_[tile]}});
+                  {"pixels", &pixels_[tile]},
+                  {"pixel_caustics", &caustics_[tile]}});
   photons_.add_to(buffers);
   camera_.add_to(buffers);
   return buffers;
 }
 
+// Makes room for the light of photons, or for nothing where there is none.
+void Wavefront::create_caustics(bool has_photons) {
+  const vk::DeviceSize slots = has_photons ? 2 * vk::DeviceSize{slots_} : 1;
+  if (sample_caustic_.size < slots * sizeof(gpu::vec4))
+    sample_caustic_ = create_storage_buffer(device_, slots * sizeof(gpu::vec4));
+  caustics_.resize(pixels_.size());
+  for (std::size_t i = 0; i < pixels_.size(); ++i) {
+    const vk::DeviceSize pixels = has_photons ? pixels_[i].size / sizeof(gpu::GpuPixel) : 1;
+    if (caustics_[i].size < pixels * sizeof(gpu::vec4))
+      caustics_[i] = create_storage_buffer(device_, pixels * sizeof(gpu::vec4));
+  }
+}
+
 void Wavefront::use_scene(Buffers scene, std::uint32_t features) {
   scene_ = std::move(scene);
+  create_caustics((features & gpu::FEATURE_PHOTONS) != 0);
   if (features != features_) create_kernels(features);
 }
 
@@ -192,6 +208,7 @@ void Wavefront::clear() {
   device_.submit([&](const vk::raii::CommandBuffer& commands) {
     for (std::size_t i = 0; i < tiles_.size(); ++i)
       record_clear(commands, pixels_[i], bytes_of(tiles_[i]));
+    for (const Buffer& caustics : caustics_) record_clear(commands, caustics, caustics.size);
   });
 }
 
@@ -311,10 +328,12 @@ void Wavefront::use_camera(const std::vector<glm::vec4>& plate) {
 }
 
 std::vector<Wavefront::Sums> Wavefront::sums() const {
+  const bool has_photons = (features_.value_or(0) & gpu::FEATURE_PHOTONS) != 0;
   std::vector<Sums> result;
   for (std::size_t i = 0; i < tiles_.size(); ++i)
     result.push_back({pixels_[i], static_cast<int>(tiles_[i].batch.y),
-                      static_cast<int>(tiles_[i].batch.height)});
+                      static_cast<int>(tiles_[i].batch.height),
+                      has_photons ? &caustics_[i] : nullptr});
   return result;
 }
 

@@ -52,6 +52,9 @@ class Wavefront {
   struct Sums {
     const Buffer& pixels;
     int first_row, rows;
+    // vec4[]: the sum of what photons bring to the change (shaders/README.md, "Denoising"); null:
+    // there are no photons.
+    const Buffer* caustics = nullptr;
   };
   std::vector<Sums> sums() const;
   gpu::GpuControl control() const;  // counters since the last clear
@@ -65,6 +68,7 @@ class Wavefront {
   void create_tiles();
   void create_paths();
   void create_path_buffers(std::uint32_t slots);
+  void create_caustics(bool has_photons);
   void create_kernels(std::uint32_t features);
   Buffers buffers_of(std::size_t tile) const;  // with the scene's and the maps'
   vk::DeviceSize bytes_of(const Tile& tile) const;
@@ -90,11 +94,13 @@ class Wavefront {
   double photons_owed_ = 0;                   // passes; photons are traced anew at 1
   Buffers scene_;
   std::vector<Tile> tiles_;
-  std::vector<Buffer> pixels_;  // of the tiles; those of smaller pictures may use a part of them
+  std::vector<Buffer> pixels_;    // of the tiles; those of smaller pictures may use a part of them
+  std::vector<Buffer> caustics_;  // likewise
   std::optional<std::uint32_t> features_;  // of the kernels, once they are made
   Kernel generate_, advance_, extend_, shade_, prepare_shadow_, shadow_, accumulate_;
   Buffer ray_origin_, ray_direction_, throughput_, receivers_, hits_, queue_, shadow_rays_,
-      sample_mixed_, sample_real_, sample_landed_, sample_aov_, sample_albedo_, limits_, control_;
+      sample_mixed_, sample_real_, sample_landed_, sample_aov_, sample_albedo_, sample_caustic_,
+      limits_, control_;
 };
 
 }  // namespace previz::render

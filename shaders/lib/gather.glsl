@@ -24,7 +24,19 @@ const float SAME_SURFACE_HEIGHT = 0.25;  // in radii
 struct GatheredPair {
   vec3 mixed;
   vec3 real;
+  // Sums of the squares of what single photons bring, as means over the channels. As photons come
+  // independently of one another, that is the variance of the sums (Campbell's theorem).
+  float mixed_variance;
+  float real_variance;
 };
+
+// A variance is limited to this, so that the light of a vanishing disc overflows nothing.
+const float MOST_VARIANCE = 1e30;
+
+float mean_square(vec3 v) { return min(dot(v, v) / 3.0, MOST_VARIANCE); }
+float scaled_variance(float variance, float scale) {
+  return min(variance * scale * scale, MOST_VARIANCE);
+}
 
 // Adds f times the flux of one photon, weighted by its closeness, 1 - d^2 / r^2, without the kernel's
 // constant. bsdf_evaluate() returns f * cos, hence the division.
@@ -43,8 +55,11 @@ void gather_photon(uint photon, float closeness, Surface s, Lobes l, bool differ
   float pdf;
   const vec3 value = bsdf_evaluate(s, l, -direction.xyz, pdf);
   if (pdf <= 0.0 || cos_geometric <= 0.0) return;
-  sum.mixed += value * mixed * (closeness / cos_geometric);
-  sum.real += value * real * (closeness / cos_geometric);
+  const vec3 weight = value * (closeness / cos_geometric);
+  sum.mixed += weight * mixed;
+  sum.real += weight * real;
+  sum.mixed_variance += mean_square(weight * mixed);
+  sum.real_variance += mean_square(weight * real);
 }
 
 // Returns whether the disc can reach into a cell, by comparing the distance of the disc's plane
@@ -86,7 +101,7 @@ void gather_cell(ivec3 cell, int level, float radius, Surface s, Lobes l, uint m
 // out, because their paths would be longer than allowed. With `differing`, so are those that are
 // equal in both worlds.
 GatheredPair gather_photons(Surface s, Lobes l, uint most_vertices, bool differing) {
-  GatheredPair sum = GatheredPair(vec3(0.0), vec3(0.0));
+  GatheredPair sum = GatheredPair(vec3(0.0), vec3(0.0), 0.0, 0.0);
   const float radius = photon_radius(s.position);
   // A photon on the disc may be nearer to the camera than its centre, or farther, by the radius.
   const int last_level = photon_level(radius * (1.0 + batch.photon_radius) * 1.0001);
@@ -108,6 +123,8 @@ GatheredPair gather_photons(Surface s, Lobes l, uint most_vertices, bool differi
   const float scale = 2.0 / (PI * radius * radius * float(frame.photon_count));
   sum.mixed *= scale;
   sum.real *= scale;
+  sum.mixed_variance = scaled_variance(sum.mixed_variance, scale);
+  sum.real_variance = scaled_variance(sum.real_variance, scale);
   return sum;
 }
 

@@ -25,10 +25,16 @@ layout(scalar) buffer Aov { vec4 sample_aov[]; };               // of a slot: no
 // surface is in white light, and what it emits over the sensor's white (lib/halves.glsl). 0: no hit.
 // It is kept with FEATURE_TEXTURES and FEATURE_VERTEX_COLORS.
 layout(scalar) buffer Albedo { uvec2 sample_albedo[]; };
+// The part of Lm and of Lr, two of a slot, that photons have brought to surfaces which the camera sees
+// directly or by way of mirrors and glass, and its variance as a mean over the channels. It is kept with
+// FEATURE_PHOTONS.
+layout(scalar) buffer Caustic { vec4 sample_caustic[]; };
 layout(scalar) buffer Control { GpuControl control; };
 layout(scalar) readonly buffer Limits { uint limits[]; };       // of a block of the picture, row-major:
                                                                 // how many samples its pixels get
 layout(scalar) buffer Pixels { GpuPixel pixels[]; };            // of the tile, row-major
+layout(scalar) buffer Caustics { vec4 pixel_caustics[]; };      // of the tile: the sums of what photons
+                                                                // bring to the change, and of its variance
 
 // A slot is one sample of one pixel. A tile's slots run through its pixels in blocks of 8x4, so
 // that the rays of a subgroup are coherent, and then through its samples. Blocks at the edge are

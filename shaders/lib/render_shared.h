@@ -368,6 +368,7 @@ struct GpuDenoise {
   uint single_sample;   // 1: pixels have one sample, and so no variance of their own
   uint has_companions;  // 1: `uncovered` and `reals` are filtered as well, with the same weights
   uint has_history;     // 1: pixels have samples of earlier frames, as many as the history says
+  uint has_caustics;    // 1: what photons bring is added after the filter
 };
 
 // Where an instance was in the frame before (daemon/render/history.hpp).
@@ -467,15 +468,16 @@ struct GpuShow {
   uint is_denoised;    // 1: the denoised change replaces that of the samples
   uint is_dithered;    // 1: codes are dithered where the worlds differ
   uint width;          // of the picture
+  uint has_caustics;   // 1: what photons bring to the change is kept apart
 };
 // Dithering repeats after so many pixels in both directions.
 PREVIZ_CONST uint DITHER_SIDE = 64u;
 
 #ifdef __cplusplus
-static_assert(sizeof(GpuDenoise) == 24);
+static_assert(sizeof(GpuDenoise) == 28);
 static_assert(sizeof(GpuMotion) == 52);
 static_assert(sizeof(GpuHistory) == 128);
-static_assert(sizeof(GpuShow) == 68);
+static_assert(sizeof(GpuShow) == 72);
 static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 56);
 static_assert(sizeof(GpuPixel) == 160);

@@ -37,9 +37,10 @@ class Accumulator {
     render::upload_bytes(device_, real_, std::as_bytes(std::span(spread(real))));
     const gpu::GpuBatch batch{0, 0, 1, 1, 0, static_cast<std::uint32_t>(mixed.size()), 0};
     const render::Buffers buffers{
-        {"frame", &frame_},          {"sample_mixed", &mixed_}, {"sample_real", &real_},
-        {"sample_landed", &landed_}, {"sample_aov", &aov_},     {"sample_albedo", &albedo_},
-        {"control", &control_},      {"pixels", &pixels_},      {"limits", &limits_}};
+        {"frame", &frame_},          {"sample_mixed", &mixed_},   {"sample_real", &real_},
+        {"sample_landed", &landed_}, {"sample_aov", &aov_},       {"sample_albedo", &albedo_},
+        {"control", &control_},      {"pixels", &pixels_},        {"limits", &limits_},
+        {"sample_caustic", &mixed_}, {"pixel_caustics", &pixels_}};  // not used without photons
     device_.submit([&](const vk::raii::CommandBuffer& commands) {
       kernel_.dispatch({commands, batch, buffers}, 1);
     });
