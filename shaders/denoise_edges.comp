@@ -65,6 +65,15 @@ struct Sides {
   vec3 object_variance, behind_variance;
 };
 
+// A side that is nowhere around counts as this part of a pixel, with no light.
+const float LEAST_PART = 1e-6;
+
+// Returns the weight of a pixel at a distance. With a history the pixels around have little noise, and
+// the nearest know best.
+float nearness(ivec2 off) {
+  return denoise.has_history != 0u ? 1.0 / (1.0 + float(off.x * off.x + off.y * off.y)) : 1.0;
+}
+
 Sides sides_around(ivec2 at) {
   Sides s = Sides(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
   float object = 0.0;
@@ -77,13 +86,16 @@ Sides sides_around(ivec2 at) {
       if (cover > 1.0) continue;  // a highlight
       // The noise of a part is taken to be its share of the pixel's.
       const vec3 variance = p.pixel.overlap * p.pixel.variance;
-      s.object += p.covered;
-      s.object_variance += cover * variance;
-      object += cover;
-      s.behind += p.uncovered;
-      s.behind_variance += (1.0 - cover) * variance;
-      behind += 1.0 - cover;
+      const float near = nearness(ivec2(x, y));
+      s.object += near * p.covered;
+      s.object_variance += near * near * cover * variance;
+      object += near * cover;
+      s.behind += near * p.uncovered;
+      s.behind_variance += near * near * (1.0 - cover) * variance;
+      behind += near * (1.0 - cover);
     }
+  object = max(object, LEAST_PART);
+  behind = max(behind, LEAST_PART);
   s.object /= object;
   s.behind /= behind;
   s.object_variance /= object * object;
@@ -108,29 +120,57 @@ float noise_share(ivec2 at, Sides s) {
   return off > 0.0 ? min((expected.r + expected.g + expected.b) / off, 1.0) : 0.0;
 }
 
+// What is shown of a pixel.
+struct Shown {
+  vec3 signal, uncovered;
+  vec4 variance;
+};
+
+// Mixes the sides by the pixel's own share, as far as noise explains that it is another mixture.
+void mix_edge(ivec2 at, Parts here, inout Shown shown) {
+  const float cover = here.pixel.cover;
+  const Sides sides = sides_around(at);
+  const float share = noise_share(at, sides);
+  const vec3 behind = (1.0 - cover) * sides.behind;
+  shown.signal = mix(shown.signal, cover * sides.object + behind, share);
+  shown.uncovered = mix(shown.uncovered, behind, share);
+  const vec3 left = cover * cover * sides.object_variance +
+                    (1.0 - cover) * (1.0 - cover) * sides.behind_variance;
+  shown.variance.rgb = (1.0 - share) * (1.0 - share) * shown.variance.rgb +
+                       share * share * left / max(shown.variance.w, 1e-6);
+}
+
+// Mixes the sides by the share that rays have found. A pixel that is whole by its samples knows one
+// side itself.
+void mix_anew(ivec2 at, Parts here, float cover, inout Shown shown) {
+  const Sides sides = sides_around(at);
+  const bool is_object = here.pixel.cover == 1.0;
+  const bool is_behind = here.pixel.cover == 0.0;
+  const vec3 object = is_object ? here.pixel.signal : sides.object;
+  shown.uncovered = (1.0 - cover) * (is_behind ? here.pixel.signal : sides.behind);
+  shown.signal = cover * object + shown.uncovered;
+  const vec3 variance = here.pixel.overlap * here.pixel.variance;
+  const vec3 left =
+      cover * cover * (is_object ? variance : sides.object_variance) +
+      (1.0 - cover) * (1.0 - cover) * (is_behind ? variance : sides.behind_variance);
+  shown.variance = vec4(left, 1.0);
+}
+
 void main() {
   const uint index = gl_GlobalInvocationID.x;
   if (index >= denoise.width * denoise.height) return;
   const ivec2 at = ivec2(index % denoise.width, index / denoise.width);
   const Parts here = load_parts(at);
-  vec3 signal = here.pixel.signal;
-  vec3 own = uncovered_at(at);
-  vec4 variance = vec4(here.pixel.variance, here.pixel.overlap);
-  const float cover = here.pixel.cover;
-  if (is_edge(here.pixel)) {
-    const Sides sides = sides_around(at);
-    const float share = noise_share(at, sides);
-    const vec3 behind = (1.0 - cover) * sides.behind;
-    signal = mix(signal, cover * sides.object + behind, share);
-    own = mix(own, behind, share);
-    const vec3 left = cover * cover * sides.object_variance +
-                      (1.0 - cover) * (1.0 - cover) * sides.behind_variance;
-    variance.rgb = (1.0 - share) * (1.0 - share) * variance.rgb +
-                   share * share * left / max(variance.w, 1e-6);
-  }
-  denoised_signals[index] = vec4(signal, here.pixel.inverse_depth);
-  denoised_variances[index] = variance;
+  Shown shown = Shown(here.pixel.signal, uncovered_at(at),
+                      vec4(here.pixel.variance, here.pixel.overlap));
+  const float cover = denoise.has_history != 0u ? texelFetch(albedos, int(index)).w : 0.0;
+  if (cover > 0.0 && cover < 1.0)
+    mix_anew(at, here, cover, shown);
+  else if (is_edge(here.pixel))
+    mix_edge(at, here, shown);
+  denoised_signals[index] = vec4(shown.signal, here.pixel.inverse_depth);
+  denoised_variances[index] = shown.variance;
   if (denoise.has_companions == 0u) return;
-  denoised_uncovered[index] = vec4(own, 0.0);
+  denoised_uncovered[index] = vec4(shown.uncovered, 0.0);
   denoised_reals[index] = vec4(texelFetch(reals, int(index)).rgb * albedo_at(at), 0.0);
 }

@@ -12,6 +12,7 @@ layout(scalar) readonly buffer KeptLights { vec4 kept_lights[]; };
 layout(scalar) readonly buffer KeptSquares { vec4 kept_squares[]; };
 layout(scalar) readonly buffer KeptUncovered { vec4 kept_uncovered[]; };
 layout(scalar) readonly buffer KeptAlbedos { uvec2 kept_albedos[]; };
+layout(scalar) readonly buffer Covers { float covers[]; };  // history_cover.comp
 // Of the band, as composite.comp makes them.
 layout(scalar) buffer Composites { vec4 composites[]; };
 layout(scalar) buffer Signals { vec4 signals[]; };
@@ -44,7 +45,13 @@ void main() {
   signals[in_band].rgb = light;
   uncovered[in_band] = vec4(factor * own.rgb, 0.0);
   reals[in_band] = vec4(real / albedo, 0.0);
-  albedos[in_band] = halves;
+  // Where rays have found how much of an outline is covered, denoise_edges.comp mixes what is on its two
+  // sides anew; it finds the share beside the albedo.
+  const float cover = covers[index];
+  const bool is_mixed_anew = show.is_denoised != 0u && cover > 0.0 && cover < 1.0;
+  albedos[in_band] =
+      is_mixed_anew ? uvec2(halves.x, halves.y | packHalf2x16(vec2(0.0, cover))) : halves;
+  if (is_mixed_anew) composites[in_band] = vec4(vec3(0.0), cover);
   if (surfaces[in_band].w != DENOISE_HIGHLIGHT) surfaces[in_band].w = mask;
   // The variance of a weighted mean is that of a sample times the sum of the squared weights, which
   // the mean square is short of (Bessel's correction).

@@ -8,10 +8,12 @@
 #include "shaders/lib/batch.glsl"
 #include "shaders/lib/calibrated_ray.glsl"
 #include "shaders/lib/history.glsl"
+#include "shaders/lib/pane.glsl"
 #include "shaders/lib/trace.glsl"
 
 layout(scalar) writeonly buffer Places { vec4 places[]; };  // from the camera; most samples
 layout(scalar) writeonly buffer Things { uvec2 things[]; };  // instance, normal (pack_unit)
+layout(scalar) writeonly buffer Classes { float classes[]; };  // 1: a virtual object; 0: none; COVER_*
 
 // Plastic and lacquer reflect about this share of the light around.
 const float COAT_SHARE = 0.1;
@@ -40,9 +42,10 @@ float turn_of(vec3 position, GpuMotion motion) {
 }
 
 void main() {
-  const uint index = gl_GlobalInvocationID.x;
-  if (index >= batch.width * batch.height) return;
-  const uvec2 pixel = uvec2(index % batch.width, index / batch.width);
+  if (gl_GlobalInvocationID.x >= batch.width * batch.height) return;
+  const uint index = batch.y * frame.width + gl_GlobalInvocationID.x;
+  const uvec2 pixel = uvec2(index % frame.width, index / frame.width);
+  classes[index] = 0.0;
   places[index] = vec4(0.0);
   things[index] = uvec2(NO_INDEX, 0u);
   const vec3 ray = normalize(vec3(calibrated_ray(pixel, vec2(0.5)), 1.0));
@@ -50,10 +53,13 @@ void main() {
   Hit hit;
   if (!trace_closest(vec3(0.0), direction, 0.0, 3.4e38, WORLD_MIXED, hit)) return;
   // What shines through, through a hole or through a pane, is not at this surface.
-  if (materials[instances[hit.instance].material].alpha_mode != ALPHA_OPAQUE) return;
+  classes[index] = hit.presence == WORLD_BOTH ? 0.0 : 1.0;
+  if (lets_light_through(instances[hit.instance].material)) {
+    classes[index] = COVER_SEE_THROUGH;
+    return;
+  }
   const Surface s =
       make_surface(GpuHit(hit.t, hit.barycentrics, hit.instance, hit.primitive), direction, 0.0);
-  if (s.thin_walled && s.transmission > 0.0) return;
   const GpuMotion motion = motions[hit.instance];
   const float most = motion.is_known != 0u ? most_samples(s, turn_of(s.position, motion)) : 0.0;
   places[index] = vec4(s.position, most);

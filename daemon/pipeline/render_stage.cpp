@@ -100,11 +100,14 @@ bool RenderStage::begin(Shot& shot, bool is_live) {
 
   light(shot);
   if (placed_ != shot.scene || is_measured_anew_) place(shot.scene);
+  // A shot with layers can be compared with what is rendered from a take, so it stands alone.
+  const bool is_shown_live = is_live && !options_.layers;
   renderer_->begin({.plate = std::move(plate),
                     .exposure = exposure_of(shot),
                     .world_from_camera = *camera,
-                    .accumulates = is_live && set_.quality.accumulate,
-                    .dithers = is_live && !options_.layers});
+                    .accumulates = is_shown_live && set_.quality.accumulate,
+                    .stands_aside = is_live && set_.quality.accumulate,
+                    .dithers = is_shown_live});
   return true;
 }
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "shaders/history.spv.h"
+#include "shaders/history_cover.spv.h"
 #include "shaders/history_show.spv.h"
 #include "shaders/history_surface.spv.h"
 
@@ -29,6 +30,10 @@ constexpr double most_lag_px = 1;
 constexpr std::size_t light_cells = 16;
 // A lamp is another one if it moved by 1 / 20 of a radian or of a metre.
 constexpr double lamp_moves = 20;
+
+// A dispatch works on no more pixels than these: devices that allow 65,535 work groups at once
+// could not do a picture of 3840x2160 in one.
+constexpr std::uint32_t most_pixels_at_once = 1u << 21;
 
 double largest_channel(const glm::dvec3& v) {
   return std::max({v.r, v.g, v.b});
@@ -165,6 +170,9 @@ void History::reserve(Frame& frame) {
   for (Buffer* buffer : {&frame.things, &frame.albedos})
     *buffer = create_texel_buffer(device_, pixels * sizeof(gpu::uvec2), vk::Format::eR32G32Uint);
   frame.pixels = pixels;
+  for (Buffer* buffer : {&classes_, &covers_})
+    if (buffer->size < pixels * sizeof(float))
+      *buffer = create_storage_buffer(device_, pixels * sizeof(float));
 }
 
 void History::begin(const View& view, std::vector<GpuScene::Stance> stances) {
@@ -251,6 +259,7 @@ void History::find_surfaces(const Buffers& scene, std::uint32_t features, std::i
   if (features_ != features) {
     features_.reset();  // stays empty if creating the kernel throws
     surface_ = Kernel(device_, "history_surface", history_surface_spv, {features});
+    cover_ = Kernel(device_, "history_cover", history_cover_spv, {features});
     features_ = features;
   }
   Frame& now = frames_[now_];
@@ -261,11 +270,18 @@ void History::find_surfaces(const Buffers& scene, std::uint32_t features, std::i
   buffers["motions"] = &motions_;
   buffers["places"] = &now.places;
   buffers["things"] = &now.things;
+  buffers["classes"] = &classes_;
+  buffers["covers"] = &covers_;
   const auto width = static_cast<std::uint32_t>(now.view.lens.width);
   const auto height = static_cast<std::uint32_t>(now.view.lens.height);
+  const std::uint32_t most_rows = std::max(most_pixels_at_once / width, 1u);
   device_.submit([&](const vk::raii::CommandBuffer& commands) {
-    surface_.dispatch({commands, gpu::GpuBatch{0, 0, width, height, 0, 0, 0}, buffers},
-                      width * height);
+    for (Kernel* pass : {&surface_, &cover_})
+      for (std::uint32_t y = 0; y < height; y += most_rows) {
+        const std::uint32_t rows = std::min(most_rows, height - y);
+        pass->dispatch({commands, gpu::GpuBatch{0, y, width, rows, 0, 0, 0}, buffers},
+                       width * rows);
+      }
   });
   samples_ = samples;
   now.is_shown = true;
@@ -284,6 +300,7 @@ void History::record(const vk::raii::CommandBuffer& commands, gpu::GpuShow const
                        {"motions", &motions_},
                        {"places", &now.places},
                        {"things", &now.things},
+                       {"covers", &covers_},
                        {"kept_lights", &now.lights},
                        {"kept_squares", &now.squares},
                        {"kept_uncovered", &now.uncovered},

@@ -64,8 +64,8 @@ class History {
   gpu::GpuHistory constants(std::int64_t samples) const;
 
   Device& device_;
-  Kernel blend_, show_, surface_;
-  std::optional<std::uint32_t> features_;  // of surface_
+  Kernel blend_, show_, surface_, cover_;
+  std::optional<std::uint32_t> features_;  // of surface_ and cover_
   Frame frames_[2];
   int now_ = 0;                                                 // the other one is the past
   std::optional<std::int64_t> samples_;                         // for which the surfaces were found
@@ -73,6 +73,7 @@ class History {
   double shortened_now_ = std::numeric_limits<double>::infinity();  // for this one
   std::vector<glm::dvec3> environment_;                             // in cells; empty: not known
   std::optional<std::vector<set::Light>> lamps_;
+  Buffer classes_, covers_;  // of the current frame (shaders/history_cover.comp)
   Buffer history_, motions_;
 };
 

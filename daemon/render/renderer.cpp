@@ -63,6 +63,7 @@ struct Renderer::Impl {
   std::optional<Presenter> presenter;  // likewise; made for the response
   std::optional<History> history;      // made when a frame first accumulates
   std::uint32_t past_samples = 0;      // of the frames that were accumulated before this one
+  bool counts_samples = false;         // this frame's are accumulated
   Buffers scene_buffers;               // of the current frame
   std::uint32_t features = 0;          // of the current frame
   Buffer rays, frame_buffer;
@@ -117,7 +118,7 @@ void Renderer::Impl::upload_frame() {
   gpu_frame.bound_share = static_cast<float>(estimation.difference_sampling);
   gpu_frame.photon_count = photons();
   gpu_frame.exposure = static_cast<float>(frame.exposure);
-  gpu_frame.past_samples = past_samples;
+  gpu_frame.past_samples = frame.accumulates ? past_samples : 0;
   constexpr std::uint32_t patterned = gpu::FEATURE_TEXTURES | gpu::FEATURE_VERTEX_COLORS;
   gpu_frame.keeps_albedo = (needed() & patterned) != 0 ? 1 : 0;
   gpu_frame.clip_from = is_clipped ? response->clipping().from : gpu::NO_INDEX;
@@ -161,8 +162,11 @@ void Renderer::Impl::upload_plate() {
 }
 
 void Renderer::Impl::begin_accumulating() {
-  past_samples = frame.accumulates ? past_samples + static_cast<std::uint32_t>(samples) : 0;
+  past_samples += counts_samples ? static_cast<std::uint32_t>(samples) : 0;
+  counts_samples = frame.accumulates;
   if (!frame.accumulates) {
+    if (frame.stands_aside) return;
+    past_samples = 0;
     if (history) history->forget();
     return;
   }

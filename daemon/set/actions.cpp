@@ -23,7 +23,7 @@ constexpr Action action_table[] = {
     {"samples_up", "More samples per pixel: less noise, fewer pictures a second.", ChangeSamples{1}},
     {"samples_down", "Fewer samples per pixel.", ChangeSamples{-1}},
     {"hold_rate", "Let the set's frame rate decide the samples again, after samples_up or samples_down.", HoldRate{}},
-    {"accumulate", "Switch the averaging over frames on; press again to switch it off.", ToggleAccumulation{}},
+    {"accumulate", "Switch the averaging over frames off; press again to switch it on.", ToggleAccumulation{}},
     {"estimator", "Next estimator: paired, difference.", NextEstimator{}},
     {"light_mode", "Next way to use the light camera's picture: image, sources, hybrid.", NextLightMode{}},
     {"debug_view", "Show the next layer in place of the composite.", NextView{}},

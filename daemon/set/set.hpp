@@ -230,14 +230,14 @@ struct PreviewStep {
   friend bool operator==(const PreviewStep&, const PreviewStep&) = default;
 };
 struct Quality {
-  int samples = 16;         // per pixel and frame, 1..1'000'000
-  bool adaptive = false;    // noisy pixels get more, `samples` on average; not in the preview
-  bool denoise = true;      // denoises the composite, guided by its own variance
-  bool accumulate = false;  // live: averages with the frames before, where they show the same
-  double error = 0;         // refines to this rms error over the picture's rms; 0: samples decide
-  double seconds = 0;       // time limit of a frame; 0: samples decide
-  double scale = 1.0;       // times the observer's resolution, preview only
-  double fps = 0;           // preview: kept by fewer samples, then pixels; 0: the others decide
+  int samples = 16;        // per pixel and frame, 1..1'000'000
+  bool adaptive = false;   // noisy pixels get more, `samples` on average; not in the preview
+  bool denoise = true;     // denoises the composite, guided by its own variance
+  bool accumulate = true;  // live: averages with the frames before, where they show the same
+  double error = 0;        // refines to this rms error over the picture's rms; 0: samples decide
+  double seconds = 0;      // time limit of a frame; 0: samples decide
+  double scale = 1.0;      // times the observer's resolution, preview only
+  double fps = 0;          // preview: kept by fewer samples, then pixels; 0: the others decide
   std::vector<PreviewStep> steps;  // how fps is held, best first; empty: scale, then ever smaller
   bool cpu_instead = false;        // live: the CPU draws while the GPU that was there is gone
 };

@@ -26,6 +26,11 @@ bool may_be_pane(uint material) {
   return materials[material].thin_walled != 0u && materials[material].transmission > 0.0;
 }
 
+// Returns whether what is behind the surface may be seen through it, unbent.
+bool lets_light_through(uint material) {
+  return materials[material].alpha_mode != ALPHA_OPAQUE || may_be_pane(material);
+}
+
 // Returns the share of light that goes straight through the surface; 0 where it is no pane.
 vec3 pane_transmittance(Surface s) {
   const bool smooth_wall = s.alpha <= frame.specular_alpha || s.ior < LEAST_ROUGH_IOR;

@@ -470,6 +470,10 @@ struct GpuShow {
   uint width;          // of the picture
   uint has_caustics;   // 1: what photons bring to the change is kept apart
 };
+// What is at the middle of a pixel, where it is neither a real surface or nothing (0) nor a virtual
+// object (1).
+PREVIZ_CONST float COVER_UNKNOWN = -1.0f;
+PREVIZ_CONST float COVER_SEE_THROUGH = -2.0f;
 // Dithering repeats after so many pixels in both directions.
 PREVIZ_CONST uint DITHER_SIDE = 64u;
 

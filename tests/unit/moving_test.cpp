@@ -221,9 +221,18 @@ TEST_F(MovingTake, ARangeKnowsWhatCameBeforeIt) {
   EXPECT_EQ(stick_of(alone[0]), stick_of(whole.at(without_stick)));
 }
 
+// Returns by how many codes two pictures differ at most.
+int most_codes_between(const Plate& a, const Plate& b) {
+  if (a.samples.size() != b.samples.size()) return 1 << 16;
+  int most = 0;
+  for (std::size_t i = 0; i < a.samples.size(); ++i)
+    most = std::max(most, std::abs(a.samples[i] - b.samples[i]));
+  return most;
+}
+
 // P21: the rig records the take while it plays it; what is rendered of the recording with its poses
-// is bit for bit what the display showed, where live neither averages over frames
-// nor smooths poses.
+// is what the display showed, but for a code by which that was dithered, where live neither
+// averages over frames nor smooths poses.
 TEST_F(MovingTake, IsRenderedAsItWasShown) {
   const std::string more =
       "[quality]\nsamples = 2\naccumulate = false\n[recording]\npreroll_s = 0\nslate = "
@@ -273,7 +282,7 @@ TEST_F(MovingTake, IsRenderedAsItWasShown) {
         rendered(take.directory, directory_ / "as_recorded.toml", post::FrameRange{i, i}).at(0);
     EXPECT_EQ(again.scene, was->second.scene);
     EXPECT_EQ(again.motion.carriers, was->second.motion.carriers);
-    EXPECT_TRUE(again.picture->samples == was->second.picture->samples) << i;
+    EXPECT_LE(most_codes_between(*again.picture, *was->second.picture), 1) << i;
     ASSERT_TRUE(again.scene.animation_s);
     if (compared++ == 0) first_s = *again.scene.animation_s;
     last_s = *again.scene.animation_s;

@@ -370,8 +370,9 @@ TEST(Denoise, TakesAnOutlierOutOfAYoungOutline) {
   }
   signals[young] = {3, 3, 3, 0.5f};
   const std::vector<glm::vec4> clean = denoised_by_hand(side, signals, variances, surfaces, true);
-  // Half of the wall's 0.4, and the outlier's own part in the mean over its surroundings.
-  EXPECT_NEAR(clean[young].r, 0.2, 3.0 / 10);
+  // Half of the wall's 0.4, and the outlier's own part in the mean over its surroundings, in which the
+  // weights 1 / (1 + distance^2) have a sum of 7.
+  EXPECT_NEAR(clean[young].r, 0.2, 3.0 / 7);
 }
 
 // Photons' light on a real floor, of one sample: on the left a focus, a disc of twice white made by

@@ -104,6 +104,31 @@ TEST(History, OfAMovingCameraIsBetterThanAFrameAlone) {
   EXPECT_LT(rms_between(last, truth), 0.7 * rms_between(shown(alone, pose, 1, false, true), truth));
 }
 
+// How much of a pixel an object covers is found by 16 rays in each frame: while the camera moves,
+// an outline of one sample a frame is as smooth as that of 16 samples, of which it may keep a tenth
+// more error. The light on both sides has the noise of a dozen frames, which is about as much.
+TEST(History, OfAMovingCameraHasOutlinesAsOfManySamples) {
+  const Stage stage(glm::vec3(0.4f));
+  SetRenderer moving(stage.view), alone(stage.view), reference(stage.view);
+  glm::dmat4 pose(1.0);
+  Plate last;
+  for (int frame = 0; frame < 12; ++frame) {
+    pose = look_at({0.01 * frame, -2, 1.4 + 0.004 * frame}, {0, 0, 0});
+    last = shown(moving, pose, 1, true, true);
+  }
+  const Plate truth = shown(reference, pose, 1024, false);
+  const std::vector<float> mask = reference.layers().mask;
+  const Plate many = shown(alone, pose, 16, false, true);
+  double off = 0, off_of_many = 0;
+  for (std::size_t i = 0; i < truth.samples.size(); ++i) {
+    if (mask[i / 3] <= 0 || mask[i / 3] >= 1) continue;
+    off += std::pow(last.samples[i] - double(truth.samples[i]), 2);
+    off_of_many += std::pow(many.samples[i] - double(truth.samples[i]), 2);
+  }
+  ASSERT_GT(off_of_many, 0);
+  EXPECT_LT(std::sqrt(off), 1.1 * std::sqrt(off_of_many));
+}
+
 // A lamp that only the mixed world has lights the floor without noise, as no light is reflected
 // further. A sample lies somewhere in its pixel, and what is carried along is interpolated between
 // pixels, so what is shown lies between the extremes of the 3x3 pixels around, within the two codes
@@ -184,6 +209,25 @@ TEST(History, IsNotSeenInAFrameThatStandsAlone) {
   shown(with, stage.view.world_from_camera, 2, true, true);
   shown(with, stage.view.world_from_camera, 2, true, true);
   EXPECT_EQ(shown(with, stage.view.world_from_camera, 2, false, true).samples, alone.samples);
+}
+
+// A snapshot's frame is that of an offline render, with the same random numbers, and the frames
+// after it are averaged with those before it.
+TEST(History, IsNotEndedByAFrameThatStandsAside) {
+  const Stage stage(glm::vec3(0.4f));
+  SetRenderer with(stage.view), without(stage.view);
+  const glm::dmat4 pose = stage.view.world_from_camera;
+  const Plate alone = shown(without, pose, 1, false, true);
+  Plate expected, last;
+  for (int frame = 0; frame < 4; ++frame) expected = shown(without, pose, 1, true);
+  for (int frame = 0; frame < 4; ++frame) {
+    last = shown(with, pose, 1, true);
+    with.begin(
+        {.plate = gray_plate(), .exposure = 0.5, .world_from_camera = pose, .stands_aside = true});
+    with.render(1);
+    EXPECT_EQ(with.show(true).samples, alone.samples);
+  }
+  EXPECT_EQ(last.samples, expected.samples);
 }
 
 // The layers are the frame's own, and asking for them changes no picture. Showing a frame again

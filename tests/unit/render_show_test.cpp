@@ -52,7 +52,9 @@ TEST_P(ShowOf, ASetIsThePictureOfItsLayers) {
   set::Estimation estimation;
   estimation.composite = GetParam();
   View view = random_scene(3, options);
-  // The denoiser divides by the albedo of a scene with textures, which is in no layer.
+  // The denoiser keeps photons' light apart and divides by the albedo of a scene with textures:
+  // both are in no layer.
+  estimation.caustics = set::Caustics::traced;
   for (scene::Material& material : view.scene.materials)
     material.base_color_texture = material.metallic_roughness_texture = material.emission_texture =
         scene::no_texture;

@@ -76,9 +76,10 @@ TEST(Spirv, APassIsCompiledOnceForFeaturesThatItDoesNotAskAbout) {
   EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
 }
 
-TEST(Spirv, TheLastPassOfASampleAsksOnlyWhetherThereIsACameraOrATexture) {
-  EXPECT_EQ(describe_spirv(accumulate_spv).asked_bits,
-            gpu::FEATURE_CAMERA | gpu::FEATURE_TEXTURES | gpu::FEATURE_VERTEX_COLORS);
+TEST(Spirv, TheLastPassOfASampleAsksOnlyWhetherThereAreACameraTexturesOrPhotons) {
+  EXPECT_EQ(describe_spirv(accumulate_spv).asked_bits, gpu::FEATURE_CAMERA | gpu::FEATURE_TEXTURES |
+                                                           gpu::FEATURE_VERTEX_COLORS |
+                                                           gpu::FEATURE_PHOTONS);
 }
 
 // The picture of a scene of plain paint, with only what it needs compiled in and with every feature

@@ -399,13 +399,13 @@ TEST(Controls, APushEndsARefinementBeforeItsKindIsKnown) {
 
 TEST(Controls, AveragingOverFramesIsTheSetsUntilItIsSwitched) {
   Desk desk;
-  EXPECT_FALSE(desk.controls.look().accumulates);
-  EXPECT_EQ(desk("accumulate").said, "averaging over frames on");
   EXPECT_TRUE(desk.controls.look().accumulates);
   EXPECT_EQ(desk("accumulate").said, "averaging over frames off");
+  EXPECT_FALSE(desk.controls.look().accumulates);
+  EXPECT_EQ(desk("accumulate").said, "averaging over frames on");
   set::Set set;
-  set.quality.accumulate = true;
-  EXPECT_TRUE(Controls(set).look().accumulates);
+  set.quality.accumulate = false;
+  EXPECT_FALSE(Controls(set).look().accumulates);
 }
 
 TEST(Controls, EstimatorAndViewGoAround) {
