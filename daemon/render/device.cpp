@@ -123,7 +123,7 @@ std::shared_ptr<const Program> Device::program(
 
 void Device::open(bool cpu_too) {
   try {
-    create_instance(options_.validation);
+    create_instance();
     pick_physical_device(options_.name, cpu_too);
     create_device();
     publish({name_, is_cpu_, is_cpu_ && had_gpu_});
@@ -133,23 +133,29 @@ void Device::open(bool cpu_too) {
   }
 }
 
-void Device::create_instance(bool validation) {
+void Device::create_instance() {
   static constexpr const char* layer = "VK_LAYER_KHRONOS_validation";
   if (context_.enumerateInstanceVersion() < VK_API_VERSION_1_3)
     throw Error("Vulkan: the loader is older than 1.3");
   std::vector<const char*> layers;
   std::vector<const char*> extensions;
-  if (validation) {
+  if (options_.validation) {
     if (!has_layer(context_, layer))
       throw Error("Vulkan: validation was asked for, but the layer " + std::string(layer) +
                   " is not installed (package vulkan-validationlayers)");
     layers.push_back(layer);
+    if (options_.synchronization) extensions.push_back(VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME);
   }
-  has_labels_ = validation || has_extension(context_, VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
+  has_labels_ = options_.validation || has_extension(context_, VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
   if (has_labels_) extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
   const vk::ApplicationInfo application("previzd", 1, "previzd", 1, VK_API_VERSION_1_3);
-  instance_ = vk::raii::Instance(context_, {{}, &application, layers, extensions});
-  if (!validation) return;
+  const vk::ValidationFeatureEnableEXT hazards =
+      vk::ValidationFeatureEnableEXT::eSynchronizationValidation;
+  const vk::ValidationFeaturesEXT features(hazards);
+  vk::InstanceCreateInfo create({}, &application, layers, extensions);
+  if (options_.validation && options_.synchronization) create.pNext = &features;
+  instance_ = vk::raii::Instance(context_, create);
+  if (!options_.validation) return;
   using Severity = vk::DebugUtilsMessageSeverityFlagBitsEXT;
   using Type = vk::DebugUtilsMessageTypeFlagBitsEXT;
   vk::DebugUtilsMessengerCreateInfoEXT info({}, Severity::eWarning | Severity::eError,
@@ -280,11 +286,12 @@ Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags u
 
 using Memory = vk::MemoryPropertyFlagBits;
 
-// Where device memory is host-visible anyway (a CPU device), it is mapped and no staging is needed.
+// Where the host works in the device's memory, it is mapped and no staging is needed.
 Buffer create_device_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags usage) {
   device.count_buffer();
   const vk::MemoryPropertyFlags host = Memory::eHostVisible | Memory::eHostCoherent;
-  if (!device.is_cpu()) return create_buffer(device, size, usage, Memory::eDeviceLocal, {});
+  if (!device.shares_host_memory())
+    return create_buffer(device, size, usage, Memory::eDeviceLocal, {});
   Buffer result = create_buffer(device, size, usage, host, Memory::eDeviceLocal);
   result.mapped = result.memory.mapMemory(0, VK_WHOLE_SIZE);
   return result;

@@ -36,6 +36,9 @@ class Device {
   const std::string& name() const { return name_; }
   const vk::PhysicalDeviceLimits& limits() const { return limits_; }
   bool is_cpu() const { return is_cpu_; }
+  // Returns whether the host works in the device's own memory; otherwise it uploads and downloads
+  // by copies, and the device is wide enough to have many samples in flight.
+  bool shares_host_memory() const { return is_cpu_ && !options_.as_gpu; }
   // What is open now; may be called on any thread.
   struct Drawing {
     std::string name;  // empty: nothing is open
@@ -91,7 +94,7 @@ class Device {
   void open(bool cpu_too);
   void close();
   void publish(Drawing drawing);
-  void create_instance(bool validation);
+  void create_instance();
   void pick_physical_device(const std::string& wanted_name, bool cpu_too);
   void create_device();
 

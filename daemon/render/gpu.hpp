@@ -14,6 +14,12 @@ namespace previz::render {
 struct DeviceOptions {
   bool validation = false;  // Khronos validation layer; its messages go to the log and are counted
   std::string name;         // substring of the device's name; empty: the first discrete, else any
+  // A CPU device is treated as a graphics card: its memory is reached by copies, and as many
+  // samples are in flight, so that a computer without a card runs the code that a card would. The
+  // device is still called a CPU. No pixel depends on it.
+  bool as_gpu = false;
+  // With `validation`: the layer also looks for accesses to memory that no barrier orders.
+  bool synchronization = false;
 };
 
 // The device is gone (VK_ERROR_DEVICE_LOST): a driver crashed, a cable came loose, a hang led to a

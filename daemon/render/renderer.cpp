@@ -24,7 +24,7 @@ void check_size(const Device& device, const PinholeIntrinsics& picture) {
   refuse_too_large(picture.width, picture.height,
                    {.bytes = device.memory_bytes(),
                     .texels = device.limits().maxTexelBufferElements,
-                    .read_back = device.is_cpu()});
+                    .read_back = device.shares_host_memory()});
 }
 
 }  // namespace

@@ -38,6 +38,19 @@ std::uint32_t slots_of(const gpu::GpuBatch& tile) {
   return round_up(tile.width, block_width) * round_up(tile.height, block_height);
 }
 
+// Returns how many slots are in flight: as many as suit the device, and few enough that the largest
+// array with an element for each slot, path, pixel or photon is no larger than a storage buffer may
+// be.
+std::uint32_t most_slots(const Device& device, std::uint32_t paths_a_slot) {
+  const std::size_t a_path = std::max({sizeof(gpu::vec4), sizeof(gpu::GpuHit),
+                                       sizeof(gpu::GpuShadowRay), 2 * sizeof(std::uint32_t)});
+  const std::size_t a_slot =
+      std::max(std::max(sizeof(gpu::GpuPixel), sizeof(gpu::GpuPhoton)), paths_a_slot * a_path);
+  const std::size_t allowed = device.limits().maxStorageBufferRange / a_slot;
+  const std::size_t suited = device.shares_host_memory() ? cpu_slots : gpu_slots;
+  return static_cast<std::uint32_t>(std::min(suited, allowed));
+}
+
 std::uint32_t sampled_blocks(int pixels) {
   return (static_cast<std::uint32_t>(pixels) + gpu::SAMPLED_BLOCK - 1) / gpu::SAMPLED_BLOCK;
 }
@@ -46,7 +59,7 @@ std::uint32_t sampled_blocks(int pixels) {
 
 Wavefront::Wavefront(Device& device, int width, int height, std::uint32_t paths_a_slot)
     : device_(device),
-      max_slots_(device.is_cpu() ? cpu_slots : gpu_slots),
+      max_slots_(most_slots(device, paths_a_slot)),
       paths_a_slot_(paths_a_slot),
       photons_(device),
       camera_(device),

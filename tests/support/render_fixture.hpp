@@ -22,8 +22,9 @@ inline lighting::EnvironmentMap uniform_environment(const glm::vec3& radiance, i
 
 // Holds a view's scene and environment.
 struct SetRenderer : render::Renderer {
-  explicit SetRenderer(const View& view, const set::Estimation& estimation = {})
-      : render::Renderer(shared_device(), estimation, view.calibration) {
+  explicit SetRenderer(const View& view, const set::Estimation& estimation = {},
+                       std::shared_ptr<render::Device> device = shared_device())
+      : render::Renderer(std::move(device), estimation, view.calibration) {
     set_scene(view.scene);
     set_environment(view.environment, set::LightSampling::importance);
   }
