@@ -163,9 +163,10 @@ void main() {
   const Parts here = load_parts(at);
   Shown shown = Shown(here.pixel.signal, uncovered_at(at),
                       vec4(here.pixel.variance, here.pixel.overlap));
-  const float cover = denoise.has_history != 0u ? texelFetch(albedos, int(index)).w : 0.0;
-  if (cover > 0.0 && cover < 1.0)
-    mix_anew(at, here, cover, shown);
+  // It is 1 and what history_cover.comp has found, or 0 where that has found nothing.
+  const float found = denoise.has_history != 0u ? texelFetch(albedos, int(index)).w : 0.0;
+  if (found >= 1.0)
+    mix_anew(at, here, found - 1.0, shown);
   else if (is_edge(here.pixel))
     mix_edge(at, here, shown);
   denoised_signals[index] = vec4(shown.signal, here.pixel.inverse_depth);

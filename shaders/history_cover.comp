@@ -25,13 +25,17 @@ float class_at(ivec2 at) {
   return classes[at.y * int(frame.width) + at.x];
 }
 
-// Returns whether a virtual object ends between the middles of the pixel and of those around it, and
-// nothing there lets light through.
+// A pixel that has an outline in it has both sides at the middles of the pixels around, and so has one beside
+// it, whose past has the outline that has moved on.
+const int REACH = 2;
+
+// Returns whether a virtual object ends between the middles of the pixels around, and nothing there lets
+// light through.
 bool is_outline(ivec2 at) {
   const float own = class_at(at);
   bool differs = false;
-  for (int y = -1; y <= 1; ++y)
-    for (int x = -1; x <= 1; ++x) {
+  for (int y = -REACH; y <= REACH; ++y)
+    for (int x = -REACH; x <= REACH; ++x) {
       const float there = class_at(at + ivec2(x, y));
       if (there == COVER_SEE_THROUGH) return false;
       differs = differs || (there != COVER_UNKNOWN && there != own);

@@ -46,11 +46,11 @@ void main() {
   uncovered[in_band] = vec4(factor * own.rgb, 0.0);
   reals[in_band] = vec4(real / albedo, 0.0);
   // Where rays have found how much of an outline is covered, denoise_edges.comp mixes what is on its two
-  // sides anew; it finds the share beside the albedo.
+  // sides anew; it finds the share, plus 1, beside the albedo.
   const float cover = covers[index];
-  const bool is_mixed_anew = show.is_denoised != 0u && cover > 0.0 && cover < 1.0;
+  const bool is_mixed_anew = show.is_denoised != 0u && cover != COVER_UNKNOWN;
   albedos[in_band] =
-      is_mixed_anew ? uvec2(halves.x, halves.y | packHalf2x16(vec2(0.0, cover))) : halves;
+      is_mixed_anew ? uvec2(halves.x, halves.y | packHalf2x16(vec2(0.0, 1.0 + cover))) : halves;
   if (is_mixed_anew) composites[in_band] = vec4(vec3(0.0), cover);
   if (surfaces[in_band].w != DENOISE_HIGHLIGHT) surfaces[in_band].w = mask;
   // The variance of a weighted mean is that of a sample times the sum of the squared weights, which
