@@ -24,7 +24,7 @@ float most_variance(float white, std::int64_t samples);
 class Denoiser {
  public:
   // Works on about `most_pixels` at once, in bands of whole rows, at 152 bytes of device memory per
-  // pixel, and 184 with companions.
+  // pixel, 32 more with companions, and 32 more with the light of photons.
   explicit Denoiser(Device& device, std::size_t most_pixels = most_band_pixels);
 
   // A band: given rows [top, bottom) as input, rows [first, last) of the output are right.

@@ -370,8 +370,8 @@ TEST(Denoise, TakesAnOutlierOutOfAYoungOutline) {
   }
   signals[young] = {3, 3, 3, 0.5f};
   const std::vector<glm::vec4> clean = denoised_by_hand(side, signals, variances, surfaces, true);
-  // Half of the wall's 0.4, and the outlier's own part in the mean over its surroundings, in which the
-  // weights 1 / (1 + distance^2) have a sum of 7.
+  // Half of the wall's 0.4, and the outlier's own part in the mean over its surroundings, in which
+  // the weights 1 / (1 + distance^2) have a sum of 7.
   EXPECT_NEAR(clean[young].r, 0.2, 3.0 / 7);
 }
 
