@@ -383,6 +383,7 @@ TEST(Denoise, TakesAnOutlierOutOfAYoungOutline) {
 // 1 % beyond the pixels that are summed.
 TEST(Denoise, KeepsAFocusOfPhotonsAndEvensOutFewOfThem) {
   constexpr int side = 64;
+  constexpr double half = side * side / 2.0;  // the pixels on the right
   const auto in_focus = [](int x, int y) { return std::hypot(x - 16, y - 32) < 6; };
   std::vector<glm::vec4> signals(side * side, glm::vec4(0, 0, 0, 0.5)), variances(side * side);
   std::vector<glm::vec4> surfaces(side * side, glm::vec4(0, 0, 1, 0)), caustics(side * side);
@@ -407,10 +408,10 @@ TEST(Denoise, KeepsAFocusOfPhotonsAndEvensOutFewOfThem) {
         EXPECT_NEAR(value, in_focus(x, y) ? 2 : 0, 4 * 2.0 / 32) << x << ", " << y;
       }
       if (x > 24) sum += value;
-      if (x >= side / 2) square += std::pow(value - drawn / (side * side / 2), 2);
+      if (x >= side / 2) square += std::pow(value - drawn / half, 2);
     }
   EXPECT_NEAR(sum, drawn, 0.05 * drawn);
-  EXPECT_LT(square / (side * side / 2), 0.1 * 0.9 * 0.01 / 10);
+  EXPECT_LT(square / half, 0.1 * 0.9 * 0.01 / 10);
 }
 
 // A virtual wall before the left third of a real one on which nothing changes: noise on the one
