@@ -13,7 +13,7 @@
 uniform textureBuffer uncovered;  // over white and albedo
 uniform textureBuffer reals;
 uniform textureBuffer albedos;  // RGBA16F
-// What photons bring, over white, which no level has seen; with has_caustics. An edge's is in its signal.
+// The light of photons, over white, is here with has_caustics; no level has seen it. An edge's is in its signal.
 uniform textureBuffer caustics;
 layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
 layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
@@ -120,7 +120,7 @@ float noise_share(ivec2 at, Sides s) {
   return off > 0.0 ? min((expected.r + expected.g + expected.b) / off, 1.0) : 0.0;
 }
 
-// What is shown of a pixel.
+// The result for a pixel.
 struct Shown {
   vec3 signal, uncovered;
   vec4 variance;

@@ -11,7 +11,7 @@
 #include "shaders/lib/sampler.glsl"
 #include "shaders/lib/trace.glsl"
 
-// What history_surface.comp found at the middle of each pixel: 0, 1 or COVER_*.
+// The classes are those that history_surface.comp found at the middles of the pixels: 0, 1 or COVER_*.
 layout(scalar) readonly buffer Classes { float classes[]; };
 layout(scalar) writeonly buffer Covers { float covers[]; };
 

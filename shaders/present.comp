@@ -21,14 +21,15 @@ layout(scalar) readonly buffer Caustics { vec4 caustics[]; };    // what the sig
 layout(scalar) readonly buffer Thresholds { float thresholds[]; };
 layout(scalar) writeonly buffer Picture { uint picture[]; };     // samples, as the plate's
 
-// Returns the largest code whose least signal is not above `signal`, and 0 for NaN.
-uint code_of(float signal) {
+// Returns the largest code that stands for no more than `signal`, and 0 for NaN. With `rounds`, what is
+// nearer to the next code already counts as that.
+uint code_of(float signal, bool rounds) {
   if (!(signal > 0.0)) return 0u;
   uint code = 0u;
   uint above = show.most + 1u;
   while (above - code > 1u) {
     const uint middle = (code + above) / 2u;
-    if (least_of[middle] <= signal) code = middle;
+    if ((rounds ? least_of[middle] : signal_of[middle]) <= signal) code = middle;
     else above = middle;
   }
   return code;
@@ -37,15 +38,8 @@ uint code_of(float signal) {
 // Returns the code below or above `signal`, so that the mean over the pattern's pixels is the signal
 // itself. Each channel has the pattern at another place, so that they are not raised together.
 uint dithered_code_of(float signal, uvec2 at, uint channel) {
-  if (!(signal > 0.0)) return 0u;
-  uint code = 0u;
-  uint above = show.most + 1u;
-  while (above - code > 1u) {
-    const uint middle = (code + above) / 2u;
-    if (signal_of[middle] <= signal) code = middle;
-    else above = middle;
-  }
-  if (code == show.most) return code;
+  const uint code = code_of(signal, false);
+  if (code == show.most || !(signal > 0.0)) return code;
   const float share = (signal - signal_of[code]) / (signal_of[code + 1u] - signal_of[code]);
   const uvec2 in_pattern = (at + channel * uvec2(23u, 41u)) % DITHER_SIDE;
   return share > thresholds[in_pattern.y * DITHER_SIDE + in_pattern.x] ? code + 1u : code;
@@ -79,7 +73,7 @@ uvec3 codes_of(uint pixel) {
   }
   const vec3 exposed = show.exposure * radiance;
   if (show.is_dithered == 0u)
-    return uvec3(code_of(exposed.r), code_of(exposed.g), code_of(exposed.b));
+    return uvec3(code_of(exposed.r, true), code_of(exposed.g, true), code_of(exposed.b, true));
   const uint in_picture = show.in_picture + index;
   const uvec2 at = uvec2(in_picture % show.width, in_picture / show.width);
   return uvec3(dithered_code_of(exposed.r, at, 0u), dithered_code_of(exposed.g, at, 1u),

@@ -10,8 +10,8 @@ namespace {
 
 // How far a dot fills its surroundings, in pixels (Ulichney's choice).
 constexpr double dot_sigma = 1.5;
-// The share of pixels that are dots in the pattern from which the ranks are counted down and up.
-constexpr std::size_t first_share = 10;
+// One place in so many is a dot in the pattern from which the ranks are counted down and up.
+constexpr std::size_t places_a_dot = 10;
 
 // Dots in a square that repeats, and how full each place of it is.
 class Dots {
@@ -34,7 +34,6 @@ class Dots {
   // The dot with the most dots around, and the place without one that has the fewest.
   std::size_t tightest_cluster() const { return extreme(true, 1); }
   std::size_t largest_void() const { return extreme(false, -1); }
-  bool is_dot(std::size_t place) const { return is_dot_[place]; }
 
  private:
   std::size_t extreme(bool among_dots, double sign) const {
@@ -57,7 +56,7 @@ Dots evenly_spread(std::size_t side) {
   std::vector<std::size_t> places(side * side);
   std::iota(places.begin(), places.end(), 0);
   std::mt19937 random(1);
-  for (std::size_t i = 0; i < places.size() / first_share; ++i) {
+  for (std::size_t i = 0; i < places.size() / places_a_dot; ++i) {
     std::swap(places[i], places[i + random() % (places.size() - i)]);
     dots.set(places[i], true);
   }
@@ -81,7 +80,7 @@ std::vector<float> blue_noise(std::uint32_t side) {
     thresholds[place] = (static_cast<float>(at) + 0.5f) / static_cast<float>(places);
   };
   Dots fewer = first;
-  const std::size_t count = places / first_share;
+  const std::size_t count = places / places_a_dot;
   for (std::size_t at = count; at > 0; --at) {
     const std::size_t place = fewer.tightest_cluster();
     fewer.set(place, false);

@@ -90,6 +90,7 @@ void Presenter::composite(const ToPresent& what, const Denoiser::Band& band, gpu
     constants.in_tile = static_cast<std::uint32_t>(first - tile.first_row) * width;
     constants.in_band = static_cast<std::uint32_t>(first - band.top) * width;
     const Buffers buffers{{"pixels", &tile.pixels},
+                          // Without photons any buffer will do: the shader does not read it.
                           {"pixel_caustics", tile.caustics ? tile.caustics : &tile.pixels},
                           {"caustics", &denoiser.caustic()},
                           {"plate_samples", &what.plate},

@@ -470,8 +470,8 @@ struct GpuShow {
   uint width;          // of the picture
   uint has_caustics;   // 1: what photons bring to the change is kept apart
 };
-// What is at the middle of a pixel, where it is neither a real surface or nothing (0) nor a virtual
-// object (1).
+// The class of what is at the middle of a pixel is 0 for a real surface or nothing, 1 for a virtual
+// object, and otherwise one of these.
 PREVIZ_CONST float COVER_UNKNOWN = -1.0f;
 PREVIZ_CONST float COVER_SEE_THROUGH = -2.0f;
 // Dithering repeats after so many pixels in both directions.

@@ -74,6 +74,7 @@ Pictures pictures_on(const std::shared_ptr<render::Device>& device) {
 
 TEST(AsGpu, HasThePicturesOfACpuBitForBit) {
   const auto as_gpu = render::open_device({.validation = true, .name = "", .as_gpu = true});
+  // On a card there is no other path to compare with; every other test then runs the card's.
   if (!as_gpu->is_cpu()) GTEST_SKIP() << "the device is a graphics card";
   EXPECT_FALSE(as_gpu->shares_host_memory());
   EXPECT_TRUE(shared_device()->shares_host_memory());

@@ -89,17 +89,23 @@ TEST(History, TakesNoiseAwayAsItsSamplesAddUp) {
   EXPECT_LT(rms_between(last, truth), rms_between(first, truth) / 4);
 }
 
+// Returns the last of twelve denoised frames of a camera that moves, and its pose.
+Plate shown_moving(SetRenderer& renderer, glm::dmat4& pose) {
+  Plate last;
+  for (int frame = 0; frame < 12; ++frame) {
+    pose = look_at({0.01 * frame, -2, 1.4 + 0.004 * frame}, {0, 0, 0});
+    last = shown(renderer, pose, 1, true, true);
+  }
+  return last;
+}
+
 // Denoised, too: a moving camera must not add error, and the picture must be better than that of a
 // frame alone.
 TEST(History, OfAMovingCameraIsBetterThanAFrameAlone) {
   const Stage stage(glm::vec3(0.4f));
   SetRenderer moving(stage.view), alone(stage.view), reference(stage.view);
   glm::dmat4 pose(1.0);
-  Plate last;
-  for (int frame = 0; frame < 12; ++frame) {
-    pose = look_at({0.01 * frame, -2, 1.4 + 0.004 * frame}, {0, 0, 0});
-    last = shown(moving, pose, 1, true, true);
-  }
+  const Plate last = shown_moving(moving, pose);
   const Plate truth = shown(reference, pose, 1024, false);
   EXPECT_LT(rms_between(last, truth), 0.7 * rms_between(shown(alone, pose, 1, false, true), truth));
 }
@@ -111,11 +117,7 @@ TEST(History, OfAMovingCameraHasOutlinesAsOfManySamples) {
   const Stage stage(glm::vec3(0.4f));
   SetRenderer moving(stage.view), alone(stage.view), reference(stage.view);
   glm::dmat4 pose(1.0);
-  Plate last;
-  for (int frame = 0; frame < 12; ++frame) {
-    pose = look_at({0.01 * frame, -2, 1.4 + 0.004 * frame}, {0, 0, 0});
-    last = shown(moving, pose, 1, true, true);
-  }
+  const Plate last = shown_moving(moving, pose);
   const Plate truth = shown(reference, pose, 1024, false);
   const std::vector<float> mask = reference.layers().mask;
   const Plate many = shown(alone, pose, 16, false, true);
