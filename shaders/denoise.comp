@@ -12,12 +12,9 @@
 // denoise_guide.comp makes the guide and its variance.
 uniform textureBuffer guides;
 uniform textureBuffer guide_variances;
-// The uncovered part of the change and mean(Lr), over white and albedo, get the signal's weights.
-uniform textureBuffer uncovered;
-uniform textureBuffer reals;
+uniform textureBuffer reals;  // mean(Lr), over white and albedo, gets the signal's weights
 layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
 layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
-layout(scalar) writeonly buffer DenoisedUncovered { vec4 denoised_uncovered[]; };
 layout(scalar) writeonly buffer DenoisedReals { vec4 denoised_reals[]; };
 
 // A neighbour's weight has fallen to 1 / e where its guide is off by so many standard deviations. A
@@ -69,7 +66,6 @@ void main() {
   const bool has_companions = denoise.has_companions != 0u;
   vec3 change = vec3(0.0);
   vec3 variance = vec3(0.0);
-  vec3 own = vec3(0.0);
   vec3 real = vec3(0.0);
   float overlap = 0.0;
   float total = 0.0;
@@ -94,15 +90,12 @@ void main() {
       overlap += weight * there.overlap;
       total += weight;
       squares += weight * weight;
-      if (!has_companions) continue;
-      own += weight * texelFetch(uncovered, pixel_index(at + off)).rgb;
-      real += weight * texelFetch(reals, pixel_index(at + off)).rgb;
+      if (has_companions) real += weight * texelFetch(reals, pixel_index(at + off)).rgb;
     }
   overlap /= total;
   if (denoise.step > 1u) overlap *= pow(total * total / squares, 1.0 - OVERLAP_POWER);
   denoised_signals[index] = vec4(here.signal + change / total, here.inverse_depth);
   denoised_variances[index] = vec4(variance / (total * total), overlap);
   if (!has_companions) return;
-  denoised_uncovered[index] = vec4(own / total, 0.0);
   denoised_reals[index] = vec4(real / total, 0.0);
 }

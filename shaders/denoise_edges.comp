@@ -10,7 +10,9 @@
 
 #include "shaders/lib/denoise.glsl"
 
-uniform textureBuffer uncovered;  // over white and albedo
+// Of an edge, over white and albedo. Of an outline that is mixed anew: its other side over white, and the
+// number of samples of that.
+uniform textureBuffer uncovered;
 uniform textureBuffer reals;
 uniform textureBuffer albedos;  // RGBA16F
 // The light of photons, over white, is here with has_caustics; no level has seen it. An edge's is in its signal.
@@ -44,16 +46,14 @@ Pixel load_lit(ivec2 at) {
   return p;
 }
 
-vec3 uncovered_at(ivec2 at) {
-  const vec3 own = texelFetch(uncovered, pixel_index(at)).rgb * albedo_at(at);
-  return texelFetch(surfaces, pixel_index(at)).w > 0.0 ? own : own + caustic_at(at);
-}
-
 Parts load_parts(ivec2 at) {
   Parts p;
   p.pixel = load_lit(at);
-  const vec3 own = min(uncovered_at(at), DENOISE_MOST_WHITES);
-  p.uncovered = p.pixel.cover >= 1.0 ? vec3(0.0) : p.pixel.cover <= 0.0 ? p.pixel.signal : own;
+  p.uncovered = p.pixel.signal;
+  if (is_edge(p.pixel))
+    p.uncovered = min(texelFetch(uncovered, pixel_index(at)).rgb * albedo_at(at), DENOISE_MOST_WHITES);
+  else if (p.pixel.cover == 1.0)
+    p.uncovered = vec3(0.0);
   p.covered = p.pixel.signal - p.uncovered;
   return p;
 }
@@ -68,12 +68,6 @@ struct Sides {
 // A side that is nowhere around counts as this part of a pixel, with no light.
 const float LEAST_PART = 1e-6;
 
-// Returns the weight of a pixel at a distance. With a history the pixels around have little noise, and
-// the nearest know best.
-float nearness(ivec2 off) {
-  return denoise.has_history != 0u ? 1.0 / (1.0 + float(off.x * off.x + off.y * off.y)) : 1.0;
-}
-
 Sides sides_around(ivec2 at) {
   Sides s = Sides(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
   float object = 0.0;
@@ -86,13 +80,12 @@ Sides sides_around(ivec2 at) {
       if (cover > 1.0) continue;  // a highlight
       // The noise of a part is taken to be its share of the pixel's.
       const vec3 variance = p.pixel.overlap * p.pixel.variance;
-      const float near = nearness(ivec2(x, y));
-      s.object += near * p.covered;
-      s.object_variance += near * near * cover * variance;
-      object += near * cover;
-      s.behind += near * p.uncovered;
-      s.behind_variance += near * near * (1.0 - cover) * variance;
-      behind += near * (1.0 - cover);
+      s.object += p.covered;
+      s.object_variance += cover * variance;
+      object += cover;
+      s.behind += p.uncovered;
+      s.behind_variance += (1.0 - cover) * variance;
+      behind += 1.0 - cover;
     }
   object = max(object, LEAST_PART);
   behind = max(behind, LEAST_PART);
@@ -140,20 +133,43 @@ void mix_edge(ivec2 at, Parts here, inout Shown shown) {
                        share * share * left / max(shown.variance.w, 1e-6);
 }
 
-// Mixes the sides by the share that rays have found. A pixel that is whole by its samples knows one
-// side itself.
-void mix_anew(ivec2 at, Parts here, float cover, inout Shown shown) {
-  const Sides sides = sides_around(at);
-  const bool is_object = here.pixel.cover == 1.0;
-  const bool is_behind = here.pixel.cover == 0.0;
-  const vec3 object = is_object ? here.pixel.signal : sides.object;
-  shown.uncovered = (1.0 - cover) * (is_behind ? here.pixel.signal : sides.behind);
-  shown.signal = cover * object + shown.uncovered;
-  const vec3 variance = here.pixel.overlap * here.pixel.variance;
-  const vec3 left =
-      cover * cover * (is_object ? variance : sides.object_variance) +
-      (1.0 - cover) * (1.0 - cover) * (is_behind ? variance : sides.behind_variance);
-  shown.variance = vec4(left, 1.0);
+// A mean of so many samples counts as half of a pixel that the levels have filtered.
+const float HALF_KNOWING = 8.0;
+
+// Returns the share that rays have found, or less than 0 where they have found none.
+float found_at(ivec2 at) { return texelFetch(albedos, pixel_index(at)).w - 1.0; }
+
+// Returns the other side of an outline: its own samples of that, and what the pixels around show
+// of it, the nearest of which know best. The fourth component is the sum of their weights.
+vec4 other_side(ivec2 at, float own_cover) {
+  vec4 sum = vec4(0.0);
+  for (int y = -REACH; y <= REACH; ++y)
+    for (int x = -REACH; x <= REACH; ++x) {
+      const ivec2 there = at + ivec2(x, y);
+      if (!is_inside(there)) continue;
+      const float near = 1.0 / (1.0 + float(x * x + y * y));
+      const float cover = texelFetch(surfaces, pixel_index(there)).w;
+      if (cover == 1.0 - own_cover) {
+        sum += near * vec4(load_lit(there).signal, 1.0);
+      } else if (cover == own_cover && found_at(there) >= 0.0) {
+        const vec4 kept = texelFetch(uncovered, pixel_index(there));
+        sum += near * kept.w / (kept.w + HALF_KNOWING) * vec4(min(kept.rgb, DENOISE_MOST_WHITES), 1.0);
+      }
+    }
+  return sum;
+}
+
+// Mixes the two sides of an outline by the share that rays have found. The pixel is filtered as if
+// its own side filled it.
+void mix_anew(ivec2 at, Pixel here, float found, inout Shown shown) {
+  const vec4 other = other_side(at, here.cover);
+  if (other.w <= 0.0) return;
+  const vec3 other_light = other.rgb / other.w;
+  const bool is_object = here.cover == 1.0;
+  const vec3 object = is_object ? here.signal : other_light;
+  const vec3 behind = is_object ? other_light : here.signal;
+  shown.uncovered = (1.0 - found) * behind;
+  shown.signal = found * object + shown.uncovered;
 }
 
 void main() {
@@ -161,12 +177,11 @@ void main() {
   if (index >= denoise.width * denoise.height) return;
   const ivec2 at = ivec2(index % denoise.width, index / denoise.width);
   const Parts here = load_parts(at);
-  Shown shown = Shown(here.pixel.signal, uncovered_at(at),
-                      vec4(here.pixel.variance, here.pixel.overlap));
-  // It is 1 and what history_cover.comp has found, or 0 where that has found nothing.
-  const float found = denoise.has_history != 0u ? texelFetch(albedos, int(index)).w : 0.0;
-  if (found >= 1.0)
-    mix_anew(at, here, found - 1.0, shown);
+  Shown shown =
+      Shown(here.pixel.signal, here.uncovered, vec4(here.pixel.variance, here.pixel.overlap));
+  const float found = denoise.has_history != 0u ? found_at(at) : -1.0;
+  if (found >= 0.0)
+    mix_anew(at, here.pixel, found, shown);
   else if (is_edge(here.pixel))
     mix_edge(at, here, shown);
   denoised_signals[index] = vec4(shown.signal, here.pixel.inverse_depth);

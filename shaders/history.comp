@@ -1,6 +1,8 @@
 // Carries what the frames before showed at each pixel along to this frame, and adds this frame to it:
 // the mean of the change, which is the difference of the worlds on real surfaces and the radiance of
-// virtual ones (shaders/README.md, "Accumulation over time").
+// virtual ones. A pixel has two sides: its own is what it shows at its middle, and where a virtual object
+// ends in it, the other one is what else it shows. Each has a mean of its own samples alone, and moves as
+// its surface does (shaders/README.md, "Accumulation over time").
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -19,22 +21,31 @@ layout(scalar) readonly buffer Signals { vec4 signals[]; };
 layout(scalar) readonly buffer Variances { vec4 variances[]; };
 layout(scalar) readonly buffer Uncovered { vec4 uncovered[]; };
 layout(scalar) readonly buffer Albedos { uvec2 albedos[]; };
-// This frame's, of the picture, as history_surface.comp makes them.
+layout(scalar) readonly buffer Caustics { vec4 caustics[]; };
+// This frame's, of the picture, as history_surface.comp and history_cover.comp make them.
 layout(scalar) readonly buffer Places { vec4 places[]; };
 layout(scalar) readonly buffer Things { uvec2 things[]; };
+layout(scalar) readonly buffer Classes { float classes[]; };
+layout(scalar) readonly buffer Covers { float covers[]; };
 // The history up to the frame before, of its picture.
 uniform textureBuffer past_places;
 uniform utextureBuffer past_things;
+uniform textureBuffer past_classes;
 uniform textureBuffer past_lights;
-uniform textureBuffer past_squares;
-uniform textureBuffer past_uncovered;
+uniform utextureBuffer past_spreads;
 uniform utextureBuffer past_albedos;
-// The history up to this frame.
-layout(scalar) writeonly buffer KeptLights { vec4 kept_lights[]; };    // mean of the change over
-                                                                       // white and albedo; 1 / samples
-layout(scalar) writeonly buffer KeptSquares { vec4 kept_squares[]; };  // mean square of a sample; mean(M)
-layout(scalar) writeonly buffer KeptUncovered { vec4 kept_uncovered[]; };  // of the change; 1: an edge
-layout(scalar) writeonly buffer KeptAlbedos { uvec2 kept_albedos[]; };
+uniform utextureBuffer past_others;
+uniform utextureBuffer past_caustics;
+// The history up to this frame. Four halves each, but for the light.
+layout(scalar) writeonly buffer KeptLights { vec4 kept_lights[]; };     // own: change over white and albedo;
+                                                                        // 1 / samples, or 0: none yet
+layout(scalar) writeonly buffer KeptSpreads { uvec2 kept_spreads[]; };  // own: standard deviation of a
+                                                                        // sample; mean(M)
+layout(scalar) writeonly buffer KeptAlbedos { uvec2 kept_albedos[]; };  // own; 0: it is in the light
+layout(scalar) writeonly buffer KeptOthers { uvec2 kept_others[]; };    // other: change over white; samples,
+                                                                        // below 0 where no ray has found it
+layout(scalar) writeonly buffer KeptCaustics { uvec2 kept_caustics[]; };  // own: photons' light over white;
+                                                                          // its standard deviation
 
 // A point of the history shows the same surface as a pixel if it lies within this share of the
 // distance from the pixel's plane, and the cosine of the normals is at least LEAST_ALIKE.
@@ -44,24 +55,28 @@ const float LEAST_ALIKE = 0.9;
 // Where a history cannot be sharpened again, it is kept for as long as it is blurred by no more than
 // this.
 const float MOST_BLUR = 2.0;
-// The history of an edge shows two surfaces, which move apart.
-const float MOST_EDGE_BLUR = 1.0;
 // Nearer to a pixel than this, the pixel itself is taken.
 const float SNAP = 0.01;
-// A camera that moves the picture by less leaves an edge where it was.
-const float STILL = 0.25;
 // A history that counts as less than this share of a sample is none.
 const float LEAST_COUNTED = 0.25;
-// An edge becomes a whole pixel again where less than this share of it is left.
+// A pixel becomes whole again where less than this share of it shows another side.
 const float LEAST_SHARE = 1.0 / 512.0;
+// The other side moves as the nearest pixel within this reach whose own side it is.
+const int REACH = int(HISTORY_REACH);
 
-struct Kept {
-  vec3 light;
-  float doubt;  // sum of the squared weights of the samples, 1 / their effective number
-  vec3 square;
-  float mask;
-  vec3 uncovered;
+// The side at the middle of a pixel.
+struct Own {
+  vec3 light;     // over white and `albedo`
+  float doubt;    // sum of the squared weights of the samples, 1 / their effective number
+  vec3 variance;  // of a sample
+  float mask;     // mean(M)
   vec3 albedo;
+  vec4 caustic;   // of photons, over white; variance of the mean
+};
+
+struct Other {
+  vec3 light;     // over white
+  float samples;
 };
 
 // What a pixel looks for in the frame before.
@@ -69,10 +84,8 @@ struct Wanted {
   vec2 at;        // place in its picture; pixel centres are at whole numbers
   vec3 position;  // from its camera
   vec3 normal;
-  uint instance, other;
-  float mask;
-  bool is_edge;
-  vec3 albedo;
+  uint instance;
+  float most;     // samples that it may count as
 };
 
 int width() { return int(history.width); }
@@ -80,37 +93,7 @@ bool is_inside(ivec2 at, uint w, uint h) {
   return all(greaterThanEqual(at, ivec2(0))) && all(lessThan(at, ivec2(w, h)));
 }
 uint in_picture(ivec2 at) { return uint(at.y * width() + at.x); }
-float mask_at(ivec2 at) { return composites[in_picture(at) - show.in_picture].w; }
-
 bool is_partly(float mask) { return mask > 0.0 && mask < 1.0; }
-
-// Returns whether what covers the pixel ends in it or beside it.
-bool is_edge_now(ivec2 at, float mask) {
-  if (is_partly(mask)) return true;
-  for (int y = -1; y <= 1; ++y)
-    for (int x = -1; x <= 1; ++x) {
-      const ivec2 there = at + ivec2(x, y);
-      if (is_inside(there, history.width, history.height) && mask_at(there) != mask) return true;
-    }
-  return false;
-}
-
-// Returns the pixel of the nearest surface around, which an edge is the outline of.
-ivec2 nearest_around(ivec2 at) {
-  ivec2 nearest = at;
-  float least = 3.4e38;
-  for (int y = -1; y <= 1; ++y)
-    for (int x = -1; x <= 1; ++x) {
-      const ivec2 there = at + ivec2(x, y);
-      if (!is_inside(there, history.width, history.height)) continue;
-      if (things[in_picture(there)].x == NO_INDEX) continue;
-      const vec3 place = places[in_picture(there)].xyz;
-      if (dot(place, place) >= least) continue;
-      least = dot(place, place);
-      nearest = there;
-    }
-  return nearest;
-}
 
 // Returns the place of a ray in the picture before.
 vec2 project_before(vec2 ray) {
@@ -129,54 +112,60 @@ bool find_before(ivec2 at, ivec2 source, out Wanted wanted) {
   const vec2 scale = vec2(history.width_before, history.height_before) /
                      vec2(history.width, history.height);
   wanted.at = project_before(camera.xy / camera.z) + scale * vec2(at - source);
-  wanted.normal = normalize(rotated(motion.before_from_now, unpack_unit(thing.y)));
+  wanted.normal = normalize(rotated(motion.before_from_now, geometric_of(thing.y)));
   wanted.instance = thing.x;
-  wanted.other = things[in_picture(at)].x;
-  return all(lessThan(abs(wanted.at), vec2(1e6)));
-}
-
-// Returns whether the pixel at the nearest place in the frame before was an edge.
-bool was_edge(vec2 at) {
-  const ivec2 nearest = ivec2(floor(at + 0.5));
-  if (!is_inside(nearest, history.width_before, history.height_before)) return false;
-  const int index = nearest.y * int(history.width_before) + nearest.x;
-  return is_partly(texelFetch(past_squares, index).w);
+  wanted.most = min(history.most_samples, places[in_picture(source)].w);
+  return all(lessThan(abs(wanted.at), vec2(1e6))) && wanted.most > 0.0;
 }
 
 bool is_same_surface(int index, uint normal, Wanted wanted) {
   const vec3 off = texelFetch(past_places, index).xyz - wanted.position;
   return abs(dot(off, wanted.normal)) <= MOST_OFF_PLANE * length(wanted.position) &&
-         dot(unpack_unit(normal), wanted.normal) >= LEAST_ALIKE;
+         dot(geometric_of(normal), wanted.normal) >= LEAST_ALIKE;
 }
 
-// Reads a pixel of the frame before, if it shows what is wanted. An edge, of two surfaces, is kept as
-// light, and any other pixel without its albedo.
-bool load_past(ivec2 at, Wanted wanted, out Kept kept) {
-  if (!is_inside(at, history.width_before, history.height_before)) return false;
+// Returns the index of a pixel of the frame before, or -1 where its own side is not what is wanted.
+int own_index(ivec2 at, Wanted wanted) {
+  if (!is_inside(at, history.width_before, history.height_before)) return -1;
   const int index = at.y * int(history.width_before) + at.x;
   const uvec2 thing = texelFetch(past_things, index).xy;
-  if (thing.x != wanted.instance && !(wanted.is_edge && thing.x == wanted.other)) return false;
+  if (thing.x != wanted.instance || !is_same_surface(index, thing.y, wanted)) return -1;
+  return texelFetch(past_lights, index).w > 0.0 ? index : -1;
+}
+
+vec3 past_albedo(int index) { return unpack_halves(texelFetch(past_albedos, index).xy); }
+bool is_known(vec3 albedo) { return all(greaterThan(albedo, vec3(0.0))); }
+
+// Returns a pixel's own side with its light over `albedo`, if that is known.
+Own load_own(int index, vec3 albedo) {
   const vec4 light = texelFetch(past_lights, index);
-  if (!(light.w > 0.0)) return false;
-  const vec4 square = texelFetch(past_squares, index);
-  const vec4 uncovered_part = texelFetch(past_uncovered, index);
-  const bool is_kept_as_light = uncovered_part.w > 0.0;
-  const vec3 albedo = unpack_halves(texelFetch(past_albedos, index).xy);
+  const vec4 spread = unpack_four_halves(texelFetch(past_spreads, index).xy);
+  const vec4 caustic = history.white_ratio * unpack_four_halves(texelFetch(past_caustics, index).xy);
+  const vec3 kept = past_albedo(index);
   vec3 factor = vec3(history.white_ratio);
-  if (wanted.is_edge) {
-    factor *= albedo;
-    kept.albedo = vec3(1.0);
-  } else {
-    if (square.w != wanted.mask || !is_same_surface(index, thing.y, wanted)) return false;
-    factor /= is_kept_as_light ? wanted.albedo : vec3(1.0);
-    kept.albedo = is_kept_as_light ? wanted.albedo : albedo;
+  if (is_known(albedo) && !is_known(kept)) factor /= albedo;
+  const vec3 deviation = factor * spread.rgb;
+  return Own(factor * light.rgb, light.w, deviation * deviation, spread.w,
+             is_known(kept) ? kept : albedo, vec4(caustic.rgb, caustic.w * caustic.w));
+}
+
+// Reads the other side of a pixel of the frame before, which is that of side `of`. It is the pixel's
+// own side where the outline has moved on.
+bool load_other(ivec2 at, float of, Wanted wanted, out Other other) {
+  if (!is_inside(at, history.width_before, history.height_before)) return false;
+  const int index = at.y * int(history.width_before) + at.x;
+  const float side = texelFetch(past_classes, index).x;
+  if (side == of) {
+    const vec4 light = texelFetch(past_lights, index);
+    if (texelFetch(past_things, index).x != wanted.instance || !(light.w > 0.0)) return false;
+    const Own own = load_own(index, vec3(0.0));
+    other = Other((is_known(own.albedo) ? own.albedo : vec3(1.0)) * own.light + own.caustic.rgb,
+                  1.0 / light.w);
+    return true;
   }
-  kept.light = light.rgb * factor;
-  kept.doubt = light.w;
-  kept.square = square.rgb * factor * factor;
-  kept.mask = square.w;
-  kept.uncovered = uncovered_part.rgb * factor;
-  return true;
+  const vec4 kept = unpack_four_halves(texelFetch(past_others, index).xy);
+  other = Other(history.white_ratio * kept.rgb, abs(kept.w));
+  return side == 1.0 - of && other.samples > 0.0;
 }
 
 // Returns the weights of four neighbours for a point f behind the second (Catmull and Rom 1974).
@@ -185,99 +174,211 @@ vec4 sharp_weights(float f) {
               f * (0.5 + f * (2.0 - 1.5 * f)), f * f * (-0.5 + 0.5 * f));
 }
 
-// Adds the 12 pixels around the four to a light that is interpolated without blurring. Returns false
-// if one of them is missing.
-bool add_around(ivec2 low, vec4 wx, vec4 wy, Wanted wanted, inout vec3 light) {
+// Adds the 12 pixels around the four to what is interpolated without blurring. Returns false if one of
+// them is missing.
+bool add_around(ivec2 low, vec4 wx, vec4 wy, Wanted wanted, vec3 albedo, inout vec3 light,
+                inout vec3 caustic) {
   for (int y = 0; y < 4; ++y)
     for (int x = 0; x < 4; ++x) {
       if ((x == 1 || x == 2) && (y == 1 || y == 2)) continue;
       if (wx[x] * wy[y] == 0.0) continue;
-      Kept there;
-      if (!load_past(low + ivec2(x - 1, y - 1), wanted, there)) return false;
-      light += wx[x] * wy[y] * there.light;
+      const int index = own_index(low + ivec2(x - 1, y - 1), wanted);
+      if (index < 0) return false;
+      const Own own = load_own(index, albedo);
+      light += wx[x] * wy[y] * own.light;
+      caustic += wx[x] * wy[y] * own.caustic.rgb;
     }
   return true;
 }
 
-// Interpolates the history at the wanted place among the pixels that show the wanted surface. `most`
-// is lowered to the number of frames for which it may be used.
-bool interpolate(Wanted wanted, out Kept kept, inout float most) {
-  kept = Kept(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0), vec3(0.0));
-  ivec2 low = ivec2(floor(wanted.at));
-  vec2 f = wanted.at - vec2(low);
-  low += ivec2(greaterThan(f, vec2(1.0 - SNAP)));
-  f = mix(f, vec2(0.0), greaterThan(abs(f - 0.5), vec2(0.5 - SNAP)));
-  const vec4 wx = sharp_weights(f.x);
-  const vec4 wy = sharp_weights(f.y);
+// Where a point lies among four pixels.
+struct Cell {
+  ivec2 low;
+  vec2 f;
+};
+
+Cell cell_at(vec2 at) {
+  const vec2 low = floor(at);
+  const vec2 f = at - low;
+  return Cell(ivec2(low) + ivec2(greaterThan(f, vec2(1.0 - SNAP))),
+              mix(f, vec2(0.0), greaterThan(abs(f - 0.5), vec2(0.5 - SNAP))));
+}
+
+float weight_of(Cell cell, int x, int y) {
+  return (x == 0 ? 1.0 - cell.f.x : cell.f.x) * (y == 0 ? 1.0 - cell.f.y : cell.f.y);
+}
+
+float blur_of(Cell cell) { return dot(cell.f, 1.0 - cell.f); }
+
+// Returns the albedo that a pixel's light is over, if this frame has none: that of a pixel before.
+vec3 albedo_before(Cell cell, Wanted wanted) {
+  for (int i = 0; i < 4; ++i) {
+    const int index = own_index(cell.low + ivec2(i & 1, i >> 1), wanted);
+    if (index >= 0 && is_known(past_albedo(index))) return past_albedo(index);
+  }
+  return vec3(0.0);
+}
+
+// Interpolates the own side at the wanted place among the pixels that show the wanted surface, and
+// lowers the samples that it may count as.
+bool interpolate_own(inout Wanted wanted, vec3 albedo, out Own own) {
+  own = Own(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0), vec4(0.0));
+  const Cell cell = cell_at(wanted.at);
+  if (!is_known(albedo)) albedo = albedo_before(cell, wanted);
+  const vec4 wx = sharp_weights(cell.f.x);
+  const vec4 wy = sharp_weights(cell.f.y);
   float total = 0.0;
   vec3 sharp = vec3(0.0);
+  vec3 sharp_caustic = vec3(0.0);
   for (int y = 0; y < 2; ++y)
     for (int x = 0; x < 2; ++x) {
-      const float weight = (x == 0 ? 1.0 - f.x : f.x) * (y == 0 ? 1.0 - f.y : f.y);
-      Kept there;
-      if (weight <= 0.0 || !load_past(low + ivec2(x, y), wanted, there)) continue;
-      kept.light += weight * there.light;
-      kept.doubt += weight * there.doubt;
-      kept.square += weight * there.square;
-      kept.mask += weight * there.mask;
-      kept.uncovered += weight * there.uncovered;
-      kept.albedo += weight * there.albedo;
+      const float weight = weight_of(cell, x, y);
+      const int index = weight > 0.0 ? own_index(cell.low + ivec2(x, y), wanted) : -1;
+      if (index < 0) continue;
+      const Own there = load_own(index, albedo);
+      own.light += weight * there.light;
+      own.doubt += weight * there.doubt;
+      own.variance += weight * there.variance;
+      own.mask += weight * there.mask;
+      own.albedo += weight * there.albedo;
+      own.caustic += weight * there.caustic;
       total += weight;
       sharp += wx[x + 1] * wy[y + 1] * there.light;
+      sharp_caustic += wx[x + 1] * wy[y + 1] * there.caustic.rgb;
     }
   if (total < 0.05) return false;
-  // The sums are left as they are where all are there: a mean of equal masks is the mask itself.
+  // The sums are left as they are where all are there: a mean of equal values is the value itself.
   if (total < 1.0) {
-    kept.light /= total;
-    kept.doubt /= total;
-    kept.square /= total;
-    kept.mask /= total;
-    kept.uncovered /= total;
-    kept.albedo /= total;
+    own.light /= total;
+    own.doubt /= total;
+    own.variance /= total;
+    own.mask /= total;
+    own.albedo /= total;
+    own.caustic /= total;
   }
-  if (!wanted.is_edge) kept.mask = wanted.mask;
-  const float blur = f.x * (1.0 - f.x) + f.y * (1.0 - f.y);
+  const float blur = blur_of(cell);
   if (blur <= 0.0) return true;
-  if (!wanted.is_edge && total > 0.999 && add_around(low, wx, wy, wanted, sharp)) {
-    kept.light = sharp;
+  if (total > 0.999 && add_around(cell.low, wx, wy, wanted, albedo, sharp, sharp_caustic)) {
+    own.light = sharp;
+    own.caustic.rgb = sharp_caustic;
     return true;
   }
-  most = min(most, history.samples * (wanted.is_edge ? MOST_EDGE_BLUR : MOST_BLUR) / blur);
-  return true;
+  wanted.most = min(wanted.most, history.samples * MOST_BLUR / blur);
+  return wanted.most >= LEAST_COUNTED;
 }
 
-// Finds the history of a pixel with this mean(M) and albedo, and lowers `most` to the samples that it
-// counts as. Where an edge was and the picture stands still, the pixel becomes an edge.
-bool find_history(ivec2 at, float mask, vec3 albedo, inout bool is_edge, out Kept past,
-                  inout float most) {
-  if (most <= 0.0) return false;
-  Wanted wanted;
-  const ivec2 source = is_edge ? nearest_around(at) : at;
-  if (!find_before(at, source, wanted)) return false;
-  most = min(most, places[in_picture(source)].w);
-  const vec2 moved_by = abs(wanted.at - vec2(at));
-  const bool stands_still = history.is_still != 0u && max(moved_by.x, moved_by.y) < STILL;
-  if (!is_edge && stands_still && was_edge(wanted.at)) is_edge = true;
-  wanted.mask = mask;
-  wanted.albedo = albedo;
-  wanted.is_edge = is_edge;
-  return interpolate(wanted, past, most) && most >= LEAST_COUNTED;
+// Likewise for the other side, which is of side `of`.
+bool interpolate_other(Wanted wanted, float of, out Other other) {
+  other = Other(vec3(0.0), 0.0);
+  const Cell cell = cell_at(wanted.at);
+  float total = 0.0;
+  for (int y = 0; y < 2; ++y)
+    for (int x = 0; x < 2; ++x) {
+      Other there;
+      const float weight = weight_of(cell, x, y);
+      if (weight <= 0.0 || !load_other(cell.low + ivec2(x, y), of, wanted, there)) continue;
+      other.light += weight * there.light;
+      other.samples += weight * there.samples;
+      total += weight;
+    }
+  if (total < 0.05) return false;
+  other.light /= total;
+  other.samples /= total;
+  const float blur = blur_of(cell);
+  const float most = blur > 0.0 ? history.samples * MOST_BLUR / blur : wanted.most;
+  other.samples = min(other.samples, min(wanted.most, most));
+  return other.samples >= LEAST_COUNTED;
 }
 
-// Keeps an edge as light.
-Kept as_light(Kept k) {
-  k.light *= k.albedo;
-  k.square *= k.albedo * k.albedo;
-  k.uncovered *= k.albedo;
-  k.albedo = vec3(1.0);
-  return k;
+// Returns the nearest pixel around whose own side is of side `of`; the pixel itself if there is none.
+ivec2 nearest_of(ivec2 at, float of) {
+  ivec2 nearest = at;
+  int least = 2 * REACH * REACH + 1;
+  for (int y = -REACH; y <= REACH; ++y)
+    for (int x = -REACH; x <= REACH; ++x) {
+      const ivec2 there = at + ivec2(x, y);
+      if (x * x + y * y >= least || !is_inside(there, history.width, history.height)) continue;
+      if (classes[in_picture(there)] != of) continue;
+      least = x * x + y * y;
+      nearest = there;
+    }
+  return nearest;
 }
 
-void store(uint index, Kept k, bool is_edge) {
-  kept_lights[index] = vec4(k.light, k.doubt);
-  kept_squares[index] = vec4(k.square, k.mask);
-  kept_uncovered[index] = vec4(k.uncovered, is_edge ? 1.0 : 0.0);
-  kept_albedos[index] = pack_halves(k.albedo);
+// Returns whether the nearest pixel of the frame before had another side that no ray had found: of
+// something thinner than a pixel.
+bool was_thin(Wanted wanted) {
+  const ivec2 at = ivec2(floor(wanted.at + 0.5));
+  if (!is_inside(at, history.width_before, history.height_before)) return false;
+  const int index = at.y * int(history.width_before) + at.x;
+  return unpack_four_halves(texelFetch(past_others, index).xy).w < 0.0;
+}
+
+// What this frame's samples say of a pixel's sides.
+struct Now {
+  Own own;
+  Other other;
+  float samples;  // of its own side
+};
+
+Now this_frame(uint in_band, float side) {
+  const float mask = composites[in_band].w;
+  const float share = side > 0.5 ? mask : 1.0 - mask;
+  const vec3 albedo = unpack_halves(albedos[in_band]);
+  const vec3 change = signals[in_band].rgb;
+  const vec3 caustic = show.has_caustics != 0u ? caustics[in_band].rgb : vec3(0.0);
+  const vec3 own = side > 0.5 ? change - uncovered[in_band].rgb : uncovered[in_band].rgb;
+  const bool is_whole = !is_partly(mask);
+  Now now;
+  now.samples = history.samples * share;
+  now.own.mask = mask;
+  // A pixel of both sides does not know their albedos, nor how the samples of one scatter.
+  now.own.albedo = is_whole && share > 0.0 ? albedo : vec3(0.0);
+  now.own.variance = is_whole ? (history.samples - 1.0) * variances[in_band].rgb : vec3(0.0);
+  now.own.light = is_whole ? change : own / max(share, 1e-6);
+  now.own.doubt = share > 0.0 ? 1.0 / now.samples : 0.0;
+  now.own.caustic = is_whole && share > 0.0 && show.has_caustics != 0u ? caustics[in_band] : vec4(0.0);
+  now.other.samples = history.samples - now.samples;
+  now.other.light = is_whole ? change * albedo + caustic : (change - own) / max(1.0 - share, 1e-6);
+  return now;
+}
+
+// Adds the samples of this frame to the own side before.
+Own added(Own past, Now now, float most) {
+  past.doubt = max(past.doubt, 1.0 / most);
+  if (now.samples <= 0.0) return past;
+  const float share = now.samples / (now.samples + 1.0 / past.doubt);
+  const vec3 over = !is_known(now.own.albedo) && is_known(past.albedo) ? past.albedo : vec3(1.0);
+  const vec3 step = now.own.light / over - past.light;
+  Own mean = past;
+  // Written as steps from the past, so that equal values stay what they are to the last bit.
+  mean.light += share * step;
+  if (is_known(now.own.albedo)) {
+    mean.albedo += share * (now.own.albedo - past.albedo);
+    mean.variance += share * (now.own.variance - past.variance);
+  }
+  mean.variance += share * (1.0 - share) * step * step;
+  mean.caustic.rgb += share * (now.own.caustic.rgb - past.caustic.rgb);
+  mean.caustic.w = (1.0 - share) * (1.0 - share) * past.caustic.w + share * share * now.own.caustic.w;
+  mean.doubt = (1.0 - share) * (1.0 - share) * past.doubt + share * share / now.samples;
+  return mean;
+}
+
+Other added(Other past, Other now) {
+  const float samples = past.samples + now.samples;
+  if (samples <= 0.0) return past;
+  return Other(past.light + now.samples / samples * (now.light - past.light), samples);
+}
+
+void store(uint index, Own own, Other other) {
+  if (own.mask < LEAST_SHARE) own.mask = 0.0;
+  if (own.mask > 1.0 - LEAST_SHARE) own.mask = 1.0;
+  if (own.mask == classes[index]) other = Other(vec3(0.0), 0.0);
+  kept_lights[index] = vec4(own.light, own.doubt);
+  kept_spreads[index] = pack_four_halves(vec4(sqrt(own.variance), own.mask));
+  kept_albedos[index] = pack_halves(own.albedo);
+  kept_others[index] = pack_four_halves(vec4(other.light, other.samples));
+  kept_caustics[index] = pack_four_halves(vec4(own.caustic.rgb, sqrt(own.caustic.w)));
 }
 
 void main() {
@@ -285,34 +386,39 @@ void main() {
   const uint in_band = show.in_band + gl_GlobalInvocationID.x;
   const uint index = show.in_picture + in_band;
   const ivec2 at = ivec2(index % history.width, index / history.width);
-  const float samples = history.samples;
-  Kept now;
-  now.light = signals[in_band].rgb;
-  now.square = (samples - 1.0) * variances[in_band].rgb + now.light * now.light;
-  now.doubt = 1.0 / samples;
-  now.mask = composites[in_band].w;
-  now.uncovered = uncovered[in_band].rgb;
-  now.albedo = unpack_halves(albedos[in_band]);
-  bool is_edge = is_edge_now(at, now.mask);
-  float most = history.most_samples;
-  Kept past;
-  const bool has_past = find_history(at, now.mask, now.albedo, is_edge, past, most);
-  if (is_edge) now = as_light(now);
-  if (!has_past) {
-    store(index, now, is_edge);
+  const float side = classes[index];
+  Now now = this_frame(in_band, side);
+  // What is seen through something has no history, and what it ends at has none.
+  if (!has_sides(side, covers[index])) {
+    now.own.doubt = 0.0;
+    store(index, now.own, Other(vec3(0.0), 0.0));
     return;
   }
-  const float doubt = max(past.doubt, 1.0 / most);
-  const float share = samples / (samples + 1.0 / doubt);
-  // Written as steps from the past, so that equal values stay what they are to the last bit.
-  Kept mean;
-  mean.light = past.light + share * (now.light - past.light);
-  mean.square = past.square + share * (now.square - past.square);
-  mean.mask = past.mask + share * (now.mask - past.mask);
-  mean.uncovered = past.uncovered + share * (now.uncovered - past.uncovered);
-  mean.albedo = past.albedo + share * (now.albedo - past.albedo);
-  mean.doubt = (1.0 - share) * (1.0 - share) * doubt + share * share / samples;
-  if (mean.mask < LEAST_SHARE) mean.mask = 0.0;
-  if (mean.mask > 1.0 - LEAST_SHARE) mean.mask = 1.0;
-  store(index, mean, is_edge);
+  const bool is_outline = covers[index] != COVER_UNKNOWN;
+  Wanted wanted;
+  Own own = now.own;
+  Own own_past;
+  bool is_thin = false;
+  bool has_past = false;
+  if (find_before(at, at, wanted)) {
+    is_thin = !is_outline && was_thin(wanted);
+    has_past = interpolate_own(wanted, now.own.albedo, own_past);
+    if (has_past) own = added(own_past, now, wanted.most);
+  }
+  Other other = now.other;
+  Other other_past = Other(vec3(0.0), 0.0);
+  if (is_outline || is_thin) {
+    Wanted moved_with;
+    if (find_before(at, is_outline ? nearest_of(at, 1.0 - side) : at, moved_with) &&
+        interpolate_other(moved_with, 1.0 - side, other_past))
+      other = added(other_past, now.other);
+  }
+  // A pixel without a sample of its own side has only had others.
+  const float before = !has_past ? 1.0 - side : is_outline || is_thin ? own_past.mask : side;
+  const float samples = (has_past ? 1.0 / own_past.doubt : 0.0) + other_past.samples;
+  if (samples > 0.0)
+    own.mask = before + history.samples / (history.samples + min(samples, wanted.most)) *
+                            (now.own.mask - before);
+  if (!is_outline) other.samples = -other.samples;
+  store(index, own, other);
 }

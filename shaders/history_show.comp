@@ -1,61 +1,141 @@
 // Puts the history up to this frame in the place of what composite.comp has made of this frame alone:
-// the composite, and the denoiser's input with its variance and number of samples.
+// the composite, and the denoiser's input with its variance and number of samples. The denoiser gets the
+// side at each pixel's middle, with the depth and the normal there, as if it filled the pixel, so that no
+// pixel with a history is an edge to it; denoise_edges.comp mixes the two sides of an outline.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
 #include "shaders/lib/halves.glsl"
+#include "shaders/lib/history.glsl"
 #include "shaders/lib/show.glsl"
 
 // The history up to this frame, of the picture (history.comp).
 layout(scalar) readonly buffer KeptLights { vec4 kept_lights[]; };
-layout(scalar) readonly buffer KeptSquares { vec4 kept_squares[]; };
-layout(scalar) readonly buffer KeptUncovered { vec4 kept_uncovered[]; };
+layout(scalar) readonly buffer KeptSpreads { uvec2 kept_spreads[]; };
 layout(scalar) readonly buffer KeptAlbedos { uvec2 kept_albedos[]; };
+layout(scalar) readonly buffer KeptOthers { uvec2 kept_others[]; };
+layout(scalar) readonly buffer KeptCaustics { uvec2 kept_caustics[]; };
+layout(scalar) readonly buffer Places { vec4 places[]; };    // history_surface.comp
+layout(scalar) readonly buffer Things { uvec2 things[]; };
+layout(scalar) readonly buffer Classes { float classes[]; };
 layout(scalar) readonly buffer Covers { float covers[]; };  // history_cover.comp
 // Of the band, as composite.comp makes them.
 layout(scalar) buffer Composites { vec4 composites[]; };
 layout(scalar) buffer Signals { vec4 signals[]; };
 layout(scalar) buffer Variances { vec4 variances[]; };  // w: number of samples
 layout(scalar) buffer Surfaces { vec4 surfaces[]; };
-layout(scalar) buffer Uncovered { vec4 uncovered[]; };
+layout(scalar) buffer Uncovered { vec4 uncovered[]; };  // an outline's: the other side, and its samples
 layout(scalar) buffer Reals { vec4 reals[]; };
-layout(scalar) buffer Albedos { uvec2 albedos[]; };
+layout(scalar) buffer Albedos { uvec2 albedos[]; };  // w: 0, or 1 and the share that rays have found
+layout(scalar) buffer Caustics { vec4 caustics[]; };
+
+// A pixel without a sample of its own side has that of pixels so far away.
+const int REACH = int(HISTORY_REACH);
+
+// The side at the middle of a pixel.
+struct Own {
+  vec3 light;     // over white and albedo
+  float samples;
+  vec3 variance;  // of the mean
+  vec3 albedo;
+  vec4 caustic;   // over white; variance
+};
+
+Own load_own(uint index) {
+  const vec4 kept = kept_lights[index];
+  const vec3 deviation = unpack_four_halves(kept_spreads[index]).rgb;
+  const vec4 caustic = unpack_four_halves(kept_caustics[index]);
+  const vec3 albedo = unpack_halves(kept_albedos[index]);
+  // The variance of a weighted mean is that of a sample times the sum of the squared weights, which
+  // the mean square is short of (Bessel's correction).
+  const float part = kept.w > 0.0 && kept.w < 0.999 ? kept.w / (1.0 - kept.w) : 0.0;
+  return Own(kept.rgb, kept.w > 0.0 ? 1.0 / kept.w : 0.0, part * deviation * deviation,
+             any(greaterThan(albedo, vec3(0.0))) ? albedo : vec3(1.0),
+             vec4(caustic.rgb, caustic.w * caustic.w));
+}
+
+// Returns the side of a pixel that has had no sample of it: the mean of those around.
+Own own_of_neighbours(ivec2 at, float side) {
+  Own sum = Own(vec3(0.0), 0.0, vec3(0.0), vec3(0.0), vec4(0.0));
+  float total = 0.0;
+  for (int y = -REACH; y <= REACH; ++y)
+    for (int x = -REACH; x <= REACH; ++x) {
+      const ivec2 there = at + ivec2(x, y);
+      if (any(lessThan(there, ivec2(0))) ||
+          any(greaterThanEqual(there, ivec2(history.width, history.height))))
+        continue;
+      const uint index = there.y * history.width + there.x;
+      if (classes[index] != side || !(kept_lights[index].w > 0.0)) continue;
+      const Own own = load_own(index);
+      const float near = 1.0 / float(x * x + y * y);
+      sum.light += near * own.light;
+      sum.variance += near * own.variance;
+      sum.albedo += near * own.albedo;
+      sum.caustic += near * own.caustic;
+      total += near;
+    }
+  if (total <= 0.0) return sum;
+  return Own(sum.light / total, 1.0, sum.variance / total, sum.albedo / total, sum.caustic / total);
+}
+
+// The number of its samples is all that a frame that stands alone lacks.
+void stand_alone(uint in_band) { variances[in_band].w = history.samples; }
 
 void main() {
   if (gl_GlobalInvocationID.x >= show.count) return;
   const uint in_band = show.in_band + gl_GlobalInvocationID.x;
   const uint index = show.in_picture + in_band;
-  const vec4 kept = kept_lights[index];
-  const vec4 squares = kept_squares[index];
-  const vec4 own = kept_uncovered[index];
-  const float mask = squares.w;
-  const vec3 albedo_now = unpack_halves(albedos[in_band]);
-  // An edge is kept as light. If it has become whole, it is filtered without its albedo again.
-  const bool becomes_whole = own.w > 0.0 && (mask <= 0.0 || mask >= 1.0);
-  const uvec2 halves = becomes_whole ? albedos[in_band] : kept_albedos[index];
-  const vec3 albedo = unpack_halves(halves);
-  const vec3 factor = becomes_whole ? 1.0 / albedo : vec3(1.0);
-  const vec3 light = factor * kept.rgb;
-  const vec3 real = reals[in_band].rgb * albedo_now;
-
-  const Estimate estimate = Estimate(show.white * albedo * light, mask,
-                                     show.white * albedo * factor * own.rgb, show.white * real);
-  composites[in_band] = vec4(compose(measured_at(in_band), estimate), mask);
-  signals[in_band].rgb = light;
-  uncovered[in_band] = vec4(factor * own.rgb, 0.0);
-  reals[in_band] = vec4(real / albedo, 0.0);
-  // Where rays have found how much of an outline is covered, denoise_edges.comp mixes what is on its two
-  // sides anew; it finds the share, plus 1, beside the albedo.
+  const float side = classes[index];
   const float cover = covers[index];
+  if (!has_sides(side, cover)) {
+    stand_alone(in_band);
+    return;
+  }
   const bool is_mixed_anew = show.is_denoised != 0u && cover != COVER_UNKNOWN;
-  albedos[in_band] =
-      is_mixed_anew ? uvec2(halves.x, halves.y | packHalf2x16(vec2(0.0, 1.0 + cover))) : halves;
-  if (is_mixed_anew) composites[in_band] = vec4(vec3(0.0), cover);
-  if (surfaces[in_band].w != DENOISE_HIGHLIGHT) surfaces[in_band].w = mask;
-  // The variance of a weighted mean is that of a sample times the sum of the squared weights, which
-  // the mean square is short of (Bessel's correction).
-  const vec3 spread = max(factor * factor * squares.rgb - light * light, vec3(0.0));
-  const vec3 variance = kept.w < 0.999 ? spread * kept.w / (1.0 - kept.w) : vec3(0.0);
-  variances[in_band] = vec4(variance, 1.0 / kept.w);
+  Own own = load_own(index);
+  if (own.samples <= 0.0 && is_mixed_anew)
+    own = own_of_neighbours(ivec2(index % history.width, index / history.width), side);
+  if (own.samples <= 0.0) {
+    stand_alone(in_band);
+    return;
+  }
+  const vec4 other = unpack_four_halves(kept_others[index]);
+  const float mask = is_mixed_anew ? side : unpack_four_halves(kept_spreads[index]).w;
+  const vec3 real = reals[in_band].rgb * unpack_halves(albedos[in_band]);
+  vec3 left = vec3(0.0);  // of the change, where nothing virtual covers the pixel
+  if (mask != side) {
+    // Two surfaces have no albedo in common.
+    const vec3 whole = own.light * own.albedo + own.caustic.rgb;
+    left = (1.0 - mask) * (side > 0.5 ? other.rgb : whole);
+    own.light = left + mask * (side > 0.5 ? whole : other.rgb);
+    // A sample is of one of the two, by chance.
+    const vec3 apart = whole - other.rgb;
+    own.variance = own.variance * own.albedo * own.albedo +
+                   mask * (1.0 - mask) / (own.samples + abs(other.w)) * apart * apart;
+    own.albedo = vec3(1.0);
+    own.caustic = vec4(0.0);
+  } else if (mask <= 0.0) {
+    left = own.light;
+  }
+  const vec3 lit = mask <= 0.0 ? own.caustic.rgb : vec3(0.0);
+  const Estimate estimate =
+      Estimate(show.white * (own.albedo * own.light + own.caustic.rgb), mask,
+               show.white * (own.albedo * left + lit), show.white * real);
+  composites[in_band] = vec4(compose(measured_at(in_band), estimate), mask);
+  const uvec2 thing = things[index];
+  const float depth = dot(places[index].xyz, history.forward);
+  signals[in_band] = vec4(own.light, thing.x != NO_INDEX ? 1.0 / depth : 0.0);
+  uncovered[in_band] = vec4(left, 0.0);
+  reals[in_band] = vec4(real / own.albedo, 0.0);
+  albedos[in_band] = pack_four_halves(vec4(own.albedo, 0.0));
+  if (show.has_caustics != 0u) caustics[in_band] = own.caustic;
+  if (is_mixed_anew) {
+    composites[in_band] = vec4(vec3(0.0), cover);
+    uncovered[in_band] = vec4(other.rgb, abs(other.w));
+    albedos[in_band] = pack_four_halves(vec4(own.albedo, 1.0 + cover));
+  }
+  const float shown = surfaces[in_band].w == DENOISE_HIGHLIGHT && !is_mixed_anew ? DENOISE_HIGHLIGHT : mask;
+  surfaces[in_band] = vec4(thing.x != NO_INDEX ? shading_of(thing.y) : vec3(0.0), shown);
+  variances[in_band] = vec4(own.variance, own.samples);
 }

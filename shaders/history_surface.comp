@@ -12,7 +12,7 @@
 #include "shaders/lib/trace.glsl"
 
 layout(scalar) writeonly buffer Places { vec4 places[]; };  // from the camera; most samples
-layout(scalar) writeonly buffer Things { uvec2 things[]; };  // instance, normal (pack_unit)
+layout(scalar) writeonly buffer Things { uvec2 things[]; };  // instance, normals (pack_normals)
 layout(scalar) writeonly buffer Classes { float classes[]; };  // 1: a virtual object; 0: none; COVER_*
 
 // Plastic and lacquer reflect about this share of the light around.
@@ -63,5 +63,5 @@ void main() {
   const GpuMotion motion = motions[hit.instance];
   const float most = motion.is_known != 0u ? most_samples(s, turn_of(s.position, motion)) : 0.0;
   places[index] = vec4(s.position, most);
-  things[index] = uvec2(hit.instance, pack_unit(s.geometric_normal));
+  things[index] = uvec2(hit.instance, pack_normals(s.geometric_normal, s.normal));
 }

@@ -19,8 +19,9 @@ constexpr int wavelet_levels = 4;
 // A row's result depends on this many rows above and below it: at every level two steps and one
 // more of the guide, the neighbours that give the variance, and those of an edge. A slope comes
 // from nearer rows.
-constexpr int band_margin = 3 * ((1 << wavelet_levels) - 1) +
-                            static_cast<int>(gpu::DENOISE_VARIANCE_REACH + gpu::DENOISE_EDGE_REACH);
+constexpr int band_margin =
+    3 * ((1 << wavelet_levels) - 1) +
+    static_cast<int>(gpu::DENOISE_VARIANCE_REACH + gpu::DENOISE_EDGE_REACH + gpu::HISTORY_REACH);
 static_assert(gpu::DENOISE_VARIANCE_REACH >= 2);
 
 // The light of photons has these levels, with steps of 1, 2 and 4 pixels.
@@ -90,7 +91,7 @@ const Buffer& Denoiser::denoised_signal() const {
   return signal_[result_side];
 }
 const Buffer& Denoiser::denoised_uncovered() const {
-  return uncovered_[filters_companions_ ? companions_side : 0];
+  return uncovered_[filters_companions_ ? 1 : 0];
 }
 const Buffer& Denoiser::denoised_real() const {
   return real_[filters_companions_ ? companions_side : 0];
@@ -115,11 +116,11 @@ void Denoiser::record(const vk::raii::CommandBuffer& commands, int width, int ro
                           {"denoised_caustics", &caustic_[1 - caustic]},
                           {"guides", &guide_},
                           {"guide_variances", &guide_variance_},
-                          {"uncovered", &uncovered_[companion]},
+                          {"uncovered", &uncovered_[0]},
                           {"reals", &real_[companion]},
                           {"denoised_signals", &signal_[1 - side]},
                           {"denoised_variances", &variance_[1 - side]},
-                          {"denoised_uncovered", &uncovered_[1 - companion]},
+                          {"denoised_uncovered", &uncovered_[1]},
                           {"denoised_reals", &real_[1 - companion]}};
     pass.dispatch({commands, constants, buffers}, constants.width * constants.height);
   };

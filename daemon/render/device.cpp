@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstring>
 #include <utility>
 
@@ -94,6 +95,7 @@ void Device::publish(Drawing drawing) {
 void Device::close() {
   publish({});
   programs_.clear();
+  clock_ = {};
   fence_.clear();
   commands_.clear();
   pool_.clear();
@@ -213,6 +215,7 @@ void Device::create_device() {
   commands_ = std::move(
       vk::raii::CommandBuffers(device_, {*pool_, vk::CommandBufferLevel::ePrimary, 1}).front());
   fence_ = vk::raii::Fence(device_, vk::FenceCreateInfo{});
+  if (options_.times_passes) clock_ = PassClock(physical_, device_, queue_family_, name_);
 }
 
 std::uint32_t Device::memory_type(std::uint32_t allowed_bits, vk::MemoryPropertyFlags wanted,
@@ -245,13 +248,18 @@ void Device::submit(const std::function<void(const vk::raii::CommandBuffer&)>& r
     ++submissions_;
     commands_.reset();  // it still holds a recording that threw
     commands_.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
+    clock_.begin(commands_);
     record(commands_);
     commands_.end();
     const vk::CommandBuffer raw = *commands_;
+    const auto start = std::chrono::steady_clock::now();
     queue_.submit(vk::SubmitInfo({}, {}, raw), *fence_);
     if (device_.waitForFences(*fence_, VK_TRUE, gpu_timeout_ns) != vk::Result::eSuccess)
       throw Error("Vulkan: " + name_ + " did not finish within ten minutes");
     device_.resetFences(*fence_);
+    clock_.collect(
+        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+            .count());
   } catch (const vk::DeviceLostError& error) {
     throw DeviceLost("Vulkan: " + name_ + " is lost: " + error.what());
   } catch (const vk::SystemError& error) {
@@ -364,7 +372,9 @@ void upload_bytes(Device& device, Buffer& buffer, std::span<const std::byte> byt
   Buffer staging = create_staging_buffer(device, bytes.size());
   std::memcpy(staging.mapped, bytes.data(), bytes.size());
   device.submit([&](const vk::raii::CommandBuffer& commands) {
+    device.clock().start(commands, "copy up");
     commands.copyBuffer(*staging.buffer, *buffer.buffer, vk::BufferCopy(0, offset, bytes.size()));
+    device.clock().stop(commands);
     barrier(commands);
   });
 }
@@ -379,7 +389,9 @@ void read_bytes(Device& device, const Buffer& buffer, vk::DeviceSize size,
   Buffer staging = create_staging_buffer(device, size);
   device.submit([&](const vk::raii::CommandBuffer& commands) {
     barrier(commands);
+    device.clock().start(commands, "copy down");
     commands.copyBuffer(*buffer.buffer, *staging.buffer, vk::BufferCopy(0, 0, size));
+    device.clock().stop(commands);
     vk::MemoryBarrier2 to_host(vk::PipelineStageFlagBits2::eCopy,
                                vk::AccessFlagBits2::eTransferWrite,
                                vk::PipelineStageFlagBits2::eHost, vk::AccessFlagBits2::eHostRead);
@@ -444,6 +456,9 @@ bool cpu_stands_in(const Device& device) {
 }
 std::string device_name(const Device& device) {
   return device.name();
+}
+DeviceTimes take_times(Device& device) {
+  return device.clock().take();
 }
 std::uint64_t validation_messages(const Device& device) {
   return device.validation_messages();

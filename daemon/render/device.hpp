@@ -14,6 +14,7 @@
 #include <vulkan/vulkan_raii.hpp>
 
 #include "daemon/render/gpu.hpp"
+#include "daemon/render/pass_clock.hpp"
 
 namespace previz::render {
 
@@ -65,6 +66,7 @@ class Device {
   void submit(const std::function<void(const vk::raii::CommandBuffer&)>& record);
   // The number of submissions so far, including the one that is being recorded.
   std::uint64_t submissions() const { return submissions_; }
+  PassClock& clock() { return clock_; }
 
   // The buffers for shaders, and the programs, that were made so far, each of which may cost more
   // time than a picture has.
@@ -119,6 +121,7 @@ class Device {
   vk::raii::CommandPool pool_{nullptr};
   vk::raii::CommandBuffer commands_{nullptr};
   vk::raii::Fence fence_{nullptr};
+  PassClock clock_;
   std::mutex programs_mutex_;
   std::vector<Compiled> programs_;  // in the order in which they were last wanted
 };

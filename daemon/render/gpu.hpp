@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "drivers/error.hpp"
 
@@ -20,6 +21,21 @@ struct DeviceOptions {
   bool as_gpu = false;
   // With `validation`: the layer also looks for accesses to memory that no barrier orders.
   bool synchronization = false;
+  // Every pass is timed by the device's clock (take_times()). Costs two timestamps a pass.
+  bool times_passes = false;
+};
+
+// What ran on a device, and how long, by its own clock.
+struct DeviceTimes {
+  struct Pass {
+    std::string name;
+    std::uint64_t count;
+    double ms;  // of all of them
+  };
+  std::vector<Pass> passes;
+  std::uint64_t submissions = 0;
+  double waited_ms = 0;       // of the computer, from handing a submission over to its end
+  std::uint64_t untimed = 0;  // passes, of submissions with too many of them
 };
 
 // The device is gone (VK_ERROR_DEVICE_LOST): a driver crashed, a cable came loose, a hang led to a
@@ -45,5 +61,7 @@ std::string device_name(const Device& device);
 std::string drawing_device(const Device& device);  // "llvmpipe (CPU)"; empty while there is none
 bool cpu_stands_in(const Device& device);          // a CPU device, where there was a GPU
 std::uint64_t validation_messages(const Device& device);
+// Returns what was timed since the last call; nothing where DeviceOptions::times_passes is false.
+DeviceTimes take_times(Device& device);
 
 }  // namespace previz::render

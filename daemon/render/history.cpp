@@ -164,15 +164,16 @@ void History::reserve(Frame& frame) {
                              static_cast<std::size_t>(frame.view.lens.height);
   if (pixels <= frame.pixels) return;
   frame.pixels = 0;  // stays 0 if an allocation below throws
-  for (Buffer* buffer : {&frame.places, &frame.lights, &frame.squares, &frame.uncovered})
+  for (Buffer* buffer : {&frame.places, &frame.lights})
     *buffer =
         create_texel_buffer(device_, pixels * sizeof(gpu::vec4), vk::Format::eR32G32B32A32Sfloat);
-  for (Buffer* buffer : {&frame.things, &frame.albedos})
+  frame.classes = create_texel_buffer(device_, pixels * sizeof(float), vk::Format::eR32Sfloat);
+  for (Buffer* buffer :
+       {&frame.things, &frame.spreads, &frame.albedos, &frame.others, &frame.caustics})
     *buffer = create_texel_buffer(device_, pixels * sizeof(gpu::uvec2), vk::Format::eR32G32Uint);
   frame.pixels = pixels;
-  for (Buffer* buffer : {&classes_, &covers_})
-    if (buffer->size < pixels * sizeof(float))
-      *buffer = create_storage_buffer(device_, pixels * sizeof(float));
+  if (covers_.size < pixels * sizeof(float))
+    covers_ = create_storage_buffer(device_, pixels * sizeof(float));
 }
 
 void History::begin(const View& view, std::vector<GpuScene::Stance> stances) {
@@ -242,6 +243,7 @@ gpu::GpuHistory History::constants(std::int64_t samples) const {
   result.width_before = static_cast<std::uint32_t>(k.width);
   result.height_before = static_cast<std::uint32_t>(k.height);
   set_rotation(result.camera_from_world, glm::transpose(glm::dmat3(past.view.world_from_camera)));
+  result.forward = glm::vec3(now.view.world_from_camera[2]);
   result.focal_px = {k.fx, k.fy};
   result.principal_px = {k.cx, k.cy};
   result.radial = {k.k1, k.k2, k.k3};
@@ -250,7 +252,6 @@ gpu::GpuHistory History::constants(std::int64_t samples) const {
   result.white_ratio = static_cast<float>(past.view.white / now.view.white);
   result.samples = static_cast<float>(samples);
   result.most_samples = static_cast<float>(frames_that_stay()) * result.samples;
-  result.is_still = past.stances == now.stances ? 1 : 0;
   return result;
 }
 
@@ -270,7 +271,7 @@ void History::find_surfaces(const Buffers& scene, std::uint32_t features, std::i
   buffers["motions"] = &motions_;
   buffers["places"] = &now.places;
   buffers["things"] = &now.things;
-  buffers["classes"] = &classes_;
+  buffers["classes"] = &now.classes;
   buffers["covers"] = &covers_;
   const auto width = static_cast<std::uint32_t>(now.view.lens.width);
   const auto height = static_cast<std::uint32_t>(now.view.lens.height);
@@ -287,30 +288,30 @@ void History::find_surfaces(const Buffers& scene, std::uint32_t features, std::i
   now.is_shown = true;
 }
 
-// A row's edges are found by its neighbours, so the outermost rows of a band that are not the
-// picture's are left to the bands beside it.
 void History::record(const vk::raii::CommandBuffer& commands, gpu::GpuShow constants, int width,
                      const Denoiser::Band& band, Buffers band_buffers) {
   Frame &now = frames_[now_], &past = frames_[1 - now_];
-  const int first = band.top > 0 ? band.top + 1 : 0;
-  const int last = band.bottom < now.view.lens.height ? band.bottom - 1 : band.bottom;
-  constants.in_band = static_cast<std::uint32_t>((first - band.top) * width);
-  constants.count = static_cast<std::uint32_t>((last - first) * width);
+  constants.in_band = 0;
+  constants.count = static_cast<std::uint32_t>((band.bottom - band.top) * width);
   band_buffers.insert({{"history", &history_},
                        {"motions", &motions_},
                        {"places", &now.places},
                        {"things", &now.things},
                        {"covers", &covers_},
                        {"kept_lights", &now.lights},
-                       {"kept_squares", &now.squares},
-                       {"kept_uncovered", &now.uncovered},
+                       {"kept_spreads", &now.spreads},
                        {"kept_albedos", &now.albedos},
+                       {"kept_others", &now.others},
+                       {"kept_caustics", &now.caustics},
+                       {"classes", &now.classes},
                        {"past_places", &past.places},
                        {"past_things", &past.things},
                        {"past_lights", &past.lights},
-                       {"past_squares", &past.squares},
-                       {"past_uncovered", &past.uncovered},
-                       {"past_albedos", &past.albedos}});
+                       {"past_classes", &past.classes},
+                       {"past_spreads", &past.spreads},
+                       {"past_albedos", &past.albedos},
+                       {"past_others", &past.others},
+                       {"past_caustics", &past.caustics}});
   for (Kernel* pass : {&blend_, &show_})
     pass->dispatch({commands, constants, band_buffers}, constants.count);
 }

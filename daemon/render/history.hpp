@@ -55,7 +55,7 @@ class History {
     std::vector<GpuScene::Stance> stances;
     bool is_shown = false;
     std::size_t pixels = 0;  // that the buffers have room for
-    Buffer places, things, lights, squares, uncovered, albedos;
+    Buffer places, things, classes, lights, spreads, albedos, others, caustics;
   };
 
   void reserve(Frame& frame);
@@ -73,7 +73,7 @@ class History {
   double shortened_now_ = std::numeric_limits<double>::infinity();  // for this one
   std::vector<glm::dvec3> environment_;                             // in cells; empty: not known
   std::optional<std::vector<set::Light>> lamps_;
-  Buffer classes_, covers_;  // of the current frame (shaders/history_cover.comp)
+  Buffer covers_;  // of the current frame (shaders/history_cover.comp)
   Buffer history_, motions_;
 };
 

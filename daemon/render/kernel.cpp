@@ -116,6 +116,7 @@ void Kernel::bind(const Recording& recording) {
   const std::span<const std::byte> push = recording.push.bytes;
   const vk::DescriptorSet set = *bound(recording.buffers).set;
   if (device_->has_labels()) commands.beginDebugUtilsLabelEXT({name_.c_str()});
+  device_->clock().start(commands, name_);
   commands.bindPipeline(compute, *program_->pipeline);
   commands.bindDescriptorSets(compute, *program_->layout, 0, set, {});
   commands.pushConstants<std::byte>(*program_->layout, compute_stage, 0,
@@ -123,6 +124,7 @@ void Kernel::bind(const Recording& recording) {
 }
 
 void Kernel::finish(const Recording& recording) const {
+  device_->clock().stop(recording.commands);
   barrier(recording.commands);
   if (device_->has_labels()) recording.commands.endDebugUtilsLabelEXT();
 }

@@ -116,7 +116,7 @@ void Presenter::accumulate(const ToPresent& what, const Denoiser::Band& band,
                         {"composites", &composites_},        {"signals", &denoiser.signal()},
                         {"variances", &denoiser.variance()}, {"surfaces", &denoiser.surface()},
                         {"albedos", &denoiser.albedo()},     {"uncovered", &denoiser.uncovered()},
-                        {"reals", &denoiser.real()}};
+                        {"reals", &denoiser.real()},         {"caustics", &denoiser.caustic()}};
   device_.submit([&](const vk::raii::CommandBuffer& commands) {
     what.history->record(commands, constants, what.width, band, buffers);
   });
@@ -133,8 +133,7 @@ Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
     const std::size_t count = static_cast<std::size_t>(band.last - band.first) * width;
     const std::size_t pixels = static_cast<std::size_t>(band.bottom - band.top) * width;
     const bool filters_companions = what.denoise && needs_companions(what);
-    // What is averaged over frames has photons' light in it.
-    const bool has_caustics = what.tiles.front().caustics && !what.history;
+    const bool has_caustics = what.tiles.front().caustics;
     denoiser.reserve(pixels, filters_companions, has_caustics);
     reserve(pixels);
     gpu::GpuShow constants = constants_of(what, bits_, clipping_);

@@ -15,8 +15,17 @@ vec3 moved(vec4 rows[3], vec3 p) {
   return rotated(rows, p) + vec3(rows[0].w, rows[1].w, rows[2].w);
 }
 
-// A unit vector in 32 bits.
-uint pack_unit(vec3 v) { return packSnorm2x16(octahedral_point(v)); }
-vec3 unpack_unit(uint bits) { return octahedral_direction(unpackSnorm2x16(bits)); }
+// Two unit vectors in 32 bits, each to half a degree: the normals of the triangle and of the shading.
+uint pack_normals(vec3 geometric, vec3 shading) {
+  return packSnorm4x8(vec4(octahedral_point(geometric), octahedral_point(shading)));
+}
+vec3 geometric_of(uint bits) { return octahedral_direction(unpackSnorm4x8(bits).xy); }
+vec3 shading_of(uint bits) { return octahedral_direction(unpackSnorm4x8(bits).zw); }
+
+// Returns whether a pixel's own side and the other one are known apart. `side` is that of its middle,
+// `cover` what history_cover.comp has found.
+bool has_sides(float side, float cover) {
+  return side != COVER_SEE_THROUGH && cover != COVER_SEE_THROUGH;
+}
 
 #endif

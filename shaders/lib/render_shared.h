@@ -382,6 +382,7 @@ struct GpuHistory {
   uint width, height;                // of this frame
   uint width_before, height_before;
   vec4 camera_from_world[3];         // rows of the rotation in the frame before
+  vec3 forward;                      // this frame's camera looks there
   vec2 focal_px, principal_px;       // of the lens in the frame before, OpenCV's convention
   vec3 radial;                       // k1, k2, k3
   vec3 radial_divisor;               // k4, k5, k6
@@ -389,7 +390,6 @@ struct GpuHistory {
   float white_ratio;                 // the sensor's white in the frame before over this frame's
   float samples;                     // that a pixel of this frame has
   float most_samples;                // as which the history of any pixel counts; 0: there is none
-  uint is_still;                     // 1: no instance has moved
 };
 
 // Up to four joints that a vertex follows: scene::Influence.
@@ -474,13 +474,15 @@ struct GpuShow {
 // object, and otherwise one of these.
 PREVIZ_CONST float COVER_UNKNOWN = -1.0f;
 PREVIZ_CONST float COVER_SEE_THROUGH = -2.0f;
+// So far a pixel looks for the other side of an outline.
+PREVIZ_CONST uint HISTORY_REACH = 2u;
 // Dithering repeats after so many pixels in both directions.
 PREVIZ_CONST uint DITHER_SIDE = 64u;
 
 #ifdef __cplusplus
 static_assert(sizeof(GpuDenoise) == 28);
 static_assert(sizeof(GpuMotion) == 52);
-static_assert(sizeof(GpuHistory) == 128);
+static_assert(sizeof(GpuHistory) == 136);
 static_assert(sizeof(GpuShow) == 72);
 static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 56);

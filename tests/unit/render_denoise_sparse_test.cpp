@@ -24,7 +24,10 @@ std::vector<glm::vec4> denoised_by_hand(int side, const std::vector<glm::vec4>& 
   upload(denoiser.surface(), surfaces);
   upload(denoiser.uncovered(), std::vector<glm::vec4>(signals.size()));
   upload(denoiser.real(), std::vector<glm::vec4>(signals.size()));
-  upload(denoiser.albedo(), std::vector<std::uint16_t>(4 * signals.size(), 0x3c00));  // halves of 1
+  constexpr std::uint16_t one = 0x3c00;  // as a half
+  std::vector<std::uint16_t> albedos(4 * signals.size(), one);
+  for (std::size_t i = 3; i < albedos.size(); i += 4) albedos[i] = 0;  // no ray has found a cover
+  upload(denoiser.albedo(), albedos);
   if (!caustics.empty()) upload(denoiser.caustic(), caustics);
   device.submit([&](const vk::raii::CommandBuffer& commands) {
     denoiser.record(commands, side, static_cast<int>(signals.size()) / side, !has_history,
@@ -49,9 +52,9 @@ TEST(DenoiseSparse, TakesAnOutlierOutOfAYoungOutline) {
   }
   signals[young] = {3, 3, 3, 0.5f};
   const std::vector<glm::vec4> clean = denoised_by_hand(side, signals, variances, surfaces, true);
-  // Half of the wall's 0.4, and the outlier's own part in the mean over its surroundings, in which
-  // the weights 1 / (1 + distance^2) have a sum of 7.
-  EXPECT_NEAR(clean[young].r, 0.2, 3.0 / 7);
+  // Half of the wall's 0.4, and half of the outlier's part in the mean of the wall over 5x5 pixels,
+  // of which ten are the wall's and five half.
+  EXPECT_NEAR(clean[young].r, 0.2, 0.5 * 3 / 12.5);
 }
 
 // Photons' light on a real floor, of one sample: on the left a focus, a disc of twice white made by
