@@ -113,6 +113,8 @@ VKAPI_ATTR void VKAPI_CALL no_barrier(VkCommandBuffer, const VkDependencyInfo*) 
 // device's table of functions, which is the test's own, gets a barrier that does nothing.
 TEST(AsGpu, AMissingBarrierIsHeard) {
   const auto device = hazards_heard();
+  // A card would run without barriers what needs them: its queues then lose paths.
+  if (!device->is_cpu()) GTEST_SKIP() << "the device is a graphics card";
   using Table = std::remove_cvref_t<decltype(*device->vk().getDispatcher())>;
   const_cast<Table*>(device->vk().getDispatcher())->vkCmdPipelineBarrier2 = no_barrier;
   two_live_frames(device);

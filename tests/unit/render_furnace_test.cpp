@@ -210,7 +210,12 @@ TEST(Furnace, MirroredGlassIsEnteredFromOutside) {
     return mean(render_view(view, 64).layers.mixed);
   };
   const glm::dvec3 plain = seen(1), mirrored = seen(-1);
-  EXPECT_EQ(plain, mirrored);  // the same paths, and the box's coordinates have no rounding
+  // The same paths, and the box's coordinates have no rounding. A card may contract the products of
+  // one and not those of the other, by a few roundings of 6e-8.
+  if (!render::is_gpu(*shared_device())) {
+    EXPECT_EQ(plain, mirrored);
+  }
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(mirrored[c] / plain[c], 1, 1e-6);
 }
 
 // Lower plane emits 1 and reflects a, upper reflects b: L_lower = 1 + a b L_lower. The squares are
