@@ -358,8 +358,11 @@ Own added(Own past, Now now, float most) {
     mean.variance += share * (now.own.variance - past.variance);
   }
   mean.variance += share * (1.0 - share) * step * step;
-  mean.caustic.rgb += share * (now.own.caustic.rgb - past.caustic.rgb);
-  mean.caustic.w = (1.0 - share) * (1.0 - share) * past.caustic.w + share * share * now.own.caustic.w;
+  const float most_caustics = min(1.0 / past.doubt, history.most_caustic_samples);
+  const float of_caustics = now.samples / (now.samples + most_caustics);
+  mean.caustic.rgb += of_caustics * (now.own.caustic.rgb - past.caustic.rgb);
+  mean.caustic.w = (1.0 - of_caustics) * (1.0 - of_caustics) * past.caustic.w +
+                   of_caustics * of_caustics * now.own.caustic.w;
   mean.doubt = (1.0 - share) * (1.0 - share) * past.doubt + share * share / now.samples;
   return mean;
 }

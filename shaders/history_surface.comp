@@ -8,6 +8,7 @@
 #include "shaders/lib/batch.glsl"
 #include "shaders/lib/calibrated_ray.glsl"
 #include "shaders/lib/history.glsl"
+#include "shaders/lib/moved.glsl"
 #include "shaders/lib/pane.glsl"
 #include "shaders/lib/trace.glsl"
 
@@ -61,7 +62,9 @@ void main() {
   const Surface s =
       make_surface(GpuHit(hit.t, hit.barycentrics, hit.instance, hit.primitive), direction, 0.0);
   const GpuMotion motion = motions[hit.instance];
-  const float most = motion.is_known != 0u ? most_samples(s, turn_of(s.position, motion)) : 0.0;
+  float most = motion.is_known != 0u ? most_samples(s, turn_of(s.position, motion)) : 0.0;
+  const float change = change_by_moved(s, hit.instance);
+  if (change > 0.0) most = min(most, history.samples * history.most_drift / change);
   places[index] = vec4(s.position, most);
   things[index] = uvec2(hit.instance, pack_normals(s.geometric_normal, s.normal));
 }

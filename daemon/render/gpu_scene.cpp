@@ -165,6 +165,9 @@ void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha, bool 
   filters_textures_ = filters_textures;
   material_features_ = material_features(scene_, specular_alpha);
   may_glow_ = scene::may_glow(scene_);
+  may_be_dirac_.clear();
+  for (const scene::Material& material : scene_.materials)
+    may_be_dirac_.push_back(scene::can_be_dirac(scene_, material, specular_alpha));
   if (!has_meshes) upload_meshes();
   upload_materials(specular_alpha);
   if (!has_textures) upload_textures();
@@ -461,7 +464,7 @@ std::vector<GpuScene::Stance> GpuScene::stances() const {
   for (const scene::Instance& instance : scene_.instances) {
     const scene::Aabb& bounds = places_[instance.mesh].bvh.bounds;
     result.push_back({instance.world_from_object, bounds.low, bounds.high, instance.material,
-                      instance.presence, 0});
+                      instance.presence, 0, may_be_dirac_[instance.material]});
   }
   for (const scene::Deformation& deformation : scene_.deformations)
     result[deformation.instance].shape = shaped_;

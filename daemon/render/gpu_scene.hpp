@@ -57,7 +57,8 @@ class GpuScene {
     glm::dmat4 world_from_object{1.0};
     glm::vec3 low{0}, high{0};  // box around it, object space; empty where low > high
     std::uint32_t material = 0, presence = 0;
-    std::uint64_t shape = 0;  // counts the shapes that it has had
+    std::uint64_t shape = 0;    // counts the shapes that it has had
+    bool may_be_dirac = false;  // it may reflect or refract without blur
     friend bool operator==(const Stance&, const Stance&) = default;
   };
   std::vector<Stance> stances() const;
@@ -106,6 +107,7 @@ class GpuScene {
   std::vector<scene::Instance> instances_as_set_;   // as set_scene() got them
   std::vector<scene::Shape> shapes_;                // as deform() got them last
   std::uint64_t shaped_ = 0;                        // how often deform() got others
+  std::vector<bool> may_be_dirac_;                  // each material
   Spheres spheres_;                                 // of instances_as_set_
   std::optional<std::vector<set::Light>> sources_;  // absent: there are never any
   std::vector<MeshPlace> places_;

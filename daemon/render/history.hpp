@@ -13,6 +13,8 @@
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/gpu_scene.hpp"
 #include "daemon/render/kernel.hpp"
+#include "daemon/render/light_change.hpp"
+#include "daemon/render/moved_instances.hpp"
 #include "drivers/calibration.hpp"
 
 namespace previz::render {
@@ -26,8 +28,7 @@ class History {
   // Lets what was accumulated up to the next frame count as no more than this many frames: less
   // than one where it is no longer true.
   void shorten(double frames);
-  // Shorten it by how much the light around the set, or its lamps, differ from those that were
-  // given before.
+  // The light around the set, and its lamps, which shorten the past where they change.
   void light_with(const EncodedEnvironment& environment);
   void light_with(std::vector<set::Light> lamps);
 
@@ -37,8 +38,8 @@ class History {
     glm::dmat4 world_from_camera{1.0};
     double white = 1;  // radiance at which the sensor clips
   };
-  // Begins a frame. What was accumulated up to the last frame that was shown is then the past. The
-  // past counts less the farther instances have moved over the picture since.
+  // Begins a frame. What was accumulated up to the last frame that was shown is then the past. It
+  // counts less where instances that have moved since may have changed the light.
   void begin(const View& view, std::vector<GpuScene::Stance> stances);
   // Finds what each pixel of the frame shows. `scene` are the buffers of lib/scene.glsl with
   // "frame", "corner_rays"; a second call for the same number of samples does nothing.
@@ -61,7 +62,8 @@ class History {
   void reserve(Frame& frame);
   double frames_that_stay() const;
   std::vector<gpu::GpuMotion> motions() const;
-  gpu::GpuHistory constants(std::int64_t samples) const;
+  MovedInstances moved() const;
+  gpu::GpuHistory constants(std::int64_t samples, const MovedInstances& moved) const;
 
   Device& device_;
   Kernel blend_, show_, surface_, cover_;
@@ -71,14 +73,9 @@ class History {
   std::optional<std::int64_t> samples_;                         // for which the surfaces were found
   double shortened_ = std::numeric_limits<double>::infinity();  // for the next frame
   double shortened_now_ = std::numeric_limits<double>::infinity();  // for this one
-  std::vector<glm::dvec3> environment_;                             // in cells; empty: not known
-  std::optional<std::vector<set::Light>> lamps_;
+  LightChange light_;
   Buffer covers_;  // of the current frame (shaders/history_cover.comp)
-  Buffer history_, motions_;
+  Buffer history_, motions_, moves_, arrivals_;
 };
-
-// Returns the share by which light differs: 0 for the same light, 1 and more for another one.
-double change_of_light(const std::vector<glm::dvec3>& before, const std::vector<glm::dvec3>& now);
-double change_of_lamps(const std::vector<set::Light>& before, const std::vector<set::Light>& now);
 
 }  // namespace previz::render

@@ -377,6 +377,22 @@ struct GpuMotion {
   uint is_known;            // 0: the instance has no history
 };
 
+// An instance that has moved since the frame before, or has changed otherwise, and the spheres
+// around it then and now, relative to this frame's camera.
+struct GpuMoved {
+  vec4 before, now;  // centre, radius
+  float share;       // of itself that it has moved by; 1: it is nowhere near where it was
+  float turn;        // radians
+  uint instance;
+};
+
+// Light that comes from infinity: a directional lamp, or a part of the environment.
+struct GpuArrival {
+  vec3 direction;  // towards it
+  float share;     // of all light
+  float width;     // half the angle that it comes from, radians
+};
+
 // What the history's passes need beside the picture (shaders/README.md, "Accumulation over time").
 struct GpuHistory {
   uint width, height;                // of this frame
@@ -390,6 +406,9 @@ struct GpuHistory {
   float white_ratio;                 // the sensor's white in the frame before over this frame's
   float samples;                     // that a pixel of this frame has
   float most_samples;                // as which the history of any pixel counts; 0: there is none
+  float most_caustic_samples;        // likewise, of the light of photons
+  float most_drift;                  // by which light may change over the frames that are averaged
+  uint moved_count, arrival_count;
 };
 
 // Up to four joints that a vertex follows: scene::Influence.
@@ -482,7 +501,9 @@ PREVIZ_CONST uint DITHER_SIDE = 64u;
 #ifdef __cplusplus
 static_assert(sizeof(GpuDenoise) == 28);
 static_assert(sizeof(GpuMotion) == 52);
-static_assert(sizeof(GpuHistory) == 136);
+static_assert(sizeof(GpuMoved) == 44);
+static_assert(sizeof(GpuArrival) == 20);
+static_assert(sizeof(GpuHistory) == 152);
 static_assert(sizeof(GpuShow) == 72);
 static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 56);

@@ -328,7 +328,6 @@ TEST_P(HistoryAfter, AJumpOrASwitchShowsNoGhost) {
   EXPECT_LT(rms_between(first, expected), 1.3 * rms_between(noisy, expected));
 }
 
-// What moves a little shortens the past by how far it moves over the picture.
 TEST(History, OfTheLightIsComparedByWhatArrives) {
   const std::vector<glm::dvec3> dark(256, glm::dvec3(0)), even(256, glm::dvec3(0.5));
   std::vector<glm::dvec3> window = even;
