@@ -197,6 +197,7 @@ void Device::create_device() {
   });
   if (family == families.end()) throw Error("Vulkan: " + name_ + " has no compute queue");
   queue_family_ = static_cast<std::uint32_t>(family - families.begin());
+  allows_ = limits_of(physical_);
 
   const float priority = 1.0f;
   const vk::DeviceQueueCreateInfo queue({}, queue_family_, 1, &priority);
@@ -269,13 +270,12 @@ void Device::submit(const std::function<void(const vk::raii::CommandBuffer&)>& r
 
 namespace {
 
-vk::raii::DeviceMemory allocate(Device& device, const vk::MemoryAllocateInfo& what) {
-  try {
-    return {device.vk(), what};
-  } catch (const vk::OutOfDeviceMemoryError&) {
-    throw Error("Vulkan: " + device.name() + " has no memory left for a buffer of " +
-                std::to_string(what.allocationSize) + " bytes");
-  }
+// Throws previz::Error where the device does not allow so large a buffer.
+void check_buffer(const Device& device, vk::DeviceSize bytes, vk::DeviceSize texels) {
+  if (const auto past = past_limits(device.allows(), bytes, texels))
+    throw Error("Vulkan: the scene or the picture needs a buffer of " + past->asked + ", but " +
+                device.name() + " allows " + std::to_string(past->allowed) +
+                ". Fewer triangles, smaller textures or a smaller picture need less");
 }
 
 Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags usage,
@@ -284,11 +284,20 @@ Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags u
   Buffer result;
   result.size = std::max<vk::DeviceSize>((size + 15) / 16 * 16, 16);
   usage |= Usage::eTransferSrc | Usage::eTransferDst;
-  result.buffer = vk::raii::Buffer(device.vk(), {{}, result.size, usage});
-  const auto requirements = result.buffer.getMemoryRequirements();
-  const auto type = device.memory_type(requirements.memoryTypeBits, wanted, preferred);
-  result.memory = allocate(device, {requirements.size, type});
-  result.buffer.bindMemory(*result.memory, 0);
+  try {
+    result.buffer = vk::raii::Buffer(device.vk(), {{}, result.size, usage});
+    const auto requirements = result.buffer.getMemoryRequirements();
+    const auto type = device.memory_type(requirements.memoryTypeBits, wanted, preferred);
+    result.memory = vk::raii::DeviceMemory(device.vk(), {requirements.size, type});
+    result.buffer.bindMemory(*result.memory, 0);
+  } catch (const vk::DeviceLostError&) {
+    throw;
+  } catch (const vk::SystemError& error) {
+    const bool is_full = error.code() == vk::Result::eErrorOutOfDeviceMemory;
+    throw Error("Vulkan: " + device.name() + (is_full ? " has no memory left" : " has no room") +
+                " for a buffer of " + std::to_string(result.size) + " bytes" +
+                (is_full ? "" : std::string(": ") + error.what()));
+  }
   return result;
 }
 
@@ -315,10 +324,7 @@ Buffer create_staging_buffer(Device& device, vk::DeviceSize size) {
 }  // namespace
 
 Buffer create_storage_buffer(Device& device, vk::DeviceSize size) {
-  if (size > device.limits().maxStorageBufferRange)
-    throw Error("Vulkan: a storage buffer of " + std::to_string(size) + " bytes is past the " +
-                std::to_string(device.limits().maxStorageBufferRange) + " that " + device.name() +
-                " allows");
+  check_buffer(device, size, 0);
   return create_device_buffer(device, size, vk::BufferUsageFlagBits::eStorageBuffer);
 }
 
@@ -350,13 +356,9 @@ vk::DeviceSize texel_bytes_of(vk::Format format) {
 
 Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format) {
   using Usage = vk::BufferUsageFlagBits;
+  check_buffer(device, size, size / texel_bytes_of(format));
   Buffer result =
       create_device_buffer(device, size, Usage::eUniformTexelBuffer | Usage::eStorageBuffer);
-  const vk::DeviceSize texel_bytes = texel_bytes_of(format);
-  if (result.size / texel_bytes > device.limits().maxTexelBufferElements)
-    throw Error("Vulkan: the scene needs a texel buffer of " +
-                std::to_string(result.size / texel_bytes) + " texels, but " + device.name() +
-                " allows " + std::to_string(device.limits().maxTexelBufferElements));
   result.view = vk::raii::BufferView(device.vk(), {{}, *result.buffer, format, 0, VK_WHOLE_SIZE});
   return result;
 }

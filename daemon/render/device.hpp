@@ -13,6 +13,7 @@
 #include <vector>
 #include <vulkan/vulkan_raii.hpp>
 
+#include "daemon/render/device_limits.hpp"
 #include "daemon/render/gpu.hpp"
 #include "daemon/render/pass_clock.hpp"
 
@@ -36,6 +37,7 @@ class Device {
   const vk::raii::Device& vk() const { return device_; }
   const std::string& name() const { return name_; }
   const vk::PhysicalDeviceLimits& limits() const { return limits_; }
+  const DeviceLimits& allows() const { return allows_; }
   bool is_cpu() const { return is_cpu_; }
   // Returns whether the host works in the device's own memory; otherwise it uploads and downloads
   // by copies, and the device is wide enough to have many samples in flight.
@@ -112,6 +114,7 @@ class Device {
   std::uint32_t queue_family_ = 0;
   std::string name_;
   vk::PhysicalDeviceLimits limits_;
+  DeviceLimits allows_{};
   bool is_cpu_ = false;
   bool had_gpu_ = false;  // since it was first opened
   mutable std::mutex drawing_mutex_;

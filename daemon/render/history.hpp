@@ -19,6 +19,7 @@
 
 namespace previz::render {
 
+// It takes 156 bytes of device memory per pixel.
 class History {
  public:
   explicit History(Device& device);

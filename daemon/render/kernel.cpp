@@ -14,8 +14,12 @@ namespace {
 constexpr auto compute = vk::PipelineBindPoint::eCompute;
 constexpr auto compute_stage = vk::ShaderStageFlagBits::eCompute;
 
-std::shared_ptr<const Program> compile(const Device& device, const SpirvInfo& info,
+std::shared_ptr<const Program> compile(const Device& device, const std::string& name,
+                                       const SpirvInfo& info,
                                        const std::vector<std::uint32_t>& spirv) {
+  if (const auto past = past_limits(device.allows(), info, Push::most_bytes))
+    throw Error("Vulkan: pass \"" + name + "\" needs " + past->asked + ", but " + device.name() +
+                " allows " + std::to_string(past->allowed));
   const auto program = std::make_shared<Program>();
   program->group_size = info.group_size;
   std::vector<vk::DescriptorSetLayoutBinding> bindings;
@@ -58,8 +62,9 @@ Kernel::Kernel(Device& device, const char* name, std::span<const std::uint32_t> 
   const SpirvInfo info = describe_spirv(spirv);
   std::vector<std::uint32_t> values = constants;
   if (!values.empty()) values.front() &= info.asked_bits;
-  program_ = device.program(spirv.data(), values,
-                            [&] { return compile(device, info, specialised(spirv, values)); });
+  program_ = device.program(spirv.data(), values, [&] {
+    return compile(device, name_, info, specialised(spirv, values));
+  });
 }
 
 Kernel::BoundSet Kernel::create_set() const {

@@ -18,14 +18,17 @@ namespace {
 constexpr std::uint64_t layer_bytes =
     (6 * 3 + 2) * sizeof(float) + 2 * 3 * sizeof(double) + 3 * sizeof(float);
 
+// A pixel's sums, and those of the light of photons.
+constexpr std::uint64_t sum_bytes = sizeof(gpu::GpuPixel) + 4 * sizeof(float);
+
 // A pixel of the plate and of the shown picture is three samples.
 constexpr std::uint64_t plate_bytes = 3 * sizeof(std::uint16_t);
 
-// A pixel of a band takes eleven arrays of four floats and one of four halves in the denoiser
-// (denoiser.hpp), one of four floats in the presenter (presenter.hpp), a word of flags, and its
-// part of the shown picture.
+// A pixel of a band takes thirteen arrays of four floats and one of four halves in the denoiser,
+// two of them for the light of photons (denoiser.hpp), one of four floats in the presenter
+// (presenter.hpp), a word of flags, and its part of the shown picture.
 constexpr std::uint64_t band_bytes =
-    12 * 4 * sizeof(float) + 4 * sizeof(std::uint16_t) + sizeof(std::uint32_t) + plate_bytes;
+    14 * 4 * sizeof(float) + 4 * sizeof(std::uint16_t) + sizeof(std::uint32_t) + plate_bytes;
 
 std::uint64_t rays_of(int width, int height) {
   return (static_cast<std::uint64_t>(width) + 1) * (static_cast<std::uint64_t>(height) + 1);
@@ -42,7 +45,7 @@ std::string gigabytes(std::uint64_t bytes) {
 std::uint64_t picture_bytes(int width, int height, bool read_back) {
   const std::uint64_t pixels =
       static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
-  const std::uint64_t device = pixels * (sizeof(gpu::GpuPixel) + plate_bytes) +
+  const std::uint64_t device = pixels * (sum_bytes + plate_bytes) +
                                rays_of(width, height) * sizeof(glm::vec2) +
                                std::min<std::uint64_t>(pixels, most_band_pixels) * band_bytes;
   return read_back ? device + pixels * layer_bytes : device;

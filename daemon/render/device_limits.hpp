@@ -1,0 +1,36 @@
+// What a device allows, and what of it a pass or a buffer is past, in words.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vulkan/vulkan_raii.hpp>
+
+#include "daemon/render/spirv.hpp"
+
+namespace previz::render {
+
+struct DeviceLimits {
+  // Of a pass.
+  std::uint32_t storage_buffers, texel_buffers, buffers;
+  std::uint32_t group_invocations, group_width, push_bytes;
+  // Of a buffer.
+  std::uint64_t buffer_bytes, allocation_bytes, storage_bytes, texels;
+};
+DeviceLimits limits_of(const vk::raii::PhysicalDevice& physical);
+
+// What is asked for and is more than a device allows.
+struct PastLimit {
+  std::string asked;  // "600 texels"
+  std::uint64_t allowed;
+};
+
+// Return the first limit that is passed, if there is one. `push_bytes` are those of the pass's push
+// constants; `texels` is 0 for a buffer that has none. Every buffer may be bound as a storage
+// buffer.
+std::optional<PastLimit> past_limits(const DeviceLimits& limits, const SpirvInfo& pass,
+                                     std::uint32_t push_bytes);
+std::optional<PastLimit> past_limits(const DeviceLimits& limits, std::uint64_t bytes,
+                                     std::uint64_t texels);
+
+}  // namespace previz::render
