@@ -149,7 +149,7 @@ Own load_own(int index, vec3 albedo) {
              is_known(kept) ? kept : albedo, vec4(caustic.rgb, caustic.w * caustic.w));
 }
 
-// Reads the other side of a pixel of the frame before, which is that of side `of`. It is the pixel's
+// Reads what a pixel of the frame before shows of a side. `of` is the class of that: it is the pixel's
 // own side where the outline has moved on.
 bool load_other(ivec2 at, float of, Wanted wanted, out Other other) {
   if (!is_inside(at, history.width_before, history.height_before)) return false;
@@ -267,7 +267,7 @@ bool interpolate_own(inout Wanted wanted, vec3 albedo, out Own own) {
   return wanted.most >= LEAST_COUNTED;
 }
 
-// Likewise for the other side, which is of side `of`.
+// Likewise for the other side, whose class is `of`.
 bool interpolate_other(Wanted wanted, float of, out Other other) {
   other = Other(vec3(0.0), 0.0);
   const Cell cell = cell_at(wanted.at);
@@ -290,7 +290,7 @@ bool interpolate_other(Wanted wanted, float of, out Other other) {
   return other.samples >= LEAST_COUNTED;
 }
 
-// Returns the nearest pixel around whose own side is of side `of`; the pixel itself if there is none.
+// Returns the nearest pixel around that is of class `of`; the pixel itself if there is none.
 ivec2 nearest_of(ivec2 at, float of) {
   ivec2 nearest = at;
   int least = 2 * REACH * REACH + 1;
@@ -373,15 +373,19 @@ Other added(Other past, Other now) {
   return Other(past.light + now.samples / samples * (now.light - past.light), samples);
 }
 
+// Halves hold no more than this, in whites, in either direction; all of it is shown as white or black.
+const float MOST_KEPT = 65504.0;
+
 void store(uint index, Own own, Other other) {
   if (own.mask < LEAST_SHARE) own.mask = 0.0;
   if (own.mask > 1.0 - LEAST_SHARE) own.mask = 1.0;
   if (own.mask == classes[index]) other = Other(vec3(0.0), 0.0);
   kept_lights[index] = vec4(own.light, own.doubt);
-  kept_spreads[index] = pack_four_halves(vec4(sqrt(own.variance), own.mask));
+  kept_spreads[index] = pack_four_halves(vec4(min(sqrt(own.variance), MOST_KEPT), own.mask));
   kept_albedos[index] = pack_halves(own.albedo);
-  kept_others[index] = pack_four_halves(vec4(other.light, other.samples));
-  kept_caustics[index] = pack_four_halves(vec4(own.caustic.rgb, sqrt(own.caustic.w)));
+  kept_others[index] = pack_four_halves(clamp(vec4(other.light, other.samples), -MOST_KEPT, MOST_KEPT));
+  kept_caustics[index] =
+      pack_four_halves(clamp(vec4(own.caustic.rgb, sqrt(own.caustic.w)), -MOST_KEPT, MOST_KEPT));
 }
 
 void main() {
@@ -403,10 +407,12 @@ void main() {
   Own own_past;
   bool is_thin = false;
   bool has_past = false;
+  float most = history.most_samples;
   if (find_before(at, at, wanted)) {
     is_thin = !is_outline && was_thin(wanted);
     has_past = interpolate_own(wanted, now.own.albedo, own_past);
     if (has_past) own = added(own_past, now, wanted.most);
+    most = wanted.most;
   }
   Other other = now.other;
   Other other_past = Other(vec3(0.0), 0.0);
@@ -420,8 +426,8 @@ void main() {
   const float before = !has_past ? 1.0 - side : is_outline || is_thin ? own_past.mask : side;
   const float samples = (has_past ? 1.0 / own_past.doubt : 0.0) + other_past.samples;
   if (samples > 0.0)
-    own.mask = before + history.samples / (history.samples + min(samples, wanted.most)) *
-                            (now.own.mask - before);
+    own.mask =
+        before + history.samples / (history.samples + min(samples, most)) * (now.own.mask - before);
   if (!is_outline) other.samples = -other.samples;
   store(index, own, other);
 }

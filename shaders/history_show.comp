@@ -50,12 +50,14 @@ Own load_own(uint index) {
   // The variance of a weighted mean is that of a sample times the sum of the squared weights, which
   // the mean square is short of (Bessel's correction).
   const float part = kept.w > 0.0 && kept.w < 0.999 ? kept.w / (1.0 - kept.w) : 0.0;
-  return Own(kept.rgb, kept.w > 0.0 ? 1.0 / kept.w : 0.0, part * deviation * deviation,
-             any(greaterThan(albedo, vec3(0.0))) ? albedo : vec3(1.0),
+  return Own(kept.rgb, kept.w > 0.0 ? 1.0 / kept.w : 0.0, part * deviation * deviation, albedo,
              vec4(caustic.rgb, caustic.w * caustic.w));
 }
 
-// Returns the side of a pixel that has had no sample of it: the mean of those around.
+bool is_known(vec3 albedo) { return all(greaterThan(albedo, vec3(0.0))); }
+
+// Returns the mean of those pixels around whose own side is `side` and whose albedo is known; with no
+// samples if there are none.
 Own own_of_neighbours(ivec2 at, float side) {
   Own sum = Own(vec3(0.0), 0.0, vec3(0.0), vec3(0.0), vec4(0.0));
   float total = 0.0;
@@ -68,6 +70,7 @@ Own own_of_neighbours(ivec2 at, float side) {
       const uint index = there.y * history.width + there.x;
       if (classes[index] != side || !(kept_lights[index].w > 0.0)) continue;
       const Own own = load_own(index);
+      if (!is_known(own.albedo)) continue;
       const float near = 1.0 / float(x * x + y * y);
       sum.light += near * own.light;
       sum.variance += near * own.variance;
@@ -77,6 +80,21 @@ Own own_of_neighbours(ivec2 at, float side) {
     }
   if (total <= 0.0) return sum;
   return Own(sum.light / total, 1.0, sum.variance / total, sum.albedo / total, sum.caustic / total);
+}
+
+// Returns the own side of a pixel, its light over an albedo. A pixel that has had no sample of it takes
+// all from those around, and one that has only had samples of both sides together the albedo, which
+// they do not know.
+Own complete(uint index, float side) {
+  const ivec2 at = ivec2(index % history.width, index / history.width);
+  Own own = load_own(index);
+  if (own.samples <= 0.0) return own_of_neighbours(at, side);
+  if (is_known(own.albedo)) return own;
+  const Own around = own_of_neighbours(at, side);
+  own.albedo = around.samples > 0.0 ? around.albedo : vec3(1.0);
+  own.light /= own.albedo;
+  own.variance /= own.albedo * own.albedo;
+  return own;
 }
 
 // The number of its samples is all that a frame that stands alone lacks.
@@ -93,10 +111,9 @@ void main() {
     return;
   }
   const bool is_mixed_anew = show.is_denoised != 0u && cover != COVER_UNKNOWN;
-  Own own = load_own(index);
-  if (own.samples <= 0.0 && is_mixed_anew)
-    own = own_of_neighbours(ivec2(index % history.width, index / history.width), side);
-  if (own.samples <= 0.0) {
+  const bool has_samples = kept_lights[index].w > 0.0;
+  Own own = complete(index, side);
+  if (own.samples <= 0.0 || !(has_samples || is_mixed_anew)) {
     stand_alone(in_band);
     return;
   }

@@ -8,8 +8,8 @@ namespace previz::render {
 void CameraMap::resize(std::uint32_t pixels) {
   if (pixels <= pixels_) return;  // a smaller picture uses a part
   pixels_ = pixels;
-  plate_ =
-      create_texel_buffer(device_, pixels * sizeof(gpu::vec4), vk::Format::eR32G32B32A32Sfloat);
+  plate_ = create_texel_buffer(device_, pixels * sizeof(gpu::vec4), vk::Format::eR32G32B32A32Sfloat,
+                               true);
   seen_ = create_storage_buffer(device_, pixels * sizeof(gpu::GpuSeen));
 }
 

@@ -29,7 +29,8 @@ constexpr int caustic_levels = 3;
 static_assert(caustic_levels <= wavelet_levels);
 
 Buffer texels_for(Device& device, std::size_t count) {
-  return create_texel_buffer(device, count * sizeof(gpu::vec4), vk::Format::eR32G32B32A32Sfloat);
+  return create_texel_buffer(device, count * sizeof(gpu::vec4), vk::Format::eR32G32B32A32Sfloat,
+                             true);
 }
 
 }  // namespace
@@ -67,7 +68,7 @@ void Denoiser::reserve(std::size_t pixels, bool companions, bool caustics) {
     }
     for (Buffer* other : {&surface_, &guide_, &guide_variance_}) *other = texels(pixels);
     albedo_ = create_texel_buffer(device_, pixels * 4 * sizeof(std::uint16_t),
-                                  vk::Format::eR16G16B16A16Sfloat);
+                                  vk::Format::eR16G16B16A16Sfloat, true);
     // composite.comp and present.comp use side 0 of the companions, filtered or not.
     uncovered_[0] = texels(pixels);
     real_[0] = texels(pixels);

@@ -271,8 +271,8 @@ void Device::submit(const std::function<void(const vk::raii::CommandBuffer&)>& r
 namespace {
 
 // Throws previz::Error where the device does not allow so large a buffer.
-void check_buffer(const Device& device, vk::DeviceSize bytes, vk::DeviceSize texels) {
-  if (const auto past = past_limits(device.allows(), bytes, texels))
+void check_buffer(const Device& device, const BufferNeed& need) {
+  if (const auto past = past_limits(device.allows(), need))
     throw Error("Vulkan: the scene or the picture needs a buffer of " + past->asked + ", but " +
                 device.name() + " allows " + std::to_string(past->allowed) +
                 ". Fewer triangles, smaller textures or a smaller picture need less");
@@ -324,7 +324,7 @@ Buffer create_staging_buffer(Device& device, vk::DeviceSize size) {
 }  // namespace
 
 Buffer create_storage_buffer(Device& device, vk::DeviceSize size) {
-  check_buffer(device, size, 0);
+  check_buffer(device, {size, 0, true});
   return create_device_buffer(device, size, vk::BufferUsageFlagBits::eStorageBuffer);
 }
 
@@ -354,9 +354,10 @@ vk::DeviceSize texel_bytes_of(vk::Format format) {
 
 }  // namespace
 
-Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format) {
+Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format,
+                           bool is_storage) {
   using Usage = vk::BufferUsageFlagBits;
-  check_buffer(device, size, size / texel_bytes_of(format));
+  check_buffer(device, {size, size / texel_bytes_of(format), is_storage});
   Buffer result =
       create_device_buffer(device, size, Usage::eUniformTexelBuffer | Usage::eStorageBuffer);
   result.view = vk::raii::BufferView(device.vk(), {{}, *result.buffer, format, 0, VK_WHOLE_SIZE});

@@ -141,8 +141,10 @@ struct Buffer {
 
 Buffer create_storage_buffer(Device& device, vk::DeviceSize size);
 Buffer create_indirect_buffer(Device& device, vk::DeviceSize size);
-// Creates a buffer that shaders read as texels; it is written by uploads or as a storage buffer.
-Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format);
+// Creates a buffer that shaders read as texels. It is written by uploads, or with `is_storage` by
+// shaders, for which a device may allow less.
+Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format,
+                           bool is_storage = false);
 
 // Uploads to `offset` (bytes). Throws previz::Error where the data would not fit.
 void upload_bytes(Device& device, Buffer& buffer, std::span<const std::byte> bytes,

@@ -57,12 +57,12 @@ std::optional<PastLimit> past_limits(const DeviceLimits& limits, const SpirvInfo
                      {"bytes of push constants", push_bytes, limits.push_bytes}});
 }
 
-std::optional<PastLimit> past_limits(const DeviceLimits& limits, std::uint64_t bytes,
-                                     std::uint64_t texels) {
-  return first_past({{"texels", texels, limits.texels},
-                     {"bytes in a storage buffer", bytes, limits.storage_bytes},
-                     {"bytes in a buffer", bytes, limits.buffer_bytes},
-                     {"bytes in an allocation", bytes, limits.allocation_bytes}});
+std::optional<PastLimit> past_limits(const DeviceLimits& limits, const BufferNeed& buffer) {
+  const std::uint64_t storage = buffer.is_storage ? buffer.bytes : 0;
+  return first_past({{"texels", buffer.texels, limits.texels},
+                     {"bytes in a storage buffer", storage, limits.storage_bytes},
+                     {"bytes in a buffer", buffer.bytes, limits.buffer_bytes},
+                     {"bytes in an allocation", buffer.bytes, limits.allocation_bytes}});
 }
 
 }  // namespace previz::render

@@ -25,12 +25,17 @@ struct PastLimit {
   std::uint64_t allowed;
 };
 
+// What a buffer is bound as.
+struct BufferNeed {
+  std::uint64_t bytes;
+  std::uint64_t texels;  // 0: it is not read as texels
+  bool is_storage;
+};
+
 // Return the first limit that is passed, if there is one. `push_bytes` are those of the pass's push
-// constants; `texels` is 0 for a buffer that has none. Every buffer may be bound as a storage
-// buffer.
+// constants.
 std::optional<PastLimit> past_limits(const DeviceLimits& limits, const SpirvInfo& pass,
                                      std::uint32_t push_bytes);
-std::optional<PastLimit> past_limits(const DeviceLimits& limits, std::uint64_t bytes,
-                                     std::uint64_t texels);
+std::optional<PastLimit> past_limits(const DeviceLimits& limits, const BufferNeed& buffer);
 
 }  // namespace previz::render

@@ -58,12 +58,14 @@ void History::reserve(Frame& frame) {
   if (pixels <= frame.pixels) return;
   frame.pixels = 0;  // stays 0 if an allocation below throws
   for (Buffer* buffer : {&frame.places, &frame.lights})
-    *buffer =
-        create_texel_buffer(device_, pixels * sizeof(gpu::vec4), vk::Format::eR32G32B32A32Sfloat);
-  frame.classes = create_texel_buffer(device_, pixels * sizeof(float), vk::Format::eR32Sfloat);
+    *buffer = create_texel_buffer(device_, pixels * sizeof(gpu::vec4),
+                                  vk::Format::eR32G32B32A32Sfloat, true);
+  frame.classes =
+      create_texel_buffer(device_, pixels * sizeof(float), vk::Format::eR32Sfloat, true);
   for (Buffer* buffer :
        {&frame.things, &frame.spreads, &frame.albedos, &frame.others, &frame.caustics})
-    *buffer = create_texel_buffer(device_, pixels * sizeof(gpu::uvec2), vk::Format::eR32G32Uint);
+    *buffer =
+        create_texel_buffer(device_, pixels * sizeof(gpu::uvec2), vk::Format::eR32G32Uint, true);
   frame.pixels = pixels;
   if (covers_.size < pixels * sizeof(float))
     covers_ = create_storage_buffer(device_, pixels * sizeof(float));

@@ -23,9 +23,9 @@ void PhotonMap::resize(std::uint32_t photons) {
   filled_ = create_storage_buffer(device_, bucket_count_ * sizeof(std::uint32_t));
   control_ = create_storage_buffer(device_, sizeof(gpu::GpuPhotonControl));
   sorted_ = create_texel_buffer(device_, slots * gpu::TEXELS_PER_PHOTON * sizeof(gpu::vec4),
-                                vk::Format::eR32G32B32A32Sfloat);
+                                vk::Format::eR32G32B32A32Sfloat, true);
   buckets_ = create_texel_buffer(device_, bucket_count_ * sizeof(gpu::GpuPhotonBucket),
-                                 vk::Format::eR32G32Uint);
+                                 vk::Format::eR32G32Uint, true);
   room_ = photons;
 }
 

@@ -25,8 +25,8 @@ SpirvInfo pass() {
 
 TEST(DeviceLimits, AllowWhatIsJustEnough) {
   EXPECT_FALSE(past_limits(just_enough, pass(), push_bytes));
-  EXPECT_FALSE(past_limits(just_enough, 4096, 512));
-  EXPECT_FALSE(past_limits(just_enough, 4096, 0));
+  EXPECT_FALSE(past_limits(just_enough, {4096, 512, true}));
+  EXPECT_FALSE(past_limits(just_enough, {4096, 0, false}));
 }
 
 TEST(DeviceLimits, OfAPassAreNamedWithBothNumbers) {
@@ -60,11 +60,15 @@ TEST(DeviceLimits, OfABufferAreNamedWithBothNumbers) {
   for (const auto& each : cases) {
     DeviceLimits limits = just_enough;
     --(limits.*each.limit);
-    const auto past = past_limits(limits, 4096, 512);
+    const auto past = past_limits(limits, {4096, 512, true});
     ASSERT_TRUE(past) << each.words;
     EXPECT_EQ(past->asked, each.words);
     EXPECT_EQ(past->allowed, limits.*each.limit);
   }
+  // What is only read as texels may be larger than a storage buffer.
+  DeviceLimits small = just_enough;
+  small.storage_bytes = 16;
+  EXPECT_FALSE(past_limits(small, {4096, 512, false}));
 }
 
 // The device's own limits are read from where Vulkan keeps them, and a buffer past them is refused

@@ -154,18 +154,24 @@ TEST(History, KeepsHowMuchAThinRodCovers) {
   EXPECT_LT(off_at_outlines(picture, truth, mask), 1.1 * off_of_many);
 }
 
-// What photons bring has a filter of its own, in the first frame of a history as in a frame alone,
-// and is carried along without being blurred. Outside the ball, after a dozen frames of a moving
-// camera, what is off is less than 0.7 of what a frame alone is off, as for all other light.
-TEST(History, KeepsPhotonsLightApart) {
+// A floor, and above it a virtual ball of glass under a small lamp, whose light it gathers.
+Stage glass_under_a_lamp(double radiance) {
   Stage stage(glm::vec3(0.05f));
   scene::Scene& scene = stage.view.scene;
   scene.instances[stage.box].mesh = add_mesh(scene, icosphere_mesh(0.3, 4));
   scene.instances[stage.box].material = add_material(scene, glass(1.5f));
-  set::Light key = lamp(set::LightType::sphere, glm::dvec3(60));
+  set::Light key = lamp(set::LightType::sphere, glm::dvec3(radiance));
   key.position = {1, 1, 3};
   key.radius_m = 0.05;
   scene.lights = {key};
+  return stage;
+}
+
+// What photons bring has a filter of its own, in the first frame of a history as in a frame alone,
+// and is carried along without being blurred. Outside the ball, after a dozen frames of a moving
+// camera, what is off is less than 0.7 of what a frame alone is off, as for all other light.
+TEST(History, KeepsPhotonsLightApart) {
+  const Stage stage = glass_under_a_lamp(60);
   SetRenderer moving(stage.view), first(stage.view), alone(stage.view), reference(stage.view);
   glm::dmat4 pose(1.0);
   const Plate last = shown_moving(moving, pose);
@@ -180,6 +186,22 @@ TEST(History, KeepsPhotonsLightApart) {
   const double off_alone = off(shown(alone, pose, 1, false, true));
   EXPECT_LT(off(shown(first, pose, 1, true, true)), 1.1 * off_alone);
   EXPECT_LT(off(last), 0.7 * off_alone);
+}
+
+// Photons' light is kept as halves, which hold no more than 65,504 times white. A virtual lamp that
+// brings a million times as much is white in every frame: nothing becomes what is no number.
+TEST(History, OfLightBeyondAllWhiteStaysWhite) {
+  Stage stage = glass_under_a_lamp(6e13);
+  stage.view.scene.lights[0].gain_real = 0;
+  SetRenderer renderer(stage.view);
+  for (int frame = 0; frame < 4; ++frame) {
+    const Plate picture = shown(renderer, stage.view.world_from_camera, 1, true, true);
+    const auto at = [&](int x, int y) {
+      return picture.samples[static_cast<std::size_t>(3 * (y * width + x))];
+    };
+    for (int y = height - 12; y < height; ++y)
+      for (int x = 0; x < width; ++x) EXPECT_EQ(at(x, y), 65535) << frame << ": " << x << ", " << y;
+  }
 }
 
 // A lamp that only the mixed world has lights the floor without noise, as no light is reflected
