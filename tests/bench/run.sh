@@ -1,7 +1,7 @@
 #!/bin/sh
 # All benchmarks of a build: run.sh BUILD_DIR OUT_DIR [SETDIR...]. Writes rays.md, instances.md,
-# frame.md, frame.csv and frame.svg, picture.md, move.md, and where ground truth sets are given equal_error.md and
-# tracking.md.
+# frame.md, frame.csv and frame.svg, picture.md, move.md, and where ground truth sets are given live.md,
+# equal_error.md and tracking.md.
 # CLOCK=cpu (default where the device is lavapipe: wall elsewhere) or wall. Beside Cycles: cycles/run.
 set -eu
 if [ $# -lt 2 ]; then
@@ -20,5 +20,6 @@ if head -n 1 "$out/rays.md" | grep -q llvmpipe; then default=cpu; else default=w
 "$bench/bench_picture" | tee "$out/picture.md"
 "$bench/bench_move" | tee "$out/move.md"
 "$bench/bench_deform" | tee "$out/deform.md"
+[ $# -eq 0 ] || "$bench/bench_live" "$@" | tee "$out/live.md"
 [ $# -eq 0 ] || "$bench/bench_equal_error" "$@" | tee "$out/equal_error.md"
 [ $# -eq 0 ] || "$bench/bench_tracking" "$@" | tee "$out/tracking.md"

@@ -134,6 +134,26 @@ TEST(History, OfAMovingCameraHasOutlinesAsOfManySamples) {
   EXPECT_LT(off_at_outlines(last, truth, mask), 1.1 * off_of_many);
 }
 
+// Samples of both sides together do not know the albedo of either, over which light is filtered: it
+// is that of the pixels around. The first frame of four samples then has outlines as good as those
+// of a frame alone, of which it may have a tenth more error.
+TEST(History, KnowsTheAlbedoOfAnOutlineFromAroundIt) {
+  Stage stage(glm::vec3(0.4f));
+  scene::Texture texture;
+  texture.width = texture.height = 1;
+  texture.texels = {{0.2f, 0.2f, 0.2f, 1}};
+  scene::Material dark = diffuse(glm::vec3(1));
+  dark.base_color_texture = add_texture(stage.view.scene, std::move(texture));
+  stage.view.scene.instances[stage.box].material = add_material(stage.view.scene, dark);
+  SetRenderer first(stage.view), alone(stage.view), reference(stage.view);
+  const glm::dmat4 pose = stage.view.world_from_camera;
+  const Plate truth = shown(reference, pose, 1024, false);
+  const std::vector<float> mask = reference.layers().mask;
+  const double off_alone = off_at_outlines(shown(alone, pose, 4, false, true), truth, mask);
+  ASSERT_GT(off_alone, 0);
+  EXPECT_LT(off_at_outlines(shown(first, pose, 4, true, true), truth, mask), 1.1 * off_alone);
+}
+
 // A rod thinner than a pixel is at the middle of hardly any, so no ray looks for its outline: how
 // much it covers is the mean of what the samples say. Standing still it is then as good as that of
 // as many samples in one frame, of which it may have a tenth more error: what is kept of the rod's
