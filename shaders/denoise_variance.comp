@@ -48,7 +48,8 @@ vec3 variance_of_neighbours(ivec2 at, Pixel here) {
 const float LEAST_KNOWING = 4.0;
 // The samples of a history follow one another in sequences that fill pixel and paths evenly, so that their
 // mean is nearer to the truth than that of independent ones. From 2 * LEAST_KNOWING on, this share of the
-// variance is left (tests/truth/RESULTS.md, "Live").
+// variance of what changes on real surfaces is left. On virtual objects, whose light is seen by itself,
+// what remains of the noise would be seen as stains (tests/truth/RESULTS.md, "Live").
 const float LEFT_BY_EVENNESS = 0.25;
 
 // Returns the variance of a pixel with history. history_show.comp leaves the number of its samples in
@@ -61,7 +62,8 @@ vec3 variance_with_history(ivec2 at, Pixel here) {
     return vec3(DENOISE_MOST_WHITES * DENOISE_MOST_WHITES);
   if (here.overlap >= LEAST_KNOWING) {
     const float evenness = min(here.overlap / LEAST_KNOWING - 1.0, 1.0);
-    return mix(1.0, LEFT_BY_EVENNESS, evenness) * max(here.variance, mean_variance(at, here));
+    const float left = here.cover > 0.0 ? 1.0 : mix(1.0, LEFT_BY_EVENNESS, evenness);
+    return left * max(here.variance, mean_variance(at, here));
   }
   const int reach = int(DENOISE_VARIANCE_REACH);
   float samples = 0.0;
