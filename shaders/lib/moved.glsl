@@ -57,7 +57,7 @@ float share_of_sphere(vec4 sphere, Surface s) {
   }
   for (uint i = 0u; i < min(frame.light_count, MOST_LAMPS); ++i) {
     if (lights[i].type == LIGHT_DIRECTIONAL) continue;
-    const vec3 off = lights[i].position - s.position;
+    const vec3 off = light_positions[i] - s.position;
     const float distance = length(off);
     if (meets_sphere(sphere, s.position, off / max(distance, 1e-30), distance)) return 1.0;
   }

@@ -231,6 +231,35 @@ TEST(LocalHistory, EndsWhereSomethingWalksAndNotElsewhere) {
   EXPECT_LT(apart(walked, truth, 36, 64), 1.5 * apart(begun, truth, 36, 64));
 }
 
+// A virtual lamp lights the floor without noise, and a box that throws a shadow on it jumps away.
+// The past of what the lamp's light is new to is none. A pixel at an outline has other samples than
+// in a fresh start, and may be off by more than 2 % of the change: fewer than a third are at one.
+TEST(LocalHistory, KeepsNothingOfAShadowThatIsGone) {
+  TwoBoxes boxes;
+  boxes.view.environment = uniform_environment(glm::vec3(0));
+  set::Light key = lamp(set::LightType::point, glm::dvec3(3));
+  key.position = {0.6, 1.2, 0.8};
+  key.gain_real = 0;
+  boxes.view.scene.lights = {key};
+  SetRenderer renderer(boxes.view, up_to_depth(1)), fresh(boxes.view, up_to_depth(1));
+  Plate before;
+  for (int frame = 0; frame < 12; ++frame) before = shown(renderer, boxes.view, 4, true);
+  std::vector<scene::Instance> instances = boxes.view.scene.instances;
+  instances[boxes.walks].world_from_object = TwoBoxes::at({0.1, 0.2, 0.1});
+  for (SetRenderer* each : {&renderer, &fresh}) each->move(instances, {key});
+  const Plate after = shown(renderer, boxes.view, 4, true);
+  const Plate begun = shown(fresh, boxes.view, 4, true);
+  int changed = 0, off = 0;
+  for (std::size_t i = 0; i < after.samples.size(); ++i) {
+    const int change = std::abs(before.samples[i] - begun.samples[i]);
+    if (change < 1000 || change > 4000) continue;  // the box itself has changed by more
+    ++changed;
+    off += std::abs(after.samples[i] - begun.samples[i]) > 0.02 * change ? 1 : 0;
+  }
+  EXPECT_GT(changed, 100);
+  EXPECT_LT(3 * off, changed);
+}
+
 // Five frames after a jump nothing is seen of where the box was, beyond half of what a fresh start
 // shows.
 TEST(LocalHistory, ShowsNoGhostOfWhatHasJumped) {
