@@ -10,8 +10,8 @@
 
 #include "shaders/lib/denoise.glsl"
 
-// Of an edge, over white and albedo. Of an outline that is mixed anew: its other side over white, and the
-// number of samples of that.
+// An edge has the uncovered part of its change here, over white and albedo. An outline that is mixed anew
+// has its other side, over white, and the number of samples of that.
 uniform textureBuffer uncovered;
 uniform textureBuffer reals;
 uniform textureBuffer albedos;  // RGBA16F

@@ -134,7 +134,6 @@ int own_index(ivec2 at, Wanted wanted) {
 }
 
 vec3 past_albedo(int index) { return unpack_halves(texelFetch(past_albedos, index).xy); }
-bool is_known(vec3 albedo) { return all(greaterThan(albedo, vec3(0.0))); }
 
 // Returns a pixel's own side with its light over `albedo`, if that is known.
 Own load_own(int index, vec3 albedo) {
@@ -191,7 +190,7 @@ bool add_around(ivec2 low, vec4 wx, vec4 wy, Wanted wanted, vec3 albedo, inout v
   return true;
 }
 
-// Where a point lies among four pixels.
+// A place among four pixels: the first of them, and how far it is from that, in pixels.
 struct Cell {
   ivec2 low;
   vec2 f;
@@ -267,7 +266,7 @@ bool interpolate_own(inout Wanted wanted, vec3 albedo, out Own own) {
   return wanted.most >= LEAST_COUNTED;
 }
 
-// Likewise for the other side, whose class is `of`.
+// Interpolates the other side in the same way, whose class is `of`, and lowers its samples.
 bool interpolate_other(Wanted wanted, float of, out Other other) {
   other = Other(vec3(0.0), 0.0);
   const Cell cell = cell_at(wanted.at);
@@ -314,7 +313,7 @@ bool was_thin(Wanted wanted) {
   return unpack_four_halves(texelFetch(past_others, index).xy).w < 0.0;
 }
 
-// What this frame's samples say of a pixel's sides.
+// The sides of a pixel by this frame's samples alone.
 struct Now {
   Own own;
   Other other;

@@ -54,8 +54,6 @@ Own load_own(uint index) {
              vec4(caustic.rgb, caustic.w * caustic.w));
 }
 
-bool is_known(vec3 albedo) { return all(greaterThan(albedo, vec3(0.0))); }
-
 // Returns the mean of those pixels around whose own side is `side` and whose albedo is known; with no
 // samples if there are none.
 Own own_of_neighbours(ivec2 at, float side) {

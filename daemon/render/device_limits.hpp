@@ -1,4 +1,4 @@
-// What a device allows, and what of it a pass or a buffer is past, in words.
+// Reads what a device allows, and says which limit a pass or a buffer is past.
 #pragma once
 
 #include <cstdint>
@@ -11,21 +11,21 @@
 namespace previz::render {
 
 struct DeviceLimits {
-  // Of a pass.
+  // These are limits of a pass.
   std::uint32_t storage_buffers, texel_buffers, buffers;
   std::uint32_t group_invocations, group_width, push_bytes;
-  // Of a buffer.
+  // These are limits of a buffer.
   std::uint64_t buffer_bytes, allocation_bytes, storage_bytes, texels;
 };
 DeviceLimits limits_of(const vk::raii::PhysicalDevice& physical);
 
-// What is asked for and is more than a device allows.
+// A need that is past what a device allows.
 struct PastLimit {
   std::string asked;  // "600 texels"
   std::uint64_t allowed;
 };
 
-// What a buffer is bound as.
+// The size of a buffer, and how passes use it.
 struct BufferNeed {
   std::uint64_t bytes;
   std::uint64_t texels;  // 0: it is not read as texels

@@ -25,7 +25,7 @@ struct DeviceOptions {
   bool times_passes = false;
 };
 
-// What ran on a device, and how long, by its own clock.
+// The passes that ran on a device, and their times by its own clock.
 struct DeviceTimes {
   struct Pass {
     std::string name;

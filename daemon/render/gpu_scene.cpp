@@ -464,7 +464,8 @@ std::vector<GpuScene::Stance> GpuScene::stances() const {
   for (const scene::Instance& instance : scene_.instances) {
     const scene::Aabb& bounds = places_[instance.mesh].bvh.bounds;
     result.push_back({instance.world_from_object, bounds.low, bounds.high, instance.material,
-                      instance.presence, 0, may_be_dirac_[instance.material]});
+                      instance.presence, 0, may_be_dirac_[instance.material],
+                      scene::emits(scene_.materials[instance.material])});
   }
   for (const scene::Deformation& deformation : scene_.deformations)
     result[deformation.instance].shape = shaped_;

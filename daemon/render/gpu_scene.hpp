@@ -59,6 +59,7 @@ class GpuScene {
     std::uint32_t material = 0, presence = 0;
     std::uint64_t shape = 0;    // counts the shapes that it has had
     bool may_be_dirac = false;  // it may reflect or refract without blur
+    bool emits = false;
     friend bool operator==(const Stance&, const Stance&) = default;
   };
   std::vector<Stance> stances() const;

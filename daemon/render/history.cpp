@@ -1,7 +1,6 @@
 #include "daemon/render/history.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -148,7 +147,10 @@ gpu::GpuHistory History::constants(std::int64_t samples, const MovedInstances& m
   result.tangential = {k.p1, k.p2};
   result.white_ratio = static_cast<float>(past.view.white / now.view.white);
   result.samples = static_cast<float>(samples);
-  const double frames = std::min(frames_that_stay(), frames_after(moved.rest));
+  double frames = std::min(frames_that_stay(), frames_after(moved.rest));
+  // Without photons caustics are traced, and are in the same mean as all other light.
+  if ((*features_ & gpu::FEATURE_PHOTONS) == 0)
+    frames = std::min(frames, frames_after(moved.throws_caustics));
   result.most_samples = static_cast<float>(frames) * result.samples;
   result.most_caustic_samples =
       static_cast<float>(std::min(frames, frames_after(moved.throws_caustics))) * result.samples;

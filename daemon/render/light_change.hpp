@@ -42,14 +42,14 @@ class LightChange {
   // count, so that it is off by no more than 3 %: infinity where light is the same or only
   // trembles.
   double frames();
-  // What was seen last.
+  // Return the light that was seen last.
   const LightCells& environment() const { return environment_; }
   const std::vector<set::Light>& lamps() const { return lamps_; }
 
  private:
   // A state of the light: what changes from frame to frame is a number beside others.
   struct State {
-    // Of the environment and of directional lamps, wherever light was found this time.
+    // These hold the light of the environment and of directional lamps, wherever it was found.
     LightCells mixed, real;
     std::vector<set::Light> lamps;  // those that are somewhere; directional ones are in the cells
     std::vector<set::Light> suns;   // directional ones

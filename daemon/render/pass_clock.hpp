@@ -1,6 +1,6 @@
-// How long every compute pass of a device takes by the device's own clock, and what a frame costs
-// beside its passes: submissions, waiting, buffers. Two timestamps are written around each pass of
-// a submission, and read when it has been waited for.
+// Measures how long every compute pass of a device takes by the device's own clock, and what a
+// frame costs beside its passes: submissions and waiting. Two timestamps are written around each
+// pass of a submission, and read when it has been waited for.
 #pragma once
 
 #include <cstdint>

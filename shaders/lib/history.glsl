@@ -22,6 +22,9 @@ uint pack_normals(vec3 geometric, vec3 shading) {
 vec3 geometric_of(uint bits) { return octahedral_direction(unpackSnorm4x8(bits).xy); }
 vec3 shading_of(uint bits) { return octahedral_direction(unpackSnorm4x8(bits).zw); }
 
+// An albedo that is not known is kept as 0, and is then in the light.
+bool is_known(vec3 albedo) { return all(greaterThan(albedo, vec3(0.0))); }
+
 // Returns whether a pixel's own side and the other one are known apart. `side` is that of its middle,
 // `cover` what history_cover.comp has found.
 bool has_sides(float side, float cover) {

@@ -1,5 +1,5 @@
-// How much the light of a surface changes where an instance has moved: by how much of it that instance
-// can hide or send. What has moved ends the past of what it reaches, and no more (shaders/README.md,
+// Estimates how much the light of a surface changes where an instance has moved: by how much of it that
+// instance can hide or send. What has moved ends the past of what it reaches, and no more (shaders/README.md,
 // "Accumulation over time").
 #ifndef PREVIZ_MOVED_GLSL
 #define PREVIZ_MOVED_GLSL
@@ -14,7 +14,7 @@ layout(scalar) readonly buffer Arrivals { GpuArrival arrivals[]; };
 const float BRIGHT_SHARE = 0.1;
 // What is seen in a smooth surface is a share of its light that nobody has measured. It counts as all.
 const float SMOOTH_ALPHA = 0.3;
-// Shadows are looked for from so many lamps.
+// Shadows are looked for from so many lamps, which are taken evenly from the list of all.
 const uint MOST_LAMPS = 32u;
 // What moves is lit by what it moves among, and changes by less than it has moved.
 const float OWN_SHARE = 0.2;
@@ -55,9 +55,11 @@ float share_of_sphere(vec4 sphere, Surface s) {
     const float part = min(angle / max(a.width, 1e-6), 1.0);
     share += a.share * (a.share > BRIGHT_SHARE ? 1.0 : part * part);
   }
-  for (uint i = 0u; i < min(frame.light_count, MOST_LAMPS); ++i) {
-    if (lights[i].type == LIGHT_DIRECTIONAL) continue;
-    const vec3 off = light_positions[i] - s.position;
+  const uint lamps = min(frame.light_count, MOST_LAMPS);
+  for (uint i = 0u; i < lamps; ++i) {
+    const uint lamp = i * frame.light_count / lamps;
+    if (lights[lamp].type == LIGHT_DIRECTIONAL) continue;
+    const vec3 off = light_positions[lamp] - s.position;
     const float distance = length(off);
     if (meets_sphere(sphere, s.position, off / max(distance, 1e-30), distance)) return 1.0;
   }

@@ -1,5 +1,5 @@
-// What a live frame costs, pass by pass: the camera of a truth set moves on, every frame gets few
-// samples, is averaged with those before it, denoised and dithered.
+// Measures what a live frame costs, pass by pass: the camera of a truth set moves on, every frame
+// gets few samples, is averaged with those before it, denoised and dithered.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>

@@ -147,6 +147,10 @@ TEST(MovedInstances, AreThoseThatMovedOrBecameOthers) {
   other.may_be_dirac = true;
   EXPECT_GT(between(box, other).throws_caustics, 0);
   EXPECT_EQ(between(box, box_at({1, 0, 0})).throws_caustics, 0);
+  EXPECT_EQ(between(box, box_at({9, 0, 0})).rest, 0);
+  render::GpuScene::Stance glows = box_at({9, 0, 0});
+  glows.emits = true;
+  EXPECT_EQ(between(box, glows).rest, 1) << "its light reaches everything";
 }
 
 TEST(MovedInstances, BeyondSixteenCountEverywhere) {

@@ -23,6 +23,13 @@ SpirvInfo pass() {
   return info;
 }
 
+void expect_past(const std::optional<render::PastLimit>& past, const char* asked,
+                 std::uint64_t allowed) {
+  ASSERT_TRUE(past) << asked;
+  EXPECT_EQ(past->asked, asked);
+  EXPECT_EQ(past->allowed, allowed);
+}
+
 TEST(DeviceLimits, AllowWhatIsJustEnough) {
   EXPECT_FALSE(past_limits(just_enough, pass(), push_bytes));
   EXPECT_FALSE(past_limits(just_enough, {4096, 512, true}));
@@ -42,10 +49,7 @@ TEST(DeviceLimits, OfAPassAreNamedWithBothNumbers) {
   for (const auto& each : cases) {
     DeviceLimits limits = just_enough;
     --(limits.*each.limit);
-    const auto past = past_limits(limits, pass(), push_bytes);
-    ASSERT_TRUE(past) << each.words;
-    EXPECT_EQ(past->asked, each.words);
-    EXPECT_EQ(past->allowed, limits.*each.limit);
+    expect_past(past_limits(limits, pass(), push_bytes), each.words, limits.*each.limit);
   }
 }
 
@@ -60,10 +64,7 @@ TEST(DeviceLimits, OfABufferAreNamedWithBothNumbers) {
   for (const auto& each : cases) {
     DeviceLimits limits = just_enough;
     --(limits.*each.limit);
-    const auto past = past_limits(limits, {4096, 512, true});
-    ASSERT_TRUE(past) << each.words;
-    EXPECT_EQ(past->asked, each.words);
-    EXPECT_EQ(past->allowed, limits.*each.limit);
+    expect_past(past_limits(limits, {4096, 512, true}), each.words, limits.*each.limit);
   }
   // What is only read as texels may be larger than a storage buffer.
   DeviceLimits small = just_enough;
