@@ -115,7 +115,7 @@ bool find_before(ivec2 at, ivec2 source, out Wanted wanted) {
   wanted.normal = normalize(rotated(motion.before_from_now, geometric_of(thing.y)));
   wanted.instance = thing.x;
   wanted.most = min(history.most_samples, places[in_picture(source)].w);
-  return all(lessThan(abs(wanted.at), vec2(1e6))) && wanted.most >= LEAST_COUNTED;
+  return all(lessThan(abs(wanted.at), vec2(1e6))) && wanted.most > 0.0;
 }
 
 bool is_same_surface(int index, uint normal, Wanted wanted) {

@@ -21,6 +21,7 @@ const float COAT_SHARE = 0.1;
 // What is reflected may turn by this share of the lobe's width while it is averaged.
 const float MOST_TURN = 0.5;
 const float ANY_NUMBER = 1e9;
+const float LEAST_LEFT = 0.25;
 
 // Returns for how many samples the reflections of a surface stay what they are, if every frame turns
 // them by this angle.
@@ -64,7 +65,9 @@ void main() {
   const GpuMotion motion = motions[hit.instance];
   float most = motion.is_known != 0u ? most_samples(s, turn_of(s.position, motion)) : 0.0;
   const float change = change_by_moved(s, hit.instance);
-  if (change > 0.0) most = min(most, history.samples * history.most_drift / change);
+  // What counts as less than a quarter of a sample after a change would only be seen as a ghost.
+  const float left = change > 0.0 ? history.samples * history.most_drift / change : ANY_NUMBER;
+  most = left < LEAST_LEFT ? 0.0 : min(most, left);
   places[index] = vec4(s.position, most);
   things[index] = uvec2(hit.instance, pack_normals(s.geometric_normal, s.normal));
 }
