@@ -34,8 +34,8 @@ void add_light(CLI::App& calibrate, LightOptions& options) {
 }
 
 void add_response(CLI::App& calibrate, ResponseOptions& options) {
-  CLI::App& command =
-      *calibrate.add_subcommand("response", "A camera's response curve, from a bracket");
+  CLI::App& command = *calibrate.add_subcommand(
+      "response", "A camera's response curve and from which code on it clips, from a bracket");
   command.add_option("footage", options.footage, "Session or folder of pictures")->required();
   command.add_option("--camera", options.camera, "Camera to calibrate")
       ->transform(CLI::CheckedTransformer(std::map<std::string, CameraRole>{

@@ -249,7 +249,7 @@ ResponseFit fit_response(std::span<const BracketPicture> bracket, ResponseMethod
   return fit;
 }
 
-std::vector<std::string> doubts_of(const ResponseFit& fit) {
+std::vector<std::string> doubts_of(const ResponseFit& fit, std::optional<int> clips_from) {
   constexpr double certain_codes = 5, jump = 3;
   constexpr std::size_t step = 5, dark_codes = 32;
   std::vector<std::string> doubts;
@@ -262,12 +262,18 @@ std::vector<std::string> doubts_of(const ResponseFit& fit) {
   const std::vector<double>& curve = fit.curve.inverse_table;
   for (std::size_t code = dark_codes; code + step < curve.size(); ++code) {
     if (curve[code + step] <= jump * curve[code]) continue;
-    doubts.push_back(fmt::format(
-        "the curve jumps from {:.3f} at code {} to {:.3f} at code {}: the camera probably clips "
-        "its light at about code {}, so that all brighter codes are guesses and white is too "
-        "bright; take a bracket with darker pictures of what is brightest, or give clip_share = "
-        "{:.2f} beside the table",
-        curve[code], code, curve[code + step], code + step, code, double(code) / 255));
+    const char* const cause =
+        clips_from
+            ? "clipped light shows at these codes too, so that codes from about {0} on are guesses "
+              "and white is too bright; take a bracket with darker pictures of what is brightest, "
+              "or rely on the table's clip_share, which counts codes from {2} on as clipped"
+            : "the camera probably clips its light at about code {0}, so that all brighter codes "
+              "are guesses and white is too bright; take a bracket with darker pictures of what is "
+              "brightest, or give clip_share = {1:.2f} beside the table";
+    doubts.push_back(
+        fmt::format("the curve jumps from {:.3f} at code {} to {:.3f} at code {}: ", curve[code],
+                    code, curve[code + step], code + step) +
+        fmt::format(fmt::runtime(cause), code, double(code) / 255, clips_from.value_or(255)));
     break;
   }
   return doubts;

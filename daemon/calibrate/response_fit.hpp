@@ -1,6 +1,7 @@
 // Fits the camera's response curve to a bracket of exposures.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -46,7 +47,9 @@ ResponseFit fit_response(std::span<const BracketPicture> bracket, ResponseMethod
 //   error   an exposure that was left out is predicted to more than 5 codes.
 //   jumps   the curve grows threefold within 5 codes above code 32, where no camera's does: a gamma
 //           of 2.2 grows by 1.37.
-std::vector<std::string> doubts_of(const ResponseFit& fit);
+// `clips_from` is the code that the table's clip_share stands for, if it was measured; a jump's
+// advice then names it.
+std::vector<std::string> doubts_of(const ResponseFit& fit, std::optional<int> clips_from = {});
 
 // Returns the better of fits to one bracket: that of the least error, where a curve that does not
 // rise over a share of its codes, and cannot tell their light apart, counts as that share worse.

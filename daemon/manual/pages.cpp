@@ -51,6 +51,7 @@ previzd calibrate observer views --board charuco:7x5:30mm:22mm:5x5_100 --out len
 previzd calibrate observer views --board aprilgrid:6x6:88mm:26.4mm --out lens.toml: Does the same by Kalibr's AprilGrid: 6x6 tags of 88 mm with gaps of 26.4 mm, which is its tagSpacing of 0.3. The output names the form found.
 previzd print board aprilgrid:6x6:40mm:12mm:kalibr --paper A3 --out board.pdf: Draws an AprilGrid as Kalibr prints it, which both programs find.
 previzd calibrate light views --board charuco:7x5:30mm:22mm:5x5_100 --tags desk.toml: Measures the fisheye's lens, and finds where it stands by the set's tags.
+previzd calibrate response bracket --camera observer --out response.toml: Measures the film camera's response curve, and from which code on it clips, from a folder of pictures of one view at several shutter times. The longest exposure should be two stops longer than a bright even area needs to become white.
 previzd calibrate from camchain.yaml --camera cam0 --out lens.toml: Takes a lens that Kalibr, OpenCV, ROS or COLMAP calibrated.
 previzd calibrate from cameras.txt --as observer: Makes a fisheye of COLMAP the film camera's lens, and says by how many pixels it is off at worst.
 previzd calibrate tags walk --set desk.toml --size 80mm --write: Finds where the tags are, from a walk with the film camera past all of them, and writes that into the set file.

@@ -85,7 +85,7 @@ Keys response_keys(ResponseCurve& r, double& responsivity) {
 
 Keys clip_keys(ResponseCurve& r) {
   return {
-      {"response", "clip_share", &r.clip_share, plain.within(0.5, 1), "From this share of the largest picture value on, a pixel is clipped: it means at least so much light. Lower it where white areas of the picture stay below it, as in compressed video or video of limited range.", {}, "response.clip_share", {}, true},
+      {"response", "clip_share", &r.clip_share, plain.within(0.5, 1), "From this share of the largest picture value on, a pixel is clipped: it means at least so much light. Lower it where white areas of the picture stay below it, as in compressed video or video of limited range (previzd calibrate response --camera observer measures it).", {}, "response.clip_share", {}, true},
   };
 }
 

@@ -285,6 +285,11 @@ TEST(ResponseCalibration, AJumpIsNamedWithItsCause) {
   ASSERT_EQ(doubts_of(fit).size(), 1u);
   EXPECT_NE(doubts_of(fit)[0].find("clips its light at about code 240"), std::string::npos)
       << doubts_of(fit)[0];
+  EXPECT_NE(doubts_of(fit)[0].find("give clip_share = 0.94"), std::string::npos);
+  // What was measured already need not be given.
+  EXPECT_NE(doubts_of(fit, 244)[0].find("clip_share, which counts codes from 244 on"),
+            std::string::npos)
+      << doubts_of(fit, 244)[0];
   fit.error_codes = 12;
   EXPECT_NE(doubts_of(fit)[0].find("predicted only to 12.0 codes"), std::string::npos);
 }
