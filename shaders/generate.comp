@@ -44,7 +44,7 @@ void main() {
   const uvec2 pixel = uvec2(batch.x, batch.y) + in_tile;
   const bool wanted = valid && slot_sample(slot) < sample_limit(pixel);
   if (wanted) {
-    const Sampler random = make_sampler(frame.seed, pixel, frame.past_samples + slot_sample(slot));
+    const Sampler random = slot_sampler(slot, pixel);
     vec3 target = vec3(calibrated_ray(pixel, sample_2d(random, PAIR_PIXEL)), 1.0);
     vec3 origin = vec3(0.0);
     if (has_feature(FEATURE_LENS)) {

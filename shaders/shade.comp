@@ -442,8 +442,7 @@ void shade_vertex(inout Path p, Surface s, out GpuShadowRay ray, out bool lit, o
   lit = false;
   scattered = false;
   const uvec2 pixel = uvec2(batch.x, batch.y) + slot_pixel(p.slot);
-  const Sampler random =
-      make_sampler(frame.seed, pixel, frame.past_samples + slot_sample(p.slot));
+  const Sampler random = slot_sampler(p.slot, pixel);
   vec2 chance = sample_2d(random, vertex_pair(PAIR_CHANCE, p.depth));
   if (ends_far_off(p, s, chance.x)) return;
   Lobes l = make_lobes(s);

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "daemon/render/error_estimate.hpp"
@@ -95,6 +96,9 @@ Refined refine(render::Renderer& renderer, const set::Quality& quality,
   };
   const bool has_target = goes_on(quality);
   int samples = has_target ? std::max(quality.samples, least_samples) : quality.samples;
+  if (has_target) renderer.separate_parts();
+  std::vector<bool> active;                 // parts of blocks, which get the next samples
+  std::vector<std::uint32_t> part_samples;  // that the pixels of each part have
   while (add(samples)) {
     if (!has_target) {
       refined.whole = true;
@@ -103,14 +107,25 @@ Refined refine(render::Renderer& renderer, const set::Quality& quality,
     const render::Layers layers = renderer.layers();
     const render::ErrorEstimate estimate = render::estimate_error(layers);
     refined.error = estimate.picture;
+    active.resize(estimate.parts.size(), true);
+    part_samples.resize(active.size());
+    for (std::size_t i = 0; i < active.size(); ++i)
+      part_samples[i] += active[i] ? static_cast<std::uint32_t>(samples) : 0;
     const double allowed = quality.error > 0 ? quality.error : 0.5 * estimate.picture;
-    const auto blocks = render::blocks_above(estimate, layers.width, layers.height, allowed);
-    const bool converged = std::ranges::find(blocks, true) == blocks.end();
+    // What has ended does not begin again: otherwise the light that a part has met would bring the
+    // others samples, and the light that these meet would bring it some, to its own dilution. Only
+    // where time alone counts, what falls behind the rest begins again, when all have ended.
+    const auto above =
+        render::parts_above(estimate, layers.width, layers.height, allowed, part_samples);
+    const std::vector<bool> before = std::exchange(active, above);
+    for (std::size_t i = 0; i < active.size(); ++i) active[i] = above[i] && before[i];
+    if (quality.error <= 0 && std::ranges::find(active, true) == active.end()) active = above;
+    const bool converged = std::ranges::find(active, true) == active.end();
     if (converged || late() || refined.samples >= most_samples) {
       refined.whole = true;
       break;
     }
-    renderer.limit_samples(limits_of(blocks, refined.samples));
+    renderer.limit_parts(limits_of(active, refined.samples));
     samples = refined.samples;
   }
   return refined;

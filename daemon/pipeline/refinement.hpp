@@ -24,10 +24,12 @@ bool spreads_samples(const set::Quality& quality);
 // .seconds every pixel gets quality.samples. If they are spread (spreads_samples), that number is
 // the average: a sixteenth of them, at least 8 a pixel, are pilot samples that decide where the
 // others help most. With a target every pixel first gets quality.samples (at least 8); then, round
-// after round, the samples are doubled in 8x8 blocks that are still above the error (with a time
-// alone: above half of the picture's error), until no block is or the time is over. `progress`
-// receives how many samples are done: the average where they are spread, else the largest number of
-// any pixel.
+// after round, the samples are doubled in those parts of 8x8 blocks that need more to come below
+// the error (with a time alone: below half of the picture's error), until none does or the time is
+// over. A part is judged by other pixels (render::parts_above), so that no light is lost where it
+// has been missed by chance; photons, which pixels share, are the exception. So the picture comes
+// down to the error, but a single block may stay above it. `progress` receives how many samples are
+// done: the average where they are spread, else the largest number of any pixel.
 Refined refine(render::Renderer& renderer, const set::Quality& quality,
                const std::function<bool()>& cancelled,
                const std::function<void(int samples)>& progress);

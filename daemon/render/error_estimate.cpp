@@ -9,6 +9,7 @@ namespace previz::render {
 namespace {
 
 constexpr int block = static_cast<int>(gpu::SAMPLED_BLOCK);
+constexpr std::size_t parts = gpu::SAMPLED_PARTS;
 
 int blocks_in(int pixels) {
   return (pixels + block - 1) / block;
@@ -38,20 +39,27 @@ Grid grid_of(int width, int height) {
   return {blocks_in(width), blocks_in(height)};
 }
 
-// Returns each block's standard error, smoothed over its neighbours; the block's own variance
-// counts half.
-std::vector<double> smoothed(const ErrorEstimate& estimate, const Grid& grid) {
+// Returns the mean over a block and its neighbours of what `squared_error` returns for each; the
+// block itself counts half.
+double smoothed(const Grid& grid, std::size_t cell, const auto& squared_error) {
   constexpr double own_weight = 8;
+  double sum = 0, weights = 0;
+  grid.each_neighbour(cell, [&](std::size_t other) {
+    const double weight = other == cell ? own_weight : 1;
+    sum += weight * squared_error(other);
+    weights += weight;
+  });
+  return sum / weights;
+}
+
+// Returns each block's standard error, smoothed over its neighbours.
+std::vector<double> smoothed(const ErrorEstimate& estimate, const Grid& grid) {
+  const auto squared_error = [&](std::size_t cell) {
+    return 1.0 * estimate.blocks[cell] * estimate.blocks[cell];
+  };
   std::vector<double> result;
-  for (std::size_t cell = 0; cell < grid.size(); ++cell) {
-    double sum = 0, weights = 0;
-    grid.each_neighbour(cell, [&](std::size_t other) {
-      const double weight = other == cell ? own_weight : 1;
-      sum += weight * estimate.blocks[other] * estimate.blocks[other];
-      weights += weight;
-    });
-    result.push_back(std::sqrt(sum / weights));
-  }
+  for (std::size_t cell = 0; cell < grid.size(); ++cell)
+    result.push_back(std::sqrt(smoothed(grid, cell, squared_error)));
   return result;
 }
 
@@ -60,39 +68,55 @@ std::vector<double> smoothed(const ErrorEstimate& estimate, const Grid& grid) {
 ErrorEstimate estimate_error(const Layers& layers) {
   const Grid grid = grid_of(layers.width, layers.height);
   std::vector<double> variance(grid.size()), pixels(grid.size());
+  std::vector<double> part_variance(parts * grid.size()), part_pixels(parts * grid.size());
   double square = 0;
   for (int y = 0; y < layers.height; ++y) {
     for (int x = 0; x < layers.width; ++x) {
       const std::size_t pixel = static_cast<std::size_t>(y) * layers.width + x;
       const std::size_t cell = grid.at(x / block, y / block);
+      const std::size_t part = parts * cell + static_cast<std::size_t>(y % 2 * 2 + x % 2);
       for (int c = 0; c < 3; ++c) {
         const double mean = layers.composite[pixel][c];
-        variance[cell] += seen_variance(mean, layers.variance[pixel][c], layers.white);
+        const double noise = seen_variance(mean, layers.variance[pixel][c], layers.white);
+        variance[cell] += noise;
+        part_variance[part] += noise;
         const double seen = std::min(mean, layers.white);
         square += seen * seen;
       }
       pixels[cell] += 1;
+      part_pixels[part] += 1;
     }
   }
   ErrorEstimate estimate;
-  estimate.blocks.resize(grid.size());
+  estimate.blocks.resize(variance.size());
+  estimate.parts.resize(part_variance.size());
   if (!(square > 0)) return estimate;
   const double mean_square = square / static_cast<double>(layers.composite.size());
   double total = 0;
-  for (std::size_t i = 0; i < grid.size(); ++i) {
+  for (std::size_t i = 0; i < variance.size(); ++i) {
     total += variance[i];
     estimate.blocks[i] = static_cast<float>(std::sqrt(variance[i] / pixels[i] / mean_square));
   }
+  // Some parts of blocks that the picture's edge cuts have no pixel.
+  for (std::size_t i = 0; i < part_variance.size(); ++i)
+    if (part_pixels[i] > 0)
+      estimate.parts[i] =
+          static_cast<float>(std::sqrt(part_variance[i] / part_pixels[i] / mean_square));
   estimate.picture = std::sqrt(total / square);
   return estimate;
 }
 
-std::vector<bool> blocks_above(const ErrorEstimate& estimate, int width, int height, double error) {
+std::vector<bool> parts_above(const ErrorEstimate& estimate, int width, int height, double error,
+                              const std::vector<std::uint32_t>& samples) {
   const Grid grid = grid_of(width, height);
-  std::vector<bool> result(grid.size());
-  for (std::size_t cell = 0; cell < grid.size(); ++cell)
-    if (estimate.blocks[cell] > error)
-      grid.each_neighbour(cell, [&](std::size_t other) { result[other] = true; });
+  std::vector<bool> result(parts * grid.size());
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    const double left = smoothed(grid, i / parts, [&](std::size_t cell) {
+      const std::size_t judge = parts * cell + (i + 1) % parts;
+      return 1.0 * estimate.parts[judge] * estimate.parts[judge] * samples[judge] / samples[i];
+    });
+    result[i] = left > error * error;
+  }
   return result;
 }
 

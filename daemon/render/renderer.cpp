@@ -64,6 +64,7 @@ struct Renderer::Impl {
   std::optional<History> history;      // made when a frame first accumulates
   std::uint32_t past_samples = 0;      // of the frames that were accumulated before this one
   bool counts_samples = false;         // this frame's are accumulated
+  bool has_separate_parts = false;     // this frame's (Renderer::separate_parts)
   Buffers scene_buffers;               // of the current frame
   std::uint32_t features = 0;          // of the current frame
   Buffer rays, frame_buffer;
@@ -119,6 +120,7 @@ void Renderer::Impl::upload_frame() {
   gpu_frame.photon_count = photons();
   gpu_frame.exposure = static_cast<float>(frame.exposure);
   gpu_frame.past_samples = frame.accumulates ? past_samples : 0;
+  gpu_frame.has_separate_parts = has_separate_parts ? 1 : 0;
   constexpr std::uint32_t patterned = gpu::FEATURE_TEXTURES | gpu::FEATURE_VERTEX_COLORS;
   gpu_frame.keeps_albedo = (needed() & patterned) != 0 ? 1 : 0;
   gpu_frame.clip_from = is_clipped ? response->clipping().from : gpu::NO_INDEX;
@@ -276,6 +278,7 @@ void Renderer::begin(FrameInput frame) {
   }
   r.begin_accumulating();
   r.samples = 0;
+  r.has_separate_parts = false;
   r.trees_before = std::exchange(r.trees_now, r.scene.rebuilt_trees());
   r.upload_plate();
   r.scene.place(glm::dvec3(r.frame.world_from_camera[3]));
@@ -323,7 +326,19 @@ std::optional<Layers> Renderer::pilot(int samples, const std::function<bool()>& 
 }
 
 void Renderer::limit_samples(const std::vector<std::uint32_t>& limits) {
+  std::vector<std::uint32_t> of_parts;
+  for (const std::uint32_t limit : limits)
+    of_parts.insert(of_parts.end(), gpu::SAMPLED_PARTS, limit);
+  limit_parts(of_parts);
+}
+
+void Renderer::limit_parts(const std::vector<std::uint32_t>& limits) {
   impl_->wavefront->limit_samples(limits);
+}
+
+void Renderer::separate_parts() {
+  impl_->has_separate_parts = true;
+  impl_->upload_frame();
 }
 
 Layers Renderer::layers() const {

@@ -87,6 +87,14 @@ class Renderer {
   // From now on the pixels of each block of SAMPLED_BLOCK^2 (row-major) get no more than this many
   // samples: adaptive sampling, daemon/render/error_estimate.hpp. begin() removes the limits.
   void limit_samples(const std::vector<std::uint32_t>& limits);
+  // The same with a limit for each of the SAMPLED_PARTS of each block, those of one block together:
+  // the pixels that have one place in squares of 2x2, row-major.
+  void limit_parts(const std::vector<std::uint32_t>& limits);
+  // From now on the parts of a block have random numbers that are independent of one another, so
+  // that one can judge how many samples another needs. Otherwise the pixels of a block share theirs
+  // out (shaders/lib/sampler.glsl): if one has missed a light, others have met it more often. The
+  // current frame must have no samples yet, and the next begin() ends it. Photons are still shared.
+  void separate_parts();
   // Returns the layers of the samples so far.
   Layers layers() const;
   // Returns the composite of the samples so far through exposure and response, as the display shows

@@ -106,8 +106,8 @@ void Wavefront::create_tiles() {
 }
 
 void Wavefront::create_paths() {
-  const vk::DeviceSize limits =
-      sizeof(std::uint32_t) * sampled_blocks(width_) * vk::DeviceSize{sampled_blocks(height_)};
+  const vk::DeviceSize limits = sizeof(std::uint32_t) * gpu::SAMPLED_PARTS *
+                                sampled_blocks(width_) * vk::DeviceSize{sampled_blocks(height_)};
   if (limits_.size < limits) limits_ = create_storage_buffer(device_, limits);
   std::uint32_t most = 0;
   for (const Tile& tile : tiles_) most = std::max(most, slots_of(tile.batch));
@@ -200,7 +200,7 @@ void Wavefront::limit_samples(const std::vector<std::uint32_t>& limits) {
   upload_bytes(device_, limits_, std::as_bytes(std::span(limits)));
   sampled_until_ = limits;
   std::ranges::sort(sampled_until_);
-  const std::size_t columns = sampled_blocks(width_);
+  const std::size_t columns = std::size_t{gpu::SAMPLED_PARTS} * sampled_blocks(width_);
   for (Tile& tile : tiles_) {
     const std::size_t first = tile.batch.y / gpu::SAMPLED_BLOCK;
     const std::size_t last = (tile.batch.y + tile.batch.height - 1) / gpu::SAMPLED_BLOCK;
@@ -211,14 +211,15 @@ void Wavefront::limit_samples(const std::vector<std::uint32_t>& limits) {
 }
 
 void Wavefront::clear() {
-  limit_samples(std::vector<std::uint32_t>(
-      std::size_t{sampled_blocks(width_)} * sampled_blocks(height_), gpu::UNLIMITED));
+  sampled_until_ = {gpu::UNLIMITED};
+  for (Tile& tile : tiles_) tile.limit = gpu::UNLIMITED;
   photons_owed_ = 0;
   gpu::GpuControl control{};
   control.extend_groups[1] = control.extend_groups[2] = 1;
   control.shadow_groups[1] = control.shadow_groups[2] = 1;
   upload_bytes(device_, control_, std::as_bytes(std::span(&control, 1)));
   device_.submit([&](const vk::raii::CommandBuffer& commands) {
+    commands.fillBuffer(*limits_.buffer, 0, VK_WHOLE_SIZE, gpu::UNLIMITED);
     for (std::size_t i = 0; i < tiles_.size(); ++i)
       record_clear(commands, pixels_[i], bytes_of(tiles_[i]));
     for (const Buffer& caustics : caustics_) record_clear(commands, caustics, caustics.size);
@@ -285,7 +286,7 @@ bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::u
   return true;
 }
 
-// Returns the share of the picture's blocks that get the sample.
+// Returns the share of the parts of the picture's blocks that get the sample.
 double Wavefront::share_of(std::uint32_t sample) const {
   const auto first = std::ranges::upper_bound(sampled_until_, sample);
   return static_cast<double>(sampled_until_.end() - first) /

@@ -38,7 +38,8 @@ class Wavefront {
   // Sets the camera's measurement, row-major (CameraMap::upload); used where `features` has
   // FEATURE_CAMERA.
   void use_camera(const std::vector<glm::vec4>& plate);
-  // Limits the number of samples for the pixels of each block of SAMPLED_BLOCK^2, row-major.
+  // Limits the number of samples for the pixels of each of the SAMPLED_PARTS of each block of
+  // SAMPLED_BLOCK^2: blocks are row-major, and so are the parts of one.
   void limit_samples(const std::vector<std::uint32_t>& limits);
   // Forgets all samples; every pixel is sampled again, without a limit.
   void clear();
@@ -62,7 +63,7 @@ class Wavefront {
  private:
   struct Tile {
     gpu::GpuBatch batch;      // the tile's rectangle
-    std::uint32_t limit = 0;  // the largest limit of its blocks
+    std::uint32_t limit = 0;  // the largest limit in its blocks
   };
 
   void create_tiles();
@@ -88,7 +89,7 @@ class Wavefront {
   int width_ = 0, height_ = 0;
   PhotonMap photons_;
   CameraMap camera_;
-  std::vector<std::uint32_t> sampled_until_;  // the limits of all blocks, sorted, least first
+  std::vector<std::uint32_t> sampled_until_;  // the limits, sorted, least first
   double photon_radius_ = 0;                  // over the distance; of the first sample
   double traced_radius_ = 0;                  // likewise; of the current photons
   double photons_owed_ = 0;                   // passes; photons are traced anew at 1

@@ -5,6 +5,7 @@
 
 #include "shaders/lib/batch.glsl"
 #include "shaders/lib/halves.glsl"
+#include "shaders/lib/sampler.glsl"
 #include "shaders/lib/scene.glsl"
 
 // A slot is one sample of one pixel. It has two paths, because a path can fork once: path 2 slot, and
@@ -30,8 +31,9 @@ layout(scalar) buffer Albedo { uvec2 sample_albedo[]; };
 // FEATURE_PHOTONS.
 layout(scalar) buffer Caustic { vec4 sample_caustic[]; };
 layout(scalar) buffer Control { GpuControl control; };
-layout(scalar) readonly buffer Limits { uint limits[]; };       // of a block of the picture, row-major:
-                                                                // how many samples its pixels get
+layout(scalar) readonly buffer Limits { uint limits[]; };       // of the parts of a block of the picture,
+                                                                // row-major: how many samples their
+                                                                // pixels get
 layout(scalar) buffer Pixels { GpuPixel pixels[]; };            // of the tile, row-major
 layout(scalar) buffer Caustics { vec4 pixel_caustics[]; };      // of the tile: the sums of what photons
                                                                 // bring to the change, and of its variance
@@ -68,10 +70,17 @@ uint pixel_slot(uvec2 pixel) {
 // Returns the largest number of samples that a pixel of the picture may get.
 uint sample_limit(uvec2 pixel) {
   const uint blocks_x = (frame.width + SAMPLED_BLOCK - 1u) / SAMPLED_BLOCK;
-  return limits[pixel.y / SAMPLED_BLOCK * blocks_x + pixel.x / SAMPLED_BLOCK];
+  const uint block = pixel.y / SAMPLED_BLOCK * blocks_x + pixel.x / SAMPLED_BLOCK;
+  return limits[SAMPLED_PARTS * block + (pixel.y & 1u) * 2u + (pixel.x & 1u)];
 }
 
 uint slot_sample(uint slot) { return batch.first_sample + slot / tile_slots(); }
+
+// Returns the random numbers of a slot, whose pixel is this one of the picture.
+Sampler slot_sampler(uint slot, uvec2 pixel) {
+  const Sampler random = make_sampler(frame.seed, pixel, frame.past_samples + slot_sample(slot));
+  return frame.has_separate_parts != 0u ? separate_parts(random) : random;
+}
 
 // The queue buffer has two halves: the active one is being worked on, the next one is being filled.
 uint active_queue_index(uint i) { return control.queue_side * (queue.length() / 2u) + i; }

@@ -50,8 +50,10 @@ PREVIZ_CONST uint COMPOSITE_HYBRID = 2u;
 PREVIZ_CONST float SAMPLE_FULL = 0.0f;        // both radiances
 PREVIZ_CONST float SAMPLE_DIFFERENCE = 1.0f;  // only the difference of the two
 
-// Blocks of so many pixels a side get the same number of samples.
+// The pixels of a block, of so many a side, fall into parts by their place in squares of 2x2; those of
+// one part get the same number of samples.
 PREVIZ_CONST uint SAMPLED_BLOCK = 8u;
+PREVIZ_CONST uint SAMPLED_PARTS = 4u;
 PREVIZ_CONST uint UNLIMITED = 0xffffffffu;
 
 PREVIZ_CONST uint WORKGROUP_SIZE = 64u;
@@ -351,6 +353,7 @@ struct GpuFrame {
   vec3 tree_offset;             // of the camera from the tree's origin
   uint distant_light_count;     // the first of the visible lights: discs at infinity
   uint past_samples;            // of earlier frames, after which the random numbers go on
+  uint has_separate_parts;      // 1: the SAMPLED_PARTS of a block have independent random numbers
 };
 
 // Push constants of a batch: a part of the picture and a range of samples.
@@ -515,7 +518,7 @@ static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 32);
 static_assert(sizeof(GpuLight) == 160);
 static_assert(offsetof(GpuLight, uv0) == 112);
-static_assert(sizeof(GpuFrame) == 236);
+static_assert(sizeof(GpuFrame) == 240);
 static_assert(sizeof(GpuLightNode) == 48);
 static_assert(sizeof(GpuBatch) == 28);
 static_assert(sizeof(GpuPhoton) == 64);

@@ -43,6 +43,12 @@ Sampler make_sampler(uint seed, uvec2 pixel, uint index) {
   return Sampler(hash_pair(hash_pair(seed, tile.x), tile.y), index, in_tile.x | (in_tile.y << 1));
 }
 
+// Gives the four pixels of a square of 2x2 to four nets that are independent of one another, each of
+// which spreads over the tile as the whole did.
+Sampler separate_parts(Sampler s) {
+  return Sampler(hash_pair(s.key, s.place & 3u), s.index, s.place >> 2);
+}
+
 // The Laine-Karras permutation, which is an Owen scramble of reversed bits (constants by Vegdahl
 // 2021).
 uint scramble_reversed(uint x, uint seed) {
