@@ -10,7 +10,6 @@
 
 #include "shaders/lib/halves.glsl"
 #include "shaders/lib/history.glsl"
-#include "shaders/lib/lens.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 layout(scalar, push_constant) uniform Show { GpuShow show; };
@@ -25,12 +24,11 @@ layout(scalar) readonly buffer Caustics { vec4 caustics[]; };
 // This frame's, of the picture, as history_surface.comp and history_cover.comp make them.
 layout(scalar) readonly buffer Places { vec4 places[]; };
 layout(scalar) readonly buffer Things { uvec2 things[]; };
-layout(scalar) readonly buffer Classes { float classes[]; };
+layout(scalar) readonly buffer Befores { vec2 befores[]; };
 layout(scalar) readonly buffer Covers { float covers[]; };
 // The history up to the frame before, of its picture.
 uniform textureBuffer past_places;
 uniform utextureBuffer past_things;
-uniform textureBuffer past_classes;
 uniform textureBuffer past_lights;
 uniform utextureBuffer past_spreads;
 uniform utextureBuffer past_albedos;
@@ -61,6 +59,15 @@ const float SNAP = 0.01;
 const float LEAST_COUNTED = 0.25;
 // A pixel becomes whole again where less than this share of it shows another side.
 const float LEAST_SHARE = 1.0 / 512.0;
+// A place in a mirror is looked for in so many steps of no more pixels than these. Where slopes are less
+// apart than this, their angle's squared sine, they do not tell where it is.
+const int MOST_STEPS = 6;
+// What is not found there moves as the mirror does, for so many frames at most.
+const float MOST_LOOSE = 4.0;
+const float LONGEST_STEP = 8.0;
+const float LEAST_DETERMINANT = 1e-4;
+const ivec2 AROUND[8] = ivec2[](ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1), ivec2(1, 1),
+                                ivec2(-1, 1), ivec2(1, -1), ivec2(-1, -1));
 // The other side moves as the nearest pixel within this reach whose own side it is.
 const int REACH = int(HISTORY_REACH);
 
@@ -84,44 +91,30 @@ struct Wanted {
   vec2 at;        // place in its picture; pixel centres are at whole numbers
   vec3 position;  // from its camera
   vec3 normal;
-  uint instance;
+  uint thing;     // pack_thing()
   float most;     // samples that it may count as
+  bool is_loose;  // anything in the same mirror will do
 };
 
 int width() { return int(history.width); }
 bool is_inside(ivec2 at, uint w, uint h) {
   return all(greaterThanEqual(at, ivec2(0))) && all(lessThan(at, ivec2(w, h)));
 }
+vec2 picture_scale() {
+  return vec2(history.width_before, history.height_before) / vec2(history.width, history.height);
+}
 uint in_picture(ivec2 at) { return uint(at.y * width() + at.x); }
 bool is_partly(float mask) { return mask > 0.0 && mask < 1.0; }
 
-// Returns the place of a ray in the picture before.
-vec2 project_before(vec2 ray) {
-  const vec2 bent = distorted(ray, history.radial, history.radial_divisor, history.tangential);
-  return history.focal_px * bent + history.principal_px;
-}
-
-// Finds where a pixel was in the frame before, if it moves as the surface at `source` does.
-bool find_before(ivec2 at, ivec2 source, out Wanted wanted) {
-  const uvec2 thing = things[in_picture(source)];
-  if (thing.x == NO_INDEX || motions[thing.x].is_known == 0u) return false;
-  const GpuMotion motion = motions[thing.x];
-  wanted.position = moved(motion.before_from_now, places[in_picture(source)].xyz);
-  const vec3 camera = rotated(history.camera_from_world, wanted.position);
-  if (camera.z <= 0.0) return false;
-  const vec2 scale = vec2(history.width_before, history.height_before) /
-                     vec2(history.width, history.height);
-  wanted.at = project_before(camera.xy / camera.z) + scale * vec2(at - source);
-  wanted.normal = normalize(rotated(motion.before_from_now, geometric_of(thing.y)));
-  wanted.instance = thing.x;
-  wanted.most = min(history.most_samples, places[in_picture(source)].w);
-  return all(lessThan(abs(wanted.at), vec2(1e6))) && wanted.most > 0.0;
-}
-
 bool is_same_surface(int index, uint normal, Wanted wanted) {
+  if (wanted.is_loose) return true;
   const vec3 off = texelFetch(past_places, index).xyz - wanted.position;
   return abs(dot(off, wanted.normal)) <= MOST_OFF_PLANE * length(wanted.position) &&
          dot(geometric_of(normal), wanted.normal) >= LEAST_ALIKE;
+}
+
+bool is_same_thing(uint thing, Wanted wanted) {
+  return wanted.is_loose ? are_same_mirror(thing, wanted.thing) : thing == wanted.thing;
 }
 
 // Returns the index of a pixel of the frame before, or -1 where its own side is not what is wanted.
@@ -129,8 +122,85 @@ int own_index(ivec2 at, Wanted wanted) {
   if (!is_inside(at, history.width_before, history.height_before)) return -1;
   const int index = at.y * int(history.width_before) + at.x;
   const uvec2 thing = texelFetch(past_things, index).xy;
-  if (thing.x != wanted.instance || !is_same_surface(index, thing.y, wanted)) return -1;
+  if (!is_same_thing(thing.x, wanted) || !is_same_surface(index, thing.y, wanted)) return -1;
   return texelFetch(past_lights, index).w > 0.0 ? index : -1;
+}
+
+// Returns how far the places that a mirror shows are apart from a pixel to the next, along one axis.
+bool find_slope(ivec2 at, ivec2 axis, out vec3 slope) {
+  const uint here = in_picture(at);
+  for (int side = 1; side >= -1; side -= 2) {
+    const ivec2 beside = at + side * axis;
+    if (!is_inside(beside, history.width, history.height)) continue;
+    const uint there = in_picture(beside);
+    slope = float(side) * (places[there].xyz - places[here].xyz);
+    if (things[there].x == things[here].x) return true;
+  }
+  return false;
+}
+
+// Returns the nearest pixel of the frame before whose own side is what is wanted, or -1.
+int own_index_near(ivec2 at, Wanted wanted) {
+  const int index = own_index(at, wanted);
+  if (index >= 0) return index;
+  for (int i = 0; i < 8; ++i) {
+    const int beside = own_index(at + AROUND[i], wanted);
+    if (beside >= 0) return beside;
+  }
+  return -1;
+}
+
+// Finds where a mirror showed a place in the frame before. That is looked for among the places that its
+// pixels showed then, by Newton's method from where its surface was, with this frame's slopes.
+bool find_in_mirror(ivec2 at, inout Wanted wanted) {
+  vec3 slope_x, slope_y;
+  if (!find_slope(at, ivec2(1, 0), slope_x) || !find_slope(at, ivec2(0, 1), slope_y)) return false;
+  const vec2 scale = picture_scale();
+  slope_x /= scale.x;
+  slope_y /= scale.y;
+  const float xx = dot(slope_x, slope_x), xy = dot(slope_x, slope_y), yy = dot(slope_y, slope_y);
+  const float determinant = xx * yy - xy * xy;
+  if (!(determinant > LEAST_DETERMINANT * xx * yy)) return false;
+  for (int i = 0; i < MOST_STEPS; ++i) {
+    const int index = own_index_near(ivec2(floor(wanted.at + 0.5)), wanted);
+    if (index < 0) return false;
+    const vec2 there = vec2(index % int(history.width_before), index / int(history.width_before));
+    const vec3 off = wanted.position - texelFetch(past_places, index).xyz;
+    const float x = dot(off, slope_x), y = dot(off, slope_y);
+    const vec2 step = vec2(yy * x - xy * y, xx * y - xy * x) / determinant;
+    wanted.at = there + clamp(step, -LONGEST_STEP, LONGEST_STEP);
+    if (all(lessThan(abs(step), vec2(1.0)))) return true;
+  }
+  return false;
+}
+
+// Finds where a pixel was in the frame before, if it moves as what is seen at `source` does.
+bool find_before(ivec2 at, ivec2 source, out Wanted wanted) {
+  const uvec2 thing = things[in_picture(source)];
+  const vec4 place = places[in_picture(source)];
+  wanted.thing = thing.x;
+  wanted.is_loose = false;
+  wanted.at = befores[in_picture(source)];
+  wanted.most = min(history.most_samples, place.w);
+  if (!all(lessThan(abs(wanted.at), vec2(1e6))) || wanted.most <= 0.0) return false;
+  const uint instance = instance_of(thing.x);
+  wanted.position = place.xyz;
+  wanted.normal = geometric_of(thing.y);
+  if (instance != NO_THING) {
+    if (motions[instance].is_known == 0u) return false;
+    wanted.position = moved(motions[instance].before_from_now, place.xyz);
+    wanted.normal = normalize(rotated(motions[instance].before_from_now, wanted.normal));
+  }
+  if (is_seen_in_mirror(thing.x)) {
+    const vec2 of_mirror = wanted.at;
+    wanted.is_loose = !find_in_mirror(source, wanted);
+    if (wanted.is_loose) {
+      wanted.at = of_mirror;
+      wanted.most = min(wanted.most, history.samples * MOST_LOOSE);
+    }
+  }
+  wanted.at += picture_scale() * vec2(at - source);
+  return true;
 }
 
 vec3 past_albedo(int index) { return unpack_halves(texelFetch(past_albedos, index).xy); }
@@ -153,10 +223,11 @@ Own load_own(int index, vec3 albedo) {
 bool load_other(ivec2 at, float of, Wanted wanted, out Other other) {
   if (!is_inside(at, history.width_before, history.height_before)) return false;
   const int index = at.y * int(history.width_before) + at.x;
-  const float side = texelFetch(past_classes, index).x;
+  const uint thing = texelFetch(past_things, index).x;
+  const float side = class_of(thing);
   if (side == of) {
     const vec4 light = texelFetch(past_lights, index);
-    if (texelFetch(past_things, index).x != wanted.instance || !(light.w > 0.0)) return false;
+    if (!is_same_thing(thing, wanted) || !(light.w > 0.0)) return false;
     const Own own = load_own(index, vec3(0.0));
     other = Other((is_known(own.albedo) ? own.albedo : vec3(1.0)) * own.light + own.caustic.rgb,
                   1.0 / light.w);
@@ -173,10 +244,28 @@ vec4 sharp_weights(float f) {
               f * (0.5 + f * (2.0 - 1.5 * f)), f * f * (-0.5 + 0.5 * f));
 }
 
+// A sum with sharp_weights(), some of which are below 0.
+struct Sharp {
+  vec3 sum;
+  vec3 least, most;  // of what is in it
+};
+
+const Sharp EMPTY_SHARP = Sharp(vec3(0.0), vec3(1e30), vec3(-1e30));
+
+void add(inout Sharp sharp, float weight, vec3 light) {
+  sharp.sum += weight * light;
+  sharp.least = min(sharp.least, light);
+  sharp.most = max(sharp.most, light);
+}
+
+// Beside a lamp in a mirror, or a focus, the sum would be below all that there is. Noise is left as it is,
+// which a limit would move to where more of it is.
+vec3 limited(Sharp sharp) { return clamp(sharp.sum, sharp.least, sharp.most); }
+
 // Adds the 12 pixels around the four to what is interpolated without blurring. Returns false if one of
 // them is missing.
-bool add_around(ivec2 low, vec4 wx, vec4 wy, Wanted wanted, vec3 albedo, inout vec3 light,
-                inout vec3 caustic) {
+bool add_around(ivec2 low, vec4 wx, vec4 wy, Wanted wanted, vec3 albedo, inout Sharp light,
+                inout Sharp caustic) {
   for (int y = 0; y < 4; ++y)
     for (int x = 0; x < 4; ++x) {
       if ((x == 1 || x == 2) && (y == 1 || y == 2)) continue;
@@ -184,8 +273,8 @@ bool add_around(ivec2 low, vec4 wx, vec4 wy, Wanted wanted, vec3 albedo, inout v
       const int index = own_index(low + ivec2(x - 1, y - 1), wanted);
       if (index < 0) return false;
       const Own own = load_own(index, albedo);
-      light += wx[x] * wy[y] * own.light;
-      caustic += wx[x] * wy[y] * own.caustic.rgb;
+      add(light, wx[x] * wy[y], own.light);
+      add(caustic, wx[x] * wy[y], own.caustic.rgb);
     }
   return true;
 }
@@ -227,8 +316,8 @@ bool interpolate_own(inout Wanted wanted, vec3 albedo, out Own own) {
   const vec4 wx = sharp_weights(cell.f.x);
   const vec4 wy = sharp_weights(cell.f.y);
   float total = 0.0;
-  vec3 sharp = vec3(0.0);
-  vec3 sharp_caustic = vec3(0.0);
+  Sharp sharp = EMPTY_SHARP;
+  Sharp sharp_caustic = EMPTY_SHARP;
   for (int y = 0; y < 2; ++y)
     for (int x = 0; x < 2; ++x) {
       const float weight = weight_of(cell, x, y);
@@ -242,8 +331,8 @@ bool interpolate_own(inout Wanted wanted, vec3 albedo, out Own own) {
       own.albedo += weight * there.albedo;
       own.caustic += weight * there.caustic;
       total += weight;
-      sharp += wx[x + 1] * wy[y + 1] * there.light;
-      sharp_caustic += wx[x + 1] * wy[y + 1] * there.caustic.rgb;
+      add(sharp, wx[x + 1] * wy[y + 1], there.light);
+      add(sharp_caustic, wx[x + 1] * wy[y + 1], there.caustic.rgb);
     }
   if (total < 0.05) return false;
   // The sums are left as they are where all are there: a mean of equal values is the value itself.
@@ -258,8 +347,8 @@ bool interpolate_own(inout Wanted wanted, vec3 albedo, out Own own) {
   const float blur = blur_of(cell);
   if (blur <= 0.0) return true;
   if (total > 0.999 && add_around(cell.low, wx, wy, wanted, albedo, sharp, sharp_caustic)) {
-    own.light = sharp;
-    own.caustic.rgb = sharp_caustic;
+    own.light = is_seen_in_mirror(wanted.thing) ? limited(sharp) : sharp.sum;
+    own.caustic.rgb = limited(sharp_caustic);
     return true;
   }
   wanted.most = min(wanted.most, history.samples * MOST_BLUR / blur);
@@ -297,7 +386,7 @@ ivec2 nearest_of(ivec2 at, float of) {
     for (int x = -REACH; x <= REACH; ++x) {
       const ivec2 there = at + ivec2(x, y);
       if (x * x + y * y >= least || !is_inside(there, history.width, history.height)) continue;
-      if (classes[in_picture(there)] != of) continue;
+      if (class_of(things[in_picture(there)].x) != of) continue;
       least = x * x + y * y;
       nearest = there;
     }
@@ -378,7 +467,7 @@ const float MOST_KEPT = 65504.0;
 void store(uint index, Own own, Other other) {
   if (own.mask < LEAST_SHARE) own.mask = 0.0;
   if (own.mask > 1.0 - LEAST_SHARE) own.mask = 1.0;
-  if (own.mask == classes[index]) other = Other(vec3(0.0), 0.0);
+  if (own.mask == class_of(things[index].x)) other = Other(vec3(0.0), 0.0);
   kept_lights[index] = vec4(own.light, own.doubt);
   kept_spreads[index] = pack_four_halves(vec4(min(sqrt(own.variance), MOST_KEPT), own.mask));
   kept_albedos[index] = pack_halves(own.albedo);
@@ -392,7 +481,7 @@ void main() {
   const uint in_band = show.in_band + gl_GlobalInvocationID.x;
   const uint index = show.in_picture + in_band;
   const ivec2 at = ivec2(index % history.width, index / history.width);
-  const float side = classes[index];
+  const float side = class_of(things[index].x);
   Now now = this_frame(in_band, side);
   // What is seen through something has no history, and what it ends at has none.
   if (!has_sides(side, covers[index])) {

@@ -8,12 +8,12 @@
 
 #include "shaders/lib/batch.glsl"
 #include "shaders/lib/calibrated_ray.glsl"
+#include "shaders/lib/history.glsl"
 #include "shaders/lib/pane.glsl"
 #include "shaders/lib/sampler.glsl"
 #include "shaders/lib/trace.glsl"
 
-// The classes are those that history_surface.comp found at the middles of the pixels: 0, 1 or COVER_*.
-layout(scalar) readonly buffer Classes { float classes[]; };
+layout(scalar) readonly buffer Things { uvec2 things[]; };  // history_surface.comp
 layout(scalar) writeonly buffer Covers { float covers[]; };
 
 // So many points of a sequence are spread evenly over pixel and lens. They are the same in every
@@ -28,7 +28,7 @@ const uint SEES_THROUGH = 1u << 16;  // added for each ray that has met what let
 float class_at(ivec2 at) {
   if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, ivec2(frame.width, frame.height))))
     return COVER_UNKNOWN;
-  return classes[at.y * int(frame.width) + at.x];
+  return class_of(things[at.y * int(frame.width) + at.x].x);
 }
 
 // A pixel that has an outline in it has both sides at the middles of the pixels around, and so has one beside

@@ -18,7 +18,6 @@ layout(scalar) readonly buffer KeptOthers { uvec2 kept_others[]; };
 layout(scalar) readonly buffer KeptCaustics { uvec2 kept_caustics[]; };
 layout(scalar) readonly buffer Places { vec4 places[]; };    // history_surface.comp
 layout(scalar) readonly buffer Things { uvec2 things[]; };
-layout(scalar) readonly buffer Classes { float classes[]; };
 layout(scalar) readonly buffer Covers { float covers[]; };  // history_cover.comp
 // Of the band, as composite.comp makes them.
 layout(scalar) buffer Composites { vec4 composites[]; };
@@ -66,7 +65,7 @@ Own own_of_neighbours(ivec2 at, float side) {
           any(greaterThanEqual(there, ivec2(history.width, history.height))))
         continue;
       const uint index = there.y * history.width + there.x;
-      if (classes[index] != side || !(kept_lights[index].w > 0.0)) continue;
+      if (class_of(things[index].x) != side || !(kept_lights[index].w > 0.0)) continue;
       const Own own = load_own(index);
       if (!is_known(own.albedo)) continue;
       const float near = 1.0 / float(x * x + y * y);
@@ -102,7 +101,7 @@ void main() {
   if (gl_GlobalInvocationID.x >= show.count) return;
   const uint in_band = show.in_band + gl_GlobalInvocationID.x;
   const uint index = show.in_picture + in_band;
-  const float side = classes[index];
+  const float side = class_of(things[index].x);
   const float cover = covers[index];
   if (!has_sides(side, cover)) {
     stand_alone(in_band);
@@ -139,8 +138,12 @@ void main() {
                show.white * (own.albedo * left + lit), show.white * real);
   composites[in_band] = vec4(compose(measured_at(in_band), estimate), mask);
   const uvec2 thing = things[index];
-  const float depth = dot(places[index].xyz, history.forward);
-  signals[in_band] = vec4(own.light, thing.x != NO_INDEX ? 1.0 / depth : 0.0);
+  const bool shows_thing = thing.x != pack_thing(NO_THING, 0u, 0u);
+  // A mirror's own depth is that of the frame's samples: what it shows lies anywhere.
+  const float inverse_depth = is_seen_in_mirror(thing.x) ? signals[in_band].w
+                              : shows_thing ? 1.0 / dot(places[index].xyz, history.forward)
+                                            : 0.0;
+  signals[in_band] = vec4(own.light, inverse_depth);
   uncovered[in_band] = vec4(left, 0.0);
   reals[in_band] = vec4(real / own.albedo, 0.0);
   albedos[in_band] = pack_four_halves(vec4(own.albedo, 0.0));
@@ -151,6 +154,6 @@ void main() {
     albedos[in_band] = pack_four_halves(vec4(own.albedo, 1.0 + cover));
   }
   const float shown = surfaces[in_band].w == DENOISE_HIGHLIGHT && !is_mixed_anew ? DENOISE_HIGHLIGHT : mask;
-  surfaces[in_band] = vec4(thing.x != NO_INDEX ? shading_of(thing.y) : vec3(0.0), shown);
+  surfaces[in_band] = vec4(shows_thing ? shading_of(thing.y) : vec3(0.0), shown);
   variances[in_band] = vec4(own.variance, own.samples);
 }

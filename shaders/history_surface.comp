@@ -1,5 +1,5 @@
-// Finds the surface that each pixel shows at its middle, and for how many samples what is seen there
-// may be carried along: light that a smooth surface reflects does not move as the surface does
+// Finds the place that each pixel shows at its middle, which is where a mirror or glass has its light from, where
+// its surface was in the picture before, and for how many samples what is seen there may be carried along
 // (shaders/README.md, "Accumulation over time").
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -8,13 +8,14 @@
 #include "shaders/lib/batch.glsl"
 #include "shaders/lib/calibrated_ray.glsl"
 #include "shaders/lib/history.glsl"
+#include "shaders/lib/mirrored.glsl"
 #include "shaders/lib/moved.glsl"
 #include "shaders/lib/pane.glsl"
 #include "shaders/lib/trace.glsl"
 
 layout(scalar) writeonly buffer Places { vec4 places[]; };  // from the camera; most samples
-layout(scalar) writeonly buffer Things { uvec2 things[]; };  // instance, normals (pack_normals)
-layout(scalar) writeonly buffer Classes { float classes[]; };  // 1: a virtual object; 0: none; COVER_*
+layout(scalar) writeonly buffer Things { uvec2 things[]; };  // pack_thing, pack_normals
+layout(scalar) writeonly buffer Befores { vec2 befores[]; };  // place in the picture before
 
 // Plastic and lacquer reflect about this share of the light around.
 const float COAT_SHARE = 0.1;
@@ -22,6 +23,8 @@ const float COAT_SHARE = 0.1;
 const float MOST_TURN = 0.5;
 const float ANY_NUMBER = 1e9;
 const float LEAST_LEFT = 0.25;
+// A lobe that is wider than this shows more than the one point that a ray finds.
+const float SHARP_ALPHA = 0.01;
 
 // Returns for how many samples the reflections of a surface stay what they are, if every frame turns
 // them by this angle.
@@ -43,31 +46,57 @@ float turn_of(vec3 position, GpuMotion motion) {
   return length(now - before);
 }
 
+// Returns the samples that are left of a past whose light has changed by this share. What counts as less than
+// a quarter of a sample would only be seen as a ghost.
+float left_after(float change) {
+  const float left = change > 0.0 ? history.samples * history.most_drift / change : ANY_NUMBER;
+  return left < LEAST_LEFT ? 0.0 : left;
+}
+
+// Returns the bits of pack_thing() for what is seen in an instance.
+uint mirror_of(uint instance, uint way) {
+  return 1u + hash_bits(instance) % 7u + (hash_bits(way) % 8u << 3);
+}
+
 void main() {
   if (gl_GlobalInvocationID.x >= batch.width * batch.height) return;
   const uint index = batch.y * frame.width + gl_GlobalInvocationID.x;
   const uvec2 pixel = uvec2(index % frame.width, index / frame.width);
-  classes[index] = 0.0;
   places[index] = vec4(0.0);
-  things[index] = uvec2(NO_INDEX, 0u);
+  things[index] = uvec2(pack_thing(NO_THING, 0u, 0u), 0u);
+  befores[index] = vec2(NOWHERE);
   const vec3 ray = normalize(vec3(calibrated_ray(pixel, vec2(0.5)), 1.0));
   const vec3 direction = transform_vector(frame.world_from_camera, ray);
   Hit hit;
   if (!trace_closest(vec3(0.0), direction, 0.0, 3.4e38, WORLD_MIXED, hit)) return;
   // What shines through, through a hole or through a pane, is not at this surface.
-  classes[index] = hit.presence == WORLD_BOTH ? 0.0 : 1.0;
   if (lets_light_through(instances[hit.instance].material)) {
-    classes[index] = COVER_SEE_THROUGH;
+    things[index].x = pack_thing(NO_THING, SEE_THROUGH_CLASS, 0u);
     return;
   }
+  const uint of_class = hit.presence == WORLD_BOTH ? 0u : 1u;
   const Surface s =
       make_surface(GpuHit(hit.t, hit.barycentrics, hit.instance, hit.primitive), direction, 0.0);
   const GpuMotion motion = motions[hit.instance];
+  if (motion.is_known != 0u) befores[index] = project_before(moved(motion.before_from_now, s.position));
+  vec3 elsewhere;
+  if (shows_elsewhere(s, elsewhere)) {
+    const Mirrored seen = follow_mirrors(s, hit, elsewhere);
+    const bool is_far = seen.instance == NO_INDEX;
+    float most = ANY_NUMBER;
+    if (!is_far && seen.is_clear) {
+      const GpuMotion of_seen = motions[seen.instance];
+      most = of_seen.is_known != 0u ? most_samples(seen.surface, turn_of(seen.position, of_seen)) : 0.0;
+      most = min(most, left_after(change_by_moved(seen.surface, seen.instance)));
+    }
+    if (seen.alpha > SHARP_ALPHA) most = min(most, left_after(change_by_moved(s, hit.instance)));
+    places[index] = vec4(seen.position, seen.is_clear && motion.is_known != 0u ? most : 0.0);
+    things[index] = uvec2(pack_thing(is_far ? NO_THING : seen.instance, of_class, mirror_of(hit.instance, seen.way)),
+                          pack_normals(seen.normal, s.normal));
+    return;
+  }
   float most = motion.is_known != 0u ? most_samples(s, turn_of(s.position, motion)) : 0.0;
-  const float change = change_by_moved(s, hit.instance);
-  // What counts as less than a quarter of a sample after a change would only be seen as a ghost.
-  const float left = change > 0.0 ? history.samples * history.most_drift / change : ANY_NUMBER;
-  most = left < LEAST_LEFT ? 0.0 : min(most, left);
-  places[index] = vec4(s.position, most);
-  things[index] = uvec2(hit.instance, pack_normals(s.geometric_normal, s.normal));
+  places[index] = vec4(s.position, min(most, left_after(change_by_moved(s, hit.instance))));
+  things[index] =
+      uvec2(pack_thing(hit.instance, of_class, 0u), pack_normals(s.geometric_normal, s.normal));
 }

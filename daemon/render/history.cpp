@@ -59,8 +59,6 @@ void History::reserve(Frame& frame) {
   for (Buffer* buffer : {&frame.places, &frame.lights})
     *buffer = create_texel_buffer(device_, pixels * sizeof(gpu::vec4),
                                   vk::Format::eR32G32B32A32Sfloat, true);
-  frame.classes =
-      create_texel_buffer(device_, pixels * sizeof(float), vk::Format::eR32Sfloat, true);
   for (Buffer* buffer :
        {&frame.things, &frame.spreads, &frame.albedos, &frame.others, &frame.caustics})
     *buffer =
@@ -68,6 +66,8 @@ void History::reserve(Frame& frame) {
   frame.pixels = pixels;
   if (covers_.size < pixels * sizeof(float))
     covers_ = create_storage_buffer(device_, pixels * sizeof(float));
+  if (befores_.size < pixels * sizeof(gpu::vec2))
+    befores_ = create_storage_buffer(device_, pixels * sizeof(gpu::vec2));
 }
 
 void History::begin(const View& view, std::vector<GpuScene::Stance> stances) {
@@ -184,7 +184,7 @@ void History::find_surfaces(const Buffers& scene, std::uint32_t features, std::i
   buffers["arrivals"] = &arrivals_;
   buffers["places"] = &now.places;
   buffers["things"] = &now.things;
-  buffers["classes"] = &now.classes;
+  buffers["befores"] = &befores_;
   buffers["covers"] = &covers_;
   const auto width = static_cast<std::uint32_t>(now.view.lens.width);
   const auto height = static_cast<std::uint32_t>(now.view.lens.height);
@@ -216,11 +216,10 @@ void History::record(const vk::raii::CommandBuffer& commands, gpu::GpuShow const
                        {"kept_albedos", &now.albedos},
                        {"kept_others", &now.others},
                        {"kept_caustics", &now.caustics},
-                       {"classes", &now.classes},
+                       {"befores", &befores_},
                        {"past_places", &past.places},
                        {"past_things", &past.things},
                        {"past_lights", &past.lights},
-                       {"past_classes", &past.classes},
                        {"past_spreads", &past.spreads},
                        {"past_albedos", &past.albedos},
                        {"past_others", &past.others},

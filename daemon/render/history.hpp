@@ -57,7 +57,7 @@ class History {
     std::vector<GpuScene::Stance> stances;
     bool is_shown = false;
     std::size_t pixels = 0;  // that the buffers have room for
-    Buffer places, things, classes, lights, spreads, albedos, others, caustics;
+    Buffer places, things, lights, spreads, albedos, others, caustics;
   };
 
   void reserve(Frame& frame);
@@ -75,7 +75,8 @@ class History {
   double shortened_ = std::numeric_limits<double>::infinity();  // for the next frame
   double shortened_now_ = std::numeric_limits<double>::infinity();  // for this one
   LightChange light_;
-  Buffer covers_;  // of the current frame (shaders/history_cover.comp)
+  Buffer covers_,
+      befores_;  // of the current frame (shaders/history_cover.comp, history_surface.comp)
   Buffer history_, motions_, moves_, arrivals_;
 };
 

@@ -17,6 +17,9 @@ namespace {
 constexpr std::uint32_t records_per_block = 8;
 constexpr float largest_coordinate = 1e20f;
 constexpr std::size_t most_triangles = 1u << 24;  // the primitive of a hit is stored in 24 bits
+// What a pixel shows is stored in 24 bits, which can also say that it is nothing
+// (shaders/lib/history.glsl).
+constexpr std::size_t most_instances = (1u << 24) - 1;
 
 struct Triangles {
   std::vector<std::array<glm::vec3, 3>> corners;
@@ -130,6 +133,9 @@ std::size_t top_bvh_texels(std::size_t instance_count) {
 }
 
 TopBvh build_top_bvh(std::span<const TopInstance> instances) {
+  if (instances.size() > most_instances)
+    throw Error("scene: it places " + std::to_string(instances.size()) + " meshes; at most " +
+                std::to_string(most_instances) + " are allowed");
   TopBvh top;
   std::vector<Record> spaces;
   std::vector<Aabb> boxes;

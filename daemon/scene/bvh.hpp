@@ -66,6 +66,7 @@ struct TopBvh {
 
 // Returns how many texels the top level over this many instances takes, wherever they are.
 std::size_t top_bvh_texels(std::size_t instance_count);
+// Throws previz::Error above 16,777,215 instances.
 TopBvh build_top_bvh(std::span<const TopInstance> instances);
 
 // Throws previz::Error if the mesh has more than 2^24 triangles.
