@@ -25,6 +25,7 @@ layout(scalar) readonly buffer Caustics { vec4 caustics[]; };
 layout(scalar) readonly buffer Places { vec4 places[]; };
 layout(scalar) readonly buffer Things { uvec2 things[]; };
 layout(scalar) readonly buffer Befores { vec2 befores[]; };
+layout(scalar) readonly buffer BentPlaces { vec3 bent_places[]; };
 layout(scalar) readonly buffer Covers { float covers[]; };
 // The history up to the frame before, of its picture.
 uniform textureBuffer past_places;
@@ -188,7 +189,9 @@ bool find_before(ivec2 at, ivec2 source, out Wanted wanted) {
   wanted.normal = geometric_of(thing.y);
   if (instance != NO_THING) {
     if (motions[instance].is_known == 0u) return false;
-    wanted.position = moved(motions[instance].before_from_now, place.xyz);
+    wanted.position = motions[instance].points == NO_INDEX
+                          ? moved(motions[instance].before_from_now, place.xyz)
+                          : bent_places[in_picture(source)];
     wanted.normal = normalize(rotated(motions[instance].before_from_now, wanted.normal));
   }
   if (is_seen_in_mirror(thing.x)) {
@@ -393,6 +396,11 @@ ivec2 nearest_of(ivec2 at, float of) {
   return nearest;
 }
 
+// Returns whether a pixel is where it was in the frame before.
+bool is_at(Wanted wanted, ivec2 at) {
+  return all(lessThan(abs(wanted.at - picture_scale() * vec2(at)), vec2(SNAP)));
+}
+
 // Returns whether the nearest pixel of the frame before had another side that no ray had found: of
 // something thinner than a pixel.
 bool was_thin(Wanted wanted) {
@@ -496,7 +504,10 @@ void main() {
   bool is_thin = false;
   bool has_past = false;
   float most = history.most_samples;
+  // Neither side moves, so that how much is covered is what it was.
+  bool is_still = false;
   if (find_before(at, at, wanted)) {
+    is_still = is_at(wanted, at);
     is_thin = !is_outline && was_thin(wanted);
     has_past = interpolate_own(wanted, now.own.albedo, own_past);
     if (has_past) own = added(own_past, now, wanted.most);
@@ -506,14 +517,17 @@ void main() {
   Other other_past = Other(vec3(0.0), 0.0);
   if (is_outline || is_thin) {
     Wanted moved_with;
-    if (find_before(at, is_outline ? nearest_of(at, 1.0 - side) : at, moved_with) &&
-        interpolate_other(moved_with, 1.0 - side, other_past))
+    const bool was_seen = find_before(at, is_outline ? nearest_of(at, 1.0 - side) : at, moved_with);
+    is_still = is_still && was_seen && is_at(moved_with, at);
+    if (was_seen && interpolate_other(moved_with, 1.0 - side, other_past))
       other = added(other_past, now.other);
   }
   // A pixel without a sample of its own side has only had others.
   const float before = !has_past ? 1.0 - side : is_outline || is_thin ? own_past.mask : side;
   const float samples = (has_past ? 1.0 / own_past.doubt : 0.0) + other_past.samples;
-  if (samples > 0.0)
+  if (samples > 0.0 && is_outline && !is_still)
+    own.mask = mix(covers[index], now.own.mask, history.samples / (history.samples + COVER_RAYS));
+  else if (samples > 0.0)
     own.mask =
         before + history.samples / (history.samples + min(samples, most)) * (now.own.mask - before);
   if (!is_outline) other.samples = -other.samples;

@@ -18,7 +18,7 @@ layout(scalar) writeonly buffer Covers { float covers[]; };
 
 // So many points of a sequence are spread evenly over pixel and lens. They are the same in every
 // frame, so that the outlines of a still picture stand still.
-const uint RAYS = 16u;
+const uint RAYS = uint(COVER_RAYS);
 
 shared uint outlines[WORKGROUP_SIZE];  // pixels
 shared uint outline_count;

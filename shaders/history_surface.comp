@@ -7,6 +7,7 @@
 
 #include "shaders/lib/batch.glsl"
 #include "shaders/lib/calibrated_ray.glsl"
+#include "shaders/lib/deformed.glsl"
 #include "shaders/lib/history.glsl"
 #include "shaders/lib/mirrored.glsl"
 #include "shaders/lib/moved.glsl"
@@ -16,6 +17,8 @@
 layout(scalar) writeonly buffer Places { vec4 places[]; };  // from the camera; most samples
 layout(scalar) writeonly buffer Things { uvec2 things[]; };  // pack_thing, pack_normals
 layout(scalar) writeonly buffer Befores { vec2 befores[]; };  // place in the picture before
+// From the camera before, of what deforms. It has no pixels in a scene where nothing does.
+layout(scalar) writeonly buffer BentPlaces { vec3 bent_places[]; };
 
 // Plastic and lacquer reflect about this share of the light around.
 const float COAT_SHARE = 0.1;
@@ -78,25 +81,32 @@ void main() {
   const Surface s =
       make_surface(GpuHit(hit.t, hit.barycentrics, hit.instance, hit.primitive), direction, 0.0);
   const GpuMotion motion = motions[hit.instance];
-  if (motion.is_known != 0u) befores[index] = project_before(moved(motion.before_from_now, s.position));
+  float bent = 0.0;
+  if (motion.is_known != 0u) {
+    const vec3 before = position_before(hit, s, motion, bent);
+    befores[index] = project_before(before);
+    if (motion.points != NO_INDEX) bent_places[index] = before;
+  }
   vec3 elsewhere;
   if (shows_elsewhere(s, elsewhere)) {
     const Mirrored seen = follow_mirrors(s, hit, elsewhere);
-    const bool is_far = seen.instance == NO_INDEX;
     float most = ANY_NUMBER;
-    if (!is_far && seen.is_clear) {
-      const GpuMotion of_seen = motions[seen.instance];
+    if (!seen.is_far && seen.is_clear) {
+      const GpuMotion of_seen = motions[seen.hit.instance];
+      float bent_there;
+      const vec3 before = position_before(seen.hit, seen.surface, of_seen, bent_there);
+      if (of_seen.points != NO_INDEX) bent_places[index] = before;
       most = of_seen.is_known != 0u ? most_samples(seen.surface, turn_of(seen.position, of_seen)) : 0.0;
-      most = min(most, left_after(change_by_moved(seen.surface, seen.instance)));
+      most = min(most, left_after(change_by_moved(seen.surface, seen.hit.instance, bent_there)));
     }
-    if (seen.alpha > SHARP_ALPHA) most = min(most, left_after(change_by_moved(s, hit.instance)));
+    if (seen.alpha > SHARP_ALPHA) most = min(most, left_after(change_by_moved(s, hit.instance, bent)));
     places[index] = vec4(seen.position, seen.is_clear && motion.is_known != 0u ? most : 0.0);
-    things[index] = uvec2(pack_thing(is_far ? NO_THING : seen.instance, of_class, mirror_of(hit.instance, seen.way)),
+    things[index] = uvec2(pack_thing(seen.is_far ? NO_THING : seen.hit.instance, of_class, mirror_of(hit.instance, seen.way)),
                           pack_normals(seen.normal, s.normal));
     return;
   }
   float most = motion.is_known != 0u ? most_samples(s, turn_of(s.position, motion)) : 0.0;
-  places[index] = vec4(s.position, min(most, left_after(change_by_moved(s, hit.instance))));
+  places[index] = vec4(s.position, min(most, left_after(change_by_moved(s, hit.instance, bent))));
   things[index] =
       uvec2(pack_thing(hit.instance, of_class, 0u), pack_normals(s.geometric_normal, s.normal));
 }

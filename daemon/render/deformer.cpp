@@ -64,7 +64,8 @@ scene::MeshBvh Deformer::add(const scene::Scene& scene, const scene::Deformation
   Mesh mesh;
   mesh.undeformed = std::make_shared<const scene::Undeformed>(from.undeformed);
   mesh.pairs = scene::deforming_pairs(from);
-  mesh.reach = scene::reach_of(from, deformation.joints.size());
+  mesh.reach = std::make_shared<const scene::DeformationReach>(
+      scene::reach_of(from, deformation.joints.size()));
   scene::RefittableBvh built = scene::build_refittable_bvh(mesh.pairs, from.positions);
   mesh.plan = std::move(built.plan);
   mesh.built_cost = cost_of(built.bvh);
@@ -186,7 +187,7 @@ void Deformer::deform(std::span<const scene::Shape> shapes, Buffer& bvh, const B
   for (std::size_t i = 0; i < meshes_.size(); ++i) {
     Mesh& mesh = meshes_[i];
     if (mesh.shape == shapes[i] || mesh.plan.leaves.empty()) continue;
-    const scene::Aabb bounds = scene::deformed_bounds(mesh.reach, shapes[i]);
+    const scene::Aabb bounds = scene::deformed_bounds(*mesh.reach, shapes[i]);
     if (!can_be_traced(bounds)) continue;
     mesh.shape = shapes[i];
     mesh.place.bvh->bounds = bounds;

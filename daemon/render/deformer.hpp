@@ -42,6 +42,11 @@ class Deformer {
   bool has_shape(std::size_t i, const scene::Shape& shape) const {
     return meshes_[i].shape == shape;
   }
+  // Returns the shape that it has; none before the first deform().
+  const std::optional<scene::Shape>& shape(std::size_t i) const { return meshes_[i].shape; }
+  std::shared_ptr<const scene::DeformationReach> reach(std::size_t i) const {
+    return meshes_[i].reach;
+  }
 
   // Returns how many trees were built anew since clear().
   std::uint64_t rebuilt() const { return rebuilt_; }
@@ -50,7 +55,7 @@ class Deformer {
   struct Mesh {
     std::shared_ptr<const scene::Undeformed> undeformed;
     std::vector<scene::DeformingPair> pairs;
-    scene::DeformationReach reach;
+    std::shared_ptr<const scene::DeformationReach> reach;
     scene::RefitPlan plan;
     Place place;
     gpu::GpuDeform push{};

@@ -186,7 +186,6 @@ void GpuScene::deform(const std::vector<scene::Shape>& shapes) {
   assert(shapes.size() == scene_.deformations.size());
   if (shapes.empty()) return;
   deformer_.deform(shapes, bvh_, vertices_);
-  if (shapes != shapes_) ++shaped_;
   shapes_ = shapes;
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     const scene::Deformation& deformation = scene_.deformations[i];
@@ -463,12 +462,22 @@ std::vector<GpuScene::Stance> GpuScene::stances() const {
   std::vector<Stance> result;
   for (const scene::Instance& instance : scene_.instances) {
     const scene::Aabb& bounds = places_[instance.mesh].bvh.bounds;
-    result.push_back({instance.world_from_object, bounds.low, bounds.high, instance.material,
-                      instance.presence, 0, may_be_dirac_[instance.material],
+    result.push_back({instance.world_from_object,
+                      bounds.low,
+                      bounds.high,
+                      instance.material,
+                      instance.presence,
+                      {},
+                      may_be_dirac_[instance.material],
                       scene::emits(scene_.materials[instance.material])});
   }
-  for (const scene::Deformation& deformation : scene_.deformations)
-    result[deformation.instance].shape = shaped_;
+  for (std::size_t i = 0; i < scene_.deformations.size(); ++i) {
+    const scene::Deformation& deformation = scene_.deformations[i];
+    const scene::Mesh& mesh = scene_.meshes[deformation.mesh];
+    result[deformation.instance].deformed =
+        Deformed{deformer_.shape(i), deformer_.reach(i), places_[deformation.mesh].first_vertex,
+                 static_cast<std::uint32_t>(mesh.undeformed.positions.size())};
+  }
   return result;
 }
 

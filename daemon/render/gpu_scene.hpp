@@ -52,12 +52,19 @@ class GpuScene {
   // Sets lamps beside the scene's own, which may change from frame to frame; absent: there are
   // never any.
   void set_sources(std::optional<std::vector<set::Light>> sources);
+  // The shape of a mesh that deforms, and where its vertices lie among all.
+  struct Deformed {
+    std::optional<scene::Shape> shape;  // none: that at rest
+    std::shared_ptr<const scene::DeformationReach> reach;
+    std::uint32_t first_vertex = 0, vertices = 0;
+    friend bool operator==(const Deformed&, const Deformed&) = default;
+  };
   // An instance as far as what is seen on it can be followed from frame to frame.
   struct Stance {
     glm::dmat4 world_from_object{1.0};
     glm::vec3 low{0}, high{0};  // box around it, object space; empty where low > high
     std::uint32_t material = 0, presence = 0;
-    std::uint64_t shape = 0;    // counts the shapes that it has had
+    std::optional<Deformed> deformed = {};
     bool may_be_dirac = false;  // it may reflect or refract without blur
     bool emits = false;
     friend bool operator==(const Stance&, const Stance&) = default;
@@ -107,7 +114,6 @@ class GpuScene {
   bool may_glow_ = false;                           // some instance does, or would in a variant
   std::vector<scene::Instance> instances_as_set_;   // as set_scene() got them
   std::vector<scene::Shape> shapes_;                // as deform() got them last
-  std::uint64_t shaped_ = 0;                        // how often deform() got others
   std::vector<bool> may_be_dirac_;                  // each material
   Spheres spheres_;                                 // of instances_as_set_
   std::optional<std::vector<set::Light>> sources_;  // absent: there are never any

@@ -15,6 +15,21 @@
 namespace previz::render {
 namespace {
 
+// Returns how many vertices deform.
+std::size_t deforming_points(const std::vector<GpuScene::Stance>& stances) {
+  std::size_t points = 0;
+  for (const GpuScene::Stance& stance : stances)
+    points += stance.deformed ? stance.deformed->vertices : 0;
+  return points;
+}
+
+// Returns whether the shape of one is that of the other, but for where its points are.
+bool are_comparable(const GpuScene::Stance& a, const GpuScene::Stance& b) {
+  if (a.material != b.material || a.presence != b.presence) return false;
+  if (!a.deformed || !b.deformed) return a.deformed == b.deformed;
+  return a.deformed->reach == b.deformed->reach;
+}
+
 // A dispatch works on no more pixels than these: devices that allow 65,535 work groups at once
 // could not do a picture of 3840x2160 in one.
 constexpr std::uint32_t most_pixels_at_once = 1u << 21;
@@ -52,8 +67,17 @@ void History::light_with(std::vector<set::Light> lamps) {
 }
 
 void History::reserve(Frame& frame) {
+  const std::size_t points = deforming_points(frame.stances);
   const std::size_t pixels = static_cast<std::size_t>(frame.view.lens.width) *
                              static_cast<std::size_t>(frame.view.lens.height);
+  const auto grow = [&](Buffer& buffer, std::size_t bytes) {
+    if (buffer.size < bytes) buffer = create_storage_buffer(device_, bytes);
+  };
+  constexpr std::size_t point_bytes = 2 * sizeof(gpu::vec4);
+  grow(frame.points, std::max<std::size_t>(points, 1) * point_bytes);
+  grow(bent_places_, (points > 0 ? pixels : 1) * sizeof(gpu::vec3));
+  grow(covers_, pixels * sizeof(float));
+  grow(befores_, pixels * sizeof(gpu::vec2));
   if (pixels <= frame.pixels) return;
   frame.pixels = 0;  // stays 0 if an allocation below throws
   for (Buffer* buffer : {&frame.places, &frame.lights})
@@ -64,10 +88,6 @@ void History::reserve(Frame& frame) {
     *buffer =
         create_texel_buffer(device_, pixels * sizeof(gpu::uvec2), vk::Format::eR32G32Uint, true);
   frame.pixels = pixels;
-  if (covers_.size < pixels * sizeof(float))
-    covers_ = create_storage_buffer(device_, pixels * sizeof(float));
-  if (befores_.size < pixels * sizeof(gpu::vec2))
-    befores_ = create_storage_buffer(device_, pixels * sizeof(gpu::vec2));
 }
 
 void History::begin(const View& view, std::vector<GpuScene::Stance> stances) {
@@ -111,6 +131,7 @@ std::vector<gpu::GpuMotion> History::motions() const {
   if (!past.is_shown || past.stances.size() != now.stances.size()) return result;
   const glm::dvec3 camera_now(now.view.world_from_camera[3]);
   const glm::dvec3 camera_before(past.view.world_from_camera[3]);
+  std::uint32_t points = 0;
   for (std::size_t i = 0; i < now.stances.size(); ++i) {
     const glm::dmat4& is = now.stances[i].world_from_object;
     const glm::dmat4& was = past.stances[i].world_from_object;
@@ -123,9 +144,12 @@ std::vector<gpu::GpuMotion> History::motions() const {
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 4; ++c) is_finite &= std::isfinite(result[i].before_from_now[r][c]);
     const GpuScene::Stance &stance = now.stances[i], &before = past.stances[i];
-    const bool is_same = stance.shape == before.shape && stance.material == before.material &&
-                         stance.presence == before.presence;
-    result[i].is_known = is_finite && is_same ? 1 : 0;
+    result[i].is_known = is_finite && are_comparable(stance, before) ? 1 : 0;
+    result[i].points = gpu::NO_INDEX;
+    if (!before.deformed) continue;
+    if (result[i].is_known == 1 && stance.deformed->shape != before.deformed->shape)
+      result[i].points = points - stance.deformed->first_vertex;
+    points += before.deformed->vertices;
   }
   return result;
 }
@@ -185,6 +209,8 @@ void History::find_surfaces(const Buffers& scene, std::uint32_t features, std::i
   buffers["places"] = &now.places;
   buffers["things"] = &now.things;
   buffers["befores"] = &befores_;
+  buffers["bent_places"] = &bent_places_;
+  buffers["past_points"] = &frames_[1 - now_].points;
   buffers["covers"] = &covers_;
   const auto width = static_cast<std::uint32_t>(now.view.lens.width);
   const auto height = static_cast<std::uint32_t>(now.view.lens.height);
@@ -196,9 +222,26 @@ void History::find_surfaces(const Buffers& scene, std::uint32_t features, std::i
         pass->dispatch({commands, gpu::GpuBatch{0, y, width, rows, 0, 0, 0}, buffers},
                        width * rows);
       }
+    keep_points(commands, *buffers.at("vertices"));
   });
   samples_ = samples;
   now.is_shown = true;
+}
+
+// Copies the vertices that deform, in whose shape the next frame will look for its past.
+void History::keep_points(const vk::raii::CommandBuffer& commands, const Buffer& vertices) {
+  const Frame& now = frames_[now_];
+  constexpr vk::DeviceSize bytes = 2 * sizeof(gpu::vec4);  // of a vertex
+  vk::DeviceSize points = 0;
+  for (const GpuScene::Stance& stance : now.stances) {
+    if (!stance.deformed || stance.deformed->vertices == 0) continue;
+    const vk::DeviceSize count = stance.deformed->vertices;
+    commands.copyBuffer(
+        *vertices.buffer, *now.points.buffer,
+        vk::BufferCopy(stance.deformed->first_vertex * bytes, points * bytes, count * bytes));
+    points += count;
+  }
+  if (points > 0) barrier(commands);
 }
 
 void History::record(const vk::raii::CommandBuffer& commands, gpu::GpuShow constants, int width,
@@ -217,6 +260,7 @@ void History::record(const vk::raii::CommandBuffer& commands, gpu::GpuShow const
                        {"kept_others", &now.others},
                        {"kept_caustics", &now.caustics},
                        {"befores", &befores_},
+                       {"bent_places", &bent_places_},
                        {"past_places", &past.places},
                        {"past_things", &past.things},
                        {"past_lights", &past.lights},

@@ -19,7 +19,7 @@
 
 namespace previz::render {
 
-// It takes 156 bytes of device memory per pixel.
+// It takes 156 bytes of device memory per pixel, and 12 more where meshes deform.
 class History {
  public:
   explicit History(Device& device);
@@ -58,9 +58,11 @@ class History {
     bool is_shown = false;
     std::size_t pixels = 0;  // that the buffers have room for
     Buffer places, things, lights, spreads, albedos, others, caustics;
+    Buffer points;  // position and normal of each vertex that deforms
   };
 
   void reserve(Frame& frame);
+  void keep_points(const vk::raii::CommandBuffer& commands, const Buffer& vertices);
   double frames_that_stay() const;
   std::vector<gpu::GpuMotion> motions() const;
   MovedInstances moved() const;
@@ -75,8 +77,8 @@ class History {
   double shortened_ = std::numeric_limits<double>::infinity();  // for the next frame
   double shortened_now_ = std::numeric_limits<double>::infinity();  // for this one
   LightChange light_;
-  Buffer covers_,
-      befores_;  // of the current frame (shaders/history_cover.comp, history_surface.comp)
+  Buffer covers_, befores_,
+      bent_places_;  // of the current frame (shaders/history_cover.comp, history_surface.comp)
   Buffer history_, motions_, moves_, arrivals_;
 };
 

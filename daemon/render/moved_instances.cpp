@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
+#include <optional>
 
 #include "daemon/render/bounds.hpp"
 #include "shaders/lib/octahedral.h"
@@ -14,6 +15,9 @@ namespace {
 
 constexpr std::size_t most_moved = 16;
 constexpr double least_arrival = 1e-3;
+// The parts of a figure, its arms and legs, are this share of it wide: what has moved by as much
+// may have moved out of its own shadow.
+constexpr double width_of_parts = 0.25;
 
 glm::dvec4 sphere_of(const GpuScene::Stance& stance) {
   return render::bounding_sphere(scene::Aabb{stance.low, stance.high}, stance.world_from_object);
@@ -34,18 +38,35 @@ glm::vec4 relative_to(const glm::dvec3& camera, const glm::dvec4& sphere) {
   return {glm::vec3(glm::dvec3(sphere) - camera), static_cast<float>(std::max(sphere.w, 0.0))};
 }
 
+// Returns by how much the points of a mesh have moved in object space, at most; nothing where they
+// cannot be compared.
+std::optional<double> deformed_by(const GpuScene::Stance& before, const GpuScene::Stance& now) {
+  if (before.deformed == now.deformed) return 0;
+  if (!before.deformed || !now.deformed || before.deformed->reach != now.deformed->reach ||
+      !before.deformed->shape || !now.deformed->shape)
+    return {};
+  return scene::most_moved(*now.deformed->reach, *before.deformed->shape, *now.deformed->shape);
+}
+
+double largest_scale(const glm::dmat4& m) {
+  double scale = 0;
+  for (int c = 0; c < 3; ++c) scale = std::max(scale, glm::length(glm::dvec3(m[c])));
+  return scale;
+}
+
 // Returns what an instance has moved by, over its own width: the farthest of its points counts.
 double moved_share(const GpuScene::Stance& before, const GpuScene::Stance& now,
                    const glm::dvec4& sphere, double turn) {
-  if (before.material != now.material || before.presence != now.presence ||
-      before.shape != now.shape)
-    return 1;
+  const std::optional<double> deformed = deformed_by(before, now);
+  if (before.material != now.material || before.presence != now.presence || !deformed) return 1;
   const glm::dvec3 middle = 0.5 * glm::dvec3(now.low + now.high);
   const glm::dvec3 was(before.world_from_object * glm::dvec4(middle, 1));
   const glm::dvec3 is(now.world_from_object * glm::dvec4(middle, 1));
-  const double grown = std::abs(sphere.w - sphere_of(before).w);
-  return std::min((glm::distance(was, is) + grown) / std::max(2 * sphere.w, 1e-9) + 0.5 * turn,
-                  1.0);
+  // The sphere around a mesh that deforms grows and shrinks by no more than its points move.
+  const double grown = *deformed > 0 ? 0 : std::abs(sphere.w - sphere_of(before).w);
+  const double of_parts = *deformed * largest_scale(now.world_from_object) / width_of_parts;
+  return std::min(
+      (glm::distance(was, is) + grown + of_parts) / std::max(2 * sphere.w, 1e-9) + 0.5 * turn, 1.0);
 }
 
 }  // namespace

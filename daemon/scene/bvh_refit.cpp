@@ -218,4 +218,31 @@ Aabb deformed_bounds(const DeformationReach& reach, const Shape& shape) {
   return is_empty(bounds) ? bounds : Aabb{bounds.low - rounding, bounds.high + rounding};
 }
 
+double most_moved(const DeformationReach& reach, const Shape& before, const Shape& after) {
+  glm::dvec3 offset(0), moved(0);
+  for (std::size_t i = 0; i < reach.targets.size(); ++i) {
+    const glm::dvec3 target(reach.targets[i]);
+    offset += std::max(std::abs(before.weights[i]), std::abs(after.weights[i])) * target;
+    moved += std::abs(after.weights[i] - before.weights[i]) * target;
+  }
+  double most = is_empty(reach.whole) ? 0 : glm::length(moved);
+  for (std::size_t i = 0; i < reach.joints.size(); ++i) {
+    const Aabb& box = reach.joints[i];
+    if (is_empty(box)) continue;
+    const glm::dvec3 middle = 0.5 * (glm::dvec3(box.low) + glm::dvec3(box.high));
+    const glm::dvec3 half = 0.5 * (glm::dvec3(box.high) - glm::dvec3(box.low)) + offset;
+    // An affine difference is largest at a corner.
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::dvec3 side(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
+      const glm::dvec4 point(middle + side * half, 1);
+      const glm::dvec3 off(after.joints[i] * point - before.joints[i] * point);
+      double of_targets = 0;
+      for (int axis = 0; axis < 3; ++axis)
+        of_targets += moved[axis] * glm::length(glm::dvec3(after.joints[i][axis]));
+      most = std::max(most, glm::length(off) + of_targets);
+    }
+  }
+  return most;
+}
+
 }  // namespace previz::scene

@@ -57,4 +57,8 @@ DeformationReach reach_of(const Mesh& mesh, std::size_t joints);
 // mean of where its joints take it.
 Aabb deformed_bounds(const DeformationReach& reach, const Shape& shape);
 
+// Returns a bound on how far a point of the mesh moves from one shape to another, in units of the
+// instance's object space.
+double most_moved(const DeformationReach& reach, const Shape& before, const Shape& after);
+
 }  // namespace previz::scene

@@ -17,7 +17,8 @@ const float FAR_AWAY = 1e7;
 
 struct Mirrored {
   Surface surface;  // where the ray ends; the last mirror if it ends nowhere
-  uint instance;    // NO_INDEX: it ends in the environment
+  Hit hit;          // of the surface
+  bool is_far;      // it ends in the environment
   vec3 position;    // from the camera
   vec3 normal;      // unit
   float alpha;      // the largest on the way
@@ -43,18 +44,18 @@ bool shows_elsewhere(Surface s, out vec3 direction) {
 
 // Follows a ray that leaves a mirror until it ends at something else.
 Mirrored follow_mirrors(Surface s, Hit hit, vec3 direction) {
-  Mirrored m = Mirrored(s, hit.instance, vec3(0.0), vec3(0.0), 0.0, 0u, true);
+  Mirrored m = Mirrored(s, hit, false, vec3(0.0), vec3(0.0), 0.0, 0u, true);
   for (uint i = 0u; i < MOST_MIRRORS; ++i) {
     m.alpha = max(m.alpha, m.surface.alpha);
     m.way = hash_pair(m.way, 2u * hit.instance + uint(dot(direction, m.surface.geometric_normal) > 0.0));
     if (!trace_closest(offset_origin(m.surface, direction), direction, 0.0, 3.4e38, WORLD_MIXED,
                        uvec2(hit.instance, hit.primitive), hit)) {
-      m.instance = NO_INDEX;
+      m.is_far = true;
       m.position = FAR_AWAY * direction;
       m.normal = -direction;
       return m;
     }
-    m.instance = hit.instance;
+    m.hit = hit;
     m.surface = make_surface(GpuHit(hit.t, hit.barycentrics, hit.instance, hit.primitive), direction, 0.0);
     m.position = m.surface.position;
     m.normal = m.surface.geometric_normal;

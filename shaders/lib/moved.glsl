@@ -67,9 +67,10 @@ float share_of_sphere(vec4 sphere, Surface s) {
   return min(share + sin(angle) * sin(angle) * clamp(up + sin(angle), 0.0, 1.0), 1.0);
 }
 
-// Returns the share by which the light of a surface of the instance may have changed.
-float change_by_moved(Surface s, uint instance) {
-  float change = 0.0;
+// Returns the share by which the light of a surface of the instance may have changed. `bent` is by which angle
+// it has turned there, beside what the whole instance has.
+float change_by_moved(Surface s, uint instance, float bent) {
+  float change = bent;
   for (uint i = 0u; i < history.moved_count; ++i) {
     const GpuMoved m = moves[i];
     if (m.instance == instance)

@@ -378,6 +378,9 @@ struct GpuDenoise {
 struct GpuMotion {
   vec4 before_from_now[3];  // rows; from the camera-relative world of this frame to that one's
   uint is_known;            // 0: the instance has no history
+  // What is added, modulo 2^32, to the number of a vertex for its place among the points that deform in
+  // the frame before (lib/deformed.glsl). NO_INDEX: points move as the instance does.
+  uint points;
 };
 
 // An instance that has moved since the frame before, or has changed otherwise, and the spheres
@@ -496,6 +499,8 @@ struct GpuShow {
 // object, and otherwise one of these.
 PREVIZ_CONST float COVER_UNKNOWN = -1.0f;
 PREVIZ_CONST float COVER_SEE_THROUGH = -2.0f;
+// So many rays find which share of an outline is covered.
+PREVIZ_CONST float COVER_RAYS = 16.0f;
 // So far a pixel looks for the other side of an outline.
 PREVIZ_CONST uint HISTORY_REACH = 2u;
 // Dithering repeats after so many pixels in both directions.
@@ -503,7 +508,7 @@ PREVIZ_CONST uint DITHER_SIDE = 64u;
 
 #ifdef __cplusplus
 static_assert(sizeof(GpuDenoise) == 28);
-static_assert(sizeof(GpuMotion) == 52);
+static_assert(sizeof(GpuMotion) == 56);
 static_assert(sizeof(GpuMoved) == 44);
 static_assert(sizeof(GpuArrival) == 20);
 static_assert(sizeof(GpuHistory) == 152);

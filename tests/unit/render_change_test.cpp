@@ -139,7 +139,7 @@ TEST(MovedInstances, AreThoseThatMovedOrBecameOthers) {
   other.material = 3;
   EXPECT_EQ(between(box, other).moved[0].share, 1);
   other = box;
-  other.shape = 1;
+  other.deformed = render::GpuScene::Deformed{};
   EXPECT_EQ(between(box, other).moved[0].share, 1);
   other = box;
   other.world_from_object = glm::rotate(glm::dmat4(1.0), 0.2, glm::dvec3(0, 0, 1));
