@@ -228,6 +228,12 @@ void GpuScene::move(const std::vector<scene::Instance>& instances,
   find_bounds(moved_spheres(spheres_, instances_as_set_, scene_.instances));
 }
 
+void GpuScene::stand(const Standing& standing) {
+  set_sources(standing.sources);
+  move(standing.instances, standing.lights);
+  deform(standing.shapes);
+}
+
 void GpuScene::find_bounds(const Spheres& spheres) {
   difference_bounds_ = difference_bounds(scene_, spheres);
   specular_bounds_ = specular_bounds(scene_, spheres, specular_alpha_);

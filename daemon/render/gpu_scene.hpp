@@ -70,6 +70,16 @@ class GpuScene {
     friend bool operator==(const Stance&, const Stance&) = default;
   };
   std::vector<Stance> stances() const;
+  // What move(), deform() and set_sources() have made of the scene.
+  struct Standing {
+    std::vector<scene::Instance> instances;
+    std::vector<set::Light> lights;
+    std::vector<scene::Shape> shapes;
+    std::optional<std::vector<set::Light>> sources;
+  };
+  Standing standing() const { return {scene_.instances, scene_.lights, shapes_, sources_}; }
+  // Puts the same scene back to where it stood; place() is to follow.
+  void stand(const Standing& standing);
   // Returns the lamps of the scene and the sources beside them.
   std::vector<set::Light> lamps() const;
   // Uploads instances, top level and lights relative to `camera_position` (world, metres).

@@ -54,12 +54,23 @@ void History::forget() {
   shorten(0);
 }
 
+void History::start_over() {
+  for (Frame& frame : frames_) frame.is_shown = false;
+  samples_.reset();
+  shortened_ = shortened_now_ = std::numeric_limits<double>::infinity();
+  light_ = {};
+}
+
 void History::shorten(double frames) {
   shortened_ = std::min(shortened_, frames);
 }
 
 void History::light_with(const EncodedEnvironment& environment) {
   light_.see(environment);
+}
+
+void History::light_with(LightCells environment) {
+  light_.see(std::move(environment));
 }
 
 void History::light_with(std::vector<set::Light> lamps) {

@@ -26,11 +26,14 @@ class History {
 
   // Forgets all frames so far.
   void forget();
+  // Forgets the light so far, too: what follows is what it would be in a new object.
+  void start_over();
   // Lets what was accumulated up to the next frame count as no more than this many frames: less
   // than one where it is no longer true.
   void shorten(double frames);
   // The light around the set, and its lamps, which shorten the past where they change.
   void light_with(const EncodedEnvironment& environment);
+  void light_with(LightCells environment);
   void light_with(std::vector<set::Light> lamps);
 
   // What a frame is seen by.

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "shaders/lib/octahedral.h"
 
@@ -145,7 +146,11 @@ double change_of_lamps(const std::vector<set::Light>& before, const std::vector<
 }
 
 void LightChange::see(const EncodedEnvironment& environment) {
-  environment_ = light_cells(environment);
+  see(light_cells(environment));
+}
+
+void LightChange::see(LightCells environment) {
+  environment_ = std::move(environment);
   is_seen_anew_ = true;
 }
 

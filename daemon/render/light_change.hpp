@@ -36,6 +36,7 @@ double change_of_lamps(const std::vector<set::Light>& before, const std::vector<
 class LightChange {
  public:
   void see(const EncodedEnvironment& environment);
+  void see(LightCells environment);
   void see(std::vector<set::Light> lamps);
   // Compares the light that was seen last with the mean of what was seen before, of which each
   // frame has the weight that it has in what is shown. Returns as how many frames the past may

@@ -122,6 +122,39 @@ void Presenter::accumulate(const ToPresent& what, const Denoiser::Band& band,
   });
 }
 
+// Composites the band and adds it to its past. Returns the constants for the whole band.
+gpu::GpuShow Presenter::start(const ToPresent& what, const Denoiser::Band& band,
+                              Denoiser& denoiser) {
+  const auto width = static_cast<std::size_t>(what.width);
+  const std::size_t pixels = static_cast<std::size_t>(band.bottom - band.top) * width;
+  const bool has_caustics = what.tiles.front().caustics;
+  denoiser.reserve(pixels, what.denoise && needs_companions(what), has_caustics);
+  reserve(pixels);
+  gpu::GpuShow constants = constants_of(what, bits_, clipping_);
+  constants.in_picture = static_cast<std::uint32_t>(static_cast<std::size_t>(band.top) * width);
+  constants.has_caustics = has_caustics ? 1 : 0;
+  composite(what, band, constants, denoiser);
+  if (what.history) accumulate(what, band, constants, denoiser);
+  return constants;
+}
+
+void Presenter::add_to_history(const ToPresent& what, Denoiser& denoiser) {
+  for (const Denoiser::Band& band : denoiser.bands(what.width, what.height))
+    start(what, band, denoiser);
+}
+
+void Presenter::read(const Denoiser::Band& band, Layers& layers) const {
+  const auto width = static_cast<std::size_t>(layers.width);
+  const std::size_t top = static_cast<std::size_t>(band.top) * width;
+  const std::size_t first = static_cast<std::size_t>(band.first) * width;
+  const std::size_t last = static_cast<std::size_t>(band.last) * width;
+  const auto composites = download<glm::vec4>(device_, composites_, last - top);
+  for (std::size_t i = first; i < last; ++i) {
+    layers.composite[i] = glm::vec3(composites[i - top]);
+    layers.mask[i] = composites[i - top].w;
+  }
+}
+
 Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
                          const std::function<void(const Denoiser::Band&)>& after_band) {
   const auto width = static_cast<std::size_t>(what.width);
@@ -131,16 +164,7 @@ Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
     const std::size_t top = static_cast<std::size_t>(band.top) * width;
     const std::size_t first = static_cast<std::size_t>(band.first) * width;
     const std::size_t count = static_cast<std::size_t>(band.last - band.first) * width;
-    const std::size_t pixels = static_cast<std::size_t>(band.bottom - band.top) * width;
-    const bool filters_companions = what.denoise && needs_companions(what);
-    const bool has_caustics = what.tiles.front().caustics;
-    denoiser.reserve(pixels, filters_companions, has_caustics);
-    reserve(pixels);
-    gpu::GpuShow constants = constants_of(what, bits_, clipping_);
-    constants.in_picture = static_cast<std::uint32_t>(top);
-    constants.has_caustics = has_caustics ? 1 : 0;
-    composite(what, band, constants, denoiser);
-    if (what.history) accumulate(what, band, constants, denoiser);
+    gpu::GpuShow constants = start(what, band, denoiser);
     if (what.denoise) constants.has_caustics = 0;  // it was added to what is denoised
     constants.count = static_cast<std::uint32_t>(count);
     constants.in_band = static_cast<std::uint32_t>(first - top);

@@ -41,8 +41,14 @@ class Presenter {
   // `after_band` is called with each band that the denoiser's passes have run over.
   Plate present(const ToPresent& what, Denoiser& denoiser,
                 const std::function<void(const Denoiser::Band&)>& after_band = {});
+  // Adds a frame to its history, which it must have, and makes no picture.
+  void add_to_history(const ToPresent& what, Denoiser& denoiser);
+  // Replaces the composite and the mask in the band's rows by those that present() has made of the
+  // samples before they are denoised, with the history if there is one; from `after_band` only.
+  void read(const Denoiser::Band& band, Layers& layers) const;
 
  private:
+  gpu::GpuShow start(const ToPresent& what, const Denoiser::Band& band, Denoiser& denoiser);
   void reserve(std::size_t pixels);
   void composite(const ToPresent& what, const Denoiser::Band& band, gpu::GpuShow constants,
                  Denoiser& denoiser);

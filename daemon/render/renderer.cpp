@@ -1,6 +1,7 @@
 #include "daemon/render/renderer.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <optional>
 #include <utility>
 
@@ -11,6 +12,7 @@
 #include "daemon/render/feature.hpp"
 #include "daemon/render/gpu_scene.hpp"
 #include "daemon/render/history.hpp"
+#include "daemon/render/kept_frame.hpp"
 #include "daemon/render/photon_schedule.hpp"
 #include "daemon/render/picture_memory.hpp"
 #include "daemon/render/presenter.hpp"
@@ -52,7 +54,12 @@ struct Renderer::Impl {
   // Returns the plate as linear radiance; w is 0 where a channel is clipped.
   std::vector<glm::vec4> measured() const;
   void upload_plate();
+  void take(FrameInput input);
+  void place();
   void begin_accumulating();
+  void add_view();
+  void put_back(const KeptFrame& kept);
+  ToPresent to_present(bool denoise);
 
   std::shared_ptr<Device> device;
   set::Estimation estimation;
@@ -61,7 +68,9 @@ struct Renderer::Impl {
   std::optional<Wavefront> wavefront;
   std::optional<Denoiser> denoiser;    // made when a picture is first shown
   std::optional<Presenter> presenter;  // likewise; made for the response
-  std::optional<History> history;      // made when a frame first accumulates
+  std::optional<History> history;      // made when a frame first accumulates, or is shown among
+                                       // others
+  LightCells light;                    // of the environment
   std::uint32_t past_samples = 0;      // of the frames that were accumulated before this one
   bool counts_samples = false;         // this frame's are accumulated
   bool has_separate_parts = false;     // this frame's (Renderer::separate_parts)
@@ -174,6 +183,10 @@ void Renderer::Impl::begin_accumulating() {
   }
   if (!history) history.emplace(*device);
   history->light_with(scene.lamps());
+  add_view();
+}
+
+void Renderer::Impl::add_view() {
   history->begin({calibration.intrinsics, frame.world_from_camera, 1 / frame.exposure},
                  scene.stances());
 }
@@ -224,7 +237,8 @@ void Renderer::set_environment(const lighting::EnvironmentMap& environment,
 
 void Renderer::set_environment(const EncodedEnvironment& environment, set::LightSampling sampling) {
   impl_->scene.set_environment(environment, sampling);
-  if (impl_->history) impl_->history->light_with(environment);
+  impl_->light = light_cells(environment);
+  if (impl_->history) impl_->history->light_with(impl_->light);
   impl_->has_environment = true;
 }
 
@@ -260,39 +274,48 @@ std::uint32_t Renderer::needed() const {
   return impl_->needed();
 }
 
+// Makes this the current frame. Throws if its plate does not fit the calibration.
+void Renderer::Impl::take(FrameInput input) {
+  const PinholeIntrinsics& lens = calibration.intrinsics;
+  if (!input.plate) input.plate = std::make_shared<const Plate>();
+  const Plate& taken = *input.plate;
+  if (!taken.samples.empty() && (taken.width != lens.width || taken.height != lens.height))
+    throw Error("observer: a frame of " + std::to_string(taken.width) + "x" +
+                std::to_string(taken.height) + " does not fit the calibration's " +
+                std::to_string(lens.width) + "x" + std::to_string(lens.height));
+  frame = std::move(input);
+  if (!response || response->bits() != taken.bits) {
+    response.emplace(calibration.response, taken.bits);
+    presenter.reset();
+  }
+}
+
+// Uploads the current frame and the scene around its camera.
+void Renderer::Impl::place() {
+  upload_plate();
+  scene.place(glm::dvec3(frame.world_from_camera[3]));
+  upload_frame();
+  scene_buffers = scene.buffers();
+  scene_buffers["corner_rays"] = &rays;
+  scene_buffers["frame"] = &frame_buffer;
+  scene_buffers["plate_samples"] = &plate;
+}
+
 void Renderer::begin(FrameInput frame) {
   Impl& r = *impl_;
   if (!r.has_scene || !r.has_environment)
     throw Error("renderer: a frame was begun before the scene and the environment were set");
-  const PinholeIntrinsics& lens = r.calibration.intrinsics;
-  if (!frame.plate) frame.plate = std::make_shared<const Plate>();
-  const Plate& plate = *frame.plate;
-  if (!plate.samples.empty() && (plate.width != lens.width || plate.height != lens.height))
-    throw Error("observer: a frame of " + std::to_string(plate.width) + "x" +
-                std::to_string(plate.height) + " does not fit the calibration's " +
-                std::to_string(lens.width) + "x" + std::to_string(lens.height));
-  r.frame = std::move(frame);
-  if (!r.response || r.response->bits() != plate.bits) {
-    r.response.emplace(r.calibration.response, plate.bits);
-    r.presenter.reset();
-  }
+  r.take(std::move(frame));
   r.begin_accumulating();
   r.samples = 0;
   r.has_separate_parts = false;
   r.trees_before = std::exchange(r.trees_now, r.scene.rebuilt_trees());
-  r.upload_plate();
-  r.scene.place(glm::dvec3(r.frame.world_from_camera[3]));
-  r.upload_frame();
-
-  Buffers buffers = r.scene.buffers();
-  buffers["corner_rays"] = &r.rays;
-  buffers["frame"] = &r.frame_buffer;
-  buffers["plate_samples"] = &r.plate;
+  r.place();
   const std::uint32_t features = r.features = r.needed() | r.carried;
-  r.scene_buffers = buffers;
   if ((features & gpu::FEATURE_PHOTONS) != 0)
-    r.wavefront->use_photons(r.photons(), r.estimation.photon_radius_px / lens.fx);
-  r.wavefront->use_scene(std::move(buffers), features);
+    r.wavefront->use_photons(r.photons(),
+                             r.estimation.photon_radius_px / r.calibration.intrinsics.fx);
+  r.wavefront->use_scene(r.scene_buffers, features);
   if ((features & gpu::FEATURE_CAMERA) != 0) r.wavefront->use_camera(r.measured());
   r.wavefront->clear();
 }
@@ -357,22 +380,18 @@ Layers Renderer::layers() const {
   return layers;
 }
 
+ToPresent Renderer::Impl::to_present(bool denoise) {
+  if (!denoiser) denoiser.emplace(*device);
+  if (!presenter) presenter.emplace(*device, *response);
+  const PinholeIntrinsics& lens = calibration.intrinsics;
+  return {wavefront->sums(), lens.width,     lens.height, plate,     !frame.plate->samples.empty(),
+          is_clipped,        frame.exposure, rule(),      sampled(), denoise,
+          frame.dithers};
+}
+
 Plate Renderer::show(bool denoise, Layers* layers) {
   Impl& r = *impl_;
-  if (!r.denoiser) r.denoiser.emplace(*r.device);
-  if (!r.presenter) r.presenter.emplace(*r.device, *r.response);
-  const PinholeIntrinsics& lens = r.calibration.intrinsics;
-  ToPresent what{r.wavefront->sums(),
-                 lens.width,
-                 lens.height,
-                 r.plate,
-                 !r.frame.plate->samples.empty(),
-                 r.is_clipped,
-                 r.frame.exposure,
-                 r.rule(),
-                 r.sampled(),
-                 denoise,
-                 r.frame.dithers};
+  ToPresent what = r.to_present(denoise);
   std::optional<Plate> accumulated;
   if (r.frame.accumulates && r.samples > 0) {
     r.history->find_surfaces(r.scene_buffers, r.features, r.samples);
@@ -388,6 +407,75 @@ Plate Renderer::show(bool denoise, Layers* layers) {
   });
   layers->denoised = true;
   return accumulated ? *std::move(accumulated) : picture;
+}
+
+KeptFramePtr Renderer::keep() const {
+  const Impl& r = *impl_;
+  assert(r.samples > 0);
+  const PinholeIntrinsics& lens = r.calibration.intrinsics;
+  return std::make_shared<const KeptFrame>(KeptFrame{lens.width, lens.height, r.frame, r.samples,
+                                                     r.features, r.scene.standing(), r.light,
+                                                     r.wavefront->keep()});
+}
+
+// Makes a kept frame the current one again, as one that does not accumulate. The scene stands as it
+// did. The rays that look for outlines get the set's seed, so that they are the same in all
+// pictures, and outlines stand still.
+void Renderer::Impl::put_back(const KeptFrame& kept) {
+  const PinholeIntrinsics& lens = calibration.intrinsics;
+  if (kept.width != lens.width || kept.height != lens.height)
+    throw Error("renderer: a kept frame of " + std::to_string(kept.width) + "x" +
+                std::to_string(kept.height) + " does not fit the calibration's " +
+                std::to_string(lens.width) + "x" + std::to_string(lens.height));
+  take(kept.frame);
+  frame.accumulates = false;
+  frame.seed.reset();
+  counts_samples = false;
+  past_samples = 0;
+  samples = kept.samples;
+  features = kept.features;
+  scene.stand(kept.standing);
+  trees_now = trees_before = scene.rebuilt_trees();
+  place();
+  wavefront->use_scene(scene_buffers, features);
+  wavefront->put_back(kept.sums);
+}
+
+Plate Renderer::show_among(const std::vector<KeptFramePtr>& frames, bool denoise, Layers* layers) {
+  Impl& r = *impl_;
+  assert(!frames.empty());
+  if (!r.history) r.history.emplace(*r.device);
+  r.history->start_over();
+  if (frames.size() == 1) {
+    r.put_back(*frames.front());
+    return show(denoise, layers);
+  }
+  const auto add = [&](const KeptFrame& kept) {
+    r.put_back(kept);
+    r.history->light_with(kept.light);
+    r.history->light_with(r.scene.lamps());
+    r.add_view();
+    r.history->find_surfaces(r.scene_buffers, r.features, r.samples);
+    ToPresent what = r.to_present(denoise);
+    what.history = &*r.history;
+    return what;
+  };
+  for (std::size_t i = 0; i + 1 < frames.size(); ++i) {
+    const ToPresent what = add(*frames[i]);
+    r.presenter->add_to_history(what, *r.denoiser);
+  }
+  const ToPresent what = add(*frames.back());
+  const bool fills = denoise && layers;
+  PlateRadiance plate;
+  if (fills) plate = plate_radiance(*r.frame.plate, *r.response, r.frame.exposure);
+  Plate picture = r.presenter->present(what, *r.denoiser, [&](const Denoiser::Band& band) {
+    if (!fills) return;
+    r.presenter->read(band, *layers);
+    r.denoiser->read(band, *layers, plate, r.rule());
+  });
+  if (fills) layers->denoised = true;
+  r.history->start_over();
+  return picture;
 }
 
 Counters Renderer::counters() const {

@@ -34,6 +34,10 @@ struct FrameInput {
   bool dithers = false;
 };
 
+// A frame with its samples, as Renderer::keep() returns it; nothing can change it.
+struct KeptFrame;
+using KeptFramePtr = std::shared_ptr<const KeptFrame>;
+
 class Renderer {
  public:
   Renderer(std::shared_ptr<Device> device, const set::Estimation& estimation,
@@ -104,6 +108,34 @@ class Renderer {
   // of `layers`, which must be those of the same samples; their variance is then the noise left.
   // Throws previz::Error where the device has no memory for it.
   Plate show(bool denoise, Layers* layers = nullptr);
+  // Returns what show_among() needs of the current frame, which must have a sample: its input, its
+  // samples' sums, and how the scene stood. It takes 160 bytes of the computer's memory per pixel,
+  // 16 more with photons, and the plate, which it shares with FrameInput.
+  KeptFramePtr keep() const;
+  // Returns the picture of the last of these frames, averaged with the others as far as they show
+  // the same: each is carried along to the next by the motion between the two, whichever was
+  // earlier (order_of_neighbours() in daemon/render/neighbours.hpp). Frames of different numbers of
+  // samples have weights in proportion to these. Where the numbers differ within a frame
+  // (limit_samples()), a pixel's weight is that of the largest one: the mean is as true, but it is
+  // not the best one, and it may have more noise than with other weights.
+  //
+  // Without `denoise` a moving outline lags by a fraction of a pixel, and how much of a pixel it
+  // covers is not as true as in the frame alone.
+  //
+  // The picture depends on these frames alone: not on the object, as long as it has the same
+  // device, set, calibration and scene, nor on what it rendered before. A frame alone is what
+  // show() makes of it if it does not accumulate. The samples should be independent: the frames
+  // need seeds of their own, and should not be begun with FrameInput::accumulates, whose random
+  // numbers depend on the frames before.
+  //
+  // With `denoise`, `layers` may be those of the last frame's samples; composite, variance and mask
+  // in them then become those of the picture.
+  //
+  // It ends what was accumulated, and the current frame: the next call is begin(). Instances,
+  // lamps, sources and shapes are left as in the last frame; the environment stays as it was set.
+  // Throws previz::Error where a frame has another size than the calibration, or the device has no
+  // memory for it.
+  Plate show_among(const std::vector<KeptFramePtr>& frames, bool denoise, Layers* layers = nullptr);
   Counters counters() const;
 
  private:

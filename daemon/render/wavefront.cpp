@@ -1,7 +1,9 @@
 #include "daemon/render/wavefront.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "daemon/render/photon_schedule.hpp"
@@ -349,6 +351,39 @@ std::vector<Wavefront::Sums> Wavefront::sums() const {
                       static_cast<int>(tiles_[i].batch.height),
                       has_photons ? &caustics_[i] : nullptr});
   return result;
+}
+
+Wavefront::KeptSums Wavefront::keep() const {
+  const auto width = static_cast<std::size_t>(width_);
+  const std::vector<Sums> tiles = sums();
+  KeptSums kept;
+  kept.pixels.resize(width * static_cast<std::size_t>(height_));
+  if (tiles.front().caustics) kept.caustics.resize(kept.pixels.size());
+  for (const Sums& tile : tiles) {
+    const std::size_t first = static_cast<std::size_t>(tile.first_row) * width;
+    const std::size_t count = static_cast<std::size_t>(tile.rows) * width;
+    download_bytes(device_, tile.pixels,
+                   std::as_writable_bytes(std::span(kept.pixels).subspan(first, count)));
+    if (tile.caustics)
+      download_bytes(device_, *tile.caustics,
+                     std::as_writable_bytes(std::span(kept.caustics).subspan(first, count)));
+  }
+  return kept;
+}
+
+void Wavefront::put_back(const KeptSums& kept) {
+  const auto width = static_cast<std::size_t>(width_);
+  const bool has_photons = (features_.value() & gpu::FEATURE_PHOTONS) != 0;
+  assert(kept.pixels.size() == width * static_cast<std::size_t>(height_));
+  assert(has_photons == !kept.caustics.empty());
+  for (std::size_t i = 0; i < tiles_.size(); ++i) {
+    const std::size_t first = tiles_[i].batch.y * width;
+    const std::size_t count = tiles_[i].batch.height * width;
+    upload_bytes(device_, pixels_[i], std::as_bytes(std::span(kept.pixels).subspan(first, count)));
+    if (has_photons)
+      upload_bytes(device_, caustics_[i],
+                   std::as_bytes(std::span(kept.caustics).subspan(first, count)));
+  }
 }
 
 gpu::GpuControl Wavefront::control() const {

@@ -58,6 +58,15 @@ class Wavefront {
     const Buffer* caustics = nullptr;
   };
   std::vector<Sums> sums() const;
+  // The same in the computer's memory, row-major, without tiles.
+  struct KeptSums {
+    std::vector<gpu::GpuPixel> pixels;
+    std::vector<glm::vec4> caustics;  // empty: there are no photons
+  };
+  KeptSums keep() const;
+  // Puts kept sums in the place of the picture's, of which they must have the size; with the
+  // features that they were kept with. The next samples are to be preceded by a clear().
+  void put_back(const KeptSums& kept);
   gpu::GpuControl control() const;  // counters since the last clear
 
  private:

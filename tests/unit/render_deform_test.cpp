@@ -400,5 +400,24 @@ TEST(Deforming, TheDifferenceFollows) {
   EXPECT_EQ(covered(bent_limb(limb, 0)), upright);
 }
 
+// A kept frame has its shapes with it, so that it is shown among others as well by an object in
+// which no mesh has been deformed yet, or has another shape since.
+TEST(Deforming, AKeptFrameIsInItsShapesAgain) {
+  const View view = figures(scene::world_mixed);
+  SetRenderer renderer(view), idle(view);
+  std::vector<render::KeptFramePtr> frames;
+  for (const double bend : {0.25, 0.2, 0.0}) {
+    renderer.deform({bent_limb(view.scene.deformations[0], bend), {{bend}, {}}});
+    renderer.begin({{}, 1.0, view.world_from_camera});
+    renderer.render(2);
+    frames.push_back(renderer.keep());
+  }
+  const Plate expected = renderer.show_among(frames, true);
+  EXPECT_EQ(renderer.show_among(frames, true).samples, expected.samples);
+  EXPECT_EQ(idle.show_among(frames, true).samples, expected.samples);
+  std::swap(frames[0], frames[2]);
+  EXPECT_NE(idle.show_among(frames, true).samples, expected.samples);
+}
+
 }  // namespace render_deform_test
 }  // namespace previz::test

@@ -1,0 +1,23 @@
+// A frame that was rendered, with all that its picture is made of, in the computer's memory.
+#pragma once
+
+#include <cstdint>
+
+#include "daemon/render/gpu_scene.hpp"
+#include "daemon/render/light_change.hpp"
+#include "daemon/render/renderer.hpp"
+#include "daemon/render/wavefront.hpp"
+
+namespace previz::render {
+
+struct KeptFrame {
+  int width = 0, height = 0;
+  FrameInput frame;
+  std::int64_t samples = 0;     // the largest number that a pixel has; 1 or more
+  std::uint32_t features = 0;   // FEATURE_* bits of the pipelines
+  GpuScene::Standing standing;  // of the scene
+  LightCells light;             // of the environment
+  Wavefront::KeptSums sums;
+};
+
+}  // namespace previz::render
