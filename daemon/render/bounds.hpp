@@ -1,5 +1,5 @@
 // This header computes the bounding spheres that directions and photons are aimed at
-// (shaders/README.md, "Difference bounds" and "Caustics").
+// (shaders/README.md, "Difference bounds" and "Caustics"), and the radius of what is lit.
 #pragma once
 
 #include <glm/vec4.hpp>
@@ -34,5 +34,14 @@ Bounds difference_bounds(const scene::Scene& scene, const Spheres& spheres);
 // plastic whose GGX alpha is somewhere at or below `specular_alpha`, and glass that hardly
 // refracts. Objects in neither world count too, so that the pipelines are ready when they return.
 Bounds specular_bounds(const scene::Scene& scene, const Spheres& spheres, double specular_alpha);
+
+// Returns the radius (metres) of the disc through which distant light counts beside lamps: half the
+// diagonal of the box around the objects that are in one world only, the `lamps` that shine from a
+// place and the objects that emit. It is at most `scene_radius` (> 0), and half octaves below it,
+// so that lights need not be weighed anew at every motion of an object. Where no object is in one
+// world only, or nothing but distant light shines, it is `scene_radius`. `spheres` are those of the
+// instances where they are now.
+double lit_radius(const scene::Scene& scene, const Spheres& spheres,
+                  const std::vector<set::Light>& lamps, double scene_radius);
 
 }  // namespace previz::render

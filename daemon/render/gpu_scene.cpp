@@ -235,6 +235,7 @@ void GpuScene::stand(const Standing& standing) {
 }
 
 void GpuScene::find_bounds(const Spheres& spheres) {
+  placed_spheres_ = spheres;
   difference_bounds_ = difference_bounds(scene_, spheres);
   specular_bounds_ = specular_bounds(scene_, spheres, specular_alpha_);
 }
@@ -404,7 +405,9 @@ void GpuScene::set_sources(std::optional<std::vector<set::Light>> sources) {
 
 void GpuScene::place(const glm::dvec3& camera_position) {
   find_extent();
-  lights_.place(scene_, lamps(), scene_radius_, camera_position);
+  const std::vector<set::Light> shining = lamps();
+  lit_radius_ = lit_radius(scene_, placed_spheres_, shining, scene_radius_);
+  lights_.place(scene_, shining, lit_radius_, camera_position);
   seen_from_ = camera_position;
   upload_instances(camera_position);
   upload_bounds(camera_position);
@@ -517,9 +520,10 @@ void GpuScene::describe(gpu::GpuFrame& frame, std::uint32_t features) const {
   frame.scene_center = glm::vec3(scene_center_ - seen_from_);
   // The radius is slightly wider, so that rounding leaves no surface outside.
   frame.scene_radius = static_cast<float>(scene_radius_ * 1.001);
-  // Light samples are divided by power. The power of distant light is what crosses the scene's
-  // disc, so that a lamp in the environment is sampled as often as the same lamp taken out of it.
-  const double disc = std::numbers::pi * scene_radius_ * scene_radius_;
+  // Light samples are divided by power. The power of distant light is what crosses the disc of what
+  // is lit, so that a lamp in the environment is sampled as often as the same lamp taken out of it,
+  // and a large room around takes no samples from a lamp beside a virtual object.
+  const double disc = std::numbers::pi * lit_radius_ * lit_radius_;
   const double environment_power = 4 * std::numbers::pi * environment_mean_ * disc;
   const bool sampled = (features & gpu::FEATURE_ENVIRONMENT_SAMPLING) != 0;
   const double share = environment_share(environment_power, lights_.power());

@@ -126,6 +126,7 @@ class GpuScene {
   std::vector<scene::Shape> shapes_;                // as deform() got them last
   std::vector<bool> may_be_dirac_;                  // each material
   Spheres spheres_;                                 // of instances_as_set_
+  Spheres placed_spheres_;                          // of the instances where they are now
   std::optional<std::vector<set::Light>> sources_;  // absent: there are never any
   std::vector<MeshPlace> places_;
   Deformer deformer_;
@@ -134,6 +135,7 @@ class GpuScene {
   glm::dvec3 scene_center_{0.0};  // of the instances' bounds; world, metres
   glm::dvec3 seen_from_{0.0};     // the camera's place of the last place()
   double scene_radius_ = 1;
+  double lit_radius_ = 1;  // of what is lit, as lit_radius() says
   std::uint32_t environment_size_ = 1, environment_levels_ = 0;
   double environment_mean_ = 0, environment_spread_ = 2;
   set::LightSampling sampling_ = set::LightSampling::importance;

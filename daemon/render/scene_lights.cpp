@@ -59,8 +59,8 @@ void SceneLights::reshape(const scene::Scene& scene, std::uint32_t instance) {
 
 SceneLights::State SceneLights::state_of(const scene::Scene& scene,
                                          const std::vector<set::Light>& lamps,
-                                         double scene_radius) const {
-  State state{{}, {}, {}, shapes_, stepped(scene_radius)};
+                                         double lit_radius) const {
+  State state{{}, {}, {}, shapes_, stepped(lit_radius)};
   for (const set::Light& lamp : lamps) append_lamp(state.lamps, lamp);
   for (const Emitter& emitter : emitters_) {
     state.places.push_back(scene.instances[emitter.instance].world_from_object);
@@ -72,12 +72,12 @@ SceneLights::State SceneLights::state_of(const scene::Scene& scene,
 bool SceneLights::are_equal(const State& a, const State& b) {
   return have_equal_bytes(a.lamps.lights, b.lamps.lights) &&
          a.lamps.positions == b.lamps.positions && a.places == b.places &&
-         a.presences == b.presences && a.shapes == b.shapes && a.scene_radius == b.scene_radius;
+         a.presences == b.presences && a.shapes == b.shapes && a.lit_radius == b.lit_radius;
 }
 
 void SceneLights::place(const scene::Scene& scene, const std::vector<set::Light>& lamps,
-                        double scene_radius, const glm::dvec3& camera_position) {
-  State state = state_of(scene, lamps, scene_radius);
+                        double lit_radius, const glm::dvec3& camera_position) {
+  State state = state_of(scene, lamps, lit_radius);
   const bool is_new = !state_ || !are_equal(*state_, state);
   if (is_new) {
     visible_count_ =
@@ -105,8 +105,8 @@ void SceneLights::encode(const scene::Scene& scene) {
                    emitter.weights);
   }
   count_ = static_cast<std::uint32_t>(all.lights.size());
-  power_ = select_by_power(all.lights, state_->scene_radius, all.weights);
-  spread_ = spread_of(all.lights, state_->scene_radius, all.weights);
+  power_ = select_by_power(all.lights, state_->lit_radius, all.weights);
+  spread_ = spread_of(all.lights, state_->lit_radius, all.weights);
   const bool has_tree = are_many(scene);
   if (!has_tree) groups.clear();
   const LightTree tree = build_light_tree(all, has_tree ? lamps : 0, groups);

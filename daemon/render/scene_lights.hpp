@@ -26,9 +26,9 @@ class SceneLights {
   // Follows the mesh of an instance that emits and has changed its shape.
   void reshape(const scene::Scene& scene, std::uint32_t instance);
   // Uploads what has changed since the last call. `lamps`: those with an extent first,
-  // and of these the distant ones;
-  // `scene_radius`: of the scene that distant light reaches, in metres.
-  void place(const scene::Scene& scene, const std::vector<set::Light>& lamps, double scene_radius,
+  // and of these the distant ones; `lit_radius`: of the disc through which distant light reaches
+  // what is lit, in metres.
+  void place(const scene::Scene& scene, const std::vector<set::Light>& lamps, double lit_radius,
              const glm::dvec3& camera_position);
 
   // Returns the index of the first of an instance's lights; NO_INDEX if it does not emit.
@@ -54,12 +54,12 @@ class SceneLights {
     std::vector<glm::dmat4> places;  // of the emitters
     std::vector<std::uint32_t> presences;
     std::uint64_t shapes;
-    double scene_radius;
+    double lit_radius;
   };
 
   static void shape(Emitter& emitter, const scene::Scene& scene);
   State state_of(const scene::Scene& scene, const std::vector<set::Light>& lamps,
-                 double scene_radius) const;
+                 double lit_radius) const;
   static bool are_equal(const State& a, const State& b);
   void encode(const scene::Scene& scene);
   void upload_positions(const glm::dvec3& camera_position);

@@ -1,11 +1,12 @@
 // From how wide a solid angle light comes, which decides where directions towards objects are worth
-// their work.
+// their work, and how samples are shared between the sky and the lamps.
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <glm/ext/matrix_transform.hpp>
 #include <numbers>
 
+#include "daemon/render/bounds.hpp"
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/gpu_lights.hpp"
 #include "tests/support/render_fixture.hpp"
@@ -167,6 +168,91 @@ TEST(DirectionsTowardsWhatDiffers, AreThoseOfTheFrameHoweverOftenItIsBegun) {
     pictures.push_back(renderer.layers().mixed);
   }
   EXPECT_EQ(pictures[0], pictures[1]);
+}
+
+// A virtual ball on a floor of 14 m under an even sky, and a lamp 0.9 m away, of a thousand times
+// the sky's radiance.
+View ball_beside_a_lamp() {
+  View view;
+  const std::uint32_t grey = add_material(view.scene, diffuse(glm::vec3(0.5f)));
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({14, 14})), grey);
+  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.1, 3)), grey,
+               glm::translate(glm::dmat4(1), glm::dvec3(0, 0, 0.1)), scene::world_mixed);
+  view.environment = uniform_environment(glm::vec3(0.1f));
+  set::Light light = lamp(set::LightType::sphere, glm::dvec3(100));
+  light.position = {0.6, 0, 0.8};
+  light.radius_m = 0.05;
+  view.scene.lights = {light};
+  view.calibration = pinhole(32, 32, 0.4);
+  view.world_from_camera = look_at({0, -0.8, 0.6}, {0, 0, 0.05});
+  return view;
+}
+
+// The box around the ball and the lamp is 0.75 m by 0.2 m by 0.85 m, half its diagonal 0.576 m, and
+// the half octave next to it below a scene's 8 m is 0.5 m.
+TEST(LightShare, IsThatOfTheBoxAroundWhatDiffersAndTheLamps) {
+  const auto radius_of = [](const scene::Scene& scene, const std::vector<set::Light>& lamps) {
+    return render::lit_radius(scene, render::bounding_spheres(scene), lamps, 8);
+  };
+  scene::Scene scene = ball_beside_a_lamp().scene;
+  std::vector<set::Light> lamps = scene.lights;
+  EXPECT_DOUBLE_EQ(radius_of(scene, lamps), 0.5);
+  lamps.push_back(lamp(set::LightType::directional));
+  lamps.push_back(lamp(set::LightType::point, glm::dvec3(0)));
+  lamps.push_back(lamp(set::LightType::point));
+  lamps[3].gain_mixed = lamps[3].gain_real = 0;
+  for (int i = 1; i < 4; ++i) lamps[i].position = {50, 0, 0};
+  EXPECT_DOUBLE_EQ(radius_of(scene, lamps), 0.5) << "a sun and lamps that are off do not count";
+  EXPECT_EQ(radius_of(scene, {lamps[1]}), 8) << "nothing but a sun shines";
+  lamps[3].gain_mixed = 1;
+  EXPECT_EQ(radius_of(scene, lamps), 8) << "no more than the scene";
+
+  // A panel that glows counts as a lamp does: 3 m above, it makes a box of 1.6 m, hence sqrt(2).
+  add_instance(scene, add_mesh(scene, rectangle_mesh({0.1, 0.1})),
+               add_material(scene, emitter(glm::vec3(1))),
+               glm::translate(glm::dmat4(1), glm::dvec3(0, 0, 3)));
+  EXPECT_DOUBLE_EQ(radius_of(scene, {}), std::numbers::sqrt2);
+  scene.instances[1].presence = scene::world_both;
+  EXPECT_EQ(radius_of(scene, scene.lights), 8) << "nothing differs";
+  scene.instances[1].presence = scene::world_mixed;
+  scene.instances[2].presence = 0;
+  EXPECT_EQ(radius_of(scene, {}), 8) << "the panel is taken away";
+}
+
+// The variance of a pixel's mean on average over the pixels of the composite (green), and that
+// average's standard error, an over-estimate because the pixels are not alike.
+struct Variance {
+  double mean = 0, error = 0;
+};
+
+Variance variance_of(const render::Layers& layers) {
+  const auto n = static_cast<double>(layers.variance.size());
+  double sum = 0, squares = 0;
+  for (const glm::vec3& pixel : layers.variance) {
+    sum += pixel.g;
+    squares += 1.0 * pixel.g * pixel.g;
+  }
+  return {sum / n, std::sqrt(std::max(squares / n - sum / n * sum / n, 0.0) / n)};
+}
+
+// A second ball, out of sight below the far corner of the floor, makes all of the floor what is
+// lit: the sky then gets the nine tenths of the samples that are the most it can get. A lamp that a
+// share p of the samples looks for leaves the variance (1 / p - 1) f^2 of what it brings, f: 9 f^2
+// for a tenth, f^2 / 9 for nine tenths. Less than a ninth of all variance is left as long as the
+// rest, which the share hardly changes, is less than f^2.
+TEST(LightShare, LeavesTheLampBesideAnObjectItsSamples) {
+  const View near = ball_beside_a_lamp();
+  View wide = near;
+  add_instance(wide.scene, add_mesh(wide.scene, icosphere_mesh(0.05, 1)), 0,
+               glm::translate(glm::dmat4(1), glm::dvec3(6.8, 6.8, -0.1)), scene::world_mixed);
+  const render::Layers few = render_clean(near, 64, up_to_depth(2)).layers;
+  const render::Layers many = render_clean(wide, 64, up_to_depth(2)).layers;
+  const Variance by_near = variance_of(few), by_wide = variance_of(many);
+  EXPECT_LT(by_near.error, 0.1 * by_near.mean);
+  EXPECT_LT(by_wide.error, 0.1 * by_wide.mean);
+  EXPECT_LT(by_near.mean + 4 * by_near.error, (by_wide.mean - 4 * by_wide.error) / 9);
+  EXPECT_NEAR(mean(few.composite).g, mean(many.composite).g,
+              4 * std::hypot(standard_error(few).g, standard_error(many).g));
 }
 
 // A small ball in a hall of 40 m whose walls shine with 1 and reflect a half: almost every path of

@@ -357,6 +357,31 @@ TEST(ManyLamps, AreEncodedAnewOnlyWhenOneOfThemHasChanged) {
   EXPECT_EQ(fresh.layers().mixed, kept);
 }
 
+// A sun and the sky count through a disc as wide as what is lit, in half octaves, here the virtual
+// object and a lamp 2 m away. So the lights stay as they are while the object moves a little, and
+// are weighed anew when it has gone far.
+TEST(ManyLamps, AreNotEncodedAnewForEachMotionOfAVirtualObject) {
+  View view = lit_point(albedo, 20);
+  set::Light light = lamp(set::LightType::point);
+  light.position = {2, 0, 1};
+  set::Light sun = lamp(set::LightType::directional);
+  view.scene.lights = {light, sun};
+  const std::uint32_t box =
+      add_instance(view.scene, add_mesh(view.scene, box_mesh(glm::dvec3(0.1))),
+                   add_material(view.scene, diffuse(glm::vec3(1))),
+                   glm::translate(glm::dmat4(1), glm::dvec3(0, 0, 1)), scene::world_mixed);
+  SetRenderer renderer(view, up_to_depth(1));
+  const auto encoded = [&](double along) {
+    view.scene.instances[box].world_from_object[3].x = along;
+    renderer.move(view.scene.instances, view.scene.lights);
+    renderer.begin({{}, 1.0, view.world_from_camera});
+    return renderer.counters().encoded_lights;
+  };
+  // The radius goes from 1.03 m to 0.88 m; all from 0.74 m to 1.05 m is a sixteenth of the scene's.
+  for (int i = 5; i < 35; ++i) EXPECT_EQ(encoded(0.01 * i), 1u) << 0.01 * i;
+  EXPECT_EQ(encoded(-4), 2u) << "3 m";
+}
+
 // 60 spheres and panels, partly behind each other, and a sun: what the camera sees of all is the
 // sum of what it sees of each four, because lamps block nothing. The sums of 16 floats may round.
 TEST(ManyLamps, AreSeenAsEachByItself) {
