@@ -181,7 +181,10 @@ void Renderer::Impl::begin_accumulating() {
     if (history) history->forget();
     return;
   }
-  if (!history) history.emplace(*device);
+  if (!history) {
+    history.emplace(*device);
+    history->light_with(light);  // that was set before
+  }
   history->light_with(scene.lamps());
   add_view();
 }
