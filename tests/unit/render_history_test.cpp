@@ -76,6 +76,39 @@ TEST(History, OfAStillCameraHasTheSamplesOfOneLongFrame) {
   }
 }
 
+// So it is in a picture of 3840x2160, of which no dispatch of 65,535 work groups covers more than
+// half.
+TEST(History, OfA4KPictureHasTheSamplesOfOneLongFrame) {
+  Stage stage(glm::vec3(0.4f));
+  constexpr int wide = 3840, high = 2160;
+  stage.view.calibration = pinhole(wide, high, 0.9);
+  stage.view.calibration.response.kind = ResponseCurve::Kind::linear;
+  SetRenderer renderer(stage.view, up_to_depth(1));
+  const auto plate = std::make_shared<const Plate>(
+      Plate{wide, high, 16, std::vector<std::uint16_t>(std::size_t{3} * wide * high, 20000)});
+  const auto picture_of = [&](int samples, bool accumulates) {
+    renderer.begin({.plate = plate,
+                    .exposure = 0.5,
+                    .world_from_camera = stage.view.world_from_camera,
+                    .accumulates = accumulates});
+    renderer.render(samples);
+    expect_clean(renderer.counters());
+    return renderer.show(false);
+  };
+  picture_of(1, true);
+  const Plate picture = picture_of(1, true);
+  const Plate expected = picture_of(2, false);
+  constexpr int bands = 8;
+  int changed = 0, others[bands] = {};
+  for (std::size_t i = 0; i < picture.samples.size(); ++i) {
+    changed += expected.samples[i] != 20000 ? 1 : 0;
+    others[i * bands / picture.samples.size()] +=
+        std::abs(picture.samples[i] - expected.samples[i]) > 1 ? 1 : 0;
+  }
+  EXPECT_GT(changed, wide * high);
+  for (const int of_band : others) EXPECT_LT(of_band, 0.02 * 3 * wide * high / bands);
+}
+
 // Of 16 times as many samples noise is at most a quarter: less, because the samples of a sequence
 // are spread evenly. The reference's own noise, of 1024 samples, is an eighth of that.
 TEST(History, TakesNoiseAwayAsItsSamplesAddUp) {
