@@ -139,21 +139,28 @@ const float HALF_KNOWING = 8.0;
 // Returns the share that rays have found, or less than 0 where they have found none.
 float found_at(ivec2 at) { return texelFetch(albedos, pixel_index(at)).w - 1.0; }
 
-// Returns the other side of an outline: its own samples of that, and what the pixels around show
-// of it, the nearest of which know best. The fourth component is the sum of their weights.
-vec4 other_side(ivec2 at, float own_cover) {
+// Returns the mean of an outline's own samples of its other side; the fourth component is how far they know
+// it, from 0 to 1.
+vec4 kept_other(ivec2 at) {
+  const vec4 kept = texelFetch(uncovered, pixel_index(at));
+  return vec4(min(kept.rgb, DENOISE_MOST_WHITES), kept.w / (kept.w + HALF_KNOWING));
+}
+
+// Returns what the pixels around show of the other side of an outline, the nearest of which know best.
+// The fourth component is the sum of their weights.
+vec4 other_around(ivec2 at, float own_cover) {
   vec4 sum = vec4(0.0);
   for (int y = -REACH; y <= REACH; ++y)
     for (int x = -REACH; x <= REACH; ++x) {
       const ivec2 there = at + ivec2(x, y);
-      if (!is_inside(there)) continue;
+      if (!is_inside(there) || (x == 0 && y == 0)) continue;
       const float near = 1.0 / (1.0 + float(x * x + y * y));
       const float cover = texelFetch(surfaces, pixel_index(there)).w;
       if (cover == 1.0 - own_cover) {
         sum += near * vec4(load_lit(there).signal, 1.0);
       } else if (cover == own_cover && found_at(there) >= 0.0) {
-        const vec4 kept = texelFetch(uncovered, pixel_index(there));
-        sum += near * kept.w / (kept.w + HALF_KNOWING) * vec4(min(kept.rgb, DENOISE_MOST_WHITES), 1.0);
+        const vec4 kept = kept_other(there);
+        sum += near * kept.w * vec4(kept.rgb, 1.0);
       }
     }
   return sum;
@@ -162,9 +169,12 @@ vec4 other_side(ivec2 at, float own_cover) {
 // Mixes the two sides of an outline by the share that rays have found. The pixel is filtered as if
 // its own side filled it.
 void mix_anew(ivec2 at, Pixel here, float found, inout Shown shown) {
-  const vec4 other = other_side(at, here.cover);
-  if (other.w <= 0.0) return;
-  const vec3 other_light = other.rgb / other.w;
+  const vec4 kept = kept_other(at);
+  const vec4 around = other_around(at, here.cover);
+  if (around.w <= 0.0 && kept.w <= 0.0) return;
+  // Between a thing and its contact shadow, which may be narrower than a pixel, only the pixel itself knows.
+  const vec3 other_light =
+      around.w > 0.0 ? mix(around.rgb / around.w, kept.rgb, kept.w) : kept.rgb;
   const bool is_object = here.cover == 1.0;
   const vec3 object = is_object ? here.signal : other_light;
   const vec3 behind = is_object ? other_light : here.signal;

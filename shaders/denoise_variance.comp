@@ -8,6 +8,7 @@
 
 #include "shaders/lib/denoise.glsl"
 
+uniform textureBuffer albedos;  // w: 0, or 1 and more at an outline that is mixed anew
 // The levels of the transform read these.
 layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
 layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
@@ -51,6 +52,8 @@ const float LEAST_KNOWING = 4.0;
 // variance of what changes on real surfaces is left. On virtual objects, whose light is seen by itself,
 // what remains of the noise would be seen as stains (tests/truth/RESULTS.md, "Live").
 const float LEFT_BY_EVENNESS = 0.25;
+// Beside an outline it is less, because a contact shadow is as narrow as a pixel.
+const float LEFT_AT_OUTLINES = 0.04;
 
 // Returns the variance of a pixel with history. history_show.comp leaves the number of its samples in
 // the place of the overlap. The neighbours of a young history may be older and scatter less, for
@@ -62,7 +65,9 @@ vec3 variance_with_history(ivec2 at, Pixel here) {
     return vec3(DENOISE_MOST_WHITES * DENOISE_MOST_WHITES);
   if (here.overlap >= LEAST_KNOWING) {
     const float evenness = min(here.overlap / LEAST_KNOWING - 1.0, 1.0);
-    const float left = here.cover > 0.0 ? 1.0 : mix(1.0, LEFT_BY_EVENNESS, evenness);
+    const bool is_outline = texelFetch(albedos, pixel_index(at)).w > 0.0;
+    const float least = is_outline ? LEFT_AT_OUTLINES : LEFT_BY_EVENNESS;
+    const float left = here.cover > 0.0 ? 1.0 : mix(1.0, least, evenness);
     return left * max(here.variance, mean_variance(at, here));
   }
   const int reach = int(DENOISE_VARIANCE_REACH);

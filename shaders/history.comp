@@ -69,6 +69,8 @@ const float LONGEST_STEP = 8.0;
 const float LEAST_DETERMINANT = 1e-4;
 const ivec2 AROUND[8] = ivec2[](ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1), ivec2(1, 1),
                                 ivec2(-1, 1), ivec2(1, -1), ivec2(-1, -1));
+// Another side of so many samples counts as half of an own side.
+const float HALF_KNOWING = 2.0;
 // The other side moves as the nearest pixel within this reach whose own side it is.
 const int REACH = int(HISTORY_REACH);
 
@@ -310,6 +312,23 @@ vec3 albedo_before(Cell cell, Wanted wanted) {
   return vec3(0.0);
 }
 
+// What pixels show of a surface beside their own side, over white.
+struct Behind {
+  vec3 light;
+  float weight;
+};
+
+// Adds what a pixel of the frame before shows of the wanted side, which ends in it. Without this, what is at an
+// outline, a contact shadow, would be made of what is around it.
+void add_other(inout Behind behind, float weight, ivec2 at, Wanted wanted) {
+  Other other;
+  const float of = class_of(wanted.thing);
+  if (is_seen_in_mirror(wanted.thing) || !load_other(at, of, wanted, other)) return;
+  const float known = other.samples / (other.samples + HALF_KNOWING);
+  behind.light += weight * known * other.light;
+  behind.weight += weight * known;
+}
+
 // Interpolates the own side at the wanted place among the pixels that show the wanted surface, and
 // lowers the samples that it may count as.
 bool interpolate_own(inout Wanted wanted, vec3 albedo, out Own own) {
@@ -319,13 +338,17 @@ bool interpolate_own(inout Wanted wanted, vec3 albedo, out Own own) {
   const vec4 wx = sharp_weights(cell.f.x);
   const vec4 wy = sharp_weights(cell.f.y);
   float total = 0.0;
+  Behind behind = Behind(vec3(0.0), 0.0);
   Sharp sharp = EMPTY_SHARP;
   Sharp sharp_caustic = EMPTY_SHARP;
   for (int y = 0; y < 2; ++y)
     for (int x = 0; x < 2; ++x) {
       const float weight = weight_of(cell, x, y);
       const int index = weight > 0.0 ? own_index(cell.low + ivec2(x, y), wanted) : -1;
-      if (index < 0) continue;
+      if (index < 0) {
+        if (weight > 0.0) add_other(behind, weight, cell.low + ivec2(x, y), wanted);
+        continue;
+      }
       const Own there = load_own(index, albedo);
       own.light += weight * there.light;
       own.doubt += weight * there.doubt;
@@ -346,6 +369,11 @@ bool interpolate_own(inout Wanted wanted, vec3 albedo, out Own own) {
     own.mask /= total;
     own.albedo /= total;
     own.caustic /= total;
+    if (behind.weight > 0.0) {
+      const vec3 over = is_known(own.albedo) ? own.albedo : vec3(1.0);
+      const vec3 light = (behind.light / behind.weight - own.caustic.rgb) / over;
+      own.light = mix(own.light, light, behind.weight / (total + behind.weight));
+    }
   }
   const float blur = blur_of(cell);
   if (blur <= 0.0) return true;
