@@ -67,6 +67,11 @@ void add_render(CLI::App& app, post::RenderOptions& options,
   add_choice(command, "--denoise,!--noisy", options.denoise,
              "Remove noise from the composite, or leave it (default: quality.denoise)");
   command
+      .add_option("--neighbours", options.neighbours,
+                  "Average a denoised picture with this many frames on each side; 0: every frame "
+                  "stands alone (default: quality.neighbours)")
+      ->check(CLI::Range(0, 4));
+  command
       .add_option(
           "--error", options.error,
           "Add samples down to this error, as a share of the picture's brightness (default: "

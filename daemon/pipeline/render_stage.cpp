@@ -1,6 +1,7 @@
 #include "daemon/pipeline/render_stage.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "daemon/pipeline/preview_size.hpp"
@@ -39,6 +40,22 @@ std::string why_no_pose(const tracking::Track& track) {
   return track.reason.empty() ? what : what + ": " + track.reason;
 }
 
+// Returns a seed of the shot's own. The bits are mixed by the finalizer of splitmix64 (Steele et
+// al. 2014), so that neighbouring indices and seeds have nothing in common.
+std::uint32_t seed_of(std::uint32_t set_seed, std::uint64_t index) {
+  const auto mixed = [](std::uint64_t bits) {
+    bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9u;
+    bits = (bits ^ (bits >> 27)) * 0x94d049bb133111ebu;
+    return bits ^ (bits >> 31);
+  };
+  constexpr std::uint64_t step = 0x9e3779b97f4a7c15u;
+  return static_cast<std::uint32_t>(mixed(mixed(set_seed + step) + (index + 1) * step) >> 32);
+}
+
+double seconds_from(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
 }  // namespace
 
 RenderStage::RenderStage(std::shared_ptr<render::Device> device, const set::Set& set,
@@ -60,11 +77,18 @@ RenderStage::RenderStage(std::shared_ptr<render::Device> device, const set::Set&
   scene_.animations = scene.animations;
   scene_.deformations = scene.deformations;
   scene_.variants = scene.variants;
+  stands_elsewhere_ = options_.seeds_shots;  // so that the first shot is placed like all others
 }
 
 void RenderStage::operator()(Shot& shot) {
   const auto start = std::chrono::steady_clock::now();
-  if (!begin(shot, options_.is_live)) return;
+  if (!begin(shot, options_.is_live) || !sample(shot)) return;
+  finish(shot);
+  shot.render_s = seconds_from(start);
+}
+
+// Returns false if it was cancelled.
+bool RenderStage::sample(Shot& shot) {
   const Refined refined = refine(
       *renderer_, set_.quality, [&] { return cancelled(); },
       [&](int samples) {
@@ -72,9 +96,31 @@ void RenderStage::operator()(Shot& shot) {
       });
   shot.error = refined.error;
   shot.samples = refined.samples;
-  if (!refined.whole) return;
-  finish(shot);
-  shot.render_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return refined.whole;
+}
+
+KeptShot RenderStage::keep(Shot& shot) {
+  const auto start = std::chrono::steady_clock::now();
+  if (!begin(shot, false) || !sample(shot)) return {};
+  KeptShot kept;
+  kept.frame = renderer_->keep();
+  if (options_.layers && !shot.only_neighbour)
+    kept.layers = std::make_shared<render::Layers>(renderer_->layers());
+  shot.counters = renderer_->counters();
+  shot.render_s = seconds_from(start);
+  return kept;
+}
+
+void RenderStage::show_among(Shot& shot, const std::vector<render::KeptFramePtr>& chain,
+                             std::shared_ptr<render::Layers> layers) {
+  const auto start = std::chrono::steady_clock::now();
+  if (layers) error_ = render::estimate_error(*layers).picture;
+  stands_elsewhere_ = true;
+  shot.picture = std::make_shared<const Plate>(
+      renderer_->show_among(chain, set_.quality.denoise, layers.get()));
+  shot.layers = std::move(layers);
+  shot.whole = true;
+  shot.render_s += seconds_from(start);
 }
 
 bool RenderStage::begin(Shot& shot) {
@@ -99,12 +145,16 @@ bool RenderStage::begin(Shot& shot, bool is_live) {
   if (!shot.light) return untouched("no light frame yet");
 
   light(shot);
-  if (placed_ != shot.scene || is_measured_anew_) place(shot.scene);
+  if (placed_ != shot.scene || is_measured_anew_ || stands_elsewhere_) place(shot.scene);
+  stands_elsewhere_ = false;
   // A shot with layers can be compared with what is rendered from a take, so it stands alone.
   const bool is_shown_live = is_live && !options_.layers;
   renderer_->begin({.plate = std::move(plate),
                     .exposure = exposure_of(shot),
                     .world_from_camera = *camera,
+                    .seed = options_.seeds_shots
+                                ? std::optional(seed_of(set_.estimation.seed, shot.index))
+                                : std::nullopt,
                     .accumulates = is_shown_live && set_.quality.accumulate,
                     .stands_aside = is_live && set_.quality.accumulate,
                     .dithers = is_shown_live});
@@ -147,9 +197,10 @@ double RenderStage::exposure_of(const Shot& shot) const {
 // Gives the renderer a new light, and what the shot's state changes of its lamps.
 void RenderStage::light(const Shot& shot) {
   LampStates changed = lamp_states_beside(shot.scene, set_);
-  if (light_ == shot.light && changed == relit_) return;
+  const bool is_same = light_ == shot.light && changed == relit_;
+  if (is_same && !stands_elsewhere_) return;
   const LightPtr light = with_lamps_parted(shot.light, set_, shot.scene);
-  renderer_->set_environment(light->encoded, set_.lighting.sampling);
+  if (!is_same) renderer_->set_environment(light->encoded, set_.lighting.sampling);
   // The light mode can change live, and lamps come and go: once there were lamps, the renderer must
   // also be given none.
   has_sources_ |= set_.lighting.mode != set::LightMode::image || !set_.captured_lamps.empty() ||

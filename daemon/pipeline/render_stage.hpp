@@ -7,6 +7,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "daemon/lighting/response.hpp"
 #include "daemon/pipeline/relight.hpp"
@@ -26,6 +27,9 @@ struct RenderStageOptions {
   // (render::FrameInput), and averaged where the set's quality asks for it. Otherwise every shot
   // stands alone.
   bool is_live = false;
+  // Every shot has random numbers of its own, by the set's seed and its index in the take, so that
+  // it can be averaged with its neighbours (keep()); otherwise all have the same.
+  bool seeds_shots = false;
   double scale = 1;  // size of everything a shot gets, over the observer's size (preview_size.hpp)
   // A frame of another size than the calibration's passes through untouched, as from a camera that
   // was exchanged; otherwise it is an error, as in a take, all of whose frames would be like it.
@@ -33,6 +37,12 @@ struct RenderStageOptions {
   std::function<bool()> cancelled;
   std::function<void(const Shot&, int samples_done)> progress;  // a few times per frame
   std::function<void(const std::string&)> note;                 // each message once
+};
+
+// What a shot is shown from, together with its neighbours.
+struct KeptShot {
+  render::KeptFramePtr frame;              // null: untouched or cancelled
+  std::shared_ptr<render::Layers> layers;  // of the shot's samples; null: none are wanted
 };
 
 class RenderStage {
@@ -44,9 +54,19 @@ class RenderStage {
               RenderStageOptions options);
 
   // Fills picture, layers, counters and untouched. Every frame uses the same random numbers (P8),
-  // unless frames are averaged.
+  // unless frames are averaged, live or with their neighbours.
   // This is begin(), the samples that the set's quality asks for, and finish().
   void operator()(Shot& shot);
+
+  // keep() and show_among() do the same in two parts, for shots of a take that are averaged with
+  // their neighbours. keep() is begin() and the samples; a shot that it finishes (it is untouched)
+  // or that was cancelled (it is not whole) has no frame. show_among() makes the shot's picture
+  // from the chain of kept frames (Renderer::show_among), the last of which is its own, and the
+  // layers that were kept with that. Their composite, mask and variance become those of the
+  // picture.
+  KeptShot keep(Shot& shot);
+  void show_among(Shot& shot, const std::vector<render::KeptFramePtr>& chain,
+                  std::shared_ptr<render::Layers> layers);
 
   // begin(), add_samples() and finish() do the same in parts, for a frame that gets samples until
   // somebody interrupts (P7). begin() returns false if the plate passes through untouched; the shot
@@ -74,6 +94,7 @@ class RenderStage {
 
  private:
   bool begin(Shot& shot, bool is_live);
+  bool sample(Shot& shot);
   bool cancelled() const { return options_.cancelled && options_.cancelled(); }
   double exposure_of(const Shot& shot) const;
   void light(const Shot& shot);
@@ -96,6 +117,7 @@ class RenderStage {
   std::set<std::string> unmatched_;  // names in relit_ of which the light has no lamp
   bool has_sources_ = false;         // lamps beside the scene's were ever set
   bool is_measured_anew_ = false;    // lamps in scene_ have another emission than the renderer's
+  bool stands_elsewhere_ = false;    // instances and lamps are as in another shot: show_among()
   std::set<std::string> unknown_;    // names in recorded states that were already reported
 };
 

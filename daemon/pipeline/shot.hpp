@@ -73,6 +73,8 @@ struct Shot {
   double error = 0;  // Refined::error
   int samples = 0;   // samples of the picture; 0: untouched
   int history = 0;   // earlier frames whose samples the picture shares; 0: it is of its own alone
+  // True: a frame of a take that is rendered only because others are averaged with it.
+  bool only_neighbour = false;
   bool frozen = false;  // true: a round of refining one frame, not a new frame
 };
 

@@ -75,6 +75,29 @@ class StageThreads {
     });
   }
 
+  // Starts a stage that looks ahead: `work` is (std::optional<In>) -> std::vector<Out>, what can be
+  // passed on by now. It gets nothing once, when its input has ended, but not after a failure.
+  template <class In, class Out, class Work>
+  void stage_ahead(std::string name, Channel<In>& input, Channel<Out>& output, Work work) {
+    know(input);
+    know(output);
+    start([this, name = std::move(name), &input, &output, work = std::move(work)]() mutable {
+      DropCount drops(metrics_, name, input);
+      bool goes_on = true;
+      while (goes_on) {
+        std::optional<In> value = input.pop();
+        drops.update();
+        if (!value && is_abandoned()) break;
+        goes_on = value.has_value();
+        const auto begin = std::chrono::steady_clock::now();
+        std::vector<Out> results = work(std::move(value));
+        if (goes_on) metrics_.worked(name, seconds_since(begin));
+        for (Out& result : results) goes_on = output.push(std::move(result)) && goes_on;
+      }
+      output.close();
+    });
+  }
+
   // Starts a sink; `consume` is (In) -> void.
   template <class In, class Consume>
   void sink(std::string name, Channel<In>& input, Consume consume) {
@@ -129,6 +152,11 @@ class StageThreads {
     const std::lock_guard lock(mutex_);
     abandoned_ = true;
     for (const auto& abandon_one : abandon_channel_) abandon_one();
+  }
+
+  bool is_abandoned() {
+    const std::lock_guard lock(mutex_);
+    return abandoned_;
   }
 
   void join() {

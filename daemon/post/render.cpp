@@ -5,12 +5,14 @@
 #include <charconv>
 #include <chrono>
 #include <cstdio>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <ostream>
 #include <set>
 #include <utility>
 
 #include "daemon/output/progress.hpp"
+#include "daemon/pipeline/neighbour_stage.hpp"
 #include "daemon/pipeline/preview_size.hpp"
 #include "daemon/pipeline/refinement.hpp"
 #include "daemon/pipeline/render_stage.hpp"
@@ -39,6 +41,7 @@ void override_set(set::Set& set, const RenderOptions& options) {
   if (options.samples) set.quality.samples = *options.samples;
   if (options.adaptive) set.quality.adaptive = *options.adaptive;
   if (options.denoise) set.quality.denoise = *options.denoise;
+  if (options.neighbours) set.quality.neighbours = *options.neighbours;
   if (options.error) set.quality.error = *options.error;
   if (options.seconds) set.quality.seconds = *options.seconds;
   if (options.seed) set.estimation.seed = *options.seed;
@@ -58,6 +61,11 @@ void check_directory(const set::Set& set, const RenderOptions& options) {
         ", outside the take's folder; name a folder with --out, or let it with --any-paths");
 }
 
+// Returns how many frames on each side a picture is averaged with.
+int neighbours_of(const set::Quality& quality) {
+  return quality.denoise ? quality.neighbours : 0;
+}
+
 // Returns everything that decides what the pictures look like, as JSON that RenderDirectory
 // compares.
 std::string settings_of(const pipeline::Take& take, const set::Set& set,
@@ -70,6 +78,8 @@ std::string settings_of(const pipeline::Take& take, const set::Set& set,
   json["samples"] = set.quality.samples;
   json["adaptive"] = set.quality.adaptive;
   json["denoise"] = set.quality.denoise;
+  // Where it is unused the pictures are those of a previzd that did not know it.
+  if (const int neighbours = neighbours_of(set.quality)) json["neighbours"] = neighbours;
   json["error"] = set.quality.error;
   json["seconds"] = set.quality.seconds;
   json["seed"] = set.estimation.seed;
@@ -133,6 +143,9 @@ std::string quality_words(const set::Quality& quality) {
   if (quality.seconds > 0)
     text += ", then for " + output::duration_words(quality.seconds) + " a frame at most";
   if (quality.denoise) text += ", denoised";
+  if (const int neighbours = neighbours_of(quality))
+    text += ", over " + std::to_string(neighbours) + (neighbours == 1 ? " frame" : " frames") +
+            " on either side";
   return text;
 }
 
@@ -197,6 +210,66 @@ struct Job {
   pipeline::Metrics& metrics;
 };
 
+// Says which frames are rendered, and takes those to be written for this process. Where frames are
+// averaged with their neighbours, it takes runs of them, because the neighbours beyond the ends of
+// a run are rendered too. The questions come in the order of the frames.
+class FramesToRender {
+ public:
+  FramesToRender(RenderDirectory& directory, const std::set<std::uint64_t>& to_do, int neighbours)
+      : directory_(directory),
+        to_do_(to_do),
+        neighbours_(static_cast<std::uint64_t>(neighbours)),
+        run_(neighbours > 0 ? run_of_frames : 1),
+        next_run_(*to_do.begin() / run_) {}
+
+  std::uint64_t first() const { return *to_do_.begin() - std::min(*to_do_.begin(), neighbours_); }
+  std::uint64_t last() const { return *to_do_.rbegin() + neighbours_; }
+  bool is_written(std::uint64_t frame) const { return own_.contains(frame); }
+  // True also for the neighbours of frames that are written.
+  bool is_rendered(std::uint64_t frame) {
+    claim_to(frame + neighbours_);
+    const auto nearest = own_.lower_bound(frame - std::min(frame, neighbours_));
+    return nearest != own_.end() && *nearest <= frame + neighbours_;
+  }
+  // Returns the frames that others have finished or are rendering.
+  const std::set<std::uint64_t>& left() const { return left_; }
+
+ private:
+  static constexpr std::uint64_t run_of_frames = 16;
+
+  void claim_to(std::uint64_t last) {
+    for (; next_run_ <= last / run_; ++next_run_) {
+      const std::set<std::uint64_t> run(to_do_.lower_bound(next_run_ * run_),
+                                        to_do_.lower_bound((next_run_ + 1) * run_));
+      if (run.empty()) continue;
+      const std::set<std::uint64_t> taken = directory_.claim(run);
+      own_.insert(taken.begin(), taken.end());
+      std::ranges::set_difference(run, taken, std::inserter(left_, left_.end()));
+    }
+  }
+
+  RenderDirectory& directory_;
+  const std::set<std::uint64_t>& to_do_;
+  const std::uint64_t neighbours_, run_;
+  std::uint64_t next_run_;
+  std::set<std::uint64_t> own_, left_;
+};
+
+// Both must outlive the options.
+pipeline::RenderStageOptions stage_options(const Job& job, output::Progress& progress) {
+  const set::Quality& quality = job.take.set.quality;
+  pipeline::RenderStageOptions options;
+  options.layers = true;
+  options.seeds_shots = neighbours_of(quality) > 0;
+  options.scale = job.options.scale;
+  options.cancelled = [&] { return job.options.stop.stop_requested(); };
+  options.progress = [&](const Shot& shot, int samples) {
+    progress.sample(shot.index, samples, quality.samples, now_s());
+  };
+  options.note = [&](const std::string& what) { progress.note(what); };
+  return options;
+}
+
 // Renders those of the frames that no other process has finished or is rendering, and returns the
 // frames that were left to others.
 std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64_t>& to_do,
@@ -206,47 +279,44 @@ std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64
   const pipeline::Take& take = job.take;
   RenderDirectory& directory = job.directory;
   const set::Set& set = take.set;
-  std::set<std::uint64_t> left;
-  const auto is_wanted = [&](std::uint64_t frame) {
-    if (!to_do.contains(frame)) return false;
-    const Claim claim = directory.claim(frame);
-    if (claim != Claim::mine) left.insert(frame);
-    return claim == Claim::mine;
-  };
-  pipeline::TakeShots shots(take, {.first = *to_do.begin(),
-                                   .last = *to_do.rbegin(),
-                                   .wanted = is_wanted,
+  const int neighbours = neighbours_of(set.quality);
+  FramesToRender frames(directory, to_do, neighbours);
+  const auto is_rendered = [&](std::uint64_t frame) { return frames.is_rendered(frame); };
+  pipeline::TakeShots shots(take, {.first = frames.first(),
+                                   .last = frames.last(),
+                                   .wanted = is_rendered,
                                    .scene = &job.scene,
                                    .note = [&](const std::string& what) { progress.note(what); },
                                    .metrics = &job.metrics,
                                    .stop = options.stop});
   report::Once light_notes;
-  pipeline::RenderStageOptions render_options;
-  render_options.layers = true;
-  render_options.scale = options.scale;
   set::Set written = set;  // with the lens of the pictures, for what is written beside them
   written.observer.calibration = pipeline::scaled(take.observer, options.scale);
-  render_options.cancelled = [&] { return options.stop.stop_requested(); };
-  render_options.progress = [&](const Shot& shot, int samples) {
-    progress.sample(shot.index, samples, set.quality.samples, now_s());
-  };
-  render_options.note = [&](const std::string& what) { progress.note(what); };
-  pipeline::RenderStage render(job.device, set, take.observer, job.scene, render_options);
+  pipeline::RenderStage render(job.device, set, take.observer, job.scene,
+                               stage_options(job, progress));
+  pipeline::NeighbourStage among_neighbours(render, neighbours);
 
   // One shot ahead of each stage keeps them all busy; whole layers wait in the last queue.
   pipeline::BoundedQueue<Shot> lit(1), rendered(1);
   pipeline::StageThreads stages(job.metrics, options.stop);
   stages.source("observer", lit, [&] {
     std::optional<Shot> shot = shots.next();
+    if (shot) shot->only_neighbour = !frames.is_written(shot->index);
     if (shot && shot->light)
       for (const std::string& what : shot->light->lighting.report.notes)
         if (light_notes.is_first(report::wording(what))) progress.note("light: " + what);
     return shot;
   });
-  stages.stage("render", lit, rendered, [&](Shot shot) {
-    render(shot);
-    return shot;
-  });
+  if (neighbours > 0)
+    stages.stage_ahead("render", lit, rendered, [&](std::optional<Shot> shot) {
+      return shot ? among_neighbours(*std::move(shot))
+                  : among_neighbours.end(options.stop.stop_requested());
+    });
+  else
+    stages.stage("render", lit, rendered, [&](Shot shot) {
+      render(shot);
+      return shot;
+    });
   stages.sink("output", rendered, [&](const Shot& shot) {
     if (!shot.whole) return directory.release(shot.index);
     directory.write(shot, written);
@@ -256,7 +326,7 @@ std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64
     if (options.on_frame) options.on_frame(shot);
   });
   stages.wait();
-  return left;
+  return frames.left();
 }
 
 // Renders the frames, and then those that another process had and did not finish: it was killed.

@@ -30,17 +30,20 @@ constexpr const char* lines_name = "frames.jsonl";
 // Returns the first few settings that differ: "quality.samples is 16 there and 64 now".
 std::string differences(const nlohmann::json& there, const nlohmann::json& now) {
   std::string text;
-  for (const auto& [key, value] : now.items()) {
-    if (there.contains(key) && there[key] == value) continue;
+  const auto add = [&](const std::string& key, const std::string& before,
+                       const std::string& after) {
     if (!text.empty()) text += "; ";
-    const std::string before = there.contains(key) ? there[key].dump() : "unknown";
-    const std::string after = value.dump();
     text += key;
     if (std::max(before.size(), after.size()) < 60)
       text += " is " + before + " there and " + after + " now";
     else
       text += " differs";
-  }
+  };
+  for (const auto& [key, value] : now.items())
+    if (!there.contains(key) || there[key] != value)
+      add(key, there.contains(key) ? there[key].dump() : "unknown", value.dump());
+  for (const auto& [key, value] : there.items())
+    if (!now.contains(key)) add(key, value.dump(), "unused");
   return text;
 }
 
@@ -292,6 +295,16 @@ Claim RenderDirectory::claim(std::uint64_t frame) {
   read_lines();
   if (finished(frame)) return Claim::finished;
   return locks_->claim(frame) ? Claim::mine : Claim::at_another;
+}
+
+std::set<std::uint64_t> RenderDirectory::claim(const std::set<std::uint64_t>& frames) {
+  const std::lock_guard guard(mutex_);
+  const FolderLocks::Transaction transaction(*locks_);
+  read_lines();
+  std::set<std::uint64_t> taken;
+  for (const std::uint64_t frame : frames)
+    if (!finished(frame) && locks_->claim(frame)) taken.insert(frame);
+  return taken;
 }
 
 void RenderDirectory::release(std::uint64_t frame) {

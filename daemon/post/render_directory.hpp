@@ -60,6 +60,9 @@ class RenderDirectory {
 
   // Takes a frame, so that no other process renders it.
   Claim claim(std::uint64_t frame);
+  // Takes those of the frames that are neither finished nor at another process, and returns them.
+  // No other process takes any of them meanwhile.
+  std::set<std::uint64_t> claim(const std::set<std::uint64_t>& frames);
   // Gives back a frame that was not written.
   void release(std::uint64_t frame);
   // Returns those of the frames that are neither finished nor free, by the process that has them:

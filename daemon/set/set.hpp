@@ -234,6 +234,7 @@ struct Quality {
   bool adaptive = false;   // noisy pixels get more, `samples` on average; not in the preview
   bool denoise = true;     // denoises the composite, guided by its own variance
   bool accumulate = true;  // live: averages with the frames before, where they show the same
+  int neighbours = 2;      // offline, denoised: averages with so many frames on each side, 0..4
   double error = 0;        // refines to this rms error over the picture's rms; 0: samples decide
   double seconds = 0;      // time limit of a frame; 0: samples decide
   double scale = 1.0;      // times the observer's resolution, preview only

@@ -120,6 +120,7 @@ class RigLive : public testing::Test {
     options.directory = directory_ / ("post" + std::to_string(frame));
     options.frames = post::FrameRange{frame, frame};
     options.samples = static_cast<int>(samples);
+    options.neighbours = 0;  // the frame alone, as a snapshot and a refinement have it
     render::Layers layers;
     options.on_frame = [&](const pipeline::Shot& shot) { layers = *shot.layers; };
     std::ostringstream ignored;

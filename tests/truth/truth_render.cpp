@@ -19,6 +19,7 @@ RenderedFrame render_truth_frame(const TruthSet& set, int frame, const RenderSet
   options.samples = settings.samples;
   options.adaptive = settings.adaptive;
   options.denoise = settings.denoise;
+  options.neighbours = settings.neighbours;
   options.seed = settings.seed;
   options.directory = directory / "render";
   options.exr = options.png = true;

@@ -15,6 +15,7 @@ namespace previz::truth {
 struct RenderSettings {
   int samples = 256;
   bool adaptive = false, denoise = false;
+  int neighbours = 0;  // with denoise: frames on each side that a picture is averaged with
   std::optional<std::uint32_t> seed = {};  // absent: the set file's
   std::string device = {};                 // a part of its name; empty: the best there is
 };

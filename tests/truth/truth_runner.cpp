@@ -257,6 +257,9 @@ int main(int argc, char** argv) {
   app.add_flag("--adaptive", arguments.render.adaptive,
                "so many on average, where they bring most");
   app.add_flag("--denoise", arguments.render.denoise, "take noise out of the composite");
+  app.add_option("--neighbours", arguments.render.neighbours,
+                 "with --denoise, average with this many frames on each side [0]")
+      ->check(CLI::Range(0, 4));
   app.add_option("--out", arguments.out, "directory for the pictures and figures")->required();
   app.add_option("--bounds", arguments.bounds, "judge by this row of bounds")
       ->check(CLI::IsMember({"paired", "full", "captured"}));

@@ -21,6 +21,7 @@ TEST(CommandLine, LeavesToTheSetWhatItDoesNotSay) {
   EXPECT_FALSE(options.samples);
   EXPECT_FALSE(options.adaptive);
   EXPECT_FALSE(options.denoise);
+  EXPECT_FALSE(options.neighbours);
   EXPECT_FALSE(options.error);
   EXPECT_FALSE(options.seconds);
   EXPECT_FALSE(options.seed);
@@ -54,6 +55,13 @@ TEST(CommandLine, SaysBothSidesOfAChoice) {
   EXPECT_EQ(render_options("--even").adaptive, false);
   EXPECT_EQ(render_options("--denoise").denoise, true);
   EXPECT_EQ(render_options("--noisy").denoise, false);
+}
+
+TEST(CommandLine, APictureHasUpToFourNeighboursOnEitherSide) {
+  EXPECT_EQ(render_options("--neighbours 0").neighbours, 0);
+  EXPECT_EQ(render_options("--neighbours 4").neighbours, 4);
+  EXPECT_THROW(render_options("--neighbours 5"), CLI::ParseError);
+  EXPECT_THROW(render_options("--neighbours -1"), CLI::ParseError);
 }
 
 CommandLine parsed(const std::string& arguments) {

@@ -135,6 +135,7 @@ class MovingTake : public ::testing::Test {
     options.frames = range;
     options.directory = directory_ / "out";
     options.force = true;
+    options.neighbours = 0;
     options.exr = options.png = options.video = false;
     std::vector<Shot> shots;
     options.on_frame = [&](const Shot& shot) { shots.push_back(shot); };

@@ -287,6 +287,14 @@ TEST_F(RenderDirectoryTest, WhatAnotherHasIsNamedWithWho) {
   EXPECT_EQ(second.claim(12), Claim::mine);
 }
 
+TEST_F(RenderDirectoryTest, ARunOfFramesIsTakenAsFarAsItIsFree) {
+  RenderDirectory first = open(), second = open();
+  first.write(sample_shot(2), set_);
+  EXPECT_EQ(first.claim({4, 5}), (std::set<std::uint64_t>{4, 5}));
+  EXPECT_EQ(second.claim({2, 3, 4, 6}), (std::set<std::uint64_t>{3, 6}));
+  EXPECT_EQ(first.claim({3, 6}), std::set<std::uint64_t>{});
+}
+
 // The other process holds a frame, is in the middle of a picture and of a line, and is killed.
 TEST_F(RenderDirectoryTest, FramesOfAKilledProcessAreFreeAgain) {
   RenderDirectory directory = open();

@@ -155,6 +155,7 @@ TEST_F(RenderSession, ADenoisedPictureSaysSoAndItsOtherLayersAreAsRendered) {
   render(options);
   const Plate noisy = output::read_png(directory_ / "out/0001.png");
   options.denoise = true;
+  options.neighbours = 0;
   EXPECT_THROW(render(options), Error);  // what is there already was made otherwise
   options.force = true;
   render(options);

@@ -92,6 +92,7 @@ Json pictures_of(const fs::path& take, const fs::path& directory) {
   options.session = take;
   options.directory = directory;
   options.samples = samples;
+  options.neighbours = 0;
   options.exr = options.video = false;
   Json pictures = Json::array();
   options.on_frame = [&](const pipeline::Shot& shot) {

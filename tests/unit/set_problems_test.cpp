@@ -77,7 +77,7 @@ const Mistake unknown[] = {
     {"[quality]\nseed = 4\n", "2:1: quality.seed: ", "did you mean it under [estimator]?"},
     {"[set]\nsize_m = 4\n", "2:1: set.size_m: ", "did you mean it under [[tag]]?"},
     {"[quality]\nzzzzzzzzzz = 4\n", "2:1: quality.zzzzzzzzzz: ",
-     "allowed: samples, adaptive, denoise, accumulate, error, seconds, scale, fps"},
+     "allowed: samples, adaptive, denoise, accumulate, neighbours, error, seconds, scale, fps"},
     {"[quality]\n\"a\\nb\" = 4\n", "2:1: quality.a\\nb: ", "unknown key"},
 };
 INSTANTIATE_TEST_SUITE_P(Unknown, SetMistake, testing::ValuesIn(unknown));
