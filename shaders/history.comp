@@ -13,6 +13,7 @@
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 layout(scalar, push_constant) uniform Show { GpuShow show; };
+layout(constant_id = 0) const uint FEATURES = 0xffffffffu;
 
 // This frame's, of the band, as composite.comp makes them.
 layout(scalar) readonly buffer Composites { vec4 composites[]; };
@@ -177,8 +178,9 @@ bool find_in_mirror(ivec2 at, inout Wanted wanted) {
   return false;
 }
 
-// Finds where a pixel was in the frame before, if it moves as what is seen at `source` does.
-bool find_before(ivec2 at, ivec2 source, out Wanted wanted) {
+// Finds where a pixel was in the frame before, if it moves as what is seen at `source` does. Unless
+// `in_mirrors` says that what a mirror shows is looked for, it moves as the mirror.
+bool find_before(ivec2 at, ivec2 source, bool in_mirrors, out Wanted wanted) {
   const uvec2 thing = things[in_picture(source)];
   const vec4 place = places[in_picture(source)];
   wanted.thing = thing.x;
@@ -196,9 +198,10 @@ bool find_before(ivec2 at, ivec2 source, out Wanted wanted) {
                           : bent_places[in_picture(source)];
     wanted.normal = normalize(rotated(motions[instance].before_from_now, wanted.normal));
   }
-  if (is_seen_in_mirror(thing.x)) {
+  const bool has_mirrors = (FEATURES & (FEATURE_GLOSSY | FEATURE_TRANSMISSION)) != 0u;
+  if (has_mirrors && is_seen_in_mirror(thing.x)) {
     const vec2 of_mirror = wanted.at;
-    wanted.is_loose = !find_in_mirror(source, wanted);
+    wanted.is_loose = !(in_mirrors && find_in_mirror(source, wanted));
     if (wanted.is_loose) {
       wanted.at = of_mirror;
       wanted.most = min(wanted.most, history.samples * MOST_LOOSE);
@@ -534,7 +537,7 @@ void main() {
   float most = history.most_samples;
   // Neither side moves, so that how much is covered is what it was.
   bool is_still = false;
-  if (find_before(at, at, wanted)) {
+  if (find_before(at, at, true, wanted)) {
     is_still = is_at(wanted, at);
     is_thin = !is_outline && was_thin(wanted);
     has_past = interpolate_own(wanted, now.own.albedo, own_past);
@@ -545,7 +548,8 @@ void main() {
   Other other_past = Other(vec3(0.0), 0.0);
   if (is_outline || is_thin) {
     Wanted moved_with;
-    const bool was_seen = find_before(at, is_outline ? nearest_of(at, 1.0 - side) : at, moved_with);
+    const bool was_seen = 
+        find_before(at, is_outline ? nearest_of(at, 1.0 - side) : at, false, moved_with);
     is_still = is_still && was_seen && is_at(moved_with, at);
     if (was_seen && interpolate_other(moved_with, 1.0 - side, other_past))
       other = added(other_past, now.other);

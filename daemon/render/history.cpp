@@ -46,9 +46,7 @@ void set_rotation(gpu::vec4 (&rows)[3], const glm::dmat3& rotation) {
 }  // namespace
 
 History::History(Device& device)
-    : device_(device),
-      blend_(device, "history", history_spv),
-      show_(device, "history_show", history_show_spv) {}
+    : device_(device), show_(device, "history_show", history_show_spv) {}
 
 void History::forget() {
   shorten(0);
@@ -200,6 +198,7 @@ void History::find_surfaces(const Buffers& scene, std::uint32_t features, std::i
     features_.reset();  // stays empty if creating the kernel throws
     surface_ = Kernel(device_, "history_surface", history_surface_spv, {features});
     cover_ = Kernel(device_, "history_cover", history_cover_spv, {features});
+    blend_ = Kernel(device_, "history", history_spv, {features});
     features_ = features;
   }
   Frame& now = frames_[now_];

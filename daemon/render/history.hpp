@@ -73,7 +73,7 @@ class History {
 
   Device& device_;
   Kernel blend_, show_, surface_, cover_;
-  std::optional<std::uint32_t> features_;  // of surface_ and cover_
+  std::optional<std::uint32_t> features_;  // of surface_, cover_ and blend_
   Frame frames_[2];
   int now_ = 0;                                                 // the other one is the past
   std::optional<std::int64_t> samples_;                         // for which the surfaces were found

@@ -29,6 +29,7 @@ struct Mirrored {
 // Returns whether a smooth surface shows above all what is elsewhere, and in which direction.
 bool shows_elsewhere(Surface s, out vec3 direction) {
   direction = vec3(0.0);
+  if (!has_feature(FEATURE_GLOSSY) && !has_feature(FEATURE_TRANSMISSION)) return false;
   const float cos_o = dot(s.normal, s.wo);
   if (!is_specular(s) || s.alpha > MOST_IMAGE_ALPHA || cos_o <= 0.0) return false;
   if (s.metallic > 0.5) {
