@@ -9,7 +9,7 @@ namespace previz::render {
 namespace {
 
 constexpr int block = static_cast<int>(gpu::SAMPLED_BLOCK);
-constexpr std::size_t parts = gpu::SAMPLED_PARTS;
+constexpr std::size_t parts_of_block = gpu::SAMPLED_PARTS;
 
 int blocks_in(int pixels) {
   return (pixels + block - 1) / block;
@@ -68,13 +68,14 @@ std::vector<double> smoothed(const ErrorEstimate& estimate, const Grid& grid) {
 ErrorEstimate estimate_error(const Layers& layers) {
   const Grid grid = grid_of(layers.width, layers.height);
   std::vector<double> variance(grid.size()), pixels(grid.size());
-  std::vector<double> part_variance(parts * grid.size()), part_pixels(parts * grid.size());
+  std::vector<double> part_variance(parts_of_block * grid.size()),
+      part_pixels(parts_of_block * grid.size());
   double square = 0;
   for (int y = 0; y < layers.height; ++y) {
     for (int x = 0; x < layers.width; ++x) {
       const std::size_t pixel = static_cast<std::size_t>(y) * layers.width + x;
       const std::size_t cell = grid.at(x / block, y / block);
-      const std::size_t part = parts * cell + static_cast<std::size_t>(y % 2 * 2 + x % 2);
+      const std::size_t part = parts_of_block * cell + static_cast<std::size_t>(y % 2 * 2 + x % 2);
       for (int c = 0; c < 3; ++c) {
         const double mean = layers.composite[pixel][c];
         const double noise = seen_variance(mean, layers.variance[pixel][c], layers.white);
@@ -109,10 +110,10 @@ ErrorEstimate estimate_error(const Layers& layers) {
 std::vector<bool> parts_above(const ErrorEstimate& estimate, int width, int height, double error,
                               const std::vector<std::uint32_t>& samples) {
   const Grid grid = grid_of(width, height);
-  std::vector<bool> result(parts * grid.size());
+  std::vector<bool> result(parts_of_block * grid.size());
   for (std::size_t i = 0; i < result.size(); ++i) {
-    const double left = smoothed(grid, i / parts, [&](std::size_t cell) {
-      const std::size_t judge = parts * cell + (i + 1) % parts;
+    const double left = smoothed(grid, i / parts_of_block, [&](std::size_t cell) {
+      const std::size_t judge = parts_of_block * cell + (i + 1) % parts_of_block;
       return 1.0 * estimate.parts[judge] * estimate.parts[judge] * samples[judge] / samples[i];
     });
     result[i] = left > error * error;
