@@ -169,7 +169,8 @@ TEST(ClipFit, WithoutClippedLightItSaysWhichPictureIsMissing) {
 TEST(ClipFit, RingingAndMixedEdgesDoNotLowerItToLight) {
   constexpr int side = 192, cell = 48, lamp = 24;
   const auto lamp_light = [&](int x, int y) {
-    return std::exp2(0.25 * (x / cell + side / cell * (y / cell)));
+    const int number = x / cell + side / cell * (y / cell);
+    return std::exp2(0.25 * number);
   };
   const auto weight = [&](int x, int y) {
     const auto inside = [](int a) {
