@@ -17,7 +17,7 @@
 layout(scalar) writeonly buffer Places { vec4 places[]; };  // from the camera; most samples
 layout(scalar) writeonly buffer Things { uvec2 things[]; };  // pack_thing, pack_normals
 layout(scalar) writeonly buffer Befores { vec2 befores[]; };  // place in the picture before
-// From the camera before, of what deforms. It has no pixels in a scene where nothing does.
+// Where what deforms was, from the camera of the frame before. It has no pixels where nothing deforms.
 layout(scalar) writeonly buffer BentPlaces { vec3 bent_places[]; };
 
 // Plastic and lacquer reflect about this share of the light around.

@@ -11,7 +11,7 @@
 
 namespace previz::calibrate {
 
-// What one channel shows of pixels that get so much light that the camera must clip it.
+// Says what one channel shows of pixels that get so much light that the camera must clip it.
 struct ClippedChannel {
   std::size_t samples = 0;   // pixels times exposures, surely clipped; enough if any
   int usual = 0;             // the median of their codes (of 255)

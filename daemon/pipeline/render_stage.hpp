@@ -39,7 +39,7 @@ struct RenderStageOptions {
   std::function<void(const std::string&)> note;                 // each message once
 };
 
-// What a shot is shown from, together with its neighbours.
+// A rendered shot as it is kept to be shown together with its neighbours.
 struct KeptShot {
   render::KeptFramePtr frame;              // null: untouched or cancelled
   std::shared_ptr<render::Layers> layers;  // of the shot's samples; null: none are wanted

@@ -1,4 +1,4 @@
-// Where the points of a mesh that deforms were in the frame before.
+// Finds where the points of a mesh that deforms were in the frame before.
 #ifndef PREVIZ_DEFORMED_GLSL
 #define PREVIZ_DEFORMED_GLSL
 
@@ -6,7 +6,7 @@
 #include "shaders/lib/scene.glsl"
 #include "shaders/lib/trace.glsl"
 
-// Of the frame before: position and normal of each vertex that deforms, object space.
+// Position and normal of each vertex that deforms, in the frame before and in object space.
 layout(scalar) readonly buffer PastPoints { vec4 past_points[]; };
 
 vec3 past_point(GpuInstance instance, GpuMotion motion, uint vertex) {

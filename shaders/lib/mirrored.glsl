@@ -1,5 +1,5 @@
-// What is seen in a mirror or through solid glass: not their own surface, but the place where a ray ends
-// that they reflect or bend. That place is what moves as its light does (shaders/README.md, "Accumulation over
+// Finds what is seen in a mirror or through solid glass, which is the place where a ray ends that they reflect
+// or bend, and not their own surface. That place is what moves as its light does (shaders/README.md, "Accumulation over
 // time").
 #ifndef PREVIZ_MIRRORED_GLSL
 #define PREVIZ_MIRRORED_GLSL
@@ -12,7 +12,7 @@
 const float MOST_IMAGE_ALPHA = 0.1;
 // Light is followed through so many surfaces: those of a hollow glass ball, and a mirror behind it.
 const uint MOST_MIRRORS = 5u;
-// What is seen of the environment is so far away, in metres.
+// The environment is taken to be so far away, in metres, where a ray ends in it.
 const float FAR_AWAY = 1e7;
 
 struct Mirrored {

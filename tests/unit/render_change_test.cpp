@@ -7,6 +7,7 @@
 
 #include "daemon/render/light_change.hpp"
 #include "daemon/render/moved_instances.hpp"
+#include "tests/support/averaged_frames.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test {
@@ -164,7 +165,7 @@ TEST(MovedInstances, BeyondSixteenCountEverywhere) {
   EXPECT_NEAR(result.rest, 0.04 / std::sqrt(3.0), 1e-6) << "the four that moved least";
 }
 
-constexpr int width = 64, height = 48;
+constexpr int width = averaged_width, height = averaged_height;
 
 // A floor under a sky, a virtual box that stands still on the left, and one that comes and goes on
 // the right.
@@ -180,23 +181,14 @@ struct TwoBoxes {
                          at({-0.9, 0, 0.2}), scene::world_mixed);
     walks = add_instance(scene, add_mesh(scene, box_mesh(glm::dvec3(0.2))), gray, at({0.9, 0, 0.1}),
                          scene::world_mixed);
-    view.environment = uniform_environment(glm::vec3(0.4f));
-    view.calibration = pinhole(width, height, 1.1);
-    view.calibration.response.kind = ResponseCurve::Kind::linear;
+    see_evenly_lit(view, glm::vec3(0.4f), 1.1);
     view.world_from_camera = look_at({0, -2, 1.4}, {0, 0, 0});
   }
   static glm::dmat4 at(const glm::dvec3& place) { return glm::translate(glm::dmat4(1.0), place); }
 };
 
 Plate shown(SetRenderer& renderer, const View& view, int samples, bool accumulates) {
-  renderer.begin({.plate = std::make_shared<const Plate>(Plate{
-                      width, height, 16, std::vector<std::uint16_t>(3 * width * height, 20000)}),
-                  .exposure = 0.5,
-                  .world_from_camera = view.world_from_camera,
-                  .accumulates = accumulates});
-  renderer.render(samples);
-  expect_clean(renderer.counters());
-  return renderer.show(accumulates);
+  return shown_frame(renderer, view.world_from_camera, samples, accumulates, accumulates);
 }
 
 // Returns the rms of what two pictures are apart over columns [first, last).

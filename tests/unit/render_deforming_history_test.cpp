@@ -1,16 +1,14 @@
 // What deforms keeps its past: each of its points moves as its own vertices do.
 #include <cmath>
-#include <glm/gtc/matrix_transform.hpp>
 
 #include "daemon/render/moved_instances.hpp"
 #include "daemon/scene/bvh_refit.hpp"
+#include "tests/support/averaged_frames.hpp"
 #include "tests/support/figure.hpp"
-#include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test {
 namespace render_deforming_history_test {
 
-constexpr int width = 64, height = 48;
 constexpr int joints = 3;
 constexpr int many = 256;  // samples
 
@@ -23,17 +21,13 @@ struct Figure {
     scene::Scene& scene = view.scene;
     const std::uint32_t gray = add_material(scene, diffuse(glm::vec3(0.5f)));
     add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
-    limb = add_limb(scene, limb_mesh(24, 24, joints), joints, gray, at({-0.5, 0, 0}),
+    limb = add_limb(scene, limb_mesh(24, 24, joints), joints, gray, placed_at({-0.5, 0, 0}),
                     scene::world_mixed);
-    ball = add_squeezed_ball(scene, squeezed_ball_mesh(0.3, 32, 16), gray, at({0.4, 0, 0.35}),
-                             scene::world_mixed);
-    view.environment = uniform_environment(glm::vec3(0.4f));
-    view.calibration = pinhole(width, height, 0.9);
-    view.calibration.response.kind = ResponseCurve::Kind::linear;
+    ball = add_squeezed_ball(scene, squeezed_ball_mesh(0.3, 32, 16), gray,
+                             placed_at({0.4, 0, 0.35}), scene::world_mixed);
+    see_evenly_lit(view, glm::vec3(0.4f), 0.9);
     view.world_from_camera = look_at({0, -1.8, 1.0}, {0, 0, 0.4});
   }
-  static glm::dmat4 at(const glm::dvec3& place) { return glm::translate(glm::dmat4(1.0), place); }
-
   // `bend` is the angle between joints, in radians, and the ball's weight.
   std::vector<scene::Shape> shapes(double bend) const {
     std::vector<scene::Shape> result(2);
@@ -42,25 +36,6 @@ struct Figure {
     return result;
   }
 };
-
-Plate shown(SetRenderer& renderer, const View& view, int samples, bool accumulates) {
-  renderer.begin({.plate = std::make_shared<const Plate>(Plate{
-                      width, height, 16, std::vector<std::uint16_t>(3 * width * height, 20000)}),
-                  .exposure = 0.5,
-                  .world_from_camera = view.world_from_camera,
-                  .accumulates = accumulates});
-  renderer.render(samples);
-  expect_clean(renderer.counters());
-  return renderer.show(false);
-}
-
-// Returns the rms of what two pictures are apart where the figure covers the whole pixel.
-double apart(const Plate& a, const Plate& b, const std::vector<float>& mask) {
-  double off = 0;
-  for (std::size_t i = 0; i < a.samples.size(); ++i)
-    if (mask[i / 3] == 1) off += std::pow(a.samples[i] - double(b.samples[i]), 2);
-  return std::sqrt(off);
-}
 
 // Each frame turns the top by about half a degree. What the light changes by lets the past count as
 // a few frames: with n of them the noise is 1 / sqrt(n + 1) of that of a frame alone, so that 0.7
@@ -73,13 +48,14 @@ TEST(DeformingHistory, StaysWhileAFigureMoves) {
   for (int frame = 0; frame < 12; ++frame) {
     bend = 0.005 * frame;
     moving.deform(figure.shapes(bend));
-    last = shown(moving, figure.view, 1, true);
+    last = shown_frame(moving, figure.view.world_from_camera, 1, true);
   }
   for (SetRenderer* each : {&alone, &reference}) each->deform(figure.shapes(bend));
-  const Plate truth = shown(reference, figure.view, many, false);
+  const Plate truth = shown_frame(reference, figure.view.world_from_camera, many, false);
   const std::vector<float> mask = reference.layers().mask;
-  EXPECT_LT(apart(last, truth, mask),
-            0.7 * apart(shown(alone, figure.view, 1, false), truth, mask));
+  EXPECT_LT(apart_where_covered(last, truth, mask),
+            0.7 * apart_where_covered(shown_frame(alone, figure.view.world_from_camera, 1, false),
+                                      truth, mask));
 }
 
 // Walking, and after a jump, a frame shows nothing of the shape before, beyond half of what a fresh
@@ -92,11 +68,13 @@ TEST(DeformingHistory, ShowsNoGhostOfAnotherShape) {
     bend += frame < 6 ? 0.03 : frame == 6 ? 0.4 : 0.0;
     SetRenderer fresh(figure.view), reference(figure.view);
     for (SetRenderer* each : {&renderer, &fresh, &reference}) each->deform(figure.shapes(bend));
-    const Plate truth = shown(reference, figure.view, many, false);
+    const Plate truth = shown_frame(reference, figure.view.world_from_camera, many, false);
     const std::vector<float> mask = reference.layers().mask;
-    const Plate after = shown(renderer, figure.view, 1, true);
-    const Plate begun = shown(fresh, figure.view, 1, true);
-    EXPECT_LT(apart(after, truth, mask), 1.5 * apart(begun, truth, mask)) << frame;
+    const Plate after = shown_frame(renderer, figure.view.world_from_camera, 1, true);
+    const Plate begun = shown_frame(fresh, figure.view.world_from_camera, 1, true);
+    EXPECT_LT(apart_where_covered(after, truth, mask),
+              1.5 * apart_where_covered(begun, truth, mask))
+        << frame;
   }
 }
 

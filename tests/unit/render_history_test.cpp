@@ -4,12 +4,13 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "tests/support/averaged_frames.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test {
 namespace render_history_test {
 
-constexpr int width = 64, height = 48;
+constexpr int width = averaged_width, height = averaged_height;
 
 // A floor, and above it a virtual box, seen from the side; codes are linear in radiance.
 struct Stage {
@@ -22,29 +23,11 @@ struct Stage {
     add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
     box = add_instance(scene, add_mesh(scene, box_mesh(glm::dvec3(0.4))), gray, at({0, 0, 0.3}),
                        scene::world_mixed);
-    view.environment = uniform_environment(sky);
-    view.calibration = pinhole(width, height, 0.9);
-    view.calibration.response.kind = ResponseCurve::Kind::linear;
+    see_evenly_lit(view, sky, 0.9);
     view.world_from_camera = look_at({0, -2, 1.4}, {0, 0, 0});
   }
   static glm::dmat4 at(const glm::dvec3& place) { return glm::translate(glm::dmat4(1.0), place); }
 };
-
-PlatePtr gray_plate() {
-  return std::make_shared<const Plate>(
-      Plate{width, height, 16, std::vector<std::uint16_t>(3 * width * height, 20000)});
-}
-
-Plate shown(SetRenderer& renderer, const glm::dmat4& world_from_camera, int samples,
-            bool accumulates, bool denoise = false) {
-  renderer.begin({.plate = gray_plate(),
-                  .exposure = 0.5,
-                  .world_from_camera = world_from_camera,
-                  .accumulates = accumulates});
-  renderer.render(samples);
-  expect_clean(renderer.counters());
-  return renderer.show(denoise);
-}
 
 // The rms over the picture of what a and b are off each other, over that of what b adds.
 double rms_between(const Plate& a, const Plate& b) {
@@ -67,8 +50,8 @@ TEST(History, OfAStillCameraHasTheSamplesOfOneLongFrame) {
     Plate picture;
     const int count = 16 / samples;
     for (int frame = 0; frame < count; ++frame)
-      picture = shown(frames, stage.view.world_from_camera, samples, true);
-    const Plate expected = shown(whole, stage.view.world_from_camera, 16, false);
+      picture = shown_frame(frames, stage.view.world_from_camera, samples, true);
+    const Plate expected = shown_frame(whole, stage.view.world_from_camera, 16, false);
     int others = 0;
     for (std::size_t i = 0; i < picture.samples.size(); ++i)
       others += std::abs(picture.samples[i] - expected.samples[i]) > 1 ? 1 : 0;
@@ -114,11 +97,11 @@ TEST(History, OfA4KPictureHasTheSamplesOfOneLongFrame) {
 TEST(History, TakesNoiseAwayAsItsSamplesAddUp) {
   const Stage stage(glm::vec3(0.4f));
   SetRenderer renderer(stage.view), reference(stage.view);
-  const Plate truth = shown(reference, stage.view.world_from_camera, 1024, false);
-  const Plate first = shown(renderer, stage.view.world_from_camera, 1, true);
+  const Plate truth = shown_frame(reference, stage.view.world_from_camera, 1024, false);
+  const Plate first = shown_frame(renderer, stage.view.world_from_camera, 1, true);
   Plate last;
   for (int frame = 1; frame < 16; ++frame)
-    last = shown(renderer, stage.view.world_from_camera, 1, true);
+    last = shown_frame(renderer, stage.view.world_from_camera, 1, true);
   EXPECT_LT(rms_between(last, truth), rms_between(first, truth) / 4);
 }
 
@@ -127,7 +110,7 @@ Plate shown_moving(SetRenderer& renderer, glm::dmat4& pose) {
   Plate last;
   for (int frame = 0; frame < 12; ++frame) {
     pose = look_at({0.01 * frame, -2, 1.4 + 0.004 * frame}, {0, 0, 0});
-    last = shown(renderer, pose, 1, true, true);
+    last = shown_frame(renderer, pose, 1, true, true);
   }
   return last;
 }
@@ -139,8 +122,9 @@ TEST(History, OfAMovingCameraIsBetterThanAFrameAlone) {
   SetRenderer moving(stage.view), alone(stage.view), reference(stage.view);
   glm::dmat4 pose(1.0);
   const Plate last = shown_moving(moving, pose);
-  const Plate truth = shown(reference, pose, 1024, false);
-  EXPECT_LT(rms_between(last, truth), 0.7 * rms_between(shown(alone, pose, 1, false, true), truth));
+  const Plate truth = shown_frame(reference, pose, 1024, false);
+  EXPECT_LT(rms_between(last, truth),
+            0.7 * rms_between(shown_frame(alone, pose, 1, false, true), truth));
 }
 
 // Returns the rms of what two pictures are off the truth, over the pixels that are covered in part.
@@ -160,9 +144,10 @@ TEST(History, OfAMovingCameraHasOutlinesAsOfManySamples) {
   SetRenderer moving(stage.view), alone(stage.view), reference(stage.view);
   glm::dmat4 pose(1.0);
   const Plate last = shown_moving(moving, pose);
-  const Plate truth = shown(reference, pose, 1024, false);
+  const Plate truth = shown_frame(reference, pose, 1024, false);
   const std::vector<float> mask = reference.layers().mask;
-  const double off_of_many = off_at_outlines(shown(alone, pose, 16, false, true), truth, mask);
+  const double off_of_many =
+      off_at_outlines(shown_frame(alone, pose, 16, false, true), truth, mask);
   ASSERT_GT(off_of_many, 0);
   EXPECT_LT(off_at_outlines(last, truth, mask), 1.1 * off_of_many);
 }
@@ -180,11 +165,11 @@ TEST(History, KnowsTheAlbedoOfAnOutlineFromAroundIt) {
   stage.view.scene.instances[stage.box].material = add_material(stage.view.scene, dark);
   SetRenderer first(stage.view), alone(stage.view), reference(stage.view);
   const glm::dmat4 pose = stage.view.world_from_camera;
-  const Plate truth = shown(reference, pose, 1024, false);
+  const Plate truth = shown_frame(reference, pose, 1024, false);
   const std::vector<float> mask = reference.layers().mask;
-  const double off_alone = off_at_outlines(shown(alone, pose, 4, false, true), truth, mask);
+  const double off_alone = off_at_outlines(shown_frame(alone, pose, 4, false, true), truth, mask);
   ASSERT_GT(off_alone, 0);
-  EXPECT_LT(off_at_outlines(shown(first, pose, 4, true, true), truth, mask), 1.1 * off_alone);
+  EXPECT_LT(off_at_outlines(shown_frame(first, pose, 4, true, true), truth, mask), 1.1 * off_alone);
 }
 
 // A rod thinner than a pixel is at the middle of hardly any, so no ray looks for its outline: how
@@ -199,10 +184,11 @@ TEST(History, KeepsHowMuchAThinRodCovers) {
   SetRenderer frames(stage.view), whole(stage.view), reference(stage.view);
   const glm::dmat4 pose = stage.view.world_from_camera;
   Plate picture;
-  for (int frame = 0; frame < 16; ++frame) picture = shown(frames, pose, 1, true, true);
-  const Plate truth = shown(reference, pose, 1024, false);
+  for (int frame = 0; frame < 16; ++frame) picture = shown_frame(frames, pose, 1, true, true);
+  const Plate truth = shown_frame(reference, pose, 1024, false);
   const std::vector<float> mask = reference.layers().mask;
-  const double off_of_many = off_at_outlines(shown(whole, pose, 16, false, true), truth, mask);
+  const double off_of_many =
+      off_at_outlines(shown_frame(whole, pose, 16, false, true), truth, mask);
   ASSERT_GT(off_of_many, 0);
   EXPECT_LT(off_at_outlines(picture, truth, mask), 1.1 * off_of_many);
 }
@@ -230,7 +216,7 @@ TEST(History, KeepsPhotonsLightApart) {
   SetRenderer moving(stage.view), first(stage.view), alone(stage.view), reference(stage.view);
   glm::dmat4 pose(1.0);
   const Plate last = shown_moving(moving, pose);
-  const Plate truth = shown(reference, pose, 256, false);
+  const Plate truth = shown_frame(reference, pose, 256, false);
   const std::vector<float> mask = reference.layers().mask;
   const auto off = [&](const Plate& picture) {
     double squares = 0;
@@ -238,8 +224,8 @@ TEST(History, KeepsPhotonsLightApart) {
       if (mask[i / 3] == 0) squares += std::pow(picture.samples[i] - double(truth.samples[i]), 2);
     return std::sqrt(squares);
   };
-  const double off_alone = off(shown(alone, pose, 1, false, true));
-  EXPECT_LT(off(shown(first, pose, 1, true, true)), 1.1 * off_alone);
+  const double off_alone = off(shown_frame(alone, pose, 1, false, true));
+  EXPECT_LT(off(shown_frame(first, pose, 1, true, true)), 1.1 * off_alone);
   EXPECT_LT(off(last), 0.8 * off_alone);
 }
 
@@ -250,7 +236,7 @@ TEST(History, OfLightBeyondAllWhiteStaysWhite) {
   stage.view.scene.lights[0].gain_real = 0;
   SetRenderer renderer(stage.view);
   for (int frame = 0; frame < 4; ++frame) {
-    const Plate picture = shown(renderer, stage.view.world_from_camera, 1, true, true);
+    const Plate picture = shown_frame(renderer, stage.view.world_from_camera, 1, true, true);
     const auto at = [&](int x, int y) {
       return picture.samples[static_cast<std::size_t>(3 * (y * width + x))];
     };
@@ -278,9 +264,9 @@ void expect_values_stay_in_their_places(const PinholeIntrinsics& lens) {
   Plate last;
   for (int frame = 0; frame < 20; ++frame) {
     pose = look_at({0.013 * frame, -2, 1.4}, {0.02 * frame, -0.5, 0});
-    last = shown(moving, pose, 1, true);
+    last = shown_frame(moving, pose, 1, true);
   }
-  const Plate expected = shown(alone, pose, 64, false);
+  const Plate expected = shown_frame(alone, pose, 64, false);
   constexpr int border = 8;
   for (int y = border; y + border < height; ++y)
     for (int x = border; x + border < width; ++x) {
@@ -334,11 +320,11 @@ TEST(History, LeavesThePlateBitForBitWhereNothingDiffers) {
 TEST(History, IsNotSeenInAFrameThatStandsAlone) {
   const Stage stage(glm::vec3(0.4f));
   SetRenderer with(stage.view), without(stage.view);
-  const Plate alone = shown(without, stage.view.world_from_camera, 2, false, true);
-  EXPECT_EQ(shown(with, stage.view.world_from_camera, 2, false, true).samples, alone.samples);
-  shown(with, stage.view.world_from_camera, 2, true, true);
-  shown(with, stage.view.world_from_camera, 2, true, true);
-  EXPECT_EQ(shown(with, stage.view.world_from_camera, 2, false, true).samples, alone.samples);
+  const Plate alone = shown_frame(without, stage.view.world_from_camera, 2, false, true);
+  EXPECT_EQ(shown_frame(with, stage.view.world_from_camera, 2, false, true).samples, alone.samples);
+  shown_frame(with, stage.view.world_from_camera, 2, true, true);
+  shown_frame(with, stage.view.world_from_camera, 2, true, true);
+  EXPECT_EQ(shown_frame(with, stage.view.world_from_camera, 2, false, true).samples, alone.samples);
 }
 
 // A snapshot's frame is that of an offline render, with the same random numbers, and the frames
@@ -347,11 +333,11 @@ TEST(History, IsNotEndedByAFrameThatStandsAside) {
   const Stage stage(glm::vec3(0.4f));
   SetRenderer with(stage.view), without(stage.view);
   const glm::dmat4 pose = stage.view.world_from_camera;
-  const Plate alone = shown(without, pose, 1, false, true);
+  const Plate alone = shown_frame(without, pose, 1, false, true);
   Plate expected, last;
-  for (int frame = 0; frame < 4; ++frame) expected = shown(without, pose, 1, true);
+  for (int frame = 0; frame < 4; ++frame) expected = shown_frame(without, pose, 1, true);
   for (int frame = 0; frame < 4; ++frame) {
-    last = shown(with, pose, 1, true);
+    last = shown_frame(with, pose, 1, true);
     with.begin(
         {.plate = gray_plate(), .exposure = 0.5, .world_from_camera = pose, .stands_aside = true});
     with.render(1);
@@ -366,7 +352,7 @@ TEST(History, GivesTheSamePictureWithLayersAndWhenAskedAgain) {
   const Stage stage(glm::vec3(0.4f));
   SetRenderer renderer(stage.view);
   for (int frame = 0; frame < 3; ++frame) {
-    const Plate picture = shown(renderer, stage.view.world_from_camera, 1, true, true);
+    const Plate picture = shown_frame(renderer, stage.view.world_from_camera, 1, true, true);
     render::Layers layers = renderer.layers();
     EXPECT_EQ(renderer.show(true, &layers).samples, picture.samples);
     EXPECT_EQ(renderer.show(true).samples, picture.samples);
@@ -388,19 +374,19 @@ TEST_P(HistoryAfter, AJumpOrASwitchShowsNoGhost) {
   stage.view.scene.lights = {key};
   SetRenderer renderer(stage.view, up_to_depth(1));
   const glm::dmat4 pose = stage.view.world_from_camera;
-  for (int frame = 0; frame < 8; ++frame) shown(renderer, pose, 4, true);
+  for (int frame = 0; frame < 8; ++frame) shown_frame(renderer, pose, 4, true);
   std::vector<scene::Instance> instances = stage.view.scene.instances;
   if (GetParam() == 0) instances[stage.box].world_from_object = Stage::at({-0.5, 0.3, 0.3});
   if (GetParam() == 1) key.gain_mixed = 0.2;
   renderer.move(instances, {key});
   if (GetParam() == 2)
     renderer.set_environment(uniform_environment(glm::vec3(0.02f)), set::LightSampling::importance);
-  const Plate first = shown(renderer, pose, 4, true);
+  const Plate first = shown_frame(renderer, pose, 4, true);
   if (GetParam() == 2) stage.view.environment = uniform_environment(glm::vec3(0.02f));
   SetRenderer fresh(stage.view, up_to_depth(1));
   fresh.move(instances, {key});
-  const Plate expected = shown(fresh, pose, 256, false);
-  const Plate noisy = shown(fresh, pose, 4, false);
+  const Plate expected = shown_frame(fresh, pose, 256, false);
+  const Plate noisy = shown_frame(fresh, pose, 4, false);
   // A ghost would be seen beside the noise of a frame.
   EXPECT_LT(rms_between(first, expected), 1.3 * rms_between(noisy, expected));
 }

@@ -1,14 +1,12 @@
 // What mirrors and glass show keeps its past while the camera moves: it moves as the place that is
 // seen in them does, and not as their own surface.
 #include <cmath>
-#include <glm/gtc/matrix_transform.hpp>
 
-#include "tests/support/pixels_by_hand.hpp"
+#include "tests/support/averaged_frames.hpp"
 
 namespace previz::test {
 namespace render_mirror_history_test {
 
-constexpr int width = 64, height = 48;
 constexpr int many = 128;  // samples, whose noise is a third of that of a dozen
 
 // Virtual light from one side falls on a real floor with real boxes, among which stands what
@@ -23,16 +21,13 @@ struct Room {
     const std::uint32_t red = add_material(scene, diffuse(glm::vec3(0.6f, 0.1f, 0.1f)));
     add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
     const std::uint32_t boxes = add_mesh(scene, box_mesh(glm::dvec3(0.3)));
-    add_instance(scene, boxes, red, at({-0.8, 0.3, 0.15}));
-    box = add_instance(scene, boxes, red, at({0.7, -0.3, 0.15}), scene::world_mixed);
+    add_instance(scene, boxes, red, placed_at({-0.8, 0.3, 0.15}));
+    box = add_instance(scene, boxes, red, placed_at({0.7, -0.3, 0.15}), scene::world_mixed);
     mirror = add_instance(scene, add_mesh(scene, std::move(mesh)), add_material(scene, material),
-                          at({0, 0, 0.5}), scene::world_mixed);
-    view.environment = uniform_environment(glm::vec3(0.4f));
-    view.calibration = pinhole(width, height, 0.9);
-    view.calibration.response.kind = ResponseCurve::Kind::linear;
+                          placed_at({0, 0, 0.5}), scene::world_mixed);
+    see_evenly_lit(view, glm::vec3(0.4f), 0.9);
     view.world_from_camera = look_at({0, -2, 1.2}, {0, 0, 0.4});
   }
-  static glm::dmat4 at(const glm::dvec3& place) { return glm::translate(glm::dmat4(1.0), place); }
 };
 
 Room room_with(const std::string& kind) {
@@ -41,29 +36,8 @@ Room room_with(const std::string& kind) {
   return {icosphere_mesh(0.5, 5), glass(1.5f)};
 }
 
-Plate shown(SetRenderer& renderer, const glm::dmat4& world_from_camera, int samples,
-            bool accumulates) {
-  renderer.begin({.plate = std::make_shared<const Plate>(Plate{
-                      width, height, 16, std::vector<std::uint16_t>(3 * width * height, 20000)}),
-                  .exposure = 0.5,
-                  .world_from_camera = world_from_camera,
-                  .accumulates = accumulates});
-  renderer.render(samples);
-  expect_clean(renderer.counters());
-  return renderer.show(false);
-}
-
 glm::dmat4 moving_pose(int frame) {
   return look_at({0.02 * frame, -2 + 0.01 * frame, 1.2}, {0.01 * frame, 0, 0.4});
-}
-
-// Returns the rms of what two pictures are apart where a mask says that an object covers the whole
-// pixel.
-double apart(const Plate& a, const Plate& b, const std::vector<float>& mask) {
-  double off = 0;
-  for (std::size_t i = 0; i < a.samples.size(); ++i)
-    if (mask[i / 3] == 1) off += std::pow(a.samples[i] - double(b.samples[i]), 2);
-  return std::sqrt(off);
 }
 
 class MirrorHistory : public ::testing::TestWithParam<std::string> {};
@@ -79,12 +53,12 @@ TEST_P(MirrorHistory, StaysWhileTheCameraMoves) {
   Plate last;
   for (int frame = 0; frame < 12; ++frame) {
     pose = moving_pose(frame);
-    last = shown(moving, pose, 1, true);
+    last = shown_frame(moving, pose, 1, true);
   }
-  const Plate truth = shown(reference, pose, many, false);
+  const Plate truth = shown_frame(reference, pose, many, false);
   const std::vector<float> mask = reference.layers().mask;
-  const double off_alone = apart(shown(alone, pose, 1, false), truth, mask);
-  const double off = apart(last, truth, mask);
+  const double off_alone = apart_where_covered(shown_frame(alone, pose, 1, false), truth, mask);
+  const double off = apart_where_covered(last, truth, mask);
   EXPECT_LT(off, 1.5 / std::sqrt(12.0) * off_alone);
 }
 
@@ -98,14 +72,15 @@ TEST_P(MirrorHistory, StaysWhileSomethingWalksBesideIt) {
   Plate last;
   for (int frame = 0; frame < 12; ++frame) {
     pose = moving_pose(frame);
-    instances[room.box].world_from_object = Room::at({0.8 - 0.01 * frame, -0.4, 0.15});
+    instances[room.box].world_from_object = placed_at({0.8 - 0.01 * frame, -0.4, 0.15});
     walking.move(instances, {});
-    last = shown(walking, pose, 1, true);
+    last = shown_frame(walking, pose, 1, true);
   }
   for (SetRenderer* each : {&alone, &reference}) each->move(instances, {});
-  const Plate truth = shown(reference, pose, many, false);
+  const Plate truth = shown_frame(reference, pose, many, false);
   const std::vector<float> mask = reference.layers().mask;
-  EXPECT_LT(apart(last, truth, mask), 0.6 * apart(shown(alone, pose, 1, false), truth, mask));
+  EXPECT_LT(apart_where_covered(last, truth, mask),
+            0.6 * apart_where_covered(shown_frame(alone, pose, 1, false), truth, mask));
 }
 
 // Nothing is seen in it of where a box has been that has jumped, beyond half of what a fresh start
@@ -115,15 +90,17 @@ TEST_P(MirrorHistory, ShowsNoGhostOfWhatHasJumped) {
   SetRenderer renderer(room.view), fresh(room.view), reference(room.view);
   const glm::dmat4& pose = room.view.world_from_camera;
   std::vector<scene::Instance> instances = room.view.scene.instances;
-  for (int frame = 0; frame < 12; ++frame) shown(renderer, pose, 1, true);
-  instances[room.box].world_from_object = Room::at({-0.7, -0.5, 0.15});
+  for (int frame = 0; frame < 12; ++frame) shown_frame(renderer, pose, 1, true);
+  instances[room.box].world_from_object = placed_at({-0.7, -0.5, 0.15});
   for (SetRenderer* each : {&renderer, &fresh, &reference}) each->move(instances, {});
-  const Plate truth = shown(reference, pose, many, false);
+  const Plate truth = shown_frame(reference, pose, many, false);
   const std::vector<float> mask = reference.layers().mask;
   for (int frame = 0; frame < 5; ++frame) {
-    const Plate after = shown(renderer, pose, 1, true);
-    const Plate begun = shown(fresh, pose, 1, true);
-    EXPECT_LT(apart(after, truth, mask), 1.5 * apart(begun, truth, mask)) << frame;
+    const Plate after = shown_frame(renderer, pose, 1, true);
+    const Plate begun = shown_frame(fresh, pose, 1, true);
+    EXPECT_LT(apart_where_covered(after, truth, mask),
+              1.5 * apart_where_covered(begun, truth, mask))
+        << frame;
   }
 }
 

@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "tests/support/averaged_frames.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test {
@@ -27,7 +28,7 @@ TEST(Neighbours, AreVisitedOnceInHopsOfAtMostTwoFrames) {
     }
 }
 
-constexpr int width = 64, height = 48;
+constexpr int width = averaged_width, height = averaged_height;
 constexpr double plate_code = 20000;
 
 // A floor, and above it a virtual box, seen from the side; codes are linear in radiance.
@@ -41,9 +42,7 @@ struct Stage {
     add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
     box = add_instance(scene, add_mesh(scene, box_mesh(glm::dvec3(0.4))), gray, at({0, 0, 0.3}),
                        scene::world_mixed);
-    view.environment = uniform_environment(glm::vec3(0.4f));
-    view.calibration = pinhole(width, height, 0.9);
-    view.calibration.response.kind = ResponseCurve::Kind::linear;
+    see_evenly_lit(view, glm::vec3(0.4f), 0.9);
     view.world_from_camera = look_at({0, -2, 1.4}, {0, 0, 0});
   }
   static glm::dmat4 at(const glm::dvec3& place) { return glm::translate(glm::dmat4(1.0), place); }
