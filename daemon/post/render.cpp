@@ -5,7 +5,6 @@
 #include <charconv>
 #include <chrono>
 #include <cstdio>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <ostream>
 #include <set>
@@ -19,6 +18,7 @@
 #include "daemon/pipeline/stages.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/pipeline/take_shots.hpp"
+#include "daemon/post/frames_to_render.hpp"
 #include "daemon/post/render_directory.hpp"
 #include "daemon/post/render_folder.hpp"
 #include "daemon/report/report.hpp"
@@ -210,51 +210,6 @@ struct Job {
   pipeline::Metrics& metrics;
 };
 
-// Says which frames are rendered, and takes those to be written for this process. Where frames are
-// averaged with their neighbours, it takes runs of them, because the neighbours beyond the ends of
-// a run are rendered too. The questions come in the order of the frames.
-class FramesToRender {
- public:
-  FramesToRender(RenderDirectory& directory, const std::set<std::uint64_t>& to_do, int neighbours)
-      : directory_(directory),
-        to_do_(to_do),
-        neighbours_(static_cast<std::uint64_t>(neighbours)),
-        run_(neighbours > 0 ? run_of_frames : 1),
-        next_run_(*to_do.begin() / run_) {}
-
-  std::uint64_t first() const { return *to_do_.begin() - std::min(*to_do_.begin(), neighbours_); }
-  std::uint64_t last() const { return *to_do_.rbegin() + neighbours_; }
-  bool is_written(std::uint64_t frame) const { return own_.contains(frame); }
-  // True also for the neighbours of frames that are written.
-  bool is_rendered(std::uint64_t frame) {
-    claim_to(frame + neighbours_);
-    const auto nearest = own_.lower_bound(frame - std::min(frame, neighbours_));
-    return nearest != own_.end() && *nearest <= frame + neighbours_;
-  }
-  // Returns the frames that others have finished or are rendering.
-  const std::set<std::uint64_t>& left() const { return left_; }
-
- private:
-  static constexpr std::uint64_t run_of_frames = 16;
-
-  void claim_to(std::uint64_t last) {
-    for (; next_run_ <= last / run_; ++next_run_) {
-      const std::set<std::uint64_t> run(to_do_.lower_bound(next_run_ * run_),
-                                        to_do_.lower_bound((next_run_ + 1) * run_));
-      if (run.empty()) continue;
-      const std::set<std::uint64_t> taken = directory_.claim(run);
-      own_.insert(taken.begin(), taken.end());
-      std::ranges::set_difference(run, taken, std::inserter(left_, left_.end()));
-    }
-  }
-
-  RenderDirectory& directory_;
-  const std::set<std::uint64_t>& to_do_;
-  const std::uint64_t neighbours_, run_;
-  std::uint64_t next_run_;
-  std::set<std::uint64_t> own_, left_;
-};
-
 // Both must outlive the options.
 pipeline::RenderStageOptions stage_options(const Job& job, output::Progress& progress) {
   const set::Quality& quality = job.take.set.quality;
@@ -280,7 +235,7 @@ std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64
   RenderDirectory& directory = job.directory;
   const set::Set& set = take.set;
   const int neighbours = neighbours_of(set.quality);
-  FramesToRender frames(directory, to_do, neighbours);
+  FramesToRender frames(directory, to_do, neighbours, take.observer_stream->records().size());
   const auto is_rendered = [&](std::uint64_t frame) { return frames.is_rendered(frame); };
   pipeline::TakeShots shots(take, {.first = frames.first(),
                                    .last = frames.last(),

@@ -69,14 +69,14 @@ struct RenderReport {
 // Several processes may render into one DIR: each takes frames that no other is at, and whoever
 // finishes the last frame of its range makes the video. A frame that a killed process had is
 // rendered by another. Where frames are averaged with their neighbours (set::Quality::neighbours),
-// a process takes 16 frames at a time, of absolute numbers 0 to 15 and so on, and renders the
-// neighbours beyond them too, without writing these; a picture has the same bits whichever frames
-// were asked for. Then every frame has random numbers of its own, by the set's seed and its number,
-// and composite, mask and variance of its EXR file are those of the averaged picture. What others
-// are still rendering at the end is named. Frames that are finished, and whose files are as they
-// were written, are skipped. A frame whose pose is lost, or that no light frame precedes, passes
-// through untouched and is reported so. Progress and notes go to `out`. Throws previz::Error on
-// anything that keeps the job from being done.
+// a process takes runs of frames (FramesToRender), and renders the neighbours beyond them too,
+// without writing these; a picture has the same bits whichever frames were asked for. Then every
+// frame has random numbers of its own, by the set's seed and its number, and composite, mask and
+// variance of its EXR file are those of the averaged picture. What others are still rendering at
+// the end is named. Frames that are finished, and whose files are as they were written, are
+// skipped. A frame whose pose is lost, or that no light frame precedes, passes through untouched
+// and is reported so. Progress and notes go to `out`. Throws previz::Error on anything that keeps
+// the job from being done.
 RenderReport render_session(const RenderOptions& options, std::ostream& out);
 
 }  // namespace previz::post

@@ -106,13 +106,18 @@ TEST_F(RenderNeighbours, ALaterRunFillsTheGapsWithTheSamePictures) {
 TEST_F(RenderNeighbours, TwoAtWorkInOneFolderMakeTheSamePictures) {
   test::write_small_take(directory_.path());
   const Sums expected = sums_of(render("whole"));
-  {
-    const std::jthread other([&] { render("out", FrameRange{0, 4}); });
-    render("out", FrameRange{3, small_take_frames - 1});
+  constexpr std::uint64_t last = small_take_frames - 1;
+  for (const auto& [one, two] : {std::pair(FrameRange{0, 4}, FrameRange{3, last}),
+                                 std::pair(FrameRange{0, last}, FrameRange{0, last})}) {
+    const std::string folder = "to" + std::to_string(one.last);
+    {
+      const std::jthread other([&, range = one] { render(folder, range); });
+      render(folder, two);
+    }
+    const RenderReport report = render(folder);
+    EXPECT_EQ(report.found_finished, std::size_t{small_take_frames});
+    EXPECT_EQ(sums_of(report), expected);
   }
-  const RenderReport report = render("out");
-  EXPECT_EQ(report.found_finished, std::size_t{small_take_frames});
-  EXPECT_EQ(sums_of(report), expected);
 }
 
 // With none on either side a picture is what the render stage makes of its frame alone, and a
