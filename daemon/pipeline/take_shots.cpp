@@ -52,6 +52,7 @@ std::optional<Shot> TakeShots::next() {
     if (const auto* what = std::get_if<DeviceTrouble>(&event)) {
       if (options_.note) options_.note(what->device + ": " + what->what);
       if (options_.metrics) options_.metrics->dropped("observer", "device trouble");
+      if (options_.unreadable && index >= options_.first) options_.unreadable(index);
       continue;
     }
     const bool wanted = index >= options_.first && (!options_.wanted || options_.wanted(index));

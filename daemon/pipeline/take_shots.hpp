@@ -27,6 +27,8 @@ struct TakeShotsOptions {
   // Frames for which this returns false are left out. It is called once a frame, in order, when
   // all earlier shots have been handed out.
   std::function<bool(std::uint64_t index)> wanted = {};
+  // It is called in the place of `wanted` for a frame that cannot be read, and after `note`.
+  std::function<void(std::uint64_t index)> unreadable = {};
   // If this is false, frames that are left out are skipped even where tracking or lighting remember
   // earlier frames. That is quick, but then the light of a shot comes from its preceding light
   // frames alone.

@@ -33,6 +33,12 @@ bool FramesToRender::is_rendered(std::uint64_t frame) {
   return is_near_own(frame);
 }
 
+void FramesToRender::leave_out(std::uint64_t frame) {
+  unreadable_.insert(frame);
+  left_.erase(frame);
+  if (own_.erase(frame) > 0) directory_.release(frame);
+}
+
 // Returns whether the frame, or one that it is a neighbour of, is written as far as is known.
 bool FramesToRender::is_near_own(std::uint64_t frame) const {
   const auto nearest = own_.lower_bound(frame - std::min(frame, neighbours_));
@@ -41,8 +47,9 @@ bool FramesToRender::is_near_own(std::uint64_t frame) const {
 
 void FramesToRender::claim_to(std::uint64_t last) {
   for (; next_run_ <= last / run_; ++next_run_) {
-    const std::set<std::uint64_t> run(to_do_.lower_bound(next_run_ * run_),
-                                      to_do_.lower_bound((next_run_ + 1) * run_));
+    std::set<std::uint64_t> run(to_do_.lower_bound(next_run_ * run_),
+                                to_do_.lower_bound((next_run_ + 1) * run_));
+    for (const std::uint64_t frame : unreadable_) run.erase(frame);
     if (run.empty()) continue;
     const std::set<std::uint64_t> taken = directory_.claim(run);
     own_.insert(taken.begin(), taken.end());

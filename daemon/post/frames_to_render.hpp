@@ -25,6 +25,9 @@ class FramesToRender {
   bool is_written(std::uint64_t frame) const { return own_.contains(frame); }
   // True also for the neighbours of frames that are written.
   bool is_rendered(std::uint64_t frame);
+  // This frame cannot be read. It is given back if it was taken, and is not left to others either.
+  // It is called in the place of is_rendered().
+  void leave_out(std::uint64_t frame);
   // Returns the frames that others have finished or are rendering.
   const std::set<std::uint64_t>& left() const { return left_; }
 
@@ -36,7 +39,7 @@ class FramesToRender {
   const std::set<std::uint64_t>& to_do_;
   const std::uint64_t neighbours_, run_;
   std::uint64_t next_run_;
-  std::set<std::uint64_t> own_, left_;
+  std::set<std::uint64_t> own_, left_, unreadable_;
 };
 
 }  // namespace previz::post

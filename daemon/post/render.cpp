@@ -237,9 +237,11 @@ std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64
   const int neighbours = neighbours_of(set.quality);
   FramesToRender frames(directory, to_do, neighbours, take.observer_stream->records().size());
   const auto is_rendered = [&](std::uint64_t frame) { return frames.is_rendered(frame); };
+  const auto leave_out = [&](std::uint64_t frame) { frames.leave_out(frame); };
   pipeline::TakeShots shots(take, {.first = frames.first(),
                                    .last = frames.last(),
                                    .wanted = is_rendered,
+                                   .unreadable = leave_out,
                                    .scene = &job.scene,
                                    .note = [&](const std::string& what) { progress.note(what); },
                                    .metrics = &job.metrics,

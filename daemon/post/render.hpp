@@ -75,8 +75,8 @@ struct RenderReport {
 // variance of its EXR file are those of the averaged picture. What others are still rendering at
 // the end is named. Frames that are finished, and whose files are as they were written, are
 // skipped. A frame whose pose is lost, or that no light frame precedes, passes through untouched
-// and is reported so. Progress and notes go to `out`. Throws previz::Error on anything that keeps
-// the job from being done.
+// and is reported so; one that cannot be read is reported and left out. Progress and notes go to
+// `out`. Throws previz::Error on anything that keeps the job from being done.
 RenderReport render_session(const RenderOptions& options, std::ostream& out);
 
 }  // namespace previz::post

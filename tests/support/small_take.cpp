@@ -1,8 +1,14 @@
 #include "tests/support/small_take.hpp"
 
+#include <cstdint>
+#include <cstdio>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <random>
+#include <vector>
 
+#include "drivers/session/clusters.hpp"
+#include "drivers/session/crc32.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/gltf_writer.hpp"
 
@@ -105,6 +111,33 @@ void write_small_take(const std::filesystem::path& directory, bool with_card,
     writer.write(record);
   }
   writer.close();
+}
+
+void make_unreadable(const std::filesystem::path& session, int index) {
+  const std::filesystem::path video = session / "observer.mkv", file = session / "observer.jsonl";
+  std::string lines;
+  std::ifstream lines_before(file);
+  int number = 0;
+  for (std::string line; std::getline(lines_before, line); ++number) {
+    if (number == index) {
+      nlohmann::ordered_json json = nlohmann::ordered_json::parse(line);
+      const auto sum = std::stoul(json["crc32"].get<std::string>(), nullptr, 16);
+      const session::PacketPlace place =
+          session::find_packets(video, {{json["video_ms"], static_cast<std::uint32_t>(sum)}},
+                                1 << 20)
+              .at(0);
+      const std::vector<std::uint8_t> spoiled(place.bytes, 0xff);
+      std::fstream bytes(video, std::ios::in | std::ios::out | std::ios::binary);
+      bytes.seekp(static_cast<std::streamoff>(place.offset));
+      bytes << std::string(spoiled.begin(), spoiled.end());
+      char text[9];
+      std::snprintf(text, sizeof(text), "%08x", session::crc32(spoiled));
+      json["crc32"] = text;
+      line = json.dump();
+    }
+    lines += line + '\n';
+  }
+  std::ofstream(file) << lines;
 }
 
 void write_card_with_variants(const std::filesystem::path& file) {

@@ -27,6 +27,10 @@ void write_small_take(const std::filesystem::path& directory, bool with_card = t
                       const std::optional<session::CapturedLight>& light = {},
                       std::int64_t interval_ns = small_take_interval_ns);
 
+// Spoils the picture of observer frame `index` in such a way that opening the session finds it
+// whole, and reading the frame fails.
+void make_unreadable(const std::filesystem::path& session, int index);
+
 // Writes the card with variants of its material: grey, as without one, black, and a lamp.
 void write_card_with_variants(const std::filesystem::path& file);
 

@@ -120,6 +120,33 @@ TEST_F(RenderNeighbours, TwoAtWorkInOneFolderMakeTheSamePictures) {
   }
 }
 
+// It is as where the disk fails after the take was opened. Another process that shares the take,
+// here one that runs while the first writes its last frame, neither waits for the frame nor says
+// that it is being rendered.
+TEST_F(RenderNeighbours, AFrameThatCannotBeReadIsNobodys) {
+  constexpr std::uint64_t unreadable = 5;
+  test::write_small_take(directory_.path());
+  test::make_unreadable(directory_ / "session", unreadable);
+  for (const int neighbours : {0, 2}) {
+    const std::string folder = "out" + std::to_string(neighbours);
+    std::optional<RenderReport> of_another;
+    RenderOptions options;
+    options.neighbours = neighbours;
+    options.on_frame = [&](const pipeline::Shot& shot) {
+      if (shot.index != small_take_frames - 1) return;
+      out_.clear();
+      of_another = render(folder, FrameRange{unreadable, unreadable}, neighbours);
+    };
+    const RenderReport report = render(folder, options);
+    EXPECT_EQ(report.frames.size(), std::size_t{small_take_frames - 1});
+    ASSERT_TRUE(of_another);
+    EXPECT_TRUE(of_another->frames.empty());
+    EXPECT_EQ(of_another->at_others, 0u) << out_;
+    EXPECT_NE(out_.find("the frame is left out"), std::string::npos) << out_;
+    EXPECT_EQ(out_.find("left unfinished"), std::string::npos) << out_;
+  }
+}
+
 // With none on either side a picture is what the render stage makes of its frame alone, and a
 // folder that knows nothing of neighbours can be gone on with.
 TEST_F(RenderNeighbours, WithoutNeighboursAFrameStandsAlone) {
