@@ -355,6 +355,12 @@ void print_costs(const set::Set& set, std::uint32_t needed, const scene::Size& s
                              render::picture_bytes(intrinsics.width, intrinsics.height, false)) /
                          mebibyte),
                " MiB\n");
+  if (set.quality.denoise && set.quality.neighbours > 0)
+    out << words("  frames that are averaged offline in the computer's memory: about ",
+                 std::ceil(static_cast<double>(render::kept_bytes(
+                               intrinsics.width, intrinsics.height, set.quality.neighbours)) /
+                           mebibyte),
+                 " MiB\n");
   // A path has a segment and a light sample a bounce, and one more segment; twice as many where the
   // worlds part.
   const double most = samples * (2.0 * set.estimation.max_depth + 1) *

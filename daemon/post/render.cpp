@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "daemon/output/progress.hpp"
+#include "daemon/output/recorder.hpp"
 #include "daemon/pipeline/neighbour_stage.hpp"
 #include "daemon/pipeline/preview_size.hpp"
 #include "daemon/pipeline/refinement.hpp"
@@ -286,6 +287,19 @@ std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64
   return frames.left();
 }
 
+// Throws previz::Error if the memory that the neighbours take is not there.
+void check_neighbours(const RenderOptions& options, const pipeline::Take& take,
+                      const render::Device& device) {
+  const int neighbours = neighbours_of(take.set.quality);
+  if (neighbours == 0) return;
+  const PinholeIntrinsics picture = pipeline::scaled(take.observer, options.scale).intrinsics;
+  const std::uint64_t free_bytes =
+      options.free_memory ? *options.free_memory
+                          : output::free_memory_bytes().value_or(output::memory_bytes());
+  render::refuse_too_many_neighbours(picture.width, picture.height, neighbours,
+                                     render::memory_of(device), free_bytes);
+}
+
 // Renders the frames, and then those that another process had and did not finish: it was killed.
 void render_all(const RenderOptions& options, const pipeline::Take& take,
                 std::set<std::uint64_t> to_do, RenderDirectory& directory,
@@ -293,6 +307,7 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
   const scene::Scene scene = scene::load_scene(take.set);
   for (const std::string& note : scene.notes) out << "scene: " << note << std::endl;
   const std::shared_ptr<render::Device> device = render::open_device(options.device);
+  check_neighbours(options, take, *device);
   out << take.session.info.name << ": " << to_do.size() << " frames of "
       << size_words(pipeline::scaled(take.observer, options.scale).intrinsics) << ", "
       << quality_words(take.set.quality) << ", on " << render::device_name(*device) << std::endl;

@@ -44,6 +44,8 @@ struct RenderOptions {
   std::optional<bool> exr, png, video;
   bool force = false;  // render frames again that are already there
   render::DeviceOptions device;
+  // Bytes of the computer's memory that are free; absent: the kernel is asked.
+  std::optional<std::uint64_t> free_memory;
   bool terminal = false;  // `out` is a terminal: progress is one rewritten line
   std::stop_token stop;   // ends cleanly, with finished frames on disk
   // Called after a frame's files are written, on the output stage's thread, in frame order, but not
@@ -72,11 +74,12 @@ struct RenderReport {
 // a process takes runs of frames (FramesToRender), and renders the neighbours beyond them too,
 // without writing these; a picture has the same bits whichever frames were asked for. Then every
 // frame has random numbers of its own, by the set's seed and its number, and composite, mask and
-// variance of its EXR file are those of the averaged picture. What others are still rendering at
-// the end is named. Frames that are finished, and whose files are as they were written, are
-// skipped. A frame whose pose is lost, or that no light frame precedes, passes through untouched
-// and is reported so; one that cannot be read is reported and left out. Progress and notes go to
-// `out`. Throws previz::Error on anything that keeps the job from being done.
+// variance of its EXR file are those of the averaged picture. Where the memory for that is not
+// there, nothing is rendered (refuse_too_many_neighbours()). What others are still rendering at the
+// end is named. Frames that are finished, and whose files are as they were written, are skipped. A
+// frame whose pose is lost, or that no light frame precedes, passes through untouched and is
+// reported so; one that cannot be read is reported and left out. Progress and notes go to `out`.
+// Throws previz::Error on anything that keeps the job from being done.
 RenderReport render_session(const RenderOptions& options, std::ostream& out);
 
 }  // namespace previz::post

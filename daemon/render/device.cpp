@@ -460,6 +460,13 @@ bool cpu_stands_in(const Device& device) {
 std::string device_name(const Device& device) {
   return device.name();
 }
+
+PictureMemory memory_of(const Device& device) {
+  return {.bytes = device.memory_bytes(),
+          .texels = device.limits().maxTexelBufferElements,
+          .read_back = device.shares_host_memory()};
+}
+
 DeviceTimes take_times(Device& device) {
   return device.clock().take();
 }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/render/picture_memory.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::render {
@@ -56,6 +57,7 @@ void reopen_device(Device& device, bool cpu_instead = false);
 bool is_open(const Device& device);  // false after a reopen_device() that threw
 bool is_gpu(const Device& device);   // and open
 std::string device_name(const Device& device);
+PictureMemory memory_of(const Device& device);
 
 // What a device is at the moment, in the crew's words. These two may be called on any thread.
 std::string drawing_device(const Device& device);  // "llvmpipe (CPU)"; empty while there is none

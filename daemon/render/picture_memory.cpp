@@ -12,11 +12,12 @@
 namespace previz::render {
 namespace {
 
-// A pixel of Layers has six members of three floats and two of one; the plate's radiance and its
-// variance (daemon/render/composite.hpp) are three doubles each, and what of it is clipped three
-// floats.
-constexpr std::uint64_t layer_bytes =
-    (6 * 3 + 2) * sizeof(float) + 2 * 3 * sizeof(double) + 3 * sizeof(float);
+// A pixel of Layers has six members of three floats and two of one.
+constexpr std::uint64_t bare_layer_bytes = (6 * 3 + 2) * sizeof(float);
+
+// While layers are made, the plate's radiance and its variance (daemon/render/composite.hpp) are
+// there as well, three doubles each, and what of it is clipped, three floats.
+constexpr std::uint64_t layer_bytes = bare_layer_bytes + 2 * 3 * sizeof(double) + 3 * sizeof(float);
 
 // A pixel's sums, and those of the light of photons.
 constexpr std::uint64_t sum_bytes = sizeof(gpu::GpuPixel) + 4 * sizeof(float);
@@ -30,21 +31,31 @@ constexpr std::uint64_t plate_bytes = 3 * sizeof(std::uint16_t);
 constexpr std::uint64_t band_bytes =
     14 * 4 * sizeof(float) + 4 * sizeof(std::uint16_t) + sizeof(std::uint32_t) + plate_bytes;
 
+// A pixel of a History (daemon/render/history.hpp) whose meshes deform.
+constexpr std::uint64_t history_bytes = 156 + 12;
+
+std::uint64_t pixels_of(int width, int height) {
+  return static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
+}
+
 std::uint64_t rays_of(int width, int height) {
   return (static_cast<std::uint64_t>(width) + 1) * (static_cast<std::uint64_t>(height) + 1);
 }
 
+std::string size_words(int width, int height) {
+  return std::to_string(width) + "x" + std::to_string(height);
+}
+
 std::string gigabytes(std::uint64_t bytes) {
   char text[32];
-  std::snprintf(text, sizeof(text), "%.1f GB", static_cast<double>(bytes) / 1e9);
+  std::snprintf(text, sizeof(text), "%.3g GB", static_cast<double>(bytes) / 1e9);
   return text;
 }
 
 }  // namespace
 
 std::uint64_t picture_bytes(int width, int height, bool read_back) {
-  const std::uint64_t pixels =
-      static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
+  const std::uint64_t pixels = pixels_of(width, height);
   const std::uint64_t device = pixels * (sum_bytes + plate_bytes) +
                                rays_of(width, height) * sizeof(glm::vec2) +
                                std::min<std::uint64_t>(pixels, most_band_pixels) * band_bytes;
@@ -52,8 +63,7 @@ std::uint64_t picture_bytes(int width, int height, bool read_back) {
 }
 
 void refuse_too_large(int width, int height, const PictureMemory& memory) {
-  const std::string picture =
-      "a picture of " + std::to_string(width) + "x" + std::to_string(height);
+  const std::string picture = "a picture of " + size_words(width, height);
   if (width < 1 || height < 1) throw Error(picture + " has no pixel");
   if (rays_of(width, height) > memory.texels)
     throw Error(picture + " is more than the " + std::to_string(memory.texels) +
@@ -62,6 +72,39 @@ void refuse_too_large(int width, int height, const PictureMemory& memory) {
   if (bytes > memory.bytes)
     throw Error(picture + " takes " + gigabytes(bytes) + " of memory, and there is " +
                 gigabytes(memory.bytes) + "; make it smaller");
+}
+
+std::uint64_t kept_bytes(int width, int height, int neighbours) {
+  // One that is finished waits for the one that is being written (daemon/post/render.cpp).
+  constexpr std::uint64_t finished = 2;
+  const auto each_side = static_cast<std::uint64_t>(neighbours);
+  return pixels_of(width, height) * ((2 * each_side + 1) * (sum_bytes + plate_bytes) +
+                                     (each_side + 1 + finished) * bare_layer_bytes);
+}
+
+void refuse_too_many_neighbours(int width, int height, int neighbours, const PictureMemory& memory,
+                                std::uint64_t free_bytes) {
+  refuse_too_large(width, height, memory);
+  const std::string key = "quality.neighbours = " + std::to_string(neighbours) + ": ";
+  const std::uint64_t averaged =
+      picture_bytes(width, height, memory.read_back) + pixels_of(width, height) * history_bytes;
+  if (!memory.read_back && averaged > memory.bytes)
+    throw Error(key + "to average a picture of " + size_words(width, height) + " takes " +
+                gigabytes(averaged) + " of the graphics card's memory, and there is " +
+                gigabytes(memory.bytes) +
+                "; make the picture smaller (--scale), or let every frame stand alone "
+                "(--neighbours 0)");
+  const auto needed = [&](int each_side) {
+    return kept_bytes(width, height, each_side) + (memory.read_back ? averaged : 0);
+  };
+  if (needed(neighbours) <= free_bytes) return;
+  int fitting = neighbours - 1;
+  while (fitting > 0 && needed(fitting) > free_bytes) --fitting;
+  throw Error(key + "to average " + std::to_string(2 * neighbours + 1) + " frames of " +
+              size_words(width, height) + " takes " + gigabytes(needed(neighbours)) +
+              " of the computer's memory, and " + gigabytes(free_bytes) +
+              " are free; make the picture smaller (--scale), or average fewer (--neighbours " +
+              std::to_string(fitting) + (fitting > 0 ? " fits)" : ", every frame stands alone)"));
 }
 
 }  // namespace previz::render

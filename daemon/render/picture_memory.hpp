@@ -9,7 +9,7 @@ namespace previz::render {
 // A picture is shown in bands of about this many pixels (daemon/render/presenter.hpp).
 inline constexpr std::size_t most_band_pixels = std::size_t{1} << 21;
 
-// The memory that is available for a picture.
+// The memory that is available for a picture, the device's (memory_of() in daemon/render/gpu.hpp).
 struct PictureMemory {
   std::uint64_t bytes = 0;
   std::uint64_t texels = 0;  // the most that one texel buffer may have
@@ -23,5 +23,18 @@ std::uint64_t picture_bytes(int width, int height, bool read_back);
 // Throws previz::Error, with the picture's size, the memory it takes and the memory there is, if
 // the picture does not fit or has no pixel.
 void refuse_too_large(int width, int height, const PictureMemory& memory);
+
+// Returns how many bytes of the computer's memory are taken where pictures are averaged with so
+// many frames on each side: by the frames that are kept (Renderer::keep()), and by the layers of
+// those that wait for the frames after them, or to be written.
+std::uint64_t kept_bytes(int width, int height, int neighbours);
+
+// Throws previz::Error, with the memory that averaging takes, the memory there is and what would
+// fit, where kept_bytes() are more than `free_bytes`, those that are free in the computer's memory,
+// or where the device has no room for a picture and its history (daemon/render/history.hpp). With
+// `memory.read_back` both lie in the computer's memory. A picture that is too large by itself is
+// refused as such.
+void refuse_too_many_neighbours(int width, int height, int neighbours, const PictureMemory& memory,
+                                std::uint64_t free_bytes);
 
 }  // namespace previz::render

@@ -23,10 +23,7 @@ namespace previz::render {
 namespace {
 
 void check_size(const Device& device, const PinholeIntrinsics& picture) {
-  refuse_too_large(picture.width, picture.height,
-                   {.bytes = device.memory_bytes(),
-                    .texels = device.limits().maxTexelBufferElements,
-                    .read_back = device.shares_host_memory()});
+  refuse_too_large(picture.width, picture.height, memory_of(device));
 }
 
 }  // namespace

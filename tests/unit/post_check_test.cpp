@@ -214,6 +214,21 @@ samples = 1500
   expect_said("the observer has no calibration here");
 }
 
+// 1920x1080 pixels of 1310 bytes with two frames on each side, and of 866 with one.
+TEST_F(Check, SaysHowMuchMemoryFramesTakeThatAreAveraged) {
+  const std::string lens =
+      "[observer.intrinsics]\nwidth=1920\nheight=1080\nfx=1866.0\nfy=1866.0\ncx=959.5\ncy=539.5\n";
+  const std::string words = "frames that are averaged offline in the computer's memory: about ";
+  ASSERT_EQ(check(lens), 0) << said_;
+  expect_said(words + "2591 MiB");
+  ASSERT_EQ(check(lens + "[quality]\nneighbours=1\n"), 0) << said_;
+  expect_said(words + "1713 MiB");
+  for (const char* quality : {"neighbours=0\n", "denoise=false\n"}) {
+    ASSERT_EQ(check(lens + "[quality]\n" + quality), 0) << said_;
+    EXPECT_EQ(said_.find(words), std::string::npos) << said_;
+  }
+}
+
 // One of a virtual object is chosen by the set, and all are there for the buttons.
 TEST_F(Check, NamesTheVariantsOfAnObject) {
   std::string file = triangle(R"("name": "matt"}, {"name": "gold", "emissiveFactor": [1, 1, 0])");

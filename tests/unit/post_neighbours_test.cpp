@@ -170,6 +170,27 @@ TEST_F(RenderNeighbours, WithoutNeighboursAFrameStandsAlone) {
   EXPECT_THROW(render("among", FrameRange{6, 6}, 0), Error);
 }
 
+// Otherwise a long render would end in the middle, for want of memory.
+TEST_F(RenderNeighbours, WhatDoesNotFitIntoMemoryIsRefusedBeforeAnyFrameIsRendered) {
+  test::write_small_take(directory_.path());
+  RenderOptions options;
+  options.free_memory = 1'500'000;  // 48x36 pixels with two on each side take 3.5 MB
+  try {
+    render("out", options);
+    FAIL() << "rendered";
+  } catch (const Error& error) {
+    const std::string words = error.what();
+    EXPECT_NE(words.find("quality.neighbours = 2: to average 5 frames of 48x36"), std::string::npos)
+        << words;
+  }
+  EXPECT_EQ(content_of("out/frames.jsonl"), "");
+  options.neighbours = 0;
+  EXPECT_EQ(render("alone", options).frames.size(), std::size_t{small_take_frames});
+  options.neighbours = 2;
+  options.free_memory = 5'000'000;
+  EXPECT_EQ(render("out", options).frames.size(), std::size_t{small_take_frames});
+}
+
 TEST_F(RenderNeighbours, TheSetMayAskForUpToFour) {
   test::write_small_take(directory_.path(), true, "neighbours = 5\n");
   try {
