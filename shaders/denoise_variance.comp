@@ -51,7 +51,7 @@ const float LEAST_KNOWING = 4.0;
 // mean is nearer to the truth than that of independent ones. From 2 * LEAST_KNOWING on, this share of the
 // variance of what changes on real surfaces is left. On virtual objects, whose light is seen by itself,
 // what remains of the noise would be seen as stains (tests/truth/RESULTS.md, "Live").
-const float LEFT_BY_EVENNESS = 0.25;
+const float LEFT_BY_EVENNESS = 0.5;
 // Beside an outline it is less, because a contact shadow is as narrow as a pixel.
 const float LEFT_AT_OUTLINES = 0.04;
 

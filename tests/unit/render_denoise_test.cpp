@@ -394,6 +394,42 @@ TEST(Denoise, MixesAnEdgeOfItsSidesByItsOwnShare) {
   EXPECT_LT(std::abs(bias), 4 * sigma / std::sqrt(10.0 * height));
 }
 
+// A contact shadow of four samples beside a virtual wall: a sample is in shadow with a probability
+// that falls to 1 / e over three pixels. From the fourth pixel on no more is there than what the
+// first two levels, whose steps are finer than that, could bring: a blur of variance v multiplies
+// an exponential that falls over L by exp(v / 2 L^2), and the spline's variance is the step
+// squared.
+TEST(Denoise, LeavesAContactShadowWhereItIs) {
+  constexpr int foot = width / 4, samples = 4;
+  constexpr double shadow = -0.25;
+  constexpr double falls_over = 3, most_blur = 1 + 2 * 2;
+  double drawn = 0, shown = 0;
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    std::mt19937 random(seed);
+    render::Layers raw = wall([](int, int) { return glm::vec3(0); });
+    raw.samples = samples;
+    for (int y = 0; y < height; ++y)
+      for (int x = foot; x < width; ++x) {
+        const auto i = static_cast<std::size_t>(y) * width + x;
+        std::binomial_distribution<int> hits(samples, 0.6 * std::exp((foot - x) / falls_over));
+        const double n = hits(random), mean = n * shadow / samples;
+        raw.mask[i] = 0;
+        raw.diff[i] = raw.mixed[i] = glm::vec3(mean);
+        raw.variance[i] = glm::vec3((n * shadow * shadow / samples - mean * mean) / (samples - 1));
+      }
+    const std::vector<double> camera(3 * raw.composite.size(), 0.5);
+    const render::Layers clean = denoised(raw, plate_of(camera));
+    for (int y = 0; y < height; ++y)
+      for (int x = foot + 4; x < width; ++x) {
+        const auto i = static_cast<std::size_t>(y) * width + x;
+        drawn += raw.diff[i].r;
+        shown += clean.composite[i].r - 0.5;
+      }
+  }
+  EXPECT_LT(shown / drawn, std::exp(most_blur / (2 * falls_over * falls_over)));
+  EXPECT_GT(shown / drawn, 0.97);
+}
+
 // What is no noise stays: a bright rim on the edge that every sample meets.
 TEST(Denoise, LeavesTheRimOfAnEdge) {
   constexpr int edge = width / 2;
