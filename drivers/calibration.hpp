@@ -77,7 +77,8 @@ inline constexpr double min_illumination = 0.01, max_dark_level = 0.5;
 struct LightCameraCalibration {
   FisheyeIntrinsics intrinsics;
   Vignetting vignetting{};  // at least min_illumination up to intrinsics.max_angle_rad
-  ResponseCurve response;
+  // Unless it was measured otherwise, only the largest value counts as clipped.
+  ResponseCurve response{.inverse_table = {}, .clip_share = 1};
   double responsivity = 1.0;
   glm::dvec3 dark_level{0};  // signal of a covered lens, per channel, 0 to max_dark_level
   // Rigid; OpenCV camera axes (x right, y down, z forward); metres; world Z up.

@@ -32,61 +32,60 @@ void print_response(const ResponseFit& fit, std::ostream& out) {
 }
 
 template <typename Calibration>
-std::string table(const ResponseCurve& curve) {
+std::string response_table(const ResponseCurve& curve) {
   Calibration calibration;
   calibration.response = curve;
   return set::response_toml(calibration);
+}
+
+std::string stream_of(CameraRole camera) {
+  return camera == CameraRole::light ? "light" : "observer";
 }
 
 // Returns a line that compares the measured code with the threshold that is in use.
 std::string compared(const ResponseCurve& curve, int measured, const ResponseOptions& options) {
   if (!is_session(options.footage))
     return "a clip_share in the set file stays in use until the table's replaces it\n";
-  const double typed = response_of(options.footage, "observer").clip_share;
+  const double typed = response_of(options.footage, stream_of(options.camera)).clip_share;
+  const char* const dark = options.camera == CameraRole::light
+                               ? "lamps come out too dark"
+                               : "shadows on them come out too dark";
   ResponseCurve in_use = curve;
   in_use.clip_share = typed;
   const int code = int(lighting::Response(in_use, 8).clipping().at);
-  return fmt::format(
-      "the session has clip_share = {:g}, which counts codes from {} on{}\n", typed, code,
-      code == measured  ? ": the same"
-      : code > measured ? ": pixels below it are clipped but pass for measured light, so that "
-                          "shadows on them come out too dark; replace it by the table's"
-                        : ": pixels that still show light count as clipped; replace it by the "
-                          "table's");
+  return fmt::format("the session has clip_share = {:g}, which counts codes from {} on", typed,
+                     code) +
+         (code == measured ? ": the same\n"
+          : code > measured
+              ? fmt::format(": pixels below it are clipped but pass for measured light, so that "
+                            "{}; replace it by the table's\n",
+                            dark)
+              : ": pixels that still show light count as clipped; replace it by the table's\n");
 }
 
-// Returns the film camera's table, under a comment with the evidence for clip_share. Where nothing
-// was measured, the session's clip_share stays.
-std::string observer_table(ResponseCurve curve, const ClipFit& clip, const ResponseOptions& options,
-                           std::ostream& out) {
-  curve.clip_share = response_of(options.footage, "observer").clip_share;
+// Returns the camera's table, under a comment with the evidence for clip_share. Where nothing was
+// measured, the session's clip_share stays.
+std::string table_of(ResponseCurve curve, const ClipFit& clip, const ResponseOptions& options,
+                     std::ostream& out) {
+  const auto table = [&] {
+    return options.camera == CameraRole::light ? response_table<LightCameraCalibration>(curve)
+                                               : response_table<ObserverCalibration>(curve);
+  };
+  curve.clip_share = response_of(options.footage, stream_of(options.camera)).clip_share;
   if (!clip.share()) {
     fmt::print(out, "clip_share stays {:g}\n", curve.clip_share);
-    return table<ObserverCalibration>(curve);
+    return table();
   }
   const std::string words = compared(curve, *clip.code(), options);
   out << words;
   curve.clip_share = *clip.share();
-  return as_comment(describe(clip) + words) + table<ObserverCalibration>(curve);
-}
-
-// The light camera has no clip_share: only the largest code counts as clipped there.
-std::vector<std::string> light_clip_doubts(const ClipFit& clip) {
-  const int code = clip.code().value_or(255);
-  if (code == 255) return {};
-  return {fmt::format(
-      "the light camera clips from code {} of 255 on, but only code 255 counts as clipped there, "
-      "so that its brightest lamps come out too dark; let the camera deliver full range and "
-      "uncompressed pictures",
-      code)};
+  return as_comment(describe(clip) + words) + table();
 }
 
 }  // namespace
 
 void calibrate_response(const ResponseOptions& options, std::ostream& out) {
-  const bool of_light = options.camera == CameraRole::light;
-  const auto bracket =
-      read_bracket(options.footage, of_light ? "light" : "observer", options.exposures);
+  const auto bracket = read_bracket(options.footage, stream_of(options.camera), options.exposures);
   fmt::print(out, "{} exposures, {:.1f} stops\n", bracket.size(),
              std::log2(bracket.back().exposure / bracket.front().exposure));
   std::vector<ResponseFit> fits;
@@ -100,15 +99,8 @@ void calibrate_response(const ResponseOptions& options, std::ostream& out) {
              best.brightest);
   const ClipFit clip = fit_clip(bracket, best.curve);
   out << describe(clip);
-  std::string tables;
-  if (of_light) {
-    tables = warn(doubts_of(best), out) + warn(light_clip_doubts(clip), out) +
-             table<LightCameraCalibration>(best.curve);
-  } else {
-    tables =
-        warn(doubts_of(best, clip.code()), out) + observer_table(best.curve, clip, options, out);
-  }
-  write_tables(tables, options.table_file, out);
+  const std::string doubts = warn(doubts_of(best, clip.code()), out);
+  write_tables(doubts + table_of(best.curve, clip, options, out), options.table_file, out);
 }
 
 }  // namespace previz::calibrate

@@ -8,10 +8,10 @@
 namespace previz::calibrate {
 
 ResponseCurve response_of(const std::filesystem::path& footage, const std::string& stream) {
-  if (!is_session(footage)) return {};
-  const session::SessionInfo info = session::open_session(footage).info;
-  if (stream == "observer") return info.observer ? info.observer->response : ResponseCurve{};
-  return info.light ? info.light->response : ResponseCurve{};
+  session::SessionInfo info;
+  if (is_session(footage)) info = session::open_session(footage).info;
+  if (stream == "observer") return info.observer.value_or(ObserverCalibration{}).response;
+  return info.light.value_or(LightCameraCalibration{}).response;
 }
 
 LightCameraCalibration light_sensor(const std::optional<std::filesystem::path>& set_file,

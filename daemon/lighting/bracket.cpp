@@ -30,8 +30,10 @@ Codes make_codes(const Response& response, double dark_level) {
   }
   codes.darkest = response.forward(dark_level);
   codes.dark = codes.signal[std::min(codes.darkest + 2, count - 1)] - codes.signal[codes.darkest];
+  codes.clipped_from = response.clipping().at;
+  codes.full = codes.signal[codes.clipped_from];
   for (double& signal : codes.signal) signal -= dark_level;
-  codes.white = codes.signal.back();
+  codes.white = codes.signal[codes.clipped_from];
   return codes;
 }
 
@@ -53,7 +55,8 @@ std::vector<double> log_ratios(const Exposure& a, const Exposure& b, double read
     const Codes& codes = (*e.codes)[green];
     const std::uint16_t code = e.plate.samples[3 * pixel + green];
     const double signal = codes.signal[code];
-    if (signal < std::max(4 * codes.dark, 10 * read_noise) || signal > 0.9 * codes.white)
+    if (signal < std::max(4 * codes.dark, 10 * read_noise * codes.full) ||
+        signal > 0.9 * codes.white)
       return std::nullopt;
     return signal / e.exposure;
   };

@@ -14,7 +14,8 @@
 namespace previz::lighting {
 
 // The noise model of a sensor: the variance of a signal s in [0, 1] is s * signal_per_electron +
-// read_noise^2, besides rounding to codes. Only ratios between exposures depend on it.
+// read_noise^2, besides rounding to codes. Only ratios between exposures depend on it. A signal of
+// 1 is here the one that the sensor clips at (Codes::full).
 struct SensorNoise {
   double signal_per_electron = 1.0 / 30000;
   double read_noise = 3e-4;  // standard deviation of the signal
@@ -29,10 +30,12 @@ struct Codes {
   std::vector<double> signal;
   std::vector<double> rounding_variance;
   std::size_t darkest = 0;  // the code that a covered lens shows
-  double dark = 0;   // below this signal, rounding to the darkest code or its neighbour dominates
-  double white = 1;  // signal of the highest code, which is clipped
+  double dark = 0;  // below this signal, rounding to the darkest code or its neighbour dominates
+  std::uint32_t clipped_from = 0;  // this code and all above it are clipped
+  double white = 1;                // its signal
+  double full = 1;                 // the same without the dark level taken off
 
-  bool clipped(std::uint16_t code) const { return code + 1u == signal.size(); }
+  bool clipped(std::uint16_t code) const { return code >= clipped_from; }
   bool black(std::uint16_t code) const { return code <= darkest; }
 };
 

@@ -10,16 +10,19 @@ namespace {
 
 constexpr double confidence = 5;  // standard deviations
 
-double variance_of(double signal, double rounding_variance, const SensorNoise& noise) {
-  return std::max(signal, 0.0) * noise.signal_per_electron + noise.read_noise * noise.read_noise +
-         rounding_variance;
+double variance_of(double signal, const Codes& codes, std::uint16_t code,
+                   const SensorNoise& noise) {
+  const double signal_per_electron = noise.signal_per_electron * codes.full;
+  const double read_noise = noise.read_noise * codes.full;
+  return std::max(signal, 0.0) * signal_per_electron + read_noise * read_noise +
+         codes.rounding_variance[code];
 }
 
 // Returns 1 well inside the range of codes, falling to 0 at white, where noise would clip some
 // samples and not others.
 double trust(double signal, const Codes& codes) {
   if (signal < codes.dark) return 0;
-  return std::clamp((codes.white - signal) / 0.08, 0.0, 1.0);
+  return std::clamp((codes.white - signal) / (0.08 * codes.full), 0.0, 1.0);
 }
 
 // The evidence about one channel of a pixel, from a single exposure or summed over several that
@@ -45,8 +48,7 @@ Evidence evidence_of(const Exposure& e, std::size_t sample, std::size_t channel,
   const std::uint16_t code = e.plate.samples[sample];
   if (codes.clipped(code)) return {0, 0, 0, 0, codes.white / e.exposure};
   const double signal = codes.signal[code];
-  return {signal, e.exposure, variance_of(signal, codes.rounding_variance[code], noise), codes.dark,
-          0};
+  return {signal, e.exposure, variance_of(signal, codes, code, noise), codes.dark, 0};
 }
 
 bool beyond(double excess, double variance) {
@@ -117,7 +119,7 @@ class PixelMerger {
       if (codes.clipped(code)) continue;
       const double expected = first * e.exposure;
       const double weight = trust(expected, codes) * e.exposure * e.exposure /
-                            variance_of(expected, codes.rounding_variance[code], noise_);
+                            variance_of(expected, codes, code, noise_);
       sum += weight * codes.signal[code] / e.exposure;
       weights += weight;
     }

@@ -83,9 +83,9 @@ Keys response_keys(ResponseCurve& r, double& responsivity) {
   };
 }
 
-Keys clip_keys(ResponseCurve& r) {
+Keys clip_keys(ResponseCurve& r, const char* about) {
   return {
-      {"response", "clip_share", &r.clip_share, plain.within(0.5, 1), "From this share of the largest picture value on, a pixel is clipped: it means at least so much light. Lower it where white areas of the picture stay below it, as in compressed video or video of limited range (previzd calibrate response --camera observer measures it).", {}, "response.clip_share", {}, true},
+      {"response", "clip_share", &r.clip_share, plain.within(0.5, 1), about, {}, "response.clip_share", {}, true},
   };
 }
 
@@ -95,6 +95,9 @@ Keys shading_keys(LightCameraCalibration& c) {
       {"response", "dark_level", &c.dark_level, plain.within(0, max_dark_level), "Signal of red, green and blue when the lens is covered, as a share of white (previzd calibrate dark).", {}, "dark_level", {}, true},
   };
 }
+
+constexpr auto observer_clips = "From this share of the largest picture value on, a pixel is clipped: it means at least so much light. Lower it where white areas of the picture stay below it, as in compressed video or video of limited range (previzd calibrate response --camera observer measures it).";
+constexpr auto light_camera_clips = "From this share of the largest picture value on, a pixel is clipped: it means at least so much light, and a shorter exposure of the bracket measures it. Lower it where lamps stay below it, as in compressed video or video of limited range (previzd calibrate response --camera light measures it).";
 
 // clang-format on
 
@@ -114,13 +117,14 @@ std::string Key::allowed(Format format) const {
 std::vector<Key> keys(ObserverDraft& draft) {
   ObserverCalibration& c = draft.calibration;
   return joined({pinhole_keys(c.intrinsics), response_keys(c.response, c.responsivity),
-                 clip_keys(c.response), lens_keys(draft.lens)});
+                 clip_keys(c.response, observer_clips), lens_keys(draft.lens)});
 }
 
 std::vector<Key> keys(LightCameraDraft& draft) {
   LightCameraCalibration& c = draft.calibration;
   return joined({fisheye_keys(c.intrinsics), pose_keys(draft.pose),
-                 response_keys(c.response, c.responsivity), shading_keys(c)});
+                 response_keys(c.response, c.responsivity),
+                 clip_keys(c.response, light_camera_clips), shading_keys(c)});
 }
 
 }  // namespace previz::calibration

@@ -190,7 +190,9 @@ LightCameraCalibration parse_light_camera(const Node& node, const ResponseCurve&
   k.max_angle_rad = node["fov_deg"].number_above_zero() / 2 * std::numbers::pi / 180;
   const bool as_observer =
       !node.has("response") || node["response"].text().find("as observer") != std::string::npos;
+  const double clip_share = out.response.clip_share;
   out.response = as_observer ? observer_curve : parse_response(node["response"]);
+  out.response.clip_share = clip_share;  // the light camera's own
   out.world_from_camera = node["world_from_camera"].pose();
   return out;
 }

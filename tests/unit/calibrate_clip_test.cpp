@@ -11,6 +11,7 @@
 #include "daemon/calibrate/calibrate.hpp"
 #include "daemon/calibrate/clip_fit.hpp"
 #include "daemon/lighting/response.hpp"
+#include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/shared_data.hpp"
@@ -265,30 +266,63 @@ TEST_F(ClipCommand, KeepsTheKeyWhereNothingClips) {
   EXPECT_EQ(table().find("clip_share"), std::string::npos) << table();
 }
 
-// The light camera has no such key, and its table would be refused with one.
-TEST_F(ClipCommand, OfTheLightCameraIsADoubtOnly) {
+// The light camera's table is accepted by a set file, and with it what brackets are merged by.
+TEST_F(ClipCommand, WritesTheLightCamerasKeyToo) {
   write_pictures(bracket_of(limited));
-  EXPECT_NE(printed(CameraRole::light).find("the light camera clips from code 235"),
-            std::string::npos);
-  EXPECT_EQ(table().find("\nclip_share"), std::string::npos) << table();
-  EXPECT_NE(table().find("# WITH A DOUBT: the light camera clips"), std::string::npos) << table();
+  const std::string output = printed(CameraRole::light);
+  EXPECT_NE(output.find("the camera clips from code 235 of 255 on"), std::string::npos) << output;
+  EXPECT_NE(table().find("[light_camera.response]"), std::string::npos) << table();
+  EXPECT_NE(table().find("# the camera clips from code 235"), std::string::npos) << table();
+  EXPECT_EQ(table().find("DOUBT: the light camera clips"), std::string::npos) << table();
+  LightCameraCalibration camera;
+  camera.intrinsics = {.width = width,
+                       .height = height,
+                       .fx = 20,
+                       .fy = 20,
+                       .cx = 79.5,
+                       .cy = 23.5,
+                       .k = {},
+                       .max_angle_rad = 1.5};
+  const set::Set set =
+      set::parse_set(set::intrinsics_toml(camera) + set::light_pose_toml(glm::dmat4(1.0)) + table(),
+                     "printed.toml");
+  ASSERT_TRUE(set.light_camera.calibration);
+  EXPECT_EQ(set.light_camera.calibration->response.clip_share, 0.91796);
+}
+
+// Of a light camera, a set file without the key means that only white is clipped.
+TEST_F(ClipCommand, LeavesTheLightCamerasKeyOutWhereNothingClips) {
+  write_pictures(bracket_of(hard, std::exp2(-6 - stops * (exposures - 1))));
+  const std::string output = printed(CameraRole::light);
+  EXPECT_NE(output.find("clip_share stays 1\n"), std::string::npos) << output;
+  EXPECT_EQ(table().find("clip_share"), std::string::npos) << table();
 }
 
 // A session's own clip_share is compared with what its pictures show, and kept where they show
 // nothing.
 TEST_F(ClipCommand, ComparesWithWhatTheSessionSays) {
-  const auto take = [&](const std::string& name, double first) {
+  const auto take = [&](const std::string& name, const std::string& source, const Camera& camera,
+                        double first) {
     session::SessionInfo info;
     info.name = name;
     info.observer = ObserverCalibration{};
     info.observer->intrinsics = {
         .width = width, .height = height, .fx = 100, .fy = 100, .cx = 79.5, .cy = 23.5};
     info.observer->response.clip_share = 0.9;
+    info.light = LightCameraCalibration{};
+    info.light->intrinsics = {.width = width,
+                              .height = height,
+                              .fx = 20,
+                              .fy = 20,
+                              .cx = 79.5,
+                              .cy = 23.5,
+                              .k = {},
+                              .max_angle_rad = 1.5};
     session::SessionWriter writer(folder() / name, info);
-    const auto bracket = bracket_of(hard, first);
+    const auto bracket = bracket_of(camera, first);
     for (int e = 0; e < exposures; ++e) {
       Frame frame;
-      frame.source = "observer";
+      frame.source = source;
       frame.sequence = std::uint64_t(e);
       frame.timestamp_ns = frame.arrival_ns = e * 40'000'000;
       frame.exposure = frame.exposure_s = bracket[std::size_t(e)].exposure;
@@ -299,24 +333,33 @@ TEST_F(ClipCommand, ComparesWithWhatTheSessionSays) {
     }
     return folder() / name;
   };
-  const auto output = [&](const fs::path& session) {
+  const auto output = [&](const fs::path& session, CameraRole role) {
     ResponseOptions options;
     options.footage = session;
-    options.camera = CameraRole::observer;
+    options.camera = role;
     options.method = ResponseMethod::debevec;
     std::ostringstream out;
     calibrate_response(options, out);
     return out.str();
   };
-  const std::string clips = output(take("clips", 1.0 / 32));
+  const std::string clips = output(take("clips", "observer", hard, 1.0 / 32), CameraRole::observer);
   EXPECT_NE(clips.find("the session has clip_share = 0.9, which counts codes from 230 on: pixels "
                        "that still show light"),
             std::string::npos)
       << clips;
   EXPECT_NE(clips.find("\nclip_share = 0.99609\n"), std::string::npos) << clips;
-  const std::string dark = output(take("dark", std::exp2(-6 - stops * (exposures - 1))));
+  const std::string dark =
+      output(take("dark", "observer", hard, std::exp2(-6 - stops * (exposures - 1))),
+             CameraRole::observer);
   EXPECT_NE(dark.find("clip_share stays 0.9\n"), std::string::npos) << dark;
   EXPECT_NE(dark.find("\nclip_share = 0.9\n"), std::string::npos) << dark;
+  const std::string light = output(take("light", "light", limited, 1.0 / 32), CameraRole::light);
+  EXPECT_NE(light.find("the session has clip_share = 1, which counts codes from 255 on: pixels "
+                       "below it are clipped but pass for measured light, so that lamps come out "
+                       "too dark"),
+            std::string::npos)
+      << light;
+  EXPECT_NE(light.find("\nclip_share = 0.91796\n"), std::string::npos) << light;
 }
 
 // A phone's JPEGs of a window clip at the largest codes.

@@ -56,6 +56,7 @@ vignetting = [-0.05, 0.0, 0.001]
 [light_camera.response]
 kind = "srgb"
 responsivity = 2.5
+clip_share = 0.93
 dark_level = [0.01, 0.02, 0.01]
 [light_camera.pose]
 world_from_camera = [[0, -1, 0, 0.5], [1, 0, 0, 0], [0, 0, 1, 1.6], [0, 0, 0, 1]]
@@ -72,7 +73,8 @@ const char* const frames_text = R"({
 "light": {
   "intrinsics": {"width": 64, "height": 60, "fx": 20.1, "fy": 20.3, "cx": 31.5, "cy": 29.5,
                  "k": [-0.01, 0, 0, 0], "max_angle_deg": 97.3, "vignetting": [-0.05, 0, 0.001]},
-  "response": {"kind": "srgb", "responsivity": 2.5, "dark_level": [0.01, 0.02, 0.01]},
+  "response": {"kind": "srgb", "responsivity": 2.5, "clip_share": 0.93,
+               "dark_level": [0.01, 0.02, 0.01]},
   "pose": {"world_from_camera": [[0, -1, 0, 0.5], [1, 0, 0, 0], [0, 0, 1, 1.6], [0, 0, 0, 1]]},
   "pictures": ["a.png"], "fps": 25, "exposure": 1}})";
 
@@ -275,6 +277,8 @@ const Mistake light_mistakes[] = {
      .words = "leaves no light at some angle; allowed: at least 0.01 of it up to max_angle_deg",
      .recorded_words = "leaves no light at some angle; allowed: at least 0.01 of it up to "
                        "max_angle_rad"},
+    {"light_camera", "response", "clip_share", "0.4",
+     "0.4 is not allowed; allowed: finite number, 0.5 to 1"},
     {"light_camera", "response", "dark_level", "[0, 0.6, 0]",
      "0.6 is not allowed; allowed: finite number, 0 to 0.5"},
     {"light_camera", "pose", "world_from_camera",
@@ -305,6 +309,7 @@ TEST(Calibration, IsTheSameCameraInEveryFormat) {
   EXPECT_EQ(set.observer.calibration->intrinsics.k4, 0.05);
   EXPECT_EQ(set.observer.calibration->intrinsics.k5, -0.006);
   EXPECT_EQ(set.observer.calibration->intrinsics.k6, 0.007);
+  EXPECT_EQ(set.light_camera.calibration->response.clip_share, 0.93);
   EXPECT_EQ(set.light_camera.calibration->world_from_camera[3], glm::dvec4(0.5, 0, 1.6, 1));
 }
 

@@ -15,7 +15,8 @@
 namespace previz::lighting {
 namespace lighting_bracket_test {
 
-const ResponseCurve linear_curve{.kind = ResponseCurve::Kind::linear, .inverse_table = {}};
+const ResponseCurve linear_curve{
+    .kind = ResponseCurve::Kind::linear, .inverse_table = {}, .clip_share = 1};
 constexpr double wall_radiance = 0.3, lamp_radiance = 500;
 constexpr int strip_width = 64, strip_height = 8;
 
@@ -147,6 +148,25 @@ TEST(MergeMoving, AStaticSceneLeavesNothingOut) {
   EXPECT_EQ(std::count_if(picture.flags.begin(), picture.flags.end(),
                           [](std::uint8_t flag) { return flag & moved; }),
             0);
+}
+
+// A curve that was fitted where the camera clips near half of white guesses what lies above, and
+// may give the codes that are seen a thousandth of their signal. That is a matter of units: the
+// same pixels have moved, by the same noise, and the light is a thousandth, up to rounding.
+TEST(MergeMoving, ByACurveThatGuessesWhatIsClippedIsTheSameLight) {
+  constexpr double units = 1e-3;
+  const ResponseCurve whole{
+      .kind = ResponseCurve::Kind::table, .inverse_table = {0, 0.5, 1}, .clip_share = 0.49};
+  ResponseCurve guessed = whole;
+  guessed.inverse_table[1] *= units;
+  const auto frames = photograph_moving_lamp({1.0 / 4096, 1.0 / 256, 1.0 / 16, 1}).frames;
+  const HdrPicture picture = merge_exposures(frames, whole);
+  const HdrPicture by_guess = merge_exposures(frames, guessed);
+  EXPECT_EQ(by_guess.flags, picture.flags);
+  EXPECT_TRUE(std::ranges::find(picture.flags, moved) != picture.flags.end());
+  for (std::size_t p = 0; p < picture.radiance.size(); ++p)
+    EXPECT_NEAR(by_guess.radiance[p].g / units, picture.radiance[p].g,
+                1e-6 * picture.radiance[p].g);
 }
 
 TEST(MergeExposures, AMissingExposureIsBridgedOrFlagged) {

@@ -17,7 +17,9 @@ namespace lighting_hdr_test {
 
 using test::make_frame;
 
-const ResponseCurve linear{.kind = ResponseCurve::Kind::linear, .inverse_table = {}};
+const ResponseCurve linear{
+    .kind = ResponseCurve::Kind::linear, .inverse_table = {}, .clip_share = 1};
+const ResponseCurve srgb = LightCameraCalibration{}.response;
 
 FramePtr frame_of(double exposure, const std::vector<glm::dvec3>& radiances) {
   std::vector<glm::dvec3> signals;
@@ -40,7 +42,7 @@ TEST(MergeExposures, OneExposureIsTheInverseResponse) {
   std::vector<std::uint8_t> codes;
   for (int code = 0; code < 255; ++code) codes.insert(codes.end(), 3, static_cast<uint8_t>(code));
   const FramePtr frame = srgb8_frame(255, 0.5, codes);
-  const HdrPicture picture = merge_exposures({&frame, 1}, {});
+  const HdrPicture picture = merge_exposures({&frame, 1}, srgb);
   const Response response({}, 8);
   for (std::size_t code = 0; code < 255; ++code) {
     EXPECT_FLOAT_EQ(picture.radiance[code].g, static_cast<float>(response.inverse()[code] / 0.5));
@@ -89,6 +91,46 @@ TEST(MergeExposures, AClippedChannelLeavesTheOthers) {
   EXPECT_NEAR(picture.radiance[0].b, 0.25, 2e-5);
 }
 
+// The signals of a sensor that saturates at this share of white.
+FramePtr saturated_frame(double exposure, const std::vector<glm::dvec3>& radiances, double share) {
+  std::vector<glm::dvec3> signals;
+  for (const glm::dvec3& radiance : radiances)
+    signals.push_back(glm::min(exposure * radiance, glm::dvec3(share)));
+  return make_frame(static_cast<int>(radiances.size()), 1, exposure, signals);
+}
+
+// A wall that the longest exposure shows, a lamp that only the shortest does, and one that none
+// does. In every order, since the newest exposure is believed.
+TEST(MergeExposures, WhatIsClippedBelowWhiteIsAtLeastSoMuchLight) {
+  constexpr double share = 0.93, wall = 0.3, light = 100, brightest = 1e4;
+  const std::vector<glm::dvec3> radiances{glm::dvec3(wall), glm::dvec3(light),
+                                          glm::dvec3(brightest)};
+  std::vector<double> exposures{1.0 / 256, 1.0 / 16, 1.0};
+  ResponseCurve measured = linear;
+  measured.clip_share = share;
+  constexpr double half_a_code = 0.5 / 65535;
+  do {
+    std::vector<FramePtr> frames;
+    for (const double exposure : exposures)
+      frames.push_back(saturated_frame(exposure, radiances, share));
+    const HdrPicture picture = merge_exposures(frames, measured);
+    EXPECT_EQ(picture.flags, (std::vector<std::uint8_t>{0, 0, overexposed}));
+    // By the shortest exposure alone, whose code for the lamp is a half off at most.
+    EXPECT_NEAR(picture.radiance[1].g, light, 256 * half_a_code + 1e-6 * light);
+    // The longest exposure weighs most, and each is right to half a code of its own.
+    EXPECT_NEAR(picture.radiance[0].g, wall, 256 * half_a_code);
+    EXPECT_NEAR(picture.radiance[2].g, share * 256, 256 * half_a_code + 1e-6 * share * 256);
+  } while (std::next_permutation(exposures.begin(), exposures.end()));
+}
+
+// Without a share that was measured, only the largest code is clipped, whatever the depth.
+TEST(MergeExposures, OnlyTheLargestCodeIsClippedUnlessTheCalibrationSaysOtherwise) {
+  for (const int bits : {1, 8, 10, 12, 16})
+    EXPECT_EQ(Response(srgb, bits).clipping().at, (1u << bits) - 1) << bits;
+  const FramePtr frame = srgb8_frame(2, 1, {254, 254, 254, 255, 255, 255});
+  EXPECT_EQ(merge_exposures({&frame, 1}, srgb).flags, (std::vector<std::uint8_t>{0, overexposed}));
+}
+
 // Within what noise and calibration allow; what lies beyond is another test's.
 TEST(MergeExposures, EqualExposuresAverage) {
   const std::vector<FramePtr> frames{make_frame(1, 1, 2, {{0.20, 0.4, 0.52}}),
@@ -126,7 +168,7 @@ TEST(MergeExposures, IsUnbiasedAndNearTheBestUnderSensorNoise) {
         best += exposure * exposure / (sigma * sigma + step * step / 12);
       }
     }
-    const HdrPicture picture = merge_exposures(frames, {});
+    const HdrPicture picture = merge_exposures(frames, srgb);
     double sum = 0, squares = 0;
     for (const glm::vec3& r : picture.radiance) {
       sum += r.g;
@@ -146,7 +188,7 @@ TEST(MergeExposures, IsUnbiasedAndNearTheBestUnderSensorNoise) {
 
 std::string merge_error(const std::vector<FramePtr>& frames) {
   try {
-    merge_exposures(frames, {});
+    merge_exposures(frames, srgb);
   } catch (const Error& error) {
     return error.what();
   }

@@ -43,7 +43,7 @@ Memorial load_memorial(const std::filesystem::path& directory) {
 
 // Robertson's curve of one channel as a table; the ends, which no picture shows well, made to rise.
 ResponseCurve channel_response(const cv::Mat& robertson, int bgr) {
-  ResponseCurve response{.kind = ResponseCurve::Kind::table, .inverse_table = {}};
+  ResponseCurve response{.kind = ResponseCurve::Kind::table, .inverse_table = {}, .clip_share = 1};
   double last = 0;
   for (int code = 0; code < 256; ++code) {
     const double signal = robertson.at<cv::Vec3f>(code)[bgr];

@@ -195,7 +195,7 @@ TEST(SessionToml, CalibrationsAreWrittenAsEver) {
   file.info.observer = observer;
   LightCameraCalibration light;
   light.intrinsics = {64, 60, 20.1, 20, 31.5, 29.5, {-0.01, 0, -0.0, 0}, 100 * (M_PI / 180)};
-  light.response = {ResponseCurve::Kind::table, 2.2, {0, 0.25, 1}};
+  light.response = {ResponseCurve::Kind::table, 2.2, {0, 0.25, 1}, 0.93};
   light.vignetting = {-0.05, 0, 0.001};
   light.dark_level = {0.01, 0.02, 0};
   light.world_from_camera = glm::dmat4(0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 0.5, 0, 1.6, 1);
@@ -243,6 +243,7 @@ dark_level = [0.01, 0.02, 0.0]
 [light.calibration.response]
 kind = "table"
 inverse_table = [0.0, 0.25, 1.0]
+clip_share = 0.93
 
 [assets])"),
             std::string::npos)
