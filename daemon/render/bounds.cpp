@@ -78,20 +78,16 @@ bool is_in_one_world(const scene::Instance& instance) {
   return instance.presence == scene::world_mixed || instance.presence == scene::world_real;
 }
 
-bool shines_from_a_place(const set::Light& lamp) {
-  const auto is_lit = [](const glm::dvec3& v) { return v.x > 0 || v.y > 0 || v.z > 0; };
-  return lamp.type != set::LightType::directional && is_lit(lamp.emission) &&
-         (lamp.gain_real > 0 || is_lit(lamp.gain_mixed * lamp.tint));
-}
+// A box along the axes that grows with the spheres that are added.
+struct Box {
+  glm::dvec3 low{std::numeric_limits<double>::max()};
+  glm::dvec3 high{std::numeric_limits<double>::lowest()};
 
-// Returns the sphere around a lamp that has a place.
-glm::dvec4 sphere_of_lamp(const set::Light& lamp) {
-  double radius = 0;
-  if (lamp.type == set::LightType::sphere) radius = lamp.radius_m;
-  if (lamp.type == set::LightType::rectangle)
-    radius = 0.5 * std::hypot(lamp.width_m, lamp.height_m);
-  return {lamp.position, radius};
-}
+  void add(const glm::dvec4& sphere) {
+    low = glm::min(low, glm::dvec3(sphere) - sphere.w);
+    high = glm::max(high, glm::dvec3(sphere) + sphere.w);
+  }
+};
 
 // Rounds a ratio to the nearest half octave, at most 1.
 double to_half_octave(double ratio) {
@@ -147,29 +143,23 @@ Bounds specular_bounds(const scene::Scene& scene, const Spheres& spheres, double
 }
 
 double lit_radius(const scene::Scene& scene, const Spheres& spheres,
-                  const std::vector<set::Light>& lamps, double scene_radius) {
-  bool differs = false, shines = false;
-  glm::dvec3 low(std::numeric_limits<double>::max());
-  glm::dvec3 high(std::numeric_limits<double>::lowest());
-  const auto add = [&](const glm::dvec4& sphere) {
-    low = glm::min(low, glm::dvec3(sphere) - sphere.w);
-    high = glm::max(high, glm::dvec3(sphere) + sphere.w);
-  };
+                  std::span<const Shining> shining, double scene_radius) {
+  bool differs = false;
+  Box lit;
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
-    const scene::Instance& instance = scene.instances[i];
-    const bool emits = scene::emits(scene.materials[instance.material]);
-    const bool is_one = is_in_one_world(instance);
-    if (spheres[i].w < 0 || instance.presence == 0 || !(emits || is_one)) continue;
-    differs |= is_one;
-    shines |= emits;
-    add(spheres[i]);
+    if (spheres[i].w < 0 || !is_in_one_world(scene.instances[i])) continue;
+    differs = true;
+    lit.add(spheres[i]);
   }
-  for (const set::Light& lamp : lamps) {
-    if (!shines_from_a_place(lamp)) continue;
-    shines = true;
-    add(sphere_of_lamp(lamp));
+  double power = 0, irradiance = 0;  // the latter but for a factor that all share
+  for (const Shining& one : shining) {
+    Box box = lit;
+    box.add(one.sphere);
+    const glm::dvec3 diagonal = box.high - box.low;
+    power += one.power;
+    irradiance += one.power / (0.25 * glm::dot(diagonal, diagonal));
   }
-  const double radius = differs && shines ? 0.5 * glm::length(high - low) : 0;
+  const double radius = differs && power > 0 ? std::sqrt(power / irradiance) : 0;
   return radius > 0 ? scene_radius * to_half_octave(radius / scene_radius) : scene_radius;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <glm/vec4.hpp>
+#include <span>
 #include <vector>
 
 #include "daemon/scene/bvh.hpp"
@@ -35,13 +36,20 @@ Bounds difference_bounds(const scene::Scene& scene, const Spheres& spheres);
 // refracts. Objects in neither world count too, so that the pipelines are ready when they return.
 Bounds specular_bounds(const scene::Scene& scene, const Spheres& spheres, double specular_alpha);
 
-// Returns the radius (metres) of the disc through which distant light counts beside lamps: half the
-// diagonal of the box around the objects that are in one world only, the `lamps` that shine from a
-// place and the objects that emit. It is at most `scene_radius` (> 0), and half octaves below it,
-// so that lights need not be weighed anew at every motion of an object. Where no object is in one
-// world only, or nothing but distant light shines, it is `scene_radius`. `spheres` are those of the
-// instances where they are now.
+// A lamp that shines from a place, or an object that emits.
+struct Shining {
+  glm::dvec4 sphere;  // around it; world, metres
+  double power;       // W per channel, mean of the channels
+};
+
+// Returns the radius (metres) of the disc through which distant light counts beside what shines
+// from a place. Each of these has a radius of its own, half the diagonal of the box around it and
+// the objects that are in one world only; the result is their harmonic mean in squares, weighted by
+// power, so that what brings little light counts little wherever it is. It is at most
+// `scene_radius` (> 0), and half octaves below it, so that lights need not be weighed anew at every
+// motion of an object. Where no object is in one world only, or nothing but distant light shines,
+// it is `scene_radius`. `spheres` are those of the instances where they are now.
 double lit_radius(const scene::Scene& scene, const Spheres& spheres,
-                  const std::vector<set::Light>& lamps, double scene_radius);
+                  std::span<const Shining> shining, double scene_radius);
 
 }  // namespace previz::render

@@ -47,26 +47,6 @@ double emitted(const gpu::GpuLight& light) {
   return std::max({gains.r, gains.g, gains.b}) * emission;
 }
 
-double power(const gpu::GpuLight& light, double scene_radius) {
-  const double brightness = emitted(light);
-  const double area = glm::length(glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v)));
-  const double disc = pi * scene_radius * scene_radius;
-  switch (light.type) {
-    case gpu::LIGHT_POINT:
-      return brightness * 4 * pi;
-    case gpu::LIGHT_SPOT:
-      return brightness * 2 * pi * (1 - light.cos_outer);
-    case gpu::LIGHT_DIRECTIONAL:
-      return brightness * disc * (light.cone_sr > 0 ? light.cone_sr : 1);
-    case gpu::LIGHT_RECTANGLE:
-      return brightness * pi * area;
-    case gpu::LIGHT_SPHERE:
-      return brightness * pi * 4 * pi * light.radius * light.radius;
-    default:
-      return brightness * pi * area;  // triangle: half the area, both sides
-  }
-}
-
 // Returns the solid angle over 2 pi of a light that faces the scene from a distance of one scene
 // radius. A point counts as a disc as wide as one direction in single precision.
 double solid_angle(const gpu::GpuLight& light, double scene_radius) {
@@ -182,6 +162,26 @@ void append_emitter(PlacedLights& to, const scene::Scene& scene, std::uint32_t i
   }
 }
 
+double power_of(const gpu::GpuLight& light, double scene_radius) {
+  const double brightness = emitted(light);
+  const double area = glm::length(glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v)));
+  const double disc = pi * scene_radius * scene_radius;
+  switch (light.type) {
+    case gpu::LIGHT_POINT:
+      return brightness * 4 * pi;
+    case gpu::LIGHT_SPOT:
+      return brightness * 2 * pi * (1 - light.cos_outer);
+    case gpu::LIGHT_DIRECTIONAL:
+      return brightness * disc * (light.cone_sr > 0 ? light.cone_sr : 1);
+    case gpu::LIGHT_RECTANGLE:
+      return brightness * pi * area;
+    case gpu::LIGHT_SPHERE:
+      return brightness * pi * 4 * pi * light.radius * light.radius;
+    default:
+      return brightness * pi * area;  // triangle: half the area, both sides
+  }
+}
+
 double intensity(const gpu::GpuLight& light) {
   const double area = glm::length(glm::cross(glm::dvec3(light.edge_u), glm::dvec3(light.edge_v)));
   double seen = 1;
@@ -196,7 +196,7 @@ double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius,
   double total = 0;
   std::size_t shining = 0;
   for (std::size_t i = 0; i < lights.size(); ++i) {
-    const double watts = power(lights[i], scene_radius) * weights.of(i);
+    const double watts = power_of(lights[i], scene_radius) * weights.of(i);
     if (!(watts > 0)) continue;  // black, or a triangle whose power is NaN
     total += watts;
     ++shining;
@@ -205,7 +205,7 @@ double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius,
   float below = 0;
   for (std::size_t i = 0; i < lights.size(); ++i) {
     gpu::GpuLight& light = lights[i];
-    const double watts = power(light, scene_radius) * weights.of(i);
+    const double watts = power_of(light, scene_radius) * weights.of(i);
     if (watts > 0)
       sum += (1 - even_share) * watts / total + even_share / static_cast<double>(shining);
     light.cdf = std::min(static_cast<float>(sum), 1.0f);
@@ -243,7 +243,7 @@ double spread_of(const std::vector<gpu::GpuLight>& lights, double scene_radius,
   double total = 0, information = 0;
   for (std::size_t i = 0; i < lights.size(); ++i) {
     const gpu::GpuLight& light = lights[i];
-    const double watts = power(light, scene_radius) * weights.of(i);
+    const double watts = power_of(light, scene_radius) * weights.of(i);
     if (!(watts > 0)) continue;
     total += watts;
     information += watts * std::log(watts / solid_angle(light, scene_radius));

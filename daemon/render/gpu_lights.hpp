@@ -43,6 +43,10 @@ void append_lamp(PlacedLights& to, const set::Light& light);
 void append_emitter(PlacedLights& to, const scene::Scene& scene, std::uint32_t index,
                     const scene::Instance& instance, const std::vector<double>& weights);
 
+// Returns the power that a light brings to a scene of this radius (metres), which matters for
+// distant light only: W per channel, mean of the channels, with the largest of its gains.
+double power_of(const gpu::GpuLight& light, double scene_radius);
+
 // Returns what a lamp with a place sends along its brightest direction, as if it were a point
 // (W/sr, mean of the channels), with the largest of its gains.
 double intensity(const gpu::GpuLight& light);

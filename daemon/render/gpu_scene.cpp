@@ -406,7 +406,8 @@ void GpuScene::set_sources(std::optional<std::vector<set::Light>> sources) {
 void GpuScene::place(const glm::dvec3& camera_position) {
   find_extent();
   const std::vector<set::Light> shining = lamps();
-  lit_radius_ = lit_radius(scene_, placed_spheres_, shining, scene_radius_);
+  lit_radius_ = lit_radius(scene_, placed_spheres_,
+                           lights_.shining(scene_, placed_spheres_, shining), scene_radius_);
   lights_.place(scene_, shining, lit_radius_, camera_position);
   seen_from_ = camera_position;
   upload_instances(camera_position);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
 #include <utility>
 
 #include "daemon/render/emission_weights.hpp"
@@ -27,6 +29,22 @@ bool have_equal_bytes(const std::vector<gpu::GpuLight>& a, const std::vector<gpu
          (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(a[0])) == 0);
 }
 
+// Returns the sphere around a lamp that has a place.
+glm::dvec4 sphere_of_lamp(const set::Light& lamp) {
+  double radius = 0;
+  if (lamp.type == set::LightType::sphere) radius = lamp.radius_m;
+  if (lamp.type == set::LightType::rectangle)
+    radius = 0.5 * std::hypot(lamp.width_m, lamp.height_m);
+  return {lamp.position, radius};
+}
+
+// Returns by how much a motion makes surfaces larger, on average over their directions: exactly
+// that for a rotation with a uniform scale.
+double area_scale(const glm::dmat4& motion) {
+  const double side = std::cbrt(std::abs(glm::determinant(glm::dmat3(motion))));
+  return side * side;
+}
+
 }  // namespace
 
 void SceneLights::set_scene(const scene::Scene& scene) {
@@ -36,7 +54,7 @@ void SceneLights::set_scene(const scene::Scene& scene) {
   for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
     const scene::Material& material = scene.materials[scene.instances[i].material];
     if (!scene::emits(material)) continue;
-    Emitter emitter{i, emission_weights(scene, scene.instances[i]), {}};
+    Emitter emitter{i, emission_weights(scene, scene.instances[i]), {}, 0};
     shape(emitter, scene);
     emitters_.push_back(std::move(emitter));
   }
@@ -49,12 +67,36 @@ void SceneLights::shape(Emitter& emitter, const scene::Scene& scene) {
   PlacedLights alone;
   append_emitter(alone, scene, emitter.instance, unmoved, emitter.weights);
   emitter.shape = shape_of_emitter(alone);
+  emitter.power = 0;
+  for (std::size_t i = 0; i < alone.lights.size(); ++i)
+    if (const double watts = power_of(alone.lights[i], 0) * alone.weights.of(i); watts > 0)
+      emitter.power += watts;
 }
 
 void SceneLights::reshape(const scene::Scene& scene, std::uint32_t instance) {
   ++shapes_;
   for (Emitter& emitter : emitters_)
     if (emitter.instance == instance) shape(emitter, scene);
+}
+
+std::vector<Shining> SceneLights::shining(const scene::Scene& scene, const Spheres& spheres,
+                                          const std::vector<set::Light>& lamps) const {
+  std::vector<Shining> all;
+  const auto add = [&](const glm::dvec4& sphere, double power) {
+    if (power > 0) all.push_back({sphere, power});
+  };
+  PlacedLights placed;
+  for (const set::Light& lamp : lamps) {
+    if (lamp.type == set::LightType::directional) continue;
+    append_lamp(placed, lamp);
+    add(sphere_of_lamp(lamp), power_of(placed.lights.back(), 0));
+  }
+  for (const Emitter& emitter : emitters_) {
+    const scene::Instance& instance = scene.instances[emitter.instance];
+    if (instance.presence == 0 || spheres[emitter.instance].w < 0) continue;
+    add(spheres[emitter.instance], emitter.power * area_scale(instance.world_from_object));
+  }
+  return all;
 }
 
 SceneLights::State SceneLights::state_of(const scene::Scene& scene,

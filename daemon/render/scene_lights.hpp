@@ -9,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "daemon/render/bounds.hpp"
 #include "daemon/render/gpu_lights.hpp"
 #include "daemon/render/kernel.hpp"
 #include "daemon/render/light_tree.hpp"
@@ -25,6 +26,10 @@ class SceneLights {
   void set_scene(const scene::Scene& scene);
   // Follows the mesh of an instance that emits and has changed its shape.
   void reshape(const scene::Scene& scene, std::uint32_t instance);
+  // Returns the lamps that have a place and the objects that emit, without what is black. `spheres`
+  // are those of the instances where they are now.
+  std::vector<Shining> shining(const scene::Scene& scene, const Spheres& spheres,
+                               const std::vector<set::Light>& lamps) const;
   // Uploads what has changed since the last call. `lamps`: those with an extent first,
   // and of these the distant ones; `lit_radius`: of the disc through which distant light reaches
   // what is lit, in metres.
@@ -47,6 +52,7 @@ class SceneLights {
     std::uint32_t instance;
     std::vector<double> weights;  // of emission_weights()
     LightShape shape;
+    double power;  // W per channel in the object's own units, mean of the channels
   };
   // All that the encoded lights depend on.
   struct State {

@@ -3,12 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <glm/ext/matrix_transform.hpp>
 #include <numbers>
 
 #include "daemon/render/bounds.hpp"
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/gpu_lights.hpp"
+#include "daemon/render/scene_lights.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test {
@@ -192,7 +194,10 @@ View ball_beside_a_lamp() {
 // the half octave next to it below a scene's 8 m is 0.5 m.
 TEST(LightShare, IsThatOfTheBoxAroundWhatDiffersAndTheLamps) {
   const auto radius_of = [](const scene::Scene& scene, const std::vector<set::Light>& lamps) {
-    return render::lit_radius(scene, render::bounding_spheres(scene), lamps, 8);
+    render::SceneLights lights(*shared_device());
+    lights.set_scene(scene);
+    const render::Spheres spheres = render::bounding_spheres(scene);
+    return render::lit_radius(scene, spheres, lights.shining(scene, spheres, lamps), 8);
   };
   scene::Scene scene = ball_beside_a_lamp().scene;
   std::vector<set::Light> lamps = scene.lights;
@@ -205,13 +210,31 @@ TEST(LightShare, IsThatOfTheBoxAroundWhatDiffersAndTheLamps) {
   EXPECT_DOUBLE_EQ(radius_of(scene, lamps), 0.5) << "a sun and lamps that are off do not count";
   EXPECT_EQ(radius_of(scene, {lamps[1]}), 8) << "nothing but a sun shines";
   lamps[3].gain_mixed = 1;
-  EXPECT_EQ(radius_of(scene, lamps), 8) << "no more than the scene";
+  EXPECT_EQ(radius_of(scene, {lamps[3]}), 8) << "no more than the scene";
+  // The ball of light has pi 100 of 4 pi 0.05^2 m^2, 9.87 W, the point at 50 m has 4 pi, 12.57 W.
+  // With them R^2 = 22.4 / (9.87 / 0.576^2 + 12.57 / 25^2), 0.87 m: the half octave is 1 m.
+  EXPECT_DOUBLE_EQ(radius_of(scene, lamps), 1) << "each counts by its power";
+  lamps[3].emission *= 0.01;
+  EXPECT_DOUBLE_EQ(radius_of(scene, lamps), 0.5) << "a faint lamp far off hardly counts";
+  lamps[3] = lamps[0];
+  lamps[3].position = {-0.6, 0, 0.8};
+  EXPECT_DOUBLE_EQ(radius_of(scene, lamps), 0.5) << "two at the same distance count as one there";
 
   // A panel that glows counts as a lamp does: 3 m above, it makes a box of 1.6 m, hence sqrt(2).
   add_instance(scene, add_mesh(scene, rectangle_mesh({0.1, 0.1})),
                add_material(scene, emitter(glm::vec3(1))),
                glm::translate(glm::dmat4(1), glm::dvec3(0, 0, 3)));
   EXPECT_DOUBLE_EQ(radius_of(scene, {}), std::numbers::sqrt2);
+  // Each of its two sides of 0.01 m^2 shines with pi, both with 0.063 W, as a point of 0.005 W/sr
+  // does. With such a point, whose box has half a diagonal of 0.54 m, R^2 = 2 / (1 / 1.54^2 + 1 /
+  // 0.54^2), 0.72 m, hence sqrt(0.5); a panel twice as wide and high has four times the power,
+  // hence 5 / (4 / 1.59^2 + 1 / 0.54^2), 1.00 m.
+  set::Light point = lamp(set::LightType::point, glm::dvec3(0.005));
+  point.position = lamps[0].position;
+  EXPECT_DOUBLE_EQ(radius_of(scene, {point}), std::numbers::sqrt2 / 2);
+  glm::dmat4& placed = scene.instances[2].world_from_object;
+  placed = glm::scale(placed, glm::dvec3(2));
+  EXPECT_DOUBLE_EQ(radius_of(scene, {point}), 1);
   scene.instances[1].presence = scene::world_both;
   EXPECT_EQ(radius_of(scene, scene.lights), 8) << "nothing differs";
   scene.instances[1].presence = scene::world_mixed;
@@ -253,6 +276,28 @@ TEST(LightShare, LeavesTheLampBesideAnObjectItsSamples) {
   EXPECT_LT(by_near.mean + 4 * by_near.error, (by_wide.mean - 4 * by_wide.error) / 9);
   EXPECT_NEAR(mean(few.composite).g, mean(many.composite).g,
               4 * std::hypot(standard_error(few).g, standard_error(many).g));
+}
+
+// A lamp far off, of a thousandth of the lamp's power, lights nothing to speak of. It takes its
+// part of the tenth that lamps share evenly, so that the lamp beside the object keeps at least 0.9
+// * 0.99
+// + 0.05 of the nine tenths that lamps get, and the variance (1 / p - 1) f^2 of what it brings
+// (above) rises accordingly, that of the rest not at all.
+TEST(LightShare, AFaintLampFarOffTakesNoneFromTheLampBesideAnObject) {
+  const View alone = ball_beside_a_lamp();
+  View both = alone;
+  set::Light faint = lamp(set::LightType::point, glm::dvec3(1e-3));
+  faint.position = {6.5, 6.5, 1};
+  both.scene.lights.push_back(faint);
+  const Variance before = variance_of(render_clean(alone, 64, up_to_depth(2)).layers);
+  const Variance after = variance_of(render_clean(both, 64, up_to_depth(2)).layers);
+  EXPECT_LT(before.error, 0.1 * before.mean);
+  EXPECT_LT(after.error, 0.1 * after.mean);
+  constexpr double lamps = 0.9, near = lamps * (0.9 * 0.99 + 0.05);
+  EXPECT_LT(after.mean - 4 * after.error,
+            (1 / near - 1) / (1 / lamps - 1) * (before.mean + 4 * before.error));
+  std::printf("variance of a pixel: %g alone, %g with a faint lamp far off\n", before.mean,
+              after.mean);
 }
 
 // A small ball in a hall of 40 m whose walls shine with 1 and reflect a half: almost every path of
