@@ -9,9 +9,8 @@
 
 #include "shaders/lib/denoise.glsl"
 
-// denoise_guide.comp makes the guide and its variance.
+// denoise_guide.comp makes the guide; w: its variance, the mean over the channels.
 uniform textureBuffer guides;
-uniform textureBuffer guide_variances;
 uniform textureBuffer reals;  // mean(Lr), over white and albedo, gets the signal's weights
 layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
 layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
@@ -39,18 +38,14 @@ const float OVERLAP_POWER = 0.535;
 
 const float SPLINE[3] = float[3](0.375, 0.25, 0.0625);
 
-struct Guide {
-  vec3 signal, variance;
-};
-
-Guide load_guide(ivec2 at) {
-  const int index = pixel_index(at);
-  return Guide(texelFetch(guides, index).rgb, texelFetch(guide_variances, index).rgb);
+// Returns the squared difference of two guides over the one that noise alone would cause.
+float guide_distance(vec4 a, vec4 b, float scale) {
+  const vec3 off = a.rgb - b.rgb;
+  return dot(off, off) / (3.0 * (scale * scale * (a.w + b.w) + LEAST_VARIANCE));
 }
 
-// Returns the squared difference of two guides over the one that noise alone would cause, as a mean
-// over the channels.
-float guide_distance(Guide a, Guide b, float scale) {
+// Returns the same of two pixels, as a mean over the channels.
+float value_distance(Pixel a, Pixel b, float scale) {
   const vec3 off = a.signal - b.signal;
   const vec3 expected = scale * scale * (a.variance + b.variance) + LEAST_VARIANCE;
   return dot(off * off / expected, vec3(1.0 / 3.0));
@@ -61,10 +56,9 @@ void main() {
   if (index >= denoise.width * denoise.height) return;
   const ivec2 at = ivec2(index % denoise.width, index / denoise.width);
   const Pixel here = load_pixel(at);
-  const Guide guide = load_guide(at);
+  const vec4 guide = texelFetch(guides, int(index));
   // The guide lies between pixels, and does not see what is finer than its step. Where pixels know
   // their variance, their values show that.
-  const Guide own_value = Guide(here.signal, here.variance);
   const float fall = pow(float(denoise.step), FALL_WITH_STEP);
   const float value_scale = fall * (here.cover > 0.0 ? OBJECT_NOISE_SCALE : CHANGE_NOISE_SCALE);
   const float guide_scale = here.cover > 0.0 ? value_scale : fall * value_scale;
@@ -85,10 +79,10 @@ void main() {
       if (x != 0 || y != 0) {
         if (!are_alike(here, there, off)) continue;
         const float foretold = here.inverse_depth + dot(slope, vec2(off));
-        float distance = guide_distance(guide, load_guide(at + off), guide_scale) +
+        float distance = guide_distance(guide, texelFetch(guides, pixel_index(at + off)), guide_scale) +
                          surface_distance(here, there, foretold);
         if (denoise.single_sample == 0u)
-          distance += guide_distance(own_value, Guide(there.signal, there.variance), value_scale);
+          distance += value_distance(here, there, value_scale);
         weight *= exp(-distance);
       }
       change += weight * (there.signal - here.signal);

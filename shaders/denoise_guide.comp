@@ -8,8 +8,7 @@
 
 #include "shaders/lib/denoise.glsl"
 
-layout(scalar) writeonly buffer Guides { vec4 guides[]; };
-layout(scalar) writeonly buffer GuideVariances { vec4 guide_variances[]; };
+layout(scalar) writeonly buffer Guides { vec4 guides[]; };  // w: its variance, the mean over the channels
 
 void main() {
   const uint index = gl_GlobalInvocationID.x;
@@ -32,6 +31,5 @@ void main() {
       variance += weight * weight * there.variance;
       total += weight;
     }
-  guides[index] = vec4(here.signal + change / total, 0.0);
-  guide_variances[index] = vec4(variance / (total * total), 0.0);
+  guides[index] = vec4(here.signal + change / total, dot(variance, vec3(1.0 / 3.0)) / (total * total));
 }

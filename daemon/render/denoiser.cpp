@@ -66,7 +66,7 @@ void Denoiser::reserve(std::size_t pixels, bool companions, bool caustics) {
       signal_[side] = texels(pixels);
       variance_[side] = texels(pixels);
     }
-    for (Buffer* other : {&surface_, &guide_, &guide_variance_}) *other = texels(pixels);
+    for (Buffer* other : {&surface_, &guide_}) *other = texels(pixels);
     albedo_ = create_texel_buffer(device_, pixels * 4 * sizeof(std::uint16_t),
                                   vk::Format::eR16G16B16A16Sfloat, true);
     // composite.comp and present.comp use side 0 of the companions, filtered or not.
@@ -116,7 +116,6 @@ void Denoiser::record(const vk::raii::CommandBuffer& commands, int width, int ro
                           {"caustics", &caustic_[caustic]},
                           {"denoised_caustics", &caustic_[1 - caustic]},
                           {"guides", &guide_},
-                          {"guide_variances", &guide_variance_},
                           {"uncovered", &uncovered_[0]},
                           {"reals", &real_[companion]},
                           {"denoised_signals", &signal_[1 - side]},

@@ -82,7 +82,7 @@ class Denoiser {
   // A pass reads one side and writes the other.
   Buffer signal_[2], variance_[2], uncovered_[2], real_[2];
   Buffer caustic_[2];
-  Buffer surface_, albedo_, guide_, guide_variance_;
+  Buffer surface_, albedo_, guide_;
 };
 
 }  // namespace previz::render

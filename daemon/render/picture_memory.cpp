@@ -25,11 +25,11 @@ constexpr std::uint64_t sum_bytes = sizeof(gpu::GpuPixel) + 4 * sizeof(float);
 // A pixel of the plate and of the shown picture is three samples.
 constexpr std::uint64_t plate_bytes = 3 * sizeof(std::uint16_t);
 
-// A pixel of a band takes thirteen arrays of four floats and one of four halves in the denoiser,
+// A pixel of a band takes twelve arrays of four floats and one of four halves in the denoiser,
 // two of them for the light of photons (denoiser.hpp), one of four floats in the presenter
 // (presenter.hpp), a word of flags, and its part of the shown picture.
 constexpr std::uint64_t band_bytes =
-    14 * 4 * sizeof(float) + 4 * sizeof(std::uint16_t) + sizeof(std::uint32_t) + plate_bytes;
+    13 * 4 * sizeof(float) + 4 * sizeof(std::uint16_t) + sizeof(std::uint32_t) + plate_bytes;
 
 // A pixel of a History (daemon/render/history.hpp) whose meshes deform.
 constexpr std::uint64_t history_bytes = 156 + 12;
