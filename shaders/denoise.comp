@@ -21,10 +21,10 @@ layout(scalar) writeonly buffer DenoisedReals { vec4 denoised_reals[]; };
 // soft edges, and little of it is seen by few samples; virtual objects have detail of their own.
 // The standard deviations are those of independent neighbours (tests/truth/RESULTS.md).
 const float CHANGE_NOISE_SCALE = 8.0;
-const float OBJECT_NOISE_SCALE = 3.5;
-// The further apart two pixels are, the likelier it is that they do differ: the numbers above fall
-// with this power of the step, and those of guides of real surfaces with its square, because a guide
-// shows soft edges before values do. Otherwise far steps spread a contact shadow over the light around.
+const float OBJECT_NOISE_SCALE = 3.0;
+// The further apart two pixels of a real surface are, the likelier it is that they do differ: the first
+// number falls with this power of the step, and for guides with its square, because a guide shows soft
+// edges before values do. Otherwise far steps spread a contact shadow over the light around.
 const float FALL_WITH_STEP = -0.25;
 // The least variance of a signal, in units of the sensor's white squared: far below what 16 bits
 // show.
@@ -60,8 +60,9 @@ void main() {
   // The guide lies between pixels, and does not see what is finer than its step. Where pixels know
   // their variance, their values show that.
   const float fall = pow(float(denoise.step), FALL_WITH_STEP);
-  const float value_scale = fall * (here.cover > 0.0 ? OBJECT_NOISE_SCALE : CHANGE_NOISE_SCALE);
-  const float guide_scale = here.cover > 0.0 ? value_scale : fall * value_scale;
+  const bool is_object = here.cover > 0.0;
+  const float value_scale = is_object ? OBJECT_NOISE_SCALE : CHANGE_NOISE_SCALE * fall;
+  const float guide_scale = is_object ? OBJECT_NOISE_SCALE : value_scale * fall;
   const vec2 slope = inverse_depth_slopes(at, here.inverse_depth);
   const bool has_companions = denoise.has_companions != 0u;
   vec3 change = vec3(0.0);
