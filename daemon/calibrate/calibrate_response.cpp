@@ -73,7 +73,10 @@ std::string table_of(ResponseCurve curve, const ClipFit& clip, const ResponseOpt
   };
   curve.clip_share = response_of(options.footage, stream_of(options.camera)).clip_share;
   if (!clip.share()) {
-    fmt::print(out, "clip_share stays {:g}\n", curve.clip_share);
+    if (is_session(options.footage))
+      fmt::print(out, "clip_share stays {:g}\n", curve.clip_share);
+    else
+      out << "the table has no clip_share; keep the one that the set file has\n";
     return table();
   }
   const std::string words = compared(curve, *clip.code(), options);

@@ -10,8 +10,8 @@
 
 namespace previz::calibrate {
 
-// Returns the response that the session states; sRGB if the footage is no session, or the session
-// states none. `stream` is "observer" or "light".
+// Returns the response that the session states; sRGB, clipped where that camera clips by default,
+// if the footage is no session, or the session states none. `stream` is "observer" or "light".
 ResponseCurve response_of(const std::filesystem::path& footage, const std::string& stream);
 
 // Returns what is known about the light camera's sensor: from the set if it gives a lens, otherwise

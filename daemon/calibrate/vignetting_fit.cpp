@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "daemon/calibrate/signals.hpp"
+#include "daemon/lighting/response.hpp"
 #include "drivers/calibration/fisheye.hpp"
 #include "drivers/error.hpp"
 
@@ -18,7 +19,8 @@ namespace previz::calibrate {
 namespace {
 
 constexpr std::size_t most_samples = 20000;
-constexpr double least_signal = 0.02, most_signal = 0.97;  // a channel; excludes noise, clipping
+constexpr double least_signal = 0.02;      // a channel; excludes noise
+constexpr double most_of_clipping = 0.97;  // a channel, over the signal that the camera clips at
 constexpr int most_turns = 500;
 constexpr double settled = 1e-12;
 
@@ -78,9 +80,15 @@ void measure_residuals(std::vector<FlatPicture>& pictures, const std::vector<glm
   fit.rms = std::sqrt(all / count);
 }
 
-bool usable(const glm::dvec3& signal) {
+// Returns the signal from which on a channel may be clipped.
+double most_signal(const ResponseCurve& curve) {
+  const lighting::Response response(curve, 8);
+  return most_of_clipping * response.inverse()[response.clipping().at];
+}
+
+bool usable(const glm::dvec3& signal, double most) {
   return std::min({signal.r, signal.g, signal.b}) > least_signal &&
-         std::max({signal.r, signal.g, signal.b}) < most_signal;
+         std::max({signal.r, signal.g, signal.b}) < most;
 }
 
 }  // namespace
@@ -89,6 +97,7 @@ std::vector<FlatPicture> read_flat_pictures(PictureSource& source,
                                             const LightCameraCalibration& camera,
                                             std::vector<std::string>& notes) {
   const Fisheye lens(camera.intrinsics);
+  const double most = most_signal(camera.response);
   std::vector<FlatPicture> pictures;
   while (const std::optional<NamedFrame> next = source.next()) {
     const SignalPicture seen = read_signals(next->frame, camera.response);
@@ -109,7 +118,7 @@ std::vector<FlatPicture> read_flat_pictures(PictureSource& source,
         const glm::dvec3& signal =
             seen.signal[static_cast<std::size_t>(y) * static_cast<std::size_t>(seen.width) +
                         static_cast<std::size_t>(x)];
-        if (!usable(signal)) continue;
+        if (!usable(signal, most)) continue;
         const glm::dvec3 light = signal - camera.dark_level;
         picture.samples.push_back({direction->x, direction->y,
                                    std::atan2(std::hypot(direction->x, direction->y), direction->z),

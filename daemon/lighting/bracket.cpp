@@ -34,6 +34,11 @@ Codes make_codes(const Response& response, double dark_level) {
   codes.full = codes.signal[codes.clipped_from];
   for (double& signal : codes.signal) signal -= dark_level;
   codes.white = codes.signal[codes.clipped_from];
+  if (!(codes.white > 0))
+    throw Error("the light camera's clip_share counts signals from " + std::to_string(codes.full) +
+                " on as clipped, and its dark_level is " + std::to_string(dark_level) +
+                ", so that it would see no light; measure both again (previzd calibrate response "
+                "--camera light, previzd calibrate sensor)");
   return codes;
 }
 

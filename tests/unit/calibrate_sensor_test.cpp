@@ -90,8 +90,10 @@ LightCameraCalibration camera() {
   return camera;
 }
 
-// Something evenly lit but for a gradient across the picture, seen through the lens.
-FramePtr flat_picture(double brightness, const glm::dvec2& gradient, const Vignetting& loss) {
+// Something evenly lit but for a gradient across the picture, seen through the lens by a sensor
+// that shows no more than `most`.
+FramePtr flat_picture(double brightness, const glm::dvec2& gradient, const Vignetting& loss,
+                      double most = 1) {
   const LightCameraCalibration lens_of = camera();
   const Fisheye lens(lens_of.intrinsics);
   std::vector<glm::dvec3> signals;
@@ -102,7 +104,8 @@ FramePtr flat_picture(double brightness, const glm::dvec2& gradient, const Vigne
       if (ray)
         light = brightness * (1 + gradient.x * ray->x + gradient.y * ray->y) *
                 relative_illumination(loss, std::acos(std::min(ray->z, 1.0)));
-      signals.push_back(light * glm::dvec3(1, 0.8, 0.6) + lens_of.dark_level);
+      signals.push_back(
+          glm::min(light * glm::dvec3(1, 0.8, 0.6) + lens_of.dark_level, glm::dvec3(most)));
     }
   return test::make_frame(lens_of.intrinsics.width, lens_of.intrinsics.height, 1, signals);
 }
@@ -123,6 +126,24 @@ TEST(VignettingFit, TheLensIsToldFromTheLight) {
     EXPECT_NEAR(relative_illumination(fit.vignetting, angle * degree),
                 relative_illumination(lens_loss, angle * degree), rounding)
         << angle;
+}
+
+// The middle of the picture is clipped at half of white, as the calibration says. What is left
+// shows the lens, to half a code in each of three channels.
+TEST(VignettingFit, WhatIsClippedBelowWhiteIsLeftOut) {
+  constexpr double brightness = 0.52;
+  LightCameraCalibration clips = camera();
+  clips.response.clip_share = 0.5;
+  Pictures source({flat_picture(brightness, {}, lens_loss, 0.5)});
+  std::vector<std::string> notes;
+  const std::vector<FlatPicture> seen = read_flat_pictures(source, clips, notes);
+  EXPECT_TRUE(notes.empty());
+  ASSERT_EQ(seen.size(), 1u);
+  for (const FlatSample& sample : seen[0].samples)
+    ASSERT_NEAR(sample.signal,
+                brightness * (1 + 0.8 + 0.6) * relative_illumination(lens_loss, sample.angle_rad),
+                3 * 0.5 / 65535)
+        << sample.angle_rad;
 }
 
 TEST(VignettingFit, PicturesThatCannotBeUsedAreLeftOutAndTold) {

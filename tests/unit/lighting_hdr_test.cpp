@@ -123,6 +123,21 @@ TEST(MergeExposures, WhatIsClippedBelowWhiteIsAtLeastSoMuchLight) {
   } while (std::next_permutation(exposures.begin(), exposures.end()));
 }
 
+// A sensor whose dark level is all that it does not clip would see no light.
+TEST(MergeExposures, ADarkLevelAtWhatIsClippedIsRefused) {
+  ResponseCurve half = linear;
+  half.clip_share = 0.5;
+  const FramePtr frame = frame_of(1, {glm::dvec3(0.3)});
+  EXPECT_NO_THROW(Bracket({&frame, 1}, half, glm::dvec3(0.4)));
+  try {
+    Bracket({&frame, 1}, half, glm::dvec3(0, 0, 0.501));
+    FAIL() << "not refused";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("dark_level is 0.501"), std::string::npos)
+        << error.what();
+  }
+}
+
 // Without a share that was measured, only the largest code is clipped, whatever the depth.
 TEST(MergeExposures, OnlyTheLargestCodeIsClippedUnlessTheCalibrationSaysOtherwise) {
   for (const int bits : {1, 8, 10, 12, 16})
