@@ -22,9 +22,10 @@ layout(scalar) writeonly buffer DenoisedReals { vec4 denoised_reals[]; };
 // The standard deviations are those of independent neighbours (tests/truth/RESULTS.md).
 const float CHANGE_NOISE_SCALE = 8.0;
 const float OBJECT_NOISE_SCALE = 3.0;
-// The further apart two pixels of a real surface are, the likelier it is that they do differ: the first
-// number falls with this power of the step, and for guides with its square, because a guide shows soft
-// edges before values do. Otherwise far steps spread a contact shadow over the light around.
+// The further apart two pixels of a real surface are, the likelier it is that they do differ. So
+// CHANGE_NOISE_SCALE is multiplied by this power of the step, and for guides by the square of that,
+// because a guide shows soft edges before values do. Otherwise far steps spread a contact shadow over
+// the light around.
 const float FALL_WITH_STEP = -0.25;
 // The least variance of a signal, in units of the sensor's white squared: far below what 16 bits
 // show.

@@ -11,8 +11,9 @@ namespace previz::post {
 // Says which frames are rendered, and takes those to be written for this process. Where frames are
 // averaged with their neighbours, it takes runs of them, because the neighbours beyond the ends of
 // a run are rendered too: 16 frames, or half of a take that is shorter than two runs, so that two
-// processes can share it. A run is taken when its first frame is asked for, or when otherwise
-// nothing would be known of a frame before it. The questions come in the order of the frames.
+// processes can share it. A run is taken when its first frame is asked for, or earlier, when a
+// frame before it is a neighbour of no frame that this process writes so far, and would be one of
+// that run's. The questions come in the order of the frames.
 class FramesToRender {
  public:
   // `take_frames` is the length of the take. Both references must outlive this, and there must be a

@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <glm/mat3x3.hpp>
-#include <glm/matrix.hpp>
+#include <glm/geometric.hpp>
 #include <utility>
 
 #include "daemon/render/emission_weights.hpp"
@@ -38,11 +37,13 @@ glm::dvec4 sphere_of_lamp(const set::Light& lamp) {
   return {lamp.position, radius};
 }
 
-// Returns by how much a motion makes surfaces larger, on average over their directions: exactly
-// that for a rotation with a uniform scale.
+// Returns by how much a motion makes surfaces larger, as the mean over the three faces of a cube:
+// that of every surface for a rotation with a uniform scale.
 double area_scale(const glm::dmat4& motion) {
-  const double side = std::cbrt(std::abs(glm::determinant(glm::dmat3(motion))));
-  return side * side;
+  const glm::dvec3 x(motion[0]), y(motion[1]), z(motion[2]);
+  return (glm::length(glm::cross(x, y)) + glm::length(glm::cross(y, z)) +
+          glm::length(glm::cross(z, x))) /
+         3;
 }
 
 }  // namespace

@@ -120,9 +120,9 @@ TEST_F(RenderNeighbours, TwoAtWorkInOneFolderMakeTheSamePictures) {
   }
 }
 
-// It is as where the disk fails after the take was opened. Another process that shares the take,
-// here one that runs while the first writes its last frame, neither waits for the frame nor says
-// that it is being rendered.
+// A disk that fails after the take was opened leaves a frame that cannot be read. Another process
+// that shares the take, here one that runs while the first writes its last frame, neither waits for
+// the frame nor says that it is being rendered.
 TEST_F(RenderNeighbours, AFrameThatCannotBeReadIsNobodys) {
   constexpr std::uint64_t unreadable = 5;
   test::write_small_take(directory_.path());

@@ -279,10 +279,9 @@ TEST(LightShare, LeavesTheLampBesideAnObjectItsSamples) {
 }
 
 // A lamp far off, of a thousandth of the lamp's power, lights nothing to speak of. It takes its
-// part of the tenth that lamps share evenly, so that the lamp beside the object keeps at least 0.9
-// * 0.99
-// + 0.05 of the nine tenths that lamps get, and the variance (1 / p - 1) f^2 of what it brings
-// (above) rises accordingly, that of the rest not at all.
+// part of the tenth that lamps share evenly. So the lamp beside the object keeps at least
+// 0.9 * 0.99 + 0.05 of the nine tenths that lamps get, and the variance (1 / p - 1) f^2 of what it
+// brings (above) rises accordingly, that of the rest not at all.
 TEST(LightShare, AFaintLampFarOffTakesNoneFromTheLampBesideAnObject) {
   const View alone = ball_beside_a_lamp();
   View both = alone;
