@@ -130,7 +130,7 @@ TEST(MergeExposures, ADarkLevelAtWhatIsClippedIsRefused) {
   const FramePtr frame = frame_of(1, {glm::dvec3(0.3)});
   EXPECT_NO_THROW(Bracket({&frame, 1}, half, glm::dvec3(0.4)));
   try {
-    Bracket({&frame, 1}, half, glm::dvec3(0, 0, 0.501));
+    const Bracket refused({&frame, 1}, half, glm::dvec3(0, 0, 0.501));
     FAIL() << "not refused";
   } catch (const Error& error) {
     EXPECT_NE(std::string(error.what()).find("dark_level is 0.501"), std::string::npos)
