@@ -296,7 +296,8 @@ TEST_F(ClipCommand, WritesTheLightCamerasKeyToo) {
   EXPECT_EQ(set.light_camera.calibration->response.clip_share, 0.91796);
 }
 
-// Of a light camera, a set file without the key means that only white is clipped.
+// A set file without the key means that its light camera clips nothing below white. So where a
+// bracket shows nothing clipped, the table leaves the key out.
 TEST_F(ClipCommand, LeavesTheLightCamerasKeyOutWhereNothingClips) {
   write_pictures(bracket_of(hard, std::exp2(-6 - stops * (exposures - 1))));
   const std::string output = printed(CameraRole::light);
