@@ -25,6 +25,9 @@ constexpr double kPushFadesS = 0.065;     // by a factor of e
 constexpr double kStirFadesS = 1.0;       // likewise, of what is feared while nothing is seen
 constexpr double kGlideS = 0.3;           // likewise, of what other tags have changed
 constexpr double kVelocityFadesS = 0.25;  // likewise, while nothing is seen
+// A wrong place of a tag moves the pose and leaves the rest in how the corners fit. A tag's own
+// corners resist a turn by half its size: of a tag that is eight sizes away a sixteenth is left.
+constexpr double kMistakePerFit = 16;
 constexpr double kLeastDeviation = 1e-7;  // of a measured pose, rad and m
 
 glm::dmat3 cross_matrix(const glm::dvec3& w) {
@@ -99,6 +102,7 @@ double surprise(const Step6& step, const Spread6& spread) {
 struct PoseFilter::State {
   std::int64_t time_ns = 0;  // of the last tracked frame
   std::vector<int> tags;     // that it used
+  double fit_px = 0;         // how far their corners were off the pose's, rms
   glm::dmat4 world_from_camera{1.0};
   Step6 twist = Step6::zeros();
   Spread12 spread = Spread12::zeros();  // of pose and twist
@@ -205,6 +209,7 @@ void PoseFilter::begin(const Pose& pose, std::int64_t time_ns) {
   state_ = std::make_unique<State>();
   state_->time_ns = time_ns;
   state_->tags = pose.tags;
+  state_->fit_px = pose.reprojection_rms_px;
   state_->world_from_camera = pose.world_from_camera;
   for (int i = 0; i < 6; ++i) {
     for (int j = 0; j < 6; ++j)
@@ -239,6 +244,7 @@ void PoseFilter::follow(const Pose& pose, std::int64_t time_ns) {
   next.stir = std::max(next.push, next.stir * std::exp(-seconds / kStirFadesS));
   next.time_ns = time_ns;
   next.tags = pose.tags;
+  next.fit_px = pose.reprojection_rms_px;
   next.holds = false;
   *state_ = std::move(next);
 }
@@ -254,11 +260,16 @@ std::optional<ShownPose> PoseFilter::held(std::int64_t time_ns) {
 }
 
 // Returns true if the step from the expected pose moves no tag that was used by more than the map
-// may be wrong.
+// may be wrong. Where both pictures have a tag in common, the fit of their corners bounds how
+// wrong.
 bool PoseFilter::is_of_the_map(const glm::dmat4& expected, const Pose& pose) const {
   const CameraFromWorld from = camera_from_world(expected);
   const CameraFromWorld to = camera_from_world(pose.world_from_camera);
-  const double gate_px = consistency_gate_px(lens_);
+  const bool share_a_tag =
+      std::ranges::find_first_of(state_->tags, pose.tags) != state_->tags.end();
+  const double shown_px = std::max(state_->fit_px, pose.reprojection_rms_px);
+  const double gate_px =
+      std::min(consistency_gate_px(lens_), share_a_tag ? kMistakePerFit * shown_px : HUGE_VAL);
   return std::ranges::all_of(settings_.tags, [&](const set::Tag& tag) {
     if (std::ranges::find(pose.tags, tag.id) == pose.tags.end()) return true;
     const glm::dvec3 middle(tag.world_from_tag[3]);
