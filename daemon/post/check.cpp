@@ -333,6 +333,26 @@ void print_features(const render::Demand& demand, const scene::Size& size, std::
   for (const auto& line : unused) out << "  " << line << '\n';
 }
 
+constexpr double mebibyte = 1024.0 * 1024.0;
+
+void print_picture_memory(const set::Quality& quality, const PinholeIntrinsics& intrinsics,
+                          std::ostream& out) {
+  const bool averaged_live = quality.denoise && quality.accumulate;
+  const bool averaged_offline = quality.denoise && quality.neighbours > 0;
+  std::uint64_t picture_bytes = render::picture_bytes(intrinsics.width, intrinsics.height, false);
+  if (averaged_live || averaged_offline)
+    picture_bytes += render::history_bytes(intrinsics.width, intrinsics.height);
+  out << words("  picture in the GPU's memory: about ",
+               std::ceil(static_cast<double>(picture_bytes) / mebibyte), " MiB\n");
+  if (averaged_offline)
+    out << words("  frames that are averaged offline in the computer's memory: about ",
+                 std::ceil(static_cast<double>(render::kept_bytes(
+                               intrinsics.width, intrinsics.height,
+                               {quality.neighbours, std::numeric_limits<std::uint64_t>::max()})) /
+                           mebibyte),
+                 " MiB\n");
+}
+
 // Estimates what a frame asks of the GPU, without measuring; `previzd trade` measures.
 void print_costs(const set::Set& set, std::uint32_t needed, const scene::Size& size,
                  std::ostream& out) {
@@ -342,7 +362,6 @@ void print_costs(const set::Set& set, std::uint32_t needed, const scene::Size& s
   const double a_texel = (needed & gpu::FEATURE_FILTERED_TEXTURES) != 0 ? 8.0 * 4 / 3 : 8.0;
   const double scene_bytes =
       32.0 * size.vertices + (16.0 + 64.0) * size.triangles + a_texel * size.texels;
-  constexpr double mebibyte = 1024.0 * 1024.0;
   constexpr auto any_number = std::numeric_limits<std::uint32_t>::max();
   out << "\na frame costs\n";
   out << words("  scene in the GPU's memory: about ", std::ceil(scene_bytes / mebibyte), " MiB\n");
@@ -350,17 +369,7 @@ void print_costs(const set::Set& set, std::uint32_t needed, const scene::Size& s
   const auto& intrinsics = set.observer.calibration->intrinsics;
   const double pixels = static_cast<double>(intrinsics.width) * intrinsics.height;
   const double samples = pixels * set.quality.samples;
-  out << words("  picture in the GPU's memory: about ",
-               std::ceil(static_cast<double>(
-                             render::picture_bytes(intrinsics.width, intrinsics.height, false)) /
-                         mebibyte),
-               " MiB\n");
-  if (set.quality.denoise && set.quality.neighbours > 0)
-    out << words("  frames that are averaged offline in the computer's memory: about ",
-                 std::ceil(static_cast<double>(render::kept_bytes(
-                               intrinsics.width, intrinsics.height, set.quality.neighbours)) /
-                           mebibyte),
-                 " MiB\n");
+  print_picture_memory(set.quality, intrinsics, out);
   // A path has a segment and a light sample a bounce, and one more segment; twice as many where the
   // worlds part.
   const double most = samples * (2.0 * set.estimation.max_depth + 1) *

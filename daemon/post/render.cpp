@@ -296,7 +296,8 @@ void check_neighbours(const RenderOptions& options, const pipeline::Take& take,
   const std::uint64_t free_bytes =
       options.free_memory ? *options.free_memory
                           : output::free_memory_bytes().value_or(output::memory_bytes());
-  render::refuse_too_many_neighbours(picture.width, picture.height, neighbours,
+  render::refuse_too_many_neighbours(picture.width, picture.height,
+                                     {neighbours, take.observer_stream->records().size()},
                                      render::memory_of(device), free_bytes);
 }
 

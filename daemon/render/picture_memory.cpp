@@ -31,9 +31,6 @@ constexpr std::uint64_t plate_bytes = 3 * sizeof(std::uint16_t);
 constexpr std::uint64_t band_bytes =
     13 * 4 * sizeof(float) + 4 * sizeof(std::uint16_t) + sizeof(std::uint32_t) + plate_bytes;
 
-// A pixel of a History (daemon/render/history.hpp) whose meshes deform.
-constexpr std::uint64_t history_bytes = 156 + 12;
-
 std::uint64_t pixels_of(int width, int height) {
   return static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
 }
@@ -74,20 +71,30 @@ void refuse_too_large(int width, int height, const PictureMemory& memory) {
                 gigabytes(memory.bytes) + "; make it smaller");
 }
 
-std::uint64_t kept_bytes(int width, int height, int neighbours) {
-  // One that is finished waits for the one that is being written (daemon/post/render.cpp).
-  constexpr std::uint64_t finished = 2;
-  const auto each_side = static_cast<std::uint64_t>(neighbours);
-  return pixels_of(width, height) * ((2 * each_side + 1) * (sum_bytes + plate_bytes) +
-                                     (each_side + 1 + finished) * bare_layer_bytes);
+std::uint64_t history_bytes(int width, int height) {
+  return pixels_of(width, height) * (156 + 12);  // 12 for points that deform
 }
 
-void refuse_too_many_neighbours(int width, int height, int neighbours, const PictureMemory& memory,
-                                std::uint64_t free_bytes) {
+std::uint64_t Averaging::frames() const {
+  return std::min(2 * static_cast<std::uint64_t>(each_side) + 1, take_frames);
+}
+
+std::uint64_t kept_bytes(int width, int height, const Averaging& averaging) {
+  // One that is finished waits for the one that is being written (daemon/post/render.cpp).
+  constexpr std::uint64_t finished = 2;
+  const std::uint64_t waiting = std::min(
+      static_cast<std::uint64_t>(averaging.each_side) + 1 + finished, averaging.take_frames);
+  return pixels_of(width, height) *
+         (averaging.frames() * (sum_bytes + plate_bytes) + waiting * bare_layer_bytes);
+}
+
+void refuse_too_many_neighbours(int width, int height, const Averaging& averaging,
+                                const PictureMemory& memory, std::uint64_t free_bytes) {
   refuse_too_large(width, height, memory);
+  const int neighbours = averaging.each_side;
   const std::string key = "quality.neighbours = " + std::to_string(neighbours) + ": ";
   const std::uint64_t averaged =
-      picture_bytes(width, height, memory.read_back) + pixels_of(width, height) * history_bytes;
+      picture_bytes(width, height, memory.read_back) + history_bytes(width, height);
   if (!memory.read_back && averaged > memory.bytes)
     throw Error(key + "to average a picture of " + size_words(width, height) + " takes " +
                 gigabytes(averaged) + " of the graphics card's memory, and there is " +
@@ -95,12 +102,13 @@ void refuse_too_many_neighbours(int width, int height, int neighbours, const Pic
                 "; make the picture smaller (--scale), or let every frame stand alone "
                 "(--neighbours 0)");
   const auto needed = [&](int each_side) {
-    return kept_bytes(width, height, each_side) + (memory.read_back ? averaged : 0);
+    return kept_bytes(width, height, {each_side, averaging.take_frames}) +
+           (memory.read_back ? averaged : 0);
   };
   if (needed(neighbours) <= free_bytes) return;
   int fitting = neighbours - 1;
   while (fitting > 0 && needed(fitting) > free_bytes) --fitting;
-  throw Error(key + "to average " + std::to_string(2 * neighbours + 1) + " frames of " +
+  throw Error(key + "to average " + std::to_string(averaging.frames()) + " frames of " +
               size_words(width, height) + " takes " + gigabytes(needed(neighbours)) +
               " of the computer's memory, and " + gigabytes(free_bytes) +
               " are free; make the picture smaller (--scale), or average fewer (--neighbours " +

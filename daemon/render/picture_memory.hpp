@@ -24,17 +24,28 @@ std::uint64_t picture_bytes(int width, int height, bool read_back);
 // the picture does not fit or has no pixel.
 void refuse_too_large(int width, int height, const PictureMemory& memory);
 
-// Returns how many bytes of the computer's memory are taken where pictures are averaged with so
-// many frames on each side: by the frames that are kept (Renderer::keep()), and by the layers of
-// those that wait for the frames after them, or to be written.
-std::uint64_t kept_bytes(int width, int height, int neighbours);
+// Returns how many bytes of the device's memory a picture's history takes
+// (daemon/render/history.hpp), where meshes deform.
+std::uint64_t history_bytes(int width, int height);
+
+// Offline, a picture is averaged with so many frames on each side, as far as the take has them.
+struct Averaging {
+  int each_side = 0;
+  std::uint64_t take_frames = 0;
+
+  std::uint64_t frames() const;  // those that one picture is averaged from
+};
+
+// Returns how many bytes of the computer's memory averaging takes: for the frames that are kept
+// (Renderer::keep()), and for the layers of those that wait for the frames after them, or to be
+// written.
+std::uint64_t kept_bytes(int width, int height, const Averaging& averaging);
 
 // Throws previz::Error, with the memory that averaging takes, the memory there is and what would
 // fit, where kept_bytes() are more than `free_bytes`, those that are free in the computer's memory,
-// or where the device has no room for a picture and its history (daemon/render/history.hpp). With
-// `memory.read_back` both lie in the computer's memory. A picture that is too large by itself is
-// refused as such.
-void refuse_too_many_neighbours(int width, int height, int neighbours, const PictureMemory& memory,
-                                std::uint64_t free_bytes);
+// or where the device has no room for a picture and its history. With `memory.read_back` both lie
+// in the computer's memory. A picture that is too large by itself is refused as such.
+void refuse_too_many_neighbours(int width, int height, const Averaging& averaging,
+                                const PictureMemory& memory, std::uint64_t free_bytes);
 
 }  // namespace previz::render

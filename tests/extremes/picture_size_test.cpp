@@ -30,9 +30,11 @@ std::string refusal(int width, int height, const render::PictureMemory& memory) 
 }
 
 std::string refusal(int width, int height, int neighbours, const render::PictureMemory& memory,
-                    std::uint64_t free_bytes) {
-  return words_of(
-      [&] { render::refuse_too_many_neighbours(width, height, neighbours, memory, free_bytes); });
+                    std::uint64_t free_bytes, std::uint64_t take_frames = 1000) {
+  return words_of([&] {
+    render::refuse_too_many_neighbours(width, height, {neighbours, take_frames}, memory,
+                                       free_bytes);
+  });
 }
 
 // A white floor and a virtual box on it, in a white environment: whatever the size, the real floor
@@ -132,6 +134,10 @@ TEST(PictureSize, ThatIsAveragedFitsOrIsRefused) {
   EXPECT_THAT(refusal(1000, 1000, 2, shared, 2020 * megabyte),
               HasSubstr("takes 2.03 GB of the computer's memory, and 2.02 GB are free"));
   EXPECT_THAT(refusal(1000, 1000, 2, card(100), 8 * gib), HasSubstr("takes 0.416 GB of memory"));
+  // A take of three frames keeps no more than those, and as many layers: 0.786 GB.
+  EXPECT_EQ(refusal(1000, 1000, 2, card(610), 790 * megabyte, 3), "");
+  EXPECT_THAT(refusal(1000, 1000, 2, card(610), 780 * megabyte, 3),
+              HasSubstr("to average 3 frames of 1000x1000 takes 0.786 GB"));
 }
 
 // More than any Vulkan device can address: refused at once, though a set file may ask for it.
