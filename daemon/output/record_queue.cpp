@@ -130,7 +130,7 @@ Backlog RecordQueue::backlog() const {
 
 Backlog RecordQueue::backlog_with(SteadyClock::time_point newest) const {
   using Seconds = std::chrono::duration<double>;
-  Backlog backlog{0, queued_bytes_, 0};
+  Backlog backlog{.bytes = queued_bytes_, .entries = queue_.size()};
   const std::size_t oldest = oldest_picture();
   if (oldest == queue_.size()) return backlog;
   const Seconds waits = newest - std::get<Captured>(queue_[oldest].entry).offered;

@@ -46,6 +46,7 @@ struct Backlog {
   // Of these seconds what the ring held when the take began, and is given time to be written: the
   // whole at the beginning, nothing after `ring_grace_s`.
   double of_ring_s = 0;
+  std::uint64_t entries = 0;  // pictures of both cameras and lines
 };
 
 // What an entry that was offered cost: itself, or pictures that waited before it.

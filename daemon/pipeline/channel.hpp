@@ -15,6 +15,24 @@
 
 namespace previz::pipeline {
 
+// What waits in a queue.
+struct Waiting {
+  std::uint64_t values = 0;
+  double oldest_s = 0;      // since the oldest of them was pushed
+  std::uint64_t bytes = 0;  // 0: few, and not counted
+};
+
+// A value and when it was pushed.
+template <class T>
+struct Pushed {
+  T value;
+  std::chrono::steady_clock::time_point at = std::chrono::steady_clock::now();
+
+  double age_s() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - at).count();
+  }
+};
+
 // A channel has one writer and one reader; any thread may close it. Values are moved; share big
 // ones by std::shared_ptr<const T>.
 template <class T>
@@ -36,6 +54,7 @@ class Channel {
   virtual void abandon() = 0;
   // Counts the values that were never popped because a newer one took their place.
   virtual std::uint64_t dropped() const = 0;
+  virtual Waiting waiting() const = 0;
 };
 
 // The channel for live use: a push replaces a value that was not taken yet and counts it as
@@ -48,7 +67,7 @@ class Mailbox final : public Channel<T> {
       const std::lock_guard lock(mutex_);
       if (closed_) return false;
       if (value_) ++dropped_;
-      value_ = std::move(value);
+      value_.emplace(Pushed<T>{std::move(value)});
     }
     filled_.notify_one();
     return true;
@@ -57,19 +76,19 @@ class Mailbox final : public Channel<T> {
   std::optional<T> pop() override {
     std::unique_lock lock(mutex_);
     filled_.wait(lock, [this] { return value_ || closed_; });
-    return std::exchange(value_, std::nullopt);
+    return take();
   }
 
   std::optional<T> try_pop() override {
     const std::lock_guard lock(mutex_);
-    return std::exchange(value_, std::nullopt);
+    return take();
   }
 
   // Works like pop(), but also returns nothing once the time is over, for readers with other work.
   std::optional<T> pop_for(std::chrono::milliseconds timeout) {
     std::unique_lock lock(mutex_);
     filled_.wait_for(lock, timeout, [this] { return value_ || closed_; });
-    return std::exchange(value_, std::nullopt);
+    return take();
   }
   // Returns true once the channel is closed and drained: nothing will ever come.
   bool finished() const {
@@ -84,8 +103,20 @@ class Mailbox final : public Channel<T> {
     const std::lock_guard lock(mutex_);
     return dropped_;
   }
+  // The age is that of the value that waits: of what it took the place of, nothing is known.
+  Waiting waiting() const override {
+    const std::lock_guard lock(mutex_);
+    return value_ ? Waiting{.values = 1, .oldest_s = value_->age_s()} : Waiting{};
+  }
 
  private:
+  std::optional<T> take() {
+    if (!value_) return std::nullopt;
+    std::optional<T> value = std::move(value_->value);
+    value_.reset();
+    return value;
+  }
+
   void close(bool empty) {
     {
       const std::lock_guard lock(mutex_);
@@ -97,7 +128,7 @@ class Mailbox final : public Channel<T> {
 
   mutable std::mutex mutex_;
   std::condition_variable filled_;
-  std::optional<T> value_;
+  std::optional<Pushed<T>> value_;
   std::uint64_t dropped_ = 0;
   bool closed_ = false;
 };
@@ -114,7 +145,7 @@ class BoundedQueue final : public Channel<T> {
       std::unique_lock lock(mutex_);
       room_.wait(lock, [this] { return values_.size() < capacity_ || closed_; });
       if (closed_) return false;
-      values_.push_back(std::move(value));
+      values_.push_back({std::move(value)});
     }
     filled_.notify_one();
     return true;
@@ -126,7 +157,7 @@ class BoundedQueue final : public Channel<T> {
     {
       const std::lock_guard lock(mutex_);
       if (closed_ || values_.size() >= capacity_) return false;
-      values_.push_back(std::move(value));
+      values_.push_back({std::move(value)});
     }
     filled_.notify_one();
     return true;
@@ -147,11 +178,16 @@ class BoundedQueue final : public Channel<T> {
   void abandon() override { close(true); }
 
   std::uint64_t dropped() const override { return 0; }
+  Waiting waiting() const override {
+    const std::lock_guard lock(mutex_);
+    if (values_.empty()) return {};
+    return {.values = values_.size(), .oldest_s = values_.front().age_s()};
+  }
 
  private:
   std::optional<T> take(std::unique_lock<std::mutex>& lock) {
     if (values_.empty()) return std::nullopt;
-    std::optional<T> value = std::move(values_.front());
+    std::optional<T> value = std::move(values_.front().value);
     values_.pop_front();
     lock.unlock();
     room_.notify_one();
@@ -171,27 +207,27 @@ class BoundedQueue final : public Channel<T> {
   const std::size_t capacity_;
   mutable std::mutex mutex_;
   std::condition_variable filled_, room_;
-  std::deque<T> values_;
+  std::deque<Pushed<T>> values_;
   bool closed_ = false;
 };
 
 // The channel for values that are all wanted, of a writer that must not wait: once more than
-// `fewest` values wait that weigh more than `most_weight` together, the oldest are dropped and
+// `fewest` values wait that have more than `most_bytes` together, the oldest are dropped and
 // counted.
 template <class T>
 class RecentQueue final : public Channel<T> {
  public:
-  using Weight = std::function<std::uint64_t(const T&)>;
-  RecentQueue(std::size_t fewest, std::uint64_t most_weight, Weight weight)
-      : fewest_(fewest), most_weight_(most_weight), weight_(std::move(weight)) {}
+  using BytesOf = std::function<std::uint64_t(const T&)>;
+  RecentQueue(std::size_t fewest, std::uint64_t most_bytes, BytesOf bytes_of)
+      : fewest_(fewest), most_bytes_(most_bytes), bytes_of_(std::move(bytes_of)) {}
 
   bool push(T value) override {
     {
       const std::lock_guard lock(mutex_);
       if (closed_) return false;
-      weighs_ += weight_(value);
-      values_.push_back(std::move(value));
-      while (values_.size() > fewest_ && weighs_ > most_weight_) {
+      bytes_ += bytes_of_(value);
+      values_.push_back({std::move(value)});
+      while (values_.size() > fewest_ && bytes_ > most_bytes_) {
         take_first();
         ++dropped_;
       }
@@ -218,13 +254,18 @@ class RecentQueue final : public Channel<T> {
     const std::lock_guard lock(mutex_);
     return dropped_;
   }
+  Waiting waiting() const override {
+    const std::lock_guard lock(mutex_);
+    if (values_.empty()) return {};
+    return {.values = values_.size(), .oldest_s = values_.front().age_s(), .bytes = bytes_};
+  }
 
  private:
   std::optional<T> take_first() {
     if (values_.empty()) return std::nullopt;
-    std::optional<T> value = std::move(values_.front());
+    std::optional<T> value = std::move(values_.front().value);
     values_.pop_front();
-    weighs_ -= weight_(*value);
+    bytes_ -= bytes_of_(*value);
     return value;
   }
 
@@ -234,19 +275,19 @@ class RecentQueue final : public Channel<T> {
       closed_ = true;
       if (empty) {
         values_.clear();
-        weighs_ = 0;
+        bytes_ = 0;
       }
     }
     filled_.notify_all();
   }
 
   const std::size_t fewest_;
-  const std::uint64_t most_weight_;
-  const Weight weight_;
+  const std::uint64_t most_bytes_;
+  const BytesOf bytes_of_;
   mutable std::mutex mutex_;
   std::condition_variable filled_;
-  std::deque<T> values_;
-  std::uint64_t weighs_ = 0, dropped_ = 0;
+  std::deque<Pushed<T>> values_;
+  std::uint64_t bytes_ = 0, dropped_ = 0;
   bool closed_ = false;
 };
 

@@ -61,14 +61,37 @@ void Metrics::shown(double latency_s) {
   }
 }
 
+Metrics::Watch::Watch(Metrics& metrics, std::string stage, std::function<Waiting()> waiting)
+    : metrics_(metrics), stage_(std::move(stage)), waiting_(std::move(waiting)) {
+  const std::lock_guard lock(metrics_.watched_mutex_);
+  metrics_.watched_.insert(this);
+}
+
+Metrics::Watch::~Watch() {
+  const std::lock_guard lock(metrics_.watched_mutex_);
+  metrics_.watched_.erase(this);
+}
+
 MetricsSnapshot Metrics::snapshot(double seconds) const {
-  const std::lock_guard lock(mutex_);
-  return {seconds,
-          stages_,
-          counts_,
-          devices_,
-          quantile(latencies_s_, 0.50),
-          quantile(latencies_s_, 0.99)};
+  MetricsSnapshot snapshot;
+  snapshot.seconds = seconds;
+  {
+    const std::lock_guard lock(mutex_);
+    snapshot.stages = stages_;
+    snapshot.counts = counts_;
+    snapshot.devices = devices_;
+    snapshot.latency_p50_s = quantile(latencies_s_, 0.50);
+    snapshot.latency_p99_s = quantile(latencies_s_, 0.99);
+  }
+  const std::lock_guard lock(watched_mutex_);
+  for (const Watch* watch : watched_) {
+    const Waiting more = watch->waiting_();
+    Waiting& all = snapshot.stages[watch->stage_].waiting;
+    all.values += more.values;
+    all.bytes += more.bytes;
+    all.oldest_s = std::max(all.oldest_s, more.oldest_s);
+  }
+  return snapshot;
 }
 
 std::string to_json(const MetricsSnapshot& snapshot) {
@@ -79,6 +102,10 @@ std::string to_json(const MetricsSnapshot& snapshot) {
     json["stages"][name] = {{"frames", stage.frames},
                             {"frames_per_second", static_cast<double>(stage.frames) / seconds},
                             {"busy_fraction", stage.busy_s / seconds},
+                            {"waiting",
+                             {{"values", stage.waiting.values},
+                              {"oldest_s", stage.waiting.oldest_s},
+                              {"bytes", stage.waiting.bytes}}},
                             {"dropped", stage.dropped}};
   }
   json["counts"] = snapshot.counts;

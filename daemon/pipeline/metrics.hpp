@@ -1,11 +1,13 @@
-// Counts what the pipeline does: frames and time per stage, every drop with its cause, latency to
-// display. DropCount and DeviceCounts add the totals of channels and devices.
+// Counts what the pipeline does: frames and time per stage, what waits in front of it, every drop
+// with its cause, latency to display. Intake and DeviceCounts add what channels and devices know.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <mutex>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,6 +21,7 @@ struct StageMetrics {
   std::uint64_t frames = 0;
   double busy_s = 0;                             // time spent working, not waiting
   std::map<std::string, std::uint64_t> dropped;  // cause -> frames
+  Waiting waiting;                               // in front of the stage
 };
 
 struct MetricsSnapshot {
@@ -44,6 +47,21 @@ class Metrics {
   void device_counted(const std::string& device, const DeviceCounters& more);
   void shown(double latency_s);
 
+  // While it lives, every snapshot asks a queue what waits in it.
+  class [[nodiscard]] Watch {
+   public:
+    Watch(Metrics& metrics, std::string stage, std::function<Waiting()> waiting);
+    ~Watch();
+    Watch(const Watch&) = delete;
+    Watch& operator=(const Watch&) = delete;
+
+   private:
+    friend class Metrics;
+    Metrics& metrics_;
+    const std::string stage_;
+    const std::function<Waiting()> waiting_;  // from any thread; must not count anything
+  };
+
   // `seconds` is the time since the start, by the caller's clock.
   MetricsSnapshot snapshot(double seconds) const;
 
@@ -59,15 +77,20 @@ class Metrics {
   std::map<std::string, DeviceCounters> devices_;
   std::vector<double> latencies_s_;  // a ring once full
   std::size_t next_latency_ = 0;
+  mutable std::mutex watched_mutex_;  // the owners' locks come after it, mutex_ after those
+  std::set<const Watch*> watched_;
 };
 
-// Counts what a channel dropped, in the metrics of the stage that reads the channel.
+// Puts what waits in a channel, and what it dropped, into the metrics of the stage that reads it.
 template <class T>
-class DropCount {
+class Intake {
  public:
   // The metrics and the channel must outlive this object.
-  DropCount(Metrics& metrics, std::string stage, const Channel<T>& channel)
-      : metrics_(metrics), stage_(std::move(stage)), channel_(channel) {}
+  Intake(Metrics& metrics, const std::string& stage, const Channel<T>& channel)
+      : metrics_(metrics),
+        stage_(stage),
+        channel_(channel),
+        watch_(metrics, stage, [&channel] { return channel.waiting(); }) {}
 
   // Counts what was dropped since the last call.
   void update() {
@@ -80,6 +103,7 @@ class DropCount {
   const std::string stage_;
   const Channel<T>& channel_;
   std::uint64_t counted_ = 0;
+  const Metrics::Watch watch_;
 };
 
 // Adds a device's own counters to the metrics. The metrics outlive the device, which is opened anew
@@ -104,7 +128,8 @@ class DeviceCounts {
 };
 
 // {"seconds": ..., "stages": {"render": {"frames": ..., "frames_per_second": ...,
-//  "busy_fraction": ..., "dropped": {"newer frame": ...}}}, "counts": {...},
+//  "busy_fraction": ..., "waiting": {"values": ..., "oldest_s": ..., "bytes": ...},
+//  "dropped": {"newer frame": ...}}}, "counts": {...},
 //  "devices": {"observer": {"lost": ..., "stream missing packets": ...}}, "latency_s": {"p50": ...,
 //  "p99": ...}}
 std::string to_json(const MetricsSnapshot& snapshot);

@@ -62,15 +62,15 @@ class StageThreads {
     know(input);
     know(output);
     start([this, name = std::move(name), &input, &output, work = std::move(work)]() mutable {
-      DropCount drops(metrics_, name, input);
+      Intake intake(metrics_, name, input);
       while (std::optional<In> value = input.pop()) {
-        drops.update();
+        intake.update();
         const auto begin = std::chrono::steady_clock::now();
         Out result = work(std::move(*value));
         metrics_.worked(name, seconds_since(begin));
         if (!output.push(std::move(result))) break;
       }
-      drops.update();
+      intake.update();
       output.close();
     });
   }
@@ -82,11 +82,11 @@ class StageThreads {
     know(input);
     know(output);
     start([this, name = std::move(name), &input, &output, work = std::move(work)]() mutable {
-      DropCount drops(metrics_, name, input);
+      Intake intake(metrics_, name, input);
       bool goes_on = true;
       while (goes_on) {
         std::optional<In> value = input.pop();
-        drops.update();
+        intake.update();
         if (!value && is_abandoned()) break;
         goes_on = value.has_value();
         const auto begin = std::chrono::steady_clock::now();
@@ -103,14 +103,14 @@ class StageThreads {
   void sink(std::string name, Channel<In>& input, Consume consume) {
     know(input);
     start([this, name = std::move(name), &input, consume = std::move(consume)]() mutable {
-      DropCount drops(metrics_, name, input);
+      Intake intake(metrics_, name, input);
       while (std::optional<In> value = input.pop()) {
-        drops.update();
+        intake.update();
         const auto begin = std::chrono::steady_clock::now();
         consume(std::move(*value));
         metrics_.worked(name, seconds_since(begin));
       }
-      drops.update();
+      intake.update();
     });
   }
 

@@ -5,11 +5,13 @@
 #include <sys/eventfd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <mutex>
 #include <utility>
 #include <vector>
 
+#include "daemon/pipeline/channel.hpp"
 #include "daemon/rig/mode.hpp"
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
@@ -26,7 +28,7 @@ class Inbox {
 
   void post(Event event) {
     const std::lock_guard lock(mutex_);
-    events_.push_back(event);
+    events_.push_back({event});
     eventfd_write(descriptor_.get(), 1);
   }
   // Call this when the pipeline has ended, with the observer's stream or by a stage's error.
@@ -41,7 +43,14 @@ class Inbox {
     const std::lock_guard lock(mutex_);
     eventfd_t ignored = 0;
     eventfd_read(descriptor_.get(), &ignored);
-    return std::exchange(events_, {});
+    std::vector<Event> events;
+    for (const auto& posted : std::exchange(events_, {})) events.push_back(posted.value);
+    return events;
+  }
+  pipeline::Waiting waiting() const {
+    const std::lock_guard lock(mutex_);
+    if (events_.empty()) return {};
+    return {.values = events_.size(), .oldest_s = events_.front().age_s()};
   }
   bool finished() const {
     const std::lock_guard lock(mutex_);
@@ -54,7 +63,7 @@ class Inbox {
 
  private:
   mutable std::mutex mutex_;
-  std::vector<Event> events_;
+  std::vector<pipeline::Pushed<Event>> events_;
   bool finished_ = false, by_error_ = false;
   OwnedDescriptor descriptor_;
 };

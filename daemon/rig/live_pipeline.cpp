@@ -77,6 +77,13 @@ struct LivePipeline::Impl {
   std::optional<pipeline::TrackStage> track_stage;
   std::optional<tracking::PoseFilter> pose_filter;  // absent: the set shows poses as they are found
   pipeline::AnimationClock animation_clock;
+  pipeline::Mailbox<Shot> seen, tracked, reviewed, rendered;
+  pipeline::Newest<std::vector<pipeline::FoundLamp>> found{{}};
+  pipeline::Newest<std::map<std::string, std::string>> recorded_variants{{}};
+  pipeline::Newest<set::PreviewStep> governed{{.samples = 0, .denoise = {}}};
+  pipeline::BoundedQueue<Shot> snapshots{4};  // closed by the render thread, or at a stop
+  std::stop_callback<std::function<void()>> close_snapshots{stop_source.get_token(),
+                                                            [this] { snapshots.close(); }};
   LiveLight light;
   LiveRender live_render;
   std::optional<pipeline::RenderStage> render_stage;
@@ -97,13 +104,6 @@ struct LivePipeline::Impl {
   std::uint64_t shown_frames = 0;
   int exposure_steps = 0;  // steps of Look::exposure_steps done so far
 
-  pipeline::Mailbox<Shot> seen, tracked, reviewed, rendered;
-  pipeline::Newest<std::vector<pipeline::FoundLamp>> found{{}};
-  pipeline::Newest<std::map<std::string, std::string>> recorded_variants{{}};
-  pipeline::Newest<set::PreviewStep> governed{{.samples = 0, .denoise = {}}};
-  pipeline::BoundedQueue<Shot> snapshots{4};  // closed by the render thread, or at a stop
-  std::stop_callback<std::function<void()>> close_snapshots{stop_source.get_token(),
-                                                            [this] { snapshots.close(); }};
   std::exception_ptr failure;
   std::optional<pipeline::StageThreads> stages;
   std::jthread waiter;

@@ -34,7 +34,8 @@ LiveRender::LiveRender(const set::Set& set, const pipeline::Newest<Look>& look, 
       reports_(reports),
       channels_(channels),
       stop_(std::move(stop)),
-      drops_(metrics, "render", channels.tracked) {
+      intake_(metrics, "render", channels.tracked),
+      review_intake_(metrics, "review", channels.reviewed) {
   if (set.quality.fps > 0) governor_.emplace(set.quality.fps, pipeline::preview_steps(set.quality));
 }
 

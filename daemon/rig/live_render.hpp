@@ -59,7 +59,10 @@ class LiveRender {
 
   // Counts the frames that newer ones replaced since the last call; next() and next_plate() do so
   // too.
-  void count_dropped() { drops_.update(); }
+  void count_dropped() {
+    intake_.update();
+    review_intake_.update();
+  }
 
   // Returns true if the picture that is being rendered is no longer wanted. Call it from the render
   // thread.
@@ -102,7 +105,7 @@ class LiveRender {
   bool refining_ = false;
   pipeline::Edits refined_edits_;
   double sample_s_ = 0;  // time of the last refinement's sample; 0: not known
-  pipeline::DropCount<pipeline::Shot> drops_;
+  pipeline::Intake<pipeline::Shot> intake_, review_intake_;
   std::uint64_t snapshots_ = 0, refined_snapshots_ = 0, refinements_ = 0;  // the Look's, done
 };
 

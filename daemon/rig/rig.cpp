@@ -81,6 +81,11 @@ output::RecorderOptions recorder_options(const LoadedSet& loaded, const Cameras&
   return options;
 }
 
+pipeline::Waiting waiting_in(const output::Recorder& recorder) {
+  const output::Backlog backlog = recorder.status().backlog;
+  return {.values = backlog.entries, .oldest_s = backlog.seconds, .bytes = backlog.bytes};
+}
+
 Cameras open_cameras_of(const LoadedSet& loaded, const Rig::Parts& parts, const Usb& usb) {
   Cameras cameras = open_cameras(loaded.set, parts.loop_cameras, usb);
   if (parts.around_cameras) parts.around_cameras(cameras);
@@ -106,6 +111,8 @@ Rig::Rig(Parts parts)
       controls_(loaded_.set, parts_.sets.edits(), loaded_.scene),
       look_(controls_.look()),
       recorder_(recorder_options(loaded_, cameras_, parts_.kept)),
+      recorder_watch_(parts_.kept.metrics, "recorder", [this] { return waiting_in(recorder_); }),
+      inbox_watch_(parts_.kept.metrics, "main loop", [this] { return inbox_.waiting(); }),
       pipeline_(
           {.set = loaded_.set,
            .cameras = cameras_,

@@ -127,13 +127,13 @@ Screen::Impl::Impl(const set::Set& set, Parts the_parts)
 }
 
 void Screen::Impl::run() {
-  pipeline::DropCount drops(parts.kept.metrics, "screen", pictures);
+  pipeline::Intake intake(parts.kept.metrics, "screen", pictures);
   while (!pictures.finished()) {
     std::optional<Picture> newest = pictures.pop_for(words_interval);
     const bool has_picture = newest.has_value();
     if (!keeper.attempt([&] { look_after(newest); }) && has_picture)
       parts.kept.metrics.dropped("screen", "failed");
-    drops.update();
+    intake.update();
   }
   life.close();
 }

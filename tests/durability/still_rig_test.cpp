@@ -1,7 +1,10 @@
 // A rig whose disks stand still: pictures and buttons go on.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "daemon/rig/set_keeper.hpp"
@@ -49,6 +52,22 @@ TEST_F(RigLive, ADiskThatStandsStillForASnapshotKeepsNoPictureWaiting) {
   EXPECT_TRUE(session::open_session(directory_ / "takes/12A_take001").missing.empty());
 }
 
+// Every queue of the rig says what waits in it, and nothing does for long while the rig is well.
+TEST_F(RigLive, EveryQueueIsMeasured) {
+  write_set();
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    until_measured([](const nlohmann::json& stages) {
+      return std::ranges::all_of(std::array{"tracking", "lighting", "render", "review", "display",
+                                            "snapshot", "recorder", "main loop"},
+                                 [&](const char* stage) {
+                                   return stages.contains(stage) &&
+                                          stages.at(stage).at("waiting").at("oldest_s") < 10;
+                                 });
+    });
+  });
+}
+
 // The takes' disk: the main loop, which answers buttons, the bus and the watchdog, asks it nothing.
 TEST_F(RigLive, ADiskOfTakesThatStandsStillKeepsNoButtonWaiting) {
   write_set();
@@ -61,6 +80,10 @@ TEST_F(RigLive, ADiskOfTakesThatStandsStillKeepsNoButtonWaiting) {
     press("record");
     until([](const Shown& s) { return s.look.state.recording; });
     until_said("its disk does not answer");
+    until_measured([](const nlohmann::json& stages) {
+      const nlohmann::json& waiting = stages.at("recorder").at("waiting");
+      return waiting.at("values") > 1 && waiting.at("oldest_s") > 0.1 && waiting.at("bytes") > 0;
+    });
     for (int times = 0; times < 2; ++times) {
       const Shown now = until([](const Shown&) { return true; });
       press("refine");

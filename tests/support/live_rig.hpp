@@ -7,6 +7,7 @@
 #include <condition_variable>
 #include <functional>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
 
@@ -72,6 +73,21 @@ class RigLive : public testing::Test {
     };
     std::ostream out(&log_);
     metrics_ = run_crewed(std::move(options), directory_.path(), hand_, script, out);
+  }
+
+  // Waits until the stages in metrics.json, which is written once a second while pictures are
+  // shown, are as they should be.
+  void until_measured(const std::function<bool(const nlohmann::json&)>& condition) {
+    const auto text = [file = directory_ / "live/metrics.json"] {
+      return std::filesystem::exists(file) ? session::read_file(file) : std::string("{}");
+    };
+    must_come(
+        "the metrics are right",
+        [&] {
+          const auto json = nlohmann::json::parse(text());
+          return json.contains("stages") && condition(json.at("stages"));
+        },
+        text);
   }
 
   // A press, then whatever is shown until the condition holds: no time is assumed.

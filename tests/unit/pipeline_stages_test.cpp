@@ -4,9 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <thread>
 
 #include "daemon/pipeline/metrics.hpp"
 #include "tests/support/wait_until.hpp"
@@ -55,6 +57,62 @@ TEST(StageThreads, MailboxDropsAreCountedByStageAndCause) {
   const auto& dropped = snapshot.stages.at("display").dropped;
   const std::uint64_t count = dropped.contains("newer frame") ? dropped.at("newer frame") : 0;
   EXPECT_EQ(shown + count, 5000u);
+}
+
+// In front of a stage that stands still each kind of queue fills, says for how long and with how
+// much, and then drops by its rule or takes no more.
+TEST(StageThreads, WhatWaitsInFrontOfAStageIsInItsMetricsUntilItDrops) {
+  constexpr std::chrono::milliseconds pause{20};
+  Metrics metrics;
+  Mailbox<int> mailbox;
+  BoundedQueue<int> bounded(2);
+  RecentQueue<int> recent(2, 30, [](int) { return std::uint64_t{10}; });
+  std::atomic<int> standing = 0;
+  std::atomic<bool> goes_on = false;
+  const auto stand_still = [&](int) {
+    ++standing;
+    goes_on.wait(false);
+  };
+  const auto waiting = [&](const char* stage) {
+    return metrics.snapshot(1).stages.at(stage).waiting;
+  };
+  StageThreads stages(metrics, {});
+  stages.sink("mailbox", mailbox, stand_still);
+  stages.sink("bounded", bounded, stand_still);
+  stages.sink("recent", recent, stand_still);
+  mailbox.push(0);
+  bounded.push(0);
+  recent.push(0);
+  ASSERT_TRUE(test::wait_until("the stages stand still", [&] { return standing == 3; }));
+  for (const char* stage : {"mailbox", "bounded", "recent"})
+    EXPECT_EQ(waiting(stage).values + waiting(stage).bytes, 0u) << stage;
+
+  mailbox.push(1);
+  for (int i = 0; i < 2; ++i) EXPECT_TRUE(bounded.offer(i));
+  EXPECT_FALSE(bounded.offer(2));
+  for (int i = 0; i < 5; ++i) recent.push(i);
+  std::this_thread::sleep_for(pause);
+  EXPECT_EQ(waiting("mailbox").values, 1u);
+  EXPECT_EQ(waiting("bounded").values, 2u);
+  EXPECT_EQ(waiting("recent").values, 3u);
+  EXPECT_EQ(waiting("recent").bytes, 30u);
+  for (const char* stage : {"mailbox", "bounded", "recent"})
+    EXPECT_GE(waiting(stage).oldest_s, 0.02) << stage;
+  mailbox.push(2);  // which has not waited yet
+
+  goes_on = true;
+  goes_on.notify_all();
+  mailbox.close();
+  bounded.close();
+  recent.close();
+  stages.wait();
+  const MetricsSnapshot after = metrics.snapshot(1);
+  EXPECT_EQ(after.stages.at("mailbox").dropped.at("newer frame"), 1u);
+  EXPECT_EQ(after.stages.at("recent").dropped.at("newer frame"), 2u);
+  EXPECT_TRUE(after.stages.at("bounded").dropped.empty());
+  for (const char* stage : {"mailbox", "bounded", "recent"})
+    EXPECT_EQ(after.stages.at(stage).waiting.values, 0u) << stage;
+  EXPECT_NE(to_json(after).find("\"waiting\": {"), std::string::npos);
 }
 
 TEST(StageThreads, StopEndsTheSourceAndFinishesWhatWasBegun) {
