@@ -33,17 +33,20 @@ ListedTake look_at(const std::filesystem::path& directory) {
     const bool is_over = take.summary.closed || !take.summary.fault.empty();
     take.may_be_in_recording =
         !is_over && (is_remembered(directory) || session::is_being_written(directory));
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {  // of std::filesystem as well
     take.fault = error.what();
   }
   try {
     take.strangers = session::strangers_in(directory);
     for (const std::filesystem::path& file : session::own_files(directory)) {
-      std::error_code gone;
-      const std::uintmax_t size = std::filesystem::file_size(directory / file, gone);
-      if (!gone) take.bytes += size;
+      std::error_code failure;
+      const std::uintmax_t size = std::filesystem::file_size(directory / file, failure);
+      if (!failure)
+        take.bytes += size;
+      else if (failure != std::errc::no_such_file_or_directory)  // it was removed just now
+        throw Error((directory / file).string() + ": cannot be looked at: " + failure.message());
     }
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {
     if (take.fault.empty()) take.fault = error.what();
   }
   return take;

@@ -198,7 +198,10 @@ std::vector<std::string> damage_of(const fs::path& take, const std::stop_token& 
 int check_takes(const Paths& takes, std::ostream& out, const std::stop_token& stop) {
   int result = 0;
   for (const ListedTake& take : takes_at_rest(takes)) {
-    const std::vector<std::string> faults = damage_of(take.directory, stop);
+    std::vector<std::string> faults = damage_of(take.directory, stop);
+    // What could not be read a moment ago, and now can, is a disk that begins to fail.
+    if (faults.empty()) faults = take.strangers;
+    if (faults.empty() && !take.fault.empty()) faults.push_back(take.fault);
     for (const std::string& fault : faults) out << take.directory.string() << ": " << fault << '\n';
     if (faults.empty())
       out << take.directory.string() << ": whole, " << take.summary.frames << " frames"

@@ -48,11 +48,16 @@ bool is_draft_name(const std::string& name) {
   return digits.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
-// Returns false where another process found the draft before it was locked, and removes it.
-bool lock(const OwnedDescriptor& draft) {
-  if (::flock(draft.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) return false;
+// Returns false where another process found the draft before it was locked, and removes it, or
+// where the disk has failed; what is left of the draft is then removed.
+bool lock(const OwnedDescriptor& draft, const fs::path& path) {
   struct stat status {};
-  return ::fstat(draft.get(), &status) == 0 && status.st_nlink > 0;
+  if (draft && (::flock(draft.get(), LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) &&
+      ::fstat(draft.get(), &status) == 0 && status.st_nlink > 0)
+    return true;
+  std::error_code gone;
+  fs::remove(path, gone);
+  return false;
 }
 
 void sync_folder_of(const fs::path& file) {
@@ -68,7 +73,7 @@ Draft::Made Draft::make(const fs::path& target) {
         ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
     if (!made && errno == EEXIST) continue;
     if (!made) fail_draft(target, "cannot be made");
-    if (lock(made)) return {std::move(path), std::move(made)};
+    if (lock(made, path)) return {std::move(path), std::move(made)};
   }
 }
 
@@ -133,7 +138,7 @@ DraftFolder::DraftFolder(const fs::path& target) : target_(fs::absolute(target))
     if (!made && errno == EEXIST) continue;
     if (!made) fail_draft(target_.parent_path(), "no folder can be made in it");
     lock_ = OwnedDescriptor(::open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    if (lock_ && lock(lock_)) return;
+    if (lock(lock_, path_)) return;
   }
 }
 

@@ -113,7 +113,11 @@ std::string read_file(const std::filesystem::path& file) {
 
 std::string why_not_plain(const std::filesystem::path& file) {
   struct stat known {};
-  if (::lstat(file.c_str(), &known) != 0 || S_ISREG(known.st_mode)) return "";
+  if (::lstat(file.c_str(), &known) != 0)
+    return errno == ENOENT || errno == ENOTDIR
+               ? ""
+               : std::string("cannot be looked at: ") + std::strerror(errno);
+  if (S_ISREG(known.st_mode)) return "";
   if (!S_ISLNK(known.st_mode))
     return "is " + words_of(known.st_mode) + " and not a file, and is not opened";
   std::error_code unknown;

@@ -15,6 +15,7 @@
 #include "daemon/post/render_directory.hpp"
 #include "daemon/post/take_copy.hpp"
 #include "drivers/error.hpp"
+#include "tests/durability/cut_off_take.hpp"
 #include "tests/durability/still_disk.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_shot.hpp"
@@ -96,27 +97,13 @@ TEST(StillDiskOfACopy, ThatIsStoppedMeanwhileLeavesNoHalfCopy) {
   }
 }
 
-// A take that was cut off, without anything that knows its end.
-void write_cut_off(const fs::path& take) {
-  session::SessionInfo info;
-  info.take = session::TakeInfo{1, "12A", "", 25, "", false};
-  session::SessionWriter writer(take, info);
-  for (std::uint64_t i = 0; i < frames; ++i)
-    writer.write(session::noise_frame("observer", i, PixelFormat::rgb8, 24, 18));
-  const fs::path as_it_is = take.string() + ".cut";
-  fs::copy(take, as_it_is, fs::copy_options::recursive);
-  writer.close();
-  fs::remove_all(take);
-  fs::rename(as_it_is, take);
-}
-
 TEST(StillDiskOfATake, ThatWasCutOffIsInOrderAgainWhereverTheDiskStoodStill) {
   bool was_still = true;
   for (std::size_t call = 0; was_still; ++call) {
     SCOPED_TRACE("still at call " + std::to_string(call));
     const TemporaryDirectory directory;
     const fs::path takes = directory / "takes";
-    write_cut_off(takes / "12A_take001");
+    test::write_cut_off_take(takes / "12A_take001", frames);
     std::vector<std::string> salvaged, notes;
     output::Salvage salvage({takes}, [&](const std::string& note) { notes.push_back(note); });
     was_still = run_past_call(

@@ -8,12 +8,13 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <condition_variable>
 #include <cstdarg>
 #include <cstdio>
 #include <cstring>
+#include <map>
 #include <mutex>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -24,9 +25,11 @@ struct Disk {
   std::mutex mutex;
   std::condition_variable goes_on;
   bool watches = false;
-  std::string folder;  // absolute, without a slash at its end
-  std::set<int> open;  // descriptors below it
-  std::size_t calls = 0, still_from = SIZE_MAX, waiting = 0;
+  std::string folder;               // absolute, without a slash at its end
+  std::map<int, std::string> open;  // paths by descriptor, of those below it
+  std::vector<std::string> calls;
+  std::size_t still_from = SIZE_MAX, waiting = 0;
+  std::size_t fails_from = SIZE_MAX, works_from = SIZE_MAX;
 };
 
 Disk& disk() {
@@ -45,38 +48,43 @@ bool is_inside(const char* path) {
          (path[folder.size()] == '/' || path[folder.size()] == '\0');
 }
 
-void pass(std::unique_lock<std::mutex>& lock) {
+// Returns whether the call works.
+bool pass(std::unique_lock<std::mutex>& lock, const char* function, const std::string& path) {
   Disk& d = disk();
-  if (d.calls++ < d.still_from) return;
-  ++d.waiting;
-  d.goes_on.wait(lock, [&] { return !d.watches || d.still_from == SIZE_MAX; });
-  --d.waiting;
+  const std::size_t call = d.calls.size();
+  d.calls.push_back(function + (" " + path));
+  if (call >= d.still_from) {
+    ++d.waiting;
+    d.goes_on.wait(lock, [&] { return !d.watches || d.still_from == SIZE_MAX; });
+    --d.waiting;
+  }
+  if (call < d.fails_from || call >= d.works_from) return true;
+  errno = EIO;
+  return false;
 }
 
-// Waits while the disk stands still, if the call is for it; returns whether it is.
-bool pass(const char* path) {
+// Wait while the disk stands still, if the call is for it; return whether the call works.
+bool pass(const char* function, const char* path) {
   std::unique_lock lock(disk().mutex);
-  if (!disk().watches || !is_inside(path)) return false;
-  pass(lock);
-  return true;
+  return !disk().watches || !is_inside(path) || pass(lock, function, path);
 }
-
-void pass(int descriptor) {
+bool pass(const char* function, int descriptor) {
   std::unique_lock lock(disk().mutex);
-  if (disk().watches && disk().open.contains(descriptor)) pass(lock);
+  if (!disk().watches) return true;
+  const auto open = disk().open.find(descriptor);
+  return open == disk().open.end() || pass(lock, function, std::string(open->second));
 }
 
-int opened(int descriptor, bool is_on_disk) {
+int opened(int descriptor, const char* path) {
   const std::lock_guard lock(disk().mutex);
-  if (descriptor >= 0 && is_on_disk) disk().open.insert(descriptor);
-  if (descriptor >= 0 && !is_on_disk) disk().open.erase(descriptor);
+  disk().open.erase(descriptor);
+  if (descriptor >= 0 && disk().watches && is_inside(path)) disk().open[descriptor] = path;
   return descriptor;
 }
 
 int open_passed(const char* path, int flags, mode_t mode) {
-  const bool is_on_disk = pass(path);
-  const int descriptor = real<int(const char*, int, ...)>("open64")(path, flags, mode);
-  return opened(descriptor, is_on_disk);
+  if (!pass("open", path)) return -1;
+  return opened(real<int(const char*, int, ...)>("open64")(path, flags, mode), path);
 }
 
 }  // namespace
@@ -87,8 +95,8 @@ StillDisk::StillDisk(const std::filesystem::path& folder) {
   d.folder = std::filesystem::absolute(folder).lexically_normal().string();
   if (d.folder.ends_with('/')) d.folder.pop_back();
   d.open.clear();
-  d.calls = 0;
-  d.still_from = SIZE_MAX;
+  d.calls.clear();
+  d.still_from = d.fails_from = d.works_from = SIZE_MAX;
   d.watches = true;
 }
 
@@ -105,18 +113,29 @@ void StillDisk::stand_still(std::size_t call) {
 
 void StillDisk::stand_still() {
   const std::lock_guard lock(disk().mutex);
-  disk().still_from = disk().calls;
+  disk().still_from = disk().calls.size();
+}
+
+void StillDisk::fail(std::size_t call, ReadFault fault) {
+  const std::lock_guard lock(disk().mutex);
+  disk().fails_from = call;
+  disk().works_from = fault == ReadFault::once ? call + 1 : SIZE_MAX;
 }
 
 void StillDisk::go_on() {
   const std::lock_guard lock(disk().mutex);
-  disk().still_from = SIZE_MAX;
+  disk().still_from = disk().fails_from = SIZE_MAX;
   disk().goes_on.notify_all();
 }
 
 std::size_t StillDisk::calls() const {
   const std::lock_guard lock(disk().mutex);
-  return disk().calls;
+  return disk().calls.size();
+}
+
+std::string StillDisk::describe(std::size_t call) const {
+  const std::lock_guard lock(disk().mutex);
+  return call < disk().calls.size() ? disk().calls[call] : "after the last call";
 }
 
 std::size_t StillDisk::waiting() const {
@@ -147,7 +166,7 @@ int open64(const char* path, int flags, ...) {
   return previz::test::open_passed(path, flags, mode);
 }
 FILE* fopen(const char* path, const char* mode) {
-  pass(path);
+  if (!pass(__func__, path)) return nullptr;
   return real<FILE*(const char*, const char*)>("fopen64")(path, mode);
 }
 FILE* fopen64(const char* path, const char* mode) {
@@ -162,85 +181,92 @@ int close(int descriptor) {
 }
 
 ssize_t read(int descriptor, void* bytes, size_t count) {
-  pass(descriptor);
+  if (!pass(__func__, descriptor)) return -1;
   return real<ssize_t(int, void*, size_t)>("read")(descriptor, bytes, count);
 }
+ssize_t pread64(int descriptor, void* bytes, size_t count, off64_t offset) {
+  if (!pass(__func__, descriptor)) return -1;
+  return real<ssize_t(int, void*, size_t, off64_t)>("pread64")(descriptor, bytes, count, offset);
+}
+ssize_t pread(int descriptor, void* bytes, size_t count, off_t offset) {
+  return pread64(descriptor, bytes, count, offset);
+}
 ssize_t write(int descriptor, const void* bytes, size_t count) {
-  pass(descriptor);
+  if (!pass(__func__, descriptor)) return -1;
   return real<ssize_t(int, const void*, size_t)>("write")(descriptor, bytes, count);
 }
 int fsync(int descriptor) {
-  pass(descriptor);
+  if (!pass(__func__, descriptor)) return -1;
   return real<int(int)>("fsync")(descriptor);
 }
 int fdatasync(int descriptor) {
-  pass(descriptor);
+  if (!pass(__func__, descriptor)) return -1;
   return real<int(int)>("fdatasync")(descriptor);
 }
 int flock(int descriptor, int operation) noexcept {
-  pass(descriptor);
+  if (!pass(__func__, descriptor)) return -1;
   return real<int(int, int)>("flock")(descriptor, operation);
 }
 int fstat(int descriptor, struct stat* status) noexcept {
-  pass(descriptor);
+  if (!pass(__func__, descriptor)) return -1;
   return real<int(int, struct stat*)>("fstat")(descriptor, status);
 }
 
 int stat(const char* path, struct stat* status) noexcept {
-  pass(path);
+  if (!pass(__func__, path)) return -1;
   return real<int(const char*, struct stat*)>("stat")(path, status);
 }
 int stat64(const char* path, struct stat64* status) noexcept {
-  pass(path);
+  if (!pass(__func__, path)) return -1;
   return real<int(const char*, struct stat64*)>("stat64")(path, status);
 }
 int lstat(const char* path, struct stat* status) noexcept {
-  pass(path);
+  if (!pass(__func__, path)) return -1;
   return real<int(const char*, struct stat*)>("lstat")(path, status);
 }
 int lstat64(const char* path, struct stat64* status) noexcept {
-  pass(path);
+  if (!pass(__func__, path)) return -1;
   return real<int(const char*, struct stat64*)>("lstat64")(path, status);
 }
 int access(const char* path, int mode) noexcept {
-  pass(path);
+  if (!pass(__func__, path)) return -1;
   return real<int(const char*, int)>("access")(path, mode);
 }
 int statvfs(const char* path, struct statvfs* status) noexcept {
-  pass(path);
+  if (!pass(__func__, path)) return -1;
   return real<int(const char*, struct statvfs*)>("statvfs")(path, status);
 }
 int statvfs64(const char* path, struct statvfs64* status) noexcept {
-  pass(path);
+  if (!pass(__func__, path)) return -1;
   return real<int(const char*, struct statvfs64*)>("statvfs64")(path, status);
 }
 DIR* opendir(const char* path) {
-  pass(path);
+  if (!pass(__func__, path)) return nullptr;
   return real<DIR*(const char*)>("opendir")(path);
 }
 char* realpath(const char* path, char* resolved) noexcept {
-  pass(path);
+  if (!pass(__func__, path)) return nullptr;
   return real<char*(const char*, char*)>("realpath")(path, resolved);
 }
 
 int rename(const char* from, const char* to) noexcept {
-  pass(to);
+  if (!pass(__func__, to)) return -1;
   return real<int(const char*, const char*)>("rename")(from, to);
 }
 int link(const char* from, const char* to) noexcept {
-  pass(to);
+  if (!pass(__func__, to)) return -1;
   return real<int(const char*, const char*)>("link")(from, to);
 }
 int mkdir(const char* path, mode_t mode) noexcept {
-  pass(path);
+  if (!pass(__func__, path)) return -1;
   return real<int(const char*, mode_t)>("mkdir")(path, mode);
 }
 int unlink(const char* path) noexcept {
-  pass(path);
+  if (!pass(__func__, path)) return -1;
   return real<int(const char*)>("unlink")(path);
 }
 int remove(const char* path) noexcept {
-  pass(path);
+  if (!pass(__func__, path)) return -1;
   return real<int(const char*)>("remove")(path);
 }
 
