@@ -12,6 +12,7 @@ extern "C" {
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <new>
 #include <span>
 #include <string>
 
@@ -41,6 +42,13 @@ using Packet = std::unique_ptr<AVPacket, Closer>;
 using Scaler = std::unique_ptr<SwsContext, Closer>;
 using Demuxer = std::unique_ptr<AVFormatContext, InputCloser>;
 using Muxer = std::unique_ptr<AVFormatContext, OutputCloser>;
+
+// Passes on what libav has made; throws std::bad_alloc where there was no memory for it.
+template <class Object>
+Object* made(Object* object) {
+  if (!object) throw std::bad_alloc();
+  return object;
+}
 
 inline std::string error_text(int code) {
   std::array<char, AV_ERROR_MAX_STRING_SIZE> text{};

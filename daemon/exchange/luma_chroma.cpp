@@ -100,7 +100,7 @@ const AVFrame& LumaChroma::with_whole_chroma(const AVFrame& frame, const std::st
     throw Error(name + ": " + av_get_pix_fmt_name(from) + " cannot be converted to RGB");
   if (!whole_ || whole_->width != frame.width || whole_->height != frame.height ||
       whole_->format != to) {
-    whole_.reset(av_frame_alloc());
+    whole_.reset(av::made(av_frame_alloc()));
     whole_->width = frame.width;
     whole_->height = frame.height;
     whole_->format = to;

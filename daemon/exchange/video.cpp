@@ -99,7 +99,7 @@ class VideoFile final : public Footage {
     const AVCodec* codec = nullptr;
     track_ = av::check(av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0), file,
                        "holds no video that can be decoded");
-    decoder_.reset(avcodec_alloc_context3(codec));
+    decoder_.reset(av::made(avcodec_alloc_context3(codec)));
     av::check(avcodec_parameters_to_context(decoder_.get(), stream().codecpar), file,
               "cannot be decoded");
     decoder_->pkt_timebase = stream().time_base;
@@ -109,9 +109,9 @@ class VideoFile final : public Footage {
     if (all_are_key_frames_) {
       decoder_->err_recognition = AV_EF_EXPLODE;
     } else {
-      // Frames refer to others: several at once would hide which of them is damaged, and faults
-      // that harm no picture, as at a cut, would end all.
-      decoder_->thread_type = FF_THREAD_SLICE;
+      // Frames refer to others: several at once, or several slices of one, would hide which of them
+      // is damaged, and faults that harm no picture, as at a cut, would end all.
+      decoder_->thread_count = 1;
     }
     words_.emplace(decoder_.get());
     av::check(avcodec_open2(decoder_.get(), codec, Limits().get()), file, "cannot be decoded");
@@ -286,8 +286,8 @@ class VideoFile final : public Footage {
   int track_ = 0;
   av::Codec decoder_;
   std::optional<DecoderWords> words_, demuxer_words_;
-  av::Packet packet_{av_packet_alloc()};
-  av::Picture frame_{av_frame_alloc()};
+  av::Packet packet_{av::made(av_packet_alloc())};
+  av::Picture frame_{av::made(av_frame_alloc())};
   bool all_are_key_frames_ = false;
   std::optional<VideoPictures> pictures_;
   std::uint64_t shown_ = 0;

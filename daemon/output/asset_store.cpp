@@ -40,8 +40,9 @@ class AssetStore::Worker {
 
   // Runs on the store's thread.
   void run() {
-    keep_all();
-    while (const std::shared_ptr<Order> order = next_order()) deliver(order);
+    as_memory_allows([&] { keep_all(); });  // a take that needs what was not kept asks for it again
+    while (const std::shared_ptr<Order> order = next_order())
+      as_memory_allows([&] { deliver(order); });  // else the take says that it was not copied
     const std::lock_guard lock(mutex_);
     has_ended_ = true;
     changed_.notify_all();
@@ -71,6 +72,14 @@ class AssetStore::Worker {
   }
 
  private:
+  static void as_memory_allows(const std::function<void()>& work) {
+    try {
+      work();
+    } catch (const std::bad_alloc&) {
+      return;
+    }
+  }
+
   void note(const std::string& what) const {
     const std::lock_guard lock(mutex_);
     if (note_) note_(what);
@@ -114,13 +123,14 @@ class AssetStore::Worker {
       try {
         keep(i, is_left);
       } catch (const std::exception& error) {
-        if (!is_stopped()) note(assets_[i].first + " will not be in the takes: " + error.what());
+        if (!is_stopped())
+          note(assets_[i].first + " will not be in the takes: " + reason_of(error));
       }
     }
     try {
       if (!is_stopped() && fs::exists(folder_)) remove_unneeded();
     } catch (const std::exception& error) {
-      note(folder_.string() + ": cannot be tidied up: " + error.what());
+      note(folder_.string() + ": cannot be tidied up: " + reason_of(error));
     }
   }
 
@@ -202,7 +212,7 @@ class AssetStore::Worker {
         put(stored, order->take_ / "assets" / stored.filename(), is_left);
         delivered.assets[assets_[i].first] = "assets/" + stored.filename().string();
       } catch (const std::exception& error) {
-        delivered.missing.push_back(missing(i, error.what()));
+        delivered.missing.push_back(missing(i, reason_of(error)));
       }
     }
     if (is_left()) return;

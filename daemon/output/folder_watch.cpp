@@ -74,7 +74,7 @@ class Ownership {
       const std::string text = session::read_plain_file(file);
       return text.substr(0, text.find('\n'));
     } catch (const Error& error) {
-      return error.what();
+      return reason_of(error);
     }
   }
   OwnedDescriptor held_;
@@ -107,11 +107,15 @@ class FolderWatch::Worker {
       }
       busy_since_ = WatchClock::now();
       lock.unlock();
-      if (task) {
-        carry_out(*task);
-      } else if (WatchClock::now() >= due) {
-        look();
-        due = WatchClock::now() + interval;
+      try {
+        if (task) {
+          carry_out(*task);
+        } else if (WatchClock::now() >= due) {
+          due = WatchClock::now() + interval;
+          look();
+        }
+      } catch (const std::bad_alloc&) {
+        due = WatchClock::now() + interval;  // once there is memory again
       }
       lock.lock();
       busy_since_.reset();
@@ -186,7 +190,7 @@ class FolderWatch::Worker {
     try {
       task.action();
     } catch (const std::exception& error) {
-      note(task.otherwise + ": " + error.what());
+      note(task.otherwise + ": " + reason_of(error));
     }
   }
 

@@ -1,6 +1,8 @@
 #include "daemon/output/record_queue.hpp"
 
 #include <algorithm>
+#include <limits>
+#include <new>
 #include <utility>
 
 #include "drivers/bracket.hpp"
@@ -77,16 +79,25 @@ session::Losses RecordQueue::push_within(std::uint64_t room, Entry entry) {
     add(left_out_, loss);
     return loss;
   }
+  const session::Losses loss = loss_of(entry);
   const auto* captured = std::get_if<Captured>(&entry);
-  if (captured && captured->frame->source == "observer")
-    last_frame_ns_ = captured->frame->timestamp_ns;
+  const bool is_observers = captured && captured->frame->source == "observer";
+  const std::int64_t frame_ns = is_observers ? captured->frame->timestamp_ns : last_frame_ns_;
+  try {
+    queue_.push_back({std::move(entry), left_out_});
+  } catch (const std::bad_alloc&) {
+    if (loss == session::Losses{}) throw;
+    add(left_out_, loss);
+    return loss;
+  }
+  left_out_ = {};
+  last_frame_ns_ = frame_ns;
   queued_bytes_ += bytes;
-  queue_.push_back({std::move(entry), std::exchange(left_out_, {})});
   return {};
 }
 
 LeftOut RecordQueue::push(const Captured& captured) {
-  if (captured.frame->source == "light") older_light_.remember(captured);
+  if (captured.frame->source == "light") remember_light(captured);
   newest_ = std::max(newest_, captured.offered);
   LeftOut left_out;
   while (is_behind(most_behind_s_)) leave_out(oldest_picture(), left_out);
@@ -212,8 +223,17 @@ double RecordQueue::ring_length_s() const {
 void RecordQueue::forget_first_of_ring() {
   ring_bytes_ -= bytes_of(ring_.front());
   const auto* captured = std::get_if<Captured>(&ring_.front());
-  if (captured && captured->frame->source == "light") older_light_.remember(*captured);
+  if (captured && captured->frame->source == "light") remember_light(*captured);
   ring_.pop_front();
+}
+
+// Without memory a take begins without this light; the next frame of its exposure is remembered.
+void RecordQueue::remember_light(const Captured& captured) {
+  try {
+    older_light_.remember(captured);
+  } catch (const std::bad_alloc&) {
+    return;
+  }
 }
 
 // In standby, or while the camera is missing, nothing is offered, and the ring's entries become too
@@ -227,33 +247,31 @@ void RecordQueue::forget_what_is_long_ago() {
   while (!ring_.empty() && is_long_ago(ring_.front())) forget_first_of_ring();
 }
 
-void RecordQueue::begin() {
-  push_mark(Start{});
+session::Losses RecordQueue::begin() {
   forget_what_is_long_ago();
   begun_with_s_ = ring_length_s();
   began_ = newest_ = SteadyClock::now();
   for (const Entry& entry : ring_)
     if (const auto* captured = std::get_if<Captured>(&entry)) began_ = newest_ = captured->offered;
-  const auto queue_always = [this](Entry entry) {
-    queued_bytes_ += bytes_of(entry);
-    queue_.push_back({std::move(entry), {}});
-  };
+  session::Losses lost;
+  constexpr std::uint64_t always = std::numeric_limits<std::uint64_t>::max() / 2;
+  const auto queue_always = [&](Entry entry) { add(lost, push_within(always, std::move(entry))); };
   const auto light_of = [](const Entry& entry) -> const Captured* {
     const auto* captured = std::get_if<Captured>(&entry);
     return captured && captured->frame->source == "light" ? captured : nullptr;
   };
   for (const Entry& entry : ring_)
     if (const Captured* light = light_of(entry)) older_light_.forget_unlike(*light->frame);
-  for (const Captured& light : older_light_.in_order()) queue_always(light);
+  const std::vector<Captured> lights = older_light_.in_order();
+  push_mark(Start{});
+  for (const Captured& light : lights) queue_always(light);
   for (Entry& entry : ring_) {
-    const auto* captured = std::get_if<Captured>(&entry);
-    if (captured && captured->frame->source == "observer")
-      last_frame_ns_ = captured->frame->timestamp_ns;
-    if (const Captured* light = light_of(entry)) older_light_.remember(*light);
+    if (const Captured* light = light_of(entry)) remember_light(*light);
     queue_always(std::move(entry));
   }
   ring_.clear();
   ring_bytes_ = 0;
+  return lost;
 }
 
 bool RecordQueue::begins_a_take() const {

@@ -67,9 +67,7 @@ class RecordQueue {
     std::string what;
   };
   struct Start {};
-  struct Stop {
-    bool is_wished;  // by somebody; otherwise the process ends
-  };
+  struct Stop {};
   struct MarkGood {};
   using Entry =
       std::variant<Captured, session::TrackRecord, ButtonEvent, Event, Start, Stop, MarkGood>;
@@ -91,18 +89,21 @@ class RecordQueue {
   // Returns the entry as a loss.
   static session::Losses loss_of(const Entry& entry);
 
-  // These return what had to be left out; the next entry says so.
+  // These return what had to be left out, also because memory has run out; the next entry says so.
   LeftOut push(const Captured& captured);
   LeftOut push_shown(const Captured& captured);
   LeftOut push_record(Entry entry);  // a line of tracking, a button or an event
-  void push_mark(Entry entry);       // a stop or a mark, for which there is always room
+  // A stop or a mark, for which there is always room. Throws std::bad_alloc, and changes nothing,
+  // if there is no memory for it; so does begin().
+  void push_mark(Entry entry);
 
   // Keep what is offered while nothing is recorded. Of a frame: returns whether others were dropped
   // only because the ring was full.
   bool keep(const Captured& captured);
   void keep(const session::TrackRecord& record);
-  // Begins a take with the light from before the ring and what the ring holds.
-  void begin();
+  // Begins a take with the light from before the ring and what the ring holds, and returns what of
+  // it had to be left out.
+  session::Losses begin();
 
   bool empty() const { return queue_.empty(); }
   Backlog backlog() const;
@@ -127,6 +128,7 @@ class RecordQueue {
   bool trim_ring();
   Backlog backlog_with(SteadyClock::time_point newest) const;
   void forget_first_of_ring();
+  void remember_light(const Captured& captured);
   void forget_what_is_long_ago();
 
   const double preroll_s_;

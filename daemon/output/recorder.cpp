@@ -1,13 +1,9 @@
 #include "daemon/output/recorder.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
-#include <cinttypes>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <utility>
 #include <vector>
 
@@ -25,6 +21,8 @@ constexpr std::chrono::milliseconds track_patience{500};
 constexpr std::chrono::seconds disk_interval{1};
 // A take that ends is looked at so often.
 constexpr std::chrono::milliseconds ending_interval{10};
+// Memory that has run out is asked for again so often.
+constexpr std::chrono::milliseconds memory_interval{10};
 // A recording that is further behind the cameras is reported.
 constexpr double long_behind_s = 1;
 // A disk that takes longer for one thing is reported.
@@ -35,31 +33,6 @@ constexpr const char *too_far_behind = "too far behind", *memory_full = "memory 
                      *disk_failed = "disk failed", *cannot_be_recorded = "cannot be recorded";
 
 }  // namespace
-
-std::uint64_t memory_bytes() {
-  return static_cast<std::uint64_t>(std::max(0L, ::sysconf(_SC_PHYS_PAGES))) *
-         static_cast<std::uint64_t>(std::max(0L, ::sysconf(_SC_PAGE_SIZE)));
-}
-
-std::uint64_t most_queue_bytes(std::uint64_t memory) {
-  return memory / 4 * 3;
-}
-
-std::optional<std::uint64_t> free_memory_bytes() {
-  std::ifstream file("/proc/meminfo");
-  for (std::string line; std::getline(file, line);) {
-    std::uint64_t kib = 0;
-    if (std::sscanf(line.c_str(), "MemAvailable: %" SCNu64 " kB", &kib) == 1) return kib * 1024;
-  }
-  return std::nullopt;
-}
-
-std::uint64_t queue_bytes(std::optional<double> wished_mb, std::uint64_t memory) {
-  constexpr std::uint64_t least = 256'000'000;
-  if (wished_mb)
-    return std::min(static_cast<std::uint64_t>(*wished_mb * 1e6), most_queue_bytes(memory));
-  return std::max(least, free_memory_bytes().value_or(0) / 4);
-}
 
 Recorder::Recorder(RecorderOptions options)
     : options_(std::move(options)),
@@ -90,8 +63,7 @@ void Recorder::finish() {
   {
     const std::lock_guard lock(mutex_);
     if (std::exchange(quit_, true)) return;
-    if (status_.recording) queue_.push_mark(RecordQueue::Stop{false});
-    status_.recording = false;
+    status_.recording = false;  // the take that runs is ended with the last entry
   }
   filled_.notify_one();
   thread_.join();
@@ -142,15 +114,6 @@ bool Recorder::has_new_lag() {
   return behind_noted_ = true;
 }
 
-void Recorder::note_far_behind() const {
-  std::array<char, 200> text{};
-  std::snprintf(text.data(), text.size(),
-                "the disk or the encoder is too slow: the recording is %.1f s behind the cameras "
-                "(recording.most_behind_s), and frames are left out",
-                options_.most_behind_s);
-  note(Severity::warning, text.data());
-}
-
 void Recorder::offer_shown(const FramePtr& frame) {
   const Captured captured{frame};
   {
@@ -189,7 +152,11 @@ void Recorder::offer_record(Entry entry) {
 void Recorder::count_as_lost(const session::Losses& loss, const char* cause, bool of_newest) {
   if (of_newest) add(status_.lost, loss);
   const std::uint64_t pictures = loss.frames + loss.shown;
-  if (pictures > 0 && options_.left_out) options_.left_out(cause, pictures);
+  try {
+    if (pictures > 0 && options_.left_out) options_.left_out(cause, pictures);
+  } catch (const std::exception&) {
+    return;  // there is no memory for a new cause
+  }
 }
 
 void Recorder::count_as_lost(const LeftOut& left_out) {
@@ -199,38 +166,35 @@ void Recorder::count_as_lost(const LeftOut& left_out) {
 }
 
 void Recorder::note_short_preroll(double kept_s) const {
-  if (!options_.note) return;
   std::array<char, 160> text{};
   std::snprintf(text.data(), text.size(),
                 "a take begins %.1f s before the button, and not %.1f s: the memory for it is full "
                 "(recording.queue_mb)",
                 kept_s, options_.preroll_s);
-  options_.note({.severity = Severity::warning,
-                 .source = "recording",
-                 .text = text.data(),
-                 .notice = report::Notice{Severity::warning, "", text.data()}});
+  note(Severity::warning, text.data(), "recording", /*is_shown=*/true);
 }
 
 void Recorder::start() {
   const std::lock_guard lock(mutex_);
   if (status_.recording) return;
+  const session::Losses lost = queue_.begin();
   ++starts_;
   status_.recording = true;
   status_.lost = {};
+  count_as_lost(lost, memory_full, true);
   status_.frames = 0;
   status_.seconds = 0;
   status_.fault.clear();
   behind_noted_ = false;
-  queue_.begin();
   filled_.notify_one();
 }
 
 void Recorder::stop() {
   const std::lock_guard lock(mutex_);
   if (!status_.recording) return;
+  queue_.push_mark(RecordQueue::Stop{});
   status_.recording = false;
   late_tracks_ = true;
-  queue_.push_mark(RecordQueue::Stop{true});
   filled_.notify_one();
 }
 
@@ -250,8 +214,16 @@ RecorderStatus Recorder::status() const {
   return status;
 }
 
-void Recorder::note(Severity severity, const std::string& what) const {
-  if (options_.note) options_.note({severity, "recording", what});
+// No take ends, and nothing is counted twice, because there is no memory to speak of it.
+void Recorder::note(Severity severity, std::string_view what, const char* source,
+                    bool is_shown) const {
+  try {
+    report::Report report{severity, source, std::string(what)};
+    if (is_shown) report.notice = report::Notice{severity, "", report.text};
+    if (options_.note) options_.note(report);
+  } catch (const std::exception&) {
+    return;
+  }
 }
 
 void Recorder::run() {
@@ -261,15 +233,14 @@ void Recorder::run() {
     const auto due = Clock::now() + (waits ? ending_interval : disk_interval);
     filled_.wait_until(lock, due,
                        [&] { return !queue_.empty() || has_news_ || (quit_ && !waits); });
-    const bool has_news = std::exchange(has_news_, false);
+    bool has_news = std::exchange(has_news_, false);
     std::optional<Queued> next;
     if (!queue_.empty()) next = queue_.pop();
     const bool is_last = quit_ && !next;
     handling_since_ = Clock::now();
     writes_ = take_ || !ending_.empty() || next;
     lock.unlock();
-    if (has_news) take_news();
-    serve(next, is_last);
+    while (!is_served(has_news, next, is_last)) std::this_thread::sleep_for(memory_interval);
     lock.lock();
     writes_ = take_ || !ending_.empty();
     if (next) queue_.give_back(std::move(*next));
@@ -284,19 +255,37 @@ void Recorder::run() {
   }
 }
 
+// Returns false where there was no memory for a stop, or for dealing with a fault: what is left is
+// to be served again, once somebody has given some back.
+bool Recorder::is_served(bool& has_news, std::optional<Queued>& next, bool is_last) {
+  try {
+    if (std::exchange(has_news, false)) take_news();
+    serve(next, is_last);
+    return true;
+  } catch (const std::bad_alloc&) {
+    return false;
+  }
+}
+
 // Handles an entry and whatever else is due. What is left of `next` could not be written, and waits
 // for the next disk.
 void Recorder::serve(std::optional<Queued>& next, bool is_last) {
+  if (is_failing_) fail(reason_of(std::bad_alloc()));
   try {
     if (next) handle(*next);
     next.reset();
+    if (take_ && is_last) end_running_take();
     if (take_) name_assets(*take_, false);
     if (take_ && Clock::now() - checked_ >= disk_interval) check_disk();
   } catch (const std::exception& error) {
-    const std::string why = error.what();
+    if (next && std::holds_alternative<RecordQueue::Stop>(next->entry) &&
+        dynamic_cast<const std::bad_alloc*>(&error))
+      throw;
+    const std::string why = reason_of(error);
     if (next && take_ && take_->writer->is_sound()) {
-      leave_out(next->entry, *take_, why);
+      const Queued left_out = std::move(*next);
       next.reset();
+      leave_out(left_out.entry, *take_, why);
     } else if (!goes_on_elsewhere(why)) {
       if (next) {
         const std::lock_guard lock(mutex_);
@@ -327,11 +316,11 @@ void Recorder::handle(Queued& next) {
     mark_last_good();
   } else if (const auto* record = std::get_if<session::TrackRecord>(&entry)) {
     write(*record);
+  } else if (std::holds_alternative<RecordQueue::Stop>(entry)) {
+    if (take_) end_running_take();
+    drop_wish();
   } else if (!take_) {
     return;  // the take has failed meanwhile
-  } else if (const auto* stop = std::get_if<RecordQueue::Stop>(&entry)) {
-    end_running_take();
-    if (stop->is_wished) drop_wish();
   } else if (const auto* captured = std::get_if<Captured>(&entry)) {
     write(*captured);
   } else if (const auto* button = std::get_if<ButtonEvent>(&entry)) {
@@ -354,7 +343,7 @@ void Recorder::mark_last_good() {
       else
         ending_.back().take.writer->mark_good();
     } catch (const std::exception& error) {
-      return note(Severity::warning, std::string("it cannot be marked good: ") + error.what());
+      return note(Severity::warning, std::string("it cannot be marked good: ") + reason_of(error));
     }
   }
   note(Severity::info, last.filename().string() + " is marked good");
@@ -398,9 +387,9 @@ void Recorder::write(const session::TrackRecord& record) {
   } catch (const std::exception& error) {
     Take& take = ending->take;
     if (take.writer->is_sound())
-      leave_out(record, take, error.what());
+      leave_out(record, take, reason_of(error));
     else if (take.fault.empty())
-      take.fault = error.what();
+      take.fault = reason_of(error);
   }
 }
 
@@ -424,7 +413,8 @@ void Recorder::begin_next_take() {
 
 void Recorder::end_running_take() {
   const Clock::time_point now = Clock::now();
-  ending_.push_back({std::move(*take_), now + track_patience, now + options_.asset_patience});
+  EndingTake& ending = ending_.emplace_back();  // without memory for it the take goes on
+  ending = {std::move(*take_), now + track_patience, now + options_.asset_patience};
   take_.reset();
 }
 
@@ -443,20 +433,27 @@ void Recorder::begin_take(bool goes_on) {
       if (goes_on)
         for (const Captured& light : light_.in_order())
           take_->writer->write(*light.frame, light.at);
+      tell_of_begun_take();
     } catch (const std::exception& error) {
-      if (take_->writer) take_->writer->abandon(error.what());
-      take_.reset();
-      if (!folders_.give_up(folder, folders_.all()[folder].string() + ": its disk failed")) throw;
-      note(Severity::error, std::string("the next disk is taken: ") + error.what());
+      const std::optional<Take> failed = std::exchange(take_, std::nullopt);
+      if (failed->writer) failed->writer->abandon(reason_of(error));
+      const bool is_disks_fault = dynamic_cast<const std::bad_alloc*>(&error) == nullptr;
+      if (!is_disks_fault ||
+          !folders_.give_up(folder, folders_.all()[folder].string() + ": its disk failed"))
+        throw;
+      note(Severity::error, std::string("the next disk is taken: ") + reason_of(error));
     }
   }
-  const std::filesystem::path directory = take_->writer->directory();
+}
+
+void Recorder::tell_of_begun_take() {
+  std::filesystem::path directory = take_->writer->directory();
   checked_ = Clock::now();
   if (!options_.take.assets.empty()) take_->order = stores_[take_->folder]->deliver(directory);
   watches_[take_->folder]->follow(directory);
   watches_[take_->folder]->keep_wish(directory);
   const std::lock_guard lock(mutex_);
-  status_.directory = directory;
+  status_.directory = std::move(directory);
   status_.number = take_->writer->number();
 }
 
@@ -474,7 +471,7 @@ void Recorder::name_assets(Take& take, bool is_last) {
     take.writer->set_assets(delivered->assets, delivered->missing);
   } catch (const std::exception& error) {
     if (!take.writer->is_sound()) throw;
-    note(Severity::warning, std::string("the set's files cannot be named: ") + error.what());
+    note(Severity::warning, std::string("the set's files cannot be named: ") + reason_of(error));
   }
 }
 
@@ -509,13 +506,13 @@ void Recorder::end(Take& take) {
     take.writer->set_lost(take.lost);
     take.writer->close();
   } catch (const std::exception& error) {
-    abandon(take, error.what());
+    abandon(take, reason_of(error));
     {
       const std::lock_guard lock(mutex_);
       count_finished(take);
-      count_failure(error.what());
+      count_failure(reason_of(error));
     }
-    return note(Severity::error, name + " could not be ended in order: " + error.what());
+    return note(Severity::error, name + " could not be ended in order: " + reason_of(error));
   }
   {
     const std::lock_guard lock(mutex_);
@@ -536,6 +533,7 @@ void Recorder::abandon(Take& take, const std::string& why) {
 }
 
 void Recorder::fail(const std::string& why) {
+  is_failing_ = true;
   if (!take_) {
     // The takes that are ending get the tracking that is there already, and wait for no more.
     std::unique_lock lock(mutex_);
@@ -556,7 +554,8 @@ void Recorder::fail(const std::string& why) {
   if (take_) abandon(*take_, why);
   take_.reset();
   for (const session::TrackRecord& record : late) write(record);
-  if (options_.note) options_.note({Severity::error, "recording ended", why});
+  is_failing_ = false;
+  note(Severity::error, why, "recording ended");
   drop_wish();
 }
 

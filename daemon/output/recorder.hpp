@@ -12,11 +12,13 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
 #include "daemon/output/asset_store.hpp"
 #include "daemon/output/folder_watch.hpp"
+#include "daemon/output/memory.hpp"
 #include "daemon/output/record_queue.hpp"
 #include "daemon/output/take_folders.hpp"
 #include "daemon/output/take_writer.hpp"
@@ -46,17 +48,6 @@ struct RecorderOptions {
   // A take that ends waits so long for files of the set that are still being copied.
   std::chrono::milliseconds asset_patience{20'000};
 };
-
-// Return bytes: the computer's memory, and how much of it may hold what is recorded at most (three
-// quarters).
-std::uint64_t memory_bytes();
-std::uint64_t most_queue_bytes(std::uint64_t memory);
-// Returns how much of it programs can still take without swapping; nothing where the kernel does
-// not say.
-std::optional<std::uint64_t> free_memory_bytes();
-// Returns the room for what is recorded: as wished, but not more than that; without a wish a
-// quarter of the memory that is free now, because the machine has other things to do.
-std::uint64_t queue_bytes(std::optional<double> wished_mb, std::uint64_t memory = memory_bytes());
 
 struct RecorderStatus {
   bool recording = false;
@@ -154,6 +145,7 @@ class Recorder {
   bool is_newest() const { return begun_ == starts_; }
   // Call these on the writer thread, without the lock.
   void run();
+  bool is_served(bool& has_news, std::optional<Queued>& next, bool is_last);
   void serve(std::optional<Queued>& next, bool is_last);
   void handle(Queued& next);
   void write(const Captured& captured);
@@ -161,7 +153,8 @@ class Recorder {
   void leave_out(const Entry& entry, Take& take, const std::string& why);  // it cannot be recorded
   void mark_last_good();
   void begin_take(bool goes_on);  // from another take, which had its light before
-  void begin_next_take();         // and lets the running one end
+  void tell_of_begun_take();
+  void begin_next_take();  // and lets the running one end
   void end_running_take();
   void end_what_is_over(bool is_last, bool at_once = false);
   void end(Take& take);
@@ -177,7 +170,8 @@ class Recorder {
   void take_news();  // of the folders' watches
   void look_for_interruption(const std::vector<FolderSeen>& seen, bool are_known);
   void drop_wish();
-  void note(report::Severity severity, const std::string& what) const;
+  void note(report::Severity severity, std::string_view what, const char* source = "recording",
+            bool is_shown = false) const;
   void note_short_preroll(double kept_s) const;
   void note_far_behind() const;
 
@@ -206,8 +200,9 @@ class Recorder {
   std::vector<std::size_t> told_;                      // takes of each that were salvaged, and said
   std::optional<Take> take_;
   std::list<EndingTake> ending_;
-  NewestLight light_;       // that the running take has
-  int highest_number_ = 0;  // of the takes so far
+  bool is_failing_ = false;  // fail() has begun, and has not ended
+  NewestLight light_;        // that the running take has
+  int highest_number_ = 0;   // of the takes so far
   Clock::time_point checked_;
   bool has_compared_speeds_ = false;
   std::jthread thread_;  // last: it uses all of the above

@@ -87,7 +87,7 @@ bool Recorder::goes_on_elsewhere(const std::string& why) {
   try {
     begin_take(true);
   } catch (const std::exception& error) {
-    note(Severity::error, std::string("recording cannot go on elsewhere: ") + error.what());
+    note(Severity::error, std::string("recording cannot go on elsewhere: ") + reason_of(error));
     return false;
   }
   note(Severity::error,
@@ -132,8 +132,17 @@ void Recorder::compare_speeds() {
     if (taken && *taken < delivered) note_slow(*taken, delivered, bytes_a_s);
   } catch (const std::exception& error) {
     note(Severity::warning,
-         std::string("how fast takes can be written is not known: ") + error.what());
+         std::string("how fast takes can be written is not known: ") + reason_of(error));
   }
+}
+
+void Recorder::note_far_behind() const {
+  std::array<char, 200> text{};
+  std::snprintf(text.data(), text.size(),
+                "the disk or the encoder is too slow: the recording is %.1f s behind the cameras "
+                "(recording.most_behind_s), and frames are left out",
+                options_.most_behind_s);
+  note(Severity::warning, text.data());
 }
 
 void Recorder::note_slow(double taken, double delivered, double bytes_a_s) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <tuple>
 
 #include "drivers/error.hpp"
 
@@ -110,9 +111,17 @@ void TakeWriter::write(const Frame& frame, std::chrono::system_clock::time_point
     take_.timecode = timecode_of(captured, take_.timecode_fps);
     writer_.set_take(take_);
   }
-  writer_.write(frame);
+  // It is known before it is written: afterwards there may be no memory for that.
   formats_.try_emplace(frame.source, format_of(frame));
-  if (observer) frame_of_.emplace(frame.timestamp_ns, frame_of_.size());
+  auto known = frame_of_.end();
+  bool is_new = false;
+  if (observer) std::tie(known, is_new) = frame_of_.emplace(frame.timestamp_ns, frame_of_.size());
+  try {
+    writer_.write(frame);
+  } catch (const std::exception&) {
+    if (is_new) frame_of_.erase(known);
+    throw;
+  }
 }
 
 bool TakeWriter::has_frame_of(const session::TrackRecord& record) const {

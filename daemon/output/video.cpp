@@ -23,7 +23,7 @@ constexpr AVRational video_clock{1, 60000};
 av::Codec open_encoder(const VideoCodec& codec, int width, int height) {
   const AVCodec* found = avcodec_find_encoder_by_name(codec.encoder.c_str());
   if (!found) return nullptr;
-  av::Codec context(avcodec_alloc_context3(found));
+  av::Codec context(av::made(avcodec_alloc_context3(found)));
   const bool odd = width % 2 != 0 || height % 2 != 0;
   context->width = width;
   context->height = height;
@@ -75,8 +75,8 @@ struct VideoWriter::Impl {
   av::Codec encoder;
   av::Muxer file;
   av::Scaler converter;
-  av::Picture frame{av_frame_alloc()};
-  av::Packet packet{av_packet_alloc()};
+  av::Picture frame{av::made(av_frame_alloc())};
+  av::Packet packet{av::made(av_packet_alloc())};
   AVStream* stream = nullptr;  // belongs to `file`
   std::optional<std::int64_t> first_timestamp_ns;
   std::int64_t last_tick = -1;
@@ -116,7 +116,7 @@ VideoWriter::VideoWriter(const std::filesystem::path& stem, int width, int heigh
   impl_->check(avformat_alloc_output_context2(&file, nullptr, codec.container.c_str(), url.c_str()),
                "cannot be made");
   impl_->file.reset(file);
-  impl_->stream = avformat_new_stream(file, nullptr);
+  impl_->stream = av::made(avformat_new_stream(file, nullptr));
   impl_->stream->time_base = video_clock;
   if (clock.fps > 0) {
     const session::RateFraction rate = session::fraction_of(clock.fps);
@@ -133,9 +133,9 @@ VideoWriter::VideoWriter(const std::filesystem::path& stem, int width, int heigh
   impl_->frame->width = width;
   impl_->frame->height = height;
   impl_->check(av_frame_get_buffer(impl_->frame.get(), 0), "has no memory for a picture");
-  impl_->converter.reset(sws_getContext(
+  impl_->converter.reset(av::made(sws_getContext(
       width, height, AV_PIX_FMT_RGB24, width, height, impl_->encoder->pix_fmt,
-      SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INP, nullptr, nullptr, nullptr));
+      SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INP, nullptr, nullptr, nullptr)));
   const int* bt709 = sws_getCoefficients(SWS_CS_ITU709);
   constexpr int unity = 1 << 16;
   sws_setColorspaceDetails(impl_->converter.get(), bt709, 1, bt709, 0, 0, unity, unity);

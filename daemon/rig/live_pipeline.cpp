@@ -226,7 +226,7 @@ void LivePipeline::Impl::record_captured(const FramePtr& frame) {
     if (parts.look.get()->state.mode != Mode::standby) parts.recorder.offer(frame);
   } catch (const std::exception& error) {  // there is no memory for it
     parts.kept.metrics.dropped("recorder", "failed");
-    parts.kept.reports(report::once({Severity::error, "recorder", error.what()}));
+    parts.kept.reports(report::once({Severity::error, "recorder", reason_of(error)}));
   }
 }
 
@@ -341,7 +341,7 @@ void LivePipeline::Impl::offer_track(Shot& shot, const pipeline::Edits& edits) {
     parts.recorder.offer(track_record_of(shot));
   } catch (const std::exception& error) {
     parts.kept.metrics.count("lines of tracking that failed");
-    parts.kept.reports(report::once({Severity::error, "tracking", error.what()}));
+    parts.kept.reports(report::once({Severity::error, "tracking", reason_of(error)}));
   }
 }
 
@@ -353,7 +353,7 @@ void LivePipeline::Impl::output_stages() {
     try {
       parts.kept.reports({Severity::info, "snapshot", write_snapshot(shot, set).string()});
     } catch (const std::exception& error) {
-      parts.kept.reports({Severity::error, "snapshot", error.what()});
+      parts.kept.reports({Severity::error, "snapshot", reason_of(error)});
     }
   });
 }

@@ -30,7 +30,7 @@ int slice_count(const StreamFormat& format) {
 av::Codec open_ffv1_encoder(const StreamFormat& format, const std::filesystem::path& file) {
   const AVCodec* codec = avcodec_find_encoder(AV_CODEC_ID_FFV1);
   if (!codec) throw Error(file.string() + ": this libavcodec has no FFV1 encoder");
-  av::Codec encoder(avcodec_alloc_context3(codec));
+  av::Codec encoder(av::made(avcodec_alloc_context3(codec)));
   const int slices = slice_count(format);
   encoder->width = format.width;
   encoder->height = format.height;
@@ -59,7 +59,7 @@ av::Codec open_ffv1_decoder(const AVCodecParameters& parameters,
                             const std::filesystem::path& file) {
   const AVCodec* codec = avcodec_find_decoder(AV_CODEC_ID_FFV1);
   if (!codec) throw Error(file.string() + ": this libavcodec has no FFV1 decoder");
-  av::Codec decoder(avcodec_alloc_context3(codec));
+  av::Codec decoder(av::made(avcodec_alloc_context3(codec)));
   av::check(avcodec_parameters_to_context(decoder.get(), &parameters), file,
             "its video header is damaged");
   // Slices are independent within a picture; threads over frames would hold pictures back.

@@ -94,11 +94,11 @@ struct SessionWriter::Impl {
   std::unique_ptr<LineFile> track, events;
   std::chrono::steady_clock::time_point synced = std::chrono::steady_clock::now();
   bool ended = false;
+  bool has_failed = false;  // the reason is file.fault, if there was memory for it
 
   void check_open() const {
     if (ended) throw Error(directory.string() + ": the session is closed; nothing can be added");
-    if (!file.fault.empty())
-      throw Error(directory.string() + ": nothing can be added after " + file.fault);
+    if (has_failed) throw Error(directory.string() + ": nothing can be added after " + file.fault);
   }
 
   // Runs what uses the disk, and keeps its failure in mind. After a failed write or sync the kernel
@@ -108,7 +108,8 @@ struct SessionWriter::Impl {
     try {
       return action();
     } catch (const std::exception& error) {
-      if (file.fault.empty()) file.fault = error.what();
+      has_failed = true;
+      if (file.fault.empty()) file.fault = reason_of(error);
       throw;
     }
   }
@@ -174,7 +175,7 @@ struct SessionWriter::Impl {
 
   void close() {
     if (ended) return;
-    if (!file.fault.empty()) return abandon(file.fault);
+    if (has_failed) return abandon(file.fault);
     using_disk([&] {
       for (auto& [source, stream] : streams) {
         stream.video.finish();
@@ -287,7 +288,7 @@ void SessionWriter::set_assets(std::map<std::string, std::string> assets,
 }
 
 bool SessionWriter::is_sound() const {
-  return impl_->file.fault.empty();
+  return !impl_->has_failed;
 }
 
 void SessionWriter::set_lost(const Losses& lost) {

@@ -48,8 +48,8 @@ struct VideoReader::Impl {
   std::map<Key, PacketPlace> places;  // of the packets, if there is no demuxer
   std::optional<OpenFile> opened;     // likewise
   av::Codec decoder;
-  av::Packet packet{av_packet_alloc()};
-  av::Picture picture{av_frame_alloc()};
+  av::Packet packet{av::made(av_packet_alloc())};
+  av::Picture picture{av::made(av_frame_alloc())};
 
   Impl(const std::filesystem::path& path, const StreamFormat& stream_format)
       : file(path),

@@ -40,8 +40,7 @@ av::Muxer open_muxer(const StreamFormat& format, const AVCodecContext* encoder,
   av::check(avformat_alloc_output_context2(&context, nullptr, "matroska", url.c_str()), file,
             "Matroska cannot be started");
   av::Muxer muxer(context);
-  AVStream* stream = avformat_new_stream(context, nullptr);
-  if (!stream) throw Error(file.string() + ": no memory for a video track");
+  AVStream* stream = av::made(avformat_new_stream(context, nullptr));
   if (encoder)
     av::check(avcodec_parameters_from_context(stream->codecpar, encoder), file, "cannot be set up");
   else
@@ -78,8 +77,8 @@ struct VideoWriter::Impl {
         encoder(format.codec == VideoCodec::ffv1 ? open_ffv1_encoder(format, file) : nullptr),
         muxer(open_muxer(format, encoder.get(), file)),
         same_file(file, O_RDONLY),
-        picture(av_frame_alloc()),
-        packet(av_packet_alloc()) {
+        picture(av::made(av_frame_alloc())),
+        packet(av::made(av_packet_alloc())) {
     if (!encoder) return;
     picture->width = format.width;
     picture->height = format.height;

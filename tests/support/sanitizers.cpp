@@ -2,7 +2,8 @@
 // theirs. LeakSanitizer: Mesa's lavapipe leaves a hundred bytes a device behind. The report could
 // not say whose they are, since the Vulkan loader has unloaded the driver by then; so libraries
 // stay loaded, and the driver's leaks can be named. So does x265, which encodes videos for tests,
-// with its parameters. ThreadSanitizer sees neither the locks of GLib
+// with its parameters, fontconfig with its patterns, and the validation layer with what it knows of
+// a device. ThreadSanitizer sees neither the locks of GLib
 // nor the threads' hand-over within Aravis and Mesa's CPU driver, nor how the standard library
 // counts the owners of an exception that one thread hands to another; and it lets a child that was
 // forked beside threads start its own, as the recorder's tests do, only if it is asked to.
@@ -10,7 +11,8 @@
 extern "C" {
 
 const char* __lsan_default_suppressions() {
-  return "leak:libvulkan_lvp.so\nleak:libx265.so\n";
+  return "leak:libvulkan_lvp.so\nleak:libx265.so\nleak:libfontconfig.so\n"
+         "leak:libVkLayer_khronos_validation.so\n";
 }
 
 const char* __tsan_default_suppressions() {

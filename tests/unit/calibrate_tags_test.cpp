@@ -385,8 +385,9 @@ TEST_F(TagCommand, RefusesAWalkWithABumpUnlessForcedAndWritesTheRest) {
   EXPECT_NE(done.find("stage.toml.1.old"), std::string::npos) << done;
   const set::Set set = set::load_set(set_file());
   ASSERT_EQ(set.tracking.tags.size(), 3u) << done;
+  const std::vector<set::Tag> truths = tags_at(0);
   for (const set::Tag& tag : set.tracking.tags) {
-    const set::Tag& truth = true_tag(tags_at(0), tag.id);
+    const set::Tag& truth = true_tag(truths, tag.id);
     // The bound of the synthetic sets that tests/truth has, which are 640 px wide, too.
     EXPECT_LT(glm::distance(tag.world_from_tag[3], truth.world_from_tag[3]), 0.0003) << tag.id;
   }

@@ -61,7 +61,7 @@ TEST(RecordQueue, SaysOfWhichTakeItLeavesFramesOut) {
   const SteadyClock::time_point begin = SteadyClock::now();
   queue.begin();
   for (int i = 0; i < 50; ++i) queue.push(frame_at(begin, i / fps));
-  queue.push_mark(RecordQueue::Stop{true});
+  queue.push_mark(RecordQueue::Stop{});
   queue.begin();
   LeftOut all;
   for (int i = 50; i < 150; ++i) {
