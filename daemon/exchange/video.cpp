@@ -109,9 +109,9 @@ class VideoFile final : public Footage {
     if (all_are_key_frames_) {
       decoder_->err_recognition = AV_EF_EXPLODE;
     } else {
-      // Frames refer to others: several at once, or several slices of one, would hide which of them
-      // is damaged, and faults that harm no picture, as at a cut, would end all.
-      decoder_->thread_count = 1;
+      // Frames refer to others: several at once would hide which of them is damaged, and faults
+      // that harm no picture, as at a cut, would end all.
+      decoder_->thread_type = FF_THREAD_SLICE;
     }
     words_.emplace(decoder_.get());
     av::check(avcodec_open2(decoder_.get(), codec, Limits().get()), file, "cannot be decoded");
