@@ -56,8 +56,10 @@ inline std::string error_text(int code) {
   return text.data();
 }
 
-// Returns `code`, or throws previz::Error "<file>: <what>: <libav's reason>" if it is an error.
+// Returns `code`, or throws previz::Error "<file>: <what>: <libav's reason>" if it is an error;
+// std::bad_alloc where libav had no memory.
 inline int check(int code, const std::filesystem::path& file, const std::string& what) {
+  if (code == AVERROR(ENOMEM)) throw std::bad_alloc();
   if (code < 0) throw Error(file.string() + ": " + what + ": " + error_text(code));
   return code;
 }

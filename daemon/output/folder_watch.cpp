@@ -10,11 +10,13 @@
 #include <condition_variable>
 #include <cstring>
 #include <ctime>
-#include <deque>
+#include <list>
 #include <mutex>
 #include <system_error>
+#include <thread>
 #include <utility>
 
+#include "daemon/output/memory.hpp"
 #include "daemon/output/salvage.hpp"
 #include "daemon/output/take_writer.hpp"
 #include "drivers/descriptor.hpp"
@@ -100,25 +102,25 @@ class FolderWatch::Worker {
     std::unique_lock lock(mutex_);
     for (WatchClock::time_point due{}; !(is_ended_ && tasks_.empty());) {
       changed_.wait_until(lock, due, [this] { return is_ended_ || !tasks_.empty(); });
-      std::optional<Task> task;
-      if (!tasks_.empty()) {
-        task = std::move(tasks_.front());
-        tasks_.pop_front();
-      }
+      std::list<Task> task;  // at most one
+      if (!tasks_.empty()) task.splice(task.begin(), tasks_, tasks_.begin());
       busy_since_ = WatchClock::now();
       lock.unlock();
+      bool is_done = true;
       try {
-        if (task) {
-          carry_out(*task);
+        if (!task.empty()) {
+          carry_out(task.front());
         } else if (WatchClock::now() >= due) {
           due = WatchClock::now() + interval;
           look();
         }
-      } catch (const std::bad_alloc&) {
-        due = WatchClock::now() + interval;  // once there is memory again
+      } catch (const std::bad_alloc&) {  // it is done once there is memory again
+        is_done = false;
+        std::this_thread::sleep_for(memory_interval);
       }
       lock.lock();
       busy_since_.reset();
+      if (!is_done && !task.empty()) tasks_.splice(tasks_.begin(), task);
     }
     has_ended_ = true;
     changed_.notify_all();
@@ -189,6 +191,8 @@ class FolderWatch::Worker {
   void carry_out(const Task& task) {
     try {
       task.action();
+    } catch (const std::bad_alloc&) {
+      throw;
     } catch (const std::exception& error) {
       note(task.otherwise + ": " + reason_of(error));
     }
@@ -221,12 +225,13 @@ class FolderWatch::Worker {
 
   // Salvages the takes that the process before left, and reads what it was recording; once.
   void bring_into_order(FolderSeen& now) {
-    if (std::exchange(is_in_order_, true)) return;
+    if (is_in_order_) return;
     const TakeFolders alone({options_.folder}, 0, {});
     now.highest_number =
         next_take_number({options_.folder}, options_.slate, now.highest_number) - 1;
     salvage_.look(now.salvaged);
     now.wish = alone.kept_wish();
+    is_in_order_ = true;
   }
 
   void publish(FolderSeen now) {
@@ -252,7 +257,7 @@ class FolderWatch::Worker {
   mutable std::mutex mutex_;
   std::condition_variable changed_;
   FolderSeen seen_;
-  std::deque<Task> tasks_;
+  std::list<Task> tasks_;
   std::optional<Followed> followed_;
   std::optional<WatchClock::time_point> busy_since_;
   bool is_ended_ = false, has_ended_ = false;

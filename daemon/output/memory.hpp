@@ -1,10 +1,14 @@
 // How much memory the computer has, and how much of it may hold what waits to be recorded.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <optional>
 
 namespace previz::output {
+
+// Memory that has run out is asked for again so often.
+inline constexpr std::chrono::milliseconds memory_interval{10};
 
 // Return bytes: the computer's memory, and how much of it may hold what is recorded at most (three
 // quarters).

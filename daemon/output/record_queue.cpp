@@ -249,10 +249,6 @@ void RecordQueue::forget_what_is_long_ago() {
 
 session::Losses RecordQueue::begin() {
   forget_what_is_long_ago();
-  begun_with_s_ = ring_length_s();
-  began_ = newest_ = SteadyClock::now();
-  for (const Entry& entry : ring_)
-    if (const auto* captured = std::get_if<Captured>(&entry)) began_ = newest_ = captured->offered;
   session::Losses lost;
   constexpr std::uint64_t always = std::numeric_limits<std::uint64_t>::max() / 2;
   const auto queue_always = [&](Entry entry) { add(lost, push_within(always, std::move(entry))); };
@@ -264,6 +260,10 @@ session::Losses RecordQueue::begin() {
     if (const Captured* light = light_of(entry)) older_light_.forget_unlike(*light->frame);
   const std::vector<Captured> lights = older_light_.in_order();
   push_mark(Start{});
+  begun_with_s_ = ring_length_s();
+  began_ = newest_ = SteadyClock::now();
+  for (const Entry& entry : ring_)
+    if (const auto* captured = std::get_if<Captured>(&entry)) began_ = newest_ = captured->offered;
   for (const Captured& light : lights) queue_always(light);
   for (Entry& entry : ring_) {
     if (const Captured* light = light_of(entry)) remember_light(*light);
@@ -287,11 +287,6 @@ RecordQueue::Queued RecordQueue::pop() {
 
 session::Losses RecordQueue::take_left_out() {
   return std::exchange(left_out_, {});
-}
-
-void RecordQueue::give_back(Queued queued) {
-  queued_bytes_ += bytes_of(queued.entry);
-  queue_.push_front(std::move(queued));
 }
 
 }  // namespace previz::output

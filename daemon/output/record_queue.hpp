@@ -94,7 +94,7 @@ class RecordQueue {
   LeftOut push_shown(const Captured& captured);
   LeftOut push_record(Entry entry);  // a line of tracking, a button or an event
   // A stop or a mark, for which there is always room. Throws std::bad_alloc, and changes nothing,
-  // if there is no memory for it; so does begin().
+  // if there is no memory for it.
   void push_mark(Entry entry);
 
   // Keep what is offered while nothing is recorded. Of a frame: returns whether others were dropped
@@ -102,14 +102,13 @@ class RecordQueue {
   bool keep(const Captured& captured);
   void keep(const session::TrackRecord& record);
   // Begins a take with the light from before the ring and what the ring holds, and returns what of
-  // it had to be left out.
+  // it had to be left out. Throws std::bad_alloc, and begins none, if there is no memory for that.
   session::Losses begin();
 
   bool empty() const { return queue_.empty(); }
   Backlog backlog() const;
   bool begins_a_take() const;  // the next entry does
   Queued pop();
-  void give_back(Queued queued);    // the one that was popped last
   session::Losses take_left_out();  // after the last entry; the next one does not say it then
 
   // The newest frames of the ring, of both cameras, that it holds within so many seconds.

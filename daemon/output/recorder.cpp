@@ -21,8 +21,6 @@ constexpr std::chrono::milliseconds track_patience{500};
 constexpr std::chrono::seconds disk_interval{1};
 // A take that ends is looked at so often.
 constexpr std::chrono::milliseconds ending_interval{10};
-// Memory that has run out is asked for again so often.
-constexpr std::chrono::milliseconds memory_interval{10};
 // A recording that is further behind the cameras is reported.
 constexpr double long_behind_s = 1;
 // A disk that takes longer for one thing is reported.
@@ -30,7 +28,7 @@ constexpr std::chrono::seconds silence{2};
 
 // Why something that was offered is not kept.
 constexpr const char *too_far_behind = "too far behind", *memory_full = "memory full",
-                     *disk_failed = "disk failed", *cannot_be_recorded = "cannot be recorded";
+                     *cannot_be_recorded = "cannot be recorded";
 
 }  // namespace
 
@@ -177,6 +175,8 @@ void Recorder::note_short_preroll(double kept_s) const {
 void Recorder::start() {
   const std::lock_guard lock(mutex_);
   if (status_.recording) return;
+  if (stops_unmarked_) queue_.push_mark(RecordQueue::Stop{});
+  stops_unmarked_ = false;
   const session::Losses lost = queue_.begin();
   ++starts_;
   status_.recording = true;
@@ -192,7 +192,11 @@ void Recorder::start() {
 void Recorder::stop() {
   const std::lock_guard lock(mutex_);
   if (!status_.recording) return;
-  queue_.push_mark(RecordQueue::Stop{});
+  try {
+    queue_.push_mark(RecordQueue::Stop{});
+  } catch (const std::bad_alloc&) {
+    stops_unmarked_ = true;  // a stop needs no memory
+  }
   status_.recording = false;
   late_tracks_ = true;
   filled_.notify_one();
@@ -231,11 +235,16 @@ void Recorder::run() {
   for (;;) {
     const bool waits = !ending_.empty();
     const auto due = Clock::now() + (waits ? ending_interval : disk_interval);
-    filled_.wait_until(lock, due,
-                       [&] { return !queue_.empty() || has_news_ || (quit_ && !waits); });
+    filled_.wait_until(lock, due, [&] {
+      return !queue_.empty() || stops_unmarked_ || has_news_ || (quit_ && !waits);
+    });
     bool has_news = std::exchange(has_news_, false);
     std::optional<Queued> next;
-    if (!queue_.empty()) next = queue_.pop();
+    if (!queue_.empty())
+      next = queue_.pop();
+    else if (std::exchange(stops_unmarked_, false))
+      next = Queued{RecordQueue::Stop{}, {}};
+    if (next && std::holds_alternative<RecordQueue::Start>(next->entry)) ++begun_;
     const bool is_last = quit_ && !next;
     handling_since_ = Clock::now();
     writes_ = take_ || !ending_.empty() || next;
@@ -243,7 +252,6 @@ void Recorder::run() {
     while (!is_served(has_news, next, is_last)) std::this_thread::sleep_for(memory_interval);
     lock.lock();
     writes_ = take_ || !ending_.empty();
-    if (next) queue_.give_back(std::move(*next));
     const bool answers_again = std::exchange(silence_noted_, false);
     handling_since_.reset();
     if (answers_again) {
@@ -255,13 +263,16 @@ void Recorder::run() {
   }
 }
 
-// Returns false where there was no memory for a stop, or for dealing with a fault: what is left is
-// to be served again, once somebody has given some back.
+// Returns false if something is left to be served again: an entry that its disk did not take, on
+// the next disk; a stop, a mark or the end of a failure, once there is memory for it.
 bool Recorder::is_served(bool& has_news, std::optional<Queued>& next, bool is_last) {
   try {
-    if (std::exchange(has_news, false)) take_news();
+    if (has_news) take_news();
+    has_news = false;
+    if (failing_) fail({});
+    if (take_ && is_last) end_running_take();
     serve(next, is_last);
-    return true;
+    return !next;
   } catch (const std::bad_alloc&) {
     return false;
   }
@@ -270,23 +281,22 @@ bool Recorder::is_served(bool& has_news, std::optional<Queued>& next, bool is_la
 // Handles an entry and whatever else is due. What is left of `next` could not be written, and waits
 // for the next disk.
 void Recorder::serve(std::optional<Queued>& next, bool is_last) {
-  if (is_failing_) fail(reason_of(std::bad_alloc()));
   try {
     if (next) handle(*next);
     next.reset();
-    if (take_ && is_last) end_running_take();
     if (take_) name_assets(*take_, false);
     if (take_ && Clock::now() - checked_ >= disk_interval) check_disk();
   } catch (const std::exception& error) {
-    if (next && std::holds_alternative<RecordQueue::Stop>(next->entry) &&
-        dynamic_cast<const std::bad_alloc*>(&error))
-      throw;
+    const bool is_memory = dynamic_cast<const std::bad_alloc*>(&error) != nullptr;
+    const bool is_mark = next && (std::holds_alternative<RecordQueue::Stop>(next->entry) ||
+                                  std::holds_alternative<RecordQueue::MarkGood>(next->entry));
+    if (is_memory && is_mark) throw;
     const std::string why = reason_of(error);
     if (next && take_ && take_->writer->is_sound()) {
       const Queued left_out = std::move(*next);
       next.reset();
       leave_out(left_out.entry, *take_, why);
-    } else if (!goes_on_elsewhere(why)) {
+    } else if (is_memory || !goes_on_elsewhere(why)) {
       if (next) {
         const std::lock_guard lock(mutex_);
         const session::Losses loss = RecordQueue::loss_of(next->entry);
@@ -305,10 +315,6 @@ void Recorder::handle(Queued& next) {
   if (take_ || !ending_.empty())
     add((take_ ? *take_ : ending_.back().take).lost, std::exchange(next.lost, {}));
   if (std::holds_alternative<RecordQueue::Start>(entry)) {
-    {
-      const std::lock_guard lock(mutex_);
-      ++begun_;
-    }
     folders_.forgive_all();
     light_.clear();
     begin_take(false);
@@ -401,8 +407,12 @@ void Recorder::leave_out(const Entry& entry, Take& take, const std::string& why)
     count_as_lost(loss, cannot_be_recorded, is_newest());
   }
   if (std::exchange(take.has_noted_odd, true)) return;
-  note(Severity::warning,
-       take.writer->directory().filename().string() + " lacks what cannot be recorded: " + why);
+  try {
+    note(Severity::warning,
+         take.writer->directory().filename().string() + " lacks what cannot be recorded: " + why);
+  } catch (const std::bad_alloc&) {
+    return;  // it is counted
+  }
 }
 
 // Ends the running take in order and goes on in the next one, without a frame between them.
@@ -463,7 +473,6 @@ void Recorder::name_assets(Take& take, bool is_last) {
   if (!delivered && !is_last) return;
   if (!delivered)
     delivered = stores_[take.folder]->undelivered("it was not copied by the end of the take");
-  take.order.reset();
   for (const session::MissingAsset& asset : delivered->missing)
     note(Severity::warning, take.writer->directory().filename().string() + " lacks " +
                                 asset.as_written + ": " + asset.why);
@@ -473,122 +482,7 @@ void Recorder::name_assets(Take& take, bool is_last) {
     if (!take.writer->is_sound()) throw;
     note(Severity::warning, std::string("the set's files cannot be named: ") + reason_of(error));
   }
-}
-
-// Ends the takes that have all they wait for, or have waited long enough.
-void Recorder::end_what_is_over(bool is_last, bool at_once) {
-  const Clock::time_point now = Clock::now();
-  for (auto ending = ending_.begin(); ending != ending_.end();) {
-    Take& take = ending->take;
-    const bool has_tracks =
-        is_last || take.writer->frames_without_track() == 0 || now >= ending->tracks_until;
-    const bool has_assets =
-        !take.order || take.order->result().has_value() || now >= ending->assets_until;
-    if (!at_once && !(has_tracks && has_assets)) {
-      ++ending;
-      continue;
-    }
-    if (at_once && take.writer->has_track())
-      take.lost.records += take.writer->frames_without_track();
-    end(take);
-    ending = ending_.erase(ending);
-  }
-  const std::lock_guard lock(mutex_);
-  if (!status_.recording && !take_ && ending_.empty() && queue_.empty()) late_tracks_ = false;
-}
-
-// What goes wrong with a take that ends is that take's failure, and the recording's no more.
-void Recorder::end(Take& take) {
-  const std::string name = take.writer->directory().filename().string();
-  try {
-    if (!take.fault.empty()) throw Error(take.fault);
-    name_assets(take, true);
-    take.writer->set_lost(take.lost);
-    take.writer->close();
-  } catch (const std::exception& error) {
-    abandon(take, reason_of(error));
-    {
-      const std::lock_guard lock(mutex_);
-      count_finished(take);
-      count_failure(reason_of(error));
-    }
-    return note(Severity::error, name + " could not be ended in order: " + reason_of(error));
-  }
-  {
-    const std::lock_guard lock(mutex_);
-    count_finished(take);
-  }
-  note(Severity::info, name + " has " + std::to_string(take.writer->observer_frames()) + " frames");
-}
-
-// Leaves the files as they are: a session that was not closed opens up to its last whole frame.
-void Recorder::abandon(Take& take, const std::string& why) {
-  if (take.order) {
-    const AssetStore::Delivered delivered = take.order->result().value_or(
-        stores_[take.folder]->undelivered("the take ended before it was copied"));
-    take.writer->set_assets(delivered.assets, delivered.missing);
-  }
-  take.writer->set_lost(take.lost);
-  take.writer->abandon(why);
-}
-
-void Recorder::fail(const std::string& why) {
-  is_failing_ = true;
-  if (!take_) {
-    // The takes that are ending get the tracking that is there already, and wait for no more.
-    std::unique_lock lock(mutex_);
-    const std::vector<session::TrackRecord> late = leave_out_queue();
-    lock.unlock();
-    for (const session::TrackRecord& record : late) write(record);
-    end_what_is_over(true, true);
-  }
-  std::vector<session::TrackRecord> late;
-  {
-    // In one go, so that nothing is offered to a take that is none any more.
-    const std::lock_guard lock(mutex_);
-    late = leave_out_queue();
-    if (queue_.empty()) status_.recording = late_tracks_ = false;
-    if (take_) count_finished(*take_);
-    count_failure(why);
-  }
-  if (take_) abandon(*take_, why);
-  take_.reset();
-  for (const session::TrackRecord& record : late) write(record);
-  is_failing_ = false;
-  note(Severity::error, why, "recording ended");
-  drop_wish();
-}
-
-// Takes what is queued before the next start out of the queue, and counts it as lost. Returns the
-// tracks among it that takes which are ending wait for. Call it with the lock held.
-std::vector<session::TrackRecord> Recorder::leave_out_queue() {
-  std::vector<session::TrackRecord> late;
-  while (!queue_.empty() && !queue_.begins_a_take()) {
-    const Queued left = queue_.pop();
-    const auto* record = std::get_if<session::TrackRecord>(&left.entry);
-    const bool is_late = record && std::ranges::any_of(ending_, [&](const EndingTake& ending) {
-                           return ending.take.writer->has_frame_of(*record);
-                         });
-    if (is_late) late.push_back(*record);
-    const session::Losses loss = is_late ? session::Losses{} : RecordQueue::loss_of(left.entry);
-    count_as_lost(loss, disk_failed, is_newest());
-    if (!take_) continue;
-    add(take_->lost, loss);
-    add(take_->lost, left.lost);
-  }
-  if (take_ && queue_.empty()) add(take_->lost, queue_.take_left_out());
-  return late;
-}
-
-void Recorder::count_failure(const std::string& why) {
-  status_.fault = why;
-  ++status_.failures;
-}
-
-void Recorder::count_finished(const Take& take) {
-  if (take.writer->observer_frames() == 0) return;
-  ++status_.finished_takes;
-  status_.finished = take.writer->directory().filename().string();
+  take.order.reset();
 }
 
 }  // namespace previz::output

@@ -132,6 +132,8 @@ class Recorder {
     Clock::time_point tracks_until, assets_until;
   };
 
+  static constexpr const char* disk_failed = "disk failed";  // why something is not kept
+
   // Call these with the lock held.
   void offer_record(Entry entry);  // or counts it as lost
   void count_as_lost(const session::Losses& loss, const char* cause, bool of_newest);
@@ -160,7 +162,8 @@ class Recorder {
   void end(Take& take);
   void name_assets(Take& take, bool is_last);  // in the running take, if they are there by now
   bool goes_on_elsewhere(const std::string& why);
-  void fail(const std::string& why);  // ends the take and leaves out what is queued of it
+  void fail(std::string why);  // ends the take and leaves out what is queued of it
+  void write_late(const std::vector<session::TrackRecord>& late);
   std::vector<session::TrackRecord> leave_out_queue();
   void abandon(Take& take, const std::string& why);
   void check_disk();
@@ -182,6 +185,7 @@ class Recorder {
   RecordQueue queue_;
   bool late_tracks_ = false;  // true: tracks may still arrive for takes that were stopped
   bool quit_ = false;
+  bool stops_unmarked_ = false;  // a stop is the last entry, without memory for it in the queue
   RecorderStatus status_;
   std::uint64_t starts_ = 0;  // calls of start() that began a take
   std::uint64_t begun_ = 0;   // those of them that the writer thread has got to
@@ -200,9 +204,13 @@ class Recorder {
   std::vector<std::size_t> told_;                      // takes of each that were salvaged, and said
   std::optional<Take> take_;
   std::list<EndingTake> ending_;
-  bool is_failing_ = false;  // fail() has begun, and has not ended
-  NewestLight light_;        // that the running take has
-  int highest_number_ = 0;   // of the takes so far
+  struct Failing {
+    std::string why;
+    bool is_counted = false;
+  };
+  std::optional<Failing> failing_;  // fail() has begun, and has not ended
+  NewestLight light_;               // that the running take has
+  int highest_number_ = 0;          // of the takes so far
   Clock::time_point checked_;
   bool has_compared_speeds_ = false;
   std::jthread thread_;  // last: it uses all of the above

@@ -34,7 +34,7 @@ ListedTake look_at(const std::filesystem::path& directory) {
     take.may_be_in_recording =
         !is_over && (is_remembered(directory) || session::is_being_written(directory));
   } catch (const std::exception& error) {  // of std::filesystem as well
-    take.fault = error.what();
+    take.fault = reason_of(error);
   }
   try {
     take.strangers = session::strangers_in(directory);
@@ -47,7 +47,7 @@ ListedTake look_at(const std::filesystem::path& directory) {
         throw Error((directory / file).string() + ": cannot be looked at: " + failure.message());
     }
   } catch (const std::exception& error) {
-    if (take.fault.empty()) take.fault = error.what();
+    if (take.fault.empty()) take.fault = reason_of(error);
   }
   return take;
 }

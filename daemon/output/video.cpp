@@ -133,9 +133,9 @@ VideoWriter::VideoWriter(const std::filesystem::path& stem, int width, int heigh
   impl_->frame->width = width;
   impl_->frame->height = height;
   impl_->check(av_frame_get_buffer(impl_->frame.get(), 0), "has no memory for a picture");
-  impl_->converter.reset(av::made(sws_getContext(
+  impl_->converter.reset(sws_getContext(
       width, height, AV_PIX_FMT_RGB24, width, height, impl_->encoder->pix_fmt,
-      SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INP, nullptr, nullptr, nullptr)));
+      SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INP, nullptr, nullptr, nullptr));
   const int* bt709 = sws_getCoefficients(SWS_CS_ITU709);
   constexpr int unity = 1 << 16;
   sws_setColorspaceDetails(impl_->converter.get(), bt709, 1, bt709, 0, 0, unity, unity);

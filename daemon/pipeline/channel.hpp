@@ -18,8 +18,8 @@ namespace previz::pipeline {
 // What waits in a queue.
 struct Waiting {
   std::uint64_t values = 0;
-  double oldest_s = 0;      // since the oldest of them was pushed
-  std::uint64_t bytes = 0;  // 0: few, and not counted
+  double oldest_s = 0;      // for how long the oldest of them has waited
+  std::uint64_t bytes = 0;  // 0 where the queue does not count bytes
 };
 
 // A value and when it was pushed.

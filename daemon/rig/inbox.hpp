@@ -41,10 +41,11 @@ class Inbox {
 
   std::vector<Event> take() {
     const std::lock_guard lock(mutex_);
+    std::vector<Event> events;
+    for (const auto& posted : events_) events.push_back(posted.value);
+    events_.clear();
     eventfd_t ignored = 0;
     eventfd_read(descriptor_.get(), &ignored);
-    std::vector<Event> events;
-    for (const auto& posted : std::exchange(events_, {})) events.push_back(posted.value);
     return events;
   }
   pipeline::Waiting waiting() const {

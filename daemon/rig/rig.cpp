@@ -254,8 +254,9 @@ void Rig::look_at_review() {
   const bool is_wanted = controls_.look().state.mode == Mode::review;
   if (review_ && !is_wanted) review_->stop();
   if (review_ && review_->is_stopped() && review_->done()) review_.reset();
-  if (!is_wanted || review_) return;
-  pipeline_.reviewed().try_pop();
+  if (review_) return;
+  pipeline_.reviewed().try_pop();  // of the review before
+  if (!is_wanted) return;
   review_ = std::make_unique<Review>(recorder_.status().directory, loaded_, pipeline_.reviewed(),
                                      inbox_, parts_.kept.reports);
 }
@@ -263,7 +264,12 @@ void Rig::look_at_review() {
 std::optional<std::string> Rig::carry_out(Request request, const std::string& by) {
   switch (request) {
     case Request::start_take:
-      recorder_.start();
+      try {
+        recorder_.start();
+      } catch (const std::bad_alloc& error) {
+        controls_.happened(Event::recorder_failed);
+        return std::string("the take is not begun: ") + reason_of(error);
+      }
       break;
     case Request::stop_take:
       recorder_.stop();

@@ -25,8 +25,9 @@ constexpr double kPushFadesS = 0.065;     // by a factor of e
 constexpr double kStirFadesS = 1.0;       // likewise, of what is feared while nothing is seen
 constexpr double kGlideS = 0.3;           // likewise, of what other tags have changed
 constexpr double kVelocityFadesS = 0.25;  // likewise, while nothing is seen
-// A wrong place of a tag moves the pose and leaves the rest in how the corners fit. A tag's own
-// corners resist a turn by half its size: of a tag that is eight sizes away a sixteenth is left.
+// A tag's wrong place moves the pose, and what the pose does not take up is seen in how the corners
+// fit. Another tag's corners resist a turn by half its size: where the two are eight sizes apart, a
+// sixteenth of the mistake is seen.
 constexpr double kMistakePerFit = 16;
 constexpr double kLeastDeviation = 1e-7;  // of a measured pose, rad and m
 

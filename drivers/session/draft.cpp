@@ -138,6 +138,13 @@ DraftFolder::DraftFolder(const fs::path& target) : target_(fs::absolute(target))
     if (!made && errno == EEXIST) continue;
     if (!made) fail_draft(target_.parent_path(), "no folder can be made in it");
     lock_ = OwnedDescriptor(::open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (!lock_ && errno != ENOENT) {
+      const int error = errno;
+      std::error_code stays;
+      fs::remove(path_, stays);
+      errno = error;
+      fail_draft(path_, "cannot be opened");
+    }
     if (lock(lock_, path_)) return;
   }
 }

@@ -175,7 +175,7 @@ struct SessionWriter::Impl {
 
   void close() {
     if (ended) return;
-    if (has_failed) return abandon(file.fault);
+    if (has_failed) return abandon(file.fault.empty() ? reason_of(std::bad_alloc()) : file.fault);
     using_disk([&] {
       for (auto& [source, stream] : streams) {
         stream.video.finish();
@@ -190,12 +190,12 @@ struct SessionWriter::Impl {
 
   void abandon(const std::string& fault) {
     if (ended) return;
-    ended = true;
     file.closed = false;
     file.fault = fault;
+    ended = true;
     try {
       write_toml();
-    } catch (const Error&) {
+    } catch (const std::exception&) {
       // Without the reason it is still a session that was not closed.
     }
   }
@@ -218,7 +218,11 @@ SessionWriter::~SessionWriter() {
   try {
     impl_->close();
   } catch (const std::exception& error) {
-    impl_->abandon(error.what());  // whoever wants to know calls close()
+    try {
+      impl_->abandon(reason_of(error));  // whoever wants to know calls close()
+    } catch (const std::exception&) {
+      return;  // without the reason it is still a session that was not closed
+    }
   }
 }
 

@@ -123,6 +123,7 @@ void record_two_takes(const std::filesystem::path& takes, std::size_t from, std:
   EXPECT_LE(frames, frame_count(second.directory));
   EXPECT_GE(frames + (first.failures > 0 ? 1 : 0), frame_count(second.directory));
   EXPECT_TRUE(session::open_session(second.directory).missing.empty());
+  EXPECT_EQ(second.frames, frame_count(second.directory));
   if (first.failures > 0) return;
   EXPECT_EQ(frame_count(first.directory) + left_out + refused.frames, frames);
   if (refused.frames + refused.tracks + left_out + first.lost.records == 0) {

@@ -52,7 +52,8 @@ TEST_F(RigLive, ADiskThatStandsStillForASnapshotKeepsNoPictureWaiting) {
   EXPECT_TRUE(session::open_session(directory_ / "takes/12A_take001").missing.empty());
 }
 
-// Every queue of the rig says what waits in it, and nothing does for long while the rig is well.
+// The stages, the recorder and the main loop say what waits for them, and nothing does for long
+// while the rig is well.
 TEST_F(RigLive, EveryQueueIsMeasured) {
   write_set();
   run([&] {
