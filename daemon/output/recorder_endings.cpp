@@ -36,6 +36,8 @@ void Recorder::end_what_is_over(bool is_last, bool at_once) {
 // What goes wrong with a take that ends is that take's failure, and the recording's no more.
 void Recorder::end(Take& take) {
   const std::string name = take.writer->directory().filename().string();
+  // What is said is put into words before it is counted: afterwards there may be no memory for it.
+  std::string said = name + " has " + std::to_string(take.writer->observer_frames()) + " frames";
   try {
     if (!take.fault.empty()) throw Error(take.fault);
     if (!take.writer->is_sound()) throw Error("a part of it could not be written");
@@ -43,19 +45,20 @@ void Recorder::end(Take& take) {
     take.writer->set_lost(take.lost);
     take.writer->close();
   } catch (const std::exception& error) {
+    said = name + " could not be ended in order: " + reason_of(error);
     abandon(take, reason_of(error));
     {
       const std::lock_guard lock(mutex_);
       count_finished(take);
       count_failure(reason_of(error));
     }
-    return note(Severity::error, name + " could not be ended in order: " + reason_of(error));
+    return note(Severity::error, said);
   }
   {
     const std::lock_guard lock(mutex_);
     count_finished(take);
   }
-  note(Severity::info, name + " has " + std::to_string(take.writer->observer_frames()) + " frames");
+  note(Severity::info, said);
 }
 
 // Leaves the files as they are: a session that was not closed opens up to its last whole frame.
@@ -101,12 +104,14 @@ void Recorder::fail(std::string why) {
 }
 
 void Recorder::write_late(const std::vector<session::TrackRecord>& late) {
-  for (const session::TrackRecord& record : late) try {
+  for (const session::TrackRecord& record : late) {
+    try {
       write(record);
     } catch (const std::bad_alloc&) {
       const std::lock_guard lock(mutex_);
       count_as_lost({.records = 1}, disk_failed, false);
     }
+  }
 }
 
 // Takes what is queued before the next start out of the queue, and counts it as lost. Returns the
