@@ -81,6 +81,7 @@ output::RecorderOptions recorder_options(const LoadedSet& loaded, const Cameras&
   return options;
 }
 
+// The oldest has waited until the newest picture was offered: while none comes, it grows no older.
 pipeline::Waiting waiting_in(const output::Recorder& recorder) {
   const output::Backlog backlog = recorder.status().backlog;
   return {.values = backlog.entries, .oldest_s = backlog.seconds, .bytes = backlog.bytes};
