@@ -8,9 +8,11 @@
 #include <charconv>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 
 #include "drivers/calibration/read.hpp"
@@ -234,9 +236,17 @@ struct Place {
     throw Error(file.string() + ":" + std::to_string(at) + ": " + key(k) + " " + what);
   }
 
+  // toml++ would cast a number with a fraction, or beyond all whole ones, to a whole one.
+  template <typename Value>
+  std::optional<Value> value_of(const char* k) const {
+    if constexpr (std::is_same_v<Value, std::int64_t>)
+      return table[k].value_exact<Value>();
+    else
+      return table[k].value<Value>();
+  }
   template <typename Value>
   Value get(const char* k, const char* allowed) const {
-    const auto value = table[k].value<Value>();
+    const auto value = value_of<Value>(k);
     if (!value) fail(k, table.contains(k) ? std::string("must be ") + allowed : "is missing");
     return *value;
   }

@@ -157,6 +157,11 @@ TEST(SessionToml, ErrorsNameFileLineAndKey) {
     text.replace(text.find(from), from.size(), to);
     return error_of(text);
   };
+  for (const char* number : {"1.0", "1.2e41", "nan"})
+    EXPECT_NE(with("format_version = 1", std::string("format_version = ") + number)
+                  .find("session.toml:2: format_version must be"),
+              std::string::npos)
+        << number;
   EXPECT_NE(with("format_version = 1", "format_version = 3").find("session.toml:2: format_version"),
             std::string::npos);
   EXPECT_NE(with("format = \"rgb8\"", "format = \"nv12\"").find("observer.video.format"),
