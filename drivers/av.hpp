@@ -56,10 +56,9 @@ inline std::string error_text(int code) {
   return text.data();
 }
 
-// Returns `code`, or throws previz::Error "<file>: <what>: <libav's reason>" if it is an error;
-// std::bad_alloc where libav had no memory.
+// Returns `code`, or throws previz::Error "<file>: <what>: <libav's reason>" if it is an error.
+// libav also says that it has no memory where a file claims too much.
 inline int check(int code, const std::filesystem::path& file, const std::string& what) {
-  if (code == AVERROR(ENOMEM)) throw std::bad_alloc();
   if (code < 0) throw Error(file.string() + ": " + what + ": " + error_text(code));
   return code;
 }
