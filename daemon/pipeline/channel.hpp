@@ -15,7 +15,7 @@
 
 namespace previz::pipeline {
 
-// What waits in a queue.
+// Says how much waits in a queue, and for how long.
 struct Waiting {
   std::uint64_t values = 0;
   double oldest_s = 0;      // for how long the oldest of them has waited

@@ -1,4 +1,4 @@
-// What reads takes and sets, on disks whose calls fail, the reading ones too: whichever it is, the
+// Takes and sets are read from disks whose calls fail, the reading ones too: whichever it is, the
 // fault is said, nothing that was recorded is lost, and all is in order once the disk works again.
 #include <gtest/gtest.h>
 

@@ -30,7 +30,7 @@ using test::wait_until;
 
 constexpr std::uint64_t frames = 4;
 
-// What the recording process says to the one that watches it.
+// The recording process says this to the one that watches it.
 struct Known {
   std::atomic<std::uint64_t> allocations = 0;  // while memory was scarce
   std::atomic<std::uint64_t> frames = 0;       // of the first take, on the disk
@@ -179,6 +179,11 @@ class ScarceMemoryOfARecorder : public ::testing::TestWithParam<std::size_t> {
     }
     std::printf("  %zu allocations, %zu tried, %zu times a library ended the process\n",
                 allocations, rounds, deaths);
+    // The libraries were seen not to bear 4 to 9 of 113 single allocations; many more would be our
+    // own code that ends. Among several in a row there is more often one of theirs.
+    if (GetParam() == 1) {
+      EXPECT_LT(5 * deaths, rounds);
+    }
   }
 };
 INSTANTIATE_TEST_SUITE_P(Fail, ScarceMemoryOfARecorder, ::testing::Values(1, 3));

@@ -91,7 +91,7 @@ TEST(StageThreads, WhatWaitsInFrontOfAStageIsInItsMetricsUntilItDrops) {
   for (int i = 0; i < 2; ++i) EXPECT_TRUE(bounded.offer(i));
   EXPECT_FALSE(bounded.offer(2));
   for (int i = 0; i < 5; ++i) recent.push(i);
-  std::this_thread::sleep_for(pause);
+  std::this_thread::sleep_for(pause);  // what waits gets an age
   EXPECT_EQ(waiting("mailbox").values, 1u);
   EXPECT_EQ(waiting("bounded").values, 2u);
   EXPECT_EQ(waiting("recent").values, 3u);
