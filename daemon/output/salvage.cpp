@@ -5,6 +5,7 @@
 #include <optional>
 #include <system_error>
 
+#include "daemon/output/take_list.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/session.hpp"
 
@@ -21,7 +22,8 @@ bool Salvage::look(std::vector<std::string>& salvaged) {
       is_first = true;
       is_looked_at[i] = true;
       for (const auto& entry : std::filesystem::directory_iterator(folders_[i]))
-        if (entry.is_directory() && !entry.is_symlink()) takes.push_back(entry.path());
+        if (may_be_take(entry.path()) && entry.is_directory() && !entry.is_symlink())
+          takes.push_back(entry.path());
       session::remove_dead_drafts(folders_[i]);
     } catch (const std::filesystem::filesystem_error& error) {
       is_looked_at[i] = true;  // once, and not each second

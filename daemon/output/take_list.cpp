@@ -59,6 +59,11 @@ std::filesystem::path named(const std::filesystem::path& directory) {
   return normal.has_filename() || !normal.has_parent_path() ? normal : normal.parent_path();
 }
 
+bool may_be_take(const std::filesystem::path& directory) {
+  const std::string name = directory.filename().string();
+  return name != "lost+found" && !name.starts_with('.');
+}
+
 ListedTake listed_take(const std::filesystem::path& directory) {
   const std::filesystem::path take = named(directory);
   if (is_take(take)) return look_at(take);
@@ -75,7 +80,8 @@ std::vector<ListedTake> list_takes(const std::vector<std::filesystem::path>& fol
     std::vector<std::filesystem::path> names;
     std::error_code failure;
     for (const auto& entry : std::filesystem::directory_iterator(folder, failure))
-      if (is_take(entry.path())) names.push_back(entry.path().filename());
+      if (may_be_take(entry.path()) && is_take(entry.path()))
+        names.push_back(entry.path().filename());
     if (failure && failure != std::errc::no_such_file_or_directory)
       throw Error(folder.string() + ": cannot be listed: " + failure.message());
     std::ranges::sort(

@@ -19,6 +19,11 @@ struct ListedTake {
   std::vector<std::string> strangers;  // as session::strangers_in() returns them
 };
 
+// Returns whether what lies in a folder of takes may be one, by its name. What is hidden, and
+// lost+found of an ext4 disk, belongs to others, and often nobody else may look into it; no take is
+// named so.
+bool may_be_take(const std::filesystem::path& directory);
+
 // Returns the take in this folder. Throws previz::Error if it is not a take, and says what a folder
 // of takes is if it is one.
 ListedTake listed_take(const std::filesystem::path& directory);

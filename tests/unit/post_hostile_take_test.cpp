@@ -24,7 +24,9 @@ namespace previz::post {
 namespace post_hostile_take_test {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 
 // What may stand in the place of a take's file.
 struct Stranger {
@@ -134,6 +136,32 @@ INSTANTIATE_TEST_SUITE_P(Holds, HostileTake, testing::ValuesIn(cases()), [](cons
   return words;
 });
 
+// Returns what the action says to somebody who is not root, from whom no folder is kept.
+std::string said_to_nobody(const std::function<void(std::ostream&)>& action) {
+  int says[2];
+  if (::pipe(says) != 0) throw Error("no pipe");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    std::ostringstream out;
+    if (::geteuid() == 0 && ::setuid(65534) != 0) ::_exit(1);
+    try {
+      action(out);
+    } catch (const Error& error) {
+      out << error.what();
+    }
+    const std::string text = out.str() + "\n";
+    ::_exit(::write(says[1], text.data(), text.size()) > 0 ? 0 : 1);
+  }
+  ::close(says[1]);
+  std::string text(4096, '\0');
+  const ssize_t count = ::read(says[0], text.data(), text.size());
+  ::close(says[0]);
+  ::waitpid(child, nullptr, 0);
+  if (count <= 0) throw Error("nothing is said");
+  text.resize(static_cast<std::size_t>(count));
+  return text;
+}
+
 // A folder of takes that belongs to somebody else is no empty one.
 TEST(TakesList, NamesATakeThatMayNotBeRead) {
   const test::TemporaryDirectory directory;
@@ -142,30 +170,29 @@ TEST(TakesList, NamesATakeThatMayNotBeRead) {
   std::ofstream(take / "session.toml") << "format_version = 3\n";
   fs::permissions(directory.path(), fs::perms{0755});
   fs::permissions(take, fs::perms{0});
-  int says[2];
-  ASSERT_EQ(::pipe(says), 0);
-  const pid_t child = ::fork();
-  if (child == 0) {  // root may read everything, so that it lists as nobody does
-    std::ostringstream out;
-    if (::geteuid() == 0 && ::setuid(65534) != 0) ::_exit(1);
-    try {
-      list_takes({directory / "takes"}, out);
-    } catch (const Error& error) {
-      out << error.what();
-    }
-    const std::string text = out.str();
-    ::_exit(::write(says[1], text.data(), text.size()) > 0 ? 0 : 1);
-  }
-  ::close(says[1]);
-  std::string text(4096, '\0');
-  const ssize_t count = ::read(says[0], text.data(), text.size());
-  ::close(says[0]);
-  ::waitpid(child, nullptr, 0);
+  const std::string said =
+      said_to_nobody([&](std::ostream& out) { list_takes({directory / "takes"}, out); });
   fs::permissions(take, fs::perms{0755});
-  ASSERT_GT(count, 0);
-  text.resize(static_cast<std::size_t>(count));
-  EXPECT_THAT(text, HasSubstr("12A_take001"));
-  EXPECT_THAT(text, HasSubstr("Permission denied"));
+  EXPECT_THAT(said, HasSubstr("12A_take001"));
+  EXPECT_THAT(said, HasSubstr("Permission denied"));
+}
+
+// The uppermost folder of a disk of its own has folders of root and of desktops, which only these
+// may look into.
+TEST(TakesList, PassesOverWhatTheDiskKeepsForItself) {
+  const test::TemporaryDirectory directory;
+  const fs::path disk = directory / "disk";
+  for (const char* name : {"lost+found", ".Trash-1000"}) {
+    fs::create_directories(disk / name);
+    fs::permissions(disk / name, fs::perms{0});
+  }
+  fs::permissions(directory.path(), fs::perms{0755});
+  const std::string said = said_to_nobody([&](std::ostream& out) {
+    list_takes({disk}, out);
+    std::vector<std::string> salvaged;
+    output::Salvage({disk}, [&](const std::string& what) { out << what; }).look(salvaged);
+  });
+  EXPECT_THAT(said, AllOf(Not(HasSubstr("lost+found")), Not(HasSubstr("Trash"))));
 }
 
 // What a copy that was killed left goes with the next one.
