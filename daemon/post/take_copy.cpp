@@ -19,9 +19,31 @@ using Checksums = std::map<std::string, std::string>;  // of files, by their pat
 
 constexpr std::size_t hash_digits = 64;
 
+// A name may have any byte. As sha256sum(1) does, a line whose name has a backslash or the end of a
+// line begins with a backslash, and these two are escaped in it.
+std::string line_of(const std::string& file, const std::string& hash) {
+  std::string name;
+  for (const char c : file) {
+    if (c == '\\') name += "\\\\";
+    if (c == '\n') name += "\\n";
+    if (c != '\\' && c != '\n') name += c;
+  }
+  return (name == file ? "" : "\\") + hash + "  " + name + "\n";
+}
+
+std::string unescaped(const std::string& name) {
+  std::string file;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    const bool is_escaped = name[i] == '\\' && i + 1 < name.size();
+    if (is_escaped) ++i;
+    file += is_escaped && name[i] == 'n' ? '\n' : name[i];
+  }
+  return file;
+}
+
 std::string to_text(const Checksums& sums) {
   std::string text;
-  for (const auto& [file, hash] : sums) text.append(hash).append("  ").append(file).append("\n");
+  for (const auto& [file, hash] : sums) text += line_of(file, hash);
   return text;
 }
 
@@ -31,11 +53,14 @@ Checksums read_checksums(const fs::path& file) {
   int number = 0;
   for (std::string line; std::getline(lines, line);) {
     ++number;
+    const bool is_escaped = line.starts_with('\\');
+    if (is_escaped) line.erase(0, 1);
     const std::size_t path = hash_digits + 2;
     if (line.size() <= path)
       throw Error(file.string() + ":" + std::to_string(number) +
                   ": is not a checksum and a file; copy the take again");
-    sums[line.substr(path)] = line.substr(0, hash_digits);
+    const std::string name = line.substr(path);
+    sums[is_escaped ? unescaped(name) : name] = line.substr(0, hash_digits);
   }
   return sums;
 }
@@ -52,7 +77,7 @@ void copy_synced(const fs::path& from, const fs::path& to, const std::stop_token
 
 bool is_same_copy(const output::ListedTake& take, const fs::path& copy) {
   const fs::path sums = copy / checksums_name;
-  if (!fs::is_regular_file(sums)) return false;
+  if (!fs::is_regular_file(fs::symlink_status(sums))) return false;
   const Checksums known = read_checksums(sums);
   const std::vector<fs::path> files = session::own_files(take.directory);
   if (known.size() != files.size()) return false;
@@ -112,7 +137,8 @@ bool copy_take(const output::ListedTake& take, const fs::path& copy, const std::
 
 std::vector<std::string> checksum_faults(const fs::path& copy, const std::stop_token& stop) {
   std::vector<std::string> faults;
-  if (!fs::is_regular_file(copy / checksums_name)) return faults;
+  // What else may be there is named as it is read.
+  if (!fs::exists(fs::symlink_status(copy / checksums_name))) return faults;
   for (const auto& [file, hash] : read_checksums(copy / checksums_name)) {
     const fs::path path = copy / file;
     if (!session::lies_within(copy, path))

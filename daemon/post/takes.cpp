@@ -170,7 +170,8 @@ void mark_takes(const Paths& takes, bool good, std::ostream& out) {
     if (!take.fault.empty()) throw Error(take.fault);
   for (const ListedTake& take : all) {
     session::change_take(take.directory, [&](session::TakeInfo& info) { info.good = good; });
-    if (fs::exists(take.directory / checksums_name)) write_checksum(take.directory, "session.toml");
+    if (fs::exists(fs::symlink_status(take.directory / checksums_name)))
+      write_checksum(take.directory, "session.toml");
     out << take.directory.string() << (good ? ": good\n" : ": not good\n");
   }
 }

@@ -160,6 +160,29 @@ TEST_F(Takes, AreCopiedWithChecksums) {
   EXPECT_EQ(std::distance(fs::directory_iterator(disk), {}), 2);
 }
 
+// As sha256sum(1) writes such a name, so that one file is one line.
+TEST_F(Takes, AreCopiedWithChecksumsOfNamesThatHaveTheEndOfALine) {
+  const std::string name = "assets/" + std::string(64, 'b') + ".g\nl\\b";
+  fs::create_directories(one_ / "assets");
+  std::ofstream(one_ / name) << "an asset";
+  const fs::path disk = directory_ / "disk", copy = disk / "12A_take001";
+  copy_takes({{one_}, disk}, out_, {});
+  EXPECT_EQ(session::read_file(copy / name), "an asset");
+  EXPECT_EQ(check_takes({copy}, out_, {}), 0) << out_.str();
+  EXPECT_EQ(std::system(("cd '" + copy.string() + "' && sha256sum --check --status --strict " +
+                         checksums_name)
+                            .c_str()),
+            0);
+}
+
+TEST_F(Takes, WhoseChecksumsAreALinkToThemselvesAreNamed) {
+  fs::create_symlink(checksums_name, one_ / checksums_name);
+  std::ostringstream out;
+  EXPECT_EQ(check_takes({one_}, out, {}), 1);
+  EXPECT_THAT(out.str(), HasSubstr(std::string(checksums_name) + ": is a link"));
+  EXPECT_THAT(refusal([&] { mark_takes({one_}, true, out_); }), HasSubstr("is a link"));
+}
+
 TEST_F(Takes, AreCopiedOnce) {
   const fs::path disk = directory_ / "disk";
   copy_takes({{one_}, disk}, out_, {});
