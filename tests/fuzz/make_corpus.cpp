@@ -306,6 +306,33 @@ void write_lenses(const fs::path& folder) {
   write(folder / "cameras.bin", binary);
 }
 
+// What is done to a take's folder: what, to which file, and how (take_targets.cpp).
+void write_takes(const fs::path& folder) {
+  write(folder / "whole", "");
+  write(folder / "not_closed", {2, 12, 0});
+  write(folder / "cut_short", {6, 11, 0, '\x80'});
+  write(folder / "links", {1, 8, 2, 0, 1, 10, 2, 5, 1, 5, 2, 6, 1, 0, 2, 0});
+  write(folder / "pipe_and_folder", {1, 10, 1, 1, 6, 0, 1, 1, 2, 1, 1, 3, 2, 1});
+  write(folder / "names_the_owners", {2, 12, 3, 2, 12, 1});
+  const std::string sum = std::string(64, '0') + "  ", line = sum + "../../owners/session.toml\n",
+                    most = sum + std::string(180, 'n'), more(100, 'n');
+  const auto text = [](char how, const std::string& words) {
+    return std::string{how, 1, static_cast<char>(words.size())} + words;
+  };
+  write(folder / "checksums", text(4, line));
+  write(folder / "name_too_long", text(4, most) + text(5, more));
+  const char strange_asset = 15;
+  write(folder / "line_in_a_name", {4, strange_asset, 1, 'x'});
+}
+
+// A camera's formats, rows, settings and what happens to it (v4l2_targets.cpp). Where the bytes
+// end, the device answers as it is.
+void write_v4l2(const fs::path& folder) {
+  write(folder / "yuyv", {0, 0, 0});
+  write(folder / "mjpeg", {1, 2, 2, 0, 1});
+  write(folder / "with_all", {0x77, 7, 8, 6, 30, 100, 0xf, 30, 10, 5});
+}
+
 }  // namespace
 }  // namespace previz::fuzz
 
@@ -325,6 +352,8 @@ int main(int count, char** arguments) {
                     12);
   write_radiance(corpus / "environment");
   write_session(corpus);
+  write_takes(corpus / "take_folder");
+  write_v4l2(corpus / "v4l2");
   write_messages(corpus / "aravis");
   fs::create_directories(corpus / "gltf");
   previz::test::gltf_sample().save(corpus / "gltf/sample.glb");

@@ -32,6 +32,8 @@ std::span<const Target> device_targets();
 std::span<const Target> footage_targets();
 std::span<const Target> scene_targets();
 std::span<const Target> session_targets();
+std::span<const Target> take_targets();
+std::span<const Target> v4l2_targets();
 std::span<const Target> bus_targets();
 std::span<const Target> video_targets();
 
