@@ -24,8 +24,12 @@ constexpr int v4l2_settle_frames = 4;
 constexpr int errors_until_lost = 10;
 constexpr int most_events = 16;
 
+// A driver may write any 64 bits into both fields. What no clock shows becomes the nearest time
+// that fits into nanoseconds, and FrameOrder then puts the arrival in its place.
 std::int64_t to_ns(const timeval& time) {
-  return std::int64_t{time.tv_sec} * 1'000'000'000 + std::int64_t{time.tv_usec} * 1000;
+  const std::int64_t seconds = std::clamp<std::int64_t>(time.tv_sec, 0, 9'000'000'000);
+  const std::int64_t microseconds = std::clamp<std::int64_t>(time.tv_usec, 0, 999'999);
+  return seconds * 1'000'000'000 + microseconds * 1000;
 }
 
 v4l2_buffer empty_buffer(std::uint32_t index) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <limits>
 
 #include "drivers/error.hpp"
 #include "drivers/v4l2/find.hpp"
@@ -297,6 +298,22 @@ TEST_F(V4l2Stream, ABrokenClockOrCounterDoesNoHarm) {
     before = std::move(frame);
   }
   EXPECT_EQ(counted("frames without a time stamp of the kernel"), 1u);
+}
+
+TEST_F(V4l2Stream, ATimeBeyondAllNanosecondsIsReplacedByTheArrival) {
+  start();
+  constexpr std::int64_t least = std::numeric_limits<std::int64_t>::min();
+  constexpr std::int64_t most = std::numeric_limits<std::int64_t>::max();
+  std::int64_t before_ns = 0;
+  for (const timeval time : {timeval{most, 0}, timeval{least, 0}, timeval{most, most},
+                             timeval{least, least}, timeval{0, most}}) {
+    device_.send(device_.now_ns, 1, [&](v4l2_buffer& buffer) { buffer.timestamp = time; });
+    const FramePtr frame = next();
+    ASSERT_TRUE(frame) << time.tv_sec << " s and " << time.tv_usec << " us";
+    EXPECT_EQ(frame->timestamp_ns, frame->arrival_ns);
+    EXPECT_GT(frame->timestamp_ns, before_ns);
+    before_ns = frame->timestamp_ns;
+  }
 }
 
 TEST_F(V4l2Stream, GapsInTheSequenceAreCounted) {
