@@ -436,7 +436,10 @@ std::shared_ptr<Device> open_device(const DeviceOptions& options) {
   return std::make_shared<Device>(options);
 }
 std::shared_ptr<Device> awaited_gpu(const DeviceOptions& options) {
-  return std::make_shared<Device>(options, Device::Awaited{});
+  return std::make_shared<Device>(options, Device::Awaited{.gpu = true});
+}
+std::shared_ptr<Device> awaited_device(const DeviceOptions& options) {
+  return std::make_shared<Device>(options, Device::Awaited{.gpu = false});
 }
 void reopen_device(Device& device, bool cpu_instead) {
   device.reopen(cpu_instead);

@@ -25,9 +25,12 @@ class Device {
  public:
   // Throws previz::Error saying what is missing and which devices were found.
   explicit Device(DeviceOptions options);
-  struct Awaited {};
+  struct Awaited {
+    bool gpu;  // and no CPU device in its place
+  };
   // Opens nothing; reopen() opens a GPU.
-  Device(DeviceOptions options, Awaited) : options_(std::move(options)), had_gpu_(true) {}
+  Device(DeviceOptions options, Awaited awaited)
+      : options_(std::move(options)), had_gpu_(awaited.gpu) {}
   // Closes and opens the device again. Throws as the constructor does, and can be called again
   // after that. Where there was a GPU, a CPU device is taken only if `cpu_instead`: drivers list
   // one while a GPU is being reset, and it would never be left.

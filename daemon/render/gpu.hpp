@@ -48,8 +48,10 @@ class DeviceLost : public Error {
 
 class Device;  // daemon/render/device.hpp
 std::shared_ptr<Device> open_device(const DeviceOptions& options = {});
-// Returns a device that is not open yet: reopen_device() opens it once there is a GPU.
+// Return a device that is not open yet: reopen_device() opens it once there is a GPU, or any
+// device.
 std::shared_ptr<Device> awaited_gpu(const DeviceOptions& options = {});
+std::shared_ptr<Device> awaited_device(const DeviceOptions& options = {});
 // Opens a lost device again, with the same options. Nothing that was created on the device may
 // still exist. Throws previz::Error while there is no device; it can be tried again. A device that
 // was a GPU, or was awaited as one, is followed by a CPU device only if `cpu_instead`.

@@ -64,21 +64,21 @@ std::shared_ptr<render::Device> open_graphics(const render::DeviceOptions& optio
                                               bool cpu_instead, report::Reports& reports) {
   const std::optional<std::filesystem::path> memory =
       options.name.empty() ? memory_file() : std::nullopt;
-  const std::string had = memory ? remembered_gpu(*memory) : std::string();
-  if (had.empty()) {
-    std::shared_ptr<render::Device> device = render::open_device(options);
-    if (memory && render::is_gpu(*device)) remember(*memory, render::device_name(*device), reports);
-    return device;
-  }
-  std::shared_ptr<render::Device> device = render::awaited_gpu(options);
+  if (!memory) return render::open_device(options);
+  const std::string had = remembered_gpu(*memory);
+  std::shared_ptr<render::Device> device =
+      had.empty() ? render::awaited_device(options) : render::awaited_gpu(options);
   try {
     render::reopen_device(*device, cpu_instead);
     if (render::is_gpu(*device)) remember(*memory, render::device_name(*device), reports);
   } catch (const Error& error) {
-    reports({report::Severity::error, "",
-             "the rig had the graphics device " + had +
-                 ", which is not there; it is waited for. If it is gone for good, remove " +
-                 memory->string() + ". " + error.what()});
+    const std::string what =
+        had.empty()
+            ? "there is no graphics device; takes can be recorded, and one is waited for. "
+            : "the rig had the graphics device " + had +
+                  ", which is not there; it is waited for. If it is gone for good, remove " +
+                  memory->string() + ". ";
+    reports({report::Severity::error, "", what + error.what()});
   }
   return device;
 }

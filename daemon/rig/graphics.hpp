@@ -13,7 +13,8 @@ namespace previz::rig {
 // that is not there now: its module may come late, or it is being reset. A CPU device is taken if
 // `cpu_instead`, or if the rig never had a GPU. The memory is the file "graphics-device" in the
 // folder that systemd names by STATE_DIRECTORY; without such a folder, or if `options` names a
-// device, nothing is remembered. Throws previz::Error if there is no device at all.
+// device, nothing is remembered. If there is no device at all, a service awaits one, because takes
+// can be recorded without; elsewhere previz::Error is thrown.
 std::shared_ptr<render::Device> open_graphics(const render::DeviceOptions& options,
                                               bool cpu_instead, report::Reports& reports);
 

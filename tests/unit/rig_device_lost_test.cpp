@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <mutex>
+#include <optional>
 #include <sstream>
 
 #include "daemon/rig/live.hpp"
@@ -219,6 +220,23 @@ TEST_F(RigWithoutItsGpu, StartsOnTheCpuIfItNeverHadOne) {
   run([&] { display_.until_rendered(1); });
   EXPECT_NE(log_.text().find("live on llvmpipe (CPU)"), std::string::npos) << log_.text();
   EXPECT_FALSE(std::filesystem::exists(directory_ / "graphics-device"));
+}
+
+// A box whose driver is not installed, or is being upgraded.
+TEST_F(RigWithoutItsGpu, RecordsWithoutAnyDriverAndDrawsOnceThereIsOne) {
+  const Variable state("STATE_DIRECTORY", directory_.path());
+  std::optional<Variable> no_driver(std::in_place, "VK_ICD_FILENAMES", directory_ / "none");
+  run([&] {
+    display_.until_plates(1);
+    hand_.press("record");
+    display_.until_plates(10);
+    no_driver.reset();
+    display_.until_rendered(2);
+    hand_.press("record");
+    test::must_come("the take ends", [&] { return said("1_take001 is finished"); });
+  });
+  EXPECT_TRUE(said("there is no graphics device; takes can be recorded")) << log_.text();
+  EXPECT_TRUE(session::open_session(directory_ / "takes/1_take001").missing.empty());
 }
 
 TEST(RigDeviceLost, PicturesComeBackAndTheTakeLacksNothing) {
