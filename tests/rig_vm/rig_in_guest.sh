@@ -8,11 +8,6 @@ tell_more() {
   journalctl --unit=previzd --no-pager --lines=40 --output=cat
   previzctl status
 }
-status() { previzctl status 2>/dev/null | sed -n "s/^$1: //p"; }
-status_is() { [[ $(status "$1") == "$2" ]]; }
-metric() { previzctl metrics 2>/dev/null | jq "$1 // 0"; }
-above() { [[ $(metric "$1") -gt $2 ]]; }
-advances() { within 120 "$2" above ".stages.\"$1\".frames" "$(metric ".stages.\"$1\".frames")"; }
 tap() {
   rig-devices press "$1"
   sleep 0.3
@@ -176,7 +171,6 @@ grep -q '"record"\|button1' "$take/events.jsonl" || fail "the take has no event 
 previzctl metrics >metrics.json
 
 step "an upgrade waits for the end of the take"
-main_pid() { systemctl show --property=MainPID --value previzd; }
 pid=$(main_pid)
 tap 1
 within 60 "a take runs" status_is Recording yes

@@ -1,29 +1,34 @@
 #!/usr/bin/env bash
 # previzd in a VM, a Debian 12 guest with real device nodes and simulated hardware behind them.
 #   tests/rig_vm/run.sh [BUILD [PART]...]
+#   tests/rig_vm/run.sh BUILD faults [FAULT]...
 #     BUILD: a build folder, made where it is not there (default: build/release)
-#     PART (default: both):
+#     PART (default: all):
 #       drivers   every driver on the kernel's own devices, unplugged a hundred times
 #       rig       the package and its daemon under systemd: a take, buttons, every device unplugged
+#       faults    what befalls a rig while it records, the shipped service unchanged: kills, disks
+#                 that are late, full, pulled out or stand still, a power cut, and others
+#                 (faults_in_guest.sh); with a FAULT that one alone
 # The guest is built the first time, and when what the package depends on or guest/ has changed: as
 # root, six minutes and the network. The guest's processor is emulated: "drivers" takes twenty
-# minutes, "rig" nine, eighteen on two busy cores. What they leave is in out/rig_vm.
+# minutes, "rig" nine, eighteen on two busy cores, "faults" twenty. What they leave is in out/rig_vm.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 here=tests/rig_vm
 build=${1:-build/release}
-parts=("${@:2}")
-[[ ${#parts[@]} -gt 0 ]] || parts=(drivers rig)
+parts=("${@:2}") faults=()
+[[ ${#parts[@]} -gt 0 ]] || parts=(drivers rig faults)
+[[ ${parts[0]} != faults ]] || faults=("${parts[@]:1}") parts=(faults)
 for part in "${parts[@]}"; do
-  [[ $part == drivers || $part == rig ]] && continue
-  echo "rig_vm: no part \"$part\"; there are drivers and rig" >&2
+  [[ $part == drivers || $part == rig || $part == faults ]] && continue
+  echo "rig_vm: no part \"$part\"; there are drivers, rig and faults" >&2
   exit 2
 done
 limit_s=3000
 
-for tool in qemu-system-x86_64 mmdebstrap mke2fs cpio busybox; do
+for tool in qemu-system-x86_64 qemu-img mmdebstrap mke2fs cpio busybox; do
   command -v "$tool" >/dev/null && continue
-  echo "rig_vm: $tool is missing; apt-get install qemu-system-x86 mmdebstrap e2fsprogs cpio" \
+  echo "rig_vm: $tool is missing; apt-get install qemu-system-x86 qemu-utils mmdebstrap e2fsprogs cpio" \
     "busybox-static linux-headers-amd64 xz-utils make gcc" >&2
   exit 1
 done
@@ -71,6 +76,10 @@ run_part() {
 }
 
 for part in "${parts[@]}"; do
+  if [[ $part == faults ]]; then
+    "$here/faults.sh" "$guest" "$build" "$deb" "${faults[@]}"
+    continue
+  fi
   share=out/rig_vm/$part
   rm -rf "$share"
   mkdir -p "$share"

@@ -11,7 +11,7 @@ root=$to/root
 [[ -e $to/modules/kver ]] || "$here/build_modules.sh" "$to/modules"
 kver=$(cat "$to/modules/kver")
 
-packages=(systemd systemd-sysv udev dbus kmod iproute2 procps "linux-image-$kver" jq)
+packages=(systemd systemd-sysv udev dbus polkitd kmod iproute2 procps dmsetup "linux-image-$kver" jq)
 # Kernel modules that no rig needs, documentation, and the generic initrd, which is slow.
 leave_out=('/usr/share/doc/*' '/usr/share/locale/*' '/usr/share/man/*' '/usr/share/info/*'
   /etc/kernel/postinst.d/initramfs-tools)
@@ -50,10 +50,11 @@ echo rig >"$root/etc/hostname"
 mkdir -p "$root/etc/systemd/journald.conf.d" "$root/rig"
 printf '[Journal]\nStorage=volatile\n' >"$root/etc/systemd/journald.conf.d/rig.conf"
 
-# An initrd that mounts the disk, read only, below memory that takes what is written.
+# An initrd that mounts the disk: as it is for the kernel's parameter rig.keep, and else read only,
+# below memory that takes what is written.
 initrd=$to/initrd
 rm -rf "$initrd"
-mkdir -p "$initrd"/{bin,dev,lib,disk,ram,new}
+mkdir -p "$initrd"/{bin,dev,lib,proc,disk,ram,new}
 cp /bin/busybox "$initrd/bin/"
 for module in virtio_pci virtio_blk crc32c_generic ext4 overlay; do
   chroot "$root" modprobe -S "$kver" --show-depends "$module"
@@ -67,6 +68,5 @@ chmod 755 "$initrd/init"
 cp "$root/boot/vmlinuz-$kver" "$to/vmlinuz"
 
 size_kib=$(du -skx "$root" | cut -f1)
-mke2fs -q -F -t ext4 -O ^has_journal -m 0 -d "$root" "$to/root.ext4" \
-  $((size_kib * 12 / 10 + 65536))k
+mke2fs -q -F -t ext4 -m 0 -d "$root" "$to/root.ext4" $((size_kib * 12 / 10 + 524288))k
 rm -rf "$root" "$initrd"
