@@ -23,7 +23,8 @@
 #   fuzz       libFuzzer on every reader of foreign bytes, a minute each (tests/fuzz/run.sh)
 #   soak       half an hour of a whole rig (tests/soak)
 #   package    builds the .deb and installs it in a bare Debian (tests/package/run.sh)
-#   rig_vm     runs the drivers, then the package, on a rig in a VM (tests/rig_vm/run.sh)
+#   rig_vm     runs the drivers, then the package, on a rig in a VM, and brings faults upon it
+#              (tests/rig_vm/run.sh)
 # package and rig_vm need root or user namespaces, and the network.
 #
 # A case may be skipped only if tests/skips.txt says why; any other skip is a failure.

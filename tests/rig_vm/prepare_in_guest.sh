@@ -11,7 +11,7 @@ tell_more() {
 step "disks"
 mkdir -p /mnt/a /mnt/b
 # A disk that is not there is not waited for as long as systemd would.
-for disk in a b; do echo "LABEL=takes_$disk /mnt/$disk ext4 nofail,x-systemd.device-timeout=5s 0 2"; done >>/etc/fstab
+for disk in a b; do echo "LABEL=takes_$disk /mnt/$disk ext4 nofail,x-systemd.device-timeout=20s 0 2"; done >>/etc/fstab
 systemctl daemon-reload
 systemctl start mnt-a.mount mnt-b.mount || fail "the disks are not mounted"
 
