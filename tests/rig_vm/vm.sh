@@ -70,6 +70,12 @@ comes() { until "$@" 2>/dev/null; do sleep 0.2; done; }
   # The children of timeout: QEMU alone.
   pkill -KILL -P "$qemu"
 ) &
+(
+  # Of a guest that has slept, QEMU does not notice that it is off.
+  comes grep -q 'reboot: Power down' "$run/console"
+  sleep 3
+  echo quit >"$run/monitor.in"
+) &
 if [[ -n $save ]]; then
   (
     comes grep -q '^rig: at rest' "$run/console"
