@@ -57,10 +57,11 @@ constexpr int mishaps = 11, takes = 3 * mishaps;  // each with each kind of stam
 
 // A computer that saves power while no camera is there lets waits end late by so much.
 constexpr std::int64_t quiet_grain = 4 * second;
-// Of what the rig does at a time: looks at clocks, and a wait that is rounded to milliseconds.
+// The rig takes so long for what it does at a time: looks at clocks, and a wait that is rounded to
+// milliseconds.
 constexpr std::int64_t work = 5 * ms;
 
-// What the watchdog of systemd hears, and when.
+// Listens as the watchdog of systemd does, and notes when it is fed.
 class Watchdog {
  public:
   Watchdog(const SimulatedTime& time, const std::filesystem::path& path)

@@ -71,7 +71,7 @@ comes() { until "$@" 2>/dev/null; do sleep 0.2; done; }
   pkill -KILL -P "$qemu"
 ) &
 (
-  # Of a guest that has slept, QEMU does not notice that it is off.
+  # QEMU does not notice that a guest is off which has slept; the others are gone by then.
   comes grep -q 'reboot: Power down' "$run/console"
   sleep 3
   echo quit >"$run/monitor.in"
