@@ -4,6 +4,7 @@
 #include "daemon/exchange/footage.hpp"
 #include "daemon/exchange/import_description.hpp"
 #include "daemon/exchange/picture_header.hpp"
+#include "tests/fuzz/mutators.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace previz::fuzz {
@@ -49,7 +50,7 @@ void picture(Bytes bytes) {
 }
 
 constexpr Target own[] = {
-    {"frames_json", "FRAMES.json", frames_json},
+    {"frames_json", "FRAMES.json", frames_json, mutate_json},
     {"frames_csv", "the table that FRAMES.json names", frames_csv},
     {"picture", "a picture to import: PNG, JPEG or TIFF", picture},
 };

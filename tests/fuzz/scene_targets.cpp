@@ -12,6 +12,7 @@
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
+#include "tests/fuzz/mutators.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace previz::fuzz {
@@ -134,8 +135,8 @@ void lens_file(Bytes bytes) {
 }
 
 constexpr Target own[] = {
-    {"set", "a set file", set_file},
-    {"gltf", "a glTF file", gltf},
+    {"set", "a set file", set_file, mutate_toml},
+    {"gltf", "a glTF file", gltf, mutate_gltf},
     {"texture", "an image of a glTF file", texture},
     {"environment", "an environment: OpenEXR or Radiance .hdr", environment},
     {"png", "a plate as PNG", png},

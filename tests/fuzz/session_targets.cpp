@@ -4,6 +4,7 @@
 #include "drivers/session/session.hpp"
 #include "drivers/session/session_toml.hpp"
 #include "drivers/session/video_reader.hpp"
+#include "tests/fuzz/mutators.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace previz::fuzz {
@@ -58,11 +59,11 @@ void matroska(Bytes bytes) {
 }
 
 constexpr Target own[] = {
-    {"session_toml", "session.toml of a take", session_toml},
-    {"frame_lines", "observer.jsonl or light.jsonl", frame_lines},
-    {"track_lines", "track.jsonl", track_lines},
-    {"button_lines", "events.jsonl", button_lines},
-    {"matroska", "observer.mkv, of 24x18 pixels", matroska},
+    {"session_toml", "session.toml of a take", session_toml, mutate_toml},
+    {"frame_lines", "observer.jsonl or light.jsonl", frame_lines, mutate_json_lines},
+    {"track_lines", "track.jsonl", track_lines, mutate_json_lines},
+    {"button_lines", "events.jsonl", button_lines, mutate_json_lines},
+    {"matroska", "observer.mkv, of 24x18 pixels", matroska, mutate_matroska},
 };
 
 }  // namespace session_targets_cpp

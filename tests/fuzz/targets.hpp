@@ -4,6 +4,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
+#include <random>
 #include <span>
 #include <string>
 #include <string_view>
@@ -11,6 +13,8 @@
 namespace previz::fuzz {
 
 using Bytes = std::span<const std::uint8_t>;
+// Returns the bytes with their structure changed, or null if they do not have the structure.
+using Mutator = std::optional<std::string> (*)(Bytes, std::mt19937&);
 
 struct Target {
   const char* name;   // also of its folder in tests/fuzz/corpus
@@ -18,6 +22,7 @@ struct Target {
   // Reads the bytes. Throws previz::Error where they are refused; anything else that it throws is a
   // fault of the reader, as is a promise of the reader's header that does not hold.
   void (*read)(Bytes);
+  Mutator mutate = nullptr;  // one of mutators.hpp; null where the bytes have no such structure
 };
 
 std::span<const Target> targets();

@@ -12,6 +12,7 @@ extern "C" {
 #include "daemon/exchange/import.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
+#include "tests/fuzz/mutators.hpp"
 #include "tests/fuzz/targets.hpp"
 
 namespace previz::fuzz {
@@ -106,7 +107,7 @@ void import_video(Bytes bytes) {
 
 constexpr Target own[] = {
     {"import_video", "FRAMES.json that names videos; or, after a v and a digit, a video",
-     import_video},
+     import_video, mutate_import_video},
 };
 
 }  // namespace video_targets_cpp
