@@ -243,6 +243,42 @@ void offer(output::Recorder& recorder, int index) {
   recorder.offer(track);
 }
 
+// The next recording has begun when the first take ends, and goes on afterwards: a failure is that
+// of one take, and leaves the other whole.
+TEST_P(EveryCall, OfARecorderThatHasBegunTheNextTakeCostsOneOfThem) {
+  for (std::size_t call = 0;; ++call) {
+    const TemporaryDirectory folder;
+    FaultyDisk disk(folder.path());
+    disk.fail(call, GetParam());
+    output::RecorderOptions options = options_of(folder / "takes", {});
+    options.take.folders.pop_back();
+    {
+      output::Recorder recorder(std::move(options));
+      recorder.start();
+      for (int i = 0; i < frames; ++i) offer(recorder, i);
+      recorder.stop();
+      recorder.start();
+      EXPECT_TRUE(wait_until("the first take is over", [&] {
+        const output::RecorderStatus status = recorder.status();
+        return status.finished_takes + status.failures > 0;
+      }));
+      for (int i = frames; i < 2 * frames; ++i) offer(recorder, i);
+      recorder.stop();
+    }
+    SCOPED_TRACE("call " + std::to_string(call) + ", " + disk.describe(call));
+    const bool has_failed = call < disk.calls();
+    int whole = 0;
+    for (const auto& take : std::filesystem::directory_iterator(folder / "takes")) {
+      if (!is_closed(take.path())) continue;
+      session::Session session = session::open_session(take.path());
+      const auto stream = session::open_stream(session, "observer");
+      whole += session.missing.empty() && stream->records().size() >= std::size_t{frames};
+    }
+    EXPECT_GE(whole, has_failed ? 1 : 2);
+    if (!has_failed) break;
+  }
+}
+
 // With a second disk the recording goes on there, and every frame that was offered is in one of the
 // takes: the frame with which the disk failed, too. A disk that fails while a stopped take is ended
 // is that take's failure, and begins no other.
