@@ -84,7 +84,7 @@ for name in "${names[@]}"; do
   if ! mutate "$name"; then
     complain "$name: ${file[$name]} does not have its text exactly once"
   elif ! compile "${program[$name]}"; then
-    complain "$name does not compile: $(grep -m 1 'error' "$log")"
+    complain "$name does not compile: $(grep -m 1 'error:' "$log")"
   else
     run "$name" "${limit[$name]:-40}" || status=$?
     how=$(sed -n 's/^\[  FAILED  \] \([^ ,]*\).*ms)$/\1/p' "$log" | head -n 1)
@@ -100,7 +100,7 @@ for name in "${names[@]}"; do
   git -C "$tree" checkout --quiet -- "${file[$name]}"
 done
 
-# Every row of the table has a mutation, or a reason to have none.
+# Every row of the table has a mutation, or a reason to have none; the lists were read as a whole.
 rows=0 without=0
 while IFS= read -r row; do
   rows=$((rows + 1)) found=
