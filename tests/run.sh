@@ -6,7 +6,7 @@
 #
 #   tests/run.sh              the gate: release asan format lint
 #   tests/run.sh full         the gate, with all tests in release, and then
-#                             bench lint-all long asan-all tsan fuzz soak package rig_vm
+#                             bench lint-all long asan-all tsan fuzz mutations soak package rig_vm
 #   tests/run.sh STEP...      only the named steps
 #
 #   release    builds everything but the benchmarks and soak, and runs the tests; in the gate without
@@ -21,6 +21,8 @@
 #   asan-all   every test program under ASan and UBSan
 #   tsan       the test programs marked THREADS under ThreadSanitizer, with a storm of ten minutes
 #   fuzz       libFuzzer on every reader of foreign bytes, a minute each (tests/fuzz/run.sh)
+#   mutations  breaks each promise of the fault table once, and looks whether its test fails
+#              (tests/mutations/run.sh)
 #   soak       half an hour of a whole rig (tests/soak)
 #   package    builds the .deb and installs it in a bare Debian (tests/package/run.sh)
 #   rig_vm     runs the drivers, then the package, on a rig in a VM, and brings faults upon it
@@ -36,7 +38,7 @@ gate=(release asan format lint)
 steps=("$@")
 once=OFF
 [[ ${#steps[@]} -gt 0 ]] || { steps=("${gate[@]}") once=ON; }
-[[ ${steps[*]} != full ]] || steps=("${gate[@]}" bench lint-all long asan-all tsan fuzz soak package rig_vm)
+[[ ${steps[*]} != full ]] || steps=("${gate[@]}" bench lint-all long asan-all tsan fuzz mutations soak package rig_vm)
 failures=()
 summaries=()
 costs=()
@@ -154,10 +156,10 @@ for name in "${steps[@]}"; do
     lint) check "lint" lint 5 ;;
     lint-all) check "lint-all" lint 86400 ;;
     bench | fuzz | soak) check "$name" "$name" ;;
-    package | rig_vm) check "$name" "tests/$name/run.sh" ;;
+    mutations | package | rig_vm) check "$name" "tests/$name/run.sh" ;;
     *)
       echo "tests/run.sh: no step '$name'; allowed: full, or of release, asan, format, lint," \
-        "bench, lint-all, long, asan-all, tsan, fuzz, soak, package and rig_vm" >&2
+        "bench, lint-all, long, asan-all, tsan, fuzz, mutations, soak, package and rig_vm" >&2
       exit 2
       ;;
   esac
