@@ -1,10 +1,11 @@
 // libFuzzer's entry into the target that PREVIZ_FUZZ_TARGET names. tests/fuzz/run.sh starts it.
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <optional>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "tests/fuzz/targets.hpp"
 
@@ -12,15 +13,31 @@ namespace {
 
 const previz::fuzz::Target* chosen = nullptr;
 
+// Where a program changes inputs itself, libFuzzer lets them be of any length from the beginning.
+// Bytes without a structure are to grow slowly nevertheless: 100 is what libFuzzer takes elsewhere.
+// What the command line says comes after this, and goes before it.
+void control_length(int& count, char**& arguments) {
+  static std::string option = "-len_control=100";
+  static std::vector<char*> all;
+  all.assign(arguments, arguments + count);
+  all.insert(all.begin() + 1, option.data());
+  count = static_cast<int>(all.size());
+  all.push_back(nullptr);
+  arguments = all.data();
+}
+
 }  // namespace
 
 // libFuzzer's own change of bytes, which lie in room for `room` bytes. Returns their new number.
 extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t room);
 
-extern "C" int LLVMFuzzerInitialize(int* /*count*/, char*** /*arguments*/) {
+extern "C" int LLVMFuzzerInitialize(int* count, char*** arguments) {
   const char* name = std::getenv("PREVIZ_FUZZ_TARGET");
   chosen = name ? previz::fuzz::find_target(name) : nullptr;
-  if (chosen) return 0;
+  if (chosen) {
+    if (!chosen->mutate) control_length(*count, *arguments);
+    return 0;
+  }
   std::fputs("PREVIZ_FUZZ_TARGET must be one of these:\n", stderr);
   for (const previz::fuzz::Target& target : previz::fuzz::targets())
     std::printf("%-14s %s\n", target.name, target.reads);
@@ -40,7 +57,7 @@ extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t s
   if (chosen->mutate && random() % 4 != 0) {
     const std::optional<std::string> changed = chosen->mutate({data, size}, random);
     if (changed && changed->size() <= room) {
-      std::memcpy(data, changed->data(), changed->size());
+      std::ranges::copy(*changed, data);
       return changed->size();
     }
   }
