@@ -60,6 +60,7 @@ TEST(Upgrade, WaitsForTheEndOfTheTake) {
     hand.press("record");
     pictures(recorded, 1);
     replaced = true;
+    hand.press("debug_view");  // whatever changes meanwhile ends no take
     pictures(recorded, 5);
     EXPECT_FALSE(ended);
     hand.press("record");
