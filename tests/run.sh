@@ -18,8 +18,8 @@
 #   lint-all   the same without a limit
 #   bench      builds the benchmarks and the programs that measure, and runs their test
 #   long       the cases that tests/*/CMakeLists.txt leave out of the gate (LONG), in the release build
-#   asan-all   every test program under ASan and UBSan
-#   tsan       the test programs marked THREADS under ThreadSanitizer, with a storm of ten minutes
+#   asan-all   every test program under ASan and UBSan, with two storms of five minutes (tests/storm)
+#   tsan       the test programs marked THREADS under ThreadSanitizer, with the same storms
 #   fuzz       libFuzzer on every reader of foreign bytes, a minute each (tests/fuzz/run.sh)
 #   mutations  breaks each promise of the fault table once, and looks whether its test fails
 #              (tests/mutations/run.sh)
@@ -149,8 +149,8 @@ lint() {
 config/install-deps.sh || exit 1
 for name in "${steps[@]}"; do
   case $name in
-    release | asan | asan-all) build_and_test "$name" ;;
-    tsan) PREVIZ_STORM_S=600 build_and_test "$name" ;;
+    release | asan) build_and_test "$name" ;;
+    asan-all | tsan) PREVIZ_STORM_S=300 build_and_test "$name" ;;  # each of the two storms
     long) build release && check "long" run_tests release --label-regex long ;;
     format) check "format" format ;;
     lint) check "lint" lint 5 ;;

@@ -1,8 +1,9 @@
 // The rig for minutes on a looped take that comes faster than it can be rendered, with cameras that
 // are unplugged and come back, and a crew that keeps pressing buttons and has the set read again:
-// memory and file descriptors must stay flat, and every captured frame must have been rendered or
-// dropped for a cause that is counted. Prints the figures; 0: all of it held.
+// memory, file descriptors and threads must stay flat, and every captured frame must have been
+// rendered or dropped for a cause that is counted. Prints the figures; 0: all of it held.
 #include <malloc.h>
+#include <sys/resource.h>
 #include <sys/timerfd.h>
 #include <unistd.h>
 
@@ -13,12 +14,14 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <iterator>
 #include <limits>
 #include <mutex>
 #include <sstream>
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "daemon/rig/live.hpp"
@@ -72,7 +75,14 @@ struct Sample {
   double allocated_mb = 0;  // by the program
   double resident_mb = 0;   // after the allocator gave back what it only kept
   double descriptors = 0;
+  double threads = 0;
 };
+
+// Returns the number of this process's threads.
+double count_threads() {
+  const std::filesystem::directory_iterator tasks("/proc/self/task");
+  return static_cast<double>(std::distance(begin(tasks), end(tasks)));
+}
 
 Sample sample_at(double minutes) {
   malloc_trim(0);
@@ -81,32 +91,43 @@ Sample sample_at(double minutes) {
   statm >> total_pages >> resident_pages;
   return {minutes, 1e-6 * static_cast<double>(test::live_bytes()),
           1e-6 * static_cast<double>(resident_pages) * static_cast<double>(sysconf(_SC_PAGESIZE)),
-          static_cast<double>(test::open_descriptors())};
+          static_cast<double>(test::open_descriptors()), count_threads()};
 }
 
-// Over the samples of a time. Files are open for the time of a write, and cameras are closed for
-// the moment in which a set is read again: so of descriptors the number counts below which a tenth
-// of the samples lie. What is never given back is in that, too.
+// Files are open for the time of a write, threads run for that of a refinement, and cameras are
+// closed for the moment in which a set is read again: so the number counts below which a tenth of
+// the samples lie. What is never given back is in that, too.
+struct Lowest {
+  double least = 0, tenth = 0;
+};
+
+Lowest lowest_of(std::vector<double> numbers) {
+  if (numbers.empty()) return {};
+  std::ranges::sort(numbers);
+  return {numbers.front(), numbers[numbers.size() / 10]};
+}
+
+// Over the samples of a time.
 struct Usage {
   double allocated_mb = 0, resident_mb = 0;  // mean
-  double least_descriptors = 0, descriptors = 0;
+  Lowest descriptors, threads;
 };
 
 Usage usage(const std::vector<Sample>& samples, double from, double to) {
   Usage found;
   double count = 0;
-  std::vector<double> descriptors;
+  std::vector<double> descriptors, threads;
   for (const Sample& sample : samples) {
     if (sample.minutes < from || sample.minutes >= to) continue;
     ++count;
     found.allocated_mb += sample.allocated_mb;
     found.resident_mb += sample.resident_mb;
     descriptors.push_back(sample.descriptors);
+    threads.push_back(sample.threads);
   }
-  if (descriptors.empty()) return found;
-  std::ranges::sort(descriptors);
-  found.least_descriptors = descriptors.front();
-  found.descriptors = descriptors[descriptors.size() / 10];
+  if (count == 0) return found;
+  found.descriptors = lowest_of(std::move(descriptors));
+  found.threads = lowest_of(std::move(threads));
   found.allocated_mb /= count;
   found.resident_mb /= count;
   return found;
@@ -137,17 +158,19 @@ bool stays_flat(const std::vector<Sample>& samples, double minutes) {
   constexpr double allowed_mb = 3, allowed_ratio = 1.1;
   const Usage early = usage(samples, minutes / 4, minutes / 2);
   const Usage late = usage(samples, minutes * 3 / 4, 2 * minutes);
-  std::printf(
-      "second quarter: %.1f MB allocated, %.1f MB resident, %.0f descriptors (%.0f at least); "
-      "last: %.1f MB, %.1f MB, %.0f (%.0f)\n",
-      early.allocated_mb, early.resident_mb, early.descriptors, early.least_descriptors,
-      late.allocated_mb, late.resident_mb, late.descriptors, late.least_descriptors);
+  for (const auto& [quarter, used] : {std::pair("second", early), {"last", late}})
+    std::printf(
+        "%s quarter: %.1f MB allocated, %.1f MB resident, %.0f descriptors (%.0f at least), %.0f "
+        "threads (%.0f at least)\n",
+        quarter, used.allocated_mb, used.resident_mb, used.descriptors.tenth,
+        used.descriptors.least, used.threads.tenth, used.threads.least);
   const bool no_leak =
       check(late.allocated_mb <= early.allocated_mb + allowed_mb, "memory is flat");
   const bool no_bloat =
       check(late.resident_mb <= allowed_ratio * early.resident_mb, "resident memory is flat");
-  return check(late.descriptors <= early.descriptors, "file descriptors are flat") && no_leak &&
-         no_bloat;
+  const bool no_threads = check(late.threads.tenth <= early.threads.tenth, "threads are flat");
+  return check(late.descriptors.tenth <= early.descriptors.tenth, "file descriptors are flat") &&
+         no_leak && no_bloat && no_threads;
 }
 
 std::string set_text(const std::filesystem::path& takes) {
@@ -225,6 +248,9 @@ bool soak(double minutes) {
   std::printf("%.1f minutes, %.1f frames a second captured, %.1f rendered\n", metrics.seconds / 60,
               static_cast<double>(metrics.stages.at("observer").frames) / metrics.seconds,
               static_cast<double>(metrics.stages.at("render").frames) / metrics.seconds);
+  rusage used{};
+  getrusage(RUSAGE_SELF, &used);
+  std::printf("CPU: %ld s user, %ld s system\n", used.ru_utime.tv_sec, used.ru_stime.tv_sec);
   std::printf("latency, capture to display: median %.1f ms, 99 in 100 below %.1f ms\n",
               1e3 * metrics.latency_p50_s, 1e3 * metrics.latency_p99_s);
   const bool accounted = all_accounted_for(metrics);
@@ -235,7 +261,7 @@ bool soak(double minutes) {
 }  // namespace previz
 
 int main(int argc, char** argv) {
-  CLI::App app("A rig for minutes: memory, file descriptors, drops, latency");
+  CLI::App app("A rig for minutes: memory, file descriptors, threads, drops, latency");
   double minutes = 3;
   app.add_option("--minutes", minutes)->check(CLI::Range(0.1, 10000.0))->capture_default_str();
   CLI11_PARSE(app, argc, argv);
