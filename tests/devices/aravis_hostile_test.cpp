@@ -301,6 +301,18 @@ TEST(Sandbox, HasUdpAndNoOtherSocketOfTheNetwork) {
   }
 }
 
+TEST(Sandbox, OpensNoFileOfTheMachine) {
+  const auto opened = [](bool usb, const char* file) {
+    return in_sandbox(usb, [=] { return ::open(file, O_RDONLY | O_CLOEXEC); });
+  };
+  const bool has_landlock = in_sandbox(true, [] { return 0; }) == 0;
+  for (const char* file : {"/etc/passwd", "/proc/self/status", "/dev/null"}) {
+    ASSERT_EQ(access(file, R_OK), 0) << file;
+    EXPECT_EQ(opened(false, file), EACCES) << file;
+    EXPECT_TRUE(!has_landlock || opened(true, file) == EACCES) << file;
+  }
+}
+
 // The kernel sends a descriptor's owner any signal that was asked for.
 TEST(Sandbox, SignalsNobodyByWayOfADescriptor) {
   int ends[2];
