@@ -10,13 +10,14 @@
 #   file: what is changed; its text behind "-" must be there exactly once, and becomes that behind "+"
 #   program: test_<program>, and tests: the cases that must fail, as GTEST_FILTER has them
 #   limit_s: a run that lasts longer has failed, since it waits in vain; 40 where there is no such line
-# Works on HEAD, in a worktree and a build of its own below build/mutations. Before anything is changed,
-# the cases must pass, in half of that time. A mutation that does not fit its file, or does not compile, is an error of the
-# list. Ends with status 0 only if every one was caught, and tests/mutations/without.txt has a reason
-# for every row of the table that has none.
+# Works on HEAD, in a worktree and a build of its own below build/mutations. Before anything is
+# changed, the cases must pass, in half of that time. A mutation that does not fit its file, or does
+# not compile, is an error of the list. Ends with status 0 only if every one was caught, and
+# tests/mutations/without.txt has a reason for every row of the table that has none.
 set -uo pipefail
 cd "$(dirname "$0")/../.." || exit
-lists=tests/mutations tree=build/mutations/tree build=build/mutations/build log=build/mutations/log
+config/install-deps.sh lld || exit
+lists=tests/mutations tree=build/mutations/tree build=build/mutations/build log=$PWD/build/mutations/log
 export CCACHE_BASEDIR=$PWD CCACHE_DEPEND=1 CCACHE_NOHASHDIR=1
 export LP_NUM_THREADS=1 MESA_SHADER_CACHE_DIR=$PWD/build/mesa_shader_cache
 names=()
@@ -42,10 +43,12 @@ done < <(cat "$lists"/*.list)
 
 compile() { nice -n 10 cmake --build "$build" --parallel "$(nproc)" --target "test_$1" >"$log" 2>&1; }
 
-# run NAME SECONDS: its cases; 124 or 137 if they last longer
+# run NAME SECONDS: its cases; 124 or 137 if they last longer. The shell's own words on a program that
+# crashes are left out.
 run() {
-  { (cd "$tree" && GTEST_FILTER=${tests[$1]} timeout -k 5 "$2" "../build/$(cd ../build && \
-    find tests -name "test_${program[$1]}" -type f)") >"$log" 2>&1; } 2>/dev/null
+  local binary
+  binary=$(realpath "$(find "$build/tests" -name "test_${program[$1]}" -type f)")
+  { (cd "$tree" && GTEST_FILTER=${tests[$1]} timeout -k 5 "$2" "$binary") >"$log" 2>&1; } 2>/dev/null
 }
 
 # mutate NAME: fails unless the file has the old text once
@@ -77,7 +80,8 @@ for name in "${names[@]}"; do
   key="${program[$name]} ${tests[$name]}"
   if [[ -z ${passes[$key]:-} ]]; then
     passes[$key]=no
-    compile "${program[$name]}" && run "$name" $((${limit[$name]:-40} / 2)) && grep -q '^\[  PASSED  \] [1-9]' "$log" && passes[$key]=yes
+    compile "${program[$name]}" && run "$name" $((${limit[$name]:-40} / 2)) &&
+      grep -q '^\[  PASSED  \] [1-9]' "$log" && passes[$key]=yes
   fi
   [[ ${passes[$key]} == yes ]] || { complain "$name: $key does not pass as it is" && continue; }
   begin=$SECONDS status=0
@@ -90,10 +94,12 @@ for name in "${names[@]}"; do
     how=$(sed -n 's/^\[  FAILED  \] \([^ ,]*\).*ms)$/\1/p' "$log" | head -n 1)
     [[ -n $how ]] || how="ends with $status in $(sed -n 's/^\[ RUN      \] //p' "$log" | tail -n 1)"
     if [[ $status == 0 ]]; then
-      printf 'SURVIVED %s: %s (%s, %d s)\n' "$name" "${promise[$name]}" "${tests[$name]}" $((SECONDS - begin))
+      printf 'SURVIVED %s: %s (%s, %d s)\n' "$name" "${promise[$name]}" "${tests[$name]}" \
+        $((SECONDS - begin))
       survived=$((survived + 1))
     else
-      printf 'caught   %s: %s (%s, %d s)\n' "$name" "${promise[$name]}" "$how" $((SECONDS - begin))
+      printf 'caught   %s: %s (%s, %d s)\n' "$name" "${promise[$name]}" "$how" \
+        $((SECONDS - begin))
       caught=$((caught + 1))
     fi
   fi
@@ -107,7 +113,9 @@ while IFS= read -r row; do
   for words in "${promise[@]}"; do [[ $row != "$words"* ]] || found=yes; done
   [[ -z $found ]] || continue
   without=$((without + 1))
-  while IFS= read -r words; do [[ -z $words || $row != "${words%% | *}"* ]] || found=yes; done <"$lists/without.txt"
+  while IFS= read -r words; do
+    [[ -z $words || $row != "${words%% | *}"* ]] || found=yes
+  done <"$lists/without.txt"
   [[ -n $found ]] || complain "no mutation of '$row', and no reason in $lists/without.txt"
 done < <(sed -n '/^# Faults/,/^# The package/s/^| //p' tests/COVERAGE.md | tail -n +3)
 printf 'mutations: %d caught, %d survived, %d errors; of %d rows, %d have no mutation\n' \

@@ -208,11 +208,9 @@ void Storm::print() const {
       tally_.presses.load(), tally_.answers.load(), tally_.buses.load(), tally_.sets.load(),
       tally_.wrong_sets.load(), tally_.exceptions.load(), tally_.unplugs.load(),
       tally_.receivers.load(), tally_.packets.load());
-  for (const char* stage : {"observer", "light", "tracking", "render", "recorder"}) {
-    if (!metrics_.stages.contains(stage)) continue;
-    std::printf("%s: %llu frames\n", stage,
-                static_cast<unsigned long long>(metrics_.stages.at(stage).frames));
-    for (const auto& [cause, frames] : metrics_.stages.at(stage).dropped)
+  for (const auto& [name, stage] : metrics_.stages) {
+    std::printf("%s: %llu frames\n", name.c_str(), static_cast<unsigned long long>(stage.frames));
+    for (const auto& [cause, frames] : stage.dropped)
       std::printf("  %llu dropped (%s)\n", static_cast<unsigned long long>(frames), cause.c_str());
   }
 }
