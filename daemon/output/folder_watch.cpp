@@ -176,6 +176,7 @@ class FolderWatch::Worker {
   }
 
   const fs::path& folder() const { return options_.folder; }
+  const std::string& slate() const { return options_.slate; }
 
  private:
   struct Task {
@@ -229,6 +230,7 @@ class FolderWatch::Worker {
     const TakeFolders alone({options_.folder}, 0, {});
     now.highest_number =
         next_take_number({options_.folder}, options_.slate, now.highest_number) - 1;
+    now.kept_number = alone.kept_number(options_.slate);
     salvage_.look(now.salvaged);
     now.wish = alone.kept_wish();
     is_in_order_ = true;
@@ -293,6 +295,14 @@ void FolderWatch::follow(const fs::path& take) {
 void FolderWatch::keep_wish(const fs::path& take) {
   worker_->add([take] { TakeFolders::keep_wish(take); },
                "after a restart it would not go on by itself");
+}
+
+void FolderWatch::keep_number(int number) {
+  worker_->add(
+      [folder = worker_->folder(), slate = worker_->slate(), number] {
+        TakeFolders::keep_number(folder, slate, number);
+      },
+      "if the other disk is not there at the next start, a take may get the name of one on it");
 }
 
 void FolderWatch::drop_wish() {

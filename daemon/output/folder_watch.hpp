@@ -33,6 +33,7 @@ struct FolderSeen {
   std::optional<std::uint64_t> free_bytes;  // of its disk; nothing: the disk cannot say
   std::optional<dev_t> disk;
   int highest_number = 0;  // of the slate's takes, as the folder was found
+  int kept_number = 0;     // TakeFolders::kept_number(), as it was found
   // Takes that the process before left cut off and that are in order again, in words, and the take
   // that it was recording.
   std::vector<std::string> salvaged;
@@ -71,8 +72,9 @@ class FolderWatch {
   // From now on looks say whether this take, which is there, is still there. May wait for the disk.
   void follow(const std::filesystem::path& take);
 
-  // Both are done on the watch's thread, in the order of the calls; what fails is noted.
+  // They are done on the watch's thread, in the order of the calls; what fails is noted.
   void keep_wish(const std::filesystem::path& take);  // TakeFolders::keep_wish()
+  void keep_number(int number);                       // TakeFolders::keep_number()
   void drop_wish();                                   // TakeFolders::drop_wish(), of this folder
 
  private:

@@ -36,7 +36,8 @@ Recorder::Recorder(RecorderOptions options)
     : options_(std::move(options)),
       queue_(options_.preroll_s, options_.queue_bytes, options_.most_behind_s),
       folders_(options_.take.folders, options_.reserve_bytes, options_.free_bytes),
-      told_(options_.take.folders.size()) {
+      told_(options_.take.folders.size()),
+      kept_numbers_(options_.take.folders.size()) {
   const auto warn = [this](const std::string& what) { note(Severity::warning, what); };
   const std::string slate = options_.take.info.take.value_or(session::TakeInfo{}).slate;
   for (std::size_t i = 0; i < folders_.all().size(); ++i) {
@@ -435,9 +436,7 @@ void Recorder::begin_take(bool goes_on) {
     take_ = Take();
     take_->folder = folder;
     try {
-      for (const FolderSeen& seen : folders())
-        highest_number_ = std::max(highest_number_, seen.highest_number);
-      highest_number_ = next_take_number({folders_.all()[folder]}, slate, highest_number_);
+      highest_number_ = next_take_number({folders_.all()[folder]}, slate, highest_known_number());
       take_->writer =
           std::make_unique<TakeWriter>(options_.take, folders_.all()[folder], highest_number_);
       if (goes_on)
@@ -462,6 +461,7 @@ void Recorder::tell_of_begun_take() {
   if (!options_.take.assets.empty()) take_->order = stores_[take_->folder]->deliver(directory);
   watches_[take_->folder]->follow(directory);
   watches_[take_->folder]->keep_wish(directory);
+  keep_numbers(folders());
   const std::lock_guard lock(mutex_);
   status_.directory = std::move(directory);
   status_.number = take_->writer->number();

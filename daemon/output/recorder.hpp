@@ -110,6 +110,8 @@ class Recorder {
   std::optional<std::uint64_t> free_bytes() const;
   // Returns the folders of takes as they were last seen, in the order of preference.
   std::vector<FolderSeen> folders() const;
+  int highest_known_number() const;
+  void keep_numbers(const std::vector<FolderSeen>& seen);
 
  private:
   using Entry = RecordQueue::Entry;
@@ -202,6 +204,7 @@ class Recorder {
   std::vector<std::unique_ptr<AssetStore>> stores_;    // one in each folder
   std::vector<std::unique_ptr<FolderWatch>> watches_;  // one of each folder
   std::vector<std::size_t> told_;                      // takes of each that were salvaged, and said
+  std::vector<int> kept_numbers_;                      // that each was told (FolderWatch)
   std::optional<Take> take_;
   std::list<EndingTake> ending_;
   struct Failing {

@@ -33,6 +33,27 @@ std::vector<FolderSeen> Recorder::folders() const {
   return seen;
 }
 
+// What a folder was told of takes elsewhere counts only where one of them is not there to be asked.
+int Recorder::highest_known_number() const {
+  const std::vector<FolderSeen> seen = folders();
+  const bool are_all_there = std::ranges::all_of(seen, &FolderSeen::is_own);
+  int highest = highest_number_;
+  for (const FolderSeen& folder : seen)
+    highest = std::max({highest, folder.highest_number, are_all_there ? 0 : folder.kept_number});
+  return highest;
+}
+
+// Tells each of two folders the highest number of all takes, for a start without the other.
+void Recorder::keep_numbers(const std::vector<FolderSeen>& seen) {
+  if (seen.size() < 2) return;
+  const int highest = highest_known_number();
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (!seen[i].is_own || kept_numbers_[i] >= highest) continue;
+    watches_[i]->keep_number(highest);
+    kept_numbers_[i] = highest;
+  }
+}
+
 // A folder in which another process records is left to that.
 std::string Recorder::why_not_own(std::size_t folder) {
   const std::string why_not = watches_[folder]->hold();
@@ -45,6 +66,7 @@ void Recorder::take_news() {
     return folder.is_looked_at || folder.silent_s > longest_wait_s;
   });
   look_for_interruption(seen, are_known);
+  keep_numbers(seen);
   if (are_known) {
     const std::optional<std::uint64_t> left = folders_.free_bytes(seen);
     const std::lock_guard lock(mutex_);

@@ -7,10 +7,12 @@
 #include <chrono>
 #include <random>
 #include <set>
+#include <sstream>
 #include <system_error>
 #include <utility>
 
 #include "daemon/output/folder_watch.hpp"
+#include "daemon/output/take_writer.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/session.hpp"
@@ -20,6 +22,18 @@ namespace {
 
 std::filesystem::path wish_in(const std::filesystem::path& folder) {
   return folder / ".recording";
+}
+
+// The names of takes, a line each: the highest of each slate that any folder has.
+std::filesystem::path names_in(const std::filesystem::path& folder) {
+  return folder / ".highest_takes";
+}
+
+std::string kept_names(const std::filesystem::path& folder) {
+  std::error_code none;
+  return std::filesystem::exists(names_in(folder), none)
+             ? session::read_plain_file(names_in(folder))
+             : std::string();
 }
 
 std::string megabytes(std::uint64_t bytes) {
@@ -184,6 +198,32 @@ std::optional<KeptWish> TakeFolders::kept_wish() const {
     }
   }
   return newest;
+}
+
+void TakeFolders::keep_number(const std::filesystem::path& folder, const std::string& slate,
+                              int number) {
+  std::istringstream before(kept_names(folder));
+  std::string names = take_name(slate, number) + "\n";
+  for (std::string name; std::getline(before, name);) {
+    const std::optional<int> known = take_number(name, slate);
+    if (known && *known > number) return;
+    if (!known) names += name + "\n";
+  }
+  session::replace_file(names_in(folder), names);
+}
+
+int TakeFolders::kept_number(const std::string& slate) const {
+  int highest = 0;
+  for (const std::filesystem::path& folder : folders_) {
+    try {
+      std::istringstream names(kept_names(folder));
+      for (std::string name; std::getline(names, name);)
+        highest = std::max(highest, take_number(name, slate).value_or(0));
+    } catch (const Error&) {
+      continue;  // it can say nothing
+    }
+  }
+  return highest;
 }
 
 }  // namespace previz::output

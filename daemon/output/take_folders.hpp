@@ -1,6 +1,6 @@
 // The folders of takes: the preferred one, and perhaps a second on another disk, where a recording
 // goes on when the first is full or fails. A folder also remembers, over a crash, a power cut, a
-// restart and an upgrade, that somebody wishes to record.
+// restart and an upgrade, that somebody wishes to record, and which takes are in the other.
 #pragma once
 
 #include <sys/types.h>
@@ -88,6 +88,13 @@ class TakeFolders {
   // Returns the take that was being recorded when the last process ended, if one was: the newest
   // that a folder remembers. A folder that cannot be read remembers nothing.
   std::optional<KeptWish> kept_wish() const;
+
+  // Writes into a folder that the slate has a take of this number, there or elsewhere, so that no
+  // other gets its name while the disk of that one is not there. Throws previz::Error.
+  static void keep_number(const std::filesystem::path& folder, const std::string& slate,
+                          int number);
+  // Returns the highest of those numbers that the folders can say; 0 if there is none.
+  int kept_number(const std::string& slate) const;
 
  private:
   const std::vector<std::filesystem::path> folders_;

@@ -68,25 +68,28 @@ std::string take_name(const std::string& slate, int number) {
   return name + "_take" + digits.data();
 }
 
-int next_take_number(const std::vector<std::filesystem::path>& folders, const std::string& slate,
-                     int used) {
+std::optional<int> take_number(const std::string& name, const std::string& slate) {
   std::string stem = take_name(slate, 0);
   stem.resize(stem.size() - 3);
+  if (!name.starts_with(stem)) return std::nullopt;
+  int number = 0;
+  const char* last = name.data() + name.size();
+  const auto [stop, code] = std::from_chars(name.data() + stem.size(), last, number);
+  const bool is_number = code == std::errc{} && stop == last && number <= highest_take;
+  return is_number ? std::optional(number) : std::nullopt;
+}
+
+int next_take_number(const std::vector<std::filesystem::path>& folders, const std::string& slate,
+                     int used) {
   int highest = used;
   for (const std::filesystem::path& folder : folders) {
     // A folder that is not there has no takes. One that cannot be read further, because its disk
     // fails, is no reason not to record in another.
     std::error_code unreadable;
     for (std::filesystem::directory_iterator entry(folder, unreadable), end;
-         !unreadable && entry != end; entry.increment(unreadable)) {
-      const std::string name = entry->path().filename().string();
-      if (!name.starts_with(stem)) continue;
-      int number = 0;
-      const char* last = name.data() + name.size();
-      const auto [stop, code] = std::from_chars(name.data() + stem.size(), last, number);
-      const bool is_number = code == std::errc{} && stop == last && number <= highest_take;
-      if (is_number) highest = std::max(highest, number);
-    }
+         !unreadable && entry != end; entry.increment(unreadable))
+      highest =
+          std::max(highest, take_number(entry->path().filename().string(), slate).value_or(0));
   }
   return highest + 1;
 }

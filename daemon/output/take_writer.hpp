@@ -32,6 +32,8 @@ std::string timecode_of(std::chrono::system_clock::time_point time, double fps);
 // Returns "12A_take007" for slate "12A". Characters that a file system cannot hold, or a shell
 // breaks on, become "_".
 std::string take_name(const std::string& slate, int number);
+// Returns the number in a take's name; nothing if it is none of the slate's.
+std::optional<int> take_number(const std::string& name, const std::string& slate);
 // Returns one more than the highest number of the slate's takes in the folders, as far as these can
 // be read, and more than `used`; 1 if there is none.
 int next_take_number(const std::vector<std::filesystem::path>& folders, const std::string& slate,

@@ -200,6 +200,49 @@ TEST(Recorder, NumbersTakesOnWhereTheFirstDiskCannotBeListed) {
   EXPECT_EQ(recorder.status().directory, rig.second / "12A_take002");
 }
 
+// The first disk is mounted later than the service starts; the second one knows what is on it.
+TEST(Recorder, GivesNoTakeTheNameOfOneOnADiskThatIsNotThere) {
+  Rig rig;
+  for (const std::filesystem::path& folder : {rig.first, rig.second})  // each is a disk's uppermost
+    session::make_folders(folder);
+  const auto record_once = [&] {
+    Recorder recorder(rig.options());
+    recorder.start();
+    recorder.offer(picture(0));
+    recorder.stop();
+    EXPECT_TRUE(
+        wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+    return recorder.status().directory;
+  };
+  EXPECT_EQ(record_once(), rig.first / "12A_take001");
+  EXPECT_EQ(record_once(), rig.first / "12A_take002");
+  std::filesystem::rename(rig.first, rig.directory / "elsewhere");
+  write_content(rig.first, "no folder");
+  EXPECT_EQ(record_once(), rig.second / "12A_take003");
+  std::filesystem::remove(rig.first);
+  std::filesystem::rename(rig.directory / "elsewhere", rig.first);
+  std::filesystem::rename(rig.second, rig.directory / "elsewhere");
+  write_content(rig.second, "no folder");
+  EXPECT_EQ(record_once(), rig.first / "12A_take003");  // nobody could tell the first disk
+}
+
+// With both disks there, what was on them and is there no longer gives its number away.
+TEST(Recorder, NumbersTakesByWhatIsThereWhereAllDisksAre) {
+  Rig rig;
+  for (const std::filesystem::path& folder : {rig.first, rig.second}) {
+    session::make_folders(folder);
+    TakeFolders::keep_number(folder, "12A", 7);
+  }
+  session::make_folders(rig.second / "12A_take004");
+  Recorder recorder(rig.options());
+  EXPECT_TRUE(wait_until("both were looked at", [&] { return recorder.free_bytes().has_value(); }));
+  recorder.start();
+  recorder.offer(picture(0));
+  recorder.stop();
+  ASSERT_TRUE(wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+  EXPECT_EQ(recorder.status().directory, rig.first / "12A_take005");
+}
+
 TEST(Recorder, LeavesOutWhatCannotBeRecordedAndGoesOn) {
   Rig rig;
   const auto nothing = std::numeric_limits<double>::quiet_NaN();

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <fstream>
 #include <map>
 #include <mutex>
 #include <thread>
@@ -111,6 +112,23 @@ TEST(NextTakeNumber, CountsThroughAllFoldersAndIgnoresAbsurdNumbers) {
     session::make_folders(directory / take);
   EXPECT_EQ(next_take_number({directory / "a", directory / "b", directory / "none"}, "12A"), 8);
   EXPECT_EQ(next_take_number({directory / "a", directory / "b"}, "12A", 11), 12);
+}
+
+TEST(TakeFolders, KeepTheHighestTakeOfEachSlate) {
+  const TemporaryDirectory directory;
+  for (const char* folder : {"a", "b"}) session::make_folders(directory / folder);
+  const TakeFolders folders({directory / "a", directory / "b", directory / "none"}, 0, {});
+  EXPECT_EQ(folders.kept_number("12A"), 0);
+  TakeFolders::keep_number(directory / "a", "12A", 7);
+  TakeFolders::keep_number(directory / "a", "12B", 2);
+  TakeFolders::keep_number(directory / "b", "12A", 9);
+  TakeFolders::keep_number(directory / "b", "12A", 8);
+  EXPECT_EQ(folders.kept_number("12A"), 9);
+  EXPECT_EQ(folders.kept_number("12B"), 2);
+  EXPECT_EQ(folders.kept_number("12"), 0);
+  EXPECT_EQ(session::read_file(directory / "a/.highest_takes"), "12B_take002\n12A_take007\n");
+  std::ofstream(directory / "a/.highest_takes") << "12B_take002\n\nnothing\n12B_take";
+  EXPECT_EQ(folders.kept_number("12B"), 2);
 }
 
 TEST(TakeFolders, AreOnOneDiskWhereTheFoldersAboveThemAre) {
