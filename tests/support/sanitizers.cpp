@@ -21,7 +21,8 @@ const char* __tsan_default_suppressions() {
          "race:std::__exception_ptr::exception_ptr::_M_release\n";
 }
 
-// Without the longest memory a thread's access is reported without the stack that would suppress it.
+// Without the longest memory a thread's access is reported without the stack that would suppress
+// it.
 const char* __tsan_default_options() {
   return "die_after_fork=0:history_size=7";
 }
