@@ -9,6 +9,8 @@
 #include "daemon/calibrate/lens_file_check.hpp"
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/output/png.hpp"
+#include "daemon/scene/deformation.hpp"
+#include "daemon/scene/placement.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
@@ -27,18 +29,48 @@ void set_file(Bytes bytes) {
   set::parse_set(text_of(bytes), work_folder() / "stage.toml");
 }
 
-scene::Scene load(const std::filesystem::path& file) {
+set::Set set_of(const std::filesystem::path& file) {
   set::Set set;
   set.objects.resize(1);
+  set.objects[0].name = "object";
   set.objects[0].file = file;
-  return scene::load_scene(set);
+  return set;
 }
 
-void gltf(Bytes bytes) {
-  const scene::Scene scene = load(file_of(bytes, "object.glb"));
-  for (const scene::Instance& instance : scene.instances)
+void expect_whole(const scene::Scene& scene, const std::vector<scene::Instance>& instances) {
+  for (const scene::Instance& instance : instances)
     expect(instance.mesh < scene.meshes.size() && instance.material < scene.materials.size(),
            "an instance has a mesh and a material");
+}
+
+// Whatever time it is, all that is shown has as many numbers as when it stands still.
+void play(const scene::Scene& scene, const set::Set& set) {
+  for (const double time_s : {0.0, 0.3, 1e9}) {
+    session::SceneState state;
+    state.animation_s = time_s;
+    for (const scene::Variants& variants : scene.variants)
+      state.variants["object"] = variants.names.back();
+    const scene::Placement placement = scene::place(scene, set, state);
+    expect_whole(scene, placement.instances);
+    expect(placement.shapes.size() == scene.deformations.size(), "each deformation has a shape");
+    for (std::size_t i = 0; i < placement.shapes.size(); ++i) {
+      const scene::Mesh& mesh = scene.meshes.at(scene.deformations[i].mesh);
+      if (!scene::can_be_shown(placement.shapes[i], scene.deformations[i].extent)) continue;
+      expect(scene::deformed(mesh.undeformed, placement.shapes[i]).positions.size() ==
+                 mesh.positions.size(),
+             "a mesh keeps its vertices");
+    }
+  }
+}
+
+// As it stands, and with all that moves.
+void gltf(Bytes bytes) {
+  set::Set set = set_of(file_of(bytes, "object.glb"));
+  const scene::Scene still = scene::load_scene(set);
+  expect_whole(still, still.instances);
+  if (text_of(bytes).find("\"animations\"") == std::string::npos) return;
+  set.objects[0].animation = "*";
+  play(scene::load_scene(set), set);
 }
 
 std::string little_endian(std::size_t number) {
@@ -77,8 +109,8 @@ std::string with_image(Bytes image) {
 void texture(Bytes bytes) {
   if (bytes.empty()) return;
   const std::string file = with_image(bytes);
-  const scene::Scene scene = load(
-      file_of({reinterpret_cast<const std::uint8_t*>(file.data()), file.size()}, "textured.glb"));
+  const scene::Scene scene = scene::load_scene(set_of(
+      file_of({reinterpret_cast<const std::uint8_t*>(file.data()), file.size()}, "textured.glb")));
   for (const scene::Texture& texture : scene.textures)
     expect(texture.texels.size() ==
                static_cast<std::size_t>(texture.width) * static_cast<std::size_t>(texture.height),

@@ -163,7 +163,7 @@ std::vector<Gust> Storm::everyday(test::PrivateBus& bus) {
           },
           [this] {
             edit_set();
-            dice_.rest(700);
+            dice_.rest(most_ms_between_sets_);
           },
           [this, &bus] {
             dice_.rest(3000);

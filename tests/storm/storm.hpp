@@ -60,6 +60,7 @@ class Storm : public test::RigLive {
   Dice dice_;
   Tally tally_;
   std::string contact_;  // what stands before an action in its button's name
+  std::size_t most_ms_between_sets_ = 700;
 
  private:
   void push(const std::string& action);
