@@ -67,7 +67,7 @@ class Member {
 
 std::chrono::seconds storm_time() {
   const char* seconds = std::getenv("PREVIZ_STORM_S");
-  return std::chrono::seconds(seconds ? std::atoi(seconds) : 6);
+  return std::chrono::seconds(seconds ? std::atoi(seconds) : 20);
 }
 
 // A take is whole up to its end, and says what is missing in between.

@@ -1,6 +1,6 @@
 // A rig that records while everything happens to it at once: presses of every button, calls on the
 // bus and restarts of it, new sets, good and bad, cameras that are unplugged, fall silent or
-// deliver damage, and exceptions in every stage. PREVIZ_STORM_S says for how many seconds; 6
+// deliver damage, and exceptions in every stage. PREVIZ_STORM_S says for how many seconds; 20
 // without it.
 #pragma once
 
