@@ -102,7 +102,7 @@ plug_disks() {
   systemctl start mnt-a.mount mnt-b.mount || fail "a disk is not mounted again"
 }
 
-promise[disk_late]="without the first disk the service starts and records on the second; what was cut off on the first is named when it comes, and the next start records there again"
+promise[disk_late]="without the first disk the service starts and records on the second, under a number of its own; what was cut off on the first is named when it comes, and the next start records there again"
 disk_late() {
   begin_take
   frames_more 3
@@ -118,6 +118,7 @@ disk_late() {
   local there
   there=$(take_folder "$take")
   [[ $there == /mnt/b/* ]] || fail "$take is in $there"
+  [[ $take != "$(basename "$cut")" ]] || fail "$take is on both disks"
   frames_more 3
   plug_disks
   within 60 "the cut-off take is named" says "$(basename "$cut") was cut off"
