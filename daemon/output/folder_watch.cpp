@@ -105,6 +105,7 @@ class FolderWatch::Worker {
       std::list<Task> task;  // at most one
       if (!tasks_.empty()) task.splice(task.begin(), tasks_, tasks_.begin());
       busy_since_ = WatchClock::now();
+      in_hand_ = task.size();
       lock.unlock();
       bool is_done = true;
       try {
@@ -120,6 +121,7 @@ class FolderWatch::Worker {
       }
       lock.lock();
       busy_since_.reset();
+      in_hand_ = 0;
       if (!is_done && !task.empty()) tasks_.splice(tasks_.begin(), task);
     }
     has_ended_ = true;
@@ -148,6 +150,7 @@ class FolderWatch::Worker {
   FolderSeen seen() const {
     const std::lock_guard lock(mutex_);
     FolderSeen seen = seen_;
+    seen.tasks = tasks_.size() + in_hand_;
     if (busy_since_)
       seen.silent_s = std::chrono::duration<double>(WatchClock::now() - *busy_since_).count();
     return seen;
@@ -262,6 +265,7 @@ class FolderWatch::Worker {
   std::list<Task> tasks_;
   std::optional<Followed> followed_;
   std::optional<WatchClock::time_point> busy_since_;
+  std::size_t in_hand_ = 0;  // tasks that are being done: one or none
   bool is_ended_ = false, has_ended_ = false;
   std::mutex calls_;  // held while the options' functions are called
   std::mutex owner_mutex_;

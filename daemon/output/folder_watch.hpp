@@ -41,8 +41,10 @@ struct FolderSeen {
   // Why the followed take is no longer there: its disk was unmounted, or it was moved. Empty: it
   // is.
   std::string take_gone;
-  // For how long the disk has not answered what it is being asked.
+  // For how long the disk has not answered what it is being asked, and how much it was asked to do
+  // that is not done.
   double silent_s = 0;
+  std::size_t tasks = 0;
 };
 
 struct FolderWatchOptions {

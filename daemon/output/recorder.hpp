@@ -110,8 +110,6 @@ class Recorder {
   std::optional<std::uint64_t> free_bytes() const;
   // Returns the folders of takes as they were last seen, in the order of preference.
   std::vector<FolderSeen> folders() const;
-  int highest_known_number() const;
-  void keep_numbers(const std::vector<FolderSeen>& seen);
 
  private:
   using Entry = RecordQueue::Entry;
@@ -174,6 +172,8 @@ class Recorder {
   std::string why_not_own(std::size_t folder);
   void take_news();  // of the folders' watches
   void look_for_interruption(const std::vector<FolderSeen>& seen, bool are_known);
+  int highest_known_number() const;
+  void keep_numbers(const std::vector<FolderSeen>& seen);
   void drop_wish();
   void note(report::Severity severity, std::string_view what, const char* source = "recording",
             bool is_shown = false) const;

@@ -87,6 +87,15 @@ pipeline::Waiting waiting_in(const output::Recorder& recorder) {
   return {.values = backlog.entries, .oldest_s = backlog.seconds, .bytes = backlog.bytes};
 }
 
+pipeline::Waiting waiting_for_folders(const output::Recorder& recorder) {
+  pipeline::Waiting waiting;
+  for (const output::FolderSeen& seen : recorder.folders()) {
+    waiting.values += seen.tasks;
+    waiting.oldest_s = std::max(waiting.oldest_s, seen.silent_s);
+  }
+  return waiting;
+}
+
 Cameras open_cameras_of(const LoadedSet& loaded, const Rig::Parts& parts, const Usb& usb) {
   Cameras cameras = open_cameras(loaded.set, parts.loop_cameras, usb);
   if (parts.around_cameras) parts.around_cameras(cameras);
@@ -113,6 +122,8 @@ Rig::Rig(Parts parts)
       look_(controls_.look()),
       recorder_(recorder_options(loaded_, cameras_, parts_.kept)),
       recorder_watch_(parts_.kept.metrics, "recorder", [this] { return waiting_in(recorder_); }),
+      folders_watch_(parts_.kept.metrics, "folders of takes",
+                     [this] { return waiting_for_folders(recorder_); }),
       inbox_watch_(parts_.kept.metrics, "main loop", [this] { return inbox_.waiting(); }),
       pipeline_(
           {.set = loaded_.set,

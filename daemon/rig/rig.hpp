@@ -101,7 +101,7 @@ class Rig {
   pipeline::Newest<Look> look_;
   Inbox inbox_;
   output::Recorder recorder_;
-  pipeline::Metrics::Watch recorder_watch_, inbox_watch_;
+  pipeline::Metrics::Watch recorder_watch_, folders_watch_, inbox_watch_;
   std::optional<ButtonDesk> desk_;  // always there once the rig is made
   std::uint64_t finished_takes_ = 0, failures_ = 0;
   std::size_t salvaged_ = 0;  // takes of RecorderStatus::salvaged that were announced

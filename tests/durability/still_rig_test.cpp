@@ -59,12 +59,12 @@ TEST_F(RigLive, EveryQueueIsMeasured) {
   run([&] {
     until([](const Shown& s) { return s.shot.samples == 2; });
     until_measured([](const nlohmann::json& stages) {
-      return std::ranges::all_of(std::array{"tracking", "lighting", "render", "review", "display",
-                                            "snapshot", "recorder", "main loop"},
-                                 [&](const char* stage) {
-                                   return stages.contains(stage) &&
-                                          stages.at(stage).at("waiting").at("oldest_s") < 10;
-                                 });
+      return std::ranges::all_of(
+          std::array{"tracking", "lighting", "render", "review", "display", "snapshot", "recorder",
+                     "folders of takes", "main loop"},
+          [&](const char* stage) {
+            return stages.contains(stage) && stages.at(stage).at("waiting").at("oldest_s") < 10;
+          });
     });
   });
 }
@@ -83,7 +83,9 @@ TEST_F(RigLive, ADiskOfTakesThatStandsStillKeepsNoButtonWaiting) {
     until_said("its disk does not answer");
     until_measured([](const nlohmann::json& stages) {
       const nlohmann::json& waiting = stages.at("recorder").at("waiting");
-      return waiting.at("values") > 1 && waiting.at("oldest_s") > 0.1 && waiting.at("bytes") > 0;
+      const nlohmann::json& folders = stages.at("folders of takes").at("waiting");
+      return waiting.at("values") > 1 && waiting.at("oldest_s") > 0.1 && waiting.at("bytes") > 0 &&
+             folders.at("oldest_s") > 0.1;
     });
     for (int times = 0; times < 2; ++times) {
       const Shown now = until([](const Shown&) { return true; });
