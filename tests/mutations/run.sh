@@ -19,6 +19,8 @@ cd "$(dirname "$0")/../.." || exit
 config/install-deps.sh lld || exit
 lists=tests/mutations tree=build/mutations/tree build=build/mutations/build log=$PWD/build/mutations/log
 export CCACHE_BASEDIR=$PWD CCACHE_DEPEND=1 CCACHE_NOHASHDIR=1
+# What tests sync is synced to memory, where there is a file system in it.
+[[ ! -d /dev/shm ]] || export TMPDIR=/dev/shm
 export LP_NUM_THREADS=1 MESA_SHADER_CACHE_DIR=$PWD/build/mesa_shader_cache
 names=()
 declare -A promise file old new program tests limit passes
