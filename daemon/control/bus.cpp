@@ -2,6 +2,8 @@
 
 #include <systemd/sd-bus.h>
 
+#include <array>
+#include <bit>
 #include <cctype>
 #include <cerrno>
 #include <chrono>
@@ -28,20 +30,29 @@ void check(int result, const std::string& what) {
   if (result < 0) throw Error("D-Bus: " + what + ": " + std::strerror(-result));
 }
 
+// Returns whether sd-bus sends this character: a Unicode scalar value that is none of the 66 that
+// stand for no character. It refuses a message with any other, so that nobody would get an answer.
+bool is_sent(char32_t character) {
+  const bool is_surrogate = character >= 0xd800 && character <= 0xdfff;
+  const bool is_none =
+      (character & 0xfffe) == 0xfffe || (character >= 0xfdd0 && character <= 0xfdef);
+  return character <= 0x10ffff && !is_surrogate && !is_none;
+}
+
 // Returns the number of bytes of the UTF-8 character (RFC 3629) at the text's beginning; 0 if there
-// is none.
+// is none that can be sent.
 std::size_t utf8_length(std::string_view text) {
+  static constexpr std::array<char32_t, 5> least = {0, 0, 0x80, 0x800, 0x10000};  // by length
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned char first = byte(0);
-  if (first < 0x80) return 1;
-  const std::size_t length = first < 0xc2 ? 0 : first < 0xe0 ? 2 : first < 0xf0 ? 3 : 4;
-  if (length == 0 || first > 0xf4 || text.size() < length) return 0;
-  for (std::size_t i = 1; i < length; ++i)
+  if (byte(0) < 0x80) return 1;
+  const auto length = static_cast<std::size_t>(std::countl_one(byte(0)));
+  if (length < 2 || length > 4 || text.size() < length) return 0;
+  char32_t character = byte(0) & (0x7fu >> length);
+  for (std::size_t i = 1; i < length; ++i) {
     if ((byte(i) & 0xc0) != 0x80) return 0;
-  const bool is_overlong = (first == 0xe0 && byte(1) < 0xa0) || (first == 0xf0 && byte(1) < 0x90);
-  const bool is_surrogate = first == 0xed && byte(1) > 0x9f;
-  const bool is_beyond_unicode = first == 0xf4 && byte(1) > 0x8f;
-  return is_overlong || is_surrogate || is_beyond_unicode ? 0 : length;
+    character = character << 6 | (byte(i) & 0x3fu);
+  }
+  return character >= least[length] && is_sent(character) ? length : 0;
 }
 
 // Returns the text as it may go on the bus, which disconnects whoever sends anything but UTF-8; the

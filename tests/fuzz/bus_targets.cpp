@@ -94,7 +94,8 @@ class Conversation {
     return {text_, text_.size() % 3 == 1};
   }
 
-  static int on_answer(sd_bus_message*, void* conversation, sd_bus_error*) {
+  static int on_answer(sd_bus_message* answer, void* conversation, sd_bus_error*) {
+    expect(sd_bus_message_is_method_error(answer, SD_BUS_ERROR_NO_REPLY) == 0, "the rig answers");
     static_cast<Conversation*>(conversation)->answered_ = true;
     return 0;
   }

@@ -150,12 +150,17 @@ TEST_F(RigOnTheBus, WhatAVerbThrowsIsAnErrorInReplyAndTheRigGoesOn) {
 }
 
 // The bus disconnects whoever sends anything else.
-TEST_F(RigOnTheBus, WhatIsNotUtf8IsSentWithoutIt) {
+TEST_F(RigOnTheBus, WhatIsNotUtf8OrNoCharacterIsSentWithoutIt) {
   status_.set = "d\xc3\xa4sk \xff\xc3";
   EXPECT_NE(previzctl("status").out.find("Set: d\xc3\xa4sk ??\n"), std::string::npos)
       << previzctl("status").out;
   status_.set = "\xed\xa0\x80 \xf4\x90\x80\x80 \xc0\xaf \xf0\x9f\x8e\xac";
   EXPECT_NE(previzctl("status").out.find("Set: ??? ???? ?? \xf0\x9f\x8e\xac\n"), std::string::npos)
+      << previzctl("status").out;
+  // The last of a plane, the first of those in Arabic's block, and characters beside them.
+  status_.set = "\xf0\xbf\xbf\xbf \xef\xbf\xbe \xef\xb7\x90 \xef\xbf\xbd \xef\xb7\xb0";
+  EXPECT_NE(previzctl("status").out.find("Set: ???? ??? ??? \xef\xbf\xbd \xef\xb7\xb0\n"),
+            std::string::npos)
       << previzctl("status").out;
 }
 
