@@ -6,7 +6,7 @@
 # which begins as tests/fuzz/found.tar.xz. Ends with a line a target, and with status 0 only if none
 # was broken. What broke one is in crashes/ beside the program: mend the reader and keep the bytes in
 # tests/fuzz/corpus/TARGET, small (-minimize_crash=1), under a name that says what they are.
-# "merge" leaves of found/ only the inputs that reach what no other does, the smallest ones, and
+# "merge" leaves of found/ only few and small inputs that together reach all that was reached, and
 # writes those of all targets to tests/fuzz/found.tar.xz, to be committed.
 set -euo pipefail
 program=$(realpath "$1")
@@ -32,7 +32,7 @@ merge() {
   before=$(find "$found/$target" -type f | wc -l)
   rm -rf "$least"
   mkdir "$least"
-  PREVIZ_FUZZ_TARGET=$target "$program" -merge=1 -timeout=25 -rss_limit_mb=2048 -max_len=65536 \
+  PREVIZ_FUZZ_TARGET=$target "$program" -set_cover_merge=1 -timeout=25 -rss_limit_mb=2048 -max_len=65536 \
     "$least" "$found/$target" >"$crashes/$target.log" 2>&1
   rm -rf "${found:?}/$target"
   mv "$least" "$found/$target"

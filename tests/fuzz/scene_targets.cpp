@@ -14,6 +14,7 @@
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
+#include "drivers/faults.hpp"
 #include "tests/fuzz/mutators.hpp"
 #include "tests/fuzz/targets.hpp"
 
@@ -26,7 +27,9 @@ void set_file(Bytes bytes) {
   for (const char* name : {"phantom.glb", "virtual.glb", "pane.gltf", "sprout.glb", "stage/set.glb",
                            "stage/creature.glb", "stage/lamp.glb"})
     std::ofstream(work_folder() / name, std::ios::app);
-  set::parse_set(text_of(bytes), work_folder() / "stage.toml");
+  const set::Set set = set::parse_set(text_of(bytes), work_folder() / "stage.toml");
+  for (const std::vector<std::string>& faults : {set.observer.faults, set.light_camera.faults})
+    for (const std::string& fault : faults) parse_fault(fault);
 }
 
 set::Set set_of(const std::filesystem::path& file) {
