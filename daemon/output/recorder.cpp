@@ -430,13 +430,12 @@ void Recorder::end_running_take() {
 }
 
 void Recorder::begin_take(bool goes_on) {
-  const std::string slate = options_.take.info.take.value_or(session::TakeInfo{}).slate;
   while (!take_) {
     const std::size_t folder = folders_.choose([&](std::size_t i) { return why_not_own(i); });
     take_ = Take();
     take_->folder = folder;
     try {
-      highest_number_ = next_take_number({folders_.all()[folder]}, slate, highest_known_number());
+      highest_number_ = next_number_in(folder);
       take_->writer =
           std::make_unique<TakeWriter>(options_.take, folders_.all()[folder], highest_number_);
       if (goes_on)

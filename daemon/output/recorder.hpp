@@ -173,6 +173,7 @@ class Recorder {
   void take_news();  // of the folders' watches
   void look_for_interruption(const std::vector<FolderSeen>& seen, bool are_known);
   int highest_known_number() const;
+  int next_number_in(std::size_t folder) const;
   void keep_numbers(const std::vector<FolderSeen>& seen);
   void drop_wish();
   void note(report::Severity severity, std::string_view what, const char* source = "recording",

@@ -43,6 +43,15 @@ int Recorder::highest_known_number() const {
   return highest;
 }
 
+// Returns the number of a take that begins in the folder, which may not have been looked at yet.
+int Recorder::next_number_in(std::size_t folder) const {
+  const std::string slate = options_.take.info.take.value_or(session::TakeInfo{}).slate;
+  const std::filesystem::path& path = folders_.all()[folder];
+  const bool is_looked_at = watches_[folder]->seen().is_own;
+  const int kept = is_looked_at ? 0 : TakeFolders({path}, 0, {}).kept_number(slate);
+  return next_take_number({path}, slate, std::max(highest_known_number(), kept));
+}
+
 // Tells each of two folders the highest number of all takes, for a start without the other.
 void Recorder::keep_numbers(const std::vector<FolderSeen>& seen) {
   if (seen.size() < 2) return;

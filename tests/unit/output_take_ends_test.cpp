@@ -212,6 +212,8 @@ TEST(Recorder, GivesNoTakeTheNameOfOneOnADiskThatIsNotThere) {
     recorder.stop();
     EXPECT_TRUE(
         wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+    EXPECT_TRUE(wait_until("the folders were looked at",
+                           [&] { return recorder.free_bytes().has_value(); }));
     return recorder.status().directory;
   };
   EXPECT_EQ(record_once(), rig.first / "12A_take001");
