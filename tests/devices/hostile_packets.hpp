@@ -1,4 +1,4 @@
-// What hosts that mean harm send to those who receive from a network camera, and who receives.
+// Packets of hosts that mean harm to the receiver of a network camera, and its process.
 #pragma once
 
 #include <arpa/inet.h>
@@ -110,7 +110,7 @@ inline Bytes extended(std::uint8_t type, std::uint32_t number, std::uint16_t fra
   return bytes;
 }
 
-// What is no packet of this camera's stream: short, empty, with numbers of packets that there are
+// Returns what is no packet of this stream: short, empty, with numbers of packets that there are
 // not, with parts and kinds that its pictures have not.
 inline std::vector<Bytes> malformed() {
   std::vector<Bytes> all{{}};

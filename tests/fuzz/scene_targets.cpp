@@ -66,7 +66,7 @@ void play(const scene::Scene& scene, const set::Set& set) {
   }
 }
 
-// As it stands, and with all that moves.
+// Reads a file as it stands, and then with all that moves in it.
 void gltf(Bytes bytes) {
   set::Set set = set_of(file_of(bytes, "object.glb"));
   const scene::Scene still = scene::load_scene(set);
