@@ -11,15 +11,15 @@
 #
 #   release    builds everything but the benchmarks and soak, and runs the tests; in the gate without
 #              those that asan has
-#   asan       the test programs marked SANITIZED (tests/CMakeLists.txt) under ASan and UBSan
-#   format     clang-format
-#   lint       clang-tidy, of targets that have changed since they last passed on this machine, the
-#              newest first; in the gate none is begun after 5 s, and it says how many are left
-#   lint-all   the same without a limit
+#   asan       the tests marked SANITIZED (tests/CMakeLists.txt) under ASan and UBSan
+#   format     clang-format, and the subjects of the last commits
+#   lint       clang-tidy on every target that has changed since it passed (tests/lint/run.sh)
+#   lint-all   the same on every target that has not passed on this machine
 #   bench      builds the benchmarks and the programs that measure, and runs their test
 #   long       the cases that tests/*/CMakeLists.txt leave out of the gate (LONG), in the release build
 #   asan-all   every test program under ASan and UBSan, with two storms of five minutes (tests/storm)
-#   tsan       the test programs marked THREADS under ThreadSanitizer, with the same storms
+#   tsan       the programs that run in threads of ours and without a GPU, whose driver's threads it
+#              cannot see into, under ThreadSanitizer, with the same storms (CMakePresets.json)
 #   fuzz       libFuzzer on every reader of foreign bytes, a minute each (tests/fuzz/run.sh)
 #   mutations  breaks each promise of the fault table once, and looks whether its test fails
 #              (tests/mutations/run.sh)
@@ -36,8 +36,8 @@ jobs=$(nproc)
 export CCACHE_DEPEND=1  # a compiler cache that is empty needs no preprocessor of its own
 gate=(release asan format lint)
 steps=("$@")
-once=OFF
-[[ ${#steps[@]} -gt 0 ]] || { steps=("${gate[@]}") once=ON; }
+gate_only=OFF
+[[ ${#steps[@]} -gt 0 ]] || { steps=("${gate[@]}") gate_only=ON; }
 [[ ${steps[*]} != full ]] || steps=("${gate[@]}" bench lint-all long asan-all tsan fuzz mutations soak package rig_vm)
 failures=()
 summaries=()
@@ -63,7 +63,9 @@ check() {
 }
 
 build() {
-  cmake --preset "$1" --log-level=WARNING -DPREVIZ_TESTS_ONCE="$once" &&
+  local options=()
+  [[ $1 != release ]] || options=(-DPREVIZ_GATE="$gate_only")
+  cmake --preset "$1" --log-level=WARNING "${options[@]}" &&
     cmake --build --preset "$1" --parallel "$jobs"
 }
 
@@ -124,25 +126,12 @@ soak() {
     build/release/tests/soak/soak --minutes 30
 }
 
-format() { git ls-files '*.cpp' '*.hpp' | xargs clang-format --dry-run -Werror; }
-
-# clang-tidy, a target's sources at once: most of its time goes into the headers of the libraries,
-# which so are read once a target. Targets whose newest commit is the newest come first; after LIMIT_S
-# seconds no further one is begun. A target that passed is not looked at again until it changes.
-lint() {
-  local limit_s=$1 passed=${XDG_CACHE_HOME:-$HOME/.cache}/previzd/lint status=0
-  mkdir -p "$passed"
-  rm -rf build/lint
-  cmake --preset lint --log-level=WARNING >/dev/null || return
-  cmake --build build/lint --target previz_render_shaders previz_tracer_shaders >/dev/null || return
-  find build/lint -name 'unity_*.cxx' | while read -r unity; do
-    local folder=${unity#build/lint/}
-    printf '%s %s\n' "$(git log -1 --format=%ct -- "${folder%%/CMakeFiles/*}")" "$unity"
-  done | sort -rn | cut -d' ' -f2 |
-    LINT_UNTIL=$(($(date +%s) + limit_s)) xargs -P "$jobs" -I{} tests/lint_target.sh build/lint "$passed" {} || status=$?
-  local left
-  left=$(find build/lint -name 'unity_*.cxx.left' | wc -l)
-  [[ $left == 0 ]] || printf 'lint: %d targets are left to "tests/run.sh lint-all"\n' "$left"
+# Subjects read `area: verb object`, and what is not built is not committed.
+format() {
+  local status=0
+  git ls-files '*.cpp' '*.hpp' | xargs clang-format --dry-run -Werror || status=1
+  git log -20 --no-merges --format='%h %s' | grep -E 'not (built|tested|run)\)|^[^ ]+ [^:]*$' && status=1 &&
+    echo 'format: these subjects are not "area: verb object" of what was built'
   return "$status"
 }
 
@@ -153,8 +142,8 @@ for name in "${steps[@]}"; do
     asan-all | tsan) PREVIZ_STORM_S=300 build_and_test "$name" ;;  # each of the two storms
     long) build release && check "long" run_tests release --label-regex long ;;
     format) check "format" format ;;
-    lint) check "lint" lint 5 ;;
-    lint-all) check "lint-all" lint 86400 ;;
+    lint) check "lint" tests/lint/run.sh ;;
+    lint-all) check "lint-all" tests/lint/run.sh all ;;
     bench | fuzz | soak) check "$name" "$name" ;;
     mutations | package | rig_vm) check "$name" "tests/$name/run.sh" ;;
     *)

@@ -35,7 +35,7 @@ done
 
 [[ -e $build/CMakeCache.txt ]] || cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release
 # The gate leaves out of a build folder the programs that only the full run runs.
-cmake "$build" --log-level=WARNING -DPREVIZ_TESTS_ONCE=OFF >/dev/null
+cmake "$build" --log-level=WARNING -DPREVIZ_GATE=OFF >/dev/null
 suites=(camera_compliance replug usb buttons display_devices)
 cmake --build "$build" --parallel "$(nproc)" --target deb rig_vm_devices previzd "${suites[@]/#/test_}"
 deb=$(ls "$build"/previzd_*.deb)

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "tests/support/figure.hpp"
 #include "tests/support/render_fixture.hpp"
 #include "tests/truth/agreement.hpp"
 #include "tests/truth/cpu_tracer.hpp"

@@ -1,0 +1,280 @@
+// The light camera's calibration: its lens on boards seen beyond 90 degrees, its pose by tags.
+#include <apriltag/apriltag.h>
+#include <apriltag/tag36h11.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+#include "daemon/calibrate/coverage.hpp"
+#include "daemon/calibrate/fisheye.hpp"
+#include "daemon/calibrate/light_pose.hpp"
+#include "daemon/set/print.hpp"
+#include "drivers/calibration/fisheye.hpp"
+#include "drivers/error.hpp"
+#include "tests/support/calibrate_pictures.hpp"
+#include "tests/support/tracking_synthetic.hpp"
+
+namespace previz::calibrate {
+namespace fisheye_test {
+
+using test::degree;
+
+constexpr double noise_px = 0.2;
+
+FisheyeIntrinsics wide_lens() {
+  return {.width = 1280,
+          .height = 1024,
+          .fx = 301,
+          .fy = 300,
+          .cx = 648,
+          .cy = 505,
+          .k = {-0.02, 0.004, -0.003, 0.0004},
+          .max_angle_rad = 105 * degree};
+}
+
+// A board held in a ring around the lens, its middle at this angle off axis.
+Views ring(const std::vector<double>& off_axis_deg, int around, unsigned seed = 1) {
+  const Board board = parse_board("chessboard:9x6:25mm");
+  const Fisheye lens(wide_lens());
+  std::mt19937 random(seed);
+  Views views{lens.intrinsics().width, lens.intrinsics().height, {}};
+  for (const double angle : off_axis_deg)
+    for (int i = 0; i < around; ++i) {
+      // Held upright before a camera that was turned towards it, then brought to the fisheye's
+      // axes.
+      const double azimuth = 2 * std::numbers::pi * (i + angle / 90) / around;
+      const glm::dmat3 turned = glm::mat3_cast(
+          glm::angleAxis(angle * degree, glm::dvec3(-std::sin(azimuth), std::cos(azimuth), 0)));
+      const test::Lens through = [&](const glm::dvec3& point) {
+        return lens.project(turned * point);
+      };
+      const test::Held held{
+          25.0 * std::sin(3.0 * i), 25.0 * std::cos(2.0 * i), 20.0 * i, {0, 0, 0.22}};
+      views.views.push_back(
+          test::hold(board, {held}, through, views.width, views.height, noise_px, random).views[0]);
+    }
+  return views;
+}
+
+Views all_around(unsigned seed = 1) {
+  return ring({15, 50, 80}, 8, seed);
+}
+
+TEST(FisheyeCalibration, ErrorsAreAsLargeAsStatedBeyond90Degrees) {
+  const FisheyeIntrinsics lens = wide_lens();
+  const std::vector<double> truth = {lens.fx,   lens.fy,   lens.cx,   lens.cy,
+                                     lens.k[0], lens.k[1], lens.k[2], lens.k[3]};
+  double squares = 0;
+  constexpr int captures = 10;
+  for (unsigned seed = 1; seed <= captures; ++seed) {
+    const Views views = all_around(seed);
+    const FisheyeFit fisheye = fit_fisheye(views);
+    EXPECT_GT(fisheye.widest_corner_rad, 95 * degree);
+    EXPECT_TRUE(missing_views(views, fisheye).empty());
+    for (std::size_t p = 0; p < truth.size(); ++p) {
+      const double z = (fisheye.fit.bundle.lens[p] - truth[p]) / fisheye.sigma[p];
+      EXPECT_LT(std::abs(z), 5) << fisheye_parameters[p] << " seed " << seed;
+      squares += z * z;
+    }
+  }
+  // The mean of squares of unit normals, were the 8 of a capture one: 1 within 4 sqrt(2/10).
+  EXPECT_LT(squares / (8 * captures), 1 + 4 * std::sqrt(2.0 / captures));
+}
+
+// What the calibration is for: rays. Where it says it can be trusted, a pixel's direction is right
+// to what 1 px is there (1 / 300 rad), and much better.
+TEST(FisheyeCalibration, RaysAreRightAsFarAsItIsTrusted) {
+  const FisheyeFit fisheye = fit_fisheye(all_around());
+  EXPECT_GT(fisheye.intrinsics.max_angle_rad, 90 * degree);
+  EXPECT_LE(fisheye.intrinsics.max_angle_rad, fisheye.widest_corner_rad);
+  const Fisheye truth(wide_lens()), found(fisheye.intrinsics);
+  for (double angle = 0; angle < found.max_angle_rad(); angle += 5 * degree)
+    for (double around = 0; around < 6; around += 0.7) {
+      const glm::dvec3 ray(std::sin(angle) * std::cos(around), std::sin(angle) * std::sin(around),
+                           std::cos(angle));
+      const auto back = found.unproject(*truth.project(ray));
+      if (!back) continue;  // a pixel or less beyond what is trusted
+      EXPECT_LT(glm::distance(*back, ray), 1.0 / 300) << angle / degree;
+    }
+}
+
+TEST(FisheyeCalibration, WritesTheTableThatASetFileTakes) {
+  const FisheyeFit fisheye = fit_fisheye(all_around());
+  LightCameraCalibration camera;
+  camera.intrinsics = fisheye.intrinsics;
+  const glm::dmat4 pose = test::camera_looking({0.3, 0.1, 0.2}, {0.4, 0.2, 2});
+  const set::Set set =
+      set::parse_set(set::intrinsics_toml(camera) + set::light_pose_toml(pose), "printed.toml");
+  ASSERT_TRUE(set.light_camera.calibration);
+  EXPECT_NEAR(set.light_camera.calibration->intrinsics.fx, fisheye.intrinsics.fx, 1e-8);
+  EXPECT_NEAR(set.light_camera.calibration->intrinsics.k[3], fisheye.intrinsics.k[3], 1e-11);
+  EXPECT_NEAR(set.light_camera.calibration->intrinsics.max_angle_rad,
+              fisheye.intrinsics.max_angle_rad, 1e-11);
+  for (int c = 0; c < 4; ++c)
+    EXPECT_LT(glm::distance(set.light_camera.calibration->world_from_camera[c], pose[c]), 1e-10);
+}
+
+TEST(FisheyeCapture, AsksForTheEdgeOfTheCircle) {
+  const Views views = ring({10, 30}, 8);
+  const auto missing = missing_views(views, fit_fisheye(views));
+  ASSERT_EQ(missing.size(), 1u);
+  EXPECT_NE(missing[0].find("near the edge of the picture circle"), std::string::npos);
+}
+
+TEST(FisheyeCapture, AsksForMoreViews) {
+  const Views views = ring({60}, 4);
+  const auto missing = missing_views(views, fit_fisheye(views));
+  ASSERT_FALSE(missing.empty());
+  EXPECT_NE(missing[0].find("more views: 4"), std::string::npos);
+}
+
+// Tags on the inside of a room, as a fisheye sees them: 4x4 rays a pixel.
+class TagRoom {
+ public:
+  explicit TagRoom(std::vector<set::Tag> tags) : tags_(std::move(tags)) {
+    apriltag_family_t* family = tag36h11_create();
+    for (const set::Tag& tag : tags_) {
+      image_u8_t* code = apriltag_to_image(family, std::uint32_t(tag.id));
+      cells_ = code->width;
+      codes_.emplace_back();
+      for (int y = 0; y < cells_; ++y)
+        for (int x = 0; x < cells_; ++x) codes_.back().push_back(code->buf[y * code->stride + x]);
+      // The packaged library does not export image_u8_destroy.
+      std::free(code->buf);
+      std::free(code);
+    }
+    tag36h11_destroy(family);
+  }
+
+  FramePtr photograph(const FisheyeIntrinsics& intrinsics, const glm::dmat4& world_from_camera,
+                      unsigned seed) const {
+    const Fisheye lens(intrinsics);
+    test::LinearPicture picture{intrinsics.width, intrinsics.height, {}};
+    for (int y = 0; y < picture.height; ++y)
+      for (int x = 0; x < picture.width; ++x) {
+        double sum = 0;
+        for (int s = 0; s < 16; ++s) {
+          const int across = s % 4, down = s / 4;
+          const auto ray = lens.unproject({x - 0.375 + 0.25 * across, y - 0.375 + 0.25 * down});
+          if (ray) sum += radiance(world_from_camera, *ray) / 16;
+        }
+        picture.value.push_back(sum);
+      }
+    std::mt19937 random(seed);
+    Frame frame = test::expose(picture, {.full_well_e = 20000, .response = {}}, random);
+    frame.source = "light";
+    return std::make_shared<const Frame>(std::move(frame));
+  }
+
+ private:
+  double radiance(const glm::dmat4& world_from_camera, const glm::dvec3& ray) const {
+    const glm::dvec3 origin(world_from_camera[3]), way = glm::dmat3(world_from_camera) * ray;
+    for (std::size_t t = 0; t < tags_.size(); ++t) {
+      const glm::dmat4& pose = tags_[t].world_from_tag;
+      const glm::dvec3 normal(pose[2]), centre(pose[3]);
+      const double along = glm::dot(normal, way);
+      if (!(along < 0)) continue;
+      const glm::dvec3 hit = origin + way * (glm::dot(normal, centre - origin) / along) - centre;
+      if (!(glm::dot(hit + centre - origin, way) > 0)) continue;
+      // The code's picture has a white ring of one cell around the black border (8 cells).
+      const double cell = tags_[t].size_m / (cells_ - 2);
+      const int x = int(std::floor(glm::dot(hit, glm::dvec3(pose[0])) / cell + 0.5 * cells_));
+      const int y = int(std::floor(-glm::dot(hit, glm::dvec3(pose[1])) / cell + 0.5 * cells_));
+      if (x >= 0 && y >= 0 && x < cells_ && y < cells_)
+        return codes_[t][std::size_t(y * cells_ + x)] ? 0.75 : 0.04;
+    }
+    return 0.75;
+  }
+
+  std::vector<set::Tag> tags_;
+  std::vector<std::vector<std::uint8_t>> codes_;
+  int cells_ = 0;
+};
+
+class OnePicture final : public PictureSource {
+ public:
+  explicit OnePicture(FramePtr frame) : frame_(std::move(frame)) {}
+  std::optional<NamedFrame> next() override {
+    if (!frame_) return std::nullopt;
+    return NamedFrame{std::exchange(frame_, nullptr), "picture"};
+  }
+  std::optional<std::size_t> count() const override { return 1; }
+
+ private:
+  FramePtr frame_;
+};
+
+// Facing the camera from `direction` at a distance.
+set::Tag facing(int id, const glm::dvec3& direction, double distance, double size_m) {
+  set::Tag tag;
+  tag.id = id;
+  tag.size_m = size_m;
+  const glm::dvec3 z = -glm::normalize(direction);
+  const glm::dvec3 x = glm::normalize(glm::cross(glm::dvec3(0.1, 0.2, 1), z));
+  tag.world_from_tag = glm::dmat4(glm::dvec4(x, 0), glm::dvec4(glm::cross(z, x), 0),
+                                  glm::dvec4(z, 0), glm::dvec4(-distance * z, 1));
+  return tag;
+}
+
+std::vector<set::Tag> room() {
+  return {facing(0, {1, 0.2, 0.5}, 0.6, 0.16), facing(1, {-0.8, 0.5, 0.3}, 0.7, 0.16),
+          facing(2, {0.1, -1, 0.05}, 0.6, 0.16), facing(3, {-0.2, 0.3, 1}, 0.8, 0.16)};
+}
+
+FisheyeIntrinsics small_lens() {
+  FisheyeIntrinsics lens = wide_lens();
+  lens.width = lens.height = 640;
+  lens.fx = lens.fy = 180;
+  lens.cx = lens.cy = 319.5;
+  return lens;
+}
+
+glm::dmat4 true_pose() {
+  return test::camera_looking({0.03, -0.02, 0.05}, {0.08, 0.03, 1}, {0, -1, 0});
+}
+
+set::Tracking tracking(std::vector<set::Tag> tags) {
+  set::Tracking settings;
+  settings.tags = std::move(tags);
+  return settings;
+}
+
+// Tags all around, one of them straight across the axis (90 degrees off it).
+TEST(LightPose, IsFoundByTagsAllAround) {
+  OnePicture picture(TagRoom(room()).photograph(small_lens(), true_pose(), 1));
+  const LightPose pose = find_light_pose(picture, small_lens(), {}, tracking(room()));
+  EXPECT_EQ(pose.tags, (std::vector<int>{0, 1, 2, 3}));
+  EXPECT_TRUE(pose.left_out.empty());
+  EXPECT_EQ(pose.pictures, 1);
+  EXPECT_LT(pose.rms_px, 0.15);
+  EXPECT_LT(pose.position_sigma_m, 0.001);
+  EXPECT_LT(glm::distance(pose.world_from_camera[3], true_pose()[3]), 5 * pose.position_sigma_m);
+  for (int axis = 0; axis < 3; ++axis)
+    EXPECT_LT(glm::distance(pose.world_from_camera[axis], true_pose()[axis]),
+              5 * pose.rotation_sigma_rad);
+}
+
+TEST(LightPose, ATagThatWasMovedIsNamed) {
+  OnePicture picture(TagRoom(room()).photograph(small_lens(), true_pose(), 1));
+  auto believed = room();
+  believed[1].world_from_tag[3].z += 0.05;
+  const LightPose pose = find_light_pose(picture, small_lens(), {}, tracking(believed));
+  EXPECT_EQ(pose.left_out, std::vector<int>{1});
+  EXPECT_LT(glm::distance(pose.world_from_camera[3], true_pose()[3]), 0.002);
+}
+
+TEST(LightPose, OneTagIsNotEnough) {
+  OnePicture picture(TagRoom({room()[0]}).photograph(small_lens(), true_pose(), 1));
+  try {
+    find_light_pose(picture, small_lens(), {}, tracking(room()));
+    FAIL() << "one tag was taken";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("only tag 0"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace fisheye_test
+}  // namespace previz::calibrate

@@ -1,0 +1,342 @@
+// The rig's bus on a bus of its own, operated by previzctl as from a shell.
+#include "daemon/control/bus.hpp"
+
+#include <grp.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <systemd/sd-bus.h>
+#include <systemd/sd-event.h>
+
+#include <array>
+#include <atomic>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "drivers/error.hpp"
+#include "tests/support/private_bus.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tests/support/wait_until.hpp"
+
+namespace previz::control {
+namespace bus_test {
+
+struct Said {
+  std::string out;
+  int status = 0;
+};
+Said previzctl(const std::string& arguments) {
+  Said said;
+  FILE* pipe =
+      popen((PREVIZ_BINARY_DIR "/daemon/control/previzctl " + arguments + " 2>&1").c_str(), "r");
+  std::array<char, 256> line{};
+  while (fgets(line.data(), line.size(), pipe)) said.out += line.data();
+  said.status = WEXITSTATUS(pclose(pipe));
+  return said;
+}
+
+class RigOnTheBus : public testing::Test {
+ protected:
+  explicit RigOnTheBus(const std::filesystem::path& policy = {}) : bus_(policy) {}
+  void SetUp() override {
+    if (!bus_.running()) GTEST_SKIP() << "dbus-daemon is not installed";
+    sd_event_new(&event_);
+    Verbs verbs;
+    verbs.perform = [this](const set::Action& action) {
+      fall_if(fallen_ == "perform");
+      status_.message = action.name;
+      rig_->changed();
+      return Answer{action.name, std::string(action.name) == "standby"};
+    };
+    verbs.go = [this](set::Mode mode) {
+      status_.mode = mode == set::Mode::refine ? "refine" : "live";
+      return Answer{status_.mode};
+    };
+    verbs.record = [this](bool on) {
+      status_.recording = on;
+      return Answer{on ? "recording" : "recording ended"};
+    };
+    verbs.status = [this] {
+      fall_if(fallen_ == "status");
+      return status_;
+    };
+    verbs.metrics = [this] {
+      fall_if(fallen_ == "metrics");
+      return std::string("{}");
+    };
+    rig_ = std::make_unique<Bus>(event_, std::move(verbs));
+    loop_ = std::thread([this] {
+      while (!quit_) sd_event_run(event_, 10'000);
+    });
+  }
+  void TearDown() override {
+    if (!loop_.joinable()) return;
+    quit_ = true;
+    loop_.join();
+    rig_.reset();
+    sd_event_unref(event_);
+  }
+
+  test::PrivateBus bus_;
+  sd_event* event_ = nullptr;
+  static Status first_status() {
+    Status status;
+    status.mode = "live";
+    status.writing = true;  // recording ended, and the disk is slow
+    status.take = "12A_take003";
+    status.take_frames = 120;
+    status.samples = 16;
+    status.set = "desk";
+    return status;
+  }
+  static void fall_if(bool falls) {
+    if (falls) throw std::runtime_error("lamp fell down");
+  }
+  std::string fallen_;  // the verb that throws
+  Status status_ = first_status();
+  std::unique_ptr<Bus> rig_;
+  std::atomic<bool> quit_ = false;
+  std::thread loop_;
+};
+
+TEST(MethodName, IsTheActionInCamelCase) {
+  EXPECT_EQ(method_name("record"), "Record");
+  EXPECT_EQ(method_name("move_left"), "MoveLeft");
+}
+
+TEST_F(RigOnTheBus, PrevizctlOperatesIt) {
+  const Said status = previzctl("status");
+  EXPECT_EQ(status.status, 0) << status.out;
+  for (const char* line :
+       {"Mode: live\n", "Recording: no\n", "Writing: yes\n", "Take: 12A_take003\n",
+        "TakeFrames: 120\n", "Samples: 16\n", "Set: desk\n"})
+    EXPECT_NE(status.out.find(line), std::string::npos) << status.out;
+  EXPECT_EQ(previzctl("mode refine").out, "refine\n");
+  EXPECT_EQ(previzctl("record on").out, "recording\n");
+  EXPECT_NE(previzctl("status").out.find("Recording: yes\n"), std::string::npos);
+  EXPECT_EQ(previzctl("action move_left").out, "move_left\n");
+  EXPECT_EQ(previzctl("set next").out, "next_set\n");
+  EXPECT_EQ(previzctl("metrics").out, "{}\n");
+}
+
+TEST_F(RigOnTheBus, WhatIsRefusedOrUnknownIsSaidAndFails) {
+  const Said refused = previzctl("action standby");
+  EXPECT_EQ(refused.status, 1);
+  EXPECT_EQ(refused.out, "previzctl: standby\n");
+  const Said unknown = previzctl("action make_coffee");
+  EXPECT_EQ(unknown.status, 1);
+  EXPECT_NE(unknown.out.find("\"make_coffee\""), std::string::npos);
+  EXPECT_EQ(previzctl("mode faster").status, 2);
+}
+
+// An exception that passes through sd-bus, which is C, is undefined behaviour, and mostly the end.
+TEST_F(RigOnTheBus, WhatAVerbThrowsIsAnErrorInReplyAndTheRigGoesOn) {
+  for (const auto& [verb, call] :
+       {std::pair("perform", "action move_left"), {"metrics", "metrics"}, {"status", "status"}}) {
+    fallen_ = verb;
+    const Said said = previzctl(call);
+    EXPECT_EQ(said.status, 1) << said.out;
+    EXPECT_NE(said.out.find("lamp fell down"), std::string::npos) << said.out;
+    fallen_.clear();
+    EXPECT_EQ(previzctl("action move_left").out, "move_left\n");
+  }
+}
+
+// The bus disconnects whoever sends anything else.
+TEST_F(RigOnTheBus, WhatIsNotUtf8OrNoCharacterIsSentWithoutIt) {
+  status_.set = "d\xc3\xa4sk \xff\xc3";
+  EXPECT_NE(previzctl("status").out.find("Set: d\xc3\xa4sk ??\n"), std::string::npos)
+      << previzctl("status").out;
+  status_.set = "\xed\xa0\x80 \xf4\x90\x80\x80 \xc0\xaf \xf0\x9f\x8e\xac";
+  EXPECT_NE(previzctl("status").out.find("Set: ??? ???? ?? \xf0\x9f\x8e\xac\n"), std::string::npos)
+      << previzctl("status").out;
+  // The last of a plane, the first of those in Arabic's block, and characters beside them.
+  status_.set = "\xf0\xbf\xbf\xbf \xef\xbf\xbe \xef\xb7\x90 \xef\xbf\xbd \xef\xb7\xb0";
+  EXPECT_NE(previzctl("status").out.find("Set: ???? ??? ??? \xef\xbf\xbd \xef\xb7\xb0\n"),
+            std::string::npos)
+      << previzctl("status").out;
+}
+
+// Every action of the table has its own method, and a change its signal.
+TEST_F(RigOnTheBus, EveryActionIsAMethodAndEveryChangeASignal) {
+  sd_bus* client = nullptr;
+  ASSERT_GE(sd_bus_open_system(&client), 0);
+  int signals = 0;
+  ASSERT_GE(sd_bus_match_signal(
+                client, nullptr, bus_name, object_path, "org.freedesktop.DBus.Properties",
+                "PropertiesChanged",
+                [](sd_bus_message*, void* count, sd_bus_error*) {
+                  return ++*static_cast<int*>(count), 0;
+                },
+                &signals),
+            0);
+  int calls = 0;
+  for (const set::Action& action : set::actions()) {
+    const std::string method = method_name(action.name);
+    if (method == "Record" || method == "Standby") continue;  // takes on or off; refused here
+    sd_bus_error error = SD_BUS_ERROR_NULL;
+    EXPECT_GE(sd_bus_call_method(client, bus_name, object_path, interface_name, method.c_str(),
+                                 &error, nullptr, ""),
+              0)
+        << method << ": " << error.message;
+    sd_bus_error_free(&error);
+    ++calls;
+  }
+  while (signals < calls && sd_bus_wait(client, 1'000'000) >= 0)
+    while (sd_bus_process(client, nullptr) > 0) continue;
+  EXPECT_EQ(signals, calls);
+  sd_bus_flush_close_unref(client);
+}
+
+// The policy that the package ships, for a group that there is on any machine instead of previz.
+class PolicyFile {
+ protected:
+  PolicyFile() {
+    std::string text = content_of(PREVIZ_SOURCE_DIR "/systemd/org.previz.Rig1.conf");
+    const std::string group = "group=\"previz\"";
+    text.replace(text.find(group), group.size(), std::string("group=\"") + member_group + '"');
+    std::ofstream(policy_) << text;
+  }
+  static std::string content_of(const std::filesystem::path& file) {
+    std::ifstream stream(file);
+    return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  static constexpr const char* member_group = "games";
+  const test::TemporaryDirectory folder_;
+  const std::filesystem::path policy_ = folder_ / "org.previz.Rig1.conf";
+};
+
+// A bus that keeps to the policy. The rig is root; callers are root, a user of no group, and the
+// same as a member of the group.
+class ShippedPolicy : private PolicyFile, public RigOnTheBus {
+ protected:
+  enum class Caller { root, nobody, member };
+
+  ShippedPolicy() : RigOnTheBus(policy_) {}
+  void SetUp() override {
+    if (geteuid() != 0) GTEST_SKIP() << "only root can be another user";
+    RigOnTheBus::SetUp();
+  }
+
+  static bool become(Caller caller) {
+    constexpr uid_t nobody = 65534;
+    const ::group* members = getgrnam(member_group);
+    const gid_t groups[] = {members ? members->gr_gid : nobody};
+    const std::size_t count = caller == Caller::member ? 1 : 0;
+    return caller == Caller::root ||
+           (setgroups(count, groups) == 0 && setgid(nobody) == 0 && setuid(nobody) == 0);
+  }
+
+  // The name of the error that a call is answered with; empty where there is none. The policy is
+  // asked before anybody looks at the arguments, so that calls without them will do.
+  using Call = std::function<void(sd_bus*, sd_bus_error*)>;
+  static std::string error_of(Caller caller, const Call& call) {
+    int answer[2];
+    if (pipe(answer) != 0) return "no pipe";
+    const pid_t child = fork();
+    if (child == 0) {
+      std::string said = "the caller cannot be another user";
+      if (become(caller)) {
+        sd_bus* bus = nullptr;
+        sd_bus_error error{};
+        said = sd_bus_open_system(&bus) < 0 ? "the bus cannot be reached" : "";
+        if (bus) call(bus, &error);
+        if (error.name) said = error.name;
+      }
+      const ssize_t written = write(answer[1], said.data(), said.size());
+      _exit(written == static_cast<ssize_t>(said.size()) ? 0 : 1);
+    }
+    close(answer[1]);
+    std::array<char, 256> text{};
+    const ssize_t size = read(answer[0], text.data(), text.size());
+    close(answer[0]);
+    waitpid(child, nullptr, 0);
+    return {text.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
+  }
+  static std::string error_of(Caller caller, const char* interface, const std::string& method) {
+    return error_of(caller, [&](sd_bus* bus, sd_bus_error* error) {
+      sd_bus_call_method(bus, bus_name, object_path, interface, method.c_str(), error, nullptr,
+                         nullptr);
+    });
+  }
+};
+
+TEST_F(ShippedPolicy, MembersAndRootMayOperateTheRigNobodyElseMayAndEverybodyMayLook) {
+  std::vector<std::string> methods{"Action", "SetMode", "Record", "Metrics", "Actions"};
+  for (const set::Action& action : set::actions()) methods.push_back(method_name(action.name));
+  for (const std::string& method : methods) {
+    EXPECT_EQ(error_of(Caller::nobody, interface_name, method), SD_BUS_ERROR_ACCESS_DENIED)
+        << method;
+    for (const Caller caller : {Caller::root, Caller::member})
+      EXPECT_NE(error_of(caller, interface_name, method), SD_BUS_ERROR_ACCESS_DENIED) << method;
+  }
+  constexpr const char* properties = "org.freedesktop.DBus.Properties";
+  EXPECT_EQ(error_of(Caller::nobody, properties, "Set"), SD_BUS_ERROR_ACCESS_DENIED);
+  for (const Caller caller : {Caller::nobody, Caller::member, Caller::root}) {
+    for (const char* method : {"Get", "GetAll"})  // for which the arguments are missing
+      EXPECT_EQ(error_of(caller, properties, method), SD_BUS_ERROR_INVALID_ARGS) << method;
+    EXPECT_EQ(error_of(caller, "org.freedesktop.DBus.Introspectable", "Introspect"), "");
+  }
+}
+
+// Who could own the name could pretend to be the rig.
+TEST_F(ShippedPolicy, OnlyTheServiceAndRootMayBeTheRig) {
+  const Call own = [](sd_bus* bus, sd_bus_error* error) {
+    sd_bus_call_method(bus, "org.freedesktop.DBus", "/org/freedesktop/DBus", "org.freedesktop.DBus",
+                       "RequestName", error, nullptr, "su", bus_name, 0u);
+  };
+  for (const Caller caller : {Caller::nobody, Caller::member})
+    EXPECT_EQ(error_of(caller, own), SD_BUS_ERROR_ACCESS_DENIED);
+  EXPECT_EQ(error_of(Caller::root, own), "");
+}
+
+TEST(BusWithoutARig, IsToldInPlainWords) {
+  const test::PrivateBus bus;
+  if (!bus.running()) GTEST_SKIP() << "dbus-daemon is not installed";
+  for (const char* request : {"status", "mode live"}) {
+    const Said said = previzctl(request);
+    EXPECT_EQ(said.status, 1);
+    EXPECT_EQ(said.out,
+              "previzctl: previzd does not answer: it is not running, or it is loading a set just "
+              "now\n");
+  }
+}
+
+// Whoever connects does so on the loop that answers buttons and feeds the watchdog.
+TEST(BusThatStandsStill, IsGivenUpSoon) {
+  const test::PrivateBus bus;
+  if (!bus.running()) GTEST_SKIP() << "dbus-daemon is not installed";
+  sd_event* event = nullptr;
+  sd_event_new(&event);
+  Verbs verbs;
+  verbs.status = [] { return Status{}; };
+  bus.stand_still();
+  std::jthread limit([&](const std::stop_token& is_given_up) {
+    const auto has_ended = [&] { return is_given_up.stop_requested(); };
+    EXPECT_TRUE(test::wait_until("it is given up", has_ended, std::chrono::seconds(15)));
+    bus.go_on();
+  });
+  EXPECT_THROW(Bus(event, verbs), Error);
+  limit.request_stop();
+  limit.join();
+  EXPECT_NO_THROW(Bus(event, verbs));
+  sd_event_unref(event);
+}
+
+TEST(RigWithoutABus, SaysSo) {
+  setenv("DBUS_SYSTEM_BUS_ADDRESS", "unix:path=/nonexistent/bus", 1);
+  const Said said = previzctl("status");
+  EXPECT_EQ(said.status, 1);
+  EXPECT_NE(said.out.find("bus cannot be reached"), std::string::npos) << said.out;
+  unsetenv("DBUS_SYSTEM_BUS_ADDRESS");
+}
+
+}  // namespace bus_test
+}  // namespace previz::control

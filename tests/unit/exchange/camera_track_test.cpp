@@ -1,0 +1,172 @@
+// The exported camera against matrices that are known, and against what OpenCV's model projects.
+#include "daemon/exchange/camera_track.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <glm/gtc/matrix_transform.hpp>
+#include <regex>
+#include <sstream>
+
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace previz::exchange {
+namespace camera_track_test {
+
+// At (1, 2, 3), level, looking along the world's +Y: right = X, down = -Z, forward = Y.
+const glm::dmat4 along_y{{1, 0, 0, 0}, {0, 0, -1, 0}, {0, 1, 0, 0}, {1, 2, 3, 1}};
+
+CameraTrack track_of(const glm::dmat4& world_from_camera) {
+  CameraTrack track;
+  track.name = "12A \"close\"";
+  track.calibration.intrinsics = {1920, 1080, 1800, 1790, 959.5, 539.5, -0.08, 0, 0, 0, 0};
+  track.calibration.lens = ThinLens{0.035, 2.8, 1.5};
+  track.frames = 11;
+  track.keys = {{7, world_from_camera}};
+  return track;
+}
+
+double value_of(const std::string& usda, const std::string& name) {
+  std::smatch found;
+  EXPECT_TRUE(std::regex_search(usda, found, std::regex("float " + name + " = (\\S+)\n"))) << name;
+  return std::stod(found[1]);
+}
+
+// A USD camera that looks along +Y with Z up has the rows X, Z, -Y.
+TEST(CameraTrack, UsdOfALevelCamera) {
+  const std::string usda = to_usda(track_of(along_y));
+  EXPECT_NE(usda.find("7: ((1, 0, 0, 0), (0, 0, 1, 0), (0, -1, 0, 0), (1, 2, 3, 1)),"),
+            std::string::npos)
+      << usda;
+  EXPECT_NE(usda.find("upAxis = \"Z\""), std::string::npos);
+  EXPECT_NE(usda.find("endTimeCode = 10\n"), std::string::npos);
+  EXPECT_NE(usda.find("12A \\\"close\\\""), std::string::npos);
+  EXPECT_NE(usda.find("Brown-Conrady: k1 -0.08"), std::string::npos);
+  EXPECT_EQ(usda.find("k4"), std::string::npos);
+  CameraTrack wide = track_of(along_y);
+  wide.calibration.intrinsics.k5 = 0.25;
+  EXPECT_NE(to_usda(wide).find("rational model: k1 -0.08"), std::string::npos);
+  EXPECT_NE(to_usda(wide).find(", k4 0, k5 0.25, k6 0"), std::string::npos);
+}
+
+// The lens is 35 mm; the film is as wide as the picture at that distance.
+TEST(CameraTrack, UsdLensIsTheCalibration) {
+  CameraTrack track = track_of(along_y);
+  track.calibration.intrinsics.cx = 969.5;  // the axis meets the picture 10 px right of its middle,
+  track.calibration.intrinsics.cy = 529.5;  // and 10 px above
+  const std::string usda = to_usda(track);
+  EXPECT_DOUBLE_EQ(value_of(usda, "focalLength"), 0.35);
+  EXPECT_DOUBLE_EQ(value_of(usda, "horizontalAperture"), 0.35 * 1920 / 1800);
+  EXPECT_DOUBLE_EQ(value_of(usda, "verticalAperture"), 0.35 * 1080 / 1790);
+  EXPECT_DOUBLE_EQ(value_of(usda, "horizontalApertureOffset"), 0.35 * -10 / 1800);
+  EXPECT_DOUBLE_EQ(value_of(usda, "verticalApertureOffset"), 0.35 * -10 / 1790);
+  EXPECT_DOUBLE_EQ(value_of(usda, "fStop"), 2.8);
+  EXPECT_DOUBLE_EQ(value_of(usda, "focusDistance"), 1.5);
+  track.calibration.lens.reset();
+  EXPECT_DOUBLE_EQ(value_of(to_usda(track), "horizontalAperture"), 0.36);
+}
+
+// Our +Y is Nuke's -Z, where an unturned camera looks.
+TEST(CameraTrack, ChanOfALevelCameraHasNoRotation) {
+  std::istringstream line(to_chan(track_of(along_y)));
+  double frame, tx, ty, tz, rx, ry, rz, vfov;
+  line >> frame >> tx >> ty >> tz >> rx >> ry >> rz >> vfov;
+  EXPECT_EQ(frame, 7);
+  EXPECT_EQ(tx, 1);
+  EXPECT_EQ(ty, 3);
+  EXPECT_EQ(tz, -2);
+  EXPECT_NEAR(rx, 0, 1e-12);
+  EXPECT_NEAR(ry, 0, 1e-12);
+  EXPECT_NEAR(rz, 0, 1e-12);
+  EXPECT_NEAR(vfov, glm::degrees(2 * std::atan(540.0 / 1790)), 1e-12);
+}
+
+TEST(CameraTrack, ChanOfACameraTippedDown) {
+  const glm::dmat4 tipped = along_y * glm::rotate(glm::dmat4(1), glm::radians(-30.0), {1, 0, 0});
+  std::istringstream line(to_chan(track_of(tipped)));
+  double skip, rx, ry, rz;
+  line >> skip >> skip >> skip >> skip >> rx >> ry >> rz;
+  // OpenCV's X is the same axis as Nuke's, its other two are turned round: the angle keeps its
+  // sign.
+  EXPECT_NEAR(rx, -30, 1e-12);
+  EXPECT_NEAR(ry, 0, 1e-12);
+  EXPECT_NEAR(rz, 0, 1e-12);
+}
+
+// Ry Rx Rz of the angles is the matrix they were taken from, also where the camera looks straight
+// up.
+TEST(CameraTrack, AnglesGiveTheMatrixBack) {
+  const auto turn = [](double degrees, const glm::dvec3& axis) {
+    return glm::dmat3(glm::rotate(glm::dmat4(1), glm::radians(degrees), axis));
+  };
+  for (const double x : {-90.0, -60.0, 0.0, 30.0, 90.0})
+    for (const double y : {-170.0, -20.0, 0.0, 100.0})
+      for (const double z : {-120.0, 0.0, 45.0, 180.0}) {
+        const auto matrix = [&](const glm::dvec3& d) {
+          return turn(d.y, {0, 1, 0}) * turn(d.x, {1, 0, 0}) * turn(d.z, {0, 0, 1});
+        };
+        const glm::dmat3 truth = matrix({x, y, z}), back = matrix(zxy_degrees(truth));
+        for (int c = 0; c < 3; ++c)
+          EXPECT_NEAR(glm::length(truth[c] - back[c]), 0, 1e-7) << x << " " << y << " " << z;
+      }
+}
+
+TEST(CameraTrack, FramesThatWereNotTrackedHaveNoKey) {
+  session::Session session;
+  session.track.resize(3);
+  for (std::uint64_t i = 0; i < 3; ++i) session.track[i].frame = i;
+  session.track[1].tracked = true;
+  std::vector<session::FrameRecord> frames(3);
+  for (std::size_t i = 0; i < 3; ++i)
+    frames[i].timestamp_ns = static_cast<std::int64_t>(i) * 50'000'000;
+  const CameraTrack track = camera_track(session, frames, {});
+  ASSERT_EQ(track.keys.size(), 1u);
+  EXPECT_EQ(track.keys[0].frame, 1u);
+  EXPECT_DOUBLE_EQ(track.rate.fps, 20);
+  session.track[1].tracked = false;
+  EXPECT_THROW(camera_track(session, frames, {}), Error);
+}
+
+// A session in which `from` stands for what `to` says, wherever it is written.
+void rewrite(const std::filesystem::path& session, const std::string& from, const std::string& to) {
+  std::string text = session::read_file(session / "session.toml");
+  for (std::size_t at = text.find(from); at != std::string::npos;
+       at = text.find(from, at + to.size()))
+    text.replace(at, from.size(), to);
+  session::replace_file(session / "session.toml", text);
+}
+
+TEST(ExportTake, TwoFilesOfOneNameStayTwo) {
+  const test::TemporaryDirectory directory;
+  test::write_small_take(directory.path());
+  const std::string floor = session::read_file(directory / "floor.gltf");
+  const std::string card = session::read_file(directory / "card.gltf");
+  rewrite(directory / "session", "card.gltf", "props/floor.gltf");
+  std::ostringstream out;
+  export_take({directory / "session", directory / "out"}, out);
+  EXPECT_EQ(session::read_file(directory / "out/floor.gltf"), floor);
+  EXPECT_EQ(session::read_file(directory / "out/floor_2.gltf"), card);
+}
+
+// What is exported is handed on: a take from elsewhere must not add files of the one who exports
+// it.
+TEST(ExportTake, CopiesNoForeignFile) {
+  const test::TemporaryDirectory directory;
+  test::write_small_take(directory.path());
+  session::replace_file(directory / "secret.gltf", session::read_file(directory / "card.gltf"));
+  rewrite(directory / "session", "\"card.gltf\"", "\"../secret.gltf\"");
+  rewrite(directory / "session", "\\\"card.gltf\\\"", "\\\"../secret.gltf\\\"");
+  // What the set names is no asset of the session any more.
+  rewrite(directory / "session", "\"../secret.gltf\" =", "\"other.gltf\" =");
+  std::ostringstream out;
+  EXPECT_THROW(export_take({directory / "session", directory / "out"}, out), Error);
+  EXPECT_FALSE(std::filesystem::exists(directory / "out/secret.gltf"));
+  export_take({directory / "session", directory / "out", {}, true}, out);
+  EXPECT_TRUE(std::filesystem::exists(directory / "out/secret.gltf"));
+}
+
+}  // namespace camera_track_test
+}  // namespace previz::exchange

@@ -1,0 +1,221 @@
+// A take that came without poses: they are found by the set's tags without rendering, and its
+// camera and its objects are exported where they are.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <glm/gtc/matrix_transform.hpp>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <sstream>
+
+#include "daemon/exchange/camera_track.hpp"
+#include "daemon/exchange/placed_model.hpp"
+#include "daemon/exchange/take_track.hpp"
+#include "daemon/scene/scene.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "tests/support/gltf_writer.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tests/support/tracking_synthetic.hpp"
+
+namespace previz::exchange {
+namespace take_track_test {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr int width = 320, height = 240, frames = 4, unseen = 2;
+
+// The tag lies on the table; in frame `unseen` somebody has put a hand on it.
+glm::dmat4 pose_of(int frame) {
+  return test::camera_looking({0.05 * frame, -0.4, 0.5}, glm::dvec3(0));
+}
+
+const char* set_text = R"(
+[set]
+name = "desk"
+[observer]
+driver = "replay"
+device = "session"
+[[tag]]
+id = 3
+size_m = 0.12
+position_m = [0.0, 0.0, 0.0]
+[[object]]
+name = "shelf"
+file = "shelf.glb"
+position_m = [-0.05, 0.0, -0.28]
+rotation_deg = [10.0, 20.0, 90.0]
+presence = "virtual"
+)";
+
+void write_model(const fs::path& file) {
+  test::GltfWriter gltf;
+  gltf.root("shelf", gltf.triangle_mesh(), {{"translation", {0.1, 0.2, 0.3}}});
+  gltf.save(file);
+}
+
+class UntrackedTake : public testing::Test {
+ protected:
+  UntrackedTake() {
+    write_model(directory_ / "shelf.glb");
+    test::TagScene scene;
+    scene.lens = test::plain_lens(width, height, 300);
+    scene.tags = {test::flat_tag(3, 0.12, glm::dvec3(0))};
+    session::SessionInfo info;
+    info.name = "walk";
+    info.set_text = set_text;
+    info.observer.emplace();
+    info.observer->intrinsics = scene.lens;
+    session::SessionWriter writer(session_, info);
+    writer.add_asset("shelf.glb", directory_ / "shelf.glb");
+    std::mt19937 random(1);
+    for (int i = 0; i < frames; ++i) {
+      scene.world_from_camera = pose_of(i);
+      test::TagScene shown = scene;
+      if (i == unseen) shown.tags.clear();
+      Frame frame =
+          test::expose(test::render(shown), {.response = info.observer->response}, random);
+      frame.source = "observer";
+      frame.sequence = static_cast<std::uint64_t>(i);
+      frame.timestamp_ns = frame.arrival_ns = 1'000'000'000 + i * 40'000'000;
+      writer.write(frame);
+    }
+    writer.close();
+  }
+
+  // World places of the object's corners as the renderer has them.
+  static glm::dmat4 place_in(const fs::path& folder, const std::string& place) {
+    std::ofstream(folder / "set.toml")
+        << "[set]\nname = \"one\"\n[observer]\ndriver = \"replay\"\ndevice = \"x\"\n"
+           "[[object]]\nname = \"shelf\"\nfile = \"shelf.glb\"\npresence = \"virtual\"\n"
+        << place;
+    return scene::load_scene(set::load_set(folder / "set.toml")).instances.at(0).world_from_object;
+  }
+
+  test::TemporaryDirectory directory_;
+  const fs::path session_ = directory_ / "session", out_ = directory_ / "out";
+  std::ostringstream said_;
+};
+
+double distance(const glm::dmat4& a, const glm::dmat4& b) {
+  double most = 0;
+  for (int c = 0; c < 4; ++c)
+    for (int r = 0; r < 4; ++r) most = std::max(most, std::abs(a[c][r] - b[c][r]));
+  return most;
+}
+
+// A tag of about 60 px is found to a tenth of a pixel: 0.1 / 300 at 0.65 m, over 60 px of leverage.
+TEST_F(UntrackedTake, PosesAreFoundWithoutRendering) {
+  TrackOptions options;
+  options.session = session_;
+  options.out = directory_ / "poses.jsonl";
+  EXPECT_EQ(track_take(options, said_), 0);
+  EXPECT_THAT(said_.str(), HasSubstr("3 of 4 frames tracked, corners off by "));
+  EXPECT_THAT(said_.str(), HasSubstr("tag 3: seen in 3 frames, used for the camera in 3\n"));
+  EXPECT_THAT(said_.str(), HasSubstr("1 without a pose, as frame 2: "));
+  std::istringstream lines(session::read_file(*options.out));
+  int count = 0;
+  for (std::string line; std::getline(lines, line); ++count) {
+    const auto json = nlohmann::json::parse(line);
+    EXPECT_EQ(json["frame"], count);
+    EXPECT_EQ(json["tracked"], count != unseen);
+    if (count == unseen) {
+      EXPECT_THAT(json["reason"].get<std::string>(), Not(HasSubstr("\n")));
+      continue;
+    }
+    glm::dmat4 pose;
+    for (int r = 0; r < 4; ++r)
+      for (int c = 0; c < 4; ++c) pose[c][r] = json["world_from_camera"][r][c];
+    EXPECT_LT(distance(pose, pose_of(count)), 0.02);
+    EXPECT_EQ(json["tags"], nlohmann::json({3}));
+  }
+  EXPECT_EQ(count, frames);
+}
+
+// It was refused: "track.jsonl has no pose".
+TEST_F(UntrackedTake, IsExportedWithItsCamera) {
+  export_take({session_, out_}, said_);
+  EXPECT_THAT(said_.str(), HasSubstr("finding the poses of 4 frames"));
+  EXPECT_THAT(said_.str(), HasSubstr("3 poses of 4 frames"));
+  EXPECT_THAT(said_.str(), HasSubstr("rotation order ZXY"));
+  std::istringstream chan(session::read_file(out_ / "camera.chan"));
+  int lines = 0;
+  for (std::string line; std::getline(chan, line);) ++lines;
+  EXPECT_EQ(lines, 3);
+}
+
+// It lay at the origin.
+TEST_F(UntrackedTake, IsExportedWithItsObjectsInTheirPlaces) {
+  export_take({session_, out_}, said_);
+  const glm::dmat4 in_set = place_in(
+      directory_.path(), "position_m = [-0.05, 0.0, -0.28]\nrotation_deg = [10.0, 20.0, 90.0]\n");
+  EXPECT_LT(distance(place_in(out_, ""), in_set), 1e-12);
+  EXPECT_GT(distance(in_set, glm::dmat4(1)), 0.2);
+}
+
+// The take was recorded before the tags were measured.
+TEST_F(UntrackedTake, IsExportedWithAnotherSetFile) {
+  std::string toml = session::read_file(session_ / "session.toml");
+  const std::string whole_set = session::open_session(session_).info.set_text;
+  const std::size_t tag = toml.find("[[tag]]");
+  toml.replace(tag, toml.find("[[object]]") - tag, "");
+  session::replace_file(session_ / "session.toml", toml);
+  session::replace_file(directory_ / "measured.toml", whole_set);
+  ExportOptions options{session_, out_};
+  options.set_file = directory_ / "measured.toml";
+  export_take(options, said_);
+  EXPECT_THAT(said_.str(), HasSubstr("3 poses of 4 frames"));
+}
+
+TEST_F(UntrackedTake, WithoutTagsSaysWhatToDo) {
+  std::string toml = session::read_file(session_ / "session.toml");
+  const std::size_t tag = toml.find("[[tag]]");
+  ASSERT_NE(tag, std::string::npos);
+  toml.replace(tag, toml.find("[[object]]") - tag, "");
+  session::replace_file(session_ / "session.toml", toml);
+  try {
+    export_take({session_, out_}, said_);
+    FAIL() << "a camera nobody knows was exported";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("`previzd track` says why, and the set needs [[tag]]"));
+  }
+}
+
+TEST(PlacedModel, KeepsWhatItDoesNotKnow) {
+  const test::TemporaryDirectory directory;
+  for (const char* name : {"model.glb", "model.gltf"}) {
+    write_model(directory / name);
+    const std::string content = session::read_file(directory / name);
+    const std::string placed =
+        placed_model(content, "shelf", glm::translate(glm::dmat4(1), glm::dvec3(1, 2, 3)));
+    EXPECT_THAT(placed, HasSubstr(R"("matrix":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,)"));
+    EXPECT_THAT(placed, HasSubstr("1.0,3.0,-2.0,1.0]"));  // Z up became Y up
+    if (content.starts_with("glTF")) {
+      std::uint32_t length = 0, json = 0;
+      std::memcpy(&length, placed.data() + 8, 4);
+      std::memcpy(&json, placed.data() + 12, 4);
+      EXPECT_EQ(length, placed.size());
+      EXPECT_EQ(json % 4, 0u);
+      std::uint32_t before = 0;
+      std::memcpy(&before, content.data() + 12, 4);
+      EXPECT_EQ(placed.substr(20 + json), content.substr(20 + before));
+    }
+  }
+}
+
+TEST(PlacedModel, WhatIsNoGltfIsRefused) {
+  const glm::dmat4 place(1);
+  for (const std::string& content :
+       {std::string(), std::string("{}"), std::string("[1]"), std::string("no json"),
+        std::string("glTF"), std::string("glTF") + std::string(8, '\1') + "\xff\xff\xff\xffJSON",
+        std::string(R"({"scenes": [{"nodes": [0]}], "scene": "x"})"),
+        std::string(R"({"scenes": 4})"), std::string(R"({"scene": 7, "scenes": [{}]})")})
+    EXPECT_THROW(placed_model(content, "x", place), Error) << content;
+}
+
+}  // namespace take_track_test
+}  // namespace previz::exchange

@@ -1,0 +1,260 @@
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfOutputFile.h>
+#include <gtest/gtest.h>
+#include <half.h>
+
+#include <cmath>
+#include <fstream>
+#include <glm/geometric.hpp>
+#include <numbers>
+#include <random>
+#include <string>
+
+#include "daemon/lighting/exr_picture.hpp"
+#include "daemon/lighting/lighting.hpp"
+#include "drivers/error.hpp"
+#include "tests/support/lighting.hpp"
+#include "tests/support/lighting_pictures.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace previz::lighting {
+namespace environment_file_test {
+
+using std::numbers::pi;
+using test::towards;
+
+set::Lighting settings_for(const std::filesystem::path& file) {
+  set::Lighting settings;
+  settings.environment = file;
+  return settings;
+}
+
+// Rough texture in every pixel and a few pixels a hundred thousand times as bright.
+LinearPicture rough_sky(int width) {
+  LinearPicture picture{width, width / 2, {}};
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> uniform(0.1f, 1.0f);
+  for (int p = 0; p < width * width / 2; ++p)
+    picture.radiance.emplace_back(uniform(random), uniform(random), 3 * uniform(random));
+  const auto pixel = [&](int x, int y) -> glm::vec3& {
+    return picture.radiance[static_cast<std::size_t>(y * width + x)];
+  };
+  pixel(width / 3, width / 8) = glm::vec3(1e5f, 8e4f, 6e4f);
+  pixel(0, width / 5) = glm::vec3(5e4f, 5e4f, 6e4f);  // across the seam
+  pixel(width / 2, 3 * width / 8) = glm::vec3(1e5f);
+  return picture;
+}
+
+// Midpoint sums over 4x4 directions a pixel of the bilinear function, in double.
+template <typename Body>  // body(direction, radiance, solid angle)
+void integrate(const LinearPicture& picture, const Body& body) {
+  const auto pixel = [&](int x, int y) {
+    y = std::clamp(y, 0, picture.height - 1);
+    x = (x + picture.width) % picture.width;
+    return glm::dvec3(picture.radiance[static_cast<std::size_t>(y * picture.width + x)]);
+  };
+  for (int r = 0; r < 4 * picture.height; ++r) {
+    for (int c = 0; c < 4 * picture.width; ++c) {
+      const double x = (c + 0.5) / 4, y = (r + 0.5) / 4;
+      const double azimuth = 2 * pi * (0.5 - x / picture.width);
+      const double elevation = pi * (0.5 - y / picture.height);
+      const double px = x - 0.5, py = y - 0.5;
+      const int column = static_cast<int>(std::floor(px)), row = static_cast<int>(std::floor(py));
+      const double s = px - column, t = py - row;
+      const glm::dvec3 radiance =
+          (1 - t) * ((1 - s) * pixel(column, row) + s * pixel(column + 1, row)) +
+          t * ((1 - s) * pixel(column, row + 1) + s * pixel(column + 1, row + 1));
+      body(glm::dvec3(std::cos(elevation) * std::cos(azimuth),
+                      std::cos(elevation) * std::sin(azimuth), std::sin(elevation)),
+           radiance, std::cos(elevation) * pi * pi / 8 / picture.height / picture.width);
+    }
+  }
+}
+
+double largest_relative_error(const glm::dvec3& value, const glm::dvec3& expected) {
+  const glm::dvec3 error = glm::abs(value / expected - 1.0);
+  return std::max({error.x, error.y, error.z});
+}
+
+TEST(LoadEnvironment, KeepsFluxAndIrradiance) {
+  const previz::test::TemporaryDirectory directory;
+  const LinearPicture sky = rough_sky(256);
+  write_exr_picture(directory / "sky.exr", sky);
+  const std::vector<glm::dvec3> normals = test::upper_normals();
+  glm::dvec3 flux(0);
+  std::vector<glm::dvec3> expected(normals.size(), glm::dvec3(0));
+  integrate(sky, [&](const glm::dvec3& direction, const glm::dvec3& radiance, double sr) {
+    flux += radiance * sr;
+    for (std::size_t n = 0; n < normals.size(); ++n)
+      if (const double cosine = glm::dot(direction, normals[n]); cosine > 0)
+        expected[n] += radiance * (sr * cosine);
+  });
+  for (int resolution : {0, 64, 1024}) {
+    set::Lighting settings = settings_for(directory / "sky.exr");
+    settings.resolution = resolution;
+    const EnvironmentMap map = load_environment(settings).environment;
+    EXPECT_EQ(map.size, resolution == 0 ? 256 : resolution);
+    // The suns hold nearly all of the flux. Each is a tent two pixels wide that is summed over a
+    // grid of h pixels; where its kink falls between two directions the sum is off by up to h^2 / 6
+    // along that axis, with either sign: h is 1/4.4 at 64 texels and 1/7 at 256.
+    EXPECT_LT(largest_relative_error(total_flux(map), flux), map.size >= 256 ? 1e-3 : 5e-3);
+    double worst = 0;
+    for (std::size_t n = 0; n < normals.size(); ++n)
+      worst = std::max(worst, largest_relative_error(irradiance(map, normals[n]), expected[n]));
+    // Texels of a degree and more move a sun that stands low over a plane by too much to compare.
+    if (map.size >= 256) {
+      EXPECT_LT(worst, 0.005) << resolution;
+    }
+  }
+}
+
+// What `previzd calibrate balance` prints makes up for an environment that does not fit the camera.
+TEST(LoadEnvironment, IsMultipliedByTheBalanceAndTheGain) {
+  const previz::test::TemporaryDirectory directory;
+  write_exr_picture(directory / "sky.exr", rough_sky(64));
+  set::Lighting settings = settings_for(directory / "sky.exr");
+  const EnvironmentMap plain = load_environment(settings).environment;
+  settings.environment_gain = 2;
+  settings.balance = {0.5, 0.25, 4};
+  const EnvironmentMap balanced = load_environment(settings).environment;
+  for (std::size_t i = 0; i < plain.radiance.size(); ++i)
+    ASSERT_EQ(balanced.radiance[i], plain.radiance[i] * glm::vec3(1, 0.5f, 8));
+}
+
+TEST(LoadEnvironment, SeesTheLayoutFromInside) {
+  const previz::test::TemporaryDirectory directory;
+  // Red grows with x, green with y, blue with z.
+  LinearPicture sky{256, 128, {}};
+  for (int r = 0; r < 128; ++r)
+    for (int c = 0; c < 256; ++c)
+      sky.radiance.emplace_back(
+          0.5 * towards(360 * (0.5 - (c + 0.5) / 256), 180 * (0.5 - (r + 0.5) / 128)) + 0.5);
+  write_exr_picture(directory / "sky.exr", sky);
+  for (double turn_deg : {0.0, 90.0, -133.0, 725.0}) {
+    set::Lighting settings = settings_for(directory / "sky.exr");
+    settings.environment_rotation_rad = turn_deg * pi / 180;
+    settings.environment_gain = 2;
+    const EnvironmentMap map = load_environment(settings).environment;
+    for (int j = 0; j < map.size; ++j) {
+      for (int i = 0; i < map.size; ++i) {
+        const glm::dvec3 d(texel_direction(map.size, i, j));
+        const double c = std::cos(-turn_deg * pi / 180), s = std::sin(-turn_deg * pi / 180);
+        const glm::dvec3 unturned(c * d.x - s * d.y, s * d.x + c * d.y, d.z);
+        // Slopes are 1/2: a texel's mean and a pixel's chord are off by their squared size, next to
+        // a pole by a pixel, where azimuth is lost.
+        const double limit = std::abs(d.z) > 0.999 ? 0.03 : 0.002;
+        ASSERT_LT(glm::length(glm::dvec3(map.radiance[static_cast<std::size_t>(j * map.size + i)]) -
+                              2.0 * (0.5 * unturned + 0.5)),
+                  limit)
+            << i << " " << j;
+      }
+    }
+    // The picture for people is the same way around.
+    if (turn_deg == 0) {
+      const LinearPicture shown = to_latitude_longitude(map, 256);
+      for (std::size_t p = 0; p < shown.radiance.size(); ++p)
+        ASSERT_LT(glm::length(shown.radiance[p] - 2.0f * sky.radiance[p]), 0.04f);
+    }
+  }
+}
+
+struct NamedChannel {
+  const char* name;
+  float value;
+  Imf::PixelType type = Imf::HALF;
+};
+
+void write_channels(const std::filesystem::path& file, const std::vector<NamedChannel>& channels) {
+  constexpr int width = 64, height = 32;
+  Imf::Header header(width, height);
+  Imf::FrameBuffer buffer;
+  std::vector<std::vector<float>> floats(channels.size());
+  std::vector<std::vector<half>> halves(channels.size());
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    header.channels().insert(channels[c].name, Imf::Channel(channels[c].type));
+    if (channels[c].type == Imf::HALF) {
+      halves[c].assign(width * height, half(channels[c].value));
+      buffer.insert(channels[c].name,
+                    Imf::Slice(Imf::HALF, reinterpret_cast<char*>(halves[c].data()), sizeof(half),
+                               sizeof(half) * width));
+    } else {
+      floats[c].assign(width * height, channels[c].value);
+      buffer.insert(channels[c].name,
+                    Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(floats[c].data()), sizeof(float),
+                               sizeof(float) * width));
+    }
+  }
+  Imf::OutputFile output(file.c_str(), header);
+  output.setFrameBuffer(buffer);
+  output.writePixels(height);
+}
+
+TEST(LoadEnvironment, ReadsTheUsualChannels) {
+  const previz::test::TemporaryDirectory directory;
+  const std::vector<std::pair<std::vector<NamedChannel>, glm::vec3>> files{
+      {{{"R", 1}, {"G", 2}, {"B", 4}}, {1, 2, 4}},
+      {{{"A", 1}, {"B", 4}, {"G", 2}, {"R", 1}}, {1, 2, 4}},
+      {{{"Z", 9, Imf::FLOAT}, {"R", 1, Imf::FLOAT}, {"G", 2}, {"B", 4, Imf::FLOAT}}, {1, 2, 4}},
+      {{{"Y", 3}}, {3, 3, 3}},
+      {{{"Y", 3}, {"A", 1}}, {3, 3, 3}}};
+  for (const auto& [channels, expected] : files) {
+    write_channels(directory / "sky.exr", channels);
+    const Lighting lighting = load_environment(settings_for(directory / "sky.exr"));
+    for (const glm::vec3& radiance : lighting.environment.radiance)
+      ASSERT_LT(glm::length(radiance - expected), 1e-5f);
+    EXPECT_NEAR(lighting.report.seen_sr, 4 * pi, 1e-12);
+    EXPECT_TRUE(lighting.report.notes.empty());
+  }
+}
+
+std::string message_of(const std::filesystem::path& file) {
+  try {
+    load_environment(settings_for(file));
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(LoadEnvironment, SaysWhatIsWrongWithAFile) {
+  const previz::test::TemporaryDirectory directory;
+  const auto file = directory / "sky.exr";
+  write_channels(file, {{"R", 1}, {"G", 1}, {"left.B", 1}});
+  EXPECT_NE(message_of(file).find("found G, R, left.B"), std::string::npos) << message_of(file);
+  write_channels(file, {{"Y", 1}, {"RY", 0}, {"BY", 0}});
+  EXPECT_NE(message_of(file).find("found BY, RY, Y"), std::string::npos) << message_of(file);
+  write_exr_picture(file, {30, 20, std::vector<glm::vec3>(600)});
+  EXPECT_NE(message_of(file).find("30x20"), std::string::npos);
+  EXPECT_NE(message_of(directory / "none.exr").find("none.exr"), std::string::npos);
+  EXPECT_NE(message_of(directory.path()).find("cannot be read"), std::string::npos);
+}
+
+// A file of some kilobytes may claim to hold a picture that no memory holds.
+TEST(LoadEnvironment, AHugeWindowIsRefusedBeforeMemoryIsAskedFor) {
+  const previz::test::TemporaryDirectory directory;
+  const auto file = directory / "sky.exr";
+  {
+    Imf::Header header(65536, 32768);
+    header.compression() = Imf::ZIP_COMPRESSION;
+    for (const char* channel : {"R", "G", "B"})
+      header.channels().insert(channel, Imf::Channel(Imf::HALF));
+    const Imf::OutputFile without_pixels(file.c_str(), header);
+  }
+  EXPECT_NE(message_of(file).find("65536x32768 pixels; allowed: at most"), std::string::npos)
+      << message_of(file);
+}
+
+// So may an attribute of its header, which OpenEXR would ask as much memory for.
+TEST(LoadEnvironment, AHugeAttributeIsRefusedBeforeMemoryIsAskedFor) {
+  const previz::test::TemporaryDirectory directory;
+  const auto file = directory / "sky.exr";
+  const std::string name("owner\0string\0", 13);
+  std::ofstream(file, std::ios::binary) << std::string("\x76\x2f\x31\x01\2\0\0\0", 8) << name
+                                        << std::string("\xff\xff\xff\x7f", 4) << "and little more";
+  EXPECT_NE(message_of(file).find("its header is damaged"), std::string::npos) << message_of(file);
+}
+
+}  // namespace environment_file_test
+}  // namespace previz::lighting

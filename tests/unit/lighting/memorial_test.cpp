@@ -1,0 +1,127 @@
+// The merge on real exposures: sixteen film scans of Memorial Church, a stop apart, against the
+// radiance map that Debevec published of them (SIGGRAPH 97).
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/photo.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tests/support/lighting.hpp"
+#include "tests/support/shared_data.hpp"
+
+namespace previz::lighting {
+namespace memorial_test {
+
+struct Memorial {
+  std::vector<cv::Mat> pictures;  // 8-bit BGR
+  std::vector<float> times_s;
+  cv::Mat reference;  // float BGR
+};
+
+Memorial load_memorial(const std::filesystem::path& directory) {
+  Memorial memorial;
+  std::ifstream list(directory / "exposures.txt");
+  for (std::string line; std::getline(list, line);) {
+    std::istringstream words(line);
+    std::string name;
+    float time_s = 0;
+    if (line.starts_with('#') || !(words >> name >> time_s)) continue;
+    memorial.pictures.push_back(cv::imread((directory / name).string()));
+    memorial.times_s.push_back(time_s);
+  }
+  memorial.reference =
+      cv::imread((directory / "memorial_reference.hdr").string(), cv::IMREAD_UNCHANGED);
+  return memorial;
+}
+
+// Robertson's curve of one channel as a table; the ends, which no picture shows well, made to rise.
+ResponseCurve channel_response(const cv::Mat& robertson, int bgr) {
+  ResponseCurve response{.kind = ResponseCurve::Kind::table, .inverse_table = {}, .clip_share = 1};
+  double last = 0;
+  for (int code = 0; code < 256; ++code) {
+    const double signal = robertson.at<cv::Vec3f>(code)[bgr];
+    const double least = last * (1 + 1e-3) + 1e-6;
+    last = code == 0 ? 0 : std::isfinite(signal) ? std::max(signal, least) : least;
+    response.inverse_table.push_back(last);
+  }
+  for (double& signal : response.inverse_table) signal /= last;
+  return response;
+}
+
+std::vector<FramePtr> frames_of(const Memorial& memorial) {
+  std::vector<FramePtr> frames;
+  for (std::size_t i = 0; i < memorial.pictures.size(); ++i) {
+    const cv::Mat& picture = memorial.pictures[i];
+    Frame frame;
+    frame.source = "light";
+    frame.sequence = i;
+    frame.exposure = memorial.times_s[i];
+    frame.width = picture.cols;
+    frame.height = picture.rows;
+    for (int y = 0; y < picture.rows; ++y)
+      for (int x = 0; x < picture.cols; ++x)
+        for (const int bgr : {2, 1, 0}) frame.bytes.push_back(picture.at<cv::Vec3b>(y, x)[bgr]);
+    frames.push_back(std::make_shared<Frame>(std::move(frame)));
+  }
+  return frames;
+}
+
+// |log2 ratio| to the reference after one factor, the median of the ratios; invalid pixels (pure
+// blue in the scans: the frame around the film) left out.
+std::vector<double> stops_off(const Memorial& memorial, const HdrPicture& merged, int rgb) {
+  std::vector<double> ratios;
+  for (int y = 0; y < merged.height; ++y) {
+    for (int x = 0; x < merged.width; ++x) {
+      const auto p = static_cast<std::size_t>(y * merged.width + x);
+      if (memorial.pictures.front().at<cv::Vec3b>(y, x) == cv::Vec3b(255, 0, 0)) continue;
+      const double truth = memorial.reference.at<cv::Vec3f>(y, x)[2 - rgb];
+      if (truth > 0 && merged.radiance[p][rgb] > 0)
+        ratios.push_back(std::log2(merged.radiance[p][rgb] / truth));
+    }
+  }
+  std::vector<double> sorted = ratios;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
+                   sorted.end());
+  const double factor = sorted[sorted.size() / 2];
+  for (double& ratio : ratios) ratio = std::abs(ratio - factor);
+  return ratios;
+}
+
+double quantile_of(std::vector<double>& values, double q) {
+  const auto place =
+      values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+TEST(MergeExposures, MatchesThePublishedMapOfRealExposures) {
+  const std::filesystem::path directory = test::shared_data("real/hdr/memorial");
+  PREVIZ_NEEDS(directory);
+  const Memorial memorial = load_memorial(directory);
+  ASSERT_EQ(memorial.pictures.size(), 16u);
+  cv::Mat robertson;
+  cv::createCalibrateRobertson()->process(memorial.pictures, robertson, memorial.times_s);
+
+  const std::vector<FramePtr> frames = frames_of(memorial);
+  std::vector<double> all;
+  for (int rgb = 0; rgb < 3; ++rgb) {
+    // A film has a curve a channel.
+    const HdrPicture merged = merge_exposures(frames, channel_response(robertson, 2 - rgb));
+    const std::vector<double> off = stops_off(memorial, merged, rgb);
+    all.insert(all.end(), off.begin(), off.end());
+  }
+  const double median = quantile_of(all, 0.5), p90 = quantile_of(all, 0.9);
+  std::printf("memorial: median %.3f, 90th percentile %.3f stops\n", median, p90);
+  EXPECT_LT(median, 0.08);
+  EXPECT_LT(p90, 0.25);
+}
+
+}  // namespace memorial_test
+}  // namespace previz::lighting

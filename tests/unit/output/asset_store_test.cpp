@@ -1,0 +1,147 @@
+// The files that takes need: kept once, as they were when the set was loaded, and linked into
+// takes.
+#include "daemon/output/asset_store.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "daemon/output/recorder.hpp"
+#include "drivers/descriptor.hpp"
+#include "drivers/session/files.hpp"
+#include "tests/support/session_fixture.hpp"
+#include "tests/support/wait_until.hpp"
+
+namespace previz::output {
+namespace asset_store_test {
+
+using session::noise_frame;
+using session::TemporaryDirectory;
+using session::write_content;
+using test::wait_until;
+
+const auto no_note = [](const std::string& what) { ADD_FAILURE() << what; };
+
+std::vector<std::string> names_in(const std::filesystem::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    names.push_back(entry.path().filename().string());
+  return names;
+}
+
+AssetStore::Delivered deliver(AssetStore& store, const std::filesystem::path& take) {
+  const auto order = store.deliver(take);
+  EXPECT_TRUE(wait_until("it is delivered", [&] { return order->result().has_value(); }));
+  return order->result().value_or(AssetStore::Delivered{});
+}
+
+TEST(AssetStore, KeepsEachContentOnceUnderItsHash) {
+  const TemporaryDirectory directory;
+  write_content(directory / "a.glb", "a model");
+  write_content(directory / "same.glb", "a model");
+  AssetStore store(directory / "store",
+                   {{"a.glb", directory / "a.glb"}, {"same.glb", directory / "same.glb"}}, no_note);
+  const AssetStore::Delivered delivered = deliver(store, directory / "take");
+  const std::string name = session::sha256_of(directory / "a.glb") + ".glb";
+  EXPECT_EQ(delivered.assets, (std::map<std::string, std::string>{{"a.glb", "assets/" + name},
+                                                                  {"same.glb", "assets/" + name}}));
+  EXPECT_TRUE(delivered.missing.empty());
+  EXPECT_EQ(session::read_file(directory / "take/assets" / name), "a model");
+  EXPECT_EQ(names_in(directory / "store"), std::vector<std::string>{name});
+}
+
+TEST(AssetStore, NamesWhatCannotBeKeptAndKeepsTheRest) {
+  const TemporaryDirectory directory;
+  write_content(directory / "b.glb", "another");
+  std::vector<std::string> notes;
+  AssetStore store(directory / "store",
+                   {{"a.glb", directory / "none.glb"}, {"b.glb", directory / "b.glb"}},
+                   [&](const std::string& what) { notes.push_back(what); });
+  const AssetStore::Delivered delivered = deliver(store, directory / "take");
+  EXPECT_EQ(delivered.assets.size(), 1u);
+  EXPECT_TRUE(delivered.assets.contains("b.glb"));
+  ASSERT_EQ(delivered.missing.size(), 1u);
+  EXPECT_EQ(delivered.missing[0].as_written, "a.glb");
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_TRUE(notes[0].starts_with("a.glb will not be in the takes: ")) << notes[0];
+}
+
+TEST(AssetStore, RemovesWhatNoTakeAndNoSetNeeds) {
+  const TemporaryDirectory directory;
+  std::filesystem::create_directories(directory / "store");
+  write_content(directory / "store/old.glb", "of a set from before");
+  write_content(directory / "store/taken.glb", "of a take");
+  std::filesystem::create_hard_link(directory / "store/taken.glb", directory / "in_a_take.glb");
+  AssetStore store(directory / "store", {}, no_note);
+  deliver(store, directory / "take");
+  EXPECT_EQ(names_in(directory / "store"), std::vector<std::string>{"taken.glb"});
+}
+
+// A take has what was there when the set was loaded, without a copy.
+TEST(Recorder, LinksTheAssetsIntoEachTakeAsTheyWereWhenTheSetWasLoaded) {
+  const TemporaryDirectory directory;
+  write_content(directory / "a.glb", "a model");
+  RecorderOptions options;
+  options.take.folders = {directory / "takes"};
+  options.take.info.take = session::TakeInfo{0, "1", "", 25, "", false};
+  options.take.assets = {{"models/a.glb", directory / "a.glb"}};
+  options.reserve_bytes = 0;
+  {
+    Recorder recorder(std::move(options));
+    ASSERT_TRUE(wait_until("the asset is kept", [&] {
+      return std::filesystem::exists(directory / "takes/.assets") &&
+             !std::filesystem::is_empty(directory / "takes/.assets") &&
+             !names_in(directory / "takes/.assets").front().starts_with(".");
+    }));
+    write_content(directory / "a.glb", "changed since");
+    for (std::uint64_t take = 1; take <= 2; ++take) {
+      recorder.start();
+      recorder.offer(
+          std::make_shared<Frame>(noise_frame("observer", take, PixelFormat::rgb8, 32, 24)));
+      recorder.stop();
+      ASSERT_TRUE(wait_until("the take is finished",
+                             [&] { return recorder.status().finished_takes == take; }));
+    }
+  }
+  for (const char* take : {"1_take001", "1_take002"}) {
+    const session::Session session = session::open_session(directory / "takes" / take);
+    EXPECT_TRUE(session.missing.empty()) << session.missing.front();
+    const std::filesystem::path file = session.directory / session.info.assets.at("models/a.glb");
+    EXPECT_EQ(session::read_file(file), "a model");
+    EXPECT_EQ(std::filesystem::hard_link_count(file), 3u);
+  }
+}
+
+// A model of which the store still waits: the take begins without it, and has it when it ends.
+TEST(Recorder, DoesNotWaitForAnAssetThatIsStillBeingRead) {
+  const TemporaryDirectory directory;
+  const std::filesystem::path pipe = directory / "slow.glb";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  RecorderOptions options;
+  options.take.folders = {directory / "takes"};
+  options.take.info.take = session::TakeInfo{0, "1", "", 25, "", false};
+  options.take.assets = {{"slow.glb", pipe}};
+  options.reserve_bytes = 0;
+  {
+    Recorder recorder(std::move(options));
+    recorder.start();
+    recorder.offer(std::make_shared<Frame>(noise_frame("observer", 0, PixelFormat::rgb8, 32, 24)));
+    ASSERT_TRUE(wait_until("it is recorded", [&] { return recorder.status().frames == 1; }));
+    // The store reads the pipe to its end, and then finds a file in its place.
+    {
+      const OwnedDescriptor into(::open(pipe.c_str(), O_WRONLY | O_CLOEXEC));
+      std::filesystem::remove(pipe);
+      write_content(pipe, "a model");
+      ASSERT_EQ(::write(into.get(), "a model", 7), 7);
+    }
+    recorder.stop();
+    ASSERT_TRUE(
+        wait_until("the take is finished", [&] { return recorder.status().finished_takes == 1; }));
+  }
+  const session::Session session = session::open_session(directory / "takes/1_take001");
+  EXPECT_EQ(session::read_file(session.directory / session.info.assets.at("slow.glb")), "a model");
+}
+
+}  // namespace asset_store_test
+}  // namespace previz::output

@@ -1,0 +1,260 @@
+// The EXR that carries every layer: exact names, exact values, honest header.
+#include "daemon/output/exr.hpp"
+
+#include <ImfChannelList.h>
+#include <ImfChromaticitiesAttribute.h>
+#include <ImfDoubleAttribute.h>
+#include <ImfInputFile.h>
+#include <ImfIntAttribute.h>
+#include <ImfMatrixAttribute.h>
+#include <ImfStandardAttributes.h>
+#include <ImfStringAttribute.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <set>
+
+#include "drivers/error.hpp"
+#include "tests/support/full_disk.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace previz::output {
+namespace exr_test {
+
+using test::TemporaryDirectory;
+
+// Every value different, with negative, tiny and huge ones, so that swapped channels cannot hide.
+render::Layers sample_layers(int width, int height) {
+  render::Layers layers;
+  layers.width = width;
+  layers.height = height;
+  layers.samples = 256;
+  layers.denoised = true;
+  float next = 0.001f;
+  const auto value = [&] { return next = next * -1.01f - 0.37f; };
+  for (int i = 0; i < width * height; ++i) {
+    for (auto* layer : {&layers.composite, &layers.mixed, &layers.real, &layers.diff,
+                        &layers.normal, &layers.variance})
+      layer->emplace_back(value(), 1e-20f * value(), 1e20f * value());
+    layers.mask.push_back(i % 3 == 0 ? 0.0f : i % 3 == 1 ? 0.25f : 1.0f);
+    layers.depth.push_back(value());
+  }
+  return layers;
+}
+
+// A camera at (1, 2, 3) that looks along +Y: a point 2 m ahead, 0.5 m right and 1 m up of it, as
+// OpenEXR's camera sees it and where it is in the picture.
+TEST(Exr, StandardCameraAttributesProjectAKnownPoint) {
+  const TemporaryDirectory directory;
+  ExrMetadata metadata;
+  metadata.world_from_camera = {{1, 0, 0, 0}, {0, 0, -1, 0}, {0, 1, 0, 0}, {1, 2, 3, 1}};
+  metadata.intrinsics = PinholeIntrinsics{64, 48, 60, 60, 31.5, 23.5};
+  metadata.lens = ThinLens{0.035, 2.8, 1.5};
+  metadata.exposure_s = 0.02;
+  write_exr(directory / "frame.exr", sample_layers(5, 3), metadata);
+  const Imf::InputFile file((directory / "frame.exr").c_str());
+  const Imf::Header& header = file.header();
+  const Imath::V3f world(1.5f, 4.0f, 4.0f);
+  Imath::V3f camera, ndc;
+  Imf::worldToCamera(header).multVecMatrix(world, camera);
+  Imf::worldToNDC(header).multVecMatrix(world, ndc);
+  EXPECT_EQ(camera, Imath::V3f(0.5f, 1.0f, 2.0f));
+  EXPECT_FLOAT_EQ(ndc.x, (32 + 60 * 0.25f) / 64);
+  EXPECT_FLOAT_EQ(ndc.y, (24 - 60 * 0.5f) / 48);
+  EXPECT_FLOAT_EQ(Imf::aperture(header), 2.8f);
+  EXPECT_FLOAT_EQ(Imf::focus(header), 1.5f);
+  EXPECT_FLOAT_EQ(Imf::expTime(header), 0.02f);
+
+  metadata.pose = "lost";
+  write_exr(directory / "lost.exr", sample_layers(5, 3), metadata);
+  EXPECT_FALSE(Imf::hasWorldToCamera(Imf::InputFile((directory / "lost.exr").c_str()).header()));
+}
+
+TEST(Exr, HasRateAndTimecode) {
+  const TemporaryDirectory directory;
+  ExrMetadata metadata;
+  metadata.fps = 30000.0 / 1001;
+  metadata.timecode = session::timecode_after({"01:00:59;29", metadata.fps}, 1);
+  write_exr(directory / "a.exr", sample_layers(5, 3), metadata);
+  const Imf::InputFile file((directory / "a.exr").c_str());
+  EXPECT_EQ(Imf::framesPerSecond(file.header()).n, 30000);
+  EXPECT_EQ(Imf::framesPerSecond(file.header()).d, 1001u);
+  const Imf::TimeCode& code = Imf::timeCode(file.header());
+  EXPECT_EQ(code.hours(), 1);
+  EXPECT_EQ(code.minutes(), 1);
+  EXPECT_EQ(code.seconds(), 0);
+  EXPECT_EQ(code.frame(), 2);
+  EXPECT_TRUE(code.dropFrame());
+
+  metadata.fps = 60;  // in pairs
+  metadata.timecode = session::timecode_after({"10:00:00:00", 60}, 59);
+  write_exr(directory / "b.exr", sample_layers(5, 3), metadata);
+  const Imf::InputFile fast((directory / "b.exr").c_str());
+  EXPECT_EQ(Imf::timeCode(fast.header()).frame(), 29);
+  EXPECT_TRUE(Imf::timeCode(fast.header()).fieldPhase());
+
+  write_exr(directory / "c.exr", sample_layers(5, 3), {});
+  EXPECT_FALSE(Imf::hasTimeCode(Imf::InputFile((directory / "c.exr").c_str()).header()));
+}
+
+TEST(Exr, ChannelsAreExactlyTheNamedOnesIn32BitFloat) {
+  const TemporaryDirectory directory;
+  write_exr(directory / "frame.exr", sample_layers(5, 3), {});
+  const Imf::InputFile file((directory / "frame.exr").c_str());
+  std::set<std::string> names;
+  const Imf::ChannelList& channels = file.header().channels();
+  for (auto channel = channels.begin(); channel != channels.end(); ++channel) {
+    names.insert(channel.name());
+    EXPECT_EQ(channel.channel().type, Imf::FLOAT) << channel.name();
+  }
+  const std::set<std::string> expected{"composite.R", "composite.G", "composite.B", "mixed.R",
+                                       "mixed.G",     "mixed.B",     "real.R",      "real.G",
+                                       "real.B",      "diff.R",      "diff.G",      "diff.B",
+                                       "mask.Y",      "depth.Z",     "normal.X",    "normal.Y",
+                                       "normal.Z",    "variance.R",  "variance.G",  "variance.B"};
+  EXPECT_EQ(names, expected);
+  EXPECT_EQ(file.header().compression(), Imf::ZIP_COMPRESSION);
+}
+
+TEST(Exr, EveryValueComesBackBitForBit) {
+  const TemporaryDirectory directory;
+  const render::Layers written = sample_layers(7, 4);
+  write_exr(directory / "frame.exr", written, {});
+  const render::Layers read = read_exr(directory / "frame.exr");
+  EXPECT_EQ(read.width, 7);
+  EXPECT_EQ(read.height, 4);
+  EXPECT_EQ(read.samples, 256);
+  EXPECT_EQ(read.denoised, written.denoised);
+  EXPECT_EQ(read.composite, written.composite);
+  EXPECT_EQ(read.mixed, written.mixed);
+  EXPECT_EQ(read.real, written.real);
+  EXPECT_EQ(read.normal, written.normal);
+  EXPECT_EQ(read.variance, written.variance);
+  EXPECT_EQ(read.mask, written.mask);
+  EXPECT_EQ(read.depth, written.depth);
+}
+
+TEST(Exr, DifferenceIsThatOfTheUncoveredPart) {
+  const TemporaryDirectory directory;
+  const render::Layers written = sample_layers(6, 2);
+  write_exr(directory / "frame.exr", written, {});
+  const render::Layers read = read_exr(directory / "frame.exr");
+  for (std::size_t i = 0; i < written.diff.size(); ++i)
+    EXPECT_EQ(read.diff[i], written.diff[i] * (1.0f - written.mask[i])) << i;
+}
+
+TEST(Exr, HeaderSaysWhatThePictureIs) {
+  const TemporaryDirectory directory;
+  ExrMetadata metadata;
+  metadata.exposure = 1.25;
+  metadata.timestamp_ns = 1'700'000'000'567'008'006;
+  metadata.set_name = "glass";
+  metadata.world_from_camera[3] = {0.5, -0.25, 2.0, 1.0};  // glm: the fourth column
+  write_exr(directory / "frame.exr", sample_layers(2, 2), metadata);
+  const Imf::InputFile file((directory / "frame.exr").c_str());
+  const Imf::Header& header = file.header();
+  EXPECT_EQ(header.typedAttribute<Imf::IntAttribute>("previz.samples").value(), 256);
+  EXPECT_EQ(header.typedAttribute<Imf::DoubleAttribute>("previz.exposure").value(), 1.25);
+  EXPECT_EQ(header.typedAttribute<Imf::StringAttribute>("previz.timestamp_ns").value(),
+            "1700000000567008006");
+  EXPECT_EQ(header.typedAttribute<Imf::StringAttribute>("previz.set").value(), "glass");
+  EXPECT_EQ(header.typedAttribute<Imf::StringAttribute>("previz.pose").value(), "tracked");
+  const Imath::M44d& pose =
+      header.typedAttribute<Imf::M44dAttribute>("previz.world_from_camera").value();
+  EXPECT_EQ(pose[0][3], 0.5);
+  EXPECT_EQ(pose[1][3], -0.25);
+  EXPECT_EQ(pose[2][3], 2.0);
+  EXPECT_EQ(pose[3][0], 0.0);
+  ASSERT_TRUE(Imf::hasChromaticities(header));
+  EXPECT_FLOAT_EQ(Imf::chromaticities(header).red.x, 0.64f);
+  EXPECT_FLOAT_EQ(Imf::chromaticities(header).white.x, 0.3127f);
+}
+
+TEST(Exr, LostPoseIsNotWritten) {
+  const TemporaryDirectory directory;
+  ExrMetadata metadata;
+  metadata.set_name = "glass";
+  metadata.pose = "lost";
+  write_exr(directory / "frame.exr", sample_layers(2, 2), metadata);
+  const Imf::InputFile file((directory / "frame.exr").c_str());
+  EXPECT_EQ(file.header().findTypedAttribute<Imf::M44dAttribute>("previz.world_from_camera"),
+            nullptr);
+}
+
+TEST(Exr, IncompleteLayersAreRefusedAndLeaveNoFile) {
+  const TemporaryDirectory directory;
+  render::Layers layers = sample_layers(4, 4);
+  layers.depth.pop_back();
+  EXPECT_THROW(write_exr(directory / "frame.exr", layers, {}), Error);
+  EXPECT_FALSE(std::filesystem::exists(directory / "frame.exr"));
+}
+
+TEST(Exr, UnwritablePlaceIsNamed) {
+  try {
+    write_exr("/nowhere/at/all/frame.exr", sample_layers(1, 1), {});
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("/nowhere/at/all/frame.exr"), std::string::npos);
+  }
+}
+
+// The disk runs full at every place of the file, the end that OpenEXR writes as it closes it among
+// them. A black picture compresses to little: then most of the file is in those last writes.
+TEST(Exr, OnAFullDiskThereIsTheWholeFileOrNone) {
+  const TemporaryDirectory directory;
+  render::Layers layers = sample_layers(64, 48);
+  for (auto* layer : {&layers.composite, &layers.mixed, &layers.real, &layers.diff, &layers.normal,
+                      &layers.variance})
+    layer->assign(layer->size(), glm::vec3(0));
+  write_exr(directory / "whole.exr", layers, {});
+  const auto whole = std::filesystem::file_size(directory / "whole.exr");
+  for (std::uintmax_t room = 0; room < whole + 16; room += 16) {
+    const auto file = directory / "frame.exr";
+    bool written = true;
+    {
+      const test::FileSizeLimit limit(room);
+      try {
+        write_exr(file, layers, {});
+      } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find(file.string()), std::string::npos) << error.what();
+        written = false;
+      }
+    }
+    EXPECT_EQ(written, room >= whole) << room << " of " << whole << " bytes";
+    EXPECT_EQ(std::filesystem::exists(file), written) << room << " of " << whole << " bytes";
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(directory.path()), {}),
+              written ? 2 : 1)
+        << "a draft was left";
+  }
+  EXPECT_EQ(read_exr(directory / "frame.exr").depth, layers.depth);
+}
+
+// A data window that lies elsewhere, or claims more pixels than anybody has, is refused before
+// anything is read into memory that was made for it.
+TEST(Exr, ADataWindowThatDoesNotBeginAtZeroIsRefused) {
+  const TemporaryDirectory directory;
+  const render::Layers layers = sample_layers(4, 4);
+  const auto window_of = [&](int min_x, int min_y, int max_x, int max_y) {
+    auto path = directory / "window.exr";
+    write_exr(path, layers, {});
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    std::string bytes(std::filesystem::file_size(path), '\0');
+    file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    const std::string name("dataWindow\0box2i\0\x10\0\0\0", 21);
+    const std::size_t at = bytes.find(name);
+    EXPECT_NE(at, std::string::npos);
+    file.seekp(static_cast<std::streamoff>(at + name.size()));
+    for (const int value : {min_x, min_y, max_x, max_y})
+      file.write(reinterpret_cast<const char*>(&value), 4);
+    file.close();
+    return path;
+  };
+  EXPECT_NO_THROW(read_exr(window_of(0, 0, 3, 3)));
+  EXPECT_THROW(read_exr(window_of(-2, -2, 1, 1)), Error);
+  EXPECT_THROW(read_exr(window_of(2, 2, 5, 5)), Error);
+  EXPECT_THROW(read_exr(window_of(5, 5, 2, 2)), Error);
+  EXPECT_THROW(read_exr(window_of(0, 0, 1 << 30, 1 << 30)), Error);
+}
+
+}  // namespace exr_test
+}  // namespace previz::output

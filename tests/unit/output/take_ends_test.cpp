@@ -1,0 +1,452 @@
+// Takes whose disks, files of the set or frames are not as they should be: the recording goes on,
+// and each take says what it lacks.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <atomic>
+#include <limits>
+#include <mutex>
+#include <thread>
+
+#include "daemon/output/recorder.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "tests/support/recorder_fixture.hpp"
+#include "tests/support/wait_until.hpp"
+
+namespace previz::output {
+namespace take_ends_test {
+
+using session::mentions;
+using session::write_content;
+using test::wait_until;
+
+// The SHA-256 of "a model", as sha256sum has it.
+constexpr char hash_of_a_model[] =
+    "97ff8a35544dcf40ad84047074439dd6aa3a0be469ea578a1b1c017d939ec61c";
+
+// A recorder of two folders whose disks have as much room as a test says.
+struct Rig {
+  const test::TemporaryDirectory directory;
+  const std::filesystem::path first = directory / "first", second = directory / "second";
+  std::atomic<std::uint64_t> free_on_first = plenty, free_on_second = plenty;
+  Heard heard;
+
+  RecorderOptions options() {
+    RecorderOptions options = recorder_options({first, second});
+    options.asset_patience = std::chrono::milliseconds(500);
+    options.free_bytes = [this](const std::filesystem::path& folder) {
+      return folder.filename() == "first" ? free_on_first.load() : free_on_second.load();
+    };
+    heard.listen(options);
+    return options;
+  }
+  RecorderOptions options_with_asset() {
+    write_content(directory / "set/a.glb", "a model");
+    RecorderOptions with = options();
+    with.take.assets = {{"a.glb", directory / "set/a.glb"}};
+    return with;
+  }
+};
+
+std::filesystem::path kept_in(const std::filesystem::path& folder) {
+  return folder / ".assets" / (std::string(hash_of_a_model) + ".glb");
+}
+
+std::size_t frames_of(const std::filesystem::path& take, const std::string& source = "observer") {
+  session::Session session = session::open_session(take);
+  const auto stream = session::open_stream(session, source);
+  return stream ? stream->records().size() : 0;
+}
+
+bool wait_for_frames(const Recorder& recorder, std::uint64_t frames) {
+  return wait_until("they are written", [&] { return recorder.status().frames == frames; });
+}
+
+bool wait_for_take(const Recorder& recorder, int number) {
+  return wait_until("the take runs", [&] { return recorder.status().number == number; });
+}
+
+// ---- files of the set
+
+TEST(Recorder, OfTwoDisksHasTheAssetsOnBothBeforeTheyAreNeeded) {
+  Rig rig;
+  Recorder recorder(rig.options_with_asset());
+  ASSERT_TRUE(wait_until("both have it", [&] {
+    return std::filesystem::exists(kept_in(rig.first)) &&
+           std::filesystem::exists(kept_in(rig.second));
+  }));
+  recorder.start();
+  recorder.offer(picture(0));
+  ASSERT_TRUE(wait_for_frames(recorder, 1));
+  // The first disk is gone with what it kept, and so is the disk of the set.
+  rig.free_on_first = 0;
+  std::filesystem::remove_all(rig.first / ".assets");
+  std::filesystem::remove_all(rig.directory / "set");
+  ASSERT_TRUE(wait_for_take(recorder, 2));
+  recorder.offer(picture(1));
+  recorder.stop();
+  recorder.finish();
+  EXPECT_EQ(recorder.status().failures, 0u);
+  const session::Session session = session::open_session(rig.second / "12A_take002");
+  EXPECT_TRUE(session.missing.empty()) << session.missing.front();
+  EXPECT_EQ(session::read_file(session.directory / session.info.assets.at("a.glb")), "a model");
+}
+
+TEST(Recorder, WithoutAFileOfTheSetRecordsAndTheTakeSaysWhichItWas) {
+  Rig rig;
+  Recorder recorder(rig.options_with_asset());
+  ASSERT_TRUE(
+      wait_until("it is kept", [&] { return std::filesystem::exists(kept_in(rig.first)); }));
+  std::filesystem::remove_all(rig.first / ".assets");
+  std::filesystem::remove_all(rig.directory / "set");
+  recorder.start();
+  recorder.offer(picture(0));
+  ASSERT_TRUE(wait_for_frames(recorder, 1));
+  recorder.stop();
+  recorder.finish();
+  EXPECT_EQ(recorder.status().failures, 0u);
+  EXPECT_EQ(recorder.status().finished, "12A_take001");
+  const session::Session session = session::open_session(rig.first / "12A_take001");
+  ASSERT_EQ(session.info.missing_assets.size(), 1u);
+  const session::MissingAsset& asset = session.info.missing_assets.front();
+  EXPECT_EQ(asset.as_written, "a.glb");
+  EXPECT_EQ(asset.file, rig.directory / "set/a.glb");
+  EXPECT_EQ(asset.sha256, hash_of_a_model);
+  EXPECT_FALSE(asset.why.empty());
+  EXPECT_TRUE(mentions(session.missing, "a.glb: is not in the take"));
+  EXPECT_TRUE(rig.heard.said("12A_take001 lacks a.glb"));
+}
+
+TEST(Recorder, OfAStoreThatWasDeletedTakesTheFileOfTheSetIfItIsTheSame) {
+  Rig rig;
+  Recorder recorder(rig.options_with_asset());
+  ASSERT_TRUE(
+      wait_until("it is kept", [&] { return std::filesystem::exists(kept_in(rig.first)); }));
+  for (const char* content : {"a model", "another model"}) {
+    std::filesystem::remove_all(rig.first / ".assets");
+    write_content(rig.directory / "set/a.glb", content);
+    const std::uint64_t takes = recorder.status().finished_takes;
+    recorder.start();
+    recorder.offer(picture(takes));
+    recorder.stop();
+    ASSERT_TRUE(wait_until("the take is finished",
+                           [&] { return recorder.status().finished_takes == takes + 1; }));
+  }
+  const session::Session same = session::open_session(rig.first / "12A_take001");
+  EXPECT_EQ(session::read_file(same.directory / same.info.assets.at("a.glb")), "a model");
+  const session::Session changed = session::open_session(rig.first / "12A_take002");
+  EXPECT_TRUE(changed.info.assets.empty());
+  EXPECT_TRUE(mentions(changed.missing, "was changed since the set was loaded"));
+}
+
+TEST(Recorder, LeavesTheReserveToTakesAndNotToTheFilesOfTheSet) {
+  Rig rig;
+  rig.free_on_first = 103;  // the reserve of 100 bytes, and less than the model's 7
+  Recorder recorder(rig.options_with_asset());
+  ASSERT_TRUE(
+      wait_until("it is said", [&] { return rig.heard.said("a.glb will not be in the takes"); }));
+  EXPECT_FALSE(std::filesystem::exists(kept_in(rig.first)));
+  recorder.start();
+  recorder.offer(picture(0));
+  ASSERT_TRUE(wait_for_frames(recorder, 1));
+  recorder.stop();
+  recorder.finish();
+  EXPECT_EQ(recorder.status().failures, 0u);
+  EXPECT_TRUE(mentions(session::open_session(rig.first / "12A_take001").missing, "almost full"));
+}
+
+// A pipe that nobody writes to, as a file on a mount that is dead.
+TEST(Recorder, EndsATakeAndItselfWhileAFileOfTheSetCannotBeRead) {
+  Rig rig;
+  const std::filesystem::path pipe = rig.directory / "dead.glb";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  RecorderOptions options = rig.options();
+  options.take.assets = {{"dead.glb", pipe}};
+  {
+    Recorder recorder(std::move(options));
+    recorder.start();
+    recorder.offer(picture(0));
+    recorder.stop();
+    ASSERT_TRUE(
+        wait_until("the take is finished", [&] { return recorder.status().finished_takes == 1; }));
+    recorder.start();
+    recorder.offer(picture(1));
+    ASSERT_TRUE(wait_for_take(recorder, 2));
+  }
+  for (const char* take : {"12A_take001", "12A_take002"}) {
+    const session::Session session = session::open_session(rig.first / take);
+    ASSERT_EQ(session.missing.size(), 1u);
+    EXPECT_TRUE(mentions(session.missing, "dead.glb: is not in the take")) << session.missing[0];
+  }
+}
+
+// ---- numbers, losses, and what cannot be recorded
+
+TEST(Recorder, NumbersTakesOnWhereTheFirstDiskCannotBeListed) {
+  Rig rig;
+  Recorder recorder(rig.options());
+  recorder.start();
+  recorder.offer(picture(0));
+  recorder.stop();
+  ASSERT_TRUE(wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+  std::filesystem::rename(rig.first, rig.directory / "elsewhere");
+  write_content(rig.first, "no folder");
+  recorder.start();
+  recorder.offer(picture(1));
+  recorder.stop();
+  ASSERT_TRUE(wait_until("it is finished", [&] { return recorder.status().finished_takes == 2; }));
+  EXPECT_EQ(recorder.status().directory, rig.second / "12A_take002");
+}
+
+// The first disk is mounted later than the service starts; the second one knows what is on it.
+TEST(Recorder, GivesNoTakeTheNameOfOneOnADiskThatIsNotThere) {
+  Rig rig;
+  for (const std::filesystem::path& folder : {rig.first, rig.second})  // each is a disk's uppermost
+    session::make_folders(folder);
+  const auto record_once = [&] {
+    Recorder recorder(rig.options());
+    recorder.start();
+    recorder.offer(picture(0));
+    recorder.stop();
+    EXPECT_TRUE(
+        wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+    EXPECT_TRUE(wait_until("the folders were looked at",
+                           [&] { return recorder.free_bytes().has_value(); }));
+    return recorder.status().directory;
+  };
+  EXPECT_EQ(record_once(), rig.first / "12A_take001");
+  EXPECT_EQ(record_once(), rig.first / "12A_take002");
+  std::filesystem::rename(rig.first, rig.directory / "elsewhere");
+  write_content(rig.first, "no folder");
+  EXPECT_EQ(record_once(), rig.second / "12A_take003");
+  std::filesystem::remove(rig.first);
+  std::filesystem::rename(rig.directory / "elsewhere", rig.first);
+  std::filesystem::rename(rig.second, rig.directory / "elsewhere");
+  write_content(rig.second, "no folder");
+  EXPECT_EQ(record_once(), rig.first / "12A_take003");  // nobody could tell the first disk
+}
+
+// With both disks there, what was on them and is there no longer gives its number away.
+TEST(Recorder, NumbersTakesByWhatIsThereWhereAllDisksAre) {
+  Rig rig;
+  for (const std::filesystem::path& folder : {rig.first, rig.second}) {
+    session::make_folders(folder);
+    TakeFolders::keep_number(folder, "12A", 7);
+  }
+  session::make_folders(rig.second / "12A_take004");
+  Recorder recorder(rig.options());
+  EXPECT_TRUE(wait_until("both were looked at", [&] { return recorder.free_bytes().has_value(); }));
+  recorder.start();
+  recorder.offer(picture(0));
+  recorder.stop();
+  ASSERT_TRUE(wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+  EXPECT_EQ(recorder.status().directory, rig.first / "12A_take005");
+}
+
+TEST(Recorder, LeavesOutWhatCannotBeRecordedAndGoesOn) {
+  Rig rig;
+  const auto nothing = std::numeric_limits<double>::quiet_NaN();
+  Frame without_gain = *picture(0);
+  without_gain.gain = without_gain.exposure = nothing;
+  session::TrackRecord astray = track_of(1);
+  astray.tracked = true;
+  astray.world_from_camera[3][0] = nothing;
+  Recorder recorder(rig.options());
+  recorder.start();
+  recorder.offer(std::make_shared<Frame>(without_gain));
+  for (std::uint64_t i = 1; i < 4; ++i) recorder.offer(picture(i));
+  recorder.offer(astray);
+  recorder.offer_event(0, "not UTF-8: \xff");
+  for (std::uint64_t i = 2; i < 4; ++i) recorder.offer(track_of(i));
+  recorder.stop();
+  recorder.finish();
+  const RecorderStatus status = recorder.status();
+  EXPECT_EQ(status.failures, 0u) << status.fault;
+  EXPECT_EQ(status.directory, rig.first / "12A_take001");
+  EXPECT_EQ(status.lost, (session::Losses{1, 0, 2}));
+  EXPECT_EQ(rig.heard.left_out(), (Causes{{"cannot be recorded", 1}}));
+  EXPECT_EQ(frames_of(rig.first / "12A_take001"), 3u);
+  const session::Session session = session::open_session(rig.first / "12A_take001");
+  EXPECT_EQ(session.track.size(), 2u);
+  EXPECT_EQ(session.missing.size(), 2u);
+  for (const std::string& words : session::words_of(status.lost))
+    EXPECT_TRUE(mentions(session.missing, words)) << words;
+  EXPECT_TRUE(rig.heard.said("12A_take001 lacks what cannot be recorded: frame 100"));
+}
+
+// The first recording loses frames, rolls over twice, and is still being written when the next one
+// begins.
+TEST(Recorder, CountsTheLossesOfEachTakeThoughTheNextRecordingHasBegun) {
+  Rig rig;
+  std::mutex disk;
+  RecorderOptions options = rig.options();
+  options.queue_bytes = 4 * picture(0)->bytes.size();
+  options.free_bytes = [&](const auto&) {  // the writer asks the disk once a second
+    const std::lock_guard lock(disk);
+    return plenty;
+  };
+  Recorder recorder(std::move(options));
+  const auto wait_for_the_disk_to_hang = [&] {
+    return wait_until("the disk hangs", [&] { return recorder.status().disk_silent_s > 0.1; });
+  };
+  recorder.start();
+  recorder.offer(picture(0));
+  ASSERT_TRUE(wait_for_frames(recorder, 1));
+  disk.lock();
+  ASSERT_TRUE(wait_for_the_disk_to_hang());
+  for (std::uint64_t i = 1; i <= 10; ++i) recorder.offer(picture(i));  // 4 of them fit
+  EXPECT_EQ(recorder.status().lost.frames, 6u);
+  disk.unlock();
+  ASSERT_TRUE(wait_for_frames(recorder, 5));
+  recorder.offer(picture(11, "observer", 40));
+  ASSERT_TRUE(wait_for_take(recorder, 2));
+  disk.lock();
+  ASSERT_TRUE(wait_for_the_disk_to_hang());
+  recorder.offer(picture(12));
+  recorder.stop();
+  recorder.start();
+  EXPECT_EQ(recorder.status().lost, session::Losses{});
+  recorder.offer(picture(13));
+  disk.unlock();
+  recorder.stop();
+  recorder.finish();
+  EXPECT_EQ(recorder.status().failures, 0u) << recorder.status().fault;
+  // What was lost was offered before the frame that began the second take, and after the last of
+  // the first that was written: whichever of the two says it, no other does.
+  std::size_t takes_that_lack = 0;
+  for (const char* name : {"12A_take001", "12A_take002", "12A_take003", "12A_take004"}) {
+    const session::Session session = session::open_session(rig.first / name);
+    EXPECT_EQ(session.missing.empty(), !mentions(session.missing, "6 frames of the cameras"));
+    takes_that_lack += session.missing.empty() ? 0 : 1;
+  }
+  EXPECT_EQ(takes_that_lack, 1u);
+  EXPECT_EQ(rig.heard.left_out(), (Causes{{"memory full", 6}}));
+}
+
+// ---- from one take to the next
+
+// Tracks come three frames late, as the tracking takes its time.
+TEST(Recorder, FromOneDiskToTheNextKeepsTheTracksOfTheLastFramesAndTheLight) {
+  Rig rig;
+  constexpr std::uint64_t behind = 3;
+  std::uint64_t offered = 0;
+  {
+    Recorder recorder(rig.options());
+    recorder.start();
+    recorder.offer(picture(0, "light"));
+    const auto offer = [&] {
+      recorder.offer(picture(offered));
+      if (offered >= behind) recorder.offer(track_of(offered - behind));
+      ++offered;
+    };
+    for (int i = 0; i < 5; ++i) offer();
+    ASSERT_TRUE(wait_for_frames(recorder, 5));
+    rig.free_on_first = 50;
+    ASSERT_TRUE(wait_until("the second take runs", [&] {
+      offer();
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));  // as a camera does
+      return recorder.status().number == 2;
+    }));
+    for (int i = 0; i < 5; ++i) offer();
+    for (std::uint64_t i = offered - behind; i < offered; ++i) recorder.offer(track_of(i));
+  }
+  const std::filesystem::path takes[] = {rig.first / "12A_take001", rig.second / "12A_take002"};
+  std::size_t frames = 0, tracks = 0;
+  for (const std::filesystem::path& take : takes) {
+    const session::Session session = session::open_session(take);
+    EXPECT_TRUE(session.missing.empty()) << session.missing.front();
+    EXPECT_EQ(session.track.size(), frames_of(take));
+    EXPECT_EQ(frames_of(take, "light"), 1u);
+    frames += frames_of(take);
+    tracks += session.track.size();
+  }
+  EXPECT_EQ(frames, offered);
+  EXPECT_EQ(tracks, offered);
+}
+
+// A disk whose free space goes up and down about the reserve, as takes that are closed give some
+// back.
+TEST(Recorder, NearTheReserveDoesNotFallApartIntoShortTakes) {
+  Rig rig;
+  std::atomic<bool> is_near = false;
+  std::atomic<unsigned> asked = 0;
+  RecorderOptions options = rig.options();
+  options.take.folders = {rig.first};
+  options.free_bytes = [&](const auto&) -> std::uint64_t {
+    // Every third answer, so that who asks every second time is not told the same for ever.
+    return !is_near ? plenty : ++asked % 3 == 1 ? 50 : 150;
+  };
+  Recorder recorder(std::move(options));
+  std::uint64_t next = 0;
+  recorder.start();
+  recorder.offer(picture(next++));
+  ASSERT_TRUE(wait_for_frames(recorder, 1));
+  is_near = true;
+  ASSERT_TRUE(wait_until("it ends", [&] {
+    recorder.offer(picture(next++));
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    return !recorder.status().recording || recorder.status().number > 1;
+  }));
+  EXPECT_EQ(recorder.status().number, 1);
+  EXPECT_NE(recorder.status().fault.find("almost full"), std::string::npos);
+  recorder.start();
+  recorder.offer(picture(next));
+  EXPECT_TRUE(wait_until("somebody begins again", [&] {
+    return recorder.status().number == 2 || recorder.status().failures == 2;
+  }));
+}
+
+// ---- what an earlier process left
+
+// A take that was cut off, and the wish to record on.
+void leave_a_cut_off_take(const std::filesystem::path& folder) {
+  const test::TemporaryDirectory elsewhere;
+  session::SessionWriter writer(elsewhere / "12A_take007", {});
+  for (std::uint64_t i = 0; i < 3; ++i) writer.write(*picture(i));
+  std::filesystem::create_directories(folder);
+  std::filesystem::copy(elsewhere / "12A_take007", folder / "12A_take007",
+                        std::filesystem::copy_options::recursive);
+  TakeFolders::keep_wish(folder / "12A_take007");
+}
+
+TEST(Recorder, WhoseFirstFolderCannotBeReadFindsWhatIsInTheSecond) {
+  Rig rig;
+  write_content(rig.first, "no folder");
+  leave_a_cut_off_take(rig.second);
+  const Recorder recorder(rig.options());
+  ASSERT_TRUE(wait_until("it has looked", [&] { return recorder.free_bytes().has_value(); }));
+  EXPECT_EQ(recorder.status().salvaged,
+            std::vector<std::string>{"12A_take007 was cut off; it has 3 frames"});
+  EXPECT_EQ(recorder.status().interrupted, "12A_take007");
+  EXPECT_TRUE(rig.heard.said("takes from before cannot be looked at"));
+}
+
+TEST(Recorder, FindsWhatIsOnADiskThatIsMountedLater) {
+  Rig rig;
+  std::filesystem::create_directory(rig.first);
+  const Recorder recorder(rig.options());
+  ASSERT_TRUE(wait_until("it has looked", [&] { return recorder.free_bytes().has_value(); }));
+  EXPECT_EQ(recorder.status().interrupted, std::nullopt);
+  leave_a_cut_off_take(rig.directory / "mounted");
+  std::filesystem::rename(rig.directory / "mounted", rig.second);
+  ASSERT_TRUE(wait_until("it is found", [&] { return recorder.status().interrupted.has_value(); }));
+  EXPECT_EQ(recorder.status().salvaged.size(), 1u);
+}
+
+TEST(Recorder, ThatHasRecordedTakesNoOldWishForOne) {
+  Rig rig;
+  Recorder recorder(rig.options());
+  recorder.start();
+  recorder.offer(picture(0));
+  recorder.stop();
+  ASSERT_TRUE(wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+  leave_a_cut_off_take(rig.directory / "mounted");
+  std::filesystem::rename(rig.directory / "mounted", rig.second);
+  ASSERT_TRUE(wait_until("it is found", [&] { return !recorder.status().salvaged.empty(); }));
+  EXPECT_EQ(recorder.status().interrupted, std::nullopt);
+}
+
+}  // namespace take_ends_test
+}  // namespace previz::output

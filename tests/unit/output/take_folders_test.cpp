@@ -1,0 +1,335 @@
+// A recording that goes on in a second folder, and what is kept before the button.
+#include "daemon/output/take_folders.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <fstream>
+#include <map>
+#include <mutex>
+#include <thread>
+
+#include "daemon/output/folder_watch.hpp"
+#include "daemon/output/recorder.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "tests/support/recorder_fixture.hpp"
+#include "tests/support/wait_until.hpp"
+
+namespace previz::output {
+namespace take_folders_test {
+
+using session::is_frame;
+using session::mentions;
+using session::TemporaryDirectory;
+using test::wait_until;
+
+std::string refusal(TakeFolders& folders) {
+  try {
+    return "chose " + folders.all()[folders.choose()].string();
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+TEST(TakeFolders, TheFirstThatHasRoomAndDidNotFailIsChosen) {
+  const TemporaryDirectory directory;
+  const std::filesystem::path first = directory / "a/takes", second = directory / "b/takes";
+  std::map<std::filesystem::path, std::uint64_t> free = {{first, plenty}, {second, plenty}};
+  TakeFolders folders({first, second}, 5'000'000, [&](const auto& folder) { return free[folder]; });
+  EXPECT_EQ(folders.choose(), 0u);
+  EXPECT_TRUE(std::filesystem::is_directory(first));
+  EXPECT_FALSE(std::filesystem::exists(second));
+  free[first] = 4'999'999;
+  EXPECT_EQ(folders.choose(), 1u);
+  EXPECT_TRUE(std::filesystem::is_directory(second));
+  EXPECT_TRUE(folders.give_up(0, first.string() + ": its disk failed"));
+  EXPECT_FALSE(folders.give_up(1, second.string() + ": its disk failed"));
+  EXPECT_EQ(refusal(folders),
+            first.string() + ": its disk failed; " + second.string() + ": its disk failed");
+  folders.forgive_all();
+  free[second] = 3'000'000;
+  EXPECT_EQ(refusal(folders), first.string() +
+                                  ": the disk is almost full, 4 MB are left and 5 MB are kept free "
+                                  "(recording.reserve_mb); " +
+                                  second.string() +
+                                  ": the disk is almost full, 3 MB are left and 5 MB are kept free "
+                                  "(recording.reserve_mb)");
+}
+
+TEST(TakeFolders, ADiskThatWasGivenUpHasNoRoomForTakes) {
+  const TemporaryDirectory directory;
+  TakeFolders folders({directory / "takes"}, 20, {});
+  FolderSeen seen;
+  seen.free_bytes = 100;
+  EXPECT_EQ(folders.free_bytes({seen}), 80u);
+  folders.give_up(0, "it failed");
+  EXPECT_FALSE(folders.free_bytes({seen}));
+  folders.forgive_all();
+  EXPECT_EQ(folders.free_bytes({seen}), 80u);
+  seen.why_not = "Read-only file system";
+  EXPECT_FALSE(folders.free_bytes({seen}));
+}
+
+TEST(TakeFolders, AFolderThatCannotBeMadeIsPassedOverByName) {
+  const TemporaryDirectory directory;
+  session::write_content(directory / "file", "no folder");
+  TakeFolders folders({directory / "file/takes", directory / "b"}, 0, {});
+  EXPECT_EQ(folders.choose(), 1u);
+  folders.give_up(1, "its disk failed");
+  EXPECT_NE(refusal(folders).find("file/takes"), std::string::npos) << refusal(folders);
+}
+
+TEST(TakeFolders, AWishIsKeptInTheFolderOfItsTakeAndTheNewestCounts) {
+  const TemporaryDirectory directory;
+  const TakeFolders folders({directory / "a", directory / "b"}, 0, {});
+  EXPECT_FALSE(folders.kept_wish());
+  for (const char* folder : {"a", "b"}) session::make_folders(directory / folder);
+  TakeFolders::keep_wish(directory / "a/12A_take003");
+  EXPECT_EQ(folders.kept_wish()->take, "12A_take003");
+  TakeFolders::keep_wish(directory / "b/12A_take004");
+  std::filesystem::last_write_time(
+      directory / "a/.recording",
+      std::filesystem::last_write_time(directory / "b/.recording") - std::chrono::seconds(1));
+  EXPECT_EQ(folders.kept_wish()->take, "12A_take004");
+  folders.drop_wish();
+  EXPECT_FALSE(folders.kept_wish());
+}
+
+TEST(TakeFolders, TheSpeedOfADiskIsMeasuredAndNothingStays) {
+  const TemporaryDirectory directory;
+  TakeFolders folders({directory / "takes"}, 0, {});
+  EXPECT_GT(folders.measure_speed().value_or(0), 0);
+  EXPECT_TRUE(std::filesystem::is_empty(directory / "takes"));
+  TakeFolders small({directory / "takes"}, 0, [](const auto&) { return 100'000'000; });
+  EXPECT_EQ(small.measure_speed(), std::nullopt);
+}
+
+TEST(NextTakeNumber, CountsThroughAllFoldersAndIgnoresAbsurdNumbers) {
+  const TemporaryDirectory directory;
+  for (const char* take :
+       {"a/12A_take003", "b/12A_take007", "b/12A_take2147483647", "a/12B_take009"})
+    session::make_folders(directory / take);
+  EXPECT_EQ(next_take_number({directory / "a", directory / "b", directory / "none"}, "12A"), 8);
+  EXPECT_EQ(next_take_number({directory / "a", directory / "b"}, "12A", 11), 12);
+}
+
+TEST(TakeFolders, KeepTheHighestTakeOfEachSlate) {
+  const TemporaryDirectory directory;
+  for (const char* folder : {"a", "b"}) session::make_folders(directory / folder);
+  const TakeFolders folders({directory / "a", directory / "b", directory / "none"}, 0, {});
+  EXPECT_EQ(folders.kept_number("12A"), 0);
+  TakeFolders::keep_number(directory / "a", "12A", 7);
+  TakeFolders::keep_number(directory / "a", "12B", 2);
+  TakeFolders::keep_number(directory / "b", "12A", 9);
+  TakeFolders::keep_number(directory / "b", "12A", 8);
+  EXPECT_EQ(folders.kept_number("12A"), 9);
+  EXPECT_EQ(folders.kept_number("12B"), 2);
+  EXPECT_EQ(folders.kept_number("12"), 0);
+  EXPECT_EQ(session::read_file(directory / "a/.highest_takes"), "12B_take002\n12A_take007\n");
+  std::ofstream(directory / "a/.highest_takes") << "12B_take002\n\nnothing\n12B_take";
+  EXPECT_EQ(folders.kept_number("12B"), 2);
+}
+
+TEST(TakeFolders, AreOnOneDiskWhereTheFoldersAboveThemAre) {
+  const TemporaryDirectory directory;
+  EXPECT_TRUE(are_on_one_disk(directory / "not/made", directory / "yet"));
+  EXPECT_FALSE(are_on_one_disk(directory.path(), "/proc"));
+}
+
+// The recorder of two disks, and what it reports.
+struct TwoDisks {
+  const TemporaryDirectory directory;
+  std::atomic<std::uint64_t> free_on_first = plenty;
+  std::mutex mutex;
+  std::vector<std::string> notes;
+
+  RecorderOptions options() {
+    RecorderOptions options;
+    options.take.folders = {directory / "first", directory / "second"};
+    options.take.info.take = session::TakeInfo{0, "12A", "", 25, "", false};
+    options.preroll_s = 0;
+    options.reserve_bytes = 100;
+    options.free_bytes = [this](const std::filesystem::path& folder) {
+      return folder.filename() == "first" ? free_on_first.load() : plenty;
+    };
+    options.note = [this](const report::Report& report) {
+      const std::lock_guard lock(mutex);
+      notes.push_back(line_of(report));
+    };
+    return options;
+  }
+};
+
+std::uint64_t frames_of(const std::filesystem::path& take, std::uint64_t first) {
+  session::Session session = session::open_session(take);
+  EXPECT_TRUE(session.missing.empty()) << session.missing.front();
+  const auto stream = session::open_stream(session, "observer");
+  if (!stream) return 0;
+  for (std::size_t i = 0; i < stream->records().size(); ++i)
+    EXPECT_TRUE(is_frame(*stream->read(i), first + i)) << first + i;
+  return stream->records().size();
+}
+
+TEST(Recorder, OfTwoDisksGoesOnWithoutAGapWhenTheFirstIsFull) {
+  TwoDisks disks;
+  std::uint64_t offered = 0;
+  {
+    Recorder recorder(disks.options());
+    const auto offer = [&] {
+      recorder.offer(picture(offered));
+      recorder.offer(track_of(offered++));
+    };
+    recorder.start();
+    for (int i = 0; i < 5; ++i) offer();
+    ASSERT_TRUE(wait_until("it is recorded", [&] { return recorder.status().frames == 5; }));
+    disks.free_on_first = 50;
+    ASSERT_TRUE(wait_until("the second take runs", [&] {
+      offer();
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));  // as a camera does
+      return recorder.status().number == 2;
+    }));
+    offer();
+    ASSERT_TRUE(wait_until("the first take is finished",
+                           [&] { return recorder.status().finished == "12A_take001"; }));
+    const RecorderStatus status = recorder.status();
+    EXPECT_TRUE(status.recording);
+    EXPECT_EQ(status.failures, 0u);
+  }
+  const std::uint64_t in_first = frames_of(disks.directory / "first/12A_take001", 0);
+  EXPECT_EQ(in_first + frames_of(disks.directory / "second/12A_take002", in_first), offered);
+  EXPECT_TRUE(
+      mentions(disks.notes, "the disk of 12A_take001 is almost full; recording goes on in " +
+                                (disks.directory / "second/12A_take002").string()));
+}
+
+TEST(Recorder, OfTwoFullDisksSaysOfEachWhyItCannotRecord) {
+  TwoDisks disks;
+  RecorderOptions options = disks.options();
+  options.free_bytes = [](const auto&) { return 50; };
+  Recorder recorder(std::move(options));
+  recorder.start();
+  ASSERT_TRUE(wait_until("it is refused", [&] { return recorder.status().failures == 1; }));
+  for (const char* folder : {"first", "second"})
+    EXPECT_NE(recorder.status().fault.find((disks.directory / folder).string()), std::string::npos);
+}
+
+// 25 frames of 2304 bytes a second, of which 23040 bytes hold 10; 4 s are wished.
+TEST(Recorder, ThatCannotKeepWhatIsWishedBeforeTheButtonSaysSoOnce) {
+  TwoDisks disks;
+  RecorderOptions options = disks.options();
+  options.preroll_s = 4;
+  options.queue_bytes = 2 * 23040;
+  Recorder recorder(std::move(options));
+  for (std::uint64_t i = 0; i < 40; ++i) recorder.offer(picture(i));
+  recorder.start();
+  ASSERT_TRUE(wait_until("it is recorded", [&] { return recorder.status().frames == 10; }));
+  const std::lock_guard lock(disks.mutex);
+  EXPECT_EQ(std::ranges::count(disks.notes,
+                               "recording: a take begins 0.4 s before the button, and not 4.0 s: "
+                               "the memory for it is full (recording.queue_mb)"),
+            1);
+}
+
+TEST(Recorder, KeepsWhatIsWishedBeforeTheButtonWithoutAWord) {
+  TwoDisks disks;
+  RecorderOptions options = disks.options();
+  options.preroll_s = 0.3;
+  options.queue_bytes = 2 * 23040;
+  Recorder recorder(std::move(options));
+  for (std::uint64_t i = 0; i < 40; ++i) recorder.offer(picture(i));
+  recorder.start();
+  ASSERT_TRUE(wait_until("it is recorded", [&] { return recorder.status().frames == 8; }));
+  const std::lock_guard lock(disks.mutex);
+  EXPECT_TRUE(disks.notes.empty()) << disks.notes.front();
+}
+
+TEST(Recorder, WarnsOfADiskThatIsTooSlowForTheCameras) {
+  TwoDisks disks;
+  RecorderOptions options = disks.options();
+  options.preroll_s = 4e-6;
+  options.measures_disk = true;
+  Recorder recorder(std::move(options));
+  // Pictures 100 ns apart are 23 GB a second, more than one thread copies.
+  for (std::uint64_t i = 0; i < 40; ++i) {
+    Frame frame = *picture(i);
+    frame.timestamp_ns = static_cast<std::int64_t>(100 * i);
+    recorder.offer(std::make_shared<Frame>(std::move(frame)));
+  }
+  EXPECT_TRUE(wait_until("it is compared", [&] {
+    const std::lock_guard lock(disks.mutex);
+    return mentions(disks.notes, "takes will lack frames; recording.codec = \"raw\" needs");
+  }));
+}
+
+TEST(Recorder, WritesTheFormThatTheSetWants) {
+  TwoDisks disks;
+  RecorderOptions options = disks.options();
+  options.take.codec = session::VideoCodec::raw;
+  Recorder recorder(std::move(options));
+  recorder.start();
+  for (std::uint64_t i = 0; i < 3; ++i) recorder.offer(picture(i));
+  recorder.stop();
+  recorder.finish();
+  const std::filesystem::path take = disks.directory / "first/12A_take001";
+  EXPECT_EQ(frames_of(take, 0), 3u);
+  EXPECT_NE(session::read_file(take / "session.toml").find("codec = \"raw\""), std::string::npos);
+}
+
+// As `umount -l` does it: files that are open stay so, and nobody finds them by name.
+TEST(Recorder, WhoseTakeIsGoneGoesOnOnTheNextDisk) {
+  TwoDisks rig;
+  Recorder recorder(rig.options());
+  recorder.start();
+  recorder.offer(picture(0));
+  ASSERT_TRUE(wait_until("the take is begun", [&] { return recorder.status().frames == 1; }));
+  std::filesystem::rename(rig.directory / "first", rig.directory / "unmounted");
+  std::filesystem::create_directory(rig.directory / "first");
+  ASSERT_TRUE(wait_until("it goes on", [&] { return recorder.status().number == 2; }));
+  recorder.offer(picture(1));
+  recorder.stop();
+  recorder.finish();
+  EXPECT_EQ(recorder.status().directory, rig.directory / "second/12A_take002");
+  const session::Session left = session::open_session(rig.directory / "unmounted/12A_take001");
+  EXPECT_TRUE(mentions(left.missing, "not closed"));
+  const std::lock_guard lock(rig.mutex);
+  EXPECT_TRUE(mentions(rig.notes, "is no longer there; its disk was unmounted"));
+}
+
+TEST(Recorder, ThatFindsAnotherInItsFolderLeavesItAlone) {
+  const TemporaryDirectory directory;
+  RecorderOptions options;
+  options.take.folders = {directory / "takes"};
+  options.take.info.take = session::TakeInfo{0, "12A", "", 25, "", false};
+  options.preroll_s = 0;
+  options.reserve_bytes = 0;
+  auto first = std::make_unique<Recorder>(options);
+  first->start();
+  first->offer(picture(0));
+  ASSERT_TRUE(wait_until("the take is begun", [&] { return first->status().frames == 1; }));
+  {
+    Recorder second(options);
+    ASSERT_TRUE(wait_until("it has looked", [&] { return second.folders()[0].is_looked_at; }));
+    EXPECT_NE(second.folders()[0].why_not.find("another previzd records there (process "),
+              std::string::npos)
+        << second.folders()[0].why_not;
+    EXPECT_TRUE(second.status().salvaged.empty());
+    second.start();
+    second.offer(picture(5));
+    ASSERT_TRUE(wait_until("it is refused", [&] { return second.status().failures == 1; }));
+    EXPECT_NE(second.status().fault.find("another previzd"), std::string::npos);
+    EXPECT_FALSE(second.status().interrupted);
+  }
+  first->offer(picture(1));
+  first->stop();
+  first->finish();
+  EXPECT_EQ(first->status().failures, 0u);
+  first.reset();
+  EXPECT_TRUE(session::open_session(directory / "takes/12A_take001").missing.empty());
+  // Whoever is left takes the folder over.
+  Recorder third(options);
+  EXPECT_TRUE(wait_until("it has the folder", [&] { return third.folders()[0].is_own; }));
+}
+
+}  // namespace take_folders_test
+}  // namespace previz::output

@@ -1,0 +1,427 @@
+// `previzd check`: right sets are described, wrong ones refused with every problem.
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "daemon/post/check.hpp"
+#include "daemon/set/table.hpp"
+#include "daemon/tracking/apriltag_tracker.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/session.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace previz::post {
+namespace check_test {
+
+// One triangle (0,0,0) (1,0,0) (0,1,0); `material` is a glTF material's body.
+std::string triangle(const std::string& material) {
+  return R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+ "nodes": [{"mesh": 0}],
+ "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}],
+ "materials": [{)" +
+         material +
+         R"(}],
+ "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+                "min": [0, 0, 0], "max": [1, 1, 0]}],
+ "bufferViews": [{"buffer": 0, "byteLength": 36}],
+ "buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64,)"
+         "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}]}";
+}
+
+class Check : public testing::Test {
+ protected:
+  void write(const std::string& name, const std::string& text) {
+    std::ofstream(directory_ / name) << text;
+  }
+
+  // Exit status; what was printed is in `said_`.
+  int check(const std::string& set) {
+    write("stage.toml", set);
+    std::ostringstream out;
+    const int status = check_set(directory_ / "stage.toml", out);
+    said_ = out.str();
+    return status;
+  }
+
+  // A take of one black frame of 16x8 pixels by each camera.
+  void write_take(const session::SessionInfo& info, const std::vector<std::string>& cameras) {
+    session::SessionWriter writer(directory_ / "take", info);
+    for (const std::string& camera : cameras) {
+      Frame frame;
+      frame.source = camera;
+      frame.width = 16;
+      frame.height = 8;
+      frame.bytes.resize(frame_bytes(frame.format, frame.width, frame.height));
+      writer.write(frame);
+    }
+    writer.close();
+  }
+
+  void expect_said(const std::string& words) {
+    EXPECT_NE(said_.find(words), std::string::npos) << words << "\nis not in\n" << said_;
+  }
+
+  void expect_used(const std::string& words) { expect_in_list(words, false); }
+  void expect_left_out(const std::string& words) { expect_in_list(words, true); }
+
+  test::TemporaryDirectory directory_;
+  std::string said_;
+
+ private:
+  // The list of what is left out comes after that of what is used.
+  void expect_in_list(const std::string& words, bool is_left_out) {
+    const auto at = said_.find(words);
+    const auto left_out = said_.find("left out, because this set does not use it");
+    ASSERT_NE(left_out, std::string::npos) << said_;
+    ASSERT_NE(at, std::string::npos) << words << "\nis not in\n" << said_;
+    EXPECT_EQ(at > left_out, is_left_out) << words;
+  }
+};
+
+TEST_F(Check, RemarksThatBothFoldersOfTakesAreOnOneDisk) {
+  ASSERT_EQ(check("[recording]\nsecond_directory='more'\n"), 0) << said_;
+  expect_said("recording.second_directory is on the disk of recording.directory now");
+  ASSERT_EQ(check("[recording]\nsecond_directory='/dev/shm/takes'\n"), 0) << said_;
+  EXPECT_EQ(said_.find("second_directory"), std::string::npos) << said_;
+}
+
+TEST_F(Check, RefusesAFolderOfTakesThatIsAFile) {
+  write("takes", "a file");
+  ASSERT_EQ(check("[recording]\ndirectory='takes'\n"), 1) << said_;
+  expect_said("recording.directory: " + (directory_ / "takes").string() + " is a file");
+  ASSERT_EQ(check("[recording]\nsecond_directory='takes/more'\n"), 1) << said_;
+  expect_said("recording.second_directory: " + (directory_ / "takes").string() + " is a file");
+}
+
+constexpr const char* live_set = R"(
+[observer]
+driver = "v4l2"
+device = "usb-camera"
+[observer.camera]
+width = 1920
+height = 1080
+rate_hz = 25.0
+[light_camera]
+driver = "none"
+)";
+
+TEST_F(Check, SaysForHowLongTheDiskLasts) {
+  ASSERT_EQ(check(live_set), 0) << said_;
+  expect_said("the cameras' pictures: about 104 MB a second, and about half of that recorded");
+  expect_said("takes go to " + (directory_ / "takes").string());
+  expect_said(" free, enough for at least ");
+  ASSERT_EQ(check(std::string(live_set) + "[recording]\ncodec='raw'\n"), 0) << said_;
+  expect_said("recorded as they are");
+}
+
+TEST_F(Check, SaysWhatItNeedsToKnowForThat) {
+  ASSERT_EQ(check("[observer]\ndriver='v4l2'\ndevice='usb-camera'\n"), 0) << said_;
+  expect_said("cannot be said without [observer.camera] rate_hz and the picture's size");
+}
+
+TEST_F(Check, RemarksOnADiskThatIsAlmostFull) {
+  ASSERT_EQ(check("[recording]\nreserve_mb = 1e9\n"), 0) << said_;
+  expect_said("recording.directory: the disk is almost full");
+  expect_said("keeps 1e+06 GB free; no take can begin there");
+}
+
+TEST_F(Check, RemarksOnMemoryTooSmallForThePreRoll) {
+  const auto with = [](const char* recording) {
+    return std::string(live_set) + "[recording]\n" + recording;
+  };
+  // 1920 * 1080 * 2 * 25 bytes a second, of which half of a gigabyte holds 4.8 seconds.
+  ASSERT_EQ(check(with("preroll_s = 10\nqueue_mb = 1000\n")), 0) << said_;
+  expect_said("recording.preroll_s = 10: this needs about 1.04 GB of memory and there are 500 MB");
+  expect_said("begins about 4.8 s before the button");
+  ASSERT_EQ(check(with("preroll_s = 4\nqueue_mb = 1000\n")), 0) << said_;
+  EXPECT_EQ(said_.find("preroll_s"), std::string::npos) << said_;
+  ASSERT_EQ(check(with("queue_mb = 1e6\n")), 0) << said_;
+  expect_said("recording.queue_mb = 1e+06: this computer has ");
+}
+
+// A light camera that the set does not have sees nothing.
+TEST_F(Check, NoLightCameraSeesNoLight) {
+  write("ring.gltf", triangle(R"("pbrMetallicRoughness": {"metallicFactor": 1})"));
+  ASSERT_EQ(check(R"(
+[set]
+name = "ring"
+[light_camera]
+driver = "none"
+[[object]]
+name = "ring"
+file = "ring.gltf"
+presence = "virtual"
+)"),
+            0)
+      << said_;
+  expect_said("light camera  none");
+  expect_said("around the set: what the session's light camera saw, if it has one");
+}
+
+TEST_F(Check, DescribesWhatASetAsksFor) {
+  write("table.gltf", triangle(R"("pbrMetallicRoughness": {"metallicFactor": 0})"));
+  write("ring.gltf", triangle(R"("pbrMetallicRoughness": {"metallicFactor": 1})"));
+  ASSERT_EQ(check(R"(
+[set]
+name = "ring on a table"
+[[tag]]
+id = 4
+size_m = 0.0805
+position_m = [0, 0, 0]
+[[tag]]
+id = 9
+size_m = 0.05
+carrier = "stick"
+[[object]]
+name = "table"
+file = "table.gltf"
+presence = "phantom"
+[[object]]
+name = "ring"
+file = "ring.gltf"
+presence = "virtual"
+[[light]]
+name = "spot"
+type = "point"
+position_m = [0, 0, 1]
+emission = [1, 1, 1]
+gain_mixed = 0.5
+gain_real = 1
+[quality]
+samples = 1500
+)"),
+            0)
+      << said_;
+  expect_said("ring on a table (");
+  expect_said("1 tag of family tag36h11: 4 (80.5 mm)");
+  expect_said("carrier stick: 1 tag: 9 (50 mm)");
+  expect_said("table: phantom, 1 triangle in 1 instance, from table.gltf");
+  expect_said("ring: virtual, 1 triangle in 1 instance, from ring.gltf");
+  expect_said("spot: point, dimmed, gain 0.5 in the picture, 1 in the real scene");
+  expect_said("1 500 samples per pixel");
+  expect_said("geometry: 2 triangles, or 2 with every copy of an object counted");
+  expect_used("metal: an object is metal");
+  expect_used("two worlds: an object is virtual or removed");
+  expect_used("lamps: the set or a model has lamps");
+  expect_used("relighting: a lamp is added, taken away, dimmed");
+  expect_used("denoiser: noise is taken out");
+  expect_left_out("refraction: nothing is made of glass");
+  expect_left_out("removed objects: no real object is taken out of the picture");
+  expect_left_out("lens: everything is in focus");
+  expect_left_out("photons: no mirror or clear glass throws patterns of light");
+  expect_said("scene in the GPU's memory: about 1 MiB");
+  expect_said("the observer has no calibration here");
+}
+
+// 1920x1080 pixels of 1310 bytes with two frames on each side, and of 866 with one. On the card a
+// pixel has 190 bytes and 226 of a band, and 168 of history where it is averaged.
+TEST_F(Check, SaysHowMuchMemoryFramesTakeThatAreAveraged) {
+  const std::string lens =
+      "[observer.intrinsics]\nwidth=1920\nheight=1080\nfx=1866.0\nfy=1866.0\ncx=959.5\ncy=539.5\n";
+  const std::string words = "frames that are averaged offline in the computer's memory: about ";
+  ASSERT_EQ(check(lens), 0) << said_;
+  expect_said(words + "2591 MiB");
+  ASSERT_EQ(check(lens + "[quality]\nneighbours=1\n"), 0) << said_;
+  expect_said(words + "1713 MiB");
+  expect_said("picture in the GPU's memory: about 1155 MiB");
+  for (const char* quality : {"neighbours=0\n", "denoise=false\n"}) {
+    ASSERT_EQ(check(lens + "[quality]\n" + quality), 0) << said_;
+    EXPECT_EQ(said_.find(words), std::string::npos) << said_;
+  }
+  expect_said("picture in the GPU's memory: about 823 MiB");
+}
+
+// One of a virtual object is chosen by the set, and all are there for the buttons.
+TEST_F(Check, NamesTheVariantsOfAnObject) {
+  std::string file = triangle(R"("name": "matt"}, {"name": "gold", "emissiveFactor": [1, 1, 0])");
+  const std::string plain = R"("material": 0})";
+  file.replace(file.find(plain), plain.size(), R"("material": 0, "extensions":
+    {"KHR_materials_variants": {"mappings": [{"material": 1, "variants": [1]}]}}})");
+  file.insert(1, R"("extensionsUsed": ["KHR_materials_variants"], "extensions":
+    {"KHR_materials_variants": {"variants": [{"name": "by day"}, {"name": "by night"}]}}, )");
+  write("a.gltf", file);
+  const std::string object = "[[object]]\nname='a'\nfile='a.gltf'\npresence='virtual'\n";
+  ASSERT_EQ(check(object + "variant='by night'\n"), 0) << said_;
+  expect_said("from a.gltf, in its variant \"by night\"\n");
+  expect_said("its variants, for the buttons: \"by day\", \"by night\"\n");
+  ASSERT_EQ(check(object), 0) << said_;
+  expect_used("glowing surfaces: a surface gives off light");  // it may, at the press of a button
+  EXPECT_EQ(check(object + "variant='at noon'\n"), 1);
+  expect_said("a.gltf: there is no variant \"at noon\"; it has \"by day\", \"by night\"");
+}
+
+// A material may be of a kind that lets light through and let none through: the renderer then
+// leaves alpha out (`Alpha.is_left_out_where_every_texel_is_opaque`), and that is what is said.
+TEST_F(Check, AgreesWithTheRendererThatSolidBlendingNeedsNoAlpha) {
+  const std::string object = "[[object]]\nname='a'\nfile='a.gltf'\npresence='virtual'\n";
+  const auto material = [](const char* alpha) {
+    return std::string(R"("alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": )") +
+           "[1, 1, 1, " + alpha + "]}";
+  };
+  write("a.gltf", triangle(material("1")));
+  ASSERT_EQ(check(object), 0) << said_;
+  expect_left_out("alpha: no surface has holes or is a veil");
+  write("a.gltf", triangle(material("0.5")));
+  ASSERT_EQ(check(object), 0) << said_;
+  expect_used("alpha: a surface has holes or is a veil");
+}
+
+TEST_F(Check, SaysWhatIsColouredInside) {
+  write("a.gltf",
+        triangle(R"("name": "bottle", "pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": {
+    "KHR_materials_transmission": {"transmissionFactor": 1},
+    "KHR_materials_volume": {"thicknessFactor": 0.01, "attenuationColor": [0, 1, 0],
+                             "attenuationDistance": 0.1}})"));
+  ASSERT_EQ(check("[[object]]\nname='a'\nfile='a.gltf'\npresence='virtual'\n"), 0) << said_;
+  expect_used("coloured glass: glass or a liquid colours light more the longer its way through");
+}
+
+TEST_F(Check, TakesSetAndCalibrationOfASession) {
+  session::SessionInfo info;
+  info.set_text =
+      "[set]\nname = 'recorded'\n[tracking]\nenabled = false\n[lighting]\nmode = 'sources'\n";
+  info.observer.emplace();
+  info.observer->intrinsics = {.width = 16, .height = 8, .fx = 20, .fy = 20, .cx = 7.5, .cy = 3.5};
+  info.observer->lens = {.focal_length_m = 0.035, .f_number = 2.8, .focus_distance_m = 1.5};
+  write_take(info, {"observer", "light"});
+
+  std::ostringstream out;
+  ASSERT_EQ(check_set(directory_ / "take", out), 0) << out.str();
+  said_ = out.str();
+  expect_said("recorded (");
+  expect_said("its lamps light the set; the rest is blurred");
+  expect_used(
+      "lamps: the set or a model has lamps, a surface glows, or lamps are found in the light");
+  expect_said("16x8, 35 mm lens at f/2.8, focus at 1.5 m");
+  expect_used("lens: the aperture blurs what is out of focus");
+  expect_said("tracking is off: only a session that recorded poses can be used");
+}
+
+// `render` refuses it later.
+TEST_F(Check, ATakeWithoutLightIsAProblem) {
+  session::SessionInfo info;
+  info.set_text = "[set]\nname = 'dark'\n[tracking]\nenabled = false\n";
+  info.observer.emplace();
+  info.observer->intrinsics = {.width = 16, .height = 8, .fx = 20, .fy = 20, .cx = 7.5, .cy = 3.5};
+  write_take(info, {"observer"});
+  std::ostringstream out;
+  EXPECT_EQ(check_set(directory_ / "take", out), 1);
+  said_ = out.str();
+  expect_said("the session has no light frames, and the set gives no lighting.environment: name");
+}
+
+// Twenty-two mistakes of beginners; what is allowed and odd is said, and the rest refused.
+TEST_F(Check, FindsImplausibleUnits) {
+  const auto odd = [&](const std::string& set, const std::string& words) {
+    EXPECT_EQ(check(set), 0) << said_;
+    expect_said(words);
+  };
+  const std::string lens = "[observer.intrinsics]\nwidth=1920\nheight=1080\ncx=959.5\ncy=539.5\n";
+  odd("[[tag]]\nid=3\nsize_m=80.0\nposition_m=[0.0,0.0,0.0]\n",
+      "tag 3: its side is 80 m; sizes are in metres, so 80 mm is 0.08");
+  odd("[[tag]]\nid=3\nsize_m=0.8\nposition_m=[0.0,0.0,0.0]\n",
+      "tag 3: its side is 0.8 m; sizes are in metres, so 80 mm is 0.08");
+  odd("[[tag]]\nid=3\nsize_m=0.08\nposition_m=[1350.0,0.0,0.0]\n",
+      "tag 3: it is 1350 m from the origin");
+  odd(lens + "fx=18.664\nfy=18.664\n",
+      "fx = 18.664: a picture 1920 px wide would show 178 degrees");
+  odd(lens + "fx=1866.0\nfy=1244.0\n", "differ by 50 %");
+  odd("[observer.intrinsics]\nwidth=1920\nheight=1080\ncx=319.5\ncy=239.5\nfx=1866.0\nfy=1866.0\n",
+      "are these numbers for another picture size?");
+  odd(lens +
+          "fx=1866.0\nfy=1866.0\n[observer.lens]\nfocal_length_mm=0.035\nf_number=2.8\n"
+          "focus_distance_m=1.8\n",
+      "focal_length_mm = 0.035: it is in millimetres");
+  odd("[observer]\ndriver='v4l2'\ndevice='a'\n[observer.camera]\nrate_hz=30.0\nexposure_s=0.5\n",
+      "exposes for 0.5 s, longer than a frame lasts at 30 a second (0.0333 s)");
+}
+
+// The numbers of another picture size: a live set would be refused.
+TEST_F(Check, RefusesTheIntrinsicsOfAnotherPictureSize) {
+  const std::string set =
+      "[observer]\ndriver='v4l2'\ndevice='a'\n[observer.camera]\nwidth=1280\nheight=720\n"
+      "[observer.intrinsics]\nwidth=1920\nheight=1080\nfx=1866.0\nfy=1866.0\ncx=959.5\ncy=539.5\n";
+  EXPECT_EQ(check(set), 1);
+  expect_said("[observer.camera] is 1280x720 and [observer.intrinsics] is for 1920x1080");
+  expect_said("multiply fx and cx + 0.5 by 0.666667");
+}
+
+// What somebody copies on the first day, with the models that come along.
+TEST_F(Check, TheExampleIsRightAsCopied) {
+  const std::filesystem::path config = PREVIZ_SOURCE_DIR "/config";
+  std::filesystem::copy(config / "set.example.toml", directory_ / "my_set.toml");
+  std::filesystem::copy(config / "stage", directory_ / "stage",
+                        std::filesystem::copy_options::recursive);
+  std::ostringstream out;
+  EXPECT_EQ(check_set(directory_ / "my_set.toml", out), 0) << out.str();
+  EXPECT_EQ(out.str().find("[observer"), std::string::npos) << out.str();  // nothing is odd
+}
+
+TEST_F(Check, RefusesWithEveryProblemOfTheSetFile) {
+  EXPECT_EQ(check("[quality]\nsamples = 0\nscala = 1\n"), 1);
+  expect_said("stage.toml:2:11: quality.samples: ");
+  expect_said("stage.toml:3:1: quality.scala: ");
+  expect_said("2 problems\n");
+}
+
+TEST_F(Check, RefusesWithEveryFileThatIsWrong) {
+  write("a.gltf", "no glTF");
+  write("b.gltf", "{}");
+  write("env.exr", "no EXR");
+  EXPECT_EQ(check("[[object]]\nname='a'\nfile='a.gltf'\npresence='phantom'\n"
+                  "[[object]]\nname='b'\nfile='b.gltf'\npresence='virtual'\n"
+                  "[lighting]\nenvironment='env.exr'\n"),
+            1);
+  expect_said("a.gltf");
+  expect_said("b.gltf");
+  expect_said("env.exr");
+  expect_said("3 problems\n");
+}
+
+TEST_F(Check, RefusesWhatIsNotThere) {
+  std::ostringstream out;
+  EXPECT_EQ(check_set(directory_ / "no.toml", out), 1);
+  EXPECT_NE(out.str().find("no.toml"), std::string::npos) << out.str();
+  EXPECT_EQ(check_set(directory_.path(), out), 1);  // a folder that is no session
+}
+
+// The families that the set file's table offers are those that the tracker names. (It is not made
+// for each: the large families take it minutes.)
+TEST_F(Check, TagFamiliesOfTheTableAreTheTrackers) {
+  std::string of_table;
+  set::Draft draft;
+  for (const auto& section : set::sections(draft))
+    if (section.path == "tracking")
+      for (const auto& key : section.open().keys)
+        if (key.name == "family") of_table = key.allowed;
+  std::erase(of_table, '"');
+  for (auto bar = of_table.find(" | "); bar != std::string::npos; bar = of_table.find(" | "))
+    of_table.replace(bar, 3, ", ");
+
+  set::Tracking tracking;
+  tracking.family = "none of them";
+  try {
+    tracking::make_apriltag_tracker(tracking, {.width = 640, .height = 480, .fx = 600, .fy = 600});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_TRUE(std::string(error.what()).ends_with(of_table)) << of_table << '\n' << error.what();
+  }
+}
+
+TEST_F(Check, LoadsTheRoom) {
+  const std::string camera =
+      "[light_camera.intrinsics]\nwidth=64\nheight=64\nfx=20.0\nfy=20.0\ncx=31.5\ncy=31.5\n"
+      "max_angle_deg=90\n[light_camera.pose]\nposition_m=[0,0,5]\n";
+  EXPECT_NE(check(camera + "[lighting.room]\nsize_m=[4,4,3]\n"), 0);
+  expect_said("lighting.room: the light camera is not inside the box");
+  write("empty.gltf", R"({"asset": {"version": "2.0"}})");
+  EXPECT_NE(check(camera + "[lighting.room]\nfile='empty.gltf'\n"), 0);
+  expect_said("holds no surface");
+  EXPECT_EQ(check(camera + "[lighting.room]\nsize_m=[4,4,3]\nposition_m=[0,0,4]\n"
+                           "seen_from_m=[0,0,4]\n"),
+            0);
+}
+
+}  // namespace check_test
+}  // namespace previz::post

@@ -1,0 +1,359 @@
+// Takes are listed, marked, checked, copied and deleted, and nothing else is.
+#include "daemon/post/takes.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "daemon/output/take_folders.hpp"
+#include "daemon/output/take_list.hpp"
+#include "daemon/post/render_folder.hpp"
+#include "daemon/post/render_takes.hpp"
+#include "daemon/post/take_copy.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace previz::post {
+namespace takes_test {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::Not;
+
+class Takes : public testing::Test {
+ protected:
+  // Two takes as a rig leaves them, each of eight frames.
+  Takes() {
+    for (const char* name : {"12A_take001", "12A_take002"}) add(name);
+  }
+
+  void add(const std::string& name) {
+    const test::TemporaryDirectory made;
+    test::write_small_take(made.path());
+    fs::create_directories(folder_);
+    fs::copy(made / "session", folder_ / name, fs::copy_options::recursive);
+    session::change_take(folder_ / name, [](session::TakeInfo& take) {
+      take.slate = "12A";
+      take.timecode = "14:03:27:12";
+    });
+  }
+
+  std::string listed() {
+    std::ostringstream out;
+    list_takes({folder_}, out);
+    return out.str();
+  }
+
+  template <typename Call>
+  static std::string refusal(const Call& call) {
+    try {
+      call();
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  void replace_in_toml(const std::string& take, const std::string& from, const std::string& to) {
+    const fs::path toml = folder_ / take / "session.toml";
+    std::string text = session::read_file(toml);
+    const std::size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    session::replace_file(toml, text.replace(at, from.size(), to));
+  }
+
+  test::TemporaryDirectory directory_;
+  const fs::path folder_ = directory_ / "takes", one_ = folder_ / "12A_take001",
+                 two_ = folder_ / "12A_take002";
+  std::ostringstream out_;
+};
+
+TEST_F(Takes, AreListedWithWhatTheyAreAndLack) {
+  mark_takes({two_}, true, out_);
+  replace_in_toml("12A_take001", "closed = true", "closed = false");
+  fs::create_directories(folder_ / "12A_take010");
+  std::ofstream(folder_ / "12A_take010/session.toml") << "format_version = 7\n";
+  fs::create_directories(folder_ / "notes");
+  const std::string text = listed();
+  EXPECT_THAT(text, HasSubstr("12A_take001        0:00.3  8"));
+  EXPECT_THAT(text, HasSubstr("cut off"));
+  EXPECT_THAT(text, HasSubstr("12A_take002  good  0:00.3  8       14:03:27:12"));
+  EXPECT_THAT(text, HasSubstr("format_version"));
+  EXPECT_THAT(text, Not(HasSubstr("notes")));
+  EXPECT_LT(text.find("take002"), text.find("take010"));
+}
+
+TEST_F(Takes, ARenderIsCounted) {
+  fs::create_directories(two_ / "out");
+  std::ofstream(two_ / "out/frames.jsonl") << "{}\n{}\n{}\n";
+  EXPECT_EQ(rendered_frames(output::listed_take(two_)), 3u);
+  EXPECT_EQ(rendered_frames(output::listed_take(one_)), 0u);
+}
+
+TEST_F(Takes, HaveARenderFolderEach) {
+  EXPECT_EQ(render_folder(one_, true, one_ / "out"), one_ / "out");
+  EXPECT_EQ(render_folder(one_, true, "/renders"), "/renders/12A_take001");
+  EXPECT_EQ(render_folder(one_ / "", true, "/renders"), "/renders/12A_take001");
+  EXPECT_EQ(render_folder(one_, false, "/renders"), "/renders");  // imported
+}
+
+TEST_F(Takes, AreMarkedAllOrNone) {
+  mark_takes({one_, two_}, true, out_);
+  EXPECT_TRUE(session::summary_of(one_).info.take->good);
+  mark_takes({one_}, false, out_);
+  EXPECT_FALSE(session::summary_of(one_).info.take->good);
+  EXPECT_EQ(session::summary_of(one_).info.take->timecode, "14:03:27:12");
+  EXPECT_THAT(refusal([&] {
+                mark_takes({one_, folder_}, true, out_);
+              }),
+              HasSubstr("is a folder of takes; name the takes in it"));
+  EXPECT_FALSE(session::summary_of(one_).info.take->good);
+  EXPECT_THAT(refusal([&] { mark_takes({folder_ / "12A_take003"}, true, out_); }),
+              HasSubstr("is not there"));
+}
+
+TEST_F(Takes, ThatAreRecordedAreLeftAlone) {
+  replace_in_toml("12A_take001", "closed = true", "closed = false");
+  output::TakeFolders::keep_wish(one_);
+  EXPECT_THAT(listed(), HasSubstr("being recorded"));
+  for (const std::string& said : {refusal([&] { mark_takes({one_}, true, out_); }), refusal([&] {
+                                    delete_takes({two_, one_}, true, out_);
+                                  }),
+                                  refusal([&] {
+                                    copy_takes({{one_}, directory_ / "disk"}, out_, {});
+                                  })})
+    EXPECT_THAT(said, HasSubstr("12A_take001: is being recorded; end the take first"));
+  EXPECT_TRUE(fs::exists(two_ / "session.toml"));
+}
+
+TEST_F(Takes, DamageIsFoundAndNamed) {
+  EXPECT_EQ(check_takes({one_, two_}, out_, {}), 0);
+  EXPECT_THAT(out_.str(), HasSubstr("12A_take001: whole, 8 frames"));
+  fs::resize_file(one_ / "observer.mkv", fs::file_size(one_ / "observer.mkv") / 2);
+  std::ostringstream out;
+  EXPECT_EQ(check_takes({one_, two_}, out, {}), 1);
+  EXPECT_THAT(out.str(), HasSubstr("12A_take001: observer"));
+  EXPECT_THAT(out.str(), HasSubstr("12A_take002: whole"));
+}
+
+TEST_F(Takes, AreCopiedWithChecksums) {
+  std::ofstream(one_ / "notes.txt") << "not the take's\n";
+  const fs::path disk = directory_ / "disk/day 1", copy = disk / "12A_take001";
+  copy_takes({{one_ / "", two_}, disk}, out_, {});
+  EXPECT_THAT(out_.str(), HasSubstr(copy.string() + ": "));
+  EXPECT_EQ(session::own_files(copy), session::own_files(one_));
+  EXPECT_FALSE(fs::exists(copy / "notes.txt"));
+  for (const fs::path& file : session::own_files(one_))
+    EXPECT_EQ(session::read_file(copy / file), session::read_file(one_ / file)) << file;
+  EXPECT_EQ(std::system(("cd '" + copy.string() + "' && sha256sum --check --status --strict " +
+                         checksums_name)
+                            .c_str()),
+            0);
+  EXPECT_EQ(check_takes({copy}, out_, {}), 0);
+  // Nothing but the takes is in the folder.
+  EXPECT_EQ(std::distance(fs::directory_iterator(disk), {}), 2);
+}
+
+// As sha256sum(1) writes such a name, so that one file is one line.
+TEST_F(Takes, AreCopiedWithChecksumsOfNamesThatHaveTheEndOfALine) {
+  const std::string name = "assets/" + std::string(64, 'b') + ".g\nl\\b";
+  fs::create_directories(one_ / "assets");
+  std::ofstream(one_ / name) << "an asset";
+  const fs::path disk = directory_ / "disk", copy = disk / "12A_take001";
+  copy_takes({{one_}, disk}, out_, {});
+  EXPECT_EQ(session::read_file(copy / name), "an asset");
+  EXPECT_EQ(check_takes({copy}, out_, {}), 0) << out_.str();
+  EXPECT_EQ(std::system(("cd '" + copy.string() + "' && sha256sum --check --status --strict " +
+                         checksums_name)
+                            .c_str()),
+            0);
+}
+
+TEST_F(Takes, WhoseChecksumsAreALinkToThemselvesAreNamed) {
+  fs::create_symlink(checksums_name, one_ / checksums_name);
+  std::ostringstream out;
+  EXPECT_EQ(check_takes({one_}, out, {}), 1);
+  EXPECT_THAT(out.str(), HasSubstr(std::string(checksums_name) + ": is a link"));
+  EXPECT_THAT(refusal([&] { mark_takes({one_}, true, out_); }), HasSubstr("is a link"));
+}
+
+TEST_F(Takes, AreCopiedOnce) {
+  const fs::path disk = directory_ / "disk";
+  copy_takes({{one_}, disk}, out_, {});
+  copy_takes({{one_, two_}, disk}, out_, {});
+  EXPECT_THAT(out_.str(), HasSubstr("12A_take001: was copied before"));
+  // Another take of the name is not replaced, and neither is one that was marked meanwhile.
+  mark_takes({two_}, true, out_);
+  EXPECT_THAT(refusal([&] {
+                copy_takes({{two_}, disk}, out_, {});
+              }),
+              HasSubstr("is no copy of this take as it is now"));
+  EXPECT_THAT(refusal([&] {
+                copy_takes({{one_}, folder_}, out_, {});
+              }),
+              HasSubstr("lies in the take itself"));
+}
+
+TEST_F(Takes, AStoppedCopyLeavesNothing) {
+  std::stop_source stop;
+  stop.request_stop();
+  const fs::path disk = directory_ / "disk";
+  EXPECT_THROW(copy_takes({{one_}, disk}, out_, stop.get_token()), Error);
+  EXPECT_TRUE(fs::is_empty(disk));
+}
+
+TEST_F(Takes, ADamagedCopyIsFound) {
+  const fs::path disk = directory_ / "disk", copy = disk / "12A_take001";
+  copy_takes({{one_}, disk}, out_, {});
+  std::ofstream(copy / "events.jsonl", std::ios::app) << "{}\n";
+  std::ofstream(copy / "track.jsonl", std::ios::app) << "\n";
+  std::ostringstream out;
+  EXPECT_EQ(check_takes({copy}, out, {}), 1);
+  EXPECT_THAT(out.str(), HasSubstr("track.jsonl: was changed since it was copied; copy the take"));
+}
+
+// A frame that was damaged on the rig's disk: the copy is the same, byte for byte, and as damaged.
+TEST_F(Takes, ADamagedTakeIsCopiedAsItIsAndSaid) {
+  const fs::path film = one_ / "observer.mkv";
+  ASSERT_TRUE(fs::exists(film));
+  {
+    std::fstream file(film, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(fs::file_size(film) / 2));
+    file << "XXXXXXXXXXXXXXXX";
+  }
+  std::ostringstream out;
+  EXPECT_EQ(copy_takes({{one_}, directory_ / "disk"}, out, {}), 1);
+  EXPECT_THAT(out.str(), HasSubstr("checked"));
+  EXPECT_THAT(out.str(), HasSubstr("the take itself is damaged, not by copying: observer.mkv"));
+  EXPECT_EQ(copy_takes({{two_}, directory_ / "disk"}, out, {}), 0);
+}
+
+TEST_F(Takes, ADamagedTakeIsRepairedIntoANewOne) {
+  const fs::path film = one_ / "observer.mkv", disk = directory_ / "disk/repaired";
+  const std::string before = session::read_file(film);
+  std::string damaged = before;
+  damaged[damaged.size() / 2] ^= 0x10;
+  session::replace_file(film, damaged);
+  EXPECT_EQ(repair_takes({{one_, two_}, disk}, out_, {}), 1);
+  EXPECT_THAT(out_.str(), HasSubstr("12A_take001: repaired, 7 frames; what is lost is in its"));
+  EXPECT_THAT(out_.str(), HasSubstr("12A_take002: whole, nothing to repair"));
+  EXPECT_EQ(session::read_file(film), damaged);
+  EXPECT_FALSE(fs::exists(disk / "12A_take002"));
+  std::ostringstream out;
+  EXPECT_EQ(check_takes({disk / "12A_take001"}, out, {}), 1);
+  EXPECT_THAT(out.str(), HasSubstr("repaired from 12A_take001, which was damaged: observer.mkv"));
+  EXPECT_EQ(std::ranges::count(out.str(), '\n'), 1);  // nothing else is wrong with it
+  EXPECT_THAT(refusal([&] {
+                repair_takes({{one_}, disk}, out_, {});
+              }),
+              HasSubstr("12A_take001: already exists; repair into another folder"));
+  EXPECT_THAT(refusal([&] {
+                repair_takes({{one_}, folder_}, out_, {});
+              }),
+              HasSubstr("already exists"));
+
+  damaged = before;
+  damaged[0] = 0;
+  session::replace_file(film, damaged);
+  EXPECT_EQ(repair_takes({{one_}, disk / "again"}, out_, {}), 0);
+  EXPECT_THAT(out_.str(), HasSubstr("repaired, 8 frames, nothing is lost"));
+  EXPECT_EQ(check_takes({disk / "again/12A_take001"}, out_, {}), 0);
+}
+
+TEST_F(Takes, AMarkIsNoDamageToACopy) {
+  const fs::path disk = directory_ / "disk", copy = disk / "12A_take001";
+  copy_takes({{one_}, disk}, out_, {});
+  mark_takes({copy}, true, out_);
+  EXPECT_EQ(check_takes({copy}, out_, {}), 0);
+}
+
+TEST_F(Takes, AreDeletedAndNothingElse) {
+  fs::create_directories(one_ / "out");
+  std::ofstream(one_ / "out/0000.exr") << "a render";
+  std::ofstream(two_ / "assets/more.txt") << "put there by somebody";
+  fs::create_directory_symlink(directory_ / "elsewhere", two_ / "linked");
+  add("12A_take003");
+  delete_takes({one_}, false, out_);
+  EXPECT_TRUE(fs::exists(one_ / "out/0000.exr"));
+  EXPECT_FALSE(fs::exists(one_ / "session.toml"));
+  EXPECT_FALSE(fs::exists(one_ / "observer.mkv"));
+  EXPECT_FALSE(fs::exists(one_ / "assets"));
+  EXPECT_THAT(out_.str(), HasSubstr("still there: out"));
+  delete_takes({folder_ / "12A_take003"}, false, out_);
+  EXPECT_FALSE(fs::exists(folder_ / "12A_take003"));
+  EXPECT_TRUE(fs::exists(two_ / "session.toml"));
+  delete_takes({two_}, false, out_);
+  EXPECT_TRUE(fs::exists(two_ / "assets/more.txt"));
+  EXPECT_TRUE(fs::is_symlink(two_ / "linked"));
+  EXPECT_TRUE(session::own_files(two_).empty());
+}
+
+TEST_F(Takes, AGoodTakeIsNotDeletedUnasked) {
+  mark_takes({two_}, true, out_);
+  EXPECT_THAT(refusal([&] {
+                delete_takes({one_, two_}, false, out_);
+              }),
+              HasSubstr("12A_take002: is marked good; say --good"));
+  EXPECT_TRUE(fs::exists(one_ / "session.toml"));
+  delete_takes({two_}, true, out_);
+  EXPECT_FALSE(fs::exists(two_));
+}
+
+TEST_F(Takes, ALinkIsNotFollowedToBeDeleted) {
+  fs::create_directory_symlink(one_, folder_ / "best");
+  EXPECT_THAT(refusal([&] { delete_takes({folder_ / "best"}, false, out_); }),
+              HasSubstr("is a link to " + one_.string()));
+  fs::create_directories(directory_ / "shared");
+  std::ofstream(directory_ / "shared/model.glb") << "of others";
+  fs::remove_all(one_ / "assets");
+  fs::create_directory_symlink(directory_ / "shared", one_ / "assets");
+  delete_takes({one_}, false, out_);
+  EXPECT_TRUE(fs::exists(directory_ / "shared/model.glb"));
+}
+
+TEST_F(Takes, AFolderOrASetFileNamesThem) {
+  const test::TemporaryDirectory stage;
+  test::write_small_take(stage.path(), true,
+                         "[recording]\ndirectory = \"" + folder_.string() + "\"\n");
+  list_takes({stage / "set.toml"}, out_);
+  EXPECT_THAT(out_.str(), HasSubstr("12A_take002"));
+  EXPECT_THAT(refusal([&] { list_takes({directory_ / "nowhere"}, out_); }),
+              HasSubstr("is not there; name a folder of takes"));
+}
+
+TEST_F(Takes, NoTakeOfThatKindIsSaid) {
+  RenderOptions options;
+  options.session = folder_;
+  EXPECT_THAT(refusal([&] { render_takes(options, WhichTakes::good, out_); }),
+              HasSubstr("no take in it is marked good; `previzd takes mark TAKE`"));
+  options.session = directory_ / "nowhere";
+  EXPECT_THAT(refusal([&] { render_takes(options, WhichTakes::all, out_); }),
+              HasSubstr("there is no take in it"));
+}
+
+TEST_F(Takes, GoodOnesAreRenderedIntoAFolderEach) {
+  mark_takes({two_}, true, out_);
+  add("12A_take003");
+  mark_takes({folder_ / "12A_take003"}, true, out_);
+  std::ofstream(folder_ / "12A_take003/session.toml", std::ios::app) << "\n[nonsense\n";
+  RenderOptions options;
+  options.session = folder_;
+  options.samples = 1;
+  options.frames = FrameRange{1, 1};
+  options.exr = options.video = false;
+  options.directory = directory_ / "renders";
+  const TakesReport report = render_takes(options, WhichTakes::good, out_);
+  ASSERT_EQ(report.rendered.size(), 1u);
+  EXPECT_EQ(report.rendered[0].directory, directory_ / "renders/12A_take002");
+  EXPECT_TRUE(fs::exists(directory_ / "renders/12A_take002/0001.png"));
+  EXPECT_FALSE(fs::exists(directory_ / "renders/12A_take001"));
+}
+
+}  // namespace takes_test
+}  // namespace previz::post

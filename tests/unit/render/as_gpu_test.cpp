@@ -1,0 +1,125 @@
+// A CPU device that is treated as a graphics card: its pictures are those of a CPU device bit for
+// bit, and no access to memory lacks the barrier that a card would need.
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "daemon/render/device.hpp"
+#include "tests/support/pixels_by_hand.hpp"
+
+namespace previz::test {
+namespace as_gpu_test {
+
+constexpr int width = 48, height = 36;
+
+// A textured floor, and above it a glass ball that only the mixed world has, under a lamp of both.
+View ball_on_texture() {
+  View view;
+  scene::Material floor = diffuse(glm::vec3(0.7f));
+  scene::Texture texture;
+  texture.width = texture.height = 2;
+  texture.texels = {
+      {0.9f, 0.2f, 0.2f, 1}, {0.2f, 0.9f, 0.2f, 1}, {0.2f, 0.2f, 0.9f, 1}, {0.9f, 0.9f, 0.9f, 1}};
+  floor.base_color_texture = add_texture(view.scene, std::move(texture));
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({2, 2})),
+               add_material(view.scene, floor));
+  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.2, 2)),
+               add_material(view.scene, glass(1.5f)),
+               glm::translate(glm::dmat4(1.0), glm::dvec3(0, 0, 0.25)), scene::world_mixed);
+  set::Light light = lamp(set::LightType::sphere, glm::dvec3(2));
+  light.position = {0.3, 0, 1};
+  light.radius_m = 0.1;
+  view.scene.lights.push_back(light);
+  view.environment = uniform_environment(glm::vec3(0.1f));
+  view.calibration = pinhole(width, height, 0.8);
+  view.world_from_camera = look_at({0, -0.8, 1}, {0, 0, 0.05});
+  return view;
+}
+
+set::Estimation many_photons() {
+  set::Estimation estimation;
+  estimation.photons = 4;
+  return estimation;
+}
+
+struct Pictures {
+  std::vector<Plate> live;
+  render::Layers offline;
+};
+
+// Renders live frames that are averaged and denoised, through a camera that moves a little.
+std::vector<Plate> live_frames(render::Renderer& renderer, int count) {
+  std::vector<Plate> shown;
+  const auto plate = std::make_shared<const Plate>(random_plate(width, height, 8));
+  for (int frame = 0; frame < count; ++frame) {
+    renderer.begin({.plate = plate,
+                    .exposure = 0.5,
+                    .world_from_camera = look_at({0.004 * frame, -0.8, 1}, {0, 0, 0.05}),
+                    .accumulates = true});
+    renderer.render(2);
+    expect_clean(renderer.counters());
+    shown.push_back(renderer.show(true));
+  }
+  return shown;
+}
+
+Pictures pictures_on(const std::shared_ptr<render::Device>& device) {
+  const View view = ball_on_texture();
+  SetRenderer renderer(view, many_photons(), device);
+  Pictures result{live_frames(renderer, 3), {}};
+  renderer.begin({.plate = nullptr, .world_from_camera = view.world_from_camera});
+  renderer.render(8);
+  result.offline = renderer.layers();
+  EXPECT_EQ(render::validation_messages(*device), 0u);
+  return result;
+}
+
+TEST(AsGpu, HasThePicturesOfACpuBitForBit) {
+  const auto as_gpu = render::open_device({.validation = true, .name = "", .as_gpu = true});
+  // On a card there is no other path to compare with; every other test then runs the card's.
+  if (!as_gpu->is_cpu()) GTEST_SKIP() << "the device is a graphics card";
+  EXPECT_FALSE(as_gpu->shares_host_memory());
+  EXPECT_TRUE(shared_device()->shares_host_memory());
+  EXPECT_FALSE(render::is_gpu(*as_gpu));
+  const Pictures expected = pictures_on(shared_device()), found = pictures_on(as_gpu);
+  ASSERT_EQ(found.live.size(), expected.live.size());
+  for (std::size_t i = 0; i < found.live.size(); ++i)
+    EXPECT_TRUE(found.live[i].samples == expected.live[i].samples) << "frame " << i;
+  EXPECT_NE(found.live[0].samples, random_plate(width, height, 8).samples);
+  EXPECT_TRUE(found.offline.composite == expected.offline.composite);
+  EXPECT_TRUE(found.offline.diff == expected.offline.diff);
+  EXPECT_TRUE(found.offline.variance == expected.offline.variance);
+  EXPECT_TRUE(found.offline.depth == expected.offline.depth);
+  EXPECT_GT(as_gpu->submissions(), 0u);
+}
+
+std::shared_ptr<render::Device> hazards_heard() {
+  return render::open_device(
+      {.validation = true, .name = "", .as_gpu = true, .synchronization = true});
+}
+
+void two_live_frames(const std::shared_ptr<render::Device>& device) {
+  SetRenderer renderer(ball_on_texture(), many_photons(), device);
+  live_frames(renderer, 2);
+}
+
+TEST(AsGpu, NoAccessLacksItsBarrier) {
+  const auto device = hazards_heard();
+  two_live_frames(device);
+  EXPECT_EQ(render::validation_messages(*device), 0u);
+}
+
+VKAPI_ATTR void VKAPI_CALL no_barrier(VkCommandBuffer, const VkDependencyInfo*) {}
+
+// The check above is worth something only if it hears a barrier that is missing. Here all are: the
+// device's table of functions, which is the test's own, gets a barrier that does nothing.
+TEST(AsGpu, AMissingBarrierIsHeard) {
+  const auto device = hazards_heard();
+  // A card would run without barriers what needs them: its queues then lose paths.
+  if (!device->is_cpu()) GTEST_SKIP() << "the device is a graphics card";
+  using Table = std::remove_cvref_t<decltype(*device->vk().getDispatcher())>;
+  const_cast<Table*>(device->vk().getDispatcher())->vkCmdPipelineBarrier2 = no_barrier;
+  two_live_frames(device);
+  EXPECT_GT(render::validation_messages(*device), 0u);
+}
+
+}  // namespace as_gpu_test
+}  // namespace previz::test

@@ -1,0 +1,108 @@
+// What mirrors and glass show keeps its past while the camera moves: it moves as the place that is
+// seen in them does, and not as their own surface.
+#include <cmath>
+
+#include "tests/support/averaged_frames.hpp"
+
+namespace previz::test {
+namespace mirror_history_test {
+
+constexpr int many = 128;  // samples, whose noise is a third of that of a dozen
+
+// Virtual light from one side falls on a real floor with real boxes, among which stands what
+// mirrors.
+struct Room {
+  View view;
+  std::uint32_t mirror = 0, box = 0;
+
+  Room(scene::Mesh mesh, const scene::Material& material) {
+    scene::Scene& scene = view.scene;
+    const std::uint32_t gray = add_material(scene, diffuse(glm::vec3(0.5f)));
+    const std::uint32_t red = add_material(scene, diffuse(glm::vec3(0.6f, 0.1f, 0.1f)));
+    add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
+    const std::uint32_t boxes = add_mesh(scene, box_mesh(glm::dvec3(0.3)));
+    add_instance(scene, boxes, red, placed_at({-0.8, 0.3, 0.15}));
+    box = add_instance(scene, boxes, red, placed_at({0.7, -0.3, 0.15}), scene::world_mixed);
+    mirror = add_instance(scene, add_mesh(scene, std::move(mesh)), add_material(scene, material),
+                          placed_at({0, 0, 0.5}), scene::world_mixed);
+    see_evenly_lit(view, glm::vec3(0.4f), 0.9);
+    view.world_from_camera = look_at({0, -2, 1.2}, {0, 0, 0.4});
+  }
+};
+
+Room room_with(const std::string& kind) {
+  if (kind == "MirrorBox") return {box_mesh(glm::dvec3(0.8)), metal(glm::vec3(0.9f), 0)};
+  if (kind == "MirrorBall") return {icosphere_mesh(0.5, 5), metal(glm::vec3(0.9f), 0)};
+  return {icosphere_mesh(0.5, 5), glass(1.5f)};
+}
+
+glm::dmat4 moving_pose(int frame) {
+  return look_at({0.02 * frame, -2 + 0.01 * frame, 1.2}, {0.01 * frame, 0, 0.4});
+}
+
+class MirrorHistory : public ::testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(Of, MirrorHistory, ::testing::Values("MirrorBox", "MirrorBall", "Glass"),
+                         [](const auto& of) { return of.param; });
+
+// A dozen samples leave a noise of 1 / sqrt(12) of one, of which half more is allowed for what
+// moves out of sight and for interpolating.
+TEST_P(MirrorHistory, StaysWhileTheCameraMoves) {
+  const Room room = room_with(GetParam());
+  SetRenderer moving(room.view), alone(room.view), reference(room.view);
+  glm::dmat4 pose(1.0);
+  Plate last;
+  for (int frame = 0; frame < 12; ++frame) {
+    pose = moving_pose(frame);
+    last = shown_frame(moving, pose, 1, true);
+  }
+  const Plate truth = shown_frame(reference, pose, many, false);
+  const std::vector<float> mask = reference.layers().mask;
+  const double off_alone = apart_where_covered(shown_frame(alone, pose, 1, false), truth, mask);
+  const double off = apart_where_covered(last, truth, mask);
+  EXPECT_LT(off, 1.5 / std::sqrt(12.0) * off_alone);
+}
+
+// A box walks beside a mirror by a centimetre a frame. What the mirror shows of everything else
+// keeps its past; all of it had ended as soon as something moved in a mirror's sight.
+TEST_P(MirrorHistory, StaysWhileSomethingWalksBesideIt) {
+  const Room room = room_with(GetParam());
+  SetRenderer walking(room.view), alone(room.view), reference(room.view);
+  std::vector<scene::Instance> instances = room.view.scene.instances;
+  glm::dmat4 pose(1.0);
+  Plate last;
+  for (int frame = 0; frame < 12; ++frame) {
+    pose = moving_pose(frame);
+    instances[room.box].world_from_object = placed_at({0.8 - 0.01 * frame, -0.4, 0.15});
+    walking.move(instances, {});
+    last = shown_frame(walking, pose, 1, true);
+  }
+  for (SetRenderer* each : {&alone, &reference}) each->move(instances, {});
+  const Plate truth = shown_frame(reference, pose, many, false);
+  const std::vector<float> mask = reference.layers().mask;
+  EXPECT_LT(apart_where_covered(last, truth, mask),
+            0.6 * apart_where_covered(shown_frame(alone, pose, 1, false), truth, mask));
+}
+
+// Nothing is seen in it of where a box has been that has jumped, beyond half of what a fresh start
+// shows.
+TEST_P(MirrorHistory, ShowsNoGhostOfWhatHasJumped) {
+  const Room room = room_with(GetParam());
+  SetRenderer renderer(room.view), fresh(room.view), reference(room.view);
+  const glm::dmat4& pose = room.view.world_from_camera;
+  std::vector<scene::Instance> instances = room.view.scene.instances;
+  for (int frame = 0; frame < 12; ++frame) shown_frame(renderer, pose, 1, true);
+  instances[room.box].world_from_object = placed_at({-0.7, -0.5, 0.15});
+  for (SetRenderer* each : {&renderer, &fresh, &reference}) each->move(instances, {});
+  const Plate truth = shown_frame(reference, pose, many, false);
+  const std::vector<float> mask = reference.layers().mask;
+  for (int frame = 0; frame < 5; ++frame) {
+    const Plate after = shown_frame(renderer, pose, 1, true);
+    const Plate begun = shown_frame(fresh, pose, 1, true);
+    EXPECT_LT(apart_where_covered(after, truth, mask),
+              1.5 * apart_where_covered(begun, truth, mask))
+        << frame;
+  }
+}
+
+}  // namespace mirror_history_test
+}  // namespace previz::test

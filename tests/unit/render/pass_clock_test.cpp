@@ -1,0 +1,72 @@
+// The device's own clock: what it times is what ran, and it is silent where nobody asked.
+#include <algorithm>
+
+#include "daemon/render/device.hpp"
+#include "tests/support/pixels_by_hand.hpp"
+
+namespace previz::test {
+namespace pass_clock_test {
+
+constexpr int width = 32, height = 24, bounces = 2;
+
+View floor_under_sky() {
+  View view;
+  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({2, 2})),
+               add_material(view.scene, diffuse(glm::vec3(0.5f))));
+  view.environment = uniform_environment(glm::vec3(0.2f));
+  view.calibration = pinhole(width, height, 0.8);
+  view.world_from_camera = look_at({0, -0.8, 1}, {0, 0, 0});
+  return view;
+}
+
+render::DeviceTimes times_of_a_frame(bool times_passes) {
+  render::DeviceOptions options;
+  options.validation = true;
+  options.times_passes = times_passes;
+  const auto device = render::open_device(options);
+  const View view = floor_under_sky();
+  set::Estimation estimation;
+  estimation.max_depth = bounces;
+  SetRenderer renderer(view, estimation, device);
+  render::take_times(*device);
+  const std::uint64_t before = device->submissions();
+  renderer.begin({.plate = nullptr, .world_from_camera = view.world_from_camera});
+  renderer.render(1);
+  renderer.layers();
+  render::DeviceTimes times = render::take_times(*device);
+  EXPECT_EQ(times.submissions, times_passes ? device->submissions() - before : 0);
+  EXPECT_TRUE(render::take_times(*device).passes.empty()) << "it was taken";
+  EXPECT_EQ(render::validation_messages(*device), 0u);
+  return times;
+}
+
+TEST(PassClock, TimesEveryPassOfAFrame) {
+  const render::DeviceTimes times = times_of_a_frame(true);
+  EXPECT_EQ(times.untimed, 0u);
+  double passes_ms = 0;
+  for (const auto& pass : times.passes) {
+    EXPECT_GT(pass.count, 0u) << pass.name;
+    EXPECT_GE(pass.ms, 0) << pass.name;
+    passes_ms += pass.ms;
+  }
+  const auto count_of = [&](const char* name) {
+    const auto found = std::ranges::find(times.passes, name, &render::DeviceTimes::Pass::name);
+    return found == times.passes.end() ? 0 : found->count;
+  };
+  EXPECT_EQ(count_of("generate"), 1u);
+  EXPECT_EQ(count_of("accumulate"), 1u);
+  EXPECT_GE(count_of("shade"), 1u);
+  EXPECT_GT(passes_ms, 0);
+  // The computer waits at least as long as the device works, by clocks whose crystals are off by
+  // less than 500 parts in a million each.
+  EXPECT_LE(passes_ms, 1.001 * times.waited_ms);
+}
+
+TEST(PassClock, TimesNothingUnlessItIsAsked) {
+  const render::DeviceTimes times = times_of_a_frame(false);
+  EXPECT_TRUE(times.passes.empty());
+  EXPECT_EQ(times.waited_ms, 0);
+}
+
+}  // namespace pass_clock_test
+}  // namespace previz::test

@@ -1,0 +1,114 @@
+// What a SPIR-V module says about itself, and what is left of it when features are switched off.
+#include "daemon/render/spirv.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+
+#include "daemon/render/feature.hpp"
+#include "daemon/render/kernel.hpp"
+#include "shaders/accumulate.spv.h"
+#include "shaders/extend.spv.h"
+#include "shaders/generate.spv.h"
+#include "shaders/lib/render_shared.h"
+#include "shaders/refit_nodes.spv.h"
+#include "shaders/shade.spv.h"
+#include "tests/support/render_fixture.hpp"
+
+namespace previz::test {
+namespace spirv_test {
+
+using render::describe_spirv;
+using render::specialise_spirv;
+using render::SpirvInfo;
+
+constexpr std::uint32_t every_feature = (gpu::FEATURE_LAYER_TEXTURES << 1) - 1;
+
+TEST(Spirv, NamesTheBuffersThatAreUsed) {
+  const SpirvInfo info = describe_spirv(generate_spv);
+  EXPECT_EQ(info.group_size, gpu::WORKGROUP_SIZE);
+  const auto has = [&](const std::string& name, bool is_storage) {
+    return std::ranges::any_of(info.bindings, [&](const SpirvInfo::Binding& binding) {
+      return binding.name == name && binding.is_storage == is_storage;
+    });
+  };
+  EXPECT_TRUE(has("control", true));
+  EXPECT_FALSE(has("vertices", false));  // declared in a header, and not used by this pass
+  const SpirvInfo shade = describe_spirv(shade_spv);
+  EXPECT_TRUE(std::ranges::any_of(shade.bindings, [](const SpirvInfo::Binding& binding) {
+    return binding.name == "vertices" && !binding.is_storage;
+  }));
+}
+
+TEST(Spirv, KnowsTheFeaturesThatAPassAsksAbout) {
+  EXPECT_EQ(describe_spirv(refit_nodes_spv).asked_bits, 0u);
+  const std::uint32_t extend = describe_spirv(extend_spv).asked_bits;
+  EXPECT_EQ(extend & ~every_feature, 0u);
+  EXPECT_NE(extend & gpu::FEATURE_ALPHA, 0u);
+  EXPECT_EQ(extend & gpu::FEATURE_PHOTONS, 0u);  // rays are traced alike with a map and without
+  const std::uint32_t shade = describe_spirv(shade_spv).asked_bits;
+  EXPECT_EQ(shade & ~every_feature, 0u);
+  for (const std::uint32_t bit : {gpu::FEATURE_GLOSSY, gpu::FEATURE_SHEEN, gpu::FEATURE_PHOTONS})
+    EXPECT_NE(shade & bit, 0u) << bit;
+}
+
+// The path tracer's heaviest pass, for a scene of plain paint: the driver gets a quarter of it.
+TEST(Spirv, LeavesOutWhatIsSwitchedOff) {
+  const std::array<std::uint32_t, 1> none = {0}, all = {every_feature};
+  const std::size_t whole = specialise_spirv(shade_spv, all).size();
+  const std::size_t plain = specialise_spirv(shade_spv, none).size();
+  EXPECT_LT(4 * plain, whole);
+  EXPECT_EQ(specialise_spirv(shade_spv, none), specialise_spirv(shade_spv, none));
+}
+
+TEST(Spirv, APassIsCompiledOnceForFeaturesThatItDoesNotAskAbout) {
+  const std::uint32_t asked = describe_spirv(extend_spv).asked_bits;
+  ASSERT_NE(asked & gpu::FEATURE_ALPHA, 0u);
+  const render::Kernel kernel(*shared_device(), "extend", extend_spv,
+                              {gpu::FEATURE_ALPHA | gpu::FEATURE_PHOTONS});
+  const std::array<std::uint32_t, 1> masked = {gpu::FEATURE_ALPHA};
+  const auto compiled = shared_device()->program(extend_spv, masked, [] {
+    ADD_FAILURE() << "it is compiled again";
+    return std::make_shared<const render::Program>();
+  });
+  EXPECT_FALSE(compiled->bindings.empty());
+  EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
+}
+
+TEST(Spirv, TheLastPassOfASampleAsksOnlyWhetherThereAreACameraTexturesOrPhotons) {
+  EXPECT_EQ(describe_spirv(accumulate_spv).asked_bits, gpu::FEATURE_CAMERA | gpu::FEATURE_TEXTURES |
+                                                           gpu::FEATURE_VERTEX_COLORS |
+                                                           gpu::FEATURE_PHOTONS);
+}
+
+// The picture of a scene of plain paint, with only what it needs compiled in and with every feature
+// that can be carried. What is carried is multiplied by nothing and adds no random number, so that
+// the pictures are equal bit for bit (daemon/render/feature.hpp).
+TEST(Spirv, NoPixelDependsOnAFeatureThatIsOnlyCompiledIn) {
+  View view;
+  view.environment = uniform_environment(glm::vec3(0.3f));
+  view.calibration = pinhole(12, 8, 0.8);
+  view.world_from_camera = look_at({0, -2, 1.2}, {0, 0, 0.2});
+  add_instance(view.scene, add_mesh(view.scene, box_mesh(glm::dvec3(0.5))),
+               add_material(view.scene, diffuse(glm::vec3(0.5))));
+  std::uint32_t carried = 0;
+  for (const render::Feature& feature : render::features())
+    if (feature.can_be_carried) carried |= feature.bit;
+  const auto layers_with = [&](std::uint32_t features) {
+    SetRenderer renderer(view, up_to_depth(3));
+    renderer.carry(features);
+    renderer.begin({{}, 1.0, view.world_from_camera});
+    EXPECT_NE(carried & ~renderer.needed(), 0u);
+    renderer.render(2);
+    expect_clean(renderer.counters());
+    return renderer.layers();
+  };
+  const render::Layers masked = layers_with(0), whole = layers_with(carried);
+  EXPECT_EQ(masked.mixed, whole.mixed);
+  EXPECT_EQ(masked.real, whole.real);
+  EXPECT_EQ(masked.mask, whole.mask);
+}
+
+}  // namespace spirv_test
+}  // namespace previz::test

@@ -1,0 +1,190 @@
+// From what a set says to the rig's cameras.
+#include "daemon/rig/cameras.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
+
+#include "daemon/rig/camera_source.hpp"
+#include "drivers/camera_drivers.hpp"
+#include "drivers/error.hpp"
+#include "tests/support/other_camera.hpp"
+#include "tests/support/session_fixture.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/wait_until.hpp"
+
+namespace previz::rig {
+namespace cameras_test {
+
+using std::chrono::milliseconds;
+using testing::HasSubstr;
+
+class RigCameras : public testing::Test {
+ protected:
+  void SetUp() override { session::write_small_session(take(), 30); }
+  std::filesystem::path take() const { return directory_.path() / "take"; }
+
+  set::Set replayed() const {
+    set::Set set;
+    set.file = "stage.toml";
+    set.observer.device = take().string();
+    set.light_camera.driver = set::no_driver;
+    return set;
+  }
+
+  static std::string error_of(const set::Set& set) {
+    try {
+      open_cameras(set);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+
+  test::TemporaryDirectory directory_;
+};
+
+TEST_F(RigCameras, AReplayedCameraStreams) {
+  const Cameras cameras = open_cameras(replayed());
+  EXPECT_FALSE(cameras.light);
+  const CameraEvent event = cameras.observer->next(milliseconds(10'000));
+  ASSERT_TRUE(std::holds_alternative<FramePtr>(event));
+  EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(event), 0));
+}
+
+TEST_F(RigCameras, FaultsAreRehearsedOnATake) {
+  set::Set set = replayed();
+  set.observer.faults = {"corrupt@2", "disconnect@4+0s"};
+  const Cameras cameras = open_cameras(set, /*loop=*/true);
+  std::string story;
+  while (story.size() < 6) {
+    const CameraEvent event = cameras.observer->next(milliseconds(1000));
+    if (std::holds_alternative<EndOfStream>(event)) break;
+    if (std::holds_alternative<FramePtr>(event)) story += 'f';
+    if (std::holds_alternative<DeviceTrouble>(event)) story += 't';
+  }
+  EXPECT_TRUE(story.starts_with("fftftf")) << story;
+}
+
+// The light's three frames last 3 ms, the film camera's eight 320: each lap is as long as the
+// longer.
+TEST_F(RigCameras, LoopedStreamsOfASessionStayTogether) {
+  test::write_small_take(directory_.path());
+  set::Set set = replayed();
+  set.observer.device = (directory_.path() / "session").string();
+  set.light_camera.driver = set::replay_driver;
+  const Cameras cameras = open_cameras(set, /*loop=*/true);
+  EXPECT_EQ(cameras.light_exposures, 3u);
+  EXPECT_EQ(cameras.lap_ns, 8 * test::small_take_interval_ns);
+  std::vector<FramePtr> frames;
+  while (frames.size() < 4) {
+    CameraEvent event = cameras.light->next(milliseconds(10'000));
+    ASSERT_TRUE(std::holds_alternative<FramePtr>(event));
+    frames.push_back(std::get<FramePtr>(event));
+  }
+  EXPECT_EQ(frames[3]->timestamp_ns, frames[0]->timestamp_ns + cameras.lap_ns);
+}
+
+TEST_F(RigCameras, MistakesNameFileAndKey) {
+  set::Set set = replayed();
+  set.observer.faults = {"melt@3"};
+  EXPECT_THAT(error_of(set), HasSubstr("stage.toml: observer.faults: fault \"melt@3\""));
+  set = replayed();
+  set.observer.driver = "gopro";  // one that this build lacks
+  EXPECT_THAT(error_of(set), HasSubstr("stage.toml: observer.driver: this build drives no"));
+  set = replayed();
+  set.light_camera.driver = set::replay_driver;
+  EXPECT_THAT(error_of(set), HasSubstr("the session has no light frames"));
+}
+
+// A rig starts with everything absent and picks its cameras up as they come.
+TEST_F(RigCameras, ACameraThatIsNotThereIsWaitedFor) {
+  if (camera_drivers().empty()) GTEST_SKIP() << "this build has no driver for a real camera";
+  set::Set set = replayed();
+  set.observer.driver = camera_drivers().front().name;
+  set.observer.device = "missing";
+  const Cameras cameras = open_cameras(set);
+  const CameraEvent event = cameras.observer->next(milliseconds(0));
+  ASSERT_TRUE(std::holds_alternative<DeviceTrouble>(event));
+  EXPECT_THAT(std::get<DeviceTrouble>(event).what, HasSubstr("tried again until it is there"));
+  EXPECT_EQ(cameras.observer->counters().at("not opened"), 1u);
+}
+
+// Silence is what counts: whether a camera says nothing, or throws.
+TEST_F(RigCameras, ACameraThatThrowsAtEveryCallIsLost) {
+  Cameras cameras = open_cameras(replayed(), /*loop=*/true);
+  bool throws = false;
+  test::put_around(cameras.observer, [&](CameraEvent event, Camera&) -> CameraEvent {
+    if (throws) throw Error("lamp fell down");
+    return event;
+  });
+  std::ostringstream out;
+  report::Reports reports(report::lines_to(out));
+  pipeline::Metrics metrics;
+  pipeline::Liveness liveness;
+  std::stop_source stop;
+  bool is_lost = false;
+  CameraSource source(*cameras.observer, "observer", "film camera",
+                      {stop.get_token(), {reports, metrics, liveness}, 0.3, [&](bool lost) {
+                         is_lost = lost;
+                         stop.request_stop();
+                       }});
+  ASSERT_TRUE(source.next());
+  throws = true;
+  std::jthread limit([&](const std::stop_token& is_over) {
+    const auto has_ended = [&] { return is_over.stop_requested(); };
+    if (!test::wait_until("it has ended", has_ended, std::chrono::seconds(30))) stop.request_stop();
+  });
+  EXPECT_FALSE(source.next());
+  EXPECT_TRUE(is_lost);
+}
+
+TEST_F(RigCameras, EachLossOfADeviceIsALineWithItsNumber) {
+  set::Set set = replayed();
+  set.observer.faults = {"disconnect@2+0s"};
+  std::ostringstream out;
+  report::Reports reports(report::lines_to(out));
+  pipeline::Metrics metrics;
+  pipeline::Liveness liveness;
+  std::string cameras_name;
+  for (int loaded = 1; loaded <= 3; ++loaded) {
+    const Cameras cameras = open_cameras(set, /*loop=*/true);
+    cameras_name = cameras.observer->name();
+    CameraSource source(*cameras.observer, "observer", "film camera",
+                        {{}, {reports, metrics, liveness}, 1.0, {}});
+    for (int i = 0; i < 4; ++i) ASSERT_TRUE(source.next());
+  }
+  const std::string lost = cameras_name + ": was unplugged; reopening it";
+  EXPECT_EQ(out.str(), lost + "\n" + lost + ", the 2nd time in this run\n" + lost +
+                           ", the 3rd time in this run\n");
+}
+
+// `previzctl metrics` prints them; they go on over sets that are loaded anew.
+TEST_F(RigCameras, WhatADeviceCountsIsInTheMetrics) {
+  set::Set set = replayed();
+  set.observer.faults = {"disconnect@2+0s"};
+  std::ostringstream out;
+  report::Reports reports(report::lines_to(out));
+  pipeline::Metrics metrics;
+  pipeline::Liveness liveness;
+  for (int loaded = 1; loaded <= 2; ++loaded) {
+    const Cameras cameras = open_cameras(set, /*loop=*/true);
+    CameraSource source(*cameras.observer, "observer", "film camera",
+                        {{}, {reports, metrics, liveness}, 1.0, {}});
+    for (int i = 0; i < 4; ++i) ASSERT_TRUE(source.next());
+    const pipeline::MetricsSnapshot snapshot = metrics.snapshot(1);
+    const DeviceCounters& counted = snapshot.devices.at("observer");
+    EXPECT_EQ(counted.at("opened"), 2u * loaded);
+    EXPECT_EQ(counted.at("lost"), 1u * loaded);
+    EXPECT_EQ(counted.at("returned"), 1u * loaded);
+    EXPECT_EQ(counted.at("stalled"), 0u);  // there before anything is counted
+  }
+  const auto json = nlohmann::json::parse(to_json(metrics.snapshot(1)));
+  EXPECT_EQ(json["devices"]["observer"]["lost"], 2);
+}
+
+}  // namespace cameras_test
+}  // namespace previz::rig

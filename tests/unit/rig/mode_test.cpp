@@ -1,0 +1,160 @@
+// Every event in every state the rig can be in, also while the camera is lost.
+#include "daemon/rig/mode.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+#include <tuple>
+#include <vector>
+
+#include "daemon/set/names.hpp"
+
+namespace previz::rig {
+namespace mode_test {
+
+using enum Mode;
+
+auto key(const State& s) {
+  return std::tuple(s.mode, s.recording, s.camera_lost, s.has_good, s.has_take);
+}
+
+// Everything that can be reached from the start by any events.
+std::vector<State> reachable() {
+  std::vector<State> states{State{}};
+  std::set<decltype(key(State{}))> known{key(State{})};
+  for (std::size_t i = 0; i < states.size(); ++i)
+    for (const Event event : all_events) {
+      const State next = step(states[i], event).state;
+      if (known.insert(key(next)).second) states.push_back(next);
+    }
+  return states;
+}
+
+// The table as a person would write it: where each event leads from standby, live, refine, review;
+// none: it stays where it is.
+struct Row {
+  Event event;
+  std::array<Mode, 4> to;
+};
+constexpr Row table[] = {
+    {Event::wish_standby, {standby, standby, standby, standby}},
+    {Event::wish_live, {live, live, live, live}},
+    {Event::wish_refine, {refine, refine, refine, refine}},
+    {Event::wish_review, {review, review, review, review}},
+    {Event::toggle_standby, {live, standby, standby, standby}},
+    {Event::toggle_refine, {refine, refine, live, refine}},
+    {Event::toggle_review, {review, review, review, live}},
+    {Event::press, {standby, live, live, review}},
+    {Event::record_on, {live, live, refine, live}},
+    {Event::record_off, {standby, live, refine, review}},
+    {Event::record_toggle, {live, live, refine, live}},
+    {Event::recorder_failed, {standby, live, refine, review}},
+    {Event::take_finished, {standby, live, refine, review}},
+    {Event::review_ended, {standby, live, refine, live}},
+    {Event::good_frame, {standby, live, refine, review}},
+    {Event::camera_lost, {standby, live, refine, review}},
+    {Event::camera_back, {standby, live, refine, review}},
+};
+
+bool must_be_refused(const State& from, Mode to) {
+  if (to == from.mode) return false;
+  return (from.recording && (to == standby || to == review)) || (to == refine && !from.has_good) ||
+         (to == review && !from.has_take);
+}
+
+TEST(Modes, EveryEventDoesWhatTheTableSaysInEveryState) {
+  ASSERT_EQ(std::size(table), all_events.size());
+  const std::vector<State> states = reachable();
+  for (const State& from : states)
+    for (const Row& row : table) {
+      SCOPED_TRACE(testing::Message()
+                   << set::name_of(from.mode) << (from.recording ? " recording" : "")
+                   << (from.camera_lost ? " camera lost" : "") << ", event "
+                   << static_cast<int>(row.event));
+      const Mode to = row.to[static_cast<std::size_t>(from.mode)];
+      const Step taken = step(from, row.event);
+      if (must_be_refused(from, to)) {
+        EXPECT_NE(taken.refused, nullptr);
+        EXPECT_EQ(taken.state, from);
+        continue;
+      }
+      State wanted = from;
+      wanted.mode = to;
+      switch (row.event) {
+        case Event::record_on:
+          wanted.recording = true;
+          break;
+        case Event::record_off:
+        case Event::recorder_failed:
+          wanted.recording = false;
+          break;
+        case Event::record_toggle:
+          wanted.recording = !from.recording;
+          break;
+        case Event::take_finished:
+          wanted.has_take = true;
+          break;
+        case Event::good_frame:
+          wanted.has_good = true;
+          break;
+        case Event::camera_lost:
+          wanted.camera_lost = true;
+          break;
+        case Event::camera_back:
+          wanted.camera_lost = false;
+          break;
+        default:
+          break;
+      }
+      EXPECT_EQ(taken.refused, nullptr);
+      EXPECT_EQ(taken.state, wanted);
+    }
+}
+
+// What the four flags and modes could be, less recording in standby or review, refining without a
+// good frame, and playing without a take: 2 (lost) * [live: 2*2*2 + refine: 2*2 + standby: 2*2 +
+// review: 2].
+TEST(Modes, WhatMakesNoSenseCannotBeReached) {
+  const std::vector<State> states = reachable();
+  EXPECT_EQ(states.size(), 2u * (8 + 4 + 4 + 2));
+  for (const State& state : states) {
+    EXPECT_FALSE(state.recording && (state.mode == standby || state.mode == review));
+    EXPECT_FALSE(state.mode == refine && !state.has_good);
+    EXPECT_FALSE(state.mode == review && !state.has_take);
+  }
+}
+
+TEST(Modes, ALostCameraIsInTheWayOfNothing) {
+  for (const State& state : reachable()) {
+    if (state.camera_lost) continue;
+    for (const Event event : all_events) {
+      if (event == Event::camera_lost || event == Event::camera_back) continue;
+      Step there = step(state, event);
+      const Step lost = step(step(state, Event::camera_lost).state, event);
+      EXPECT_EQ(there.refused, lost.refused);
+      there.state.camera_lost = true;
+      EXPECT_EQ(there.state, lost.state);
+    }
+  }
+}
+
+TEST(Modes, RecordingRunsOnThroughEveryChangeOfMode) {
+  for (const State& state : reachable())
+    for (const Event event : all_events) {
+      const bool ends = event == Event::record_off || event == Event::record_toggle ||
+                        event == Event::recorder_failed;
+      if (state.recording && !ends) {
+        EXPECT_TRUE(step(state, event).state.recording);
+      }
+    }
+}
+
+TEST(ModeTable, EveryModeCanBeWishedFor) {
+  State anything;
+  anything.has_good = anything.has_take = true;
+  for (const auto& [name, mode] : set::names(Mode{}))
+    EXPECT_EQ(step(anything, wish_for(mode)).state.mode, mode) << name;
+}
+
+}  // namespace mode_test
+}  // namespace previz::rig

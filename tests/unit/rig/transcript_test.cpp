@@ -1,0 +1,335 @@
+// The rig from end to end by a transcript: a replayed take is looped, a hand presses the button of
+// every action there is, and each line says what D-Bus signalled and what the crew then read on the
+// display. Afterwards the take has the same story.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <gtest/gtest.h>
+#include <systemd/sd-bus.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <span>
+#include <sstream>
+#include <string_view>
+#include <thread>
+
+#include "daemon/control/bus.hpp"
+#include "daemon/rig/live.hpp"
+#include "daemon/set/actions.hpp"
+#include "drivers/session/files.hpp"
+#include "drivers/session/session.hpp"
+#include "tests/support/crewed_rig.hpp"
+#include "tests/support/private_bus.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace previz::rig {
+namespace transcript_test {
+
+using output::OsdPage;
+using output::OsdText;
+
+// The overlay is switched off: a page without a word.
+constexpr const char* no_words = "(no words)";
+// The screen is dark, and shows no page that could be read.
+constexpr const char* dark = "(dark)";
+
+// A line of the transcript: a press, or nothing but what follows by itself; the message that is
+// signalled on the bus, with the other properties that change at once; and what then comes onto the
+// display, if it is not the message's own words.
+struct Line {
+  const char* button;
+  const char* message;
+  const char* changes = "";
+  const char* screen = nullptr;
+};
+
+// clang-format off
+constexpr Line transcript[] = {
+    {"samples_up", "button samples_up: 3 samples", "Samples=3"},
+    {"samples_down", "button samples_down: 2 samples", "Samples=2"},
+    {"hold_rate", "button hold_rate: this set holds no frame rate (refused)", "", "this set holds no frame rate"},
+    {"accumulate", "button accumulate: averaging over frames off"},
+    {"accumulate", "button accumulate: averaging over frames on"},
+    {"estimator", "button estimator: estimator: difference"},
+    {"light_mode", "button light_mode: light: sources"},
+    {"debug_view", "button debug_view: view: mixed"},
+    {"record", "button record: recording", "Recording=yes", "● 00:"},
+    {"next_object", "button next_object: object: sign", "Object=sign"},
+    {"previous_object", "button previous_object: object: card", "Object=card"},
+    {"move_left", "button move_left: card moved by -0.010 +0.000 +0.000 m"},
+    {"move_right", "button move_right: card moved by +0.000 +0.000 +0.000 m"},
+    {"move_back", "button move_back: card moved by +0.000 -0.010 +0.000 m"},
+    {"move_forward", "button move_forward: card moved by +0.000 +0.000 +0.000 m"},
+    {"move_down", "button move_down: card moved by +0.000 +0.000 -0.010 m"},
+    {"move_up", "button move_up: card moved by +0.000 +0.000 +0.000 m"},
+    {"turn_left", "button turn_left: card turned by +0.0 +0.0 +5.0 degrees"},
+    {"turn_right", "button turn_right: card turned by +0.0 +0.0 +0.0 degrees"},
+    {"tilt_forward", "button tilt_forward: card turned by +5.0 +0.0 +0.0 degrees"},
+    {"tilt_back", "button tilt_back: card turned by +0.0 +0.0 +0.0 degrees"},
+    {"roll_right", "button roll_right: card turned by +0.0 +5.0 +0.0 degrees"},
+    {"roll_left", "button roll_left: card turned by +0.0 +0.0 +0.0 degrees"},
+    {"scale_up", "button scale_up: card at 1.05 of its size"},
+    {"scale_down", "button scale_down: card at 1 of its size"},
+    {"next_variant", "button next_variant: card has no variants in its file (refused)", "", "card has no variants in its file"},
+    {"previous_variant", "button previous_variant: card has no variants in its file (refused)", "", "card has no variants in its file"},
+    {"reset_object", "button reset_object: card is back where the set file has it"},
+    {"play", "button play: this set has no animation (refused)", "", "this set has no animation"},
+    {"hold", "button hold: this set has no animation (refused)", "", "this set has no animation"},
+    {"next_light", "button next_light: lamp: fill", "Light=fill"},
+    {"previous_light", "button previous_light: lamp: key", "Light=key"},
+    {"light_up", "button light_up: key +0.33 stops"},
+    {"light_down", "button light_down: key +0.00 stops"},
+    {"light_warmer", "button light_warmer: key warm +0.10 green +0.00 stops"},
+    {"light_cooler", "button light_cooler: key warm +0.00 green +0.00 stops"},
+    {"light_greener", "button light_greener: key warm +0.00 green +0.10 stops"},
+    {"light_pinker", "button light_pinker: key warm +0.00 green +0.00 stops"},
+    {"reset_light", "button reset_light: key is back as in the set file"},
+    {"exposure_up", "button exposure_up: exposure +0.33 stops"},
+    {"exposure_down", "button exposure_down: exposure +0.00 stops"},
+    {"standby", "button standby: still recording; end the take first (refused)", "", "still recording; end the take first"},
+    {"refine", "button refine: refine", "Mode=refine", "REFINE"},
+    {"snapshot", "button snapshot: live", "Mode=live", "LIVE"},  // any button ends a refinement
+    {nullptr, "button snapshot: snapshot"},
+    {"mark_good", "button mark_good: take marked good"},
+    {"acknowledge", "button acknowledge: noted"},
+    {"record", "button record: recording ended", "Recording=no"},
+    {nullptr, "recorder: take 12A_take001 is finished"},
+    {"review", "button review: review", "Mode=review", "REVIEW"},
+    {"live", "button live: live", "Mode=live", "LIVE"},
+    {"osd", "button osd: overlay off", "", no_words},
+    {"osd", "button osd: overlay on"},
+    {"keep", "button keep: buttons have changed nothing; there is nothing to keep (refused)", "", "buttons have changed nothing"},
+    {"reload_set", "button reload_set: loading the set file again", "", "LIVE"},
+    {"next_set", "button next_set: next set", "", "LIVE"},
+    {"previous_set", "button previous_set: previous set", "", "LIVE"},
+    {"standby", "button standby: standby", "Mode=standby", dark},
+    {"standby", "button standby: live", "Mode=live", "LIVE"},
+};
+// clang-format on
+
+using Changes = std::map<std::string, std::string>;  // of properties
+
+// The changes of one PropertiesChanged.
+Changes changes_of(sd_bus_message* signal) {
+  Changes changes;
+  sd_bus_message_skip(signal, "s");
+  sd_bus_message_enter_container(signal, 'a', "{sv}");
+  while (sd_bus_message_enter_container(signal, 'e', "sv") > 0) {
+    const char *name = nullptr, *type = nullptr, *text = nullptr;
+    sd_bus_message_read(signal, "s", &name);
+    sd_bus_message_peek_type(signal, nullptr, &type);
+    sd_bus_message_enter_container(signal, 'v', type);
+    std::string value;
+    int number = 0;
+    std::uint64_t frames = 0;
+    if (*type == 't' && sd_bus_message_read(signal, "t", &frames) >= 0) {
+      value = std::to_string(frames);
+    } else if (*type == 's' && sd_bus_message_read(signal, "s", &text) >= 0) {
+      value = text;
+    } else if (*type == 'b' && sd_bus_message_read(signal, "b", &number) >= 0) {
+      value = number != 0 ? "yes" : "no";
+    } else if (*type == 'i' && sd_bus_message_read(signal, "i", &number) >= 0) {
+      value = std::to_string(number);
+    } else {
+      sd_bus_message_skip(signal, type);
+    }
+    sd_bus_message_exit_container(signal);
+    sd_bus_message_exit_container(signal);
+    changes[name] = value;
+  }
+  return changes;
+}
+
+// Hears what the rig signals on the bus, for a thread that waits for it.
+class Listener {
+ public:
+  explicit Listener(const std::function<void(Changes)>& heard) : heard_(heard) {
+    sd_bus_open_system(&bus_);
+    sd_bus_match_signal(bus_, nullptr, nullptr, control::object_path,
+                        "org.freedesktop.DBus.Properties", "PropertiesChanged", &on_signal, this);
+    thread_ = std::jthread([this](const std::stop_token& stop) {
+      while (!stop.stop_requested() && sd_bus_wait(bus_, 100'000) >= 0)
+        while (sd_bus_process(bus_, nullptr) > 0) continue;
+    });
+  }
+  ~Listener() {
+    thread_.request_stop();
+    thread_.join();
+    sd_bus_flush_close_unref(bus_);
+  }
+
+ private:
+  static int on_signal(sd_bus_message* signal, void* listener, sd_bus_error*) {
+    static_cast<Listener*>(listener)->heard_(changes_of(signal));
+    return 0;
+  }
+
+  const std::function<void(Changes)> heard_;
+  sd_bus* bus_ = nullptr;
+  std::jthread thread_;
+};
+
+std::vector<std::string> words_on(const OsdPage& page) {
+  std::vector<std::string> words;
+  for (const auto* texts :
+       {&page.top_left, &page.top_right, &page.bottom_left, &page.bottom_right, &page.notices})
+    for (const OsdText& text : *texts) words.push_back(text.text);
+  return words;
+}
+
+class RigTranscript : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!bus_.running()) GTEST_SKIP() << "dbus-daemon is not installed";
+    std::string text =
+        "[[object]]\nname = \"sign\"\nfile = \"card.gltf\"\npresence = \"virtual\"\n"
+        "[[light]]\nname = \"key\"\ntype = \"point\"\nposition_m = [0.3, 0, 0.6]\n"
+        "emission = [1, 1, 1]\n"
+        "[[light]]\nname = \"fill\"\ntype = \"point\"\nposition_m = [-0.3, 0, 0.6]\n"
+        "emission = [1, 1, 1]\n"
+        "[recording]\nslate = \"12A\"\nreserve_mb = 1\ndirectory = \"takes\"\n"
+        "[display]\ndriver = \"headless\"\nmode = \"480x270\"\n";
+    text += test::button_for_every_action();
+    test::write_small_take(directory_.path(), true, text);
+    std::filesystem::copy_file(directory_ / "set.toml", directory_ / "z.toml");
+  }
+
+  void perform() {
+    const Listener listener([this](Changes changes) {
+      const std::lock_guard lock(mutex_);
+      // A machine may be so busy that the replayed camera is taken for stalled.
+      if (changes["Message"].starts_with("rig: film camera: ")) return;
+      if (changes["Message"].empty()) changes.erase("Message");
+      remember_take(changes);
+      if (changes.empty()) return;
+      signals_.push_back(std::move(changes));
+      news_.notify_all();
+    });
+    LiveOptions options;
+    options.bus = true;
+    options.on_screen = [this](const Plate&, const OsdPage& page) {
+      const std::lock_guard lock(mutex_);
+      pages_.push_back(page);
+      news_.notify_all();
+    };
+    test::run_crewed(
+        std::move(options), directory_.path(), hand_, [this] { follow(); }, log_);
+  }
+
+  // Which signal says what of the take depends on how far the recorder's thread is: it is no part
+  // of a line, and compared with the take afterwards.
+  void remember_take(Changes& changes) {
+    for (const char* name :
+         {"Take", "TakeFrames", "TakeDropped", "Writing", "BehindSeconds", "BehindMegabytes"})
+      if (const auto found = changes.find(name); found != changes.end()) {
+        take_[name].push_back(found->second);
+        changes.erase(found);
+      }
+  }
+
+  void follow() {
+    next_page_with("2 samples");  // it runs
+    for (const Line& line : transcript) {
+      SCOPED_TRACE(line.message);
+      if (line.button) press(line.button);
+      const Changes changes = next_signal();
+      EXPECT_EQ(written(changes),
+                std::string(line.changes) + (*line.changes ? " " : "") + "Message=" + line.message);
+      const std::string message = line.message;
+      next_page_with(line.screen ? line.screen : message.substr(message.find(": ") + 2));
+    }
+  }
+
+  static std::string written(const Changes& changes) {
+    std::string text, message;
+    for (const auto& [name, value] : changes)
+      (name == "Message" ? message : text) += name + "=" + value + (name == "Message" ? "" : " ");
+    return text + message;
+  }
+
+  // The pages before it are of no interest any more.
+  void press(const std::string& button) {
+    const std::lock_guard lock(mutex_);
+    pages_.clear();
+    hand_.press(button);
+  }
+  Changes next_signal() {
+    std::unique_lock lock(mutex_);
+    test::await(
+        news_, lock, [&] { return !signals_.empty(); }, [] { return std::string("no signal"); });
+    Changes changes = signals_.front();
+    signals_.pop_front();
+    return changes;
+  }
+  void next_page_with(const std::string& words) {
+    if (words == dark) return;
+    std::unique_lock lock(mutex_);
+    std::string last;
+    const auto found = [&] {
+      while (!pages_.empty()) {
+        const std::vector<std::string> page = words_on(pages_.front());
+        last = fmt::format("{}", fmt::join(page, " | "));
+        if (words == no_words ? page.empty()
+                              : std::ranges::any_of(page, [&](const std::string& text) {
+                                  return text.find(words) != text.npos;
+                                }))
+          return true;
+        pages_.pop_front();
+      }
+      return false;
+    };
+    test::await(news_, lock, found, [&] { return "\"" + words + "\" is not in: " + last; });
+  }
+
+  test::PrivateBus bus_;
+  test::TemporaryDirectory directory_;
+  test::Hand hand_;
+  std::mutex mutex_;
+  std::condition_variable news_;
+  std::deque<OsdPage> pages_;
+  std::deque<Changes> signals_;
+  std::map<std::string, std::vector<std::string>> take_;  // of its properties what was signalled
+  std::ostringstream log_;
+};
+
+TEST_F(RigTranscript, EveryActionIsSignalledShownAndRecorded) {
+  for (const set::Action& action : set::actions())
+    EXPECT_TRUE(std::ranges::any_of(transcript,
+                                    [&](const Line& line) {
+                                      return line.button &&
+                                             std::string_view(line.button) == action.name;
+                                    }))
+        << action.name << " is not in the transcript";
+  perform();
+  EXPECT_TRUE(signals_.empty());
+
+  // The take tells the same, from its first word to its last.
+  session::Session take = session::open_session(directory_ / "takes/12A_take001");
+  std::erase(take_["Take"], "");  // of the sets that were read afterwards, which have none yet
+  std::erase(take_["TakeFrames"], "0");
+  EXPECT_EQ(take_["Take"], std::vector<std::string>{"12A_take001"});
+  EXPECT_TRUE(std::ranges::is_sorted(take_["TakeFrames"], {}, [](const std::string& frames) {
+    return std::stoull(frames);
+  })) << testing::PrintToString(take_["TakeFrames"]);
+  ASSERT_FALSE(take_["TakeFrames"].empty());
+  EXPECT_LE(std::stoull(take_["TakeFrames"].back()),
+            session::open_stream(take, "observer")->records().size());
+  EXPECT_TRUE(take.info.take->good);
+  const std::string events = session::read_file(take.directory / "events.jsonl");
+  std::size_t at = 0;
+  const auto begins =
+      std::ranges::find(transcript, std::string_view("Object=sign"), &Line::changes);
+  const auto ends = std::ranges::find(transcript, std::string_view("Recording=no"), &Line::changes);
+  for (const Line& line : std::span(begins, ends)) {
+    const std::size_t found = events.find(line.message, at);
+    EXPECT_NE(found, std::string::npos) << line.message << " is not in order in\n" << events;
+    if (found != std::string::npos) at = found;
+  }
+}
+
+}  // namespace transcript_test
+}  // namespace previz::rig

@@ -1,0 +1,196 @@
+// What systemd hears of the rig: its watchdog is fed by threads that are live, not by frames.
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <fstream>
+#include <mutex>
+#include <thread>
+
+#include "daemon/rig/live.hpp"
+#include "daemon/rig/service.hpp"
+#include "drivers/descriptor.hpp"
+#include "drivers/session/files.hpp"
+#include "tests/support/live_rig.hpp"
+#include "tests/support/notify_socket.hpp"
+#include "tests/support/other_camera.hpp"
+
+namespace previz::rig {
+namespace watchdog_test {
+
+using test::NotifySocket;
+using test::RigLive;
+
+// The watchdog is fed every 50 ms here. A machine that is busy with other tests is late at times,
+// so that a quarter of it is enough.
+constexpr std::chrono::milliseconds while_fed{2000};
+constexpr int often = 10;
+
+// A display that hangs: the camera goes on, and the watchdog starves although the loop is alive.
+TEST_F(RigLive, TheWatchdogStarvesWhileAThreadHangs) {
+  write_set();
+  NotifySocket systemd(directory_ / "notify");
+  options_.patience.stage = std::chrono::milliseconds(1000);
+  std::mutex gate;
+  while_shown_ = [&] { const std::lock_guard wait(gate); };
+  run([&] {
+    systemd.until("READY=1");
+    systemd.until("WATCHDOG=1");
+    {
+      const std::lock_guard hang(gate);
+      until_said("does not answer any more: display");
+      systemd.skip();
+      press("samples_up");  // the loop answers
+      systemd.until("STATUS=button samples_up");
+      EXPECT_EQ(systemd.fed_within(std::chrono::milliseconds(500)), 0);
+    }
+    systemd.until("WATCHDOG=1");
+  });
+  systemd.until("STOPPING=1");
+}
+
+// A legal set may wait for its camera for ten minutes before it counts as lost; here it does for
+// two seconds.
+TEST_F(RigLive, TheWatchdogIsFedWhileTheCameraIsSilent) {
+  write_set();
+  NotifySocket systemd(directory_ / "notify");
+  std::atomic<bool> is_silent = false;
+  options_.around_cameras = [&](Cameras& cameras) {
+    test::put_around(cameras.observer, [&](CameraEvent event, Camera&) -> CameraEvent {
+      if (!is_silent) return event;
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      return NoFrame{};
+    });
+  };
+  run([&] {
+    until([](const Shown& s) { return s.shot.samples == 2; });
+    is_silent = true;
+    systemd.skip();
+    EXPECT_GE(systemd.fed_within(while_fed), often);
+    is_silent = false;
+    const int before = until([](const Shown&) { return true; }).count;
+    until([&](const Shown& s) { return s.count > before; });
+  });
+}
+
+// systemd waits 90 s for a start unless it is asked for more.
+TEST(ServiceTest, AsksForMoreTimeUntilItIsReadyAndWhileItStops) {
+  const test::TemporaryDirectory directory;
+  NotifySocket systemd(directory / "notify");
+  std::ostringstream log;
+  report::Reports reports(report::lines_to(log));
+  pipeline::Liveness liveness;
+  pipeline::Liveness::Pulse pulse(liveness, "main loop");
+  pulse.begin(std::chrono::hours(1));
+  Service service(liveness, reports, {});
+  for (int times = 0; times < 3; ++times) systemd.until("EXTEND_TIMEOUT_USEC=");
+  service.ready("set \"desk\"");
+  systemd.until("READY=1");
+  systemd.until("WATCHDOG=1");
+  service.stopping();
+  systemd.until("STOPPING=1");
+  for (int times = 0; times < 3; ++times) systemd.until("EXTEND_TIMEOUT_USEC=");
+  pulse.begin(std::chrono::milliseconds(-1));  // it hangs
+  test::must_come("the hang is reported",
+                  [&] { return log.str() == "does not answer any more: main loop\n"; });
+  systemd.skip();
+  EXPECT_EQ(systemd.next(300), "");
+}
+
+// A camera that hangs takes no time from the disk that takes what is queued.
+TEST(ServiceTest, WhileATakeIsClosedTheMainThreadAloneDecides) {
+  const test::TemporaryDirectory directory;
+  NotifySocket systemd(directory / "notify");
+  std::ostringstream log;
+  report::Reports reports(report::lines_to(log));
+  pipeline::Liveness liveness;
+  pipeline::Liveness::Pulse main(liveness, Service::main_thread), camera(liveness, "observer");
+  main.begin(std::chrono::hours(1));
+  camera.begin(std::chrono::milliseconds(-1));  // it hangs
+  Service service(liveness, reports, {});
+  service.ready("set \"desk\"");
+  systemd.until("READY=1");
+  systemd.skip();
+  EXPECT_EQ(systemd.next(300), "");
+  service.closing_take(true);  // another set was read
+  systemd.until("WATCHDOG=1");
+  service.stopping();
+  for (int times = 0; times < 3; ++times) systemd.until("EXTEND_TIMEOUT_USEC=");
+  service.closing_take(false);
+  systemd.next(100);
+  systemd.skip();
+  EXPECT_EQ(systemd.next(300), "");
+  service.closing_take(true);
+  systemd.until("EXTEND_TIMEOUT_USEC=");
+  main.begin(std::chrono::milliseconds(-1));  // it does not wait for the disk any more
+  systemd.next(100);
+  systemd.skip();
+  EXPECT_EQ(systemd.next(300), "");
+}
+
+// A start may be granted ten minutes, but none of them once it is to stop.
+TEST(ServiceTest, AsksForNoTimeToStartWhatIsToStop) {
+  const test::TemporaryDirectory directory;
+  NotifySocket systemd(directory / "notify");
+  std::ostringstream log;
+  report::Reports reports(report::lines_to(log));
+  pipeline::Liveness liveness;
+  std::stop_source stop;
+  Service service(liveness, reports, stop.get_token());
+  systemd.until("EXTEND_TIMEOUT_USEC=");
+  stop.request_stop();
+  systemd.next(100);
+  systemd.skip();
+  EXPECT_EQ(systemd.next(300), "");
+  service.stopping();
+  systemd.until("STOPPING=1");
+  systemd.until("EXTEND_TIMEOUT_USEC=");
+}
+
+// A camera whose giving back comes at the same time as a stop.
+class StoppingCamera final : public test::OtherCamera {
+ public:
+  StoppingCamera(std::unique_ptr<Camera> camera, std::stop_source& stop)
+      : OtherCamera(std::move(camera), [](CameraEvent event, Camera&) { return event; }),
+        stop_(stop) {}
+  ~StoppingCamera() override { stop_.request_stop(); }
+
+ private:
+  std::stop_source& stop_;
+};
+
+TEST_F(RigLive, AStopThatComesWithASetThatWasReadOpensNoDevicesForIt) {
+  write_set();
+  NotifySocket systemd(directory_ / "notify");
+  std::stop_source stop;
+  int opened = 0;
+  options_.set_file = directory_ / "set.toml";
+  options_.directory = directory_ / "live";
+  options_.loop = true;
+  options_.stop = stop.get_token();
+  options_.buttons = [&] {
+    std::vector<std::unique_ptr<Buttons>> buttons;
+    buttons.push_back(std::make_unique<test::Hand::Device>(hand_));
+    return buttons;
+  };
+  options_.around_cameras = [&](Cameras& cameras) {
+    ++opened;
+    cameras.observer = std::make_unique<StoppingCamera>(std::move(cameras.observer), stop);
+  };
+  press("reload_set");
+  std::ostream out(&log_);
+  report::Reports reports(report::lines_to(out));
+  run_live(options_, reports);
+  EXPECT_EQ(opened, 1) << log_.text();
+  systemd.until("STOPPING=1");
+}
+
+}  // namespace watchdog_test
+}  // namespace previz::rig

@@ -1,0 +1,516 @@
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <numbers>
+
+#include "daemon/scene/load_log.hpp"
+#include "tests/support/gltf_test.hpp"
+
+namespace previz::test {
+namespace gltf_material_test {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using Json = GltfWriter::Json;
+
+class GltfMaterials : public GltfTest {
+ protected:
+  // A triangle with two sets of texture coordinates and the material given.
+  void use(Json material) {
+    const int index = gltf.add("materials", std::move(material));
+    const Json attributes = {{"POSITION", gltf.positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}})},
+                             {"TEXCOORD_0", gltf.uvs({{0, 0}, {1, 0}, {0, 1}})},
+                             {"TEXCOORD_1", gltf.uvs({{0.5f, 0.5f}, {0.75f, 0}, {0, 0.75f}})}};
+    gltf.root("a", gltf.mesh({{"attributes", attributes}, {"material", index}}));
+  }
+  scene::Material loaded(Json material) {
+    use(std::move(material));
+    return load().materials.at(0);
+  }
+};
+
+const std::vector<unsigned char> two_texels = {0, 51, 255, 255, 10, 11, 128, 64};
+
+TEST_F(GltfMaterials, DefaultsAreGltfs) {
+  gltf.root("a", gltf.triangle_mesh());
+  for (const scene::Material& m : {load().materials.at(0), loaded({{"name", "empty"}})}) {
+    EXPECT_EQ(m.base_color, glm::vec3(1));
+    EXPECT_EQ(m.metallic, 1);
+    EXPECT_EQ(m.roughness, 1);
+    EXPECT_EQ(m.specular, 1);
+    EXPECT_EQ(m.specular_color, glm::vec3(1));
+    EXPECT_EQ(m.sheen_color, glm::vec3(0));
+    EXPECT_EQ(m.anisotropy, 0);
+    EXPECT_EQ(m.ior, 1.5f);
+    EXPECT_EQ(m.transmission, 0);
+    EXPECT_TRUE(m.thin_walled);
+    EXPECT_EQ(m.emission, glm::vec3(0));
+    EXPECT_EQ(m.alpha_mode, scene::AlphaMode::opaque);
+    EXPECT_EQ(m.attenuation_distance_m, std::numeric_limits<float>::infinity());
+    EXPECT_EQ(m.base_color_texture, scene::no_texture);
+  }
+}
+
+TEST_F(GltfMaterials, ReadsEveryFactor) {
+  const scene::Material m =
+      loaded({{"name", "all"},
+              {"pbrMetallicRoughness",
+               {{"baseColorFactor", {0.1, 0.2, 0.3, 0.4}},
+                {"metallicFactor", 0.5},
+                {"roughnessFactor", 0.6}}},
+              {"emissiveFactor", {0.25, 0.5, 1}},
+              {"alphaMode", "MASK"},
+              {"alphaCutoff", 0.3},
+              {"extensions",
+               {{"KHR_materials_emissive_strength", {{"emissiveStrength", 8}}},
+                {"KHR_materials_transmission", {{"transmissionFactor", 0.9}}},
+                {"KHR_materials_ior", {{"ior", 1.33}}},
+                {"KHR_materials_specular", {{"specularFactor", 0.7}}},
+                {"KHR_materials_volume",
+                 {{"thicknessFactor", 0.01},
+                  {"attenuationColor", {0.8, 0.9, 1}},
+                  {"attenuationDistance", 0.5}}}}}});
+  EXPECT_EQ(m.name, "all");
+  EXPECT_EQ(m.base_color, glm::vec3(0.1f, 0.2f, 0.3f));
+  EXPECT_EQ(m.alpha, 0.4f);
+  EXPECT_EQ(m.alpha_mode, scene::AlphaMode::mask);
+  EXPECT_EQ(m.alpha_cutoff, 0.3f);
+  EXPECT_EQ(m.metallic, 0.5f);
+  EXPECT_EQ(m.roughness, 0.6f);
+  EXPECT_EQ(m.emission, glm::vec3(2, 4, 8));
+  EXPECT_EQ(m.transmission, 0.9f);
+  EXPECT_EQ(m.ior, 1.33f);
+  EXPECT_EQ(m.specular, 0.7f);
+  EXPECT_FALSE(m.thin_walled);
+  EXPECT_EQ(m.attenuation_color, glm::vec3(0.8f, 0.9f, 1));
+  EXPECT_EQ(m.attenuation_distance_m, 0.5f);
+}
+
+// What the set knows better than the model: on real objects only, though a virtual one shares the
+// file and the material.
+TEST_F(GltfMaterials, SurfacesOfTheSetColourRealObjects) {
+  object.presence = set::Presence::phantom;
+  a_set.surfaces = {{"paint", {0.5, 0.25, 0.125}}};
+  set::Object shown = object;
+  shown.presence = set::Presence::virtual_object;
+  shown.file = directory / "test.gltf";
+  a_set.objects = {shown};
+  use({{"name", "paint"}});
+  const scene::Scene scene = load();
+  ASSERT_EQ(scene.instances.size(), 2u);
+  for (const scene::Instance& instance : scene.instances) {
+    const bool real = (instance.presence & scene::world_real) != 0;
+    EXPECT_EQ(scene.materials[instance.material].base_color,
+              real ? glm::vec3(0.5f, 0.25f, 0.125f) : glm::vec3(1));
+  }
+  a_set.surfaces = {{"pain", {1, 1, 1}}};
+  EXPECT_THAT(error(), HasSubstr("no real object has a material \"pain\"; there are \"paint\""));
+}
+
+TEST_F(GltfMaterials, OpaqueMeansAlphaOneAndThicknessZeroMeansThin) {
+  const scene::Material m =
+      loaded({{"pbrMetallicRoughness", {{"baseColorFactor", {1, 1, 1, 0.4}}}},
+              {"extensions", {{"KHR_materials_volume", {{"attenuationDistance", 1}}}}}});
+  EXPECT_EQ(m.alpha, 1);
+  EXPECT_TRUE(m.thin_walled);
+}
+
+// White light that went this far inside has the attenuation colour: exp(-sigma d) = colour.
+TEST_F(GltfMaterials, ColourInsideOfGlassIsPerMetre) {
+  const scene::Material m = loaded({{"extensions",
+                                     {{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
+                                      {"KHR_materials_volume",
+                                       {{"thicknessFactor", 0.01},
+                                        {"attenuationColor", {0.1, 1, 0}},
+                                        {"attenuationDistance", 0.5}}}}},
+                                    {"pbrMetallicRoughness", {{"metallicFactor", 0}}}});
+  EXPECT_TRUE(scene::attenuates(m));
+  const glm::vec3 sigma = scene::attenuation_per_m(m);
+  EXPECT_FLOAT_EQ(sigma.r, -std::log(0.1f) / 0.5f);
+  EXPECT_EQ(sigma.g, 0);
+  EXPECT_TRUE(std::isfinite(sigma.b) && sigma.b > 100);  // black is finite, and leaves nothing
+}
+
+TEST_F(GltfMaterials, ReadsLacquer) {
+  const Json lacquer = {{"clearcoatFactor", 0.5}, {"clearcoatRoughnessFactor", 0.25}};
+  const scene::Material m = loaded({{"extensions", {{"KHR_materials_clearcoat", lacquer}}}});
+  EXPECT_EQ(m.clearcoat, 0.5f);
+  EXPECT_EQ(m.clearcoat_roughness, 0.25f);
+}
+
+TEST_F(GltfMaterials, ReadsSheen) {
+  const auto sheen_of = [](Json sheen) {
+    return Json{{"name", "velvet"}, {"extensions", {{"KHR_materials_sheen", std::move(sheen)}}}};
+  };
+  const scene::Material m =
+      loaded(sheen_of({{"sheenColorFactor", {0.25, 0.5, 1}}, {"sheenRoughnessFactor", 0.375}}));
+  EXPECT_EQ(m.sheen_color, glm::vec3(0.25f, 0.5f, 1));
+  EXPECT_EQ(m.sheen_roughness, 0.375f);
+  EXPECT_TRUE(scene::has_sheen(m));
+  use(sheen_of({{"sheenRoughnessFactor", 0.5}}));
+  EXPECT_FALSE(scene::has_sheen(load().materials.at(1)));
+  EXPECT_THAT(load().notes, IsEmpty());
+  use(sheen_of({{"sheenColorFactor", {0, 2, 0}}}));
+  EXPECT_THAT(load().notes,
+              ElementsAre(HasSubstr("\"velvet\": sheenColorFactor is out of range"),
+                          HasSubstr("\"velvet\": its sheenRoughnessFactor is taken as 0.07")));
+}
+
+TEST_F(GltfMaterials, ReadsAnisotropy) {
+  const auto anisotropy_of = [](Json anisotropy) {
+    return Json{{"name", "pan"},
+                {"extensions", {{"KHR_materials_anisotropy", std::move(anisotropy)}}}};
+  };
+  const scene::Material m =
+      loaded(anisotropy_of({{"anisotropyStrength", 0.5}, {"anisotropyRotation", -1.25}}));
+  EXPECT_EQ(m.anisotropy, 0.5f);
+  EXPECT_EQ(m.anisotropy_rotation_rad, -1.25f);
+  EXPECT_TRUE(scene::is_anisotropic(m));
+  // alpha = lerp(0.25, 1, 0.5^2)
+  EXPECT_DOUBLE_EQ(scene::widest_alpha(m, 0.5), 0.4375);
+  EXPECT_THAT(load().notes, IsEmpty());
+  Json glass = anisotropy_of({{"anisotropyStrength", 1}});
+  glass["extensions"]["KHR_materials_transmission"] = {{"transmissionFactor", 0.5}};
+  use(glass);
+  const int pan = gltf.add("materials", anisotropy_of({{"anisotropyStrength", 1}}));
+  gltf.root("plain", gltf.triangle_mesh(pan));
+  const scene::Scene scene = load();
+  EXPECT_FALSE(scene::is_anisotropic(scene.materials.at(1)));
+  EXPECT_THAT(
+      scene.notes,
+      ElementsAre(HasSubstr("\"pan\": as it lets light through, its anisotropy is left out"),
+                  HasSubstr("has no TEXCOORD_0 that says which way its anisotropy runs")));
+}
+
+TEST_F(GltfMaterials, ReadsTheColourOfGloss) {
+  const auto gloss_of = [](Json specular) {
+    return Json{{"name", "lipstick"},
+                {"extensions", {{"KHR_materials_specular", std::move(specular)}}}};
+  };
+  EXPECT_EQ(loaded(gloss_of({{"specularColorFactor", {4, 0.5, 0}}})).specular_color,
+            glm::vec3(4, 0.5f, 0));
+  EXPECT_THAT(load().notes, IsEmpty());
+  Json glass = gloss_of({{"specularColorFactor", {1, 0, 0}}});
+  glass["extensions"]["KHR_materials_transmission"] = {{"transmissionFactor", 1}};
+  use(glass);
+  EXPECT_THAT(
+      load().notes,
+      ElementsAre(HasSubstr("KHR_materials_specular does not colour the reflection of its glass")));
+}
+
+TEST_F(GltfMaterials, BringsNumbersIntoRangeWithANote) {
+  use({{"name", "odd"},
+       {"pbrMetallicRoughness",
+        {{"baseColorFactor", {2, 0.5, -1, 1}}, {"metallicFactor", 7}, {"roughnessFactor", -1}}},
+       {"extensions", {{"KHR_materials_ior", {{"ior", 0}}}}}});
+  const scene::Scene scene = load();
+  const scene::Material& m = scene.materials.at(0);
+  EXPECT_EQ(m.base_color, glm::vec3(1, 0.5f, 0));
+  EXPECT_EQ(m.metallic, 1);
+  EXPECT_EQ(m.roughness, 0);
+  EXPECT_EQ(m.ior, 1);
+  EXPECT_THAT(scene.notes,
+              Contains(HasSubstr("material 0 \"odd\": its base colour is out of range; brought to "
+                                 "the nearest allowed (2 times)")));
+  EXPECT_EQ(scene.notes.size(), 4u);
+}
+
+TEST_F(GltfMaterials, DecodesColoursBySrgbAndDataAsTheyAre) {
+  const int texture = gltf.texture(2, 1, two_texels);
+  use({{"pbrMetallicRoughness",
+        {{"baseColorTexture", {{"index", texture}}},
+         {"metallicRoughnessTexture", {{"index", texture}}}}},
+       {"emissiveTexture", {{"index", texture}}},
+       {"normalTexture", {{"index", texture}, {"scale", 0.5}}}});
+  const scene::Scene scene = load();
+  const scene::Material& m = scene.materials.at(0);
+  ASSERT_EQ(scene.textures.size(), 2u);  // one image, as colour and as data
+  EXPECT_EQ(m.emission_texture, m.base_color_texture);
+  EXPECT_EQ(m.normal_texture, m.metallic_roughness_texture);
+  EXPECT_EQ(m.normal_scale, 0.5f);
+  EXPECT_THAT(scene.notes, IsEmpty());
+  const scene::Texture& color = scene.textures[m.base_color_texture];
+  EXPECT_EQ(color.width, 2);
+  EXPECT_EQ(color.height, 1);
+  // IEC 61966-2-1: ((0.2 + 0.055) / 1.055)^2.4, and value / 12.92 up to 0.04045 (10 of 255).
+  const auto srgb = [](double v) { return static_cast<float>(std::pow((v + 0.055) / 1.055, 2.4)); };
+  EXPECT_EQ(color.texels[0], glm::vec4(0, srgb(0.2), 1, 1));
+  EXPECT_EQ(color.texels[1], glm::vec4(static_cast<float>(10 / 255.0 / 12.92), srgb(11 / 255.0),
+                                       srgb(128 / 255.0), static_cast<float>(64 / 255.0)));
+  const scene::Texture& data = scene.textures[m.metallic_roughness_texture];
+  EXPECT_EQ(data.texels[0], glm::vec4(0, 0.2f, 1, 1));
+}
+
+TEST_F(GltfMaterials, ReadsSamplers) {
+  const auto sampled = [&](const Json& sampler) {
+    const int texture = gltf.texture(2, 1, two_texels, sampler);
+    return Json{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}};
+  };
+  use(sampled(Json::object()));
+  use(sampled({{"magFilter", 9728}, {"wrapS", 33071}, {"wrapT", 33648}}));
+  const scene::Scene scene = load();
+  const scene::Texture& first = scene.textures.at(0);
+  EXPECT_EQ(first.wrap_u, scene::Wrap::repeat);
+  EXPECT_FALSE(first.nearest);
+  const scene::Texture& second = scene.textures.at(1);
+  EXPECT_EQ(second.wrap_u, scene::Wrap::clamp);
+  EXPECT_EQ(second.wrap_v, scene::Wrap::mirror);
+  EXPECT_TRUE(second.nearest);
+}
+
+TEST_F(GltfMaterials, MakesTextureCoordinatesOfTheSetAndTransformAsked) {
+  const int texture = gltf.texture(2, 1, two_texels);
+  const auto colored = [&](Json more) {
+    more["index"] = texture;
+    return Json{{"pbrMetallicRoughness", {{"baseColorTexture", more}}}};
+  };
+  const auto transformed = [](Json transform) {
+    return Json{{"extensions", {{"KHR_texture_transform", std::move(transform)}}}};
+  };
+  use(colored({{"texCoord", 1}}));
+  use(colored(transformed({{"offset", {0.5, 0.25}}, {"scale", {2, 3}}})));
+  // The extension's own example: the lower left quadrant, turned.
+  use(colored(transformed(
+      {{"offset", {0, 1}}, {"rotation", std::numbers::pi / 2}, {"scale", {0.5, 0.5}}})));
+  use(colored(transformed({{"texCoord", 1}})));
+  const scene::Scene scene = load();
+  ASSERT_EQ(scene.meshes.size(), 4u);
+  EXPECT_THAT(scene.meshes[0].uvs,
+              ElementsAre(glm::vec2(0.5f, 0.5f), glm::vec2(0.75f, 0), glm::vec2(0, 0.75f)));
+  EXPECT_THAT(scene.meshes[1].uvs,
+              ElementsAre(glm::vec2(0.5f, 0.25f), glm::vec2(2.5f, 0.25f), glm::vec2(0.5f, 3.25f)));
+  const auto expect_uv = [](const glm::vec2& uv, float u, float v) {
+    EXPECT_NEAR(uv.x, u, 1e-7);  // half a last place of single precision at 1
+    EXPECT_NEAR(uv.y, v, 1e-7);
+  };
+  expect_uv(scene.meshes[2].uvs[0], 0, 1);
+  expect_uv(scene.meshes[2].uvs[1], 0, 0.5f);
+  expect_uv(scene.meshes[2].uvs[2], 0.5f, 1);
+  EXPECT_EQ(scene.meshes[3].uvs, scene.meshes[0].uvs);
+  EXPECT_THAT(scene.notes, IsEmpty());
+}
+
+// A mesh has the coordinates of every mapping once, and the textures say which they are read by.
+TEST_F(GltfMaterials, ReadsEveryTextureByItsOwnMapping) {
+  const int texture = gltf.texture(2, 1, two_texels);
+  const Json scaled = {{"KHR_texture_transform", {{"scale", {2, 3}}}}};
+  use({{"name", "three"},
+       {"pbrMetallicRoughness",
+        {{"baseColorTexture", {{"index", texture}, {"texCoord", 1}}},
+         {"metallicRoughnessTexture", {{"index", texture}}}}},
+       {"emissiveTexture", {{"index", texture}, {"extensions", scaled}}},
+       {"normalTexture", {{"index", texture}, {"texCoord", 1}}},
+       {"extensions",
+        {{"KHR_materials_clearcoat",
+          {{"clearcoatFactor", 1},
+           {"clearcoatTexture", {{"index", texture}, {"extensions", scaled}}}}}}}});
+  const scene::Scene scene = load();
+  const scene::Material& m = scene.materials.at(0);
+  const auto mapping = [&](std::uint32_t scene::Material::*of) { return scene::mapping_of(m, of); };
+  EXPECT_EQ(mapping(&scene::Material::base_color_texture), 0u);
+  EXPECT_EQ(mapping(&scene::Material::normal_texture), 0u);
+  EXPECT_EQ(mapping(&scene::Material::metallic_roughness_texture), 1u);
+  EXPECT_EQ(mapping(&scene::Material::emission_texture), 2u);
+  EXPECT_EQ(mapping(&scene::Material::clearcoat_texture), 2u);
+  const scene::Mesh& mesh = scene.meshes.at(0);
+  ASSERT_EQ(mesh.more_uvs.size(), 2u);
+  EXPECT_EQ(mesh.uvs[1], glm::vec2(0.75f, 0));
+  EXPECT_EQ(scene::uvs_of(mesh, 1)[1], glm::vec2(1, 0));
+  EXPECT_EQ(scene::uvs_of(mesh, 2)[1], glm::vec2(2, 0));
+  EXPECT_EQ(scene::uvs_of(mesh, 2)[2], glm::vec2(0, 3));
+  EXPECT_THAT(scene.notes, IsEmpty());
+}
+
+// The files of KHR_materials_*: which texture, and in which encoding. An alpha is the same in
+// either.
+TEST_F(GltfMaterials, ReadsTheTexturesOfExtensions) {
+  const Json texture = {{"index", gltf.texture(2, 1, two_texels)}};
+  use({{"extensions",
+        {{"KHR_materials_transmission",
+          {{"transmissionFactor", 1}, {"transmissionTexture", texture}}},
+         {"KHR_materials_clearcoat",
+          {{"clearcoatFactor", 1},
+           {"clearcoatTexture", texture},
+           {"clearcoatRoughnessTexture", texture},
+           {"clearcoatNormalTexture", {{"index", texture["index"]}, {"scale", 0.5}}}}},
+         {"KHR_materials_sheen",
+          {{"sheenColorFactor", {1, 1, 1}},
+           {"sheenRoughnessFactor", 1},
+           {"sheenColorTexture", texture},
+           {"sheenRoughnessTexture", texture}}},
+         {"KHR_materials_specular",
+          {{"specularTexture", texture}, {"specularColorTexture", texture}}}}}});
+  use({{"extensions",
+        {{"KHR_materials_anisotropy",
+          {{"anisotropyStrength", 1}, {"anisotropyTexture", texture}}}}}});
+  const scene::Scene scene = load();
+  ASSERT_EQ(scene.textures.size(), 2u);  // one image, as colour and as data
+  const scene::Material& m = scene.materials.at(0);
+  const std::uint32_t data = m.transmission_texture, color = m.sheen_color_texture;
+  EXPECT_EQ(scene.textures[data].texels[0].g, 0.2f);
+  EXPECT_NE(scene.textures[color].texels[0].g, 0.2f);
+  EXPECT_EQ(m.clearcoat_texture, data);
+  EXPECT_EQ(m.clearcoat_roughness_texture, data);
+  EXPECT_EQ(m.clearcoat_normal_texture, data);
+  EXPECT_EQ(m.clearcoat_normal_scale, 0.5f);
+  EXPECT_EQ(m.specular_color_texture, color);
+  EXPECT_EQ(scene.textures[m.sheen_roughness_texture].texels[1].a, static_cast<float>(64 / 255.0));
+  EXPECT_EQ(scene.textures[m.specular_texture].texels[1].a, static_cast<float>(64 / 255.0));
+  EXPECT_EQ(scene.materials.at(1).anisotropy_texture, data);
+  EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("does not colour the reflection of its glass")));
+}
+
+// What writes a factor of 1 beside a texture means the texture: without it nothing is glass.
+TEST_F(GltfMaterials, LeavesOutExtensionsWhoseTextureCannotBeRead) {
+  gltf.json["extensionsUsed"] = {"KHR_texture_basisu"};
+  const Json lost = {
+      {"index", gltf.add("textures", {{"extensions", {{"KHR_texture_basisu", {{"source", 0}}}}}})}};
+  const auto with = [](const char* extension, Json what) {
+    return Json{{"name", extension}, {"extensions", {{extension, std::move(what)}}}};
+  };
+  use(with("KHR_materials_transmission",
+           {{"transmissionFactor", 1}, {"transmissionTexture", lost}}));
+  use(with("KHR_materials_clearcoat",
+           {{"clearcoatFactor", 1}, {"clearcoatRoughnessTexture", lost}}));
+  use(with("KHR_materials_sheen", {{"sheenColorFactor", {1, 1, 1}},
+                                   {"sheenRoughnessFactor", 1},
+                                   {"sheenRoughnessTexture", lost}}));
+  use(with(
+      "KHR_materials_specular",
+      {{"specularColorFactor", {2, 0, 0}}, {"specularFactor", 0.5}, {"specularTexture", lost}}));
+  use(with("KHR_materials_anisotropy", {{"anisotropyStrength", 1}, {"anisotropyTexture", lost}}));
+  const scene::Scene scene = load();
+  EXPECT_EQ(scene.materials.at(0).transmission, 0);
+  EXPECT_EQ(scene.materials.at(1).clearcoat, 0);
+  EXPECT_FALSE(scene::has_sheen(scene.materials.at(2)));
+  EXPECT_EQ(scene.materials.at(3).specular, 1);
+  EXPECT_EQ(scene.materials.at(3).specular_color, glm::vec3(1));
+  EXPECT_EQ(scene.materials.at(4).anisotropy, 0);
+  for (int i = 0; i < 5; ++i) {
+    const std::string name = gltf.json["materials"][static_cast<std::size_t>(i)]["name"];
+    EXPECT_THAT(scene.notes, Contains(HasSubstr("\"" + name + "\": " + name +
+                                                " is left out, since "
+                                                "its texture cannot be read")));
+  }
+}
+
+TEST_F(GltfMaterials, NotesTexturedMeshesWithoutCoordinates) {
+  const int texture = gltf.texture(2, 1, two_texels);
+  const int material = gltf.add(
+      "materials", {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}});
+  gltf.root("a", gltf.triangle_mesh(material));
+  const scene::Scene scene = load();
+  EXPECT_THAT(scene.meshes.at(0).uvs, IsEmpty());
+  EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("has no TEXCOORD_0 for its textures")));
+}
+
+TEST_F(GltfMaterials, ReadsImagesOfDataUrisAndOfFilesBeside) {
+  const std::vector<unsigned char> bytes = png(2, 1, two_texels);
+  std::ofstream(directory / "my wood.png", std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<long>(bytes.size()));
+  gltf.add("images", {{"uri", "data:image/png;base64," + base64(bytes)}});
+  gltf.add("images", {{"uri", "my%20wood.png"}});
+  for (int i = 0; i < 2; ++i)
+    use({{"pbrMetallicRoughness",
+          {{"baseColorTexture", {{"index", gltf.add("textures", {{"source", i}})}}}}}});
+  const scene::Scene scene = load();
+  ASSERT_EQ(scene.textures.size(), 2u);
+  EXPECT_EQ(scene.textures[0].texels, scene.textures[1].texels);
+}
+
+TEST_F(GltfMaterials, Reads16BitPng) {
+  // One grey texel of 0x8001: 1 x 1, 16 bit, colour type 0.
+  const std::string encoded =
+      "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABEAAAAABq7kcWAAAAC0lEQVR4nGNo"
+      "YAQAAQQAgjmbwLoAAAAASUVORK5CYII=";
+  gltf.add("images", {{"uri", "data:image/png;base64," + encoded}});
+  gltf.add("textures", {{"source", 0}});
+  use({{"pbrMetallicRoughness", {{"metallicRoughnessTexture", {{"index", 0}}}}}});
+  const scene::Scene scene = load();
+  const float grey = static_cast<float>(0x8001 / 65535.0);
+  EXPECT_THAT(scene.textures.at(0).texels, ElementsAre(glm::vec4(grey, grey, grey, 1)));
+}
+
+TEST_F(GltfMaterials, NamesImagesThatCannotBeRead) {
+  const int image = gltf.add("images", {{"uri", "lost.png"}});
+  use({{"pbrMetallicRoughness",
+        {{"baseColorTexture", {{"index", gltf.add("textures", {{"source", image}})}}}}}});
+  const std::string file = (directory / "test.gltf").string();
+  const auto message_of = [&](const Json& given) {
+    gltf.json["images"][0] = given;
+    return error();
+  };
+  EXPECT_EQ(message_of({{"uri", "lost.png"}}),
+            file + ": image 0 \"lost.png\": there is no such file, or it is empty");
+  EXPECT_EQ(message_of({{"name", "text"},
+                        {"uri", "data:text/plain;base64," + base64({'n', 'o', '!', '!'})}}),
+            file + ": image 0 \"text\": is neither PNG nor JPEG");
+  std::vector<unsigned char> broken = png(2, 1, two_texels);
+  broken.at(42) ^= 0xff;  // the header of the compressed texels
+  EXPECT_THAT(message_of({{"uri", "data:image/png;base64," + base64(broken)}}),
+              HasSubstr("image 0: cannot be decoded"));
+  // Width in the PNG's header, big-endian at byte 16: larger than allowed, and more than its bytes.
+  std::vector<unsigned char> huge = png(2, 1, two_texels);
+  huge[16] = 0x01;
+  EXPECT_THAT(message_of({{"uri", "data:image/png;base64," + base64(huge)}}), HasSubstr("image 0"));
+  huge[16] = 0x00;
+  huge[18] = 0x20;
+  huge[22] = 0x20;
+  EXPECT_THAT(message_of({{"uri", "data:image/png;base64," + base64(huge)}}),
+              HasSubstr("is cut short"));
+  EXPECT_THAT(message_of({{"bufferView", 99}, {"mimeType", "image/png"}}), HasSubstr("image[0]"));
+}
+
+// A PNG is a signature of 8 bytes and chunks of length, name, data and checksum, up to IEND. The
+// decoder asks for as many bytes as a chunk claims before it looks whether the file has them.
+TEST_F(GltfMaterials, RefusesPngsWhoseChunksGoOnAfterTheFile) {
+  const int image = gltf.add("images", Json::object());
+  use({{"pbrMetallicRoughness",
+        {{"baseColorTexture", {{"index", gltf.add("textures", {{"source", image}})}}}}}});
+  const auto message_of = [&](const std::vector<unsigned char>& bytes) {
+    gltf.json["images"][0] = {{"uri", "data:image/png;base64," + base64(bytes)}};
+    return error();
+  };
+  const std::vector<unsigned char> whole = png(2, 1, two_texels);
+  const auto said = HasSubstr("image 0: is cut short: its chunk ");
+  for (std::size_t size = 34; size < whole.size() - 8; ++size)
+    EXPECT_THAT(message_of({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)}),
+                HasSubstr("image 0: is cut short"))
+        << size;
+  for (const std::size_t length_at : {std::size_t{8}, std::size_t{33}}) {  // IHDR, IDAT
+    std::vector<unsigned char> lying = whole;
+    lying.at(length_at) = 0x58;  // 1.5 GB
+    EXPECT_THAT(message_of(lying), said);
+    lying.at(length_at) = 0xff;
+    EXPECT_THAT(message_of(lying), said);
+  }
+  // The one checksum that no decoder needs.
+  gltf.json["images"][0] = {
+      {"uri", "data:image/png;base64," + base64({whole.begin(), whole.end() - 4})}};
+  EXPECT_EQ(load().textures.at(0).width, 2);
+}
+
+TEST_F(GltfMaterials, LeavesOutTexturesInFormatsOfExtensions) {
+  gltf.json["extensionsUsed"] = {"EXT_texture_webp"};
+  const int texture =
+      gltf.add("textures", {{"extensions", {{"EXT_texture_webp", {{"source", 0}}}}}});
+  use({{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}});
+  const scene::Scene scene = load();
+  EXPECT_EQ(scene.materials.at(0).base_color_texture, scene::no_texture);
+  EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("\"EXT_texture_webp\" is not supported; ignored"),
+                                       HasSubstr("texture 0: has no PNG or JPEG image; left out")));
+}
+
+// The levels of 2^27 texels have a third more.
+TEST(TextureBudget, CountsTheLevelsOfTexturesThatAreFiltered) {
+  scene::Budget(false).add_texture(16384, 8192, "here");
+  EXPECT_THROW(scene::Budget(true).add_texture(16384, 8192, "here"), Error);
+  scene::Budget budget(true);
+  for (int i = 0; i < 2; ++i) budget.add_texture(8192, 4096, "here");
+  EXPECT_THROW(budget.add_texture(8192, 4096, "here"), Error);
+}
+
+}  // namespace gltf_material_test
+}  // namespace previz::test

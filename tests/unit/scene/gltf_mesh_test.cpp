@@ -1,0 +1,294 @@
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "tests/support/gltf_test.hpp"
+
+namespace previz::test {
+namespace gltf_mesh_test {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using Json = GltfWriter::Json;
+
+using GltfMesh = GltfTest;
+
+const std::vector<glm::vec3> square = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+
+TEST_F(GltfMesh, ReadsIndicesOfEveryComponentTypeAndNone) {
+  const int positions = gltf.positions(square);
+  const int unindexed = gltf.positions({square[0], square[1], square[2]});
+  const Json attributes = {{"POSITION", positions}, {"NORMAL", gltf.normals({4, {0, 0, 1}})}};
+  const int u8 = gltf.values<std::uint8_t>(5121, "SCALAR", {0, 1, 2, 0, 2, 3});
+  const int u16 = gltf.values<std::uint16_t>(5123, "SCALAR", {0, 1, 2, 0, 2, 3});
+  const int u32 = gltf.values<std::uint32_t>(5125, "SCALAR", {0, 1, 2, 0, 2, 3});
+  for (const int indices : {u8, u16, u32})
+    gltf.root("a", gltf.mesh({{"attributes", attributes}, {"indices", indices}}));
+  gltf.root("b", gltf.mesh({{"attributes", {{"POSITION", unindexed}}}}));
+  for (const char* name : {"test.gltf", "test.glb"}) {
+    const scene::Scene scene = load(name);
+    ASSERT_EQ(scene.meshes.size(), 4u);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_EQ(scene.meshes[i].positions, square);
+      EXPECT_THAT(scene.meshes[i].triangles, ElementsAre(glm::uvec3(0, 1, 2), glm::uvec3(0, 2, 3)));
+    }
+    EXPECT_THAT(scene.meshes[3].triangles, ElementsAre(glm::uvec3(0, 1, 2)));
+    EXPECT_THAT(scene.notes, IsEmpty());
+  }
+}
+
+TEST_F(GltfMesh, TurnsStripsAndFansIntoTriangles) {
+  const std::vector<glm::vec3> zigzag = {{0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {1, 1, 0}, {2, 0, 0}};
+  const std::vector<glm::vec3> wheel = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {-1, 1, 0}};
+  const int normals = gltf.normals({5, {0, 0, 1}}), down = gltf.normals({5, {0, 0, -1}});
+  gltf.root("strip",
+            gltf.mesh({{"attributes", {{"POSITION", gltf.positions(zigzag)}, {"NORMAL", down}}},
+                       {"mode", 5}}));
+  gltf.root("fan",
+            gltf.mesh({{"attributes", {{"POSITION", gltf.positions(wheel)}, {"NORMAL", normals}}},
+                       {"mode", 6}}));
+  const scene::Scene scene = load();
+  ASSERT_EQ(scene.meshes.size(), 2u);
+  EXPECT_THAT(scene.meshes[0].triangles,
+              ElementsAre(glm::uvec3(0, 1, 2), glm::uvec3(1, 3, 2), glm::uvec3(2, 3, 4)));
+  EXPECT_THAT(scene.meshes[1].triangles,
+              ElementsAre(glm::uvec3(1, 2, 0), glm::uvec3(2, 3, 0), glm::uvec3(3, 4, 0)));
+  EXPECT_THAT(scene.notes, IsEmpty());  // every triangle faces its normals
+}
+
+TEST_F(GltfMesh, SkipsPointsAndLinesWithANote) {
+  const Json attributes = {{"POSITION", gltf.positions(square)}};
+  for (int mode = 0; mode < 4; ++mode)
+    gltf.root("n", gltf.mesh({{"attributes", attributes}, {"mode", mode}}));
+  gltf.root("t", gltf.triangle_mesh());
+  const scene::Scene scene = load();
+  EXPECT_EQ(scene.instances.size(), 1u);
+  EXPECT_EQ(scene.notes.size(), 4u);
+  EXPECT_THAT(scene.notes, Contains(HasSubstr("points and lines are not supported; skipped")));
+}
+
+TEST_F(GltfMesh, MakesFlatNormalsWhereThereAreNone) {
+  // Two faces of a roof that share an edge: the shared vertices are split.
+  gltf.root("roof",
+            gltf.mesh({{"attributes",
+                        {{"POSITION", gltf.positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}})},
+                         {"TEXCOORD_0", gltf.uvs({{0, 0}, {1, 0}, {0, 1}, {1, 1}})}}},
+                       {"indices", gltf.indices({0, 1, 2, 0, 2, 3})}}));
+  const scene::Scene scene = load();
+  const scene::Mesh& mesh = scene.meshes.at(0);
+  const glm::vec3 z(0, 0, 1), x(1, 0, 0);
+  EXPECT_THAT(mesh.normals, ElementsAre(z, z, z, x, x, x));
+  EXPECT_THAT(mesh.triangles, ElementsAre(glm::uvec3(0, 1, 2), glm::uvec3(3, 4, 5)));
+  EXPECT_EQ(mesh.uvs.size(), 6u);
+  EXPECT_EQ(mesh.uvs[5], glm::vec2(1, 1));
+  EXPECT_EQ(mesh.positions[5], glm::vec3(0, 0, 1));
+}
+
+TEST_F(GltfMesh, AppliesSparseReplacements) {
+  const int base = gltf.positions(square);
+  const int indices = gltf.view(GltfWriter::bytes_of(std::vector<std::uint16_t>{1, 2}));
+  const int values = gltf.view(GltfWriter::bytes_of(std::vector<glm::vec3>{{2, 0, 0}, {2, 2, 0}}));
+  const Json sparse = {{"count", 2},
+                       {"indices", {{"bufferView", indices}, {"componentType", 5123}}},
+                       {"values", {{"bufferView", values}}}};
+  gltf.json["accessors"][base]["sparse"] = sparse;
+  // The same over zeros: no buffer view at all.
+  const int over_zeros = gltf.accessor(-1, 5126, "VEC3", 4);
+  gltf.json["accessors"][over_zeros]["sparse"] = sparse;
+  gltf.root("a", gltf.mesh({{"attributes", {{"POSITION", base}}},
+                            {"indices", gltf.indices({0, 1, 2, 0, 2, 3})}}));
+  gltf.root("b", gltf.mesh({{"attributes", {{"POSITION", over_zeros}}},
+                            {"indices", gltf.indices({0, 1, 2})}}));
+  const scene::Scene scene = load();
+  EXPECT_EQ(scene.meshes.at(0).positions[1], glm::vec3(2, 0, 0));
+  EXPECT_EQ(scene.meshes.at(0).positions[2], glm::vec3(2, 2, 0));
+  EXPECT_THAT(scene.meshes.at(1).positions,
+              ElementsAre(glm::vec3(0), glm::vec3(2, 0, 0), glm::vec3(2, 2, 0)));
+}
+
+TEST_F(GltfMesh, ReadsQuantisedAttributesAndStrides) {
+  gltf.json["extensionsUsed"] = {"KHR_mesh_quantization"};
+  // Interleaved, stride 12: int16 position (3, padded), int8 normalised normal (3, padded).
+  struct Vertex {
+    std::int16_t position[3], padding;
+    std::int8_t normal[4];
+  };
+  const std::vector<Vertex> vertices = {{{0, 0, 0}, 0, {0, 0, 127, 0}},
+                                        {{300, 0, 0}, 0, {0, 0, 127, 0}},
+                                        {{0, -200, 0}, 0, {0, 0, -128, 0}}};
+  const int view = gltf.view(GltfWriter::bytes_of(vertices), sizeof(Vertex));
+  const Json attributes = {
+      {"POSITION", gltf.accessor(view, 5122, "VEC3", 3)},
+      {"NORMAL", gltf.accessor(view, 5120, "VEC3", 3, true, offsetof(Vertex, normal))},
+      {"TEXCOORD_0",
+       gltf.values<std::uint16_t>(5123, "VEC2", {0, 65535, 32768, 0, 65535, 65535}, true)}};
+  gltf.json["accessors"][2]["count"] = 3;  // six numbers, three pairs
+  gltf.root("a", gltf.mesh({{"attributes", attributes}}));
+  gltf.json["extensionsRequired"] = {"KHR_mesh_quantization"};
+  const scene::Scene scene = load();
+  const scene::Mesh& mesh = scene.meshes.at(0);
+  EXPECT_THAT(mesh.positions,
+              ElementsAre(glm::vec3(0), glm::vec3(300, 0, 0), glm::vec3(0, -200, 0)));
+  // (0,0,0) (300,0,0) (0,-200,0) winds to -Z: the two normals that do not are turned round.
+  EXPECT_THAT(mesh.normals,
+              ElementsAre(glm::vec3(0, 0, -1), glm::vec3(0, 0, -1), glm::vec3(0, 0, -1)));
+  EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("2 normals point to the back")));
+  EXPECT_EQ(mesh.uvs[0], glm::vec2(0, 1));
+  EXPECT_FLOAT_EQ(mesh.uvs[1].x, 32768.0f / 65535.0f);
+}
+
+TEST_F(GltfMesh, DropsAndCountsWhatCannotBeTraced) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<glm::vec3> positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0},    {nan, 0, 0},
+                                            {2, 0, 0}, {9, 9, 9}, {1e20f, 0, 0}};
+  gltf.root("a", gltf.mesh({{"attributes",
+                             {{"POSITION", gltf.positions(positions)},
+                              {"NORMAL", gltf.normals({7, {0, 0, 1}})}}},
+                            {"indices", gltf.indices({0, 1, 3,     // NaN
+                                                      0, 1, 4,     // collinear
+                                                      0, 2, 6,     // beyond any stage
+                                                      1, 1, 2,     // a point twice
+                                                      0, 1, 2,     // good
+                                                      0, 1})}}));  // incomplete
+  const scene::Scene scene = load();
+  EXPECT_THAT(scene.meshes.at(0).triangles, ElementsAre(glm::uvec3(0, 1, 2)));
+  EXPECT_EQ(scene.meshes[0].positions.size(), 3u);  // unused vertices are gone
+  EXPECT_THAT(scene.notes,
+              ElementsAre(HasSubstr("the last triangle is incomplete"),
+                          HasSubstr("2 triangles have positions that are not a number"),
+                          HasSubstr("2 triangles have no area; dropped")));
+}
+
+TEST_F(GltfMesh, MakesNormalsUnitAndReplacesThoseThatAreNone) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  gltf.root(
+      "a",
+      gltf.mesh({{"attributes",
+                  {{"POSITION", gltf.positions(square)},
+                   {"NORMAL", gltf.normals({{0, 0, 0.5f}, {0, 0, 0}, {nan, 0, 1}, {0, 3, 4}})}}},
+                 {"indices", gltf.indices({0, 1, 2, 0, 2, 3})}}));
+  const scene::Scene scene = load();
+  const glm::vec3 z(0, 0, 1);
+  EXPECT_THAT(scene.meshes.at(0).normals, ElementsAre(z, z, z, glm::vec3(0, 0.6f, 0.8f)));
+  EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("2 normals are no direction")));
+}
+
+TEST_F(GltfMesh, NotesEmptyMeshesAndSkipsThem) {
+  gltf.root("none", gltf.add("meshes", {{"name", "none"}, {"primitives", Json::array()}}));
+  gltf.root("flat", gltf.mesh({{"attributes", {{"POSITION", gltf.positions({3, {1, 1, 1}})}}}}));
+  gltf.root("nowhere", gltf.mesh({{"attributes", {{"NORMAL", gltf.normals({3, {0, 0, 1}})}}}}));
+  const scene::Scene scene = load();
+  EXPECT_THAT(scene.instances, IsEmpty());
+  EXPECT_THAT(scene.meshes, IsEmpty());
+  EXPECT_THAT(scene.notes, Contains(HasSubstr("mesh 0: has no primitives; skipped")));
+  EXPECT_THAT(scene.notes, Contains(HasSubstr("is empty; skipped")));
+  EXPECT_THAT(scene.notes, Contains(HasSubstr("has no positions; skipped")));
+  EXPECT_THAT(scene.notes, Contains(HasSubstr("has nothing to see in it")));
+}
+
+TEST_F(GltfMesh, SharesGeometryBetweenNodesAndMaterials) {
+  const int positions = gltf.positions(square);
+  const int indices = gltf.indices({0, 1, 2, 0, 2, 3});
+  const auto primitive = [&](int material) {
+    return Json{
+        {"attributes", {{"POSITION", positions}}}, {"indices", indices}, {"material", material}};
+  };
+  gltf.add("materials", {{"name", "red"}});
+  gltf.add("materials", {{"name", "blue"}});
+  const int red = gltf.mesh(primitive(0)), blue = gltf.mesh(primitive(1));
+  gltf.root("a", red);
+  gltf.root("b", red);
+  gltf.root("c", blue);
+  object.presence = set::Presence::phantom;
+  set::Object again;  // the same file once more, as another object
+  again.file = directory.path() / "." / "test.gltf";
+  a_set.objects = {again};
+  const scene::Scene scene = load();
+  EXPECT_EQ(scene.meshes.size(), 1u);
+  EXPECT_EQ(scene.materials.size(), 2u);
+  ASSERT_EQ(scene.instances.size(), 6u);
+  EXPECT_EQ(scene.instances[0].material, scene.instances[1].material);
+  EXPECT_NE(scene.instances[0].material, scene.instances[2].material);
+  EXPECT_EQ(scene.instances[2].object, 0u);
+  EXPECT_EQ(scene.instances[3].object, 1u);
+  EXPECT_EQ(scene.instances[2].presence, scene::world_both);
+  EXPECT_EQ(scene.instances[3].presence, scene::world_mixed);
+}
+
+TEST_F(GltfMesh, NamesFileMeshAndPrimitiveOfBadIndicesAndAccessors) {
+  const auto message_of = [&](const Json& primitive) {
+    gltf.json.erase("meshes");
+    gltf.json.erase("nodes");
+    gltf.json.erase("scenes");
+    gltf.root("a", gltf.mesh(primitive, "statue"));
+    return error();
+  };
+  const int positions = gltf.positions(square);
+  const std::string at = (directory / "test.gltf").string() + ": mesh 0 \"statue\", primitive 0";
+  EXPECT_EQ(
+      message_of({{"attributes", {{"POSITION", positions}}}, {"indices", gltf.indices({0, 1, 4})}}),
+      at + ": index 4 is outside its 4 vertices");
+  EXPECT_EQ(message_of({{"attributes", {{"POSITION", 99}}}}),
+            at + ", positions: there is no accessor 99");
+  EXPECT_EQ(message_of({{"attributes", {{"POSITION", gltf.uvs({3, {0, 0}})}}}}),
+            at + ", positions: must have 3 components an element");
+  EXPECT_EQ(message_of({{"attributes", {{"POSITION", positions}}},
+                        {"indices", gltf.values<float>(5126, "SCALAR", {0, 1, 2})}}),
+            at + ", indices: indices must be unsigned scalars of 1, 2 or 4 bytes");
+  EXPECT_EQ(message_of({{"attributes",
+                         {{"POSITION", positions}, {"NORMAL", gltf.normals({3, {0, 0, 1}})}}}}),
+            at + ": its attributes have different numbers of elements");
+  EXPECT_EQ(message_of({{"attributes", {{"POSITION", positions}}}, {"mode", 7}}),
+            at + ": mode 7 is not one of glTF's");
+}
+
+TEST_F(GltfMesh, RefusesAbsurdSizesBeforeAllocating) {
+  const int positions = gltf.positions(square);
+  gltf.root("a", gltf.mesh({{"attributes", {{"POSITION", positions}}}}));
+  const auto message_of = [&](const char* key, const Json& value) {
+    const Json before = gltf.json;
+    gltf.json["accessors"][positions][key] = value;
+    std::string message = error();
+    gltf.json = before;
+    return message;
+  };
+  EXPECT_THAT(message_of("count", 5), HasSubstr("5 elements do not fit into a view of 48 bytes"));
+  EXPECT_THAT(message_of("count", 4000000000u),
+              HasSubstr("4000000000 elements are more than its data can hold"));
+  EXPECT_THAT(message_of("byteOffset", 1ull << 53), HasSubstr("do not fit into a view"));
+  EXPECT_THAT(message_of("byteOffset", 1), HasSubstr("do not fit into a view"));
+  gltf.json["accessors"][positions].erase("bufferView");
+  EXPECT_THAT(message_of("count", 1u << 30), HasSubstr("more than its data can hold"));
+}
+
+// glTF 2.0, 3.7.2.1: factors of the base colour, linear, brought into 0 to 1.
+TEST_F(GltfMesh, ReadsVertexColours) {
+  const int positions = gltf.positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
+  const auto colored = [&](int colors) {
+    gltf.root("a", gltf.mesh({{"attributes", {{"POSITION", positions}, {"COLOR_0", colors}}}}));
+  };
+  colored(gltf.values<glm::vec3>(5126, "VEC3", {{0, 0.25f, 0.5f}, {1, 1, 1}, {0, 0, 0}}));
+  colored(gltf.accessor(gltf.view({255, 51, 0, 102, 0, 0, 0, 255, 255, 255, 255, 255}, 4), 5121,
+                        "VEC4", 3, true));
+  colored(gltf.accessor(
+      gltf.view(GltfWriter::bytes_of(std::vector<std::uint16_t>{65535, 0, 13107, 0,  //
+                                                                0, 65535, 0, 0,      //
+                                                                0, 0, 0, 0}),
+                8),
+      5123, "VEC3", 3, true));
+  colored(gltf.values<glm::vec3>(5126, "VEC3", {{2, -1, std::nanf("")}, {1, 1, 1}, {0, 0, 0}}));
+  colored(gltf.values<glm::vec3>(5126, "VEC3", {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}}));
+  const scene::Scene scene = load();
+  ASSERT_EQ(scene.meshes.size(), 5u);
+  EXPECT_EQ(scene.meshes[0].colors[0], glm::vec4(0, 0.25f, 0.5f, 1));
+  EXPECT_EQ(scene.meshes[1].colors[0], glm::vec4(1, 0.2f, 0, 0.4f));
+  EXPECT_EQ(scene.meshes[2].colors[0], glm::vec4(1, 0, 0.2f, 1));
+  EXPECT_EQ(scene.meshes[3].colors[0], glm::vec4(1, 0, 1, 1));
+  EXPECT_TRUE(scene.meshes[4].colors.empty());  // white changes nothing
+  EXPECT_THAT(scene.notes,
+              ::testing::ElementsAre(HasSubstr("1 vertex colour is outside of 0 to 1")));
+}
+
+}  // namespace gltf_mesh_test
+}  // namespace previz::test

@@ -1,0 +1,258 @@
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <numbers>
+
+#include "daemon/scene/placement.hpp"
+#include "tests/support/gltf_test.hpp"
+
+namespace previz::test {
+namespace gltf_node_test {
+
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using Json = GltfWriter::Json;
+
+using GltfNodes = GltfTest;
+
+// Products of a few doubles of size 10: 1e-14 is some 5 roundings.
+void expect_near(const glm::dmat4& given, const glm::dmat4& expected) {
+  for (int column = 0; column < 4; ++column)
+    for (int row = 0; row < 4; ++row)
+      EXPECT_NEAR(given[column][row], expected[column][row], 1e-14) << column << ", " << row;
+}
+
+glm::dvec3 world(const scene::Instance& instance, const glm::dvec3& point) {
+  return glm::dvec3(instance.world_from_object * glm::dvec4(point, 1));
+}
+
+TEST_F(GltfNodes, TurnsYUpIntoZUp) {
+  gltf.root("a", gltf.triangle_mesh());
+  const scene::Scene scene = load();
+  EXPECT_EQ(world(scene.instances.at(0), {1, 2, 3}), glm::dvec3(1, -3, 2));
+}
+
+TEST_F(GltfNodes, MultipliesTheHierarchyAsComputedByHand) {
+  const int mesh = gltf.triangle_mesh();
+  const double half = std::sqrt(0.5);
+  // Child: scale 2, then 90 degrees about glTF's Y (z to x), then move by (0, 0, 1).
+  const int child = gltf.add("nodes", {{"name", "child"},
+                                       {"mesh", mesh},
+                                       {"scale", {2, 2, 2}},
+                                       {"rotation", {0, half, 0, half}},
+                                       {"translation", {0, 0, 1}}});
+  // Parent: columns x to y, y to -x, z to z, moved by (10, 0, 0).
+  gltf.root(
+      "parent", -1,
+      {{"matrix", {0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 10, 0, 0, 1}}, {"children", {child}}});
+  object.world_from_file[3] = {0, 0, 5, 1};
+  const scene::Scene scene = load();
+  ASSERT_EQ(scene.instances.size(), 1u);
+  EXPECT_EQ(scene.instances[0].name, "child");
+  // x: (1,0,0) -> 2 (0,0,-1) -> (0,0,-2); y -> (0,2,0) -> (-2,0,0); z -> (2,0,0) -> (0,2,0);
+  // origin (0,0,1) -> (10,0,1). Then (x, y, z) -> (x, -z, y), then up by 5.
+  expect_near(scene.instances[0].world_from_object,
+              {0, 2, 0, 0, -2, 0, 0, 0, 0, 0, 2, 0, 10, -1, 5, 1});
+}
+
+// EXT_mesh_gpu_instancing: copies of a mesh, each placed within the node, which an animation may
+// move.
+TEST_F(GltfNodes, PlacesTheCopiesOfANode) {
+  const double half = std::sqrt(0.5);
+  const std::vector<glm::vec4> turns = {{0, 0, 0, 1}, {0, 0, float(half), float(half)}};
+  const int translations = gltf.positions({{1, 0, 0}, {0, 3, 0}});
+  const int scales = gltf.positions({{2, 2, 2}, {1, 1, 1}});
+  const int rotations =
+      gltf.accessor(gltf.view(GltfWriter::bytes_of(turns)), 5126, "VEC4", turns.size());
+  gltf.root(
+      "trees", gltf.triangle_mesh(),
+      {{"translation", {0, 0, 5}},
+       {"extensions",
+        {{"EXT_mesh_gpu_instancing",
+          {{"attributes",
+            {{"TRANSLATION", translations}, {"ROTATION", rotations}, {"SCALE", scales}}}}}}}});
+  gltf.json["extensionsRequired"] = {"EXT_mesh_gpu_instancing"};
+  const int times = gltf.values<float>(5126, "SCALAR", {0, 1});
+  const int places = gltf.positions({{0, 0, 5}, {0, 0, 7}});
+  gltf.json["animations"] = {
+      {{"name", "go"},
+       {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}}},
+       {"samplers", {{{"input", times}, {"output", places}}}}}};
+  object.animation = "go";
+  object.loops = false;
+  scene::Scene scene = load();
+  EXPECT_THAT(scene.notes, IsEmpty());
+  ASSERT_EQ(scene.instances.size(), 2u);
+  EXPECT_EQ(scene.instances[0].mesh, scene.instances[1].mesh);
+  // glTF's (x, y, z) is the world's (x, -z, y).
+  EXPECT_EQ(world(scene.instances[0], {1, 0, 0}), glm::dvec3(3, -5, 0));
+  EXPECT_NEAR(glm::distance(world(scene.instances[1], {1, 0, 0}), {0, -5, 4}), 0, 1e-6);
+  session::SceneState state;
+  state.animation_s = 1;
+  scene.instances = scene::place(scene, {}, state).instances;
+  EXPECT_EQ(world(scene.instances[0], {1, 0, 0}), glm::dvec3(3, -7, 0));
+  EXPECT_NEAR(glm::distance(world(scene.instances[1], {1, 0, 0}), {0, -7, 4}), 0, 1e-6);
+  gltf.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["SCALE"] =
+      gltf.positions({{1, 1, 1}});
+  EXPECT_THAT(error(), HasSubstr("its copies: their attributes have different numbers"));
+}
+
+TEST_F(GltfNodes, KeepsMirroredTransformsAndTheFrontOfTheObject) {
+  gltf.root("mirrored", gltf.triangle_mesh(), {{"scale", {-1, 1, 1}}});
+  const scene::Scene scene = load();
+  const scene::Instance& instance = scene.instances.at(0);
+  const scene::Mesh& mesh = scene.meshes.at(0);
+  EXPECT_LT(glm::determinant(instance.world_from_object), 0);
+  EXPECT_EQ(mesh.normals[0], glm::vec3(0, 0, 1));
+  // scene.hpp's two ways to the world's geometric normal agree: glTF's +Z is the world's -Y.
+  const glm::dvec3 by_transpose = glm::normalize(
+      glm::transpose(glm::inverse(glm::dmat3(instance.world_from_object))) * mesh.normals[0]);
+  const auto corner = [&](int i) { return world(instance, mesh.positions[mesh.triangles[0][i]]); };
+  const glm::dvec3 by_cross =
+      -glm::normalize(glm::cross(corner(1) - corner(0), corner(2) - corner(0)));
+  EXPECT_EQ(by_transpose, glm::dvec3(0, -1, 0));
+  EXPECT_EQ(by_cross, glm::dvec3(0, -1, 0));
+}
+
+TEST_F(GltfNodes, KeepsPositionsInDoublePrecision) {
+  gltf.root("far", gltf.triangle_mesh(), {{"translation", {1000.0000001, 0, 0}}});
+  EXPECT_EQ(load().instances.at(0).world_from_object[3].x, 1000.0000001);
+}
+
+TEST_F(GltfNodes, TakesTheDefaultSceneElseTheFirstElseAllRoots) {
+  const int mesh = gltf.triangle_mesh();
+  const int child = gltf.add("nodes", {{"name", "child"}, {"mesh", mesh}});
+  const int a = gltf.add("nodes", {{"name", "a"}, {"mesh", mesh}, {"children", {child}}});
+  const int b = gltf.add("nodes", {{"name", "b"}, {"mesh", mesh}});
+  const auto names = [&] {
+    std::vector<std::string> found;
+    const scene::Scene scene = load();
+    for (const scene::Instance& instance : scene.instances) found.push_back(instance.name);
+    return found;
+  };
+  EXPECT_THAT(names(), ElementsAre("a", "child", "b"));
+  gltf.json["scenes"] = {{{"nodes", {b}}}, {{"nodes", {a}}}};
+  EXPECT_THAT(names(), ElementsAre("b"));
+  EXPECT_THAT(load().notes, Contains(HasSubstr("has 2 scenes; only scene 0 is used")));
+  gltf.json["scene"] = 1;
+  EXPECT_THAT(names(), ElementsAre("a", "child"));
+  gltf.json["scene"] = 2;
+  EXPECT_THAT(error(), HasSubstr("its default scene 2 is not there"));
+}
+
+TEST_F(GltfNodes, FiltersByNameWithWhatHangsBelow) {
+  const int mesh = gltf.triangle_mesh();
+  const int leaf = gltf.add("nodes", {{"name", "leaf"}, {"mesh", mesh}});
+  const int inner = gltf.add(
+      "nodes",
+      {{"name", "inner"}, {"mesh", mesh}, {"translation", {0, 0, 1}}, {"children", {leaf}}});
+  gltf.root("outer", mesh, {{"children", {inner}}, {"translation", {1, 0, 0}}});
+  gltf.root("other", mesh);
+  object.nodes = {"inner", "other"};
+  const scene::Scene scene = load();
+  ASSERT_EQ(scene.instances.size(), 3u);
+  EXPECT_EQ(scene.instances[0].name, "inner");
+  EXPECT_EQ(scene.instances[1].name, "leaf");
+  EXPECT_EQ(scene.instances[2].name, "other");
+  EXPECT_EQ(world(scene.instances[1], {0, 0, 0}), glm::dvec3(1, -1, 0));  // outer's too
+  object.nodes = {"iner"};
+  EXPECT_EQ(error(),
+            (directory / "test.gltf").string() + ": has no node \"iner\"; did you mean \"inner\"?");
+}
+
+TEST_F(GltfNodes, RefusesWhatIsNoTree) {
+  const int mesh = gltf.triangle_mesh();
+  gltf.root("a", mesh, {{"children", {1}}});
+  gltf.root("b", mesh);
+  EXPECT_THAT(error(), HasSubstr("node 1 \"b\" has two parents or is its own ancestor"));
+  gltf.json["scenes"][0]["nodes"] = {0};
+  gltf.json["nodes"][1]["children"] = {0};
+  EXPECT_THAT(error(), HasSubstr("has two parents or is its own ancestor"));
+  gltf.json["nodes"][1]["children"] = {7};
+  EXPECT_THAT(error(), HasSubstr("there is no node 7"));
+  gltf.json["nodes"][1].erase("children");
+  gltf.json["nodes"][1]["matrix"] = {1, 2, 3};
+  EXPECT_THAT(error(), HasSubstr("node 1 \"b\": its transform has 3 numbers"));
+}
+
+TEST_F(GltfNodes, SkipsSingularTransformsWithANote) {
+  const int mesh = gltf.triangle_mesh();
+  gltf.root("flat", mesh, {{"scale", {1, 0, 1}}});
+  gltf.root("tiny", mesh, {{"scale", {1e-6, 1e-6, 1e-6}}});  // small, but not singular
+  const scene::Scene scene = load();
+  ASSERT_EQ(scene.instances.size(), 1u);
+  EXPECT_EQ(scene.instances[0].name, "tiny");
+  EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("\"flat\": its transform is singular")));
+}
+
+TEST_F(GltfNodes, LoadsADeepChainOfNodes) {
+  const int mesh = gltf.triangle_mesh();
+  const int depth = 20000;
+  for (int i = 0; i < depth; ++i) {
+    Json node = {{"translation", {0, 0.5, 0}}};
+    if (i > 0) node["children"] = {i - 1};
+    gltf.add("nodes", std::move(node));
+  }
+  gltf.json["nodes"][0]["mesh"] = mesh;
+  gltf.json["scenes"][0]["nodes"] = {depth - 1};
+  EXPECT_EQ(load().instances.at(0).world_from_object[3].z, 0.5 * depth);
+}
+
+TEST_F(GltfNodes, PutsLightsIntoTheWorld) {
+  const double half = std::sqrt(0.5);
+  gltf.json["extensionsUsed"] = {"KHR_lights_punctual"};
+  gltf.json["extensions"]["KHR_lights_punctual"]["lights"] = {
+      {{"type", "point"}, {"color", {1, 0.5, 0.25}}, {"intensity", 8}},
+      {{"type", "directional"}, {"name", "sun"}},
+      {{"type", "spot"},
+       {"range", 3},
+       {"spot", {{"innerConeAngle", 0.2}, {"outerConeAngle", 0.5}}}},
+      {{"type", "torch"}}};
+  const auto light = [](int index) {
+    return Json{{"extensions", {{"KHR_lights_punctual", {{"light", index}}}}}};
+  };
+  Json at = light(0);
+  at["translation"] = {1, 2, 3};
+  gltf.root("lamp", -1, at);
+  Json down = light(1);  // -90 degrees about X turns -Z to -Y: straight down
+  down["rotation"] = {-half, 0, 0, half};
+  down["scale"] = {3, 3, 3};
+  gltf.root("sun node", -1, down);
+  gltf.root("spot", -1, light(2));
+  gltf.root("torch", -1, light(3));
+  set::Light of_set;
+  of_set.name = "of the set";
+  a_set.lights = {of_set};
+  const scene::Scene scene = load();
+  ASSERT_EQ(scene.lights.size(), 4u);
+  EXPECT_EQ(scene.lights[0].name, "lamp");
+  EXPECT_EQ(scene.lights[0].type, set::LightType::point);
+  EXPECT_EQ(scene.lights[0].position, glm::dvec3(1, -3, 2));
+  EXPECT_EQ(scene.lights[0].emission, glm::dvec3(8, 4, 2));
+  EXPECT_EQ(scene.lights[0].gain_mixed, 1);
+  EXPECT_EQ(scene.lights[0].gain_real, 0);
+  EXPECT_EQ(scene.lights[1].name, "sun");
+  EXPECT_EQ(scene.lights[1].type, set::LightType::directional);
+  EXPECT_NEAR(glm::distance(scene.lights[1].direction, {0, 0, -1}), 0, 1e-14);
+  EXPECT_EQ(scene.lights[1].emission, glm::dvec3(1));
+  EXPECT_EQ(scene.lights[2].type, set::LightType::spot);
+  EXPECT_EQ(scene.lights[2].direction, glm::dvec3(0, 1, 0));
+  EXPECT_FLOAT_EQ(static_cast<float>(scene.lights[2].inner_cone_rad), 0.2f);
+  EXPECT_FLOAT_EQ(static_cast<float>(scene.lights[2].outer_cone_rad), 0.5f);
+  EXPECT_EQ(scene.lights[3].name, "of the set");
+  EXPECT_THAT(scene.notes, Contains(HasSubstr("range is ignored")));
+  EXPECT_THAT(scene.notes, Contains(HasSubstr("unknown type \"torch\"")));
+
+  object.presence = set::Presence::phantom;
+  EXPECT_EQ(load().lights[0].gain_real, 1);
+  object.presence = set::Presence::removed;
+  EXPECT_EQ(load().lights[0].gain_mixed, 0);
+  EXPECT_EQ(load().lights[0].gain_real, 1);
+  gltf.json["nodes"][0]["extensions"]["KHR_lights_punctual"]["light"] = 4;
+  EXPECT_THAT(error(), HasSubstr("node 0 \"lamp\": there is no light 4"));
+}
+
+}  // namespace gltf_node_test
+}  // namespace previz::test

@@ -1,0 +1,194 @@
+// A scene with things moved and relit: what moves, what goes along, and what stays bit for bit.
+#include "daemon/scene/placement.hpp"
+
+#include <gtest/gtest.h>
+
+#include <glm/gtc/matrix_transform.hpp>
+
+namespace previz::scene {
+namespace placement_test {
+
+// Two objects of the set, the second with a lamp of its own, and one lamp of the set.
+struct Stage {
+  set::Set set;
+  Scene scene;
+  Stage() {
+    set.objects.resize(2);
+    set.objects[0].name = "vase";
+    set.objects[1].name = "torch";
+    set.objects[1].world_from_file = glm::translate(glm::dmat4(1), {1, 0, 0});
+    scene.instances.resize(3);
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      scene.instances[i].object = i == 0 ? 0 : 1;
+      scene.instances[i].world_from_object = glm::translate(glm::dmat4(1), {0.1 * i, 1.0 / 3, 0});
+    }
+    set::Light flame;
+    flame.position = {1, 0, 0.5};
+    scene.lights = {flame};
+    scene.light_objects = {1, no_object};
+    set::Light key;
+    key.name = "key";
+    key.emission = {2, 3, 4};
+    key.gain_real = 1;
+    set.lights = {key};
+    scene.lights.push_back(key);
+  }
+};
+
+TEST(Placement, OfNothingIsTheSceneItself) {
+  const Stage stage;
+  const Placement placement = place(stage.scene, stage.set, {});
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_EQ(placement.instances[i].world_from_object, stage.scene.instances[i].world_from_object);
+  EXPECT_EQ(placement.lights.size(), 2u);
+  EXPECT_TRUE(placement.unknown.empty());
+}
+
+// A quarter turn about Z through the world's origin, then 1 m up.
+TEST(Placement, AnObjectTakesItsLampsAlongAndLeavesTheOthers) {
+  const Stage stage;
+  session::SceneState state;
+  const glm::dmat4 moved = glm::translate(glm::dmat4(1), {0, 0, 1}) *
+                           glm::rotate(glm::dmat4(1), glm::radians(90.0), {0, 0, 1});
+  state.objects["torch"] = moved * stage.set.objects[1].world_from_file;
+  const Placement placement = place(stage.scene, stage.set, state);
+  EXPECT_EQ(placement.instances[0].world_from_object, stage.scene.instances[0].world_from_object);
+  for (std::size_t i = 1; i < 3; ++i) {
+    const glm::dvec3 was = stage.scene.instances[i].world_from_object[3];
+    const glm::dvec3 is = placement.instances[i].world_from_object[3];
+    EXPECT_NEAR(glm::length(is - glm::dvec3(-was.y, was.x, was.z + 1)), 0, 1e-15);
+  }
+  EXPECT_NEAR(glm::length(placement.lights[0].position - glm::dvec3(0, 1, 1.5)), 0, 1e-15);
+  EXPECT_EQ(placement.lights[1].position, stage.scene.lights[1].position);
+}
+
+TEST(Placement, AnObjectWhereTheSetHasItIsBitForBitWhereItWas) {
+  const Stage stage;
+  session::SceneState state;
+  state.objects["torch"] = stage.set.objects[1].world_from_file;
+  const Placement placement = place(stage.scene, stage.set, state);
+  EXPECT_EQ(placement.instances[1].world_from_object, stage.scene.instances[1].world_from_object);
+}
+
+// Of a carrier that was not found yet: back at once when it is.
+TEST(Placement, WhatIsNowhereIsInNeitherWorld) {
+  const Stage stage;
+  session::SceneState state;
+  state.objects["torch"] = std::nullopt;
+  state.lights["key"] = std::nullopt;
+  const Placement placement = place(stage.scene, stage.set, state);
+  ASSERT_EQ(placement.instances.size(), 3u);
+  EXPECT_EQ(placement.instances[0].presence, world_both);
+  EXPECT_EQ(placement.instances[1].presence, 0u);
+  EXPECT_EQ(placement.instances[2].presence, 0u);
+  for (const set::Light& light : placement.lights) {
+    EXPECT_EQ(light.gain_mixed, 0);
+    EXPECT_EQ(light.gain_real, 0);
+  }
+}
+
+// The node goes along X by 2 m a second, and shrinks to nothing at 1 s; then the crew's move.
+TEST(Placement, AnimatesBeforeItMoves) {
+  Stage stage;
+  Animation animation;
+  animation.object = 1;
+  animation.duration_s = 2;
+  AnimatedNode node;
+  node.moves = true;
+  node.translations = {Interpolation::linear, {0, 2}, {{0, 0, 0, 0}, {4, 0, 0, 0}}};
+  node.scales = {Interpolation::linear, {0, 1, 2}, {{1, 1, 1, 0}, {0, 0, 0, 0}, {1, 1, 1, 0}}};
+  animation.nodes = {node};
+  animation.instances = {{2, 0}};
+  animation.lights = {{0, 0}};
+  stage.scene.animations = {animation};
+  session::SceneState state;
+  state.animation_s = 0.5;
+  state.objects["torch"] =
+      glm::translate(glm::dmat4(1), {0, 0, 3}) * stage.set.objects[1].world_from_file;
+  Placement placement = place(stage.scene, stage.set, state);
+  EXPECT_EQ(placement.instances[2].world_from_object[3], glm::dvec4(1, 0, 3, 1));
+  EXPECT_EQ(placement.instances[2].world_from_object[0], glm::dvec4(0.5, 0, 0, 0));
+  // The lamp was at (1, 0, 0.5) of the node at rest.
+  EXPECT_EQ(placement.lights[0].position, glm::dvec3(1.5, 0, 3.25));
+  EXPECT_EQ(placement.instances[0].world_from_object, stage.scene.instances[0].world_from_object);
+
+  state.animation_s = 3;  // 1 s into its second time
+  placement = place(stage.scene, stage.set, state);
+  EXPECT_EQ(placement.instances[2].presence, 0u);
+  EXPECT_EQ(placement.lights[0].gain_mixed, 0);
+}
+
+TEST(Placement, DimmingIsOfTheMixedWorldOnly) {
+  const Stage stage;
+  session::SceneState state;
+  state.lights["key"] = state_of(stage.set.lights[0]);
+  state.lights["key"]->gain_mixed = 0.25;
+  const Placement placement = place(stage.scene, stage.set, state);
+  ASSERT_EQ(placement.lights.size(), 2u);
+  EXPECT_EQ(placement.lights[1].gain_mixed, 0.25);
+  EXPECT_EQ(placement.lights[1].gain_real, 1);
+  EXPECT_EQ(placement.lights[1].emission, stage.set.lights[0].emission);
+}
+
+// Two lamps, one of each world, would share no sample, and their difference would be all noise.
+TEST(Placement, ATintedRealLampStaysOneLamp) {
+  const Stage stage;
+  session::SceneState state;
+  state.lights["key"] = state_of(stage.set.lights[0]);
+  state.lights["key"]->tint = {2, 1, 0.5};
+  const Placement placement = place(stage.scene, stage.set, state);
+  ASSERT_EQ(placement.lights.size(), 2u);
+  EXPECT_EQ(placement.lights[1].gain_mixed, 1);
+  EXPECT_EQ(placement.lights[1].tint, glm::dvec3(2, 1, 0.5));
+  EXPECT_EQ(placement.lights[1].gain_real, 1);
+  EXPECT_EQ(placement.lights[1].emission, stage.set.lights[0].emission);
+}
+
+TEST(Placement, ALampThatTheSetTintsKeepsItsTintUnlessTheStateSaysOtherwise) {
+  Stage stage;
+  stage.set.lights[0].tint = stage.scene.lights[1].tint = {1, 0.5, 0.25};
+  session::SceneState state;
+  EXPECT_EQ(place(stage.scene, stage.set, state).lights[1].tint, glm::dvec3(1, 0.5, 0.25));
+  state.lights["key"] = state_of(stage.set.lights[0]);
+  EXPECT_EQ(place(stage.scene, stage.set, state).lights[1].tint, glm::dvec3(1, 0.5, 0.25));
+  state.lights["key"]->tint = {1, 1, 1};
+  EXPECT_EQ(place(stage.scene, stage.set, state).lights[1].tint, glm::dvec3(1));
+}
+
+// Of the torch's two instances one is lacquered in the variant.
+TEST(Placement, AVariantIsOfTheMaterialsOfItsObjectAlone) {
+  Stage stage;
+  stage.scene.variants = {{1, {"lacquered"}, "", {{2, {{0, 4}, {3, 5}}}}}};
+  stage.scene.instances[2].material = 4;
+  session::SceneState state;
+  state.variants["torch"] = "lacquered";
+  Placement placement = place(stage.scene, stage.set, state);
+  EXPECT_TRUE(placement.unknown.empty());
+  EXPECT_EQ(placement.instances[2].material, 5u);
+  EXPECT_EQ(placement.instances[2].mesh, 3u);
+  EXPECT_EQ(placement.instances[1].material, 0u);
+  EXPECT_EQ(placement.instances[2].world_from_object, stage.scene.instances[2].world_from_object);
+  state.variants["torch"] = "";
+  EXPECT_EQ(place(stage.scene, stage.set, state).instances[2].material, 4u);
+  state.variants["torch"] = "gilded";
+  state.variants["vase"] = "gilded";
+  placement = place(stage.scene, stage.set, state);
+  EXPECT_EQ(placement.instances[2].material, 4u);
+  ASSERT_EQ(placement.unknown.size(), 2u);
+  EXPECT_EQ(placement.unknown[0],
+            "object \"torch\" was shown as its variant \"gilded\"; it has none such");
+}
+
+TEST(Placement, NamesTheSetHasNotAreTold) {
+  const Stage stage;
+  session::SceneState state;
+  state.objects["ghost"] = glm::dmat4(1);
+  state.lights["moon"] = {};
+  const Placement placement = place(stage.scene, stage.set, state);
+  ASSERT_EQ(placement.unknown.size(), 2u);
+  EXPECT_NE(placement.unknown[0].find("\"ghost\""), std::string::npos);
+  EXPECT_NE(placement.unknown[1].find("\"moon\""), std::string::npos);
+}
+
+}  // namespace placement_test
+}  // namespace previz::scene

@@ -1,0 +1,126 @@
+// Values that are changed in a set file's text, and what stays as it was.
+#include "daemon/set/file_edit.hpp"
+
+#include <gtest/gtest.h>
+
+#include "drivers/error.hpp"
+
+namespace previz::set {
+namespace file_edit_test {
+
+constexpr const char* file = R"(# The attic, früh am Morgen
+[set]
+name = "ä"   # an umlaut
+
+[[object]]  # the first
+name = "vase"
+position_m = [0.1,   # about
+              0.2, 0.3]  # measured
+scale=2 # twice
+
+# Between two tables.
+[[object]]
+name = 'bird'
+[object.more]
+x = 1
+
+[[light]]
+name = "key")";
+
+TEST(FileEdit, WithoutAChangeIsTheText) {
+  EXPECT_EQ(FileEdit(file).text(), file);
+}
+
+TEST(FileEdit, SaysWhatIsWritten) {
+  const FileEdit edit(file);
+  EXPECT_EQ(edit.count("object"), 2u);
+  EXPECT_EQ(edit.count("tag"), 0u);
+  EXPECT_EQ(edit.written("object", 0, "scale"), "2");
+  EXPECT_EQ(edit.written("object", 1, "name"), "'bird'");
+  EXPECT_EQ(edit.written("object", 1, "scale"), std::nullopt);
+}
+
+TEST(FileEdit, ReplacesTheValueAlone) {
+  FileEdit edit(file);
+  edit.put("object", 0, "position_m", "[1.0, 2.0, 3.0]");
+  edit.put("object", 0, "scale", "0.5");
+  EXPECT_EQ(edit.text(), R"(# The attic, früh am Morgen
+[set]
+name = "ä"   # an umlaut
+
+[[object]]  # the first
+name = "vase"
+position_m = [1.0, 2.0, 3.0]  # measured
+scale=0.5 # twice
+
+# Between two tables.
+[[object]]
+name = 'bird'
+[object.more]
+x = 1
+
+[[light]]
+name = "key")");
+}
+
+TEST(FileEdit, AddsAKeyBehindTheTablesLastAndATableAtTheEnd) {
+  FileEdit edit(file);
+  EXPECT_TRUE(edit.has("object", 0, "scale"));
+  EXPECT_FALSE(edit.has("object", 1, "scale"));
+  edit.put("object", 0, "rotation_deg", "[0.0, 0.0, 5.0]");
+  edit.put("object", 1, "scale", "1.5");
+  edit.put("light", 0, "gain_mixed", "0.5");
+  edit.put("light", 0, "tint", "[1.0, 0.5, 0.5]");
+  edit.append("[[captured_light]]\nname = \"found 1\"\n");
+  EXPECT_EQ(edit.text(), R"(# The attic, früh am Morgen
+[set]
+name = "ä"   # an umlaut
+
+[[object]]  # the first
+name = "vase"
+position_m = [0.1,   # about
+              0.2, 0.3]  # measured
+scale=2 # twice
+rotation_deg = [0.0, 0.0, 5.0]
+
+# Between two tables.
+[[object]]
+name = 'bird'
+scale = 1.5
+[object.more]
+x = 1
+
+[[light]]
+name = "key"
+gain_mixed = 0.5
+tint = [1.0, 0.5, 0.5]
+
+[[captured_light]]
+name = "found 1"
+)");
+}
+
+// Every kind of value ends where it ends.
+TEST(FileEdit, KnowsWhereValuesEnd) {
+  for (const char* value : {"1", "-1.5e3", "true", "\"a # b\"", "'c]d'", "[1, 2]", "[[1, 2], [3]]",
+                            "[ # one\n 1,\n]", "\"\"\"x\ny\"\"\"", "1979-05-27", "inf", "0x1F"})
+    for (const char* end : {"", "\n", " # comment\n", "\r\n", "\ny = 1\n", "   \n\n# more\n"}) {
+      const std::string before = "a = 1\n[[t]]\nk = ";
+      FileEdit edit(before + value + end);
+      edit.put("t", 0, "k", "7");
+      EXPECT_EQ(edit.text(), before + "7" + end) << value;
+    }
+}
+
+TEST(FileEdit, RefusesWhatItCannotDo) {
+  EXPECT_THROW(FileEdit("= 1"), Error);
+  FileEdit edit("t = [{k = 1}]\n[[u]]\nk = 1\n");
+  EXPECT_THROW(edit.put("t", 0, "k", "2"), Error);
+  EXPECT_THROW(edit.put("u", 1, "k", "2"), Error);
+  EXPECT_THROW(edit.put("v", 0, "k", "2"), Error);
+  edit.put("u", 0, "k", "2 3");
+  EXPECT_THROW(edit.text(), Error);
+}
+
+}  // namespace file_edit_test
+}  // namespace previz::set

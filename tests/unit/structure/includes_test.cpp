@@ -1,0 +1,123 @@
+// The order of the rooms: a file includes only its own room and rooms below it. The floors are
+// those of the CMakeLists.txt, which build the rooms from the ground up.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <string>
+#include <vector>
+
+namespace previz {
+namespace includes_test {
+
+namespace fs = std::filesystem;
+
+const fs::path source = PREVIZ_SOURCE_DIR;
+
+struct Include {
+  std::string file;  // as the include writes it, from the source directory on
+  int line;
+};
+
+// The subdirectories of a CMakeLists.txt in its order.
+std::vector<std::string> subdirectories(const fs::path& directory) {
+  std::vector<std::string> names;
+  std::ifstream file(directory / "CMakeLists.txt");
+  const std::regex add("^add_subdirectory\\((.+)\\)");
+  std::smatch match;
+  for (std::string line; std::getline(file, line);)
+    if (std::regex_search(line, match, add)) names.push_back(match[1]);
+  return names;
+}
+
+// Every room and its floor. The files of daemon/ itself are above all rooms but the manual's.
+std::map<std::string, int> floors() {
+  std::map<std::string, int> result;
+  const auto add = [&](const std::string& room) {
+    result.emplace(room, static_cast<int>(result.size()));
+  };
+  add("drivers");
+  add("shaders");
+  for (const std::string& room : subdirectories(source / "daemon")) {
+    if (room == "manual") add("daemon");
+    add("daemon/" + room);
+  }
+  return result;
+}
+
+std::string room_of(const std::string& file) {
+  const std::string directory = fs::path(file).parent_path();
+  if (!directory.starts_with("daemon/")) return directory.substr(0, directory.find('/'));
+  return directory.substr(0, directory.find('/', std::string("daemon/").size()));
+}
+
+std::vector<Include> includes_of(const std::string& file) {
+  std::vector<Include> includes;
+  std::ifstream stream(source / file);
+  int number = 0;
+  for (std::string line; std::getline(stream, line);) {
+    ++number;
+    const std::string begin = "#include \"";
+    if (line.starts_with(begin))
+      includes.push_back({line.substr(begin.size(), line.rfind('"') - begin.size()), number});
+  }
+  return includes;
+}
+
+// Every C++ file of the daemon and the drivers, with what it includes of the project.
+const std::map<std::string, std::vector<Include>>& includes() {
+  static const auto all = [] {
+    std::map<std::string, std::vector<Include>> result;
+    for (const char* top : {"daemon", "drivers"})
+      for (const fs::directory_entry& entry : fs::recursive_directory_iterator(source / top))
+        if (entry.path().extension() == ".cpp" || entry.path().extension() == ".hpp") {
+          const std::string file = entry.path().lexically_relative(source);
+          result[file] = includes_of(file);
+        }
+    return result;
+  }();
+  return all;
+}
+
+TEST(Includes, NoRoomIncludesARoomAboveIt) {
+  const std::map<std::string, int> floor = floors();
+  ASSERT_GT(includes().size(), 300u);
+  ASSERT_GT(floor.size(), 15u);
+  for (const auto& [file, included] : includes()) {
+    const auto own = floor.find(room_of(file));
+    ASSERT_NE(own, floor.end()) << file << ": its room is not in daemon/CMakeLists.txt";
+    for (const Include& include : included) {
+      const auto other = floor.find(room_of(include.file));
+      if (other == floor.end()) continue;  // beside the rooms: generated
+      EXPECT_LE(other->second, own->second)
+          << file << ":" << include.line << ": " << own->first << " includes " << include.file
+          << ", whose room is above it";
+    }
+  }
+}
+
+TEST(Includes, TheLiveRigKnowsNothingOfTheOfflineRooms) {
+  for (const auto& [file, included] : includes()) {
+    if (room_of(file) != "daemon/rig") continue;
+    for (const Include& include : included)
+      for (const char* offline : {"calibrate", "exchange", "post", "print", "trade"})
+        EXPECT_NE(room_of(include.file), std::string("daemon/") + offline)
+            << file << ":" << include.line << ": includes " << include.file;
+  }
+}
+
+// A driver would otherwise be compiled again with every change of the list of drivers.
+TEST(Includes, NoDriverIncludesTheRegistryThatListsIt) {
+  for (const auto& [file, included] : includes()) {
+    if (fs::path(file).parent_path().parent_path() != "drivers") continue;
+    for (const Include& include : included)
+      EXPECT_FALSE(include.file.ends_with("_drivers.hpp"))
+          << file << ":" << include.line << ": includes " << include.file;
+  }
+}
+
+}  // namespace includes_test
+}  // namespace previz

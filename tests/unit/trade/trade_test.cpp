@@ -1,0 +1,290 @@
+// `previzd trade` from end to end on a small take, on whatever Vulkan device there is.
+#include "daemon/trade/trade.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
+
+namespace previz::trade {
+namespace trade_test {
+
+class Trade : public testing::Test {
+ protected:
+  // 32x24, as little as a sweep can be.
+  TradeOptions options() const {
+    TradeOptions options;
+    options.source.set_or_session = directory_ / "set.toml";
+    options.directory = directory_ / "out";
+    options.scale = 2.0 / 3;
+    options.axes = {"estimator"};
+    options.samples = {2, 1};
+    options.reference_samples = 16;
+    return options;
+  }
+  void expect_refused(const TradeOptions& refused, const std::string& words) {
+    try {
+      run_trade(refused, out_);
+      ADD_FAILURE() << "not refused: " << words;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+    }
+  }
+  void rewrite_set(const std::string& from, const std::string& to) {
+    std::string text = session::read_file(directory_ / "set.toml");
+    ASSERT_NE(text.find(from), std::string::npos);
+    text.replace(text.find(from), from.size(), to);
+    std::ofstream(directory_ / "set.toml") << text;
+  }
+  test::TemporaryDirectory directory_;
+  std::ostringstream out_;
+};
+
+TEST_F(Trade, SweepsAndWritesTableAndPage) {
+  test::write_small_take(directory_.path());
+  const TradeReport report = run_trade(options(), out_);
+  EXPECT_EQ(report.frame, 1u);  // frame 0 has no light yet
+  EXPECT_EQ(report.width, 32);
+  EXPECT_EQ(report.height, 24);
+  ASSERT_GT(*report.noise.picture, 0.0);
+  std::size_t entries = 0;
+  for (const TradePlan::Axis& axis : report.plan.axes) entries += axis.entries.size();
+  const std::string csv = session::read_file(report.csv);
+  EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(csv, '\n')), 2 + 2 * entries);
+  EXPECT_NE(session::read_file(report.page).find("What time buys on"), std::string::npos);
+  EXPECT_NE(out_.str().find("round 3 of 3, estimator difference ("), std::string::npos);
+
+  for (const TradeMethod& method : report.methods) {
+    ASSERT_EQ(method.points.size(), 2u);
+    EXPECT_EQ(method.points[0].samples, 1);
+    for (const TradePoint& point : method.points) {
+      EXPECT_GT(point.seconds, 0.0);
+      EXPECT_GT(*point.errors.picture, 0.0);
+    }
+    EXPECT_TRUE(method.bias);
+  }
+  ASSERT_FALSE(report.corners.empty());
+  EXPECT_EQ(report.corners.front().at, front_of(report).front());
+  EXPECT_EQ(report.corners.front().difference.width, 32);
+}
+
+// The half-size picture loses the camera's own detail, random in every pixel: no samples bring it
+// back. A plate of independent pixels of standard deviation s, averaged by fours and enlarged, is
+// off by about s itself: far more than any noise of the render.
+TEST_F(Trade, AHalfSizedPictureStaysOff) {
+  test::write_small_take(directory_.path());
+  TradeOptions only = options();
+  only.axes = {"resolution"};
+  const TradeReport report = run_trade(only, out_);
+  ASSERT_EQ(report.plan.methods[1].name, "resolution half");
+  EXPECT_GT(report.methods[1].bias->value, 0.1);
+  EXPECT_EQ(report.methods[0].bias->value, 0.0);
+}
+
+TEST_F(Trade, PartsThatNobodyNeedsChangeNoPixel) {
+  test::write_small_take(directory_.path());
+  TradeOptions only = options();
+  only.axes = {"parts"};
+  only.rounds = 1;
+  const TradeReport report = run_trade(only, out_);
+  std::vector<std::string> carried;
+  for (const TradeMethod& method : report.methods) {
+    if (!method.changed_pixels) continue;
+    carried.push_back(method.name);
+    EXPECT_EQ(*method.changed_pixels, 0u) << method.name;
+    EXPECT_FALSE(method.points.back().pareto) << "is no choice";
+  }
+  EXPECT_EQ(carried, (std::vector<std::string>{
+                         "parts lens", "parts coloured gloss", "parts brushed metal", "parts cloth",
+                         "parts lacquer", "parts refraction", "parts panes", "parts coloured glass",
+                         "parts textures", "parts textures of layers", "parts texture mappings",
+                         "parts vertex colours", "parts normal maps", "parts alpha", "parts lamps",
+                         "parts lamps in view", "parts many lamps"}));
+}
+
+TEST_F(Trade, AnswersWithFilesThatRunAndRenderTake) {
+  test::write_small_take(directory_.path());
+  TradeOptions asking = options();
+  asking.answers = true;
+  asking.fps = 2;
+  asking.error = 0.5;
+  const TradeReport report = run_trade(asking, out_);
+  ASSERT_EQ(report.answers.size(), 3u);
+  for (const TradeAnswer& answer : report.answers) {
+    SCOPED_TRACE(answer.use + ": " + answer.words + "\n" + answer.toml);
+    EXPECT_TRUE(answer.is_met);
+    EXPECT_GT(answer.seconds, 0);
+    EXPECT_EQ(answer.file, directory_ / "out" / (answer.use + ".toml"));
+    const std::filesystem::path file = directory_ / "set.toml";
+    const set::Set set = set::parse_set(session::read_file(file), file, {}, set::Origin::crew,
+                                        set::read_overlay(answer.file));
+    EXPECT_EQ(set.estimation.estimator, answer.settings.estimation.estimator);
+    if (answer.use == "live") {
+      EXPECT_EQ(set.quality.fps, 2);
+      EXPECT_LE(answer.seconds, 0.9 / 2);
+      EXPECT_FALSE(set.quality.steps.empty());
+    } else {
+      EXPECT_EQ(set.quality.samples, answer.making.samples);
+      EXPECT_EQ(set.quality.denoise, answer.making.denoise);
+    }
+  }
+  EXPECT_NE(session::read_file(report.page).find("What you get"), std::string::npos);
+}
+
+TEST_F(Trade, TakesASessionOrTheNewestTakeOfALiveSet) {
+  test::write_small_take(directory_.path());
+  const auto frame_of = [](const TradeSource& source) { return TradeFrame(source, {}).index(); };
+  EXPECT_EQ(frame_of({directory_ / "session"}), 1u);
+  EXPECT_EQ(frame_of({directory_ / "session", directory_ / "set.toml"}), 1u);
+  EXPECT_THROW(frame_of({directory_ / "set.toml", directory_ / "set.toml"}), Error);
+  rewrite_set("driver = \"replay\"\ndevice = \"session\"", "driver = \"none\"");
+  EXPECT_THROW(frame_of({directory_ / "set.toml"}), Error) << "it has no take";
+  std::ofstream(directory_ / "set.toml", std::ios::app) << "\n[recording]\ndirectory = \".\"\n";
+  EXPECT_EQ(frame_of({directory_ / "set.toml"}), 1u);
+}
+
+TEST_F(Trade, SharesAreWrittenInTwoWays) {
+  EXPECT_DOUBLE_EQ(parse_share("2%"), 0.02);
+  EXPECT_DOUBLE_EQ(parse_share("0.02"), 0.02);
+  for (const char* wrong : {"", "%", "0", "-1%", "two", "2 %"})
+    EXPECT_THROW(parse_share(wrong), Error) << wrong;
+}
+
+TEST_F(Trade, RefusesWhatCannotBeTraded) {
+  test::write_small_take(directory_.path());
+  TradeOptions wrong = options();
+  wrong.frame = test::small_take_lost;
+  expect_refused(wrong, "frame 3: pose lost");
+  wrong.frame = test::small_take_unlit;
+  expect_refused(wrong, "frame 0: no light frame");
+  wrong.frame = 80;
+  expect_refused(wrong, "the last observer frame is 7");
+  for (const double scale : {0.0, 1.5, std::nan("")}) {
+    wrong = options();
+    wrong.scale = scale;
+    expect_refused(wrong, "must be above 0 and at most 1");
+  }
+  wrong = options();
+  wrong.directory = directory_ / "set.toml";
+  expect_refused(wrong, "is not a directory");
+  wrong = options();
+  wrong.axes = {"colour"};
+  expect_refused(wrong, "--axes colour: there is no such axis; estimator, ");
+  wrong = options();
+  wrong.samples = {0};
+  expect_refused(wrong, "--samples 0: must be from 1");
+}
+
+TEST_F(Trade, RefusesASetWithoutAReplayedCamera) {
+  test::write_small_take(directory_.path());
+  rewrite_set("driver = \"replay\"\ndevice = \"session\"", "driver = \"none\"");
+  expect_refused(options(), "observer: a trade needs a take; ");
+}
+
+TEST_F(Trade, RefusesAPictureWithNothingVirtualInIt) {
+  test::write_small_take(directory_.path(), false);
+  TradeOptions none = options();
+  none.reference_samples = 2;
+  expect_refused(none, "nothing virtual");
+}
+
+// A page of what is known by then: the reference at least.
+TEST_F(Trade, AStopLeavesWhatIsKnown) {
+  test::write_small_take(directory_.path());
+  std::stop_source stop;
+  stop.request_stop();
+  TradeOptions stopped = options();
+  stopped.stop = stop.get_token();
+  const TradeReport report = run_trade(stopped, out_);
+  EXPECT_TRUE(report.interrupted);
+  const std::string page = session::read_file(report.page);
+  EXPECT_NE(page.find("It was stopped before it had ended"), std::string::npos);
+  EXPECT_NE(page.find("There was no time to measure: "), std::string::npos);
+  EXPECT_NE(page.find("<b>converged</b>"), std::string::npos);
+  EXPECT_TRUE(report.answers.empty());
+}
+
+// Whatever the time, the set's own settings are measured and judged; the rest is named.
+TEST_F(Trade, TakesTheTimeThatItIsGiven) {
+  test::write_small_take(directory_.path());
+  TradeOptions hurried = options();
+  hurried.minutes = 1e-3;
+  hurried.answers = true;
+  hurried.fps = 1e-3;
+  const TradeReport report = run_trade(hurried, out_);
+  EXPECT_FALSE(report.interrupted);
+  ASSERT_FALSE(report.methods.front().points.empty());
+  EXPECT_EQ(report.unmeasured.size(), report.methods.size() - 1);
+  ASSERT_EQ(report.answers.size(), 3u);
+  for (const TradeAnswer& answer : report.answers) {
+    EXPECT_FALSE(answer.is_whole) << answer.use;
+    EXPECT_NE(answer.words.find("no time to try all settings"), std::string::npos);
+    EXPECT_EQ(answer.file.empty(), !answer.is_met);
+  }
+  const std::string csv = session::read_file(report.csv);
+  EXPECT_NE(csv.find("estimator,"), std::string::npos);
+  const auto count = std::ranges::count(csv, '\n');
+  // The heads, the reference, and the set's own settings on each axis.
+  EXPECT_EQ(count, 2 + 2 * std::ptrdiff_t(report.plan.axes.size())) << csv;
+  EXPECT_NE(out_.str().find(", within "), std::string::npos);
+}
+
+// The second trade of the same frame and set measures only what the first did not: no method, and
+// with a reference that is whole no sample of it. Another depth is another picture.
+TEST_F(Trade, GoesOnFromItsLastTable) {
+  test::write_small_take(directory_.path());
+  TradeOptions once = options();
+  once.rounds = 1;
+  const TradeReport first = run_trade(once, out_);
+  out_.str("");
+  const TradeReport second = run_trade(once, out_);
+  EXPECT_NE(out_.str().find("goes on from the last table"), std::string::npos);
+  EXPECT_EQ(out_.str().find("round 1 of 1"), std::string::npos) << out_.str();
+  EXPECT_EQ(second.reference_samples, first.reference_samples);
+  for (std::size_t m = 0; m < first.methods.size(); ++m)
+    for (std::size_t i = 0; i < first.methods[m].points.size(); ++i) {
+      EXPECT_EQ(second.methods[m].points[i].seconds, first.methods[m].points[i].seconds);
+      EXPECT_EQ(second.methods[m].points[i].errors.picture,
+                first.methods[m].points[i].errors.picture);
+    }
+
+  once.rounds = 2;
+  *once.reference_samples *= 2;
+  out_.str("");
+  const TradeReport third = run_trade(once, out_);
+  EXPECT_EQ(third.reference_samples, 2 * first.reference_samples);
+  EXPECT_EQ(out_.str().find("round 1 of 2"), std::string::npos) << out_.str();
+  EXPECT_NE(out_.str().find("round 2 of 2"), std::string::npos) << out_.str();
+
+  rewrite_set("[quality]", "[estimator]\nmax_depth = 3\n\n[quality]");
+  out_.str("");
+  run_trade(once, out_);
+  EXPECT_NE(out_.str().find("everything is measured anew"), std::string::npos) << out_.str();
+  EXPECT_NE(out_.str().find("round 1 of 2"), std::string::npos);
+}
+
+TEST_F(Trade, ADamagedMemoryIsSaidAndNotUsed) {
+  test::write_small_take(directory_.path());
+  TradeOptions once = options();
+  once.rounds = 1;
+  run_trade(once, out_);
+  const std::filesystem::path reference = directory_ / "out" / "reference.bin";
+  std::filesystem::resize_file(reference, std::filesystem::file_size(reference) / 2);
+  out_.str("");
+  run_trade(once, out_);
+  EXPECT_NE(out_.str().find("it ends early; everything is measured anew"), std::string::npos)
+      << out_.str();
+  std::ofstream(directory_ / "out" / "trade.json") << "{]";
+  out_.str("");
+  EXPECT_NO_THROW(run_trade(once, out_));
+  EXPECT_NE(out_.str().find("everything is measured anew"), std::string::npos) << out_.str();
+}
+
+}  // namespace trade_test
+}  // namespace previz::trade
