@@ -11,6 +11,7 @@
 
 #include "drivers/device.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz {
 

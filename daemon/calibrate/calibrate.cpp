@@ -11,8 +11,10 @@
 #include "daemon/calibrate/observer.hpp"
 #include "daemon/calibrate/report.hpp"
 #include "daemon/calibrate/residual_plot.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::calibrate {

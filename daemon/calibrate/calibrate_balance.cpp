@@ -8,6 +8,7 @@
 #include "daemon/calibrate/report.hpp"
 #include "daemon/calibrate/surface_pixels.hpp"
 #include "daemon/pipeline/take.hpp"
+#include "daemon/scene/load.hpp"
 #include "daemon/set/print.hpp"
 
 namespace previz::calibrate {

@@ -3,6 +3,7 @@
 #include "daemon/calibrate/calibrate.hpp"
 #include "daemon/calibrate/lens_fit.hpp"
 #include "daemon/calibrate/report.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/session/session.hpp"

@@ -5,6 +5,7 @@
 #include "daemon/calibrate/known_camera.hpp"
 #include "daemon/calibrate/report.hpp"
 #include "daemon/calibrate/vignetting_fit.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 
 namespace previz::calibrate {

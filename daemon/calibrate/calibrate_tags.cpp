@@ -14,7 +14,9 @@
 #include "daemon/calibrate/tag_tables.hpp"
 #include "daemon/calibrate/tag_walk.hpp"
 #include "daemon/set/file_edit.hpp"
+#include "daemon/set/load.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::calibrate {

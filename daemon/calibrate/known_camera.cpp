@@ -2,6 +2,7 @@
 
 #include "daemon/calibrate/source.hpp"
 #include "daemon/pipeline/take.hpp"
+#include "daemon/set/load.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 

@@ -7,6 +7,7 @@
 
 #include "daemon/calibrate/residual_plot.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::calibrate {

@@ -15,6 +15,7 @@
 #include "daemon/exchange/take_track.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::exchange {

@@ -13,6 +13,7 @@
 #include "daemon/exchange/import_tables.hpp"
 #include "daemon/exchange/json_members.hpp"
 #include "daemon/exchange/read_as.hpp"
+#include "daemon/set/load.hpp"
 #include "drivers/calibration/read.hpp"
 #include "drivers/error.hpp"
 

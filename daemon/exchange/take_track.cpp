@@ -12,6 +12,7 @@
 #include "daemon/report/report.hpp"
 #include "daemon/tracking/tag_map.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::exchange {

@@ -10,6 +10,7 @@
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/lighting/linear_picture.hpp"
 #include "daemon/lighting/parallel.hpp"
+#include "daemon/lighting/picture_file.hpp"
 #include "daemon/lighting/picture_reduction.hpp"
 #include "daemon/lighting/picture_repair.hpp"
 #include "drivers/error.hpp"

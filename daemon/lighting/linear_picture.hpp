@@ -1,5 +1,4 @@
-// Reads a picture of linear light from a file of either format that can hold one: OpenEXR or
-// Radiance .hdr.
+// A picture of linear light, and how large one may be.
 #pragma once
 
 #include <cstdint>
@@ -37,11 +36,5 @@ void check_size(const std::filesystem::path& path, std::int64_t width, std::int6
 // Reserves memory for the picture, but no more than a file of this many bytes is likely to fill, so
 // that a small file that claims to be large costs no memory before its pixels are met.
 void reserve_pixels(LinearPicture& picture, std::uintmax_t bytes);
-
-// Reads the file by what it holds, whatever its name is. Oddities that do not prevent its use are
-// appended to `notes`. Throws previz::Error naming the file and what is wrong with it; a file of
-// another format is refused by the name of that format.
-LinearPicture read_linear_picture(const std::filesystem::path& path,
-                                  std::vector<std::string>& notes);
 
 }  // namespace previz::lighting

@@ -12,6 +12,7 @@
 #include "daemon/lighting/room.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::lighting {
 

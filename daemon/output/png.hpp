@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 #include "drivers/session/draft.hpp"
 
 namespace previz::output {

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::output {
 

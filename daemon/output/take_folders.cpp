@@ -11,7 +11,6 @@
 #include <system_error>
 #include <utility>
 
-#include "daemon/output/folder_watch.hpp"
 #include "daemon/output/take_writer.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/output/folder_seen.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/session/video_codec.hpp"
 
@@ -29,14 +30,6 @@ std::optional<dev_t> disk_of(const std::filesystem::path& folder);
 std::uint64_t free_on_disk_of(
     const std::filesystem::path& folder,
     const std::function<std::uint64_t(const std::filesystem::path& folder)>& free_bytes);
-
-struct FolderSeen;
-
-// The take that was being recorded, by its name, and when that was written down.
-struct KeptWish {
-  std::string take;
-  std::filesystem::file_time_type time;
-};
 
 // Used by one thread, since every call may wait for a disk.
 class TakeFolders {

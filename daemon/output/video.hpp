@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 #include "drivers/session/timecode.hpp"
 
 namespace previz::output {

@@ -15,6 +15,7 @@
 #include "daemon/set/set.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::pipeline {
 

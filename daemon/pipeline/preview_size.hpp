@@ -5,6 +5,7 @@
 #include "daemon/lighting/response.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::pipeline {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/pipeline/shot.hpp"
+#include "daemon/pipeline/light.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/session/session.hpp"
 

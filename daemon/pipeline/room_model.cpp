@@ -4,6 +4,7 @@
 #include <glm/matrix.hpp>
 #include <string>
 
+#include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "drivers/error.hpp"
 

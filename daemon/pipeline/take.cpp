@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "daemon/scene/assets.hpp"
+#include "daemon/set/load.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 

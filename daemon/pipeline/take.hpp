@@ -8,6 +8,7 @@
 #include <stop_token>
 #include <string>
 
+#include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/session/session.hpp"

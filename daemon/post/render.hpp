@@ -15,6 +15,7 @@
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/post/finished_frame.hpp"
 #include "daemon/render/renderer.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 
 namespace previz::post {

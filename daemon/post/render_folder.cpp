@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"

@@ -9,6 +9,7 @@
 #include "daemon/output/take_list.hpp"
 #include "daemon/post/render_folder.hpp"
 #include "daemon/post/take_copy.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"

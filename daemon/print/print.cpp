@@ -7,6 +7,7 @@
 #include "daemon/print/pdf.hpp"
 #include "daemon/print/tags.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::print {

@@ -9,6 +9,7 @@
 #include "daemon/render/layers.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 #include "shaders/lib/render_shared.h"
 
 namespace previz::render {

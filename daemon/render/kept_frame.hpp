@@ -3,9 +3,9 @@
 
 #include <cstdint>
 
+#include "daemon/render/frame_input.hpp"
 #include "daemon/render/gpu_scene.hpp"
 #include "daemon/render/light_change.hpp"
-#include "daemon/render/renderer.hpp"
 #include "daemon/render/wavefront.hpp"
 
 namespace previz::render {

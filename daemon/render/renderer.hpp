@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/lighting/environment.hpp"
+#include "daemon/render/frame_input.hpp"
 #include "daemon/render/gpu.hpp"
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/layers.hpp"
@@ -15,24 +16,9 @@
 #include "daemon/set/set.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::render {
-
-// One observer frame, the renderer's input.
-struct FrameInput {
-  PlatePtr plate;                          // samples as captured; null: composite over black
-  double exposure = 1.0;                   // absolute, of this frame
-  glm::dmat4 world_from_camera{1.0};       // OpenCV camera axes
-  std::optional<std::uint32_t> seed = {};  // absent: the set's, the same in every frame (P8)
-  // What show() returns is averaged with the frames before, as far as they show the same
-  // (daemon/render/history.hpp). The frame's random numbers then follow those of the frames before.
-  // A frame that does not accumulate ends what was accumulated, unless it only stands aside.
-  bool accumulates = false;
-  bool stands_aside = false;
-  // show() dithers the codes where the worlds differ, by a pattern that stands still, so that the
-  // mean over a few pixels is right to a fraction of a code.
-  bool dithers = false;
-};
 
 // A frame with its samples, as Renderer::keep() returns it; nothing can change it.
 struct KeptFrame;

@@ -6,6 +6,7 @@
 #include "daemon/lighting/response.hpp"
 #include "daemon/render/layers.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::render {
 

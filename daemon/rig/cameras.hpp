@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "daemon/rig/driven_camera.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/buttons.hpp"
 #include "drivers/camera.hpp"

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::rig {

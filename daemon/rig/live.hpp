@@ -17,6 +17,7 @@
 #include "daemon/report/reports.hpp"
 #include "daemon/rig/cameras.hpp"
 #include "daemon/rig/controls.hpp"
+#include "daemon/set/load.hpp"
 #include "drivers/buttons.hpp"
 
 namespace previz::rig {

@@ -11,6 +11,7 @@
 #include "daemon/pipeline/channel.hpp"
 #include "daemon/report/reports.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::rig {
 

@@ -5,8 +5,11 @@
 
 #include "daemon/rig/errand.hpp"
 #include "daemon/rig/kept_edits.hpp"
+#include "daemon/scene/load.hpp"
 #include "daemon/set/file_edit.hpp"
+#include "daemon/set/load.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::rig {

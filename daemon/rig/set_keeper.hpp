@@ -14,6 +14,7 @@
 #include "daemon/pipeline/edits.hpp"
 #include "daemon/report/reports.hpp"
 #include "daemon/scene/scene.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 
 namespace previz::rig {

@@ -20,16 +20,12 @@
 #include <span>
 #include <vector>
 
+#include "daemon/scene/aabb.hpp"
 #include "daemon/scene/scene.hpp"
 
 namespace previz::scene {
 
 inline constexpr std::uint32_t texels_per_record = 4;
-
-struct Aabb {
-  glm::vec3 low{1e30f};
-  glm::vec3 high{-1e30f};
-};
 
 // The bottom level of one mesh. It is position independent: indices inside it are relative to its
 // start.
@@ -44,9 +40,6 @@ struct MeshBvh {
   // They are never traced.
   std::uint32_t dropped_triangles = 0;
 };
-
-// The qualities are Embree's Morton, binned SAH, and binned SAH with spatial splits.
-enum class BvhQuality { low, medium, high };
 
 // The same input gives the same bytes. Throws previz::Error past 2^24 triangles.
 MeshBvh build_mesh_bvh(const Mesh& mesh, BvhQuality quality = BvhQuality::medium);

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "daemon/scene/bvh.hpp"
+#include "daemon/scene/aabb.hpp"
 
 namespace previz::scene {
 
@@ -29,15 +29,5 @@ std::vector<BinaryNode> build_binary_tree(std::span<const Aabb> boxes, BvhQualit
 
 // Builds a tree by median splits: it ignores cost but is as shallow as possible.
 std::vector<BinaryNode> build_balanced_tree(std::span<const Aabb> boxes);
-
-inline Aabb merged(const Aabb& a, const Aabb& b) {
-  return {glm::min(a.low, b.low), glm::max(a.high, b.high)};
-}
-
-// Returns half the surface area.
-inline double half_area(const Aabb& box) {
-  const glm::dvec3 size = glm::dvec3(box.high) - glm::dvec3(box.low);
-  return size.x * size.y + size.y * size.z + size.z * size.x;
-}
 
 }  // namespace previz::scene

@@ -8,7 +8,6 @@
 #include <span>
 #include <vector>
 
-#include "daemon/scene/bvh.hpp"
 #include "daemon/scene/bvh_wide.hpp"
 
 namespace previz::scene {

@@ -90,24 +90,6 @@ TakenOut take_out_compression(GltfJson& json, bool is_binary) {
   return taken_out;
 }
 
-void DecodingLimit::add(std::uint64_t compressed, std::uint64_t decoded, const std::string& where) {
-  if (compressed > compressed_left_)
-    throw Error(where + ": more is compressed than its buffers hold: parts of it overlap");
-  if (decoded > decoded_left_)
-    throw Error(where + ": the file would have more than 4 GiB when decompressed");
-  compressed_left_ -= compressed;
-  decoded_left_ -= decoded;
-}
-
-int add_view(tinygltf::Model& model, std::vector<unsigned char> bytes) {
-  tinygltf::BufferView view;
-  view.buffer = static_cast<int>(model.buffers.size());
-  view.byteLength = bytes.size();
-  model.buffers.emplace_back().data = std::move(bytes);
-  model.bufferViews.push_back(std::move(view));
-  return static_cast<int>(model.bufferViews.size()) - 1;
-}
-
 void decompress(tinygltf::Model& model, const TakenOut& taken_out, const std::string& file) {
   std::uint64_t size = 0;
   for (const tinygltf::Buffer& buffer : model.buffers) size += buffer.data.size();

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "daemon/scene/gltf_animation.hpp"
-#include "daemon/scene/gltf_mesh.hpp"
+#include "daemon/scene/gltf_mesh_source.hpp"
 #include "daemon/scene/gltf_nodes.hpp"
 #include "daemon/scene/load_log.hpp"
 #include "daemon/scene/scene.hpp"

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "daemon/scene/gltf_compression.hpp"
+#include "daemon/scene/gltf_decoding.hpp"
 
 namespace previz::scene {
 

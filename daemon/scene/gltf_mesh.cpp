@@ -254,24 +254,6 @@ int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
 
 }  // namespace
 
-MeshSource mesh_source(const tinygltf::Primitive& primitive, std::vector<UvMapping> mappings) {
-  MeshSource source;
-  if (mappings.empty()) mappings.emplace_back();
-  source.positions = attribute(primitive, "POSITION");
-  source.normals = attribute(primitive, "NORMAL");
-  source.colors = attribute(primitive, "COLOR_0");
-  for (const UvMapping& mapping : mappings)
-    source.uvs.push_back(attribute(primitive, "TEXCOORD_" + std::to_string(mapping.set)));
-  source.indices = primitive.indices;
-  if (primitive.mode >= 0) source.mode = primitive.mode;
-  source.mappings = std::move(mappings);
-  return source;
-}
-
-bool has_usable_positions(const Mesh& mesh) {
-  return std::ranges::all_of(mesh.positions, is_usable);
-}
-
 bool keep_shape(Mesh& mesh, const std::string& what, Notes& notes) {
   mesh.undeformed = {};
   drop_bad_triangles(mesh, what, notes);

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/scene/gltf_compression.hpp"
+#include "daemon/scene/gltf_decoding.hpp"
 
 namespace previz::scene {
 

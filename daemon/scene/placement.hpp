@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/session/session.hpp"

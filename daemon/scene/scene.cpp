@@ -2,14 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <memory>
 #include <string>
-#include <system_error>
 #include <vector>
 
-#include "daemon/scene/gltf.hpp"
-#include "drivers/error.hpp"
 #include "shaders/lib/render_shared.h"
 
 namespace previz::scene {
@@ -22,29 +17,6 @@ double least_factor(const Scene& scene, std::uint32_t texture, int channel) {
   for (const glm::vec4& texel : scene.textures[texture].texels)
     least = std::min(least, texel[channel]);
   return least;
-}
-
-// Only real objects take the colours that the set states: a virtual object of the same file keeps
-// the material it was made with.
-void apply(const set::Surface& surface, const std::string& set_file, Scene& scene) {
-  std::map<std::uint32_t, std::uint32_t> recoloured;  // index as loaded to index as recoloured
-  std::string known;
-  for (Instance& instance : scene.instances) {
-    if ((instance.presence & world_real) == 0) continue;
-    const std::string name = scene.materials[instance.material].name;
-    if (known.find('"' + name + '"') == std::string::npos)
-      known += (known.empty() ? "\"" : ", \"") + name + '"';
-    if (name != surface.material) continue;
-    const auto entry = recoloured.try_emplace(instance.material, scene.materials.size()).first;
-    if (entry->second == scene.materials.size()) {
-      scene.materials.push_back(scene.materials[instance.material]);
-      scene.materials.back().base_color = surface.albedo;
-    }
-    instance.material = entry->second;
-  }
-  if (recoloured.empty())
-    throw Error(set_file + ": surface.material: no real object has a material \"" +
-                surface.material + "\"; there are " + (known.empty() ? "none" : known));
 }
 
 // The shape at rest of a mesh that deforms follows from what it is before, and from its
@@ -62,31 +34,6 @@ bool deform_alike(const Deformation& a, const Deformation& b) {
 }
 
 }  // namespace
-
-Scene load_scene(const set::Set& set) {
-  Scene scene;
-  Budget budget(set.estimation.filter_textures);
-  std::map<std::filesystem::path, std::unique_ptr<GltfFile>> files;
-  std::vector<const GltfFile*> in_order;
-  for (std::size_t i = 0; i < set.objects.size(); ++i) {
-    const set::Object& object = set.objects[i];
-    std::error_code not_there;
-    const auto canonical = std::filesystem::weakly_canonical(object.file, not_there);
-    auto& file = files[not_there ? object.file : canonical];
-    if (!file) {
-      file = std::make_unique<GltfFile>(object.file, scene, budget);
-      in_order.push_back(file.get());
-    }
-    file->add(object, static_cast<std::uint32_t>(i));
-    scene.light_objects.resize(scene.lights.size(), static_cast<std::uint32_t>(i));
-  }
-  for (const set::Surface& surface : set.surfaces) apply(surface, set.file.string(), scene);
-  scene.lights.insert(scene.lights.end(), set.lights.begin(), set.lights.end());
-  scene.light_objects.resize(scene.lights.size(), no_object);
-  for (const GltfFile* file : in_order)
-    for (std::string& note : file->notes()) scene.notes.push_back(std::move(note));
-  return scene;
-}
 
 const Variants* variants_of(const Scene& scene, std::size_t object) {
   const auto found = std::ranges::find(scene.variants, object, &Variants::object);

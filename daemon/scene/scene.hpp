@@ -203,13 +203,6 @@ inline constexpr std::uint64_t max_joints = 1ull << 20;  // of the skins of all 
 inline constexpr int max_texture_side = 16384;
 inline constexpr std::uint64_t max_file_bytes = 0xffffffffull;  // glTF binary's own limit
 
-// Loads every object of the set. Geometry that nodes share (the same accessors) becomes one mesh
-// with several instances, also where objects name the same file. Throws previz::Error naming the
-// file and what is wrong in it; what can be left out (zero-area and NaN triangles, extensions that
-// are used but not required) goes into Scene::notes. The set's surfaces replace the colours of
-// real objects' materials; a surface that no real object has is an error too.
-Scene load_scene(const set::Set& set);
-
 // Returns the looks of the object with this index; null if it has no variants.
 const Variants* variants_of(const Scene& scene, std::size_t object);
 

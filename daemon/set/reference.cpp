@@ -1,5 +1,6 @@
 #include <sstream>
 
+#include "daemon/set/reference.hpp"
 #include "daemon/set/set.hpp"
 #include "daemon/set/table.hpp"
 

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/set/origin.hpp"
 #include "daemon/set/problems.hpp"
 #include "daemon/set/table.hpp"
 

@@ -335,38 +335,4 @@ struct Set {
   Output output;
 };
 
-// Says where a set file comes from: the crew, who can mend it, or a session that was recorded with
-// it. Buttons that nobody can press are an error in the crew's files only. A session may come from
-// anywhere, so that its set is read as data: a file that it names must be in its own folder, unless
-// the crew trusts it.
-enum class Origin { crew, session, trusted_session };
-
-// Settings that replace those of a set: a file with nothing but [quality], [[quality.preview]],
-// [estimator] and [lighting], as `previzd trade` writes it and --with takes it.
-struct Overlay {
-  std::filesystem::path file;
-  std::string text;
-};
-// Reads the file; throws previz::Error that names it if it cannot be read.
-Overlay read_overlay(const std::filesystem::path& file);
-
-// Parses TOML text. `file` names it in errors, and its folder is what relative paths are relative
-// to; `assets` maps paths as the set writes them to paths that stand in for them (a session's
-// assets, relative to that folder too). The files of objects and the environment must exist; a
-// replay device's session and the output directory need not. Tag and camera poses come out exactly
-// rigid. Throws previz::Error whose message holds every problem found, one a line, in the order of
-// the file's lines: file:line:column: key: what is wrong; what is allowed. Text that is not TOML at
-// all is the only problem then, reported without a key. What `with` has replaces what the set has,
-// key by key, but all [[quality.preview]] together; its problems name its own file and lines.
-Set parse_set(const std::string& text, const std::filesystem::path& file,
-              const std::vector<std::pair<std::string, std::filesystem::path>>& assets = {},
-              Origin origin = Origin::crew, const std::optional<Overlay>& with = {});
-// Reads and parses a file as parse_set() does; throws previz::Error that names it if it cannot be
-// read.
-Set load_set(const std::filesystem::path& file);
-
-// Returns the text of config/reference.toml: every key with its unit, default and range, from the
-// parser's own table.
-std::string reference_toml();
-
 }  // namespace previz::set

@@ -4,6 +4,7 @@
 
 #include "daemon/pipeline/preview_size.hpp"
 #include "daemon/pipeline/take_shots.hpp"
+#include "daemon/set/load.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 

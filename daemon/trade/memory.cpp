@@ -13,6 +13,7 @@
 #include "daemon/scene/assets.hpp"
 #include "daemon/set/print.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::trade {

@@ -12,6 +12,7 @@
 #include "daemon/trade/axes.hpp"
 #include "daemon/trade/measure.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::trade {
 

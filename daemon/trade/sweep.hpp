@@ -19,9 +19,9 @@
 #include "daemon/trade/measure.hpp"
 #include "daemon/trade/memory.hpp"
 #include "daemon/trade/method.hpp"
+#include "daemon/trade/options.hpp"
 #include "daemon/trade/probes.hpp"
 #include "daemon/trade/report.hpp"
-#include "daemon/trade/trade.hpp"
 
 namespace previz::trade {
 

@@ -6,6 +6,7 @@
 #include <memory>
 #include <ostream>
 
+#include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/problems.hpp"
 #include "daemon/trade/frame.hpp"
@@ -13,6 +14,7 @@
 #include "daemon/trade/page.hpp"
 #include "daemon/trade/sweep.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::trade {

@@ -160,6 +160,13 @@ void DraftFolder::put() {
   sync_folder_of(target_);
 }
 
+void replace_file(const std::filesystem::path& file, const std::string& content) {
+  Draft draft(file);
+  draft.keep_owner();
+  draft.file().append(content);
+  draft.put();
+}
+
 std::vector<std::string> remove_dead_drafts(const fs::path& folder) {
   std::vector<std::string> removed;
   std::error_code unreadable;

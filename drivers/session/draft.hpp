@@ -67,6 +67,11 @@ class DraftFolder {
   OwnedDescriptor lock_;
 };
 
+// Replaces the file's content at once: a crash or a power cut leaves the old or the new, never a
+// part, and after the return the new. The mode stays, and the owner where the system lets it.
+// Throws previz::Error; the old content then stays.
+void replace_file(const std::filesystem::path& file, const std::string& content);
+
 // Removes the drafts, files and folders, that dead processes left in a folder, and returns their
 // names. Those that cannot be locked or removed stay: their process lives, or the file system knows
 // no locks.

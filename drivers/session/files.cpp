@@ -17,7 +17,6 @@
 #include <vector>
 
 #include "drivers/error.hpp"
-#include "drivers/session/draft.hpp"
 
 namespace previz::session {
 namespace {
@@ -64,13 +63,6 @@ void make_folders(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder, failure);
   if (failure) throw Error(folder.string() + ": cannot be made a directory: " + failure.message());
   for (const std::filesystem::path& made : missing) sync_names(made.parent_path());
-}
-
-void replace_file(const std::filesystem::path& file, const std::string& content) {
-  Draft draft(file);
-  draft.keep_owner();
-  draft.file().append(content);
-  draft.put();
 }
 
 bool lies_within(const std::filesystem::path& folder, const std::filesystem::path& file) {

@@ -51,10 +51,6 @@ void sync_names(const std::filesystem::path& folder);
 // previz::Error.
 void make_folders(const std::filesystem::path& folder);
 
-// Replaces the file's content at once: a crash or a power cut leaves the old or the new, never a
-// part, and after the return the new. The mode stays, and the owner where the system lets it.
-// Throws previz::Error; the old content then stays.
-void replace_file(const std::filesystem::path& file, const std::string& content);
 // Returns whether a file, or the place of one that is not there, is inside the folder, wherever
 // links on the way to it lead.
 bool lies_within(const std::filesystem::path& folder, const std::filesystem::path& file);

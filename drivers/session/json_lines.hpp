@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "drivers/buttons.hpp"
-#include "drivers/session/session.hpp"
+#include "drivers/session/records.hpp"
 
 namespace previz::session {
 

@@ -3,7 +3,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "drivers/session/session.hpp"
+#include "drivers/session/records.hpp"
 
 namespace previz::session {
 

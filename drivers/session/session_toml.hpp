@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "drivers/session/session.hpp"
+#include "drivers/session/records.hpp"
 
 namespace previz::session {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/session/session.hpp"
+#include "drivers/session/records.hpp"
 
 namespace previz::session {
 

@@ -1,5 +1,6 @@
 // Apertures from nothing to the widest, focus from a centimetre to infinity: continuous with the
 // pinhole, sharp where the focus is; what no lens can be is refused by the key's name.
+#include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session_toml.hpp"

@@ -6,6 +6,7 @@
 
 #include <string>
 
+#include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"

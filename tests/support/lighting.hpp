@@ -10,6 +10,7 @@
 #include "daemon/lighting/exr_picture.hpp"
 #include "daemon/lighting/hdr.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::lighting {
 

@@ -8,6 +8,7 @@
 
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::truth {
 

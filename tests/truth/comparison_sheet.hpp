@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 #include "tests/truth/compare.hpp"
 
 namespace previz::truth {

@@ -13,6 +13,7 @@
 #include "daemon/lighting/exr_picture.hpp"
 #include "daemon/lighting/resampling.hpp"
 #include "daemon/output/png.hpp"
+#include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "drivers/error.hpp"
 #include "tests/truth/cpu_geometry.hpp"

@@ -12,6 +12,7 @@
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/pipeline/take_shots.hpp"
+#include "daemon/scene/load.hpp"
 #include "drivers/error.hpp"
 #include "tests/truth/cpu_camera.hpp"
 

@@ -12,6 +12,7 @@
 #include "daemon/scene/scene.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 #include "tests/truth/compare.hpp"
 #include "tests/truth/cpu_geometry.hpp"
 

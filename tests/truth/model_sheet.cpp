@@ -10,6 +10,7 @@
 
 #include "daemon/output/png.hpp"
 #include "daemon/render/renderer.hpp"
+#include "daemon/scene/load.hpp"
 #include "drivers/error.hpp"
 #include "shaders/lib/octahedral.h"
 #include "tests/support/scenes.hpp"

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "daemon/lighting/lighting.hpp"
+#include "daemon/scene/load.hpp"
 #include "tests/support/figure.hpp"
 #include "tests/support/render_fixture.hpp"
 #include "tests/support/shared_data.hpp"

@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/tracking/apriltag_tracker.hpp"
 #include "daemon/tracking/joint_pose.hpp"

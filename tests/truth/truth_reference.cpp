@@ -6,6 +6,7 @@
 #include <iostream>
 
 #include "daemon/lighting/lighting.hpp"
+#include "daemon/scene/load.hpp"
 #include "drivers/error.hpp"
 #include "tests/truth/compare.hpp"
 #include "tests/truth/cpu_camera.hpp"

@@ -4,6 +4,7 @@
 
 #include "daemon/lighting/light_mode.hpp"
 #include "daemon/lighting/lighting.hpp"
+#include "daemon/scene/load.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/lighting.hpp"

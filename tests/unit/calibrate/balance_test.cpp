@@ -10,6 +10,8 @@
 
 #include "daemon/calibrate/balance_fit.hpp"
 #include "daemon/calibrate/calibrate.hpp"
+#include "daemon/scene/load.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"

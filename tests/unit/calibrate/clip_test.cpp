@@ -11,6 +11,7 @@
 #include "daemon/calibrate/calibrate.hpp"
 #include "daemon/calibrate/clip_fit.hpp"
 #include "daemon/lighting/response.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/session/session.hpp"

@@ -11,6 +11,7 @@
 #include "daemon/calibrate/coverage.hpp"
 #include "daemon/calibrate/fisheye.hpp"
 #include "daemon/calibrate/light_pose.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "drivers/calibration/fisheye.hpp"
 #include "drivers/error.hpp"

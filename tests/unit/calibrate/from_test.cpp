@@ -14,6 +14,7 @@
 #include "daemon/calibrate/lens_file.hpp"
 #include "daemon/calibrate/lens_file_check.hpp"
 #include "daemon/calibrate/lens_refit.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration/fisheye.hpp"
 #include "drivers/calibration/pinhole.hpp"

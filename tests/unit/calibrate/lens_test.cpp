@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "daemon/calibrate/lens_fit.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"

@@ -11,6 +11,7 @@
 #include "daemon/calibrate/observer.hpp"
 #include "daemon/calibrate/report.hpp"
 #include "daemon/calibrate/residual_plot.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration/pinhole.hpp"

@@ -9,6 +9,7 @@
 #include "daemon/calibrate/brackets.hpp"
 #include "daemon/calibrate/response_fit.hpp"
 #include "daemon/lighting/response.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"

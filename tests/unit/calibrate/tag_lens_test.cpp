@@ -7,6 +7,7 @@
 #include "daemon/calibrate/observer.hpp"
 #include "daemon/calibrate/tag_lens.hpp"
 #include "daemon/calibrate/tag_tables.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"

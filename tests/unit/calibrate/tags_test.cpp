@@ -17,6 +17,7 @@
 #include "daemon/calibrate/tag_survey.hpp"
 #include "daemon/calibrate/tag_tables.hpp"
 #include "daemon/calibrate/tag_walk.hpp"
+#include "daemon/set/load.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/tag_walks.hpp"

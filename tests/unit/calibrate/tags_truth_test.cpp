@@ -16,6 +16,7 @@
 #include "daemon/calibrate/tag_lens.hpp"
 #include "daemon/calibrate/tag_survey.hpp"
 #include "daemon/calibrate/tag_walk.hpp"
+#include "daemon/set/load.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_directory.hpp"

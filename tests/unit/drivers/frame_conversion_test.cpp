@@ -6,6 +6,7 @@
 
 #include "drivers/error.hpp"
 #include "drivers/frame.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz {
 namespace frame_conversion_test {

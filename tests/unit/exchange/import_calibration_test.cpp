@@ -11,6 +11,7 @@
 #include <string>
 
 #include "daemon/exchange/import_description.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration/fisheye.hpp"

@@ -8,6 +8,7 @@
 
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/take.hpp"
+#include "daemon/scene/load.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"

@@ -13,6 +13,7 @@
 #include "daemon/pipeline/take.hpp"
 #include "daemon/pipeline/take_shots.hpp"
 #include "daemon/post/render.hpp"
+#include "daemon/scene/load.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"

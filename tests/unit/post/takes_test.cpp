@@ -15,6 +15,7 @@
 #include "daemon/post/render_takes.hpp"
 #include "daemon/post/take_copy.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"

@@ -19,6 +19,7 @@
 #include "daemon/print/tags.hpp"
 #include "daemon/tracking/tag_detector.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/tracking_synthetic.hpp"

@@ -12,6 +12,7 @@
 #include "daemon/control/bus.hpp"
 #include "daemon/rig/live.hpp"
 #include "drivers/descriptor.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/live_rig.hpp"

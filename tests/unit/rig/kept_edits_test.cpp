@@ -9,6 +9,7 @@
 #include <numbers>
 #include <random>
 
+#include "daemon/set/load.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace previz::rig {

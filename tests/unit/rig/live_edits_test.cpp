@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "daemon/set/load.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/live_rig.hpp"
 

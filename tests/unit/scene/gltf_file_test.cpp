@@ -1,5 +1,6 @@
 #include <fstream>
 
+#include "daemon/scene/load.hpp"
 #include "tests/support/gltf_test.hpp"
 
 namespace previz::test {

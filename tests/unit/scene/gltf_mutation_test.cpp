@@ -13,6 +13,7 @@
 
 #include "daemon/render/feature.hpp"
 #include "daemon/scene/bvh_refit.hpp"
+#include "daemon/scene/load.hpp"
 #include "daemon/scene/placement.hpp"
 #include "daemon/scene/scene.hpp"
 #include "drivers/error.hpp"

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "daemon/render/feature.hpp"
+#include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "tests/support/shared_data.hpp"
 

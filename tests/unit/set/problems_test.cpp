@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/temporary_directory.hpp"

@@ -6,6 +6,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "daemon/set/load.hpp"
+#include "daemon/set/reference.hpp"
 #include "daemon/set/set.hpp"
 #include "daemon/set/table.hpp"
 #include "drivers/error.hpp"

@@ -1,5 +1,6 @@
 // The order of the rooms: a file includes only its own room and rooms below it. The floors are
-// those of the CMakeLists.txt, which build the rooms from the ground up.
+// those of the CMakeLists.txt, which build the rooms from the ground up. Within a room no two files
+// need each other.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <fstream>
 #include <map>
 #include <regex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -117,6 +119,51 @@ TEST(Includes, NoDriverIncludesTheRegistryThatListsIt) {
       EXPECT_FALSE(include.file.ends_with("_drivers.hpp"))
           << file << ":" << include.line << ": includes " << include.file;
   }
+}
+
+// Returns a file's name without its ending: a header and its source count as one file.
+std::string stem_of(const std::string& file) {
+  return fs::path(file).replace_extension();
+}
+
+// Walks the includes of a file and of those that it includes; returns the way that leads back to a
+// file on it. Empty: there is none. Each file is looked at once.
+class Circle {
+ public:
+  explicit Circle(const std::map<std::string, std::set<std::string>>& included)
+      : included_(included) {}
+
+  std::string from(const std::string& file) {
+    const auto at = std::ranges::find(way_, file);
+    if (at != way_.end()) {
+      std::string words;
+      for (auto step = at; step != way_.end(); ++step) words += *step + " -> ";
+      return words + file;
+    }
+    if (!seen_.insert(file).second) return "";
+    way_.push_back(file);
+    std::string found;
+    if (const auto own = included_.find(file); own != included_.end())
+      for (const std::string& next : own->second)
+        if (found = from(next); !found.empty()) break;
+    way_.pop_back();
+    return found;
+  }
+
+ private:
+  const std::map<std::string, std::set<std::string>>& included_;
+  std::vector<std::string> way_;
+  std::set<std::string> seen_;
+};
+
+TEST(Includes, NoFileNeedsOneThatNeedsIt) {
+  std::map<std::string, std::set<std::string>> by_stem;
+  for (const auto& [file, included] : includes())
+    for (const Include& include : included)
+      if (stem_of(include.file) != stem_of(file) && includes().contains(include.file))
+        by_stem[stem_of(file)].insert(stem_of(include.file));
+  Circle circle(by_stem);
+  for (const auto& [file, included] : by_stem) EXPECT_EQ(circle.from(file), "") << file;
 }
 
 }  // namespace includes_test

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "daemon/set/load.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/small_take.hpp"

@@ -1,5 +1,5 @@
 // Parses a set file by the table of keys: TOML goes in; typed values, or every problem, come out.
-#include "daemon/set/set.hpp"
+#include "daemon/set/load.hpp"
 
 #include <toml++/toml.h>
 #include <algorithm>

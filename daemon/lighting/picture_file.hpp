@@ -1,0 +1,19 @@
+// Reads a picture of linear light from a file of either format that can hold one: OpenEXR or
+// Radiance .hdr.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "daemon/lighting/linear_picture.hpp"
+
+namespace previz::lighting {
+
+// Reads the file by what it holds, whatever its name is. Oddities that do not prevent its use are
+// appended to `notes`. Throws previz::Error naming the file and what is wrong with it; a file of
+// another format is refused by the name of that format.
+LinearPicture read_linear_picture(const std::filesystem::path& path,
+                                  std::vector<std::string>& notes);
+
+}  // namespace previz::lighting

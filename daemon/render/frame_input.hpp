@@ -1,0 +1,27 @@
+// One observer frame, as the renderer is given it.
+#pragma once
+
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <optional>
+
+#include "drivers/plate.hpp"
+
+namespace previz::render {
+
+struct FrameInput {
+  PlatePtr plate;                          // samples as captured; null: composite over black
+  double exposure = 1.0;                   // absolute, of this frame
+  glm::dmat4 world_from_camera{1.0};       // OpenCV camera axes
+  std::optional<std::uint32_t> seed = {};  // absent: the set's, the same in every frame (P8)
+  // What show() returns is averaged with the frames before, as far as they show the same
+  // (daemon/render/history.hpp). The frame's random numbers then follow those of the frames before.
+  // A frame that does not accumulate ends what was accumulated, unless it only stands aside.
+  bool accumulates = false;
+  bool stands_aside = false;
+  // show() dithers the codes where the worlds differ, by a pattern that stands still, so that the
+  // mean over a few pixels is right to a fraction of a code.
+  bool dithers = false;
+};
+
+}  // namespace previz::render

@@ -1,0 +1,16 @@
+// Loads the scene that a set describes.
+#pragma once
+
+#include "daemon/scene/scene.hpp"
+#include "daemon/set/set.hpp"
+
+namespace previz::scene {
+
+// Loads every object of the set. Geometry that nodes share (the same accessors) becomes one mesh
+// with several instances, also where objects name the same file. Throws previz::Error naming the
+// file and what is wrong in it; what can be left out (zero-area and NaN triangles, extensions that
+// are used but not required) goes into Scene::notes. The set's surfaces replace the colours of
+// real objects' materials; a surface that no real object has is an error too.
+Scene load_scene(const set::Set& set);
+
+}  // namespace previz::scene

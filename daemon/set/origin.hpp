@@ -1,0 +1,12 @@
+// Says how far a set file is trusted.
+#pragma once
+
+namespace previz::set {
+
+// Says where a set file comes from: the crew, who can mend it, or a session that was recorded with
+// it. Buttons that nobody can press are an error in the crew's files only. A session may come from
+// anywhere, so that its set is read as data: a file that it names must be in its own folder, unless
+// the crew trusts it.
+enum class Origin { crew, session, trusted_session };
+
+}  // namespace previz::set
