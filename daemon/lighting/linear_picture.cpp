@@ -49,7 +49,7 @@ std::string beginning_of(const std::filesystem::path& path) {
   std::string bytes(16, '\0');
   file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   if (file.bad() || std::filesystem::is_directory(path))
-    throw Error(path.string() + ": cannot be read: it is no file");
+    throw Error(path.string() + ": cannot be read: it is not a file");
   bytes.resize(static_cast<std::size_t>(file.gcount()));
   return bytes;
 }
@@ -81,7 +81,7 @@ std::string beginning_of(const std::filesystem::path& path) {
 void check_size(const std::filesystem::path& path, std::int64_t width, std::int64_t height) {
   if (width < 1 || height < 1 || width > most_pixels / height ||
       std::max(width, height) > most_side)
-    throw Error(fmt::format("{}: has {}x{} pixels; allowed: at most {}, and {} a side",
+    throw Error(fmt::format("{}: has {}x{} pixels; allowed: at most {}, and {} per side",
                             path.string(), width, height, most_pixels, most_side));
 }
 

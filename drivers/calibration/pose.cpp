@@ -29,7 +29,7 @@ double rigidity_error(const glm::dmat4& transform) {
 std::string rigidity_fault(const glm::dmat4& transform) {
   const double error = rigidity_error(transform);
   if (error <= rigid_tolerance) return "";
-  return std::isinf(error) ? "is a mirroring or singular transform; allowed: a rotation and a shift"
+  return std::isinf(error) ? "mirrors or is singular; allowed: a rotation and a translation"
                            : "is not rigid, its axes are off by " + codec::print_number(error) +
                                  "; allowed: unit axes at right angles to within 1e-4";
 }

@@ -117,7 +117,7 @@ TEST_F(AbsurdCamera, ASizeThatCannotBeIsRefused) {
     write(ARV_FAKE_CAMERA_REGISTER_HEIGHT, 48);
   }
   write(ARV_FAKE_CAMERA_REGISTER_WIDTH, 0);
-  EXPECT_THAT(refusal(), HasSubstr("says its pictures are 0x48 pixels, which cannot be"));
+  EXPECT_THAT(refusal(), HasSubstr("reports pictures of 0x48 pixels, which is impossible"));
   write(ARV_FAKE_CAMERA_REGISTER_WIDTH, 64);
   EXPECT_EQ(refusal(), "it was opened");
 }

@@ -218,7 +218,7 @@ TEST(ButtonNames, MistakesSayWhatIsAllowed) {
     }
     return "no error";
   };
-  EXPECT_THAT(error_of("midi:1:2"), HasSubstr("this build drives no \"midi\" buttons"));
+  EXPECT_THAT(error_of("midi:1:2"), HasSubstr("this build supports no \"midi\" buttons"));
   EXPECT_THAT(error_of("gpio:chip"), HasSubstr("gpio:CHIP:LINE"));
   EXPECT_THAT(error_of("hid:12:zz:0.1"), HasSubstr("hexadecimal"));
   EXPECT_THAT(error_of("hid:12:13:0.9"), HasSubstr("BYTE.BIT"));

@@ -174,7 +174,7 @@ std::string refusal(const TagWalk& walk, const TagSurveyOptions& options,
 TEST(TagSurvey, AnOriginThatMovedIsRefused) {
   const TagWalk walk = walk_past([](int picture) { return bumped(picture, 0); });
   const std::string said = refusal(walk, {});
-  EXPECT_NE(said.find("tag 0, which defines the world, did not stay in one place (moved by "),
+  EXPECT_NE(said.find("tag 0, which defines the world, did not stay in place (moved by "),
             std::string::npos)
       << said;
   EXPECT_NE(said.find("--origin"), std::string::npos);
@@ -377,7 +377,7 @@ class TagCommand : public ::testing::Test {
 
 TEST_F(TagCommand, RefusesAWalkWithABumpUnlessForcedAndWritesTheRest) {
   const std::string refused = said();
-  EXPECT_NE(refused.find("tag 4 once more, when it is fastened: moved by 1"), std::string::npos)
+  EXPECT_NE(refused.find("tag 4 again, once it is fixed in place: moved by 1"), std::string::npos)
       << refused;
   EXPECT_NE(refused.find("0007.png and "), std::string::npos) << refused;
   options.force = options.write = true;
@@ -403,7 +403,7 @@ TEST_F(TagCommand, AForcedMapSaysSoInTheSetFile) {
   options.force = options.write = true;
   said();
   const std::string forced = text_of_set();
-  const std::size_t doubt = forced.find("# NOT TO BE RELIED ON: taken with --force although");
+  const std::size_t doubt = forced.find("# UNRELIABLE: accepted with --force although");
   ASSERT_NE(doubt, std::string::npos) << forced;
   EXPECT_LT(doubt, forced.find("[[tag]]"));
   EXPECT_NE(forced.find("# tag 4 once more"), std::string::npos) << forced;

@@ -273,7 +273,7 @@ TEST(Recorder, LeavesOutWhatCannotBeRecordedAndGoesOn) {
   EXPECT_EQ(session.missing.size(), 2u);
   for (const std::string& words : session::words_of(status.lost))
     EXPECT_TRUE(mentions(session.missing, words)) << words;
-  EXPECT_TRUE(rig.heard.said("12A_take001 lacks what cannot be recorded: frame 100"));
+  EXPECT_TRUE(rig.heard.said("12A_take001 is missing what cannot be recorded: frame 100"));
 }
 
 // The first recording loses frames, rolls over twice, and is still being written when the next one
@@ -318,7 +318,7 @@ TEST(Recorder, CountsTheLossesOfEachTakeThoughTheNextRecordingHasBegun) {
   std::size_t takes_that_lack = 0;
   for (const char* name : {"12A_take001", "12A_take002", "12A_take003", "12A_take004"}) {
     const session::Session session = session::open_session(rig.first / name);
-    EXPECT_EQ(session.missing.empty(), !mentions(session.missing, "6 frames of the cameras"));
+    EXPECT_EQ(session.missing.empty(), !mentions(session.missing, "6 camera frames"));
     takes_that_lack += session.missing.empty() ? 0 : 1;
   }
   EXPECT_EQ(takes_that_lack, 1u);

@@ -50,10 +50,10 @@ TEST(TakeFolders, TheFirstThatHasRoomAndDidNotFailIsChosen) {
   folders.forgive_all();
   free[second] = 3'000'000;
   EXPECT_EQ(refusal(folders), first.string() +
-                                  ": the disk is almost full, 4 MB are left and 5 MB are kept free "
+                                  ": the disk is almost full, 4 MB are free, 5 MB are kept free "
                                   "(recording.reserve_mb); " +
                                   second.string() +
-                                  ": the disk is almost full, 3 MB are left and 5 MB are kept free "
+                                  ": the disk is almost full, 3 MB are free, 5 MB are kept free "
                                   "(recording.reserve_mb)");
 }
 
@@ -199,7 +199,7 @@ TEST(Recorder, OfTwoDisksGoesOnWithoutAGapWhenTheFirstIsFull) {
   const std::uint64_t in_first = frames_of(disks.directory / "first/12A_take001", 0);
   EXPECT_EQ(in_first + frames_of(disks.directory / "second/12A_take002", in_first), offered);
   EXPECT_TRUE(
-      mentions(disks.notes, "the disk of 12A_take001 is almost full; recording goes on in " +
+      mentions(disks.notes, "the disk of 12A_take001 is almost full; recording continues in " +
                                 (disks.directory / "second/12A_take002").string()));
 }
 

@@ -234,7 +234,7 @@ TEST(DeclaredLamp, OfARemovedObjectTakesItsLightAlong) {
   expect_nothing_is_taken();
   EXPECT_EQ(claims_of(set, &scene, place).troubles,
             std::vector<std::string>{"the light of \"ugly lamp\" is not taken out of the light "
-                                     "around the set: it is around the light camera"});
+                                     "around the set: it encloses the light camera"});
 }
 
 // A narrow lamp in the middle of a wide claim is its own.

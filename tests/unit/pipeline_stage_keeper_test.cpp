@@ -46,10 +46,11 @@ TEST_F(StageKeeperTest, AFailureIsReportedShownAndCountedUntilThePartWorksAgain)
   EXPECT_EQ(log_.str(), "");
   EXPECT_FALSE(keeper.attempt(fail));
   EXPECT_EQ(log_.str(),
-            "render: has failed and begins anew; what is recorded goes on: lamp fell down\n");
+            "render: has failed and is restarting; recording continues: lamp fell down\n");
   EXPECT_EQ(reports_.announced() + "\n", log_.str());  // what the bus says
   ASSERT_EQ(reports_.troubles().size(), 1u);
-  EXPECT_EQ(line_of(reports_.troubles()[0]), "render: has failed and begins anew: lamp fell down");
+  EXPECT_EQ(line_of(reports_.troubles()[0]),
+            "render: has failed and is restarting: lamp fell down");
   EXPECT_TRUE(reports_.troubles()[0].lasts);
   EXPECT_EQ(count_of("render: failed"), 1u);
   EXPECT_EQ(begun_anew, 0);
@@ -97,7 +98,7 @@ TEST_F(StageKeeperTest, WhatCannotBeBegunAnewIsTriedAgain) {
   }
   EXPECT_EQ(worked, 1);
   EXPECT_EQ(count_of("render: failed"), 3u);
-  const std::string failed = "render: has failed and begins anew; what is recorded goes on: ";
+  const std::string failed = "render: has failed and is restarting; recording continues: ";
   EXPECT_EQ(log_.str(),
             failed + "lamp fell down\n" + failed + "no memory\n" + "render: works again\n")
       << "the same failure is reported once";

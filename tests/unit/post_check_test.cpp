@@ -198,16 +198,16 @@ samples = 1500
   expect_said("carrier stick: 1 tag: 9 (50 mm)");
   expect_said("table: phantom, 1 triangle in 1 instance, from table.gltf");
   expect_said("ring: virtual, 1 triangle in 1 instance, from ring.gltf");
-  expect_said("spot: point, dimmed, gain 0.5 in the picture, 1 in the real scene");
+  expect_said("spot: point, dimmed, gain 0.5 in the composite, 1 on the real set");
   expect_said("1 500 samples per pixel");
-  expect_said("geometry: 2 triangles, or 2 with every copy of an object counted");
+  expect_said("geometry: 2 triangles, or 2 counting every copy of an object");
   expect_used("metal: an object is metal");
   expect_used("two worlds: an object is virtual or removed");
   expect_used("lamps: the set or a model has lamps");
   expect_used("relighting: a lamp is added, taken away, dimmed");
   expect_used("denoiser: noise is taken out");
   expect_left_out("refraction: nothing is made of glass");
-  expect_left_out("removed objects: no real object is taken out of the picture");
+  expect_left_out("removed objects: no real object is removed from the picture");
   expect_left_out("lens: everything is in focus");
   expect_left_out("photons: no mirror or clear glass throws patterns of light");
   expect_said("scene in the GPU's memory: about 1 MiB");
@@ -243,7 +243,7 @@ TEST_F(Check, NamesTheVariantsOfAnObject) {
   write("a.gltf", file);
   const std::string object = "[[object]]\nname='a'\nfile='a.gltf'\npresence='virtual'\n";
   ASSERT_EQ(check(object + "variant='by night'\n"), 0) << said_;
-  expect_said("from a.gltf, in its variant \"by night\"\n");
+  expect_said("from a.gltf, variant \"by night\"\n");
   expect_said("its variants, for the buttons: \"by day\", \"by night\"\n");
   ASSERT_EQ(check(object), 0) << said_;
   expect_used("glowing surfaces: a surface gives off light");  // it may, at the press of a button
@@ -261,7 +261,7 @@ TEST_F(Check, AgreesWithTheRendererThatSolidBlendingNeedsNoAlpha) {
   };
   write("a.gltf", triangle(material("1")));
   ASSERT_EQ(check(object), 0) << said_;
-  expect_left_out("alpha: no surface has holes or is a veil");
+  expect_left_out("alpha: no surface has holes or is see-through");
   write("a.gltf", triangle(material("0.5")));
   ASSERT_EQ(check(object), 0) << said_;
   expect_used("alpha: a surface has holes or is a veil");
@@ -274,7 +274,7 @@ TEST_F(Check, SaysWhatIsColouredInside) {
     "KHR_materials_volume": {"thicknessFactor": 0.01, "attenuationColor": [0, 1, 0],
                              "attenuationDistance": 0.1}})"));
   ASSERT_EQ(check("[[object]]\nname='a'\nfile='a.gltf'\npresence='virtual'\n"), 0) << said_;
-  expect_used("coloured glass: glass or a liquid colours light more the longer its way through");
+  expect_used("coloured glass: glass or a liquid tints light, the more the thicker it is");
 }
 
 TEST_F(Check, TakesSetAndCalibrationOfASession) {
@@ -292,10 +292,11 @@ TEST_F(Check, TakesSetAndCalibrationOfASession) {
   expect_said("recorded (");
   expect_said("its lamps light the set; the rest is blurred");
   expect_used(
-      "lamps: the set or a model has lamps, a surface glows, or lamps are found in the light");
+      "lamps: the set or a model has lamps, a surface glows, or lamps are found in the "
+      "environment");
   expect_said("16x8, 35 mm lens at f/2.8, focus at 1.5 m");
   expect_used("lens: the aperture blurs what is out of focus");
-  expect_said("tracking is off: only a session that recorded poses can be used");
+  expect_said("tracking is off: only a session with recorded poses can be used");
 }
 
 // `render` refuses it later.

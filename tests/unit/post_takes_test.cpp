@@ -187,7 +187,7 @@ TEST_F(Takes, AreCopiedOnce) {
   const fs::path disk = directory_ / "disk";
   copy_takes({{one_}, disk}, out_, {});
   copy_takes({{one_, two_}, disk}, out_, {});
-  EXPECT_THAT(out_.str(), HasSubstr("12A_take001: was copied before"));
+  EXPECT_THAT(out_.str(), HasSubstr("12A_take001: already copied"));
   // Another take of the name is not replaced, and neither is one that was marked meanwhile.
   mark_takes({two_}, true, out_);
   EXPECT_THAT(refusal([&] {

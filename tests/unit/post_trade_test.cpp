@@ -175,7 +175,7 @@ TEST_F(Trade, RefusesWhatCannotBeTraded) {
   expect_refused(wrong, "is not a directory");
   wrong = options();
   wrong.axes = {"colour"};
-  expect_refused(wrong, "--axes colour: there is no such axis; estimator, ");
+  expect_refused(wrong, "--axes colour: unknown axis; estimator, ");
   wrong = options();
   wrong.samples = {0};
   expect_refused(wrong, "--samples 0: must be from 1");
@@ -278,7 +278,7 @@ TEST_F(Trade, ADamagedMemoryIsSaidAndNotUsed) {
   std::filesystem::resize_file(reference, std::filesystem::file_size(reference) / 2);
   out_.str("");
   run_trade(once, out_);
-  EXPECT_NE(out_.str().find("it ends early; everything is measured anew"), std::string::npos)
+  EXPECT_NE(out_.str().find("it ends early; measuring everything again"), std::string::npos)
       << out_.str();
   std::ofstream(directory_ / "out" / "trade.json") << "{]";
   out_.str("");

@@ -172,8 +172,7 @@ TEST_F(GltfFiles, NamesFilesThatAreNoGltf) {
   set.objects = {object};
   EXPECT_THROW(
       try { scene::load_scene(set); } catch (const Error& thrown) {
-        EXPECT_THAT(thrown.what(),
-                    HasSubstr("missing.glb: cannot be opened: there is no such file"));
+        EXPECT_THAT(thrown.what(), HasSubstr("missing.glb: cannot be opened: file not found"));
         throw;
       },
       Error);

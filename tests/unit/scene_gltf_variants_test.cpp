@@ -127,7 +127,7 @@ TEST_F(GltfVariants, NamesThatAreMissingOrRepeatedBecomeNumbers) {
   const scene::Scene scene = load();
   EXPECT_THAT(scene.variants.at(0).names, ElementsAre("red", "variant 2", "variant 3"));
   EXPECT_THAT(scene.notes,
-              Contains(HasSubstr("variant 1 has no name of its own; called \"variant 2\"")));
+              Contains(HasSubstr("variant 1 has no unique name; called \"variant 2\"")));
 }
 
 TEST_F(GltfVariants, DamagedOnesAreRefused) {

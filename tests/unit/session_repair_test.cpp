@@ -130,7 +130,7 @@ TEST_F(Repair, NamesAnAssetThatWasChanged) {
   write_content(take_ / stored, "another model");
   EXPECT_FALSE(repair_session(take_, repaired_).is_complete);
   const Session session = open_session(repaired_);
-  EXPECT_TRUE(mentions(session.missing, "model.glb: is not in the take, because the take was"));
+  EXPECT_TRUE(mentions(session.missing, "model.glb: missing from the take, because the take was"));
   EXPECT_FALSE(fs::exists(repaired_ / stored));
 }
 
