@@ -73,7 +73,7 @@ std::shared_ptr<render::Device> open_graphics(const render::DeviceOptions& optio
     if (render::is_gpu(*device)) remember(*memory, render::device_name(*device), reports);
   } catch (const Error& error) {
     const std::string what =
-        had.empty() ? "there is no graphics card; takes can be recorded; waiting for one. "
+        had.empty() ? "no graphics card; takes can be recorded; waiting for one. "
                     : "the rig's graphics card " + had +
                           " is missing; waiting for it. If it is gone for good, delete " +
                           memory->string() + ". ";

@@ -55,7 +55,7 @@ std::vector<KeyFault> faults(const PoseDraft& draft, const GivenKeys& given,
   std::vector<KeyFault> all;
   for (const char* key : {"position_m", "rotation_deg"})
     if (given.contains(key))
-      all.push_back({key, "contradicts " + matrix_key + "; allowed: one of the two forms"});
+      all.push_back({key, "conflicts with " + matrix_key + "; allowed: one of the two forms"});
   if (const auto fault = matrix->second ? rigidity_fault(*draft.matrix) : ""; !fault.empty())
     all.push_back({matrix_key, fault});
   return all;

@@ -334,7 +334,7 @@ struct Device::Impl {
       const lc::PixelFormat wanted = lc::PixelFormat::fromString(*settings.format);
       if (std::ranges::find(its, wanted) == its.end())
         refuse("has no format " + *settings.format + "; it has: " + names_of(its));
-      if (!find_known(wanted)) refuse("sends " + *settings.format + ", which cannot be converted");
+      if (!find_known(wanted)) refuse("sends " + *settings.format + ", which is not supported");
       return wanted;
     }
     if (find_known(proposed)) return proposed;

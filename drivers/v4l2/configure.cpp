@@ -197,7 +197,7 @@ class Configuration {
       refuse("reports pictures of " + size_text(picture.width, picture.height) +
              " pixels, which is impossible");
     const std::optional<convert::WireFormat> wire = wire_format(picture);
-    if (!wire) refuse("sends " + fourcc_name(picture.pixelformat) + ", which cannot be converted");
+    if (!wire) refuse("sends " + fourcc_name(picture.pixelformat) + ", which is not supported");
     agreed_.wire = *wire;
     picture_ = picture;
     agreed_.stride = wire->layout == convert::Layout::mjpeg ? 0 : picture.bytesperline;

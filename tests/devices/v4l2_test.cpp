@@ -177,12 +177,12 @@ TEST(V4l2Configure, WhatCannotBeSaysWhatCan) {
   wanted.width = 640;
   wanted.height = 480;
   EXPECT_EQ(refusal(device, wanted),
-            "usb-cam: made YUYV 32x24 of YUYV 640x480; possible: 32x24, 16x12");
+            "usb-cam: offers YUYV 32x24 instead of YUYV 640x480; possible: 32x24, 16x12");
   wanted = settings();
   wanted.format = "NV12";
   EXPECT_EQ(refusal(device, wanted), "usb-cam: has no format NV12; it has: MJPG, YUYV");
   wanted.format = "nonsense";
-  EXPECT_THAT(refusal(device, wanted), HasSubstr("known are: GREY"));
+  EXPECT_THAT(refusal(device, wanted), HasSubstr("known: GREY"));
   wanted = settings();
   wanted.exposure_s = 0.1;
   EXPECT_EQ(refusal(device, wanted), "usb-cam: its exposure cannot be set; remove exposure_s");
@@ -493,12 +493,12 @@ TEST(V4l2Configure, FormatsThatCannotBeAreRefused) {
       {[](v4l2_pix_format& format) { format.width = 70'000; }, "which cannot be"},
       {[](v4l2_pix_format& format) { format.height = 0xffffffff; }, "which cannot be"},
       {[](v4l2_pix_format& format) { format.bytesperline = 1; }, "rows are 1 bytes; 64 are needed"},
-      {[](v4l2_pix_format& format) { format.bytesperline = 0xffffffff; }, "bytes are the most"},
+      {[](v4l2_pix_format& format) { format.bytesperline = 0xffffffff; }, "bytes is the maximum"},
       {[](v4l2_pix_format& format) {
          format.width = format.height = 65'535;
          format.bytesperline = 4 * 65'536;
        },
-       "bytes are the most"},
+       "bytes is the maximum"},
       {[](v4l2_pix_format& format) {
          format.pixelformat = V4L2_PIX_FMT_MJPEG;
          format.width = format.height = 65'535;

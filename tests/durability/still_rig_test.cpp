@@ -41,7 +41,7 @@ TEST_F(RigLive, ADiskThatStandsStillForASnapshotKeepsNoPictureWaiting) {
       const Shown now = until([&](const Shown& s) { return s.look.snapshots == i; });
       until([&](const Shown& s) { return s.count > now.count + 3; });
     }
-    until_said("snapshot: is left out");
+    until_said("snapshot: is skipped");
     press("record");
     until_said("12A_take001 is finished");
   });
@@ -80,7 +80,7 @@ TEST_F(RigLive, ADiskOfTakesThatStandsStillKeepsNoButtonWaiting) {
     disk.stand_still();
     press("record");
     until([](const Shown& s) { return s.look.state.recording; });
-    until_said("its disk does not answer");
+    until_said("its disk does not respond");
     until_measured([](const nlohmann::json& stages) {
       const nlohmann::json& waiting = stages.at("recorder").at("waiting");
       const nlohmann::json& folders = stages.at("folders of takes").at("waiting");
@@ -148,7 +148,7 @@ TEST_F(RigLive, ASetThatTakesLongToBeReadHoldsUpNothing) {
   EXPECT_TRUE(session::open_session(directory_ / "takes/12A_take001").missing.empty());
 }
 
-// Nobody waits for a set whose disk does not answer: it is given up after a while, and a rig that
+// Nobody waits for a set whose disk does not respond: it is given up after a while, and a rig that
 // ends meanwhile does so.
 TEST(SetKeeperOnAStillDisk, ReadsOnAThreadOfItsOwnAndGivesUp) {
   const test::TemporaryDirectory folder;
@@ -167,7 +167,7 @@ TEST(SetKeeperOnAStillDisk, ReadsOnAThreadOfItsOwnAndGivesUp) {
     EXPECT_TRUE(sets.is_reading());
     const std::optional<SetKeeper::Ended> ended = sets.finish(std::chrono::milliseconds(0));
     ASSERT_TRUE(ended && ended->why_not);
-    EXPECT_NE(ended->why_not->find("the disk does not answer"), std::string::npos);
+    EXPECT_NE(ended->why_not->find("the disk does not respond"), std::string::npos);
     EXPECT_FALSE(sets.is_reading());
     EXPECT_EQ(sets.running().set.name, "old");
     EXPECT_FALSE(sets.look_at_file());

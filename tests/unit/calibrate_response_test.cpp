@@ -203,7 +203,8 @@ TEST_F(BracketFiles, ComeDarkestFirst) {
 
 TEST_F(BracketFiles, EveryMistakeIsNamed) {
   EXPECT_NE(problem("a.png 1\nb.png 2\n").find("no line for c.png"), std::string::npos);
-  EXPECT_NE(problem("a.png 1\nb.png two\n").find(":2: \"two\" is no exposure"), std::string::npos);
+  EXPECT_NE(problem("a.png 1\nb.png two\n").find(":2: \"two\" is not an exposure"),
+            std::string::npos);
   EXPECT_NE(problem("a.png 1\nb.png 2\nc.png 2.001\n").find("the same exposure as"),
             std::string::npos);
   try {

@@ -217,7 +217,7 @@ TEST(TagSurvey, AStatedDistanceGivesAllLengths) {
               0.001);
   }
   options.stated->a = 99;
-  EXPECT_NE(refusal(walk, options).find("tag 99 of the stated distance"), std::string::npos);
+  EXPECT_NE(refusal(walk, options).find("tag 99 of --distance"), std::string::npos);
 }
 
 TEST(TagSurvey, TheSetSaysWhereTheOriginIs) {
@@ -291,7 +291,7 @@ TEST(TagTables, AreAsTheSetFileHasThem) {
             "# defines the world; in 12 pictures\n"
             "[[tag]]\nid = 3\nsize_m = 0.08\nposition_m = [0.123457, -0.2, 0.0]\n"
             "rotation_deg = [0.0, 0.0, 0.0]\n\n"
-            "# certain to 0.10 mm and 0.057 degrees, from 12 pictures\n"
+            "# accurate to 0.10 mm, 0.057 degrees, from 12 pictures\n"
             "[[tag]]\nid = 5\nsize_m = 0.08\nposition_m = [0.123457, -0.2, 0.0]\n"
             "rotation_deg = [0.0, 0.0, 0.0]\n");
 }
@@ -437,11 +437,11 @@ TEST(TagSurvey, AChainOfPairsIsNamed) {
 
 TEST_F(TagCommand, SaysWhatItLacks) {
   options.sizes = "";
-  EXPECT_NE(said().find("the size of tags 2, 3 and 4 is not known: give --size"), std::string::npos)
+  EXPECT_NE(said().find("the size of tags 2, 3 and 4 is unknown: give --size"), std::string::npos)
       << said();
   options.sizes = "80mm";
   options.set_file.reset();
-  EXPECT_NE(said().find("the film camera's lens is not known"), std::string::npos) << said();
+  EXPECT_NE(said().find("the film camera has no lens calibration"), std::string::npos) << said();
   options.write = true;
   EXPECT_NE(said().find("--write changes the set file that --set names"), std::string::npos);
   options.write = false;

@@ -226,7 +226,7 @@ TEST(Recorder, ThatCannotKeepWhatIsWishedBeforeTheButtonSaysSoOnce) {
   ASSERT_TRUE(wait_until("it is recorded", [&] { return recorder.status().frames == 10; }));
   const std::lock_guard lock(disks.mutex);
   EXPECT_EQ(std::ranges::count(disks.notes,
-                               "recording: a take begins 0.4 s before the button, and not 4.0 s: "
+                               "recording: takes begin 0.4 s before the button, not 4.0 s: "
                                "the memory for it is full (recording.queue_mb)"),
             1);
 }
@@ -293,7 +293,7 @@ TEST(Recorder, WhoseTakeIsGoneGoesOnOnTheNextDisk) {
   const session::Session left = session::open_session(rig.directory / "unmounted/12A_take001");
   EXPECT_TRUE(mentions(left.missing, "not closed"));
   const std::lock_guard lock(rig.mutex);
-  EXPECT_TRUE(mentions(rig.notes, "is no longer there; its disk was unmounted"));
+  EXPECT_TRUE(mentions(rig.notes, "is gone; its disk was unmounted"));
 }
 
 TEST(Recorder, ThatFindsAnotherInItsFolderLeavesItAlone) {

@@ -61,7 +61,7 @@ TEST_F(StageKeeperTest, AFailureIsReportedShownAndCountedUntilThePartWorksAgain)
   EXPECT_TRUE(has_worked);
   EXPECT_EQ(begun_anew, 1);
   EXPECT_FALSE(reports_.troubles()[0].lasts);
-  EXPECT_EQ(count_of("render: begun anew"), 1u);
+  EXPECT_EQ(count_of("render: restarted"), 1u);
   EXPECT_TRUE(keeper.attempt([] {}));
   EXPECT_EQ(begun_anew, 1);
 }
@@ -110,12 +110,12 @@ TEST_F(StageKeeperTest, APartThatHadNothingToDoDoesNotWorkAgain) {
   EXPECT_FALSE(keeper.attempt(fail));
   now_ += milliseconds(1000);
   EXPECT_TRUE(keeper.attempt([&] { keeper.had_nothing_to_do(); }));
-  EXPECT_EQ(count_of("render: begun anew"), 0u);
+  EXPECT_EQ(count_of("render: restarted"), 0u);
   EXPECT_TRUE(reports_.troubles().at(0).lasts);
   now_ += std::chrono::hours(1);
   EXPECT_TRUE(liveness_.hung().empty()) << "it waits for the next work";
   EXPECT_TRUE(keeper.attempt([] {}));
-  EXPECT_EQ(count_of("render: begun anew"), 1u);
+  EXPECT_EQ(count_of("render: restarted"), 1u);
   EXPECT_FALSE(reports_.troubles().at(0).lasts);
 }
 

@@ -72,7 +72,7 @@ class Check : public testing::Test {
   // The list of what is left out comes after that of what is used.
   void expect_in_list(const std::string& words, bool is_left_out) {
     const auto at = said_.find(words);
-    const auto left_out = said_.find("left out, because this set does not use it");
+    const auto left_out = said_.find("not used by this set, so switched off");
     ASSERT_NE(left_out, std::string::npos) << said_;
     ASSERT_NE(at, std::string::npos) << words << "\nis not in\n" << said_;
     EXPECT_EQ(at > left_out, is_left_out) << words;
@@ -108,7 +108,7 @@ driver = "none"
 
 TEST_F(Check, SaysForHowLongTheDiskLasts) {
   ASSERT_EQ(check(live_set), 0) << said_;
-  expect_said("the cameras' pictures: about 104 MB a second, and about half of that recorded");
+  expect_said("the cameras' pictures: about 104 MB per second, and about half of that recorded");
   expect_said("takes go to " + (directory_ / "takes").string());
   expect_said(" free, enough for at least ");
   ASSERT_EQ(check(std::string(live_set) + "[recording]\ncodec='raw'\n"), 0) << said_;
@@ -156,7 +156,7 @@ presence = "virtual"
             0)
       << said_;
   expect_said("light camera  none");
-  expect_said("around the set: what the session's light camera saw, if it has one");
+  expect_said("environment: from the session's light camera, if it has one");
 }
 
 TEST_F(Check, DescribesWhatASetAsksFor) {
@@ -248,7 +248,7 @@ TEST_F(Check, NamesTheVariantsOfAnObject) {
   ASSERT_EQ(check(object), 0) << said_;
   expect_used("glowing surfaces: a surface gives off light");  // it may, at the press of a button
   EXPECT_EQ(check(object + "variant='at noon'\n"), 1);
-  expect_said("a.gltf: there is no variant \"at noon\"; it has \"by day\", \"by night\"");
+  expect_said("a.gltf: no variant \"at noon\"; it has \"by day\", \"by night\"");
 }
 
 // A material may be of a kind that lets light through and let none through: the renderer then
@@ -293,7 +293,7 @@ TEST_F(Check, TakesSetAndCalibrationOfASession) {
   expect_said("its lamps light the set; the rest is blurred");
   expect_used(
       "lamps: the set or a model has lamps, a surface glows, or lamps are found in the "
-      "environment");
+      "environment light");
   expect_said("16x8, 35 mm lens at f/2.8, focus at 1.5 m");
   expect_used("lens: the aperture blurs what is out of focus");
   expect_said("tracking is off: only a session with recorded poses can be used");
@@ -309,7 +309,7 @@ TEST_F(Check, ATakeWithoutLightIsAProblem) {
   std::ostringstream out;
   EXPECT_EQ(check_set(directory_ / "take", out), 1);
   said_ = out.str();
-  expect_said("the session has no light frames, and the set gives no lighting.environment: name");
+  expect_said("the session has no light frames, and the set file no lighting.environment: give");
 }
 
 // Twenty-two mistakes of beginners; what is allowed and odd is said, and the rest refused.
@@ -335,7 +335,7 @@ TEST_F(Check, FindsImplausibleUnits) {
           "focus_distance_m=1.8\n",
       "focal_length_mm = 0.035: it is in millimetres");
   odd("[observer]\ndriver='v4l2'\ndevice='a'\n[observer.camera]\nrate_hz=30.0\nexposure_s=0.5\n",
-      "exposes for 0.5 s, longer than a frame lasts at 30 a second (0.0333 s)");
+      "exposes for 0.5 s, longer than a frame lasts at 30 per second (0.0333 s)");
 }
 
 // The numbers of another picture size: a live set would be refused.

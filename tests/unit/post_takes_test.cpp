@@ -115,7 +115,7 @@ TEST_F(Takes, AreMarkedAllOrNone) {
               HasSubstr("is a folder of takes; name the takes in it"));
   EXPECT_FALSE(session::summary_of(one_).info.take->good);
   EXPECT_THAT(refusal([&] { mark_takes({folder_ / "12A_take003"}, true, out_); }),
-              HasSubstr("is not there"));
+              HasSubstr("not found"));
 }
 
 TEST_F(Takes, ThatAreRecordedAreLeftAlone) {
@@ -193,7 +193,7 @@ TEST_F(Takes, AreCopiedOnce) {
   EXPECT_THAT(refusal([&] {
                 copy_takes({{two_}, disk}, out_, {});
               }),
-              HasSubstr("is no copy of this take as it is now"));
+              HasSubstr("is not a current copy of this take"));
   EXPECT_THAT(refusal([&] {
                 copy_takes({{one_}, folder_}, out_, {});
               }),
@@ -324,7 +324,7 @@ TEST_F(Takes, AFolderOrASetFileNamesThem) {
   list_takes({stage / "set.toml"}, out_);
   EXPECT_THAT(out_.str(), HasSubstr("12A_take002"));
   EXPECT_THAT(refusal([&] { list_takes({directory_ / "nowhere"}, out_); }),
-              HasSubstr("is not there; name a folder of takes"));
+              HasSubstr("not found; give a folder of takes"));
 }
 
 TEST_F(Takes, NoTakeOfThatKindIsSaid) {
@@ -334,7 +334,7 @@ TEST_F(Takes, NoTakeOfThatKindIsSaid) {
               HasSubstr("no take in it is marked good; `previzd takes mark TAKE`"));
   options.session = directory_ / "nowhere";
   EXPECT_THAT(refusal([&] { render_takes(options, WhichTakes::all, out_); }),
-              HasSubstr("there is no take in it"));
+              HasSubstr("contains no takes"));
 }
 
 TEST_F(Takes, GoodOnesAreRenderedIntoAFolderEach) {

@@ -244,7 +244,7 @@ TEST_F(Trade, GoesOnFromItsLastTable) {
   const TradeReport first = run_trade(once, out_);
   out_.str("");
   const TradeReport second = run_trade(once, out_);
-  EXPECT_NE(out_.str().find("goes on from the last table"), std::string::npos);
+  EXPECT_NE(out_.str().find("continuing the last table"), std::string::npos);
   EXPECT_EQ(out_.str().find("round 1 of 1"), std::string::npos) << out_.str();
   EXPECT_EQ(second.reference_samples, first.reference_samples);
   for (std::size_t m = 0; m < first.methods.size(); ++m)
@@ -265,7 +265,7 @@ TEST_F(Trade, GoesOnFromItsLastTable) {
   rewrite_set("[quality]", "[estimator]\nmax_depth = 3\n\n[quality]");
   out_.str("");
   run_trade(once, out_);
-  EXPECT_NE(out_.str().find("everything is measured anew"), std::string::npos) << out_.str();
+  EXPECT_NE(out_.str().find("measuring everything again"), std::string::npos) << out_.str();
   EXPECT_NE(out_.str().find("round 1 of 2"), std::string::npos);
 }
 
@@ -283,7 +283,7 @@ TEST_F(Trade, ADamagedMemoryIsSaidAndNotUsed) {
   std::ofstream(directory_ / "out" / "trade.json") << "{]";
   out_.str("");
   EXPECT_NO_THROW(run_trade(once, out_));
-  EXPECT_NE(out_.str().find("everything is measured anew"), std::string::npos) << out_.str();
+  EXPECT_NE(out_.str().find("measuring everything again"), std::string::npos) << out_.str();
 }
 
 }  // namespace post_trade_test

@@ -266,9 +266,9 @@ TEST(PrintRefusals, SayWhatIsPossible) {
   tags.ids = "587";
   EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("it has 0 to 586"));
   tags.ids = "0", tags.family = "tag99";
-  EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("known are tag36h11"));
+  EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("known: tag36h11"));
   tags.family = "tag36h11", tags.paper = "A5";
-  EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("known are A4, A3, Letter"));
+  EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("known: A4, A3, Letter"));
   tags.paper = "A4", tags.size = "3m";
   EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("sheets of A4; at most 64"));
   tags.size = "80mm", tags.ids = "1,2,3";

@@ -109,7 +109,7 @@ TEST_F(RigCameras, ACameraThatIsNotThereIsWaitedFor) {
   const Cameras cameras = open_cameras(set);
   const CameraEvent event = cameras.observer->next(milliseconds(0));
   ASSERT_TRUE(std::holds_alternative<DeviceTrouble>(event));
-  EXPECT_THAT(std::get<DeviceTrouble>(event).what, HasSubstr("tried again until it is there"));
+  EXPECT_THAT(std::get<DeviceTrouble>(event).what, HasSubstr("retrying until it is available"));
   EXPECT_EQ(cameras.observer->counters().at("not opened"), 1u);
 }
 

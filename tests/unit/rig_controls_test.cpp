@@ -84,7 +84,7 @@ TEST(Controls, SamplesGoOnFromTheGovernorsNumberAndTheRateCanBeHadBack) {
   EXPECT_EQ(controls.perform(*set::find_action("samples_up")).said, "4 samples");
   controls.use_governed(9);  // of a picture before the press
   EXPECT_EQ(controls.perform(*set::find_action("samples_down")).said, "3 samples");
-  EXPECT_EQ(controls.perform(*set::find_action("hold_rate")).said, "25 pictures a second are held");
+  EXPECT_EQ(controls.perform(*set::find_action("hold_rate")).said, "holding 25 frames per second");
   EXPECT_TRUE(controls.look().governed);
   EXPECT_EQ(controls.look().samples, set.quality.samples) << "a refinement begins with the set's";
   set.quality.fps = 0;

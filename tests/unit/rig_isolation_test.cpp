@@ -64,7 +64,7 @@ TEST_P(RigIsolation, AStageThatFailsBeginsAnewAndTheTakeLacksNothing) {
             2)  // what is thrown twice in a row is reported once
       << log_.text();
   EXPECT_EQ(metrics_.counts.at(stage + ": failed"), 4u);
-  EXPECT_EQ(metrics_.counts.at(stage + ": begun anew"), 2u);
+  EXPECT_EQ(metrics_.counts.at(stage + ": restarted"), 2u);
   EXPECT_EQ(test::accounted_for(metrics_), metrics_.stages.at("observer").frames);
 
   const std::filesystem::path take = directory_ / "takes/12A_take001";
@@ -319,7 +319,7 @@ TEST_F(RigLive, ABusThatIsRestartedIsJoinedAgain) {
     press("record");
     until([](const Shown& s) { return s.look.state.recording; });
     bus.stop();
-    until_said("bus: has failed and begins anew");
+    until_said("bus: has failed and is restarting");
     bus.start();
     test::must_come("the rig answers again", answers);
     press("record");

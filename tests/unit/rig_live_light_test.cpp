@@ -83,7 +83,7 @@ TEST_F(LiveLightTest, IsMadeOfTheLightCamerasFrames) {
 TEST_F(LiveLightTest, AFrameThatCannotBeUsedIsReportedShownAndCounted) {
   LiveLight light(parts(), camera(), ObserverCalibration{});
   EXPECT_EQ(run(light, {grey(8, 1), grey(8, 2)}), nullptr);
-  EXPECT_EQ(log_.str().find("light: light frame 1 is left out"), 0u) << log_.str();
+  EXPECT_EQ(log_.str().find("light: light frame 1 is skipped"), 0u) << log_.str();
   EXPECT_EQ(log_.str().find("light frame 2"), std::string::npos) << "said twice";
   EXPECT_EQ(metrics_.snapshot(1).stages.at("lighting").dropped.at("not usable"), 2u);
   ASSERT_EQ(reports_.troubles().size(), 1u);

@@ -325,7 +325,7 @@ TEST_F(RigLive, ASetThatCannotStartIsTriedOnce) {
     until([](const Shown& s) { return s.shot.samples == 2; });
     std::ofstream(directory_ / "set.toml")
         << other("[observer]\n", "[observer]\nfaults = [\"nonsense\"]\n");
-    until_said("back to the set as it was");  // the rig saw the file by itself
+    until_said("back to the previous set");  // the rig saw the file by itself
     // What must not happen cannot be waited for: its next looks at the file, one a second.
     std::this_thread::sleep_for(std::chrono::seconds(4));
     EXPECT_EQ(count_said("back to"), 1) << log_.text();

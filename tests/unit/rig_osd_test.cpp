@@ -145,7 +145,7 @@ TEST(OsdWords, FaultsInPlainWordsAndWhatAButtonDid) {
             (Texts{{"film camera: was unplugged; it is opened anew", OsdTone::alarm},
                    {"light camera: is stalled", OsdTone::alarm},
                    {"recording ended: the disk is almost full", OsdTone::alarm},
-                   {"the disk has not answered for 5 s", OsdTone::alarm},
+                   {"disk not responding for 5 s", OsdTone::alarm},
                    {"missing from the take: 12 camera frames", OsdTone::alarm},
                    {"missing from the take: 3 tracking, button and event lines", OsdTone::alarm},
                    {moved},

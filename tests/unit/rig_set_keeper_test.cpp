@@ -134,7 +134,7 @@ TEST_F(SetKeeperTest, ReadsNoPipe) {
   sets.begin_change(0);
   const std::optional<std::string> why_not = ended(sets);
   ASSERT_TRUE(why_not);
-  EXPECT_NE(why_not->find("is no file, but a folder, a pipe or a device"), std::string::npos)
+  EXPECT_NE(why_not->find("is not a file, but a folder, a pipe or a device"), std::string::npos)
       << *why_not;
   EXPECT_EQ(sets.running().set.name, "old");
 }
@@ -182,8 +182,8 @@ TEST_F(SetKeeperTest, ChangesOutlastTheSameFileAndNoOther) {
   sets.leave(edits);
   sets.begin_next();
   EXPECT_EQ(sets.edits(), a_stop_down("key"));
-  EXPECT_TRUE(says("\"gone\" was changed by buttons and is no longer in the set"));
-  EXPECT_TRUE(says("\"vase\" was changed by buttons and is no longer in the set"));
+  EXPECT_TRUE(says("\"gone\" was changed by buttons but is no longer in the set"));
+  EXPECT_TRUE(says("\"vase\" was changed by buttons but is no longer in the set"));
   change(sets, 1);
   sets.begin_next();
   EXPECT_EQ(sets.edits(), pipeline::Edits{});

@@ -279,9 +279,9 @@ TEST_F(GltfDeformations, AreRefusedWhereTheyMakeNoSense) {
     gltf.json[Json::json_pointer(pointer)] = value;
     return error();
   };
-  EXPECT_THAT(refusal("/nodes/0/skin", 4), HasSubstr("there is no skin 4"));
+  EXPECT_THAT(refusal("/nodes/0/skin", 4), HasSubstr("no skin 4"));
   EXPECT_THAT(refusal("/skins/0/joints", {1}), HasSubstr("follows joint 1, but there are 1"));
-  EXPECT_THAT(refusal("/skins/0/joints", {1, 9}), HasSubstr("there is no node 9"));
+  EXPECT_THAT(refusal("/skins/0/joints", {1, 9}), HasSubstr("no node 9"));
   EXPECT_THAT(refusal("/skins/0/joints", {1, 2, 1}), HasSubstr("fewer inverse bind matrices"));
   EXPECT_THAT(refusal("/skins/0/inverseBindMatrices", 0), HasSubstr("4 by 4 floats"));
   gltf.json = sound;

@@ -390,7 +390,7 @@ TEST_F(GltfMaterials, LeavesOutExtensionsWhoseTextureCannotBeRead) {
   for (int i = 0; i < 5; ++i) {
     const std::string name = gltf.json["materials"][static_cast<std::size_t>(i)]["name"];
     EXPECT_THAT(scene.notes, Contains(HasSubstr("\"" + name + "\": " + name +
-                                                " is left out, since "
+                                                " is ignored, because "
                                                 "its texture cannot be read")));
   }
 }

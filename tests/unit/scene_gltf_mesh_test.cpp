@@ -229,8 +229,7 @@ TEST_F(GltfMesh, NamesFileMeshAndPrimitiveOfBadIndicesAndAccessors) {
   EXPECT_EQ(
       message_of({{"attributes", {{"POSITION", positions}}}, {"indices", gltf.indices({0, 1, 4})}}),
       at + ": index 4 is outside its 4 vertices");
-  EXPECT_EQ(message_of({{"attributes", {{"POSITION", 99}}}}),
-            at + ", positions: there is no accessor 99");
+  EXPECT_EQ(message_of({{"attributes", {{"POSITION", 99}}}}), at + ", positions: no accessor 99");
   EXPECT_EQ(message_of({{"attributes", {{"POSITION", gltf.uvs({3, {0, 0}})}}}}),
             at + ", positions: must have 3 components an element");
   EXPECT_EQ(message_of({{"attributes", {{"POSITION", positions}}},

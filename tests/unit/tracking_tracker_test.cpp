@@ -146,7 +146,7 @@ TEST(Tracker, TwoTagsAtOddsAreNotGuessedAbout) {
   const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
   const Track track = tracker->track(picture(moved, random));
   EXPECT_EQ(track.status, TrackStatus::lost);
-  EXPECT_NE(track.reason.find("contradict"), std::string::npos) << track.reason;
+  EXPECT_NE(track.reason.find("disagree"), std::string::npos) << track.reason;
 }
 
 // Normalised errors of whole pictures: mean of n chi-squares of 6 degrees, standard error
