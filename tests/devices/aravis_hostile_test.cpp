@@ -266,7 +266,7 @@ TEST(Receiver, OfAnotherVersionIsRefused) {
   ASSERT_EQ(aravis::receive(socket.get(), message), aravis::Received::message);
   EXPECT_EQ(message.kind, aravis::Kind::refused);
   EXPECT_THAT(aravis::body_of<std::string>(message).value_or(""),
-              HasSubstr("another version of previzd"));
+              HasSubstr("another version than the running previzd"));
 }
 
 // Runs a call in a process that has entered the sandbox; returns 0, or the error that it had.

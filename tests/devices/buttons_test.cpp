@@ -434,7 +434,7 @@ TEST(ButtonDevices, AGpioChipThatGoesAHundredTimes) {
 TEST(ButtonDevices, APadThatIsPulledAHundredTimes) {
   if (!UhidPad::possible()) GTEST_SKIP() << "this machine has no /dev/uhid that may be written";
   const auto buttons = open_buttons(std::vector<std::string>{"hid:1209:0001:PREVIZ1:0.0"}, {});
-  ASSERT_NO_FATAL_FAILURE(expect_trouble(*buttons[0], "not there"));
+  ASSERT_NO_FATAL_FAILURE(expect_trouble(*buttons[0], "not found"));
   std::uint64_t opened = 0;
   expect_nothing_left_behind([&] {
     const auto pad = std::make_unique<UhidPad>("PREVIZ1");
@@ -451,7 +451,7 @@ TEST(ButtonDevices, APadOfUhidPressedUnpluggedAndBack) {
   const std::vector<std::string> names{"hid:1209:0001:PREVIZ1:0.0", "hid:1209:0001:PREVIZ1:0.5"};
   const auto buttons = open_buttons(names, {});
   ASSERT_EQ(buttons.size(), 1u);
-  expect_trouble(*buttons[0], "not there");
+  expect_trouble(*buttons[0], "not found");
   for (int i = 0; i < 2; ++i) {
     auto pad = std::make_unique<UhidPad>("PREVIZ1");
     // Reports before the driver has found the pad are nobody's; it looks once a second.

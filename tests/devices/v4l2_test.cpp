@@ -62,7 +62,7 @@ TEST(V4l2Find, ByEveryStableName) {
 
 TEST(V4l2Find, NeverByNumber) {
   EXPECT_THAT(error_of([] { resolve("/dev/video2", found); }),
-              HasSubstr("this one is called \"platform-vivid.0-video-index0\""));
+              HasSubstr("use the stable name \"platform-vivid.0-video-index0\""));
   EXPECT_THAT(error_of([] { resolve("/dev/video9", found); }), HasSubstr("number"));
 }
 
@@ -488,10 +488,10 @@ TEST(V4l2Configure, FormatsThatCannotBeAreRefused) {
     const char* why;
   };
   const std::vector<Made> all{
-      {[](v4l2_pix_format& format) { format.width = 0; }, "which cannot be"},
-      {[](v4l2_pix_format& format) { format.height = 0; }, "which cannot be"},
-      {[](v4l2_pix_format& format) { format.width = 70'000; }, "which cannot be"},
-      {[](v4l2_pix_format& format) { format.height = 0xffffffff; }, "which cannot be"},
+      {[](v4l2_pix_format& format) { format.width = 0; }, "which is impossible"},
+      {[](v4l2_pix_format& format) { format.height = 0; }, "which is impossible"},
+      {[](v4l2_pix_format& format) { format.width = 70'000; }, "which is impossible"},
+      {[](v4l2_pix_format& format) { format.height = 0xffffffff; }, "which is impossible"},
       {[](v4l2_pix_format& format) { format.bytesperline = 1; }, "rows are 1 bytes; 64 are needed"},
       {[](v4l2_pix_format& format) { format.bytesperline = 0xffffffff; }, "bytes is the maximum"},
       {[](v4l2_pix_format& format) {

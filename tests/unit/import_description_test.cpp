@@ -194,9 +194,9 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"/observer/pictures", "[]", "observer.pictures is empty"},
         Mistake{"/observer/pictures", "7", "observer.pictures must be a list"},
         Mistake{"/observer/video", "\"a.mkv\"", "observer.video conflicts with pictures"},
-        Mistake{"/observer/fps", "", "observer.fps is missing: when the pictures were taken"},
+        Mistake{"/observer/fps", "", "observer.fps is missing: the pictures have no times"},
         Mistake{"/observer/pictures", "\"clip.MP4\"",
-                "observer.pictures names a video; write \"video\""},
+                "observer.pictures is a video; use \"video\""},
         Mistake{"/observer/timestamps_ns", "[1]",
                 "observer.timestamps_ns conflicts with another member"},
         Mistake{"/observer/fps", "0",
@@ -221,9 +221,8 @@ INSTANTIATE_TEST_SUITE_P(
                 "observer.intrinsics.fx: -3 is not allowed; allowed: finite number"},
         Mistake{"/observer/intrinsics/width", "33", "observer.intrinsics is for 33x24"},
         Mistake{"/observer/intrinsics/k7", "0", "observer.intrinsics.k7 is unknown"},
-        Mistake{"/observer/intrinsics", "", "observer.lens needs intrinsics beside it"},
-        Mistake{"/observer/lens/focus_distance_m", "0.01",
-                "the focus is not beyond the focal length"},
+        Mistake{"/observer/intrinsics", "", "observer.lens needs intrinsics too"},
+        Mistake{"/observer/lens/focus_distance_m", "0.01", "must exceed the focal length"},
         Mistake{"/observer/lens/focal_length", "3", "did you mean focal_length_mm?"},
         Mistake{"/observer/response", "{\"kind\":\"log\"}",
                 "observer.response.kind: \"log\" is not allowed"},
@@ -238,7 +237,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "light.intrinsics.k: a list of 2 entries is not allowed; allowed: 4 numbers"},
         Mistake{"/light/intrinsics/max_angle_deg", "181", "light.intrinsics.max_angle_deg: 181"},
         Mistake{"/light/intrinsics/vignetting", "[-0.5, 0, 0]",
-                "light.intrinsics.vignetting: leaves no light"},
+                "light.intrinsics.vignetting: passes no light"},
         Mistake{"/light/response/dark_level", "[0, 0.6, 0]", "light.response.dark_level"},
         Mistake{"/light/pose", "", "light.pose is missing"},
         Mistake{"/light/pose/world_from_camera", "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]",
@@ -302,7 +301,7 @@ TEST(ImportDescription, TablesNameFileAndLine) {
     session::write_content(shoot.folder() / "t.csv", table);
     return shoot.error();
   };
-  EXPECT_NE(error_with("").find("t.csv: holds no rows"), std::string::npos);
+  EXPECT_NE(error_with("").find("t.csv: has no rows"), std::string::npos);
   EXPECT_NE(error_with("timestamp_ns,kind\n1\n").find("t.csv:2: has 1 cells"), std::string::npos);
   EXPECT_NE(error_with("timestamp_ns\n\"1\"\n").find("t.csv:2: quotes"), std::string::npos);
   EXPECT_NE(error_with("timestamp_ns\n1\n2\n3.5\n").find("column timestamp_ns, row 3: \"3.5\""),

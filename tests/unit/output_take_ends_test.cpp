@@ -146,7 +146,7 @@ TEST(Recorder, LeavesTheReserveToTakesAndNotToTheFilesOfTheSet) {
   rig.free_on_first = 103;  // the reserve of 100 bytes, and less than the model's 7
   Recorder recorder(rig.options_with_asset());
   ASSERT_TRUE(
-      wait_until("it is said", [&] { return rig.heard.said("a.glb will not be in the takes"); }));
+      wait_until("it is said", [&] { return rig.heard.said("a.glb will be missing from takes"); }));
   EXPECT_FALSE(std::filesystem::exists(kept_in(rig.first)));
   recorder.start();
   recorder.offer(picture(0));
@@ -420,7 +420,7 @@ TEST(Recorder, WhoseFirstFolderCannotBeReadFindsWhatIsInTheSecond) {
   EXPECT_EQ(recorder.status().salvaged,
             std::vector<std::string>{"12A_take007 was cut off; it has 3 frames"});
   EXPECT_EQ(recorder.status().interrupted, "12A_take007");
-  EXPECT_TRUE(rig.heard.said("takes from before cannot be looked at"));
+  EXPECT_TRUE(rig.heard.said("earlier takes cannot be checked"));
 }
 
 TEST(Recorder, FindsWhatIsOnADiskThatIsMountedLater) {

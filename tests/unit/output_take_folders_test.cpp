@@ -50,10 +50,10 @@ TEST(TakeFolders, TheFirstThatHasRoomAndDidNotFailIsChosen) {
   folders.forgive_all();
   free[second] = 3'000'000;
   EXPECT_EQ(refusal(folders), first.string() +
-                                  ": the disk is almost full, 4 MB are free, 5 MB are kept free "
+                                  ": the disk is almost full, 4 MB are free, 5 MB are reserved "
                                   "(recording.reserve_mb); " +
                                   second.string() +
-                                  ": the disk is almost full, 3 MB are free, 5 MB are kept free "
+                                  ": the disk is almost full, 3 MB are free, 5 MB are reserved "
                                   "(recording.reserve_mb)");
 }
 
@@ -227,7 +227,7 @@ TEST(Recorder, ThatCannotKeepWhatIsWishedBeforeTheButtonSaysSoOnce) {
   const std::lock_guard lock(disks.mutex);
   EXPECT_EQ(std::ranges::count(disks.notes,
                                "recording: takes begin 0.4 s before the button, not 4.0 s: "
-                               "the memory for it is full (recording.queue_mb)"),
+                               "the frame memory is full (recording.queue_mb)"),
             1);
 }
 
@@ -258,7 +258,7 @@ TEST(Recorder, WarnsOfADiskThatIsTooSlowForTheCameras) {
   }
   EXPECT_TRUE(wait_until("it is compared", [&] {
     const std::lock_guard lock(disks.mutex);
-    return mentions(disks.notes, "takes will lack frames; recording.codec = \"raw\" needs");
+    return mentions(disks.notes, "takes will miss frames; recording.codec = \"raw\" needs");
   }));
 }
 

@@ -81,7 +81,7 @@ class Check : public testing::Test {
 
 TEST_F(Check, RemarksThatBothFoldersOfTakesAreOnOneDisk) {
   ASSERT_EQ(check("[recording]\nsecond_directory='more'\n"), 0) << said_;
-  expect_said("recording.second_directory is on the disk of recording.directory now");
+  expect_said("recording.second_directory is now on the same disk as recording.directory");
   ASSERT_EQ(check("[recording]\nsecond_directory='/dev/shm/takes'\n"), 0) << said_;
   EXPECT_EQ(said_.find("second_directory"), std::string::npos) << said_;
 }
@@ -204,14 +204,14 @@ samples = 1500
   expect_used("metal: an object is metal");
   expect_used("two worlds: an object is virtual or removed");
   expect_used("lamps: the set or a model has lamps");
-  expect_used("relighting: a lamp is added, taken away, dimmed");
-  expect_used("denoiser: noise is taken out");
+  expect_used("relighting: a lamp is added, switched off, dimmed");
+  expect_used("denoiser: noise is removed");
   expect_left_out("refraction: nothing is made of glass");
   expect_left_out("removed objects: no real object is removed from the picture");
   expect_left_out("lens: everything is in focus");
   expect_left_out("photons: no mirror or clear glass throws patterns of light");
   expect_said("scene in the GPU's memory: about 1 MiB");
-  expect_said("the observer has no calibration here");
+  expect_said("no film camera calibration here");
 }
 
 // 1920x1080 pixels of 1310 bytes with two frames on each side, and of 866 with one. On the card a
@@ -264,7 +264,7 @@ TEST_F(Check, AgreesWithTheRendererThatSolidBlendingNeedsNoAlpha) {
   expect_left_out("alpha: no surface has holes or is see-through");
   write("a.gltf", triangle(material("0.5")));
   ASSERT_EQ(check(object), 0) << said_;
-  expect_used("alpha: a surface has holes or is a veil");
+  expect_used("alpha: a surface has holes or is see-through");
 }
 
 TEST_F(Check, SaysWhatIsColouredInside) {

@@ -112,7 +112,7 @@ TEST_F(Takes, AreMarkedAllOrNone) {
   EXPECT_THAT(refusal([&] {
                 mark_takes({one_, folder_}, true, out_);
               }),
-              HasSubstr("is a folder of takes; name the takes in it"));
+              HasSubstr("is a folder of takes; give the takes in it"));
   EXPECT_FALSE(session::summary_of(one_).info.take->good);
   EXPECT_THAT(refusal([&] { mark_takes({folder_ / "12A_take003"}, true, out_); }),
               HasSubstr("not found"));
@@ -299,7 +299,7 @@ TEST_F(Takes, AGoodTakeIsNotDeletedUnasked) {
   EXPECT_THAT(refusal([&] {
                 delete_takes({one_, two_}, false, out_);
               }),
-              HasSubstr("12A_take002: is marked good; say --good"));
+              HasSubstr("12A_take002: is marked good; add --good"));
   EXPECT_TRUE(fs::exists(one_ / "session.toml"));
   delete_takes({two_}, true, out_);
   EXPECT_FALSE(fs::exists(two_));

@@ -164,7 +164,7 @@ TEST_F(Trade, RefusesWhatCannotBeTraded) {
   wrong.frame = test::small_take_unlit;
   expect_refused(wrong, "frame 0: no light frame");
   wrong.frame = 80;
-  expect_refused(wrong, "the last observer frame is 7");
+  expect_refused(wrong, "the last frame is 7");
   for (const double scale : {0.0, 1.5, std::nan("")}) {
     wrong = options();
     wrong.scale = scale;
@@ -172,7 +172,7 @@ TEST_F(Trade, RefusesWhatCannotBeTraded) {
   }
   wrong = options();
   wrong.directory = directory_ / "set.toml";
-  expect_refused(wrong, "is not a directory");
+  expect_refused(wrong, "is not a folder");
   wrong = options();
   wrong.axes = {"colour"};
   expect_refused(wrong, "--axes colour: unknown axis; estimator, ");

@@ -273,10 +273,10 @@ TEST(PrintRefusals, SayWhatIsPossible) {
   EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("sheets of A4; at most 64"));
   tags.size = "80mm", tags.ids = "1,2,3";
   EXPECT_THAT(refused([&] { print_block(tags, out); }), HasSubstr("5 or 6 tags"));
-  EXPECT_THAT(refused([&] { print_stick(tags, out); }), HasSubstr("four tags around it"));
+  EXPECT_THAT(refused([&] { print_stick(tags, out); }), HasSubstr("rings of four tags"));
   BoardOptions board;
   board.board = "charuco:7x5:30mm:22mm:9x9_100";
-  EXPECT_THAT(refused([&] { print_board(board, out); }), HasSubstr("not a dictionary"));
+  EXPECT_THAT(refused([&] { print_board(board, out); }), HasSubstr("not a marker dictionary"));
   board.board = "aprilgrid:3x3:40mm:5mm:tagStandard41h12";
   EXPECT_THAT(refused([&] { print_board(board, out); }), HasSubstr("gap of 32 mm or more"));
   board.board = "aprilgrid:3x3:40mm:7mm:kalibr";  // a white cell about each of ten cells of 4 mm

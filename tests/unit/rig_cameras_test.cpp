@@ -94,7 +94,7 @@ TEST_F(RigCameras, MistakesNameFileAndKey) {
   EXPECT_THAT(error_of(set), HasSubstr("stage.toml: observer.faults: fault \"melt@3\""));
   set = replayed();
   set.observer.driver = "gopro";  // one that this build lacks
-  EXPECT_THAT(error_of(set), HasSubstr("stage.toml: observer.driver: this build drives no"));
+  EXPECT_THAT(error_of(set), HasSubstr("stage.toml: observer.driver: this build supports no"));
   set = replayed();
   set.light_camera.driver = set::replay_driver;
   EXPECT_THAT(error_of(set), HasSubstr("the session has no light frames"));

@@ -200,9 +200,9 @@ TEST_F(RigWithoutItsGpu, StartsAgainWhereTheModuleOfItsCardCameLaterThanItself) 
     test::must_come("a take begins", [&] { return said("button record: recording\n"); });
     has_new_devices = true;
     display_.until_plates(60);  // two seconds, in which it would end
-    EXPECT_FALSE(said("starts again to open them"));
+    EXPECT_FALSE(said("is restarting to open"));
     hand_.press("record");
-    test::must_come("the rig starts again", [&] { return said("starts again to open them"); });
+    test::must_come("the rig starts again", [&] { return said("is restarting to open"); });
   });
   EXPECT_TRUE(session::open_session(directory_ / "takes/1_take001").missing.empty());
 }

@@ -189,7 +189,7 @@ TEST(OsdWords, ATrackingThatIsHeld) {
   shot.shown_pose = tracking::ShownPose{glm::dmat4(1), {}, 0.32};
   const PictureFacts facts = facts_of(shot);
   const OsdPage page = osd_page(in(Mode::live), &facts, pace);
-  EXPECT_EQ(page.bottom_right.at(0), (OsdText{"tracking held 0.3 s", OsdTone::warning}));
+  EXPECT_EQ(page.bottom_right.at(0), (OsdText{"predicted pose 0.3 s", OsdTone::warning}));
   EXPECT_EQ(page.notices, (Texts{{"tracking: no tag in the picture", OsdTone::warning}}));
 }
 

@@ -192,7 +192,7 @@ TEST_F(GltfDeformations, AShapeThatCannotBeShownIsNotSeen) {
       scene.deformations[0].joints[joint].joint_from_mesh[3].x = far;
       const Placement placement = place(scene, {}, state);
       EXPECT_EQ(placement.instances[0].presence, 0u) << far;
-      EXPECT_THAT(placement.unknown, Contains(HasSubstr("\"figure\" has no shape")));
+      EXPECT_THAT(placement.unknown, Contains(HasSubstr("\"figure\" cannot be shown")));
     }
   }
 }
@@ -207,7 +207,7 @@ TEST_F(GltfDeformations, AShapeThatReachesTooFarIsNotSeen) {
   state.animation_s = 1;
   const Placement placement = place(scene, {}, state);
   EXPECT_EQ(placement.instances[0].presence, 0u);
-  EXPECT_THAT(placement.unknown, Contains(HasSubstr("\"figure\" has no shape")));
+  EXPECT_THAT(placement.unknown, Contains(HasSubstr("\"figure\" cannot be shown")));
 }
 
 // A joint may be anywhere if the weights of its vertices make up for it, but the bounds of the mesh
@@ -268,7 +268,8 @@ TEST_F(GltfDeformations, OfASkinsCopiesOneIsKept) {
   gltf.json["extensionsUsed"] = {"EXT_mesh_gpu_instancing"};
   const Scene scene = load();
   EXPECT_EQ(scene.instances.size(), 1u);
-  EXPECT_THAT(scene.notes, Contains(HasSubstr("a skin places its mesh; of its 3 copies one is")));
+  EXPECT_THAT(scene.notes,
+              Contains(HasSubstr("a skin places its mesh; only one of its 3 copies is")));
 }
 
 TEST_F(GltfDeformations, AreRefusedWhereTheyMakeNoSense) {

@@ -74,8 +74,8 @@ TEST_F(GltfFiles, IgnoresRequiredExtensionsThatOnlyChangeLooks) {
     gltf.json[key] = {"KHR_materials_unlit"};
   EXPECT_THAT(load().notes,
               ElementsAre(HasSubstr("\"KHR_materials_unlit\", which the file requires, is not "
-                                    "supported; ignored: what should have one colour in any light "
-                                    "is lit like all else (materials: \"sign\")")));
+                                    "supported; ignored: unlit materials are lit like all others "
+                                    "(materials: \"sign\")")));
 }
 
 TEST_F(GltfFiles, RefusesOtherVersionsByName) {

@@ -180,7 +180,7 @@ TEST_F(GltfMaterials, ReadsAnisotropy) {
   EXPECT_FALSE(scene::is_anisotropic(scene.materials.at(1)));
   EXPECT_THAT(scene.notes,
               ElementsAre(HasSubstr("\"pan\": it transmits light, so its anisotropy is ignored"),
-                          HasSubstr("has no TEXCOORD_0 that says which way its anisotropy runs")));
+                          HasSubstr("has no TEXCOORD_0 for its anisotropy direction")));
 }
 
 TEST_F(GltfMaterials, ReadsTheColourOfGloss) {
@@ -211,8 +211,8 @@ TEST_F(GltfMaterials, BringsNumbersIntoRangeWithANote) {
   EXPECT_EQ(m.roughness, 0);
   EXPECT_EQ(m.ior, 1);
   EXPECT_THAT(scene.notes,
-              Contains(HasSubstr("material 0 \"odd\": its base colour is out of range; brought to "
-                                 "the nearest allowed (2 times)")));
+              Contains(HasSubstr("material 0 \"odd\": its base colour is out of range; nearest "
+                                 "allowed value used (2 times)")));
   EXPECT_EQ(scene.notes.size(), 4u);
 }
 

@@ -184,7 +184,7 @@ TEST_F(GltfMesh, NotesEmptyMeshesAndSkipsThem) {
   EXPECT_THAT(scene.notes, Contains(HasSubstr("mesh 0: has no primitives; skipped")));
   EXPECT_THAT(scene.notes, Contains(HasSubstr("is empty; skipped")));
   EXPECT_THAT(scene.notes, Contains(HasSubstr("has no positions; skipped")));
-  EXPECT_THAT(scene.notes, Contains(HasSubstr("has nothing to see in it")));
+  EXPECT_THAT(scene.notes, Contains(HasSubstr("has nothing visible in it")));
 }
 
 TEST_F(GltfMesh, SharesGeometryBetweenNodesAndMaterials) {

@@ -310,7 +310,7 @@ TEST_F(Damage, ChangedLinesAreLeftOut) {
   write_content(copy() / "observer.jsonl", lines);
   const Opened opened = open_copy();
   EXPECT_EQ(opened.frames, (std::vector<std::uint64_t>{0, 1, 3, 4, 5}));
-  EXPECT_TRUE(mentions(opened.missing, "observer.jsonl: line 3 cannot be understood"));
+  EXPECT_TRUE(mentions(opened.missing, "observer.jsonl: line 3 unreadable"));
   EXPECT_TRUE(mentions(opened.missing, "1 picture of observer.mkv"));
 }
 
@@ -326,7 +326,7 @@ TEST_F(Damage, NumbersOfTheWrongKindAreDamage) {
     write_content(copy() / "observer.jsonl", lines + line + "\n");
     const Opened opened = open_copy();
     EXPECT_EQ(opened.frames.size(), std::size_t{frame_count});
-    EXPECT_TRUE(mentions(opened.missing, "line 7 cannot be understood")) << line;
+    EXPECT_TRUE(mentions(opened.missing, "line 7 unreadable")) << line;
   }
 }
 

@@ -138,7 +138,7 @@ TEST_F(Repair, LeavesOutAnEventThatIsTorn) {
   write_content(take_ / "events.jsonl", content_of(take_ / "events.jsonl") + "{\"timest");
   const session::Repair repair = repair_session(take_, repaired_);
   EXPECT_FALSE(repair.is_complete);
-  EXPECT_TRUE(mentions(repair.lacked, "events.jsonl: line 7 cannot be understood"));
+  EXPECT_TRUE(mentions(repair.lacked, "events.jsonl: line 7 unreadable"));
   EXPECT_EQ(content_of(repaired_ / "events.jsonl").find("{\"timest\n"), std::string::npos);
 }
 

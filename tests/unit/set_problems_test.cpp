@@ -94,7 +94,7 @@ const Mistake types[] = {
     {"tag = 4\n", "1:1: tag: is not a list of tables", "[[tag]]"},
     {"[tag]\nid = 4\n", "1:2: tag: is not a list of tables", "[[tag]]"},
     {"[[quality]]\nsamples = 4\n", "1:3: quality: is not a table", "[quality]"},
-    {"tag = [4]\n", "1:8: tag: an entry is not a table", "[[tag]]"},
+    {"tag = [4]\n", "1:8: tag: has an entry that is not a table", "[[tag]]"},
     {"[observer]\ndriver = 4\n", "2:10: observer.driver: 4 is not allowed",
      "\"replay\" | \"v4l2\" | "},
     {"[display]\ndriver = \"vga\"\n", "2:10: display.driver: \"vga\"",
@@ -162,7 +162,7 @@ const Mistake missing[] = {
     {"[observer.intrinsics]\nwidth=64\nheight=48\nfx=60.0\ncx=31.5\ncy=23.5\n",
      "1:1: observer.intrinsics.fy: is missing", "number in px, 1 to 1000000"},
     {"[observer.lens]\nf_number=2.0\nfocal_length_mm=35\nfocus_distance_m=1.0\n",
-     "1:1: observer.lens: [observer.intrinsics] is missing", "as a whole"},
+     "1:1: observer.lens: [observer.intrinsics] is missing", "all of the session's"},
     {"[light_camera.response]\nkind=\"linear\"\n",
      "1:1: light_camera.response: [light_camera.intrinsics] is missing", ""},
     {"[light_camera.intrinsics]\nmax_angle_deg=90\n" FISHEYE, "1:1: light_camera.pose: is missing",
@@ -202,7 +202,7 @@ const Mistake contradictions[] = {
      "\n",
      "6:1: tag.id: tag 7 is already on line 2", "each id once"},
     {"[[button]]\nname='red'\naction='record'\n[[button]]\naction='live'\nname='red'\n",
-     "6:1: button.name: a short press of \"red\" is already on line 2", "one action a press"},
+     "6:1: button.name: a short press of \"red\" is already on line 2", "one action per press"},
     {"[[button]]\nname='gpoi:pads:1'\naction='record'\n",
      "2:1: button.name: no button driver matches \"gpoi:pads:1\"",
      "gpio:CHIP:LINE | hid:VENDOR:PRODUCT:SELECTOR"},
@@ -221,7 +221,7 @@ const Mistake contradictions[] = {
     {"[[light]]\ntype='point'\nposition_m=[0,0,1]\nemission=[1,1,1]\ncarrier='x'\n",
      "5:1: light.carrier: no tag is on a carrier \"x\"", "the carrier of a [[tag]]"},
     {"[[tag]]\nid=1\nsize_m=0.1\ncarrier='a'\n[[tag]]\nid=2\nsize_m=0.1\ncarrier='a'\n",
-     "8:1: tag.carrier: another tag of \"a\" is its frame already", "position_m"},
+     "8:1: tag.carrier: another tag of \"a\" already defines its frame", "position_m"},
     {"[[tag]]\nid=1\nsize_m=0.1\ncarrier='a'\n[[tag]]\nid=1\nsize_m=0.1\ncarrier='b'\n",
      "6:1: tag.id: tag 1 is already on line 2", "each id once"},
     {"[[light]]\nname='key'\ntype='point'\nposition_m=[0,0,1]\nemission=[1,1,1]\n"
@@ -275,9 +275,9 @@ const Mistake contradictions[] = {
      "3:1: captured_light: conflicts with lighting.from", ""},
     {"[[light]]\nname='a'\ntype='point'\nposition_m=[0,0,1]\nemission=[1,1,1]\n"
      "[[captured_light]]\nname='a'\ncone_deg=5\ndirection=[0,0,1]\n",
-     "7:1: captured_light.name: \"a\" is a [[light]] too", "each name once"},
+     "7:1: captured_light.name: \"a\" is also a [[light]]", "each name once"},
     {"[[light]]\ntype='point'\nposition_m=[0,0,1]\nemission=[1,1,1]\nwidth_m=1\n",
-     "5:1: light.width_m: a point light has no such thing", ""},
+     "5:1: light.width_m: a point light does not have this", ""},
     {"[[light]]\ntype='spot'\nposition_m=[0,0,1]\ndirection=[0,0,-1]\nemission=[1,1,1]\n"
      "inner_cone_deg=50\n",
      "6:1: light.inner_cone_deg: is wider", "45.0"},
@@ -287,11 +287,11 @@ INSTANTIATE_TEST_SUITE_P(Contradictions, SetMistake, testing::ValuesIn(contradic
 const Mistake geometry[] = {
     {"[light_camera.intrinsics]\n" FISHEYE
      "max_angle_deg=90\nvignetting=[-0.5,0,0]\n[light_camera.pose]\nposition_m=[0,0,0]\n",
-     "9:1: light_camera.intrinsics.vignetting: leaves no light", "at least 0.01"},
+     "9:1: light_camera.intrinsics.vignetting: passes no light", "at least 0.01"},
     {"[[tag]]\nid=1\nsize_m=0.1\nworld_from_tag=[[1,0,0,0],[0,1.1,0,0],[0,0,1,0],[0,0,0,1]]\n",
      "4:1: tag.world_from_tag: is not rigid", "0.21"},
     {"[[tag]]\nid=1\nsize_m=0.1\nworld_from_tag=[[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]\n",
-     "4:1: tag.world_from_tag: is a mirroring", "rotation"},
+     "4:1: tag.world_from_tag: mirrors or is singular", "rotation"},
     {"[light_camera.intrinsics]\nmax_angle_deg=90\n" FISHEYE
      "[light_camera.pose]\nworld_from_camera=[[1,0.001,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]\n",
      "10:1: light_camera.pose.world_from_camera: is not rigid", "1e-4"},
@@ -307,7 +307,7 @@ const Mistake geometry[] = {
      "3:1: light.direction: has no length", ""},
     {"[[light]]\ntype='rectangle'\nposition_m=[0,0,1]\ndirection=[0,0,-1]\nup=[0,0,1]\nwidth_m=1\n"
      "height_m=1\nemission=[1,1,1]\n",
-     "5:1: light.up: has no part", ""},
+     "5:1: light.up: is parallel", ""},
 };
 INSTANTIATE_TEST_SUITE_P(Geometry, SetMistake, testing::ValuesIn(geometry));
 
@@ -320,7 +320,7 @@ const Mistake optics[] = {
      "10:10: observer.lens.f_number: -2.8", ""},
     {"[observer.intrinsics]\n" PINHOLE
      "[observer.lens]\nfocal_length_mm=35\nf_number=2.8\nfocus_distance_m=0.03\n",
-     "11:1: observer.lens.focus_distance_m: the focus is not beyond", "0.035 m"},
+     "11:1: observer.lens.focus_distance_m: must exceed", "0.035 m"},
     {"[observer.intrinsics]\n" PINHOLE
      "[observer.response]\nkind='table'\ntable=[0.0, 0.5, 0.5, 1.0]\n",
      "10:1: observer.response.table: number 3", "strictly increasing"},
@@ -384,7 +384,7 @@ TEST(SetProblems, OfAnOverlayNameItsFileAndItsLines) {
   EXPECT_TRUE(problems("", "[quality]\nfsp = 1\n").starts_with("live.toml:2:1: quality.fsp: "));
   EXPECT_TRUE(problems("", "[quality\n").starts_with("live.toml:1:9: not valid TOML"));
   const std::string other = problems("", "[[tag]]\nid = 1\n");
-  EXPECT_TRUE(other.starts_with("live.toml:1:3: tag: belongs into the set file")) << other;
+  EXPECT_TRUE(other.starts_with("live.toml:1:3: tag: belongs in the set file")) << other;
 }
 
 TEST(SetProblems, NameAFileThatCannotBeRead) {
