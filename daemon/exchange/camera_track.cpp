@@ -205,8 +205,8 @@ CameraTrack camera_track(const session::Session& session,
     throw Error(
         session.directory.string() +
         ": no frame has a pose, so there is no camera to export; `previzd track` says why; "
-        "and the set needs [[tag]] tables (`previzd calibrate tags` measures them; --set names "
-        "another set file than the take's own), or the take's import a track");
+        "the set file needs [[tag]] tables (`previzd calibrate tags` measures them; --set names "
+        "another set file than the take's own), or the import a track");
   return track;
 }
 

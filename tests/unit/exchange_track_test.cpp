@@ -181,7 +181,7 @@ TEST_F(UntrackedTake, WithoutTagsSaysWhatToDo) {
     export_take({session_, out_}, said_);
     FAIL() << "a camera nobody knows was exported";
   } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("`previzd track` says why, and the set needs [[tag]]"));
+    EXPECT_THAT(error.what(), HasSubstr("`previzd track` says why; the set file needs [[tag]]"));
   }
 }
 

@@ -115,8 +115,8 @@ TEST(Recorder, WithoutAFileOfTheSetRecordsAndTheTakeSaysWhichItWas) {
   EXPECT_EQ(asset.file, rig.directory / "set/a.glb");
   EXPECT_EQ(asset.sha256, hash_of_a_model);
   EXPECT_FALSE(asset.why.empty());
-  EXPECT_TRUE(mentions(session.missing, "a.glb: is not in the take"));
-  EXPECT_TRUE(rig.heard.said("12A_take001 lacks a.glb"));
+  EXPECT_TRUE(mentions(session.missing, "a.glb: missing from the take"));
+  EXPECT_TRUE(rig.heard.said("12A_take001 is missing a.glb"));
 }
 
 TEST(Recorder, OfAStoreThatWasDeletedTakesTheFileOfTheSetIfItIsTheSame) {
@@ -178,7 +178,7 @@ TEST(Recorder, EndsATakeAndItselfWhileAFileOfTheSetCannotBeRead) {
   for (const char* take : {"12A_take001", "12A_take002"}) {
     const session::Session session = session::open_session(rig.first / take);
     ASSERT_EQ(session.missing.size(), 1u);
-    EXPECT_TRUE(mentions(session.missing, "dead.glb: is not in the take")) << session.missing[0];
+    EXPECT_TRUE(mentions(session.missing, "dead.glb: missing from the take")) << session.missing[0];
   }
 }
 
