@@ -112,7 +112,7 @@ void print_survey(const TagSurvey& survey, const set::Set& set, std::ostream& ou
 }
 
 void print_refined(const RefinedLens& refined, std::ostream& out) {
-  if (!refined.is_refined) return fmt::print(out, "the lens stays as it is: {}\n", refined.why_not);
+  if (!refined.is_refined) return fmt::print(out, "the lens is not changed: {}\n", refined.why_not);
   fmt::print(
       out,
       "the lens is refined by boards and tags together: rms {:.3f} px, {}; it moves by {:.2f} "
@@ -142,7 +142,7 @@ TagSurvey surveyed_with_lens(const TagWalk& walk, const PinholeIntrinsics& lens,
   if (!why_not.empty()) {
     if (!table.values.empty())
       why_not = "[observer.lens_fit] is not of [observer.intrinsics]: " + why_not;
-    fmt::print(out, "the lens stays as it is: {}\n", why_not);
+    fmt::print(out, "the lens is not changed: {}\n", why_not);
     return survey_tags(walk, lens, how);
   }
   const RefinedLens refined = survey_tags_and_lens(walk, lens, how, lens_prior(table));

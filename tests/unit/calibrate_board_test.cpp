@@ -52,7 +52,8 @@ TEST(Board, EveryMistakeIsNamed) {
   EXPECT_NE(problem("chessboard:9x6:25").find("square \"25\""), std::string::npos);
   EXPECT_NE(problem("chessboard:9x6:-25mm").find("square \"-25mm\""), std::string::npos);
   EXPECT_NE(problem("chessboard:9x6:25mm:3").find("an extra field \"3\""), std::string::npos);
-  EXPECT_NE(problem("charuco:5x5:20mm:20mm:4x4_50").find("do not fit"), std::string::npos);
+  EXPECT_NE(problem("charuco:5x5:20mm:20mm:4x4_50").find("needs markers smaller"),
+            std::string::npos);
   EXPECT_NE(problem("chessboard:9x6:25mm:3").find(board_grammar), std::string::npos);
 }
 

@@ -301,7 +301,7 @@ TEST(ObserverByForce, OneViewGivesNoLens) {
   const Views views = captured({Held{}});
   EXPECT_TRUE(has_few_views(views, fit_observer(views)));
   const std::string why = why_useless(fit_observer_by_few(views));
-  EXPECT_NE(why.find("by 1 view), even with --force: film the board turned"), std::string::npos)
+  EXPECT_NE(why.find("from 1 view), even with --force: film the board turned"), std::string::npos)
       << why;
 }
 

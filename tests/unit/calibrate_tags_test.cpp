@@ -253,7 +253,7 @@ TEST(TagSurvey, SaysWhichPicturesAreMissing) {
   for (const std::string& line : missing) all += line + "\n";
   EXPECT_NE(all.find("tag 31, together with another tag"), std::string::npos) << all;
   EXPECT_NE(all.find("tags 7, 8 and 9 together with others: step back"), std::string::npos) << all;
-  EXPECT_NE(all.find("tag 20 in more pictures: 3 can be used"), std::string::npos) << all;
+  EXPECT_NE(all.find("tag 20 in more pictures: 3 are usable"), std::string::npos) << all;
   EXPECT_NE(all.find("tag 4 from further to the side: walk around it"), std::string::npos) << all;
 }
 
@@ -407,7 +407,7 @@ TEST_F(TagCommand, AForcedMapSaysSoInTheSetFile) {
   const std::size_t doubt = forced.find("# UNRELIABLE: accepted with --force although");
   ASSERT_NE(doubt, std::string::npos) << forced;
   EXPECT_LT(doubt, forced.find("[[tag]]"));
-  EXPECT_NE(forced.find("# tag 4 once more"), std::string::npos) << forced;
+  EXPECT_NE(forced.find("# tag 4 again"), std::string::npos) << forced;
   said();
   EXPECT_EQ(text_of_set(), forced);
   EXPECT_EQ(with_tags(forced, two_tags(), "").find("UNRELIABLE"), std::string::npos);

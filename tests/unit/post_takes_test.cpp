@@ -197,7 +197,7 @@ TEST_F(Takes, AreCopiedOnce) {
   EXPECT_THAT(refusal([&] {
                 copy_takes({{one_}, folder_}, out_, {});
               }),
-              HasSubstr("lies in the take itself"));
+              HasSubstr("is inside the take"));
 }
 
 TEST_F(Takes, AStoppedCopyLeavesNothing) {
@@ -284,7 +284,7 @@ TEST_F(Takes, AreDeletedAndNothingElse) {
   EXPECT_FALSE(fs::exists(one_ / "session.toml"));
   EXPECT_FALSE(fs::exists(one_ / "observer.mkv"));
   EXPECT_FALSE(fs::exists(one_ / "assets"));
-  EXPECT_THAT(out_.str(), HasSubstr("still there: out"));
+  EXPECT_THAT(out_.str(), HasSubstr("not part of the take: out"));
   delete_takes({folder_ / "12A_take003"}, false, out_);
   EXPECT_FALSE(fs::exists(folder_ / "12A_take003"));
   EXPECT_TRUE(fs::exists(two_ / "session.toml"));
